@@ -1,0 +1,128 @@
+"""Rigid kinematics: poses and target motions of the undeformed character from joint angles."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from ..shot.character import Array
+from .markers import allocate_marker, marker_jacobian, marker_values
+from .model import Model
+from .so3 import matrix_of, quaternion_of
+from .system import State, allocate_state
+
+
+@njit(cache=True)
+def _rigid_poses(parent, position, rotation, angles, c, q, R):
+    """Poses of all components for joint angles, shape [T, B]; R is scratch, shape [B, 3, 3]."""
+    A = np.zeros((3, 3))
+    for n in range(angles.shape[0]):
+        for b in range(len(parent)):
+            p = parent[b]
+            cs, sn = np.cos(angles[n, b]), np.sin(angles[n, b])
+            # R_b = R_p R_i R_z(angle) R_j^T
+            for i in range(3):
+                x = rotation[b, 0, i, 0] * cs + rotation[b, 0, i, 1] * sn
+                y = rotation[b, 0, i, 1] * cs - rotation[b, 0, i, 0] * sn
+                z = rotation[b, 0, i, 2]
+                for k in range(3):
+                    A[i, k] = x * rotation[b, 1, k, 0] + y * rotation[b, 1, k, 1] + z * rotation[b, 1, k, 2]
+            for i in range(3):
+                t = position[b, 0, i]
+                if p >= 0:
+                    t = c[n, p, i]
+                    for k in range(3):
+                        t += R[p, i, k] * position[b, 0, k]
+                for k in range(3):
+                    if p >= 0:
+                        R[b, i, k] = R[p, i, 0] * A[0, k] + R[p, i, 1] * A[1, k] + R[p, i, 2] * A[2, k]
+                    else:
+                        R[b, i, k] = A[i, k]
+                for k in range(3):
+                    t -= R[b, i, k] * position[b, 1, k]
+                c[n, b, i] = t
+            quaternion_of(R[b], q[n, b])
+
+
+def rigid_poses(model: Model, joint_angles: Array) -> tuple[Array, Array]:
+    """Poses of the undeformed character.
+
+    Args:
+        joint_angles: Angles of the components' joints [rad], shape [T, B], free joints included.
+
+    Returns:
+        Origins [m], shape [T, B, 3], and unit quaternions, shape [T, B, 4], world.
+    """
+    system = model.system
+    total, count = joint_angles.shape
+    c, q = np.zeros((total, count, 3)), np.zeros((total, count, 4))
+    _rigid_poses(
+        system.parent, system.position, system.rotation, joint_angles, c, q, np.zeros((count, 3, 3))
+    )
+    return c, q
+
+
+def rigid_state(model: Model, joint_angles: Array) -> State:
+    """A state at rest in the rigid pose of joint angles of shape [B]."""
+    state = allocate_state(model.system)
+    c, q = rigid_poses(model, joint_angles[None])
+    state.c[:], state.q[:] = c[0], q[0]
+    return state
+
+
+@njit(cache=True)
+def _target_frames(targets, elastic, c, q, u, m, R, positions, quaternions):
+    component, position, rotation, Phi, Psi = targets
+    V = np.zeros(6 + u.shape[2])
+    for n in range(c.shape[0]):
+        for k in range(len(component)):
+            b = component[k]
+            matrix_of(q[n, b], R)
+            marker_values(elastic[b], position[k], rotation[k], Phi[k], Psi[k], c[n, b], R, u[n, b], V, m)
+            for i in range(3):
+                positions[n, k, i] = m.p[i]
+            quaternion_of(m.R, quaternions[n, k])
+
+
+def target_arrays(model: Model) -> tuple[Array, ...]:
+    """The target markers as the tuple that the kernels take."""
+    t = model.targets
+    return (t.component, t.position, t.rotation, t.Phi, t.Psi)
+
+
+def target_frames(model: Model, c: Array, q: Array, u: Array) -> tuple[Array, Array]:
+    """Motion of the targets: positions [m], shape [T, K, 3], and quaternions, shape [T, K, 4], world."""
+    count = len(model.targets.component)
+    positions, quaternions = np.zeros((len(c), count, 3)), np.zeros((len(c), count, 4))
+    _target_frames(
+        target_arrays(model), model.system.elastic, c, q, u, allocate_marker(model.system.size), np.zeros((3, 3)),
+        positions, quaternions,
+    )  # fmt: skip
+    return positions, quaternions
+
+
+@njit(cache=True)
+def _target_jacobians(targets, elastic, c, q, u, m, R, J):
+    component, position, rotation, Phi, Psi = targets
+    V = np.zeros(6 + u.shape[2])
+    for n in range(c.shape[0]):
+        for k in range(len(component)):
+            b = component[k]
+            r = elastic[b]
+            matrix_of(q[n, b], R)
+            marker_values(r, position[k], rotation[k], Phi[k], Psi[k], c[n, b], R, u[n, b], V, m)
+            marker_jacobian(r, rotation[k], Phi[k], Psi[k], m)
+            for a in range(6 + r):
+                for i in range(3):
+                    J[n, k, i, a] = R[i, 0] * m.Jp[0, a] + R[i, 1] * m.Jp[1, a] + R[i, 2] * m.Jp[2, a]
+                    J[n, k, 3 + i, a] = m.Jf[i, a]
+
+
+def target_jacobians(model: Model, c: Array, q: Array, u: Array) -> Array:
+    """Derivative of the targets' frames by their component's coordinates (R^T dc, dphi, du), shape [T, K, 6, N]:
+    rows 0-2 the position in world axes, rows 3-5 the turning in the target's own axes."""
+    J = np.zeros((len(c), len(model.targets.component), 6, model.system.size))
+    _target_jacobians(
+        target_arrays(model), model.system.elastic, c, q, u, allocate_marker(model.system.size), np.zeros((3, 3)), J
+    )
+    return J

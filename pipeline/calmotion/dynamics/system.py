@@ -1,0 +1,173 @@
+"""The compiled multibody system: flat arrays that the kernels read, one row a component, parents before children.
+
+Each component hangs by one joint from its parent (-1: the world). Arrays are padded to the largest number of
+elastic coordinates. Side 0 of a joint is on the parent, side 1 on the component.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ..shot.character import Array, IntArray
+
+JOINT_ROWS = 6
+
+
+class System(NamedTuple):
+    """Constants of the system (B components, at most R elastic coordinates, N = 6 + R).
+
+    Attributes:
+        parent: Parent of each component, shape [B], -1 for the world.
+        elastic: Number of elastic coordinates, shape [B].
+        rows: Number of constraint rows of its joint: 6 (weld, motor) or 5 (free hinge), shape [B].
+        mass, s, Z, M3, M4, S: Inertia integrals, see `fem.Invariants`.
+        axial: axial(S[j, k]) = int rho phi_j x phi_k, shape [B, R, R, 3].
+        stiffness, damping: Diagonals, shape [B, R].
+        position, rotation, Phi, Psi: Joint markers, shapes [B, 2, 3], [B, 2, 3, 3], [B, 2, 3, R] twice.
+        gravity: [m/s^2], shape [3].
+    """
+
+    parent: IntArray
+    elastic: IntArray
+    rows: IntArray
+    mass: Array
+    s: Array
+    Z: Array
+    M3: Array
+    M4: Array
+    S: Array
+    axial: Array
+    stiffness: Array
+    damping: Array
+    position: Array
+    rotation: Array
+    Phi: Array
+    Psi: Array
+    gravity: Array
+
+    @property
+    def size(self) -> int:
+        """Position coordinates of the largest component, N = 6 + R."""
+        return 6 + self.M3.shape[1]
+
+
+class Scheme(NamedTuple):
+    """How a step turns positions into velocities and accelerations.
+
+    Attributes:
+        velocity: d(velocity)/d(position) [1/s]; 0 for statics.
+        acceleration: d(acceleration)/d(velocity) [1/s]; 0 for statics.
+        gamma: Weight of the constraint at velocity level: 1, or 0 for statics.
+        alpha: Baumgarte coefficient [1/s]; 1 for statics. Seed (31).
+    """
+
+    velocity: float
+    acceleration: float
+    gamma: float
+    alpha: float
+
+
+class State(NamedTuple):
+    """State of one instant, all components.
+
+    Attributes:
+        c: Origins [m], shape [B, 3], world.
+        q: Unit quaternions (w, x, y, z), shape [B, 4].
+        u: Elastic coordinates, shape [B, R].
+        turn: Rotation vector from the previous instant to this one, body axes [rad], shape [B, 3].
+        V: Velocities (w in world axes, omega in body axes, v), shape [B, N].
+        lam: Joint multipliers (force on the component at the joint in world axes [N], moment in the parent-side
+            joint frame [N m]), shape [B, 6].
+    """
+
+    c: Array
+    q: Array
+    u: Array
+    turn: Array
+    V: Array
+    lam: Array
+
+
+class Blocks(NamedTuple):
+    """The linearised equations of one instant, component by component (see `assembly.assemble`).
+
+    Unknowns of a component are (R^T dc, dphi, du) in body axes and its joint's multipliers.
+
+    Attributes:
+        K: Tangent of its own rows, shape [B, N, N].
+        P: By its velocity, dV-dot included, shape [B, N, N].
+        D: By its acceleration (its mass matrix), shape [B, N, N].
+        Lc, Lp: By its joint's multipliers: its own rows, its parent's rows, shape [B, N, 6].
+        Hc, Hp: Its joint's constraint rows, by itself and by its parent, shape [B, 6, N].
+        Nc: Its own rows by the turning of the parent-side marker, shape [B, N, 3].
+        Jp: Turning of the parent-side marker by the parent's coordinates, shape [B, 3, N].
+        by_angle, by_rate: Its joint's rotation rows by the motor's angle and rate, shape [B, 3].
+        res: Residual of its rows, shape [B, N].
+        gap: Residual of its constraint rows, shape [B, 6].
+    """
+
+    K: Array
+    P: Array
+    D: Array
+    Lc: Array
+    Lp: Array
+    Hc: Array
+    Hp: Array
+    Nc: Array
+    Jp: Array
+    by_angle: Array
+    by_rate: Array
+    res: Array
+    gap: Array
+
+
+class Factors(NamedTuple):
+    """The eliminated step matrix: `lu`, `pivots` of each component with its joint, and `Z`, the transposed
+    solutions for its multipliers, shapes [B, N + 6, N + 6], [B, N + 6], [B, N + 6, 6]."""
+
+    lu: Array
+    pivots: IntArray
+    Z: Array
+
+
+def allocate_state(system: System) -> State:
+    """A state at the origin, at rest."""
+    count, size = len(system.parent), system.size
+    q = np.zeros((count, 4))
+    q[:, 0] = 1.0
+    return State(
+        c=np.zeros((count, 3)),
+        q=q,
+        u=np.zeros((count, size - 6)),
+        turn=np.zeros((count, 3)),
+        V=np.zeros((count, size)),
+        lam=np.zeros((count, JOINT_ROWS)),
+    )
+
+
+def allocate_blocks(system: System, instants: int | None = None) -> Blocks:
+    """Zeroed blocks, for one instant or with a leading axis of that many instants."""
+    count, size = len(system.parent), system.size
+    lead = () if instants is None else (instants,)
+
+    def zeros(*shape: int) -> Array:
+        return np.zeros(lead + (count,) + shape)
+
+    square, wide, tall = (size, size), (JOINT_ROWS, size), (size, JOINT_ROWS)
+    return Blocks(
+        zeros(*square), zeros(*square), zeros(*square), zeros(*tall), zeros(*tall), zeros(*wide), zeros(*wide),
+        zeros(size, 3), zeros(3, size), zeros(3), zeros(3), zeros(size), zeros(JOINT_ROWS),
+    )  # fmt: skip
+
+
+def allocate_factors(system: System, instants: int | None = None) -> Factors:
+    """Zeroed factors, for one instant or with a leading axis of that many instants."""
+    count, size = len(system.parent), system.size + JOINT_ROWS
+    lead = () if instants is None else (instants,)
+    return Factors(
+        np.zeros(lead + (count, size, size)),
+        np.zeros(lead + (count, size), dtype=np.int32),
+        np.zeros(lead + (count, size, JOINT_ROWS)),
+    )

@@ -1,0 +1,44 @@
+"""The one kind of error that a user sees: what is wrong, where, and what to do."""
+
+from __future__ import annotations
+
+
+class ShotError(Exception):
+    """A shot that cannot be processed.
+
+    Printed as one message, and the command ends with exit status 1. Every place that refuses input raises
+    this class, so a pipeline can read the fields instead of the text.
+
+    Args:
+        problem: What is wrong, as a sentence without a full stop.
+        path: Prim path (or file) the problem is at; empty when it concerns the whole shot.
+        attribute: Attribute or relationship name; empty when it is the prim itself.
+        found: The value that was found, printed as it is.
+        remedy: What the user can do about it, as an imperative sentence.
+    """
+
+    def __init__(self, problem: str, *, path: str = "", attribute: str = "", found: object = None, remedy: str = ""):
+        self.problem = problem
+        self.path = str(path)
+        self.attribute = attribute
+        self.found = found
+        self.remedy = remedy
+        super().__init__(self.message())
+
+    def message(self) -> str:
+        """The error as one line of text: place, problem, what was found, remedy."""
+        place = self.path + (f".{self.attribute}" if self.attribute else "")
+        text = f"{place}: {self.problem}" if place else self.problem
+        if self.found is not None:
+            text += f" (found {self.found})"
+        return f"{text}. {self.remedy}" if self.remedy else f"{text}."
+
+    def as_dict(self) -> dict[str, str]:
+        """The fields, for `--json`."""
+        return {
+            "problem": self.problem,
+            "path": self.path,
+            "attribute": self.attribute,
+            "found": "" if self.found is None else str(self.found),
+            "remedy": self.remedy,
+        }

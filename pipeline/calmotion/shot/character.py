@@ -1,0 +1,247 @@
+"""What a character is: bodies, joints, motors, targets, materials. SI units, world axes of the stage.
+
+Rotations are unit quaternions `(w, x, y, z)` that turn body axes into the axes of the frame they are given in.
+Indices point into the character's tuples; body index -1 is the world.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+IntArray = NDArray[np.int32]
+
+WORLD = -1
+
+
+@dataclass(frozen=True, eq=False)
+class Frame:
+    """A frame fixed in a body (or in the world).
+
+    Attributes:
+        position: Origin [m], shape [3], in the axes of the carrying body.
+        rotation: Unit quaternion (w, x, y, z), shape [4].
+    """
+
+    position: Array
+    rotation: Array
+
+
+@dataclass(frozen=True, eq=False)
+class MassProperties:
+    """Mass of a body.
+
+    Attributes:
+        mass: [kg].
+        center: Center of mass [m], shape [3], body frame.
+        inertia: Inertia tensor about the center of mass [kg m^2], shape [3, 3], body axes.
+    """
+
+    mass: float
+    center: Array
+    inertia: Array
+
+
+@dataclass(frozen=True, eq=False)
+class ElasticMaterial:
+    """Isotropic elastic material with damping.
+
+    Attributes:
+        path: Prim path of the material.
+        youngs_modulus: [Pa].
+        poissons_ratio: [-].
+        density: [kg/m^3].
+        damping_ratio: Fraction of critical damping of each mode, used when `rayleigh` is None.
+        rayleigh: (mass [1/s], stiffness [s]) coefficients, or None.
+    """
+
+    path: str
+    youngs_modulus: float
+    poissons_ratio: float
+    density: float
+    damping_ratio: float = 0.01
+    rayleigh: tuple[float, float] | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class FlexibleSettings:
+    """How a body is made flexible; -1 means: choose automatically.
+
+    Attributes:
+        material: Its elastic material.
+        mode_count: Number of elastic coordinates to keep.
+        max_frequency: Highest frequency of fixed-interface modes to keep [Hz].
+        element_size: Edge length of the elements [m].
+        interface_radius: Radius around a joint anchor that moves rigidly with it [m].
+        mesh_file: External mesh file, resolved; empty when the geometry is in the shot.
+        mesh_scale: Metres per unit of that file.
+        elasticity: `auto`, `linear`, `stvk` or `neohookean`.
+    """
+
+    material: ElasticMaterial
+    mode_count: int = -1
+    max_frequency: float = -1.0
+    element_size: float = -1.0
+    interface_radius: float = -1.0
+    mesh_file: str = ""
+    mesh_scale: float = 1.0
+    elasticity: str = "auto"
+
+
+@dataclass(frozen=True, eq=False)
+class SurfaceMesh:
+    """A triangulated surface carried by a body.
+
+    Attributes:
+        path: Prim path.
+        points: [m], shape [n, 3], body frame.
+        triangles: Shape [m, 3], int32, outward by the right-hand rule as authored.
+        color: Linear RGB in 0..1, or None.
+        visible: False for collision and guide geometry.
+        displaced: How many of the leading points are the prim's own points, in the prim's order (0 for a cube,
+            sphere and the like, whose points cannot be written back).
+    """
+
+    path: str
+    points: Array
+    triangles: IntArray
+    color: tuple[float, float, float] | None = None
+    visible: bool = True
+    displaced: int = 0
+
+
+@dataclass(frozen=True, eq=False)
+class TetGeometry:
+    """Linear tetrahedra authored in the shot: `points` [m], shape [n, 3], body frame; `tets` [m, 4], int32."""
+
+    path: str
+    points: Array
+    tets: IntArray
+
+
+@dataclass(frozen=True, eq=False)
+class Body:
+    """A component: rigid, or flexible when `flexible` is given.
+
+    Attributes:
+        path: Prim path.
+        rest: Pose of the body frame in the world at the first frame of the shot.
+        mass: Mass properties; None for a flexible body whose mass follows from its mesh and density.
+        surfaces: Geometry for pictures and meshing, body frame.
+        tets: Tetrahedra authored in the shot, or None.
+        flexible: Settings, or None for a rigid body.
+    """
+
+    path: str
+    rest: Frame
+    mass: MassProperties | None
+    surfaces: tuple[SurfaceMesh, ...] = ()
+    tets: TetGeometry | None = None
+    flexible: FlexibleSettings | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Joint:
+    """A joint between two bodies; its axis is the z axis of both frames.
+
+    Attributes:
+        path: Prim path.
+        kind: `revolute` or `fixed`.
+        body0, body1: Body indices, -1 for the world. The angle is that of body1 relative to body0 about z.
+        frame0, frame1: The joint frame in body0 (in the world for -1) and in body1.
+        lower, upper: Limits [rad], infinite when there are none.
+    """
+
+    path: str
+    kind: str
+    body0: int
+    body1: int
+    frame0: Frame
+    frame1: Frame
+    lower: float = -np.inf
+    upper: float = np.inf
+
+
+@dataclass(frozen=True, eq=False)
+class Motor:
+    """A driven joint.
+
+    Attributes:
+        joint: Index of the joint.
+        path: Prim path of the joint.
+        attribute: Name of the attribute that holds its track.
+        optimize: Whether its curve may be changed.
+        max_velocity, max_acceleration, max_torque: [rad/s], [rad/s^2], [N m]; infinite when there are none.
+    """
+
+    joint: int
+    path: str
+    attribute: str
+    optimize: bool = True
+    max_velocity: float = np.inf
+    max_acceleration: float = np.inf
+    max_torque: float = np.inf
+
+
+@dataclass(frozen=True, eq=False)
+class Target:
+    """A frame whose motion matters.
+
+    Attributes:
+        path: Prim path.
+        body: Body index.
+        frame: The target's frame in that body, undeformed.
+        position_weight, rotation_weight: Weights of the squared position error [1/m^2] and rotation error [1/rad^2].
+    """
+
+    path: str
+    body: int
+    frame: Frame
+    position_weight: float = 1.0
+    rotation_weight: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class RetargetSettings:
+    """What the shot asks of the optimisation; None means: choose automatically.
+
+    Attributes:
+        tolerance: Error at the targets that does not matter [m].
+        time_step: Step of the simulation [s].
+        knot_spacing: Distance of the spline's knots [s].
+        smoothness: Weight of the regulariser.
+        reference: `rigid` or `static`.
+        endpoints: `free` or `kept`.
+        cyclic: The shot loops.
+    """
+
+    tolerance: float | None = None
+    time_step: float | None = None
+    knot_spacing: float | None = None
+    smoothness: float | None = None
+    reference: str = "rigid"
+    endpoints: str = "free"
+    cyclic: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class Character:
+    """A robotic character, SI.
+
+    Attributes:
+        path: Prim path of its root.
+        gravity: [m/s^2], shape [3], world.
+        notes: What the reader decided where the shot was silent, as sentences for the user.
+    """
+
+    path: str
+    bodies: tuple[Body, ...]
+    joints: tuple[Joint, ...]
+    motors: tuple[Motor, ...]
+    targets: tuple[Target, ...]
+    gravity: Array
+    retarget: RetargetSettings = field(default_factory=RetargetSettings)
+    notes: tuple[str, ...] = ()

@@ -1,0 +1,48 @@
+"""Finite-element meshes of the flexible bodies."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from .character import Array, IntArray
+
+
+@dataclass(frozen=True, eq=False)
+class MeshQuality:
+    """What was measured on a tetrahedral mesh.
+
+    Attributes:
+        min_dihedral_deg: Smallest dihedral angle [deg].
+        volume: [m^3].
+        volume_error: Relative difference to the volume of the (repaired) input surface; 0 for authored tetrahedra.
+        repairs: What was repaired, as sentences.
+    """
+
+    min_dihedral_deg: float
+    volume: float
+    volume_error: float
+    repairs: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class FEMesh:
+    """Tetrahedra of one flexible body.
+
+    Attributes:
+        body: Body index.
+        points: Corner points [m], shape [n, 3], body frame.
+        tets: Shape [m, 4], int32, positive volumes.
+        quality: What was measured.
+    """
+
+    body: int
+    points: Array
+    tets: IntArray
+    quality: MeshQuality
+
+
+@dataclass(frozen=True, eq=False)
+class FEMeshes:
+    """One mesh for each flexible body of the character, in the order of the bodies."""
+
+    meshes: tuple[FEMesh, ...]

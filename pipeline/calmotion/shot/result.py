@@ -1,0 +1,152 @@
+"""What comes back: simulated motions, errors, curves, and the optimiser's progress."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from .character import Array
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """A motion of the whole character, one row a time step (T steps, B bodies, M motors, K targets).
+
+    Attributes:
+        times: [s] after the first frame of the shot, shape [T]; negative during a pre-roll.
+        positions: Origins of the body frames [m], shape [T, B, 3], world.
+        rotations: Unit quaternions (w, x, y, z) of the body frames, shape [T, B, 4], world.
+        elastic: Elastic coordinates of each body, B arrays of shape [T, r_b] (r_b = 0 for a rigid body).
+        motor_values: Motor angles [rad], shape [T, M].
+        motor_efforts: Motor torques [N m], shape [T, M]; NaN in a motion that was not simulated.
+        target_positions: [m], shape [T, K, 3], world.
+        target_rotations: Unit quaternions, shape [T, K, 4], world.
+    """
+
+    times: Array
+    positions: Array
+    rotations: Array
+    elastic: tuple[Array, ...]
+    motor_values: Array
+    motor_efforts: Array
+    target_positions: Array
+    target_rotations: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Simulation:
+    """A motion that was simulated, and its cost.
+
+    Attributes:
+        motion: The motion.
+        position_errors: Distance of each target to the reference [m], shape [T, K].
+        rotation_errors: Angle of each target to the reference [rad], shape [T, K].
+        newton_iterations: In all.
+        max_joint_gap: Largest position gap of any joint at any step [m].
+        wall_s: Time of this forward simulation alone [s].
+    """
+
+    motion: Motion
+    position_errors: Array
+    rotation_errors: Array
+    newton_iterations: int
+    max_joint_gap: float
+    wall_s: float
+
+
+@dataclass(frozen=True, eq=False)
+class Skin:
+    """How a flexible body's elastic coordinates move its surfaces: point i of surface s moves by
+    `modes[s][i] @ u`, shape [n_s, 3, r], body axes [m per unit of the coordinates]."""
+
+    modes: tuple[Array, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class MotorCurve:
+    """The optimised curve of one motor, `input + offset`.
+
+    Attributes:
+        motor: Motor index.
+        changed: False when the offset is exactly zero; such a motor is not written.
+        knots: Knots of the offset's cubic spline [s], shape [n]; frames of the shot.
+        frame_values: The optimised curve at the shot's frames [rad], shape [f].
+        max_offset: Largest change [rad].
+    """
+
+    motor: int
+    changed: bool
+    knots: Array
+    frame_values: Array
+    max_offset: float
+
+
+@dataclass(frozen=True, eq=False)
+class LeftOut:
+    """Something the run left out: what, why, and the error this costs at the targets (None: none, exact)."""
+
+    what: str
+    why: str
+    estimated_error_m: float | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class OptimizerStep:
+    """One iteration of the optimiser: objective, gradient norm (projected), products and simulations so far."""
+
+    objective: float
+    gradient_norm: float
+    forward_simulations: int
+    linearized_sweeps: int
+
+
+@dataclass(frozen=True, eq=False)
+class ModeTable:
+    """Frequencies of one flexible body [Hz], clamped at its parent side, and the size of its mesh."""
+
+    body: int
+    frequencies: Array
+    nodes: int
+    elements: int
+    mass: float
+
+
+@dataclass(frozen=True, eq=False)
+class Result:
+    """What a run computed. `simulate` fills `before` alone; `optimize` also `after` and what follows it.
+
+    Attributes:
+        reference: The motion that was meant: the input on a rigid robot; same times as the simulations.
+        before: The input, simulated.
+        after: The optimised curves, simulated, or None.
+        skins: One for each body; None for a rigid one.
+        modes: One for each flexible body.
+        curves: One for each motor, empty for `simulate`.
+        steps: The optimiser's progress, first entry the start.
+        objective_before, objective_after: Value of the objective.
+        gradients, linearized_sweeps, forward_simulations, iterations, parameters: Counts.
+        wall_s: The optimisation alone (or the simulation, for `simulate`) [s].
+        step_s: Time step [s].
+        pre_roll_s: Length of the pre-roll [s].
+        dof: Number of position coordinates (6 a body, and the elastic ones).
+        left_out: What was left out.
+    """
+
+    reference: Motion
+    before: Simulation
+    after: Simulation | None
+    skins: tuple[Skin | None, ...]
+    modes: tuple[ModeTable, ...]
+    curves: tuple[MotorCurve, ...]
+    steps: tuple[OptimizerStep, ...]
+    objective_before: float
+    objective_after: float | None
+    gradients: int
+    linearized_sweeps: int
+    forward_simulations: int
+    iterations: int
+    parameters: int
+    wall_s: float
+    step_s: float
+    pre_roll_s: float
+    dof: int
+    left_out: tuple[LeftOut, ...] = ()

@@ -1,0 +1,88 @@
+"""Systems made of particles, whose integrals are sums: an independent way to every term of the dynamics."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from calmotion.dynamics.system import System, allocate_state
+from scipy.spatial.transform import Rotation
+
+
+@dataclass
+class Particles:
+    """Masses [n], points [n, 3] and mode displacements [n, 3, r] with a mass-orthonormal basis."""
+
+    masses: np.ndarray
+    points: np.ndarray
+    modes: np.ndarray
+
+
+def random_particles(rng, r: int, count: int = 12) -> Particles:
+    masses = rng.uniform(0.1, 0.4, count)
+    points = rng.normal(size=(count, 3)) * 0.3
+    modes = rng.normal(size=(count, 3, r))
+    if r:
+        gram = np.einsum("n,nij,nik->jk", masses, modes, modes)
+        modes = modes @ np.linalg.inv(np.linalg.cholesky(gram)).T
+    return Particles(masses, points, modes)
+
+
+def axial(T):
+    """axial(y z^T) = y x z over the last two axes."""
+    return np.stack(
+        [T[..., 1, 2] - T[..., 2, 1], T[..., 2, 0] - T[..., 0, 2], T[..., 0, 1] - T[..., 1, 0]], axis=-1
+    )
+
+
+def particle_system(rng, parents, elastic, rows=None, stiffness=50.0) -> tuple[System, list[Particles]]:
+    """A random tree of components with random joint frames and modes."""
+    count, size = len(parents), max(elastic)
+    parts = [random_particles(rng, r) for r in elastic]
+
+    def pad(shape, values):
+        out = np.zeros((count,) + shape)
+        for b, value in enumerate(values):
+            out[(b,) + tuple(slice(0, n) for n in value.shape)] = value
+        return out
+
+    S = [np.einsum("n,naj,nbk->jkab", p.masses, p.modes, p.modes) for p in parts]
+    markers = [rng.normal(size=(2, 3, r)) * 0.3 for b, r in enumerate(elastic)]
+    parent_Phi = [rng.normal(size=(2, 3, elastic[p])) * 0.3 if p >= 0 else np.zeros((2, 3, 0)) for p in parents]
+    Phi, Psi = np.zeros((count, 2, 3, size)), np.zeros((count, 2, 3, size))
+    for b in range(count):
+        Phi[b, 1, :, : elastic[b]], Psi[b, 1, :, : elastic[b]] = markers[b]
+        Phi[b, 0, :, : parent_Phi[b].shape[2]], Psi[b, 0, :, : parent_Phi[b].shape[2]] = parent_Phi[b]
+    system = System(
+        parent=np.array(parents, dtype=np.int32),
+        elastic=np.array(elastic, dtype=np.int32),
+        rows=np.array(rows or [6] * count, dtype=np.int32),
+        mass=np.array([p.masses.sum() for p in parts]),
+        s=np.array([p.masses @ p.points for p in parts]),
+        Z=np.array([np.einsum("n,na,nb->ab", p.masses, p.points, p.points) for p in parts]),
+        M3=pad((size, 3), [np.einsum("n,naj->ja", p.masses, p.modes) for p in parts]),
+        M4=pad((size, 3, 3), [np.einsum("n,na,nbj->jab", p.masses, p.points, p.modes) for p in parts]),
+        S=pad((size, size, 3, 3), S),
+        axial=pad((size, size, 3), [axial(s) for s in S]),
+        stiffness=pad((size,), [np.full(r, stiffness) * (1 + np.arange(r)) for r in elastic]),
+        damping=pad((size,), [np.full(r, 0.4) for r in elastic]),
+        position=rng.normal(size=(count, 2, 3)) * 0.2,
+        rotation=Rotation.random(2 * count, random_state=7).as_matrix().reshape(count, 2, 3, 3),
+        Phi=Phi,
+        Psi=Psi,
+        gravity=np.array([0.3, -0.2, -9.81]),
+    )
+    return system, parts
+
+
+def random_state(rng, system, spread=0.5):
+    state = allocate_state(system)
+    count = len(system.parent)
+    state.c[:] = rng.normal(size=state.c.shape)
+    state.q[:] = np.roll(Rotation.random(count, random_state=3).as_quat(), 1, axis=1)
+    for b, r in enumerate(system.elastic):
+        state.u[b, :r] = spread * rng.normal(size=r)
+        state.V[b, : 6 + r] = rng.normal(size=6 + r)
+    state.lam[:] = rng.normal(size=state.lam.shape)
+    state.lam[system.rows == 5, 5] = 0.0
+    return state
