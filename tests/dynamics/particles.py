@@ -30,9 +30,7 @@ def random_particles(rng, r: int, count: int = 12) -> Particles:
 
 def axial(T):
     """axial(y z^T) = y x z over the last two axes."""
-    return np.stack(
-        [T[..., 1, 2] - T[..., 2, 1], T[..., 2, 0] - T[..., 0, 2], T[..., 0, 1] - T[..., 1, 0]], axis=-1
-    )
+    return np.stack([T[..., 1, 2] - T[..., 2, 1], T[..., 2, 0] - T[..., 0, 2], T[..., 0, 1] - T[..., 1, 0]], axis=-1)
 
 
 def particle_system(rng, parents, elastic, rows=None, stiffness=50.0) -> tuple[System, list[Particles]]:

@@ -5,6 +5,7 @@ Joint rows (side i on the parent, j on the component; Q = R_i^T R_j, z the joint
     gamma (p_j' - p_i') + alpha (p_j - p_i)                            3 rows, world axes
     gamma (Q (omega_j - theta' z) - omega_i) + alpha c                 3 rows (weld, motor), parent-side axes
     the x and y rows of it, without theta'                             2 rows (free hinge)
+    none                                                               a component that floats freely
 
 where c is the axial vector of the skew part of E = Q R_z(-theta), and (-n_y, n_x), n = Q z, for the hinge. On the
 constraint manifold these rows are C_t + C_U T V + alpha C of Seed (31); the multipliers act through exactly the
@@ -17,8 +18,8 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
+from ..kernels import kernel
 from ..shot.character import Array
 from .inertia import body_residual, deformed_integrals, mass_matrix, position_jacobian, velocity_jacobian
 from .markers import (
@@ -67,7 +68,7 @@ def allocate_work(system: System) -> Work:
     )  # fmt: skip
 
 
-@njit(cache=True)
+@kernel
 def _apply_wrench(n, f, t, sign, m, res):
     """res += sign * (Jp^T f + Jf^T t), f in body axes, t in marker axes."""
     for a in range(n):
@@ -77,7 +78,7 @@ def _apply_wrench(n, f, t, sign, m, res):
         res[a] += sign * g
 
 
-@njit(cache=True)
+@kernel
 def _rows_by_multipliers(n, Rb, m, Q, sign, out):
     """out[:, :3] = sign Jp^T Rb^T, out[:, 3:] = sign Jf^T Q^T."""
     for a in range(n):
@@ -91,7 +92,7 @@ def _rows_by_multipliers(n, Rb, m, Q, sign, out):
             out[a, 3 + i] = sign * h
 
 
-@njit(cache=True)
+@kernel
 def _joint_kinematics(system, b, c, u, V, w):
     """Values of both markers of the joint of component b, and Q = R_i^T R_j into w.Q."""
     p = system.parent[b]
@@ -114,7 +115,7 @@ def _joint_kinematics(system, b, c, u, V, w):
             w.Q[i, k] = t
 
 
-@njit(cache=True)
+@kernel
 def _turned_back(Q, angle, E):
     """E = Q R_z(-angle)."""
     cs, sn = math.cos(angle), math.sin(angle)
@@ -124,7 +125,7 @@ def _turned_back(Q, angle, E):
         E[i, 2] = Q[i, 2]
 
 
-@njit(cache=True)
+@kernel
 def _constraint(system, b, angle, rate, scheme, w, gap):
     """Residual of the joint rows of component b; leaves omega_j - theta' z in w.x, E in w.E."""
     hinge = system.rows[b] == 5
@@ -150,7 +151,7 @@ def _constraint(system, b, angle, rate, scheme, w, gap):
     gap[5] = scheme.gamma * (w.y[2] - w.i.w[2]) + 0.5 * scheme.alpha * (E[1, 0] - E[0, 1])
 
 
-@njit(cache=True)
+@kernel
 def _position_rows(n, Rb, m, gamma, alpha, sign, Hv, H):
     """Rows of p' and p: H[:3] = sign Rb (gamma (Gp + Jp Hv) + alpha Jp); Hv, [n, n], maps dX to dV."""
     for a in range(n):
@@ -170,7 +171,7 @@ def _position_rows(n, Rb, m, gamma, alpha, sign, Hv, H):
             H[i, a] = sign * (Rb[i, 0] * h0 + Rb[i, 1] * h1 + Rb[i, 2] * h2)
 
 
-@njit(cache=True)
+@kernel
 def _rotation_rows(n, m, Hv, A, C, gamma, H):
     """Rows of the angular velocity: H[3:] = gamma A (Gf + Jf Hv) + C Jf."""
     for a in range(n):
@@ -193,7 +194,7 @@ def _rotation_rows(n, m, Hv, A, C, gamma, H):
             H[3 + i, a] = t
 
 
-@njit(cache=True)
+@kernel
 def _add_skew(A, x, sign, out):
     """out += sign A [x]x."""
     for i in range(3):
@@ -202,7 +203,7 @@ def _add_skew(A, x, sign, out):
         out[i, 2] += sign * (A[i, 0] * x[1] - A[i, 1] * x[0])
 
 
-@njit(cache=True)
+@kernel
 def _joint_tangent(system, b, scheme, Hv, V, w, blocks):
     """All blocks of the joint of component b; needs `_joint_kinematics` and `_constraint` first."""
     p = system.parent[b]
@@ -263,17 +264,19 @@ def _joint_tangent(system, b, scheme, Hv, V, w, blocks):
         for i in range(3):
             for a in range(np_):
                 blocks.Jp[b, i, a] = w.i.Jf[i, a]
-    if hinge:
+    # rows that this joint does not have
+    for i in range(system.rows[b], 6):
+        blocks.gap[b, i] = 0.0
         for a in range(n):
-            blocks.Lc[b, a, 5] = 0.0
-            blocks.Hc[b, 5, a] = 0.0
+            blocks.Lc[b, a, i] = 0.0
+            blocks.Hc[b, i, a] = 0.0
         if p >= 0:
             for a in range(6 + system.elastic[p]):
-                blocks.Lp[b, a, 5] = 0.0
-                blocks.Hp[b, 5, a] = 0.0
+                blocks.Lp[b, a, i] = 0.0
+                blocks.Hp[b, i, a] = 0.0
 
 
-@njit(cache=True)
+@kernel
 def _body_rows(system, b, ydd_world, V, Vd, u, w, res):
     """Inertia, elastic and gravity rows of component b; leaves its integrals in the scratch."""
     for i in range(3):
@@ -282,16 +285,14 @@ def _body_rows(system, b, ydd_world, V, Vd, u, w, res):
             t += w.R[b, k, i] * (ydd_world[k] - system.gravity[k])
         w.a[i] = t
     r = system.elastic[b]
-    deformed_integrals(
-        r, system.s[b], system.Z[b], system.M3[b], system.M4[b], system.S[b], u[b], w.s, w.Z, w.B
-    )
+    deformed_integrals(r, system.s[b], system.Z[b], system.M3[b], system.M4[b], system.S[b], u[b], w.s, w.Z, w.B)
     body_residual(
         r, system.mass[b], system.M3[b], system.S[b], system.axial[b], system.stiffness[b], system.damping[b],
         w.a, V[b, 3:6], Vd[b, 3:6], u[b], V[b, 6:], Vd[b, 6:], w.s, w.Z, w.B, w.W, w.tmp, res,
     )  # fmt: skip
 
 
-@njit(cache=True)
+@kernel
 def assemble(system, scheme, c, q, u, V, Vd, lam, angle, rate, Hv, tangent, w, blocks):
     """Residual, and with `tangent` the linearised blocks, of the whole system at one instant.
 
@@ -315,7 +316,9 @@ def assemble(system, scheme, c, q, u, V, Vd, lam, angle, rate, Hv, tangent, w, b
         if tangent:
             D, P, K = blocks.D[b], blocks.P[b], blocks.K[b]
             mass_matrix(r, system.mass[b], system.M3[b], w.s, w.Z, w.B, D)
-            velocity_jacobian(r, system.M3[b], system.axial[b], system.damping[b], V[b, 3:6], V[b, 6:], w.s, w.Z, w.B, P)
+            velocity_jacobian(
+                r, system.M3[b], system.axial[b], system.damping[b], V[b, 3:6], V[b, 6:], w.s, w.Z, w.B, P
+            )
             position_jacobian(
                 r, system.M3[b], system.S[b], system.axial[b], system.stiffness[b], w.a, V[b, 3:6], V[b, 6:],
                 Vd[b, 6:], w.B, w.W, D, w.E, w.T, w.tmp, K,
@@ -326,9 +329,7 @@ def assemble(system, scheme, c, q, u, V, Vd, lam, angle, rate, Hv, tangent, w, b
                     P[i, k] += scheme.acceleration * D[i, k]
                 for k in range(3):
                     K[i, k] += beta * P[i, k]
-                    K[i, 3 + k] += (
-                        P[i, 3] * Hv[b, 1, 1 + k] + P[i, 4] * Hv[b, 2, 1 + k] + P[i, 5] * Hv[b, 3, 1 + k]
-                    )
+                    K[i, 3 + k] += P[i, 3] * Hv[b, 1, 1 + k] + P[i, 4] * Hv[b, 2, 1 + k] + P[i, 5] * Hv[b, 3, 1 + k]
                 for k in range(6, n):
                     K[i, k] += beta * P[i, k]
     for b in range(count):
@@ -337,11 +338,8 @@ def assemble(system, scheme, c, q, u, V, Vd, lam, angle, rate, Hv, tangent, w, b
         _joint_kinematics(system, b, c, u, V, w)
         _constraint(system, b, angle[b], rate[b], scheme, w, blocks.gap[b])
         # force on the component in body axes, moment in marker axes; the parent gets the opposite
-        hinge = system.rows[b] == 5
         for i in range(3):
             w.tau[i] = lam[b, 3 + i]
-        if hinge:
-            w.tau[2] = 0.0
         for i in range(3):
             f = 0.0
             t = 0.0

@@ -13,8 +13,8 @@ backwards as constant, velocities as zero.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from ..kernels import kernel
 from .assembly import assemble
 from .elimination import factor, solve
 from .so3 import inverse_right_jacobian, right_jacobian, right_jacobian_derivative, turn
@@ -22,7 +22,7 @@ from .so3 import inverse_right_jacobian, right_jacobian, right_jacobian_derivati
 CONVERGED, SINGULAR, NOT_CONVERGED = 0, 1, 2
 
 
-@njit(cache=True)
+@kernel
 def rotation_rate(h, turn_now, turn_before, J, omega):
     """omega_n of the backward difference, shape [3]; J is scratch and holds J_r(theta_n) afterwards."""
     right_jacobian(turn_now, J)
@@ -33,7 +33,7 @@ def rotation_rate(h, turn_now, turn_before, J, omega):
         omega[i] = t / h
 
 
-@njit(cache=True)
+@kernel
 def rotation_rate_jacobian(h, turn_now, turn_before, J, T, Wt, Hv):
     """d omega_n / d dphi_n into Hv[1:4, 1:4] and d omega_n / d theta_n into Wt; T holds J_r^-1 afterwards."""
     right_jacobian_derivative(turn_now, turn_before, 1.0, Wt)
@@ -47,7 +47,7 @@ def rotation_rate_jacobian(h, turn_now, turn_before, J, T, Wt, Hv):
             Hv[1 + i, 1 + k] = Wt[i, 0] * T[0, k] + Wt[i, 1] * T[1, k] + Wt[i, 2] * T[2, k]
 
 
-@njit(cache=True)
+@kernel
 def velocities(system, h, now, before, before2, J, Vd):
     """Velocities (into now.V) and accelerations (into Vd, shape [B, N]) of instant n by the backward difference."""
     c1, c2 = 2.0 / h, 0.5 / h
@@ -61,7 +61,7 @@ def velocities(system, h, now, before, before2, J, Vd):
             Vd[b, i] = 3.0 * c2 * now.V[b, i] - c1 * before.V[b, i] + c2 * before2.V[b, i]
 
 
-@njit(cache=True)
+@kernel
 def position_to_velocity(system, h, now, before, J, T, Wt, Hv):
     """How the velocity of instant n follows its position, into Hv, shape [B, 4, 4]; see `assemble`."""
     for b in range(len(system.parent)):
@@ -69,7 +69,7 @@ def position_to_velocity(system, h, now, before, J, T, Wt, Hv):
         rotation_rate_jacobian(h, now.turn[b], before.turn[b], J, T, Wt, Hv[b])
 
 
-@njit(cache=True)
+@kernel
 def correct(system, before, now, R, x, lam, T):
     """Add a Newton correction (x, shape [B, N], and lam) to a state; returns its largest entry (lengths, angles)."""
     largest = 0.0
@@ -93,7 +93,7 @@ def correct(system, before, now, R, x, lam, T):
     return largest
 
 
-@njit(cache=True)
+@kernel
 def step(system, scheme, h, before2, before, now, angle, rate, tolerance, limit, work, blocks, factors, scratch):
     """One step of BDF2 with Newton's method, from two instants to the next.
 
@@ -131,9 +131,7 @@ def step(system, scheme, h, before2, before, now, angle, rate, tolerance, limit,
                 x[b, i] = -blocks.res[b, i]
             for i in range(6):
                 lam[b, i] = -blocks.gap[b, i]
-        solve(
-            system, blocks.Lp, blocks.Hp, blocks.Nc, blocks.Jp, factors.lu, factors.pivots, factors.Z, x, lam, block
-        )
+        solve(system, blocks.Lp, blocks.Hp, blocks.Nc, blocks.Jp, factors.lu, factors.pivots, factors.Z, x, lam, block)
         largest = correct(system, before, now, work.R, x, lam, T)
         if not (largest < 1e3):
             return NOT_CONVERGED, iteration + 1, _worst(system, x)
@@ -143,7 +141,7 @@ def step(system, scheme, h, before2, before, now, angle, rate, tolerance, limit,
     return NOT_CONVERGED, limit, _worst(system, x)
 
 
-@njit(cache=True)
+@kernel
 def _worst(system, x):
     """Component with the largest (or a non-finite) correction."""
     worst = 0

@@ -8,12 +8,11 @@ eliminating it changes the parent's K by -Lp (D_b^-1)_multiplier-rows F. With Z 
 
 from __future__ import annotations
 
-from numba import njit
-
+from ..kernels import kernel
 from .system import JOINT_ROWS
 
 
-@njit(cache=True)
+@kernel
 def lu_factor(n, A, piv):
     """In-place LU with partial pivoting of A[:n, :n]; False when a pivot is zero or not finite."""
     for k in range(n):
@@ -44,7 +43,7 @@ def lu_factor(n, A, piv):
     return True
 
 
-@njit(cache=True)
+@kernel
 def lu_solve(n, A, piv, x):
     """x <- A^-1 x with the factors of `lu_factor`."""
     for k in range(n):
@@ -65,7 +64,7 @@ def lu_solve(n, A, piv, x):
         x[i] = t / A[i, i]
 
 
-@njit(cache=True)
+@kernel
 def lu_solve_transposed(n, A, piv, x):
     """x <- A^-T x with the factors of `lu_factor`."""
     for i in range(n):
@@ -85,7 +84,7 @@ def lu_solve_transposed(n, A, piv, x):
             x[p] = t
 
 
-@njit(cache=True)
+@kernel
 def factor(system, blocks, lu, piv, Z):
     """Eliminate all components; `blocks.K` of parents is overwritten by their Schur complements.
 
@@ -105,9 +104,9 @@ def factor(system, blocks, lu, piv, Z):
         for i in range(m):
             for k in range(m):
                 A[n + i, n + k] = 0.0
-        # a free hinge has five rows; its sixth multiplier is set to zero
-        if system.rows[b] == 5:
-            A[n + 5, n + 5] = 1.0
+        # multipliers of rows that this joint does not have are zero
+        for i in range(system.rows[b], m):
+            A[n + i, n + i] = 1.0
         if not lu_factor(n + m, A, piv[b]):
             return b
         p = system.parent[b]
@@ -138,7 +137,7 @@ def factor(system, blocks, lu, piv, Z):
     return -1
 
 
-@njit(cache=True)
+@kernel
 def solve(system, Lp, Hp, Nc, Jp, lu, piv, Z, x, lam, block):
     """(x, lam) <- K^-1 (x, lam): x of shape [B, N], lam of shape [B, 6]; `block` is scratch, shape [N + 6]."""
     m = JOINT_ROWS
@@ -183,7 +182,7 @@ def solve(system, Lp, Hp, Nc, Jp, lu, piv, Z, x, lam, block):
             lam[b, i] = block[n + i]
 
 
-@njit(cache=True)
+@kernel
 def solve_transposed(system, Lp, Hp, Nc, Jp, lu, piv, Z, x, lam, block):
     """(x, lam) <- K^-T (x, lam), same shapes as `solve`."""
     m = JOINT_ROWS

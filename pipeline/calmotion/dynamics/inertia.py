@@ -12,10 +12,10 @@ which is formulation, section 1 (Seed (4)-(10), (19)-(22), with the rows of c an
 
 from __future__ import annotations
 
-from numba import njit
+from ..kernels import kernel
 
 
-@njit(cache=True)
+@kernel
 def deformed_integrals(r, s0, Z0, M3, M4, S, u, s, Z, B):
     """s, Z and B_j (shapes [3], [3, 3], [r, 3, 3]) of the deformed component."""
     for i in range(3):
@@ -39,7 +39,7 @@ def deformed_integrals(r, s0, Z0, M3, M4, S, u, s, Z, B):
             Z[a, b] = t
 
 
-@njit(cache=True)
+@kernel
 def _gradient_of_acceleration(al, om, W):
     """W = [alpha]x + [omega]x^2."""
     w2 = om[0] * om[0] + om[1] * om[1] + om[2] * om[2]
@@ -55,7 +55,7 @@ def _gradient_of_acceleration(al, om, W):
     W[2, 1] += al[0]
 
 
-@njit(cache=True)
+@kernel
 def _axial_of_product(Z, W, out):
     """out = axial(Z W^T), with axial(y z^T) = y x z."""
     for i in range(3):
@@ -66,7 +66,7 @@ def _axial_of_product(Z, W, out):
         out[i] = t
 
 
-@njit(cache=True)
+@kernel
 def body_residual(r, mass, M3, S, axial, stiffness, damping, a, om, al, u, v, vd, s, Z, B, W, tmp, res):
     """Rows of one component without its joints, into res, shape [6 + r]; needs `deformed_integrals` first.
 
@@ -116,7 +116,7 @@ def body_residual(r, mass, M3, S, axial, stiffness, damping, a, om, al, u, v, vd
         res[6 + j] = t
 
 
-@njit(cache=True)
+@kernel
 def mass_matrix(r, mass, M3, s, Z, B, D):
     """D, shape [6 + r, 6 + r]: the rows by (a, alpha, v'), symmetric. Formulation, section 1."""
     trace = Z[0, 0] + Z[1, 1] + Z[2, 2]
@@ -150,7 +150,7 @@ def mass_matrix(r, mass, M3, s, Z, B, D):
         D[6 + j, 6 + j] = 1.0
 
 
-@njit(cache=True)
+@kernel
 def velocity_jacobian(r, M3, axial, damping, om, v, s, Z, B, P):
     """P, shape [6 + r, 6 + r]: the rows by (c', omega, v) at fixed acceleration; its first three columns are zero."""
     n = 6 + r
@@ -222,7 +222,7 @@ def velocity_jacobian(r, M3, axial, damping, om, v, s, Z, B, P):
         P[6 + j, 6 + j] += damping[j]
 
 
-@njit(cache=True)
+@kernel
 def position_jacobian(r, M3, S, axial, stiffness, a, om, v, vd, B, W, D, E, T, tmp, K):
     """K, shape [6 + r, 6 + r]: the rows by (R^T dc, dphi, du) at fixed c', omega, v and their rates.
 

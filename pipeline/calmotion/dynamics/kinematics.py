@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from ..kernels import kernel
 from ..shot.character import Array
 from .markers import allocate_marker, marker_jacobian, marker_values
 from .model import Model
@@ -12,7 +12,7 @@ from .so3 import matrix_of, quaternion_of
 from .system import State, allocate_state
 
 
-@njit(cache=True)
+@kernel
 def _rigid_poses(parent, position, rotation, angles, c, q, R):
     """Poses of all components for joint angles, shape [T, B]; R is scratch, shape [B, 3, 3]."""
     A = np.zeros((3, 3))
@@ -56,9 +56,7 @@ def rigid_poses(model: Model, joint_angles: Array) -> tuple[Array, Array]:
     system = model.system
     total, count = joint_angles.shape
     c, q = np.zeros((total, count, 3)), np.zeros((total, count, 4))
-    _rigid_poses(
-        system.parent, system.position, system.rotation, joint_angles, c, q, np.zeros((count, 3, 3))
-    )
+    _rigid_poses(system.parent, system.position, system.rotation, joint_angles, c, q, np.zeros((count, 3, 3)))
     return c, q
 
 
@@ -70,7 +68,7 @@ def rigid_state(model: Model, joint_angles: Array) -> State:
     return state
 
 
-@njit(cache=True)
+@kernel
 def _target_frames(targets, elastic, c, q, u, m, R, positions, quaternions):
     component, position, rotation, Phi, Psi = targets
     V = np.zeros(6 + u.shape[2])
@@ -101,7 +99,7 @@ def target_frames(model: Model, c: Array, q: Array, u: Array) -> tuple[Array, Ar
     return positions, quaternions
 
 
-@njit(cache=True)
+@kernel
 def _target_jacobians(targets, elastic, c, q, u, m, R, J):
     component, position, rotation, Phi, Psi = targets
     V = np.zeros(6 + u.shape[2])

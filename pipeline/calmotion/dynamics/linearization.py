@@ -14,8 +14,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
+from ..kernels import kernel
 from ..shot.character import Array, IntArray
 from .assembly import assemble
 from .bdf2 import position_to_velocity, velocities
@@ -36,7 +36,7 @@ class Linearization:
     pivots: IntArray
 
 
-@njit(cache=True)
+@kernel
 def _copy(n, blocks, factors, work, Hv, data, pivots):
     P, D, Lc, Lp, Hp, Nc, Jp, by_angle, by_rate, lu, Z, R, H = data
     P[n] = blocks.P
@@ -55,7 +55,7 @@ def _copy(n, blocks, factors, work, Hv, data, pivots):
     pivots[n] = factors.pivots
 
 
-@njit(cache=True)
+@kernel
 def _linearize(system, static, scheme, h, states, angles, rates, work, blocks, factors, scratch, data, pivots):
     """Blocks and factors of all instants; returns -1 or the component that is singular, and the instant."""
     J, T, Wt, Hv, Vd, x, lam, block = scratch
@@ -83,7 +83,11 @@ def _linearize(system, static, scheme, h, states, angles, rates, work, blocks, f
 
 
 def linearize(
-    system: System, trajectory: Trajectory, angles: Array, rates: Array, workspace: Workspace,
+    system: System,
+    trajectory: Trajectory,
+    angles: Array,
+    rates: Array,
+    workspace: Workspace,
     previous: Linearization | None = None,
 ) -> Linearization:
     """Linearise a simulation about its trajectory.
@@ -99,6 +103,7 @@ def linearize(
     if previous is not None and previous.data[0].shape[0] == total:
         data, pivots = previous.data, previous.pivots
     else:
+
         def zeros(*shape: int) -> Array:
             return np.zeros((total, count) + shape)
 
@@ -118,7 +123,7 @@ def linearize(
     return Linearization(system, trajectory, data, pivots)
 
 
-@njit(cache=True)
+@kernel
 def _tangent(system, h, turns, d_angle, d_rate, data, pivots, dX):
     P, D, Lc, Lp, Hp, Nc, Jp, by_angle, by_rate, lu, Z, R, Hv = data
     total, count, size = dX.shape
@@ -212,7 +217,7 @@ def _tangent(system, h, turns, d_angle, d_rate, data, pivots, dX):
                 dth[now, b, i] = J[i, 0] * tmp[0] + J[i, 1] * tmp[1] + J[i, 2] * tmp[2]
 
 
-@njit(cache=True)
+@kernel
 def _adjoint(system, h, turns, Xbar, data, pivots, g_angle, g_rate, cbar, nubar, thbar):
     """Transpose of `_tangent`; Xbar (body axes), cbar (world axes), nubar, thbar are overwritten."""
     P, D, Lc, Lp, Hp, Nc, Jp, by_angle, by_rate, lu, Z, R, Hv = data
@@ -334,9 +339,7 @@ def tangent(lin: Linearization, d_angle: Array, d_rate: Array) -> Array:
         (R^T dc, dphi, du) of each component, shape [T, B, N].
     """
     dX = np.zeros(d_angle.shape + (lin.system.size,))
-    _tangent(
-        lin.system, lin.trajectory.h, lin.trajectory.states.turn, d_angle, d_rate, lin.data, lin.pivots, dX
-    )
+    _tangent(lin.system, lin.trajectory.h, lin.trajectory.states.turn, d_angle, d_rate, lin.data, lin.pivots, dX)
     return dX
 
 

@@ -15,8 +15,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
+from ..kernels import kernel
 from ..shot.character import Array
 from .so3 import cross, exponential, right_jacobian, right_jacobian_derivative
 
@@ -54,7 +54,7 @@ def allocate_marker(size: int) -> MarkerWork:
     return MarkerWork(*[np.zeros(shape) for shape in shapes])
 
 
-@njit(cache=True)
+@kernel
 def fixed_marker(position, rotation, m):
     """A marker of the world: constant frame, no velocity."""
     for i in range(3):
@@ -65,7 +65,7 @@ def fixed_marker(position, rotation, m):
             m.R[i, k] = rotation[i, k]
 
 
-@njit(cache=True)
+@kernel
 def marker_values(r, position, rotation, Phi, Psi, c, Rb, u, V, m):
     """Position, velocity, rotation and angular velocity of the marker, into m."""
     om = V[3:6]
@@ -116,7 +116,7 @@ def marker_values(r, position, rotation, Phi, Psi, c, Rb, u, V, m):
         m.w[i] = rotation[0, i] * m.C[0, 0] + rotation[1, i] * m.C[0, 1] + rotation[2, i] * m.C[0, 2]
 
 
-@njit(cache=True)
+@kernel
 def _minus_skew(y, out, column):
     """out[:, column:column+3] = -[y]x."""
     out[0, column] = 0.0
@@ -130,7 +130,7 @@ def _minus_skew(y, out, column):
     out[2, column + 2] = 0.0
 
 
-@njit(cache=True)
+@kernel
 def _rotate_rows(rotation, B, Psi, r, out):
     """out[:, 6:] = R_0^T B Psi."""
     for i in range(3):
@@ -141,7 +141,7 @@ def _rotate_rows(rotation, B, Psi, r, out):
             out[i, 6 + j] = b0 * Psi[0, j] + b1 * Psi[1, j] + b2 * Psi[2, j]
 
 
-@njit(cache=True)
+@kernel
 def marker_jacobian(r, rotation, Phi, Psi, m):
     """Jp and Jf of the marker; needs `marker_values` first."""
     for i in range(3):
@@ -159,7 +159,7 @@ def marker_jacobian(r, rotation, Phi, Psi, m):
     _rotate_rows(rotation, m.jr, Psi, r, m.Jf)
 
 
-@njit(cache=True)
+@kernel
 def marker_velocity_jacobian(r, rotation, Phi, Psi, V, m):
     """Gp and Gf of the marker; needs `marker_values` first."""
     om = V[3:6]
@@ -180,7 +180,7 @@ def marker_velocity_jacobian(r, rotation, Phi, Psi, V, m):
     _rotate_rows(rotation, m.A, Psi, r, m.Gf)
 
 
-@njit(cache=True)
+@kernel
 def add_wrench_stiffness(r, rotation, Phi, Psi, f, t, sign, m, K):
     """K += sign * d(generalised force)/d(R^T dc, dphi, du) for a force f fixed in the world and a moment t fixed
     in marker axes. Needs `marker_values` first.

@@ -6,8 +6,8 @@ import time
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
+from ..kernels import kernel
 from ..shot.character import Array
 from . import bdf2
 from .assembly import Work, allocate_work
@@ -86,17 +86,19 @@ def allocate_scratch(system: System) -> tuple[Array, ...]:
     )
 
 
-@njit(cache=True)
+@kernel
 def _instant(states, n):
     """Views of instant n of a trajectory."""
     return State(states.c[n], states.q[n], states.u[n], states.turn[n], states.V[n], states.lam[n])
 
 
-@njit(cache=True)
+@kernel
 def _largest_gap(system, c, u, V, work):
     gap = 0.0
     for b in range(len(system.parent)):
         p = system.parent[b]
+        if system.rows[b] == 0:
+            continue
         marker_values(
             system.elastic[b], system.position[b, 1], system.rotation[b, 1], system.Phi[b, 1], system.Psi[b, 1],
             c[b], work.R[b], u[b], V[b], work.j,
@@ -116,7 +118,7 @@ def _largest_gap(system, c, u, V, work):
     return gap
 
 
-@njit(cache=True)
+@kernel
 def _advance(system, scheme, h, first, last, states, angles, rates, tolerance, limit, work, blocks, factors, scratch):
     """Steps first..last-1 of a trajectory; returns (code, instant, component, iterations, largest joint gap)."""
     iterations = 0
@@ -152,8 +154,9 @@ class Workspace:
 
 
 def simulate(
-    system: System, start: State, angles: Array, rates: Array, h: float, workspace: Workspace, progress=None
-) -> Trajectory:
+    system: System, start: State, angles: Array, rates: Array, h: float, workspace: Workspace, progress=None,
+    settled: bool = True,
+) -> Trajectory:  # fmt: skip
     """Simulate the system from static equilibrium.
 
     Args:
@@ -163,6 +166,7 @@ def simulate(
         h: Time step [s].
         workspace: Scratch of this system.
         progress: Called with a fraction in 0..1 now and then, or None.
+        settled: False releases the system from rest at `start` as it is, without looking for the equilibrium.
 
     Returns:
         The trajectory, T instants.
@@ -172,7 +176,7 @@ def simulate(
     """
     begin = time.perf_counter()
     total = len(angles)
-    first, iterations = equilibrium(system, start, angles[0], workspace)
+    first, iterations = equilibrium(system, start, angles[0], workspace) if settled else (start, 0)
     states = State(*[np.zeros((total,) + part.shape) for part in first])
     for part, value in zip(states, first, strict=True):
         part[0] = value

@@ -9,12 +9,13 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
+
+from ..kernels import kernel
 
 _SMALL = 1e-2  # below this squared angle the four-term series are exact to rounding
 
 
-@njit(cache=True, inline="always")
+@kernel
 def cross(a, b, out):
     """out = a x b; `out` must not alias."""
     out[0] = a[1] * b[2] - a[2] * b[1]
@@ -22,7 +23,7 @@ def cross(a, b, out):
     out[2] = a[0] * b[1] - a[1] * b[0]
 
 
-@njit(cache=True)
+@kernel
 def coefficients(angle2):
     """sin(a)/a, (1 - cos a)/a^2, (a - sin a)/a^3 and the derivatives of the last two by a^2."""
     x = angle2
@@ -43,7 +44,7 @@ def coefficients(angle2):
     return a0, a1, a2, d1, d2
 
 
-@njit(cache=True)
+@kernel
 def _polynomial(t, a, b, out):
     """out = E + a [t]x + b [t]x^2."""
     x, y, z = t[0], t[1], t[2]
@@ -59,21 +60,21 @@ def _polynomial(t, a, b, out):
     out[2, 1] = b * y * z + a * x
 
 
-@njit(cache=True)
+@kernel
 def exponential(t, out):
     """Rotation matrix of the rotation vector t (shape [3], rad) into out (shape [3, 3])."""
     a0, a1, _, _, _ = coefficients(t[0] * t[0] + t[1] * t[1] + t[2] * t[2])
     _polynomial(t, a0, a1, out)
 
 
-@njit(cache=True)
+@kernel
 def right_jacobian(t, out):
     """J_r(t) into out, shape [3, 3]; J_r(-t) is its transpose, the left Jacobian."""
     _, a1, a2, _, _ = coefficients(t[0] * t[0] + t[1] * t[1] + t[2] * t[2])
     _polynomial(t, -a1, a2, out)
 
 
-@njit(cache=True)
+@kernel
 def inverse_right_jacobian(t, out):
     """J_r(t)^-1 into out, shape [3, 3], for |t| < 2 pi."""
     x = t[0] * t[0] + t[1] * t[1] + t[2] * t[2]
@@ -85,7 +86,7 @@ def inverse_right_jacobian(t, out):
     _polynomial(t, 0.5, b, out)
 
 
-@njit(cache=True)
+@kernel
 def right_jacobian_derivative(t, b, sign, out):
     """d/dt of J_r(sign t) b into out, shape [3, 3]; sign +1 or -1."""
     _, a1, a2, d1, d2 = coefficients(t[0] * t[0] + t[1] * t[1] + t[2] * t[2])
@@ -125,7 +126,7 @@ def right_jacobian_derivative(t, b, sign, out):
     out[2, 2] += g2 * t2
 
 
-@njit(cache=True)
+@kernel
 def matrix_of(q, out):
     """Rotation matrix of the quaternion q (w, x, y, z), normalised, into out."""
     w, x, y, z = q[0], q[1], q[2], q[3]
@@ -141,7 +142,7 @@ def matrix_of(q, out):
     out[2, 2] = 1.0 - n * (x * x + y * y)
 
 
-@njit(cache=True)
+@kernel
 def turn(q, t, out):
     """out = q exp(t) as unit quaternions; renormalised, which changes it by rounding alone."""
     x2 = 0.25 * (t[0] * t[0] + t[1] * t[1] + t[2] * t[2])
@@ -159,7 +160,7 @@ def turn(q, t, out):
     out[3] = w3 * n
 
 
-@njit(cache=True)
+@kernel
 def logarithm(R, out):
     """Rotation vector of the rotation matrix R, |out| <= pi, into out."""
     # through the quaternion, largest component first, which is well conditioned at every angle
@@ -174,7 +175,7 @@ def logarithm(R, out):
         out[i] = k * q[i + 1]
 
 
-@njit(cache=True)
+@kernel
 def quaternion_of(R, out):
     """Unit quaternion (w, x, y, z), w >= 0, of the rotation matrix R into out."""
     tr = R[0, 0] + R[1, 1] + R[2, 2]

@@ -78,9 +78,7 @@ def _iterate(system: System, state: State, angle: Array, ws: Workspace, inertia:
             return component, iteration + 1
         x[:] = -blocks.res
         lam[:] = -blocks.gap
-        solve(
-            system, blocks.Lp, blocks.Hp, blocks.Nc, blocks.Jp, factors.lu, factors.pivots, factors.Z, x, lam, block
-        )
+        solve(system, blocks.Lp, blocks.Hp, blocks.Nc, blocks.Jp, factors.lu, factors.pivots, factors.Z, x, lam, block)
         size = float(np.max(np.abs(x)))
         if not np.isfinite(size):
             return bdf2._worst(system, x), iteration + 1

@@ -21,7 +21,7 @@ class System(NamedTuple):
     Attributes:
         parent: Parent of each component, shape [B], -1 for the world.
         elastic: Number of elastic coordinates, shape [B].
-        rows: Number of constraint rows of its joint: 6 (weld, motor) or 5 (free hinge), shape [B].
+        rows: Number of constraint rows of its joint: 6 (weld, motor), 5 (free hinge) or 0 (floating), shape [B].
         mass, s, Z, M3, M4, S: Inertia integrals, see `fem.Invariants`.
         axial: axial(S[j, k]) = int rho phi_j x phi_k, shape [B, R, R, 3].
         stiffness, damping: Diagonals, shape [B, R].

@@ -1,0 +1,43 @@
+"""Compiled kernels, cached on disk under a key of all their sources.
+
+numba's own cache looks at one file at a time, so a kernel compiled into its caller would go stale when only the
+kernel's file changes. The folder is named by a hash of every kernel source instead, and lies in the user's cache,
+so that an installation that cannot be written to caches as well.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from numba import config, njit
+
+from .cache import cache_folder
+
+PACKAGE = Path(__file__).parent
+
+
+@cache
+def kernel_folder() -> Path:
+    """Folder of the compiled kernels of exactly these sources."""
+    digest = hashlib.sha256()
+    for path in [Path(__file__), *sorted(PACKAGE.glob("dynamics/*.py")), *sorted(PACKAGE.glob("retarget/*.py"))]:
+        digest.update(path.read_bytes())
+    return cache_folder() / "kernels" / digest.hexdigest()[:16]
+
+
+def kernel(function: Callable[..., Any]) -> Any:
+    """Compile a function with numba when it is first called, and keep the result on disk."""
+    if os.environ.get("NUMBA_CACHE_DIR"):
+        return njit(cache=True)(function)
+    # numba picks the folder when a function is decorated; other users of numba keep theirs
+    before = config.CACHE_DIR
+    config.CACHE_DIR = str(kernel_folder())
+    try:
+        return njit(cache=True)(function)
+    finally:
+        config.CACHE_DIR = before

@@ -1,0 +1,236 @@
+"""Motor curves over time: the animator's tracks, the offset splines, the pre-roll, and the time grid they live on."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.interpolate import BSpline, CubicSpline
+from scipy.sparse import csr_matrix, diags
+
+from ..shot.animation import Track
+from ..shot.character import Array
+
+DEGREE = 3
+MAX_STEP = 1.0 / 480.0
+KNOT_SPACING = 0.05
+PRE_ROLL = 1.0
+AT_REST = 1e-3  # share of the shot's fastest motor below which a start counts as being at rest
+
+
+@dataclass(frozen=True, eq=False)
+class TimeGrid:
+    """Steps of a simulation: frames are steps, and the pre-roll is a whole number of them.
+
+    Attributes:
+        frame_times: [s], shape [f], first 0.
+        substeps: Steps in a frame.
+        pre_steps: Steps of the pre-roll, at negative times.
+        h: Step [s].
+    """
+
+    frame_times: Array
+    substeps: int
+    pre_steps: int
+    h: float
+
+    @property
+    def times(self) -> Array:
+        """Times of all instants [s], shape [T]."""
+        total = self.pre_steps + (len(self.frame_times) - 1) * self.substeps + 1
+        return (np.arange(total) - self.pre_steps) * self.h
+
+    @property
+    def frames(self) -> Array:
+        """Index of each frame among the instants, shape [f]."""
+        return self.pre_steps + self.substeps * np.arange(len(self.frame_times))
+
+    @property
+    def pre_roll(self) -> float:
+        """Length of the pre-roll [s]."""
+        return self.pre_steps * self.h
+
+
+def make_grid(frame_times: Array, step: float | None, pre_roll: float) -> TimeGrid:
+    """The grid with the largest step that divides a frame and is no longer than asked for.
+
+    Args:
+        frame_times: [s], uniform, shape [f].
+        step: Longest step [s]; None for 1/480 s, at which BDF2 keeps 10 Hz to better than a percent.
+        pre_roll: [s], rounded up to whole steps.
+    """
+    frame = float(frame_times[1] - frame_times[0])
+    substeps = max(1, math.ceil(frame / (step or MAX_STEP) - 1e-9))
+    h = frame / substeps
+    return TimeGrid(frame_times, substeps, math.ceil(pre_roll / h - 1e-9), h)
+
+
+def interpolate(track: Track, end: float) -> CubicSpline:
+    """The C2 cubic interpolant through a track's samples; constant outside them, as USD holds the value.
+
+    The end conditions are not-a-knot where the samples cover the shot, so that a spline sampled at the frames is
+    read back exactly; where the value is held before or after, the slope there is zero.
+
+    Args:
+        end: Last frame of the shot [s].
+    """
+    times, values = np.asarray(track.times, float), np.asarray(track.values, float)
+    if len(times) == 1:
+        times, values = np.array([times[0], times[0] + 1.0]), np.repeat(values, 2)
+    held_before, held_after = times[0] > 1e-9, times[-1] < end - 1e-9
+    left = (1, 0.0) if held_before else "not-a-knot"
+    right = (1, 0.0) if held_after else "not-a-knot"
+    if len(times) < 4 and not (held_before or held_after):
+        return CubicSpline(times, values, bc_type="not-a-knot")
+    if len(times) == 2 and (held_before != held_after):
+        # one condition too many for a line: both ends at rest
+        left = right = (1, 0.0)
+    return CubicSpline(times, values, bc_type=(left, right))
+
+
+def _held(spline: CubicSpline, times: Array) -> tuple[Array, Array]:
+    first, last = spline.x[0], spline.x[-1]
+    inside = np.clip(times, first, last)
+    rate = spline(inside, 1)
+    rate[(times < first) | (times > last)] = 0.0
+    return spline(inside), rate
+
+
+def _pre_roll_weights(times: Array, length: float) -> tuple[Array, Array]:
+    """Values and rates at times in [-length, 0) of the quintic that leaves rest and meets the curve at 0 in value,
+    rate and acceleration; columns multiply these three. It starts half a rate times length back, where a constant
+    acceleration would."""
+    s = (times + length) / length
+    start = 1 - 10 * s**3 + 15 * s**4 - 6 * s**5
+    rate_end = -4 * s**3 + 7 * s**4 - 3 * s**5
+    acceleration_end = 0.5 * s**3 - s**4 + 0.5 * s**5
+    value = np.stack([np.ones_like(s), length * (rate_end - 0.5 * start), length**2 * acceleration_end], axis=1)
+    d_start = (-30 * s**2 + 60 * s**3 - 30 * s**4) / length
+    d_rate = (-12 * s**2 + 28 * s**3 - 15 * s**4) / length
+    d_acceleration = (1.5 * s**2 - 4 * s**3 + 2.5 * s**4) / length
+    rate = np.stack([np.zeros_like(s), length * (d_rate - 0.5 * d_start), length**2 * d_acceleration], axis=1)
+    return value, rate
+
+
+def sample_tracks(tracks: Sequence[Track], grid: TimeGrid) -> tuple[Array, Array]:
+    """Angles [rad] and rates [rad/s] of all tracks at the grid's instants, shape [T, M], pre-roll included."""
+    times, pre = grid.times, grid.pre_steps
+    angles, rates = np.zeros((len(times), len(tracks))), np.zeros((len(times), len(tracks)))
+    for k, track in enumerate(tracks):
+        spline = interpolate(track, grid.frame_times[-1])
+        angles[pre:, k], rates[pre:, k] = _held(spline, times[pre:])
+        if pre:
+            value, rate = _pre_roll_weights(times[:pre], grid.pre_roll)
+            meet = np.array([angles[pre, k], rates[pre, k], float(spline(0.0, 2)) if spline.x[0] <= 0.0 else 0.0])
+            angles[:pre, k], rates[:pre, k] = value @ meet, rate @ meet
+    return angles, rates
+
+
+def needed_pre_roll(tracks: Sequence[Track], frame_times: Array) -> float:
+    """Length of the pre-roll [s] that a shot needs: none when it starts at rest, else a second."""
+    end = frame_times[-1]
+    fine = np.linspace(0.0, end, 4 * len(frame_times))
+    start, fastest = 0.0, 0.0
+    for track in tracks:
+        _, rate = _held(interpolate(track, end), fine)
+        start, fastest = max(start, abs(rate[0])), max(fastest, float(np.max(np.abs(rate))))
+    return 0.0 if start <= AT_REST * fastest else PRE_ROLL
+
+
+@dataclass(frozen=True, eq=False)
+class OffsetBasis:
+    """Cubic B-splines of the offsets, the same for all motors.
+
+    Attributes:
+        knots: Break points [s], frames of the shot, shape [n].
+        values, rates: Basis and its rate at the grid's instants, sparse, shape [T, P].
+        at_frames: Basis at the frames, sparse, shape [f, P].
+        penalty: Gram matrix of the second derivatives, shape [P, P] [1/s^3].
+        support: First and last time at which each basis function acts [s], shape [P, 2].
+    """
+
+    knots: Array
+    values: csr_matrix
+    rates: csr_matrix
+    at_frames: csr_matrix
+    penalty: csr_matrix
+    support: Array
+
+    @property
+    def count(self) -> int:
+        """Number of coefficients of one motor."""
+        return self.values.shape[1]
+
+
+def _breaks(frame_times: Array, spacing: float) -> Array:
+    """Knots on frames, about `spacing` apart; never the second or the last but one frame, so that samples at the
+    frames with not-a-knot ends hold the spline exactly."""
+    last = len(frame_times) - 1
+    stride = max(1, round(spacing / float(frame_times[1] - frame_times[0])))
+    inner = [k for k in range(stride, last, stride) if 2 <= k <= last - 2]
+    return frame_times[[0, *inner, last]]
+
+
+def make_basis(grid: TimeGrid, spacing: float, kept_ends: bool) -> OffsetBasis:
+    """Basis of the offsets on a grid.
+
+    Args:
+        spacing: Wanted distance of the knots [s].
+        kept_ends: Whether the offset vanishes, with its slope, at the first and last frame.
+
+    Without a pre-roll slope and curvature are zero at the start, since the system starts at rest.
+    """
+    breaks = _breaks(grid.frame_times, spacing)
+    knots = np.concatenate([np.repeat(breaks[0], DEGREE), breaks, np.repeat(breaks[-1], DEGREE)])
+    count = len(knots) - DEGREE - 1
+    eye = np.eye(count)
+    splines = BSpline(knots, eye, DEGREE)
+    merge = np.eye(count)
+    if kept_ends:
+        merge = merge[:, 2:-2]
+    elif grid.pre_steps == 0:
+        # equal first three coefficients: zero slope and curvature
+        merge = merge[:, 2:]
+        merge[:2, 0] = 1.0
+    pre, times = grid.pre_steps, grid.times
+
+    def sample(order: int) -> Array:
+        inside = np.clip(times[pre:], breaks[0], breaks[-1])
+        return splines(inside, nu=order) @ merge
+
+    values, rates = sample(0), sample(1)
+    if pre:
+        meet = np.stack([splines(0.0, nu=k) @ merge for k in range(3)])
+        value, rate = _pre_roll_weights(times[:pre], grid.pre_roll)
+        values, rates = np.vstack([value @ meet, values]), np.vstack([rate @ meet, rates])
+    # two Gauss points integrate the squared second derivative of a cubic exactly
+    width = np.diff(breaks)[:, None]
+    points = (0.5 * (breaks[:-1] + breaks[1:])[:, None] + 0.5 * width * np.array([-1, 1]) / math.sqrt(3)).ravel()
+    bend = csr_matrix(splines(points, nu=2) @ merge)
+    penalty = bend.T @ diags(np.repeat(0.5 * width.ravel(), 2)) @ bend
+    support = np.stack([knots[:count], knots[DEGREE + 1 :]], axis=1)
+    columns = [np.flatnonzero(merge[:, k]) for k in range(merge.shape[1])]
+    support = np.array([[support[rows, 0].min(), support[rows, 1].max()] for rows in columns])
+    frames = grid.frames
+    return OffsetBasis(
+        breaks, csr_matrix(values), csr_matrix(rates), csr_matrix(values[frames]), csr_matrix(penalty), support
+    )
+
+
+def coefficient_bounds(basis: OffsetBasis, grid: TimeGrid, angles: Array, lower: float, upper: float) -> Array:
+    """Bounds of one motor's coefficients that keep `angles + offset` within its limits, shape [P, 2].
+
+    A B-spline lies in the hull of its coefficients, so bounding each by the room that the input leaves over its
+    support bounds the curve at every time. Where the input itself is outside, the offset must bring it back.
+    """
+    times = grid.times
+    bounds = np.empty((basis.count, 2))
+    for k, (first, last) in enumerate(basis.support):
+        inside = angles[(times >= first - 1e-9) & (times <= last + 1e-9)]
+        low, high = lower - inside.min(), upper - inside.max()
+        if low > high:
+            low = high = 0.5 * (low + high)
+        bounds[k] = low, high
+    return bounds

@@ -1,0 +1,130 @@
+"""Reduce, simulate and retarget: hands a shot to the engine and its result back to the host."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+from calmotion.host import Operator, Property, RunContext
+from calmotion.host.values import ReducedBodies, Source
+from calmotion.shot import Animation, Character, FEMeshes, Result
+
+if TYPE_CHECKING:
+    from calmotion.retarget.run import Options
+
+
+def _nothing_flexible(data: Mapping[type, Any]) -> str | None:
+    character = data.get(Character)
+    if character is not None and not any(body.flexible for body in character.bodies):
+        return "nothing is flexible: no body has CalmFlexibleBodyAPI"
+    return None
+
+
+def _wrong_command(data: Mapping[type, Any], command: str) -> str | None:
+    source = data.get(Source)
+    return None if source is None or source.command == command else f"the command is {source.command}"
+
+
+class ReduceFlexibleBodies(Operator):
+    """Finite elements to Craig-Bampton modes, for every flexible body."""
+
+    idname = "fem.reduce"
+    label = "Reduce flexible bodies"
+    requires = (Character,)
+    uses = (FEMeshes,)
+    provides = (ReducedBodies,)
+
+    @classmethod
+    def poll(cls, data: Mapping[type, Any]) -> str | None:
+        return _nothing_flexible(data)
+
+    def execute(self, context: RunContext) -> Sequence[object]:
+        from calmotion.dynamics.topology import span_tree
+        from calmotion.retarget.bodies import mode_tables, reduce_bodies
+
+        character = context.get(Character)
+        bodies = reduce_bodies(character, span_tree(character), context.get(FEMeshes), context.progress)
+        return [ReducedBodies(tuple(bodies), mode_tables(bodies))]
+
+
+class SimulateShot(Operator):
+    """The shot as animated, on the flexible robot."""
+
+    idname = "retarget.simulate"
+    label = "Simulate the shot"
+    requires = (Character, Animation, Source)
+    uses = (ReducedBodies,)
+    provides = (Result,)
+
+    @classmethod
+    def poll(cls, data: Mapping[type, Any]) -> str | None:
+        return _wrong_command(data, "simulate")
+
+    def execute(self, context: RunContext) -> Sequence[object]:
+        from calmotion.retarget.run import simulate_shot
+
+        return [simulate_shot(*_inputs(context), _options(context), context.progress)]
+
+
+class OptimizeShot(Operator):
+    """The motor curves that make the flexible robot move as animated."""
+
+    idname = "retarget.optimize"
+    label = "Optimise the motor curves"
+    requires = (Character, Animation, Source)
+    uses = (ReducedBodies,)
+    provides = (Result,)
+    properties = (
+        Property("max_iterations", int, 30, minimum=1, description="Most Gauss-Newton iterations"),
+        Property("knot_spacing", float, -1.0, unit="s", description="Distance of the spline's knots, -1: the shot's"),
+        Property("smoothness", float, -1.0, description="Weight of the offsets' second derivative, -1: the shot's"),
+    )
+
+    @classmethod
+    def poll(cls, data: Mapping[type, Any]) -> str | None:
+        return _wrong_command(data, "optimize")
+
+    def execute(self, context: RunContext) -> Sequence[object]:
+        from calmotion.retarget.run import optimize_shot
+
+        values = context.properties
+        options = _options(
+            context,
+            max_iterations=values.max_iterations,
+            knot_spacing=values.knot_spacing if values.knot_spacing > 0.0 else None,
+            smoothness=values.smoothness if values.smoothness >= 0.0 else None,
+        )
+        return [optimize_shot(*_inputs(context), options, context.progress)]
+
+
+def _inputs(context: RunContext) -> tuple[Character, Animation, Sequence[Any] | None]:
+    reduced = context.get(ReducedBodies)
+    return context.get(Character), context.get(Animation), None if reduced is None else reduced.bodies
+
+
+def _options(context: RunContext, **more: Any) -> Options:
+    from calmotion.retarget.run import Options
+
+    source = context.get(Source)
+    return Options(
+        tolerance=source.tolerance,
+        step=source.step,
+        pre_roll=source.pre_roll,
+        integrator=source.integrator,
+        **more,
+    )
+
+
+OPERATORS = (ReduceFlexibleBodies, SimulateShot, OptimizeShot)
+
+
+def register(host: Any) -> None:
+    """Register the operators."""
+    for operator in OPERATORS:
+        host.register_operator(operator)
+
+
+def unregister(host: Any) -> None:
+    """Undo `register`."""
+    for operator in reversed(OPERATORS):
+        host.unregister_operator(operator)

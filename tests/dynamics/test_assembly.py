@@ -1,0 +1,113 @@
+"""The linearised system against central differences of its residual (identity 5)."""
+
+import numpy as np
+import pytest
+from calmotion.dynamics.assembly import allocate_work, assemble
+from calmotion.dynamics.so3 import turn
+from calmotion.dynamics.system import Blocks, Scheme, State, allocate_blocks
+from dense import dense_matrix, join, offsets, split
+from particles import particle_system, random_state
+from scipy.spatial.transform import Rotation
+
+TREES = {
+    "one rigid body": ([-1], [0], [6]),
+    "flexible chain": ([-1, 0, 1], [2, 3, 1], [6, 6, 6]),
+    "branches, hinges, rigid among flexible": ([-1, 0, 1, 0, 3], [2, 0, 3, 4, 1], [6, 5, 6, 6, 5]),
+    "two roots, one floating": ([-1, -1, 0], [2, 1, 2], [6, 0, 5]),
+}
+
+
+@pytest.mark.parametrize("name", TREES)
+@pytest.mark.parametrize("scheme", [Scheme(7.0, 5.0, 1.0, 3.0), Scheme(0.0, 0.0, 0.0, 1.0)], ids=["step", "statics"])
+def test_blocks_are_the_derivative_of_the_residual(name, scheme):
+    parents, elastic, rows = TREES[name]
+    rng = np.random.default_rng(0)
+    system, _ = particle_system(rng, parents, elastic, rows)
+    count, size = len(parents), system.size
+    state = random_state(rng, system)
+    state.lam[system.rows == 0] = 0.0
+    Vd, Hv = np.zeros((count, size)), np.zeros((count, 4, 4))
+    for b, r in enumerate(elastic):
+        Vd[b, : 6 + r] = rng.normal(size=6 + r)
+    Hv[:, 0, 0] = scheme.velocity
+    Hv[:, 1:, 1:] = rng.normal(size=(count, 3, 3)) * (scheme.velocity > 0)
+    angle, rate = rng.normal(size=(2, count))
+    work = allocate_work(system)
+
+    def evaluate(z, tangent=False, angle=angle, rate=rate):
+        x, lam = split(system, z)
+        moved = State(*[part.copy() for part in state])
+        accelerated = Vd.copy()
+        for b, r in enumerate(elastic):
+            R = Rotation.from_quat(np.roll(state.q[b], -1)).as_matrix()
+            moved.c[b] += R @ x[b, :3]
+            turn(state.q[b], x[b, 3:6], moved.q[b])
+            moved.u[b] += x[b, 6:]
+            dV = np.concatenate(
+                [scheme.velocity * R @ x[b, :3], Hv[b, 1:, 1:] @ x[b, 3:6], scheme.velocity * x[b, 6 : 6 + r]]
+            )
+            moved.V[b, : 6 + r] += dV
+            accelerated[b, : 6 + r] += scheme.acceleration * dV
+        moved.lam[:] += lam * (np.arange(6) < system.rows[:, None])
+        blocks = allocate_blocks(system)
+        assemble(
+            system,
+            scheme,
+            moved.c,
+            moved.q,
+            moved.u,
+            moved.V,
+            accelerated,
+            moved.lam,
+            angle,
+            rate,
+            Hv,
+            tangent,
+            work,
+            blocks,
+        )
+        blocks.gap[np.arange(6) >= system.rows[:, None]] = 0.0
+        return blocks
+
+    def rows_of(blocks: Blocks):
+        return join(system, blocks.res, blocks.gap)
+
+    total = offsets(system)[-1]
+    A = dense_matrix(system, evaluate(np.zeros(total), tangent=True))
+    e = 1e-5
+    expected = np.stack([(rows_of(evaluate(d)) - rows_of(evaluate(-d))) / (2 * e) for d in e * np.eye(total)], axis=1)
+    assert np.abs(A - expected).max() < 1e-8 * max(1.0, np.abs(expected).max())
+    blocks = evaluate(np.zeros(total), tangent=True)
+    for attribute, motor in (("by_angle", "angle"), ("by_rate", "rate")):
+        for b in np.flatnonzero(system.rows == 6):
+            d = e * np.eye(count)[b]
+            base = {"angle": angle, "rate": rate}
+            plus = evaluate(np.zeros(total), **{motor: base[motor] + d}).gap[b, 3:]
+            minus = evaluate(np.zeros(total), **{motor: base[motor] - d}).gap[b, 3:]
+            assert np.abs(getattr(blocks, attribute)[b] - (plus - minus) / (2 * e)).max() < 1e-8
+
+
+def test_multipliers_do_no_work_on_motions_that_the_constraints_allow():
+    """The rows by the multipliers are minus the transpose of the constraints' velocity Jacobian."""
+    rng = np.random.default_rng(1)
+    system, _ = particle_system(rng, [-1, 0], [2, 3])
+    state = random_state(rng, system)
+    zero = np.zeros((2, system.size))
+    blocks, Hv = allocate_blocks(system), np.zeros((2, 4, 4))
+    args = (state.lam, np.zeros(2), np.zeros(2), Hv)
+    scheme = Scheme(0.0, 0.0, 1.0, 0.0)
+    work = allocate_work(system)
+    assemble(system, scheme, state.c, state.q, state.u, state.V, zero, *args, True, work, blocks)
+    V = rng.normal(size=state.V.shape)
+    rows = []
+    for sign in (1.0, -1.0):
+        moved = allocate_blocks(system)
+        assemble(system, scheme, state.c, state.q, state.u, state.V + sign * V, zero, *args, False, work, moved)
+        rows.append(moved.gap)
+    change = 0.5 * (rows[0] - rows[1])
+    R = Rotation.from_quat(np.roll(state.q, -1, axis=1)).as_matrix()
+    body = V.copy()
+    body[:, :3] = np.einsum("bji,bj->bi", R, V[:, :3])
+    expected = -np.einsum("bai,ba->bi", blocks.Lc, body)
+    expected[1] -= blocks.Lp[1].T @ body[0]
+    assert np.abs(change - expected).max() < 1e-12

@@ -1,0 +1,93 @@
+"""Tangent and adjoint sweeps: transpose test, and central differences of the whole simulation (identities 6, 7)."""
+
+import numpy as np
+import pytest
+from calmotion.dynamics.kinematics import _rigid_poses
+from calmotion.dynamics.linearization import adjoint, linearize, tangent
+from calmotion.dynamics.simulation import Workspace, simulate
+from calmotion.dynamics.system import allocate_state
+from particles import particle_system
+from scipy.spatial.transform import Rotation
+
+H = 0.01
+TIMES = np.arange(0.0, 0.3 + H / 2, H)
+
+
+def rigid_start(system, angle):
+    state, count = allocate_state(system), len(system.parent)
+    c, q = np.zeros((1, count, 3)), np.zeros((1, count, 4))
+    _rigid_poses(system.parent, system.position, system.rotation, angle[None], c, q, np.zeros((count, 3, 3)))
+    state.c[:], state.q[:] = c[0], q[0]
+    return state
+
+
+def curves(p):
+    """Joint angles and rates from coefficients of shape [4, B]: harmonics, so that the start moves too."""
+    w = 3.0 + 2.0 * np.arange(4)
+    phase = np.outer(TIMES, w)
+    return np.cos(phase) @ p, (-w * np.sin(phase)) @ p
+
+
+class Case:
+    """A tree with free hinges, and a random linear functional of its motion."""
+
+    def __init__(self, rows, seed=0):
+        rng = np.random.default_rng(seed)
+        self.system, _ = particle_system(rng, [-1, 0, 1, 0], [2, 0, 3, 2], rows, stiffness=3000.0)
+        self.p = 0.3 * rng.normal(size=(4, 4))
+        self.dp = rng.normal(size=(4, 4))
+        self.ws = Workspace.for_system(self.system)
+        shape = (len(TIMES), 4)
+        self.wc, self.wq, self.wu = (rng.normal(size=shape + (k,)) for k in (3, 4, self.system.size - 6))
+
+    def simulate(self, p):
+        angles, rates = curves(p)
+        return simulate(self.system, rigid_start(self.system, angles[0]), angles, rates, H, self.ws), angles, rates
+
+    def value(self, p):
+        states = self.simulate(p)[0].states
+        return float(np.sum(self.wc * states.c) + np.sum(self.wq * states.q) + np.sum(self.wu * states.u))
+
+    def gradient(self, states):
+        """Derivative of `value` by (R^T dc, dphi, du)."""
+        shape = states.q.shape[:2]
+        R = Rotation.from_quat(np.roll(states.q.reshape(-1, 4), -1, axis=1)).as_matrix().reshape(shape + (3, 3))
+        w, x, y, z = np.moveaxis(states.q, -1, 0)
+        E = 0.5 * np.stack([[-x, -y, -z], [w, -z, y], [z, w, -x], [-y, x, w]])  # dq = E dphi
+        out = np.zeros(shape + (self.system.size,))
+        out[..., :3] = np.einsum("nbik,nbi->nbk", R, self.wc)
+        out[..., 3:6] = np.einsum("ijnb,nbi->nbj", E, self.wq)
+        out[..., 6:] = self.wu
+        return out
+
+
+@pytest.fixture(scope="module", params=[[6, 6, 6, 6], [6, 6, 5, 6]], ids=["driven", "with a free hinge"])
+def case(request):
+    case = Case(request.param)
+    trajectory, angles, rates = case.simulate(case.p)
+    lin = linearize(case.system, trajectory, angles, rates, case.ws)
+    return case, lin, case.gradient(trajectory.states)
+
+
+def test_adjoint_is_the_transpose_of_the_tangent(case):
+    case, lin, gradient = case
+    d_angle, d_rate = curves(case.dp)
+    forward = float(np.sum(tangent(lin, d_angle, d_rate) * gradient))
+    g_angle, g_rate = adjoint(lin, gradient)
+    backward = float(np.sum(g_angle * d_angle) + np.sum(g_rate * d_rate))
+    assert abs(forward - backward) < 1e-12 * abs(forward)
+
+
+def test_gradient_matches_central_differences_of_the_whole_simulation(case):
+    case, lin, gradient = case
+    g_angle, g_rate = adjoint(lin, gradient)
+    d_angle, d_rate = curves(case.dp)
+    found = float(np.sum(g_angle * d_angle) + np.sum(g_rate * d_rate))
+    e = 1e-3
+
+    def difference(e):
+        return (case.value(case.p + e * case.dp) - case.value(case.p - e * case.dp)) / (2 * e)
+
+    # Richardson extrapolation of two central differences
+    expected = (4.0 * difference(e) - difference(2 * e)) / 3.0
+    assert abs(found - expected) < 1e-7 * abs(expected)

@@ -1,0 +1,38 @@
+import dataclasses
+
+import pytest
+from arms import chain
+from calmotion import ShotError
+from calmotion.dynamics.topology import span_tree
+
+
+def test_parents_come_before_children_whatever_the_order_of_bodies_and_joints():
+    character = chain(4, flipped=(2,))
+    order = [2, 0, 3, 1]
+    place = {old: new for new, old in enumerate(order)} | {-1: -1}
+    shuffled = dataclasses.replace(
+        character,
+        bodies=tuple(character.bodies[k] for k in order),
+        joints=tuple(
+            dataclasses.replace(j, body0=place[j.body0], body1=place[j.body1]) for j in reversed(character.joints)
+        ),
+    )
+    tree = span_tree(shuffled)
+    assert [shuffled.bodies[b].path for b in tree.body] == ["/C/L0", "/C/L1", "/C/L2", "/C/L3"]
+    assert tree.parent == (-1, 0, 1, 2)
+    assert tree.flipped == (False, False, True, False)
+
+
+def test_a_loop_is_refused_with_the_joint_that_closes_it():
+    character = chain(3)
+    extra = dataclasses.replace(character.joints[0], path="/C/Closing", body0=-1, body1=2)
+    with pytest.raises(ShotError) as error:
+        span_tree(dataclasses.replace(character, joints=character.joints + (extra,)))
+    assert error.value.path in ("/C/Closing", "/C/J2", "/C/J1") and error.value.remedy
+
+
+def test_a_body_without_a_way_to_the_world_is_refused():
+    character = chain(3)
+    with pytest.raises(ShotError) as error:
+        span_tree(dataclasses.replace(character, joints=character.joints[:2]))
+    assert error.value.path == "/C/L2"

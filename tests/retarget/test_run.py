@@ -1,0 +1,100 @@
+"""The two jobs on a small arm: tenfold calmer, reproducible, within limits, honest about what it does not do."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+from calmotion import ShotError
+from calmotion.retarget.run import Options, optimize_shot, simulate_shot
+from calmotion.shot import Animation, Track
+
+OPTIONS = Options(step=1 / 240)
+
+
+def quiet(fraction, message):
+    assert 0.0 <= fraction <= 1.0 and message
+
+
+@pytest.fixture(scope="module")
+def result(arm, animation, bodies):
+    return optimize_shot(arm, animation, bodies, OPTIONS, quiet)
+
+
+def judged(simulation):
+    return simulation.position_errors[simulation.motion.times >= 0.0].max(axis=0)
+
+
+def test_error_at_the_payload_falls_at_least_tenfold(result):
+    before, after = judged(result.before), judged(result.after)
+    assert before[1] > 0.01, "the input should shake visibly"
+    assert after[1] < 0.1 * before[1]
+    assert result.objective_after < 0.01 * result.objective_before
+    values = [step.objective for step in result.steps]
+    assert all(b < a for a, b in zip(values, values[1:], strict=False))
+
+
+def test_written_curves_simulated_again_give_the_reported_errors(result, arm, animation, bodies):
+    tracks = tuple(Track(animation.frame_times, curve.frame_values) for curve in result.curves)
+    again = simulate_shot(arm, Animation(animation.frame_times, animation.tracks, tracks), bodies, OPTIONS, quiet)
+    assert np.abs(again.before.position_errors - result.after.position_errors).max() < 1e-9
+    assert np.abs(again.before.rotation_errors - result.after.rotation_errors).max() < 1e-8
+
+
+def test_optimising_the_result_again_finds_nothing_left(result, arm, animation, bodies):
+    tracks = tuple(Track(animation.frame_times, curve.frame_values) for curve in result.curves)
+    again = optimize_shot(arm, Animation(animation.frame_times, animation.tracks, tracks), bodies, OPTIONS, quiet)
+    assert again.iterations <= 2
+    assert again.objective_after <= result.objective_after * (1 + 1e-6)
+
+
+def test_joints_stay_closed_and_motors_within_their_limits(arm, animation, bodies):
+    at_frames = np.array([track.values for track in animation.tracks])
+    limits = [(float(v.min()) - 0.002, float(v.max()) + 0.002) for v in at_frames]
+    joints = tuple(
+        dataclasses.replace(joint, lower=limits[k][0], upper=limits[k][1]) if k < 2 else joint
+        for k, joint in enumerate(arm.joints)
+    )
+    tight = optimize_shot(dataclasses.replace(arm, joints=joints), animation, bodies, OPTIONS, quiet)
+    values = tight.after.motion.motor_values
+    for k, (low, high) in enumerate(limits):
+        assert values[:, k].min() >= low - 1e-9 and values[:, k].max() <= high + 1e-9
+    assert tight.objective_after < tight.objective_before
+    assert max(tight.before.max_joint_gap, tight.after.max_joint_gap) < 1e-6
+
+
+def test_locked_motors_keep_their_curves(arm, animation, bodies):
+    motors = (dataclasses.replace(arm.motors[0], optimize=False), arm.motors[1])
+    result = optimize_shot(dataclasses.replace(arm, motors=motors), animation, bodies, OPTIONS, quiet)
+    assert not result.curves[0].changed and result.curves[1].changed
+    assert np.array_equal(result.after.motion.motor_values[:, 0], result.before.motion.motor_values[:, 0])
+    assert any("/Arm/Shoulder" in row.what for row in result.left_out)
+
+
+def test_kept_ends_keep_the_first_and_last_pose(arm, animation, bodies):
+    character = dataclasses.replace(arm, retarget=dataclasses.replace(arm.retarget, endpoints="kept"))
+    result = optimize_shot(character, animation, bodies, OPTIONS, quiet)
+    for curve, track in zip(result.curves, animation.tracks, strict=True):
+        assert curve.frame_values[0] == track.values[0] and curve.frame_values[-1] == track.values[-1]
+    # the sag of the first pose cannot be removed then
+    assert judged(result.after)[1] >= 0.999 * result.before.position_errors[0, 1]
+
+
+def test_a_rigid_character_needs_no_change(arm, animation):
+    from calmotion.shot import MassProperties
+
+    mass = MassProperties(0.17, np.array([0.16, 0.0, 0.0]), 1e-3 * np.eye(3))
+    rigid = dataclasses.replace(arm, bodies=tuple(dataclasses.replace(b, flexible=None, mass=b.mass or mass) for b in arm.bodies))
+    result = simulate_shot(rigid, animation, None, OPTIONS, quiet)
+    assert judged(result.before).max() < 1e-4
+    assert any("finite elements" in row.what for row in result.left_out)
+
+
+@pytest.mark.parametrize(
+    ("change", "attribute"),
+    [({"reference": "static"}, "calm:retarget:reference"), ({"cyclic": True}, "calm:retarget:cyclic")],
+)
+def test_settings_that_are_not_there_yet_are_refused(arm, animation, bodies, change, attribute):
+    character = dataclasses.replace(arm, retarget=dataclasses.replace(arm.retarget, **change))
+    with pytest.raises(ShotError) as error:
+        simulate_shot(character, animation, bodies, OPTIONS, quiet)
+    assert error.value.attribute == attribute and error.value.path == "/Arm" and error.value.remedy
