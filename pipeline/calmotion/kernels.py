@@ -31,13 +31,25 @@ def kernel_folder() -> Path:
 
 
 def kernel(function: Callable[..., Any]) -> Any:
-    """Compile a function with numba when it is first called, and keep the result on disk."""
+    """Compile a function with numba when it is first called, and keep the result on disk.
+
+    It must not allocate: without reference counting it compiles in a fraction of the time.
+    """
+    return _compile(function, _nrt=False, no_cfunc_wrapper=True)
+
+
+def allocating_kernel(function: Callable[..., Any]) -> Any:
+    """`kernel` for a function that makes arrays."""
+    return _compile(function)
+
+
+def _compile(function: Callable[..., Any], **options: Any) -> Any:
     if os.environ.get("NUMBA_CACHE_DIR"):
-        return njit(cache=True)(function)
+        return njit(cache=True, **options)(function)
     # numba picks the folder when a function is decorated; other users of numba keep theirs
     before = config.CACHE_DIR
     config.CACHE_DIR = str(kernel_folder())
     try:
-        return njit(cache=True)(function)
+        return njit(cache=True, **options)(function)
     finally:
         config.CACHE_DIR = before

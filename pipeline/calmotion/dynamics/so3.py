@@ -10,7 +10,7 @@ import math
 
 import numpy as np
 
-from ..kernels import kernel
+from ..kernels import allocating_kernel, kernel
 
 _SMALL = 1e-2  # below this squared angle the four-term series are exact to rounding
 
@@ -160,7 +160,7 @@ def turn(q, t, out):
     out[3] = w3 * n
 
 
-@kernel
+@allocating_kernel
 def logarithm(R, out):
     """Rotation vector of the rotation matrix R, |out| <= pi, into out."""
     # through the quaternion, largest component first, which is well conditioned at every angle

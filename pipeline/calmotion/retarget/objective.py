@@ -9,11 +9,11 @@ import numpy as np
 from ..dynamics.kinematics import target_jacobians
 from ..dynamics.model import Model
 from ..dynamics.so3 import inverse_right_jacobian, logarithm, matrix_of
-from ..kernels import kernel
+from ..kernels import allocating_kernel
 from ..shot.character import Array
 
 
-@kernel
+@allocating_kernel
 def _rotation_errors(reference, actual, errors, inverse):
     """Rotation vector of R_ref^T R, and J_r^-1 of it, for quaternions of shape [T, K, 4]."""
     A = np.zeros((3, 3))
