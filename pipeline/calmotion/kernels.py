@@ -25,8 +25,10 @@ PACKAGE = Path(__file__).parent
 def kernel_folder() -> Path:
     """Folder of the compiled kernels of exactly these sources."""
     digest = hashlib.sha256()
-    for path in [Path(__file__), *sorted(PACKAGE.glob("dynamics/*.py")), *sorted(PACKAGE.glob("retarget/*.py"))]:
-        digest.update(path.read_bytes())
+    for path in sorted(PACKAGE.glob("*/*.py")):
+        source = path.read_bytes()
+        if b"kernel\ndef " in source:
+            digest.update(source)
     return cache_folder() / "kernels" / digest.hexdigest()[:16]
 
 

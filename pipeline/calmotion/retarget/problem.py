@@ -76,6 +76,13 @@ def rigid_motion(model: Model, angles: Array, rates: Array, h: float) -> RigidMo
     return RigidMotion(c, q, positions, rotations)
 
 
+def compile_kernels(model: Model, workspace: Workspace, angles: Array, rates: Array, h: float) -> None:
+    """Run every kernel once on three instants, so that compiling them is not counted as simulating."""
+    run = run_forward(model, workspace, angles[:3], rates[:3], h)
+    lin = linearize(model.system, run.trajectory, run.joint_angles, run.joint_rates, workspace)
+    adjoint(lin, tangent(lin, run.joint_angles, run.joint_rates))
+
+
 class RetargetProblem:
     """`gauss_newton.LeastSquares` over the spline coefficients of the offsets, ordered by basis function, then motor.
 

@@ -37,7 +37,7 @@ from .curves import (
 )
 from .gauss_newton import Iterate, minimize
 from .objective import Objective, Reference, rotation_errors
-from .problem import ForwardRun, RetargetProblem, RigidMotion, rigid_motion, run_forward
+from .problem import ForwardRun, RetargetProblem, RigidMotion, compile_kernels, rigid_motion, run_forward
 
 SMOOTHNESS = 1e-9
 TOLERANCE = 1e-3
@@ -207,6 +207,8 @@ def simulate_shot(
     meant, meant_rates = sample_tracks(animation.tracks, grid)
     try:
         rigid = rigid_motion(model, meant, meant_rates, grid.h)
+        progress(0.0, "compiling kernels, once")
+        run_forward(model, workspace, angles[:3], rates[:3], grid.h)
         begin = time.perf_counter()
         run = run_forward(model, workspace, angles, rates, grid.h, lambda fraction: progress(fraction, "simulating"))
         wall = time.perf_counter() - begin
@@ -310,6 +312,8 @@ def optimize_shot(
         problem = RetargetProblem(
             model, grid, angles, rates, objective, basis, motors, smoothness, gain=0.01 * tolerance
         )
+        progress(0.0, "compiling kernels, once")
+        compile_kernels(model, Workspace.for_system(model.system), angles, rates, grid.h)
         begin = time.perf_counter()
         problem.value(np.zeros(problem.size))
         before = problem.run
