@@ -1,0 +1,74 @@
+# make demo     optimise the bartender sample, and print the errors before and after
+# make test     lint, types and tests
+# make samples  build the sample characters again
+# make clean    remove what was built, and the environment
+#
+# Needs make and Python 3.11 to 3.13 with pip; PYTHON=... chooses one.
+
+SHELL := /bin/sh
+VENV ?= .venv
+RUN := $(VENV)/bin/python
+# A virtual environment does not survive being moved, so the stamps name the folder they are for.
+HERE := $(shell printf '%s' "$(CURDIR)" | cksum | cut -d' ' -f1)
+MADE := $(VENV)/.made-$(HERE)
+INSTALLED := $(VENV)/.installed-$(HERE)
+INSTALLED_DEV := $(VENV)/.installed-dev-$(HERE)
+
+CHECK := import sys, venv, ensurepip; sys.exit(not (3, 11) <= sys.version_info[:2] < (3, 14))
+PYTHON ?= $(shell for python in python3 python3.13 python3.12 python3.11 python; do \
+	command -v $$python >/dev/null 2>&1 && $$python -c '$(CHECK)' >/dev/null 2>&1 && echo $$python && break; done)
+
+export PIP_DISABLE_PIP_VERSION_CHECK := 1
+
+.PHONY: help demo test samples clean
+.DELETE_ON_ERROR:
+
+help:
+	@sed -n 's/^# \{0,1\}//p' Makefile | sed -n '1,6p'
+
+demo: $(INSTALLED)
+	@mkdir -p build
+	$(RUN) -m calmotion optimize samples/bartender/bartender.usda -o build/bartender_calm.usda \
+		--rrd build/bartender.rrd --csv build/bartender.csv
+
+# Every check runs, also when an earlier one fails, so that one run shows all there is to repair.
+test: $(INSTALLED_DEV)
+	@status=0; summary=; \
+	check() { \
+		name=$$1; shift; echo "== $$name"; \
+		if "$$@"; then summary="$$summary$$name: passed\n"; else summary="$$summary$$name: FAILED\n"; status=1; fi; \
+	}; \
+	check ruff $(RUN) -m ruff check .; \
+	check mypy $(RUN) -m mypy; \
+	check pytest $(RUN) -m pytest -n 2 -q; \
+	echo "== summary"; printf "$$summary"; exit $$status
+
+samples: $(INSTALLED)
+	@for script in samples/*/build.py; do echo "$$script"; $(RUN) "$$script" || exit 1; done
+
+clean:
+	rm -rf $(VENV) build dist .mypy_cache .pytest_cache .ruff_cache
+	find pipeline plugins samples tests -name __pycache__ -type d -prune -exec rm -rf {} +
+
+# The interpreter that the environment was made with may be gone: then it is made again.
+ifneq ($(shell $(RUN) -c 'print(1)' 2>/dev/null),1)
+.PHONY: $(MADE)
+endif
+
+$(MADE):
+	@test -n "$(PYTHON)" || { \
+		echo "error: no Python 3.11, 3.12 or 3.13 with venv and pip was found on the PATH." >&2; \
+		echo "Install one (on Debian or Ubuntu also python3-venv), or name it: make PYTHON=/path/to/python3" >&2; \
+		exit 1; }
+	$(PYTHON) -m venv --clear $(VENV)
+	@touch $@
+
+$(INSTALLED): $(MADE) pyproject.toml hatch_build.py
+	@echo "Installing Calmotion and what it needs into $(VENV); the first time this takes some minutes."
+	@$(RUN) -m pip install --quiet --editable .
+	@touch $@
+
+$(INSTALLED_DEV): $(MADE) pyproject.toml hatch_build.py
+	@echo "Installing Calmotion and what its tests need into $(VENV); the first time this takes some minutes."
+	@$(RUN) -m pip install --quiet --editable '.[dev]'
+	@touch $@ $(INSTALLED)

@@ -1,0 +1,180 @@
+"""The command line: a thin layer over the host. Imports nothing heavy, so that `--help` comes at once."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING
+
+from . import ShotError, __version__
+
+if TYPE_CHECKING:
+    from .cli_output import Output
+
+    Commands = argparse._SubParsersAction[argparse.ArgumentParser]
+
+DONE, FAILED, WRONG_USAGE, INTERRUPTED = 0, 1, 2, 130
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run a command.
+
+    Args:
+        arguments: Those after the program's name; of this process when None.
+
+    Returns:
+        0 done, 1 the shot cannot be processed, 2 wrong usage, 130 interrupted.
+    """
+    try:
+        args = _parser().parse_args(arguments)
+    except SystemExit as stop:
+        return stop.code if isinstance(stop.code, int) else WRONG_USAGE
+    from .cli_output import print_error, protected_stdout
+
+    with protected_stdout(args.json) as output:
+        try:
+            return args.command(args, output)
+        except ShotError as error:
+            from .host import SettingError
+
+            print_error(error, output)
+            return WRONG_USAGE if isinstance(error, SettingError) else FAILED
+        except KeyboardInterrupt:
+            print_error(ShotError("interrupted"), output)
+            return INTERRUPTED
+        except BrokenPipeError:
+            return FAILED
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="calmotion",
+        description="Retargets the animation of a flexible robotic character so that it does not shake.",
+        epilog="Exit status: 0 done, 1 the shot cannot be processed, 2 wrong usage, 130 interrupted.",
+    )
+    parser.add_argument("--version", action="version", version=f"calmotion {__version__}")
+    commands = parser.add_subparsers(title="commands", required=True, metavar="COMMAND")
+
+    _shot_command(commands, "inspect", _inspect, "what is in the shot, and what would be left out and why")
+    simulate = _shot_command(commands, "simulate", _simulate, "simulate as animated")
+    optimize = _shot_command(commands, "optimize", _optimize, "find motor curves that do not shake, and write them")
+    simulate.add_argument("-o", "--output", metavar="LAYER", help="USD layer to write")
+    optimize.add_argument("-o", "--output", metavar="LAYER", required=True, help="USD layer to write")
+    for command in (simulate, optimize):
+        _run_options(command)
+    _plugins_commands(commands)
+    return parser
+
+
+def _shot_command(commands: Commands, name: str, function: Callable[..., int], text: str) -> argparse.ArgumentParser:
+    command = commands.add_parser(name, help=text, description=text[0].upper() + text[1:] + ".")
+    command.set_defaults(command=function)
+    command.add_argument("shot", metavar="SHOT", help="USD file of the shot")
+    command.add_argument("--json", action="store_true", help="print one JSON object on stdout, and nothing else there")
+    command.add_argument("--quiet", action="store_true", help="print nothing but errors (and the object of --json)")
+    _plugin_options(command)
+    command.add_argument("--settings", metavar="FILE", help="TOML file with a table for each operator")
+    command.add_argument(
+        "--set",
+        metavar="NAME=VALUE",
+        action="append",
+        default=[],
+        help="set a property of an operator, such as fe.mesh.element_size=5mm; see `calmotion plugins list`",
+    )
+    return command
+
+
+def _plugin_options(command: argparse.ArgumentParser) -> None:
+    command.add_argument(
+        "--plugins", metavar="DIR", action="append", default=[], help="folder with more plugins; may be repeated"
+    )
+
+
+def _run_options(command: argparse.ArgumentParser) -> None:
+    outputs = command.add_argument_group("outputs")
+    outputs.add_argument(
+        "--bake",
+        nargs="?",
+        const="motors",
+        choices=("motors", "simulated"),
+        help="write body transforms as well: of a rigid robot with the new curves, or of the predicted motion",
+    )
+    outputs.add_argument(
+        "--samples-per-second", metavar="HZ", help="write denser samples than the frames, for linear interpolation"
+    )
+    outputs.add_argument("--csv", metavar="FILE", help="table of targets and motors, one row a time step")
+    outputs.add_argument("--rrd", metavar="FILE", help="recording for the rerun viewer")
+    outputs.add_argument("--figures", metavar="DIR", help="folder for figures")
+    model = command.add_argument_group("simulation")
+    model.add_argument("--step", metavar="TIME", type=_quantity("s"), help="time step, in s or with a unit (2ms)")
+    model.add_argument(
+        "--tolerance", metavar="LENGTH", type=_quantity("m"), help="error at the targets that does not matter (1mm)"
+    )
+    model.add_argument("--integrator", metavar="NAME", default=None, help="time integrator (default: bdf2)")
+    model.add_argument(
+        "--pre-roll", metavar="TIME", type=_quantity("s"), help="time that eases into the motion (default: automatic)"
+    )
+
+
+def _quantity(unit: str) -> Callable[[str], float]:
+    def read(text: str) -> float:
+        from .host import SettingError, parse_quantity
+
+        try:
+            value = parse_quantity(text, unit)
+        except SettingError as error:
+            raise argparse.ArgumentTypeError(str(error)) from None
+        if not 0.0 <= value < float("inf"):
+            raise argparse.ArgumentTypeError(f"{text} is out of range; it must be finite and not negative")
+        return value
+
+    return read
+
+
+def _plugins_commands(commands: Commands) -> None:
+    plugins = commands.add_parser("plugins", help="list and check plugins", description="List and check plugins.")
+    actions = plugins.add_subparsers(title="commands", required=True, metavar="COMMAND")
+    listing = actions.add_parser("list", help="every plugin, its state, its operators and their properties")
+    listing.set_defaults(command=_list_plugins)
+    _plugin_options(listing)
+    listing.add_argument("--verbose", action="store_true", help="print the traceback of a plugin that failed")
+    check = actions.add_parser("check", help="check that a plugin keeps to the rules")
+    check.set_defaults(command=_check_plugin)
+    check.add_argument("folder", metavar="DIR", help="folder of the plugin")
+    for command in (listing, check):
+        command.add_argument("--json", action="store_true", help="print one JSON object on stdout")
+
+
+def _inspect(args: argparse.Namespace, output: Output) -> int:
+    from .cli_inspect import inspect_shot
+
+    return inspect_shot(args, output)
+
+
+def _simulate(args: argparse.Namespace, output: Output) -> int:
+    from .cli_run import run_shot
+
+    return run_shot(args, "simulate", output)
+
+
+def _optimize(args: argparse.Namespace, output: Output) -> int:
+    from .cli_run import run_shot
+
+    return run_shot(args, "optimize", output)
+
+
+def _list_plugins(args: argparse.Namespace, output: Output) -> int:
+    from .cli_plugins import list_plugins
+
+    return list_plugins(args, output)
+
+
+def _check_plugin(args: argparse.Namespace, output: Output) -> int:
+    from .cli_plugins import check_plugins
+
+    return check_plugins(args, output)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,139 @@
+"""`calmotion inspect`: what is in the shot, and what would be left out and why."""
+
+from __future__ import annotations
+
+import argparse
+from typing import Any, TextIO
+
+import numpy as np
+
+from . import __version__
+from .cli_output import Output, Problem
+from .cli_progress import ProgressDisplay
+from .cli_report import left_out_row, operator_row
+from .cli_run import INTERRUPTED, carry_out, conclude, problems_of, settings_of
+from .errors import ShotError
+from .host import OutputPaths, ReducedBodies, Run, Source, open_host
+from .shot import Animation, Body, Character, ModeTable, Motor, Provenance, Track
+
+
+def inspect_shot(args: argparse.Namespace, output: Output) -> int:
+    """Read a shot and print what is in it; the exit status.
+
+    Raises:
+        ShotError: When nothing could be read.
+        SettingError: When an option or setting does not fit.
+    """
+    host = open_host(args.plugins)
+    wanted: list[type] = [Character, Animation, Provenance]
+    with ProgressDisplay(args.quiet) as display:
+        run = host.run(
+            [Source(path=args.shot, command="inspect"), OutputPaths()],
+            wanted,
+            optional=[ReducedBodies],
+            settings=settings_of(args),
+            progress=display,
+        )
+        interrupted = carry_out(run, display)
+    problems = [Problem(ShotError("interrupted"))] if interrupted else problems_of(run, wanted)
+    report = inspect_report(run) if all(run.get(kind) for kind in wanted) else {}
+    status = conclude(report, problems, output, None if args.quiet else _print)
+    return INTERRUPTED if interrupted else status
+
+
+def inspect_report(run: Run) -> dict[str, Any]:
+    """The object of `inspect --json`; SI units and radians, as the names of the keys say."""
+    character, animation, provenance = run.data[Character], run.data[Animation], run.data[Provenance]
+    reduced = run.get(ReducedBodies)
+    tables = {table.body: table for table in reduced.modes} if reduced else {}
+    names = [body.path for body in character.bodies]
+    return {
+        "command": "inspect",
+        "version": __version__,
+        "shot": provenance.shot,
+        "layers": [{"path": layer.path, "sha256": layer.sha256} for layer in provenance.layers],
+        "earlier_layers": list(provenance.earlier_layers),
+        "units": {
+            "meters_per_unit": provenance.meters_per_unit,
+            "kilograms_per_unit": provenance.kilograms_per_unit,
+            "up_axis": provenance.up_axis,
+            "time_codes_per_second": provenance.time_codes_per_second,
+            "frames_per_second": provenance.frames_per_second,
+        },
+        "frames": len(animation.frame_times),
+        "duration_s": float(animation.frame_times[-1]),
+        "character": character.path,
+        "gravity_m_s2": character.gravity,
+        "bodies": [_body(body, tables.get(index)) for index, body in enumerate(character.bodies)],
+        "joints": [
+            {
+                "path": joint.path,
+                "kind": joint.kind,
+                "body0": names[joint.body0] if joint.body0 >= 0 else "",
+                "body1": names[joint.body1] if joint.body1 >= 0 else "",
+                "lower_rad": joint.lower,
+                "upper_rad": joint.upper,
+            }
+            for joint in character.joints
+        ],
+        "motors": [
+            _motor(motor, track, character) for motor, track in zip(character.motors, animation.tracks, strict=True)
+        ],
+        "targets": [
+            {
+                "path": target.path,
+                "body": names[target.body],
+                "position_weight": target.position_weight,
+                "rotation_weight": target.rotation_weight,
+            }
+            for target in character.targets
+        ],
+        "notes": list(character.notes),
+        "left_out": [left_out_row(row) for row in run.left_out()],
+        "operators": [operator_row(row) for row in run.results],
+    }
+
+
+def _body(body: Body, table: ModeTable | None) -> dict[str, Any]:
+    report: dict[str, Any] = {
+        "path": body.path,
+        "kind": "flexible" if body.flexible else "rigid",
+        # The mesh's mass is the one that is simulated, so it beats the one of the shot.
+        "mass_kg": table.mass if table else body.mass.mass if body.mass else None,
+    }
+    if body.flexible:
+        material = body.flexible.material
+        report |= {
+            "material": material.path,
+            "youngs_modulus_pa": material.youngs_modulus,
+            "poissons_ratio": material.poissons_ratio,
+            "density_kg_m3": material.density,
+        }
+    if table:
+        report |= {"frequencies_hz": table.frequencies, "nodes": table.nodes, "elements": table.elements}
+    return report
+
+
+def _motor(motor: Motor, track: Track, character: Character) -> dict[str, Any]:
+    joint = character.joints[motor.joint]
+    speeds = np.abs(np.diff(track.values) / np.diff(track.times))
+    return {
+        "path": motor.path,
+        "attribute": motor.attribute,
+        "optimize": motor.optimize,
+        "samples": len(track.times),
+        "min_rad": float(track.values.min()),
+        "max_rad": float(track.values.max()),
+        "lower_rad": joint.lower,
+        "upper_rad": joint.upper,
+        "peak_velocity_rad_s": float(speeds.max(initial=0.0)),
+        "max_velocity_rad_s": motor.max_velocity,
+        "max_acceleration_rad_s2": motor.max_acceleration,
+        "max_torque_n_m": motor.max_torque,
+    }
+
+
+def _print(report: dict[str, Any], stream: TextIO) -> None:
+    from .cli_inspect_tables import print_inspection
+
+    print_inspection(report, stream)

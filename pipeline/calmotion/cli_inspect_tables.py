@@ -1,0 +1,80 @@
+"""The report of `calmotion inspect` as tables for a person."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, TextIO
+
+from .cli_tables import angle, console_on, print_left_out, print_table
+
+
+def print_inspection(report: dict[str, Any], stream: TextIO) -> None:
+    """Print what is in a shot."""
+    console = console_on(stream)
+    units = report["units"]
+    console.print(
+        f"{report['shot']}: {report['character']}, {report['frames']} frames, {report['duration_s']:.4g} s",
+        markup=False,
+        soft_wrap=True,
+    )
+    gravity = ", ".join(f"{component:.4g}" for component in report["gravity_m_s2"])
+    console.print(
+        f"units: {units['meters_per_unit']:g} m, {units['kilograms_per_unit']:g} kg, {units['up_axis']} up, "
+        f"{units['time_codes_per_second']:g} time codes and {units['frames_per_second']:g} frames a second; "
+        f"gravity ({gravity}) m/s²"
+    )
+    for layer in report["earlier_layers"]:
+        console.print(f"carries an optimised layer: {layer}", soft_wrap=True)
+    bodies = [_body_row(body) for body in report["bodies"]]
+    print_table(console, "Bodies", ["body", "kind", "mass", "elements", "frequencies"], bodies, texts=2)
+    print_table(
+        console,
+        "Joints",
+        ["joint", "kind", "body 0", "body 1"],
+        [[j["path"], j["kind"], j["body0"] or "world", j["body1"] or "world"] for j in report["joints"]],
+        texts=4,
+    )
+    print_table(
+        console,
+        "Motors",
+        ["motor", "track", "limits", "peak speed", "speed limit", "torque limit", "optimised"],
+        [_motor_row(motor) for motor in report["motors"]],
+    )
+    print_table(
+        console,
+        "Targets",
+        ["target", "body", "position weight", "rotation weight"],
+        [[t["path"], t["body"], f"{t['position_weight']:g}", f"{t['rotation_weight']:g}"] for t in report["targets"]],
+        texts=2,
+    )
+    print_left_out(console, report["left_out"])
+    for note in report["notes"]:
+        console.print(f"note: {note}")
+
+
+def _body_row(body: dict[str, Any]) -> list[str]:
+    frequencies = [f"{value:.4g}" for value in body.get("frequencies_hz", ())]
+    shown = ", ".join(frequencies[:6]) + (", ..." if len(frequencies) > 6 else "")
+    return [
+        body["path"],
+        body["kind"],
+        "-" if body["mass_kg"] is None else f"{body['mass_kg']:.4g} kg",
+        str(body.get("elements", "-")),
+        f"{shown} Hz" if shown else "-",
+    ]
+
+
+def _motor_row(motor: dict[str, Any]) -> list[str]:
+    return [
+        motor["path"],
+        f"{angle(motor['min_rad'])} .. {angle(motor['max_rad'])}",
+        f"{angle(motor['lower_rad'])} .. {angle(motor['upper_rad'])}",
+        f"{angle(motor['peak_velocity_rad_s'])}/s",
+        _limit(motor["max_velocity_rad_s"], f"{angle(motor['max_velocity_rad_s'])}/s"),
+        _limit(motor["max_torque_n_m"], f"{motor['max_torque_n_m']:.4g} N m"),
+        "yes" if motor["optimize"] else "no",
+    ]
+
+
+def _limit(value: float, text: str) -> str:
+    return text if math.isfinite(value) else "-"

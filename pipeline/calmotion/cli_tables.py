@@ -1,0 +1,82 @@
+"""Reports as tables for a person."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any, TextIO
+
+from rich.console import Console
+from rich.table import Table
+
+
+def length(meters: float | None) -> str:
+    """A length or error as text in mm; `-` when it is not known."""
+    return "-" if meters is None or not math.isfinite(meters) else f"{1000.0 * meters:.4g} mm"
+
+
+def angle(radians: float | None) -> str:
+    """An angle as text in degrees; `-` when there is none."""
+    return "-" if radians is None or not math.isfinite(radians) else f"{math.degrees(radians):.4g}°"
+
+
+def print_table(
+    console: Console, title: str, columns: Sequence[str], rows: Sequence[Sequence[str]], texts: int = 1
+) -> None:
+    """Print a table whose first `texts` columns are text and whose others are numbers; nothing without rows."""
+    if not rows:
+        return
+    table = Table(title=title, title_justify="left", title_style="bold")
+    for index, column in enumerate(columns):
+        # Prim paths stand alone on their line rather than being cut: a reader copies them.
+        table.add_column(column, justify="left" if index < texts else "right", overflow="fold")
+    for row in rows:
+        table.add_row(*row)
+    console.print(table)
+
+
+def console_on(stream: TextIO) -> Console:
+    """A console on a stream; wide in a file, where nothing needs to be folded."""
+    return Console(file=stream, highlight=False, markup=False, width=None if stream.isatty() else 200)
+
+
+def print_left_out(console: Console, rows: Sequence[dict[str, Any]]) -> None:
+    """What was left out and why."""
+    for row in rows:
+        error = row["estimated_error_m"]
+        cost = "" if error is None else f" (error about {length(error)})"
+        console.print(f"left out: {row['what']}: {row['why']}{cost}")
+
+
+def print_run(report: dict[str, Any], stream: TextIO) -> None:
+    """The report of `simulate` or `optimize`."""
+    console = console_on(stream)
+    optimized = "objective_after" in report
+    suffixes = ["_before", "_after"] if optimized else [""]
+    heads = [f"{kind}{' ' + s[1:] if s else ''}" for kind in ("max", "rms") for s in suffixes]
+    for title, unit, shown in (("Position", "m", length), ("Rotation", "rad", angle)):
+        name = "error" if unit == "m" else "rotation_error"
+        keys = [f"{kind}_{name}{suffix}_{unit}" for kind in ("max", "rms") for suffix in suffixes]
+        rows = [[target["path"], *(shown(target[key]) for key in keys)] for target in report["targets"]]
+        print_table(console, f"{title} error of the targets", ["target", *heads], rows)
+    if optimized:
+        console.print(
+            f"objective {report['objective_before']:.6g} -> {report['objective_after']:.6g} in {report['iterations']} "
+            f"iterations, {report['forward_simulations']} simulations, {report['linearized_sweeps']} linearized "
+            f"sweeps, {report['wall_s']:.2f} s"
+        )
+        kept = [motor["path"] for motor in report["motors"] if not motor["changed"]]
+        if kept:
+            console.print(f"motors that did not change: {', '.join(kept)}")
+    console.print(
+        f"{report['steps']} steps of {1000 * report['step_s']:.4g} ms, {report['dof']} coordinates, "
+        f"{report['modes']} of them elastic; {report['total_wall_s']:.1f} s in all"
+    )
+    print_left_out(console, report["left_out"])
+    for note in report["notes"]:
+        console.print(f"note: {note}")
+    for name in ("layer", "root_layer", "rrd", "csv"):
+        if report[name]:
+            console.print(f"wrote {report[name]}", soft_wrap=True)
+    for figure in report["figures"]:
+        console.print(f"wrote {figure}", soft_wrap=True)

@@ -1,0 +1,110 @@
+"""How much of a body a joint holds when nobody says: the end face that it sits on, else a measured radius."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..shot.character import Array, IntArray
+from .assembly import QuadraticMesh
+from .nearness import ray_length
+
+_DIRECTIONS = 16  # rays across the body that find its width at an anchor
+_FLAT_COSINE = np.cos(np.radians(10.0))  # a tetrahedraliser may tilt the triangles of a plane by a few degrees
+_FLAT_OFFSET = 3e-3  # and move its corners by about a thousandth of the body
+
+
+def end_face(
+    mesh: QuadraticMesh, center: Array, triangles: Array, closest: Array, gaps: Array, room: float
+) -> IntArray:
+    """Nodes of the flat end face that an anchor lies on; empty where there is none.
+
+    A joint in the middle of the end of a link holds all of that end, as a flange does, and nothing of its sides:
+    this is the clamped beam of the text books. A face is an end when the body is deeper behind it than the face is
+    wide, measured from the anchor.
+
+    Args:
+        mesh: Of the body.
+        center: Anchor [m], shape [3].
+        triangles: Surface [m], shape [k, 3, 3], outward, in the order of `mesh.surface`.
+        closest, gaps: Closest point of each triangle to the anchor [m], shape [k, 3], and its distance, shape [k].
+        room: Distance to the next anchor [m].
+    """
+    from scipy.sparse import coo_matrix
+    from scipy.sparse.csgraph import connected_components
+
+    none = np.zeros(0, dtype=np.int32)
+    size = float(np.linalg.norm(np.ptp(mesh.nodes, axis=0)))
+    nearest = int(gaps.argmin())
+    if gaps[nearest] > _FLAT_OFFSET * size:
+        return none
+    normal = _touched_normal(triangles, gaps, size)
+    own = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+    own /= np.maximum(np.linalg.norm(own, axis=1, keepdims=True), np.finfo(float).tiny)
+    off_plane = np.abs((triangles - center) @ normal).max(axis=1)
+    flat = np.flatnonzero((own @ normal > _FLAT_COSINE) & (off_plane <= _FLAT_OFFSET * size))
+    if nearest not in flat:
+        return none
+    corners = mesh.surface[flat, :3]
+    links = (np.repeat(np.arange(len(flat)), 3), corners.ravel())
+    graph = coo_matrix((np.ones(len(links[0])), links), shape=(len(flat), len(mesh.nodes)))
+    label = connected_components(graph @ graph.T, directed=False)[1]
+    face = flat[label == label[np.searchsorted(flat, nearest)]]
+    extent = float(np.linalg.norm(triangles[face] - center, axis=-1).max())
+    depth = _depth(closest[nearest], normal, triangles, size)
+    if extent > min(0.5 * depth, room):
+        return none
+    return np.unique(mesh.surface[face])
+
+
+def automatic_radius(center: Array, triangles: Array, closest: Array, gaps: Array, room: float) -> float:
+    """A radius that holds the body at an anchor without stiffening what is beside it [m].
+
+    On the surface it is the local half width of the body: going inward, the first depth d at which the narrowest
+    half width w across (rays in planes parallel to the surface) is at most 2 d, or the whole depth on a plate. Off the
+    surface (on the axis of a bore, inside a socket) the patch is a band of that height around the anchor. Never more
+    than 0.45 of the distance to the next anchor.
+
+    Args:
+        center: Anchor [m], shape [3].
+        triangles: Surface [m], shape [k, 3, 3], outward.
+        closest, gaps: Closest point of each triangle to the anchor [m], shape [k, 3], and its distance, shape [k].
+        room: Distance to the next anchor [m].
+    """
+    gap = float(gaps.min())
+    size = float(np.linalg.norm(np.ptp(triangles.reshape(-1, 3), axis=0)))
+    normal = _touched_normal(triangles, gaps, size)
+    surface = closest[int(gaps.argmin())]
+    eps = 1e-6 * size
+    depth = _depth(surface, normal, triangles, size)
+    across = np.linalg.svd(normal[None])[2][1:]
+    width = depth
+    d = max(1e-3 * depth, 10.0 * eps)
+    while d <= 0.5 * depth:
+        half = _half_width(surface - d * normal, across, triangles)
+        if half <= 2.0 * d:
+            width = half
+            break
+        d *= 1.25
+    radius = max(1.25 * gap, float(np.hypot(gap, width)))
+    return min(radius, max(0.45 * room, 1.25 * gap))
+
+
+def _half_width(start: Array, across: Array, triangles: Array) -> float:
+    angles = 2.0 * np.pi * np.arange(_DIRECTIONS) / _DIRECTIONS
+    rays = np.stack([np.cos(angles), np.sin(angles)], axis=1) @ across
+    lengths = np.array([ray_length(start, ray, triangles, 0.0) for ray in rays])
+    # opposite rays together: an anchor at an edge has no width on one side of it
+    return 0.5 * float(lengths.reshape(2, -1).sum(axis=0).min())
+
+
+def _touched_normal(triangles: Array, gaps: Array, size: float) -> Array:
+    """Outward unit normal where the anchor is nearest, the mean by area of the triangles that meet there."""
+    touched = triangles[gaps <= gaps.min() + 1e-9 * size]
+    normal = np.cross(touched[:, 1] - touched[:, 0], touched[:, 2] - touched[:, 0]).sum(axis=0)
+    return normal / max(float(np.linalg.norm(normal)), np.finfo(float).tiny)
+
+
+def _depth(surface: Array, normal: Array, triangles: Array, size: float) -> float:
+    """How far the body reaches inward from a point of its surface [m]."""
+    depth = ray_length(surface, -normal, triangles, 1e-6 * size)
+    return depth if np.isfinite(depth) else size

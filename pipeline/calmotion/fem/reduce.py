@@ -1,0 +1,113 @@
+"""From a tetrahedral mesh to the reduced body that the dynamics steps."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ..errors import ShotError
+from ..shot.character import Array, Body, ElasticMaterial, SurfaceMesh
+from ..shot.meshes import FEMesh
+from .assembly import QuadraticMesh, assemble
+from .craig_bampton import Basis, reduced_basis
+from .embedding import embed
+from .integrals import inertia_integrals
+from .interfaces import Anchor, Patch, interface_patches
+from .reduced_body import Marker, ReducedBody
+
+__all__ = ["Anchor", "modal_damping", "reduce_body"]
+
+
+def reduce_body(
+    mesh: FEMesh, body: Body, anchors: Sequence[Anchor], surfaces: Sequence[SurfaceMesh], root: int
+) -> ReducedBody:
+    """Reduces one flexible body.
+
+    The body frame is the prim frame as carried by the root's patch, which is clamped: every mode vanishes there.
+    The patches of the other interfaces move as rigid ones; at their markers Phi and Psi are that motion exactly. At
+    point anchors they are the displacement and half the curl of the nearest element.
+
+    Args:
+        mesh: Tetrahedra of the body.
+        body: With `flexible` settings. A `mass` scales the density so that the mesh weighs as much.
+        anchors: Where joints attach and targets are, body frame.
+        surfaces: To be skinned, body frame.
+        root: Index of the anchor of the parent-side joint; of kind `interface`.
+
+    Returns:
+        The reduced body, markers in the order of the anchors, skins in the order of the surfaces.
+
+    Raises:
+        ShotError: An elasticity that is not supported, a material that is none, or an anchor off the body.
+
+    Source: Seed (11)-(20); formulation, section 1.
+    """
+    settings = body.flexible
+    if settings is None:
+        raise ShotError("is not a flexible body", path=body.path, remedy="Apply CalmFlexibleBodyAPI")
+    if settings.elasticity in ("stvk", "neohookean"):
+        raise ShotError(
+            "this elasticity is not supported yet", path=body.path, attribute="calm:flexible:elasticity",
+            found=settings.elasticity, remedy="Use auto or linear",
+        )  # fmt: skip
+    _check_material(settings.material)
+    model = assemble(mesh.points, mesh.tets, settings.material, None if body.mass is None else body.mass.mass)
+    patches = interface_patches(model.mesh, anchors, settings.interface_radius, body.path)
+    held = next((patch for patch in patches if root in patch.anchors), None)
+    if held is None:
+        raise ShotError(
+            "a flexible body needs a joint that carries it",
+            path=body.path, remedy="Join it to its parent or to the world with a PhysicsJoint",
+        )  # fmt: skip
+    moving = [patch for patch in patches if patch is not held]
+    centers = [anchors[patch.anchors[0]].frame.position for patch in moving]
+    basis = reduced_basis(model, held.nodes, [patch.nodes for patch in moving], centers, settings)
+    return ReducedBody(
+        invariants=inertia_integrals(model.mesh.nodes, model.mass, basis.modes),
+        stiffness=basis.omega_squared,
+        damping=modal_damping(basis.omega_squared, settings.material),
+        markers=_markers(model.mesh, anchors, moving, basis),
+        skin=tuple(embed(model.mesh, surface.points).displacements(basis.modes) for surface in surfaces),
+        nodes=len(model.mesh.nodes),
+        elements=len(model.mesh.tets),
+    )
+
+
+def modal_damping(omega_squared: Array, material: ElasticMaterial) -> Array:
+    """Diagonal of the reduced damping [1/s]: 2 zeta omega, or a + b omega^2 (Rayleigh)."""
+    if material.rayleigh is not None:
+        a, b = material.rayleigh
+        return a + b * omega_squared
+    return 2.0 * material.damping_ratio * np.sqrt(np.maximum(omega_squared, 0.0))
+
+
+def _markers(
+    mesh: QuadraticMesh, anchors: Sequence[Anchor], moving: Sequence[Patch], basis: Basis
+) -> tuple[Marker, ...]:
+    r = len(basis.omega_squared)
+    points = [i for i, anchor in enumerate(anchors) if anchor.kind != "interface"]
+    tied = embed(mesh, np.array([anchors[i].frame.position for i in points]).reshape(-1, 3))
+    Phi, Psi = np.zeros((len(anchors), 3, r)), np.zeros((len(anchors), 3, r))
+    if points:
+        Phi[points], Psi[points] = tied.displacements(basis.modes), tied.rotations(basis.modes)
+    for patch, motion in zip(moving, basis.patch_motion, strict=True):
+        for i in patch.anchors:
+            Phi[i], Psi[i] = motion[:3], motion[3:]
+    return tuple(
+        Marker(position=a.frame.position, rotation=a.frame.rotation, Phi=Phi[i], Psi=Psi[i])
+        for i, a in enumerate(anchors)
+    )
+
+
+def _check_material(material: ElasticMaterial) -> None:
+    for value, low, high, name, meaning in (
+        (material.youngs_modulus, 0.0, np.inf, "physics:youngsModulus", "must be positive"),
+        (material.poissons_ratio, -1.0, 0.5, "physics:poissonsRatio", "must be between -1 and 0.5"),
+        (material.density, 0.0, np.inf, "physics:density", "must be positive"),
+    ):
+        if not low < value < high:
+            raise ShotError(
+                f"of an elastic material {meaning}", path=material.path, attribute=name, found=value,
+                remedy="Author a physical value in stage units",
+            )  # fmt: skip

@@ -1,0 +1,46 @@
+"""The host of plugins: it finds and registers them, orders their operators by data, and runs what is needed."""
+
+from .errors import HostError, PlanError, PluginError, SettingError
+from .manifest import Manifest, read_manifest
+from .operators import Operator, Record, RunContext
+from .plan import Plan
+from .properties import Property, PropertyValues
+from .registry import Host, Plugin, PluginState, open_host
+from .run import OperatorResult, Outcome, Run
+from .settings import Settings, merge, read_assignment, read_settings_file
+from .units import parse_quantity
+from .values import CsvFile, Figures, OutputPaths, Recording, ReducedBodies, Source, WrittenLayer
+
+__all__ = [
+    "CsvFile",
+    "Figures",
+    "Host",
+    "HostError",
+    "Manifest",
+    "Operator",
+    "OperatorResult",
+    "Outcome",
+    "OutputPaths",
+    "Plan",
+    "PlanError",
+    "Plugin",
+    "PluginError",
+    "PluginState",
+    "Property",
+    "PropertyValues",
+    "Record",
+    "Recording",
+    "ReducedBodies",
+    "Run",
+    "RunContext",
+    "SettingError",
+    "Settings",
+    "Source",
+    "WrittenLayer",
+    "merge",
+    "open_host",
+    "parse_quantity",
+    "read_assignment",
+    "read_manifest",
+    "read_settings_file",
+]

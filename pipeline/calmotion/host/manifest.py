@@ -1,0 +1,152 @@
+"""The static description of a plugin, `plugin.toml`, read without importing anything of the plugin."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from .errors import PluginError
+
+FILE_NAME = "plugin.toml"
+_TEXTS = ("id", "version", "name", "tagline", "maintainer", "license", "calmotion")
+_LISTS = ("tags", "requires")
+
+
+@dataclass(frozen=True)
+class Manifest:
+    """What `plugin.toml` says.
+
+    Attributes:
+        id: Name of the plugin's folder.
+        version: Its version.
+        name, tagline: For lists.
+        maintainer, license: Whom to ask, and the SPDX identifier.
+        tags: For lists.
+        calmotion: Range of Calmotion versions it works with, such as `>=0.1`.
+        requires: Python distributions it needs, such as `trimesh>=4`.
+    """
+
+    id: str
+    version: str
+    name: str
+    tagline: str
+    maintainer: str
+    license: str
+    tags: tuple[str, ...]
+    calmotion: str
+    requires: tuple[str, ...]
+
+
+def read_manifest(folder: Path) -> Manifest:
+    """The manifest of the plugin in `folder`.
+
+    Raises:
+        PluginError: When the file is missing, is not TOML, or a field is missing, unknown or wrong.
+    """
+    file = folder / FILE_NAME
+    try:
+        fields = tomllib.loads(file.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise PluginError("the manifest cannot be read", path=str(file), found=error.strerror) from error
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise PluginError("the manifest is not valid TOML", path=str(file), found=error) from error
+    _check_fields(fields, file)
+    lists: dict[str, Any] = {key: tuple(fields[key]) for key in _LISTS}
+    manifest = Manifest(**fields | lists)
+    _check_values(manifest, file)
+    return manifest
+
+
+def _check_fields(fields: dict[str, Any], file: Path) -> None:
+    for key in fields:
+        if key not in _TEXTS + _LISTS:
+            known = ", ".join(_TEXTS + _LISTS)
+            raise PluginError("unknown field", path=str(file), attribute=key, remedy=f"The fields are {known}.")
+    for key in _TEXTS + _LISTS:
+        if key not in fields:
+            raise PluginError("a field is missing", path=str(file), attribute=key, remedy="Add it.")
+        value = fields[key]
+        if key in _TEXTS and not (isinstance(value, str) and value.strip()):
+            raise PluginError("must be a text that is not empty", path=str(file), attribute=key, found=repr(value))
+        if key in _LISTS and not (isinstance(value, list) and all(isinstance(v, str) for v in value)):
+            raise PluginError("must be a list of texts", path=str(file), attribute=key, found=repr(value))
+
+
+def _check_values(manifest: Manifest, file: Path) -> None:
+    from packaging.requirements import InvalidRequirement, Requirement
+    from packaging.specifiers import InvalidSpecifier, SpecifierSet
+    from packaging.version import InvalidVersion, Version
+
+    if not re.fullmatch(r"[a-z][a-z0-9_]*", manifest.id):
+        raise PluginError(
+            "must be a small Python name", path=str(file), attribute="id", found=manifest.id, remedy="Use a-z, 0-9, _."
+        )
+    if manifest.id != file.parent.name:
+        raise PluginError(
+            f"must be the folder's name, {file.parent.name}", path=str(file), attribute="id", found=manifest.id
+        )
+    if "\n" in manifest.tagline:
+        raise PluginError("must be one line", path=str(file), attribute="tagline", found=repr(manifest.tagline))
+    try:
+        Version(manifest.version)
+    except InvalidVersion:
+        raise PluginError(
+            "is not a version", path=str(file), attribute="version", found=manifest.version, remedy="Write 0.1.0."
+        ) from None
+    try:
+        SpecifierSet(manifest.calmotion)
+    except InvalidSpecifier:
+        raise PluginError(
+            "is not a range of versions",
+            path=str(file),
+            attribute="calmotion",
+            found=manifest.calmotion,
+            remedy='Write ">=0.1".',
+        ) from None
+    for requirement in manifest.requires:
+        try:
+            Requirement(requirement)
+        except InvalidRequirement:
+            raise PluginError(
+                "is not a Python requirement",
+                path=str(file),
+                attribute="requires",
+                found=requirement,
+                remedy='Write "trimesh>=4".',
+            ) from None
+
+
+def check_requirements(manifest: Manifest, calmotion_version: str) -> None:
+    """Check what the plugin needs against what is installed, without importing it.
+
+    Raises:
+        PluginError: When this Calmotion or an installed distribution does not fit, or one is missing.
+    """
+    from importlib.metadata import PackageNotFoundError, version
+
+    from packaging.requirements import Requirement
+    from packaging.specifiers import SpecifierSet
+
+    if not SpecifierSet(manifest.calmotion).contains(calmotion_version, prereleases=True):
+        raise PluginError(
+            f"the plugin needs Calmotion {manifest.calmotion}",
+            path=manifest.id,
+            found=calmotion_version,
+            remedy="Install versions of the two that fit.",
+        )
+    for text in manifest.requires:
+        requirement = Requirement(text)
+        if requirement.marker and not requirement.marker.evaluate():
+            continue
+        remedy = f"Install it: pip install '{text}'."
+        try:
+            found = version(requirement.name)
+        except PackageNotFoundError:
+            raise PluginError(
+                f"the plugin needs {text}", path=manifest.id, found="not installed", remedy=remedy
+            ) from None
+        if not requirement.specifier.contains(found, prereleases=True):
+            raise PluginError(f"the plugin needs {text}", path=manifest.id, found=found, remedy=remedy)

@@ -1,0 +1,144 @@
+"""What an operator is: the step that a plugin adds, and what it sees while it runs."""
+
+from __future__ import annotations
+
+import inspect
+import re
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, ClassVar, TypeVar
+
+from .errors import PluginError
+from .properties import Property, PropertyValues
+
+T = TypeVar("T")
+LEVELS = ("info", "warning")
+
+
+@dataclass(frozen=True)
+class Record:
+    """Something an operator reports to the user; `level` is `info` or `warning`."""
+
+    level: str
+    text: str
+
+
+@dataclass
+class RunContext:
+    """What an operator sees while it runs.
+
+    Attributes:
+        operator: The operator's class.
+        data: Type to value: everything that is known when it starts.
+        properties: Values of its properties.
+        on_progress: Called with a fraction in 0..1 and a message.
+        records: What it reported so far.
+    """
+
+    operator: type[Operator]
+    data: Mapping[type, Any]
+    properties: PropertyValues
+    on_progress: Callable[[float, str], None] = lambda fraction, message: None
+    records: list[Record] = field(default_factory=list)
+
+    def get(self, kind: type[T]) -> T:
+        """The value of a type; None for one of `uses` that nobody provided.
+
+        Raises:
+            PluginError: When the operator does not declare the type, since the order then does not know of it.
+        """
+        if kind not in self.operator.requires + self.operator.uses:
+            raise PluginError(
+                f"operator {self.operator.idname} reads {kind.__name__}, which it does not declare",
+                remedy="Add the type to its `requires` or `uses`.",
+            )
+        return self.data.get(kind)  # type: ignore[return-value]
+
+    def progress(self, fraction: float, message: str = "") -> None:
+        """Say how far the operator is, 0..1."""
+        self.on_progress(min(max(float(fraction), 0.0), 1.0), message)
+
+    def report(self, level: str, text: str) -> None:
+        """Tell the user something; `level` is `info` or `warning`."""
+        if level not in LEVELS:
+            raise PluginError("unknown level of a report", found=level, remedy=f"Use one of {', '.join(LEVELS)}.")
+        self.records.append(Record(level, text))
+
+
+class Operator:
+    """Base of the operators that plugins register.
+
+    Attributes:
+        idname: Unique name with a dot, such as `fe.mesh`.
+        label: What it does, in a few words, for progress and lists.
+        requires: Types that must exist before it runs.
+        uses: Types that are made first where some operator provides them and its poll says yes.
+        provides: Types that it makes.
+        properties: What can be set.
+    """
+
+    idname: ClassVar[str] = ""
+    label: ClassVar[str] = ""
+    requires: ClassVar[tuple[type, ...]] = ()
+    uses: ClassVar[tuple[type, ...]] = ()
+    provides: ClassVar[tuple[type, ...]] = ()
+    properties: ClassVar[tuple[Property, ...]] = ()
+
+    @classmethod
+    def poll(cls, data: Mapping[type, Any]) -> str | None:
+        """None when it runs on this data, else the reason why it is left out, as a clause for the user."""
+        return None
+
+    def execute(self, context: RunContext) -> Sequence[object]:
+        """Make the values it provides, in the order of `provides`."""
+        raise NotImplementedError
+
+
+def check_operator(cls: object) -> None:
+    """Check that a class is a well-formed operator.
+
+    Raises:
+        PluginError: The message says what is wrong with which operator.
+    """
+    if not (isinstance(cls, type) and issubclass(cls, Operator)):
+        raise PluginError("only classes derived from calmotion.host.Operator can be registered", found=repr(cls))
+    name = cls.idname if isinstance(cls.idname, str) and cls.idname else cls.__name__
+
+    def refuse(problem: str, found: object = None, remedy: str = "") -> None:
+        raise PluginError(problem, path=f"operator {name}", found=found, remedy=remedy)
+
+    if not (isinstance(cls.idname, str) and re.fullmatch(r"[a-z][a-z0-9_]*(\.[a-z][a-z0-9_]*)+", cls.idname)):
+        refuse("idname must be small names with dots between", repr(cls.idname), "Write one like fe.mesh.")
+    if not (isinstance(cls.label, str) and cls.label.strip()):
+        refuse("label is empty", remedy="Say in a few words what it does.")
+    for attribute in ("requires", "uses", "provides"):
+        kinds = getattr(cls, attribute)
+        if not (isinstance(kinds, tuple) and all(isinstance(kind, type) for kind in kinds)):
+            refuse(f"{attribute} must be a tuple of types", repr(kinds))
+        if len(set(kinds)) != len(kinds):
+            refuse(f"{attribute} names a type twice", repr(kinds))
+    if not cls.provides:
+        refuse("provides is empty", remedy="An operator makes at least one value.")
+    both = set(cls.provides) & set(cls.requires + cls.uses) | set(cls.requires) & set(cls.uses)
+    if both:
+        refuse("a type stands in two of requires, uses and provides", ", ".join(sorted(k.__name__ for k in both)))
+    if not (isinstance(cls.properties, tuple) and all(isinstance(p, Property) for p in cls.properties)):
+        refuse("properties must be a tuple of Property", repr(cls.properties))
+    if len({p.name for p in cls.properties}) != len(cls.properties):
+        refuse("two properties have the same name", ", ".join(p.name for p in cls.properties))
+    for declared in cls.properties:
+        try:
+            declared.check()
+        except PluginError as error:
+            refuse(error.problem, error.found, error.remedy)
+    if cls.execute is Operator.execute:
+        refuse("execute is missing")
+    for method, arguments in (("poll", [{}]), ("execute", [None, None])):
+        try:
+            inspect.signature(getattr(cls, method)).bind(*arguments)
+        except TypeError as error:
+            refuse(f"{method} has a wrong signature: {error}", remedy="See calmotion.host.Operator.")
+    try:
+        inspect.signature(cls).bind()
+    except TypeError:
+        refuse("the class cannot be made without arguments")

@@ -1,0 +1,117 @@
+"""Ordering operators by what they require and provide."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from graphlib import CycleError, TopologicalSorter
+
+from .errors import PlanError
+from .operators import Operator
+
+Operators = Sequence[type[Operator]]
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What runs, in order.
+
+    Attributes:
+        operators: Every operator that the wanted types may need, providers before users.
+        wanted: Types that must come out.
+        optional: Types that are made where they can be.
+    """
+
+    operators: tuple[type[Operator], ...]
+    wanted: tuple[type, ...]
+    optional: tuple[type, ...]
+
+
+def make_plan(
+    operators: Operators,
+    given: Sequence[type],
+    wanted: Sequence[type],
+    optional: Sequence[type] = (),
+    broken: Sequence[str] = (),
+) -> Plan:
+    """Choose the operators that the wanted types need, and order them.
+
+    Args:
+        operators: All there are.
+        given: Types whose values are known already.
+        wanted: Types that must come out.
+        optional: Types that are made where some operator can.
+        broken: Plugins that failed, for the message when something is missing.
+
+    Raises:
+        PlanError: When a wanted type cannot be made (naming what is missing), or operators need each other in
+            a circle (naming it).
+    """
+    needed = _closure(operators, given, [*wanted, *optional])
+    order = _sort(needed)
+    able: list[type[Operator]] = []
+    known = set(given)
+    for cls in order:
+        if known.issuperset(cls.requires):
+            able.append(cls)
+            known.update(cls.provides)
+    for kind in wanted:
+        if kind not in known:
+            raise _missing(kind, needed, known, broken)
+    # Without what cannot run, others may no longer be needed.
+    kept = set(_closure(able, given, [*wanted, *optional]))
+    return Plan(tuple(cls for cls in able if cls in kept), tuple(wanted), tuple(optional))
+
+
+def _closure(operators: Operators, given: Sequence[type], kinds: Sequence[type]) -> list[type[Operator]]:
+    """Every operator that some of the types may need; those of earlier types first."""
+    needed: list[type[Operator]] = []
+    seen = set(given)
+    queue = list(kinds)
+    while queue:
+        kind = queue.pop(0)
+        if kind in seen:
+            continue
+        seen.add(kind)
+        for cls in operators:
+            if kind in cls.provides and cls not in needed:
+                needed.append(cls)
+                queue += cls.requires + cls.uses
+    return needed
+
+
+def _sort(operators: Operators) -> list[type[Operator]]:
+    makers: dict[type, list[type[Operator]]] = {}
+    for cls in operators:
+        for kind in cls.provides:
+            makers.setdefault(kind, []).append(cls)
+    sorter: TopologicalSorter[type[Operator]] = TopologicalSorter()
+    for cls in operators:
+        sorter.add(cls, *(maker for kind in cls.requires + cls.uses for maker in makers.get(kind, ())))
+    try:
+        sorter.prepare()
+    except CycleError as error:
+        circle = " -> ".join(cls.idname for cls in reversed(error.args[1]))
+        raise PlanError(
+            "operators need each other in a circle", found=circle, remedy="Leave one of their plugins out."
+        ) from None
+    order: list[type[Operator]] = []
+    rank = {cls: index for index, cls in enumerate(operators)}
+    while sorter.is_active():
+        ready = sorted(sorter.get_ready(), key=lambda cls: rank[cls])
+        order += ready
+        sorter.done(*ready)
+    return order
+
+
+def _missing(kind: type, needed: Operators, known: set[type], broken: Sequence[str]) -> PlanError:
+    """The error that names what is missing at the root of an unreachable type."""
+    while makers := [cls for cls in needed if kind in cls.provides]:
+        lacking = [required for required in makers[0].requires if required not in known]
+        if not lacking:
+            break
+        kind = lacking[0]
+    users = sorted(cls.idname for cls in needed if kind in cls.requires)
+    problem = f"no operator provides {kind.__name__}" + (f", which {', '.join(users)} needs" if users else "")
+    remedy = f"Plugins that failed: {'; '.join(broken)}" if broken else "Install a plugin that provides it."
+    return PlanError(problem, remedy=remedy.rstrip("."))

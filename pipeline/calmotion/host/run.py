@@ -1,0 +1,201 @@
+"""Carrying out a plan: one result for each operator, whatever happens to the others."""
+
+from __future__ import annotations
+
+import time
+import traceback
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import TYPE_CHECKING, Any, TypeVar
+
+from .errors import PluginError
+from .operators import Operator, Record, RunContext
+from .plan import Plan
+from .properties import PropertyValues
+
+if TYPE_CHECKING:
+    from ..shot import LeftOut
+
+T = TypeVar("T")
+Progress = Callable[[str, float, str], None]
+
+
+class Outcome(StrEnum):
+    """What became of an operator in a run."""
+
+    DONE = "done"
+    LEFT_OUT = "left out"
+    FAILED = "failed"
+    BLOCKED = "blocked"
+
+
+@dataclass(frozen=True)
+class OperatorResult:
+    """What became of one operator.
+
+    Attributes:
+        idname, label, plugin: Which operator, and the plugin it belongs to.
+        outcome: `done`; `left out` by its poll; `failed` when it raised; `blocked` when an input is missing.
+        reason: Why it did not run, or empty.
+        error: What it raised, or None.
+        traceback: Where, or empty.
+        duration: [s].
+        records: What it reported.
+    """
+
+    idname: str
+    label: str
+    plugin: str
+    outcome: Outcome
+    reason: str = ""
+    error: Exception | None = None
+    traceback: str = ""
+    duration: float = 0.0
+    records: tuple[Record, ...] = ()
+
+    @property
+    def success(self) -> bool:
+        """Whether it ran and made what it provides."""
+        return self.outcome == Outcome.DONE
+
+
+class Run:
+    """A plan that is carried out by iterating over it, once.
+
+    Attributes:
+        plan: The plan.
+        data: Type to value: what is known so far.
+        results: One for each operator so far.
+    """
+
+    def __init__(
+        self,
+        plan: Plan,
+        data: Mapping[type, Any],
+        properties: Mapping[str, PropertyValues],
+        owners: Mapping[str, str],
+        progress: Progress | None = None,
+    ):
+        self.plan = plan
+        self.data: dict[type, Any] = dict(data)
+        self.results: list[OperatorResult] = []
+        self._failed: set[type] = set()
+        self._properties = properties
+        self._owners = owners
+        self._progress = progress or (lambda stage, fraction, message: None)
+
+    def get(self, kind: type[T]) -> T | None:
+        """The value of a type, None while there is none."""
+        return self.data.get(kind)
+
+    def __iter__(self) -> Iterator[OperatorResult]:
+        for cls in self.plan.operators:
+            result = self._step(cls)
+            self.results.append(result)
+            yield result
+
+    def finish(self) -> Run:
+        """Carry out all of it; returns itself."""
+        for _ in self:
+            pass
+        return self
+
+    def _step(self, cls: type[Operator]) -> OperatorResult:
+        # A used value may be absent because nobody needs it, but not because making it failed.
+        failed = [kind for kind in cls.requires + cls.uses if kind not in self.data and kind in self._failed]
+        missing = failed or [kind for kind in cls.requires if kind not in self.data]
+        if missing:
+            self._failed |= set(cls.provides if failed else ())
+            names = ", ".join(kind.__name__ for kind in missing)
+            return self._result(cls, Outcome.BLOCKED, reason=f"there is no {names}")
+        start = time.perf_counter()
+        context = RunContext(
+            cls, dict(self.data), self._properties[cls.idname], lambda f, m: self._progress(cls.label, f, m)
+        )
+        try:
+            reason = _poll(cls, self.data)
+            if reason is not None:
+                return self._result(cls, Outcome.LEFT_OUT, reason=reason)
+            self._refuse_rivals(cls)
+            self._progress(cls.label, 0.0, "")
+            values = _checked(cls, cls().execute(context))
+            self._progress(cls.label, 1.0, "")
+        except Exception as error:
+            self._failed |= set(cls.provides)
+            return self._result(
+                cls,
+                Outcome.FAILED,
+                reason=str(error),
+                error=error,
+                traceback="".join(traceback.format_exception(error)),
+                duration=time.perf_counter() - start,
+                records=tuple(context.records),
+            )
+        self.data.update(values)
+        duration = time.perf_counter() - start
+        return self._result(cls, Outcome.DONE, duration=duration, records=tuple(context.records))
+
+    def _result(self, cls: type[Operator], outcome: Outcome, **fields: Any) -> OperatorResult:
+        return OperatorResult(cls.idname, cls.label, self._owners[cls.idname], outcome, **fields)
+
+    def _refuse_rivals(self, cls: type[Operator]) -> None:
+        """Two operators that both want to make the same value: a choice that is the user's, not ours."""
+        for kind in cls.provides:
+            others = [other for other in self.plan.operators if other is not cls and kind in other.provides]
+            rivals = [other for other in others if kind in self.data or self._is_willing(other)]
+            if rivals:
+                raise PluginError(
+                    f"more than one operator makes {kind.__name__}",
+                    found=", ".join(f"{one.idname} of the plugin {self._owners[one.idname]}" for one in [cls, *rivals]),
+                    remedy="Leave one of the plugins out.",
+                )
+
+    def _is_willing(self, cls: type[Operator]) -> bool:
+        if any(kind not in self.data for kind in cls.requires):
+            return False
+        try:
+            return _poll(cls, self.data) is None
+        except Exception:
+            return False  # it fails by itself when its turn comes
+
+    def left_out(self) -> tuple[LeftOut, ...]:
+        """What the polls left out, for the report; not an operator whose values another one made."""
+        from ..shot import LeftOut
+
+        made = {cls.idname: all(kind in self.data for kind in cls.provides) for cls in self.plan.operators}
+        return tuple(
+            LeftOut(result.label, result.reason)
+            for result in self.results
+            if result.outcome == Outcome.LEFT_OUT and not made[result.idname]
+        )
+
+    def failures(self) -> list[OperatorResult]:
+        """The operators that raised."""
+        return [result for result in self.results if result.outcome == Outcome.FAILED]
+
+
+def _poll(cls: type[Operator], data: Mapping[type, Any]) -> str | None:
+    reason = cls.poll(dict(data))
+    if reason is not None and not (isinstance(reason, str) and reason.strip()):
+        raise PluginError(
+            f"poll of {cls.idname} must return None or a reason", found=repr(reason), remedy="Return a text."
+        )
+    return reason
+
+
+def _checked(cls: type[Operator], values: object) -> dict[type, object]:
+    expected = ", ".join(kind.__name__ for kind in cls.provides)
+    if not isinstance(values, (tuple, list)) or len(values) != len(cls.provides):
+        found = f"{len(values)} values" if isinstance(values, (tuple, list)) else type(values).__name__
+        raise PluginError(
+            f"operator {cls.idname} must return a sequence of ({expected})",
+            found=found,
+            remedy="Return the values in the order of `provides`.",
+        )
+    for kind, value in zip(cls.provides, values, strict=True):
+        if not isinstance(value, kind):
+            raise PluginError(
+                f"operator {cls.idname} must return ({expected})", found=f"{type(value).__name__} for {kind.__name__}"
+            )
+    return dict(zip(cls.provides, values, strict=True))

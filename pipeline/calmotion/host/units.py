@@ -1,0 +1,58 @@
+"""Quantities as people write them: `5mm`, `30 deg`, `2.1GPa`."""
+
+from __future__ import annotations
+
+import math
+import re
+from decimal import Decimal
+
+from .errors import SettingError
+
+# Unit -> (base unit, size in base units). Decimals, so that `5mm` is exactly the float 0.005.
+_UNITS = {
+    "": ("", Decimal(1)),
+    "m": ("m", Decimal(1)),
+    "cm": ("m", Decimal("0.01")),
+    "mm": ("m", Decimal("0.001")),
+    "rad": ("rad", Decimal(1)),
+    "deg": ("rad", Decimal(repr(math.pi)) / 180),
+    "s": ("s", Decimal(1)),
+    "ms": ("s", Decimal("0.001")),
+    "Hz": ("Hz", Decimal(1)),
+    "kHz": ("Hz", Decimal(1000)),
+    "Pa": ("Pa", Decimal(1)),
+    "kPa": ("Pa", Decimal(1000)),
+    "MPa": ("Pa", Decimal(10**6)),
+    "GPa": ("Pa", Decimal(10**9)),
+}
+_QUANTITY = re.compile(r"\s*([+-]?(?:(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|inf))\s*([A-Za-z]*)\s*")
+
+
+def is_unit(unit: str) -> bool:
+    """Whether `unit` is one that `parse_quantity` knows; the empty string is a number without a unit."""
+    return unit in _UNITS
+
+
+def parse_quantity(text: str, unit: str = "") -> float:
+    """The number that `text` means.
+
+    Args:
+        text: A number, with or without a unit of the same kind as `unit`.
+        unit: Unit of a number that has none, and of what is returned.
+
+    Returns:
+        The value in `unit`.
+
+    Raises:
+        SettingError: When `text` is not a number, or its unit is unknown or of another kind.
+    """
+    match = _QUANTITY.fullmatch(text)
+    base, size = _UNITS[unit]
+    alike = ", ".join(name for name, (kind, _) in _UNITS.items() if kind == base and name)
+    remedy = f"Write a number, or one with a unit ({alike})." if alike else "Write a number without a unit."
+    if not match:
+        raise SettingError("this is not a number", found=repr(text), remedy=remedy)
+    number, written = match.groups()
+    if written not in _UNITS or (written and _UNITS[written][0] != base):
+        raise SettingError("this unit does not fit", found=repr(text), remedy=remedy)
+    return float(Decimal(number) * _UNITS[written or unit][1] / size)

@@ -1,0 +1,83 @@
+"""Values that travel between the command line, the host and plugins, beside those of `calmotion.shot`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from ..fem import ReducedBody
+    from ..shot import ModeTable
+
+
+@dataclass(frozen=True)
+class Source:
+    """What the user asked for.
+
+    Attributes:
+        path: The shot.
+        command: `inspect`, `simulate` or `optimize`.
+        tolerance: Error at the targets that does not matter [m], or None for the shot's own.
+        step: Time step [s], or None for automatic.
+        integrator: Name of the integrator.
+        pre_roll: Length of the pre-roll [s], or None for automatic.
+    """
+
+    path: str
+    command: str
+    tolerance: float | None = None
+    step: float | None = None
+    integrator: str = "bdf2"
+    pre_roll: float | None = None
+
+
+@dataclass(frozen=True)
+class OutputPaths:
+    """Where the results go; None: not asked for."""
+
+    layer: str | None = None
+    rrd: str | None = None
+    csv: str | None = None
+    figures: str | None = None
+
+
+@dataclass(frozen=True)
+class WrittenLayer:
+    """Paths of the layer of overs and of the root layer that opens it with the shot."""
+
+    layer: str
+    root: str
+
+
+@dataclass(frozen=True)
+class Recording:
+    """Path of a rerun recording."""
+
+    path: str
+
+
+@dataclass(frozen=True)
+class CsvFile:
+    """Path of a table."""
+
+    path: str
+
+
+@dataclass(frozen=True)
+class Figures:
+    """Paths of the figures."""
+
+    paths: tuple[str, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class ReducedBodies:
+    """Bodies as the dynamics takes them, and the frequencies of the flexible ones.
+
+    Attributes:
+        bodies: One for each body of the character.
+        modes: One for each flexible body.
+    """
+
+    bodies: tuple[ReducedBody, ...]
+    modes: tuple[ModeTable, ...]

@@ -1,0 +1,81 @@
+"""Between time codes of a stage and seconds after the first frame of the shot."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..errors import ShotError
+from ..shot.character import Array
+
+
+@dataclass(frozen=True)
+class Clock:
+    """Attributes:
+    start, end: Time codes of the first and last frame.
+    time_codes_per_second: Time codes in a second.
+    frames_per_second: Frames in a second.
+    """
+
+    start: float
+    end: float
+    time_codes_per_second: float
+    frames_per_second: float
+
+    def seconds(self, time_codes):
+        """Seconds after the first frame of time codes (a value or an array)."""
+        return (np.asarray(time_codes, dtype=np.float64) - self.start) / self.time_codes_per_second
+
+    def time_codes(self, seconds):
+        """Time codes of seconds after the first frame (a value or an array)."""
+        codes = self.start + np.asarray(seconds, dtype=np.float64) * self.time_codes_per_second
+        # Frames are mostly whole time codes: do not write 17.000000000000004.
+        whole = np.round(codes)
+        return np.where(np.abs(codes - whole) < 1e-9 * np.maximum(1.0, np.abs(codes)), whole, codes)
+
+    def frame_times(self) -> Array:
+        """Times of the frames [s], shape [f], first 0."""
+        count = int(np.floor((self.end - self.start) / self.time_codes_per_second * self.frames_per_second + 1e-6))
+        return np.arange(count + 1) / self.frames_per_second
+
+
+def clock_of(stage, sample_codes: Array) -> Clock:
+    """The clock of a stage.
+
+    The range is that of the stage; where start or end is not authored, that of the samples. A frame is
+    1/framesPerSecond where that is authored, else one time code.
+
+    Args:
+        stage: The Usd.Stage.
+        sample_codes: Time codes of the samples of all motors.
+
+    Raises:
+        ShotError: The shot has no duration.
+    """
+    root = stage.GetRootLayer()
+    session = stage.GetSessionLayer()
+    layers = [layer for layer in (session, root) if layer]
+    start = next((x.startTimeCode for x in layers if x.HasStartTimeCode()), None)
+    end = next((x.endTimeCode for x in layers if x.HasEndTimeCode()), None)
+    authored = start is not None or end is not None
+    if start is None and len(sample_codes):
+        start = float(np.min(sample_codes))
+    if end is None and len(sample_codes):
+        end = float(np.max(sample_codes))
+    rate = float(stage.GetTimeCodesPerSecond())
+    frames = next((x.framesPerSecond for x in layers if x.HasFramesPerSecond()), rate)
+    for name, found in (("timeCodesPerSecond", rate), ("framesPerSecond", frames)):
+        if not (np.isfinite(found) and found > 0.0):
+            raise ShotError(
+                "must be positive", path=root.identifier, attribute=name, found=found, remedy="Author a positive rate"
+            )
+    if start is None or end is None or not end > start:
+        raise ShotError(
+            "the shot has no duration",
+            path=root.identifier,
+            attribute="endTimeCode",
+            found=f"startTimeCode {start}, endTimeCode {end}" if authored else "samples at one time code only",
+            remedy="Author startTimeCode and a later endTimeCode in the root layer, and animate within them",
+        )
+    return Clock(float(start), float(end), rate, float(frames))

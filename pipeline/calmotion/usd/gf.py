@@ -1,0 +1,67 @@
+"""The one place where Gf and Vt values become NumPy arrays and back.
+
+Gf multiplies row vectors from the left; here a matrix maps column vectors, `x -> A x + t`, as everywhere else in
+the engine. Quaternions are (w, x, y, z).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..shot.character import Array, IntArray
+
+
+def vector(value) -> Array:
+    """A Gf vector as float64, shape [n]."""
+    return np.array([float(x) for x in value])
+
+
+def quaternion(value) -> Array:
+    """A Gf quaternion as (w, x, y, z), shape [4], not normalised."""
+    return np.array([float(value.GetReal()), *(float(x) for x in value.GetImaginary())])
+
+
+def matrix(value) -> Array:
+    """A Gf.Matrix4d as the matrix that maps column vectors, shape [4, 4]."""
+    return np.array(value, dtype=np.float64).T.copy()
+
+
+def points(value) -> Array:
+    """A Vt array of points as float64, shape [n, 3]; empty for None."""
+    if value is None:
+        return np.zeros((0, 3))
+    return np.array(value, dtype=np.float64).reshape(-1, 3)
+
+
+def indices(value, width: int | None = None) -> IntArray:
+    """A Vt array of integers as int32, shape [n], or [n, width] for int2, int3, int4 arrays; empty for None."""
+    shape = (-1,) if width is None else (-1, width)
+    return (np.zeros(0, np.int32) if value is None else np.array(value, dtype=np.int32)).reshape(shape)
+
+
+def to_matrix(value: Array):
+    """The Gf.Matrix4d of a matrix [4, 4] that maps column vectors."""
+    from pxr import Gf
+
+    return Gf.Matrix4d(np.ascontiguousarray(value.T).tolist())
+
+
+def to_points(value: Array):
+    """A Vt.Vec3fArray of points [n, 3]."""
+    from pxr import Vt
+
+    return Vt.Vec3fArray.FromNumpy(np.ascontiguousarray(value, dtype=np.float32))
+
+
+def to_strings(values):
+    """A Vt.StringArray: a Python list in layer metadata writes a file that cannot be opened again."""
+    from pxr import Vt
+
+    return Vt.StringArray([str(v) for v in values])
+
+
+def to_doubles(values):
+    """A Vt.DoubleArray, for the same reason."""
+    from pxr import Vt
+
+    return Vt.DoubleArray([float(v) for v in values])

@@ -1,0 +1,96 @@
+"""Writing a layer so that an interrupted run leaves the old file or the new one, never half of one."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from collections.abc import Callable, Iterable
+
+from ..errors import ShotError
+
+EXTENSIONS = (".usda", ".usdc", ".usd")
+
+
+def refuse_input_as_output(output: str, inputs: Iterable[str]) -> None:
+    """Refuse to write over a layer that was read.
+
+    Raises:
+        ShotError: `output` is one of `inputs` (the same file, also through links), or is not named like a layer.
+    """
+    if os.path.splitext(output)[1].lower() not in EXTENSIONS:
+        raise ShotError(
+            "the output is not named like a USD layer",
+            path=output,
+            remedy="Give it the extension .usda, .usdc or .usd",
+        )
+    if os.path.isdir(output):
+        raise ShotError("the output is a folder", path=output, remedy="Name a file")
+    for name in inputs:
+        same = os.path.realpath(output) == os.path.realpath(name)
+        if same or (os.path.exists(output) and os.path.exists(name) and os.path.samefile(output, name)):
+            raise ShotError(
+                "the output is one of the layers that the shot is made of, and those are never written to",
+                path=output,
+                remedy="Choose another output",
+            )
+
+
+def write_layer(layer, output: str, validate: Callable[[str], None]) -> None:
+    """Write an anonymous layer to a file, atomically.
+
+    It is exported beside its destination, flushed to disk, reopened and validated, and then renamed over it.
+
+    Args:
+        layer: The Sdf.Layer; its content is written in the format that the extension of `output` names.
+        output: Destination.
+        validate: Called with the path of the temporary file; raises what is wrong with it.
+
+    Raises:
+        ShotError: The file cannot be written, or cannot be opened again.
+    """
+    from pxr import Sdf, Tf
+
+    folder = os.path.dirname(os.path.abspath(output))
+    suffix = os.path.splitext(output)[1]
+    temporary = None
+    try:
+        os.makedirs(folder, exist_ok=True)
+        handle, temporary = tempfile.mkstemp(suffix=suffix, prefix=".calmotion-", dir=folder)
+        os.close(handle)
+        if not layer.Export(temporary):
+            raise OSError("USD could not write it")
+        _flush(temporary)
+        if Sdf.Layer.OpenAsAnonymous(temporary) is None:
+            raise OSError("what was written cannot be opened again")
+        validate(temporary)
+        os.chmod(temporary, 0o666 & ~_umask())  # mkstemp makes private files
+        os.replace(temporary, output)
+        temporary = None
+        _flush(folder)
+    except (OSError, Tf.ErrorException) as error:
+        raise ShotError(
+            "the layer cannot be written",
+            path=output,
+            found=str(error).strip(),
+            remedy="Check the folder, its permissions and the space on the disk",
+        ) from error
+    finally:
+        if temporary is not None and os.path.exists(temporary):
+            os.unlink(temporary)
+    opened = Sdf.Layer.Find(output)
+    if opened is not None:
+        opened.Reload(True)
+
+
+def _umask() -> int:
+    mask = os.umask(0)
+    os.umask(mask)
+    return mask
+
+
+def _flush(path: str) -> None:
+    descriptor = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)

@@ -1,0 +1,180 @@
+"""Bodies, joints, motors and targets put together into a Character."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from ...errors import ShotError
+from ...shot import Body, Character, Joint
+from ..transforms import Pose
+from . import mass, motors, scene, targets, topology
+from .context import Reading, is_rigid_body, prims_of
+from .flexible import flexible_settings
+from .joints import JointPrim, body_index, joint_prims, joint_to_world, read_joint, refuse_unsupported
+from .shapes import shapes_of, tets_of
+from .stillness import refuse_moving
+
+
+@dataclass(frozen=True, eq=False)
+class Skeleton:
+    """What moves and what drives it, before geometry and mass are read.
+
+    Attributes:
+        bodies: Paths of the bodies, from the world outwards.
+        poses: World pose of each, stage units.
+        joints: In the order of the bodies they carry.
+        drives: The driven joints, in the order of the joints.
+        targets: Target prims with the path of their body.
+    """
+
+    bodies: list[str]
+    poses: dict[str, Pose]
+    joints: list[JointPrim]
+    drives: list[motors.Drive]
+    targets: list[tuple[Any, str]]
+
+
+def animated_attributes(stage) -> list:
+    """The attributes that hold the animation of the drives of a stage, whether they turn out as motors or not."""
+    found = (prim.GetAttribute(motors.ATTRIBUTE) for prim in joint_prims(stage))
+    return [attribute for attribute in found if attribute]
+
+
+def read_skeleton(reading: Reading) -> Skeleton:
+    """Find the bodies, joints and motors of the character; what no motor reaches is left out.
+
+    Raises:
+        ShotError: No bodies, no joints, no motors, or what `read_joint` and `read_drives` refuse.
+    """
+    stage = reading.stage
+    root_file = stage.GetRootLayer().identifier
+    prims = {str(p.GetPath()): p for p in prims_of(stage) if is_rigid_body(p)}
+    if not prims:
+        raise ShotError(
+            "no bodies: the shot has no prim with PhysicsRigidBodyAPI",
+            path=root_file,
+            remedy="Apply PhysicsRigidBodyAPI to the moving parts of the character",
+        )
+    found = joint_prims(stage)
+    if not found:
+        raise ShotError(
+            "no joints: the shot has no enabled PhysicsRevoluteJoint or PhysicsFixedJoint",
+            path=topology.common_path(list(prims)),
+            remedy="Connect the bodies with joints, and the first one with the world",
+        )
+    poses = {path: reading.pose(prim) for path, prim in prims.items()}
+    joints = [joint for prim in found if (joint := read_joint(reading, prim, poses))]
+    drives = motors.read_drives(joints, motors.actuated_joints(stage), topology.common_path(list(prims)), reading.notes)
+    target_prims = targets.target_prims(stage)
+    bodies = _moved(reading, list(prims), joints, drives, [body for _, body in target_prims])
+    kept = set(bodies)
+    joints = [j for j in joints if (j.body0 or j.body1) in kept]
+    for joint in joints:
+        refuse_unsupported(joint)
+    joints += _held(reading, bodies, joints, prims, poses)
+    far = topology.distances(bodies, joints)
+    bodies = list(far)
+    joints.sort(key=lambda j: max(far.get(j.body0, 0), far.get(j.body1, 0)))  # stable: the shot's order otherwise
+    order = {id(joint): k for k, joint in enumerate(joints)}
+    drives = sorted((d for d in drives if id(d.joint) in order), key=lambda d: order[id(d.joint)])
+    roots = [j.body1 for j in joints if j.body0 == ""]
+    refuse_moving(reading, [prims[b] for b in roots], [prims[b] for b in bodies if b not in roots])
+    return Skeleton(bodies, {b: poses[b] for b in bodies}, joints, drives, target_prims)
+
+
+def build_character(reading: Reading, skeleton: Skeleton) -> Character:
+    """Read geometry, mass, materials, targets and settings of a skeleton.
+
+    Raises:
+        ShotError: A body without mass, or what the readers of the parts refuse.
+    """
+    numbers = {path: k for k, path in enumerate(skeleton.bodies)}
+    bodies = tuple(_body(reading, path, skeleton.poses[path]) for path in skeleton.bodies)
+    joints = tuple(
+        Joint(
+            j.path,
+            j.kind,
+            body_index(j.body0, numbers),
+            body_index(j.body1, numbers),
+            j.frame0,
+            j.frame1,
+            j.lower,
+            j.upper,
+        )
+        for j in skeleton.joints
+    )
+    order = {id(joint): k for k, joint in enumerate(skeleton.joints)}
+    chosen = tuple(
+        targets.read_target(reading, prim, numbers[body], skeleton.poses[body])
+        for prim, body in skeleton.targets
+        if body in numbers
+    )
+    if not chosen:
+        outer = topology.leaves(skeleton.bodies, skeleton.joints)
+        chosen = tuple(targets.outermost_target(bodies[numbers[b]], numbers[b], joints) for b in outer)
+        reading.note(f"no CalmTargetAPI: the outermost point of {', '.join(outer)} is taken as target")
+    root = topology.common_path(skeleton.bodies)
+    default = reading.stage.GetDefaultPrim()
+    whole = default and all(b.startswith(f"{default.GetPath()}/") for b in skeleton.bodies)
+    return Character(
+        path=str(default.GetPath()) if whole else root,
+        bodies=bodies,
+        joints=joints,
+        motors=tuple(motors.read_motor(d, order[id(d.joint)], reading.units) for d in skeleton.drives),
+        targets=chosen,
+        gravity=scene.gravity(reading),
+        retarget=scene.retarget_settings(reading, root),
+        notes=tuple(reading.notes),
+    )
+
+
+def _body(reading: Reading, path: str, pose: Pose) -> Body:
+    prim = reading.stage.GetPrimAtPath(path)
+    shapes = shapes_of(reading, prim, pose)
+    flexible = flexible_settings(reading, prim, pose)
+    if flexible is not None and not mass.has_authored_mass(prim):
+        properties = None  # the mesh and the density of the material decide
+    else:
+        properties = mass.mass_of(reading, prim, pose, shapes)
+        if properties is None:
+            raise ShotError(
+                "a body without mass: neither a mass, nor a density with geometry, nor a collider is authored",
+                path=path,
+                attribute="physics:mass",
+                remedy="Apply PhysicsMassAPI and author physics:mass, or physics:density where the body has geometry",
+            )
+    return Body(
+        path=path,
+        rest=pose.frame(reading.units.length(1.0)),
+        mass=properties,
+        surfaces=tuple(shape.surface for shape in shapes),
+        tets=tets_of(reading, prim, pose),
+        flexible=flexible,
+    )
+
+
+def _moved(reading: Reading, bodies: list[str], joints: list[JointPrim], drives, wanted: list[str]) -> list[str]:
+    """The bodies of every group that a motor moves or a target is on; a note for the others."""
+    driven = {end for drive in drives for end in (drive.joint.body0, drive.joint.body1) if end} | set(wanted)
+    kept = []
+    for group in topology.components(bodies, joints):
+        if driven.intersection(group):
+            kept += group
+        else:
+            reading.note(f"{group[0]}: no motor moves this body or those joined to it ({len(group)}); left out")
+    return kept
+
+
+def _held(reading: Reading, bodies, joints, prims, poses) -> list[JointPrim]:
+    """A joint to the world for each group of bodies that has none."""
+    added = []
+    for group in topology.components(bodies, joints):
+        if any(j.body0 == "" and j.body1 in group for j in joints):
+            continue
+        kinematic = [b for b in group if prims[b].GetAttribute("physics:kinematicEnabled").Get()]
+        carried = {j.body1 for j in joints}
+        root = next(iter(kinematic or [b for b in group if b not in carried] or group))
+        reading.note(f"{root}: no joint holds the character in the world; this body is held at its pose")
+        added.append(joint_to_world(root, poses[root], reading.units.length(1.0)))
+    return added

@@ -1,0 +1,74 @@
+"""What every part of the reader needs: the stage, its units, poses at the first frame, and a place for notes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import Any
+
+from ..gf import matrix
+from ..schemas import is_applied
+from ..transforms import Pose, pose_from_matrix
+from ..units import StageUnits
+
+
+@dataclass(eq=False)
+class Reading:
+    """The stage that is being read.
+
+    Attributes:
+        stage: The Usd.Stage.
+        units: Its units.
+        start: Time code of the first frame.
+        notes: Sentences for the user about what was decided where the shot was silent.
+    """
+
+    stage: Any
+    units: StageUnits
+    start: float
+    notes: list[str] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        from pxr import UsdGeom
+
+        self._xforms = UsdGeom.XformCache(self.start)
+
+    def note(self, text: str) -> None:
+        """Keep a sentence for the user, once."""
+        if text not in self.notes:
+            self.notes.append(text)
+
+    def world_matrix(self, prim):
+        """Local-to-world matrix [4, 4] of a prim at the first frame, stage units, mapping column vectors."""
+        return matrix(self._xforms.GetLocalToWorldTransform(prim))
+
+    def pose(self, prim) -> Pose:
+        """World pose of a prim at the first frame, stage units; a ShotError if it shears."""
+        return pose_from_matrix(self.world_matrix(prim), str(prim.GetPath()))
+
+
+def prims_of(stage) -> Iterator:
+    """Every prim of a stage in depth-first order, those inside instances too."""
+    from pxr import Usd
+
+    return iter(stage.Traverse(Usd.TraverseInstanceProxies(Usd.PrimDefaultPredicate)))
+
+
+def prims_below(prim, stop) -> Iterator:
+    """A prim and those below it, depth first, not entering a prim below it for which `stop` holds."""
+    from pxr import Usd
+
+    walk = iter(Usd.PrimRange(prim, Usd.TraverseInstanceProxies(Usd.PrimDefaultPredicate)))
+    for below in walk:
+        if below != prim and stop(below):
+            walk.PruneChildren()
+            continue
+        yield below
+
+
+def is_rigid_body(prim) -> bool:
+    """Whether a prim is an enabled rigid body."""
+    if not is_applied(prim, "PhysicsRigidBodyAPI"):
+        return False
+    enabled = prim.GetAttribute("physics:rigidBodyEnabled")
+    return not enabled or enabled.Get() is not False

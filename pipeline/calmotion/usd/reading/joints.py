@@ -1,0 +1,201 @@
+"""Joints: what they connect, and their frames with the axis turned to z."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ...errors import ShotError
+from ...shot import WORLD, Frame
+from ...shot.character import Array
+from .. import gf
+from ..transforms import Pose, axis_rotation, quaternion_from_rotation, rotation_from_quaternion
+from .context import Reading, prims_of
+
+_KINDS = {"PhysicsRevoluteJoint": "revolute", "PhysicsFixedJoint": "fixed"}
+UNSUPPORTED = "unsupported"
+_HALF_TURN = np.diag([1.0, -1.0, -1.0])  # about x: turns the z axis over
+
+
+@dataclass(frozen=True, eq=False)
+class JointPrim:
+    """A joint as read, before bodies are numbered.
+
+    Attributes:
+        prim: The Usd.Prim, None for a joint that the reader added.
+        path: Its path.
+        kind: `revolute` or `fixed`, or `UNSUPPORTED`, which matters only where the joint is part of the character.
+        body0, body1: Paths of the bodies, empty for the world.
+        frame0, frame1: Frames in them, m.
+        lower, upper: Limits [rad].
+    """
+
+    prim: Any
+    path: str
+    kind: str
+    body0: str
+    body1: str
+    frame0: Frame
+    frame1: Frame
+    lower: float = -np.inf
+    upper: float = np.inf
+
+
+def joint_prims(stage) -> list:
+    """The enabled joints of a stage, in its order."""
+    from pxr import UsdPhysics
+
+    found = []
+    for prim in prims_of(stage):
+        if prim.IsA(UsdPhysics.Joint) and prim.GetAttribute("physics:jointEnabled").Get() is not False:
+            found.append(prim)
+    return found
+
+
+def read_joint(reading: Reading, prim, poses: dict[str, Pose]) -> JointPrim | None:
+    """A joint of the stage.
+
+    Args:
+        reading: The stage.
+        prim: The joint's prim.
+        poses: World pose of each body by path, stage units.
+
+    Returns:
+        The joint; None where it connects no body at all.
+
+    Raises:
+        ShotError: A body that does not exist, both ends on one body, values that are not finite.
+    """
+    path = str(prim.GetPath())
+    ends = [_end(reading, prim, side, poses) for side in (0, 1)]
+    if ends[0][0] == "" and ends[1][0] == "":
+        reading.note(f"{path}: neither of its bodies is a rigid body, so it is left out")
+        return None
+    if ends[0][0] == ends[1][0]:
+        raise ShotError(
+            "both ends of the joint are on the same body",
+            path=path,
+            attribute="physics:body1",
+            found=ends[0][0],
+            remedy="Correct physics:body0 or physics:body1",
+        )
+    kind = _KINDS.get(str(prim.GetTypeName()), UNSUPPORTED)
+    turn = axis_rotation(str(prim.GetAttribute("physics:axis").Get())) if kind == "revolute" else np.eye(3)
+    lower, upper = _limits(prim) if kind == "revolute" else (-np.inf, np.inf)
+    (body0, position0, rotation0), (body1, position1, rotation1) = ends
+    if body1 == "":
+        # The world comes first. Turning the axis over keeps the sense of the angle, so limits and track stay.
+        body0, body1 = body1, body0
+        position0, position1 = position1, position0
+        rotation0, rotation1 = rotation1, rotation0
+        turn = turn @ _HALF_TURN
+    meters = reading.units.length(1.0)
+    return JointPrim(
+        prim,
+        path,
+        kind,
+        body0,
+        body1,
+        Frame(position0 * meters, quaternion_from_rotation(rotation0 @ turn)),
+        Frame(position1 * meters, quaternion_from_rotation(rotation1 @ turn)),
+        lower,
+        upper,
+    )
+
+
+def joint_to_world(body: str, pose: Pose, meters: float) -> JointPrim:
+    """A joint that holds a body where it is at the first frame."""
+    here = Frame(np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0]))
+    return JointPrim(None, body, "fixed", "", body, pose.frame(meters), here)
+
+
+def _end(reading: Reading, prim, side: int, poses: dict[str, Pose]) -> tuple[str, Array, Array]:
+    """One end of a joint: path of its body (empty: world), position [3] in stage units and rotation [3, 3] there."""
+    name = f"physics:body{side}"
+    relationship = prim.GetRelationship(name)
+    named = relationship.GetForwardedTargets() if relationship else []
+    if len(named) > 1:
+        raise ShotError(
+            "a joint end is one body",
+            path=prim.GetPath(),
+            attribute=name,
+            found=", ".join(str(t) for t in named),
+            remedy="Keep one target",
+        )
+    position = _finite(prim, f"physics:localPos{side}", gf.vector)
+    quaternion = _finite(prim, f"physics:localRot{side}", gf.quaternion)
+    if np.linalg.norm(quaternion) < 1e-6:
+        raise ShotError(
+            "is not a rotation",
+            path=prim.GetPath(),
+            attribute=f"physics:localRot{side}",
+            found=quaternion.tolist(),
+            remedy="Author a unit quaternion",
+        )
+    rotation = rotation_from_quaternion(quaternion)
+    if not named:
+        return "", position, rotation
+    target = reading.stage.GetPrimAtPath(named[0])
+    if not target:
+        raise ShotError(
+            "names a prim that does not exist",
+            path=prim.GetPath(),
+            attribute=name,
+            found=named[0],
+            remedy="Correct the target, or remove the joint",
+        )
+    body = target
+    while body and str(body.GetPath()) not in poses:
+        body = body.GetParent()
+    path = str(body.GetPath()) if body else ""
+    if path == str(target.GetPath()):
+        # The position is in the body's own axes, which may be scaled; the rotation is not.
+        return path, poses[path].scale * position, rotation
+    pose = reading.pose(target)  # of a prim that is no body: carried by the body above it, or by the world
+    world = pose.rotation @ (pose.scale * position) + pose.position
+    if not path:
+        return "", world, pose.rotation @ rotation
+    return path, poses[path].to_local(world[None])[0], poses[path].rotation.T @ pose.rotation @ rotation
+
+
+def _finite(prim, name: str, convert) -> Array:
+    value = prim.GetAttribute(name).Get()
+    found = convert(value)
+    if not np.all(np.isfinite(found)):
+        raise ShotError("is not finite", path=prim.GetPath(), attribute=name, found=value, remedy="Correct the value")
+    return found
+
+
+def _limits(prim) -> tuple[float, float]:
+    """Lower and upper limit [rad], infinite where there is none."""
+    values = []
+    for name, unlimited in (("physics:lowerLimit", -np.inf), ("physics:upperLimit", np.inf)):
+        attribute = prim.GetAttribute(name)
+        value = attribute.Get() if attribute.HasAuthoredValue() else None
+        value = unlimited if value is None else float(value)
+        if np.isnan(value):
+            raise ShotError("is not a number", path=prim.GetPath(), attribute=name, found=value, remedy="Correct it")
+        values.append(np.deg2rad(value))
+    lower, upper = values
+    if lower > upper:
+        return -np.inf, np.inf  # UsdPhysics: a joint whose lower limit exceeds its upper one is not limited
+    return lower, upper
+
+
+def refuse_unsupported(joint: JointPrim) -> None:
+    """Raise a ShotError for a joint of a kind that cannot be simulated yet."""
+    if joint.kind == UNSUPPORTED:
+        raise ShotError(
+            "a joint of this type is not supported yet",
+            path=joint.path,
+            found=joint.prim.GetTypeName(),
+            remedy="Use PhysicsRevoluteJoint or PhysicsFixedJoint (two hinges make a universal joint), or disable it "
+            "with physics:jointEnabled = false",
+        )
+
+
+def body_index(path: str, numbers: dict[str, int]) -> int:
+    """The index of a body by its path, `WORLD` for the empty one."""
+    return WORLD if path == "" else numbers[path]

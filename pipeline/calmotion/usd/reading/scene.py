@@ -1,0 +1,107 @@
+"""What concerns the character as a whole: gravity, and what the shot asks of the optimisation."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ...errors import ShotError
+from ...shot import RetargetSettings
+from ...shot.character import Array
+from .. import gf, schemas
+from ..units import EARTH_GRAVITY
+from .context import Reading, prims_of
+
+_SCHEMA = "CalmRetargetAPI"
+
+
+def gravity(reading: Reading) -> Array:
+    """Gravity [m/s^2], shape [3], world: of the PhysicsScene, else 9.81 down the up axis.
+
+    UsdPhysics: a direction (0, 0, 0) means down, a negative magnitude means that of the Earth.
+
+    Raises:
+        ShotError: A direction or magnitude that is not finite.
+    """
+    from pxr import UsdGeom
+
+    up = UsdGeom.GetStageUpAxis(reading.stage)
+    down = 0.0 - np.eye(3)["XYZ".index(str(up))]
+    scenes = [p for p in prims_of(reading.stage) if p.GetTypeName() == "PhysicsScene"]
+    if not scenes:
+        reading.note(f"the shot has no PhysicsScene; gravity is {EARTH_GRAVITY} m/s^2 down the {up} axis")
+        return EARTH_GRAVITY * down
+    scene = scenes[0]
+    if len(scenes) > 1:
+        reading.note(f"{scene.GetPath()}: the shot has several PhysicsScene prims; gravity is taken from this one")
+    direction = gf.vector(scene.GetAttribute("physics:gravityDirection").Get(reading.start))
+    magnitude = float(scene.GetAttribute("physics:gravityMagnitude").Get(reading.start))
+    for name, found in (("physics:gravityDirection", direction), ("physics:gravityMagnitude", magnitude)):
+        bad = np.isnan(found).any() or (np.isposinf(found).any() or (name.endswith("n") and np.isinf(found).any()))
+        if bad:
+            raise ShotError("is not finite", path=scene.GetPath(), attribute=name, found=found, remedy="Correct it")
+    size = float(np.linalg.norm(direction))
+    along = down if size == 0.0 else direction / size
+    return along * (EARTH_GRAVITY if magnitude < 0.0 else reading.units.acceleration(magnitude))
+
+
+def retarget_settings(reading: Reading, root: str) -> RetargetSettings:
+    """The settings of CalmRetargetAPI on the character's root or the nearest prim above it.
+
+    Args:
+        reading: The stage.
+        root: Path of the deepest prim that holds the whole character.
+
+    Raises:
+        ShotError: A value out of range.
+    """
+    prim = reading.stage.GetPrimAtPath(root)
+    while prim and not schemas.is_applied(prim, _SCHEMA):
+        prim = prim.GetParent()
+    elsewhere = [p for p in prims_of(reading.stage) if schemas.is_applied(p, _SCHEMA) and p != prim]
+    for other in elsewhere:
+        if not (prim and prim.GetPath().HasPrefix(other.GetPath())):
+            reading.note(f"{other.GetPath()}: {_SCHEMA} is neither on the root of the character nor above it; ignored")
+    if not prim:
+        return RetargetSettings()
+    tolerance = _positive(prim, "tolerance")
+    return RetargetSettings(
+        tolerance=None if tolerance is None else reading.units.length(tolerance),
+        time_step=_positive(prim, "timeStep"),
+        knot_spacing=_positive(prim, "knotSpacing"),
+        smoothness=_positive(prim, "smoothness", zero=True),
+        reference=_choice(prim, "reference", ("rigid", "static")),
+        endpoints=_choice(prim, "endpoints", ("free", "kept")),
+        cyclic=bool(schemas.value(prim, _SCHEMA, "calm:retarget:cyclic")),
+    )
+
+
+def _positive(prim, name: str, *, zero: bool = False) -> float | None:
+    attribute = f"calm:retarget:{name}"
+    value = schemas.value(prim, _SCHEMA, attribute)
+    if value is None or value == -1:
+        return None
+    if not math.isfinite(value) or value < 0.0 or (value == 0.0 and not zero):
+        raise ShotError(
+            "must be positive, or -1 for automatic",
+            path=prim.GetPath(),
+            attribute=attribute,
+            found=value,
+            remedy="Correct the value, or remove the attribute",
+        )
+    return float(value)
+
+
+def _choice(prim, name: str, allowed: tuple[str, ...]) -> str:
+    attribute = f"calm:retarget:{name}"
+    value = str(schemas.value(prim, _SCHEMA, attribute))
+    if value not in allowed:
+        raise ShotError(
+            "has a value that does not exist",
+            path=prim.GetPath(),
+            attribute=attribute,
+            found=value,
+            remedy=f"Use {' or '.join(allowed)}",
+        )
+    return value

@@ -1,0 +1,206 @@
+"""The geometry of a body: triangulated surfaces in its frame, tetrahedra, and the solids for its mass."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ...errors import ShotError
+from ...shot import SurfaceMesh, TetGeometry
+from ...shot.character import Array, IntArray
+from .. import gf
+from ..schemas import is_applied
+from ..transforms import Pose
+from . import primitives
+from .context import Reading, is_rigid_body, prims_below
+from .moments import Moments, is_closed, surface_moments
+
+
+@dataclass(frozen=True, eq=False)
+class Shape:
+    """One geometric prim of a body.
+
+    Attributes:
+        prim: The Usd.Prim.
+        surface: Its surface, in the body's frame, m.
+        moments: Moments of its solid, in the body's frame, m; None for an open surface.
+        collider: Whether it collides.
+    """
+
+    prim: Any
+    surface: SurfaceMesh
+    moments: Moments | None
+    collider: bool
+
+
+def shapes_of(reading: Reading, body_prim, pose: Pose) -> list[Shape]:
+    """The geometry below a body, up to bodies nested in it.
+
+    Args:
+        reading: The stage.
+        body_prim: The body's prim.
+        pose: Its pose, stage units.
+
+    Raises:
+        ShotError: Geometry that is not finite or whose faces do not fit its points.
+    """
+    shapes: list[Shape] = []
+    for prim in prims_below(body_prim, is_rigid_body):
+        kind = str(prim.GetTypeName())
+        if kind == "Mesh":
+            points, triangles = _mesh(prim, reading.start)
+            moments = None
+        elif kind in primitives.TYPES:
+            points, triangles, moments = primitives.solid(prim, reading.start)
+        else:
+            continue
+        if len(triangles) == 0:
+            continue
+        linear, offset = _to_body(reading, prim, pose)
+        placed = points @ linear.T + offset
+        if np.linalg.det(linear) < 0.0:
+            triangles = triangles[:, ::-1].copy()
+        if moments is not None:
+            moments = moments.mapped(linear, offset)
+        elif is_closed(triangles, placed):
+            moments = surface_moments(placed, triangles)
+        writable = kind == "Mesh" and not prim.IsInstanceProxy()
+        surface = SurfaceMesh(
+            path=str(prim.GetPath()),
+            points=placed,
+            triangles=triangles,
+            color=_color(prim, reading.start),
+            visible=_is_visible(prim, reading.start) and not _is_copy(placed, triangles, shapes),
+            displaced=len(placed) if writable else 0,
+        )
+        collider = is_applied(prim, "PhysicsCollisionAPI")
+        collider = collider and prim.GetAttribute("physics:collisionEnabled").Get() is not False
+        shapes.append(Shape(prim, surface, moments, collider))
+    return shapes
+
+
+def tets_of(reading: Reading, body_prim, pose: Pose) -> TetGeometry | None:
+    """The tetrahedra authored below a body, or None.
+
+    Raises:
+        ShotError: Several TetMesh prims, or one whose tetrahedra do not fit its points.
+    """
+    found = [p for p in prims_below(body_prim, is_rigid_body) if p.GetTypeName() == "TetMesh"]
+    if not found:
+        return None
+    if len(found) > 1:
+        raise ShotError(
+            "a body has one TetMesh",
+            path=body_prim.GetPath(),
+            found=", ".join(str(p.GetPath()) for p in found),
+            remedy="Merge them into one, or keep one of them",
+        )
+    prim = found[0]
+    points = _finite_points(prim, reading.start)
+    tets = gf.indices(prim.GetAttribute("tetVertexIndices").Get(reading.start), 4)
+    if len(tets) == 0 or len(points) == 0:
+        raise ShotError(
+            "has no tetrahedra",
+            path=prim.GetPath(),
+            attribute="tetVertexIndices",
+            remedy="Author them, or remove the prim",
+        )
+    _check_indices(prim, "tetVertexIndices", tets, len(points))
+    linear, offset = _to_body(reading, prim, pose)
+    mirrored = np.linalg.det(linear) < 0.0
+    if mirrored != (prim.GetAttribute("orientation").Get() == "leftHanded"):
+        tets = tets[:, [1, 0, 2, 3]].copy()
+    return TetGeometry(str(prim.GetPath()), points @ linear.T + offset, tets)
+
+
+def _to_body(reading: Reading, prim, pose: Pose) -> tuple[Array, Array]:
+    """Linear part [3, 3] and offset [3] from a prim's own axes, stage units, to the body's frame, m."""
+    world = reading.world_matrix(prim)
+    scale = reading.units.length(1.0)
+    return scale * pose.rotation.T @ world[:3, :3], scale * pose.rotation.T @ (world[:3, 3] - pose.position)
+
+
+def _finite_points(prim, time: float) -> Array:
+    points = gf.points(prim.GetAttribute("points").Get(time))
+    if not np.all(np.isfinite(points)):
+        raise ShotError("its points are not finite", path=prim.GetPath(), attribute="points", remedy="Correct them")
+    return points
+
+
+def _check_indices(prim, name: str, found: IntArray, count: int) -> None:
+    if len(found) and (int(found.min()) < 0 or int(found.max()) >= count):
+        raise ShotError(
+            f"refers to points that do not exist (it has {count})",
+            path=prim.GetPath(),
+            attribute=name,
+            found=int(found.min()) if found.min() < 0 else int(found.max()),
+            remedy="Correct the indices",
+        )
+
+
+def _mesh(prim, time: float) -> tuple[Array, IntArray]:
+    """Points and right-handed triangles of a Mesh, its polygons cut into fans, its holes left out."""
+    points = _finite_points(prim, time)
+    counts = gf.indices(prim.GetAttribute("faceVertexCounts").Get(time))
+    corners = gf.indices(prim.GetAttribute("faceVertexIndices").Get(time))
+    if int(counts.sum()) != len(corners):
+        raise ShotError(
+            "the faces use another number of corners than there are",
+            path=prim.GetPath(),
+            attribute="faceVertexCounts",
+            found=f"{int(counts.sum())} and {len(corners)}",
+            remedy="Correct faceVertexCounts or faceVertexIndices",
+        )
+    _check_indices(prim, "faceVertexIndices", corners, len(points))
+    keep = counts >= 3
+    holes = gf.indices(prim.GetAttribute("holeIndices").Get(time))
+    keep[holes[(holes >= 0) & (holes < len(counts))]] = False
+    first = np.cumsum(counts) - counts
+    cut = np.where(keep, counts - 2, 0)  # triangles of each polygon
+    fans = np.repeat(np.arange(len(counts)), cut)
+    step = np.arange(len(fans)) - np.repeat(np.cumsum(cut) - cut, cut)
+    base = first[fans]
+    triangles = np.stack([corners[base], corners[base + step + 1], corners[base + step + 2]], axis=1)
+    if prim.GetAttribute("orientation").Get() == "leftHanded":
+        triangles = triangles[:, ::-1].copy()
+    return points, triangles.astype(np.int32)
+
+
+def _is_visible(prim, time: float) -> bool:
+    from pxr import UsdGeom
+
+    image = UsdGeom.Imageable(prim)
+    if image.ComputePurpose() in (UsdGeom.Tokens.guide, UsdGeom.Tokens.proxy):
+        return False
+    return image.ComputeVisibility(time) != UsdGeom.Tokens.invisible
+
+
+def _is_copy(points: Array, triangles: IntArray, earlier: list[Shape]) -> bool:
+    """Whether a visible surface with the same points is there already, as converters make for collisions."""
+    size = float(np.max(np.ptp(points, axis=0)))
+    for shape in earlier:
+        other = shape.surface
+        if other.visible and other.points.shape == points.shape and len(other.triangles) == len(triangles):
+            if np.allclose(other.points, points, rtol=0.0, atol=1e-6 * size):
+                return True
+    return False
+
+
+def _color(prim, time: float) -> tuple[float, float, float] | None:
+    """The display colour, else the diffuse colour of a preview surface; linear RGB."""
+    from pxr import UsdGeom, UsdShade
+
+    primvar = UsdGeom.PrimvarsAPI(prim).FindPrimvarWithInheritance("displayColor")
+    if primvar and primvar.HasValue():
+        values = gf.points(primvar.Get(time))
+        if len(values):
+            return tuple(float(x) for x in values[0])  # type: ignore[return-value]
+    material, _ = UsdShade.MaterialBindingAPI(prim).ComputeBoundMaterial()
+    if material:
+        shader, _, _ = material.ComputeSurfaceSource()
+        color = shader.GetInput("diffuseColor").Get() if shader and shader.GetInput("diffuseColor") else None
+        if color is not None:
+            return tuple(float(x) for x in color)  # type: ignore[return-value]
+    return None

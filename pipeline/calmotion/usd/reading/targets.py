@@ -1,0 +1,124 @@
+"""Targets: the frames whose motion matters, authored or chosen."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from ...errors import ShotError
+from ...shot import Body, Frame, Joint, Target
+from .. import schemas
+from ..transforms import Pose, pose_from_matrix, quaternion_from_rotation
+from .context import Reading, is_rigid_body, prims_of
+
+_SCHEMA = "CalmTargetAPI"
+_UPRIGHT = np.array([1.0, 0.0, 0.0, 0.0])
+
+
+def target_prims(stage) -> list[tuple[Any, str]]:
+    """The prims with CalmTargetAPI, each with the path of the body that carries it.
+
+    Raises:
+        ShotError: One that is not below a rigid body, or has no transform.
+    """
+    from pxr import UsdGeom
+
+    found = []
+    for prim in prims_of(stage):
+        if not schemas.is_applied(prim, _SCHEMA):
+            continue
+        body = prim
+        while body and not is_rigid_body(body):
+            body = body.GetParent()
+        if not body:
+            raise ShotError(
+                "a target must be carried by a body",
+                path=prim.GetPath(),
+                attribute="apiSchemas",
+                found=_SCHEMA,
+                remedy="Move the prim below a prim with PhysicsRigidBodyAPI, or remove CalmTargetAPI",
+            )
+        if not prim.IsA(UsdGeom.Xformable):
+            raise ShotError(
+                "a target needs a transform",
+                path=prim.GetPath(),
+                found=prim.GetTypeName() or "a prim without a type",
+                remedy="Make it an Xform",
+            )
+        found.append((prim, str(body.GetPath())))
+    return found
+
+
+def read_target(reading: Reading, prim, body: int, pose: Pose) -> Target:
+    """An authored target.
+
+    Args:
+        reading: The stage.
+        prim: Its prim.
+        body: Index of its body.
+        pose: World pose of that body, stage units.
+
+    Raises:
+        ShotError: Weights that are negative, not finite, or both zero; a transform that shears.
+    """
+    own = pose_from_matrix(reading.world_matrix(prim), str(prim.GetPath()))
+    weights = [_weight(reading, prim, f"calm:target:{name}") for name in ("positionWeight", "rotationWeight")]
+    if weights == [0.0, 0.0]:
+        raise ShotError(
+            "a target without any weight",
+            path=prim.GetPath(),
+            attribute="calm:target:positionWeight",
+            found="0, and calm:target:rotationWeight 0",
+            remedy="Give it a positive weight, or remove CalmTargetAPI",
+        )
+    return Target(
+        path=str(prim.GetPath()),
+        body=body,
+        frame=Frame(
+            reading.units.length(pose.to_local(own.position[None])[0]),
+            quaternion_from_rotation(pose.rotation.T @ own.rotation),
+        ),
+        position_weight=weights[0],
+        rotation_weight=weights[1],
+    )
+
+
+def outermost_target(body: Body, index: int, joints: tuple[Joint, ...]) -> Target:
+    """The target of a leaf body where none is authored: its point farthest from the joints that carry it.
+
+    Args:
+        body: The body.
+        index: Its index.
+        joints: The joints of the character.
+    """
+    own = [j for j in joints if index in (j.body0, j.body1)]
+    anchors = [j.frame1.position if j.body1 == index else j.frame0.position for j in own]
+    anchor = np.mean(anchors, axis=0) if anchors else np.zeros(3)
+    points = [s.points for s in body.surfaces if s.visible] or [s.points for s in body.surfaces]
+    if body.tets is not None:
+        points.append(body.tets.points)
+    if points:
+        cloud = np.concatenate(points)
+        position = cloud[int(np.argmax(np.linalg.norm(cloud - anchor, axis=1)))]
+    else:
+        position = np.zeros(3) if body.mass is None else body.mass.center
+    return Target(body.path, index, Frame(np.array(position), _UPRIGHT.copy()))
+
+
+def _weight(reading: Reading, prim, name: str) -> float:
+    attribute = prim.GetAttribute(name)
+    if attribute and attribute.ValueMightBeTimeVarying():
+        path = attribute.GetPath()
+        reading.note(f"{path}: weights that change in time are not supported yet; the first value is used")
+    value = schemas.value(prim, _SCHEMA, name, reading.start)
+    if value is None or not (math.isfinite(value) and value >= 0.0):
+        raise ShotError(
+            "a weight must not be negative",
+            path=prim.GetPath(),
+            attribute=name,
+            found=value,
+            remedy="Author a weight of 0 or more",
+        )
+    return float(value)

@@ -1,0 +1,67 @@
+"""The samples of a drive as a track in seconds and radians."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...errors import ShotError
+from ...shot import Track
+from ...shot.character import Array
+from ..clock import Clock
+
+
+def sample_codes(attribute) -> Array:
+    """Time codes of the samples of an attribute; the knots of its spline where it has no samples."""
+    codes = attribute.GetTimeSamples()
+    if not codes and attribute.HasSpline():
+        codes = list(attribute.GetSpline().GetKnots().keys())
+    return np.array(codes, dtype=np.float64)
+
+
+def read_track(attribute, clock: Clock, notes: list[str]) -> Track:
+    """The track of a motor.
+
+    Samples are taken where they are, also outside the shot. Where they begin after the first frame or end
+    before the last, USD holds the value, so frames with that value are added. A spline is evaluated at the frames.
+    A constant gives two equal samples.
+
+    Args:
+        attribute: The drive's target position, degrees.
+        clock: The clock of the shot.
+        notes: Sentences for the user are added here.
+
+    Raises:
+        ShotError: A sample that is blocked, not a number or not finite.
+    """
+    path = attribute.GetPath()
+    frames = clock.time_codes(clock.frame_times())
+    codes = np.array(attribute.GetTimeSamples(), dtype=np.float64)
+    if len(codes) == 0 and attribute.HasSpline():
+        notes.append(f"{path}: the spline is evaluated at the frames of the shot")
+        codes = frames
+    elif len(codes) == 0:
+        codes = frames[[0, -1]]
+    values = np.array([_degrees(attribute, code) for code in codes])
+    held = (frames < codes[0] - 1e-9, frames > codes[-1] + 1e-9)
+    if len(attribute.GetTimeSamples()) > 0 and (held[0].any() or held[1].any()):
+        notes.append(f"{path}: its samples do not span the shot; the first and last value are held, as USD does")
+    codes = np.concatenate([frames[held[0]], codes, frames[held[1]]])
+    values = np.concatenate([np.full(held[0].sum(), values[0]), values, np.full(held[1].sum(), values[-1])])
+    return Track(clock.seconds(codes), np.deg2rad(values))
+
+
+def _degrees(attribute, code: float) -> float:
+    value = attribute.Get(code)
+    try:
+        number = float(value)
+    except (TypeError, ValueError):
+        number = np.nan
+    if not np.isfinite(number):
+        raise ShotError(
+            "a sample of the animation is not a finite number",
+            path=attribute.GetPrimPath(),
+            attribute=attribute.GetName(),
+            found=f"{'a block' if value is None else value} at time code {code:g}",
+            remedy="Correct or remove the sample",
+        )
+    return number

@@ -1,0 +1,181 @@
+"""Opening a shot: what is broken is refused with its place, and layers of ours are told from the animator's."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import re
+from contextlib import contextmanager
+from pathlib import Path
+
+from ..errors import ShotError
+from ..shot import InputLayer
+from . import schemas
+
+METADATA_KEY = "calmotion"
+CURVES, MOTION, ROOT = "curves", "motion", "root"  # roles of layers that we write
+
+_ARCS = {"reference": "references", "payload": "payload", "sublayer": "subLayers"}
+_REFUSED = (
+    "ErrorInvalidAssetPath",
+    "ErrorInvalidSublayerPath",
+    "ErrorUnresolvedPrimPath",
+    "ErrorInvalidPrimPath",
+    "ErrorSublayerCycle",
+    "ErrorArcCycle",
+)
+
+
+@contextmanager
+def quiet():
+    """Hold back USD's own messages on stderr; what matters in them is raised as a ShotError."""
+    from pxr import UsdUtils
+
+    delegate = UsdUtils.CoalescingDiagnosticDelegate()
+    try:
+        yield
+    finally:
+        delegate.TakeUncoalescedDiagnostics()
+        del delegate
+
+
+def open_layer(path: str):
+    """The root layer of a shot.
+
+    Raises:
+        ShotError: The file does not exist, cannot be read, or is not a USD file.
+    """
+    from pxr import Sdf, Tf
+
+    if not os.path.exists(path):
+        raise ShotError("the file does not exist", path=path, remedy="Check the path of the shot")
+    if os.path.isdir(path):
+        raise ShotError("this is a folder", path=path, remedy="Name the .usda, .usdc, .usd or .usdz file of the shot")
+    if not os.access(path, os.R_OK):
+        raise ShotError("the file cannot be read", path=path, remedy="Check its permissions")
+    reason = ""
+    layer = None
+    try:
+        with quiet():
+            layer = Sdf.Layer.FindOrOpen(str(path))
+    except Tf.ErrorException as error:
+        reason = _last_quoted(str(error))
+    if layer is None:
+        raise ShotError(
+            "this is not a USD file, or a broken one",
+            path=path,
+            found=reason or None,
+            remedy="Name a .usda, .usdc, .usd or .usdz file that opens in a USD viewer",
+        )
+    return layer
+
+
+def open_stage(path: str, *, muted: tuple[str, ...] = ()):
+    """The composed stage of a shot, everything loaded and checked; registers our schemas first.
+
+    Args:
+        path: File of the shot.
+        muted: Identifiers of layers to leave out.
+
+    Raises:
+        ShotError: See `open_layer`; or a sublayer, reference or payload is missing.
+    """
+    from pxr import Usd
+
+    schemas.register()
+    layer = open_layer(path)
+    with quiet():
+        stage = Usd.Stage.Open(layer, Usd.Stage.LoadAll)
+        # USD keeps layers that were opened earlier in this process; take what is on disk now.
+        for used in stage.GetUsedLayers():
+            if not used.anonymous and not used.dirty:
+                used.Reload()
+        if muted:
+            stage.MuteAndUnmuteLayers(list(muted), [])
+        errors = stage.GetCompositionErrors()
+    for error in errors:
+        _refuse(error, path)
+    return stage
+
+
+def _last_quoted(text: str) -> str:
+    quoted = re.findall(r"'([^']*)'", text)
+    return quoted[-1] if quoted else ""
+
+
+def _refuse(error, shot: str) -> None:
+    """Raise a ShotError for a composition error that means something of the shot is missing."""
+    if type(error).__name__ not in _REFUSED:
+        return
+    text = str(error).strip()
+    site = re.search(r"<(/[^>]*)>\.?\s*$", text)
+    prim = site.group(1) if site else str(error.rootSite.path)
+    assets = re.findall(r"@([^@]*)@", text)
+    arc = next((name for name in _ARCS if name in text.lower()), "reference")
+    if arc == "sublayer":
+        raise ShotError(
+            "names a sublayer that cannot be opened",
+            path=assets[-1] if assets else shot,
+            attribute=_ARCS[arc],
+            found=f"@{assets[0]}@" if assets else text,
+            remedy="Put the file there, or correct or remove the sublayer",
+        )
+    if "UnresolvedPrimPath" in type(error).__name__:
+        problem, remedy = f"its {arc} names a prim that does not exist", f"Correct the prim path of the {arc}"
+        found: str = text
+    elif "Cycle" in type(error).__name__:
+        problem, remedy, found = "its composition refers to itself", "Remove the cycle", text
+    else:
+        problem = f"its {arc} cannot be opened"
+        remedy = f"Put the file there, or correct or remove the {arc}"
+        found = f"@{assets[0]}@, introduced by {assets[1]}" if len(assets) > 1 else text
+    raise ShotError(problem, path=prim, attribute=_ARCS[arc], found=found, remedy=remedy)
+
+
+def role_of(layer) -> str:
+    """The role of a layer that we wrote, `curves`, `motion` or `root`; empty for anybody else's."""
+    ours = layer.customLayerData.get(METADATA_KEY)
+    return str(ours.get("role", "")) if isinstance(ours, dict) else ""
+
+
+def earlier_layers(stage) -> tuple[str, ...]:
+    """Identifiers of the layers in a stage that hold curves or motions that we computed."""
+    return tuple(
+        layer.identifier
+        for layer in stage.GetUsedLayers(True)
+        if role_of(layer) in (CURVES, MOTION) and layer != stage.GetRootLayer()
+    )
+
+
+def refuse_own_layer(stage, path: str) -> None:
+    """Refuse a layer of ours that was given instead of the root layer that opens it with its shot."""
+    if role_of(stage.GetRootLayer()) in (CURVES, MOTION):
+        raise ShotError(
+            "this layer was written by Calmotion and holds opinions over a shot, not a shot",
+            path=path,
+            remedy="Open the root layer beside it, whose name ends in _root, or the shot itself",
+        )
+
+
+def display_name(identifier: str, shot: str) -> str:
+    """A layer's file relative to the folder of the shot."""
+    return Path(os.path.relpath(os.path.realpath(identifier), os.path.dirname(os.path.realpath(shot)))).as_posix()
+
+
+def input_layers(stage, shot: str) -> tuple[InputLayer, ...]:
+    """Every file that a stage was composed from, the shot first, relative to the shot's folder, with SHA-256.
+
+    Layers of ours are among them where they are not muted.
+    """
+    files = [os.path.realpath(shot)]
+    for layer in stage.GetUsedLayers(True):
+        name = layer.realPath.split("[")[0]  # a layer inside a .usdz package counts as the package
+        if name and not layer.anonymous and os.path.realpath(name) not in files:
+            files.append(os.path.realpath(name))
+    first, rest = files[0], sorted(files[1:])
+    return tuple(InputLayer(display_name(file, shot), _sha256(file)) for file in (first, *rest))
+
+
+def _sha256(file: str) -> str:
+    with open(file, "rb") as handle:
+        return hashlib.file_digest(handle, "sha256").hexdigest()

@@ -1,0 +1,102 @@
+"""Rigid poses out of affine transforms, and rotations between their forms. NumPy alone; stage or SI length alike."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..errors import ShotError
+from ..shot.character import Array, Frame
+
+_SHEAR_TOLERANCE = 1e-4  # xforms are often authored in single precision
+
+
+@dataclass(frozen=True, eq=False)
+class Pose:
+    """A transform x -> R diag(scale) x + t.
+
+    Attributes:
+        rotation: R, shape [3, 3], a proper rotation.
+        position: t, shape [3].
+        scale: Shape [3]; all three negative for a mirrored prim.
+    """
+
+    rotation: Array
+    position: Array
+    scale: Array
+
+    def frame(self, meters: float) -> Frame:
+        """The pose without its scale, in SI."""
+        return Frame(self.position * meters, quaternion_from_rotation(self.rotation))
+
+    def matrix(self) -> Array:
+        """The transform with its scale, shape [4, 4], mapping column vectors."""
+        out = np.eye(4)
+        out[:3, :3] = self.rotation * self.scale
+        out[:3, 3] = self.position
+        return out
+
+    def to_local(self, points: Array) -> Array:
+        """Points [n, 3] of the outer space in the axes of the pose without its scale."""
+        return (points - self.position) @ self.rotation
+
+
+def pose_from_matrix(matrix: Array, path: str) -> Pose:
+    """Split an affine matrix into rotation, position and scale.
+
+    Args:
+        matrix: Shape [4, 4], maps column vectors.
+        path: Prim path, for the message.
+
+    Raises:
+        ShotError: The matrix shears, or is singular or not finite.
+    """
+    linear = matrix[:3, :3]
+    if not np.all(np.isfinite(matrix)):
+        raise ShotError("its transform is not finite", path=path, attribute="xformOpOrder", remedy="Correct it")
+    scale = np.linalg.norm(linear, axis=0)
+    if np.min(scale) <= 1e-12 * max(1.0, float(np.max(scale))):
+        raise ShotError(
+            "its transform has a scale of zero",
+            path=path,
+            attribute="xformOpOrder",
+            found=scale.tolist(),
+            remedy="Give it a scale that is not zero",
+        )
+    if np.linalg.det(linear) < 0.0:
+        scale = -scale
+    rotation = linear / scale
+    if np.max(np.abs(rotation.T @ rotation - np.eye(3))) > _SHEAR_TOLERANCE:
+        raise ShotError(
+            "its transform shears (a scale that differs by axis above a rotation does that), so it has no rigid pose",
+            path=path,
+            attribute="xformOpOrder",
+            remedy="Freeze the scale of the prims above it into their geometry",
+        )
+    # Remove what single precision left: the nearest rotation.
+    u, _, vt = np.linalg.svd(rotation)
+    return Pose(u @ vt, matrix[:3, 3].copy(), scale)
+
+
+def quaternion_from_rotation(rotation: Array) -> Array:
+    """Unit quaternions (w, x, y, z), w >= 0, shape [..., 4], of rotation matrices [..., 3, 3]."""
+    from scipy.spatial.transform import Rotation
+
+    return Rotation.from_matrix(rotation).as_quat(canonical=True, scalar_first=True)
+
+
+def rotation_from_quaternion(quaternion: Array) -> Array:
+    """Rotation matrices [..., 3, 3] of quaternions (w, x, y, z) [..., 4], which are normalised first."""
+    from scipy.spatial.transform import Rotation
+
+    return Rotation.from_quat(quaternion, scalar_first=True).as_matrix()
+
+
+def axis_rotation(axis: str) -> Array:
+    """The rotation, shape [3, 3], that takes the z axis to the named axis `X`, `Y` or `Z`."""
+    if axis == "X":
+        return np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])
+    if axis == "Y":
+        return np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
+    return np.eye(3)

@@ -1,0 +1,73 @@
+"""The one place where stage units become SI and back; seconds are seconds in both."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+EARTH_GRAVITY = 9.81  # m/s^2
+
+
+@dataclass(frozen=True)
+class StageUnits:
+    """Units of a stage; each method converts a value, or array, in stage units to SI.
+
+    Attributes:
+        meters: Metres per unit of length.
+        kilograms: Kilograms per unit of mass.
+    """
+
+    meters: float
+    kilograms: float
+
+    def length(self, value):
+        """To m."""
+        return value * self.meters
+
+    def mass(self, value):
+        """To kg."""
+        return value * self.kilograms
+
+    def density(self, value):
+        """Mass / length^3, to kg/m^3."""
+        return value * (self.kilograms / self.meters**3)
+
+    def inertia(self, value):
+        """Mass length^2, to kg m^2."""
+        return value * (self.kilograms * self.meters**2)
+
+    def pressure(self, value):
+        """Mass / (length s^2), to Pa."""
+        return value * (self.kilograms / self.meters)
+
+    def torque(self, value):
+        """Mass length^2 / s^2, to N m."""
+        return value * (self.kilograms * self.meters**2)
+
+    def acceleration(self, value):
+        """Length / s^2, to m/s^2."""
+        return value * self.meters
+
+
+def units_of(stage) -> StageUnits:
+    """The units of a stage, with USD's fallbacks (0.01 m, 1 kg).
+
+    Raises:
+        ShotError: A unit that is not positive.
+    """
+    import math
+
+    from pxr import UsdGeom, UsdPhysics
+
+    from ..errors import ShotError
+
+    units = StageUnits(UsdGeom.GetStageMetersPerUnit(stage), UsdPhysics.GetStageKilogramsPerUnit(stage))
+    for name, found in (("metersPerUnit", units.meters), ("kilogramsPerUnit", units.kilograms)):
+        if not (math.isfinite(found) and found > 0.0):
+            raise ShotError(
+                "the unit of the stage must be positive",
+                path=stage.GetRootLayer().identifier,
+                attribute=name,
+                found=found,
+                remedy=f"Author a positive {name} in the root layer",
+            )
+    return units

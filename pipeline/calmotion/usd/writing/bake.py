@@ -1,0 +1,143 @@
+"""Baking a motion: body transforms, and the points of deformed meshes, as time samples that any viewer shows."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...shot import Character, Skin
+from ...shot.character import Array
+from .. import gf
+from ..clock import Clock
+from ..transforms import Pose, pose_from_matrix, rotation_from_quaternion
+from .curves import attribute_spec
+from .motions import BakedMotion
+
+_OP = "xformOp:transform:calmotion"  # a name of our own: never the type of an op that the shot has
+
+
+def bake_bodies(layer, stage, character: Character, motion: BakedMotion, clock: Clock, meters: float) -> dict[str, int]:
+    """Author one matrix for each body and frame, relative to its parent prim, in place of its other transform ops.
+
+    Args:
+        layer: The Sdf.Layer to write to.
+        stage: The shot, layers of ours muted.
+        character: The character.
+        motion: What to bake.
+        clock: The clock of the shot.
+        meters: Metres per unit of the stage.
+
+    Returns:
+        Path of each attribute that was written, with its number of samples.
+    """
+    from pxr import Sdf, UsdGeom, Vt
+
+    codes = clock.time_codes(motion.times)
+    poses = _rest_poses(stage, character, clock.start)
+    worlds = {
+        body.path: _world_matrices(poses[body.path], motion, k, meters) for k, body in enumerate(character.bodies)
+    }
+    written = {}
+    for body in character.bodies:
+        prim = stage.GetPrimAtPath(body.path)
+        reset = UsdGeom.Xformable(prim).GetResetXformStack()
+        local = worlds[body.path]
+        if not reset:
+            local = np.linalg.inv(_parent_matrices(stage, prim.GetParent(), worlds, poses, codes, clock.start)) @ local
+        spec = attribute_spec(layer, f"{body.path}.{_OP}", Sdf.ValueTypeNames.Matrix4d)
+        for code, matrix in zip(codes, local, strict=True):
+            layer.SetTimeSample(spec.path, float(code), gf.to_matrix(matrix))
+        order = attribute_spec(layer, f"{body.path}.xformOpOrder", Sdf.ValueTypeNames.TokenArray)
+        order.variability = Sdf.VariabilityUniform
+        order.default = Vt.TokenArray(["!resetXformStack!", _OP] if reset else [_OP])
+        written[str(spec.path)] = len(codes)
+    return written
+
+
+def bake_points(
+    layer, stage, character: Character, skins: tuple[Skin | None, ...], motion: BakedMotion, clock: Clock, meters: float
+) -> dict[str, int]:
+    """Author the deformed points of the meshes of flexible bodies, and their extents.
+
+    Args:
+        skins: One for each body; None for a rigid one.
+        The others as for `bake_bodies`; `motion` is a simulated one.
+
+    Returns:
+        Path of each attribute that was written, with its number of samples.
+    """
+    from pxr import Sdf, Usd, UsdGeom, Vt
+
+    if motion.elastic is None:
+        return {}
+    codes = clock.time_codes(motion.times)
+    xforms = UsdGeom.XformCache(Usd.TimeCode(clock.start))
+    poses = _rest_poses(stage, character, clock.start)
+    written = {}
+    for body, skin, u in zip(character.bodies, skins, motion.elastic, strict=True):
+        if skin is None:
+            continue
+        for surface, modes in zip(body.surfaces, skin.modes, strict=True):
+            if surface.displaced == 0:
+                continue
+            prim = stage.GetPrimAtPath(surface.path)
+            world = gf.matrix(xforms.GetLocalToWorldTransform(prim))
+            to_body = meters * poses[body.path].rotation.T @ world[:3, :3]  # of vectors; stage units to m
+            back = np.linalg.inv(to_body)
+            rest = gf.points(prim.GetAttribute("points").Get(clock.start))
+            own_modes = np.einsum("ab,nbr->nar", back, modes[: surface.displaced])
+            points = attribute_spec(layer, f"{surface.path}.points", Sdf.ValueTypeNames.Point3fArray)
+            extent = attribute_spec(layer, f"{surface.path}.extent", Sdf.ValueTypeNames.Float3Array)
+            for code, coordinates in zip(codes, u, strict=True):
+                moved = rest + own_modes @ coordinates
+                layer.SetTimeSample(points.path, float(code), gf.to_points(moved))
+                box = np.stack([moved.min(axis=0), moved.max(axis=0)])
+                layer.SetTimeSample(extent.path, float(code), Vt.Vec3fArray.FromNumpy(box.astype(np.float32)))
+            written[str(points.path)] = len(codes)
+    return written
+
+
+def _rest_poses(stage, character: Character, start: float) -> dict[str, Pose]:
+    """World poses of the bodies as authored at the first frame, stage units, with their scales."""
+    from pxr import Usd, UsdGeom
+
+    xforms = UsdGeom.XformCache(Usd.TimeCode(start))
+    return {
+        body.path: pose_from_matrix(
+            gf.matrix(xforms.GetLocalToWorldTransform(stage.GetPrimAtPath(body.path))), body.path
+        )
+        for body in character.bodies
+    }
+
+
+def _world_matrices(rest: Pose, motion: BakedMotion, body: int, meters: float) -> Array:
+    """Local-to-world matrices of a body in a motion, its scale kept, stage units, shape [f, 4, 4]."""
+    out = np.zeros((len(motion.times), 4, 4))
+    out[:, :3, :3] = rotation_from_quaternion(motion.rotations[:, body]) * rest.scale
+    out[:, :3, 3] = motion.positions[:, body] / meters
+    out[:, 3, 3] = 1.0
+    return out
+
+
+def _parent_matrices(
+    stage, parent, worlds: dict[str, Array], poses: dict[str, Pose], codes: Array, start: float
+) -> Array:
+    """Local-to-world matrices of the prim above a body, shape [f, 4, 4], carried by the body above that, if any."""
+    from pxr import Usd, UsdGeom
+
+    carrier = parent
+    while carrier and str(carrier.GetPath()) not in worlds:
+        if carrier.IsA(UsdGeom.Xformable) and UsdGeom.Xformable(carrier).GetResetXformStack():
+            carrier = None
+            break
+        carrier = carrier.GetParent()
+    if not carrier:
+        return np.array([_local_to_world(parent, code) for code in codes])
+    at_start = gf.matrix(UsdGeom.XformCache(Usd.TimeCode(start)).GetLocalToWorldTransform(parent))
+    path = str(carrier.GetPath())
+    return worlds[path] @ np.linalg.inv(poses[path].matrix()) @ at_start
+
+
+def _local_to_world(prim, code: float) -> Array:
+    from pxr import Usd, UsdGeom
+
+    return gf.matrix(UsdGeom.XformCache(Usd.TimeCode(code)).GetLocalToWorldTransform(prim))

@@ -1,0 +1,75 @@
+"""Motor curves as time samples of the attributes that they came from."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...shot import Character, MotorCurve, Track
+from ...shot.character import Array
+from ..clock import Clock
+
+
+def sample_times(frame_times: Array, samples_per_second: float | None) -> Array:
+    """Times of the samples [s]: the frames, or a uniform grid that is at least that dense and has the frames.
+
+    Args:
+        frame_times: Shape [f].
+        samples_per_second: None for the frames alone.
+    """
+    if samples_per_second is None:
+        return frame_times
+    frame = float(frame_times[1] - frame_times[0])
+    parts = max(1, int(np.ceil(frame * samples_per_second - 1e-9)))
+    steps = np.arange((len(frame_times) - 1) * parts + 1)
+    return frame_times[0] + steps * (frame / parts)
+
+
+def curve_values(curve: MotorCurve, frame_times: Array, times: Array) -> Array:
+    """A motor's curve [rad] at times within the shot, by the rule with which samples at frames are read back."""
+    if times is frame_times:
+        return curve.frame_values
+    from ...retarget.curves import interpolate
+
+    return interpolate(Track(frame_times, curve.frame_values), float(frame_times[-1]))(times)
+
+
+def author_curves(
+    layer, character: Character, curves: tuple[MotorCurve, ...], frame_times: Array, times: Array, clock: Clock
+) -> dict[str, int]:
+    """Author each curve as an over with time samples, degrees.
+
+    Args:
+        layer: The Sdf.Layer.
+        character: The character.
+        curves: Those to write.
+        frame_times: Frames of the shot [s], shape [f].
+        times: Times of the samples [s].
+        clock: The clock of the shot.
+
+    Returns:
+        Path of each attribute that was written, with its number of samples.
+    """
+    from pxr import Sdf
+
+    codes = clock.time_codes(times)
+    written = {}
+    for curve in curves:
+        motor = character.motors[curve.motor]
+        path = f"{motor.path}.{motor.attribute}"
+        spec = attribute_spec(layer, path, Sdf.ValueTypeNames.Float)
+        for code, value in zip(codes, np.rad2deg(curve_values(curve, frame_times, times)), strict=True):
+            layer.SetTimeSample(spec.path, float(code), float(value))
+        written[path] = len(codes)
+    return written
+
+
+def attribute_spec(layer, path: str, kind):
+    """The spec of an attribute in a layer, made with overs above it where needed."""
+    from pxr import Sdf
+
+    sdf = Sdf.Path(path)
+    spec = layer.GetAttributeAtPath(sdf)
+    if spec is not None:
+        return spec
+    prim = Sdf.CreatePrimInLayer(layer, sdf.GetPrimPath())
+    return Sdf.AttributeSpec(prim, sdf.name, kind)

@@ -1,0 +1,87 @@
+"""What a layer says about itself: stage metadata, and where it came from in `customLayerData["calmotion"]`."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ... import __version__
+from ...shot import Character, Provenance, Result, Simulation
+from .. import gf
+from ..stages import METADATA_KEY
+
+
+def author_stage_metadata(layer, provenance: Provenance) -> None:
+    """The shot's units, axes, rates, range and default prim: a sublayer's are not taken over by what sublayers it."""
+    root = layer.pseudoRoot
+    root.SetInfo("metersPerUnit", provenance.meters_per_unit)
+    root.SetInfo("kilogramsPerUnit", provenance.kilograms_per_unit)
+    root.SetInfo("upAxis", provenance.up_axis)
+    layer.timeCodesPerSecond = provenance.time_codes_per_second
+    layer.framesPerSecond = provenance.frames_per_second
+    layer.startTimeCode = provenance.start_time_code
+    layer.endTimeCode = provenance.end_time_code
+    if provenance.default_prim:
+        layer.defaultPrim = provenance.default_prim
+
+
+def author_origin(
+    layer, role: str, provenance: Provenance, *, settings: dict | None = None, errors: dict | None = None
+) -> None:
+    """Record version, role, input layers with their hashes, settings and errors."""
+    entry = {
+        "version": __version__,
+        "role": role,
+        "inputs": gf.to_strings(item.path for item in provenance.layers),
+        "sha256": gf.to_strings(item.sha256 for item in provenance.layers),
+    }
+    if settings:
+        entry["settings"] = settings
+    if errors:
+        entry["errors"] = errors
+    layer.customLayerData = {**layer.customLayerData, METADATA_KEY: entry}
+
+
+def settings_of(character: Character, result: Result, bake: str, samples_per_second: float | None) -> dict:
+    """The settings that a result was computed and written with, as plain values that USD stores."""
+    asked = character.retarget
+    found: dict[str, object] = {
+        "step_s": float(result.step_s),
+        "pre_roll_s": float(result.pre_roll_s),
+        "reference": asked.reference,
+        "endpoints": asked.endpoints,
+        "cyclic": asked.cyclic,
+        "bake": bake,
+    }
+    for name, value in (
+        ("tolerance_m", asked.tolerance),
+        ("knot_spacing_s", asked.knot_spacing),
+        ("smoothness", asked.smoothness),
+        ("samples_per_second", samples_per_second),
+    ):
+        if value is not None:
+            found[name] = float(value)
+    return found
+
+
+def errors_of(character: Character, result: Result) -> dict:
+    """Errors of each target before and after, in the order of `targets`."""
+    found: dict[str, object] = {"targets": gf.to_strings(target.path for target in character.targets)}
+    for name, simulation in (("before", result.before), ("after", result.after)):
+        if simulation is None:
+            continue
+        shown = _of_the_shot(simulation)
+        for quantity, unit, values in (
+            ("error", "m", simulation.position_errors[shown]),
+            ("rotation_error", "rad", simulation.rotation_errors[shown]),
+        ):
+            found[f"max_{quantity}_{name}_{unit}"] = gf.to_doubles(np.max(values, axis=0))
+            found[f"rms_{quantity}_{name}_{unit}"] = gf.to_doubles(np.sqrt(np.mean(values**2, axis=0)))
+    found["objective_before"] = float(result.objective_before)
+    if result.objective_after is not None:
+        found["objective_after"] = float(result.objective_after)
+    return found
+
+
+def _of_the_shot(simulation: Simulation):
+    """The steps that count: not those of the pre-roll."""
+    return simulation.motion.times >= -1e-9

@@ -1,0 +1,83 @@
+"""The small layer that opens a result with its shot."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+from ...errors import ShotError
+from ...shot import Provenance
+from .. import stages
+from ..layers import write_layer
+from .metadata import author_origin, author_stage_metadata
+
+
+def root_path(layer: str) -> str:
+    """Where the root layer of a layer goes: beside it, `<stem>_root.usda`."""
+    return f"{os.path.splitext(layer)[0]}_root.usda"
+
+
+def write_root(layer: str, provenance: Provenance, role: str) -> str:
+    """Write the root layer that sublayers [the new layer, the shot].
+
+    Where the shot is itself a root layer of an earlier result, what that one opened takes its place, without what
+    the new layer replaces: a new motion replaces earlier motions, new curves replace both.
+
+    Args:
+        layer: The layer of overs, already written.
+        provenance: The shot.
+        role: The role of that layer, `stages.CURVES` or `stages.MOTION`.
+
+    Returns:
+        The path of the root layer.
+
+    Raises:
+        ShotError: It cannot be written, or does not compose.
+    """
+    from pxr import Sdf
+
+    output = root_path(layer)
+    root = Sdf.Layer.CreateAnonymous(".usda")
+    author_stage_metadata(root, provenance)
+    author_origin(root, stages.ROOT, provenance)
+    folder = os.path.dirname(os.path.realpath(output))
+    replaced = (stages.MOTION,) if role == stages.MOTION else (stages.CURVES, stages.MOTION)
+    below = [relative_asset(path, folder) for path in shot_layers(provenance.shot, replaced)]
+    root.subLayerPaths = [relative_asset(os.path.realpath(layer), folder), *below]
+    root.documentation = f"Opens {os.path.basename(layer)} over its shot."
+    write_layer(root, output, lambda temporary: _validate(temporary, provenance))
+    return output
+
+
+def shot_layers(shot: str, replaced: tuple[str, ...]) -> list[str]:
+    """The layers to put below a new result: the shot, or what our earlier root layer opens but for `replaced`."""
+    layer = stages.open_layer(shot)
+    if stages.role_of(layer) != stages.ROOT:
+        return [os.path.realpath(shot)]
+    found = []
+    for asset in layer.subLayerPaths:
+        path = layer.ComputeAbsolutePath(asset)
+        if stages.role_of(stages.open_layer(path)) not in replaced:
+            found += shot_layers(path, replaced)
+    return found
+
+
+def relative_asset(path: str, folder: str) -> str:
+    """An asset path relative to a folder, `./` in front; absolute where there is no relative one (another drive)."""
+    try:
+        relative = Path(os.path.relpath(os.path.realpath(path), folder)).as_posix()
+    except ValueError:
+        return Path(path).as_posix()
+    return relative if relative.startswith("../") else f"./{relative}"
+
+
+def _validate(temporary: str, provenance: Provenance) -> None:
+    """Open a root layer as a stage: it must compose, with the shot's rate."""
+    stage = stages.open_stage(temporary)
+    if stage.GetTimeCodesPerSecond() != provenance.time_codes_per_second:
+        raise ShotError(
+            "the root layer does not keep the rate of the shot",
+            path=temporary,
+            attribute="timeCodesPerSecond",
+            found=stage.GetTimeCodesPerSecond(),
+        )

@@ -1,0 +1,75 @@
+"""The operator `fe.mesh`."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from calmotion.host import Operator, Property, RunContext
+from calmotion.shot import Character, FEMeshes
+
+
+class TetrahedralizeFlexibleBodies(Operator):
+    """Makes one tetrahedral mesh for each flexible body."""
+
+    idname = "fe.mesh"
+    label = "Tetrahedralise flexible bodies"
+    requires = (Character,)
+    provides = (FEMeshes,)
+    properties = (
+        Property(
+            "element_size",
+            float,
+            -1.0,
+            unit="m",
+            minimum=1e-6,
+            description="Edge length of the elements of every body; -1: as the shot says, or automatic.",
+        ),
+        Property(
+            "time_limit",
+            float,
+            300.0,
+            unit="s",
+            minimum=1.0,
+            description="Longest time that meshing one body may take.",
+        ),
+        Property("cache", bool, True, description="Keep meshes in the user's cache folder and reuse them."),
+    )
+
+    @classmethod
+    def poll(cls, data: Mapping[type, Any]) -> str | None:
+        """Left out where nothing bends."""
+        character = data.get(Character)
+        if character is not None and not any(body.flexible for body in character.bodies):
+            return "no body is flexible"
+        return None
+
+    def execute(self, context: RunContext) -> Sequence[object]:
+        """The meshes, in the order of the bodies."""
+        # trimesh and manifold3d load in half a second: only when something bends
+        from .body_mesh import MeshOptions, mesh_body
+
+        character = context.get(Character)
+        options = MeshOptions(
+            element_size=context.properties.element_size,
+            time_limit=context.properties.time_limit,
+            cache=context.properties.cache,
+        )
+        flexible = [index for index, body in enumerate(character.bodies) if body.flexible]
+        meshes = []
+        for done, index in enumerate(flexible):
+            body = character.bodies[index]
+            context.progress(done / len(flexible), body.path)
+            mesh = mesh_body(index, body, options)
+            quality = mesh.quality
+            context.report(
+                "info",
+                f"{body.path}: {len(mesh.tets)} tetrahedra, {len(mesh.points)} points, "
+                f"{1e6 * quality.volume:.4g} cm^3, "
+                f"volume error {quality.volume_error:.2%}, smallest dihedral angle {quality.min_dihedral_deg:.1f} deg",
+            )
+            for repair in quality.repairs:
+                context.report("info", f"{body.path}: {repair}")
+            meshes.append(mesh)
+        context.progress(1.0, "")
+        return (FEMeshes(tuple(meshes)),)

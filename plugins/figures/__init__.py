@@ -1,0 +1,51 @@
+"""Draws a result as figures (.png)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from calmotion.host import Figures, Operator, OutputPaths, Property, RunContext
+from calmotion.shot import Animation, Character, Result
+
+
+class PlotFigures(Operator):
+    """Errors over time, motor curves with their limits, the optimiser's convergence, and the motion in pictures."""
+
+    idname = "figures.plot"
+    label = "Draw the figures"
+    requires = (Character, Animation, Result, OutputPaths)
+    provides = (Figures,)
+    properties = (
+        Property("dpi", int, 150, minimum=30, maximum=600, description="Resolution of the figures, dots an inch."),
+        Property("instants", int, 5, minimum=1, maximum=12, description="Number of instants in the filmstrip."),
+    )
+
+    @classmethod
+    def poll(cls, data: Mapping[type, Any]) -> str | None:
+        paths = data.get(OutputPaths)
+        return None if paths and paths.figures else "no figures are asked for (--figures)"
+
+    def execute(self, context: RunContext) -> Sequence[object]:
+        from .drawing import draw_figures
+
+        written = draw_figures(
+            context.get(OutputPaths).figures or "",
+            context.get(Character),
+            context.get(Animation),
+            context.get(Result),
+            dpi=context.properties.dpi,
+            instants=context.properties.instants,
+            progress=context.progress,
+        )
+        return (Figures(tuple(written)),)
+
+
+def register(host: Any) -> None:
+    """Add the operator to the host."""
+    host.register_operator(PlotFigures)
+
+
+def unregister(host: Any) -> None:
+    """Take it out again."""
+    host.unregister_operator(PlotFigures)

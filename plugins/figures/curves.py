@@ -1,0 +1,112 @@
+"""Figures of curves: errors over time, motor angles, convergence."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from calmotion.shot import Character, Result, Simulation
+from calmotion.shot.playback import sample_motion
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
+
+from .style import AFTER, BEFORE, INTENDED, LIMIT, SMALL, TEXT, new_figure, tidy
+
+MOST_TARGETS = 8
+WIDTH = 9.0
+
+
+def judged(simulation: Simulation) -> slice:
+    """The rows from the first frame of the shot on."""
+    return slice(int(np.searchsorted(simulation.motion.times, -1e-9)), None)
+
+
+def runs_of(result: Result) -> list[tuple[Simulation, str, str, str]]:
+    """What was simulated, with color, line style and name."""
+    runs = [(result.before, BEFORE, "--" if result.after else "-", "before" if result.after else "as animated")]
+    return runs + ([(result.after, AFTER, "-", "after")] if result.after else [])
+
+
+def plot_errors(character: Character, result: Result) -> Figure:
+    """Distance of each target to where it was meant to be [mm], and its rotation error [deg] where that counts."""
+    largest = result.before.position_errors[judged(result.before)].max(axis=0)
+    shown = sorted(np.argsort(-largest, kind="stable")[:MOST_TARGETS].tolist())
+    panels = [(k, False) for k in shown]
+    panels += [(k, True) for k in shown if character.targets[k].rotation_weight > 0.0]
+    figure = new_figure(WIDTH, 0.6 + 1.9 * len(panels))
+    all_axes = figure.subplots(len(panels), 1, sharex=True, squeeze=False)[:, 0]
+    for axes, (k, rotation) in zip(all_axes, panels, strict=True):
+        for simulation, color, line, name in runs_of(result):
+            rows = judged(simulation)
+            errors = simulation.rotation_errors if rotation else simulation.position_errors
+            values = np.degrees(errors[rows, k]) if rotation else 1e3 * errors[rows, k]
+            unit = "deg" if rotation else "mm"
+            text = f"{name}: largest {values.max():.2f} {unit}, rms {np.sqrt(np.mean(values**2)):.2f} {unit}"
+            axes.plot(simulation.motion.times[rows], values, line, color=color, linewidth=1.5, label=text)
+        tidy(axes, "rotation error [deg]" if rotation else "position error [mm]", character.targets[k].path)
+        axes.set_ylim(bottom=0.0)
+        axes.margins(x=0.0)
+        axes.legend(fontsize=SMALL, loc="upper right", framealpha=0.85, edgecolor="none")
+    all_axes[-1].set_xlabel("time [s]", fontsize=SMALL)
+    if len(shown) < len(character.targets):
+        note = f"The {len(shown)} of {len(character.targets)} targets with the largest errors"
+        figure.supxlabel(note, fontsize=SMALL, color=TEXT)
+    return figure
+
+
+def plot_motors(character: Character, result: Result, motors: Sequence[int]) -> Figure:
+    """Angle of each motor [deg] with its limits, and what the optimiser changed [deg]."""
+    columns = 2 if result.after else 1
+    figure = new_figure(WIDTH, 0.6 + 1.75 * len(motors))
+    grid = figure.subplots(len(motors), columns, sharex=True, squeeze=False)
+    for row, m in zip(grid, motors, strict=True):
+        motor = character.motors[m]
+        for simulation, color, line, name in runs_of(result):
+            rows = judged(simulation)
+            values = np.degrees(simulation.motion.motor_values[rows, m])
+            row[0].plot(simulation.motion.times[rows], values, line, color=color, linewidth=1.5, label=name)
+        joint = character.joints[motor.joint]
+        tidy(row[0], "angle [deg]", motor.path)
+        draw_limits(row[0], np.degrees([joint.lower, joint.upper]))
+        if result.after is None:
+            continue
+        rows = judged(result.after)
+        after = result.after.motion
+        before = sample_motion(result.before.motion, after.times[rows])
+        change = np.degrees(after.motor_values[rows, m] - before.motor_values[:, m])
+        row[1].plot(after.times[rows], change, color=INTENDED, linewidth=1.5)
+        row[1].axhline(0.0, color=LIMIT, linewidth=0.7)
+        tidy(row[1], "change [deg]", f"largest {np.abs(change).max():.2f} deg")
+    grid[0, 0].legend(fontsize=SMALL, loc="best", framealpha=0.85, edgecolor="none")
+    for axes in grid.flat:
+        axes.margins(x=0.0)
+    for axes in grid[-1]:
+        axes.set_xlabel("time [s]", fontsize=SMALL)
+    return figure
+
+
+def draw_limits(axes: Axes, limits: np.ndarray) -> None:
+    """The joint's limits, as lines where they are near the curve and always as text."""
+    if not np.any(np.isfinite(limits)):
+        return
+    low, high = axes.get_ylim()
+    reach = 0.35 * max(high - low, 1e-6)
+    for limit in limits:
+        if np.isfinite(limit) and low - reach < limit < high + reach:
+            axes.axhline(limit, color=LIMIT, linewidth=1.0, linestyle=":")
+    text = " to ".join(f"{limit:.0f}" if np.isfinite(limit) else "none" for limit in limits)
+    axes.set_title(f"limits {text} deg", fontsize=SMALL, loc="right", color=LIMIT)
+
+
+def plot_convergence(result: Result) -> Figure:
+    """Objective and gradient at each iteration, over the work done so far."""
+    figure = new_figure(WIDTH, 3.2)
+    work = [step.forward_simulations + step.linearized_sweeps for step in result.steps]
+    panels = (("objective", "objective", AFTER), ("gradient_norm", "norm of the projected gradient", INTENDED))
+    for axes, (name, title, color) in zip(figure.subplots(1, 2), panels, strict=True):
+        axes.semilogy(work, [getattr(step, name) for step in result.steps], color=color, marker="o", markersize=4)
+        tidy(axes, "", title)
+        axes.set_xlabel("simulations and linearised sweeps so far; a dot is an iteration", fontsize=SMALL)
+        axes.xaxis.set_major_locator(MaxNLocator(integer=True))
+    return figure

@@ -1,0 +1,67 @@
+"""All figures of a result, one after the other."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+from calmotion.errors import ShotError
+from calmotion.shot import Animation, Character, Result
+
+from .curves import plot_convergence, plot_errors, plot_motors
+from .filmstrip import draw_filmstrip
+from .style import save
+
+MOTORS_ON_A_PAGE = 8
+Progress = Callable[[float, str], None]
+
+
+def draw_figures(
+    folder: str,
+    character: Character,
+    animation: Animation,
+    result: Result,
+    *,
+    dpi: int = 150,
+    instants: int = 5,
+    progress: Progress = lambda fraction, message: None,
+) -> list[str]:
+    """Draw what the result holds.
+
+    Args:
+        folder: Where to; made when it does not exist.
+        character: The character.
+        animation: For the times of its frames.
+        result: Of `simulate` (then without what comes after) or of `optimize`.
+        dpi: Dots an inch.
+        instants: Number of instants in the filmstrip.
+        progress: Called with a fraction in 0..1 and a message.
+
+    Returns:
+        The paths that were written.
+
+    Raises:
+        ShotError: When the folder cannot be written.
+    """
+    target = Path(folder)
+    written: list[str] = []
+    try:
+        target.mkdir(parents=True, exist_ok=True)
+        if character.targets:
+            progress(0.0, "errors")
+            written.append(save(plot_errors(character, result), target / "errors.png", dpi))
+        for page, first in enumerate(range(0, len(character.motors), MOTORS_ON_A_PAGE)):
+            progress(0.2, "motors")
+            motors = range(first, min(first + MOTORS_ON_A_PAGE, len(character.motors)))
+            name = "motors.png" if page == 0 else f"motors_{page + 1}.png"
+            written.append(save(plot_motors(character, result, motors), target / name, dpi))
+        if len(result.steps) > 1:
+            progress(0.4, "convergence")
+            written.append(save(plot_convergence(result), target / "convergence.png", dpi))
+        progress(0.5, "filmstrip")
+        written.append(save(draw_filmstrip(character, animation, result, instants), target / "filmstrip.png", dpi))
+    except OSError as error:
+        raise ShotError(
+            f"the figures cannot be written: {error}", path=folder, remedy="Choose another --figures."
+        ) from error
+    return written

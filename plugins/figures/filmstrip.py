@@ -1,0 +1,100 @@
+"""The motion in pictures: each row one motion over the outline of what was meant, each column one instant."""
+
+from __future__ import annotations
+
+import numpy as np
+from calmotion.shot import Animation, Character, Motion, Result, Simulation
+from calmotion.shot.character import Array
+from calmotion.shot.playback import sample_motion
+from calmotion.shot.viewpoint import choose_viewpoint
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from .magnifier import choose_magnifier, draw_magnifier
+from .scene import Camera, draw_over_ghost, fit_camera, pose, prepare
+from .style import AFTER, BEFORE, INTENDED, NORMAL, SMALL, TEXT, new_figure
+
+PANEL = 340  # pixels across a panel, before it is drawn into the figure
+SMOOTH = 2  # rendered this much larger, then averaged
+TRAIL_S = 0.5
+WIDTH = 12.0
+
+
+def choose_instants(animation: Animation, result: Result, count: int) -> Array:
+    """In each of `count` equal parts of the shot, the frame at which the input is farthest off; times [s]."""
+    frames = animation.frame_times
+    errors = result.before.position_errors
+    worst = (
+        np.interp(frames, result.before.motion.times, errors.max(axis=1)) if errors.shape[1] else np.zeros(len(frames))
+    )
+    parts = [part for part in np.array_split(np.arange(len(frames)), count) if len(part)]
+    return frames[[int(part[np.argmax(worst[part])]) for part in parts]]
+
+
+def draw_filmstrip(character: Character, animation: Animation, result: Result, count: int) -> Figure:
+    """The input and, where there is one, the optimised motion at the instants at which the input is worst.
+
+    Args:
+        character: The character.
+        animation: For the times of its frames.
+        result: What was computed.
+        count: Number of instants.
+    """
+    times = choose_instants(animation, result, count)
+    model = prepare(character, result.skins)
+    view = choose_viewpoint(character, result.skins, sample_motion(result.before.motion, animation.frame_times))
+    runs: list[tuple[Simulation, str, str]] = [(result.before, BEFORE, "as animated")]
+    if result.after is not None:
+        runs.append((result.after, AFTER, "optimised"))
+    reference = sample_motion(result.reference, times)
+    motions = [sample_motion(run.motion, times) for run, _, _ in runs]
+    cloud = np.concatenate(
+        [pose(model, m, row)[0].reshape(-1, 3) for m in [reference, *motions] for row in range(len(times))]
+    )
+    cloud = np.concatenate([cloud, reference.target_positions.reshape(-1, 3)])
+    probe = fit_camera(view, cloud, PANEL, PANEL, 0.0).project(cloud)[:, :2]
+    aspect = float(np.clip(np.ptp(probe[:, 1]) / max(np.ptp(probe[:, 0]), 1e-9), 0.35, 1.8))
+    camera = fit_camera(view, cloud, SMOOTH * PANEL, round(SMOOTH * PANEL * aspect))
+    magnifier = choose_magnifier(reference, motions, camera)
+    figure = new_figure(WIDTH, 0.55 + len(runs) * (0.22 + aspect * WIDTH / len(times)))
+    grid = figure.subplots(len(runs), len(times), squeeze=False)
+    for row, (run, color, name), motion in zip(grid, runs, motions, strict=True):
+        for column, axes in enumerate(row):
+            picture = draw_over_ghost(model, motion, reference, column, camera, SMOOTH)
+            axes.imshow(picture, extent=(0, camera.size[0], camera.size[1], 0), interpolation="antialiased")
+            draw_trails(axes, character, result.reference, times[column], camera, INTENDED, 1.0)
+            draw_trails(axes, character, run.motion, times[column], camera, color, 1.4)
+            if magnifier.useful:
+                draw_magnifier(axes, magnifier, model, motion, reference, column, camera, color, picture, SMOOTH)
+            axes.set_axis_off()
+            axes.set_xlim(0, camera.size[0])
+            axes.set_ylim(camera.size[1], 0)
+            error = largest_error(run, times[column])
+            axes.set_title(f"{times[column]:.2f} s, {error}", fontsize=SMALL, color=color, pad=2)
+        place = {"ha": "right", "va": "center", "transform": row[0].transAxes, "rotation": 90}
+        row[0].text(0.0, 0.5, name, fontsize=NORMAL, color=color, fontweight="bold", **place)
+    text = "Simulated motion over what was meant (green), when the input is farthest off"
+    if magnifier.useful:
+        text += f"; in the boxes {character.targets[magnifier.target].path}, {magnifier.factor:g} times as large"
+    figure.suptitle(text, fontsize=NORMAL, color=TEXT)
+    return figure
+
+
+def largest_error(run: Simulation, time: float) -> str:
+    """The largest position error of any target at a time, as text."""
+    if not run.position_errors.shape[1]:
+        return "no target"
+    value = np.interp(time, run.motion.times, run.position_errors.max(axis=1))
+    return f"{1e3 * value:.1f} mm off"
+
+
+def draw_trails(
+    axes: Axes, character: Character, motion: Motion, time: float, camera: Camera, color: str, width: float
+) -> None:
+    """The path of each target up to now."""
+    start = max(time - TRAIL_S, 0.0)
+    trail = sample_motion(motion, np.linspace(start, time, 60))
+    for k in range(len(character.targets)):
+        pixels = camera.project(trail.target_positions[:, k])
+        axes.plot(pixels[:, 0], pixels[:, 1], color=color, linewidth=width, solid_capstyle="round")
+        axes.plot(pixels[-1:, 0], pixels[-1:, 1], "o", color=color, markersize=2.5)

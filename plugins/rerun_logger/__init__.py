@@ -1,0 +1,57 @@
+"""Writes a result as a rerun recording (.rrd)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from calmotion.host import Operator, OutputPaths, Property, Recording, RunContext
+from calmotion.shot import Animation, Character, Result
+
+
+class LogRecording(Operator):
+    """The character in 3D at the shot's frames, and errors, motor curves and progress as plots."""
+
+    idname = "rerun.log"
+    label = "Write the rerun recording"
+    requires = (Character, Animation, Result, OutputPaths)
+    provides = (Recording,)
+    properties = (
+        Property(
+            "samples_per_plot",
+            int,
+            2000,
+            minimum=2,
+            maximum=100000,
+            description="Largest number of samples of a plotted curve; a longer one is thinned evenly.",
+        ),
+    )
+
+    @classmethod
+    def poll(cls, data: Mapping[type, Any]) -> str | None:
+        paths = data.get(OutputPaths)
+        return None if paths and paths.rrd else "no recording is asked for (--rrd)"
+
+    def execute(self, context: RunContext) -> Sequence[object]:
+        from .recording import write_recording
+
+        path = context.get(OutputPaths).rrd or ""
+        write_recording(
+            path,
+            context.get(Character),
+            context.get(Animation),
+            context.get(Result),
+            samples_per_plot=context.properties.samples_per_plot,
+            progress=context.progress,
+        )
+        return (Recording(path),)
+
+
+def register(host: Any) -> None:
+    """Add the operator to the host."""
+    host.register_operator(LogRecording)
+
+
+def unregister(host: Any) -> None:
+    """Take it out again."""
+    host.unregister_operator(LogRecording)

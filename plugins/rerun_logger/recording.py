@@ -1,0 +1,246 @@
+"""The recording itself. With `layout.py`, all that talks to rerun, which changes with every minor version.
+
+Only rerun's viewer binds sockets or reports on its use. It is never started here: a recording is a file.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import rerun as rr
+from calmotion.errors import ShotError
+from calmotion.shot import Animation, Character, Motion, Result, Simulation, SurfaceMesh
+from calmotion.shot.character import Array
+from calmotion.shot.playback import deformed_points, modes_of, sample_motion
+from calmotion.shot.shading import split_at_creases
+
+from .layout import INPUT, OPTIMIZED, REFERENCE, STYLES, make_blueprint
+from .summary import describe, judged
+
+TIME, ITERATION = "time", "iteration"
+GHOST = (70, 160, 130, 70)
+DEFAULT_COLOR = (0.55, 0.55, 0.57)
+Progress = Callable[[float, str], None]
+
+
+def write_recording(
+    path: str,
+    character: Character,
+    animation: Animation,
+    result: Result,
+    *,
+    samples_per_plot: int = 2000,
+    progress: Progress = lambda fraction, message: None,
+) -> None:
+    """Write a .rrd file, whole or not at all.
+
+    In 3D the motion is sampled at the shot's frames; curves keep the simulation's steps, thinned to
+    `samples_per_plot`. What lies before the first frame (the pre-roll) is not recorded.
+
+    Args:
+        path: The file.
+        character: The character.
+        animation: For the times of its frames.
+        result: Of `simulate` (then nothing is logged as optimised) or of `optimize`.
+        samples_per_plot: Largest number of samples of a curve.
+        progress: Called with a fraction in 0..1 and a message.
+
+    Raises:
+        ShotError: When the file cannot be written.
+    """
+    target = Path(path)
+    partial = target.with_name(f".{target.stem}.{os.getpid()}.partial.rrd")
+    recording = rr.RecordingStream("calmotion", recording_id=f"{target.stem}{character.path}")
+    try:
+        target.parent.mkdir(parents=True, exist_ok=True)
+        recording.save(str(partial), default_blueprint=make_blueprint(character, animation, result))
+        log_all(recording, character, animation, result, samples_per_plot, progress)
+        recording.flush()
+        recording.disconnect()
+        with partial.open("rb+") as file:
+            os.fsync(file.fileno())
+        os.replace(partial, target)
+    except OSError as error:
+        raise ShotError(
+            f"the recording cannot be written: {error}", path=path, remedy="Choose another --rrd."
+        ) from error
+    finally:
+        recording.disconnect()
+        with contextlib.suppress(OSError):
+            partial.unlink()
+
+
+def log_all(
+    recording: rr.RecordingStream,
+    character: Character,
+    animation: Animation,
+    result: Result,
+    samples_per_plot: int,
+    progress: Progress,
+) -> None:
+    """Everything, in the order of the entity tree."""
+    recording.log("summary", rr.TextDocument(describe(character, result), media_type="text/markdown"), static=True)
+    motions = {INPUT: result.before.motion, REFERENCE: result.reference}
+    if result.after is not None:
+        motions[OPTIMIZED] = result.after.motion
+    for count, (root, motion) in enumerate(motions.items()):
+        progress(count / (len(motions) + 1), f"{root} in 3D")
+        at_frames = sample_motion(motion, animation.frame_times)
+        log_bodies(recording, root, character, result, at_frames)
+        log_trails(recording, root, character, at_frames)
+    progress(len(motions) / (len(motions) + 1), "curves")
+    log_errors(recording, character, INPUT, result.before, samples_per_plot)
+    log_motors(recording, character, INPUT, result.before, samples_per_plot)
+    if result.after is not None:
+        log_errors(recording, character, OPTIMIZED, result.after, samples_per_plot)
+        log_motors(recording, character, OPTIMIZED, result.after, samples_per_plot)
+        log_changes(recording, character, result, samples_per_plot)
+    log_progress(recording, result)
+
+
+def log_bodies(recording: rr.RecordingStream, root: str, character: Character, result: Result, motion: Motion) -> None:
+    """A transform for each body and frame, its meshes once, and the vertices of those that bend."""
+    frames = rr.TimeColumn(TIME, duration=motion.times)
+    for index, body in enumerate(character.bodies):
+        columns = rr.Transform3D.columns(
+            translation=motion.positions[:, index], quaternion=motion.rotations[:, index][:, [1, 2, 3, 0]]
+        )
+        recording.send_columns(root + body.path, [frames], columns)
+        if root == REFERENCE and stands_still(motion, index):
+            continue
+        for s, surface in enumerate(body.surfaces):
+            if surface.visible and len(surface.triangles):
+                entity = root + (surface.path if surface.path != body.path else f"{body.path}/mesh")
+                modes = modes_of(result.skins[index], s)
+                log_mesh(
+                    recording, entity, surface, deformed_points(surface.points, modes, motion.elastic[index]), frames
+                )
+
+
+def stands_still(motion: Motion, body: int) -> bool:
+    """Whether a body never moves, so that its ghost would only tint it."""
+    return bool(
+        np.ptp(motion.positions[:, body], axis=0).max() < 1e-9
+        and np.ptp(motion.rotations[:, body], axis=0).max() < 1e-9
+    )
+
+
+def log_mesh(recording: rr.RecordingStream, entity: str, surface: SurfaceMesh, points: Array, frames) -> None:
+    """One surface; `points` has one row when it does not deform, else one a frame."""
+    sources, triangles, normals = split_at_creases(surface.points, surface.triangles)
+    ghost = entity.startswith(REFERENCE)
+    fixed = {
+        "triangle_indices": triangles,
+        "vertex_normals": normals.astype(np.float32),
+        "albedo_factor": GHOST if ghost else display_color(surface.color),
+    }
+    if len(points) == 1:
+        fixed["vertex_positions"] = points[0, sources].astype(np.float32)
+        recording.log(entity, rr.Mesh3D.from_fields(**fixed), static=True)
+        return
+    # A static component would hide one that changes over time, so the positions are left out of it.
+    recording.log(entity, rr.Mesh3D.from_fields(**fixed), static=True)
+    moving = points[:, sources].astype(np.float32)
+    columns = rr.Mesh3D.columns(vertex_positions=moving.reshape(-1, 3)).partition([len(sources)] * len(moving))
+    recording.send_columns(entity, [frames], columns)
+
+
+def display_color(color: tuple[float, float, float] | None) -> tuple[int, int, int, int]:
+    """A linear color as rerun shows it: 8 bits in sRGB."""
+    linear = np.clip(np.array(color if color is not None else DEFAULT_COLOR, dtype=float), 0.0, 1.0)
+    encoded = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1.0 / 2.4) - 0.055)
+    red, green, blue = (255.0 * encoded).round().astype(int).tolist()
+    return red, green, blue, 255
+
+
+def log_trails(recording: rr.RecordingStream, root: str, character: Character, motion: Motion) -> None:
+    """The path of each target through the shot, and its place now."""
+    style = STYLES[root]
+    frames = rr.TimeColumn(TIME, duration=motion.times)
+    for k, target in enumerate(character.targets):
+        path = motion.target_positions[:, k].astype(np.float32)
+        trail = rr.LineStrips3D([path], colors=[style.color], radii=[rr.Radius.ui_points(style.width)])
+        recording.log(f"trails/{root}{target.path}", trail, static=True)
+        dot = f"trails/{root}{target.path}/now"
+        recording.log(dot, rr.Points3D.from_fields(colors=[style.color], radii=[rr.Radius.ui_points(4.0)]), static=True)
+        recording.send_columns(dot, [frames], rr.Points3D.columns(positions=path))
+
+
+def thinned(simulation: Simulation, samples: int) -> slice:
+    """Rows of a simulation to plot: the judged ones, every n-th."""
+    rows = judged(simulation)
+    count = len(simulation.motion.times) - rows.start
+    return slice(rows.start, None, max(1, int(np.ceil(count / samples))))
+
+
+def log_curve(
+    recording: rr.RecordingStream, entity: str, times: Array, values: Array, color: tuple[int, int, int], name: str
+) -> None:
+    """One curve over the time of the shot."""
+    recording.log(entity, rr.SeriesLines(colors=[color], names=[name], widths=[1.8]), static=True)
+    recording.send_columns(entity, [rr.TimeColumn(TIME, duration=times)], rr.Scalars.columns(scalars=values))
+
+
+def log_errors(
+    recording: rr.RecordingStream, character: Character, root: str, simulation: Simulation, samples: int
+) -> None:
+    """Position errors [mm] of all targets, rotation errors [deg] of those whose rotation counts."""
+    rows, style = thinned(simulation, samples), STYLES[root]
+    times = simulation.motion.times[rows]
+    for k, target in enumerate(character.targets):
+        name = f"{target.path.rsplit('/', 1)[-1]} {style.label}"
+        color = style.shade(k, len(character.targets))
+        errors = 1e3 * simulation.position_errors[rows, k]
+        log_curve(recording, f"errors/position_mm/{root}{target.path}", times, errors, color, f"{name} [mm]")
+        if target.rotation_weight > 0.0:
+            turns = np.degrees(simulation.rotation_errors[rows, k])
+            log_curve(recording, f"errors/rotation_deg/{root}{target.path}", times, turns, color, f"{name} [deg]")
+
+
+def log_motors(
+    recording: rr.RecordingStream, character: Character, root: str, simulation: Simulation, samples: int
+) -> None:
+    """Angle [deg] and torque [N m] of each motor."""
+    rows, style = thinned(simulation, samples), STYLES[root]
+    motion = simulation.motion
+    for m, motor in enumerate(character.motors):
+        angles, efforts = np.degrees(motion.motor_values[rows, m]), motion.motor_efforts[rows, m]
+        entity = f"motors{motor.path}"
+        log_curve(
+            recording, f"{entity}/angle_deg/{root}", motion.times[rows], angles, style.color, f"{style.label} [deg]"
+        )
+        log_curve(
+            recording, f"{entity}/torque_Nm/{root}", motion.times[rows], efforts, style.color, f"{style.label} [N m]"
+        )
+
+
+def log_changes(recording: rr.RecordingStream, character: Character, result: Result, samples: int) -> None:
+    """What the optimiser added to each motor's angle [deg]."""
+    assert result.after is not None
+    rows = thinned(result.after, samples)
+    after = result.after.motion
+    before = sample_motion(result.before.motion, after.times[rows])
+    for m, motor in enumerate(character.motors):
+        change = np.degrees(after.motor_values[rows, m] - before.motor_values[:, m])
+        color = STYLES[OPTIMIZED].shade(m, len(character.motors))
+        name = f"{motor.path.rsplit('/', 1)[-1]} [deg]"
+        log_curve(recording, f"changes_deg{motor.path}", after.times[rows], change, color, name)
+
+
+def log_progress(recording: rr.RecordingStream, result: Result) -> None:
+    """Objective and gradient of each iteration, as powers of ten since a plot has no logarithmic axis."""
+    if not result.steps:
+        return
+    iterations = [rr.TimeColumn(ITERATION, sequence=range(len(result.steps)))]
+    series = {
+        "log10_objective": [step.objective for step in result.steps],
+        "log10_gradient_norm": [step.gradient_norm for step in result.steps],
+    }
+    for (name, values), color in zip(series.items(), ((0, 114, 178), (150, 150, 150)), strict=True):
+        powers = np.log10(np.maximum(np.abs(np.array(values, dtype=float)), 1e-300))
+        recording.log(f"optimizer/{name}", rr.SeriesLines(colors=[color], names=[name.replace("_", " ")]), static=True)
+        recording.send_columns(f"optimizer/{name}", iterations, rr.Scalars.columns(scalars=powers))

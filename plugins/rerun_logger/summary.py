@@ -1,0 +1,83 @@
+"""The text of a recording: errors before and after, sizes, what was left out, and how the optimiser went."""
+
+from __future__ import annotations
+
+import numpy as np
+from calmotion.shot import Character, Result, Simulation
+
+HEAD = "| target | largest before | largest after | rms before | rms after |\n|---|---:|---:|---:|---:|"
+
+
+def describe(character: Character, result: Result) -> str:
+    """The summary as Markdown; positions in mm, rotations in degrees."""
+    parts = [f"# {character.path}", errors_table(character, result), sizes(character, result)]
+    parts.append(left_out(result))
+    if character.notes:
+        parts.append("## Notes on the shot\n" + "\n".join(f"- {note}" for note in character.notes))
+    if result.steps:
+        parts.append(progress_table(result))
+    return "\n\n".join(parts) + "\n"
+
+
+def judged(simulation: Simulation) -> slice:
+    """The rows of a simulation that are judged: those from the first frame of the shot on."""
+    return slice(int(np.searchsorted(simulation.motion.times, -1e-9)), None)
+
+
+def errors_table(character: Character, result: Result) -> str:
+    """One row for each target."""
+    rows = []
+    for k, target in enumerate(character.targets):
+        cells = []
+        for measure in (np.max, lambda e: np.sqrt(np.mean(e**2))):
+            for simulation in (result.before, result.after):
+                cells.append(error_cell(simulation, k, target.rotation_weight > 0.0, measure))
+        rows.append(f"| `{target.path}` | " + " | ".join(cells) + " |")
+    return "## Errors at the targets\n" + "\n".join([HEAD, *rows])
+
+
+def error_cell(simulation: Simulation | None, target: int, rotation: bool, measure) -> str:
+    """Position error, and rotation error where it counts."""
+    if simulation is None:
+        return "-"
+    rows = judged(simulation)
+    text = f"{1e3 * measure(simulation.position_errors[rows, target]):.2f} mm"
+    if rotation:
+        text += f", {np.degrees(measure(simulation.rotation_errors[rows, target])):.2f}°"
+    return text
+
+
+def sizes(character: Character, result: Result) -> str:
+    """Size of the model and cost of the run."""
+    lines = [
+        f"- {len(character.bodies)} bodies, {len(character.motors)} motors, {result.dof} position coordinates",
+        f"- time step {1e3 * result.step_s:g} ms, pre-roll {result.pre_roll_s:g} s",
+    ]
+    for table in result.modes:
+        shown = ", ".join(f"{f:.1f}" for f in table.frequencies[:6])
+        more = ", ..." if len(table.frequencies) > 6 else ""
+        size = f"{table.nodes} nodes, {table.elements} elements, {table.mass:.3g} kg"
+        lines.append(f"- `{character.bodies[table.body].path}`: {size}; clamped at its parent: {shown}{more} Hz")
+    if result.after is not None:
+        lines.append(f"- {result.iterations} iterations in {result.wall_s:.2f} s, {result.parameters} parameters")
+    return "## Model\n" + "\n".join(lines)
+
+
+def left_out(result: Result) -> str:
+    """What the run left out, and what that costs."""
+    if not result.left_out:
+        return "## Left out\nNothing."
+    rows = ["| what | why | estimated error |", "|---|---|---:|"]
+    for item in result.left_out:
+        cost = "none" if item.estimated_error_m is None else f"{1e3 * item.estimated_error_m:.3g} mm"
+        rows.append(f"| {item.what} | {item.why} | {cost} |")
+    return "## Left out\n" + "\n".join(rows)
+
+
+def progress_table(result: Result) -> str:
+    """The optimiser's iterations."""
+    rows = ["| iteration | objective | gradient | simulations | linearised sweeps |", "|---:|---:|---:|---:|---:|"]
+    for k, step in enumerate(result.steps):
+        numbers = f"{step.objective:.4g} | {step.gradient_norm:.3g}"
+        rows.append(f"| {k} | {numbers} | {step.forward_simulations} | {step.linearized_sweeps} |")
+    return "## Optimiser\n" + "\n".join(rows)

@@ -1,0 +1,69 @@
+"""Results into USD."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from calmotion.host import Operator, OutputPaths, Property, RunContext, WrittenLayer
+from calmotion.shot import Animation, Character, Provenance, Result
+
+
+class WriteResult(Operator):
+    """Writes one layer of overs, and a root layer that opens it with the shot."""
+
+    idname = "usd.write"
+    label = "Write the layer"
+    requires = (Character, Animation, Provenance, Result, OutputPaths)
+    provides = (WrittenLayer,)
+    properties = (
+        Property(
+            "samples_per_second",
+            float,
+            -1.0,
+            unit="Hz",
+            minimum=1e-3,
+            description="Least density of the motor samples, for consumers that interpolate linearly; -1: the frames.",
+        ),
+        Property(
+            "bake",
+            str,
+            "none",
+            choices=("none", "motors", "simulated"),
+            description="Body transforms as well: of a rigid robot with the new curves, or of the predicted motion "
+            "with its deformed meshes.",
+        ),
+    )
+
+    @classmethod
+    def poll(cls, data: Mapping[type, Any]) -> str | None:
+        """Left out where no layer is asked for."""
+        outputs = data.get(OutputPaths)
+        return "no layer is asked for" if outputs is not None and outputs.layer is None else None
+
+    def execute(self, context: RunContext) -> Sequence[object]:
+        """The paths of both layers."""
+        from calmotion.usd.writing import WriteOptions, write_result
+
+        values = context.properties
+        rate = values.samples_per_second
+        layer, root = write_result(
+            context.get(Character),
+            context.get(Animation),
+            context.get(Provenance),
+            context.get(Result),
+            str(context.get(OutputPaths).layer),
+            WriteOptions(samples_per_second=rate if rate > 0.0 else None, bake=values.bake),
+        )
+        context.report("info", f"{root} opens {layer} with the shot")
+        return (WrittenLayer(layer=layer, root=root),)
+
+
+def register(host: Any) -> None:
+    """Register the operator."""
+    host.register_operator(WriteResult)
+
+
+def unregister(host: Any) -> None:
+    """Undo `register`."""
+    host.unregister_operator(WriteResult)

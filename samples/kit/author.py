@@ -1,0 +1,173 @@
+"""Writes a robot into a stage: bodies, meshes, joints, drives and materials, with UsdPhysics and the calm schemas.
+
+The calm schemas and the deformable material are applied by name, so building needs no schema registration.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from pxr import Gf, Sdf, Usd, UsdGeom, UsdPhysics, UsdShade, Vt
+
+from .robot import BodySpec, JointSpec, Part, Pose, TargetSpec, mass_properties
+
+DIGITS = 6
+
+
+@dataclass(frozen=True)
+class Look:
+    """A plain surface: linear RGB, roughness, metalness."""
+
+    color: tuple[float, float, float]
+    roughness: float = 0.5
+    metallic: float = 0.0
+
+
+@dataclass(frozen=True)
+class Plastic:
+    """An elastic material, SI."""
+
+    name: str
+    youngs_modulus: float
+    poissons_ratio: float
+    density: float
+    damping_ratio: float
+
+
+def new_stage(root: str, frames: tuple[int, int], rate: float) -> Usd.Stage:
+    """An empty stage in metres and kilograms, z up, with its root as default prim and gravity."""
+    stage = Usd.Stage.CreateInMemory(".usda")
+    UsdGeom.SetStageUpAxis(stage, UsdGeom.Tokens.z)
+    UsdGeom.SetStageMetersPerUnit(stage, 1.0)
+    UsdPhysics.SetStageKilogramsPerUnit(stage, 1.0)
+    stage.SetTimeCodesPerSecond(rate)
+    stage.SetFramesPerSecond(rate)
+    stage.SetStartTimeCode(frames[0])
+    stage.SetEndTimeCode(frames[1])
+    prim = UsdGeom.Xform.Define(stage, f"/{root}").GetPrim()
+    Usd.ModelAPI(prim).SetKind("assembly")
+    stage.SetDefaultPrim(prim)
+    UsdPhysics.ArticulationRootAPI.Apply(prim)
+    scene = UsdPhysics.Scene.Define(stage, "/PhysicsScene")
+    scene.CreateGravityDirectionAttr(Gf.Vec3f(0, 0, -1))
+    scene.CreateGravityMagnitudeAttr(9.81)
+    return stage
+
+
+def author_looks(stage: Usd.Stage, scope: str, looks: Mapping[str, Look]) -> None:
+    """One UsdPreviewSurface material for each look."""
+    UsdGeom.Scope.Define(stage, scope)
+    for name, look in looks.items():
+        material = UsdShade.Material.Define(stage, f"{scope}/{name}")
+        shader = UsdShade.Shader.Define(stage, f"{scope}/{name}/Surface")
+        shader.CreateIdAttr("UsdPreviewSurface")
+        shader.CreateInput("diffuseColor", Sdf.ValueTypeNames.Color3f).Set(Gf.Vec3f(*look.color))
+        shader.CreateInput("roughness", Sdf.ValueTypeNames.Float).Set(look.roughness)
+        shader.CreateInput("metallic", Sdf.ValueTypeNames.Float).Set(look.metallic)
+        surface = shader.CreateOutput("surface", Sdf.ValueTypeNames.Token)
+        material.CreateSurfaceOutput().ConnectToSource(surface)
+
+
+def author_plastic(stage: Usd.Stage, scope: str, plastic: Plastic) -> None:
+    """A material for the `physics` purpose: elasticity by the names of the deformable proposal, and damping."""
+    prim = UsdShade.Material.Define(stage, f"{scope}/{plastic.name}").GetPrim()
+    prim.AddAppliedSchema("PhysicsVolumeDeformableMaterialAPI")
+    prim.AddAppliedSchema("CalmDampingAPI")
+    create(prim, "physics:youngsModulus", plastic.youngs_modulus)
+    create(prim, "physics:poissonsRatio", plastic.poissons_ratio)
+    create(prim, "physics:density", plastic.density)
+    create(prim, "calm:damping:ratio", plastic.damping_ratio)
+
+
+def create(prim: Usd.Prim, name: str, value: float) -> None:
+    """A schema's float attribute, by name; ours are uniform, but for the weights of a target."""
+    fixed = name.startswith("calm:") and not name.startswith("calm:target:")
+    variability = Sdf.VariabilityUniform if fixed else Sdf.VariabilityVarying
+    prim.CreateAttribute(name, Sdf.ValueTypeNames.Float, False, variability).Set(value)
+
+
+def author_part(stage: Usd.Stage, path: str, part: Part, looks: Mapping[str, Look], scope: str) -> UsdGeom.Mesh:
+    """A mesh with its display color and its look."""
+    mesh = UsdGeom.Mesh.Define(stage, path)
+    points = np.round(part.shape.points, DIGITS).astype(np.float32)
+    mesh.CreatePointsAttr(Vt.Vec3fArray.FromNumpy(points))
+    mesh.CreateFaceVertexCountsAttr([len(face) for face in part.shape.faces])
+    mesh.CreateFaceVertexIndicesAttr([index for face in part.shape.faces for index in face])
+    mesh.CreateSubdivisionSchemeAttr(UsdGeom.Tokens.none)
+    mesh.CreateExtentAttr(Vt.Vec3fArray.FromNumpy(np.stack([points.min(axis=0), points.max(axis=0)])))
+    mesh.CreateDisplayColorAttr([Gf.Vec3f(*looks[part.look].color)])
+    material = UsdShade.Material.Get(stage, f"{scope}/{part.look}")
+    UsdShade.MaterialBindingAPI.Apply(mesh.GetPrim()).Bind(material)
+    return mesh
+
+
+def author_body(
+    stage: Usd.Stage, root: str, body: BodySpec, pose: Pose, looks: Mapping[str, Look], scope: str, plastic: Plastic
+) -> None:
+    """A body at its pose, with its meshes, mass or elastic material, and targets."""
+    xform = UsdGeom.Xform.Define(stage, f"{root}/{body.name}")
+    xform.AddTranslateOp().Set(Gf.Vec3d(*np.round(pose.position, 9).tolist()))
+    turn = pose.rotation / np.linalg.norm(pose.rotation)
+    orient = xform.AddOrientOp(UsdGeom.XformOp.PrecisionDouble)
+    orient.Set(Gf.Quatd(*np.round(turn, 12).tolist()))
+    prim = xform.GetPrim()
+    UsdPhysics.RigidBodyAPI.Apply(prim)
+    for part in body.parts:
+        author_part(stage, f"{root}/{body.name}/{part.name}", part, looks, scope)
+    if body.mass is None:
+        prim.AddAppliedSchema("CalmFlexibleBodyAPI")
+        if body.interface_radius is not None:
+            create(prim, "calm:flexible:interfaceRadius", body.interface_radius)
+        binding = UsdShade.MaterialBindingAPI.Apply(prim)
+        material = UsdShade.Material.Get(stage, f"{scope}/{plastic.name}")
+        binding.Bind(material, UsdShade.Tokens.weakerThanDescendants, "physics")
+    else:
+        mass, center, inertia = mass_properties(body)
+        api = UsdPhysics.MassAPI.Apply(prim)
+        api.CreateMassAttr(mass)
+        api.CreateCenterOfMassAttr(Gf.Vec3f(*np.round(center, DIGITS).tolist()))
+        api.CreateDiagonalInertiaAttr(Gf.Vec3f(*(float(f"{value:.4g}") for value in inertia)))
+    for target in body.targets:
+        author_target(stage, f"{root}/{body.name}/{target.name}", target)
+
+
+def author_target(stage: Usd.Stage, path: str, target: TargetSpec) -> None:
+    """A target frame below its body."""
+    xform = UsdGeom.Xform.Define(stage, path)
+    xform.AddTranslateOp().Set(Gf.Vec3d(*target.position))
+    xform.GetPrim().AddAppliedSchema("CalmTargetAPI")
+    create(xform.GetPrim(), "calm:target:positionWeight", target.position_weight)
+    create(xform.GetPrim(), "calm:target:rotationWeight", target.rotation_weight)
+
+
+def author_joint(stage: Usd.Stage, root: str, scope: str, joint: JointSpec, frames: Sequence[int]) -> None:
+    """A weld, or a revolute joint whose drive carries the animation."""
+    path = f"{scope}/{joint.name}"
+    kind = UsdPhysics.FixedJoint if joint.drive is None else UsdPhysics.RevoluteJoint
+    prim = kind.Define(stage, path)
+    if joint.parent:
+        prim.CreateBody0Rel().SetTargets([f"{root}/{joint.parent}"])
+    prim.CreateBody1Rel().SetTargets([f"{root}/{joint.child}"])
+    prim.CreateLocalPos0Attr(Gf.Vec3f(*joint.anchor_parent))
+    prim.CreateLocalRot0Attr(Gf.Quatf(1.0))
+    prim.CreateLocalPos1Attr(Gf.Vec3f(*joint.anchor_child))
+    prim.CreateLocalRot1Attr(Gf.Quatf(1.0))
+    if joint.drive is None:
+        return
+    prim.CreateAxisAttr(joint.drive.axis)
+    prim.CreateLowerLimitAttr(joint.drive.lower)
+    prim.CreateUpperLimitAttr(joint.drive.upper)
+    drive = UsdPhysics.DriveAPI.Apply(prim.GetPrim(), UsdPhysics.Tokens.angular)
+    drive.CreateTypeAttr(UsdPhysics.Tokens.force)
+    drive.CreateMaxForceAttr(joint.drive.max_torque)
+    drive.CreateStiffnessAttr(50.0)
+    drive.CreateDampingAttr(0.5)
+    target = drive.CreateTargetPositionAttr()
+    for frame, value in zip(frames, joint.drive.track, strict=True):
+        target.Set(value, frame)
+    prim.GetPrim().AddAppliedSchema("CalmMotorAPI")
+    create(prim.GetPrim(), "calm:motor:maxVelocity", joint.drive.max_velocity)
+    create(prim.GetPrim(), "calm:motor:maxAcceleration", joint.drive.max_acceleration)
+    create(prim.GetPrim(), "calm:motor:maxTorque", joint.drive.max_torque)

@@ -1,0 +1,75 @@
+"""What tests of several rooms share: the repository, the command line in a process, and plugins made on the spot."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import textwrap
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+REPOSITORY = Path(__file__).resolve().parents[1]
+
+MANIFEST = {
+    "version": "0.1.0",
+    "name": "A plugin",
+    "tagline": "Made for a test",
+    "maintainer": "Calmotion",
+    "license": "Apache-2.0",
+    "tags": [],
+    "calmotion": ">=0.1",
+    "requires": [],
+}
+
+
+@pytest.fixture(scope="session")
+def repository() -> Path:
+    """The checkout."""
+    return REPOSITORY
+
+
+@pytest.fixture(scope="session")
+def shared_data() -> Path:
+    """Robots that are not part of the repository; a test that needs them is skipped where they are absent."""
+    folder = Path(os.environ.get("CALMOTION_DATA", REPOSITORY.parent / "shared" / "data"))
+    if not folder.is_dir():
+        pytest.skip("the shared robots are not here; name their folder with CALMOTION_DATA")
+    return folder
+
+
+@pytest.fixture(scope="session")
+def calmotion() -> Callable[..., subprocess.CompletedProcess[str]]:
+    """Runs `calmotion` in a process of its own, from the checkout."""
+
+    def run(*arguments: object, **options: object) -> subprocess.CompletedProcess[str]:
+        path = os.pathsep.join([str(REPOSITORY / "pipeline"), os.environ.get("PYTHONPATH", "")])
+        environment = os.environ | {"PYTHONPATH": path.rstrip(os.pathsep)}
+        command = [sys.executable, "-m", "calmotion", *map(str, arguments)]
+        settings: dict = {"env": environment, "capture_output": True, "text": True, "timeout": 600} | options
+        return subprocess.run(command, **settings)
+
+    return run
+
+
+@pytest.fixture
+def make_plugin(tmp_path: Path) -> Callable[..., Path]:
+    """Makes the folder of a plugin: id, source of its module, and fields of its manifest that differ."""
+
+    def make(plugin_id: str, source: str, **fields: object) -> Path:
+        folder = tmp_path / "plugins" / plugin_id
+        folder.mkdir(parents=True)
+        values = {"id": plugin_id} | MANIFEST | fields
+        lines = [f"{key} = {toml(value)}" for key, value in values.items() if value is not None]
+        (folder / "plugin.toml").write_text("\n".join(lines))
+        (folder / "__init__.py").write_text(textwrap.dedent(source))
+        return folder
+
+    return make
+
+
+def toml(value: object) -> str:
+    """A text, number or list of texts as TOML."""
+    return "[" + ", ".join(toml(item) for item in value) + "]" if isinstance(value, list) else repr(value)

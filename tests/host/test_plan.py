@@ -1,0 +1,58 @@
+import itertools
+
+import pytest
+from calmotion.host import PlanError
+from calmotion.host.plan import make_plan
+from fakes import Coal, Iron, Ore, Steel, operator
+
+DIG = operator("mine.dig", provides=[Ore])
+MELT = operator("smithy.melt", requires=[Ore], provides=[Iron])
+BURN = operator("wood.burn", provides=[Coal])
+ALLOY = operator("smithy.alloy", requires=[Iron], uses=[Coal], provides=[Steel])
+
+
+def names(plan):
+    return [cls.idname for cls in plan.operators]
+
+
+def test_providers_come_before_those_that_need_them_in_whatever_order_they_registered():
+    for order in itertools.permutations([DIG, MELT, BURN, ALLOY]):
+        planned = names(make_plan(order, [], [Steel]))
+        assert planned.index("mine.dig") < planned.index("smithy.melt") < planned.index("smithy.alloy")
+        assert planned.index("wood.burn") < planned.index("smithy.alloy")
+
+
+def test_only_what_is_needed_is_planned():
+    assert names(make_plan([DIG, MELT, BURN, ALLOY], [], [Iron])) == ["mine.dig", "smithy.melt"]
+
+
+def test_what_is_given_is_not_made():
+    assert names(make_plan([DIG, MELT], [Ore], [Iron])) == ["smithy.melt"]
+
+
+def test_a_used_type_without_a_provider_is_no_obstacle():
+    assert names(make_plan([DIG, MELT, ALLOY], [], [Steel])) == ["mine.dig", "smithy.melt", "smithy.alloy"]
+
+
+def test_an_optional_type_that_cannot_be_made_is_not_planned_for():
+    assert names(make_plan([DIG, ALLOY], [], [Ore], [Steel])) == ["mine.dig"]
+
+
+def test_a_missing_type_is_named_with_who_needs_it_and_the_plugins_that_failed():
+    with pytest.raises(PlanError) as missing:
+        make_plan([MELT, ALLOY], [], [Steel], broken=["mine (no shovel)"])
+    assert "no operator provides Ore, which smithy.melt needs" in str(missing.value)
+    assert "mine (no shovel)" in str(missing.value)
+
+
+def test_a_circle_is_named():
+    back = operator("smithy.scrap", requires=[Steel], provides=[Ore])
+    with pytest.raises(PlanError) as circle:
+        make_plan([MELT, ALLOY, back], [], [Steel])
+    assert all(name in circle.value.found for name in ("smithy.melt", "smithy.alloy", "smithy.scrap"))
+
+
+def test_a_circle_that_is_not_needed_does_no_harm():
+    one = operator("a.one", requires=[Steel], provides=[Coal])
+    two = operator("a.two", requires=[Coal], provides=[Steel])
+    assert names(make_plan([DIG, one, two], [], [Ore])) == ["mine.dig"]

@@ -1,0 +1,140 @@
+import pytest
+from calmotion.errors import ShotError
+from calmotion.host import Outcome, PluginError, Property
+from fakes import Coal, Iron, Ore, Steel, host_of, operator
+
+DIG = operator("mine.dig", provides=[Ore])
+MELT = operator("smithy.melt", requires=[Ore], provides=[Iron])
+
+
+def outcomes(run):
+    return {result.idname: result.outcome for result in run.results}
+
+
+def test_a_run_gives_one_result_an_operator_as_it_goes():
+    run = host_of(DIG, MELT).run([], [Iron])
+    steps = iter(run)
+    first = next(steps)
+    assert (first.idname, first.plugin, first.success) == ("mine.dig", "smithy", True)
+    assert run.get(Ore) == Ore() and run.get(Iron) is None
+    assert [result.idname for result in steps] == ["smithy.melt"]
+    assert run.get(Iron) == Iron()
+
+
+def test_an_operator_sees_its_inputs_its_properties_and_reports():
+    seen = {}
+
+    def execute(context):
+        seen.update(ore=context.get(Ore), coal=context.get(Coal), heat=context.properties.heat)
+        context.report("warning", "the fire is low")
+        context.progress(0.5, "halfway")
+        return (Iron(2),)
+
+    calls = []
+    heat = Property("heat", float, 1.0, unit="m")
+    melt = operator("smithy.melt", requires=[Ore], uses=[Coal], provides=[Iron], execute=execute, properties=[heat])
+    run = host_of(DIG, melt).run(
+        [], [Iron], settings={"smithy.melt": {"heat": "5mm"}}, progress=lambda *call: calls.append(call)
+    )
+    result = run.finish().results[-1]
+    assert seen == {"ore": Ore(), "coal": None, "heat": 0.005}
+    assert [(record.level, record.text) for record in result.records] == [("warning", "the fire is low")]
+    assert ("smithy melt", 0.5, "halfway") in calls and calls[-1] == ("smithy melt", 1.0, "")
+    assert result.duration > 0.0
+
+
+def test_an_operator_that_raises_is_named_with_its_traceback_while_others_go_on():
+    def explode(context):
+        raise ZeroDivisionError("no fire")
+
+    melt = operator("smithy.melt", requires=[Ore], provides=[Iron], execute=explode)
+    sell = operator("smithy.sell", requires=[Iron], provides=[Steel])
+    burn = operator("wood.burn", requires=[Ore], provides=[Coal])
+    run = host_of(DIG, melt, sell, burn).run([], [Steel, Coal]).finish()
+    assert outcomes(run) == {
+        "mine.dig": Outcome.DONE,
+        "smithy.melt": Outcome.FAILED,
+        "smithy.sell": Outcome.BLOCKED,
+        "wood.burn": Outcome.DONE,
+    }
+    (failure,) = run.failures()
+    assert isinstance(failure.error, ZeroDivisionError) and "in explode" in failure.traceback
+    assert run.get(Coal) == Coal()
+
+
+def test_a_shot_error_passes_through_as_it_is():
+    error = ShotError("has no mass", path="/Robot/Arm", remedy="Author a density.")
+
+    def refuse(context):
+        raise error
+
+    run = host_of(operator("mine.dig", provides=[Ore], execute=refuse)).run([], [Ore]).finish()
+    assert run.failures()[0].error is error
+
+
+@pytest.mark.parametrize("returned", [Iron(), (Ore(),), (Iron(), Iron()), None, ()])
+def test_a_wrong_return_value_is_refused(returned):
+    melt = operator("smithy.melt", requires=[Ore], provides=[Iron], execute=lambda context: returned)
+    run = host_of(DIG, melt).run([], [Iron]).finish()
+    assert isinstance(run.results[-1].error, PluginError) and "Iron" in str(run.results[-1].error)
+    assert run.get(Iron) is None
+
+
+def test_reading_a_type_that_is_not_declared_is_refused():
+    melt = operator("smithy.melt", requires=[], provides=[Iron], execute=lambda context: (context.get(Ore),))
+    run = host_of(DIG, melt).run([], [Ore, Iron]).finish()
+    assert "does not declare" in str(run.failures()[0].error)
+
+
+def test_what_a_poll_refuses_is_left_out_with_the_reason_and_its_users_run_without_it():
+    burn = operator("wood.burn", provides=[Coal], poll=lambda data: "the wood is wet")
+    alloy = operator("smithy.alloy", requires=[Ore], uses=[Coal], provides=[Steel])
+    run = host_of(DIG, burn, alloy).run([], [Steel]).finish()
+    assert run.get(Steel) == Steel()
+    assert [(row.what, row.why) for row in run.left_out()] == [("wood burn", "the wood is wet")]
+
+
+def test_a_used_value_whose_making_failed_stops_its_users():
+    def explode(context):
+        raise RuntimeError("no match")
+
+    burn = operator("wood.burn", provides=[Coal], execute=explode)
+    bake = operator("wood.bake", uses=[Coal], provides=[Iron])
+    alloy = operator("smithy.alloy", uses=[Iron], provides=[Steel])
+    run = host_of(burn, bake, alloy).run([], [Steel]).finish()
+    assert list(outcomes(run).values()) == [Outcome.FAILED, Outcome.BLOCKED, Outcome.BLOCKED]
+
+
+def test_a_poll_sees_what_is_known_and_an_alternative_is_not_left_out():
+    def when(amount):
+        return lambda data: None if data[Ore].amount == amount else f"there are {data[Ore].amount}"
+
+    one = operator("smithy.one", requires=[Ore], provides=[Iron], poll=when(1), execute=lambda context: (Iron(1),))
+    two = operator("smithy.two", requires=[Ore], provides=[Iron], poll=when(2), execute=lambda context: (Iron(2),))
+    for amount in (1, 2):
+        run = host_of(one, two).run([Ore(amount)], [Iron]).finish()
+        assert run.get(Iron) == Iron(amount)
+        assert run.left_out() == ()
+
+
+def test_two_operators_that_both_want_to_make_a_value_are_refused_and_named():
+    again = operator("smithy.again", requires=[Ore], provides=[Iron])
+    run = host_of(DIG, MELT, again).run([], [Iron]).finish()
+    assert run.get(Iron) is None and len(run.failures()) == 2
+    assert "smithy.melt" in str(run.failures()[0].error) and "smithy.again" in str(run.failures()[0].error)
+
+
+def test_a_poll_that_raises_or_answers_nonsense_is_a_failure():
+    for answer in (lambda data: data["nothing"], lambda data: True):
+        run = host_of(operator("mine.dig", provides=[Ore], poll=answer)).run([], [Ore]).finish()
+        assert run.results[0].outcome is Outcome.FAILED
+
+
+def test_an_interruption_ends_the_run_and_keeps_what_is_there():
+    def interrupt(context):
+        raise KeyboardInterrupt
+
+    run = host_of(DIG, operator("smithy.melt", requires=[Ore], provides=[Iron], execute=interrupt)).run([], [Iron])
+    with pytest.raises(KeyboardInterrupt):
+        run.finish()
+    assert run.get(Ore) == Ore()

@@ -1,0 +1,37 @@
+import math
+
+import pytest
+from calmotion.host import SettingError, parse_quantity
+
+
+@pytest.mark.parametrize(
+    ("text", "unit", "value"),
+    [
+        ("5mm", "m", 0.005),
+        ("3 cm", "m", 0.03),
+        ("0.1", "m", 0.1),
+        ("-1", "m", -1.0),
+        ("90deg", "rad", math.pi / 2),
+        ("2ms", "s", 0.002),
+        (".5s", "s", 0.5),
+        ("1.5e3Hz", "Hz", 1500.0),
+        ("2.1GPa", "Pa", 2.1e9),
+        ("70MPa", "Pa", 70e6),
+        ("5", "mm", 5.0),
+        ("1m", "mm", 1000.0),
+        ("12", "", 12.0),
+    ],
+)
+def test_a_quantity_is_read_in_the_unit_that_is_asked_for(text, unit, value):
+    assert parse_quantity(text, unit) == pytest.approx(value, rel=1e-15)
+
+
+def test_millimetres_give_the_float_a_person_would_write():
+    assert [parse_quantity(f"{n}mm", "m") for n in range(1, 100)] == [float(f"{n}e-3") for n in range(1, 100)]
+
+
+@pytest.mark.parametrize(("text", "unit"), [("5s", "m"), ("5furlongs", "m"), ("5mm", ""), ("five", "m"), ("", "m")])
+def test_a_unit_of_another_kind_is_refused_with_the_ones_that_fit(text, unit):
+    with pytest.raises(SettingError) as refused:
+        parse_quantity(text, unit)
+    assert ("mm" in refused.value.remedy) == (unit == "m")

@@ -1,0 +1,211 @@
+"""The recording, read back: what it holds, at which times, and with which values."""
+
+from __future__ import annotations
+
+import dataclasses
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+import synthetic
+from calmotion.errors import ShotError
+from calmotion.host import OutputPaths, PluginError, Recording
+from calmotion.testing import check_plugin, host_with, run_operator
+
+pytest.importorskip("rerun")
+
+ROOT = Path(__file__).resolve().parents[2]
+PLUGIN = ROOT / "plugins" / "rerun_logger"
+
+
+def write(path, result, settings=None):
+    values = [synthetic.character(), synthetic.animation(), result, OutputPaths(rrd=str(path))]
+    return run_operator(host_with(PLUGIN), "rerun.log", values, settings)
+
+
+def read(path):
+    """Component columns by entity and name: (seconds, iterations or None; list of values)."""
+    from rerun.chunk import RrdReader
+
+    columns = {}
+    for chunk in RrdReader(str(path)).stream():
+        table = chunk.to_record_batch()
+        names = table.schema.names
+        index = next((table.column(names.index(t)) for t in ("time", "iteration") if t in names), None)
+        if index is not None:
+            kind = str(index.type)
+            index = np.array(index.cast("int64")) * (1e-9 if kind.startswith("duration") else 1)
+        for name in names:
+            if ":" in name:
+                columns.setdefault((chunk.entity_path, name), []).append(
+                    (index, table.column(names.index(name)).to_pylist())
+                )
+    merged = {}
+    for key, pieces in columns.items():
+        times = None if pieces[0][0] is None else np.concatenate([piece[0] for piece in pieces])
+        merged[key] = (times, [value for piece in pieces for value in piece[1]])
+    return merged
+
+
+@pytest.fixture(scope="module")
+def columns(tmp_path_factory):
+    path = tmp_path_factory.mktemp("recording") / "out.rrd"
+    assert write(path, synthetic.result()) == (Recording(str(path)),)
+    return read(path)
+
+
+def test_the_plugin_keeps_to_the_rules():
+    assert check_plugin(PLUGIN) == []
+
+
+def test_every_visible_mesh_is_there_once_for_each_motion_under_its_prim_path(columns):
+    meshes = sorted(entity for entity, name in columns if name == "Mesh3D:triangle_indices")
+    moving = ["/Robot/Link/Beam", "/Robot/Tip/Ball"]
+    expected = [f"/{root}{mesh}" for root in ("input", "optimized") for mesh in ["/Robot/Base/Box", *moving]]
+    # What never moves has no ghost, and guide geometry is not shown.
+    assert meshes == sorted(expected + [f"/reference{mesh}" for mesh in moving])
+    for mesh in meshes:
+        times, values = columns[mesh, "Mesh3D:triangle_indices"]
+        assert times is None and len(values) == 1 and len(values[0]) == 12
+
+
+def test_bodies_move_at_the_frames_of_the_shot_and_never_before_them(columns):
+    result = synthetic.result()
+    frames = synthetic.animation().frame_times
+    for root, motion in (
+        ("input", result.before.motion),
+        ("optimized", result.after.motion),
+        ("reference", result.reference),
+    ):
+        times, places = columns[f"/{root}/Robot/Tip", "Transform3D:translation"]
+        np.testing.assert_allclose(times, frames, atol=2e-9)
+        expected = [np.interp(frames, motion.times, motion.positions[:, 2, axis]) for axis in range(3)]
+        np.testing.assert_allclose(np.array(places)[:, 0], np.transpose(expected), atol=1e-6)
+        quaternion = np.array(columns[f"/{root}/Robot/Link", "Transform3D:quaternion"][1])[:, 0]
+        angle = 2.0 * np.arctan2(quaternion[:, 2], quaternion[:, 3])
+        np.testing.assert_allclose(angle, np.interp(frames, motion.times, motion.motor_values[:, 0]), atol=1e-5)
+
+
+def test_vertices_of_a_flexible_body_follow_its_modes_and_rigid_ones_stay(columns):
+    result = synthetic.result()
+    frames = synthetic.animation().frame_times
+    times, shapes = columns["/input/Robot/Link/Beam", "Mesh3D:vertex_positions"]
+    np.testing.assert_allclose(times, frames, atol=2e-9)
+    shapes = np.array(shapes)
+    assert shapes.shape == (len(frames), 24, 3)  # a box has three normals at each of its eight corners
+    tip = np.isclose(shapes[0, :, 0], synthetic.LENGTH)
+    bend = np.interp(frames, result.before.motion.times, result.before.motion.elastic[1][:, 0])
+    middle = shapes[:, tip, 1].mean(axis=1)
+    np.testing.assert_allclose(middle, bend, atol=1e-6)
+    assert np.abs(bend).max() > 0.02
+    np.testing.assert_allclose(shapes[:, ~tip], np.broadcast_to(shapes[0, ~tip], shapes[:, ~tip].shape), atol=1e-7)
+    times, shapes = columns["/input/Robot/Tip/Ball", "Mesh3D:vertex_positions"]
+    assert times is None and len(shapes) == 1
+
+
+def test_normals_of_a_box_are_those_of_its_faces(columns):
+    normals = np.array(columns["/input/Robot/Tip/Ball", "Mesh3D:vertex_normals"][1][0])
+    points = np.array(columns["/input/Robot/Tip/Ball", "Mesh3D:vertex_positions"][1][0])
+    assert sorted(np.abs(normals).max(axis=1).tolist()) == pytest.approx([1.0] * 24)
+    assert np.all(np.sum(normals * points, axis=1) > 0.0)
+
+
+def test_errors_and_motor_curves_have_the_units_they_are_named_by(columns):
+    result = synthetic.result()
+    first = int(np.searchsorted(result.before.motion.times, -1e-9))
+    for root, simulation in (("input", result.before), ("optimized", result.after)):
+        times, values = columns[f"/errors/position_mm/{root}/Robot/Tip/Target", "Scalars:scalars"]
+        assert times[0] == 0.0 and times[-1] == pytest.approx(1.0)
+        np.testing.assert_allclose(np.ravel(values), 1e3 * simulation.position_errors[first:, 0])
+        values = columns[f"/errors/rotation_deg/{root}/Robot/Tip/Target", "Scalars:scalars"][1]
+        np.testing.assert_allclose(np.ravel(values), np.degrees(simulation.rotation_errors[first:, 0]))
+        values = columns[f"/motors/Robot/Joints/Swing/angle_deg/{root}", "Scalars:scalars"][1]
+        np.testing.assert_allclose(np.ravel(values), np.degrees(simulation.motion.motor_values[first:, 0]))
+        values = columns[f"/motors/Robot/Joints/Swing/torque_Nm/{root}", "Scalars:scalars"][1]
+        np.testing.assert_allclose(np.ravel(values), simulation.motion.motor_efforts[first:, 0])
+    change = np.ravel(columns["/changes_deg/Robot/Joints/Swing", "Scalars:scalars"][1])
+    assert change.max() == pytest.approx(np.degrees(0.01), rel=1e-3)
+
+
+def test_progress_is_a_series_over_iterations(columns):
+    times, values = columns["/optimizer/log10_objective", "Scalars:scalars"]
+    assert times.tolist() == [0, 1, 2, 3]
+    np.testing.assert_allclose(np.ravel(values), [-2.0, -3.0, -4.0, -5.0])
+
+
+def test_trails_run_through_the_places_of_the_target(columns):
+    strip = np.array(columns["/trails/reference/Robot/Tip/Target", "LineStrips3D:strips"][1][0][0])
+    assert strip.shape == (synthetic.FRAMES, 3)
+    np.testing.assert_allclose(np.linalg.norm(strip, axis=1), synthetic.LENGTH, rtol=1e-4)
+
+
+def test_the_summary_names_what_was_left_out_and_the_errors(columns):
+    text = columns["/summary", "TextDocument:text"][1][0][0]
+    result = synthetic.result()
+    assert "modes above 40 Hz" in text and "0.02 mm" in text
+    assert f"{1e3 * result.before.position_errors.max():.2f} mm" in text
+    assert f"{1e3 * result.after.position_errors.max():.2f} mm" in text
+
+
+def test_the_recording_carries_its_own_layout(tmp_path):
+    from rerun.chunk import RrdReader
+
+    write(tmp_path / "out.rrd", synthetic.result())
+    assert len(RrdReader(str(tmp_path / "out.rrd")).blueprints()) == 1
+    assert [path.name for path in tmp_path.iterdir()] == ["out.rrd"]
+
+
+def test_a_simulation_alone_logs_nothing_as_optimised(tmp_path):
+    write(tmp_path / "out.rrd", synthetic.result(optimized=False))
+    entities = {entity for entity, _ in read(tmp_path / "out.rrd")}
+    assert not [e for e in entities if "optimize" in e or "change" in e]
+    assert "/input/Robot/Link/Beam" in entities and "/reference/Robot/Link/Beam" in entities
+
+
+def test_long_curves_are_thinned_and_the_frames_kept(tmp_path):
+    write(tmp_path / "out.rrd", synthetic.result(), {"rerun.log": {"samples_per_plot": 50}})
+    columns = read(tmp_path / "out.rrd")
+    times = columns["/errors/position_mm/input/Robot/Tip/Target", "Scalars:scalars"][0]
+    assert 25 < len(times) <= 50
+    assert len(columns["/input/Robot/Tip", "Transform3D:translation"][0]) == synthetic.FRAMES
+
+
+def test_it_is_left_out_when_no_recording_is_asked_for():
+    values = [synthetic.character(), synthetic.animation(), synthetic.result(), OutputPaths()]
+    with pytest.raises(PluginError, match="--rrd"):
+        run_operator(host_with(PLUGIN), "rerun.log", values)
+
+
+def test_a_folder_that_cannot_be_written_is_reported_and_nothing_is_left(tmp_path):
+    (tmp_path / "file").write_text("not a folder")
+    with pytest.raises(ShotError, match="cannot be written"):
+        write(tmp_path / "file" / "out.rrd", synthetic.result())
+    assert [path.name for path in tmp_path.iterdir()] == ["file"]
+
+
+def test_a_failure_half_way_leaves_the_old_recording(tmp_path):
+    path = tmp_path / "out.rrd"
+    path.write_bytes(b"old")
+    broken = dataclasses.replace(synthetic.result(), steps=(None,))
+    with pytest.raises(AttributeError):
+        write(path, broken)
+    assert path.read_bytes() == b"old" and [p.name for p in tmp_path.iterdir()] == ["out.rrd"]
+
+
+def test_writing_a_recording_leaves_no_trace_in_the_home_folder(tmp_path):
+    home = tmp_path / "home"
+    home.mkdir()
+    code = (
+        "import sys; sys.path[:0] = sys.argv[1:3]\n"
+        "import test_rerun_logger as t, synthetic\n"
+        "t.write(sys.argv[3], synthetic.result())\n"
+    )
+    folders = [str(ROOT / "pipeline"), str(Path(__file__).parent)]
+    environment = {key: value for key, value in os.environ.items() if not key.startswith("XDG_")} | {"HOME": str(home)}
+    subprocess.run(
+        [sys.executable, "-c", code, *folders, str(tmp_path / "out.rrd")], env=environment, check=True, timeout=120
+    )
+    assert (tmp_path / "out.rrd").is_file() and not list(home.rglob("*rerun*"))

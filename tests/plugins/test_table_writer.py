@@ -1,0 +1,63 @@
+import csv
+import stat
+
+import numpy as np
+import pytest
+import synthetic
+from calmotion.errors import ShotError
+from calmotion.host import OutputPaths
+from calmotion.testing import host_with, run_operator
+
+
+@pytest.fixture
+def host(repository):
+    return host_with(repository / "plugins" / "table_writer")
+
+
+def written(host, path, result):
+    run_operator(host, "table.write", [synthetic.character(), result, OutputPaths(csv=str(path))])
+    with path.open(newline="") as file:
+        head, *rows = csv.reader(file)
+    return head, np.array(rows, dtype=float)
+
+
+def test_the_columns_are_those_of_the_contract(host, tmp_path):
+    head, rows = written(host, tmp_path / "table.csv", synthetic.result())
+    target, motor = "/Robot/Tip/Target", "/Robot/Joints/Swing"
+    names = [f"{target}.{name}" for name in ("x", "y", "z", "error", "rotation_error")]
+    assert head == ["time_s", *names, f"{motor}.input", f"{motor}.output", f"{motor}.effort"]
+    assert rows[0, 0] == 0.0 and rows[-1, 0] == pytest.approx(1.0)
+
+
+def test_the_optimised_motion_is_written_beside_the_animators_curve(host, tmp_path):
+    _, rows = written(host, tmp_path / "table.csv", synthetic.result())
+    times = rows[:, 0]
+    expected = synthetic.motion(synthetic.CALM, 0.01)
+    judged = expected.times >= -1e-9
+    np.testing.assert_allclose(rows[:, 1:4], expected.target_positions[judged, 0], atol=1e-11)
+    np.testing.assert_allclose(rows[:, 6], synthetic.angle(times), atol=1e-11)
+    np.testing.assert_allclose(rows[:, 7], expected.motor_values[judged, 0], atol=1e-11)
+    assert np.abs(rows[:, 7] - rows[:, 6]).max() > 0.005
+
+
+def test_simulate_writes_the_simulated_motion(host, tmp_path):
+    _, rows = written(host, tmp_path / "table.csv", synthetic.result(False))
+    np.testing.assert_array_equal(rows[:, 6], rows[:, 7])
+    assert rows[:, 4].max() > 0.02
+    np.testing.assert_allclose(rows[:, 5], 2 * rows[:, 4], atol=1e-12)
+
+
+def test_a_table_is_replaced_whole_and_readable_like_any_new_file(host, tmp_path):
+    path, other = tmp_path / "table.csv", tmp_path / "other"
+    path.write_text("old")
+    other.touch()
+    written(host, path, synthetic.result())
+    assert stat.S_IMODE(path.stat().st_mode) == stat.S_IMODE(other.stat().st_mode)
+    assert sorted(file.name for file in tmp_path.iterdir()) == ["other", "table.csv"]
+
+
+def test_a_table_that_cannot_be_written_is_refused_by_name(host, tmp_path):
+    path = tmp_path / "absent" / "table.csv"
+    with pytest.raises(ShotError) as refused:
+        written(host, path, synthetic.result())
+    assert refused.value.path == str(path) and "--csv" in refused.value.remedy

@@ -1,0 +1,81 @@
+"""A wheel in an empty environment does the main job, far from the checkout."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+import venv
+from pathlib import Path
+
+import pytest
+
+
+def run(*command: object, folder: Path) -> str:
+    """Run a command in a folder without what would let it see the checkout or earlier runs; its stdout."""
+    hidden = ("PYTHONPATH", "PYTHONHOME", "VIRTUAL_ENV", "CALMOTION_PLUGINS")
+    environment = {key: value for key, value in os.environ.items() if key not in hidden}
+    environment["CALMOTION_CACHE"] = str(folder / "cache")
+    done = subprocess.run(
+        list(map(str, command)), cwd=folder, env=environment, capture_output=True, text=True, timeout=1800
+    )
+    assert done.returncode == 0, f"{command}\n{done.stdout}\n{done.stderr}"
+    return done.stdout
+
+
+@pytest.fixture(scope="module")
+def installed(tmp_path_factory: pytest.TempPathFactory, repository: Path) -> Path:
+    """An environment that holds a wheel of this checkout and what it depends on, nothing else."""
+    folder = tmp_path_factory.mktemp("wheel")
+    run(sys.executable, "-m", "pip", "wheel", "--quiet", "--no-deps", "-w", folder, repository, folder=folder)
+    (wheel,) = folder.glob("calmotion-*.whl")
+    venv.create(folder / "environment", with_pip=True)
+    python = folder / "environment" / "bin" / "python"
+    run(python, "-m", "pip", "install", "--quiet", wheel, folder=folder)
+    return python
+
+
+def test_a_wheel_in_an_empty_environment_optimises_a_shot(installed: Path, repository: Path, tmp_path: Path):
+    environment = installed.parents[1]
+    code = "import calmotion, sys; print(calmotion.__file__); print(*sys.path, sep='\\n')"
+    module, *path = run(installed, "-c", code, folder=tmp_path).splitlines()
+    assert Path(module).is_relative_to(environment)
+    assert not [entry for entry in path if entry and Path(entry).resolve().is_relative_to(repository)]
+
+    command = environment / "bin" / "calmotion"
+    plugins = json.loads(run(command, "plugins", "list", "--json", folder=tmp_path))["plugins"]
+    assert {plugin["id"]: plugin["error"] for plugin in plugins} == {
+        manifest.parent.name: None for manifest in (repository / "plugins").glob("*/plugin.toml")
+    }
+    assert all(Path(plugin["folder"]).is_relative_to(environment) for plugin in plugins)
+
+    shutil.copytree(repository / "samples" / "bartender", tmp_path / "bartender")
+    printed = run(
+        command,
+        "optimize",
+        "bartender/bartender.usda",
+        "-o",
+        "calm.usda",
+        "--csv",
+        "calm.csv",
+        "--rrd",
+        "calm.rrd",
+        "--json",
+        "--step",
+        "10ms",
+        "--set",
+        "retarget.optimize.max_iterations=3",
+        folder=tmp_path,
+    )
+    report = json.loads(printed)
+    assert "error" not in report
+    for name in ("layer", "root_layer", "csv", "rrd"):
+        assert (tmp_path / report[name]).stat().st_size > 0
+    asked_for = {"bartender", "cache", "calm.usda", "calm_root.usda", "calm.csv", "calm.rrd"}
+    assert {path.name for path in tmp_path.iterdir()} == asked_for, "a run leaves only what was asked for"
+    assert report["targets"] and report["modes"] > 0
+    assert report["objective_after"] < report["objective_before"]
+    for target in report["targets"]:
+        assert target["max_error_after_m"] < target["max_error_before_m"]

@@ -1,0 +1,118 @@
+"""The whole character: order, what is left out, what holds it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from pxr import Gf, UsdGeom, UsdPhysics
+from small_shots import BASE, ELBOW, FORE, SHOULDER, UPPER, Scale, box, make_flexible, make_target, write_arm
+
+from calmotion.shot import WORLD
+from calmotion.usd.reading import read_shot
+
+
+def read(tmp_path, edit=None, scale=None, name="arm.usda"):
+    return read_shot(str(write_arm(tmp_path / name, edit, scale)))[0]
+
+
+def test_the_same_arm_in_other_units_is_the_same_character(tmp_path):
+    def edit(scale):
+        def change(stage):
+            make_flexible(stage, scale=scale)
+            make_target(stage)
+
+        return change
+
+    scales = [Scale(), Scale(0.01, 0.001), Scale(0.0254, 0.45359237)]
+    first, *others = (read(tmp_path, edit(s), s, f"arm{k}.usda") for k, s in enumerate(scales))
+    for other in others:
+        for a, b in zip(first.bodies, other.bodies, strict=True):
+            assert a.path == b.path
+            assert np.allclose(a.rest.position, b.rest.position, atol=1e-7)
+            assert a.mass.mass == pytest.approx(b.mass.mass, rel=1e-6)
+            assert np.allclose(a.mass.center, b.mass.center, atol=1e-7)
+            assert np.allclose(a.mass.inertia, b.mass.inertia, rtol=1e-5, atol=1e-12)
+            for s, t in zip(a.surfaces, b.surfaces, strict=True):
+                assert np.allclose(s.points, t.points, atol=1e-7) and np.array_equal(s.triangles, t.triangles)
+        for a, b in zip(first.joints, other.joints, strict=True):
+            assert np.allclose(a.frame0.position, b.frame0.position, atol=1e-7) and a.lower == b.lower
+        assert np.allclose(first.targets[0].frame.position, other.targets[0].frame.position, atol=1e-7)
+        assert np.allclose(first.gravity, other.gravity)
+
+
+def test_bodies_and_joints_go_from_the_world_outwards(tmp_path):
+    def leaf_first(stage):
+        order = ["fore", "upper", "joints", "base"]
+        stage.GetRootLayer().GetPrimAtPath("/Arm").nameChildrenOrder = order
+
+    character = read(tmp_path, leaf_first)
+    assert [b.path for b in character.bodies] == [BASE, UPPER, FORE]
+    assert [j.path for j in character.joints] == ["/Arm/joints/stand", SHOULDER, ELBOW]
+    assert [m.joint for m in character.motors] == [1, 2]
+    assert character.path == "/Arm"
+
+
+def test_without_a_default_prim_the_root_is_what_holds_all_bodies(tmp_path):
+    character = read(tmp_path, lambda stage: stage.ClearDefaultPrim())
+    assert character.path == "/Arm"
+
+
+def test_a_character_without_a_joint_to_the_world_is_held_at_its_pose(tmp_path):
+    character = read(tmp_path, lambda stage: stage.RemovePrim("/Arm/joints/stand"))
+    held = character.joints[0]
+    assert (held.kind, held.body0, character.bodies[held.body1].path) == ("fixed", WORLD, BASE)
+    assert np.allclose(held.frame0.position, [0, 0, 1])
+    assert any("held at its pose" in note and BASE in note for note in character.notes)
+
+
+def test_a_kinematic_body_is_what_holds_it(tmp_path):
+    def edit(stage):
+        stage.RemovePrim("/Arm/joints/stand")
+        UsdPhysics.RigidBodyAPI(stage.GetPrimAtPath(FORE)).CreateKinematicEnabledAttr(True)
+
+    character = read(tmp_path, edit)
+    assert character.bodies[character.joints[0].body1].path == FORE
+
+
+def test_what_no_motor_moves_is_left_out_with_a_note(tmp_path):
+    def edit(stage):
+        drum = UsdGeom.Cube.Define(stage, "/Drum").GetPrim()
+        UsdPhysics.RigidBodyAPI.Apply(drum)
+        lid = UsdGeom.Cube.Define(stage, "/Lid").GetPrim()
+        UsdPhysics.RigidBodyAPI.Apply(lid)
+        slide = UsdPhysics.PrismaticJoint.Define(stage, "/Slide")  # not supported, and no part of the character
+        slide.CreateBody0Rel().SetTargets(["/Drum"])
+        slide.CreateBody1Rel().SetTargets(["/Lid"])
+
+    character = read(tmp_path, edit)
+    assert [b.path for b in character.bodies] == [BASE, UPPER, FORE]
+    assert any("/Drum" in note and "left out" in note for note in character.notes)
+
+
+def test_nested_bodies_have_their_own_poses(tmp_path):
+    def edit(stage):
+        nested = UsdGeom.Xform.Define(stage, f"{FORE}/finger")
+        nested.AddTranslateOp().Set(Gf.Vec3d(0.4, 0, 0))
+        UsdPhysics.RigidBodyAPI.Apply(nested.GetPrim())
+        box(stage, f"{FORE}/finger/skin", Scale())
+        UsdPhysics.MassAPI.Apply(nested.GetPrim()).CreateDensityAttr(1000.0)
+        joint = UsdPhysics.FixedJoint.Define(stage, "/Arm/joints/finger")
+        joint.CreateBody0Rel().SetTargets([FORE])
+        joint.CreateBody1Rel().SetTargets([f"{FORE}/finger"])
+        joint.CreateLocalPos0Attr(Gf.Vec3f(0.4, 0, 0))
+
+    character = read(tmp_path, edit)
+    finger = character.bodies[-1]
+    assert finger.path == f"{FORE}/finger" and np.allclose(finger.rest.position, [0.8, 0, 1], atol=1e-6)
+    assert character.targets[0].path == f"{FORE}/finger"
+
+
+def test_a_disabled_body_is_no_body(tmp_path):
+    def edit(stage):
+        UsdPhysics.RigidBodyAPI(stage.GetPrimAtPath(BASE)).CreateRigidBodyEnabledAttr(False)
+
+    character = read(tmp_path, edit)
+    assert [b.path for b in character.bodies] == [UPPER, FORE]
+    shoulder = character.joints[0]
+    assert shoulder.path == SHOULDER and shoulder.body0 == WORLD
+    assert np.allclose(shoulder.frame0.position, [0, 0, 1])

@@ -1,0 +1,103 @@
+"""Settings of flexible bodies."""
+
+from __future__ import annotations
+
+import pytest
+from pxr import Gf, Sdf, UsdGeom
+from small_shots import FORE, Scale, make_flexible, set_float, write_arm
+
+from calmotion import ShotError
+from calmotion.usd.reading import read_shot
+
+
+def fore(tmp_path, edit, scale=None):
+    character, _, _ = read_shot(str(write_arm(tmp_path / "arm.usda", edit, scale)))
+    return next(b for b in character.bodies if b.path == FORE), character.notes
+
+
+def test_fallbacks_mean_automatic(tmp_path):
+    settings = fore(tmp_path, make_flexible)[0].flexible
+    assert (settings.mode_count, settings.max_frequency, settings.element_size) == (-1, -1.0, -1.0)
+    assert (settings.interface_radius, settings.mesh_file, settings.elasticity) == (-1.0, "", "auto")
+
+
+def test_lengths_become_metres(tmp_path):
+    scale = Scale(0.01, 0.001)
+
+    def edit(stage):
+        make_flexible(stage, scale=scale)
+        set_float(stage, FORE, "calm:flexible:elementSize", 2.0)
+        set_float(stage, FORE, "calm:flexible:interfaceRadius", 3.0)
+        set_float(stage, FORE, "calm:flexible:maxFrequency", 80.0)
+        stage.GetPrimAtPath(FORE).CreateAttribute("calm:flexible:modeCount", Sdf.ValueTypeNames.Int).Set(7)
+
+    settings = fore(tmp_path, edit, scale)[0].flexible
+    assert settings.element_size == pytest.approx(0.02) and settings.interface_radius == pytest.approx(0.03)
+    assert settings.max_frequency == 80.0 and settings.mode_count == 7
+
+
+def test_a_body_that_is_switched_off_or_lacks_the_schema_is_rigid(tmp_path):
+    def off(stage):
+        make_flexible(stage)
+        stage.GetPrimAtPath(FORE).CreateAttribute("calm:flexible:enabled", Sdf.ValueTypeNames.Bool).Set(False)
+
+    assert fore(tmp_path, off)[0].flexible is None
+    body, notes = fore(tmp_path, lambda stage: set_float(stage, FORE, "calm:flexible:elementSize", 1.0))
+    assert body.flexible is None and any("CalmFlexibleBodyAPI" in note for note in notes)
+
+
+def test_the_mass_of_a_flexible_body_is_left_to_its_density(tmp_path):
+    def edit(stage):
+        make_flexible(stage)
+        stage.GetPrimAtPath(FORE).RemoveProperty("physics:mass")
+
+    assert fore(tmp_path, edit)[0].mass is None
+    assert fore(tmp_path, make_flexible)[0].mass.mass == pytest.approx(0.5)
+
+
+def test_a_mesh_file_is_found_beside_the_layer_that_names_it(tmp_path):
+    (tmp_path / "meshes").mkdir()
+    (tmp_path / "meshes" / "link.msh").write_text("mesh")
+
+    def edit(stage):
+        make_flexible(stage)
+        asset = stage.GetPrimAtPath(FORE).CreateAttribute("calm:flexible:meshFile", Sdf.ValueTypeNames.Asset)
+        asset.Set(Sdf.AssetPath("./meshes/link.msh"))
+        UsdGeom.Xformable(stage.GetPrimAtPath(FORE)).AddScaleOp().Set(Gf.Vec3f(2, 2, 2))
+
+    settings = fore(tmp_path, edit)[0]
+    assert settings.flexible.mesh_file == str(tmp_path / "meshes" / "link.msh")
+    assert settings.flexible.mesh_scale == pytest.approx(2.0)
+
+
+def test_a_missing_mesh_file_is_refused(tmp_path):
+    def edit(stage):
+        make_flexible(stage)
+        asset = stage.GetPrimAtPath(FORE).CreateAttribute("calm:flexible:meshFile", Sdf.ValueTypeNames.Asset)
+        asset.Set(Sdf.AssetPath("./gone.msh"))
+
+    with pytest.raises(ShotError, match=r"gone\.msh") as caught:
+        fore(tmp_path, edit)
+    assert (caught.value.path, caught.value.attribute) == (FORE, "calm:flexible:meshFile")
+
+
+@pytest.mark.parametrize(
+    ("name", "value"), [("elementSize", 0.0), ("interfaceRadius", -3.0), ("maxFrequency", float("nan"))]
+)
+def test_settings_out_of_range_are_refused(tmp_path, name, value):
+    def edit(stage):
+        make_flexible(stage)
+        set_float(stage, FORE, f"calm:flexible:{name}", value)
+
+    with pytest.raises(ShotError) as caught:
+        fore(tmp_path, edit)
+    assert caught.value.attribute == f"calm:flexible:{name}"
+
+
+def test_an_unknown_elasticity_is_refused_with_the_choices(tmp_path):
+    def edit(stage):
+        make_flexible(stage)
+        stage.GetPrimAtPath(FORE).CreateAttribute("calm:flexible:elasticity", Sdf.ValueTypeNames.Token).Set("rubber")
+
+    with pytest.raises(ShotError, match="neohookean"):
+        fore(tmp_path, edit)

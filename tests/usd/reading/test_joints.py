@@ -1,0 +1,171 @@
+"""Joints: frames, axes, limits, the world, and what is refused."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from pxr import Gf, UsdGeom, UsdPhysics
+from small_shots import BASE, ELBOW, FORE, LENGTH, SHOULDER, UPPER, write_arm
+
+from calmotion import ShotError
+from calmotion.shot import WORLD
+from calmotion.usd.reading import read_shot
+from calmotion.usd.transforms import rotation_from_quaternion
+
+
+def read(tmp_path, edit=None):
+    return read_shot(str(write_arm(tmp_path / "arm.usda", edit)))[0]
+
+
+def joint(character, path):
+    return next(j for j in character.joints if j.path == path)
+
+
+def axis(frame) -> np.ndarray:
+    return rotation_from_quaternion(frame.rotation)[:, 2]
+
+
+def world_anchor(character, joint, side: int) -> np.ndarray:
+    body, frame = ((joint.body0, joint.frame0), (joint.body1, joint.frame1))[side]
+    if body == WORLD:
+        return frame.position
+    rest = character.bodies[body].rest
+    return rest.position + rotation_from_quaternion(rest.rotation) @ frame.position
+
+
+@pytest.mark.parametrize(("name", "direction"), [("X", [1, 0, 0]), ("Y", [0, 1, 0]), ("Z", [0, 0, 1])])
+def test_the_axis_becomes_z_of_both_frames(tmp_path, name, direction):
+    found = joint(read(tmp_path, lambda s: UsdPhysics.RevoluteJoint(s.GetPrimAtPath(ELBOW)).GetAxisAttr().Set(name)), ELBOW)
+    assert np.allclose(axis(found.frame0), direction, atol=1e-12)
+    assert np.allclose(axis(found.frame1), direction, atol=1e-12)
+
+
+def test_both_anchors_meet_at_the_rest_pose_and_limits_are_radians(tmp_path):
+    character = read(tmp_path)
+    found = joint(character, ELBOW)
+    assert np.allclose(world_anchor(character, found, 0), [LENGTH, 0, 1], atol=1e-6)
+    assert np.allclose(world_anchor(character, found, 1), [LENGTH, 0, 1], atol=1e-6)
+    assert (found.lower, found.upper) == pytest.approx((np.deg2rad(-90), np.deg2rad(120)))
+
+
+def test_the_scale_of_a_body_is_in_its_anchors(tmp_path):
+    def edit(stage):
+        UsdGeom.Xformable(stage.GetPrimAtPath(UPPER)).AddScaleOp().Set(Gf.Vec3f(2, 2, 2))
+        UsdPhysics.RevoluteJoint(stage.GetPrimAtPath(ELBOW)).GetLocalPos0Attr().Set(Gf.Vec3f(LENGTH / 2, 0, 0))
+
+    assert np.allclose(joint(read(tmp_path, edit), ELBOW).frame0.position, [LENGTH, 0, 0], atol=1e-6)
+
+
+def test_a_body_that_is_no_rigid_body_is_the_world(tmp_path):
+    def edit(stage):
+        pedestal = UsdGeom.Xform.Define(stage, "/Arm/pedestal")
+        pedestal.AddTranslateOp().Set(Gf.Vec3d(0, 2, 0))
+        pedestal.AddRotateZOp().Set(90.0)
+        stand = UsdPhysics.FixedJoint(stage.GetPrimAtPath("/Arm/joints/stand"))
+        stand.CreateBody0Rel().SetTargets(["/Arm/pedestal"])
+        stand.GetLocalPos0Attr().Set(Gf.Vec3f(1, 0, 0))
+
+    found = joint(read(tmp_path, edit), "/Arm/joints/stand")
+    assert found.body0 == WORLD
+    assert np.allclose(found.frame0.position, [0, 3, 0], atol=1e-6)
+    assert np.allclose(rotation_from_quaternion(found.frame0.rotation)[:, 0], [0, 1, 0], atol=1e-6)
+
+
+def test_a_prim_below_a_body_is_carried_by_it(tmp_path):
+    def edit(stage):
+        socket = UsdGeom.Xform.Define(stage, f"{UPPER}/socket")
+        socket.AddTranslateOp().Set(Gf.Vec3d(0.3, 0, 0))
+        elbow = UsdPhysics.RevoluteJoint(stage.GetPrimAtPath(ELBOW))
+        elbow.GetBody0Rel().SetTargets([f"{UPPER}/socket"])
+        elbow.GetLocalPos0Attr().Set(Gf.Vec3f(0.1, 0, 0))
+
+    character = read(tmp_path, edit)
+    found = joint(character, ELBOW)
+    assert character.bodies[found.body0].path == UPPER
+    assert np.allclose(found.frame0.position, [0.4, 0, 0], atol=1e-6)
+
+
+def test_a_joint_that_names_the_world_second_is_turned_round_with_the_same_angle(tmp_path):
+    def swapped(stage):
+        stage.RemovePrim("/Arm/joints/stand")
+        stage.RemovePrim(BASE)
+        shoulder = UsdPhysics.RevoluteJoint(stage.GetPrimAtPath(SHOULDER))
+        shoulder.GetBody0Rel().SetTargets([UPPER])
+        shoulder.GetBody1Rel().ClearTargets(True)
+        shoulder.GetLocalPos0Attr().Set(Gf.Vec3f(0, 0, 0))
+        shoulder.GetLocalPos1Attr().Set(Gf.Vec3f(0, 0, 1))
+
+    found = joint(read(tmp_path, swapped), SHOULDER)
+    assert found.body0 == WORLD and np.allclose(found.frame0.position, [0, 0, 1])
+    # "world relative to arm, about y" is "arm relative to world, about -y": one angle, its axis turned over
+    assert np.allclose(axis(found.frame0), [0, -1, 0], atol=1e-12)
+    assert np.allclose(axis(found.frame1), [0, -1, 0], atol=1e-12)
+    assert (found.lower, found.upper) == pytest.approx((np.deg2rad(-90), np.deg2rad(120)))
+
+
+def test_a_disabled_joint_is_not_there(tmp_path):
+    def edit(stage):
+        extra = UsdPhysics.PrismaticJoint.Define(stage, "/Arm/joints/slide")
+        extra.CreateBody0Rel().SetTargets([BASE])
+        extra.CreateBody1Rel().SetTargets([FORE])
+        extra.CreateJointEnabledAttr(False)
+
+    assert len(read(tmp_path, edit).joints) == 3
+
+
+def test_a_joint_that_closes_a_loop_is_read_as_a_joint(tmp_path):
+    def edit(stage):
+        extra = UsdPhysics.RevoluteJoint.Define(stage, "/Arm/joints/loop")
+        extra.CreateBody0Rel().SetTargets([BASE])
+        extra.CreateBody1Rel().SetTargets([FORE])
+        extra.CreateExcludeFromArticulationAttr(True)
+
+    assert len(read(tmp_path, edit).joints) == 4
+
+
+@pytest.mark.parametrize("kind", ["PrismaticJoint", "SphericalJoint", "DistanceJoint", "Joint"])
+def test_other_joints_of_the_character_are_not_supported_yet(tmp_path, kind):
+    def edit(stage):
+        extra = getattr(UsdPhysics, kind).Define(stage, "/Arm/joints/other")
+        extra.CreateBody0Rel().SetTargets([BASE])
+        extra.CreateBody1Rel().SetTargets([FORE])
+
+    with pytest.raises(ShotError, match="not supported yet") as caught:
+        read(tmp_path, edit)
+    assert caught.value.path == "/Arm/joints/other" and "physics:jointEnabled" in caught.value.remedy
+
+
+def test_a_joint_with_both_ends_on_one_body_is_refused(tmp_path):
+    def edit(stage):
+        UsdPhysics.RevoluteJoint(stage.GetPrimAtPath(ELBOW)).GetBody0Rel().SetTargets([FORE])
+
+    with pytest.raises(ShotError, match="same body") as caught:
+        read(tmp_path, edit)
+    assert caught.value.path == ELBOW
+
+
+def test_a_body_that_does_not_exist_is_refused(tmp_path):
+    def edit(stage):
+        UsdPhysics.RevoluteJoint(stage.GetPrimAtPath(ELBOW)).GetBody0Rel().SetTargets(["/Arm/gone"])
+
+    with pytest.raises(ShotError, match="does not exist") as caught:
+        read(tmp_path, edit)
+    assert (caught.value.path, caught.value.attribute) == (ELBOW, "physics:body0")
+
+
+@pytest.mark.parametrize(
+    ("attribute", "value"),
+    [
+        ("physics:localPos0", Gf.Vec3f(float("nan"), 0, 0)),
+        ("physics:localRot1", Gf.Quatf(0, 0, 0, 0)),
+        ("physics:lowerLimit", float("nan")),
+    ],
+)
+def test_values_that_make_no_joint_are_refused(tmp_path, attribute, value):
+    def edit(stage):
+        UsdPhysics.RevoluteJoint(stage.GetPrimAtPath(ELBOW)).CreateLocalRot1Attr()
+        stage.GetPrimAtPath(ELBOW).GetAttribute(attribute).Set(value)
+
+    with pytest.raises(ShotError) as caught:
+        read(tmp_path, edit)
+    assert (caught.value.path, caught.value.attribute) == (ELBOW, attribute)

@@ -1,0 +1,122 @@
+"""Which joints are motors, and their limits."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from pxr import Sdf, UsdPhysics
+from small_shots import ELBOW, SHOULDER, TARGET_POSITION, UPPER, Scale, set_float, write_arm
+
+from calmotion import ShotError
+from calmotion.usd.reading import read_shot
+
+
+def read(tmp_path, edit=None, scale=None):
+    return read_shot(str(write_arm(tmp_path / "arm.usda", edit, scale)))
+
+
+def clear(stage, path: str) -> None:
+    stage.GetPrimAtPath(path).GetAttribute(TARGET_POSITION).Clear()
+
+
+def test_limits_are_si_and_the_smaller_torque_counts(tmp_path):
+    scale = Scale(0.01, 0.001)
+
+    def edit(stage):
+        prim = stage.GetPrimAtPath(ELBOW)
+        prim.AddAppliedSchema("CalmMotorAPI")
+        set_float(stage, ELBOW, "calm:motor:maxVelocity", 180.0)
+        set_float(stage, ELBOW, "calm:motor:maxAcceleration", 90.0)
+        set_float(stage, ELBOW, "calm:motor:maxTorque", 3e7)  # 3 N m in g cm^2/s^2
+        prim.CreateAttribute("calm:motor:optimize", Sdf.ValueTypeNames.Bool).Set(False)
+        UsdPhysics.DriveAPI(prim, "angular").CreateMaxForceAttr(2e7)
+
+    character, _, _ = read(tmp_path, edit, scale)
+    shoulder, elbow = character.motors
+    assert elbow.path == ELBOW and elbow.attribute == TARGET_POSITION
+    assert character.joints[elbow.joint].path == ELBOW
+    assert elbow.max_velocity == pytest.approx(np.pi) and elbow.max_acceleration == pytest.approx(np.pi / 2)
+    assert elbow.max_torque == pytest.approx(2.0) and not elbow.optimize
+    assert shoulder.optimize and np.isinf([shoulder.max_velocity, shoulder.max_torque]).all()
+
+
+@pytest.mark.parametrize("value", [0.0, -1.0, float("nan")])
+def test_a_limit_that_is_not_positive_is_refused(tmp_path, value):
+    with pytest.raises(ShotError, match="must be positive") as caught:
+        read(tmp_path, lambda stage: set_float(stage, ELBOW, "calm:motor:maxTorque", value))
+    assert (caught.value.path, caught.value.attribute) == (ELBOW, "calm:motor:maxTorque")
+
+
+def test_a_drive_that_is_not_animated_holds_its_value(tmp_path):
+    def edit(stage):
+        clear(stage, ELBOW)
+        stage.GetPrimAtPath(ELBOW).GetAttribute(TARGET_POSITION).Set(45.0)
+
+    character, animation, _ = read(tmp_path, edit)
+    assert len(character.motors) == 2
+    assert np.allclose(animation.tracks[1].values, np.pi / 4)
+    assert any("holds 45 degrees" in note for note in character.notes)
+
+
+def test_a_drive_that_pulls_nowhere_leaves_its_joint_free(tmp_path):
+    character, animation, _ = read(tmp_path, lambda stage: clear(stage, ELBOW))
+    assert [motor.path for motor in character.motors] == [SHOULDER] and len(animation.tracks) == 1
+    assert any("moves freely" in note for note in character.notes)
+
+
+def test_a_drive_with_stiffness_alone_holds_zero(tmp_path):
+    def edit(stage):
+        clear(stage, ELBOW)
+        UsdPhysics.DriveAPI(stage.GetPrimAtPath(ELBOW), "angular").CreateStiffnessAttr(100.0)
+
+    _, animation, _ = read(tmp_path, edit)
+    assert np.array_equal(animation.tracks[1].values, [0.0, 0.0])
+
+
+def test_a_joint_without_a_drive_moves_freely(tmp_path):
+    def edit(stage):
+        clear(stage, ELBOW)
+        stage.GetPrimAtPath(ELBOW).RemoveAPI(UsdPhysics.DriveAPI, "angular")
+
+    assert [motor.path for motor in read(tmp_path, edit)[0].motors] == [SHOULDER]
+
+
+def test_an_animated_target_without_the_drive_schema_is_refused(tmp_path):
+    with pytest.raises(ShotError, match="no drive") as caught:
+        read(tmp_path, lambda stage: stage.GetPrimAtPath(ELBOW).RemoveAPI(UsdPhysics.DriveAPI, "angular"))
+    assert caught.value.path == ELBOW
+
+
+def test_an_actuator_of_a_conversion_makes_a_motor_that_must_be_animated(tmp_path):
+    def edit(stage):
+        clear(stage, ELBOW)
+        stage.GetPrimAtPath(ELBOW).RemoveAPI(UsdPhysics.DriveAPI, "angular")
+        actuator = stage.DefinePrim("/Arm/actuator", "MjcActuator")
+        actuator.CreateRelationship("mjc:target").SetTargets([ELBOW])
+
+    with pytest.raises(ShotError, match="motor without animation") as caught:
+        read(tmp_path, edit)
+    assert caught.value.path == ELBOW and "/Arm/actuator" in caught.value.problem
+
+
+def test_a_motor_inside_an_instance_is_refused(tmp_path):
+    write_arm(tmp_path / "robot.usda")
+    shot = tmp_path / "shot.usda"
+    shot.write_text(
+        "#usda 1.0\n(\n startTimeCode = 0\n endTimeCode = 24\n timeCodesPerSecond = 24\n metersPerUnit = 1\n)\n"
+        'def Xform "Robot" (instanceable = true\n references = @./robot.usda@</Arm>) {}\n'
+    )
+    with pytest.raises(ShotError, match="inside an instance") as caught:
+        read_shot(str(shot))
+    assert "instanceable" in caught.value.remedy
+
+
+def test_a_fixed_joint_is_no_motor(tmp_path):
+    with pytest.raises(ShotError, match="fixed joint cannot be a motor"):
+        read(tmp_path, lambda stage: stage.GetPrimAtPath("/Arm/joints/stand").AddAppliedSchema("CalmMotorAPI"))
+
+
+def test_the_body_of_a_motor_is_moved_by_it(tmp_path):
+    character, _, _ = read(tmp_path)
+    joint = character.joints[character.motors[0].joint]
+    assert character.bodies[joint.body1].path == UPPER

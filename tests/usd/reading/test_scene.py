@@ -1,0 +1,97 @@
+"""Gravity, and the settings of the optimisation."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from pxr import Gf, Sdf, UsdGeom, UsdPhysics
+from small_shots import FORE, Scale, set_float, write_arm
+
+from calmotion import ShotError
+from calmotion.usd.reading import read_shot
+
+
+def read(tmp_path, edit=None, scale=None):
+    return read_shot(str(write_arm(tmp_path / "arm.usda", edit, scale)))[0]
+
+
+def scene(stage, direction=None, magnitude=None):
+    made = UsdPhysics.Scene.Define(stage, "/scene")
+    if direction is not None:
+        made.CreateGravityDirectionAttr(Gf.Vec3f(*direction))
+    if magnitude is not None:
+        made.CreateGravityMagnitudeAttr(magnitude)
+
+
+def test_without_a_scene_gravity_is_the_earths_down_the_up_axis(tmp_path):
+    assert read(tmp_path).gravity.tolist() == [0, 0, -9.81]
+    assert read(tmp_path, lambda s: UsdGeom.SetStageUpAxis(s, "Y")).gravity.tolist() == [0, -9.81, 0]
+
+
+@pytest.mark.parametrize(
+    ("direction", "magnitude", "expected"),
+    [
+        (None, None, [0, 0, -9.81]),
+        ((0, 0, 0), -1.0, [0, 0, -9.81]),
+        ((2, 0, 0), 162.0, [1.62, 0, 0]),
+        ((0, 0, -1), 0.0, [0, 0, 0]),
+        ((0, 0, 0), 981.0, [0, 0, -9.81]),
+    ],
+)
+def test_the_conventions_of_usdphysics_hold(tmp_path, direction, magnitude, expected):
+    found = read(tmp_path, lambda stage: scene(stage, direction, magnitude), Scale(0.01, 1.0)).gravity
+    assert np.allclose(found, expected, atol=1e-6)
+
+
+def test_gravity_that_is_not_finite_is_refused(tmp_path):
+    with pytest.raises(ShotError, match="gravityMagnitude"):
+        read(tmp_path, lambda stage: scene(stage, None, float("nan")))
+
+
+def retarget(stage, path: str, **values) -> None:
+    prim = stage.GetPrimAtPath(path)
+    prim.AddAppliedSchema("CalmRetargetAPI")
+    for name, value in values.items():
+        kind = {str: Sdf.ValueTypeNames.Token, bool: Sdf.ValueTypeNames.Bool}.get(type(value), Sdf.ValueTypeNames.Float)
+        prim.CreateAttribute(f"calm:retarget:{name}", kind).Set(value)
+
+
+def test_settings_are_automatic_until_authored(tmp_path):
+    for character in (read(tmp_path), read(tmp_path, lambda stage: retarget(stage, "/Arm"))):
+        found = character.retarget
+        assert (found.tolerance, found.time_step, found.knot_spacing, found.smoothness) == (None,) * 4
+        assert (found.reference, found.endpoints, found.cyclic) == ("rigid", "free", False)
+
+
+def test_authored_settings_are_read_in_si(tmp_path):
+    def edit(stage):
+        retarget(
+            stage, "/Arm", tolerance=0.1, timeStep=0.002, knotSpacing=0.05, smoothness=0.0, reference="static",
+            endpoints="kept", cyclic=True,
+        )  # fmt: skip
+
+    found = read(tmp_path, edit, Scale(0.01, 1.0)).retarget
+    assert found.tolerance == pytest.approx(1e-3) and found.time_step == pytest.approx(0.002)
+    assert found.knot_spacing == pytest.approx(0.05) and found.smoothness == 0.0
+    assert (found.reference, found.endpoints, found.cyclic) == ("static", "kept", True)
+
+
+def test_the_settings_are_those_above_the_character_not_those_below(tmp_path):
+    character = read(tmp_path, lambda stage: retarget(stage, FORE, tolerance=0.1))
+    assert character.retarget.tolerance is None
+    assert any("CalmRetargetAPI" in note and FORE in note for note in character.notes)
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [("tolerance", 0.0), ("timeStep", -2.0), ("knotSpacing", float("nan")), ("smoothness", -3.0),
+     ("reference", "soft"), ("endpoints", "fixed")],
+)  # fmt: skip
+def test_settings_out_of_range_are_refused(tmp_path, name, value):
+    with pytest.raises(ShotError) as caught:
+        read(tmp_path, lambda stage: retarget(stage, "/Arm", **{name: value}))
+    assert (caught.value.path, caught.value.attribute) == ("/Arm", f"calm:retarget:{name}")
+
+
+def test_attributes_without_the_schema_on_them_change_nothing(tmp_path):
+    assert read(tmp_path, lambda s: set_float(s, "/Arm", "calm:retarget:tolerance", 1.0)).retarget.tolerance is None

@@ -1,0 +1,137 @@
+"""Geometry of a body: frames, orientation, copies, colours, tetrahedra."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from pxr import Gf, UsdGeom, UsdPhysics, Vt
+from small_shots import FORE, LENGTH, UPPER, WIDTH, Scale, box, write_arm
+
+from calmotion import ShotError
+from calmotion.usd.reading import read_shot
+
+
+def body(tmp_path, path: str, edit=None):
+    character, _, _ = read_shot(str(write_arm(tmp_path / "arm.usda", edit)))
+    return next(b for b in character.bodies if b.path == path)
+
+
+def signed_volume(surface) -> float:
+    corners = surface.points[surface.triangles]
+    return float(np.einsum("na,na->", np.cross(corners[:, 0], corners[:, 1]), corners[:, 2]) / 6.0)
+
+
+def test_scale_goes_into_points_and_quads_become_triangles(tmp_path):
+    cube = body(tmp_path, UPPER).surfaces[0]
+    assert np.allclose(cube.points.min(axis=0), [0, -WIDTH / 2, -WIDTH / 2])
+    assert np.allclose(cube.points.max(axis=0), [LENGTH, WIDTH / 2, WIDTH / 2])
+    assert cube.displaced == 0
+    mesh = body(tmp_path, FORE).surfaces[0]
+    assert len(mesh.triangles) == 12 and mesh.displaced == 8
+    assert mesh.color == pytest.approx((0.2, 0.4, 0.6))
+    for surface in (cube, mesh):
+        assert signed_volume(surface) == pytest.approx(LENGTH * WIDTH**2, rel=1e-6)
+
+
+def test_mirrored_and_left_handed_meshes_stay_outward(tmp_path):
+    def edit(stage):
+        mirrored = box(stage, f"{FORE}/mirrored", Scale())
+        mirrored.AddScaleOp().Set(Gf.Vec3f(-1, 1, 1))
+        left = box(stage, f"{FORE}/left", Scale())
+        left.CreateOrientationAttr("leftHanded")
+        indices = list(left.GetFaceVertexIndicesAttr().Get())
+        left.GetFaceVertexIndicesAttr().Set([i for k in range(0, 24, 4) for i in reversed(indices[k : k + 4])])
+
+    surfaces = {s.path.split("/")[-1]: s for s in body(tmp_path, FORE, edit).surfaces}
+    assert surfaces["mirrored"].points[:, 0].min() == pytest.approx(-LENGTH)
+    for name in ("mirrored", "left"):
+        assert signed_volume(surfaces[name]) == pytest.approx(LENGTH * WIDTH**2, rel=1e-6)
+
+
+def test_a_mirrored_body_keeps_its_geometry_in_place(tmp_path):
+    def edit(stage):
+        UsdGeom.Xformable(stage.GetPrimAtPath(FORE)).AddScaleOp().Set(Gf.Vec3f(-1, -1, -1))
+
+    surface = body(tmp_path, FORE, edit).surfaces[0]
+    # the body frame has no scale, so the mirrored box lies on its negative side
+    assert surface.points[:, 0].min() == pytest.approx(-LENGTH)
+    assert signed_volume(surface) == pytest.approx(LENGTH * WIDTH**2, rel=1e-6)
+
+
+def test_copies_guides_and_hidden_meshes_are_not_shown(tmp_path):
+    def edit(stage):
+        box(stage, f"{FORE}/skin_collision", Scale())
+        box(stage, f"{FORE}/guide", Scale()).CreatePurposeAttr("guide")
+        hidden = box(stage, f"{FORE}/hidden", Scale())
+        hidden.CreateVisibilityAttr("invisible")
+        other = box(stage, f"{FORE}/other", Scale())
+        other.AddTranslateOp().Set(Gf.Vec3d(0, 1, 0))
+
+    shown = {s.path.split("/")[-1]: s.visible for s in body(tmp_path, FORE, edit).surfaces}
+    assert shown == {"skin": True, "skin_collision": False, "guide": False, "hidden": False, "other": True}
+
+
+def test_geometry_of_a_nested_body_belongs_to_that_body(tmp_path):
+    def edit(stage):
+        nested = UsdGeom.Xform.Define(stage, f"{FORE}/nested")
+        UsdPhysics.RigidBodyAPI.Apply(nested.GetPrim())
+        box(stage, f"{FORE}/nested/skin", Scale())
+
+    assert [s.path for s in body(tmp_path, FORE, edit).surfaces] == [f"{FORE}/skin"]
+
+
+def test_instanced_geometry_is_read_but_cannot_be_written_back(tmp_path):
+    def edit(stage):
+        box(stage, "/Prototype/skin", Scale()).AddTranslateOp().Set(Gf.Vec3d(0, 0.5, 0))
+        instance = stage.DefinePrim(f"{FORE}/instance", "Xform")
+        instance.GetReferences().AddInternalReference("/Prototype")
+        instance.SetInstanceable(True)
+
+    surface = next(s for s in body(tmp_path, FORE, edit).surfaces if "instance" in s.path)
+    assert surface.displaced == 0
+    assert surface.points[:, 1].mean() == pytest.approx(0.5)
+
+
+def test_holes_are_left_out(tmp_path):
+    def edit(stage):
+        UsdGeom.Mesh(stage.GetPrimAtPath(f"{FORE}/skin")).CreateHoleIndicesAttr([0, 3])
+
+    assert len(body(tmp_path, FORE, edit).surfaces[0].triangles) == 8
+
+
+def test_indices_that_do_not_fit_are_refused(tmp_path):
+    def wrong_count(stage):
+        UsdGeom.Mesh(stage.GetPrimAtPath(f"{FORE}/skin")).GetFaceVertexCountsAttr().Set([4] * 5)
+
+    def wrong_index(stage):
+        mesh = UsdGeom.Mesh(stage.GetPrimAtPath(f"{FORE}/skin"))
+        mesh.GetFaceVertexIndicesAttr().Set([99, *list(mesh.GetFaceVertexIndicesAttr().Get())[1:]])
+
+    for edit, attribute in ((wrong_count, "faceVertexCounts"), (wrong_index, "faceVertexIndices")):
+        with pytest.raises(ShotError) as caught:
+            body(tmp_path, FORE, edit)
+        assert caught.value.path == f"{FORE}/skin" and caught.value.attribute == attribute
+
+
+def tet_mesh(stage, path: str, scale=(1, 1, 1)):
+    mesh = UsdGeom.TetMesh.Define(stage, path)
+    mesh.CreatePointsAttr([(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)])
+    mesh.CreateTetVertexIndicesAttr(Vt.Vec4iArray([(0, 1, 2, 3)]))
+    mesh.AddScaleOp().Set(Gf.Vec3f(*scale))
+    return mesh
+
+
+@pytest.mark.parametrize("scale", [(0.1, 0.2, 0.3), (-0.1, 0.2, 0.3)])
+def test_tetrahedra_are_read_with_positive_volumes(tmp_path, scale):
+    tets = body(tmp_path, FORE, lambda stage: tet_mesh(stage, f"{FORE}/tets", scale)).tets
+    corners = tets.points[tets.tets[0]]
+    assert np.linalg.det(corners[1:] - corners[0]) == pytest.approx(0.006, rel=1e-5)
+
+
+def test_two_tet_meshes_on_a_body_are_refused(tmp_path):
+    def edit(stage):
+        tet_mesh(stage, f"{FORE}/one")
+        tet_mesh(stage, f"{FORE}/two")
+
+    with pytest.raises(ShotError, match="one TetMesh"):
+        body(tmp_path, FORE, edit)

@@ -1,0 +1,93 @@
+"""Targets, authored and chosen."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from pxr import Gf, Sdf, UsdGeom
+from small_shots import FORE, HAND, LENGTH, WIDTH, Scale, make_target, write_arm
+
+from calmotion import ShotError
+from calmotion.usd.reading import read_shot
+from calmotion.usd.transforms import rotation_from_quaternion
+
+
+def read(tmp_path, edit=None, scale=None):
+    return read_shot(str(write_arm(tmp_path / "arm.usda", edit, scale)))[0]
+
+
+@pytest.mark.parametrize("scale", [Scale(), Scale(0.01, 0.001)])
+def test_an_authored_target_is_a_frame_of_its_body(tmp_path, scale):
+    def edit(stage):
+        make_target(stage, positionWeight=2.0, rotationWeight=0.5)
+        UsdGeom.Xformable(stage.GetPrimAtPath(HAND)).AddRotateZOp().Set(90.0)
+
+    character = read(tmp_path, edit, scale)
+    (target,) = character.targets
+    assert target.path == HAND and character.bodies[target.body].path == FORE
+    assert np.allclose(target.frame.position, [LENGTH, 0, 0], atol=1e-6)
+    assert np.allclose(rotation_from_quaternion(target.frame.rotation)[:, 0], [0, 1, 0], atol=1e-6)
+    assert (target.position_weight, target.rotation_weight) == (2.0, 0.5)
+
+
+def test_a_target_on_a_scaled_body_is_where_it_looks(tmp_path):
+    def edit(stage):
+        make_target(stage)
+        UsdGeom.Xformable(stage.GetPrimAtPath(FORE)).AddScaleOp().Set(Gf.Vec3f(1, 1, 2))
+
+    (target,) = read(tmp_path, edit).targets
+    assert np.allclose(target.frame.position, [LENGTH, 0, 0], atol=1e-6)
+    assert np.allclose(target.frame.rotation, [1, 0, 0, 0], atol=1e-6)
+
+
+def test_a_body_itself_can_be_a_target(tmp_path):
+    (target,) = read(tmp_path, lambda stage: make_target(stage, FORE)).targets
+    assert np.allclose(target.frame.position, 0.0) and target.path == FORE
+
+
+def test_without_targets_the_outermost_point_of_the_leaf_is_taken(tmp_path):
+    character = read(tmp_path)
+    (target,) = character.targets
+    assert target.path == FORE
+    assert np.allclose(np.abs(target.frame.position), [LENGTH, WIDTH / 2, WIDTH / 2], atol=1e-6)
+    assert any("CalmTargetAPI" in note and FORE in note for note in character.notes)
+
+
+def test_weights_in_time_give_a_note_and_their_first_value(tmp_path):
+    def edit(stage):
+        make_target(stage)
+        weight = stage.GetPrimAtPath(HAND).CreateAttribute("calm:target:positionWeight", Sdf.ValueTypeNames.Float)
+        weight.Set(3.0, 0.0)
+        weight.Set(9.0, 10.0)
+
+    character = read(tmp_path, edit)
+    assert character.targets[0].position_weight == 3.0
+    assert any("change in time" in note for note in character.notes)
+
+
+def test_a_target_that_no_body_carries_is_refused(tmp_path):
+    def edit(stage):
+        UsdGeom.Xform.Define(stage, "/Arm/loose")
+        make_target(stage, "/Arm/loose")
+
+    with pytest.raises(ShotError, match="carried by a body") as caught:
+        read(tmp_path, edit)
+    assert caught.value.path == "/Arm/loose"
+
+
+def test_a_target_without_a_transform_is_refused(tmp_path):
+    def edit(stage):
+        stage.DefinePrim(f"{FORE}/scope", "Scope")
+        make_target(stage, f"{FORE}/scope")
+
+    with pytest.raises(ShotError, match="needs a transform"):
+        read(tmp_path, edit)
+
+
+@pytest.mark.parametrize(
+    "weights", [{"positionWeight": -1.0}, {"rotationWeight": float("nan")}, {"positionWeight": 0.0}]
+)
+def test_weights_that_weigh_nothing_are_refused(tmp_path, weights):
+    with pytest.raises(ShotError) as caught:
+        read(tmp_path, lambda stage: make_target(stage, **weights))
+    assert caught.value.path == HAND and caught.value.attribute.startswith("calm:target:")

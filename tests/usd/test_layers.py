@@ -1,0 +1,76 @@
+"""Atomic writes."""
+
+from __future__ import annotations
+
+import os
+
+import pytest
+from pxr import Sdf
+
+from calmotion import ShotError
+from calmotion.usd.layers import refuse_input_as_output, write_layer
+
+
+def small_layer(name: str):
+    layer = Sdf.Layer.CreateAnonymous(".usda")
+    Sdf.CreatePrimInLayer(layer, f"/{name}")
+    return layer
+
+
+def accept(path: str) -> None:
+    assert os.path.exists(path)
+
+
+@pytest.mark.parametrize("name", ["out.usda", "out.usdc", "out.usd", "new/folder/out.usda"])
+def test_what_is_written_opens_again_and_nothing_else_is_left(tmp_path, name):
+    output = tmp_path / name
+    write_layer(small_layer("A"), str(output), accept)
+    assert Sdf.Layer.FindOrOpen(str(output)).GetPrimAtPath("/A")
+    assert [p.name for p in output.parent.iterdir()] == [output.name]
+
+
+def test_a_failed_validation_keeps_the_old_file(tmp_path):
+    output = tmp_path / "out.usda"
+    write_layer(small_layer("Old"), str(output), accept)
+    before = output.read_bytes()
+
+    def refuse(path: str) -> None:
+        raise ShotError("not good")
+
+    with pytest.raises(ShotError, match="not good"):
+        write_layer(small_layer("New"), str(output), refuse)
+    assert output.read_bytes() == before
+    assert os.listdir(tmp_path) == ["out.usda"]
+
+
+def test_an_open_layer_is_not_stale_after_a_write(tmp_path):
+    output = str(tmp_path / "out.usda")
+    write_layer(small_layer("Old"), output, accept)
+    opened = Sdf.Layer.FindOrOpen(output)
+    write_layer(small_layer("New"), output, accept)
+    assert opened.GetPrimAtPath("/New") and not opened.GetPrimAtPath("/Old")
+
+
+def test_a_folder_that_cannot_be_written_is_an_error_with_a_remedy(tmp_path):
+    blocker = tmp_path / "file"
+    blocker.write_text("")
+    with pytest.raises(ShotError, match="cannot be written") as caught:
+        write_layer(small_layer("A"), str(blocker / "out.usda"), accept)
+    assert caught.value.remedy
+
+
+def test_an_input_is_never_an_output(tmp_path):
+    shot = tmp_path / "shot.usda"
+    shot.write_text("#usda 1.0\n")
+    (tmp_path / "link.usda").symlink_to(shot)
+    os.link(shot, tmp_path / "hard.usda")
+    for name in ("shot.usda", "link.usda", "hard.usda", "../" + tmp_path.name + "/shot.usda"):
+        with pytest.raises(ShotError, match="never written"):
+            refuse_input_as_output(str(tmp_path / name), [str(shot)])
+    refuse_input_as_output(str(tmp_path / "other.usda"), [str(shot)])
+
+
+@pytest.mark.parametrize("name", ["out.txt", "out", "out.usdz"])
+def test_an_output_is_named_like_a_layer(tmp_path, name):
+    with pytest.raises(ShotError, match="not named like a USD layer"):
+        refuse_input_as_output(str(tmp_path / name), [])

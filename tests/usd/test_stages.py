@@ -1,0 +1,96 @@
+"""Opening shots, broken ones too, and telling our own layers."""
+
+from __future__ import annotations
+
+import hashlib
+
+import pytest
+from pxr import Sdf
+from small_shots import write_arm
+
+from calmotion import ShotError
+from calmotion.usd import stages
+
+
+def test_a_missing_file_is_named(tmp_path):
+    with pytest.raises(ShotError, match="does not exist") as caught:
+        stages.open_stage(str(tmp_path / "nothing.usda"))
+    assert caught.value.path.endswith("nothing.usda")
+
+
+@pytest.mark.parametrize("name", ["text.usda", "picture.png", "data.usdc", "pack.usdz"])
+def test_a_file_that_is_not_usd_is_refused(tmp_path, name, capfd):
+    (tmp_path / name).write_text("not a stage")
+    with pytest.raises(ShotError, match="not a USD file") as caught:
+        stages.open_stage(str(tmp_path / name))
+    assert caught.value.path.endswith(name) and caught.value.remedy
+    assert capfd.readouterr().err == ""
+
+
+@pytest.mark.parametrize(
+    ("metadata", "prim", "attribute", "path"),
+    [
+        ("", 'references = @./gone.usda@</X>', "references", "/Set"),
+        ("", 'payload = @./gone.usda@', "payload", "/Set"),
+        ("", 'references = </Nowhere>', "references", "/Set"),
+        ("subLayers = [@./gone.usda@]", "", "subLayers", "shot.usda"),
+    ],
+)
+def test_a_missing_layer_is_named_with_its_place(tmp_path, metadata, prim, attribute, path, capfd):
+    shot = tmp_path / "shot.usda"
+    shot.write_text(f'#usda 1.0\n({metadata}\n)\ndef Xform "Set" ({prim}) {{ }}\n')
+    with pytest.raises(ShotError) as caught:
+        stages.open_stage(str(shot))
+    assert caught.value.attribute == attribute
+    assert caught.value.path.endswith(path)
+    assert ("gone.usda" in caught.value.found) or ("Nowhere" in caught.value.found)
+    assert caught.value.remedy
+    assert capfd.readouterr().err == ""
+
+
+def test_a_missing_layer_deep_in_a_reference_names_the_prim_of_the_shot(tmp_path):
+    robot = '#usda 1.0\ndef Xform "R"\n{\n def "arm" (references = @./mesh.usd@</M>)\n {\n }\n}\n'
+    (tmp_path / "robot.usda").write_text(robot)
+    (tmp_path / "shot.usda").write_text('#usda 1.0\ndef Xform "A" (references = @./robot.usda@</R>) {}\n')
+    with pytest.raises(ShotError) as caught:
+        stages.open_stage(str(tmp_path / "shot.usda"))
+    assert caught.value.path.endswith("/arm")
+    assert "mesh.usd" in caught.value.found and "robot.usda" in caught.value.found
+
+
+def test_the_file_on_disk_counts_not_what_was_opened_before(tmp_path):
+    shot = tmp_path / "shot.usda"
+    shot.write_text('#usda 1.0\ndef Xform "Old" {}\n')
+    kept = stages.open_stage(str(shot))
+    shot.write_text('#usda 1.0\ndef Xform "New" {}\ndef Xform "More" {}\n')
+    assert stages.open_stage(str(shot)).GetPrimAtPath("/New")
+    del kept
+
+
+def test_inputs_are_listed_with_their_hashes_the_shot_first(tmp_path):
+    write_arm(tmp_path / "robot.usda")
+    (tmp_path / "shots").mkdir()
+    shot = tmp_path / "shots" / "a.usda"
+    shot.write_text("#usda 1.0\n(subLayers = [@../robot.usda@])\n")
+    layers = stages.input_layers(stages.open_stage(str(shot)), str(shot))
+    assert [layer.path for layer in layers] == ["a.usda", "../robot.usda"]
+    assert layers[0].sha256 == hashlib.sha256(shot.read_bytes()).hexdigest()
+
+
+def test_a_layer_of_ours_is_told_by_its_role_and_refused_as_a_shot(tmp_path):
+    layer = Sdf.Layer.CreateNew(str(tmp_path / "ours.usda"))
+    layer.customLayerData = {"calmotion": {"role": "curves"}}
+    layer.Save()
+    assert stages.role_of(layer) == stages.CURVES
+    (tmp_path / "root.usda").write_text("#usda 1.0\n(subLayers = [@./ours.usda@])\n")
+    found = stages.earlier_layers(stages.open_stage(str(tmp_path / "root.usda")))
+    assert [stages.display_name(name, str(tmp_path / "root.usda")) for name in found] == ["ours.usda"]
+    with pytest.raises(ShotError, match="written by Calmotion"):
+        stages.refuse_own_layer(stages.open_stage(str(tmp_path / "ours.usda")), "ours.usda")
+
+
+@pytest.mark.parametrize("data", [{}, {"calmotion": "text"}, {"calmotion": {"other": 1}}])
+def test_other_layer_data_is_nobody_of_ours(data):
+    layer = Sdf.Layer.CreateAnonymous()
+    layer.customLayerData = data
+    assert stages.role_of(layer) == ""

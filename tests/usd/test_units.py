@@ -1,0 +1,31 @@
+"""Stage units to SI."""
+
+from __future__ import annotations
+
+import pytest
+from pxr import Usd, UsdGeom
+
+from calmotion import ShotError
+from calmotion.usd.units import StageUnits, units_of
+
+
+def test_centimetres_and_grams_give_si():
+    units = StageUnits(meters=0.01, kilograms=0.001)
+    assert units.length(100.0) == pytest.approx(1.0)
+    assert units.mass(1000.0) == pytest.approx(1.0)
+    assert units.density(1.0) == pytest.approx(1000.0)  # 1 g/cm^3
+    assert units.torque(1e7) == pytest.approx(1.0)  # 1e7 dyn cm
+    assert units.pressure(10.0) == pytest.approx(1.0)  # 10 barye = 1 Pa
+    assert units.inertia(1e7) == pytest.approx(1.0)
+    assert units.acceleration(981.0) == pytest.approx(9.81)
+
+
+def test_a_stage_without_units_has_usds_fallbacks():
+    assert units_of(Usd.Stage.CreateInMemory()) == StageUnits(0.01, 1.0)
+
+
+def test_a_unit_of_zero_is_refused():
+    stage = Usd.Stage.CreateInMemory()
+    UsdGeom.SetStageMetersPerUnit(stage, 0.0)
+    with pytest.raises(ShotError, match="metersPerUnit"):
+        units_of(stage)
