@@ -11,11 +11,12 @@ from calmotion.fem.tetrahedra import connected_parts, measure_quality, oriented_
 from calmotion.shot import Body, FEMesh, SurfaceMesh, TetGeometry
 
 from .mesh_file import read_mesh_file
-from .repair import Solid, closed_solid
+from .repair import Solid, closed_solid, simplified
 from .tetwild import tetrahedralize
 
 MAX_VOLUME_ERROR = 0.01
 _ATTEMPTS = 3
+_DETAIL = 0.1  # of the envelope: detail that the mesh does not follow anyway
 
 
 @dataclass(frozen=True)
@@ -77,9 +78,8 @@ def _from_surfaces(index: int, body: Body, surfaces: tuple[SurfaceMesh, ...], op
     error = np.inf
     for attempt in range(_ATTEMPTS):
         distance = envelope(size, diagonal, len(solid.triangles), attempt)
-        points, tets = tetrahedralize(
-            solid.points, solid.triangles, size, distance / diagonal, body.path, options.time_limit, options.cache
-        )
+        surface = simplified(solid, _DETAIL * distance)
+        points, tets = tetrahedralize(*surface, size, distance / diagonal, body.path, options.time_limit, options.cache)
         tets, _ = oriented_tets(points, tets, body.path)
         points, tets = without_unused_points(points, tets)
         quality = measure_quality(points, tets, surface_volume=solid.volume, repairs=solid.repairs)

@@ -9,15 +9,9 @@ import zipfile
 from pathlib import Path
 
 import numpy as np
+from calmotion.cache import cache_folder
 
-
-def cache_folder() -> Path:
-    """`$CALMOTION_CACHE`, else the user's cache folder."""
-    chosen = os.environ.get("CALMOTION_CACHE")
-    if chosen:
-        return Path(chosen) / "tetrahedra"
-    base = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
-    return Path(base) / "calmotion" / "tetrahedra"
+FOLDER = "tetrahedra"
 
 
 def cache_key(points: np.ndarray, triangles: np.ndarray, settings: dict[str, object]) -> str:
@@ -33,7 +27,7 @@ def cache_key(points: np.ndarray, triangles: np.ndarray, settings: dict[str, obj
 def load(key: str) -> tuple[np.ndarray, np.ndarray] | None:
     """Points and tetrahedra kept under a key; None when there are none, or the file is damaged."""
     try:
-        with np.load(cache_folder() / f"{key}.npz", allow_pickle=False) as file:
+        with np.load(cache_folder() / FOLDER / f"{key}.npz", allow_pickle=False) as file:
             return file["points"], file["tets"]
     except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):
         return None
@@ -41,7 +35,7 @@ def load(key: str) -> tuple[np.ndarray, np.ndarray] | None:
 
 def store(key: str, points: np.ndarray, tets: np.ndarray) -> None:
     """Keep a mesh; a reader sees all of it or nothing. A folder that cannot be written is passed over."""
-    folder = cache_folder()
+    folder = cache_folder() / FOLDER
     try:
         folder.mkdir(parents=True, exist_ok=True)
         handle, name = tempfile.mkstemp(dir=folder, suffix=".part")

@@ -76,7 +76,10 @@ def _run(
         worker = Path(__file__).with_name("tetwild_worker.py")
         command = [sys.executable, "-P", str(worker), str(source), str(destination)]
         try:
-            done = subprocess.run(command, capture_output=True, timeout=time_limit, stdin=subprocess.DEVNULL)
+            # the tetrahedraliser leaves a file in the folder it runs in
+            done = subprocess.run(
+                command, capture_output=True, timeout=time_limit, stdin=subprocess.DEVNULL, cwd=folder
+            )
         except subprocess.TimeoutExpired:
             raise ShotError(
                 "tetrahedralising took too long", path=path, found=f"{len(triangles)} triangles, {time_limit:g} s",

@@ -300,6 +300,17 @@ def test_a_flat_sheet_encloses_nothing(package):
         solid(package, SurfaceMesh("/sheet", corners, both_sides))
 
 
+def test_detail_below_the_tolerance_is_left_out_and_the_shape_kept(package):
+    ball = trimesh.creation.icosphere(subdivisions=5, radius=0.05)
+    made = solid(package, surface(ball))
+    points, triangles = package("repair").simplified(made, 1e-4)
+    assert len(triangles) < 0.5 * len(ball.faces)
+    assert trimesh.Trimesh(points, triangles).volume == pytest.approx(ball.volume, rel=1e-2)
+    assert np.linalg.norm(points, axis=1) == pytest.approx(0.05, abs=3e-4)
+    plain = package("repair").simplified(solid(package, surface(box())), 1e-4)
+    assert len(plain[1]) == 12
+
+
 def test_tetrahedra_that_do_not_fill_the_surface_are_refused(host, package, monkeypatch):
     small = box((0.19, 0.019, 0.019))
     corners = np.array(small.vertices)
@@ -364,5 +375,9 @@ def test_nothing_is_left_behind(host, own_cache, tmp_path, monkeypatch):
     scratch.mkdir()
     monkeypatch.setenv("TMPDIR", str(scratch))
     monkeypatch.setattr("tempfile.tempdir", None)
+    work = tmp_path / "work"
+    work.mkdir()
+    monkeypatch.chdir(work)
     run(host, link(surface(box((0.05, 0.02, 0.02)))), cache=False)
+    assert os.listdir(work) == []
     assert os.listdir(scratch) == [] and not own_cache.exists()
