@@ -21,7 +21,7 @@ def make_problem(arm, bodies, animation, pre_roll, smoothness=1e-6, kept=False):
     rigid = rigid_motion(model, angles, rates, grid.h)
     objective = Objective.over(model, rigid.reference, grid.times, grid.h)
     basis = make_basis(grid, 0.1, kept)
-    return RetargetProblem(model, grid, angles, rates, objective, basis, np.array([0, 1]), smoothness, gain=1e-6)
+    return RetargetProblem(model, grid, angles, rates, objective, basis, np.array([0, 1]), smoothness, 1e-4, gain=1e-6)
 
 
 @pytest.fixture(scope="module", params=[(0.0, False), (0.25, False), (0.0, True)], ids=["rest", "pre-roll", "kept"])
@@ -91,7 +91,7 @@ def test_preconditioner_inverts_the_rigid_gauss_newton_matrix(arm, bodies, anima
     problem = make_problem(arm, bodies, animation, 0.0)
     rigid = rigid_model(problem.model)
     J = rigid_motor_jacobian(rigid, rigid.joint_angles(problem.angles), problem.motors)
-    penalty = 1e-6 * problem.basis.penalty
+    penalty = 1e-6 * problem.basis.bending + 1e-4 * problem.basis.closeness
     pre = RigidPreconditioner(J, problem.objective.weights, problem.basis.values, penalty)
     B = problem.basis.values.toarray()
     rows = np.einsum("nkia,np->nkipa", J * problem.objective.weights[..., None], B).reshape(-1, problem.size)

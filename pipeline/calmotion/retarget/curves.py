@@ -98,9 +98,9 @@ def _held(spline: CubicSpline, times: Array) -> tuple[Array, Array]:
     return spline(inside), rate
 
 
-def _pre_roll_weights(times: Array, length: float) -> tuple[Array, Array]:
-    """Values and rates at times in [-length, 0) of the quintic that leaves rest and meets the curve at 0 in value,
-    rate and acceleration; columns multiply these three. It starts half a rate times length back, where a constant
+def _pre_roll_weights(times: Array, length: float) -> tuple[Array, Array, Array]:
+    """Values, rates and accelerations at times in [-length, 0) of the quintic that leaves rest and meets the curve
+    at 0 in value, rate and acceleration; columns multiply these three. It starts half a rate times length back, where a constant
     acceleration would."""
     s = (times + length) / length
     start = 1 - 10 * s**3 + 15 * s**4 - 6 * s**5
@@ -111,7 +111,11 @@ def _pre_roll_weights(times: Array, length: float) -> tuple[Array, Array]:
     d_rate = (-12 * s**2 + 28 * s**3 - 15 * s**4) / length
     d_acceleration = (1.5 * s**2 - 4 * s**3 + 2.5 * s**4) / length
     rate = np.stack([np.zeros_like(s), length * (d_rate - 0.5 * d_start), length**2 * d_acceleration], axis=1)
-    return value, rate
+    dd_start = -60 * s + 180 * s**2 - 120 * s**3
+    dd_rate = -24 * s + 84 * s**2 - 60 * s**3
+    dd_acceleration = 3 * s - 12 * s**2 + 10 * s**3
+    bend = np.stack([np.zeros_like(s), (dd_rate - 0.5 * dd_start) / length, dd_acceleration], axis=1)
+    return value, rate, bend
 
 
 def sample_tracks(tracks: Sequence[Track], grid: TimeGrid) -> tuple[Array, Array]:
@@ -122,7 +126,7 @@ def sample_tracks(tracks: Sequence[Track], grid: TimeGrid) -> tuple[Array, Array
         spline = interpolate(track, grid.frame_times[-1])
         angles[pre:, k], rates[pre:, k] = _held(spline, times[pre:])
         if pre:
-            value, rate = _pre_roll_weights(times[:pre], grid.pre_roll)
+            value, rate, _ = _pre_roll_weights(times[:pre], grid.pre_roll)
             meet = np.array([angles[pre, k], rates[pre, k], float(spline(0.0, 2)) if spline.x[0] <= 0.0 else 0.0])
             angles[:pre, k], rates[:pre, k] = value @ meet, rate @ meet
     return angles, rates
@@ -147,7 +151,8 @@ class OffsetBasis:
         knots: Break points [s], frames of the shot, shape [n].
         values, rates: Basis and its rate at the grid's instants, sparse, shape [T, P].
         at_frames: Basis at the frames, sparse, shape [f, P].
-        penalty: Gram matrix of the second derivatives, shape [P, P] [1/s^3].
+        bending: Gram matrix of the second derivatives, pre-roll included, shape [P, P] [1/s^3].
+        closeness: Gram matrix of the functions themselves, pre-roll included, shape [P, P] [s].
         support: First and last time at which each basis function acts [s], shape [P, 2].
     """
 
@@ -155,7 +160,8 @@ class OffsetBasis:
     values: csr_matrix
     rates: csr_matrix
     at_frames: csr_matrix
-    penalty: csr_matrix
+    bending: csr_matrix
+    closeness: csr_matrix
     support: Array
 
     @property
@@ -201,21 +207,23 @@ def make_basis(grid: TimeGrid, spacing: float, kept_ends: bool) -> OffsetBasis:
         return splines(inside, nu=order) @ merge
 
     values, rates = sample(0), sample(1)
-    if pre:
-        meet = np.stack([splines(0.0, nu=k) @ merge for k in range(3)])
-        value, rate = _pre_roll_weights(times[:pre], grid.pre_roll)
-        values, rates = np.vstack([value @ meet, values]), np.vstack([rate @ meet, rates])
     # two Gauss points integrate the squared second derivative of a cubic exactly
     width = np.diff(breaks)[:, None]
     points = (0.5 * (breaks[:-1] + breaks[1:])[:, None] + 0.5 * width * np.array([-1, 1]) / math.sqrt(3)).ravel()
     bend = csr_matrix(splines(points, nu=2) @ merge)
-    penalty = bend.T @ diags(np.repeat(0.5 * width.ravel(), 2)) @ bend
+    bending = bend.T @ diags(np.repeat(0.5 * width.ravel(), 2)) @ bend
+    if pre:
+        meet = np.stack([splines(0.0, nu=k) @ merge for k in range(3)])
+        value, rate, curvature = _pre_roll_weights(times[:pre], grid.pre_roll)
+        values, rates = np.vstack([value @ meet, values]), np.vstack([rate @ meet, rates])
+        bending = bending + csr_matrix(grid.h * (curvature @ meet).T @ (curvature @ meet))
+    stored = csr_matrix(values)
     support = np.stack([knots[:count], knots[DEGREE + 1 :]], axis=1)
     columns = [np.flatnonzero(merge[:, k]) for k in range(merge.shape[1])]
     support = np.array([[support[rows, 0].min(), support[rows, 1].max()] for rows in columns])
     frames = grid.frames
     return OffsetBasis(
-        breaks, csr_matrix(values), csr_matrix(rates), csr_matrix(values[frames]), csr_matrix(penalty), support
+        breaks, stored, csr_matrix(rates), stored[frames], csr_matrix(bending), grid.h * (stored.T @ stored), support
     )
 
 

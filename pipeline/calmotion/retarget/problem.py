@@ -94,15 +94,17 @@ class RetargetProblem:
         basis: Offset splines.
         motors: Motors that may change.
         smoothness: Weight of int |offset''|^2 / 2 for each motor.
+        closeness: Weight of int |offset|^2 / 2 for each motor.
         gain: A predicted decrease of the root-mean-square error by less than this is not worth an iteration [m].
     """
 
     def __init__(
         self, model: Model, grid: TimeGrid, angles: Array, rates: Array, objective: Objective, basis: OffsetBasis,
-        motors: IntArray, smoothness: float, gain: float,
+        motors: IntArray, smoothness: float, closeness: float, gain: float,
     ):  # fmt: skip
         self.model, self.grid, self.objective, self.basis = model, grid, objective, basis
-        self.angles, self.rates, self.motors, self.smoothness = angles, rates, motors, smoothness
+        self.angles, self.rates, self.motors = angles, rates, motors
+        self._penalty = smoothness * basis.bending + closeness * basis.closeness
         self._workspace = Workspace.for_system(model.system)
         self._run: ForwardRun | None = None
         self._linearization: Linearization | None = None
@@ -136,7 +138,7 @@ class RetargetProblem:
     def _bend(self, x: Array) -> Array:
         """Matrix of the regulariser times x."""
         coefficients = x.reshape(self.basis.count, len(self.motors))
-        return self.smoothness * (self.basis.penalty @ coefficients).ravel()
+        return (self._penalty @ coefficients).ravel()
 
     def value(self, x: Array) -> float:
         """The objective; infinite where the simulation fails."""
@@ -187,7 +189,7 @@ class RetargetProblem:
             rigid = rigid_model(self.model)
             J = rigid_motor_jacobian(rigid, self.model.joint_angles(self.angles), self.motors)
             self._preconditioner = RigidPreconditioner(
-                J, self.objective.weights, self.basis.values, self.smoothness * self.basis.penalty
+                J, self.objective.weights, self.basis.values, self._penalty
             )
         self._preconditioner.factor(fixed)
         return self._preconditioner.solve

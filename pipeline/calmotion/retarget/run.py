@@ -39,7 +39,8 @@ from .gauss_newton import Iterate, minimize
 from .objective import Objective, Reference, rotation_errors
 from .problem import ForwardRun, RetargetProblem, RigidMotion, compile_kernels, rigid_motion, run_forward
 
-SMOOTHNESS = 1e-9
+SMOOTHNESS = 1e-10
+CLOSENESS = 1e-4  # an offset of 0.1 rad weighs as much as an error of 1 mm [m^2/rad^2]
 TOLERANCE = 1e-3
 UNCHANGED = 1e-5  # an offset that stays below this angle [rad] is none
 
@@ -310,7 +311,7 @@ def optimize_shot(
         rigid = rigid_motion(model, angles, rates, grid.h)
         objective = Objective.over(model, rigid.reference, grid.times, grid.h)
         problem = RetargetProblem(
-            model, grid, angles, rates, objective, basis, motors, smoothness, gain=0.01 * tolerance
+            model, grid, angles, rates, objective, basis, motors, smoothness, CLOSENESS, gain=0.01 * tolerance
         )
         progress(0.0, "compiling kernels, once")
         compile_kernels(model, Workspace.for_system(model.system), angles, rates, grid.h)
