@@ -46,8 +46,7 @@ def bake_bodies(layer, stage, character: Character, motion: BakedMotion, clock: 
         spec = attribute_spec(layer, f"{body.path}.{_OP}", Sdf.ValueTypeNames.Matrix4d)
         for code, matrix in zip(codes, local, strict=True):
             layer.SetTimeSample(spec.path, float(code), gf.to_matrix(matrix))
-        order = attribute_spec(layer, f"{body.path}.xformOpOrder", Sdf.ValueTypeNames.TokenArray)
-        order.variability = Sdf.VariabilityUniform
+        order = attribute_spec(layer, f"{body.path}.xformOpOrder", Sdf.ValueTypeNames.TokenArray, uniform=True)
         order.default = Vt.TokenArray(["!resetXformStack!", _OP] if reset else [_OP])
         written[str(spec.path)] = len(codes)
     return written

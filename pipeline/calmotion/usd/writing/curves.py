@@ -63,7 +63,7 @@ def author_curves(
     return written
 
 
-def attribute_spec(layer, path: str, kind):
+def attribute_spec(layer, path: str, kind, uniform: bool = False):
     """The spec of an attribute in a layer, made with overs above it where needed."""
     from pxr import Sdf
 
@@ -72,4 +72,5 @@ def attribute_spec(layer, path: str, kind):
     if spec is not None:
         return spec
     prim = Sdf.CreatePrimInLayer(layer, sdf.GetPrimPath())
-    return Sdf.AttributeSpec(prim, sdf.name, kind)
+    variability = Sdf.VariabilityUniform if uniform else Sdf.VariabilityVarying
+    return Sdf.AttributeSpec(prim, sdf.name, kind, variability)
