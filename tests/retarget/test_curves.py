@@ -46,6 +46,23 @@ def test_offset_rates_are_the_derivative_and_start_at_rest():
     assert np.allclose(values.sum(axis=1), 1.0)
 
 
+@pytest.mark.parametrize("frames", [2, 3, 4, 5, 6, 7])
+@pytest.mark.parametrize("pre_roll", [0.0, 0.25])
+def test_short_shots_still_have_an_offset_that_can_be_written(frames, pre_roll):
+    grid = make_grid(FRAMES[:frames], 1 / 240, pre_roll)
+    basis = make_basis(grid, 0.05, False)
+    assert basis.count >= 1 and np.allclose(basis.values.toarray()[grid.pre_steps :].sum(axis=1), 1.0)
+    p = np.random.default_rng(3).normal(size=basis.count)
+    written = Track(FRAMES[:frames], basis.at_frames @ p)
+    read, _ = sample_tracks([written], grid)
+    assert np.abs(read[grid.pre_steps :, 0] - (basis.values @ p)[grid.pre_steps :]).max() < 1e-12
+
+
+def test_offsets_end_at_rest():
+    rates = make_basis(make_grid(FRAMES, 1 / 240, 0.0), 0.05, False).rates.toarray()
+    assert np.abs(rates[-1]).max() < 1e-10 and np.abs(rates[-2]).max() < 0.05 * np.abs(rates).max()
+
+
 def test_kept_ends_leave_value_and_slope_there():
     grid = make_grid(FRAMES, 1 / 240, 0.0)
     basis = make_basis(grid, 0.08, True)

@@ -186,7 +186,8 @@ def make_basis(grid: TimeGrid, spacing: float, kept_ends: bool) -> OffsetBasis:
         spacing: Wanted distance of the knots [s].
         kept_ends: Whether the offset vanishes, with its slope, at the first and last frame.
 
-    Without a pre-roll slope and curvature are zero at the start, since the system starts at rest.
+    Slope and curvature are zero at the end, so that no motor is thrown in the last frames, where nothing that
+    follows is judged; and at the start unless there is a pre-roll, since the system then starts at rest.
     """
     breaks = _breaks(grid.frame_times, spacing)
     knots = np.concatenate([np.repeat(breaks[0], DEGREE), breaks, np.repeat(breaks[-1], DEGREE)])
@@ -196,10 +197,16 @@ def make_basis(grid: TimeGrid, spacing: float, kept_ends: bool) -> OffsetBasis:
     merge = np.eye(count)
     if kept_ends:
         merge = merge[:, 2:-2]
-    elif grid.pre_steps == 0:
-        # equal first three coefficients: zero slope and curvature
-        merge = merge[:, 2:]
-        merge[:2, 0] = 1.0
+    elif count <= 4:
+        # too short for anything but a constant
+        merge = np.ones((count, 1))
+    else:
+        # three equal coefficients at an end: zero slope and curvature there
+        merge = merge[:, :-2]
+        merge[-2:, -1] = 1.0
+        if grid.pre_steps == 0:
+            merge = merge[:, 2:]
+            merge[:2, 0] = 1.0
     pre, times = grid.pre_steps, grid.times
 
     def sample(order: int) -> Array:

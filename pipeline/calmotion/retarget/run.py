@@ -79,6 +79,13 @@ def prepare(
         ShotError: Something the shot asks for is not supported.
     """
     _refuse_unsupported(character, options)
+    if len(animation.frame_times) < 2:
+        raise ShotError(
+            "a shot of one frame has no motion",
+            path=character.path,
+            attribute="endTimeCode",
+            remedy="Author startTimeCode and endTimeCode of the stage, at least a frame apart.",
+        )
     tree = span_tree(character)
     if bodies is None:
         bodies = reduce_bodies(character, tree, None)
@@ -300,6 +307,14 @@ def optimize_shot(
     tolerance = options.tolerance or settings.tolerance or TOLERANCE
     basis = make_basis(grid, spacing, settings.endpoints == "kept")
     motors = np.array([k for k, motor in enumerate(character.motors) if motor.optimize], dtype=np.int32)
+    if not basis.count:
+        raise ShotError(
+            "the shot is too short to change anything between its kept end poses",
+            path=character.path,
+            attribute="calm:retarget:endpoints",
+            found=settings.endpoints,
+            remedy="Set it to free, or lengthen the shot to five frames or more.",
+        )
     if not len(motors):
         raise ShotError(
             "every motor is locked, so there is nothing to optimise",
