@@ -13,8 +13,10 @@ from .cli_progress import ProgressDisplay
 from .cli_report import left_out_row, operator_row
 from .cli_run import INTERRUPTED, carry_out, conclude, problems_of, settings_of
 from .errors import ShotError
-from .host import OutputPaths, ReducedBodies, Run, Source, open_host
+from .host import OutputPaths, ReducedBodies, Run, Source, SystemModes, open_host
 from .shot import Animation, Body, Character, ModeTable, Motor, Provenance, Track
+
+SHOWN_MODES = 10
 
 
 def inspect_shot(args: argparse.Namespace, output: Output) -> int:
@@ -30,7 +32,7 @@ def inspect_shot(args: argparse.Namespace, output: Output) -> int:
         run = host.run(
             [Source(path=args.shot, command="inspect"), OutputPaths()],
             wanted,
-            optional=[ReducedBodies],
+            optional=[ReducedBodies, SystemModes],
             settings=settings_of(args),
             progress=display,
         )
@@ -44,7 +46,7 @@ def inspect_shot(args: argparse.Namespace, output: Output) -> int:
 def inspect_report(run: Run) -> dict[str, Any]:
     """The object of `inspect --json`; SI units and radians, as the names of the keys say."""
     character, animation, provenance = run.data[Character], run.data[Animation], run.data[Provenance]
-    reduced = run.get(ReducedBodies)
+    reduced, modes = run.get(ReducedBodies), run.get(SystemModes)
     tables = {table.body: table for table in reduced.modes} if reduced else {}
     names = [body.path for body in character.bodies]
     return {
@@ -88,6 +90,7 @@ def inspect_report(run: Run) -> dict[str, Any]:
             }
             for target in character.targets
         ],
+        "system_frequencies_hz": modes.frequencies[:SHOWN_MODES].tolist() if modes else [],
         "notes": list(character.notes),
         "left_out": [left_out_row(row) for row in run.left_out()],
         "operators": [operator_row(row) for row in run.results],

@@ -47,6 +47,9 @@ def print_inspection(report: dict[str, Any], stream: TextIO) -> None:
         [[t["path"], t["body"], f"{t['position_weight']:g}", f"{t['rotation_weight']:g}"] for t in report["targets"]],
         texts=2,
     )
+    if report["system_frequencies_hz"]:
+        shown = ", ".join(f"{value:.4g}" for value in report["system_frequencies_hz"])
+        console.print(f"frequencies of the whole character in its first pose: {shown}, ... Hz")
     print_left_out(console, report["left_out"])
     for note in report["notes"]:
         console.print(f"note: {note}")

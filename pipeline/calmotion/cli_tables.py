@@ -20,6 +20,25 @@ def angle(radians: float | None) -> str:
     return "-" if radians is None or not math.isfinite(radians) else f"{math.degrees(radians):.4g}°"
 
 
+LONG = 60  # characters of a prim path beyond which a table shows names
+
+
+def name_paths(paths: Sequence[str]) -> dict[str, str]:
+    """Prim paths as they are when all are short, else by the fewest last names that tell them apart."""
+    unique = sorted(set(paths))
+    if max(map(len, unique), default=0) <= LONG:
+        return {path: path for path in unique}
+    parts = {path: path.strip("/").split("/") for path in unique}
+    names = {}
+    for path in unique:
+        for count in range(1, len(parts[path]) + 1):
+            end = parts[path][-count:]
+            if sum(other[-count:] == end for other in parts.values()) == 1:
+                break
+        names[path] = "/".join(end)
+    return names
+
+
 def print_table(
     console: Console, title: str, columns: Sequence[str], rows: Sequence[Sequence[str]], texts: int = 1
 ) -> None:
@@ -30,9 +49,12 @@ def print_table(
     for index, column in enumerate(columns):
         # Prim paths stand alone on their line rather than being cut: a reader copies them.
         table.add_column(column, justify="left" if index < texts else "right", overflow="fold")
+    names = name_paths([cell for row in rows for cell in row[:texts] if cell.startswith("/")])
     for row in rows:
-        table.add_row(*row)
+        table.add_row(*(names.get(cell, cell) for cell in row))
     console.print(table)
+    if any(name != path for path, name in names.items()):
+        console.print("(names are the ends of prim paths; --json has the paths)")
 
 
 def console_on(stream: TextIO) -> Console:

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from calmotion.host import Operator, Property, RunContext
-from calmotion.host.values import ReducedBodies, Source
+from calmotion.host.values import ReducedBodies, Source, SystemModes
 from calmotion.shot import Animation, Character, FEMeshes, Result
 
 if TYPE_CHECKING:
@@ -45,6 +45,26 @@ class ReduceFlexibleBodies(Operator):
         character = context.get(Character)
         bodies = reduce_bodies(character, span_tree(character), context.get(FEMeshes), context.progress)
         return [ReducedBodies(tuple(bodies), mode_tables(bodies))]
+
+
+class FindSystemModes(Operator):
+    """Natural frequencies of the whole character in its first pose."""
+
+    idname = "dynamics.modes"
+    label = "Find the frequencies of the character"
+    requires = (Character, Animation)
+    uses = (ReducedBodies,)
+    provides = (SystemModes,)
+
+    @classmethod
+    def poll(cls, data: Mapping[type, Any]) -> str | None:
+        return _nothing_flexible(data)
+
+    def execute(self, context: RunContext) -> Sequence[object]:
+        from calmotion.retarget.run import first_pose_frequencies
+
+        context.progress(0.0, "compiling kernels, once")
+        return [SystemModes(first_pose_frequencies(*_inputs(context)))]
 
 
 class SimulateShot(Operator):
@@ -115,7 +135,7 @@ def _options(context: RunContext, **more: Any) -> Options:
     )
 
 
-OPERATORS = (ReduceFlexibleBodies, SimulateShot, OptimizeShot)
+OPERATORS = (ReduceFlexibleBodies, FindSystemModes, SimulateShot, OptimizeShot)
 
 
 def register(host: Any) -> None:

@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-from calmotion.retarget.bodies import reduce_bodies
 from calmotion.dynamics.topology import span_tree
+from calmotion.retarget.bodies import reduce_bodies
 from calmotion.shot import (
     Animation,
     Body,

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from pxr import Usd
-
 from calmotion import ShotError
 from calmotion.usd.clock import Clock, clock_of
+from pxr import Usd
 
 
 def stage_with(**values: float) -> Usd.Stage:

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from pxr import Gf, Sdf, Vt
-
 from calmotion.usd import gf
+from pxr import Gf, Sdf, Vt
 
 
 def test_a_matrix_maps_the_same_point_on_both_sides():

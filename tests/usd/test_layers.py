@@ -5,10 +5,9 @@ from __future__ import annotations
 import os
 
 import pytest
-from pxr import Sdf
-
 from calmotion import ShotError
 from calmotion.usd.layers import refuse_input_as_output, write_layer
+from pxr import Sdf
 
 
 def small_layer(name: str):

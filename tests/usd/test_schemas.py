@@ -8,7 +8,6 @@ import sys
 from pathlib import Path
 
 import pytest
-
 from calmotion.usd import schemas
 
 FOLDER = Path(schemas.plugin_path())

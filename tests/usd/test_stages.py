@@ -5,11 +5,10 @@ from __future__ import annotations
 import hashlib
 
 import pytest
-from pxr import Sdf
-from small_shots import write_arm
-
 from calmotion import ShotError
 from calmotion.usd import stages
+from pxr import Sdf
+from small_shots import write_arm
 
 
 def test_a_missing_file_is_named(tmp_path):
@@ -30,9 +29,9 @@ def test_a_file_that_is_not_usd_is_refused(tmp_path, name, capfd):
 @pytest.mark.parametrize(
     ("metadata", "prim", "attribute", "path"),
     [
-        ("", 'references = @./gone.usda@</X>', "references", "/Set"),
-        ("", 'payload = @./gone.usda@', "payload", "/Set"),
-        ("", 'references = </Nowhere>', "references", "/Set"),
+        ("", "references = @./gone.usda@</X>", "references", "/Set"),
+        ("", "payload = @./gone.usda@", "payload", "/Set"),
+        ("", "references = </Nowhere>", "references", "/Set"),
         ("subLayers = [@./gone.usda@]", "", "subLayers", "shot.usda"),
     ],
 )

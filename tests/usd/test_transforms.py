@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-
 from calmotion import ShotError
 from calmotion.usd import transforms
 

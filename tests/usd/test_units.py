@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import pytest
-from pxr import Usd, UsdGeom
-
 from calmotion import ShotError
 from calmotion.usd.units import StageUnits, units_of
+from pxr import Usd, UsdGeom
 
 
 def test_centimetres_and_grams_give_si():

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..kernels import allocating_kernel
-from ..shot.character import Array
+from ..shot.character import Array, IntArray
 from .markers import allocate_marker, marker_jacobian, marker_values
 from .model import Model
 from .so3 import matrix_of, quaternion_of
@@ -82,7 +82,7 @@ def _target_frames(targets, elastic, c, q, u, m, R, positions, quaternions):
             quaternion_of(m.R, quaternions[n, k])
 
 
-def target_arrays(model: Model) -> tuple[Array, ...]:
+def target_arrays(model: Model) -> tuple[IntArray, Array, Array, Array, Array]:
     """The target markers as the tuple that the kernels take."""
     t = model.targets
     return (t.component, t.position, t.rotation, t.Phi, t.Psi)

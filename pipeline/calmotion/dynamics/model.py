@@ -204,16 +204,15 @@ def rigid_model(model: Model) -> Model:
     none = 0
     rigid = system._replace(
         elastic=np.zeros_like(system.elastic),
-        M3=system.M3[:, :none],
-        M4=system.M4[:, :none],
-        S=system.S[:, :none, :none],
-        axial=system.axial[:, :none, :none],
-        stiffness=system.stiffness[:, :none],
-        damping=system.damping[:, :none],
-        Phi=system.Phi[..., :none],
-        Psi=system.Psi[..., :none],
+        M3=np.ascontiguousarray(system.M3[:, :none]),
+        M4=np.ascontiguousarray(system.M4[:, :none]),
+        S=np.ascontiguousarray(system.S[:, :none, :none]),
+        axial=np.ascontiguousarray(system.axial[:, :none, :none]),
+        stiffness=np.ascontiguousarray(system.stiffness[:, :none]),
+        damping=np.ascontiguousarray(system.damping[:, :none]),
+        Phi=np.ascontiguousarray(system.Phi[..., :none]),
+        Psi=np.ascontiguousarray(system.Psi[..., :none]),
     )
-    rigid = System(*[np.ascontiguousarray(part) for part in rigid])
     t = model.targets
     targets = Targets(
         t.component, t.position, t.rotation, np.ascontiguousarray(t.Phi[..., :none]),

@@ -9,7 +9,7 @@ from .registry import Host, Plugin, PluginState, open_host
 from .run import OperatorResult, Outcome, Run
 from .settings import Settings, merge, read_assignment, read_settings_file
 from .units import parse_quantity
-from .values import CsvFile, Figures, OutputPaths, Recording, ReducedBodies, Source, WrittenLayer
+from .values import CsvFile, Figures, OutputPaths, Recording, ReducedBodies, Source, SystemModes, WrittenLayer
 
 __all__ = [
     "CsvFile",
@@ -36,6 +36,7 @@ __all__ = [
     "SettingError",
     "Settings",
     "Source",
+    "SystemModes",
     "WrittenLayer",
     "merge",
     "open_host",

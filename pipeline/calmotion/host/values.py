@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from ..fem import ReducedBody
     from ..shot import ModeTable
+    from ..shot.character import Array
 
 
 @dataclass(frozen=True)
@@ -81,3 +82,10 @@ class ReducedBodies:
 
     bodies: tuple[ReducedBody, ...]
     modes: tuple[ModeTable, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class SystemModes:
+    """Natural frequencies of the whole character in its first pose, motors held [Hz], ascending."""
+
+    frequencies: Array

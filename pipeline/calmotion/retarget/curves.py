@@ -11,7 +11,7 @@ from scipy.interpolate import BSpline, CubicSpline
 from scipy.sparse import csr_matrix, diags
 
 from ..shot.animation import Track
-from ..shot.character import Array
+from ..shot.character import Array, IntArray
 
 DEGREE = 3
 MAX_STEP = 1.0 / 480.0
@@ -40,12 +40,12 @@ class TimeGrid:
     def times(self) -> Array:
         """Times of all instants [s], shape [T]."""
         total = self.pre_steps + (len(self.frame_times) - 1) * self.substeps + 1
-        return (np.arange(total) - self.pre_steps) * self.h
+        return np.asarray((np.arange(total) - self.pre_steps) * self.h, dtype=np.float64)
 
     @property
-    def frames(self) -> Array:
+    def frames(self) -> IntArray:
         """Index of each frame among the instants, shape [f]."""
-        return self.pre_steps + self.substeps * np.arange(len(self.frame_times))
+        return self.pre_steps + self.substeps * np.arange(len(self.frame_times), dtype=np.int32)
 
     @property
     def pre_roll(self) -> float:
@@ -100,8 +100,8 @@ def _held(spline: CubicSpline, times: Array) -> tuple[Array, Array]:
 
 def _pre_roll_weights(times: Array, length: float) -> tuple[Array, Array, Array]:
     """Values, rates and accelerations at times in [-length, 0) of the quintic that leaves rest and meets the curve
-    at 0 in value, rate and acceleration; columns multiply these three. It starts half a rate times length back, where a constant
-    acceleration would."""
+    at 0 in value, rate and acceleration; columns multiply these three. It starts half a rate times length back,
+    where a constant acceleration would."""
     s = (times + length) / length
     start = 1 - 10 * s**3 + 15 * s**4 - 6 * s**5
     rate_end = -4 * s**3 + 7 * s**4 - 3 * s**5

@@ -8,7 +8,7 @@ from typing import Protocol
 
 import numpy as np
 
-from ..shot.character import Array
+from ..shot.character import Array, BoolArray
 
 
 class LeastSquares(Protocol):
@@ -23,7 +23,7 @@ class LeastSquares(Protocol):
     def product(self, direction: Array) -> Array:
         """Gauss-Newton matrix times a direction."""
 
-    def precondition(self, fixed: Array) -> Callable[[Array], Array]:
+    def precondition(self, fixed: BoolArray) -> Callable[[Array], Array]:
         """An approximate inverse of the Gauss-Newton matrix, for the entries that are not fixed."""
 
     def gain_is_small(self, gain: float, value: float) -> bool:
@@ -119,7 +119,7 @@ def minimize(
             reason = "stationary"
             break
 
-        def masked(d: Array, fixed: Array = fixed) -> Array:
+        def masked(d: Array, fixed: BoolArray = fixed) -> Array:
             return np.where(fixed, 0.0, problem.product(np.where(fixed, 0.0, d)))
 
         # the first systems need only a direction; later ones are solved as the model becomes exact

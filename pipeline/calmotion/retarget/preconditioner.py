@@ -8,11 +8,11 @@ from scipy.sparse import csr_matrix
 
 from ..dynamics.kinematics import rigid_poses
 from ..dynamics.model import Model
-from ..shot.character import Array
+from ..shot.character import Array, BoolArray, IntArray
 from .curves import DEGREE
 
 
-def rigid_motor_jacobian(model: Model, joint_angles: Array, motors: Array) -> Array:
+def rigid_motor_jacobian(model: Model, joint_angles: Array, motors: IntArray) -> Array:
     """Derivative of the rigid targets' frames by motor angles, shape [T, K, 6, len(motors)].
 
     Rows 0-2: position, world axes [m/rad]; rows 3-5: turning, world axes.
@@ -80,7 +80,7 @@ class RigidPreconditioner:
         self._banded = banded
         self._scale = float(np.max(banded[0]))
 
-    def factor(self, fixed: Array) -> None:
+    def factor(self, fixed: BoolArray) -> None:
         """Factorise with the unknowns where `fixed` (shape [P * M], bool) is true left out."""
         banded = self._banded.copy()
         for d in range(1, self._width):

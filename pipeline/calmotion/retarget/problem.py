@@ -11,7 +11,7 @@ from ..dynamics.kinematics import rigid_poses, rigid_state, target_frames
 from ..dynamics.linearization import Linearization, adjoint, linearize, tangent
 from ..dynamics.model import Model, rigid_model
 from ..dynamics.simulation import SimulationFailure, Trajectory, Workspace, simulate
-from ..shot.character import Array, IntArray
+from ..shot.character import Array, BoolArray, IntArray
 from .curves import OffsetBasis, TimeGrid
 from .objective import Objective, Reference
 from .preconditioner import RigidPreconditioner, rigid_motor_jacobian
@@ -183,14 +183,12 @@ class RetargetProblem:
         """Gauss-Newton matrix times a direction: one tangent and one adjoint sweep."""
         return self._pull_back(self.push_forward(direction)) + self._bend(direction)
 
-    def precondition(self, fixed: Array) -> Callable[[Array], Array]:
+    def precondition(self, fixed: BoolArray) -> Callable[[Array], Array]:
         """The rigid robot's Gauss-Newton matrix, inverted over the entries that are not fixed."""
         if self._preconditioner is None:
             rigid = rigid_model(self.model)
             J = rigid_motor_jacobian(rigid, self.model.joint_angles(self.angles), self.motors)
-            self._preconditioner = RigidPreconditioner(
-                J, self.objective.weights, self.basis.values, self._penalty
-            )
+            self._preconditioner = RigidPreconditioner(J, self.objective.weights, self.basis.values, self._penalty)
         self._preconditioner.factor(fixed)
         return self._preconditioner.solve
 

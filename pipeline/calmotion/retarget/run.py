@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..dynamics.model import Model, compile_model
+from ..dynamics.modes import system_frequencies
 from ..dynamics.simulation import SimulationFailure, Workspace
 from ..dynamics.topology import span_tree
 from ..errors import ShotError
@@ -95,6 +96,20 @@ def prepare(
         pre_roll = needed_pre_roll(animation.tracks, animation.frame_times)
     step = options.step if options.step is not None else character.retarget.time_step
     return Prepared(character, bodies, model, make_grid(animation.frame_times, step, pre_roll))
+
+
+def first_pose_frequencies(character: Character, animation: Animation, bodies: Sequence[ReducedBody] | None) -> Array:
+    """Natural frequencies of the whole character in its first pose, motors held [Hz], ascending.
+
+    Raises:
+        ShotError: It has no static equilibrium there.
+    """
+    prepared = prepare(character, animation, bodies, Options(pre_roll=0.0))
+    angles, _ = sample_tracks(animation.tracks, prepared.grid)
+    try:
+        return system_frequencies(prepared.model, prepared.model.joint_angles(angles[0]))
+    except SimulationFailure as failure:
+        raise _failure(prepared, failure) from failure
 
 
 def _refuse_unsupported(character: Character, options: Options) -> None:

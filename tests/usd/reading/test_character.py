@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from pxr import Gf, UsdGeom, UsdPhysics
-from small_shots import BASE, ELBOW, FORE, SHOULDER, UPPER, Scale, box, make_flexible, make_target, write_arm
-
 from calmotion.shot import WORLD
 from calmotion.usd.reading import read_shot
+from pxr import Gf, UsdGeom, UsdPhysics
+from small_shots import BASE, ELBOW, FORE, SHOULDER, UPPER, Scale, box, make_flexible, make_target, write_arm
 
 
 def read(tmp_path, edit=None, scale=None, name="arm.usda"):

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import pytest
-from pxr import Gf, Sdf, UsdGeom
-from small_shots import FORE, Scale, make_flexible, set_float, write_arm
-
 from calmotion import ShotError
 from calmotion.usd.reading import read_shot
+from pxr import Gf, Sdf, UsdGeom
+from small_shots import FORE, Scale, make_flexible, set_float, write_arm
 
 
 def fore(tmp_path, edit, scale=None):

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from pxr import Gf, UsdGeom, UsdPhysics
-from small_shots import BASE, ELBOW, FORE, LENGTH, SHOULDER, UPPER, write_arm
-
 from calmotion import ShotError
 from calmotion.shot import WORLD
 from calmotion.usd.reading import read_shot
 from calmotion.usd.transforms import rotation_from_quaternion
+from pxr import Gf, UsdGeom, UsdPhysics
+from small_shots import BASE, ELBOW, FORE, LENGTH, SHOULDER, UPPER, write_arm
 
 
 def read(tmp_path, edit=None):
@@ -35,7 +34,9 @@ def world_anchor(character, joint, side: int) -> np.ndarray:
 
 @pytest.mark.parametrize(("name", "direction"), [("X", [1, 0, 0]), ("Y", [0, 1, 0]), ("Z", [0, 0, 1])])
 def test_the_axis_becomes_z_of_both_frames(tmp_path, name, direction):
-    found = joint(read(tmp_path, lambda s: UsdPhysics.RevoluteJoint(s.GetPrimAtPath(ELBOW)).GetAxisAttr().Set(name)), ELBOW)
+    found = joint(
+        read(tmp_path, lambda s: UsdPhysics.RevoluteJoint(s.GetPrimAtPath(ELBOW)).GetAxisAttr().Set(name)), ELBOW
+    )
     assert np.allclose(axis(found.frame0), direction, atol=1e-12)
     assert np.allclose(axis(found.frame1), direction, atol=1e-12)
 

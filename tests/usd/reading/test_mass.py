@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from pxr import Gf, UsdPhysics, UsdShade
-from small_shots import BASE, FORE, LENGTH, UPPER, WIDTH, set_float, write_arm
-
 from calmotion import ShotError
 from calmotion.usd.reading import read_shot
+from pxr import Gf, UsdPhysics, UsdShade
+from small_shots import BASE, FORE, LENGTH, UPPER, WIDTH, set_float, write_arm
 
 VOLUME = LENGTH * WIDTH**2
 CUBE = f"{UPPER}/box"

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import pytest
-from pxr import Sdf, UsdShade
-from small_shots import FORE, PLASTIC, Scale, make_flexible, set_float, write_arm
-
 from calmotion import ShotError
 from calmotion.usd.reading import read_shot
+from pxr import Sdf, UsdShade
+from small_shots import FORE, PLASTIC, Scale, make_flexible, set_float, write_arm
 
 
 def material(tmp_path, edit=None, scale=None, **values):

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-
 from calmotion.shot import MassProperties
 from calmotion.usd.reading.moments import is_closed, sum_of, surface_moments, tetrahedron_moments
 
@@ -26,7 +25,9 @@ def test_a_box_far_from_the_origin_has_its_exact_inertia():
     assert np.allclose(moments.center, [10.0, -20.0, 30.0], atol=1e-12)
     mass = moments.mass_properties(1000.0)
     m = 1000.0 * a * b * c
-    assert np.allclose(mass.inertia, m / 12 * np.diag([b * b + c * c, a * a + c * c, a * a + b * b]), rtol=1e-9, atol=1e-12)
+    assert np.allclose(
+        mass.inertia, m / 12 * np.diag([b * b + c * c, a * a + c * c, a * a + b * b]), rtol=1e-9, atol=1e-12
+    )
 
 
 def test_a_surface_that_is_inside_out_is_turned():

@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from pxr import Usd, UsdGeom
-
 from calmotion import ShotError
 from calmotion.usd import schemas
 from calmotion.usd.reading.moments import is_closed, surface_moments
 from calmotion.usd.reading.primitives import solid
-
+from pxr import Usd, UsdGeom
 
 schemas.register()
 STAGE = Usd.Stage.CreateInMemory()

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from pxr import Gf, Sdf, UsdGeom, UsdPhysics
-from small_shots import FORE, Scale, set_float, write_arm
-
 from calmotion import ShotError
 from calmotion.usd.reading import read_shot
+from pxr import Gf, Sdf, UsdGeom, UsdPhysics
+from small_shots import FORE, Scale, set_float, write_arm
 
 
 def read(tmp_path, edit=None, scale=None):

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from pxr import Gf, UsdGeom, UsdPhysics, Vt
-from small_shots import FORE, LENGTH, UPPER, WIDTH, Scale, box, write_arm
-
 from calmotion import ShotError
 from calmotion.usd.reading import read_shot
+from pxr import Gf, UsdGeom, UsdPhysics, Vt
+from small_shots import FORE, LENGTH, UPPER, WIDTH, Scale, box, write_arm
 
 
 def body(tmp_path, path: str, edit=None):

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import pytest
-from pxr import Gf, UsdGeom
-from small_shots import BASE, FORE, write_arm
-
 from calmotion import ShotError
 from calmotion.usd.reading import read_shot
+from pxr import Gf, UsdGeom
+from small_shots import BASE, FORE, write_arm
 
 
 def read(tmp_path, edit):

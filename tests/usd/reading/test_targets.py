@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from pxr import Gf, Sdf, UsdGeom
-from small_shots import FORE, HAND, LENGTH, WIDTH, Scale, make_target, write_arm
-
 from calmotion import ShotError
 from calmotion.usd.reading import read_shot
 from calmotion.usd.transforms import rotation_from_quaternion
+from pxr import Gf, Sdf, UsdGeom
+from small_shots import FORE, HAND, LENGTH, WIDTH, Scale, make_target, write_arm
 
 
 def read(tmp_path, edit=None, scale=None):

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from pxr import Ts, Usd
-from small_shots import ELBOW, FRAMES, RATE, SHOULDER, TARGET_POSITION, angles, write_arm
-
 from calmotion import ShotError
 from calmotion.usd.reading import read_shot
+from pxr import Ts, Usd
+from small_shots import ELBOW, FRAMES, RATE, SHOULDER, TARGET_POSITION, angles, write_arm
 
 
 def read(tmp_path, edit=None):
