@@ -10,7 +10,7 @@ from calmotion.host.values import ReducedBodies, Source, SystemModes
 from calmotion.shot import Animation, Character, FEMeshes, Result
 
 if TYPE_CHECKING:
-    from calmotion.retarget.run import Options
+    from calmotion.retarget.prepare import Options
 
 
 def _nothing_flexible(data: Mapping[type, Any]) -> str | None:
@@ -61,7 +61,7 @@ class FindSystemModes(Operator):
         return _nothing_flexible(data)
 
     def execute(self, context: RunContext) -> Sequence[object]:
-        from calmotion.retarget.run import first_pose_frequencies
+        from calmotion.retarget.prepare import first_pose_frequencies
 
         context.progress(0.0, "compiling kernels, once")
         return [SystemModes(first_pose_frequencies(*_inputs(context)))]
@@ -123,7 +123,7 @@ def _inputs(context: RunContext) -> tuple[Character, Animation, Sequence[Any] | 
 
 
 def _options(context: RunContext, **more: Any) -> Options:
-    from calmotion.retarget.run import Options
+    from calmotion.retarget.prepare import Options
 
     source = context.get(Source)
     return Options(

@@ -5,7 +5,7 @@ from calmotion.dynamics.modes import system_frequencies
 from calmotion.dynamics.simulation import Workspace
 from calmotion.dynamics.statics import equilibrium
 from particles import particle_system
-from test_linearization import rigid_start
+from test_sweeps import rigid_start
 
 
 def test_hanging_double_pendulum_has_its_textbook_frequencies():

@@ -5,7 +5,7 @@ from calmotion.dynamics.kinematics import rigid_state, target_frames
 from calmotion.dynamics.simulation import Workspace
 from calmotion.dynamics.statics import equilibrium, linearize
 from particles import particle_system
-from test_linearization import rigid_start
+from test_sweeps import rigid_start
 
 
 @pytest.mark.parametrize("start", [0.0, 1.0, -2.5])

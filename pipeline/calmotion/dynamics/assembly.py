@@ -1,20 +1,7 @@
-"""Residual and tangent of the whole system at one instant; compiled.
-
-Joint rows (side i on the parent, j on the component; Q = R_i^T R_j, z the joint axis, theta the motor's angle):
-
-    gamma (p_j' - p_i') + alpha (p_j - p_i)                            3 rows, world axes
-    gamma (Q (omega_j - theta' z) - omega_i) + alpha c                 3 rows (weld, motor), parent-side axes
-    the x and y rows of it, without theta'                             2 rows (free hinge)
-    none                                                               a component that floats freely
-
-where c is the axial vector of the skew part of E = Q R_z(-theta), and (-n_y, n_x), n = Q z, for the hinge. On the
-constraint manifold these rows are C_t + C_U T V + alpha C of Seed (31); the multipliers act through exactly the
-transpose of their velocity Jacobian, so they do no work there.
-"""
+"""Residual and tangent of the whole system at one instant; compiled. The joint rows are in `joints`."""
 
 from __future__ import annotations
 
-import math
 from typing import NamedTuple
 
 import numpy as np
@@ -22,15 +9,8 @@ import numpy as np
 from ..kernels import kernel
 from ..shot.character import Array
 from .inertia import body_residual, deformed_integrals, mass_matrix, position_jacobian, velocity_jacobian
-from .markers import (
-    MarkerWork,
-    add_wrench_stiffness,
-    allocate_marker,
-    fixed_marker,
-    marker_jacobian,
-    marker_values,
-    marker_velocity_jacobian,
-)
+from .joints import add_skew, apply_wrench, constraint_residual, joint_kinematics, joint_tangent
+from .markers import MarkerWork, add_wrench_stiffness, allocate_marker, marker_jacobian
 from .so3 import matrix_of
 from .system import JOINT_ROWS, System
 
@@ -66,214 +46,6 @@ def allocate_work(system: System) -> Work:
         np.zeros((3, 3)), np.zeros(3), np.zeros((2, JOINT_ROWS)), allocate_marker(system.size),
         allocate_marker(system.size),
     )  # fmt: skip
-
-
-@kernel
-def _apply_wrench(n, f, t, sign, m, res):
-    """res += sign * (Jp^T f + Jf^T t), f in body axes, t in marker axes."""
-    for a in range(n):
-        g = 0.0
-        for i in range(3):
-            g += m.Jp[i, a] * f[i] + m.Jf[i, a] * t[i]
-        res[a] += sign * g
-
-
-@kernel
-def _rows_by_multipliers(n, Rb, m, Q, sign, out):
-    """out[:, :3] = sign Jp^T Rb^T, out[:, 3:] = sign Jf^T Q^T."""
-    for a in range(n):
-        for i in range(3):
-            g = 0.0
-            h = 0.0
-            for k in range(3):
-                g += m.Jp[k, a] * Rb[i, k]
-                h += m.Jf[k, a] * Q[i, k]
-            out[a, i] = sign * g
-            out[a, 3 + i] = sign * h
-
-
-@kernel
-def _joint_kinematics(system, b, c, u, V, w):
-    """Values of both markers of the joint of component b, and Q = R_i^T R_j into w.Q."""
-    p = system.parent[b]
-    if p < 0:
-        fixed_marker(system.position[b, 0], system.rotation[b, 0], w.i)
-    else:
-        marker_values(
-            system.elastic[p], system.position[b, 0], system.rotation[b, 0], system.Phi[b, 0], system.Psi[b, 0],
-            c[p], w.R[p], u[p], V[p], w.i,
-        )  # fmt: skip
-    marker_values(
-        system.elastic[b], system.position[b, 1], system.rotation[b, 1], system.Phi[b, 1], system.Psi[b, 1],
-        c[b], w.R[b], u[b], V[b], w.j,
-    )  # fmt: skip
-    for i in range(3):
-        for k in range(3):
-            t = 0.0
-            for n in range(3):
-                t += w.i.R[n, i] * w.j.R[n, k]
-            w.Q[i, k] = t
-
-
-@kernel
-def _turned_back(Q, angle, E):
-    """E = Q R_z(-angle)."""
-    cs, sn = math.cos(angle), math.sin(angle)
-    for i in range(3):
-        E[i, 0] = Q[i, 0] * cs - Q[i, 1] * sn
-        E[i, 1] = Q[i, 0] * sn + Q[i, 1] * cs
-        E[i, 2] = Q[i, 2]
-
-
-@kernel
-def _constraint(system, b, angle, rate, scheme, w, gap):
-    """Residual of the joint rows of component b; leaves omega_j - theta' z in w.x, E in w.E."""
-    hinge = system.rows[b] == 5
-    for i in range(3):
-        gap[i] = scheme.gamma * (w.j.pd[i] - w.i.pd[i]) + scheme.alpha * (w.j.p[i] - w.i.p[i])
-        w.x[i] = w.j.w[i]
-    if not hinge:
-        w.x[2] -= rate
-    for i in range(3):
-        t = 0.0
-        for k in range(3):
-            t += w.Q[i, k] * w.x[k]
-        w.y[i] = t
-    if hinge:
-        gap[3] = scheme.gamma * (w.y[0] - w.i.w[0]) - scheme.alpha * w.Q[1, 2]
-        gap[4] = scheme.gamma * (w.y[1] - w.i.w[1]) + scheme.alpha * w.Q[0, 2]
-        gap[5] = 0.0
-        return
-    _turned_back(w.Q, angle, w.E)
-    E = w.E
-    gap[3] = scheme.gamma * (w.y[0] - w.i.w[0]) + 0.5 * scheme.alpha * (E[2, 1] - E[1, 2])
-    gap[4] = scheme.gamma * (w.y[1] - w.i.w[1]) + 0.5 * scheme.alpha * (E[0, 2] - E[2, 0])
-    gap[5] = scheme.gamma * (w.y[2] - w.i.w[2]) + 0.5 * scheme.alpha * (E[1, 0] - E[0, 1])
-
-
-@kernel
-def _position_rows(n, Rb, m, gamma, alpha, sign, Hv, H):
-    """Rows of p' and p: H[:3] = sign Rb (gamma (Gp + Jp Hv) + alpha Jp); Hv, [n, n], maps dX to dV."""
-    for a in range(n):
-        h0 = gamma * m.Gp[0, a] + alpha * m.Jp[0, a]
-        h1 = gamma * m.Gp[1, a] + alpha * m.Jp[1, a]
-        h2 = gamma * m.Gp[2, a] + alpha * m.Jp[2, a]
-        if a < 3 or a >= 6:
-            h0 += gamma * m.Jp[0, a] * Hv[0, 0]
-            h1 += gamma * m.Jp[1, a] * Hv[0, 0]
-            h2 += gamma * m.Jp[2, a] * Hv[0, 0]
-        else:
-            for k in range(3):
-                h0 += gamma * m.Jp[0, 3 + k] * Hv[1 + k, a - 2]
-                h1 += gamma * m.Jp[1, 3 + k] * Hv[1 + k, a - 2]
-                h2 += gamma * m.Jp[2, 3 + k] * Hv[1 + k, a - 2]
-        for i in range(3):
-            H[i, a] = sign * (Rb[i, 0] * h0 + Rb[i, 1] * h1 + Rb[i, 2] * h2)
-
-
-@kernel
-def _rotation_rows(n, m, Hv, A, C, gamma, H):
-    """Rows of the angular velocity: H[3:] = gamma A (Gf + Jf Hv) + C Jf."""
-    for a in range(n):
-        g0 = m.Gf[0, a]
-        g1 = m.Gf[1, a]
-        g2 = m.Gf[2, a]
-        if a >= 6:
-            g0 += m.Jf[0, a] * Hv[0, 0]
-            g1 += m.Jf[1, a] * Hv[0, 0]
-            g2 += m.Jf[2, a] * Hv[0, 0]
-        elif a >= 3:
-            for k in range(3):
-                g0 += m.Jf[0, 3 + k] * Hv[1 + k, a - 2]
-                g1 += m.Jf[1, 3 + k] * Hv[1 + k, a - 2]
-                g2 += m.Jf[2, 3 + k] * Hv[1 + k, a - 2]
-        for i in range(3):
-            t = gamma * (A[i, 0] * g0 + A[i, 1] * g1 + A[i, 2] * g2)
-            for k in range(3):
-                t += C[i, k] * m.Jf[k, a]
-            H[3 + i, a] = t
-
-
-@kernel
-def _add_skew(A, x, sign, out):
-    """out += sign A [x]x."""
-    for i in range(3):
-        out[i, 0] += sign * (A[i, 1] * x[2] - A[i, 2] * x[1])
-        out[i, 1] += sign * (A[i, 2] * x[0] - A[i, 0] * x[2])
-        out[i, 2] += sign * (A[i, 0] * x[1] - A[i, 1] * x[0])
-
-
-@kernel
-def _joint_tangent(system, b, scheme, Hv, V, w, blocks):
-    """All blocks of the joint of component b; needs `_joint_kinematics` and `_constraint` first."""
-    p = system.parent[b]
-    rb = system.elastic[b]
-    n = 6 + rb
-    hinge = system.rows[b] == 5
-    gamma, alpha = scheme.gamma, scheme.alpha
-    marker_velocity_jacobian(rb, system.rotation[b, 1], system.Phi[b, 1], system.Psi[b, 1], V[b], w.j)
-    _rows_by_multipliers(n, w.R[b], w.j, w.Q, -1.0, blocks.Lc[b])
-    _position_rows(n, w.R[b], w.j, gamma, alpha, 1.0, Hv[b], blocks.Hc[b])
-    # dc by the turning of side j is M Q, by that of side i -M
-    M = w.M
-    for i in range(3):
-        for k in range(3):
-            M[i, k] = 0.0
-    if hinge:
-        # c = (-n_y, n_x): dc = [n]x-rows of the turning, seen from the parent side
-        M[0, 0] = alpha * w.Q[2, 2]
-        M[0, 2] = -alpha * w.Q[0, 2]
-        M[1, 1] = alpha * w.Q[2, 2]
-        M[1, 2] = -alpha * w.Q[1, 2]
-    else:
-        trace = w.E[0, 0] + w.E[1, 1] + w.E[2, 2]
-        for i in range(3):
-            for k in range(3):
-                M[i, k] = -0.5 * alpha * w.E[i, k]
-            M[i, i] += 0.5 * alpha * trace
-    # side j: gamma (Q domega_j - Q [x]x dphi_j) + M Q dphi_j
-    for i in range(3):
-        for k in range(3):
-            t = 0.0
-            for l in range(3):
-                t += M[i, l] * w.Q[l, k]
-            w.T[i, k] = t
-    _add_skew(w.Q, w.x, -gamma, w.T)
-    _rotation_rows(n, w.j, Hv[b], w.Q, w.T, gamma, blocks.Hc[b])
-    for i in range(3):
-        z = 0.0
-        for k in range(3):
-            z += M[i, k] * w.Q[k, 2]
-        blocks.by_angle[b, i] = 0.0 if hinge else -z
-        blocks.by_rate[b, i] = 0.0 if hinge else -gamma * w.Q[i, 2]
-    if p >= 0:
-        rp = system.elastic[p]
-        np_ = 6 + rp
-        marker_velocity_jacobian(rp, system.rotation[b, 0], system.Phi[b, 0], system.Psi[b, 0], V[p], w.i)
-        for i in range(3):
-            for k in range(3):
-                w.E[i, k] = 1.0 if i == k else 0.0
-                w.T[i, k] = -M[i, k]
-        _rows_by_multipliers(np_, w.R[p], w.i, w.E, 1.0, blocks.Lp[b])
-        _position_rows(np_, w.R[p], w.i, gamma, alpha, -1.0, Hv[p], blocks.Hp[b])
-        # side i: gamma ([Q x]x dphi_i - domega_i) - M dphi_i
-        _add_skew(w.E, w.y, gamma, w.T)
-        for i in range(3):
-            w.E[i, i] = -1.0
-        _rotation_rows(np_, w.i, Hv[p], w.E, w.T, gamma, blocks.Hp[b])
-        for i in range(3):
-            for a in range(np_):
-                blocks.Jp[b, i, a] = w.i.Jf[i, a]
-    # rows that this joint does not have
-    for i in range(system.rows[b], 6):
-        blocks.gap[b, i] = 0.0
-        for a in range(n):
-            blocks.Lc[b, a, i] = 0.0
-            blocks.Hc[b, i, a] = 0.0
-        if p >= 0:
-            for a in range(6 + system.elastic[p]):
-                blocks.Lp[b, a, i] = 0.0
-                blocks.Hp[b, i, a] = 0.0
 
 
 @kernel
@@ -335,8 +107,8 @@ def assemble(system, scheme, c, q, u, V, Vd, lam, angle, rate, Hv, tangent, w, b
     for b in range(count):
         p = system.parent[b]
         rb = system.elastic[b]
-        _joint_kinematics(system, b, c, u, V, w)
-        _constraint(system, b, angle[b], rate[b], scheme, w, blocks.gap[b])
+        joint_kinematics(system, b, c, u, V, w)
+        constraint_residual(system, b, angle[b], rate[b], scheme, w, blocks.gap[b])
         # force on the component in body axes, moment in marker axes; the parent gets the opposite
         for i in range(3):
             w.tau[i] = lam[b, 3 + i]
@@ -349,7 +121,7 @@ def assemble(system, scheme, c, q, u, V, Vd, lam, angle, rate, Hv, tangent, w, b
             w.wrench[1, i] = f
             w.wrench[1, 3 + i] = t
         marker_jacobian(rb, system.rotation[b, 1], system.Phi[b, 1], system.Psi[b, 1], w.j)
-        _apply_wrench(6 + rb, w.wrench[1, :3], w.wrench[1, 3:], -1.0, w.j, blocks.res[b])
+        apply_wrench(6 + rb, w.wrench[1, :3], w.wrench[1, 3:], -1.0, w.j, blocks.res[b])
         if p >= 0:
             rp = system.elastic[p]
             for i in range(3):
@@ -358,10 +130,10 @@ def assemble(system, scheme, c, q, u, V, Vd, lam, angle, rate, Hv, tangent, w, b
                     f += w.R[p, k, i] * lam[b, k]
                 w.wrench[0, i] = f
             marker_jacobian(rp, system.rotation[b, 0], system.Phi[b, 0], system.Psi[b, 0], w.i)
-            _apply_wrench(6 + rp, w.wrench[0, :3], w.tau, 1.0, w.i, blocks.res[p])
+            apply_wrench(6 + rp, w.wrench[0, :3], w.tau, 1.0, w.i, blocks.res[p])
         if not tangent:
             continue
-        _joint_tangent(system, b, scheme, Hv, V, w, blocks)
+        joint_tangent(system, b, scheme, Hv, V, w, blocks)
         # the moment on the component follows both markers: dt = [t]x dphi_j - Q^T [tau]x dphi_i
         n = 6 + rb
         t = w.wrench[1, 3:]
@@ -369,7 +141,7 @@ def assemble(system, scheme, c, q, u, V, Vd, lam, angle, rate, Hv, tangent, w, b
             for k in range(3):
                 w.T[i, k] = 0.0
                 w.E[i, k] = w.Q[k, i]
-        _add_skew(w.E, w.tau, 1.0, w.T)
+        add_skew(w.E, w.tau, 1.0, w.T)
         for a in range(n):
             for k in range(3):
                 g = 0.0

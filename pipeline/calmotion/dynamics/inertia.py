@@ -67,6 +67,19 @@ def _axial_of_product(Z, W, out):
 
 
 @kernel
+def _elastic_momentum(r, M3, v):
+    """int rho Phi v = M3^T v."""
+    p0 = 0.0
+    p1 = 0.0
+    p2 = 0.0
+    for j in range(r):
+        p0 += M3[j, 0] * v[j]
+        p1 += M3[j, 1] * v[j]
+        p2 += M3[j, 2] * v[j]
+    return p0, p1, p2
+
+
+@kernel
 def body_residual(r, mass, M3, S, axial, stiffness, damping, a, om, al, u, v, vd, s, Z, B, W, tmp, res):
     """Rows of one component without its joints, into res, shape [6 + r]; needs `deformed_integrals` first.
 
@@ -76,13 +89,7 @@ def body_residual(r, mass, M3, S, axial, stiffness, damping, a, om, al, u, v, vd
         W, tmp: Scratch, shapes [3, 3] and [3]; W holds [alpha]x + [omega]x^2 afterwards.
     """
     _gradient_of_acceleration(al, om, W)
-    p0 = 0.0
-    p1 = 0.0
-    p2 = 0.0
-    for j in range(r):
-        p0 += M3[j, 0] * v[j]
-        p1 += M3[j, 1] * v[j]
-        p2 += M3[j, 2] * v[j]
+    p0, p1, p2 = _elastic_momentum(r, M3, v)
     for i in range(3):
         t = mass * a[i]
         for k in range(3):
@@ -157,13 +164,7 @@ def velocity_jacobian(r, M3, axial, damping, om, v, s, Z, B, P):
     for i in range(n):
         for k in range(n):
             P[i, k] = 0.0
-    p0 = 0.0
-    p1 = 0.0
-    p2 = 0.0
-    for j in range(r):
-        p0 += M3[j, 0] * v[j]
-        p1 += M3[j, 1] * v[j]
-        p2 += M3[j, 2] * v[j]
+    p0, p1, p2 = _elastic_momentum(r, M3, v)
     # translation by omega: -[omega x s + 2 p]x - [omega]x [s]x
     so = s[0] * om[0] + s[1] * om[1] + s[2] * om[2]
     e0 = om[1] * s[2] - om[2] * s[1] + 2.0 * p0

@@ -1,12 +1,11 @@
-"""The simulation linearised about a trajectory: tangent and discrete adjoint sweeps over stored factors; compiled.
+"""The simulation linearised about a trajectory: blocks and factors of every instant, for `sweeps`; compiled.
 
 A perturbation at instant n is (R^T dc, dphi, du) of each component. With (dV, dtheta) following from it and the
 earlier instants by the backward differences of `bdf2`, each step reads
 
     K z_n = -( P h_V + D h_A + r_theta dtheta_m + r_rate dtheta_m' )
 
-with h_V, h_A the part of dV, dV' that earlier instants determine. The adjoint is the exact transpose of this
-recursion, the static start included, so gradients hold to rounding: Seed (39) for the discretised system.
+with h_V, h_A the part of dV, dV' that earlier instants determine.
 """
 
 from __future__ import annotations
@@ -15,13 +14,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..kernels import allocating_kernel, kernel
+from ..kernels import kernel
 from ..shot.character import Array, IntArray
 from .assembly import assemble
 from .bdf2 import position_to_velocity, velocities
-from .elimination import factor, solve, solve_transposed
+from .elimination import factor
 from .simulation import SimulationFailure, Trajectory, Workspace, _instant, dynamic_scheme
-from .so3 import exponential, inverse_right_jacobian, right_jacobian
 from .statics import STATIC
 from .system import JOINT_ROWS, Blocks, System
 
@@ -114,242 +112,3 @@ def linearize(
     if bad >= 0:
         raise SimulationFailure(instant * trajectory.h, bad, "singular")
     return Linearization(system, trajectory, data, pivots)
-
-
-@allocating_kernel
-def _tangent(system, h, turns, d_angle, d_rate, data, pivots, dX):
-    P, D, Lc, Lp, Hp, Nc, Jp, by_angle, by_rate, lu, Z, R, Hv = data
-    total, count, size = dX.shape
-    x = np.zeros((count, size))
-    lam = np.zeros((count, 6))
-    block = np.zeros(size + 6)
-    hV = np.zeros((count, size))
-    hA = np.zeros((count, size))
-    tmp = np.zeros(3)
-    J = np.zeros((3, 3))
-    # three instants back, by turns; translation in world axes
-    dc = np.zeros((3, count, 3))
-    nu = np.zeros((3, count, size))
-    dth = np.zeros((3, count, 3))
-    c1, c2 = 2.0 / h, 0.5 / h
-    for n in range(total):
-        now, one, two = n % 3, (n + 2) % 3, (n + 1) % 3
-        if n == 1:
-            two = one
-        for b in range(count):
-            m = 6 + system.elastic[b]
-            for i in range(m):
-                x[b, i] = 0.0
-            if n > 0:
-                for i in range(3):
-                    v = 0.0
-                    a = 0.0
-                    for k in range(3):
-                        v += R[n, b, k, i] * (c2 * dc[two, b, k] - c1 * dc[one, b, k])
-                        a += R[n, b, k, i] * (c2 * nu[two, b, k] - c1 * nu[one, b, k])
-                    hV[b, i] = v
-                    hA[b, i] = a
-                exponential(turns[n, b], J)
-                for i in range(3):
-                    tmp[i] = J[0, i] * dX[n - 1, b, 3] + J[1, i] * dX[n - 1, b, 4] + J[2, i] * dX[n - 1, b, 5]
-                right_jacobian(turns[n, b], J)
-                for i in range(3):
-                    t = 0.0
-                    for k in range(3):
-                        t -= Hv[n, b, 1 + i, 1 + k] * tmp[k] + 0.5 / h * J[i, k] * dth[one, b, k]
-                    hV[b, 3 + i] = t
-                    hA[b, 3 + i] = c2 * nu[two, b, 3 + i] - c1 * nu[one, b, 3 + i]
-                back = n - 2 if n > 1 else 0
-                for i in range(6, m):
-                    hV[b, i] = c2 * dX[back, b, i] - c1 * dX[n - 1, b, i]
-                    hA[b, i] = c2 * nu[two, b, i] - c1 * nu[one, b, i]
-                for i in range(m):
-                    t = 0.0
-                    for k in range(m):
-                        t -= P[n, b, i, k] * hV[b, k] + D[n, b, i, k] * hA[b, k]
-                    x[b, i] = t
-        for b in range(count):
-            p = system.parent[b]
-            for i in range(6):
-                t = 0.0
-                if n > 0:
-                    for k in range(6 + system.elastic[b]):
-                        t += Lc[n, b, k, i] * hV[b, k]
-                    if p >= 0:
-                        for k in range(6 + system.elastic[p]):
-                            t += Lp[n, b, k, i] * hV[p, k]
-                if i >= 3:
-                    t -= by_angle[n, b, i - 3] * d_angle[n, b] + by_rate[n, b, i - 3] * d_rate[n, b]
-                lam[b, i] = t
-        solve(system, Lp[n], Hp[n], Nc[n], Jp[n], lu[n], pivots[n], Z[n], x, lam, block)
-        for b in range(count):
-            m = 6 + system.elastic[b]
-            for i in range(m):
-                dX[n, b, i] = x[b, i]
-            for i in range(3):
-                dc[now, b, i] = R[n, b, i, 0] * x[b, 0] + R[n, b, i, 1] * x[b, 1] + R[n, b, i, 2] * x[b, 2]
-            if n == 0:
-                continue
-            for i in range(3):
-                v = 0.0
-                w = 0.0
-                for k in range(3):
-                    v += R[n, b, i, k] * (Hv[n, b, 0, 0] * x[b, k] + hV[b, k])
-                    w += Hv[n, b, 1 + i, 1 + k] * x[b, 3 + k]
-                nu[now, b, i] = v
-                nu[now, b, 3 + i] = w + hV[b, 3 + i]
-            for i in range(6, m):
-                nu[now, b, i] = Hv[n, b, 0, 0] * x[b, i] + hV[b, i]
-            exponential(turns[n, b], J)
-            for i in range(3):
-                tmp[i] = x[b, 3 + i]
-                for k in range(3):
-                    tmp[i] -= J[k, i] * dX[n - 1, b, 3 + k]
-            inverse_right_jacobian(turns[n, b], J)
-            for i in range(3):
-                dth[now, b, i] = J[i, 0] * tmp[0] + J[i, 1] * tmp[1] + J[i, 2] * tmp[2]
-
-
-@allocating_kernel
-def _adjoint(system, h, turns, Xbar, data, pivots, g_angle, g_rate, cbar, nubar, thbar):
-    """Transpose of `_tangent`; Xbar (body axes), cbar (world axes), nubar, thbar are overwritten."""
-    P, D, Lc, Lp, Hp, Nc, Jp, by_angle, by_rate, lu, Z, R, Hv = data
-    total, count, size = Xbar.shape
-    x = np.zeros((count, size))
-    lam = np.zeros((count, 6))
-    block = np.zeros(size + 6)
-    hV = np.zeros((count, size))
-    tmp = np.zeros(3)
-    J = np.zeros((3, 3))
-    c1, c2 = 2.0 / h, 0.5 / h
-    for n in range(total - 1, -1, -1):
-        back = n - 2 if n > 1 else 0
-        for b in range(count):
-            m = 6 + system.elastic[b]
-            if n > 0:
-                # velocities: dV = (beta dc, H dphi, beta du) + h_V
-                for i in range(3):
-                    cbar[n, b, i] += Hv[n, b, 0, 0] * nubar[n, b, i]
-                    t = 0.0
-                    for k in range(3):
-                        t += R[n, b, k, i] * nubar[n, b, k]
-                        Xbar[n, b, 3 + i] += Hv[n, b, 1 + k, 1 + i] * nubar[n, b, 3 + k]
-                    hV[b, i] = t
-                    hV[b, 3 + i] = nubar[n, b, 3 + i]
-                for i in range(6, m):
-                    Xbar[n, b, i] += Hv[n, b, 0, 0] * nubar[n, b, i]
-                    hV[b, i] = nubar[n, b, i]
-                # dtheta = J_r^-1 (dphi_n - exp^T dphi_{n-1})
-                inverse_right_jacobian(turns[n, b], J)
-                for i in range(3):
-                    tmp[i] = J[0, i] * thbar[n, b, 0] + J[1, i] * thbar[n, b, 1] + J[2, i] * thbar[n, b, 2]
-                exponential(turns[n, b], J)
-                for i in range(3):
-                    Xbar[n, b, 3 + i] += tmp[i]
-                    Xbar[n - 1, b, 3 + i] -= J[i, 0] * tmp[0] + J[i, 1] * tmp[1] + J[i, 2] * tmp[2]
-            for i in range(3):
-                t = Xbar[n, b, i]
-                for k in range(3):
-                    t += R[n, b, k, i] * cbar[n, b, k]
-                x[b, i] = t
-            for i in range(3, m):
-                x[b, i] = Xbar[n, b, i]
-            for i in range(6):
-                lam[b, i] = 0.0
-        solve_transposed(system, Lp[n], Hp[n], Nc[n], Jp[n], lu[n], pivots[n], Z[n], x, lam, block)
-        for b in range(count):
-            ga = 0.0
-            gr = 0.0
-            for i in range(3):
-                ga -= by_angle[n, b, i] * lam[b, 3 + i]
-                gr -= by_rate[n, b, i] * lam[b, 3 + i]
-            g_angle[n, b] = ga
-            g_rate[n, b] = gr
-        if n == 0:
-            continue
-        for b in range(count):
-            p = system.parent[b]
-            for i in range(6):
-                t = lam[b, i]
-                for k in range(6 + system.elastic[b]):
-                    hV[b, k] += Lc[n, b, k, i] * t
-                if p >= 0:
-                    for k in range(6 + system.elastic[p]):
-                        hV[p, k] += Lp[n, b, k, i] * t
-        for b in range(count):
-            m = 6 + system.elastic[b]
-            for i in range(m):
-                t = x[b, i]
-                for k in range(m):
-                    hV[b, k] -= P[n, b, i, k] * t
-            # h_A = (nu_{n-2} - 4 nu_{n-1}) / 2h, translation turned into body axes
-            for k in range(m):
-                block[k] = 0.0
-            for i in range(m):
-                t = x[b, i]
-                for k in range(m):
-                    block[k] -= D[n, b, i, k] * t
-            for i in range(3):
-                a = 0.0
-                v = 0.0
-                for k in range(3):
-                    a += R[n, b, i, k] * block[k]
-                    v += R[n, b, i, k] * hV[b, k]
-                nubar[n - 1, b, i] -= c1 * a
-                nubar[back, b, i] += c2 * a
-                cbar[n - 1, b, i] -= c1 * v
-                cbar[back, b, i] += c2 * v
-            for i in range(3, m):
-                nubar[n - 1, b, i] -= c1 * block[i]
-                nubar[back, b, i] += c2 * block[i]
-            for i in range(6, m):
-                Xbar[n - 1, b, i] -= c1 * hV[b, i]
-                Xbar[back, b, i] += c2 * hV[b, i]
-            for k in range(3):
-                tmp[k] = 0.0
-                for i in range(3):
-                    tmp[k] -= Hv[n, b, 1 + i, 1 + k] * hV[b, 3 + i]
-            exponential(turns[n, b], J)
-            for i in range(3):
-                Xbar[n - 1, b, 3 + i] += J[i, 0] * tmp[0] + J[i, 1] * tmp[1] + J[i, 2] * tmp[2]
-            right_jacobian(turns[n, b], J)
-            for k in range(3):
-                for i in range(3):
-                    thbar[n - 1, b, k] -= 0.5 / h * J[i, k] * hV[b, 3 + i]
-        if n == 1:
-            # before the start the system rests: velocity and last turn of instant 0 are zero, whatever the start
-            nubar[0] = 0.0
-            thbar[0] = 0.0
-
-
-def tangent(lin: Linearization, d_angle: Array, d_rate: Array) -> Array:
-    """How the motion follows a change of the joint angles.
-
-    Args:
-        d_angle, d_rate: Change of angle [rad] and rate [rad/s] of each component's joint, shape [T, B].
-
-    Returns:
-        (R^T dc, dphi, du) of each component, shape [T, B, N].
-    """
-    dX = np.zeros(d_angle.shape + (lin.system.size,))
-    _tangent(lin.system, lin.trajectory.h, lin.trajectory.states.turn, d_angle, d_rate, lin.data, lin.pivots, dX)
-    return dX
-
-
-def adjoint(lin: Linearization, gradient: Array) -> tuple[Array, Array]:
-    """How an objective follows the joint angles.
-
-    Args:
-        gradient: Its derivative by (R^T dc, dphi, du) of each component at each instant, shape [T, B, N].
-
-    Returns:
-        Its derivatives by angle and rate of each component's joint, shape [T, B] each.
-    """
-    Xbar = gradient.copy()
-    total, count, size = Xbar.shape
-    g_angle, g_rate = np.zeros((total, count)), np.zeros((total, count))
-    _adjoint(
-        lin.system, lin.trajectory.h, lin.trajectory.states.turn, Xbar, lin.data, lin.pivots, g_angle, g_rate,
-        np.zeros((total, count, 3)), np.zeros((total, count, size)), np.zeros((total, count, 3)),
-    )  # fmt: skip
-    return g_angle, g_rate

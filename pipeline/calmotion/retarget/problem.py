@@ -8,9 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..dynamics.kinematics import rigid_poses, rigid_state, target_frames
-from ..dynamics.linearization import Linearization, adjoint, linearize, tangent
+from ..dynamics.linearization import Linearization, linearize
 from ..dynamics.model import Model, rigid_model
 from ..dynamics.simulation import SimulationFailure, Trajectory, Workspace, simulate
+from ..dynamics.sweeps import adjoint, tangent
 from ..shot.character import Array, BoolArray, IntArray
 from .curves import OffsetBasis, TimeGrid
 from .objective import Objective, Reference

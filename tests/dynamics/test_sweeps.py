@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 from calmotion.dynamics.kinematics import _rigid_poses
-from calmotion.dynamics.linearization import adjoint, linearize, tangent
+from calmotion.dynamics.linearization import linearize
 from calmotion.dynamics.simulation import Workspace, simulate
+from calmotion.dynamics.sweeps import adjoint, tangent
 from calmotion.dynamics.system import allocate_state
 from particles import particle_system
 from scipy.spatial.transform import Rotation

@@ -1,0 +1,123 @@
+"""A shot made ready for simulation: options, the compiled model, the time grid, and errors in the user's words."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from ..dynamics.model import Model, compile_model
+from ..dynamics.modes import system_frequencies
+from ..dynamics.simulation import SimulationFailure
+from ..dynamics.topology import span_tree
+from ..errors import ShotError
+from ..fem.reduced_body import ReducedBody
+from ..shot import Animation, Character
+from ..shot.character import Array
+from .bodies import reduce_bodies
+from .curves import TimeGrid, make_grid, needed_pre_roll, sample_tracks
+
+
+@dataclass(frozen=True)
+class Options:
+    """What the user overrides; None keeps the shot's own or the automatic choice. Lengths [m], times [s]."""
+
+    tolerance: float | None = None
+    step: float | None = None
+    pre_roll: float | None = None
+    integrator: str = "bdf2"
+    knot_spacing: float | None = None
+    smoothness: float | None = None
+    max_iterations: int = 30
+
+
+@dataclass(frozen=True, eq=False)
+class Prepared:
+    """A shot compiled for simulation."""
+
+    character: Character
+    bodies: Sequence[ReducedBody]
+    model: Model
+    grid: TimeGrid
+
+
+def prepare(
+    character: Character, animation: Animation, bodies: Sequence[ReducedBody] | None, options: Options
+) -> Prepared:
+    """Compile the system and the time grid.
+
+    Raises:
+        ShotError: Something the shot asks for is not supported.
+    """
+    _refuse_unsupported(character, options)
+    if len(animation.frame_times) < 2:
+        raise ShotError(
+            "a shot of one frame has no motion",
+            path=character.path,
+            attribute="endTimeCode",
+            remedy="Author startTimeCode and endTimeCode of the stage, at least a frame apart.",
+        )
+    tree = span_tree(character)
+    if bodies is None:
+        bodies = reduce_bodies(character, tree, None)
+    model = compile_model(character, tree, bodies)
+    pre_roll = options.pre_roll
+    if pre_roll is None:
+        pre_roll = needed_pre_roll(animation.tracks, animation.frame_times)
+    step = options.step if options.step is not None else character.retarget.time_step
+    return Prepared(character, bodies, model, make_grid(animation.frame_times, step, pre_roll))
+
+
+def first_pose_frequencies(character: Character, animation: Animation, bodies: Sequence[ReducedBody] | None) -> Array:
+    """Natural frequencies of the whole character in its first pose, motors held [Hz], ascending.
+
+    Raises:
+        ShotError: It has no static equilibrium there.
+    """
+    prepared = prepare(character, animation, bodies, Options(pre_roll=0.0))
+    angles, _ = sample_tracks(animation.tracks, prepared.grid)
+    try:
+        return system_frequencies(prepared.model, prepared.model.joint_angles(angles[0]))
+    except SimulationFailure as failure:
+        raise failure_error(prepared, failure) from failure
+
+
+def _refuse_unsupported(character: Character, options: Options) -> None:
+    settings = character.retarget
+    for attribute, value, supported in (
+        ("calm:retarget:reference", settings.reference, "rigid"),
+        ("calm:retarget:cyclic", settings.cyclic, False),
+    ):
+        if value != supported:
+            raise ShotError(
+                "this setting is not supported yet",
+                path=character.path,
+                attribute=attribute,
+                found=value,
+                remedy=f"Set it to {str(supported).lower()} for now.",
+            )
+    if options.integrator != "bdf2":
+        raise ShotError(
+            "this integrator is not available",
+            attribute="--integrator",
+            found=options.integrator,
+            remedy="Use bdf2.",
+        )
+
+
+def failure_error(prepared: Prepared, failure: SimulationFailure) -> ShotError:
+    """A failed step in the user's words: which body, which joint, when."""
+    tree, character = prepared.model.tree, prepared.character
+    joint = character.joints[tree.joint[failure.component]]
+    when = failure.time_s - prepared.grid.pre_roll
+    return ShotError(
+        f"the simulation {_REASONS[failure.reason]} at {when:.3f} s, first at the joint {joint.path}",
+        path=character.bodies[tree.body[failure.component]].path,
+        remedy="Try a smaller --step; check the masses, the material and the motion of this joint there.",
+    )
+
+
+_REASONS = {
+    "singular": "meets a singular system",
+    "diverged": "diverges",
+    "no static equilibrium": "finds no static equilibrium",
+}

@@ -1,0 +1,77 @@
+"""Runs of the engine as the values that plugins write: motions by body, simulations with errors, what was left out."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..dynamics.model import Model
+from ..shot import LeftOut, Motion, Simulation
+from ..shot.character import Array
+from .curves import TimeGrid
+from .objective import Reference, rotation_errors
+from .prepare import Prepared
+from .problem import ForwardRun, RigidMotion
+
+
+def by_body(model: Model, values: Array, axis: int = 1) -> Array:
+    """Reorder an axis of components to the character's bodies."""
+    order = np.empty(len(model.tree.body), int)
+    order[list(model.tree.body)] = np.arange(len(order))
+    return np.take(values, order, axis=axis)
+
+
+def _simulated_motion(model: Model, grid: TimeGrid, run: ForwardRun, motors: int) -> Motion:
+    states = run.trajectory.states
+    component = {body: k for k, body in enumerate(model.tree.body)}
+    elastic = tuple(
+        states.u[:, component[b], : model.system.elastic[component[b]]].copy() for b in range(len(component))
+    )
+    values, efforts = np.zeros((len(states.c), motors)), np.zeros((len(states.c), motors))
+    for k, motor in enumerate(model.motor):
+        if motor >= 0:
+            values[:, motor] = run.joint_angles[:, k] * model.sign[k]
+            efforts[:, motor] = states.lam[:, k, 5] * model.sign[k]
+    return Motion(
+        grid.times, by_body(model, states.c), by_body(model, states.q), elastic, values, efforts,
+        run.target_positions, run.target_rotations,
+    )  # fmt: skip
+
+
+def reference_motion(model: Model, grid: TimeGrid, rigid: RigidMotion, angles: Array) -> Motion:
+    """The motion that was meant; it has no efforts."""
+    total = len(rigid.c)
+    return Motion(
+        grid.times, by_body(model, rigid.c), by_body(model, rigid.q),
+        tuple(np.zeros((total, 0)) for _ in model.tree.body), angles, np.full_like(angles, np.nan),
+        rigid.target_positions, rigid.target_rotations,
+    )  # fmt: skip
+
+
+def simulation_of(model: Model, grid: TimeGrid, run: ForwardRun, reference: Reference, motors: int) -> Simulation:
+    """A forward run as a value for the user, measured against the reference."""
+    turned, _ = rotation_errors(reference.rotations, run.target_rotations)
+    return Simulation(
+        motion=_simulated_motion(model, grid, run, motors),
+        position_errors=np.linalg.norm(run.target_positions - reference.positions, axis=2),
+        rotation_errors=np.linalg.norm(turned, axis=2),
+        newton_iterations=run.trajectory.newton_iterations,
+        max_joint_gap=run.trajectory.max_joint_gap,
+        wall_s=run.trajectory.wall_s,
+    )
+
+
+def left_out_rows(prepared: Prepared) -> list[LeftOut]:
+    """What a run of this shot leaves out."""
+    character, grid = prepared.character, prepared.grid
+    rigid = [body.path for body in character.bodies if body.flexible is None]
+    rows = [LeftOut("finite elements of " + ", ".join(rigid), "rigid: no CalmFlexibleBodyAPI")] if rigid else []
+    rows += [
+        LeftOut("nonlinear elasticity of " + body.path, "deflections are taken as small")
+        for body in character.bodies
+        if body.flexible is not None and body.flexible.elasticity == "auto"
+    ]
+    if grid.pre_steps == 0:
+        rows.append(LeftOut("pre-roll", "the shot starts at rest"))
+    locked = [motor.path for motor in character.motors if not motor.optimize]
+    rows += [LeftOut("optimisation of " + path, "calm:motor:optimize is false") for path in locked]
+    return rows
