@@ -65,7 +65,7 @@ def link(*surfaces, **fields):
 
 def run(host, *bodies, **properties):
     character = Character("/Arm", bodies, (), (), (), np.array([0.0, 0.0, -9.81]))
-    meshes, = run_operator(host, "fe.mesh", [character], {"fe.mesh": properties})
+    (meshes,) = run_operator(host, "fe.mesh", [character], {"fe.mesh": properties})
     assert isinstance(meshes, FEMeshes)
     return meshes.meshes
 
@@ -85,7 +85,7 @@ def test_a_character_that_does_not_bend_is_left_out(host):
 
 def test_a_box_becomes_tetrahedra_that_fill_it(host):
     rigid = Body("/Arm/base", REST, None)
-    mesh, = run(host, rigid, link(surface(box((0.3, 0.02, 0.02), at=(0.15, 0, 0)))))
+    (mesh,) = run(host, rigid, link(surface(box((0.3, 0.02, 0.02), at=(0.15, 0, 0)))))
     assert mesh.body == 1 and mesh.tets.dtype == np.int32
     assert (tet_volumes(mesh.points, mesh.tets) > 0.0).all() and connected_parts(mesh.tets) == 1
     assert mesh.quality.volume == pytest.approx(1.2e-4, rel=1e-3)
@@ -97,22 +97,22 @@ def test_a_box_becomes_tetrahedra_that_fill_it(host):
 
 def test_smaller_elements_are_more_and_the_command_line_goes_before_the_shot(host):
     body = link(surface(box((0.1, 0.02, 0.02))), element_size=0.02)
-    coarse, = run(host, body)
-    fine, = run(host, body, element_size="8mm")
+    (coarse,) = run(host, body)
+    (fine,) = run(host, body, element_size="8mm")
     assert len(fine.tets) > 2 * len(coarse.tets)
 
 
 def test_a_mesh_is_made_once_and_then_read_from_the_cache(host, package, own_cache, monkeypatch):
     body = link(surface(box()))
-    first, = run(host, body)
-    kept, = own_cache.iterdir()
+    (first,) = run(host, body)
+    (kept,) = own_cache.iterdir()
     monkeypatch.setattr(package("tetwild"), "_run", lambda *arguments: pytest.fail("meshed again"))
-    again, = run(host, body)
+    (again,) = run(host, body)
     assert np.array_equal(first.points, again.points) and np.array_equal(first.tets, again.tets)
     kept.write_bytes(b"torn")
     monkeypatch.undo()
     monkeypatch.setenv("CALMOTION_CACHE", str(own_cache.parent))
-    third, = run(host, body)
+    (third,) = run(host, body)
     assert third.quality.volume == pytest.approx(first.quality.volume, rel=1e-3)
     assert [path.suffix for path in own_cache.iterdir()] == [".npz"]
 
@@ -163,7 +163,7 @@ def test_authored_tetrahedra_are_taken_as_they_are_but_turned(host):
     points = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 1, 1], [9, 9, 9]])
     tets = TetGeometry("/Arm/link/tets", points, np.array([[0, 1, 2, 3], [1, 2, 3, 4][::-1]], dtype=np.int32))
     volumes = tet_volumes(points, tets.tets)
-    mesh, = run(host, replace(link(surface(box())), tets=tets))
+    (mesh,) = run(host, replace(link(surface(box())), tets=tets))
     assert np.array_equal(mesh.points, points[:5])
     assert mesh.quality.volume == pytest.approx(np.abs(volumes).sum()) and mesh.quality.volume_error == 0.0
     assert any("points that no tetrahedron uses" in repair for repair in mesh.quality.repairs)
@@ -175,7 +175,7 @@ def test_a_mesh_file_is_read_in_its_own_unit(host, tmp_path):
 
     points = 1000.0 * np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
     meshio.Mesh(points, [("tetra", [[0, 1, 2, 3]])]).write(tmp_path / "link.vtu")
-    mesh, = run(host, link(mesh_file=str(tmp_path / "link.vtu"), mesh_scale=1e-3))
+    (mesh,) = run(host, link(mesh_file=str(tmp_path / "link.vtu"), mesh_scale=1e-3))
     assert mesh.quality.volume == pytest.approx(1.0 / 6.0)
 
 
@@ -186,7 +186,7 @@ def test_files_of_surfaces_are_filled(host, tmp_path, name):
     cube = box((50.0, 20.0, 20.0))
     extra = {"file_format": "gmsh"} if name.endswith("msh") else {}
     meshio.Mesh(np.array(cube.vertices), [("triangle", np.array(cube.faces))]).write(tmp_path / name, **extra)
-    mesh, = run(host, link(mesh_file=str(tmp_path / name), mesh_scale=1e-3))
+    (mesh,) = run(host, link(mesh_file=str(tmp_path / name), mesh_scale=1e-3))
     assert mesh.quality.volume == pytest.approx(2e-5, rel=1e-2)
 
 
@@ -218,7 +218,7 @@ def test_hidden_geometry_stands_in_for_an_open_mesh(host):
     lidless = box()
     lidless.update_faces(np.arange(12) >= 2)
     hull = surface(box(), "/Arm/link/collision", visible=False)
-    mesh, = run(host, link(surface(lidless, "/Arm/link/shell"), hull))
+    (mesh,) = run(host, link(surface(lidless, "/Arm/link/shell"), hull))
     assert mesh.quality.volume == pytest.approx(8e-5, rel=1e-2)
     assert "/Arm/link/shell" in mesh.quality.repairs[0] and "collision" in mesh.quality.repairs[0]
 
@@ -240,7 +240,7 @@ def test_a_mesh_that_runs_through_itself_has_the_volume_of_what_it_covers(host, 
     crossed = trimesh.util.concatenate([box((0.2, 0.02, 0.02)), box((0.02, 0.2, 0.02))])
     assert crossed.is_watertight and crossed.volume == pytest.approx(1.6e-4)
     assert solid(package, surface(crossed)).volume == pytest.approx(1.52e-4, rel=1e-6)
-    mesh, = run(host, link(surface(crossed)))
+    (mesh,) = run(host, link(surface(crossed)))
     assert mesh.quality.volume == pytest.approx(1.52e-4, rel=1e-2)
 
 
@@ -364,8 +364,8 @@ def test_links_of_a_real_robot_are_closed(package, shared_data):
 
 
 def test_a_link_of_a_real_robot_is_meshed(host, shared_data):
-    elbow, = links_of(shared_data, "left_elbow_link")
-    mesh, = run(host, link(*elbow))
+    (elbow,) = links_of(shared_data, "left_elbow_link")
+    (mesh,) = run(host, link(*elbow))
     assert mesh.quality.volume_error < 0.01 and mesh.quality.min_dihedral_deg > 4.0
     assert 800 < len(mesh.tets) < 4000
 

@@ -1,0 +1,76 @@
+import dataclasses
+
+import numpy as np
+import pytest
+from calmotion import ShotError
+from calmotion.host import ReducedBodies, Source, SystemModes
+from calmotion.shot import Character, Result
+from calmotion.testing import host_with, run_operator, small_shot
+
+
+@pytest.fixture(scope="module")
+def host(repository):
+    return host_with(repository / "plugins" / "vibration_optimizer")
+
+
+def source(command):
+    return Source(path="shot.usda", command=command, step=0.01)
+
+
+def test_rigid_shots_need_neither_reduction_nor_modes(host):
+    character, _ = small_shot()
+    for idname in ("fem.reduce", "dynamics.modes"):
+        assert "nothing is flexible" in host.operators[idname].poll({Character: character})
+
+
+def test_one_of_simulate_and_optimize_runs(host):
+    for command in ("simulate", "optimize"):
+        other = "optimize" if command == "simulate" else "simulate"
+        assert host.operators[f"retarget.{command}"].poll({Source: source(command)}) is None
+        assert command in host.operators[f"retarget.{other}"].poll({Source: source(command)})
+
+
+def test_simulation_of_a_rigid_shot_follows_the_animation(host):
+    character, animation = small_shot()
+    (result,) = run_operator(host, "retarget.simulate", [character, animation, source("simulate")])
+    assert isinstance(result, Result) and result.after is None
+    # the simulation's own error: second order in its step
+    judged = result.before.motion.times >= 0.0
+    assert result.before.position_errors[judged].max() < 5e-3
+
+
+def test_flexible_shot_without_a_mesh_says_what_is_missing(host):
+    character, animation = small_shot(flexible=True)
+    with pytest.raises(ShotError) as error:
+        run_operator(host, "fem.reduce", [character])
+    assert "mesh" in error.value.problem and error.value.path.startswith("/")
+
+
+def test_properties_reach_the_optimiser(host, repository):
+    plugins = repository / "plugins"
+    both = host_with(plugins / "fe_mesher", plugins / "vibration_optimizer")
+    character, animation = small_shot(flexible=True)
+    run = both.run(
+        [character, animation, source("optimize")],
+        [Result, SystemModes, ReducedBodies],
+        settings={"retarget.optimize": {"max_iterations": 1, "knot_spacing": 0.2}},
+    )
+    outcomes = {result.idname: (result.outcome, result.error) for result in run}
+    assert outcomes["retarget.optimize"][0] == "done", outcomes
+    result = run.get(Result)
+    assert result.gradients == 1 and result.objective_after < result.objective_before
+    moving = [curve for curve in result.curves if curve.changed]
+    assert moving and np.all(np.diff(moving[0].knots) > 0.15)
+    frequencies = run.get(SystemModes).frequencies
+    assert np.all(np.diff(frequencies) >= 0.0) and frequencies[0] > 0.1
+    assert len(run.get(ReducedBodies).bodies) == len(character.bodies)
+
+
+def test_locked_motors_only_are_refused(host):
+    character, animation = small_shot()
+    motors = tuple(dataclasses.replace(motor, optimize=False) for motor in character.motors)
+    with pytest.raises(ShotError) as error:
+        run_operator(
+            host, "retarget.optimize", [dataclasses.replace(character, motors=motors), animation, source("optimize")]
+        )
+    assert error.value.attribute == "calm:motor:optimize"
