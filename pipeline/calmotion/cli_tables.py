@@ -9,6 +9,8 @@ from typing import Any, TextIO
 from rich.console import Console
 from rich.table import Table
 
+from .naming import distinct_names
+
 
 def length(meters: float | None) -> str:
     """A length or error as text in mm; `-` when it is not known."""
@@ -24,19 +26,10 @@ LONG = 60  # characters of a prim path beyond which a table shows names
 
 
 def name_paths(paths: Sequence[str]) -> dict[str, str]:
-    """Prim paths as they are when all are short, else by the fewest last names that tell them apart."""
-    unique = sorted(set(paths))
-    if max(map(len, unique), default=0) <= LONG:
-        return {path: path for path in unique}
-    parts = {path: path.strip("/").split("/") for path in unique}
-    names = {}
-    for path in unique:
-        for count in range(1, len(parts[path]) + 1):
-            end = parts[path][-count:]
-            if sum(other[-count:] == end for other in parts.values()) == 1:
-                break
-        names[path] = "/".join(end)
-    return names
+    """Prim paths as they are when all are short, else by names that tell them apart."""
+    if max(map(len, paths), default=0) <= LONG:
+        return {path: path for path in paths}
+    return distinct_names(paths)
 
 
 def print_table(

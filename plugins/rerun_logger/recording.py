@@ -13,9 +13,10 @@ from pathlib import Path
 import numpy as np
 import rerun as rr
 from calmotion.errors import ShotError
+from calmotion.naming import distinct_names
 from calmotion.shot import Animation, Character, Motion, Result, Simulation, SurfaceMesh
 from calmotion.shot.character import Array
-from calmotion.shot.playback import deformed_points, modes_of, sample_motion
+from calmotion.shot.playback import carriers, deformed_points, modes_of, relative_poses, sample_motion
 from calmotion.shot.shading import split_at_creases
 
 from .layout import INPUT, OPTIMIZED, REFERENCE, STYLES, make_blueprint
@@ -105,10 +106,10 @@ def log_all(
 def log_bodies(recording: rr.RecordingStream, root: str, character: Character, result: Result, motion: Motion) -> None:
     """A transform for each body and frame, its meshes once, and the vertices of those that bend."""
     frames = rr.TimeColumn(TIME, duration=motion.times)
-    for index, body in enumerate(character.bodies):
-        columns = rr.Transform3D.columns(
-            translation=motion.positions[:, index], quaternion=motion.rotations[:, index][:, [1, 2, 3, 0]]
-        )
+    # transforms add up along the entity tree, which mirrors the prims'
+    for index, (body, carrier) in enumerate(zip(character.bodies, carriers(character.bodies), strict=True)):
+        positions, rotations = relative_poses(motion, index, carrier)
+        columns = rr.Transform3D.columns(translation=positions, quaternion=rotations[:, [1, 2, 3, 0]])
         recording.send_columns(root + body.path, [frames], columns)
         if root == REFERENCE and stands_still(motion, index):
             continue
@@ -191,8 +192,9 @@ def log_errors(
     """Position errors [mm] of all targets, rotation errors [deg] of those whose rotation counts."""
     rows, style = thinned(simulation, samples), STYLES[root]
     times = simulation.motion.times[rows]
+    names = distinct_names([target.path for target in character.targets])
     for k, target in enumerate(character.targets):
-        name = f"{target.path.rsplit('/', 1)[-1]} {style.label}"
+        name = f"{names[target.path]} {style.label}"
         color = style.shade(k, len(character.targets))
         errors = 1e3 * simulation.position_errors[rows, k]
         log_curve(recording, f"errors/position_mm/{root}{target.path}", times, errors, color, f"{name} [mm]")
@@ -224,10 +226,11 @@ def log_changes(recording: rr.RecordingStream, character: Character, result: Res
     rows = thinned(result.after, samples)
     after = result.after.motion
     before = sample_motion(result.before.motion, after.times[rows])
+    names = distinct_names([motor.path for motor in character.motors])
     for m, motor in enumerate(character.motors):
         change = np.degrees(after.motor_values[rows, m] - before.motor_values[:, m])
         color = STYLES[OPTIMIZED].shade(m, len(character.motors))
-        name = f"{motor.path.rsplit('/', 1)[-1]} [deg]"
+        name = f"{names[motor.path]} [deg]"
         log_curve(recording, f"changes_deg{motor.path}", after.times[rows], change, color, name)
 
 

@@ -5,7 +5,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import synthetic
-from calmotion.shot.playback import deformed_points, rotation_matrices, sample_motion, world_points
+from calmotion.shot import Body, Motion
+from calmotion.shot.playback import (
+    carriers,
+    deformed_points,
+    relative_poses,
+    rotation_matrices,
+    sample_motion,
+    world_points,
+)
 
 
 def test_sampling_at_its_own_steps_returns_the_motion_itself():
@@ -52,3 +60,18 @@ def test_rotation_matrices_turn_as_the_quaternions_do():
     half = 0.25 * np.pi
     matrix = rotation_matrices(np.array([np.cos(half), 0.0, 0.0, np.sin(half)]))
     assert matrix @ [1.0, 0.0, 0.0] == pytest.approx([0.0, 1.0, 0.0])
+
+
+def test_a_nested_body_is_placed_in_the_body_above_it():
+    rng = np.random.default_rng(7)
+    bodies = [Body(path, None, None) for path in ("/R/a/b/c", "/R/a", "/R/ab", "/R/a/x/d")]
+    assert carriers(bodies) == [1, -1, -1, 1]
+    q = rng.normal(size=(5, 2, 4))
+    q /= np.linalg.norm(q, axis=2, keepdims=True)
+    empty = np.zeros((5, 0))
+    c = rng.normal(size=(5, 2, 3))
+    motion = Motion(np.arange(5.0), c, q, (empty, empty), empty, empty, np.zeros((5, 0, 3)), np.zeros((5, 0, 4)))
+    positions, rotations = relative_poses(motion, 0, 1)
+    outer, inner = rotation_matrices(q[:, 1]), rotation_matrices(rotations)
+    assert np.abs(outer @ inner - rotation_matrices(q[:, 0])).max() < 1e-14
+    assert np.abs(np.einsum("fij,fj->fi", outer, positions) + c[:, 1] - c[:, 0]).max() < 1e-14

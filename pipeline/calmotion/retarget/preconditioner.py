@@ -9,6 +9,7 @@ from scipy.sparse import csr_matrix
 from ..dynamics.kinematics import rigid_poses
 from ..dynamics.model import Model
 from ..shot.character import Array, BoolArray, IntArray
+from ..shot.playback import rotation_matrices
 from .curves import DEGREE
 
 
@@ -19,7 +20,7 @@ def rigid_motor_jacobian(model: Model, joint_angles: Array, motors: IntArray) ->
     """
     system, targets = model.system, model.targets
     c, q = rigid_poses(model, joint_angles)
-    R = _matrices(q)
+    R = rotation_matrices(q)
     column = {int(motor): k for k, motor in enumerate(motors)}
     J = np.zeros((len(joint_angles), len(targets.component), 6, len(motors)))
     for k, own in enumerate(targets.component):
@@ -35,16 +36,6 @@ def rigid_motor_jacobian(model: Model, joint_angles: Array, motors: IntArray) ->
                 J[:, k, 3:, column[motor]] += axis
             b = int(system.parent[b])
     return J
-
-
-def _matrices(q: Array) -> Array:
-    w, x, y, z = (q[..., i] for i in range(4))
-    rows = [
-        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-    ]
-    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
 
 
 class RigidPreconditioner:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..dynamics.model import Model
+from ..naming import distinct_names
 from ..shot import LeftOut, Motion, Simulation
 from ..shot.character import Array
 from .curves import TimeGrid
@@ -64,7 +65,8 @@ def left_out_rows(prepared: Prepared) -> list[LeftOut]:
     """What a run of this shot leaves out."""
     character, grid = prepared.character, prepared.grid
     rigid = [body.path for body in character.bodies if body.flexible is None]
-    rows = [LeftOut("finite elements of " + ", ".join(rigid), "rigid: no CalmFlexibleBodyAPI")] if rigid else []
+    names = ", ".join(distinct_names(rigid).values())
+    rows = [LeftOut("finite elements of " + names, "rigid: no CalmFlexibleBodyAPI")] if rigid else []
     rows += [
         LeftOut("nonlinear elasticity of " + body.path, "deflections are taken as small")
         for body in character.bodies

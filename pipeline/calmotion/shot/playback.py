@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from .character import Array, Body
@@ -84,6 +86,35 @@ def rotation_matrices(quaternions: Array) -> Array:
         [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
     ]
     return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+
+
+def carriers(bodies: Sequence[Body]) -> list[int]:
+    """For each body the one whose prim is its nearest ancestor, -1 for none: what its prim is placed in."""
+    index = {body.path: k for k, body in enumerate(bodies)}
+    found = []
+    for body in bodies:
+        path = body.path
+        while path and path not in index or path == body.path:
+            path = path.rpartition("/")[0]
+        found.append(index.get(path, -1))
+    return found
+
+
+def relative_poses(motion: Motion, body: int, carrier: int) -> tuple[Array, Array]:
+    """Pose of a body in another's frame, or in the world for -1.
+
+    Returns:
+        Positions [m], shape [f, 3], and unit quaternions (w, x, y, z), shape [f, 4].
+    """
+    positions, rotations = motion.positions[:, body], motion.rotations[:, body]
+    if carrier < 0:
+        return positions, rotations
+    turned = rotation_matrices(motion.rotations[:, carrier])
+    offset = positions - motion.positions[:, carrier]
+    w, v = motion.rotations[:, carrier, :1], -motion.rotations[:, carrier, 1:]
+    real = w * rotations[:, :1] - np.sum(v * rotations[:, 1:], axis=1, keepdims=True)
+    imaginary = w * rotations[:, 1:] + rotations[:, :1] * v + np.cross(v, rotations[:, 1:])
+    return np.einsum("fji,fj->fi", turned, offset), np.concatenate([real, imaginary], axis=1)
 
 
 def world_points(body: Body, index: int, skin: Skin | None, motion: Motion, row: int) -> list[Array]:
