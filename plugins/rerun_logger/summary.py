@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from calmotion.naming import distinct_names
 from calmotion.shot import Character, Result, Simulation
 
 HEAD = "| target | largest before | largest after | rms before | rms after |\n|---|---:|---:|---:|---:|"
@@ -26,13 +27,14 @@ def judged(simulation: Simulation) -> slice:
 
 def errors_table(character: Character, result: Result) -> str:
     """One row for each target."""
+    names = distinct_names([target.path for target in character.targets])
     rows = []
     for k, target in enumerate(character.targets):
         cells = []
         for measure in (np.max, lambda e: np.sqrt(np.mean(e**2))):
             for simulation in (result.before, result.after):
                 cells.append(error_cell(simulation, k, target.rotation_weight > 0.0, measure))
-        rows.append(f"| `{target.path}` | " + " | ".join(cells) + " |")
+        rows.append(f"| `{names[target.path]}` | " + " | ".join(cells) + " |")
     return "## Errors at the targets\n" + "\n".join([HEAD, *rows])
 
 
@@ -53,11 +55,12 @@ def sizes(character: Character, result: Result) -> str:
         f"- {len(character.bodies)} bodies, {len(character.motors)} motors, {result.dof} position coordinates",
         f"- time step {1e3 * result.step_s:g} ms, pre-roll {result.pre_roll_s:g} s",
     ]
+    names = distinct_names([body.path for body in character.bodies])
     for table in result.modes:
         shown = ", ".join(f"{f:.1f}" for f in table.frequencies[:6])
         more = ", ..." if len(table.frequencies) > 6 else ""
         size = f"{table.nodes} nodes, {table.elements} elements, {table.mass:.3g} kg"
-        lines.append(f"- `{character.bodies[table.body].path}`: {size}; clamped at its parent: {shown}{more} Hz")
+        lines.append(f"- `{names[character.bodies[table.body].path]}`: {size}; clamped at its parent: {shown}{more} Hz")
     if result.after is not None:
         lines.append(f"- {result.iterations} iterations in {result.wall_s:.2f} s, {result.parameters} parameters")
     return "## Model\n" + "\n".join(lines)

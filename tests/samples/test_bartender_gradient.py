@@ -1,0 +1,39 @@
+"""The exact gradient on a whole sample, and its joints (identity 6 of the formulation)."""
+
+import numpy as np
+import pytest
+from calmotion.host import ReducedBodies, Source, open_host
+from calmotion.retarget.curves import make_basis, sample_tracks
+from calmotion.retarget.objective import Objective
+from calmotion.retarget.prepare import Options, prepare
+from calmotion.retarget.problem import RetargetProblem, rigid_motion
+from calmotion.shot import Animation, Character
+
+
+@pytest.fixture(scope="module")
+def problem(repository):
+    shot = repository / "samples" / "bartender" / "bartender.usda"
+    run = open_host([]).run([Source(path=str(shot), command="optimize")], [Character, Animation, ReducedBodies])
+    assert all(result.success for result in run)
+    character, animation = run.get(Character), run.get(Animation)
+    prepared = prepare(character, animation, run.get(ReducedBodies).bodies, Options(step=1 / 120))
+    angles, rates = sample_tracks(animation.tracks, prepared.grid)
+    rigid = rigid_motion(prepared.model, angles, rates, prepared.grid.h)
+    objective = Objective.over(prepared.model, rigid.reference, prepared.grid.times, prepared.grid.h)
+    basis = make_basis(prepared.grid, 0.2, False)
+    motors = np.arange(len(character.motors), dtype=np.int32)
+    return RetargetProblem(prepared.model, prepared.grid, angles, rates, objective, basis, motors, 1e-8, 1e-4, 1e-6)
+
+
+def test_gradient_matches_central_differences_of_the_whole_simulation(problem):
+    rng = np.random.default_rng(0)
+    x, d = 0.01 * rng.normal(size=problem.size), rng.normal(size=problem.size)
+    problem.value(x)
+    assert problem.run.trajectory.max_joint_gap < 1e-6
+    found = float(problem.linearize() @ d)
+
+    def difference(e):
+        return (problem.value(x + e * d) - problem.value(x - e * d)) / (2 * e)
+
+    expected = (4.0 * difference(1e-4) - difference(2e-4)) / 3.0
+    assert abs(found - expected) < 1e-7 * abs(expected)
