@@ -140,3 +140,20 @@ def test_an_inertia_that_is_not_positive_is_refused(tmp_path, diagonal):
     with pytest.raises(ShotError) as caught:
         body(tmp_path, FORE, edit)
     assert (caught.value.path, caught.value.attribute) == (FORE, "physics:diagonalInertia")
+
+
+@pytest.mark.parametrize("value", [0.0, -1.0, float("nan"), float("inf")])
+@pytest.mark.parametrize("path", [BASE, UPPER, FORE])
+def test_an_authored_mass_that_is_not_positive_is_refused(tmp_path, path, value):
+    def edit(stage):
+        UsdPhysics.MassAPI.Apply(stage.GetPrimAtPath(path)).CreateMassAttr(value)
+
+    with pytest.raises(ShotError, match="mass must be positive") as caught:
+        body(tmp_path, path, edit)
+    assert (caught.value.path, caught.value.attribute) == (path, "physics:mass")
+
+
+def test_a_negative_density_is_refused(tmp_path):
+    with pytest.raises(ShotError) as caught:
+        body(tmp_path, UPPER, lambda stage: set_float(stage, CUBE, "physics:density", -2.0))
+    assert (caught.value.path, caught.value.attribute) == (CUBE, "physics:density")

@@ -1,0 +1,51 @@
+"""Motor curves as time samples."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from calmotion.shot import MotorCurve, Track
+from calmotion.usd.clock import Clock
+from calmotion.usd.writing.curves import attribute_spec, author_curves, curve_values, sample_times
+from pxr import Sdf
+
+FRAMES = np.arange(13) / 24.0
+CURVE = MotorCurve(0, True, FRAMES, 0.3 * np.sin(9.0 * FRAMES), 0.3)
+
+
+@pytest.mark.parametrize(("rate", "parts"), [(24.0, 1), (25.0, 2), (96.0, 4), (1.0, 1)])
+def test_samples_are_at_least_as_dense_as_asked_for_and_hold_the_frames(rate, parts):
+    times = sample_times(FRAMES, rate)
+    assert len(times) == 12 * parts + 1
+    assert np.allclose(times[::parts], FRAMES)
+
+
+def test_between_frames_a_curve_is_what_its_frames_are_read_back_as():
+    from calmotion.retarget.curves import interpolate
+
+    times = sample_times(FRAMES, 240.0)
+    read_back = interpolate(Track(FRAMES, CURVE.frame_values), 0.5)
+    assert np.array_equal(curve_values(CURVE, FRAMES, times), read_back(times))
+    assert curve_values(CURVE, FRAMES, FRAMES) is CURVE.frame_values
+
+
+def test_values_are_degrees_at_the_time_codes_of_the_stage():
+    layer = Sdf.Layer.CreateAnonymous(".usda")
+    motor = SimpleNamespace(path="/arm/elbow", attribute="drive:angular:physics:targetPosition")
+    clock = Clock(start=101, end=113, time_codes_per_second=24, frames_per_second=24)
+    written = author_curves(layer, SimpleNamespace(motors=[motor]), (CURVE,), FRAMES, FRAMES, clock)
+    path = f"{motor.path}.{motor.attribute}"
+    assert written == {path: 13}
+    assert layer.ListTimeSamplesForPath(path) == list(range(101, 114))
+    assert layer.QueryTimeSample(path, 105) == pytest.approx(np.rad2deg(CURVE.frame_values[4]), abs=1e-5)
+    assert layer.GetAttributeAtPath(path).typeName == Sdf.ValueTypeNames.Float
+
+
+def test_the_prims_above_an_attribute_are_overs():
+    layer = Sdf.Layer.CreateAnonymous(".usda")
+    spec = attribute_spec(layer, "/a/b.size", Sdf.ValueTypeNames.Double)
+    assert attribute_spec(layer, "/a/b.size", Sdf.ValueTypeNames.Double) == spec
+    for path in ("/a", "/a/b"):
+        assert layer.GetPrimAtPath(path).specifier == Sdf.SpecifierOver
