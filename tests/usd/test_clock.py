@@ -49,3 +49,8 @@ def test_a_shot_without_duration_is_refused(values):
 def test_samples_at_one_time_alone_are_no_shot():
     with pytest.raises(ShotError, match="one time code"):
         clock_of(Usd.Stage.CreateInMemory(), np.array([4.0]))
+
+
+def test_time_codes_of_whole_seconds_are_no_frames():
+    clock = clock_of(stage_with(timeCodesPerSecond=1, startTimeCode=0, endTimeCode=2), [])
+    assert clock.frames_per_second == 24.0 and len(clock.frame_times()) == 49

@@ -9,6 +9,8 @@ import numpy as np
 from ..errors import ShotError
 from ..shot.character import Array
 
+_COARSEST = 10.0  # time codes in a second, below which they are not frames
+
 
 @dataclass(frozen=True)
 class Clock:
@@ -44,7 +46,8 @@ def clock_of(stage, sample_codes: Array) -> Clock:
     """The clock of a stage.
 
     The range is that of the stage; where start or end is not authored, that of the samples. A frame is
-    1/framesPerSecond where that is authored, else one time code.
+    1/framesPerSecond where that is authored, else one time code; but where time codes are so coarse that they must
+    be seconds or the like, USD's fallback of 24 frames a second.
 
     Args:
         stage: The Usd.Stage.
@@ -64,7 +67,8 @@ def clock_of(stage, sample_codes: Array) -> Clock:
     if end is None and len(sample_codes):
         end = float(np.max(sample_codes))
     rate = float(stage.GetTimeCodesPerSecond())
-    frames = next((x.framesPerSecond for x in layers if x.HasFramesPerSecond()), rate)
+    unauthored = rate if rate >= _COARSEST else float(stage.GetFramesPerSecond())
+    frames = next((x.framesPerSecond for x in layers if x.HasFramesPerSecond()), unauthored)
     for name, found in (("timeCodesPerSecond", rate), ("framesPerSecond", frames)):
         if not (np.isfinite(found) and found > 0.0):
             raise ShotError(

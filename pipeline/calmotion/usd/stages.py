@@ -138,12 +138,12 @@ def role_of(layer) -> str:
     return str(ours.get("role", "")) if isinstance(ours, dict) else ""
 
 
-def earlier_layers(stage) -> tuple[str, ...]:
+def earlier_layers(stage, roles: tuple[str, ...] = (CURVES, MOTION)) -> tuple[str, ...]:
     """Identifiers of the layers in a stage that hold curves or motions that we computed."""
     return tuple(
         layer.identifier
         for layer in stage.GetUsedLayers(True)
-        if role_of(layer) in (CURVES, MOTION) and layer != stage.GetRootLayer()
+        if role_of(layer) in roles and layer != stage.GetRootLayer()
     )
 
 

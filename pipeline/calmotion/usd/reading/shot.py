@@ -40,6 +40,7 @@ def read_shot(path: str) -> tuple[Character, Animation, Provenance]:
         reading, clock = _start_reading(stage)
         skeleton = read_skeleton(reading)
         tracks = _tracks(stage, skeleton, clock, reading.notes)
+        _note_dense_samples(tracks, clock, reading)
         character = build_character(reading, skeleton)
         current = tracks
         if earlier:
@@ -70,6 +71,16 @@ def _tracks(stage, skeleton: Skeleton, clock: Clock, notes: list[str]) -> tuple[
         attribute = stage.GetAttributeAtPath(drive.attribute.GetPath())
         found.append(read_track(attribute, clock, notes))
     return tuple(found)
+
+
+def _note_dense_samples(tracks: tuple[Track, ...], clock: Clock, reading: Reading) -> None:
+    """Say so where the animation has more detail than the frames, at which curves are written."""
+    frame = 1.0 / clock.frames_per_second
+    if any(len(track.times) > 1 and np.median(np.diff(track.times)) < 0.75 * frame for track in tracks):
+        reading.note(
+            f"the animation is sampled more densely than its {clock.frames_per_second:g} frames a second, at which "
+            "curves are written unless more samples are asked for"
+        )
 
 
 def _provenance(path: str, stage, reading: Reading, clock: Clock, earlier: tuple[str, ...]) -> Provenance:

@@ -12,7 +12,7 @@ from ..clock import Clock
 from ..layers import refuse_input_as_output, write_layer
 from . import bake, metadata, motions
 from .curves import author_curves, sample_times
-from .root import root_path, write_root
+from .root import keeps_earlier_curves, root_path, write_root
 
 BAKES = ("none", "motors", "simulated")
 
@@ -98,8 +98,9 @@ def refuse_inputs(provenance: Provenance, output: str) -> None:
 
 
 def _curves_to_write(result: Result, provenance: Provenance) -> tuple[MotorCurve, ...]:
-    """The curves that changed; all of them over an earlier result, whose own curves would show through."""
-    return tuple(curve for curve in result.curves if curve.changed or provenance.earlier_layers)
+    """The curves that changed; all of them where curves of an earlier result would show through."""
+    every = keeps_earlier_curves(provenance)
+    return tuple(curve for curve in result.curves if curve.changed or every)
 
 
 def _bake(

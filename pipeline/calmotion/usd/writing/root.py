@@ -62,6 +62,14 @@ def shot_layers(shot: str, replaced: tuple[str, ...]) -> list[str]:
     return found
 
 
+def keeps_earlier_curves(provenance: Provenance) -> bool:
+    """Whether curves of an earlier result stay below new ones, since no root layer of ours opens them."""
+    if not provenance.earlier_layers:
+        return False
+    below = shot_layers(provenance.shot, (stages.CURVES, stages.MOTION))
+    return any(stages.earlier_layers(stages.open_stage(path), (stages.CURVES,)) for path in below)
+
+
 def relative_asset(path: str, folder: str) -> str:
     """An asset path relative to a folder, `./` in front; absolute where there is no relative one (another drive)."""
     try:

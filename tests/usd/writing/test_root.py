@@ -1,0 +1,99 @@
+"""Root layers, and results over results."""
+
+from __future__ import annotations
+
+import shutil
+
+import numpy as np
+import pytest
+from calmotion import ShotError
+from calmotion.usd import stages
+from calmotion.usd.reading import read_shot
+from calmotion.usd.writing.root import keeps_earlier_curves, relative_asset, root_path, shot_layers, write_root
+from pxr import Sdf, Usd
+from small_shots import SHOULDER, TARGET_POSITION, write_arm
+
+
+def layer_of_ours(path, role: str, value: float):
+    layer = Sdf.Layer.CreateAnonymous(".usda")
+    layer.customLayerData = {"calmotion": {"role": role}}
+    prim = Sdf.CreatePrimInLayer(layer, SHOULDER)
+    attribute = Sdf.AttributeSpec(prim, TARGET_POSITION, Sdf.ValueTypeNames.Float)
+    for frame in range(25):
+        layer.SetTimeSample(attribute.path, frame, value)
+    layer.Export(str(path))
+    return str(path)
+
+
+def root_over(shot, path, role: str, value: float) -> str:
+    """Write a layer of ours and its root layer; returns the root's path."""
+    _, _, provenance = read_shot(str(shot))
+    return write_root(layer_of_ours(path, role, value), provenance, role)
+
+
+def first_value(root: str) -> float:
+    stage = Usd.Stage.Open(root)
+    return stage.GetAttributeAtPath(f"{SHOULDER}.{TARGET_POSITION}").Get(12)
+
+
+def names(paths) -> list[str]:
+    return [str(path).split("/")[-1] for path in paths]
+
+
+def test_the_root_stands_beside_its_layer_and_can_be_moved_with_the_shot(tmp_path):
+    (tmp_path / "here" / "out").mkdir(parents=True)
+    shot = write_arm(tmp_path / "here" / "arm.usda")
+    root = root_over(shot, tmp_path / "here" / "out" / "calm.usda", stages.CURVES, 5.0)
+    assert root == root_path(str(tmp_path / "here" / "out" / "calm.usda")) and root.endswith("calm_root.usda")
+    assert list(Sdf.Layer.FindOrOpen(root).subLayerPaths) == ["./calm.usda", "../arm.usda"]
+    shutil.move(tmp_path / "here", tmp_path / "there")
+    assert first_value(str(tmp_path / "there" / "out" / "calm_root.usda")) == 5.0
+
+
+def test_new_curves_replace_earlier_ones_and_the_intent_stays(tmp_path):
+    shot = write_arm(tmp_path / "arm.usda")
+    first = root_over(shot, tmp_path / "one.usda", stages.CURVES, 5.0)
+    second = root_over(first, tmp_path / "two.usda", stages.CURVES, 7.0)
+    assert names(Sdf.Layer.FindOrOpen(second).subLayerPaths) == ["two.usda", "arm.usda"]
+    intent = read_shot(str(shot))[1].tracks
+    _, animation, provenance = read_shot(second)
+    assert np.array_equal(animation.tracks[0].values, intent[0].values)
+    assert np.allclose(animation.current[0].values, np.deg2rad(7.0))
+    assert provenance.earlier_layers == ("two.usda",)
+    assert not keeps_earlier_curves(provenance)
+
+
+def test_a_motion_over_a_result_keeps_its_curves(tmp_path):
+    shot = write_arm(tmp_path / "arm.usda")
+    calm = root_over(shot, tmp_path / "calm.usda", stages.CURVES, 5.0)
+    layer = layer_of_ours(tmp_path / "moved.usda", stages.MOTION, 5.0)
+    moved = write_root(layer, read_shot(calm)[2], stages.MOTION)
+    assert names(Sdf.Layer.FindOrOpen(moved).subLayerPaths) == ["moved.usda", "calm.usda", "arm.usda"]
+    assert names(shot_layers(moved, (stages.CURVES, stages.MOTION))) == ["arm.usda"]
+    assert names(shot_layers(moved, (stages.MOTION,))) == ["calm.usda", "arm.usda"]
+
+
+def test_curves_that_somebody_took_into_a_shot_of_their_own_are_noticed(tmp_path):
+    write_arm(tmp_path / "arm.usda")
+    layer_of_ours(tmp_path / "calm.usda", stages.CURVES, 5.0)
+    own = tmp_path / "own.usda"
+    own.write_text(
+        "#usda 1.0\n(\n startTimeCode = 0\n endTimeCode = 24\n timeCodesPerSecond = 24\n metersPerUnit = 1\n"
+        " subLayers = [@./calm.usda@, @./arm.usda@]\n)\n"
+    )
+    _, animation, provenance = read_shot(str(own))
+    assert provenance.earlier_layers == ("calm.usda",) and keeps_earlier_curves(provenance)
+    assert np.ptp(animation.tracks[0].values) > 0.1 and np.ptp(animation.current[0].values) == 0.0
+
+
+def test_a_root_that_does_not_compose_is_not_left_behind(tmp_path):
+    shot = write_arm(tmp_path / "arm.usda")
+    _, _, provenance = read_shot(str(shot))
+    with pytest.raises(ShotError):
+        write_root(str(tmp_path / "never_written.usda"), provenance, stages.CURVES)
+    assert names(tmp_path.iterdir()) == ["arm.usda"]
+
+
+def test_assets_are_relative_with_a_leading_dot(tmp_path):
+    assert relative_asset(str(tmp_path / "a.usda"), str(tmp_path)) == "./a.usda"
+    assert relative_asset(str(tmp_path / "a.usda"), str(tmp_path / "b")) == "../a.usda"
