@@ -5,8 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from calmotion.dynamics.system import System, allocate_state
+from calmotion.dynamics.system import LINEAR, NEOHOOKEAN, STVK, System, allocate_state
 from scipy.spatial.transform import Rotation
+
+POINTS = 4
 
 
 @dataclass
@@ -31,6 +33,36 @@ def random_particles(rng, r: int, count: int = 12) -> Particles:
 def axial(T):
     """axial(y z^T) = y x z over the last two axes."""
     return np.stack([T[..., 1, 2] - T[..., 2, 1], T[..., 2, 0] - T[..., 0, 2], T[..., 0, 1] - T[..., 1, 0]], axis=-1)
+
+
+def nonlinear(system, laws, rng, stiffness=50.0) -> System:
+    """The system with random nonlinear elasticity: a law for each component, LINEAR keeps what it has."""
+    starts, arrays, size = [], [], 0
+    lame = np.tile([0.3, 0.2], (len(laws), 1)) * stiffness
+    for law, r in zip(laws, system.elastic, strict=True):
+        data = np.zeros(0)
+        if law == STVK:
+            pairs = r + r * (r + 1) // 2
+            fields = np.eye(pairs, pairs + 3) + 0.3 * rng.normal(size=(pairs, pairs + 3))
+            data = stiffness * fields @ fields.T
+        elif law == NEOHOOKEAN:
+            gradients = 0.3 * rng.normal(size=(POINTS, 9 * r))
+            points = np.hstack([rng.uniform(0.5, 1.5, (POINTS, 1)), gradients])
+            data = np.concatenate([stiffness * np.eye(r).ravel(), points.ravel()])
+        starts.append(size)
+        arrays.append(data.ravel())
+        size += data.size
+    law = np.array(laws, dtype=np.int32)
+    kept = np.where(law[:, None] == LINEAR, 1.0, 0.0)
+    return system._replace(
+        law=law,
+        stiffness=system.stiffness * kept,
+        retardation=np.where(law == LINEAR, 0.0, 0.02),
+        lame=lame,
+        points=np.where(law == NEOHOOKEAN, POINTS, 0).astype(np.int32),
+        data_start=np.array(starts, dtype=np.int64),
+        data=np.concatenate(arrays),
+    )
 
 
 def particle_system(rng, parents, elastic, rows=None, stiffness=50.0) -> tuple[System, list[Particles]]:
@@ -64,6 +96,12 @@ def particle_system(rng, parents, elastic, rows=None, stiffness=50.0) -> tuple[S
         axial=pad((size, size, 3), [axial(s) for s in S]),
         stiffness=pad((size,), [np.full(r, stiffness) * (1 + np.arange(r)) for r in elastic]),
         damping=pad((size,), [np.full(r, 0.4) for r in elastic]),
+        law=np.zeros(count, dtype=np.int32),
+        retardation=np.zeros(count),
+        lame=np.zeros((count, 2)),
+        points=np.zeros(count, dtype=np.int32),
+        data_start=np.zeros(count, dtype=np.int64),
+        data=np.zeros(0),
         position=rng.normal(size=(count, 2, 3)) * 0.2,
         rotation=Rotation.random(2 * count, random_state=7).as_matrix().reshape(count, 2, 3, 3),
         Phi=Phi,

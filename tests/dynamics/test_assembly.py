@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from calmotion.dynamics.assembly import allocate_work, assemble
 from calmotion.dynamics.so3 import turn
-from calmotion.dynamics.system import Blocks, Scheme, State, allocate_blocks
+from calmotion.dynamics.system import LINEAR, NEOHOOKEAN, STVK, Blocks, Scheme, State, allocate_blocks
 from dense import dense_matrix, join, offsets, split
-from particles import particle_system, random_state
+from particles import nonlinear, particle_system, random_state
 from scipy.spatial.transform import Rotation
 
 TREES = {
@@ -14,7 +14,9 @@ TREES = {
     "flexible chain": ([-1, 0, 1], [2, 3, 1], [6, 6, 6]),
     "branches, hinges, rigid among flexible": ([-1, 0, 1, 0, 3], [2, 0, 3, 4, 1], [6, 5, 6, 6, 5]),
     "two roots, one floating": ([-1, -1, 0], [2, 1, 2], [6, 0, 5]),
+    "bodies of large deflection": ([-1, 0, 1, 0], [2, 3, 0, 2], [6, 5, 6, 6]),
 }
+LAWS = {"bodies of large deflection": [STVK, NEOHOOKEAN, LINEAR, LINEAR]}
 
 
 @pytest.mark.parametrize("name", TREES)
@@ -23,6 +25,8 @@ def test_blocks_are_the_derivative_of_the_residual(name, scheme):
     parents, elastic, rows = TREES[name]
     rng = np.random.default_rng(0)
     system, _ = particle_system(rng, parents, elastic, rows)
+    if name in LAWS:
+        system = nonlinear(system, LAWS[name], rng)
     count, size = len(parents), system.size
     state = random_state(rng, system)
     state.lam[system.rows == 0] = 0.0

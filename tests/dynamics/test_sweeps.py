@@ -6,8 +6,8 @@ from calmotion.dynamics.kinematics import _rigid_poses
 from calmotion.dynamics.linearization import linearize
 from calmotion.dynamics.simulation import Workspace, simulate
 from calmotion.dynamics.sweeps import adjoint, tangent
-from calmotion.dynamics.system import allocate_state
-from particles import particle_system
+from calmotion.dynamics.system import LINEAR, NEOHOOKEAN, STVK, allocate_state
+from particles import nonlinear, particle_system
 from scipy.spatial.transform import Rotation
 
 H = 0.01
@@ -32,9 +32,11 @@ def curves(p):
 class Case:
     """A tree with free hinges, and a random linear functional of its motion."""
 
-    def __init__(self, rows, seed=0):
+    def __init__(self, rows, laws=None, seed=0):
         rng = np.random.default_rng(seed)
         self.system, _ = particle_system(rng, [-1, 0, 1, 0], [2, 0, 3, 2], rows, stiffness=3000.0)
+        if laws is not None:
+            self.system = nonlinear(self.system, laws, rng, stiffness=3000.0)
         self.p = 0.3 * rng.normal(size=(4, 4))
         self.dp = rng.normal(size=(4, 4))
         self.ws = Workspace.for_system(self.system)
@@ -62,9 +64,16 @@ class Case:
         return out
 
 
-@pytest.fixture(scope="module", params=[[6, 6, 6, 6], [6, 6, 5, 6]], ids=["driven", "with a free hinge"])
+CASES = {
+    "driven": ([6, 6, 6, 6], None),
+    "with a free hinge": ([6, 6, 5, 6], None),
+    "bodies of large deflection": ([6, 6, 6, 6], [STVK, LINEAR, NEOHOOKEAN, LINEAR]),
+}
+
+
+@pytest.fixture(scope="module", params=CASES.values(), ids=CASES)
 def case(request):
-    case = Case(request.param)
+    case = Case(*request.param)
     trajectory, angles, rates = case.simulate(case.p)
     lin = linearize(case.system, trajectory, angles, rates, case.ws)
     return case, lin, case.gradient(trajectory.states)

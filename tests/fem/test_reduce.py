@@ -77,7 +77,7 @@ def test_a_skin_moves_with_the_body(mesh, body, anchors):
     points = np.array([[0.0, 0.005, 0.005], [0.6, 0.0, 0.0], [0.3, 0.0, 0.0101]])
     surface = SurfaceMesh("/Arm/link/skin", points, np.array([[0, 1, 2]], dtype=np.int32))
     reduced = reduce_body(mesh, body, anchors, [surface], 1)
-    skin, = reduced.skin
+    (skin,) = reduced.skin
     assert skin.shape == (3, 3, len(reduced.stiffness))
     assert np.abs(skin[0]).max() < 1e-12
     assert np.abs(skin[1] - reduced.markers[2].Phi).max() < 1e-10
@@ -95,14 +95,6 @@ def test_damping_is_modal_or_rayleigh(plastic):
     omega_squared = np.array([4.0, 9.0])
     assert np.allclose(modal_damping(omega_squared, plastic), 2 * 0.01 * np.array([2.0, 3.0]))
     assert np.allclose(modal_damping(omega_squared, replace(plastic, rayleigh=(0.5, 0.1))), [0.9, 1.4])
-
-
-@pytest.mark.parametrize("elasticity", ["stvk", "neohookean"])
-def test_what_is_not_supported_is_refused(mesh, body, anchors, elasticity):
-    bent = replace(body, flexible=replace(body.flexible, elasticity=elasticity))
-    with pytest.raises(ShotError, match="not supported yet") as caught:
-        reduce_body(mesh, bent, anchors, [], 1)
-    assert caught.value.attribute == "calm:flexible:elasticity" and caught.value.found == elasticity
 
 
 @pytest.mark.parametrize(

@@ -8,15 +8,18 @@ import numpy as np
 
 from ..kernels import kernel
 from ..shot.character import Array
+from .elastic import stvk_forces
 from .inertia import body_residual, deformed_integrals, mass_matrix, position_jacobian, velocity_jacobian
 from .joints import add_skew, apply_wrench, constraint_residual, joint_kinematics, joint_tangent
 from .markers import MarkerWork, add_wrench_stiffness, allocate_marker, marker_jacobian
+from .neohookean import neohookean_forces
 from .so3 import matrix_of
-from .system import JOINT_ROWS, System
+from .system import JOINT_ROWS, NEOHOOKEAN, STVK, System
 
 
 class Work(NamedTuple):
-    """Scratch of `assemble`: rotations of all bodies, integrals of one body, two markers, small matrices."""
+    """Scratch of `assemble`: rotations of all bodies, integrals of one body, two markers, small matrices, and what
+    the forces of nonlinear bodies need (empty where there is none)."""
 
     R: Array
     s: Array
@@ -33,6 +36,10 @@ class Work(NamedTuple):
     M: Array
     tau: Array
     wrench: Array
+    strain: Array
+    rows: Array
+    row: Array
+    point: Array
     i: MarkerWork
     j: MarkerWork
 
@@ -40,11 +47,15 @@ class Work(NamedTuple):
 def allocate_work(system: System) -> Work:
     """Scratch for one system."""
     r = system.size - 6
+    pairs = r + r * (r + 1) // 2 if np.any(system.law == STVK) else 0
+    points = 18 if np.any(system.law == NEOHOOKEAN) else 0
+    nonlinear = r if pairs or points else 0
     return Work(
         np.zeros((len(system.parent), 3, 3)), np.zeros(3), np.zeros((3, 3)), np.zeros((r, 3, 3)), np.zeros((3, 3)),
         np.zeros((3, 3)), np.zeros((3, 3)), np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(3), np.zeros((3, 3)),
-        np.zeros((3, 3)), np.zeros(3), np.zeros((2, JOINT_ROWS)), allocate_marker(system.size),
-        allocate_marker(system.size),
+        np.zeros((3, 3)), np.zeros(3), np.zeros((2, JOINT_ROWS)), np.zeros(pairs),
+        np.zeros((max(nonlinear, points), max(pairs, nonlinear))), np.zeros(nonlinear), np.zeros((points, points)),
+        allocate_marker(system.size), allocate_marker(system.size),
     )  # fmt: skip
 
 
@@ -62,6 +73,22 @@ def _body_rows(system, b, ydd_world, V, Vd, u, w, res):
         r, system.mass[b], system.M3[b], system.S[b], system.axial[b], system.stiffness[b], system.damping[b],
         w.a, V[b, 3:6], Vd[b, 3:6], u[b], V[b, 6:], Vd[b, 6:], w.s, w.Z, w.B, w.W, w.tmp, res,
     )  # fmt: skip
+
+
+@kernel
+def _add_elastic_forces(system, b, u, v, tangent, w, res, P, K):
+    """Forces of a body of nonlinear material; a linear one has its own in `body_residual`."""
+    r = system.elastic[b]
+    if system.law[b] == STVK:
+        stvk_forces(
+            r, u, v, system.retardation[b], system.data_start[b], system.data, tangent, w.strain, w.rows, w.row, res,
+            P, K,
+        )  # fmt: skip
+    elif system.law[b] == NEOHOOKEAN:
+        neohookean_forces(
+            r, u, v, system.lame[b, 0], system.lame[b, 1], system.retardation[b], system.data_start[b],
+            system.points[b], system.data, tangent, w.point, w.rows, res, P, K,
+        )  # fmt: skip
 
 
 @kernel
@@ -85,7 +112,9 @@ def assemble(system, scheme, c, q, u, V, Vd, lam, angle, rate, Hv, tangent, w, b
         r = system.elastic[b]
         n = 6 + r
         _body_rows(system, b, Vd[b], V, Vd, u, w, blocks.res[b])
-        if tangent:
+        if not tangent:
+            _add_elastic_forces(system, b, u[b], V[b, 6:], False, w, blocks.res[b], blocks.P[b], blocks.K[b])
+        else:
             D, P, K = blocks.D[b], blocks.P[b], blocks.K[b]
             mass_matrix(r, system.mass[b], system.M3[b], w.s, w.Z, w.B, D)
             velocity_jacobian(
@@ -95,6 +124,7 @@ def assemble(system, scheme, c, q, u, V, Vd, lam, angle, rate, Hv, tangent, w, b
                 r, system.M3[b], system.S[b], system.axial[b], system.stiffness[b], w.a, V[b, 3:6], V[b, 6:],
                 Vd[b, 6:], w.B, w.W, D, w.E, w.T, w.tmp, K,
             )  # fmt: skip
+            _add_elastic_forces(system, b, u[b], V[b, 6:], True, w, blocks.res[b], P, K)
             beta = Hv[b, 0, 0]
             for i in range(n):
                 for k in range(n):
@@ -155,10 +185,11 @@ def assemble(system, scheme, c, q, u, V, Vd, lam, angle, rate, Hv, tangent, w, b
             for k in range(n):
                 blocks.K[b, a, k] += g0 * w.j.Jf[0, k] + g1 * w.j.Jf[1, k] + g2 * w.j.Jf[2, k]
         add_wrench_stiffness(
-            rb, system.rotation[b, 1], system.Phi[b, 1], system.Psi[b, 1], w.wrench[1, :3], t, -1.0, w.j, blocks.K[b]
-        )
+            rb, system.law[b], system.rotation[b, 1], system.Phi[b, 1], system.Psi[b, 1], w.wrench[1, :3], t, -1.0, w.j,
+            blocks.K[b],
+        )  # fmt: skip
         if p >= 0:
             add_wrench_stiffness(
-                system.elastic[p], system.rotation[b, 0], system.Phi[b, 0], system.Psi[b, 0], w.wrench[0, :3], w.tau,
-                1.0, w.i, blocks.K[p],
+                system.elastic[p], system.law[p], system.rotation[b, 0], system.Phi[b, 0], system.Psi[b, 0],
+                w.wrench[0, :3], w.tau, 1.0, w.i, blocks.K[p],
             )  # fmt: skip

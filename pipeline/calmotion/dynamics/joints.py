@@ -52,12 +52,12 @@ def joint_kinematics(system, b, c, u, V, w):
         fixed_marker(system.position[b, 0], system.rotation[b, 0], w.i)
     else:
         marker_values(
-            system.elastic[p], system.position[b, 0], system.rotation[b, 0], system.Phi[b, 0], system.Psi[b, 0],
-            c[p], w.R[p], u[p], V[p], w.i,
+            system.elastic[p], system.law[p], system.position[b, 0], system.rotation[b, 0], system.Phi[b, 0],
+            system.Psi[b, 0], c[p], w.R[p], u[p], V[p], w.i,
         )  # fmt: skip
     marker_values(
-        system.elastic[b], system.position[b, 1], system.rotation[b, 1], system.Phi[b, 1], system.Psi[b, 1],
-        c[b], w.R[b], u[b], V[b], w.j,
+        system.elastic[b], system.law[b], system.position[b, 1], system.rotation[b, 1], system.Phi[b, 1],
+        system.Psi[b, 1], c[b], w.R[b], u[b], V[b], w.j,
     )  # fmt: skip
     for i in range(3):
         for k in range(3):
@@ -163,7 +163,7 @@ def joint_tangent(system, b, scheme, Hv, V, w, blocks):
     n = 6 + rb
     hinge = system.rows[b] == 5
     gamma, alpha = scheme.gamma, scheme.alpha
-    marker_velocity_jacobian(rb, system.rotation[b, 1], system.Phi[b, 1], system.Psi[b, 1], V[b], w.j)
+    marker_velocity_jacobian(rb, system.law[b], system.rotation[b, 1], system.Phi[b, 1], system.Psi[b, 1], V[b], w.j)
     _rows_by_multipliers(n, w.R[b], w.j, w.Q, -1.0, blocks.Lc[b])
     _position_rows(n, w.R[b], w.j, gamma, alpha, 1.0, Hv[b], blocks.Hc[b])
     # dc by the turning of side j is M Q, by that of side i -M
@@ -201,7 +201,9 @@ def joint_tangent(system, b, scheme, Hv, V, w, blocks):
     if p >= 0:
         rp = system.elastic[p]
         np_ = 6 + rp
-        marker_velocity_jacobian(rp, system.rotation[b, 0], system.Phi[b, 0], system.Psi[b, 0], V[p], w.i)
+        marker_velocity_jacobian(
+            rp, system.law[p], system.rotation[b, 0], system.Phi[b, 0], system.Psi[b, 0], V[p], w.i
+        )
         for i in range(3):
             for k in range(3):
                 w.E[i, k] = 1.0 if i == k else 0.0

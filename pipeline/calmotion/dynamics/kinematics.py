@@ -69,14 +69,14 @@ def rigid_state(model: Model, joint_angles: Array) -> State:
 
 
 @allocating_kernel
-def _target_frames(targets, elastic, c, q, u, m, R, positions, quaternions):
+def _target_frames(targets, elastic, law, c, q, u, m, R, positions, quaternions):
     component, position, rotation, Phi, Psi = targets
     V = np.zeros(6 + u.shape[2])
     for n in range(c.shape[0]):
         for k in range(len(component)):
             b = component[k]
             matrix_of(q[n, b], R)
-            marker_values(elastic[b], position[k], rotation[k], Phi[k], Psi[k], c[n, b], R, u[n, b], V, m)
+            marker_values(elastic[b], law[b], position[k], rotation[k], Phi[k], Psi[k], c[n, b], R, u[n, b], V, m)
             for i in range(3):
                 positions[n, k, i] = m.p[i]
             quaternion_of(m.R, quaternions[n, k])
@@ -93,14 +93,14 @@ def target_frames(model: Model, c: Array, q: Array, u: Array) -> tuple[Array, Ar
     count = len(model.targets.component)
     positions, quaternions = np.zeros((len(c), count, 3)), np.zeros((len(c), count, 4))
     _target_frames(
-        target_arrays(model), model.system.elastic, c, q, u, allocate_marker(model.system.size), np.zeros((3, 3)),
-        positions, quaternions,
+        target_arrays(model), model.system.elastic, model.system.law, c, q, u, allocate_marker(model.system.size),
+        np.zeros((3, 3)), positions, quaternions,
     )  # fmt: skip
     return positions, quaternions
 
 
 @allocating_kernel
-def _target_jacobians(targets, elastic, c, q, u, m, R, J):
+def _target_jacobians(targets, elastic, law, c, q, u, m, R, J):
     component, position, rotation, Phi, Psi = targets
     V = np.zeros(6 + u.shape[2])
     for n in range(c.shape[0]):
@@ -108,7 +108,7 @@ def _target_jacobians(targets, elastic, c, q, u, m, R, J):
             b = component[k]
             r = elastic[b]
             matrix_of(q[n, b], R)
-            marker_values(r, position[k], rotation[k], Phi[k], Psi[k], c[n, b], R, u[n, b], V, m)
+            marker_values(r, law[b], position[k], rotation[k], Phi[k], Psi[k], c[n, b], R, u[n, b], V, m)
             marker_jacobian(r, rotation[k], Phi[k], Psi[k], m)
             for a in range(6 + r):
                 for i in range(3):
@@ -121,6 +121,14 @@ def target_jacobians(model: Model, c: Array, q: Array, u: Array) -> Array:
     rows 0-2 the position in world axes, rows 3-5 the turning in the target's own axes."""
     J = np.zeros((len(c), len(model.targets.component), 6, model.system.size))
     _target_jacobians(
-        target_arrays(model), model.system.elastic, c, q, u, allocate_marker(model.system.size), np.zeros((3, 3)), J
+        target_arrays(model),
+        model.system.elastic,
+        model.system.law,
+        c,
+        q,
+        u,
+        allocate_marker(model.system.size),
+        np.zeros((3, 3)),
+        J,
     )
     return J

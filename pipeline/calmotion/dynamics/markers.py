@@ -5,6 +5,8 @@ A marker sits at y = X + Phi u in the body frame and is turned by exp(psi), psi 
     p = c + R y            p' = w + R (omega x y + Phi v)
     R_m = R exp(psi) R_0   omega_m = R_0^T ( exp(-psi) omega + J_r(psi) Psi v )
 
+(On bodies of large deflection another map stands for exp, and its Jacobian for J_r: `finite_rotation`.)
+
 World axes for p and p', marker axes for omega_m. A force f (world) and a moment t (marker axes) at the marker
 do the virtual work f . dp + t . dphi_m, hence the generalised force (R^T f, y x R^T f + exp(psi) R_0 t,
 Phi^T R^T f + Psi^T J_r^T R_0 t) on (R^T dc, dphi, du).
@@ -18,7 +20,8 @@ import numpy as np
 
 from ..kernels import kernel
 from ..shot.character import Array
-from .so3 import cross, exponential, right_jacobian, right_jacobian_derivative
+from .finite_rotation import interface_rotation, interface_rotation_derivative
+from .so3 import cross
 
 
 class MarkerWork(NamedTuple):
@@ -66,7 +69,7 @@ def fixed_marker(position, rotation, m):
 
 
 @kernel
-def marker_values(r, position, rotation, Phi, Psi, c, Rb, u, V, m):
+def marker_values(r, kind, position, rotation, Phi, Psi, c, Rb, u, V, m):
     """Position, velocity, rotation and angular velocity of the marker, into m."""
     om = V[3:6]
     for i in range(3):
@@ -86,8 +89,7 @@ def marker_values(r, position, rotation, Phi, Psi, c, Rb, u, V, m):
     cross(om, m.y, m.yd)
     for i in range(3):
         m.yd[i] += m.p[i]
-    exponential(m.psi, m.ex)
-    right_jacobian(m.psi, m.jr)
+    interface_rotation(kind, m.psi, m.ex, m.jr)
     for i in range(3):
         p = c[i]
         pd = V[i]
@@ -160,7 +162,7 @@ def marker_jacobian(r, rotation, Phi, Psi, m):
 
 
 @kernel
-def marker_velocity_jacobian(r, rotation, Phi, Psi, V, m):
+def marker_velocity_jacobian(r, kind, rotation, Phi, Psi, V, m):
     """Gp and Gf of the marker; needs `marker_values` first."""
     om = V[3:6]
     for i in range(3):
@@ -172,7 +174,7 @@ def marker_velocity_jacobian(r, rotation, Phi, Psi, V, m):
             m.Gp[i, 6 + j] = om[k] * Phi[n, j] - om[n] * Phi[k, j]
     _minus_skew(m.yd, m.Gp, 3)
     # d(exp(-psi) omega) = [e]x J_r dpsi, and d(J_r(psi) psid)
-    right_jacobian_derivative(m.psi, m.psid, 1.0, m.A)
+    interface_rotation_derivative(kind, m.psi, m.psid, 1.0, m.A)
     for i in range(3):
         k, n = (i + 1) % 3, (i + 2) % 3
         for l in range(3):
@@ -181,7 +183,7 @@ def marker_velocity_jacobian(r, rotation, Phi, Psi, V, m):
 
 
 @kernel
-def add_wrench_stiffness(r, rotation, Phi, Psi, f, t, sign, m, K):
+def add_wrench_stiffness(r, kind, rotation, Phi, Psi, f, t, sign, m, K):
     """K += sign * d(generalised force)/d(R^T dc, dphi, du) for a force f fixed in the world and a moment t fixed
     in marker axes. Needs `marker_values` first.
 
@@ -225,7 +227,7 @@ def add_wrench_stiffness(r, rotation, Phi, Psi, f, t, sign, m, K):
         for j in range(r):
             K[3 + i, 6 + j] += sign * (m.C[i, 0] * Psi[0, j] + m.C[i, 1] * Psi[1, j] + m.C[i, 2] * Psi[2, j])
     # J_r(psi)^T = J_r(-psi)
-    right_jacobian_derivative(m.psi, b, -1.0, m.A)
+    interface_rotation_derivative(kind, m.psi, b, -1.0, m.A)
     for j in range(r):
         for i in range(3):
             m.C[0, i] = Psi[0, j] * m.A[0, i] + Psi[1, j] * m.A[1, i] + Psi[2, j] * m.A[2, i]

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from ..fem.reduced_body import Marker, ReducedBody, rigid_invariants
 from ..shot.character import Array, Body, Character, Frame, IntArray
 from .so3 import matrix_of
-from .system import System
+from .system import LINEAR, NEOHOOKEAN, STVK, System
 from .topology import Tree, span_tree
 
 
@@ -143,7 +144,9 @@ def compile_model(character: Character, tree: Tree, bodies: Sequence[ReducedBody
         for i in range(3):
             j, m = (i + 1) % 3, (i + 2) % 3
             axial[k, :r, :r, i] = integrals.S[:, :, j, m] - integrals.S[:, :, m, j]
-        stiffness[k, :r], damping[k, :r] = body.stiffness, body.damping
+        damping[k, :r] = body.damping
+        if body.elasticity is None:
+            stiffness[k, :r] = body.stiffness
         put(k, 1, body.markers[anchors[b].root])
         item = character.joints[joint]
         if parent < 0:
@@ -159,10 +162,32 @@ def compile_model(character: Character, tree: Tree, bodies: Sequence[ReducedBody
             rows[k] = 5
         rest[k] = _rest_angle(character, k, tree, rotation[k])
     system = System(
-        np.array(tree.parent, np.int32), elastic, rows, mass, s, Z, M3, M4, S, axial, stiffness, damping, position,
-        rotation, Phi, Psi, np.asarray(character.gravity, dtype=float),
+        parent=np.array(tree.parent, np.int32), elastic=elastic, rows=rows, mass=mass, s=s, Z=Z, M3=M3, M4=M4, S=S,
+        axial=axial, stiffness=stiffness, damping=damping, position=position, rotation=rotation, Phi=Phi, Psi=Psi,
+        gravity=np.asarray(character.gravity, dtype=float), **_elastic_laws([bodies[b] for b in tree.body]),
     )  # fmt: skip
     return Model(system, tree, motor, sign, _targets(character, tree, bodies, anchors, r_max), rest)
+
+
+def _elastic_laws(bodies: Sequence[ReducedBody]) -> dict[str, Any]:
+    """What `System` says of elastic laws, bodies in the order of the components."""
+    count = len(bodies)
+    law, points, start = np.full(count, LINEAR, np.int32), np.zeros(count, np.int32), np.zeros(count, np.int64)
+    retardation, lame = np.zeros(count), np.zeros((count, 2))
+    arrays: list[Array] = []
+    size = 0
+    for k, body in enumerate(bodies):
+        item = body.elasticity
+        if item is None:
+            continue
+        law[k] = {"stvk": STVK, "neohookean": NEOHOOKEAN}[item.law]
+        retardation[k], lame[k], points[k], start[k] = item.retardation, item.lame, item.points, size
+        arrays.append(item.data)
+        size += item.data.size
+    data = np.concatenate(arrays) if arrays else np.zeros(0)
+    return {
+        "law": law, "retardation": retardation, "lame": lame, "points": points, "data_start": start, "data": data,
+    }  # fmt: skip
 
 
 def _rest_angle(character: Character, component: int, tree: Tree, rotation: Array) -> float:
@@ -210,6 +235,8 @@ def rigid_model(model: Model) -> Model:
         axial=np.ascontiguousarray(system.axial[:, :none, :none]),
         stiffness=np.ascontiguousarray(system.stiffness[:, :none]),
         damping=np.ascontiguousarray(system.damping[:, :none]),
+        law=np.full_like(system.law, LINEAR),
+        data=np.zeros(0),
         Phi=np.ascontiguousarray(system.Phi[..., :none]),
         Psi=np.ascontiguousarray(system.Psi[..., :none]),
     )

@@ -11,7 +11,7 @@ from ..kernels import kernel
 from ..shot.character import Array
 from . import bdf2
 from .assembly import Work, allocate_work
-from .markers import marker_values
+from .joints import joint_kinematics
 from .statics import equilibrium
 from .system import (
     JOINT_ROWS,
@@ -96,24 +96,12 @@ def _instant(states, n):
 def _largest_gap(system, c, u, V, work):
     gap = 0.0
     for b in range(len(system.parent)):
-        p = system.parent[b]
         if system.rows[b] == 0:
             continue
-        marker_values(
-            system.elastic[b], system.position[b, 1], system.rotation[b, 1], system.Phi[b, 1], system.Psi[b, 1],
-            c[b], work.R[b], u[b], V[b], work.j,
-        )  # fmt: skip
+        joint_kinematics(system, b, c, u, V, work)
         d = 0.0
-        if p < 0:
-            for i in range(3):
-                d += (work.j.p[i] - system.position[b, 0, i]) ** 2
-        else:
-            marker_values(
-                system.elastic[p], system.position[b, 0], system.rotation[b, 0], system.Phi[b, 0], system.Psi[b, 0],
-                c[p], work.R[p], u[p], V[p], work.i,
-            )  # fmt: skip
-            for i in range(3):
-                d += (work.j.p[i] - work.i.p[i]) ** 2
+        for i in range(3):
+            d += (work.j.p[i] - work.i.p[i]) ** 2
         gap = max(gap, np.sqrt(d))
     return gap
 

@@ -13,6 +13,7 @@ import numpy as np
 from ..shot.character import Array, IntArray
 
 JOINT_ROWS = 6
+LINEAR, STVK, NEOHOOKEAN = 0, 1, 2  # elastic laws; `finite_rotation` tells linear from nonlinear by zero
 
 
 class System(NamedTuple):
@@ -24,7 +25,12 @@ class System(NamedTuple):
         rows: Number of constraint rows of its joint: 6 (weld, motor), 5 (free hinge) or 0 (floating), shape [B].
         mass, s, Z, M3, M4, S: Inertia integrals, see `fem.Invariants`.
         axial: axial(S[j, k]) = int rho phi_j x phi_k, shape [B, R, R, 3].
-        stiffness, damping: Diagonals, shape [B, R].
+        stiffness, damping: Diagonals, shape [B, R]; of a nonlinear body, no stiffness, and damping by mass alone.
+        law: Elastic law: LINEAR, STVK, NEOHOOKEAN, shape [B].
+        retardation: Kelvin-Voigt coefficient of nonlinear bodies [s], shape [B].
+        lame: Lame's constants [Pa], shape [B, 2], where the law is NEOHOOKEAN.
+        points: Number of cubature points, shape [B].
+        data_start, data: What `elastic` and `neohookean` read of each body, in one array, and where it starts.
         position, rotation, Phi, Psi: Joint markers, shapes [B, 2, 3], [B, 2, 3, 3], [B, 2, 3, R] twice.
         gravity: [m/s^2], shape [3].
     """
@@ -41,6 +47,12 @@ class System(NamedTuple):
     axial: Array
     stiffness: Array
     damping: Array
+    law: IntArray
+    retardation: Array
+    lame: Array
+    points: IntArray
+    data_start: IntArray
+    data: Array
     position: Array
     rotation: Array
     Phi: Array

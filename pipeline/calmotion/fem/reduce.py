@@ -14,6 +14,7 @@ from .craig_bampton import Basis, reduced_basis
 from .embedding import embed
 from .integrals import inertia_integrals
 from .interfaces import Anchor, Patch, interface_patches
+from .modal_derivatives import Support
 from .reduced_body import Marker, ReducedBody
 
 __all__ = ["Anchor", "modal_damping", "reduce_body"]
@@ -39,18 +40,13 @@ def reduce_body(
         The reduced body, markers in the order of the anchors, skins in the order of the surfaces.
 
     Raises:
-        ShotError: An elasticity that is not supported, a material that is none, or an anchor off the body.
+        ShotError: A material that is none, or an anchor off the body.
 
     Source: Seed (11)-(20); formulation, section 1.
     """
     settings = body.flexible
     if settings is None:
         raise ShotError("is not a flexible body", path=body.path, remedy="Apply CalmFlexibleBodyAPI")
-    if settings.elasticity in ("stvk", "neohookean"):
-        raise ShotError(
-            "this elasticity is not supported yet", path=body.path, attribute="calm:flexible:elasticity",
-            found=settings.elasticity, remedy="Use auto or linear",
-        )  # fmt: skip
     _check_material(settings.material)
     model = assemble(mesh.points, mesh.tets, settings.material, None if body.mass is None else body.mass.mass)
     patches = interface_patches(model.mesh, anchors, settings.interface_radius, body.path)
@@ -62,15 +58,23 @@ def reduce_body(
         )  # fmt: skip
     moving = [patch for patch in patches if patch is not held]
     centers = [anchors[patch.anchors[0]].frame.position for patch in moving]
-    basis = reduced_basis(model, held.nodes, [patch.nodes for patch in moving], centers, settings)
+    support = Support(held.nodes, [patch.nodes for patch in moving], centers)
+    basis = reduced_basis(model, support.root, support.patches, support.centers, settings)
+    elasticity, damping = None, modal_damping(basis.omega_squared, settings.material)
+    if settings.elasticity in ("stvk", "neohookean") and len(basis.omega_squared):
+        from .large_deflection import large_deflection
+
+        basis, elasticity, by_mass = large_deflection(model, support, basis, settings.material, settings.elasticity)
+        damping = np.full(len(basis.omega_squared), by_mass)
     return ReducedBody(
         invariants=inertia_integrals(model.mesh.nodes, model.mass, basis.modes),
         stiffness=basis.omega_squared,
-        damping=modal_damping(basis.omega_squared, settings.material),
+        damping=damping,
         markers=_markers(model.mesh, anchors, moving, basis),
         skin=tuple(embed(model.mesh, surface.points).displacements(basis.modes) for surface in surfaces),
         nodes=len(model.mesh.nodes),
         elements=len(model.mesh.tets),
+        elasticity=elasticity,
     )
 
 

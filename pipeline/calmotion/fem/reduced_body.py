@@ -39,7 +39,8 @@ class Marker:
     """A frame on a body at which joints attach or targets are measured.
 
     With elastic coordinates u the marker is at `position + Phi u` (body frame), and turned by the rotation
-    vector `Psi u` (body axes) before `rotation`.
+    vector `Psi u` (body axes) before `rotation`; on a body of large deflection `Psi u` is the axis of the turn times
+    the sine of its angle (`dynamics.finite_rotation`).
 
     Attributes:
         position: [m], shape [3], body frame, undeformed.
@@ -55,16 +56,38 @@ class Marker:
 
 
 @dataclass(frozen=True, eq=False)
+class Elasticity:
+    """The elastic law of a body of large deflection, as the dynamics reads it.
+
+    Attributes:
+        law: `stvk` or `neohookean`.
+        retardation: Kelvin-Voigt coefficient [s].
+        data: Flat array. `stvk`: the Gram matrix of `elastic_forms.strain_gram`. `neohookean`: a correction of the
+            stiffness (r x r), then for each cubature point its weight [m^3] and the displacement gradients of the
+            modes (9 x r).
+        points: Number of cubature points.
+        lame: Lame's constants (lambda, mu) [Pa].
+    """
+
+    law: str
+    retardation: float
+    data: Array
+    points: int = 0
+    lame: tuple[float, float] = (0.0, 0.0)
+
+
+@dataclass(frozen=True, eq=False)
 class ReducedBody:
     """A component of the multibody system in its own frame, clamped to its parent-side interface.
 
     Attributes:
         invariants: Inertia integrals.
-        stiffness: Diagonal of the reduced stiffness, omega_j^2 [1/s^2], shape [r].
-        damping: Diagonal of the reduced damping [1/s], shape [r].
+        stiffness: Diagonal of the reduced stiffness about the undeformed state, omega_j^2 [1/s^2], shape [r].
+        damping: Diagonal of the reduced damping [1/s], shape [r]; with `elasticity`, its part by mass.
         markers: One for each anchor that was asked for, in that order.
         skin: One array for each surface that was asked for: displacement of its points, shape [n, 3, r].
         nodes, elements: Size of the finite-element mesh; 0 for a rigid body.
+        elasticity: None for a linear body.
     """
 
     invariants: Invariants
@@ -74,6 +97,7 @@ class ReducedBody:
     skin: tuple[Array, ...] = ()
     nodes: int = 0
     elements: int = 0
+    elasticity: Elasticity | None = None
 
     @property
     def frequencies(self) -> Array:

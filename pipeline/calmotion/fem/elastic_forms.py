@@ -1,0 +1,153 @@
+"""Second-order internal forces of hyperelastic materials on the full mesh, and the strain fields of modes.
+
+With displacement gradient G of the body (F = E + G), the first Piola-Kirchhoff stress of a material expands about
+the undeformed state as P = C:sym(G) + P''[G, G]/2 + ..., where P''[A, B] is symmetric in A and B.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ..shot.character import Array
+from .assembly import QuadraticMesh
+
+
+class GradientRule:
+    """Displacement gradients at the quadrature points of every element.
+
+    Args:
+        mesh: Of the body, m elements.
+        order: Polynomial degree that the rule integrates exactly, 2 or 4.
+
+    Attributes:
+        weights: Quadrature weights times volume [m^3], shape [m, q].
+    """
+
+    def __init__(self, mesh: QuadraticMesh, order: int):
+        from skfem import Basis, ElementTetP2
+
+        basis = Basis(mesh.basis.mesh, ElementTetP2(), intorder=order)
+        self._shape = np.stack([np.asarray(field[0].grad) for field in basis.basis])  # [10, 3, m, q]
+        self._tets = mesh.tets
+        self._nodes = len(mesh.nodes)
+        self.weights: Array = np.ascontiguousarray(basis.dx)
+
+    def gradients(self, modes: Array, elements: slice = slice(None)) -> Array:
+        """G_ij = d(displacement i)/dX_j of nodal fields of shape [n, 3, r]; shape [r, m, q, 3, 3]."""
+        local = modes[self._tets[elements]]  # [m, 10, 3, r]
+        return np.einsum("eair,ajeq->reqij", local, self._shape[:, :, elements], optimize=True)
+
+    def nodal_forces(self, stress: Array) -> Array:
+        """int P : grad N, shape [n, 3], of a stress field P of shape [m, q, 3, 3] [Pa]."""
+        local = np.einsum("eqij,ajeq,eq->eai", stress, self._shape, self.weights, optimize=True)
+        out = np.zeros((self._nodes, 3))
+        np.add.at(out, self._tets, local)
+        return out
+
+
+def linear_stress(G: Array, lame: float, mu: float) -> Array:
+    """C : sym(G) [Pa], shape of G [..., 3, 3]."""
+    trace = np.trace(G, axis1=-2, axis2=-1)[..., None, None]
+    return mu * (G + np.swapaxes(G, -1, -2)) + lame * trace * np.eye(3)
+
+
+def second_order_stress(A: Array, B: Array, lame: float, mu: float, material: str) -> Array:
+    """P''[A, B] [Pa] of two displacement gradients, shapes [..., 3, 3].
+
+    Args:
+        material: `stvk` (St. Venant-Kirchhoff) or `neohookean`.
+
+    Source: the second derivative of S = C:E, P = F S with E = sym(G) + G^T G/2, or of
+    P = mu (F - F^-T) + lame ln(J) F^-T, at F = E.
+    """
+    At, Bt = np.swapaxes(A, -1, -2), np.swapaxes(B, -1, -2)
+    if material == "stvk":
+        return linear_stress(At @ B, lame, mu) + A @ linear_stress(B, lame, mu) + B @ linear_stress(A, lame, mu)
+    trace_a = np.trace(A, axis1=-2, axis2=-1)[..., None, None]
+    trace_b = np.trace(B, axis1=-2, axis2=-1)[..., None, None]
+    product = np.einsum("...ij,...ji->...", A, B)[..., None, None]
+    return -mu * (At @ Bt + Bt @ At) - lame * (trace_a * Bt + trace_b * At + product * np.eye(3))
+
+
+def second_order_force(
+    rule: GradientRule, A: Array, B: Array, lame: float, mu: float, material: str
+) -> Array:  # fmt: skip
+    """Second derivative of the internal force in the directions of two fields [N], shape [n, 3].
+
+    Args:
+        A, B: Gradients of the fields at the rule's points, shape [m, q, 3, 3].
+    """
+    return rule.nodal_forces(second_order_stress(A, B, lame, mu, material))
+
+
+def lame_constants(youngs_modulus: float, poissons_ratio: float) -> tuple[float, float]:
+    """Lame's constants (lambda, mu) [Pa]."""
+    mu = 0.5 * youngs_modulus / (1.0 + poissons_ratio)
+    return 2.0 * mu * poissons_ratio / (1.0 - 2.0 * poissons_ratio), mu
+
+
+def strain_gram(rule: GradientRule, modes: Array, lame: float, mu: float) -> Array:
+    """Inner products of the Green strains that modes make, alone and in pairs.
+
+    The Green strain of a displacement sum_k u_k phi_k is a combination of fields, one for each mode and one for each
+    pair of modes, with the coefficients z(u) = (u_k; u_k u_l for k <= l). Hence the energy of a St. Venant-Kirchhoff
+    body is exactly z^T A z / 2 with A_ab = int E_a : C : E_b: the force is a cubic polynomial whose coefficients
+    are in A. It is a Gram matrix, so the energy is never negative.
+
+    Args:
+        rule: Of order 4, which integrates the products of two quadratic strains exactly.
+        modes: Nodal displacements, shape [n, 3, r].
+        lame, mu: Lame's constants [Pa].
+
+    Returns:
+        A, symmetric, shape [r + r (r + 1) / 2] squared; pairs ordered (0, 0), (0, 1), ..., (1, 1), ...
+
+    Source: Barbic and James, Real-Time Subspace Integration for St. Venant-Kirchhoff Deformable Models, 2005 (the
+    cubic polynomial), in the form of a Gram matrix.
+    """
+    r = modes.shape[2]
+    first, second = np.triu_indices(r)
+    size = r + len(first)
+    A = np.zeros((size, size))
+    count = len(rule.weights)
+    points = rule.weights.shape[1]
+    # strain fields of about 64 MB at a time
+    chunk = max(1, 8_000_000 // (7 * points * size))
+    root_mu, root_lame = np.sqrt(2.0 * mu), np.sqrt(abs(lame))
+    scale = root_mu * np.array([1.0, 1.0, 1.0, np.sqrt(2.0), np.sqrt(2.0), np.sqrt(2.0)])
+    rows, columns = np.array([0, 1, 2, 1, 0, 0]), np.array([0, 1, 2, 2, 2, 1])
+    for start in range(0, count, chunk):
+        part = slice(start, min(start + chunk, count))
+        weight = np.sqrt(np.abs(rule.weights[part]))
+        sign = np.sign(rule.weights[part]).ravel()  # the rule has a negative weight at the centre
+        G = rule.gradients(modes, part)  # [r, e, q, 3, 3]
+        n = weight.size
+        G = G.reshape(r, n, 3, 3)
+        fields = np.empty((size, 6, n))
+        for at, (i, j) in enumerate(zip(rows, columns, strict=True)):
+            fields[:r, at] = 0.5 * (G[:, :, i, j] + G[:, :, j, i])
+            left, right = np.ascontiguousarray(G[:, :, :, i]), np.ascontiguousarray(G[:, :, :, j])
+            p = r
+            for k in range(r):
+                # sym(G_k^T G_l), halved on the diagonal where the pair stands once
+                pair = np.einsum("nc,lnc->ln", left[k], right[k:]) + np.einsum("nc,lnc->ln", right[k], left[k:])
+                pair *= 0.5
+                pair[0] *= 0.5
+                fields[p : p + r - k, at] = pair
+                p += r - k
+        fields *= weight.ravel()
+        trace = fields[:, :3].sum(axis=1)
+        fields *= scale[:, None]
+        A += fields.reshape(size, -1) @ (fields * sign).reshape(size, -1).T
+        A += np.sign(lame) * (root_lame * trace) @ (root_lame * trace * sign).T
+    return 0.5 * (A + A.T)
+
+
+def pair_index(r: int) -> Any:
+    """Position of each pair of modes in z(u), shape [r, r], symmetric."""
+    first, second = np.triu_indices(r)
+    index = np.zeros((r, r), dtype=np.int64)
+    index[first, second] = index[second, first] = r + np.arange(len(first))
+    return index
