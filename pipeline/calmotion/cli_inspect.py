@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Sequence
 from typing import Any, TextIO
 
 import numpy as np
@@ -14,7 +15,7 @@ from .cli_report import left_out_row, operator_row
 from .cli_run import INTERRUPTED, carry_out, conclude, problems_of, settings_of
 from .errors import ShotError
 from .host import OutputPaths, ReducedBodies, Run, Source, SystemModes, open_host
-from .shot import Animation, Body, Character, ModeTable, Motor, Provenance, Track
+from .shot import Animation, Body, Character, LeftOut, ModeTable, Motor, Provenance, Track
 
 SHOWN_MODES = 10
 
@@ -92,9 +93,14 @@ def inspect_report(run: Run) -> dict[str, Any]:
         ],
         "system_frequencies_hz": modes.frequencies[:SHOWN_MODES].tolist() if modes else [],
         "notes": list(character.notes),
-        "left_out": [left_out_row(row) for row in run.left_out()],
+        "left_out": [left_out_row(row) for row in (*run.left_out(), *_without(reduced))],
         "operators": [operator_row(row) for row in run.results],
     }
+
+
+def _without(reduced: ReducedBodies | None) -> Sequence[LeftOut]:
+    """What the flexible bodies do without."""
+    return [row for body in reduced.bodies for row in body.left_out] if reduced else []
 
 
 def _body(body: Body, table: ModeTable | None) -> dict[str, Any]:

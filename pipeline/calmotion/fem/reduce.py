@@ -7,11 +7,13 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..errors import ShotError
-from ..shot.character import Array, Body, ElasticMaterial, SurfaceMesh
+from ..shot.character import DEFAULT_TOLERANCE, Array, Body, ElasticMaterial, SurfaceMesh
 from ..shot.meshes import FEMesh
-from .assembly import QuadraticMesh, assemble
+from ..shot.result import LeftOut
+from .assembly import FEModel, QuadraticMesh, assemble
 from .craig_bampton import Basis, reduced_basis
 from .embedding import embed
+from .excitation_data import Excitation
 from .integrals import inertia_integrals
 from .interfaces import Anchor, Patch, interface_patches
 from .modal_derivatives import Support
@@ -21,8 +23,9 @@ __all__ = ["Anchor", "modal_damping", "reduce_body"]
 
 
 def reduce_body(
-    mesh: FEMesh, body: Body, anchors: Sequence[Anchor], surfaces: Sequence[SurfaceMesh], root: int
-) -> ReducedBody:
+    mesh: FEMesh, body: Body, anchors: Sequence[Anchor], surfaces: Sequence[SurfaceMesh], root: int,
+    excitation: Excitation | None = None, tolerance: float = DEFAULT_TOLERANCE,
+) -> ReducedBody:  # fmt: skip
     """Reduces one flexible body.
 
     The body frame is the prim frame as carried by the root's patch, which is clamped: every mode vanishes there.
@@ -35,6 +38,8 @@ def reduce_body(
         anchors: Where joints attach and targets are, body frame.
         surfaces: To be skinned, body frame.
         root: Index of the anchor of the parent-side joint; of kind `interface`.
+        excitation: Loads on the body in this shot, for what is chosen automatically; None when nothing is known.
+        tolerance: Error that does not matter [m].
 
     Returns:
         The reduced body, markers in the order of the anchors, skins in the order of the surfaces.
@@ -61,10 +66,11 @@ def reduce_body(
     support = Support(held.nodes, [patch.nodes for patch in moving], centers)
     basis = reduced_basis(model, support.root, support.patches, support.centers, settings)
     elasticity, damping = None, modal_damping(basis.omega_squared, settings.material)
-    if settings.elasticity in ("stvk", "neohookean") and len(basis.omega_squared):
+    law, left_out = _law(model, support, basis, body, excitation, tolerance)
+    if law != "linear" and len(basis.omega_squared):
         from .large_deflection import large_deflection
 
-        basis, elasticity, by_mass = large_deflection(model, support, basis, settings.material, settings.elasticity)
+        basis, elasticity, by_mass = large_deflection(model, support, basis, settings.material, law)
         damping = np.full(len(basis.omega_squared), by_mass)
     return ReducedBody(
         invariants=inertia_integrals(model.mesh.nodes, model.mass, basis.modes),
@@ -75,7 +81,29 @@ def reduce_body(
         nodes=len(model.mesh.nodes),
         elements=len(model.mesh.tets),
         elasticity=elasticity,
+        left_out=left_out,
     )
+
+
+def _law(
+    model: FEModel, support: Support, basis: Basis, body: Body, excitation: Excitation | None, tolerance: float
+) -> tuple[str, tuple[LeftOut, ...]]:
+    """The elastic law of a body, and what it leaves out."""
+    settings = body.flexible
+    assert settings is not None
+    law, what = settings.elasticity, f"nonlinear elasticity of {body.path}"
+    if law != "auto":
+        return law, (LeftOut(what, "calm:flexible:elasticity is linear"),) if law == "linear" else ()
+    if excitation is None:
+        return "linear", (LeftOut(what, "no motion tells how far it bends"),)
+    from .choose_law import choose_law
+
+    choice = choose_law(model, support, basis, settings.material, excitation, tolerance)
+    if choice.law == "neohookean":
+        return choice.law, ()
+    if choice.law == "stvk":
+        what = f"nonlinear material of {body.path}"
+    return choice.law, (LeftOut(what, choice.reason, choice.error_m),)
 
 
 def modal_damping(omega_squared: Array, material: ElasticMaterial) -> Array:

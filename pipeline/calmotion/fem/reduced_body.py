@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..shot.character import Array, MassProperties
+from ..shot.result import LeftOut
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,6 +89,7 @@ class ReducedBody:
         skin: One array for each surface that was asked for: displacement of its points, shape [n, 3, r].
         nodes, elements: Size of the finite-element mesh; 0 for a rigid body.
         elasticity: None for a linear body.
+        left_out: What this body does without, and what that costs.
     """
 
     invariants: Invariants
@@ -98,6 +100,7 @@ class ReducedBody:
     nodes: int = 0
     elements: int = 0
     elasticity: Elasticity | None = None
+    left_out: tuple[LeftOut, ...] = ()
 
     @property
     def frequencies(self) -> Array:

@@ -67,11 +67,7 @@ def left_out_rows(prepared: Prepared) -> list[LeftOut]:
     rigid = [body.path for body in character.bodies if body.flexible is None]
     names = ", ".join(distinct_names(rigid).values())
     rows = [LeftOut("finite elements of " + names, "rigid: no CalmFlexibleBodyAPI")] if rigid else []
-    rows += [
-        LeftOut("nonlinear elasticity of " + body.path, "deflections are taken as small")
-        for body in character.bodies
-        if body.flexible is not None and body.flexible.elasticity == "auto"
-    ]
+    rows += [row for body in prepared.bodies for row in body.left_out]
     if grid.pre_steps == 0:
         rows.append(LeftOut("pre-roll", "the shot starts at rest"))
     locked = [motor.path for motor in character.motors if not motor.optimize]

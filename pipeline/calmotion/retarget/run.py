@@ -11,7 +11,7 @@ from ..dynamics.simulation import SimulationFailure, Workspace
 from ..errors import ShotError
 from ..fem.reduced_body import ReducedBody
 from ..shot import Animation, Character, MotorCurve, OptimizerStep, Result
-from ..shot.character import Array, IntArray
+from ..shot.character import DEFAULT_TOLERANCE, Array, IntArray
 from .bodies import mode_tables, skins
 from .curves import KNOT_SPACING, OffsetBasis, TimeGrid, coefficient_bounds, make_basis, sample_tracks
 from .gauss_newton import Iterate, minimize
@@ -22,7 +22,6 @@ from .report import left_out_rows, reference_motion, simulation_of
 
 SMOOTHNESS = 1e-10
 CLOSENESS = 1e-4  # an offset of 0.1 rad weighs as much as an error of 1 mm [m^2/rad^2]
-TOLERANCE = 1e-3
 UNCHANGED = 1e-5  # an offset that stays below this angle [rad] is none
 
 Progress = Callable[[float, str], None]
@@ -132,7 +131,7 @@ def optimize_shot(
     angles, rates = sample_tracks(animation.tracks, grid)
     spacing = options.knot_spacing or settings.knot_spacing or KNOT_SPACING
     smoothness = next(v for v in (options.smoothness, settings.smoothness, SMOOTHNESS) if v is not None)
-    tolerance = options.tolerance or settings.tolerance or TOLERANCE
+    tolerance = options.tolerance or settings.tolerance or DEFAULT_TOLERANCE
     basis = make_basis(grid, spacing, settings.endpoints == "kept")
     motors = np.array([k for k, motor in enumerate(character.motors) if motor.optimize], dtype=np.int32)
     if not basis.count:

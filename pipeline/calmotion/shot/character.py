@@ -205,6 +205,9 @@ class Target:
     rotation_weight: float = 0.0
 
 
+DEFAULT_TOLERANCE = 1e-3  # error at the targets that does not matter where nobody says [m]
+
+
 @dataclass(frozen=True, eq=False)
 class RetargetSettings:
     """What the shot asks of the optimisation; None means: choose automatically.
