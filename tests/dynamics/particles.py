@@ -65,8 +65,15 @@ def nonlinear(system, laws, rng, stiffness=50.0) -> System:
     )
 
 
-def particle_system(rng, parents, elastic, rows=None, stiffness=50.0) -> tuple[System, list[Particles]]:
-    """A random tree of components with random joint frames and modes."""
+def particle_system(
+    rng, parents, elastic, rows=None, stiffness=50.0, sliding=(), loops=()
+) -> tuple[System, list[Particles]]:
+    """A random tree of components with random joint frames and modes.
+
+    Args:
+        sliding: Numbers of the joints that slide.
+        loops: Further joints: (component on side 0 or -1, component on side 1, rows).
+    """
     count, size = len(parents), max(elastic)
     parts = [random_particles(rng, r) for r in elastic]
 
@@ -77,16 +84,20 @@ def particle_system(rng, parents, elastic, rows=None, stiffness=50.0) -> tuple[S
         return out
 
     S = [np.einsum("n,naj,nbk->jkab", p.masses, p.modes, p.modes) for p in parts]
-    markers = [rng.normal(size=(2, 3, r)) * 0.3 for b, r in enumerate(elastic)]
-    parent_Phi = [rng.normal(size=(2, 3, elastic[p])) * 0.3 if p >= 0 else np.zeros((2, 3, 0)) for p in parents]
-    Phi, Psi = np.zeros((count, 2, 3, size)), np.zeros((count, 2, 3, size))
-    for b in range(count):
-        Phi[b, 1, :, : elastic[b]], Psi[b, 1, :, : elastic[b]] = markers[b]
-        Phi[b, 0, :, : parent_Phi[b].shape[2]], Psi[b, 0, :, : parent_Phi[b].shape[2]] = parent_Phi[b]
+    side = np.array([*((p, b) for b, p in enumerate(parents)), *((p, b) for p, b, _ in loops)], dtype=np.int32)
+    joints = len(side)
+    rows = [*(rows or [6] * count), *(r for _, _, r in loops)]
+    Phi, Psi = np.zeros((joints, 2, 3, size)), np.zeros((joints, 2, 3, size))
+    for j, pair in enumerate(side):
+        for k, b in enumerate(pair):
+            if b >= 0:
+                Phi[j, k, :, : elastic[b]], Psi[j, k, :, : elastic[b]] = 0.3 * rng.normal(size=(2, 3, elastic[b]))
     system = System(
         parent=np.array(parents, dtype=np.int32),
         elastic=np.array(elastic, dtype=np.int32),
-        rows=np.array(rows or [6] * count, dtype=np.int32),
+        side=side,
+        rows=np.array(rows, dtype=np.int32),
+        sliding=np.isin(np.arange(joints), sliding).astype(np.int32),
         mass=np.array([p.masses.sum() for p in parts]),
         s=np.array([p.masses @ p.points for p in parts]),
         Z=np.array([np.einsum("n,na,nb->ab", p.masses, p.points, p.points) for p in parts]),
@@ -102,8 +113,8 @@ def particle_system(rng, parents, elastic, rows=None, stiffness=50.0) -> tuple[S
         points=np.zeros(count, dtype=np.int32),
         data_start=np.zeros(count, dtype=np.int64),
         data=np.zeros(0),
-        position=rng.normal(size=(count, 2, 3)) * 0.2,
-        rotation=Rotation.random(2 * count, random_state=7).as_matrix().reshape(count, 2, 3, 3),
+        position=rng.normal(size=(joints, 2, 3)) * 0.2,
+        rotation=Rotation.random(2 * joints, random_state=7).as_matrix().reshape(joints, 2, 3, 3),
         Phi=Phi,
         Psi=Psi,
         gravity=np.array([0.3, -0.2, -9.81]),
@@ -120,5 +131,5 @@ def random_state(rng, system, spread=0.5):
         state.u[b, :r] = spread * rng.normal(size=r)
         state.V[b, : 6 + r] = rng.normal(size=6 + r)
     state.lam[:] = rng.normal(size=state.lam.shape)
-    state.lam[system.rows == 5, 5] = 0.0
+    state.lam[np.arange(6) >= system.rows[:, None]] = 0.0
     return state

@@ -1,11 +1,12 @@
 """The linearised system against central differences of its residual (identity 5)."""
 
+import dense
 import numpy as np
 import pytest
 from calmotion.dynamics.assembly import allocate_work, assemble
 from calmotion.dynamics.so3 import turn
 from calmotion.dynamics.system import LINEAR, NEOHOOKEAN, STVK, Blocks, Scheme, State, allocate_blocks
-from dense import dense_matrix, join, offsets, split
+from dense import dense_matrix, join, split
 from particles import nonlinear, particle_system, random_state
 from scipy.spatial.transform import Rotation
 
@@ -15,27 +16,33 @@ TREES = {
     "branches, hinges, rigid among flexible": ([-1, 0, 1, 0, 3], [2, 0, 3, 4, 1], [6, 5, 6, 6, 5]),
     "two roots, one floating": ([-1, -1, 0], [2, 1, 2], [6, 0, 5]),
     "bodies of large deflection": ([-1, 0, 1, 0], [2, 3, 0, 2], [6, 5, 6, 6]),
+    "balls and sliders": ([-1, 0, 1, 0, -1], [0, 2, 3, 1, 2], [6, 3, 6, 6, 3], [0, 2, 3]),
+    "loops": ([-1, 0, 1, 0], [1, 2, 0, 2], [5, 3, 3, 3], [6], [(2, 3, 3), (-1, 2, 5), (1, 3, 6)]),
 }
 LAWS = {"bodies of large deflection": [STVK, NEOHOOKEAN, LINEAR, LINEAR]}
+
+
+def tree(name, seed):
+    parents, elastic, rows, *more = TREES[name]
+    rng = np.random.default_rng(seed)
+    system, _ = particle_system(rng, parents, elastic, rows, 50.0, *more)
+    return nonlinear(system, LAWS[name], rng) if name in LAWS else system
 
 
 @pytest.mark.parametrize("name", TREES)
 @pytest.mark.parametrize("scheme", [Scheme(7.0, 5.0, 1.0, 3.0), Scheme(0.0, 0.0, 0.0, 1.0)], ids=["step", "statics"])
 def test_blocks_are_the_derivative_of_the_residual(name, scheme):
-    parents, elastic, rows = TREES[name]
+    system = tree(name, 0)
     rng = np.random.default_rng(0)
-    system, _ = particle_system(rng, parents, elastic, rows)
-    if name in LAWS:
-        system = nonlinear(system, LAWS[name], rng)
-    count, size = len(parents), system.size
+    elastic = system.elastic
+    count, size, joints = len(system.parent), system.size, len(system.rows)
     state = random_state(rng, system)
-    state.lam[system.rows == 0] = 0.0
     Vd, Hv = np.zeros((count, size)), np.zeros((count, 4, 4))
     for b, r in enumerate(elastic):
         Vd[b, : 6 + r] = rng.normal(size=6 + r)
     Hv[:, 0, 0] = scheme.velocity
     Hv[:, 1:, 1:] = rng.normal(size=(count, 3, 3)) * (scheme.velocity > 0)
-    angle, rate = rng.normal(size=(2, count))
+    angle, rate = rng.normal(size=(2, joints))
     work = allocate_work(system)
 
     def evaluate(z, tangent=False, angle=angle, rate=rate):
@@ -76,19 +83,25 @@ def test_blocks_are_the_derivative_of_the_residual(name, scheme):
     def rows_of(blocks: Blocks):
         return join(system, blocks.res, blocks.gap)
 
-    total = offsets(system)[-1]
+    total = dense.size(system)
     A = dense_matrix(system, evaluate(np.zeros(total), tangent=True))
     e = 1e-5
     expected = np.stack([(rows_of(evaluate(d)) - rows_of(evaluate(-d))) / (2 * e) for d in e * np.eye(total)], axis=1)
     assert np.abs(A - expected).max() < 1e-8 * max(1.0, np.abs(expected).max())
     blocks = evaluate(np.zeros(total), tangent=True)
     for attribute, motor in (("by_angle", "angle"), ("by_rate", "rate")):
-        for b in np.flatnonzero(system.rows == 6):
-            d = e * np.eye(count)[b]
+        for joint in np.flatnonzero(system.rows == 6):
+            d = e * np.eye(joints)[joint]
             base = {"angle": angle, "rate": rate}
-            plus = evaluate(np.zeros(total), **{motor: base[motor] + d}).gap[b, 3:]
-            minus = evaluate(np.zeros(total), **{motor: base[motor] - d}).gap[b, 3:]
-            assert np.abs(getattr(blocks, attribute)[b] - (plus - minus) / (2 * e)).max() < 1e-8
+            plus = evaluate(np.zeros(total), **{motor: base[motor] + d})
+            minus = evaluate(np.zeros(total), **{motor: base[motor] - d})
+            by_motor = (plus.gap[joint] - minus.gap[joint]) / (2 * e)
+            assert np.abs(getattr(blocks, attribute)[joint] - by_motor).max() < 1e-8
+            on_bodies = (plus.res - minus.res) / (2 * e)
+            p = system.side[joint, 0]
+            if motor == "angle" and system.sliding[joint] and p >= 0:
+                on_bodies[p] -= blocks.on_parent[joint]
+            assert np.abs(on_bodies).max() < 1e-8
 
 
 def test_multipliers_do_no_work_on_motions_that_the_constraints_allow():

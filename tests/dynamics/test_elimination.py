@@ -2,24 +2,23 @@
 
 import numpy as np
 import pytest
-from calmotion.dynamics import elimination
+from calmotion.dynamics import elimination, loops
 from calmotion.dynamics.assembly import allocate_work, assemble
+from calmotion.dynamics.loops import allocate_border
 from calmotion.dynamics.system import Blocks, Scheme, allocate_blocks, allocate_factors
-from dense import dense_matrix, join, offsets, split
-from particles import particle_system, random_state
-from test_assembly import TREES
+from dense import dense_matrix, join, multipliers, split
+from particles import random_state
+from test_assembly import TREES, tree
 
 
 def eliminated(name):
-    parents, elastic, rows = TREES[name]
-    rng = np.random.default_rng(2)
-    system, _ = particle_system(rng, parents, elastic, rows)
-    state = random_state(rng, system)
-    Hv = np.zeros((len(parents), 4, 4))
+    system = tree(name, 2)
+    state = random_state(np.random.default_rng(2), system)
+    Hv = np.zeros((len(system.parent), 4, 4))
     Hv[:, 0, 0] = 50.0
     Hv[:, 1:, 1:] = 50.0 * np.eye(3)
     blocks = allocate_blocks(system)
-    zero, vector = np.zeros((len(parents), system.size)), np.zeros(len(parents))
+    zero, vector = np.zeros((len(system.parent), system.size)), np.zeros(len(system.rows))
     assemble(
         system,
         Scheme(50.0, 50.0, 1.0, 100.0),
@@ -37,9 +36,9 @@ def eliminated(name):
         blocks,
     )
     A = dense_matrix(system, Blocks(*[part.copy() for part in blocks]))
-    for b, row in enumerate(system.rows):
-        for i in range(row, 6):
-            A[offsets(system)[b] + 6 + elastic[b] + i, offsets(system)[b] + 6 + elastic[b] + i] = 1.0
+    for joint, row in enumerate(system.rows):
+        for k in range(multipliers(system, joint).start + row, multipliers(system, joint).stop):
+            A[k, k] = 1.0
     factors = allocate_factors(system)
     assert elimination.factor(system, blocks, factors.lu, factors.pivots, factors.Z) == -1
     return system, blocks, factors, A
@@ -51,20 +50,15 @@ def test_solution_is_that_of_the_dense_matrix(name, transposed):
     system, blocks, factors, A = eliminated(name)
     b = np.random.default_rng(3).normal(size=len(A))
     x, lam = split(system, b)
-    solve = elimination.solve_transposed if transposed else elimination.solve
+    border = allocate_border(system)
+    shared = (blocks.Lc, blocks.Lp, blocks.Hc[len(system.parent) :], blocks.Hp, blocks.Nc, blocks.Jp)
+    block = np.zeros(system.size + 6)
+    loops.factor_loops(system, *shared, factors.lu, factors.pivots, factors.Z, border, block)
+    solve = loops.solve_system_transposed if transposed else loops.solve_system
     solve(
-        system,
-        blocks.Lp,
-        blocks.Hp,
-        blocks.Nc,
-        blocks.Jp,
-        factors.lu,
-        factors.pivots,
-        factors.Z,
-        x,
-        lam,
-        np.zeros(system.size + 6),
-    )
+        system, *shared, factors.lu, factors.pivots, factors.Z, border.inverse, x, lam, border.X, border.lam, border.y,
+        border.x, block,
+    )  # fmt: skip
     M = A.T if transposed else A
     found = join(system, x, lam)
     assert np.abs(M @ found - b).max() < 1e-9

@@ -17,28 +17,46 @@ TIMES = np.arange(0.0, 0.3 + H / 2, H)
 def rigid_start(system, angle):
     state, count = allocate_state(system), len(system.parent)
     c, q = np.zeros((1, count, 3)), np.zeros((1, count, 4))
-    _rigid_poses(system.parent, system.position, system.rotation, angle[None], c, q, np.zeros((count, 3, 3)))
+    _rigid_poses(
+        system.parent, system.sliding, system.position, system.rotation, angle[None], c, q, np.zeros((count, 3, 3))
+    )
     state.c[:], state.q[:] = c[0], q[0]
     return state
 
 
 def curves(p):
-    """Joint angles and rates from coefficients of shape [4, B]: harmonics, so that the start moves too."""
+    """Joint angles and rates from coefficients of shape [4, J]: harmonics, so that the start moves too."""
     w = 3.0 + 2.0 * np.arange(4)
     phase = np.outer(TIMES, w)
     return np.cos(phase) @ p, (-w * np.sin(phase)) @ p
 
 
+def close(system, angle):
+    """Put the component-side markers of the loops where the parent-side ones are."""
+    state = rigid_start(system, angle)
+    R = Rotation.from_quat(np.roll(state.q, -1, axis=1)).as_matrix()
+    for joint in range(len(system.parent), len(system.rows)):
+        p, b = system.side[joint]
+        point = state.c[p] + R[p] @ system.position[joint, 0]
+        system.position[joint, 1] = R[b].T @ (point - state.c[b])
+        system.rotation[joint, 1] = R[b].T @ R[p] @ system.rotation[joint, 0]
+
+
 class Case:
     """A tree with free hinges, and a random linear functional of its motion."""
 
-    def __init__(self, rows, laws=None, seed=0):
+    def __init__(self, rows, laws=None, sliding=(), loops=(), seed=0):
         rng = np.random.default_rng(seed)
-        self.system, _ = particle_system(rng, [-1, 0, 1, 0], [2, 0, 3, 2], rows, stiffness=3000.0)
+        self.system, _ = particle_system(
+            rng, [-1, 0, 1, 0], [2, 0, 3, 2], rows, stiffness=3000.0, sliding=sliding, loops=loops
+        )
         if laws is not None:
             self.system = nonlinear(self.system, laws, rng, stiffness=3000.0)
-        self.p = 0.3 * rng.normal(size=(4, 4))
-        self.dp = rng.normal(size=(4, 4))
+        joints = len(self.system.rows)
+        self.p = (0.1 if loops else 0.3) * rng.normal(size=(4, joints))
+        self.dp = rng.normal(size=(4, joints))
+        if loops:
+            close(self.system, curves(self.p)[0][0])
         self.ws = Workspace.for_system(self.system)
         shape = (len(TIMES), 4)
         self.wc, self.wq, self.wu = (rng.normal(size=shape + (k,)) for k in (3, 4, self.system.size - 6))
@@ -68,6 +86,8 @@ CASES = {
     "driven": ([6, 6, 6, 6], None),
     "with a free hinge": ([6, 6, 5, 6], None),
     "bodies of large deflection": ([6, 6, 6, 6], [STVK, LINEAR, NEOHOOKEAN, LINEAR]),
+    "sliders": ([6, 6, 6, 6], None, (0, 2, 3)),
+    "a loop": ([6, 5, 3, 5], None, (0,), ((2, 3, 3),)),
 }
 
 

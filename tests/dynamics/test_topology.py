@@ -23,12 +23,18 @@ def test_parents_come_before_children_whatever_the_order_of_bodies_and_joints():
     assert tree.flipped == (False, False, True, False)
 
 
-def test_a_loop_is_refused_with_the_joint_that_closes_it():
-    character = chain(3)
-    extra = dataclasses.replace(character.joints[0], path="/C/Closing", body0=-1, body1=2)
-    with pytest.raises(ShotError) as error:
-        span_tree(dataclasses.replace(character, joints=character.joints + (extra,)))
-    assert error.value.path in ("/C/Closing", "/C/J2", "/C/J1") and error.value.remedy
+def test_the_loosest_joint_closes_a_loop():
+    character = chain(3, driven=(0, 2))
+    closing = dataclasses.replace(character.joints[1], path="/C/Extra", body0=0, body1=2)
+    ball = dataclasses.replace(closing, path="/C/Ball", kind="spherical")
+    tree = span_tree(dataclasses.replace(character, joints=(*character.joints, closing)))
+    assert sorted(tree.joint) == [0, 1, 2] and tree.loops == (3,)
+    # a ball before a hinge, and whatever the shot asks for before all others
+    swapped = dataclasses.replace(character, joints=(ball, *character.joints), motors=())
+    assert span_tree(swapped).loops == (0,)
+    asked = dataclasses.replace(character.joints[2], closes_loop=True)
+    wanted = dataclasses.replace(character, joints=(*character.joints[:2], asked, ball), motors=())
+    assert span_tree(wanted).loops == (2,)
 
 
 def test_a_body_without_a_way_to_the_world_is_refused():

@@ -1,4 +1,4 @@
-"""Spin-up of a flexible beam (Simo and Vu-Quoc, On the dynamics of flexible beams under large overall motions, 1986)."""
+"""Spin-up of a flexible beam (Simo and Vu-Quoc, On the dynamics of flexible beams under large motions, 1986)."""
 
 import numpy as np
 import pytest

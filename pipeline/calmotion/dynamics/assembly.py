@@ -13,6 +13,7 @@ from .inertia import body_residual, deformed_integrals, mass_matrix, position_ja
 from .joints import add_skew, apply_wrench, constraint_residual, joint_kinematics, joint_tangent
 from .markers import MarkerWork, add_wrench_stiffness, allocate_marker, marker_jacobian
 from .neohookean import neohookean_forces
+from .sliders import slide_jacobian, slide_wrench
 from .so3 import matrix_of
 from .system import JOINT_ROWS, NEOHOOKEAN, STVK, System
 
@@ -92,14 +93,87 @@ def _add_elastic_forces(system, b, u, v, tangent, w, res, P, K):
 
 
 @kernel
+def _joint_rows(system, scheme, joint, angle, rate, c, u, V, lam, Hv, tangent, w, blocks):
+    """Constraint rows of a joint and the forces it transmits."""
+    p = system.side[joint, 0]
+    b = system.side[joint, 1]
+    rb = system.elastic[b]
+    joint_kinematics(system, joint, angle, rate, c, u, V, w)
+    constraint_residual(system, joint, angle, rate, scheme, w, blocks.gap[joint])
+    # force on the component in body axes, moment in marker axes; the parent gets the opposite
+    for i in range(3):
+        w.tau[i] = lam[3 + i]
+    for i in range(3):
+        f = 0.0
+        t = 0.0
+        for k in range(3):
+            f += w.R[b, k, i] * lam[k]
+            t += w.Q[k, i] * w.tau[k]
+        w.wrench[1, i] = f
+        w.wrench[1, 3 + i] = t
+    marker_jacobian(rb, system.rotation[joint, 1], system.Phi[joint, 1], system.Psi[joint, 1], w.j)
+    apply_wrench(6 + rb, w.wrench[1, :3], w.wrench[1, 3:], -1.0, w.j, blocks.res[b])
+    if p >= 0:
+        rp = system.elastic[p]
+        for i in range(3):
+            f = 0.0
+            for k in range(3):
+                f += w.R[p, k, i] * lam[k]
+            w.wrench[0, i] = f
+        marker_jacobian(rp, system.rotation[joint, 0], system.Phi[joint, 0], system.Psi[joint, 0], w.i)
+        if system.sliding[joint]:
+            slide_jacobian(6 + rp, angle, w.R[p], w.i)
+        apply_wrench(6 + rp, w.wrench[0, :3], w.tau, 1.0, w.i, blocks.res[p])
+    if not tangent:
+        return
+    joint_tangent(system, joint, angle, rate, scheme, Hv, V, w, blocks)
+    # the moment on the component follows both markers: dt = [t]x dphi_j - Q^T [tau]x dphi_i
+    n = 6 + rb
+    t = w.wrench[1, 3:]
+    for i in range(3):
+        for k in range(3):
+            w.T[i, k] = 0.0
+            w.E[i, k] = w.Q[k, i]
+    add_skew(w.E, w.tau, 1.0, w.T)
+    for a in range(n):
+        for k in range(3):
+            g = 0.0
+            for i in range(3):
+                g += w.j.Jf[i, a] * w.T[i, k]
+            blocks.Nc[joint, a, k] = g
+        # -Jf^T [t]x Jf: rows (t x Jf_a)^T
+        g0 = t[1] * w.j.Jf[2, a] - t[2] * w.j.Jf[1, a]
+        g1 = t[2] * w.j.Jf[0, a] - t[0] * w.j.Jf[2, a]
+        g2 = t[0] * w.j.Jf[1, a] - t[1] * w.j.Jf[0, a]
+        for k in range(n):
+            blocks.K[b, a, k] += g0 * w.j.Jf[0, k] + g1 * w.j.Jf[1, k] + g2 * w.j.Jf[2, k]
+    add_wrench_stiffness(
+        rb, system.law[b], system.rotation[joint, 1], system.Phi[joint, 1], system.Psi[joint, 1], w.wrench[1, :3], t,
+        -1.0, w.j, blocks.K[b],
+    )  # fmt: skip
+    if p >= 0:
+        rp = system.elastic[p]
+        if system.sliding[joint]:
+            slide_wrench(
+                6 + rp, angle, w.wrench[0, :3], w.tau, 1.0, w.R[p], w.i, blocks.K[p], w.tmp, blocks.on_parent[joint]
+            )
+            for i in range(3):
+                w.tau[i] = w.tmp[i]
+        add_wrench_stiffness(
+            rp, system.law[p], system.rotation[joint, 0], system.Phi[joint, 0], system.Psi[joint, 0],
+            w.wrench[0, :3], w.tau, 1.0, w.i, blocks.K[p],
+        )  # fmt: skip
+
+
+@kernel
 def assemble(system, scheme, c, q, u, V, Vd, lam, angle, rate, Hv, tangent, w, blocks):
     """Residual, and with `tangent` the linearised blocks, of the whole system at one instant.
 
     Args:
         c, q, u: Positions, see `State`.
         V, Vd: Velocities and accelerations, shape [B, N].
-        lam: Multipliers, shape [B, 6].
-        angle, rate: Angle and rate of each component's joint, shape [B] (0 for welds).
+        lam: Multipliers, shape [J, 6].
+        angle, rate: Angle (or length) and rate of each joint's motor, shape [J] (0 for welds).
         Hv: How velocity follows position: Hv[b, 0, 0] the factor for c and u, Hv[b, 1:4, 1:4] the matrix of
             dphi to domega, shape [B, 4, 4].
         tangent: Whether to fill more than `res` and `gap`.
@@ -134,62 +208,5 @@ def assemble(system, scheme, c, q, u, V, Vd, lam, angle, rate, Hv, tangent, w, b
                     K[i, 3 + k] += P[i, 3] * Hv[b, 1, 1 + k] + P[i, 4] * Hv[b, 2, 1 + k] + P[i, 5] * Hv[b, 3, 1 + k]
                 for k in range(6, n):
                     K[i, k] += beta * P[i, k]
-    for b in range(count):
-        p = system.parent[b]
-        rb = system.elastic[b]
-        joint_kinematics(system, b, c, u, V, w)
-        constraint_residual(system, b, angle[b], rate[b], scheme, w, blocks.gap[b])
-        # force on the component in body axes, moment in marker axes; the parent gets the opposite
-        for i in range(3):
-            w.tau[i] = lam[b, 3 + i]
-        for i in range(3):
-            f = 0.0
-            t = 0.0
-            for k in range(3):
-                f += w.R[b, k, i] * lam[b, k]
-                t += w.Q[k, i] * w.tau[k]
-            w.wrench[1, i] = f
-            w.wrench[1, 3 + i] = t
-        marker_jacobian(rb, system.rotation[b, 1], system.Phi[b, 1], system.Psi[b, 1], w.j)
-        apply_wrench(6 + rb, w.wrench[1, :3], w.wrench[1, 3:], -1.0, w.j, blocks.res[b])
-        if p >= 0:
-            rp = system.elastic[p]
-            for i in range(3):
-                f = 0.0
-                for k in range(3):
-                    f += w.R[p, k, i] * lam[b, k]
-                w.wrench[0, i] = f
-            marker_jacobian(rp, system.rotation[b, 0], system.Phi[b, 0], system.Psi[b, 0], w.i)
-            apply_wrench(6 + rp, w.wrench[0, :3], w.tau, 1.0, w.i, blocks.res[p])
-        if not tangent:
-            continue
-        joint_tangent(system, b, scheme, Hv, V, w, blocks)
-        # the moment on the component follows both markers: dt = [t]x dphi_j - Q^T [tau]x dphi_i
-        n = 6 + rb
-        t = w.wrench[1, 3:]
-        for i in range(3):
-            for k in range(3):
-                w.T[i, k] = 0.0
-                w.E[i, k] = w.Q[k, i]
-        add_skew(w.E, w.tau, 1.0, w.T)
-        for a in range(n):
-            for k in range(3):
-                g = 0.0
-                for i in range(3):
-                    g += w.j.Jf[i, a] * w.T[i, k]
-                blocks.Nc[b, a, k] = g
-            # -Jf^T [t]x Jf: rows (t x Jf_a)^T
-            g0 = t[1] * w.j.Jf[2, a] - t[2] * w.j.Jf[1, a]
-            g1 = t[2] * w.j.Jf[0, a] - t[0] * w.j.Jf[2, a]
-            g2 = t[0] * w.j.Jf[1, a] - t[1] * w.j.Jf[0, a]
-            for k in range(n):
-                blocks.K[b, a, k] += g0 * w.j.Jf[0, k] + g1 * w.j.Jf[1, k] + g2 * w.j.Jf[2, k]
-        add_wrench_stiffness(
-            rb, system.law[b], system.rotation[b, 1], system.Phi[b, 1], system.Psi[b, 1], w.wrench[1, :3], t, -1.0, w.j,
-            blocks.K[b],
-        )  # fmt: skip
-        if p >= 0:
-            add_wrench_stiffness(
-                system.elastic[p], system.law[p], system.rotation[b, 0], system.Phi[b, 0], system.Psi[b, 0],
-                w.wrench[0, :3], w.tau, 1.0, w.i, blocks.K[p],
-            )  # fmt: skip
+    for joint in range(len(system.rows)):
+        _joint_rows(system, scheme, joint, angle[joint], rate[joint], c, u, V, lam[joint], Hv, tangent, w, blocks)

@@ -16,7 +16,8 @@ import numpy as np
 
 from ..kernels import kernel
 from .assembly import assemble
-from .elimination import factor, solve
+from .elimination import factor
+from .loops import factor_loops, least_multipliers, solve_system
 from .so3 import inverse_right_jacobian, right_jacobian, right_jacobian_derivative, turn
 
 CONVERGED, SINGULAR, NOT_CONVERGED = 0, 1, 2
@@ -87,9 +88,10 @@ def correct(system, before, now, R, x, lam, T):
         for j in range(system.elastic[b]):
             now.u[b, j] += x[b, 6 + j]
             largest = max(largest, abs(x[b, 6 + j]))
-        for i in range(6):
-            now.lam[b, i] += lam[b, i]
         turn(before.q[b], now.turn[b], now.q[b])
+    for j in range(len(system.rows)):
+        for i in range(6):
+            now.lam[j, i] += lam[j, i]
     return largest
 
 
@@ -103,22 +105,24 @@ def step(system, scheme, h, before2, before, now, angle, rate, tolerance, limit,
         tolerance: Largest Newton correction that counts as converged [m, rad]; the iteration is quadratic, so the
             error left is about its square.
         limit: Most iterations.
-        scratch: (J, T, Wt, Hv, Vd, x, lam, block), see `simulation.allocate_scratch`.
+        scratch: (J, T, Wt, Hv, Vd, x, lam, block, border), see `simulation.allocate_scratch`.
 
     Returns:
         (code, iterations, component): CONVERGED, or why not and at which component.
     """
-    J, T, Wt, Hv, Vd, x, lam, block = scratch
+    J, T, Wt, Hv, Vd, x, lam, block, border = scratch
     count = len(system.parent)
+    joints = len(system.rows)
     for b in range(count):
         for i in range(3):
             now.c[b, i] = 2.0 * before.c[b, i] - before2.c[b, i]
             now.turn[b, i] = before.turn[b, i]
         for j in range(system.elastic[b]):
             now.u[b, j] = 2.0 * before.u[b, j] - before2.u[b, j]
-        for i in range(6):
-            now.lam[b, i] = before.lam[b, i]
         turn(before.q[b], now.turn[b], now.q[b])
+    for j in range(joints):
+        for i in range(6):
+            now.lam[j, i] = before.lam[j, i]
     for iteration in range(limit):
         velocities(system, h, now, before, before2, J, Vd)
         position_to_velocity(system, h, now, before, J, T, Wt, Hv)
@@ -129,14 +133,25 @@ def step(system, scheme, h, before2, before, now, angle, rate, tolerance, limit,
         for b in range(count):
             for i in range(6 + system.elastic[b]):
                 x[b, i] = -blocks.res[b, i]
+        for j in range(joints):
             for i in range(6):
-                lam[b, i] = -blocks.gap[b, i]
-        solve(system, blocks.Lp, blocks.Hp, blocks.Nc, blocks.Jp, factors.lu, factors.pivots, factors.Z, x, lam, block)
+                lam[j, i] = -blocks.gap[j, i]
+        if joints > count:
+            factor_loops(
+                system, blocks.Lc, blocks.Lp, blocks.Hc[count:], blocks.Hp, blocks.Nc, blocks.Jp, factors.lu,
+                factors.pivots, factors.Z, border, block,
+            )  # fmt: skip
+        solve_system(
+            system, blocks.Lc, blocks.Lp, blocks.Hc[count:], blocks.Hp, blocks.Nc, blocks.Jp, factors.lu,
+            factors.pivots, factors.Z, border.inverse, x, lam, border.X, border.lam, border.y, border.x, block,
+        )  # fmt: skip
         largest = correct(system, before, now, work.R, x, lam, T)
         if not (largest < 1e3):
             return NOT_CONVERGED, iteration + 1, _worst(system, x)
         if largest < tolerance:
             velocities(system, h, now, before, before2, J, Vd)
+            if joints > count:
+                least_multipliers(system, border, now.lam)
             return CONVERGED, iteration + 1, -1
     return NOT_CONVERGED, limit, _worst(system, x)
 

@@ -5,8 +5,10 @@ The rows (side i on the parent, j on the component; Q = R_i^T R_j, z the joint a
     gamma (p_j' - p_i') + alpha (p_j - p_i)                            3 rows, world axes
     gamma (Q (omega_j - theta' z) - omega_i) + alpha c                 3 rows (weld, motor), parent-side axes
     the x and y rows of it, without theta'                             2 rows (free hinge)
-    none                                                               a component that floats freely
+    no more                                                            a ball joint
+    none at all                                                        a component that floats freely
 
+On a slider theta is a length: the parent-side marker is moved along its z axis by it, and the rotation is locked.
 where c is the axial vector of the skew part of E = Q R_z(-theta), and (-n_y, n_x), n = Q z, for the hinge. On the
 constraint manifold these rows are C_t + C_U T V + alpha C of Seed (31); the multipliers act through exactly the
 transpose of their velocity Jacobian, so they do no work there.
@@ -18,6 +20,7 @@ import math
 
 from ..kernels import kernel
 from .markers import fixed_marker, marker_values, marker_velocity_jacobian
+from .sliders import slide, slide_velocity_jacobian
 
 
 @kernel
@@ -45,19 +48,22 @@ def _rows_by_multipliers(n, Rb, m, Q, sign, out):
 
 
 @kernel
-def joint_kinematics(system, b, c, u, V, w):
-    """Values of both markers of the joint of component b, and Q = R_i^T R_j into w.Q."""
-    p = system.parent[b]
+def joint_kinematics(system, joint, value, rate, c, u, V, w):
+    """Values of both markers of a joint at its motor's value and rate, and Q = R_i^T R_j into w.Q."""
+    p = system.side[joint, 0]
+    b = system.side[joint, 1]
     if p < 0:
-        fixed_marker(system.position[b, 0], system.rotation[b, 0], w.i)
+        fixed_marker(system.position[joint, 0], system.rotation[joint, 0], w.i)
     else:
         marker_values(
-            system.elastic[p], system.law[p], system.position[b, 0], system.rotation[b, 0], system.Phi[b, 0],
-            system.Psi[b, 0], c[p], w.R[p], u[p], V[p], w.i,
+            system.elastic[p], system.law[p], system.position[joint, 0], system.rotation[joint, 0],
+            system.Phi[joint, 0], system.Psi[joint, 0], c[p], w.R[p], u[p], V[p], w.i,
         )  # fmt: skip
+    if system.sliding[joint]:
+        slide(value, rate, w.i)
     marker_values(
-        system.elastic[b], system.law[b], system.position[b, 1], system.rotation[b, 1], system.Phi[b, 1],
-        system.Psi[b, 1], c[b], w.R[b], u[b], V[b], w.j,
+        system.elastic[b], system.law[b], system.position[joint, 1], system.rotation[joint, 1], system.Phi[joint, 1],
+        system.Psi[joint, 1], c[b], w.R[b], u[b], V[b], w.j,
     )  # fmt: skip
     for i in range(3):
         for k in range(3):
@@ -78,9 +84,12 @@ def _turned_back(Q, angle, E):
 
 
 @kernel
-def constraint_residual(system, b, angle, rate, scheme, w, gap):
-    """Residual of the joint rows of component b; leaves omega_j - theta' z in w.x, E in w.E."""
-    hinge = system.rows[b] == 5
+def constraint_residual(system, joint, angle, rate, scheme, w, gap):
+    """Residual of a joint's rows; leaves omega_j - theta' z in w.x, E in w.E."""
+    hinge = system.rows[joint] == 5
+    if system.sliding[joint]:
+        angle = 0.0
+        rate = 0.0
     for i in range(3):
         gap[i] = scheme.gamma * (w.j.pd[i] - w.i.pd[i]) + scheme.alpha * (w.j.p[i] - w.i.p[i])
         w.x[i] = w.j.w[i]
@@ -156,16 +165,19 @@ def add_skew(A, x, sign, out):
 
 
 @kernel
-def joint_tangent(system, b, scheme, Hv, V, w, blocks):
-    """All blocks of the joint of component b; needs `joint_kinematics` and `_constraint` first."""
-    p = system.parent[b]
+def joint_tangent(system, joint, value, rate, scheme, Hv, V, w, blocks):
+    """All blocks of a joint; needs `joint_kinematics`, `constraint_residual` and the markers' Jacobians first."""
+    p = system.side[joint, 0]
+    b = system.side[joint, 1]
     rb = system.elastic[b]
     n = 6 + rb
-    hinge = system.rows[b] == 5
+    hinge, sliding = system.rows[joint] == 5, system.sliding[joint] != 0
     gamma, alpha = scheme.gamma, scheme.alpha
-    marker_velocity_jacobian(rb, system.law[b], system.rotation[b, 1], system.Phi[b, 1], system.Psi[b, 1], V[b], w.j)
-    _rows_by_multipliers(n, w.R[b], w.j, w.Q, -1.0, blocks.Lc[b])
-    _position_rows(n, w.R[b], w.j, gamma, alpha, 1.0, Hv[b], blocks.Hc[b])
+    marker_velocity_jacobian(
+        rb, system.law[b], system.rotation[joint, 1], system.Phi[joint, 1], system.Psi[joint, 1], V[b], w.j
+    )
+    _rows_by_multipliers(n, w.R[b], w.j, w.Q, -1.0, blocks.Lc[joint])
+    _position_rows(n, w.R[b], w.j, gamma, alpha, 1.0, Hv[b], blocks.Hc[joint])
     # dc by the turning of side j is M Q, by that of side i -M
     M = w.M
     for i in range(3):
@@ -191,40 +203,52 @@ def joint_tangent(system, b, scheme, Hv, V, w, blocks):
                 t += M[i, l] * w.Q[l, k]
             w.T[i, k] = t
     add_skew(w.Q, w.x, -gamma, w.T)
-    _rotation_rows(n, w.j, Hv[b], w.Q, w.T, gamma, blocks.Hc[b])
+    _rotation_rows(n, w.j, Hv[b], w.Q, w.T, gamma, blocks.Hc[joint])
     for i in range(3):
         z = 0.0
         for k in range(3):
             z += M[i, k] * w.Q[k, 2]
-        blocks.by_angle[b, i] = 0.0 if hinge else -z
-        blocks.by_rate[b, i] = 0.0 if hinge else -gamma * w.Q[i, 2]
+        turning = 0.0 if hinge or sliding else 1.0
+        blocks.by_angle[joint, 3 + i] = -turning * z
+        blocks.by_rate[joint, 3 + i] = -turning * gamma * w.Q[i, 2]
+        blocks.by_angle[joint, i] = 0.0
+        blocks.by_rate[joint, i] = 0.0
+        if sliding:
+            # the marker's z axis in the world, and how the marker's turning moves it
+            blocks.by_rate[joint, i] = -gamma * w.i.R[i, 2]
+            spin = w.i.R[i, 0] * w.i.w[1] - w.i.R[i, 1] * w.i.w[0]
+            blocks.by_angle[joint, i] = -alpha * w.i.R[i, 2] - gamma * spin
     if p >= 0:
         rp = system.elastic[p]
         np_ = 6 + rp
         marker_velocity_jacobian(
-            rp, system.law[p], system.rotation[b, 0], system.Phi[b, 0], system.Psi[b, 0], V[p], w.i
+            rp, system.law[p], system.rotation[joint, 0], system.Phi[joint, 0], system.Psi[joint, 0], V[p], w.i
         )
+        if sliding:
+            slide_velocity_jacobian(np_, value, rate, w.R[p], w.i)
         for i in range(3):
             for k in range(3):
                 w.E[i, k] = 1.0 if i == k else 0.0
                 w.T[i, k] = -M[i, k]
-        _rows_by_multipliers(np_, w.R[p], w.i, w.E, 1.0, blocks.Lp[b])
-        _position_rows(np_, w.R[p], w.i, gamma, alpha, -1.0, Hv[p], blocks.Hp[b])
+        _rows_by_multipliers(np_, w.R[p], w.i, w.E, 1.0, blocks.Lp[joint])
+        _position_rows(np_, w.R[p], w.i, gamma, alpha, -1.0, Hv[p], blocks.Hp[joint])
         # side i: gamma ([Q x]x dphi_i - domega_i) - M dphi_i
         add_skew(w.E, w.y, gamma, w.T)
         for i in range(3):
             w.E[i, i] = -1.0
-        _rotation_rows(np_, w.i, Hv[p], w.E, w.T, gamma, blocks.Hp[b])
+        _rotation_rows(np_, w.i, Hv[p], w.E, w.T, gamma, blocks.Hp[joint])
         for i in range(3):
             for a in range(np_):
-                blocks.Jp[b, i, a] = w.i.Jf[i, a]
+                blocks.Jp[joint, i, a] = w.i.Jf[i, a]
     # rows that this joint does not have
-    for i in range(system.rows[b], 6):
-        blocks.gap[b, i] = 0.0
+    for i in range(system.rows[joint], 6):
+        blocks.gap[joint, i] = 0.0
+        blocks.by_angle[joint, i] = 0.0
+        blocks.by_rate[joint, i] = 0.0
         for a in range(n):
-            blocks.Lc[b, a, i] = 0.0
-            blocks.Hc[b, i, a] = 0.0
+            blocks.Lc[joint, a, i] = 0.0
+            blocks.Hc[joint, i, a] = 0.0
         if p >= 0:
             for a in range(6 + system.elastic[p]):
-                blocks.Lp[b, a, i] = 0.0
-                blocks.Hp[b, i, a] = 0.0
+                blocks.Lp[joint, a, i] = 0.0
+                blocks.Hp[joint, i, a] = 0.0

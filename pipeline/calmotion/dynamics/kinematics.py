@@ -13,13 +13,15 @@ from .system import State, allocate_state
 
 
 @allocating_kernel
-def _rigid_poses(parent, position, rotation, angles, c, q, R):
-    """Poses of all components for joint angles, shape [T, B]; R is scratch, shape [B, 3, 3]."""
+def _rigid_poses(parent, sliding, position, rotation, values, c, q, R):
+    """Poses of all components for joint angles and lengths, shape [T, B]; R is scratch, shape [B, 3, 3]."""
     A = np.zeros((3, 3))
-    for n in range(angles.shape[0]):
+    for n in range(values.shape[0]):
         for b in range(len(parent)):
             p = parent[b]
-            cs, sn = np.cos(angles[n, b]), np.sin(angles[n, b])
+            length = values[n, b] if sliding[b] else 0.0
+            angle = 0.0 if sliding[b] else values[n, b]
+            cs, sn = np.cos(angle), np.sin(angle)
             # R_b = R_p R_i R_z(angle) R_j^T
             for i in range(3):
                 x = rotation[b, 0, i, 0] * cs + rotation[b, 0, i, 1] * sn
@@ -28,11 +30,11 @@ def _rigid_poses(parent, position, rotation, angles, c, q, R):
                 for k in range(3):
                     A[i, k] = x * rotation[b, 1, k, 0] + y * rotation[b, 1, k, 1] + z * rotation[b, 1, k, 2]
             for i in range(3):
-                t = position[b, 0, i]
+                t = position[b, 0, i] + rotation[b, 0, i, 2] * length
                 if p >= 0:
                     t = c[n, p, i]
                     for k in range(3):
-                        t += R[p, i, k] * position[b, 0, k]
+                        t += R[p, i, k] * (position[b, 0, k] + rotation[b, 0, k, 2] * length)
                 for k in range(3):
                     if p >= 0:
                         R[b, i, k] = R[p, i, 0] * A[0, k] + R[p, i, 1] * A[1, k] + R[p, i, 2] * A[2, k]
@@ -48,20 +50,23 @@ def rigid_poses(model: Model, joint_angles: Array) -> tuple[Array, Array]:
     """Poses of the undeformed character.
 
     Args:
-        joint_angles: Angles of the components' joints [rad], shape [T, B], free joints included.
+        joint_angles: Angles [rad] (or lengths [m]) of the components' joints, shape [T, B] or, with those of loops
+            behind, [T, J]; free joints included.
 
     Returns:
         Origins [m], shape [T, B, 3], and unit quaternions, shape [T, B, 4], world.
     """
     system = model.system
-    total, count = joint_angles.shape
+    total, count = len(joint_angles), len(system.parent)
     c, q = np.zeros((total, count, 3)), np.zeros((total, count, 4))
-    _rigid_poses(system.parent, system.position, system.rotation, joint_angles, c, q, np.zeros((count, 3, 3)))
+    _rigid_poses(
+        system.parent, system.sliding, system.position, system.rotation, joint_angles, c, q, np.zeros((count, 3, 3))
+    )
     return c, q
 
 
 def rigid_state(model: Model, joint_angles: Array) -> State:
-    """A state at rest in the rigid pose of joint angles of shape [B]."""
+    """A state at rest in the rigid pose of joint angles (or lengths) of shape [B] or [J]."""
     state = allocate_state(model.system)
     c, q = rigid_poses(model, joint_angles[None])
     state.c[:], state.q[:] = c[0], q[0]

@@ -19,6 +19,7 @@ from ..shot.character import Array, IntArray
 from .assembly import assemble
 from .bdf2 import position_to_velocity, velocities
 from .elimination import factor
+from .loops import UNKNOWNS, copy_rows, factor_loops
 from .simulation import SimulationFailure, Trajectory, Workspace, _instant, dynamic_scheme
 from .statics import STATIC
 from .system import JOINT_ROWS, Blocks, System
@@ -37,9 +38,10 @@ class Linearization:
 @kernel
 def _linearize(system, static, scheme, h, states, angles, rates, work, blocks, scratch, data, pivots):
     """Blocks and factors of all instants; returns -1 or the component that is singular, and the instant."""
-    J, T, Wt, _, Vd, x, lam, block = scratch
-    P, D, Lc, Lp, Hp, Nc, Jp, by_angle, by_rate, lu, Z, R, Hv = data
+    J, T, Wt, _, Vd, x, lam, block, border = scratch
+    P, D, Lc, Lp, Hc, Hp, Nc, Jp, by_angle, by_rate, on_parent, lu, Z, inverse, R, Hv = data
     count, size = Vd.shape
+    joints = len(system.rows)
     for n in range(len(angles)):
         now = _instant(states, n)
         if n == 0:
@@ -56,8 +58,8 @@ def _linearize(system, static, scheme, h, states, angles, rates, work, blocks, s
             position_to_velocity(system, h, now, before, J, T, Wt, Hv[n])
         # the sweeps read these in place, so they are made there
         here = Blocks(
-            blocks.K, P[n], D[n], Lc[n], Lp[n], blocks.Hc, Hp[n], Nc[n], Jp[n], by_angle[n], by_rate[n], blocks.res,
-            blocks.gap,
+            blocks.K, P[n], D[n], Lc[n], Lp[n], blocks.Hc, Hp[n], Nc[n], Jp[n], by_angle[n], by_rate[n], on_parent[n],
+            blocks.res, blocks.gap,
         )  # fmt: skip
         kind = static if n == 0 else scheme
         assemble(
@@ -66,6 +68,11 @@ def _linearize(system, static, scheme, h, states, angles, rates, work, blocks, s
         bad = factor(system, here, lu[n], pivots[n], Z[n])
         if bad >= 0:
             return bad, n
+        if joints > count:
+            for j in range(count, joints):
+                copy_rows(blocks.Hc[j], Hc[n, j - count])
+            factor_loops(system, Lc[n], Lp[n], Hc[n], Hp[n], Nc[n], Jp[n], lu[n], pivots[n], Z[n], border, block)
+            copy_rows(border.inverse, inverse[n])
         for b in range(count):
             for i in range(3):
                 for k in range(3):
@@ -84,24 +91,27 @@ def linearize(
     """Linearise a simulation about its trajectory.
 
     Args:
-        angles, rates: The joint angles and rates it was simulated with, shape [T, B].
+        angles, rates: The joint angles (or lengths) and rates it was simulated with, shape [T, J].
         previous: A linearisation of the same size whose memory is used again (it becomes invalid).
 
     Raises:
         SimulationFailure: A singular step.
     """  # fmt: skip
-    total, count, size = len(angles), len(system.parent), system.size
+    total, count, size, joints = len(angles), len(system.parent), system.size, len(system.rows)
+    loops = joints - count
     if previous is not None and previous.data[0].shape[0] == total:
         data, pivots = previous.data, previous.pivots
     else:
 
         def zeros(*shape: int) -> Array:
-            return np.zeros((total, count) + shape)
+            return np.zeros((total,) + shape)
 
+        m, border = JOINT_ROWS, UNKNOWNS * loops
         data = (
-            zeros(size, size), zeros(size, size), zeros(size, JOINT_ROWS), zeros(size, JOINT_ROWS),
-            zeros(JOINT_ROWS, size), zeros(size, 3), zeros(3, size), zeros(3), zeros(3),
-            zeros(size + JOINT_ROWS, size + JOINT_ROWS), zeros(size + JOINT_ROWS, JOINT_ROWS), zeros(3, 3), zeros(4, 4),
+            zeros(count, size, size), zeros(count, size, size), zeros(joints, size, m), zeros(joints, size, m),
+            zeros(loops, m, size), zeros(joints, m, size), zeros(joints, size, 3), zeros(joints, 3, size),
+            zeros(joints, m), zeros(joints, m), zeros(joints, size), zeros(count, size + m, size + m),
+            zeros(count, size + m, m), zeros(border, border), zeros(count, 3, 3), zeros(count, 4, 4),
         )  # fmt: skip
         pivots = np.zeros((total, count, size + JOINT_ROWS), np.int32)
     ws = workspace

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from ..fem.reduced_body import Marker, ReducedBody, rigid_invariants
-from ..shot.character import Array, Body, Character, Frame, IntArray
-from .so3 import matrix_of
+from ..shot.character import Array, Body, Character, IntArray
+from .joint_arrays import BodyAnchors, body_anchors, joint_arrays, rotation_matrix
 from .system import LINEAR, NEOHOOKEAN, STVK, System
 from .topology import Tree, span_tree
 
@@ -35,10 +35,11 @@ class Model:
     Attributes:
         system: The flat arrays.
         tree: Order of the components.
-        motor: Motor that drives each component's joint, -1 for none, shape [B].
-        sign: +1, or -1 where the joint's angle runs against the tree, shape [B].
+        motor: Motor that drives each joint, -1 for none, shape [J]: the joints of the tree, by component, then
+            those that close loops.
+        sign: +1, or -1 where the joint's angle runs against the tree, shape [J].
         targets: The target markers.
-        rest_angles: Angle of each component's joint in the shot's first pose [rad], shape [B].
+        rest_angles: Angle [rad] (or length [m]) of each joint in the pose the shot was authored in, shape [J].
     """
 
     system: System
@@ -49,51 +50,24 @@ class Model:
     rest_angles: Array
 
     def joint_angles(self, motor_values: Array) -> Array:
-        """Angles of the components' joints, shape [..., B], from values of the motors, shape [..., M]."""
+        """Angles (or lengths) of the joints, shape [..., J], from values of the motors, shape [..., M]."""
         out = np.zeros(motor_values.shape[:-1] + (len(self.motor),))
         driven = self.motor >= 0
         out[..., driven] = motor_values[..., self.motor[driven]] * self.sign[driven]
         return out
 
     def motor_values(self, joint_values: Array) -> Array:
-        """The transpose of `joint_angles`: shape [..., B] to [..., M]."""
+        """The transpose of `joint_angles`: shape [..., J] to [..., M]."""
         out = np.zeros(joint_values.shape[:-1] + (int(self.motor.max(initial=-1)) + 1,))
-        for component, motor in enumerate(self.motor):
+        for joint, motor in enumerate(self.motor):
             if motor >= 0:
-                out[..., motor] += self.sign[component] * joint_values[..., component]
+                out[..., motor] += self.sign[joint] * joint_values[..., joint]
         return out
 
     @property
     def dof(self) -> int:
         """Position coordinates of all components."""
         return int(np.sum(6 + self.system.elastic))
-
-
-@dataclass(frozen=True, eq=False)
-class BodyAnchors:
-    """The frames of a body that joints and targets use, in this order; `root` is the joint to its parent."""
-
-    joints: tuple[int, ...]
-    targets: tuple[int, ...]
-    frames: tuple[Frame, ...]
-    root: int
-
-
-def body_anchors(character: Character, tree: Tree) -> list[BodyAnchors]:
-    """For each body, which frames its reduction must provide markers for."""
-    carrier = dict(zip(tree.body, tree.joint, strict=True))
-    result = []
-    for index in range(len(character.bodies)):
-        joints = [k for k, joint in enumerate(character.joints) if index in (joint.body0, joint.body1)]
-        targets = [k for k, target in enumerate(character.targets) if target.body == index]
-        frames = [_side(character, k, index) for k in joints] + [character.targets[k].frame for k in targets]
-        result.append(BodyAnchors(tuple(joints), tuple(targets), tuple(frames), joints.index(carrier[index])))
-    return result
-
-
-def _side(character: Character, joint: int, body: int) -> Frame:
-    item = character.joints[joint]
-    return item.frame0 if item.body0 == body else item.frame1
 
 
 def rigid_body(body: Body, anchors: BodyAnchors) -> ReducedBody:
@@ -103,12 +77,6 @@ def rigid_body(body: Body, anchors: BodyAnchors) -> ReducedBody:
     markers = tuple(Marker(frame.position, frame.rotation, none, none) for frame in anchors.frames)
     empty = np.zeros(0)
     return ReducedBody(rigid_invariants(body.mass), empty, empty, markers)
-
-
-def _rotation_matrix(quaternion: Array) -> Array:
-    out = np.zeros((3, 3))
-    matrix_of(np.asarray(quaternion, dtype=float), out)
-    return out
 
 
 def compile_model(character: Character, tree: Tree, bodies: Sequence[ReducedBody]) -> Model:
@@ -123,19 +91,8 @@ def compile_model(character: Character, tree: Tree, bodies: Sequence[ReducedBody
     mass, s, Z, M3, M4 = zeros(), zeros(3), zeros(3, 3), zeros(r_max, 3), zeros(r_max, 3, 3)
     S, axial = zeros(r_max, r_max, 3, 3), zeros(r_max, r_max, 3)
     stiffness, damping = zeros(r_max), zeros(r_max)
-    position, rotation, Phi, Psi = zeros(2, 3), zeros(2, 3, 3), zeros(2, 3, r_max), zeros(2, 3, r_max)
-    elastic, rows = np.zeros(count, np.int32), np.full(count, 6, np.int32)
-    motor, sign, rest = np.full(count, -1, np.int32), np.ones(count), zeros()
-    motor_of = {item.joint: k for k, item in enumerate(character.motors)}
-
-    def put(component: int, side: int, marker: Marker) -> None:
-        r = marker.Phi.shape[1]
-        position[component, side] = marker.position
-        rotation[component, side] = _rotation_matrix(marker.rotation)
-        Phi[component, side, :, :r] = marker.Phi
-        Psi[component, side, :, :r] = marker.Psi
-
-    for k, (b, parent, joint) in enumerate(zip(tree.body, tree.parent, tree.joint, strict=True)):
+    elastic = np.zeros(count, np.int32)
+    for k, b in enumerate(tree.body):
         body = bodies[b]
         integrals = body.invariants
         r = elastic[k] = len(body.stiffness)
@@ -147,26 +104,14 @@ def compile_model(character: Character, tree: Tree, bodies: Sequence[ReducedBody
         damping[k, :r] = body.damping
         if body.elasticity is None:
             stiffness[k, :r] = body.stiffness
-        put(k, 1, body.markers[anchors[b].root])
-        item = character.joints[joint]
-        if parent < 0:
-            frame = item.frame1 if tree.flipped[k] else item.frame0
-            none = np.zeros((3, 0))
-            put(k, 0, Marker(frame.position, frame.rotation, none, none))
-        else:
-            carrier = tree.body[parent]
-            put(k, 0, bodies[carrier].markers[anchors[carrier].joints.index(joint)])
-        sign[k] = -1.0 if tree.flipped[k] else 1.0
-        motor[k] = motor_of.get(joint, -1)
-        if item.kind == "revolute" and motor[k] < 0:
-            rows[k] = 5
-        rest[k] = _rest_angle(character, k, tree, rotation[k])
+    joints = joint_arrays(character, tree, bodies, anchors, r_max)
     system = System(
-        parent=np.array(tree.parent, np.int32), elastic=elastic, rows=rows, mass=mass, s=s, Z=Z, M3=M3, M4=M4, S=S,
-        axial=axial, stiffness=stiffness, damping=damping, position=position, rotation=rotation, Phi=Phi, Psi=Psi,
-        gravity=np.asarray(character.gravity, dtype=float), **_elastic_laws([bodies[b] for b in tree.body]),
+        parent=np.array(tree.parent, np.int32), elastic=elastic, mass=mass, s=s, Z=Z, M3=M3, M4=M4, S=S, axial=axial,
+        stiffness=stiffness, damping=damping, gravity=np.asarray(character.gravity, dtype=float),
+        **_elastic_laws([bodies[b] for b in tree.body]), **joints.arrays,
     )  # fmt: skip
-    return Model(system, tree, motor, sign, _targets(character, tree, bodies, anchors, r_max), rest)
+    targets = _targets(character, tree, bodies, anchors, r_max)
+    return Model(system, tree, joints.motor, joints.sign, targets, joints.rest)
 
 
 def _elastic_laws(bodies: Sequence[ReducedBody]) -> dict[str, Any]:
@@ -190,15 +135,6 @@ def _elastic_laws(bodies: Sequence[ReducedBody]) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _rest_angle(character: Character, component: int, tree: Tree, rotation: Array) -> float:
-    """Angle of a component's joint in the pose in which the shot was authored."""
-    parent = tree.parent[component]
-    child = _rotation_matrix(character.bodies[tree.body[component]].rest.rotation)
-    carrier = np.eye(3) if parent < 0 else _rotation_matrix(character.bodies[tree.body[parent]].rest.rotation)
-    Q = (carrier @ rotation[0]).T @ (child @ rotation[1])
-    return float(np.arctan2(Q[1, 0] - Q[0, 1], Q[0, 0] + Q[1, 1]))
-
-
 def _targets(
     character: Character, tree: Tree, bodies: Sequence[ReducedBody], anchors: list[BodyAnchors], r_max: int
 ) -> Targets:
@@ -210,7 +146,7 @@ def _targets(
         own = anchors[target.body]
         marker = bodies[target.body].markers[len(own.joints) + own.targets.index(k)]
         r = marker.Phi.shape[1]
-        position[k], rotation[k] = marker.position, _rotation_matrix(marker.rotation)
+        position[k], rotation[k] = marker.position, rotation_matrix(marker.rotation)
         Phi[k, :, :r], Psi[k, :, :r] = marker.Phi, marker.Psi
     return Targets(
         component=np.array([component_of[target.body] for target in character.targets], np.int32),

@@ -26,19 +26,21 @@ def system_frequencies(model: Model, joint_angles: Array) -> Array:
     linearize(system, state, joint_angles, workspace)
     blocks = workspace.blocks
     offset = np.concatenate([[0], np.cumsum(6 + system.elastic)])
-    total, count = int(offset[-1]), len(system.parent)
-    K, M, H = np.zeros((total, total)), np.zeros((total, total)), np.zeros((6 * count, total))
-    for b, p in enumerate(system.parent):
+    total = int(offset[-1])
+    K, M, H = np.zeros((total, total)), np.zeros((total, total)), np.zeros((6 * len(system.rows), total))
+    for b, r in enumerate(system.elastic):
+        own = slice(offset[b], offset[b] + 6 + r)
+        K[own, own] = blocks.K[b, : 6 + r, : 6 + r]
+        M[own, own] = blocks.D[b, : 6 + r, : 6 + r]
+    for joint, (p, b) in enumerate(system.side):
         n = int(6 + system.elastic[b])
-        own, rows = slice(offset[b], offset[b] + n), slice(6 * b, 6 * b + 6)
-        K[own, own] = blocks.K[b, :n, :n]
-        M[own, own] = blocks.D[b, :n, :n]
-        H[rows, own] = blocks.Hc[b, :, :n]
+        own, rows = slice(offset[b], offset[b] + n), slice(6 * joint, 6 * joint + 6)
+        H[rows, own] = blocks.Hc[joint, :, :n]
         if p >= 0:
             m = int(6 + system.elastic[p])
             parent = slice(offset[p], offset[p] + m)
-            K[own, parent] = blocks.Nc[b, :n] @ blocks.Jp[b, :, :m]
-            H[rows, parent] = blocks.Hp[b, :, :m]
+            K[own, parent] += blocks.Nc[joint, :n] @ blocks.Jp[joint, :, :m]
+            H[rows, parent] = blocks.Hp[joint, :, :m]
     allowed = null_space(H)
     if not allowed.shape[1]:
         return np.zeros(0)

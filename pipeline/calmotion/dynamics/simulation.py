@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -12,6 +13,8 @@ from ..shot.character import Array
 from . import bdf2
 from .assembly import Work, allocate_work
 from .joints import joint_kinematics
+from .loops import allocate_border
+from .start import initial_acceleration, instant_before
 from .statics import equilibrium
 from .system import (
     JOINT_ROWS,
@@ -71,8 +74,8 @@ def dynamic_scheme(h: float) -> Scheme:
     return Scheme(velocity=1.5 / h, acceleration=1.5 / h, gamma=1.0, alpha=baumgarte(h))
 
 
-def allocate_scratch(system: System) -> tuple[Array, ...]:
-    """(J, T, Wt, Hv, Vd, x, lam, block) of `bdf2.step`."""
+def allocate_scratch(system: System) -> tuple[Any, ...]:
+    """(J, T, Wt, Hv, Vd, x, lam, block, border) of `bdf2.step`."""
     count, size = len(system.parent), system.size
     return (
         np.zeros((3, 3)),
@@ -81,8 +84,9 @@ def allocate_scratch(system: System) -> tuple[Array, ...]:
         np.zeros((count, 4, 4)),
         np.zeros((count, size)),
         np.zeros((count, size)),
-        np.zeros((count, JOINT_ROWS)),
+        np.zeros((len(system.rows), JOINT_ROWS)),
         np.zeros(size + JOINT_ROWS),
+        allocate_border(system),
     )
 
 
@@ -93,12 +97,12 @@ def _instant(states, n):
 
 
 @kernel
-def _largest_gap(system, c, u, V, work):
+def _largest_gap(system, angle, rate, c, u, V, work):
     gap = 0.0
-    for b in range(len(system.parent)):
-        if system.rows[b] == 0:
+    for joint in range(len(system.rows)):
+        if system.rows[joint] == 0:
             continue
-        joint_kinematics(system, b, c, u, V, work)
+        joint_kinematics(system, joint, angle[joint], rate[joint], c, u, V, work)
         d = 0.0
         for i in range(3):
             d += (work.j.p[i] - work.i.p[i]) ** 2
@@ -107,14 +111,15 @@ def _largest_gap(system, c, u, V, work):
 
 
 @kernel
-def _advance(system, scheme, h, first, last, states, angles, rates, tolerance, limit, work, blocks, factors, scratch):
+def _advance(
+    system, scheme, h, first, last, earlier, states, angles, rates, tolerance, limit, work, blocks, factors, scratch
+):
     """Steps first..last-1 of a trajectory; returns (code, instant, component, iterations, largest joint gap)."""
     iterations = 0
     gap = 0.0
     for n in range(first, last):
         before = _instant(states, n - 1)
-        # before the start the system rests
-        before2 = _instant(states, max(n - 2, 0))
+        before2 = earlier if n == 1 else _instant(states, n - 2)
         code, count, component = bdf2.step(
             system, scheme, h, before2, before, _instant(states, n), angles[n], rates[n], tolerance, limit, work,
             blocks, factors, scratch,
@@ -122,7 +127,7 @@ def _advance(system, scheme, h, first, last, states, angles, rates, tolerance, l
         iterations += count
         if code != bdf2.CONVERGED:
             return code, n, component, iterations, gap
-        gap = max(gap, _largest_gap(system, states.c[n], states.u[n], states.V[n], work))
+        gap = max(gap, _largest_gap(system, angles[n], rates[n], states.c[n], states.u[n], states.V[n], work))
     return bdf2.CONVERGED, last, -1, iterations, gap
 
 
@@ -133,7 +138,7 @@ class Workspace:
     work: Work
     blocks: Blocks
     factors: Factors
-    scratch: tuple[Array, ...]
+    scratch: tuple[Any, ...]
 
     @classmethod
     def for_system(cls, system: System) -> Workspace:
@@ -145,16 +150,17 @@ def simulate(
     system: System, start: State, angles: Array, rates: Array, h: float, workspace: Workspace, progress=None,
     settled: bool = True,
 ) -> Trajectory:  # fmt: skip
-    """Simulate the system from static equilibrium.
+    """Simulate the system from static equilibrium, or from a state that is given.
 
     Args:
         system: The compiled system.
         start: Where the search for the equilibrium starts (the rigid pose); not changed.
-        angles, rates: Angle [rad] and rate [rad/s] of each component's joint, shape [T, B].
+        angles, rates: Angle [rad] (or length [m]) and rate of each joint's motor, shape [T, J].
         h: Time step [s].
         workspace: Scratch of this system.
         progress: Called with a fraction in 0..1 now and then, or None.
-        settled: False releases the system from rest at `start` as it is, without looking for the equilibrium.
+        settled: False releases the system at `start` as it is, with its velocities, without looking for the
+            equilibrium.
 
     Returns:
         The trajectory, T instants.
@@ -169,14 +175,19 @@ def simulate(
     for part, value in zip(states, first, strict=True):
         part[0] = value
     ws = workspace
+    earlier = State(*[part[0] for part in states])  # before the start the system rests
+    if not settled:
+        motors = np.gradient(rates[:3], h, axis=0)[0] if total > 2 else np.zeros_like(rates[0])
+        acceleration, states.lam[0] = initial_acceleration(system, first, angles[0], rates[0], motors, ws)
+        earlier, states.turn[0] = instant_before(system, first, acceleration, h)
     gap = 0.0
     done = 1
     chunk = total if progress is None else max(1, total // 50)
     while done < total:
         last = min(done + chunk, total)
         code, instant, component, count, largest = _advance(
-            system, dynamic_scheme(h), h, done, last, states, angles, rates, NEWTON_TOLERANCE, NEWTON_LIMIT, ws.work,
-            ws.blocks, ws.factors, ws.scratch,
+            system, dynamic_scheme(h), h, done, last, earlier, states, angles, rates, NEWTON_TOLERANCE, NEWTON_LIMIT,
+            ws.work, ws.blocks, ws.factors, ws.scratch,
         )  # fmt: skip
         iterations += count
         gap = max(gap, largest)

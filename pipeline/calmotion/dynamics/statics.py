@@ -9,7 +9,8 @@ import numpy as np
 from ..shot.character import Array
 from . import bdf2
 from .assembly import assemble
-from .elimination import factor, solve
+from .elimination import factor
+from .loops import factor_loops, least_multipliers, solve_system
 from .system import Scheme, State, System, allocate_state
 
 if TYPE_CHECKING:
@@ -24,7 +25,7 @@ def linearize(system: System, state: State, angle: Array, ws: Workspace) -> None
     """Residual and blocks of the static equations at a state, into the workspace.
 
     Args:
-        angle: Angle of each component's joint [rad], shape [B].
+        angle: Angle [rad] (or length [m]) of each joint, shape [J].
     """
     Hv, Vd = ws.scratch[3], ws.scratch[4]
     Hv[:] = 0.0
@@ -49,7 +50,7 @@ def equilibrium(system: System, start: State, angle: Array, ws: Workspace) -> tu
     """
     from .simulation import SimulationFailure
 
-    free = bool(np.any(system.rows == 5))
+    free = bool(np.any((system.rows > 0) & (system.rows < 6)))
     component = 0
     used = 0
     for inertia in (1e4, 1e6) if free else (0.0, 1e2, 1e4, 1e6):
@@ -66,7 +67,8 @@ def equilibrium(system: System, start: State, angle: Array, ws: Workspace) -> tu
 
 def _iterate(system: System, state: State, angle: Array, ws: Workspace, inertia: float) -> tuple[int, int]:
     """Newton or pseudo-transient iteration in place; (-1, iterations), or the component where it failed."""
-    x, lam, block, T = ws.scratch[5], ws.scratch[6], ws.scratch[7], ws.scratch[1]
+    x, lam, block, border, T = *ws.scratch[5:9], ws.scratch[1]
+    count, loops = len(system.parent), len(system.rows) > len(system.parent)
     before = allocate_state(system)
     previous = np.inf
     for iteration in range(LIMIT):
@@ -78,7 +80,14 @@ def _iterate(system: System, state: State, angle: Array, ws: Workspace, inertia:
             return component, iteration + 1
         x[:] = -blocks.res
         lam[:] = -blocks.gap
-        solve(system, blocks.Lp, blocks.Hp, blocks.Nc, blocks.Jp, factors.lu, factors.pivots, factors.Z, x, lam, block)
+        closing = blocks.Hc[count:]
+        tree = (factors.lu, factors.pivots, factors.Z)
+        if loops:
+            factor_loops(system, blocks.Lc, blocks.Lp, closing, blocks.Hp, blocks.Nc, blocks.Jp, *tree, border, block)
+        solve_system(
+            system, blocks.Lc, blocks.Lp, closing, blocks.Hp, blocks.Nc, blocks.Jp, *tree, border.inverse, x, lam,
+            border.X, border.lam, border.y, border.x, block,
+        )  # fmt: skip
         size = float(np.max(np.abs(x)))
         if not np.isfinite(size):
             return bdf2._worst(system, x), iteration + 1
@@ -90,6 +99,8 @@ def _iterate(system: System, state: State, angle: Array, ws: Workspace, inertia:
         state.turn[:] = 0.0
         bdf2.correct(system, before, state, ws.work.R, x, lam, T)
         if size < TOLERANCE and inertia == 0.0:
+            if loops:
+                least_multipliers(system, border, state.lam)
             return -1, iteration + 1
         if inertia > 0.0:
             # switched evolution relaxation: less inertia as the correction shrinks, none at the end

@@ -10,18 +10,21 @@ import numpy as np
 
 from ..kernels import allocating_kernel
 from ..shot.character import Array
-from .elimination import solve, solve_transposed
 from .linearization import Linearization
+from .loops import UNKNOWNS, solve_system, solve_system_transposed
 from .so3 import exponential, inverse_right_jacobian, right_jacobian
 
 
 @allocating_kernel
 def _tangent(system, h, turns, d_angle, d_rate, data, pivots, dX):
-    P, D, Lc, Lp, Hp, Nc, Jp, by_angle, by_rate, lu, Z, R, Hv = data
+    P, D, Lc, Lp, Hc, Hp, Nc, Jp, by_angle, by_rate, on_parent, lu, Z, inverse, R, Hv = data
+    joints = len(system.rows)
     total, count, size = dX.shape
     x = np.zeros((count, size))
-    lam = np.zeros((count, 6))
+    lam = np.zeros((joints, 6))
     block = np.zeros(size + 6)
+    border = UNKNOWNS * (joints - count)
+    X, tree, y, g = np.zeros((count, size)), np.zeros((joints, 6)), np.zeros(border), np.zeros(border)
     hV = np.zeros((count, size))
     hA = np.zeros((count, size))
     tmp = np.zeros(3)
@@ -67,20 +70,25 @@ def _tangent(system, h, turns, d_angle, d_rate, data, pivots, dX):
                     for k in range(m):
                         t -= P[n, b, i, k] * hV[b, k] + D[n, b, i, k] * hA[b, k]
                     x[b, i] = t
-        for b in range(count):
-            p = system.parent[b]
+        for j in range(joints):
+            p = system.side[j, 0]
+            b = system.side[j, 1]
             for i in range(6):
                 t = 0.0
                 if n > 0:
                     for k in range(6 + system.elastic[b]):
-                        t += Lc[n, b, k, i] * hV[b, k]
+                        t += Lc[n, j, k, i] * hV[b, k]
                     if p >= 0:
                         for k in range(6 + system.elastic[p]):
-                            t += Lp[n, b, k, i] * hV[p, k]
-                if i >= 3:
-                    t -= by_angle[n, b, i - 3] * d_angle[n, b] + by_rate[n, b, i - 3] * d_rate[n, b]
-                lam[b, i] = t
-        solve(system, Lp[n], Hp[n], Nc[n], Jp[n], lu[n], pivots[n], Z[n], x, lam, block)
+                            t += Lp[n, j, k, i] * hV[p, k]
+                lam[j, i] = t - by_angle[n, j, i] * d_angle[n, j] - by_rate[n, j, i] * d_rate[n, j]
+            if p >= 0 and system.sliding[j]:
+                for i in range(6 + system.elastic[p]):
+                    x[p, i] -= on_parent[n, j, i] * d_angle[n, j]
+        solve_system(
+            system, Lc[n], Lp[n], Hc[n], Hp[n], Nc[n], Jp[n], lu[n], pivots[n], Z[n], inverse[n], x, lam, X, tree, y,
+            g, block,
+        )  # fmt: skip
         for b in range(count):
             m = 6 + system.elastic[b]
             for i in range(m):
@@ -112,11 +120,14 @@ def _tangent(system, h, turns, d_angle, d_rate, data, pivots, dX):
 @allocating_kernel
 def _adjoint(system, h, turns, Xbar, data, pivots, g_angle, g_rate, cbar, nubar, thbar):
     """Transpose of `_tangent`; Xbar (body axes), cbar (world axes), nubar, thbar are overwritten."""
-    P, D, Lc, Lp, Hp, Nc, Jp, by_angle, by_rate, lu, Z, R, Hv = data
+    P, D, Lc, Lp, Hc, Hp, Nc, Jp, by_angle, by_rate, on_parent, lu, Z, inverse, R, Hv = data
+    joints = len(system.rows)
     total, count, size = Xbar.shape
     x = np.zeros((count, size))
-    lam = np.zeros((count, 6))
+    lam = np.zeros((joints, 6))
     block = np.zeros(size + 6)
+    border = UNKNOWNS * (joints - count)
+    X, tree, y, g = np.zeros((count, size)), np.zeros((joints, 6)), np.zeros(border), np.zeros(border)
     hV = np.zeros((count, size))
     tmp = np.zeros(3)
     J = np.zeros((3, 3))
@@ -153,28 +164,35 @@ def _adjoint(system, h, turns, Xbar, data, pivots, g_angle, g_rate, cbar, nubar,
                 x[b, i] = t
             for i in range(3, m):
                 x[b, i] = Xbar[n, b, i]
-            for i in range(6):
-                lam[b, i] = 0.0
-        solve_transposed(system, Lp[n], Hp[n], Nc[n], Jp[n], lu[n], pivots[n], Z[n], x, lam, block)
-        for b in range(count):
+        lam[:] = 0.0
+        solve_system_transposed(
+            system, Lc[n], Lp[n], Hc[n], Hp[n], Nc[n], Jp[n], lu[n], pivots[n], Z[n], inverse[n], x, lam, X, tree, y,
+            g, block,
+        )  # fmt: skip
+        for j in range(joints):
+            p = system.side[j, 0]
             ga = 0.0
             gr = 0.0
-            for i in range(3):
-                ga -= by_angle[n, b, i] * lam[b, 3 + i]
-                gr -= by_rate[n, b, i] * lam[b, 3 + i]
-            g_angle[n, b] = ga
-            g_rate[n, b] = gr
+            for i in range(6):
+                ga -= by_angle[n, j, i] * lam[j, i]
+                gr -= by_rate[n, j, i] * lam[j, i]
+            if p >= 0 and system.sliding[j]:
+                for i in range(6 + system.elastic[p]):
+                    ga -= on_parent[n, j, i] * x[p, i]
+            g_angle[n, j] = ga
+            g_rate[n, j] = gr
         if n == 0:
             continue
-        for b in range(count):
-            p = system.parent[b]
+        for j in range(joints):
+            p = system.side[j, 0]
+            b = system.side[j, 1]
             for i in range(6):
-                t = lam[b, i]
+                t = lam[j, i]
                 for k in range(6 + system.elastic[b]):
-                    hV[b, k] += Lc[n, b, k, i] * t
+                    hV[b, k] += Lc[n, j, k, i] * t
                 if p >= 0:
                     for k in range(6 + system.elastic[p]):
-                        hV[p, k] += Lp[n, b, k, i] * t
+                        hV[p, k] += Lp[n, j, k, i] * t
         for b in range(count):
             m = 6 + system.elastic[b]
             for i in range(m):
@@ -225,12 +243,12 @@ def tangent(lin: Linearization, d_angle: Array, d_rate: Array) -> Array:
     """How the motion follows a change of the joint angles.
 
     Args:
-        d_angle, d_rate: Change of angle [rad] and rate [rad/s] of each component's joint, shape [T, B].
+        d_angle, d_rate: Change of angle [rad] (or length [m]) and rate of each joint's motor, shape [T, J].
 
     Returns:
         (R^T dc, dphi, du) of each component, shape [T, B, N].
     """
-    dX = np.zeros(d_angle.shape + (lin.system.size,))
+    dX = np.zeros((len(d_angle), len(lin.system.parent), lin.system.size))
     _tangent(lin.system, lin.trajectory.h, lin.trajectory.states.turn, d_angle, d_rate, lin.data, lin.pivots, dX)
     return dX
 
@@ -242,11 +260,11 @@ def adjoint(lin: Linearization, gradient: Array) -> tuple[Array, Array]:
         gradient: Its derivative by (R^T dc, dphi, du) of each component at each instant, shape [T, B, N].
 
     Returns:
-        Its derivatives by angle and rate of each component's joint, shape [T, B] each.
+        Its derivatives by angle and rate of each joint's motor, shape [T, J] each.
     """
     Xbar = gradient.copy()
     total, count, size = Xbar.shape
-    g_angle, g_rate = np.zeros((total, count)), np.zeros((total, count))
+    g_angle, g_rate = np.zeros((total, len(lin.system.rows))), np.zeros((total, len(lin.system.rows)))
     _adjoint(
         lin.system, lin.trajectory.h, lin.trajectory.states.turn, Xbar, lin.data, lin.pivots, g_angle, g_rate,
         np.zeros((total, count, 3)), np.zeros((total, count, size)), np.zeros((total, count, 3)),

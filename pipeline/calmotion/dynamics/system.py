@@ -1,7 +1,8 @@
 """The compiled multibody system: flat arrays that the kernels read, one row a component, parents before children.
 
-Each component hangs by one joint from its parent (-1: the world). Arrays are padded to the largest number of
-elastic coordinates. Side 0 of a joint is on the parent, side 1 on the component.
+Each component hangs by one joint from its parent (-1: the world): component b by joint b. Further joints, from
+number B on, close loops. Arrays are padded to the largest number of elastic coordinates. Side 0 of a joint is on the
+parent, side 1 on the component; a loop's joint may have the world on side 0, never on side 1.
 """
 
 from __future__ import annotations
@@ -17,12 +18,15 @@ LINEAR, STVK, NEOHOOKEAN = 0, 1, 2  # elastic laws; `finite_rotation` tells line
 
 
 class System(NamedTuple):
-    """Constants of the system (B components, at most R elastic coordinates, N = 6 + R).
+    """Constants of the system (B components, J >= B joints, at most R elastic coordinates, N = 6 + R).
 
     Attributes:
         parent: Parent of each component, shape [B], -1 for the world.
         elastic: Number of elastic coordinates, shape [B].
-        rows: Number of constraint rows of its joint: 6 (weld, motor), 5 (free hinge) or 0 (floating), shape [B].
+        side: Components on the two sides of each joint, shape [J, 2].
+        rows: Number of constraint rows of each joint: 6 (weld, motor), 5 (free hinge), 3 (ball) or 0 (floating),
+            shape [J].
+        sliding: Whether what a joint's motor sets is a length along its axis instead of an angle, shape [J].
         mass, s, Z, M3, M4, S: Inertia integrals, see `fem.Invariants`.
         axial: axial(S[j, k]) = int rho phi_j x phi_k, shape [B, R, R, 3].
         stiffness, damping: Diagonals, shape [B, R]; of a nonlinear body, no stiffness, and damping by mass alone.
@@ -31,13 +35,15 @@ class System(NamedTuple):
         lame: Lame's constants [Pa], shape [B, 2], where the law is NEOHOOKEAN.
         points: Number of cubature points, shape [B].
         data_start, data: What `elastic` and `neohookean` read of each body, in one array, and where it starts.
-        position, rotation, Phi, Psi: Joint markers, shapes [B, 2, 3], [B, 2, 3, 3], [B, 2, 3, R] twice.
+        position, rotation, Phi, Psi: Joint markers, shapes [J, 2, 3], [J, 2, 3, 3], [J, 2, 3, R] twice.
         gravity: [m/s^2], shape [3].
     """
 
     parent: IntArray
     elastic: IntArray
+    side: IntArray
     rows: IntArray
+    sliding: IntArray
     mass: Array
     s: Array
     Z: Array
@@ -91,7 +97,7 @@ class State(NamedTuple):
         turn: Rotation vector from the previous instant to this one, body axes [rad], shape [B, 3].
         V: Velocities (w in world axes, omega in body axes, v), shape [B, N].
         lam: Joint multipliers (force on the component at the joint in world axes [N], moment in the parent-side
-            joint frame [N m]), shape [B, 6].
+            joint frame [N m]), shape [J, 6].
     """
 
     c: Array
@@ -105,19 +111,21 @@ class State(NamedTuple):
 class Blocks(NamedTuple):
     """The linearised equations of one instant, component by component (see `assembly.assemble`).
 
-    Unknowns of a component are (R^T dc, dphi, du) in body axes and its joint's multipliers.
+    Unknowns of a component are (R^T dc, dphi, du) in body axes and its joint's multipliers. What concerns a joint
+    has one entry for each of the J joints; "component" and "parent" are then its sides 1 and 0.
 
     Attributes:
         K: Tangent of its own rows, shape [B, N, N].
         P: By its velocity, dV-dot included, shape [B, N, N].
         D: By its acceleration (its mass matrix), shape [B, N, N].
-        Lc, Lp: By its joint's multipliers: its own rows, its parent's rows, shape [B, N, 6].
-        Hc, Hp: Its joint's constraint rows, by itself and by its parent, shape [B, 6, N].
-        Nc: Its own rows by the turning of the parent-side marker, shape [B, N, 3].
-        Jp: Turning of the parent-side marker by the parent's coordinates, shape [B, 3, N].
-        by_angle, by_rate: Its joint's rotation rows by the motor's angle and rate, shape [B, 3].
+        Lc, Lp: By the joint's multipliers: the component's rows, its parent's rows, shape [J, N, 6].
+        Hc, Hp: The joint's constraint rows, by the component and by its parent, shape [J, 6, N].
+        Nc: The component's rows by the turning of the parent-side marker, shape [J, N, 3].
+        Jp: Turning of the parent-side marker by the parent's coordinates, shape [J, 3, N].
+        by_angle, by_rate: The joint's rows by the motor's angle (or length) and rate, shape [J, 6].
+        on_parent: The parent's rows by the motor's length, shape [J, N]; zero where it is an angle.
         res: Residual of its rows, shape [B, N].
-        gap: Residual of its constraint rows, shape [B, 6].
+        gap: Residual of the joint's constraint rows, shape [J, 6].
     """
 
     K: Array
@@ -131,6 +139,7 @@ class Blocks(NamedTuple):
     Jp: Array
     by_angle: Array
     by_rate: Array
+    on_parent: Array
     res: Array
     gap: Array
 
@@ -155,7 +164,7 @@ def allocate_state(system: System) -> State:
         u=np.zeros((count, size - 6)),
         turn=np.zeros((count, 3)),
         V=np.zeros((count, size)),
-        lam=np.zeros((count, JOINT_ROWS)),
+        lam=np.zeros((len(system.rows), JOINT_ROWS)),
     )
 
 
@@ -164,13 +173,17 @@ def allocate_blocks(system: System, instants: int | None = None) -> Blocks:
     count, size = len(system.parent), system.size
     lead = () if instants is None else (instants,)
 
-    def zeros(*shape: int) -> Array:
-        return np.zeros(lead + (count,) + shape)
+    joints = len(system.rows)
 
-    square, wide, tall = (size, size), (JOINT_ROWS, size), (size, JOINT_ROWS)
+    def zeros(*shape: int) -> Array:
+        return np.zeros(lead + shape)
+
+    square, wide, tall = (count, size, size), (joints, JOINT_ROWS, size), (joints, size, JOINT_ROWS)
+    row = (joints, JOINT_ROWS)
     return Blocks(
         zeros(*square), zeros(*square), zeros(*square), zeros(*tall), zeros(*tall), zeros(*wide), zeros(*wide),
-        zeros(size, 3), zeros(3, size), zeros(3), zeros(3), zeros(size), zeros(JOINT_ROWS),
+        zeros(joints, size, 3), zeros(joints, 3, size), zeros(*row), zeros(*row), zeros(joints, size),
+        zeros(count, size), zeros(*row),
     )  # fmt: skip
 
 

@@ -17,22 +17,29 @@ class Tree:
         parent: Parent component of each, -1 for the world.
         joint: Joint that carries each component.
         flipped: Whether the component is `body0` of that joint, so that its angle runs backwards.
+        loops: Joints that are not in the tree: each closes a loop.
     """
 
     body: tuple[int, ...]
     parent: tuple[int, ...]
     joint: tuple[int, ...]
     flipped: tuple[bool, ...]
+    loops: tuple[int, ...] = ()
 
 
 def span_tree(character: Character) -> Tree:
     """Order the bodies of a character from the world outwards.
 
+    Where joints close a loop, one of them is left out of the tree: the one that constrains least, so that motors and
+    welds stay in it.
+
     Raises:
-        ShotError: A body that no chain of joints connects to the world, or joints that close a loop.
+        ShotError: A body that no chain of joints connects to the world.
     """
+    inside, loops = _spanning(character)
     touching: dict[int, list[int]] = {}
-    for index, joint in enumerate(character.joints):
+    for index in inside:
+        joint = character.joints[index]
         touching.setdefault(joint.body0, []).append(index)
         touching.setdefault(joint.body1, []).append(index)
     body: list[int] = []
@@ -40,22 +47,13 @@ def span_tree(character: Character) -> Tree:
     joint_of: list[int] = []
     flipped: list[bool] = []
     component_of = {WORLD: -1}
-    used: set[int] = set()
     queue = [WORLD]
     for current in queue:
         for index in touching.get(current, ()):
-            if index in used:
-                continue
-            used.add(index)
             joint = character.joints[index]
             other = joint.body1 if joint.body0 == current else joint.body0
             if other in component_of:
-                raise ShotError(
-                    "this joint closes a loop of bodies, which cannot be simulated yet",
-                    path=joint.path,
-                    attribute="physics:body1",
-                    remedy="Disable the joint (physics:jointEnabled = false) or remove one joint of the loop.",
-                )
+                continue  # the way we came
             component_of[other] = len(body)
             body.append(other)
             parent.append(component_of[current])
@@ -69,4 +67,33 @@ def span_tree(character: Character) -> Tree:
                 path=item.path,
                 remedy="Add a joint to its neighbour, or a PhysicsFixedJoint with an empty body0.",
             )
-    return Tree(tuple(body), tuple(parent), tuple(joint_of), tuple(flipped))
+    return Tree(tuple(body), tuple(parent), tuple(joint_of), tuple(flipped), tuple(loops))
+
+
+def _spanning(character: Character) -> tuple[list[int], list[int]]:
+    """Joints of a spanning tree, and those that close loops (Kruskal's algorithm, firmest joints first)."""
+    driven = {motor.joint for motor in character.motors}
+
+    def looseness(index: int) -> tuple[int, int]:
+        joint = character.joints[index]
+        kind = 0 if index in driven else {"fixed": 1, "prismatic": 2, "revolute": 3, "spherical": 4}[joint.kind]
+        return (5 if joint.closes_loop else kind), index
+
+    group = {index: index for index in range(WORLD, len(character.bodies))}
+
+    def leader(item: int) -> int:
+        while group[item] != item:
+            group[item] = group[group[item]]
+            item = group[item]
+        return item
+
+    inside, loops = [], []
+    for index in sorted(range(len(character.joints)), key=looseness):
+        joint = character.joints[index]
+        one, other = leader(joint.body0), leader(joint.body1)
+        if one == other:
+            loops.append(index)
+        else:
+            group[one] = other
+            inside.append(index)
+    return sorted(inside), sorted(loops)

@@ -32,8 +32,11 @@ def rigid_motor_jacobian(model: Model, joint_angles: Array, motors: IntArray) ->
                 # the joint's frame on the component's side: its z axis is the joint axis
                 axis = np.einsum("nij,j->ni", R[:, b], system.rotation[b, 1, :, 2]) * model.sign[b]
                 origin = c[:, b] + np.einsum("nij,j->ni", R[:, b], system.position[b, 1])
-                J[:, k, :3, column[motor]] += np.cross(axis, point - origin)
-                J[:, k, 3:, column[motor]] += axis
+                if system.sliding[b]:
+                    J[:, k, :3, column[motor]] += axis
+                else:
+                    J[:, k, :3, column[motor]] += np.cross(axis, point - origin)
+                    J[:, k, 3:, column[motor]] += axis
             b = int(system.parent[b])
     return J
 

@@ -29,9 +29,15 @@ class ForwardRun:
     target_rotations: Array
 
 
+def _moves_freely(model: Model) -> BoolArray:
+    """Which joints no motor holds."""
+    rows = model.system.rows
+    return (rows > 0) & (rows < 6)
+
+
 def start_angles(model: Model, joint_angles: Array) -> Array:
     """Angles of all joints for the first pose: motors from their tracks, free joints as the shot was authored."""
-    free = model.system.rows == 5
+    free = _moves_freely(model)
     return np.where(free, model.rest_angles, joint_angles)
 
 
@@ -68,7 +74,7 @@ class RigidMotion:
 def rigid_motion(model: Model, angles: Array, rates: Array, h: float) -> RigidMotion:
     """The animation on a rigid robot: kinematics alone, or a rigid simulation where joints move freely."""
     rigid = rigid_model(model)
-    if np.any(rigid.system.rows == 5):
+    if np.any(_moves_freely(rigid)):
         run = run_forward(rigid, Workspace.for_system(rigid.system), angles, rates, h)
         states = run.trajectory.states
         return RigidMotion(states.c, states.q, run.target_positions, run.target_rotations)

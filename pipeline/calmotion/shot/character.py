@@ -150,10 +150,12 @@ class Joint:
 
     Attributes:
         path: Prim path.
-        kind: `revolute` or `fixed`.
-        body0, body1: Body indices, -1 for the world. The angle is that of body1 relative to body0 about z.
+        kind: `revolute`, `prismatic`, `spherical` or `fixed`.
+        body0, body1: Body indices, -1 for the world. The angle is that of body1 relative to body0 about z, the
+            length of a prismatic joint that of frame1 beyond frame0 along z.
         frame0, frame1: The joint frame in body0 (in the world for -1) and in body1.
-        lower, upper: Limits [rad], infinite when there are none.
+        lower, upper: Limits [rad or m], infinite when there are none.
+        closes_loop: Whether the shot asks that this joint, rather than another, be the one that closes a loop.
     """
 
     path: str
@@ -164,6 +166,7 @@ class Joint:
     frame1: Frame
     lower: float = -np.inf
     upper: float = np.inf
+    closes_loop: bool = False
 
 
 @dataclass(frozen=True, eq=False)

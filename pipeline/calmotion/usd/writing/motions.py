@@ -69,7 +69,7 @@ def rigid_motion(character: Character, animation: Animation, result: Result) -> 
     tree = span_tree(rigid)
     anchors = body_anchors(rigid, tree)
     model = compile_model(rigid, tree, [rigid_body(b, a) for b, a in zip(rigid.bodies, anchors, strict=True)])
-    if np.any(model.system.rows == 5) or len(character.joints) > len(character.bodies):
+    if np.any(model.system.rows < 6) or len(character.joints) > len(character.bodies):
         raise ShotError(
             "a joint without a motor, or a closed loop, has no angle on a robot that is not simulated",
             path=character.path,
