@@ -6,7 +6,7 @@ import numpy as np
 from arms import Z_TO_Y, frame
 from boxes import box_tets, fe_mesh
 from calmotion.dynamics.kinematics import rigid_state, target_frames
-from calmotion.dynamics.model import body_anchors, compile_model
+from calmotion.dynamics.model import body_anchors, compile_model, rigid_body
 from calmotion.dynamics.simulation import Workspace, simulate
 from calmotion.dynamics.topology import span_tree
 from calmotion.fem.interfaces import Anchor
@@ -23,7 +23,7 @@ class TurningBeam:
         cells: Bricks of six tetrahedra along the axes.
         law: `linear`, `stvk` or `neohookean`.
         modes: Linear modes; the nonlinear laws add modal derivatives.
-        payload: Mass [kg] and edge [m] of a rigid cube welded to the tip, its centre on the end face, or None.
+        payload: Mass [kg] and inertia [kg m^2], [3, 3], of a rigid body welded to the tip about its middle, or None.
         gravity: [m/s^2].
     """
 
@@ -33,9 +33,7 @@ class TurningBeam:
         joints = [Joint("/C/J0", "revolute", -1, 0, frame(rotation=Z_TO_Y), frame(rotation=Z_TO_Y))]
         last = 0
         if payload is not None:
-            mass, edge = payload
-            cube = MassProperties(mass, np.zeros(3), mass * edge**2 / 6.0 * np.eye(3))
-            bodies.append(Body("/C/Cube", frame(length), cube))
+            bodies.append(Body("/C/Cube", frame(length), MassProperties(payload[0], np.zeros(3), payload[1])))
             joints.append(Joint("/C/Weld", "fixed", 0, 1, frame(length), frame()))
             last = 1
         target = Target("/C/tip", last, frame() if last else frame(length))
@@ -50,8 +48,6 @@ class TurningBeam:
         kinds = ["interface"] * len(own.joints) + ["point"] * len(own.targets)
         named = [Anchor(f"/C/{k}", f, kind) for k, (f, kind) in enumerate(zip(own.frames, kinds, strict=True))]
         self.body = reduce_body(fe_mesh(points, tets), bodies[0], named, (), own.root)
-        from calmotion.dynamics.model import rigid_body
-
         reduced = [self.body] + [rigid_body(body, a) for body, a in zip(bodies[1:], anchors[1:], strict=True)]
         self.model = compile_model(self.character, tree, reduced)
         self.length = length
