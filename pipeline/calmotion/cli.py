@@ -56,7 +56,10 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--version", action="version", version=f"calmotion {__version__}")
     commands = parser.add_subparsers(title="commands", required=True, metavar="COMMAND")
 
-    _shot_command(commands, "inspect", _inspect, "what is in the shot, and what would be left out and why")
+    inspect = _shot_command(commands, "inspect", _inspect, "what is in the shot, and what would be left out and why")
+    inspect.add_argument(
+        "--modes", metavar="DIR", help="folder for the mode shapes of the flexible bodies (.vtu, .png) and their table"
+    )
     simulate = _shot_command(commands, "simulate", _simulate, "simulate as animated")
     optimize = _shot_command(commands, "optimize", _optimize, "find motor curves that do not shake, and write them")
     simulate.add_argument("-o", "--output", metavar="LAYER", help="USD layer to write")

@@ -14,7 +14,7 @@ from .cli_progress import ProgressDisplay
 from .cli_report import left_out_row, operator_row
 from .cli_run import INTERRUPTED, carry_out, conclude, problems_of, settings_of
 from .errors import ShotError
-from .host import OutputPaths, ReducedBodies, Run, Source, SystemModes, open_host
+from .host import ModeShapes, OutputPaths, ReducedBodies, Run, Source, SystemModes, open_host
 from .shot import Animation, Body, Character, LeftOut, ModeTable, Motor, Provenance, Track
 
 SHOWN_MODES = 10
@@ -29,9 +29,11 @@ def inspect_shot(args: argparse.Namespace, output: Output) -> int:
     """
     host = open_host(args.plugins)
     wanted: list[type] = [Character, Animation, Provenance]
+    if args.modes:
+        wanted.append(ModeShapes)
     with ProgressDisplay(args.quiet) as display:
         run = host.run(
-            [Source(path=args.shot, command="inspect"), OutputPaths()],
+            [Source(path=args.shot, command="inspect"), OutputPaths(modes=args.modes)],
             wanted,
             optional=[ReducedBodies, SystemModes],
             settings=settings_of(args),
@@ -92,6 +94,7 @@ def inspect_report(run: Run) -> dict[str, Any]:
             for target in character.targets
         ],
         "system_frequencies_hz": modes.frequencies[:SHOWN_MODES].tolist() if modes else [],
+        "mode_shapes": list(shapes.paths) if (shapes := run.get(ModeShapes)) else [],
         "notes": list(character.notes),
         "left_out": [left_out_row(row) for row in (*run.left_out(), *_without(reduced))],
         "operators": [operator_row(row) for row in run.results],

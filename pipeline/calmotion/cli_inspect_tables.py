@@ -51,6 +51,8 @@ def print_inspection(report: dict[str, Any], stream: TextIO) -> None:
         shown = ", ".join(f"{value:.4g}" for value in report["system_frequencies_hz"])
         console.print(f"frequencies of the whole character in its first pose: {shown}, ... Hz")
     print_left_out(console, report["left_out"])
+    if report["mode_shapes"]:
+        console.print(f"mode shapes: {', '.join(report['mode_shapes'])}", soft_wrap=True)
     for note in report["notes"]:
         console.print(f"note: {note}")
 

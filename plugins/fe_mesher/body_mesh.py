@@ -6,17 +6,29 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from calmotion.errors import ShotError
-from calmotion.fem.element_size import automatic_element_size, envelope
-from calmotion.fem.tetrahedra import connected_parts, measure_quality, oriented_tets, without_unused_points
-from calmotion.shot import Body, FEMesh, SurfaceMesh, TetGeometry
+from calmotion.fem.element_size import ACCURACY, MAX_NODES, Shape, element_size, envelope, shape_of
+from calmotion.fem.tetrahedra import (
+    connected_parts,
+    measure_quality,
+    oriented_tets,
+    welded_tets,
+    without_unused_points,
+)
+from calmotion.shot import Body, FEMesh, Frame, SurfaceMesh, TetGeometry
 
+from . import cache
+from .accuracy import Accuracy, compared, estimate, finer, remark
 from .mesh_file import read_mesh_file
 from .repair import Solid, closed_solid, simplified
 from .tetwild import tetrahedralize
 
-MAX_VOLUME_ERROR = 0.01
+# Tried for, and allowed. Half a percent of volume, lost where walls are thin, is more than that of a frequency; but
+# where tens of thousands of triangles take minutes, the first mesh that is allowed will do.
+_GOOD_VOLUME, MAX_VOLUME_ERROR = 0.005, 0.01
 _ATTEMPTS = 3
-_DETAIL = 0.1  # of the envelope: detail that the mesh does not follow anyway
+_REFINEMENTS = 1
+_WELD = 1e-6  # of the diagonal
+_DETAIL, _DENSE_DETAIL, _DENSE = 0.1, 0.5, 15_000  # of the envelope: detail that the mesh does not follow anyway
 
 
 @dataclass(frozen=True)
@@ -28,74 +40,135 @@ class MeshOptions:
     cache: bool = True
 
 
-def mesh_body(index: int, body: Body, options: MeshOptions) -> FEMesh:
+def mesh_body(index: int, body: Body, options: MeshOptions, carrier: Frame | None = None) -> FEMesh:
     """The tetrahedra of a flexible body: authored ones, else those of its mesh file, else of its surfaces.
 
     Args:
         index: Of the body in its character.
         body: With `flexible` settings.
         options: What the user set.
+        carrier: Where the joint towards the world takes hold of it, body frame.
 
     Raises:
         ShotError: There is no geometry, it encloses no volume, or it cannot be meshed.
     """
     settings = body.flexible
     assert settings is not None
-    geometry: TetGeometry | tuple[SurfaceMesh, ...]
     if body.tets is not None:
-        geometry = body.tets
-    elif settings.mesh_file:
-        geometry = read_mesh_file(settings.mesh_file, settings.mesh_scale, body.path)
-    else:
-        geometry = body.surfaces
-    if isinstance(geometry, TetGeometry):
-        return _authored(index, geometry)
-    if not any(len(surface.triangles) for surface in geometry):
+        return _authored(index, body.tets, ())
+    surfaces = body.surfaces
+    repairs: tuple[str, ...] = ()
+    if settings.mesh_file:
+        geometry, repairs = read_mesh_file(settings.mesh_file, settings.mesh_scale, body.path)
+        if isinstance(geometry, TetGeometry):
+            return _authored(index, geometry, repairs)
+        surfaces = geometry
+    if not any(len(surface.triangles) for surface in surfaces):
         raise ShotError(
             "is flexible but has no geometry", path=body.path, found="neither TetMesh nor Mesh nor mesh file",
             remedy="Add a closed Mesh below it, or name a mesh file in calm:flexible:meshFile",
         )  # fmt: skip
+    solid = solid_of(body, surfaces)
+    solid = replace(solid, repairs=(*repairs, *solid.repairs))
     size = options.element_size if options.element_size > 0.0 else settings.element_size
-    return _from_surfaces(index, body, geometry, replace(options, element_size=size))
+    if size > 0.0:
+        return filled(index, body, solid, shape_of(solid.points, solid.triangles), size, options)
+    return _accurate(index, body, solid, options, carrier)
 
 
-def _authored(index: int, geometry: TetGeometry) -> FEMesh:
+def _authored(index: int, geometry: TetGeometry, repairs: tuple[str, ...]) -> FEMesh:
     tets, turned = oriented_tets(geometry.points, geometry.tets, geometry.path)
     points, tets = without_unused_points(np.asarray(geometry.points, dtype=float), tets)
-    repairs = []
     if turned:
-        repairs.append(f"turned {turned} inverted tetrahedra")
+        repairs += (f"turned {turned} inverted tetrahedra",)
     if len(points) < len(geometry.points):
-        repairs.append(f"dropped {len(geometry.points) - len(points)} points that no tetrahedron uses")
+        repairs += (f"dropped {len(geometry.points) - len(points)} points that no tetrahedron uses",)
+    if connected_parts(tets) > 1:
+        points, tets, merged = welded_tets(points, tets, _WELD)
+        if merged:
+            repairs += (f"merged {merged} points that parts of the mesh have in one place",)
     _refuse_loose_parts(tets, geometry.path)
-    return FEMesh(index, points, tets, measure_quality(points, tets, repairs=tuple(repairs)))
+    return FEMesh(index, points, tets, measure_quality(points, tets, repairs=repairs))
 
 
-def _from_surfaces(index: int, body: Body, surfaces: tuple[SurfaceMesh, ...], options: MeshOptions) -> FEMesh:
-    solid = _solid(body, surfaces)
-    size = options.element_size if options.element_size > 0.0 else automatic_element_size(solid.volume)
+def _accurate(index: int, body: Body, solid: Solid, options: MeshOptions, carrier: Frame | None) -> FEMesh:
+    """Tetrahedra as fine as the first frequencies need; the size that was found is kept with the meshes."""
+    shape = shape_of(solid.points, solid.triangles)
+    assert body.flexible is not None
+    held = None if carrier is None else carrier.position.tolist()
+    rule = {"accuracy": ACCURACY, "nodes": MAX_NODES, "held": held, "poisson": body.flexible.material.poissons_ratio}
+    rule["radius"] = body.flexible.interface_radius
+    key = cache.cache_key(solid.points, solid.triangles, rule)
+    known = cache.load(key, ("size", "error", "nodes")) if options.cache else None
+    if known is not None:
+        size, error, nodes = (float(value) for value in known)
+        mesh = filled(index, body, solid, shape, size, options)
+        return _with_remarks(mesh, remark(Accuracy(error, int(nodes))))
+    size = element_size(shape)
+    mesh = filled(index, body, solid, shape, size, options)
+    found = estimate(mesh.points, mesh.tets, body, carrier)
+    for _ in range(_REFINEMENTS):
+        smaller = finer(size, found, shape)
+        if smaller is None:
+            break
+        size, before = smaller, found
+        mesh = filled(index, body, solid, shape, size, options)
+        found = compared(before, estimate(mesh.points, mesh.tets, body, carrier))
+    if options.cache:
+        cache.store(key, size=np.array(size), error=np.array(found.error), nodes=np.array(found.nodes))
+    return _with_remarks(mesh, remark(found))
+
+
+def _with_remarks(mesh: FEMesh, remarks: tuple[str, ...]) -> FEMesh:
+    return replace(mesh, quality=replace(mesh.quality, repairs=mesh.quality.repairs + remarks))
+
+
+def filled(index: int, body: Body, solid: Solid, shape: Shape, size: float, options: MeshOptions) -> FEMesh:
+    """Tetrahedra of one size that fill a solid.
+
+    Args:
+        index: Of the body in its character.
+        body: For errors.
+        solid: Closed.
+        shape: Measured on it.
+        size: Edge length [m].
+        options: Time limit and cache; their element size does not matter here.
+
+    Raises:
+        ShotError: It cannot be meshed, or the tetrahedra do not fill it.
+    """
     diagonal = float(np.linalg.norm(np.ptp(solid.points, axis=0)))
-    error = np.inf
+    dense = len(solid.triangles) > _DENSE
+    volumes: list[float] = []
+    best: FEMesh | None = None
     for attempt in range(_ATTEMPTS):
-        distance = envelope(size, diagonal, len(solid.triangles), attempt)
-        surface = simplified(solid, _DETAIL * distance)
+        distance = envelope(size, diagonal, shape.thickness, len(solid.triangles), attempt)
+        surface = simplified(solid, (_DENSE_DETAIL if dense else _DETAIL) * distance)
         points, tets = tetrahedralize(*surface, size, distance / diagonal, body.path, options.time_limit, options.cache)
         tets, _ = oriented_tets(points, tets, body.path)
         points, tets = without_unused_points(points, tets)
         quality = measure_quality(points, tets, surface_volume=solid.volume, repairs=solid.repairs)
-        error = quality.volume_error
-        if error <= MAX_VOLUME_ERROR:
-            _refuse_loose_parts(tets, body.path)
-            return FEMesh(index, points, tets, quality)
-        size *= 0.8
+        if quality.volume_error <= MAX_VOLUME_ERROR:
+            if best is None or quality.volume_error < best.quality.volume_error:
+                best = FEMesh(index, points, tets, quality)
+            if quality.volume_error <= _GOOD_VOLUME or dense or attempt == 1:
+                break
+        volumes.append(quality.volume)
+        size *= 0.8 if best is None else 1.0
+    if best is not None:
+        _refuse_loose_parts(best.tets, body.path)
+        return best
+    error = abs(volumes[-1] / solid.volume - 1.0)
+    # ever closer envelopes that agree with each other, but not with the surface, blame the surface
+    agree = abs(volumes[-1] - volumes[-2]) < 0.2 * error * solid.volume
     raise ShotError(
-        "the tetrahedra do not fill the surface", path=body.path,
-        found=f"volume off by {100.0 * error:.2g}%, allowed {100.0 * MAX_VOLUME_ERROR:.2g}%",
+        "the tetrahedra do not fill the surface" + (", which seems to run through itself" if agree else ""),
+        path=body.path, found=f"volume off by {100.0 * error:.2g}%, allowed {100.0 * MAX_VOLUME_ERROR:.2g}%",
         remedy="Author a smaller calm:flexible:elementSize, repair the Mesh, or give a TetMesh or a mesh file",
     )  # fmt: skip
 
 
-def _solid(body: Body, surfaces: tuple[SurfaceMesh, ...]) -> Solid:
+def solid_of(body: Body, surfaces: tuple[SurfaceMesh, ...]) -> Solid:
     """The solid of what is seen; of hidden (collision) geometry where what is seen is not closed."""
     seen = tuple(s for s in surfaces if s.visible) or surfaces
     hidden = tuple(s for s in surfaces if not s.visible)

@@ -24,17 +24,17 @@ def cache_key(points: np.ndarray, triangles: np.ndarray, settings: dict[str, obj
     return digest.hexdigest()
 
 
-def load(key: str) -> tuple[np.ndarray, np.ndarray] | None:
-    """Points and tetrahedra kept under a key; None when there are none, or the file is damaged."""
+def load(key: str, names: tuple[str, ...] = ("points", "tets")) -> tuple[np.ndarray, ...] | None:
+    """The arrays kept under a key; None when there are none, or the file is damaged."""
     try:
         with np.load(cache_folder() / FOLDER / f"{key}.npz", allow_pickle=False) as file:
-            return file["points"], file["tets"]
+            return tuple(file[name] for name in names)
     except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):
         return None
 
 
-def store(key: str, points: np.ndarray, tets: np.ndarray) -> None:
-    """Keep a mesh; a reader sees all of it or nothing. A folder that cannot be written is passed over."""
+def store(key: str, **arrays: np.ndarray) -> None:
+    """Keep arrays; a reader sees all of them or nothing. A folder that cannot be written is passed over."""
     folder = cache_folder() / FOLDER
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -43,7 +43,7 @@ def store(key: str, points: np.ndarray, tets: np.ndarray) -> None:
         return
     try:
         with os.fdopen(handle, "wb") as file:
-            np.savez(file, points=points, tets=tets)
+            np.savez(file, **arrays)  # type: ignore[arg-type]
         os.replace(name, folder / f"{key}.npz")
     except OSError:
         pass

@@ -3,24 +3,31 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from calmotion.errors import ShotError
 from calmotion.shot import SurfaceMesh, TetGeometry
 
+from .cells import CORNERS, TRIANGLES, tets_of, triangles_of
 
-def read_mesh_file(path: str, scale: float, body: str) -> TetGeometry | tuple[SurfaceMesh, ...]:
-    """The tetrahedra of a mesh file, or its surface where it has none.
+_CURVED = 1e-3  # of an edge: distance of a midpoint from its middle that is worth a word
+
+
+def read_mesh_file(path: str, scale: float, body: str) -> tuple[TetGeometry | tuple[SurfaceMesh, ...], tuple[str, ...]]:
+    """The tetrahedra of a mesh file, or its surface where it has no volume elements, and what was changed.
+
+    Hexahedra, wedges and pyramids are cut into tetrahedra; quadratic elements give their corners, since ours get
+    midpoints of their own.
 
     Args:
-        path: File; quadratic elements give their corners.
+        path: File; Gmsh, VTK, Abaqus, Nastran, STL, OBJ, PLY and whatever else meshio reads.
         scale: Metres per unit of the file.
         body: Prim path of the body, for errors.
 
     Raises:
-        ShotError: The file is missing, cannot be read, or has neither tetrahedra nor triangles.
+        ShotError: The file is missing, cannot be read, or has neither volume elements nor faces.
     """
-    import meshio
 
     def refuse(problem: str, found: object, remedy: str) -> ShotError:
         return ShotError(problem, path=body, attribute="calm:flexible:meshFile", found=found, remedy=remedy)
@@ -28,21 +35,49 @@ def read_mesh_file(path: str, scale: float, body: str) -> TetGeometry | tuple[Su
     if not Path(path).is_file():
         raise refuse("the mesh file does not exist", path, "Correct the asset path")
     try:
-        # meshio takes .msh for ANSYS first; everybody else means Gmsh
-        mesh = meshio.read(path, file_format="gmsh" if path.lower().endswith(".msh") else None)
+        mesh = _read(path)
+        points = np.asarray(mesh.points, dtype=float) * scale
+        cells = [(block.type, np.asarray(block.data, dtype=np.int64)) for block in mesh.cells if len(block.data)]
     except (Exception, SystemExit) as error:  # meshio ends the process on a format it does not know
         raise refuse("the mesh file cannot be read", f"{path}: {error}", "Use a format that meshio reads") from error
-    points = np.asarray(mesh.points, dtype=float) * scale
-    if points.shape[1] != 3:
+    if points.ndim != 2 or points.shape[1] != 3:
         raise refuse("the mesh file is not three-dimensional", path, "Give a volume mesh or a closed surface")
-    tets = [block.data[:, :4] for block in mesh.cells if block.type in ("tetra", "tetra10")]
-    if tets:
-        return TetGeometry(path, points, np.vstack(tets).astype(np.int32))
-    faces = [block.data[:, :3] for block in mesh.cells if block.type in ("triangle", "triangle6")]
-    for block in mesh.cells:
-        if block.type in ("quad", "quad8", "quad9"):
-            faces += [block.data[:, [0, 1, 2]], block.data[:, [0, 2, 3]]]
+    for kind, data in cells:
+        if data.min() < 0 or data.max() >= len(points):
+            worst = int(data.min()) if data.min() < 0 else int(data.max())
+            raise refuse(f"an element of the mesh file ({kind}) names a node that does not exist", worst, "Repair it")
+    volume = [(kind, data) for kind, data in cells if kind in CORNERS]
+    if volume:
+        tets = np.vstack([tets_of(kind, data) for kind, data in volume])
+        if not np.isfinite(points[tets]).all():
+            raise refuse("a node of the mesh file is not finite", path, "Repair the file")
+        return TetGeometry(path, points, tets.astype(np.int32)), _changes(volume, points, path)
+    faces = [(kind, data) for kind, data in cells if kind in TRIANGLES]
     if not faces:
-        kinds = ", ".join(sorted({block.type for block in mesh.cells})) or "nothing"
-        raise refuse("the mesh file has neither tetrahedra nor triangles", kinds, "Give tetrahedra or a closed surface")
-    return (SurfaceMesh(path, points, np.vstack(faces).astype(np.int32)),)
+        kinds = ", ".join(sorted({kind for kind, _ in cells})) or "nothing"
+        raise refuse("the mesh file has neither volume elements nor faces", kinds, "Give tetrahedra or a surface")
+    triangles = np.vstack([triangles_of(kind, data) for kind, data in faces])
+    return (SurfaceMesh(path, points, triangles.astype(np.int32)),), ()
+
+
+def _read(path: str) -> Any:
+    import meshio
+
+    # meshio takes .msh for ANSYS first; everybody else means Gmsh
+    return meshio.read(path, file_format="gmsh" if path.lower().endswith(".msh") else None)
+
+
+def _changes(volume: list[tuple[str, np.ndarray]], points: np.ndarray, path: str) -> tuple[str, ...]:
+    """What the elements of a file lost on the way to linear tetrahedra."""
+    told = []
+    for kind, data in volume:
+        if not kind.startswith("tetra"):
+            told.append(f"{path}: cut {len(data)} elements of type {kind} into tetrahedra")
+        if kind == "tetra10":
+            # meshio orders the midpoints as VTK does: edges 01, 12, 20, 03, 13, 23
+            ends = points[data[:, [0, 1, 2, 0, 1, 2]]], points[data[:, [1, 2, 0, 3, 3, 3]]]
+            away = np.linalg.norm(points[data[:, 4:]] - 0.5 * (ends[0] + ends[1]), axis=-1)
+            curved = int((away > _CURVED * np.linalg.norm(ends[1] - ends[0], axis=-1)).any(axis=1).sum())
+            if curved:
+                told.append(f"{path}: straightened the edges of {curved} curved tetrahedra")
+    return tuple(told)

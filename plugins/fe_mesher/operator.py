@@ -47,6 +47,7 @@ class TetrahedralizeFlexibleBodies(Operator):
     def execute(self, context: RunContext) -> Sequence[object]:
         """The meshes, in the order of the bodies."""
         # trimesh and manifold3d load in half a second: only when something bends
+        from .accuracy import carrier_of
         from .body_mesh import MeshOptions, mesh_body
 
         character = context.get(Character)
@@ -60,7 +61,7 @@ class TetrahedralizeFlexibleBodies(Operator):
         for done, index in enumerate(flexible):
             body = character.bodies[index]
             context.progress(done / len(flexible), body.path)
-            mesh = mesh_body(index, body, options)
+            mesh = mesh_body(index, body, options, carrier_of(character, index))
             quality = mesh.quality
             context.report(
                 "info",

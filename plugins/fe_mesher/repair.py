@@ -1,22 +1,21 @@
-"""From surfaces as robots have them to one closed solid: trimesh repairs, manifold3d unites."""
+"""From surfaces as robots have them to one closed solid: parts are closed one by one, manifold3d unites them."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
-import trimesh
 from calmotion.errors import ShotError
-from calmotion.fem.closed_surfaces import close, winding_number
-from calmotion.fem.tetrahedra import surface_area, surface_volume
+from calmotion.fem.closed_surfaces import winding_number
 from calmotion.shot import SurfaceMesh
 
-_MERGE = 1e-6  # of the diagonal: STL files repeat their corners in single precision
-_CRUMB = 1e-3  # of the area: triangles that hang in the air
-_HOLE, _HOLES = 5e-3, 2e-2  # of the area of a part: one hole, all of them
+from .bridges import bridged
+from .closing import REMEDY, Part, closed_parts, connected_pieces
+from .uniting import NotManifold, united
+
+_TURNED, _PLACES = 0.02, 200  # share of the surface that may be inside out, measured in so many places
 _LOOSE = 1e-2  # of the volume: screws that touch nothing
-_REMEDY = "Close the mesh, or name a closed one in calm:flexible:meshFile, or author a TetMesh below the body"
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,6 +38,8 @@ class Solid:
 def closed_solid(surfaces: Sequence[SurfaceMesh], body: str) -> Solid:
     """One solid from the surfaces of a body: repaired, and united where there are several.
 
+    A closed shell inside another is a cavity where it faces the other way, and solid where it faces the same way.
+
     Args:
         surfaces: Of the body, body frame.
         body: Prim path of the body.
@@ -47,20 +48,35 @@ def closed_solid(surfaces: Sequence[SurfaceMesh], body: str) -> Solid:
         ShotError: A surface is open, or encloses no volume; the path is that of its Mesh prim.
     """
     repairs: list[str] = []
-    parts: list[trimesh.Trimesh] = []
-    for surface in _without_copies(surfaces, repairs):
-        parts += _closed_parts(surface, repairs)
+    kept = _without_copies([_checked(surface, repairs) for surface in surfaces], repairs)
+    if not kept:
+        raise ShotError("its surfaces enclose no volume", path=body, found="no triangles", remedy=REMEDY)
+    # about the origin and of size one, so that no tolerance depends on the unit or on where the body is
+    every = np.vstack([surface.points[surface.triangles.ravel()] for surface in kept])
+    center, scale = 0.5 * (every.min(axis=0) + every.max(axis=0)), float(np.linalg.norm(np.ptp(every, axis=0)))
+    if not scale > 0.0:
+        raise ShotError("its surfaces enclose no volume", path=body, found="all points in one place", remedy=REMEDY)
+    kept = [replace(surface, points=(surface.points - center) / scale) for surface in kept]
+    parts = _parts(kept, repairs)
     if not parts:
-        raise ShotError("its surfaces enclose no volume", path=body, found="no triangles", remedy=_REMEDY)
-    united = _unite(parts, body)
-    pieces = [piece for piece in united.split(only_watertight=False, repair=False) if len(piece.faces) > 3]
-    outer = [piece for piece in pieces if piece.volume > 0.0]
-    if len(outer) > 1:
-        united = _without_loose_pieces(united, pieces, repairs, body)
-    if not united.volume > 0.0:
-        raise ShotError("its surfaces enclose no volume", path=body, found=f"{united.volume:.3g} m^3", remedy=_REMEDY)
-    volume = surface_volume(np.asarray(united.vertices), np.asarray(united.faces))
-    return Solid(np.array(united.vertices, dtype=float), np.array(united.faces, dtype=np.int32), volume, tuple(repairs))
+        raise ShotError("its surfaces enclose no volume", path=body, found="no solid part", remedy=REMEDY)
+    try:
+        whole = united(parts)
+    except NotManifold as error:
+        raise ShotError(
+            "its surfaces cannot be united into one solid", path=body, found=str(error), remedy=REMEDY
+        ) from error
+    whole = _in_one_piece(whole, scale, repairs, body)
+    if not whole.volume > 0.0:
+        raise ShotError("its surfaces enclose no volume", path=body, found=f"{whole.volume:.3g} m^3", remedy=REMEDY)
+    turned = _inside_out(whole)
+    if turned > _TURNED:
+        raise ShotError(
+            "its surface runs through itself so that some of it is inside out", path=body,
+            found=f"{100.0 * turned:.2g}% of the surface", remedy="Untwist it, or author a TetMesh below the body",
+        )  # fmt: skip
+    points = whole.points * scale + center
+    return Solid(points, whole.triangles.astype(np.int32), whole.volume * scale**3, tuple(repairs))
 
 
 def simplified(solid: Solid, tolerance: float) -> tuple[np.ndarray, np.ndarray]:
@@ -73,6 +89,30 @@ def simplified(solid: Solid, tolerance: float) -> tuple[np.ndarray, np.ndarray]:
         return solid.points, solid.triangles
     mesh = coarse.to_mesh64()
     return np.array(mesh.vert_properties, dtype=float)[:, :3], np.array(mesh.tri_verts, dtype=np.int32)
+
+
+def _checked(surface: SurfaceMesh, repairs: list[str]) -> SurfaceMesh:
+    """A surface whose triangles name points that are there, and finite."""
+    points = np.asarray(surface.points, dtype=float).reshape(-1, 3)
+    triangles = np.asarray(surface.triangles).reshape(-1, 3)
+    if len(triangles) == 0:
+        return replace(surface, points=points, triangles=triangles)
+    if triangles.min() < 0 or triangles.max() >= len(points):
+        worst = int(triangles.min()) if triangles.min() < 0 else int(triangles.max())
+        raise ShotError(
+            f"refers to points that do not exist (it has {len(points)})", path=surface.path,
+            attribute="faceVertexIndices", found=worst, remedy="Correct the indices",
+        )  # fmt: skip
+    bad = ~np.isfinite(points).all(axis=1)
+    if bad[triangles].any():
+        raise ShotError(
+            "a point is not finite", path=surface.path, attribute="points",
+            found=f"point {int(triangles[bad[triangles]].min())}", remedy="Correct it, or remove its faces",
+        )  # fmt: skip
+    if bad.any():
+        repairs.append(f"{surface.path}: passed over {int(bad.sum())} points that are not finite and in no triangle")
+        points = np.where(bad[:, None], points[triangles[0, 0]], points)
+    return replace(surface, points=points, triangles=triangles)
 
 
 def _without_copies(surfaces: Sequence[SurfaceMesh], repairs: list[str]) -> list[SurfaceMesh]:
@@ -91,97 +131,105 @@ def _without_copies(surfaces: Sequence[SurfaceMesh], repairs: list[str]) -> list
     return kept
 
 
-def _closed_parts(surface: SurfaceMesh, repairs: list[str]) -> list[trimesh.Trimesh]:
-    """The connected parts of a surface, each closed and outward, cavities joined to the part around them."""
-    points = np.asarray(surface.points, dtype=float)
-    if not np.isfinite(points).all():
-        raise ShotError("a point is not finite", path=surface.path, attribute="points", remedy=_REMEDY)
-    mesh = trimesh.Trimesh(points, surface.triangles, process=False)
-    diagonal = float(np.linalg.norm(np.ptp(points, axis=0)))
-    digits = int(np.clip(-np.floor(np.log10(max(_MERGE * diagonal, 1e-12))), 0, 12))
-    mesh.merge_vertices(merge_tex=True, merge_norm=True, digits_vertex=digits)
-    before = len(mesh.faces)
-    mesh.update_faces(mesh.nondegenerate_faces() & mesh.unique_faces())
-    if len(mesh.faces) < before:
-        repairs.append(f"{surface.path}: dropped {before - len(mesh.faces)} degenerate or repeated triangles")
-    area = mesh.area
-    parts, crumbs = [], 0
-    for part in mesh.split(only_watertight=False, repair=False):
-        if part.area < _CRUMB * area and not part.is_watertight:
-            crumbs += 1
-            continue
-        parts.append(_closed_part(part, surface.path, repairs))
-    if crumbs:
-        repairs.append(f"{surface.path}: dropped {crumbs} stray scraps of surface")
-    return _outward([part for part in parts if abs(part.volume) > 1e-9 * part.area**1.5], surface.path, repairs)
+def _parts(surfaces: list[SurfaceMesh], repairs: list[str]) -> list[Part]:
+    """Closed and outward; open surfaces are joined first, since colours often cut one closed surface into several."""
+    parts: list[Part] = []
+    opened: list[tuple[SurfaceMesh, ShotError]] = []
+    for surface in surfaces:
+        noted: list[str] = []
+        try:
+            parts += _outward(closed_parts(surface.points, surface.triangles, surface.path, noted), surface.path, noted)
+            repairs += noted
+        except ShotError as error:
+            opened.append((surface, error))
+    if not opened:
+        return parts
+    if len(surfaces) == 1:
+        raise opened[0][1]
+    open_ones = [surface for surface, _ in opened]
+    path = open_ones[0].path
+    noted = [f"joined {len(opened)} open surfaces: {', '.join(surface.path for surface in open_ones)}"]
+    starts = np.cumsum([0] + [len(surface.points) for surface in open_ones[:-1]])
+    triangles = np.vstack([s.triangles.astype(np.int64) + k for s, k in zip(open_ones, starts, strict=True)])
+    try:
+        points = np.vstack([surface.points for surface in open_ones])
+        parts += _outward(closed_parts(points, triangles, path, noted), path, noted)
+    except ShotError:
+        raise opened[0][1] from None
+    repairs += noted
+    return parts
 
 
-def _closed_part(part: trimesh.Trimesh, path: str, repairs: list[str]) -> trimesh.Trimesh:
-    if not part.is_winding_consistent:
-        trimesh.repair.fix_winding(part)
-        repairs.append(f"{path}: made the orientation of the triangles agree")
-    closure = close(np.asarray(part.vertices), np.asarray(part.faces))
-    if len(closure.areas) == 0:
-        return part
-    area = surface_area(np.asarray(part.vertices), np.asarray(part.faces))
-    if closure.areas.max() > _HOLE * area or closure.areas.sum() > _HOLES * area:
-        raise ShotError(
-            "is an open surface, so it has no inside to fill with tetrahedra", path=path,
-            found=f"{len(closure.areas)} holes, the largest {100.0 * closure.areas.max() / area:.3g}% of the surface",
-            remedy=_REMEDY,
-        )  # fmt: skip
-    holes = f"{len(closure.areas)} hole" + ("s" if len(closure.areas) > 1 else "")
-    repairs.append(f"{path}: closed {holes}, {100.0 * closure.areas.sum() / area:.2g}% of the surface")
-    return trimesh.Trimesh(closure.points, closure.triangles, process=False)
-
-
-def _outward(parts: list[trimesh.Trimesh], path: str, repairs: list[str]) -> list[trimesh.Trimesh]:
+def _outward(parts: list[Part], path: str, repairs: list[str]) -> list[Part]:
     """Turns parts that are inside out; those inside another part are cavities, and stay inward as part of it."""
     if sum(part.volume for part in parts) < 0.0:
         repairs.append(f"{path}: turned the surface, which was inside out")
-        for part in parts:
-            part.invert()
+        parts = [_inverted(part) for part in parts]
     solids = sorted((part for part in parts if part.volume > 0.0), key=lambda part: part.volume)
     for part in [part for part in parts if part.volume < 0.0]:
-        around = [s for s in solids if _holds(s, part.vertices[0]) and s.volume > -part.volume]
+        around = [i for i, s in enumerate(solids) if s.volume > -part.volume and _holds(s, part.points[0])]
         if around:
-            at = next(i for i, solid in enumerate(solids) if solid is around[0])
-            solids[at] = trimesh.util.concatenate([solids[at], part])
+            solids[around[0]] = _together([solids[around[0]], part])
         else:
-            part.invert()
             repairs.append(f"{path}: turned a part that was inside out")
-            solids.append(part)
+            solids.append(_inverted(part))
+    inside = sum(any(t.volume > s.volume and _holds(t, s.points[0]) for t in solids) for s in solids)
+    if inside:
+        repairs.append(
+            f"{path}: took {inside} closed shells inside others as solid, since they face outward; "
+            "turn them to make cavities"
+        )
     return solids
 
 
-def _holds(solid: trimesh.Trimesh, point: np.ndarray) -> bool:
-    return winding_number(np.asarray(point), np.asarray(solid.vertices), np.asarray(solid.faces)) > 0.5
+def _inverted(part: Part) -> Part:
+    return Part(part.points, part.triangles[:, ::-1])
 
 
-def _unite(parts: list[trimesh.Trimesh], body: str) -> trimesh.Trimesh:
-    """The union; also of one part, since that resolves where it runs through itself."""
-    try:
-        return trimesh.boolean.union(parts, engine="manifold", check_volume=False)
-    except Exception as error:
-        raise ShotError(
-            "its surfaces cannot be united into one solid", path=body, found=str(error), remedy=_REMEDY
-        ) from error
+def _together(parts: Sequence[Part]) -> Part:
+    starts = np.cumsum([0] + [len(part.points) for part in parts[:-1]])
+    triangles = np.vstack([part.triangles + start for part, start in zip(parts, starts, strict=True)])
+    return Part(np.vstack([part.points for part in parts]), triangles)
 
 
-def _without_loose_pieces(
-    united: trimesh.Trimesh, pieces: list[trimesh.Trimesh], repairs: list[str], body: str
-) -> trimesh.Trimesh:
-    """Without small solids that touch nothing; they cannot be part of a body that holds together."""
-    least = _LOOSE * united.volume
-    loose = [piece for piece in pieces if 0.0 < piece.volume < least]
-    if sum(piece.volume > 0.0 for piece in pieces) - len(loose) > 1:
-        sizes = ", ".join(f"{1e6 * piece.volume:.3g}" for piece in pieces if piece.volume >= least)
+def _holds(solid: Part, point: np.ndarray) -> bool:
+    low, high = solid.points.min(axis=0), solid.points.max(axis=0)
+    return bool(((point > low) & (point < high)).all()) and winding_number(point, solid.points, solid.triangles) > 0.5
+
+
+def _inside_out(whole: Part) -> float:
+    """Share of a surface that has nothing of the body just below it; places lie evenly over it."""
+    x = whole.points[whole.triangles]
+    normal = np.cross(x[:, 1] - x[:, 0], x[:, 2] - x[:, 0])
+    area = np.linalg.norm(normal, axis=1)
+    upto = np.cumsum(area)
+    chosen = np.minimum(np.searchsorted(upto, upto[-1] * (np.arange(_PLACES) + 0.5) / _PLACES), len(x) - 1)
+    weights = np.random.default_rng(2).dirichlet(np.full(3, 2.0), _PLACES)
+    places = np.einsum("ij,ijk->ik", weights, x[chosen]) - 1e-6 * normal[chosen] / area[chosen, None]
+    return sum(winding_number(place, whole.points, whole.triangles) < 0.5 for place in places) / _PLACES
+
+
+def _in_one_piece(whole: Part, scale: float, repairs: list[str], body: str) -> Part:
+    """Without small solids that touch nothing, and with narrow gaps between large ones bridged."""
+    pieces = connected_pieces(whole.points, whole.triangles)
+    solids = [piece for piece in pieces if piece.volume > 0.0]
+    if len(solids) <= 1:
+        return whole
+    least = _LOOSE * whole.volume
+    loose = [piece for piece in solids if piece.volume < least]
+    large = [piece for piece in solids if piece.volume >= least]
+    cavities = [p for p in pieces if p.volume < 0.0 and not any(_holds(solid, p.points[0]) for solid in loose)]
+    if loose:
+        lost = sum(piece.volume for piece in loose)
+        repairs.append(f"left out {len(loose)} loose pieces, {100.0 * lost / whole.volume:.2g}% of the volume")
+    if len(large) == 1:
+        return _together([*large, *cavities])
+    joined, gap = bridged(large)
+    if joined is None:
+        sizes = ", ".join(f"{1e6 * scale**3 * piece.volume:.3g}" for piece in large)
         raise ShotError(
             "its surfaces are separate solids that touch nowhere", path=body, found=f"{sizes} cm^3",
             remedy="Make them overlap, or split them into several bodies",
         )  # fmt: skip
-    inward = [piece for piece in pieces if piece.volume < 0.0]
-    cavities = [piece for piece in inward if not any(_holds(solid, piece.vertices[0]) for solid in loose)]
-    lost = sum(piece.volume for piece in loose)
-    repairs.append(f"left out {len(loose)} loose pieces, {100.0 * lost / united.volume:.2g}% of the volume")
-    return trimesh.util.concatenate([piece for piece in pieces if piece.volume >= least] + cavities)
+    repairs.append(f"bridged gaps of up to {1e3 * scale * gap:.2g} mm between {len(large)} separate solids")
+    return _together([joined, *cavities])

@@ -15,6 +15,9 @@ from . import cache
 
 _REMEDY = "Simplify or repair the Mesh, author a larger calm:flexible:elementSize, or give a TetMesh or a mesh file"
 _STOP_ENERGY = 10.0
+# Passes that improve the elements. Where tens of thousands of triangles decide what there is to mesh, a few angles stay
+# below a degree however many passes there are, and passes are all that the time goes to.
+_PASSES, _DENSE_PASSES, _DENSE = 80, 12, 15_000
 
 
 def tetrahedralize(
@@ -40,25 +43,28 @@ def tetrahedralize(
     Raises:
         ShotError: It crashed, took too long, or made nothing.
     """
+    passes = _DENSE_PASSES if len(triangles) > _DENSE else _PASSES
     settings: dict[str, object] = {
         "element_size": element_size,
         "envelope": envelope,
         "stop_energy": _STOP_ENERGY,
         "coarsen": True,
+        "passes": passes,
         "pytetwild": version("pytetwild"),
     }
     key = cache.cache_key(points, triangles, settings)
     found = cache.load(key) if use_cache else None
     if found is None:
-        found = _run(points, triangles, element_size, envelope, path, time_limit)
+        found = _run(points, triangles, element_size, envelope, passes, path, time_limit)
         if use_cache:
-            cache.store(key, *found)
-    return found
+            cache.store(key, points=found[0], tets=found[1])
+    return found[0], found[1]
 
 
 def _run(
-    points: np.ndarray, triangles: np.ndarray, element_size: float, envelope: float, path: str, time_limit: float
-) -> tuple[np.ndarray, np.ndarray]:
+    points: np.ndarray, triangles: np.ndarray, element_size: float, envelope: float, passes: int, path: str,
+    time_limit: float,
+) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
     # in units of the bounding box, about its centre: fTetWild's own tolerances then suit any robot
     low, high = points.min(axis=0), points.max(axis=0)
     center, diagonal = 0.5 * (low + high), float(np.linalg.norm(high - low))
@@ -71,6 +77,7 @@ def _run(
             element_size=element_size / diagonal,
             envelope=envelope,
             stop_energy=_STOP_ENERGY,
+            passes=passes,
         )
         # -P: the plugin's folder must not stand before the libraries on the path
         worker = Path(__file__).with_name("tetwild_worker.py")

@@ -28,6 +28,7 @@ def main(source: str, destination: str) -> None:
             edge_length_abs=float(file["element_size"]),
             epsilon=float(file["envelope"]),
             stop_energy=float(file["stop_energy"]),
+            num_opt_iter=int(file["passes"]),
             # up to the element size: a third of the elements at the same volume error and better angles
             coarsen=True,
             vtk_ordering=True,

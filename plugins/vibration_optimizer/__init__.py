@@ -31,8 +31,17 @@ class ReduceFlexibleBodies(Operator):
     idname = "fem.reduce"
     label = "Reduce flexible bodies"
     requires = (Character,)
-    uses = (FEMeshes,)
+    uses = (FEMeshes, Animation, Source)
     provides = (ReducedBodies,)
+    properties = (
+        Property(
+            "elasticity",
+            str,
+            "shot",
+            choices=("shot", "auto", "linear", "stvk", "neohookean"),
+            description="Elastic law of every flexible body; shot: as calm:flexible:elasticity says",
+        ),
+    )
 
     @classmethod
     def poll(cls, data: Mapping[type, Any]) -> str | None:
@@ -40,10 +49,18 @@ class ReduceFlexibleBodies(Operator):
 
     def execute(self, context: RunContext) -> Sequence[object]:
         from calmotion.dynamics.topology import span_tree
-        from calmotion.retarget.bodies import mode_tables, reduce_bodies
+        from calmotion.retarget.bodies import mode_tables, reduce_bodies, with_elasticity
+        from calmotion.retarget.prepare import excitations
 
-        character = context.get(Character)
-        bodies = reduce_bodies(character, span_tree(character), context.get(FEMeshes), context.progress)
+        character, meshes, animation = context.get(Character), context.get(FEMeshes), context.get(Animation)
+        if context.properties.elasticity != "shot":
+            character = with_elasticity(character, context.properties.elasticity)
+        loads, tolerance = None, None
+        if animation is not None and context.get(Source) is not None:
+            context.progress(0.0, "compiling kernels, once")
+            options = _options(context)
+            loads, tolerance = excitations(character, animation, meshes, options), options.tolerance
+        bodies = reduce_bodies(character, span_tree(character), meshes, context.progress, loads, tolerance)
         return [ReducedBodies(tuple(bodies), mode_tables(bodies))]
 
 

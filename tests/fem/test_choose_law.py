@@ -45,7 +45,7 @@ def test_a_slow_swing_is_linear_and_a_fast_one_is_not():
 
 
 def test_rubber_needs_the_material_law():
-    assert choose_law(*arm(5e6), swing(0.5), 1e-3).law == "neohookean"
+    assert choose_law(*arm(5e6), swing(1.0), 1e-3).law == "neohookean"
 
 
 def test_at_rest_everything_is_linear():
@@ -57,7 +57,9 @@ def test_at_rest_everything_is_linear():
 def test_the_work_of_loads_is_that_of_their_sum_at_worst():
     model, _, basis, _ = arm(1.8e9)
     rng = np.random.default_rng(0)
-    loads = Excitation(*(rng.uniform(0.0, 2.0, 3) for _ in range(3)), *(rng.uniform(0.0, 2.0, (1, 3)) for _ in range(2)))
+    loads = Excitation(
+        *(rng.uniform(0.0, 2.0, 3) for _ in range(3)), *(rng.uniform(0.0, 2.0, (1, 3)) for _ in range(2))
+    )
     bound = work_of_loads(model, basis.modes, basis.patch_motion, loads)
     X = model.mesh.nodes
     largest = np.zeros(len(bound))

@@ -29,6 +29,7 @@ def test_holes_are_closed_and_the_volume_comes_back(box, missing):
     # the holes are flat, so their caps lie in them
     assert surface_volume(closure.points, closure.triangles) == pytest.approx(1.0, rel=1e-12)
     assert closure.areas.sum() == pytest.approx(missing / 32.0, rel=0.5)
+    assert len(closure.sides) == len(closure.areas) and (missing > 1 or closure.sides.tolist() == [3])
 
 
 def test_two_holes_that_touch_at_a_corner_are_closed_apart(box):

@@ -3,12 +3,18 @@
 import numpy as np
 import pytest
 from boxes import box_tets
-from calmotion.dynamics.neohookean import neohookean_forces
+from calmotion.dynamics.neohookean import JOIN, neohookean_forces
 from calmotion.errors import ShotError
 from calmotion.fem import cubature
 from calmotion.fem.assembly import assemble
 from calmotion.fem.craig_bampton import reduced_basis
-from calmotion.fem.cubature import greedy_cubature, linear_tangent, neohookean_cubature, neohookean_stress
+from calmotion.fem.cubature import (
+    LEAST_VOLUME,
+    greedy_cubature,
+    linear_tangent,
+    neohookean_cubature,
+    neohookean_stress,
+)
 from calmotion.fem.elastic_forms import GradientRule, lame_constants
 from calmotion.fem.modal_derivatives import Support, extended_basis
 from calmotion.shot import FlexibleSettings
@@ -81,6 +87,18 @@ def test_the_stress_is_linear_elasticity_at_first_order():
     assert np.allclose(
         neohookean_stress(np.eye(3) + G, 2.0, 0.7).ravel(), linear_tangent(2.0, 0.7) @ G.ravel(), atol=1e-10
     )
+
+
+def test_the_stress_is_that_of_the_compiled_law_also_where_an_element_is_inside_out():
+    rng = np.random.default_rng(6)
+    assert LEAST_VOLUME == JOIN
+    for size in (0.1, 1.0, 3.0):
+        G = size * rng.normal(size=(9, 9))
+        data = np.concatenate([np.zeros(81), [1.0], G.ravel()])
+        u = rng.normal(size=9)
+        F = np.eye(3) + (G @ u).reshape(3, 3)
+        force, _ = reduced(9, data, 1, 2.0, 0.7, u)
+        assert np.allclose(force, G.T @ neohookean_stress(F, 2.0, 0.7).ravel(), rtol=1e-10)
 
 
 def test_greedy_weights_are_non_negative_and_meet_the_target():

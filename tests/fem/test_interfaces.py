@@ -20,7 +20,7 @@ def anchor(helpers):
 
 
 def test_a_given_radius_takes_the_surface_nodes_within_it(beam, anchor):
-    patch, = interface_patches(beam, [anchor("/j", 0.3, 0.0, 0.01)], 0.025, "/b")
+    (patch,) = interface_patches(beam, [anchor("/j", 0.3, 0.0, 0.01)], 0.025, "/b")
     distance = np.linalg.norm(beam.nodes - [0.3, 0.0, 0.01], axis=1)
     surface = np.isin(np.arange(len(beam.nodes)), beam.surface_nodes)
     assert np.array_equal(patch.nodes, np.flatnonzero(surface & (distance <= 0.025)))
@@ -39,7 +39,7 @@ def test_patches_never_share_a_node_and_anchors_at_one_place_share_a_patch(beam,
 
 
 def test_a_radius_finer_than_the_mesh_takes_the_triangle_that_is_touched(beam, anchor):
-    patch, = interface_patches(beam, [anchor("/j", 0.312, 0.003, 0.01)], 1e-3, "/b")
+    (patch,) = interface_patches(beam, [anchor("/j", 0.312, 0.003, 0.01)], 1e-3, "/b")
     assert len(patch.nodes) == 6 and spans_a_plane(beam.nodes[patch.nodes])
 
 
@@ -62,7 +62,7 @@ def test_the_axis_of_a_bore_is_held_by_a_band_of_its_wall(helpers, anchor):
     tets = tets[np.abs(center[:, :2]).max(axis=1) > 0.025]
     used = np.unique(tets)
     ring = quadratic_mesh(points[used], np.searchsorted(used, tets).astype(np.int32))
-    patch, = interface_patches(ring, [anchor("/j", 0, 0, 0)], -1.0, "/b")
+    (patch,) = interface_patches(ring, [anchor("/j", 0, 0, 0)], -1.0, "/b")
     assert np.abs(ring.nodes[patch.nodes][:, :2]).max() < 0.049
     for direction in ((1, 0), (-1, 0), (0, 1), (0, -1)):
         assert (ring.nodes[patch.nodes][:, :2] @ direction).max() >= 0.025 - 1e-12

@@ -40,6 +40,15 @@ def test_parts_that_share_no_point_are_counted(helpers):
     assert t.connected_parts(np.vstack([tets, tets + len(points)])) == 2
 
 
+def test_points_in_one_place_become_one(helpers):
+    points, tets = helpers.box((1, 1, 1), (1, 1, 1))
+    doubled = np.vstack([points, points + [1.0 + 1e-9, 0.0, 0.0]])
+    welded, joined, merged = t.welded_tets(doubled, np.vstack([tets, tets + len(points)]), 1e-6)
+    assert merged == 4 and len(welded) == 12 and t.connected_parts(joined) == 1
+    assert t.tet_volumes(welded, joined).sum() == pytest.approx(2.0, rel=1e-8)
+    assert t.welded_tets(doubled, np.vstack([tets, tets + len(points)]), 1e-12)[2] == 0
+
+
 def test_points_without_an_element_are_dropped(helpers):
     points, tets = helpers.box((1, 1, 1), (1, 1, 1))
     loose = np.vstack([[[9.0, 9, 9]], points])

@@ -6,7 +6,16 @@ from calmotion.testing import check_plugin
 
 @pytest.mark.parametrize(
     "name",
-    ["fe_mesher", "figures", "rerun_logger", "table_writer", "usd_reader", "usd_writer", "vibration_optimizer"],
+    [
+        "fe_mesher",
+        "figures",
+        "mode_shapes",
+        "rerun_logger",
+        "table_writer",
+        "usd_reader",
+        "usd_writer",
+        "vibration_optimizer",
+    ],
 )
 def test_bundled_plugin_conforms(repository, name):
     assert check_plugin(repository / "plugins" / name) == []

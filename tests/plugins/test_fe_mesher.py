@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 import os
+import re
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -85,7 +86,7 @@ def test_a_character_that_does_not_bend_is_left_out(host):
 
 def test_a_box_becomes_tetrahedra_that_fill_it(host):
     rigid = Body("/Arm/base", REST, None)
-    (mesh,) = run(host, rigid, link(surface(box((0.3, 0.02, 0.02), at=(0.15, 0, 0)))))
+    (mesh,) = run(host, rigid, link(surface(box((0.3, 0.02, 0.02), at=(0.15, 0, 0))), element_size=0.011))
     assert mesh.body == 1 and mesh.tets.dtype == np.int32
     assert (tet_volumes(mesh.points, mesh.tets) > 0.0).all() and connected_parts(mesh.tets) == 1
     assert mesh.quality.volume == pytest.approx(1.2e-4, rel=1e-3)
@@ -103,7 +104,7 @@ def test_smaller_elements_are_more_and_the_command_line_goes_before_the_shot(hos
 
 
 def test_a_mesh_is_made_once_and_then_read_from_the_cache(host, package, own_cache, monkeypatch):
-    body = link(surface(box()))
+    body = link(surface(box()), element_size=0.02)
     (first,) = run(host, body)
     (kept,) = own_cache.iterdir()
     monkeypatch.setattr(package("tetwild"), "_run", lambda *arguments: pytest.fail("meshed again"))
@@ -133,7 +134,7 @@ def test_the_key_of_a_mesh_holds_everything_that_decides_it(package):
 def test_a_cache_that_cannot_be_written_is_no_error(host, monkeypatch, tmp_path):
     (tmp_path / "file").write_text("")
     monkeypatch.setenv("CALMOTION_CACHE", str(tmp_path / "file"))
-    assert len(run(host, link(surface(box((0.05, 0.02, 0.02)))))) == 1
+    assert len(run(host, link(surface(box((0.05, 0.02, 0.02))), element_size=0.01))) == 1
 
 
 @pytest.mark.parametrize(
@@ -155,7 +156,7 @@ def test_a_mesher_that_crashes_or_hangs_takes_only_itself_down(package, monkeypa
 
 
 def test_the_mesher_needs_no_viewer_library(host):
-    run(host, link(surface(box((0.05, 0.02, 0.02)))))
+    run(host, link(surface(box((0.05, 0.02, 0.02))), element_size=0.01))
     assert not {"pyvista", "vtk", "vtkmodules"} & set(sys.modules)
 
 
@@ -186,7 +187,7 @@ def test_files_of_surfaces_are_filled(host, tmp_path, name):
     cube = box((50.0, 20.0, 20.0))
     extra = {"file_format": "gmsh"} if name.endswith("msh") else {}
     meshio.Mesh(np.array(cube.vertices), [("triangle", np.array(cube.faces))]).write(tmp_path / name, **extra)
-    (mesh,) = run(host, link(mesh_file=str(tmp_path / name), mesh_scale=1e-3))
+    (mesh,) = run(host, link(mesh_file=str(tmp_path / name), mesh_scale=1e-3, element_size=0.01))
     assert mesh.quality.volume == pytest.approx(2e-5, rel=1e-2)
 
 
@@ -218,7 +219,7 @@ def test_hidden_geometry_stands_in_for_an_open_mesh(host):
     lidless = box()
     lidless.update_faces(np.arange(12) >= 2)
     hull = surface(box(), "/Arm/link/collision", visible=False)
-    (mesh,) = run(host, link(surface(lidless, "/Arm/link/shell"), hull))
+    (mesh,) = run(host, link(surface(lidless, "/Arm/link/shell"), hull, element_size=0.015))
     assert mesh.quality.volume == pytest.approx(8e-5, rel=1e-2)
     assert "/Arm/link/shell" in mesh.quality.repairs[0] and "collision" in mesh.quality.repairs[0]
 
@@ -228,7 +229,7 @@ def test_copies_count_once_and_hidden_geometry_not_at_all(package):
     made = solid(package, shown, surface(box(), "/b"))
     assert made.volume == pytest.approx(8e-5) and made.repairs == ("left out /b, a copy of /a",)
     body = link(shown, surface(box((1.0, 1.0, 1.0)), "/c", visible=False))
-    assert package("body_mesh")._solid(body, body.surfaces).volume == pytest.approx(8e-5)
+    assert package("body_mesh").solid_of(body, body.surfaces).volume == pytest.approx(8e-5)
 
 
 def test_overlapping_parts_are_united(package):
@@ -240,7 +241,7 @@ def test_a_mesh_that_runs_through_itself_has_the_volume_of_what_it_covers(host, 
     crossed = trimesh.util.concatenate([box((0.2, 0.02, 0.02)), box((0.02, 0.2, 0.02))])
     assert crossed.is_watertight and crossed.volume == pytest.approx(1.6e-4)
     assert solid(package, surface(crossed)).volume == pytest.approx(1.52e-4, rel=1e-6)
-    (mesh,) = run(host, link(surface(crossed)))
+    (mesh,) = run(host, link(surface(crossed), element_size=0.012))
     assert mesh.quality.volume == pytest.approx(1.52e-4, rel=1e-2)
 
 
@@ -300,6 +301,69 @@ def test_a_flat_sheet_encloses_nothing(package):
         solid(package, SurfaceMesh("/sheet", corners, both_sides))
 
 
+def test_colours_that_cut_one_closed_surface_apart_are_joined(package):
+    """As in the KUKA arm: what is orange and what is grey are meshes of their own, each open."""
+    ball = trimesh.creation.icosphere(subdivisions=3, radius=0.05)
+    grey = np.array(ball.vertices)[ball.faces].mean(axis=1)[:, 2] > 0.01
+    halves = [
+        SurfaceMesh(path, np.array(ball.vertices), np.array(ball.faces, dtype=np.int32)[which])
+        for path, which in (("/grey", grey), ("/orange", ~grey))
+    ]
+    for half in halves:
+        with pytest.raises(ShotError, match="open surface"):
+            solid(package, half)
+    made = solid(package, *halves)
+    assert made.volume == pytest.approx(ball.volume, rel=1e-9)
+    assert made.repairs == ("joined 2 open surfaces: /grey, /orange",)
+
+
+def test_solids_a_hair_apart_are_bridged_and_not_thickened(package):
+    parts = [surface(box((0.1, 0.04, 0.02)), "/a"), surface(box((0.1, 0.02, 0.02), at=(0.02, 0, 0.0201)), "/b")]
+    made = solid(package, *parts)
+    face = 0.08 * 0.02  # where they look at each other, to the size of a triangle
+    assert 1.2e-4 < made.volume < 1.2e-4 + 3.0 * face * 1e-4
+    assert any("bridged gaps of up to 0.1 mm" in repair for repair in made.repairs)
+    with pytest.raises(ShotError, match="touch nowhere"):
+        solid(package, parts[0], surface(box((0.1, 0.02, 0.02), at=(0.02, 0, 0.021)), "/b"))
+
+
+def test_the_size_that_accuracy_needs_is_found_once_and_kept(host, package, own_cache, monkeypatch):
+    body = link(surface(box((0.2, 0.02, 0.02))))
+    (first,) = run(host, body)
+    assert len(list(own_cache.iterdir())) == 2  # the mesh, and what was found out about it
+    for module, name in (("tetwild", "_run"), ("body_mesh", "estimate")):
+        monkeypatch.setattr(package(module), name, lambda *arguments: pytest.fail("worked again"))
+    (again,) = run(host, body)
+    assert np.array_equal(first.tets, again.tets) and first.quality.repairs == again.quality.repairs
+
+
+def test_a_mesh_that_is_not_fine_enough_is_made_again_and_what_is_missing_is_told(host, package, monkeypatch):
+    accuracy, body_mesh = package("accuracy"), package("body_mesh")
+    estimates = iter([accuracy.Accuracy(0.05, 1000, np.ones(3)), accuracy.Accuracy(0.03, 5000, np.ones(3) * 0.9)])
+    monkeypatch.setattr(body_mesh, "estimate", lambda *arguments: next(estimates))
+    sizes = []
+    made = body_mesh.filled
+
+    def filled(*arguments):
+        sizes.append(arguments[4])
+        return made(*arguments)
+
+    monkeypatch.setattr(body_mesh, "filled", filled)
+    (mesh,) = run(host, link(surface(box((0.2, 0.02, 0.02)))), cache=False)
+    assert len(sizes) == 2 and sizes[1] == pytest.approx(0.5 * sizes[0])
+    assert any("up to 3% too high (5000 nodes)" in repair for repair in mesh.quality.repairs)
+
+
+def test_two_meshes_may_show_that_the_estimate_is_too_high_but_never_that_it_is_too_low(package):
+    accuracy = package("accuracy")
+    coarse = accuracy.Accuracy(0.05, 1000, np.array([10.2, 20.0, 30.0]))
+    fine = accuracy.Accuracy(0.04, 8000, np.array([10.0, 20.0, 30.0]))
+    # half the size: an error of order two is a third of the change; twice that is believed
+    assert accuracy.compared(coarse, fine).error == pytest.approx(2.0 * 0.02 / 3.0)
+    assert accuracy.compared(coarse, replace(fine, error=1e-3)).error == 1e-3
+    assert accuracy.compared(replace(coarse, nodes=7500), fine).error == 0.04
+
+
 def test_detail_below_the_tolerance_is_left_out_and_the_shape_kept(package):
     ball = trimesh.creation.icosphere(subdivisions=5, radius=0.05)
     made = solid(package, surface(ball))
@@ -322,7 +386,7 @@ def test_tetrahedra_that_do_not_fill_the_surface_are_refused(host, package, monk
         return corners, tets
 
     monkeypatch.setattr(package("body_mesh"), "tetrahedralize", shrunken)
-    with pytest.raises(ShotError, match="do not fill"):
+    with pytest.raises(ShotError, match="do not fill .* seems to run through itself"):
         run(host, link(surface(box())))
     assert len(calls) == 3 and calls == sorted(calls, reverse=True)
 
@@ -359,15 +423,15 @@ def test_links_of_a_real_robot_are_closed(package, shared_data):
     elbow, yaw = links_of(shared_data, "left_elbow_link", "left_shoulder_yaw_link")
     made = solid(package, *elbow)
     assert made.volume == pytest.approx(2.145e-4, rel=2e-3)
-    assert any("closed" in repair for repair in made.repairs) and any("copy" in repair for repair in made.repairs)
+    assert any("copy" in repair for repair in made.repairs)
     assert solid(package, *yaw).volume == pytest.approx(4.07e-4, rel=5e-3)
 
 
 def test_a_link_of_a_real_robot_is_meshed(host, shared_data):
     (elbow,) = links_of(shared_data, "left_elbow_link")
-    (mesh,) = run(host, link(*elbow))
+    (mesh,) = run(host, link(*elbow, element_size=0.012))
     assert mesh.quality.volume_error < 0.01 and mesh.quality.min_dihedral_deg > 4.0
-    assert 800 < len(mesh.tets) < 4000
+    assert 800 < len(mesh.tets) < 6000
 
 
 def test_nothing_is_left_behind(host, own_cache, tmp_path, monkeypatch):
@@ -378,6 +442,23 @@ def test_nothing_is_left_behind(host, own_cache, tmp_path, monkeypatch):
     work = tmp_path / "work"
     work.mkdir()
     monkeypatch.chdir(work)
-    run(host, link(surface(box((0.05, 0.02, 0.02)))), cache=False)
+    run(host, link(surface(box((0.05, 0.02, 0.02))), element_size=0.01), cache=False)
     assert os.listdir(work) == []
     assert os.listdir(scratch) == [] and not own_cache.exists()
+
+
+@pytest.mark.parametrize(("name", "volume"), [("link2", 3.947e-3), ("link4", 2.736e-3), ("link7", 3.08e-4)])
+def test_links_in_several_colours_and_with_gaps_of_a_tenth_of_a_millimetre_are_closed(
+    package, shared_data, name, volume
+):
+    """KUKA iiwa: orange and grey are open meshes of their own; the flange misses the link by 0.1 mm."""
+    pytest.importorskip("pxr")
+    from calmotion.evidence.links import read_links
+
+    file = shared_data / "converted" / "kuka_iiwa_14" / "iiwa14.usda"
+    if not file.is_file():
+        pytest.skip("the robot is not here")
+    (found,) = read_links(f"{file}:{name}")
+    made = solid(package, *(s for s in found.body.surfaces if s.visible))
+    assert made.volume == pytest.approx(volume, rel=5e-3)
+    assert any(re.search("joined 2 open|bridged gaps of up to 0.1 mm", repair) for repair in made.repairs)

@@ -18,7 +18,7 @@ import math
 
 from ..kernels import kernel
 
-JOIN = 0.2  # volume ratio below which the logarithm is continued as a parabola
+JOIN = 0.2  # volume ratio below which the logarithm is continued as a parabola; `fem.cubature` does the same
 
 
 @kernel

@@ -83,28 +83,31 @@ def assemble_mass(mesh: QuadraticMesh, density: float) -> Any:
 def assemble_stiffness(mesh: QuadraticMesh, youngs_modulus: float, poissons_ratio: float) -> Any:
     """Stiffness of linear isotropic elasticity [N/m], CSR, shape [3n, 3n].
 
-    int lambda div(u) div(v) + 2 mu e(u):e(v) needs D[i,a,j,b] = int d_a N_i d_b N_j alone; one product for all
-    elements is ten times faster than a form called for each of the 30 x 30 pairs.
+    int lambda div(u) div(v) + 2 mu e(u):e(v) needs D[i,a,j,b] = int d_a N_i d_b N_j alone. It is summed over the
+    elements for one (a, b) at a time, on the pattern of nodes: a tenth of the memory of all element matrices.
     """
-    from scipy.sparse import coo_matrix
+    from scipy.sparse import bsr_matrix
     from skfem import Basis, ElementTetP2
     from skfem.models.elasticity import lame_parameters
 
     lame, mu = lame_parameters(youngs_modulus, poissons_ratio)
     basis = Basis(mesh.basis.mesh, ElementTetP2(), intorder=2)  # gradients are linear on straight-sided elements
-    gradient = np.stack([np.asarray(field[0].grad) for field in basis.basis])  # [10, 3, e, q]
-    dofs = (3 * mesh.tets.astype(np.int64)[:, :, None] + np.arange(3)).reshape(-1, 30)
-    n = 3 * len(mesh.nodes)
-    g = np.ascontiguousarray(gradient.transpose(2, 0, 1, 3))  # [e, 10, 3, q]
-    flat = g.reshape(len(g), 30, -1)
-    D = ((flat * basis.dx[:, None, :]) @ flat.transpose(0, 2, 1)).reshape(-1, 10, 3, 10, 3)
-    K = lame * D + mu * D.transpose(0, 1, 4, 3, 2)
-    trace = np.einsum("eicjc->eij", D)
+    n, tets = len(mesh.nodes), mesh.tets.astype(np.int64)
+    keys, place = np.unique((n * tets[:, :, None] + tets[:, None, :]).ravel(), return_inverse=True)
+    gradient = [np.stack([np.asarray(field[0].grad[a]) for field in basis.basis], axis=1) for a in range(3)]
+    blocks = np.zeros((len(keys), 3, 3))
     for a in range(3):
-        K[:, :, a, :, a] += mu * trace
-    K = K.reshape(-1, 30, 30)
-    rows, columns = np.repeat(dofs, 30, axis=1).ravel(), np.tile(dofs, (1, 30)).ravel()
-    matrix = coo_matrix((K.ravel(), (rows, columns)), shape=(n, n)).tocsr()
+        weighted = gradient[a] * basis.dx[:, None, :]  # [e, 10, q]
+        for b in range(3):
+            D = weighted @ gradient[b].transpose(0, 2, 1)
+            summed = np.bincount(place, weights=D.ravel(), minlength=len(keys))
+            blocks[:, a, b] += lame * summed
+            blocks[:, b, a] += mu * summed
+            if a == b:
+                for c in range(3):
+                    blocks[:, c, c] += mu * summed
+    indptr = np.searchsorted(keys, n * np.arange(n + 1))
+    matrix = bsr_matrix((blocks, keys % n, indptr), shape=(3 * n, 3 * n)).tocsr()
     return 0.5 * (matrix + matrix.T)  # symmetric to the last bit, whatever the order of summation
 
 

@@ -7,7 +7,8 @@ the quasi-static deflection and theta_ij the modal derivatives:
 - stiffening (or softening): a load f works along theta_ij too, so that the stiffness changes by -f . theta_ij, and the
   deflection by that part of itself.
 
-St. Venant-Kirchhoff leaves out that the material itself is not linear, which is of the order of the strain.
+St. Venant-Kirchhoff leaves out that the material itself is not linear, by a part of the order of the strain; in
+bending, one side is strained as the other is not, and what is left is of the order of its square.
 """
 
 from __future__ import annotations
@@ -23,6 +24,7 @@ from .excitation_data import Excitation
 from .modal_derivatives import Support, modal_derivatives
 
 _MODES = 4  # the lowest carry nearly all of a deflection
+_LARGE_STRAIN = 0.1  # below, the loads' bound says more about the bound than about the material
 _OVERSHOOT = 2.0  # of a sudden load, against the deflection it holds at rest
 
 
@@ -70,14 +72,14 @@ def choose_law(
     linear_error = shortening + deflection * softening
     volume = float(model.mass.sum()) / material.density
     strain = float(np.sqrt(bend @ (omega_squared * bend) / (material.youngs_modulus * volume)))
-    stvk_error = deflection * strain
+    stvk_error = deflection * strain**2
     found = f"it bends by about {_mm(deflection)}"
     if linear_error <= tolerance:
         return LawChoice("linear", f"{found}, of which {_mm(linear_error)} is not linear", linear_error)
     because = f"{found}, of which {_mm(linear_error)} is not linear"
-    if stvk_error <= tolerance:
+    if stvk_error <= tolerance or strain <= _LARGE_STRAIN:
         return LawChoice("stvk", f"{because}; it is strained by {strain:.1%}", stvk_error)
-    return LawChoice("neohookean", f"{because}, and is strained by {strain:.0%}", stvk_error * strain)
+    return LawChoice("neohookean", f"{because}; it is strained by {strain:.0%}", 0.0)
 
 
 def work_of_loads(model: FEModel, fields: Array, motion: Array, excitation: Excitation) -> Array:

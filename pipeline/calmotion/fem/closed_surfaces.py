@@ -18,11 +18,13 @@ class Closure:
         points: [m], shape [n, 3]; the input's, then one for each cap of more than three edges.
         triangles: Shape [m, 3]; the input's, then the caps.
         areas: Area of each cap [m^2].
+        sides: Number of edges of each cap.
     """
 
     points: Array
     triangles: Indices
     areas: Array
+    sides: Indices
 
 
 def boundary_walks(triangles: Indices) -> list[list[int]]:
@@ -69,7 +71,8 @@ def close(points: Array, triangles: Indices) -> Closure:
         points: [m], shape [n, 3].
         triangles: Shape [m, 3].
     """
-    new_points, new_triangles, areas = [points], [triangles], []
+    new_points, new_triangles = [points], [triangles]
+    areas, sides = [], []
     count = len(points)
     for walk in boundary_walks(triangles):
         if len(walk) < 3:
@@ -84,7 +87,8 @@ def close(points: Array, triangles: Indices) -> Closure:
             count += 1
         new_triangles.append(cap)
         areas.append(surface_area(corners, cap))
-    return Closure(np.vstack(new_points), np.vstack(new_triangles), np.array(areas))
+        sides.append(len(walk))
+    return Closure(np.vstack(new_points), np.vstack(new_triangles), np.array(areas), np.array(sides, dtype=int))
 
 
 def winding_number(point: Array, points: Array, triangles: Indices) -> float:

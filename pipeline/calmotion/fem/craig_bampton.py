@@ -1,4 +1,4 @@
-"""A small basis for a body held by rigid patches: constraint modes and fixed-interface normal modes.
+"""A small basis for a body held by rigid patches: constraint modes, fixed-interface modes and residual vectors.
 
 Source: Craig and Bampton, Coupling of Substructures for Dynamic Analyses, AIAA Journal 6(7), 1968; rigid patches as
 in Seed, Sec. 2 (components are coupled at rigid interfaces).
@@ -7,20 +7,24 @@ in Seed, Sec. 2 (components are coupled at rigid interfaces).
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from ..shot.character import Array, FlexibleSettings, IntArray
 from .assembly import FEModel
-from .natural_modes import SparseSolver, lowest_modes, vector_mass
-from .tetrahedra import Indices
+from .blas_threads import one_blas_thread
+from .excitation_data import Excitation
+from .fixed_interface import FixedInterface, frequency_limit, mode_signs, ritz_modes
+from .residual_flexibility import StaticModel, displacement_alone, largest_displacement, needed_coordinates
+from .rigid_patch import rigid_patch
+from .static_loads import peak_loads, unit_accelerations
 
-_FEWEST = 4  # fixed-interface modes that are always kept: two bending pairs, or bending and twist of a plate
-_MOST = 8  # and at most, when they are chosen automatically
-_FREQUENCY_RATIO = 3.0
-_COMPLIANCE_LEFT = 1e-3
+__all__ = ["Basis", "mode_signs", "reduced_basis", "rigid_patch"]
+
+_BAND = 2.0  # modes up to this times the highest excited frequency move on their own: above, by a third too little
+_OUTPUTS = 1000  # nodes that are looked at on a body with neither targets nor moving interfaces
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,26 +35,34 @@ class Basis:
         modes: Nodal displacements, shape [n, 3, r]; zero on the root patch.
         omega_squared: Diagonal of the reduced stiffness [1/s^2], ascending, shape [r].
         patch_motion: Motion of each moving patch (translation of its anchor, then rotation vector), shape [p, 6, r].
+        residual: How many of the modes stand for those that were left out, by their static response.
+        cut_error_m: Bound of the static displacement that is missing at the targets [m]; None when nobody said what
+            excites the body.
     """
 
     modes: Array
     omega_squared: Array
     patch_motion: Array
+    residual: int = 0
+    cut_error_m: float | None = None
 
 
-def rigid_patch(nodes: Array, center: Array) -> Array:
-    """Displacement of nodes for a unit translation and a unit small rotation about `center`, shape [k, 3, 6]."""
-    motion = np.zeros((len(nodes), 3, 6))
-    motion[:, :, :3] = np.eye(3)
-    for axis in range(3):
-        motion[:, :, 3 + axis] = np.cross(np.eye(3)[axis], nodes - center)
-    return motion
-
-
+@one_blas_thread()
 def reduced_basis(
-    model: FEModel, root: IntArray, patches: Sequence[IntArray], centers: Sequence[Array], settings: FlexibleSettings
-) -> Basis:
+    model: FEModel, root: IntArray, patches: Sequence[IntArray], centers: Sequence[Array],
+    settings: FlexibleSettings, *, excitation: Excitation | None = None, tolerance: float | None = None,
+    targets: Any = None,
+) -> Basis:  # fmt: skip
     """The reduced basis of a body.
+
+    With `mode_count` the lowest modes of constraint modes and fixed-interface modes, exactly as many. With an
+    excitation and a tolerance the modes up to `max_frequency`, or else those in the excited band and those whose own
+    motion, beyond following their load, moves the outputs by more than the tolerance; and residual vectors until all
+    that is missing of the static displacement is below it.
+    With neither all constraint modes, fixed-interface modes up to `max_frequency` or as a shot usually needs, and the
+    residual vectors that hold more than 0.1% of the work of a uniform (angular) acceleration.
+
+    The outputs are the translation of each moving patch, its rotation times the excitation's reach, and the targets.
 
     Args:
         model: Full model, n nodes.
@@ -58,108 +70,109 @@ def reduced_basis(
         patches: Nodes of the p patches that move as rigid ones, disjoint from each other and from the root.
         centers: Anchor of each [m], shape [3].
         settings: `mode_count` and `max_frequency`; negative is automatic.
+        excitation: Peaks over the shot, one row of forces for each patch; None when they are not known.
+        tolerance: Static displacement at the outputs that may be missing [m].
+        targets: Function from nodal fields, shape [n, 3, r], to displacements of the body's targets, shape [k, 3, r];
+            `embedding.embed(...).displacements` is one.
 
     Returns:
-        6 p + (fixed-interface modes) modes, or the lowest `mode_count` of them.
+        The basis; it may be empty with an excitation that does not bend the body.
+
+    Raises:
+        NotPositiveDefinite: The root patch does not hold the body.
     """
-    from scipy.linalg import eigh
-
-    n = len(model.mesh.nodes)
-    free = np.ones(n, dtype=bool)
-    free[root] = False
-    for patch in patches:
-        free[patch] = False
-    interior = np.flatnonzero(np.repeat(free, 3))
-    M = vector_mass(model.mass)
-    K_ii, M_ii = model.stiffness[interior][:, interior], M[interior][:, interior]
-    solver = SparseSolver(K_ii)
-
-    constraint = np.zeros((n, 3, 6 * len(patches)))
-    for k, (patch, center) in enumerate(zip(patches, centers, strict=True)):
-        constraint[patch, :, 6 * k : 6 * k + 6] = rigid_patch(model.mesh.nodes[patch], center)
-    flat = constraint.reshape(3 * n, -1)
-    if len(patches):
-        # static response of the interior to a motion of the patches; the interior rows of `flat` are zero before
-        flat[interior] = -solver.solve((model.stiffness @ flat)[interior])
-
-    normal = _fixed_interface_modes(model, K_ii, M_ii, M, interior, solver, flat, settings)
-    ritz = np.zeros((3 * n, flat.shape[1] + normal.shape[1]))
-    ritz[:, : flat.shape[1]] = flat
-    ritz[interior, flat.shape[1] :] = normal
-    if ritz.shape[1] == 0:
-        return Basis(np.zeros((n, 3, 0)), np.zeros(0), np.zeros((len(patches), 6, 0)))
-    # rotations and translations differ by a length: equal kinetic energy keeps the small eigenproblem well scaled
-    M_r = ritz.T @ (M @ ritz)
-    scale = 1.0 / np.sqrt(np.diag(M_r))
-    K_r = ritz.T @ (model.stiffness @ ritz)
-    omega_squared, U = eigh(K_r * np.outer(scale, scale), M_r * np.outer(scale, scale))
-    U = scale[:, None] * U
+    fixed = FixedInterface.of(model, root, patches, centers)
+    places = None if excitation is None else _Places(fixed, excitation, targets)
+    if places is not None and tolerance is not None and settings.mode_count < 0:
+        return _chosen(fixed, places, settings, tolerance)
+    if settings.mode_count >= 0:
+        columns, residual = fixed.lowest(settings.mode_count), 0
+    else:
+        columns, residual = fixed.usual(settings)
+    omega_squared, U = ritz_modes(model, columns)
     if settings.mode_count >= 0:
         omega_squared, U = omega_squared[: settings.mode_count], U[:, : settings.mode_count]
-    modes = ritz @ U
+    basis = _basis(fixed, columns, omega_squared, U, residual)
+    return basis if places is None else _with_error(basis, places, frequency_limit(settings, 0.0))
+
+
+def _basis(fixed: FixedInterface, columns: Array, omega_squared: Array, U: Array, residual: int) -> Basis:
+    """The basis of combinations U of columns, the first of which are the constraint modes."""
+    n, p = len(fixed.model.mesh.nodes), len(fixed.patches)
+    modes = columns @ U
     sign = mode_signs(modes)
     modes *= sign
-    patch_motion = (U[: flat.shape[1]] * sign).reshape(len(patches), 6, U.shape[1])
-    return Basis(np.ascontiguousarray(modes.reshape(n, 3, U.shape[1])), omega_squared, patch_motion)
+    patch_motion = (U[: 6 * p] * sign).reshape(p, 6, U.shape[1])
+    return Basis(np.ascontiguousarray(modes.reshape(n, 3, U.shape[1])), omega_squared, patch_motion, residual)
 
 
-def _fixed_interface_modes(
-    model: FEModel, K: Any, M: Any, full_mass: Any, interior: Indices, solver: SparseSolver, constraint: Array,
-    settings: FlexibleSettings,
-) -> Array:  # fmt: skip
-    """Modes with every patch held, shape [interior degrees of freedom, count]."""
-    room = K.shape[0]
-    if settings.mode_count >= 0:
-        # as many as are kept: constraint modes alone would make the lowest frequencies too high
-        return lowest_modes(K, M, min(max(settings.mode_count, _FEWEST), room), solver=solver)[1]
-    if settings.max_frequency >= 0.0:
-        limit = (2.0 * np.pi * settings.max_frequency) ** 2
-        count = _FEWEST
-        while True:
-            values, vectors = lowest_modes(K, M, min(count, room), solver=solver)
-            if count >= room or values[-1] > limit:
-                return vectors[:, values <= limit]
-            count *= 2
-    values, vectors = lowest_modes(K, M, min(_MOST, room), solver=solver)
-    return vectors[:, : _automatic_count(model, values, vectors, M, full_mass, interior, solver, constraint)]
+@dataclass(frozen=True, eq=False)
+class _Places:
+    """What is looked at, and under which loads.
 
-
-def _automatic_count(
-    model: FEModel, values: Array, vectors: Array, M: Any, full_mass: Any, interior: Indices, solver: SparseSolver,
-    constraint: Array,
-) -> int:  # fmt: skip
-    """How many fixed-interface modes a shot needs when nobody says.
-
-    Motors excite a body up to a few times its first frequency, hence all modes below three times that; and its own
-    weight, and an acceleration of its base, must bend it by the right amount, hence as many as hold all but 0.1% of
-    the work that a uniform acceleration does on the body. Both are usually met by four; more than eight are never
-    taken, since every mode costs a row and a column of each step's system.
+    Attributes:
+        targets: As of `reduced_basis`.
     """
-    from scipy.linalg import cho_factor, cho_solve, eigh
 
-    weight = full_mass @ np.tile(np.eye(3), (len(model.mesh.nodes), 1))
-    first, work = values[0], np.zeros(3)
-    if constraint.shape[1]:
-        M_r = constraint.T @ (full_mass @ constraint)
-        scale = 1.0 / np.sqrt(np.diag(M_r))
-        K_r = constraint.T @ (model.stiffness @ constraint) * np.outer(scale, scale)
-        first = min(first, eigh(K_r, M_r * np.outer(scale, scale), eigvals_only=True)[0])
-        load = scale[:, None] * (constraint.T @ weight)
-        # constraint and fixed-interface modes are orthogonal in K, so their shares of the work add
-        work += np.einsum("ij,ij->j", load, cho_solve(cho_factor(K_r), load))
-    inner = weight[interior]
-    left = np.einsum("ij,ij->j", inner, solver.solve(inner))
-    work += left
-    held = np.cumsum((vectors.T @ inner) ** 2 / values[:, None], axis=0)
-    enough = np.flatnonzero((left - held).max(axis=1) <= _COMPLIANCE_LEFT * work.max())
-    below = int(np.count_nonzero(values <= _FREQUENCY_RATIO**2 * first))
-    count = max(below, _FEWEST, int(enough[0]) + 1 if len(enough) else len(values))
-    return min(count, len(values))
+    fixed: FixedInterface
+    excitation: Excitation
+    targets: Any
+
+    def static_model(self, omega_squared: Array, modes: Array, patch_motion: Array) -> StaticModel:
+        """The static behaviour of a basis of shapes [r], [3n, r] and [p, 6, r] under the peak loads."""
+        mesh, mass = self.fixed.model.mesh, self.fixed.model.mass
+        n, r = len(mesh.nodes), len(omega_squared)
+        weight = mass @ unit_accelerations(mesh.nodes).reshape(n, 36)
+        inertia = modes.T @ weight.reshape(3 * n, 12)
+        # a wrench does work on the motion of its patch alone
+        loads = np.hstack([inertia, patch_motion.reshape(-1, r).T])
+        nodal = modes.reshape(n, 3, r)
+        outputs = [patch_motion[:, :3], self.excitation.lever[:, None, None] * patch_motion[:, 3:]]
+        if self.targets is not None:
+            outputs.append(self.targets(nodal))
+        if sum(map(len, outputs)) == 0:
+            surface = mesh.surface_nodes
+            outputs.append(nodal[surface[:: max(1, len(surface) // _OUTPUTS)]])
+        return StaticModel(omega_squared, loads * peak_loads(self.excitation), np.concatenate(outputs))
 
 
-def mode_signs(modes: Array) -> Array:
-    """+1 or -1 for each column: the first entry that is (nearly) the largest becomes positive; shape [r]."""
-    size = np.abs(modes)
-    # "nearly": symmetric modes have entries equal but for rounding, and rounding must not choose between them
-    first = (size >= (1.0 - 1e-6) * size.max(axis=0)).argmax(axis=0)
-    return np.where(modes[first, np.arange(modes.shape[1])] < 0.0, -1.0, 1.0)
+def _chosen(fixed: FixedInterface, places: _Places, settings: FlexibleSettings, tolerance: float) -> Basis:
+    """As many of all candidates as the tolerance needs."""
+    limit = frequency_limit(settings, _BAND * places.excitation.frequency)
+    columns, U, static = _candidates(fixed, places, limit)
+    kept = static.omega_squared <= (2.0 * np.pi * limit) ** 2
+    if settings.max_frequency < 0.0:
+        kept |= displacement_alone(static) * _lag(static.omega_squared, limit) > tolerance
+    combination, residual, error = needed_coordinates(static, kept, tolerance)
+    omega_squared = np.einsum("ij,i,ij->j", combination, static.omega_squared, combination)
+    basis = _basis(fixed, columns, omega_squared, U @ combination, int(residual.sum()))
+    return replace(basis, cut_error_m=error)
+
+
+def _lag(omega_squared: Array, limit: float) -> Array:
+    """How much modes move beyond following a load of at most a frequency [Hz], as a share of following it.
+
+    A mode above the limit answers 1 / (1 - r^2) times as far as at rest, r the ratio of the frequencies. Where
+    nothing is known of the excitation all of a mode's motion counts as its own.
+    """
+    if limit <= 0.0:
+        return np.ones_like(omega_squared)
+    squared = np.minimum((2.0 * np.pi * limit) ** 2 / omega_squared, 0.5)
+    return squared / (1.0 - squared)
+
+
+def _with_error(basis: Basis, places: _Places, limit: float) -> Basis:
+    """The basis with the difference between its static responses and the exact ones."""
+    exact = _candidates(places.fixed, places, limit)[2]
+    flat = basis.modes.reshape(-1, len(basis.omega_squared))
+    own = places.static_model(basis.omega_squared, flat, basis.patch_motion)
+    return replace(basis, cut_error_m=largest_displacement(exact.response - own.response))
+
+
+def _candidates(fixed: FixedInterface, places: _Places, limit: float) -> tuple[Array, Array, StaticModel]:
+    """Columns, their combinations, and the static behaviour of more modes than are needed up to a frequency [Hz];
+    with all residual vectors, so that static responses are those of the full model."""
+    columns = fixed.all_needed(limit, peak_loads(places.excitation)[:12])
+    omega_squared, U = ritz_modes(fixed.model, columns)
+    motion = U[: 6 * len(fixed.patches)].reshape(len(fixed.patches), 6, len(U))
+    return columns, U, places.static_model(omega_squared, columns @ U, motion)

@@ -24,6 +24,7 @@ ERROR = 2e-5
 POSES = 24
 _BATCH = 4  # points added between two solutions for the weights
 _MOST = 600
+LEAST_VOLUME = 0.2  # volume ratio below which the logarithm of the law is continued as a parabola
 _CANDIDATES = 10_000  # points that are looked at, a random choice on large meshes
 
 
@@ -114,10 +115,19 @@ def _stiffness(G: Array, omega_squared: Array, lame: float, mu: float) -> Array:
 
 
 def neohookean_stress(F: Array, lame: float, mu: float) -> Array:
-    """P = mu (F - F^-T) + lame ln(J) F^-T [Pa] of deformation gradients of positive J, shape [..., 3, 3]."""
-    J = np.linalg.det(F)[..., None, None]
-    inverse = np.swapaxes(np.linalg.inv(F), -1, -2)
-    return mu * (F - inverse) + lame * np.log(J) * inverse
+    """P = mu F + (lame L - mu) L' cof F [Pa] of deformation gradients, shape [..., 3, 3].
+
+    L = ln J, continued below `LEAST_VOLUME` as its parabola, as `dynamics.neohookean` does.
+    """
+    rows = np.moveaxis(F, -2, 0)
+    cofactor = np.stack([np.cross(rows[(i + 1) % 3], rows[(i + 2) % 3]) for i in range(3)], axis=-2)
+    J = np.einsum("...i,...i->...", rows[0], cofactor[..., 0, :])[..., None, None]
+    x = (J - LEAST_VOLUME) / LEAST_VOLUME
+    flat = J < LEAST_VOLUME
+    held = np.where(flat, LEAST_VOLUME, J)
+    L = np.log(held) + np.where(flat, x - 0.5 * x * x, 0.0)
+    slope = np.where(flat, (1.0 - x) / LEAST_VOLUME, 1.0 / held)
+    return mu * F + (lame * L - mu) * slope * cofactor
 
 
 def greedy_cubature(columns: Array, target: Array, error: float, most: int) -> tuple[Array, Array, float]:
@@ -132,7 +142,7 @@ def greedy_cubature(columns: Array, target: Array, error: float, most: int) -> t
     Returns:
         Indices of the columns, their weights, and the error reached, relative to the target.
     """
-    from scipy.optimize import nnls
+    from scipy.optimize import lsq_linear, nnls
 
     norm = np.linalg.norm(columns, axis=0)
     norm[norm == 0.0] = np.inf
@@ -150,7 +160,10 @@ def greedy_cubature(columns: Array, target: Array, error: float, most: int) -> t
         if not len(best):
             break
         chosen.extend(best.tolist())
-        weights, _ = nnls(columns[:, chosen], target)
+        try:
+            weights, _ = nnls(columns[:, chosen], target)
+        except RuntimeError:  # it gives up on nearly parallel columns
+            weights = lsq_linear(columns[:, chosen], target, (0.0, np.inf), "bvls").x
         used = weights > 0.0
         chosen = [c for c, keep in zip(chosen, used, strict=True) if keep]
         weights = weights[used]

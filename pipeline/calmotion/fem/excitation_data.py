@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
 
 from ..shot.character import Array
 
@@ -12,12 +15,15 @@ class Excitation:
     """Largest loads on a body over a shot, taken from a rigid simulation; absolute values, body axes.
 
     Attributes:
-        acceleration: Of the frame's origin, less gravity [m/s^2], shape [3].
+        acceleration: Of the frame's origin, less gravity [m/s^2], shape [3]; a body at rest has its weight here.
         angular_acceleration: [rad/s^2], shape [3].
         angular_velocity: [rad/s], shape [3].
-        force: On each moving interface, in the order of the anchors that name them [N], shape [p, 3].
-        moment: About its anchor [N m], shape [p, 3].
-        frequency: Highest frequency at which the motion pushes noticeably [Hz].
+        force: On each interface, by the body beyond it [N], shape [j, 3]; `patch_excitation` makes it one row for
+            each moving patch.
+        moment: Likewise, about the interface's anchor [N m], shape [j, 3].
+        frequency: Highest frequency at which the motion pushes noticeably [Hz]; 0 when it is not known.
+        reach: Longest distance from each interface to a target beyond it [m], shape [j]: a small turn of the
+            interface moves that target by the angle times this. None: turns do not matter.
     """
 
     acceleration: Array
@@ -26,3 +32,35 @@ class Excitation:
     force: Array
     moment: Array
     frequency: float = 0.0
+    reach: Array | None = None
+
+    @property
+    def lever(self) -> Array:
+        """`reach`, zero where turns do not matter."""
+        return np.zeros(len(self.force)) if self.reach is None else self.reach
+
+
+def patch_excitation(
+    excitation: Excitation, anchors: Sequence[Sequence[int]], positions: Array, centers: Sequence[Array]
+) -> Excitation:
+    """The excitation with one row for each moving patch instead of one for each interface.
+
+    Args:
+        excitation: Of a body with j interfaces.
+        anchors: For each of the p patches the interfaces that it carries.
+        positions: Anchors of the interfaces, body frame [m], shape [j, 3] (more rows are ignored).
+        centers: Point of each patch that its wrench is about [m], shape [3].
+
+    Returns:
+        Forces add, as if all peaks met; so do moments, with those of the forces about the patch's center.
+    """
+    count = len(anchors)
+    force, moment, reach = np.zeros((count, 3)), np.zeros((count, 3)), np.zeros(count)
+    for k, (group, center) in enumerate(zip(anchors, centers, strict=True)):
+        for i in group:
+            arm, f = np.abs(positions[i] - center), excitation.force[i]
+            lever = np.roll(arm, -1) * np.roll(f, -2) + np.roll(arm, -2) * np.roll(f, -1)
+            force[k] += f
+            moment[k] += excitation.moment[i] + lever
+            reach[k] = max(reach[k], float(excitation.lever[i]))
+    return replace(excitation, force=force, moment=moment, reach=reach)

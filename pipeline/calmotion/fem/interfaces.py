@@ -8,9 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import ShotError
-from ..shot.character import Array, Frame, IntArray
+from ..shot.character import Array, Frame, IntArray, InterfaceSurface
 from .assembly import QuadraticMesh
 from .automatic_patch import automatic_radius, end_face
+from .named_patch import named_patch
 from .nearness import closest_on_triangles
 
 _GROWTH = 1.25
@@ -25,11 +26,13 @@ class Anchor:
         path: Prim path of the joint or target, for errors.
         frame: Its frame in the body frame, undeformed.
         kind: `interface` (a joint: a patch of the surface moves rigidly with it) or `point` (a target).
+        surface: The part of the surface that the shot says it holds, or None.
     """
 
     path: str
     frame: Frame
     kind: str
+    surface: InterfaceSurface | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,8 +47,8 @@ class Patch:
 def interface_patches(mesh: QuadraticMesh, anchors: Sequence[Anchor], radius: float, body: str) -> list[Patch]:
     """The rigid patches of a body, in the order of the anchors that first name them.
 
-    Anchors of kind `interface` at one position share a patch. A node within reach of two patches goes to the nearer
-    anchor.
+    Anchors of kind `interface` at one position share a patch, unless they name their surfaces. Nodes on a named
+    surface belong to it alone; any other within reach of two patches goes to the nearer anchor.
 
     Args:
         mesh: Of the body.
@@ -54,7 +57,7 @@ def interface_patches(mesh: QuadraticMesh, anchors: Sequence[Anchor], radius: fl
         body: Prim path of the body, for errors.
 
     Raises:
-        ShotError: An anchor touches no surface, or its patch cannot carry a moment.
+        ShotError: An anchor touches no surface, or its patch cannot carry a moment, or two named ones overlap.
     """
     size = float(np.linalg.norm(np.ptp(mesh.nodes, axis=0)))
     groups: list[list[int]] = []
@@ -63,7 +66,11 @@ def interface_patches(mesh: QuadraticMesh, anchors: Sequence[Anchor], radius: fl
             continue
         at = anchor.frame.position
         for group in groups:
-            if np.linalg.norm(anchors[group[0]].frame.position - at) < 1e-6 * size:
+            if (
+                anchor.surface is None
+                and anchors[group[0]].surface is None
+                and np.linalg.norm(anchors[group[0]].frame.position - at) < 1e-6 * size
+            ):
                 group.append(index)
                 break
         else:
@@ -73,13 +80,45 @@ def interface_patches(mesh: QuadraticMesh, anchors: Sequence[Anchor], radius: fl
     surface = mesh.surface_nodes
     distance = np.linalg.norm(mesh.nodes[surface][None] - centers[:, None], axis=-1)
     nearest = distance.argmin(axis=0)
+    named = _named_patches(mesh, anchors, groups, body)
+    taken = np.isin(surface, np.concatenate([np.zeros(0, np.int32), *named.values()]))
     patches = []
     for k, group in enumerate(groups):
-        own = surface[nearest == k]
+        if k in named:
+            extent = float(np.linalg.norm(mesh.nodes[named[k]] - centers[k], axis=1).max())
+            patches.append(Patch(nodes=named[k], anchors=tuple(group), radius=extent))
+            continue
+        own = surface[(nearest == k) & ~taken]
         others = np.delete(centers, k, axis=0)
         room = float(np.linalg.norm(others - centers[k], axis=1).min()) if len(others) else np.inf
         patches.append(_patch(mesh, triangles, own, anchors, group, radius, room, size, body))
     return patches
+
+
+def _named_patches(
+    mesh: QuadraticMesh, anchors: Sequence[Anchor], groups: list[list[int]], body: str
+) -> dict[int, IntArray]:
+    """Nodes of the patches whose surface the shot names, by group."""
+    found: dict[int, IntArray] = {}
+    for k, group in enumerate(groups):
+        surface = anchors[group[0]].surface
+        if surface is None:
+            continue
+        nodes = named_patch(mesh, surface.triangles)
+        if not spans_a_plane(mesh.nodes[nodes]):
+            raise ShotError(
+                f"this interface of {anchors[group[0]].path} is too small to hold a joint",
+                path=surface.path, attribute="indices", found=f"{len(nodes)} nodes of the mesh of {body} on it",
+                remedy="Add faces to it, or author a smaller calm:flexible:elementSize",
+            )  # fmt: skip
+        for other, taken in found.items():
+            if np.intersect1d(nodes, taken).size:
+                raise ShotError(
+                    f"this interface overlaps that of {anchors[groups[other][0]].path}",
+                    path=surface.path, attribute="indices", remedy="Leave a face between the two, or join them by one",
+                )  # fmt: skip
+        found[k] = nodes
+    return found
 
 
 def _patch(

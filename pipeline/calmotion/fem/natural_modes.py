@@ -8,7 +8,13 @@ import numpy as np
 
 from ..shot.character import Array
 from .assembly import FEModel
+from .block_lanczos import lowest_by_lanczos
+from .sparse_solver import SparseSolver
 from .tetrahedra import Indices
+
+__all__ = ["SparseSolver", "frequencies", "lowest_modes", "vector_mass"]
+
+_DENSE = 60  # degrees of freedom up to which a dense solver is as quick
 
 
 def vector_mass(mass: Any) -> Any:
@@ -18,52 +24,40 @@ def vector_mass(mass: Any) -> Any:
     return kron(mass, identity(3), format="csr")
 
 
-class SparseSolver:
-    """A factorised symmetric positive definite matrix: `solve(b)` for b of shape [n] or [n, k]."""
-
-    def __init__(self, matrix: Any):
-        from scipy.sparse.linalg import splu
-
-        # symmetric mode keeps the fill of a symmetric ordering: no row exchanges are needed here
-        self._lu = splu(
-            matrix.tocsc(), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
-        )
-
-    def solve(self, b: Array) -> Array:
-        """x with matrix @ x = b."""
-        return self._lu.solve(np.ascontiguousarray(b))
-
-
 def lowest_modes(
-    K: Any, M: Any, count: int, *, shift: float = 0.0, solver: SparseSolver | None = None
-) -> tuple[Array, Array]:
+    K: Any, M: Any, count: int, *, shift: float = 0.0, solver: SparseSolver | None = None, below: float | None = None,
+    most: int | None = None,
+) -> tuple[Array, Array]:  # fmt: skip
     """Lowest eigenpairs of K x = omega^2 M x.
 
     Args:
         K, M: Sparse symmetric, shape [n, n]; K + shift M positive definite.
-        count: How many, at most n.
+        count: How many, at most n; the fewest with `below`.
         shift: [1/s^2], positive where K alone is singular.
         solver: Of K + shift M, when it is there already.
+        below: All up to this omega^2 [1/s^2] are wanted, and one above.
+        most: But no more than this many.
 
     Returns:
-        omega^2 [1/s^2], ascending, shape [count], and M-orthonormal modes, shape [n, count].
+        omega^2 [1/s^2], ascending, shape [count] (or more), and M-orthonormal modes, shape [n, count] (or more).
+
+    Raises:
+        NotPositiveDefinite: K + shift M is not.
     """
     from scipy.linalg import eigh
-    from scipy.sparse.linalg import LinearOperator, eigsh
 
     n = K.shape[0]
-    count = min(count, n)
-    if count == 0:
+    most = n if most is None else min(most, n)
+    count = min(count, most)
+    if count == 0 and below is None:
         return np.zeros(0), np.zeros((n, 0))
-    if n <= 60 or count >= n - 1:
-        values, vectors = eigh(K.toarray(), M.toarray(), subset_by_index=(0, count - 1))
-        return values, vectors
+    if n <= _DENSE or 3 * count >= n:
+        values, vectors = eigh(K.toarray(), M.toarray())
+        if below is not None:
+            count = min(max(count, int(np.count_nonzero(values <= below)) + 1), most)
+        return values[:count], vectors[:, :count]
     solver = solver or SparseSolver(K + shift * M if shift else K)
-    inverse = LinearOperator((n, n), matvec=solver.solve, matmat=solver.solve, dtype=float)
-    start = np.random.default_rng(20190712).standard_normal(n)  # fixed, so that a run repeats to the last bit
-    values, vectors = eigsh(K, k=count, M=M, sigma=-shift, OPinv=inverse, v0=start, which="LM", tol=0.0)
-    order = np.argsort(values)
-    return values[order], vectors[:, order]
+    return lowest_by_lanczos(K, M, max(count, 1), shift, solver, below, most)
 
 
 def frequencies(model: FEModel, count: int, clamped: Indices | None = None) -> Array:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -12,14 +13,14 @@ from ..shot.meshes import FEMesh
 from ..shot.result import LeftOut
 from .assembly import FEModel, QuadraticMesh, assemble
 from .craig_bampton import Basis, reduced_basis
-from .embedding import embed
-from .excitation_data import Excitation
+from .embedding import Embedding, embed
+from .excitation_data import Excitation, patch_excitation
 from .integrals import inertia_integrals
 from .interfaces import Anchor, Patch, interface_patches
 from .modal_derivatives import Support
 from .reduced_body import Marker, ReducedBody
 
-__all__ = ["Anchor", "modal_damping", "reduce_body"]
+__all__ = ["Anchor", "LinearModes", "linear_modes", "modal_damping", "reduce_body"]
 
 
 def reduce_body(
@@ -49,6 +50,56 @@ def reduce_body(
 
     Source: Seed (11)-(20); formulation, section 1.
     """
+    linear = linear_modes(mesh, body, anchors, root, excitation, tolerance)
+    model, moving, basis, excitation = linear.model, linear.moving, linear.basis, linear.excitation
+    left_out = _modes_left_out(basis, body, excitation)
+    assert body.flexible is not None
+    material = body.flexible.material
+    elasticity, damping = None, modal_damping(basis.omega_squared, material)
+    law, without = _law(model, linear.support, basis, body, excitation, tolerance)
+    left_out += without
+    if law != "linear" and len(basis.omega_squared):
+        from .large_deflection import large_deflection
+
+        basis, elasticity, by_mass = large_deflection(model, linear.support, basis, material, law)
+        damping = np.full(len(basis.omega_squared), by_mass)
+    return ReducedBody(
+        invariants=inertia_integrals(model.mesh.nodes, model.mass, basis.modes),
+        stiffness=basis.omega_squared,
+        damping=damping,
+        markers=_markers(model.mesh, anchors, moving, basis),
+        skin=tuple(embed(model.mesh, surface.points).displacements(basis.modes) for surface in surfaces),
+        nodes=len(model.mesh.nodes),
+        elements=len(model.mesh.tets),
+        elasticity=elasticity,
+        left_out=left_out,
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class LinearModes:
+    """The full model of a body and its linear basis.
+
+    Attributes:
+        model: Full model.
+        support: What holds the body.
+        moving: Patches that move, in the order of the support's.
+        basis: Its modes.
+        excitation: The loads, by moving patch; None when they are not known.
+    """
+
+    model: FEModel
+    support: Support
+    moving: Sequence[Patch]
+    basis: Basis
+    excitation: Excitation | None
+
+
+def linear_modes(
+    mesh: FEMesh, body: Body, anchors: Sequence[Anchor], root: int, excitation: Excitation | None = None,
+    tolerance: float = DEFAULT_TOLERANCE,
+) -> LinearModes:  # fmt: skip
+    """The linear part of `reduce_body`, on the mesh; same arguments, same errors."""
     settings = body.flexible
     if settings is None:
         raise ShotError("is not a flexible body", path=body.path, remedy="Apply CalmFlexibleBodyAPI")
@@ -64,25 +115,14 @@ def reduce_body(
     moving = [patch for patch in patches if patch is not held]
     centers = [anchors[patch.anchors[0]].frame.position for patch in moving]
     support = Support(held.nodes, [patch.nodes for patch in moving], centers)
-    basis = reduced_basis(model, support.root, support.patches, support.centers, settings)
-    elasticity, damping = None, modal_damping(basis.omega_squared, settings.material)
-    law, left_out = _law(model, support, basis, body, excitation, tolerance)
-    if law != "linear" and len(basis.omega_squared):
-        from .large_deflection import large_deflection
-
-        basis, elasticity, by_mass = large_deflection(model, support, basis, settings.material, law)
-        damping = np.full(len(basis.omega_squared), by_mass)
-    return ReducedBody(
-        invariants=inertia_integrals(model.mesh.nodes, model.mass, basis.modes),
-        stiffness=basis.omega_squared,
-        damping=damping,
-        markers=_markers(model.mesh, anchors, moving, basis),
-        skin=tuple(embed(model.mesh, surface.points).displacements(basis.modes) for surface in surfaces),
-        nodes=len(model.mesh.nodes),
-        elements=len(model.mesh.tets),
-        elasticity=elasticity,
-        left_out=left_out,
-    )
+    if excitation is not None:
+        positions = np.array([anchor.frame.position for anchor in anchors]).reshape(-1, 3)
+        excitation = patch_excitation(excitation, [patch.anchors for patch in moving], positions, centers)
+    basis = reduced_basis(
+        model, support.root, support.patches, support.centers, settings, excitation=excitation,
+        tolerance=tolerance if excitation is not None else None, targets=_points(model.mesh, anchors).displacements,
+    )  # fmt: skip
+    return LinearModes(model, support, moving, basis, excitation)
 
 
 def _law(
@@ -114,12 +154,32 @@ def modal_damping(omega_squared: Array, material: ElasticMaterial) -> Array:
     return 2.0 * material.damping_ratio * np.sqrt(np.maximum(omega_squared, 0.0))
 
 
+def _points(mesh: QuadraticMesh, anchors: Sequence[Anchor]) -> Embedding:
+    """The point anchors tied to the mesh."""
+    places = [anchor.frame.position for anchor in anchors if anchor.kind != "interface"]
+    return embed(mesh, np.array(places).reshape(-1, 3))
+
+
+def _modes_left_out(basis: Basis, body: Body, excitation: Excitation | None) -> tuple[LeftOut, ...]:
+    """The modes that the basis does without, and what that costs."""
+    if excitation is None or basis.cut_error_m is None:
+        return ()
+    kept = len(basis.omega_squared)
+    return (
+        LeftOut(
+            f"all but {kept} linear modes of {body.path}",
+            "the motion of this shot hardly moves them",
+            basis.cut_error_m,
+        ),
+    )
+
+
 def _markers(
     mesh: QuadraticMesh, anchors: Sequence[Anchor], moving: Sequence[Patch], basis: Basis
 ) -> tuple[Marker, ...]:
     r = len(basis.omega_squared)
     points = [i for i, anchor in enumerate(anchors) if anchor.kind != "interface"]
-    tied = embed(mesh, np.array([anchors[i].frame.position for i in points]).reshape(-1, 3))
+    tied = _points(mesh, anchors)
     Phi, Psi = np.zeros((len(anchors), 3, r)), np.zeros((len(anchors), 3, r))
     if points:
         Phi[points], Psi[points] = tied.displacements(basis.modes), tied.rotations(basis.modes)

@@ -45,14 +45,14 @@ def min_dihedral_deg(points: Array, tets: IntArray) -> float:
     return float(np.degrees(np.arccos(cosine.max())))
 
 
-def surface_volume(points: Array, triangles: IntArray) -> float:
+def surface_volume(points: Array, triangles: Indices) -> float:
     """Volume enclosed by a closed, consistently outward surface [m^3] (divergence theorem)."""
     # about the centroid, so that a surface far from the origin loses no digits
     x = (points - points.mean(axis=0))[triangles]
     return float(np.einsum("ij,ij->", np.cross(x[:, 0], x[:, 1]), x[:, 2]) / 6.0)
 
 
-def surface_area(points: Array, triangles: IntArray) -> float:
+def surface_area(points: Array, triangles: Indices) -> float:
     """Area of a triangulated surface [m^2]."""
     x = points[triangles]
     return float(0.5 * np.linalg.norm(np.cross(x[:, 1] - x[:, 0], x[:, 2] - x[:, 0]), axis=1).sum())
@@ -102,6 +102,31 @@ def without_unused_points(points: Array, tets: IntArray) -> tuple[Array, IntArra
     """Points that some tetrahedron uses, in their order, and the tetrahedra renumbered."""
     used, inverse = np.unique(tets, return_inverse=True)
     return np.ascontiguousarray(points[used]), inverse.reshape(tets.shape).astype(np.int32)
+
+
+def welded_tets(points: Array, tets: IntArray, tolerance: float) -> tuple[Array, IntArray, int]:
+    """Tetrahedra whose points in one place are one point.
+
+    Args:
+        points: [m], shape [n, 3], every one used.
+        tets: Shape [m, 4].
+        tolerance: Largest distance of points in one place, as a part of the bounding box's diagonal.
+
+    Returns:
+        Points, tetrahedra, and how many points went into others.
+    """
+    from scipy.sparse import coo_matrix
+    from scipy.sparse.csgraph import connected_components
+    from scipy.spatial import cKDTree
+
+    reach = tolerance * float(np.linalg.norm(np.ptp(points, axis=0)))
+    pairs = cKDTree(points).query_pairs(reach, output_type="ndarray")
+    n = len(points)
+    graph = coo_matrix((np.ones(len(pairs)), pairs.T.reshape(2, -1)), shape=(n, n))
+    count, label = connected_components(graph, directed=False)
+    first = np.full(count, n)
+    np.minimum.at(first, label, np.arange(n))
+    return np.ascontiguousarray(points[first]), label[tets].astype(np.int32), n - int(count)
 
 
 def connected_parts(tets: IntArray) -> int:

@@ -9,11 +9,22 @@ from .registry import Host, Plugin, PluginState, open_host
 from .run import OperatorResult, Outcome, Run
 from .settings import Settings, merge, read_assignment, read_settings_file
 from .units import parse_quantity
-from .values import CsvFile, Figures, OutputPaths, Recording, ReducedBodies, Source, SystemModes, WrittenLayer
+from .values import (
+    CsvFile,
+    Figures,
+    ModeShapes,
+    OutputPaths,
+    Recording,
+    ReducedBodies,
+    Source,
+    SystemModes,
+    WrittenLayer,
+)
 
 __all__ = [
     "CsvFile",
     "Figures",
+    "ModeShapes",
     "Host",
     "HostError",
     "Manifest",

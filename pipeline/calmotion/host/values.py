@@ -40,6 +40,7 @@ class OutputPaths:
     rrd: str | None = None
     csv: str | None = None
     figures: str | None = None
+    modes: str | None = None
 
 
 @dataclass(frozen=True)
@@ -67,6 +68,13 @@ class CsvFile:
 @dataclass(frozen=True)
 class Figures:
     """Paths of the figures."""
+
+    paths: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class ModeShapes:
+    """Paths of the files that show the modes of the flexible bodies."""
 
     paths: tuple[str, ...]
 

@@ -2,15 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+from functools import partial
+from typing import TYPE_CHECKING
 
+from ..dynamics.joint_arrays import BodyAnchors
 from ..dynamics.model import body_anchors, rigid_body
-from ..dynamics.topology import Tree
+from ..dynamics.topology import Tree, span_tree
 from ..errors import ShotError
 from ..fem.excitation_data import Excitation
 from ..fem.reduced_body import ReducedBody
-from ..shot import Character, FEMeshes, ModeTable, Skin
+from ..shot import Body, Character, FEMeshes, ModeTable, Skin
 from ..shot.character import DEFAULT_TOLERANCE
+
+if TYPE_CHECKING:
+    from ..fem.interfaces import Anchor
+    from ..fem.reduce import LinearModes
 
 
 def reduce_bodies(
@@ -49,18 +57,51 @@ def reduce_bodies(
                 path=body.path,
                 remedy="Enable the plugin that provides meshes, or remove CalmFlexibleBodyAPI.",
             )
-        from ..fem.reduce import Anchor, reduce_body
+        from ..fem.reduce import reduce_body
+        from ..fem.reduction_cache import cached_reduction
 
-        paths = [character.joints[k].path for k in anchors.joints] + [
-            character.targets[k].path for k in anchors.targets
-        ]
-        kinds = ["interface"] * len(anchors.joints) + ["point"] * len(anchors.targets)
-        frames = [Anchor(*item) for item in zip(paths, anchors.frames, kinds, strict=True)]
+        frames = fem_anchors(character, body, anchors)
         excitation = None if excitations is None else excitations[index]
-        result.append(
-            reduce_body(mesh_of[index], body, frames, body.surfaces, anchors.root, excitation, allowed / flexible)
-        )
+        parts = (mesh_of[index], body, frames, body.surfaces, anchors.root, excitation, allowed / flexible)
+        result.append(cached_reduction(parts, partial(reduce_body, *parts)))
     return result
+
+
+def fem_anchors(character: Character, body: Body, anchors: BodyAnchors) -> list[Anchor]:
+    """The anchors of a flexible body as finite elements take them."""
+    from ..fem.interfaces import Anchor
+
+    joints, targets = character.joints, character.targets
+    paths = [joints[k].path for k in anchors.joints] + [targets[k].path for k in anchors.targets]
+    kinds = ["interface"] * len(anchors.joints) + ["point"] * len(anchors.targets)
+    held = {surface.joint: surface for surface in body.interfaces}
+    named = [held.get(path) for path in paths]
+    return [Anchor(*item) for item in zip(paths, anchors.frames, kinds, named, strict=True)]
+
+
+def flexible_modes(
+    character: Character, meshes: FEMeshes, excitations: Sequence[Excitation | None] | None, tolerance: float | None
+) -> Iterator[tuple[Body, LinearModes]]:
+    """Every flexible body with its linear modes on the mesh; arguments as of `reduce_bodies`."""
+    from ..fem.reduce import linear_modes
+
+    tree = span_tree(character)
+    anchors = body_anchors(character, tree)
+    allowed = tolerance or character.retarget.tolerance or DEFAULT_TOLERANCE
+    for mesh in meshes.meshes:
+        body, own = character.bodies[mesh.body], anchors[mesh.body]
+        excitation = None if excitations is None else excitations[mesh.body]
+        frames = fem_anchors(character, body, own)
+        yield body, linear_modes(mesh, body, frames, own.root, excitation, allowed / len(meshes.meshes))
+
+
+def with_elasticity(character: Character, law: str) -> Character:
+    """The character with one elastic law (see `FlexibleSettings`) for all flexible bodies."""
+    bodies = tuple(
+        body if body.flexible is None else replace(body, flexible=replace(body.flexible, elasticity=law))
+        for body in character.bodies
+    )
+    return replace(character, bodies=bodies)
 
 
 def mode_tables(bodies: Sequence[ReducedBody]) -> tuple[ModeTable, ...]:

@@ -10,8 +10,9 @@ from ..dynamics.modes import system_frequencies
 from ..dynamics.simulation import SimulationFailure
 from ..dynamics.topology import span_tree
 from ..errors import ShotError
+from ..fem.excitation_data import Excitation
 from ..fem.reduced_body import ReducedBody
-from ..shot import Animation, Character
+from ..shot import Animation, Character, FEMeshes
 from ..shot.character import Array
 from .bodies import reduce_bodies
 from .curves import TimeGrid, make_grid, needed_pre_roll, sample_tracks
@@ -60,11 +61,31 @@ def prepare(
     if bodies is None:
         bodies = reduce_bodies(character, tree, None)
     model = compile_model(character, tree, bodies)
+    return Prepared(character, bodies, model, _grid(character, animation, options))
+
+
+def _grid(character: Character, animation: Animation, options: Options) -> TimeGrid:
     pre_roll = options.pre_roll
     if pre_roll is None:
         pre_roll = needed_pre_roll(animation.tracks, animation.frame_times)
     step = options.step if options.step is not None else character.retarget.time_step
-    return Prepared(character, bodies, model, make_grid(animation.frame_times, step, pre_roll))
+    return make_grid(animation.frame_times, step, pre_roll)
+
+
+def excitations(
+    character: Character, animation: Animation, meshes: FEMeshes | None, options: Options
+) -> tuple[Excitation, ...] | None:
+    """What the shot does to each body, for what the reduction chooses; None where a rigid robot cannot follow it."""
+    if len(animation.frame_times) < 2:
+        return None
+    from .excitation import shot_excitation
+
+    try:
+        return shot_excitation(
+            character, animation.tracks, _grid(character, animation, options), span_tree(character), meshes
+        )
+    except SimulationFailure:
+        return None  # the flexible robot will say so, with the place
 
 
 def first_pose_frequencies(character: Character, animation: Animation, bodies: Sequence[ReducedBody] | None) -> Array:

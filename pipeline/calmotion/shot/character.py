@@ -115,6 +115,21 @@ class SurfaceMesh:
 
 
 @dataclass(frozen=True, eq=False)
+class InterfaceSurface:
+    """The part of a body's surface that a joint holds, named in the shot.
+
+    Attributes:
+        path: Prim path of the subset.
+        joint: Prim path of the joint.
+        triangles: Corners [m], shape [k, 3, 3], body frame, outward.
+    """
+
+    path: str
+    joint: str
+    triangles: Array
+
+
+@dataclass(frozen=True, eq=False)
 class TetGeometry:
     """Linear tetrahedra authored in the shot: `points` [m], shape [n, 3], body frame; `tets` [m, 4], int32."""
 
@@ -134,6 +149,7 @@ class Body:
         surfaces: Geometry for pictures and meshing, body frame.
         tets: Tetrahedra authored in the shot, or None.
         flexible: Settings, or None for a rigid body.
+        interfaces: Parts of the surface that name the joint which holds them.
     """
 
     path: str
@@ -142,6 +158,7 @@ class Body:
     surfaces: tuple[SurfaceMesh, ...] = ()
     tets: TetGeometry | None = None
     flexible: FlexibleSettings | None = None
+    interfaces: tuple[InterfaceSurface, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,7 +7,7 @@ import pytest
 from calmotion import ShotError
 from calmotion.usd.reading import read_shot
 from pxr import Gf, UsdGeom, UsdPhysics, Vt
-from small_shots import FORE, LENGTH, UPPER, WIDTH, Scale, box, write_arm
+from small_shots import FORE, LENGTH, UPPER, WIDTH, Scale, box, make_flexible, write_arm
 
 
 def body(tmp_path, path: str, edit=None):
@@ -110,6 +110,64 @@ def test_indices_that_do_not_fit_are_refused(tmp_path):
         with pytest.raises(ShotError) as caught:
             body(tmp_path, FORE, edit)
         assert caught.value.path == f"{FORE}/skin" and caught.value.attribute == attribute
+
+
+def test_dented_polygons_keep_their_volume_and_surface(tmp_path):
+    """A channel section whose ends are polygons of eight corners."""
+    ring = np.array([[0, 0], [3, 0], [3, 3], [2, 3], [2, 1], [1, 1], [1, 3], [0, 3]]) * 0.01
+
+    def edit(stage):
+        mesh = UsdGeom.Mesh.Define(stage, f"{FORE}/channel")
+        mesh.CreatePointsAttr([(x, float(y), float(z)) for x in (0.0, 0.2) for y, z in ring])
+        sides = [[i, (i + 1) % 8, 8 + (i + 1) % 8, 8 + i] for i in range(8)]
+        faces = [list(range(7, -1, -1)), list(range(8, 16)), *sides]
+        mesh.CreateFaceVertexCountsAttr([len(face) for face in faces])
+        mesh.CreateFaceVertexIndicesAttr([i for face in faces for i in face])
+
+    surface = next(s for s in body(tmp_path, FORE, edit).surfaces if "channel" in s.path)
+    assert signed_volume(surface) == pytest.approx(7e-4 * 0.2, rel=1e-6)
+    corners = surface.points[surface.triangles]
+    area = 0.5 * np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1).sum()
+    assert area == pytest.approx(2 * 7e-4 + 0.2 * 0.16, rel=1e-6)
+
+
+def test_instances_of_one_prototype_are_each_where_they_belong(tmp_path):
+    def edit(stage):
+        box(stage, "/Prototype/skin", Scale())
+        for name, place in (("left", 0.5), ("right", -0.5)):
+            instance = UsdGeom.Xform.Define(stage, f"{FORE}/{name}")
+            instance.AddTranslateOp().Set(Gf.Vec3d(0, place, 0))
+            instance.AddScaleOp().Set(Gf.Vec3f(1, -2, 1))
+            instance.GetPrim().GetReferences().AddInternalReference("/Prototype")
+            instance.GetPrim().SetInstanceable(True)
+
+    found = {s.path.split("/")[-2]: s for s in body(tmp_path, FORE, edit).surfaces if "skin" in s.path}
+    for name, place in (("left", 0.5), ("right", -0.5)):
+        assert found[name].points[:, 1].mean() == pytest.approx(place)
+        assert signed_volume(found[name]) == pytest.approx(2.0 * LENGTH * WIDTH**2, rel=1e-6)
+
+
+def points_instanced(stage):
+    instancer = UsdGeom.PointInstancer.Define(stage, f"{FORE}/studs")
+    box(stage, f"{FORE}/studs/prototypes/stud", Scale())
+    instancer.CreatePrototypesRel().AddTarget(f"{FORE}/studs/prototypes/stud")
+    instancer.CreatePositionsAttr([(0, 0, 0), (0.1, 0, 0)])
+    instancer.CreateProtoIndicesAttr([0, 0])
+
+
+def test_point_instances_are_passed_over_on_a_rigid_body_and_refused_on_a_flexible_one(tmp_path):
+    character, _, _ = read_shot(str(write_arm(tmp_path / "rigid.usda", points_instanced)))
+    fore = next(b for b in character.bodies if b.path == FORE)
+    assert [s.path for s in fore.surfaces] == [f"{FORE}/skin"]
+    assert any("point instances" in note and "studs" in note for note in character.notes)
+
+    def flexible(stage):
+        points_instanced(stage)
+        make_flexible(stage)
+
+    with pytest.raises(ShotError, match="point instances") as caught:
+        body(tmp_path, FORE, flexible)
+    assert caught.value.path == f"{FORE}/studs" and caught.value.remedy
 
 
 def tet_mesh(stage, path: str, scale=(1, 1, 1)):

@@ -11,6 +11,7 @@ from ..transforms import Pose
 from . import mass, motors, scene, targets, topology
 from .context import Reading, is_rigid_body, prims_of
 from .flexible import flexible_settings
+from .interfaces import interfaces_of
 from .joints import JointPrim, body_index, joint_prims, joint_to_world, read_joint, refuse_unsupported
 from .shapes import shapes_of, tets_of
 from .stillness import refuse_moving
@@ -90,7 +91,8 @@ def build_character(reading: Reading, skeleton: Skeleton) -> Character:
         ShotError: A body without mass, or what the readers of the parts refuse.
     """
     numbers = {path: k for k, path in enumerate(skeleton.bodies)}
-    bodies = tuple(_body(reading, path, skeleton.poses[path]) for path in skeleton.bodies)
+    touching = {path: [j.path for j in skeleton.joints if path in (j.body0, j.body1)] for path in skeleton.bodies}
+    bodies = tuple(_body(reading, path, skeleton.poses[path], touching[path]) for path in skeleton.bodies)
     joints = tuple(
         Joint(
             j.path,
@@ -129,7 +131,7 @@ def build_character(reading: Reading, skeleton: Skeleton) -> Character:
     )
 
 
-def _body(reading: Reading, path: str, pose: Pose) -> Body:
+def _body(reading: Reading, path: str, pose: Pose, joints: list[str]) -> Body:
     prim = reading.stage.GetPrimAtPath(path)
     shapes = shapes_of(reading, prim, pose)
     flexible = flexible_settings(reading, prim, pose)
@@ -151,6 +153,7 @@ def _body(reading: Reading, path: str, pose: Pose) -> Body:
         surfaces=tuple(shape.surface for shape in shapes),
         tets=tets_of(reading, prim, pose),
         flexible=flexible,
+        interfaces=interfaces_of(reading, prim, pose, joints) if flexible is not None else (),
     )
 
 

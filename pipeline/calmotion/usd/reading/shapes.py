@@ -16,6 +16,7 @@ from ..transforms import Pose
 from . import primitives
 from .context import Reading, is_rigid_body, prims_below
 from .moments import Moments, is_closed, surface_moments
+from .polygons import triangulate
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,7 +48,9 @@ def shapes_of(reading: Reading, body_prim, pose: Pose) -> list[Shape]:
         ShotError: Geometry that is not finite or whose faces do not fit its points.
     """
     shapes: list[Shape] = []
-    for prim in prims_below(body_prim, is_rigid_body):
+    for prim in prims_below(body_prim, _is_elsewhere):
+        if prim.GetTypeName() == "PointInstancer":
+            _pass_over(reading, prim, body_prim)
         kind = str(prim.GetTypeName())
         if kind == "Mesh":
             points, triangles = _mesh(prim, reading.start)
@@ -58,7 +61,7 @@ def shapes_of(reading: Reading, body_prim, pose: Pose) -> list[Shape]:
             continue
         if len(triangles) == 0:
             continue
-        linear, offset = _to_body(reading, prim, pose)
+        linear, offset = to_body(reading, prim, pose)
         placed = points @ linear.T + offset
         if np.linalg.det(linear) < 0.0:
             triangles = triangles[:, ::-1].copy()
@@ -87,7 +90,7 @@ def tets_of(reading: Reading, body_prim, pose: Pose) -> TetGeometry | None:
     Raises:
         ShotError: Several TetMesh prims, or one whose tetrahedra do not fit its points.
     """
-    found = [p for p in prims_below(body_prim, is_rigid_body) if p.GetTypeName() == "TetMesh"]
+    found = [p for p in prims_below(body_prim, _is_elsewhere) if p.GetTypeName() == "TetMesh"]
     if not found:
         return None
     if len(found) > 1:
@@ -98,7 +101,7 @@ def tets_of(reading: Reading, body_prim, pose: Pose) -> TetGeometry | None:
             remedy="Merge them into one, or keep one of them",
         )
     prim = found[0]
-    points = _finite_points(prim, reading.start)
+    points = finite_points(prim, reading.start)
     tets = gf.indices(prim.GetAttribute("tetVertexIndices").Get(reading.start), 4)
     if len(tets) == 0 or len(points) == 0:
         raise ShotError(
@@ -108,21 +111,44 @@ def tets_of(reading: Reading, body_prim, pose: Pose) -> TetGeometry | None:
             remedy="Author them, or remove the prim",
         )
     _check_indices(prim, "tetVertexIndices", tets, len(points))
-    linear, offset = _to_body(reading, prim, pose)
+    linear, offset = to_body(reading, prim, pose)
     mirrored = np.linalg.det(linear) < 0.0
     if mirrored != (prim.GetAttribute("orientation").Get() == "leftHanded"):
         tets = tets[:, [1, 0, 2, 3]].copy()
     return TetGeometry(str(prim.GetPath()), points @ linear.T + offset, tets)
 
 
-def _to_body(reading: Reading, prim, pose: Pose) -> tuple[Array, Array]:
+def _is_elsewhere(prim) -> bool:
+    """Whether what is below a prim is no geometry of the body above it: another body, or patterns of instances."""
+    return is_rigid_body(prim) or prim.GetParent().GetTypeName() == "PointInstancer"
+
+
+def _pass_over(reading: Reading, prim, body_prim) -> None:
+    """Point instances are not read: refused where a body is to be meshed, a note where they are only looks."""
+    flexible = is_applied(body_prim, "CalmFlexibleBodyAPI")
+    if flexible and body_prim.GetAttribute("calm:flexible:enabled").Get() is not False:
+        raise ShotError(
+            "holds point instances, which are not read as geometry of a flexible body",
+            path=prim.GetPath(),
+            found="PointInstancer",
+            remedy="Make them Mesh prims or instanceable references, or move them out of the body",
+        )
+    reading.note(f"{prim.GetPath()}: point instances are not read; the body is treated without them")
+
+
+def to_body(reading: Reading, prim, pose: Pose) -> tuple[Array, Array]:
     """Linear part [3, 3] and offset [3] from a prim's own axes, stage units, to the body's frame, m."""
     world = reading.world_matrix(prim)
     scale = reading.units.length(1.0)
     return scale * pose.rotation.T @ world[:3, :3], scale * pose.rotation.T @ (world[:3, 3] - pose.position)
 
 
-def _finite_points(prim, time: float) -> Array:
+def finite_points(prim, time: float) -> Array:
+    """The points of a Mesh or TetMesh, its own axes and stage units, shape [n, 3].
+
+    Raises:
+        ShotError: They are not finite.
+    """
     points = gf.points(prim.GetAttribute("points").Get(time))
     if not np.all(np.isfinite(points)):
         raise ShotError("its points are not finite", path=prim.GetPath(), attribute="points", remedy="Correct them")
@@ -141,8 +167,8 @@ def _check_indices(prim, name: str, found: IntArray, count: int) -> None:
 
 
 def _mesh(prim, time: float) -> tuple[Array, IntArray]:
-    """Points and right-handed triangles of a Mesh, its polygons cut into fans, its holes left out."""
-    points = _finite_points(prim, time)
+    """Points and right-handed triangles of a Mesh, its polygons cut up, its holes left out."""
+    points = finite_points(prim, time)
     counts = gf.indices(prim.GetAttribute("faceVertexCounts").Get(time))
     corners = gf.indices(prim.GetAttribute("faceVertexIndices").Get(time))
     if int(counts.sum()) != len(corners):
@@ -154,18 +180,13 @@ def _mesh(prim, time: float) -> tuple[Array, IntArray]:
             remedy="Correct faceVertexCounts or faceVertexIndices",
         )
     _check_indices(prim, "faceVertexIndices", corners, len(points))
-    keep = counts >= 3
+    keep = np.ones(len(counts), dtype=bool)
     holes = gf.indices(prim.GetAttribute("holeIndices").Get(time))
     keep[holes[(holes >= 0) & (holes < len(counts))]] = False
-    first = np.cumsum(counts) - counts
-    cut = np.where(keep, counts - 2, 0)  # triangles of each polygon
-    fans = np.repeat(np.arange(len(counts)), cut)
-    step = np.arange(len(fans)) - np.repeat(np.cumsum(cut) - cut, cut)
-    base = first[fans]
-    triangles = np.stack([corners[base], corners[base + step + 1], corners[base + step + 2]], axis=1)
+    triangles = triangulate(points, counts, corners, keep)
     if prim.GetAttribute("orientation").Get() == "leftHanded":
         triangles = triangles[:, ::-1].copy()
-    return points, triangles.astype(np.int32)
+    return points, triangles
 
 
 def _is_visible(prim, time: float) -> bool:

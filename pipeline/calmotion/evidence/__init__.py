@@ -1,0 +1,1 @@
+"""Error against run time, convergence and cost: what the claims of this package rest on."""

@@ -1,0 +1,44 @@
+"""Unions of solids with manifold3d."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from .closing import Part
+
+
+class NotManifold(Exception):
+    """A part that is no manifold even where its edges are told apart by direction."""
+
+
+def united(parts: Sequence[Part]) -> Part:
+    """The union. A part that runs through itself stays as it is: only its parts against each other are resolved.
+
+    Args:
+        parts: Closed and outward, cavities inward.
+
+    Raises:
+        NotManifold: A part is none, for manifold3d.
+    """
+    import manifold3d
+
+    return part_of(manifold3d.Manifold.batch_boolean([manifold_of(part) for part in parts], manifold3d.OpType.Add))
+
+
+def manifold_of(part: Part) -> Any:
+    """The manifold3d.Manifold of a closed surface."""
+    import manifold3d
+
+    made = manifold3d.Manifold(manifold3d.Mesh64(part.points, part.triangles.astype(np.uint64)))
+    if made.status() != manifold3d.Error.NoError:
+        raise NotManifold(str(made.status()))
+    return made
+
+
+def part_of(manifold: Any) -> Part:
+    """The surface of a manifold3d.Manifold."""
+    mesh = manifold.to_mesh64()
+    return Part(np.array(mesh.vert_properties, dtype=float)[:, :3], np.array(mesh.tri_verts, dtype=np.int64))

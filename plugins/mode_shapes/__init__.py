@@ -1,0 +1,60 @@
+"""Writes the mode shapes of flexible bodies: .vtu for ParaView, pictures, and a table."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from calmotion.host import ModeShapes, Operator, OutputPaths, Property, RunContext, Source
+from calmotion.shot import Animation, Character, FEMeshes
+
+
+class WriteModeShapes(Operator):
+    """Mode shapes of every flexible body with their frequencies, damping and effective masses."""
+
+    idname = "modes.write"
+    label = "Write the mode shapes"
+    requires = (Character, FEMeshes, OutputPaths)
+    uses = (Animation, Source)
+    provides = (ModeShapes,)
+    properties = (
+        Property("dpi", int, 150, minimum=30, maximum=600, description="Resolution of the pictures, dots an inch."),
+        Property("pictures", int, 8, minimum=1, maximum=30, description="Most modes in the picture of a body."),
+    )
+
+    @classmethod
+    def poll(cls, data: Mapping[type, Any]) -> str | None:
+        paths, character = data.get(OutputPaths), data.get(Character)
+        if character is not None and not any(body.flexible for body in character.bodies):
+            return "nothing is flexible: no body has CalmFlexibleBodyAPI"
+        return None if paths and paths.modes else "no mode shapes are asked for (--modes)"
+
+    def execute(self, context: RunContext) -> Sequence[object]:
+        from calmotion.retarget.bodies import flexible_modes
+        from calmotion.retarget.prepare import Options, excitations
+
+        from .writing import write_modes
+
+        character, meshes, animation = context.get(Character), context.get(FEMeshes), context.get(Animation)
+        source = context.get(Source)
+        options = Options() if source is None else Options(tolerance=source.tolerance, step=source.step)
+        loads = None if animation is None else excitations(character, animation, meshes, options)
+        written = write_modes(
+            context.get(OutputPaths).modes or "",
+            flexible_modes(character, meshes, loads, options.tolerance),
+            total=len(meshes.meshes),
+            dpi=context.properties.dpi,
+            pictures=context.properties.pictures,
+            progress=context.progress,
+        )
+        return (ModeShapes(tuple(written)),)
+
+
+def register(host: Any) -> None:
+    """Add the operator to the host."""
+    host.register_operator(WriteModeShapes)
+
+
+def unregister(host: Any) -> None:
+    """Take it out again."""
+    host.unregister_operator(WriteModeShapes)

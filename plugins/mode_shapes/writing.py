@@ -1,0 +1,113 @@
+"""Mode shapes as files: `.vtu`, `.png` and `modes.csv`."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Callable, Iterable
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from calmotion.errors import ShotError
+from calmotion.fem.integrals import inertia_integrals
+from calmotion.fem.reduce import modal_damping
+from calmotion.naming import distinct_names
+from calmotion.shot import Body
+
+from .picture import draw_modes
+
+if TYPE_CHECKING:
+    from calmotion.fem.reduce import LinearModes
+
+SHOWN = 0.1  # largest displacement of a mode in the files, of the body's size
+COLUMNS = ("body", "mode", "frequency_hz", "damping_ratio", "mass_x_kg", "mass_y_kg", "mass_z_kg", "mass_kg")
+Progress = Callable[[float, str], None]
+
+
+def write_modes(
+    folder: str, modes: Iterable[tuple[Body, LinearModes]], *, total: int, dpi: int = 150, pictures: int = 8,
+    progress: Progress = lambda fraction, message: None,
+) -> list[str]:  # fmt: skip
+    """Write the modes of each body.
+
+    Args:
+        folder: Where to; made when it does not exist.
+        modes: Bodies with their linear modes; the next is made when the one before is written.
+        total: How many there are, for the progress.
+        dpi: Of the pictures, dots an inch.
+        pictures: Most modes in the picture of a body.
+        progress: Called with a fraction in 0..1 and a message.
+
+    Returns:
+        Paths of the files: `<body>.vtu` (quadratic tetrahedra in metres; a vector field for each mode, whose largest
+        displacement is a tenth of the body's size), `<body>.png`, and `modes.csv` (effective masses are those that a
+        mode carries when the root of the body is shaken along an axis of its frame).
+
+    Raises:
+        ShotError: The folder cannot be written, or a body cannot be reduced.
+    """
+    target = Path(folder)
+    written: list[str] = []
+    rows: list[tuple] = []
+    found: list[str] = []
+    try:
+        target.mkdir(parents=True, exist_ok=True)
+        for k, (body, linear) in enumerate(modes):
+            progress(k / total, body.path)
+            found.append(body.path)
+            name = distinct_names(found)[body.path].replace("/", "_")
+            if len({n.replace("/", "_") for n in distinct_names(found).values()}) < len(found):
+                name = body.path.strip("/").replace("/", "_")
+            shapes = scaled_modes(linear)
+            frequencies = np.sqrt(np.maximum(linear.basis.omega_squared, 0.0)) / (2.0 * np.pi)
+            path = target / f"{name}.vtu"
+            write_vtu(path, linear, shapes)
+            written.append(str(path))
+            if len(frequencies):
+                picture = target / f"{name}.png"
+                draw_modes(picture, body.path, linear.model.mesh, shapes[:, :, :pictures], frequencies, dpi)
+                written.append(str(picture))
+            rows += table_rows(body, linear, frequencies)
+        table = target / "modes.csv"
+        with open(table, "w", newline="", encoding="utf-8") as file:
+            writer = csv.writer(file)
+            writer.writerow(COLUMNS)
+            writer.writerows(rows)
+        written.append(str(table))
+    except OSError as error:
+        raise ShotError(
+            f"the mode shapes cannot be written: {error}", path=folder, remedy="Choose another --modes."
+        ) from error
+    return written
+
+
+def scaled_modes(linear: LinearModes) -> np.ndarray:
+    """Modes [m], shape [n, 3, r], the largest displacement of each a tenth of the body's size."""
+    modes = linear.basis.modes
+    size = float(np.linalg.norm(np.ptp(linear.model.mesh.nodes, axis=0)))
+    largest = np.linalg.norm(modes, axis=1).max(axis=0, initial=0.0)
+    return modes * (SHOWN * size / np.where(largest > 0.0, largest, 1.0))
+
+
+def write_vtu(path: Path, linear: LinearModes, shapes: np.ndarray) -> None:
+    """One body; the nodes of a quadratic tetrahedron stand in VTK's order already."""
+    import meshio
+
+    mesh = linear.model.mesh
+    fields = {f"mode_{k + 1:02d}": np.ascontiguousarray(shapes[:, :, k]) for k in range(shapes.shape[2])}
+    meshio.Mesh(mesh.nodes, [("tetra10", mesh.tets)], point_data=fields).write(path)
+
+
+def table_rows(body: Body, linear: LinearModes, frequencies: np.ndarray) -> list[tuple]:
+    """Rows of `modes.csv`."""
+    assert body.flexible is not None
+    omega = 2.0 * np.pi * frequencies
+    damping = modal_damping(linear.basis.omega_squared, body.flexible.material)
+    integrals = inertia_integrals(linear.model.mesh.nodes, linear.model.mass, linear.basis.modes)
+    effective = integrals.M3**2  # of mass-orthonormal modes
+    return [
+        (body.path, k + 1, f"{frequencies[k]:.6g}", f"{damping[k] / (2.0 * omega[k]):.6g}")
+        + tuple(f"{value:.6g}" for value in effective[k])
+        + (f"{integrals.mass:.6g}",)
+        for k in range(len(frequencies))
+    ]
