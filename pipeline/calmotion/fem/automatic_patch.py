@@ -6,11 +6,27 @@ import numpy as np
 
 from ..shot.character import Array, IntArray
 from .assembly import QuadraticMesh
-from .nearness import ray_length
+from .nearness import closest_on_triangles, ray_length
 
+_ASIDE = 0.01  # of the body's size: how far from the anchor the width is measured again
 _DIRECTIONS = 16  # rays across the body that find its width at an anchor
 _FLAT_COSINE = np.cos(np.radians(10.0))  # a tetrahedraliser may tilt the triangles of a plane by a few degrees
 _FLAT_OFFSET = 3e-3  # and move its corners by about a thousandth of the body
+
+
+def _triangle_parts(count: int) -> Array:
+    """Barycentric coordinates of the middles of count^2 equal parts of a triangle, shape [count^2, 3]."""
+    points = []
+    for i in range(count):
+        for j in range(count - i):
+            points.append((i + 1 / 3, j + 1 / 3))
+            if i + j < count - 1:
+                points.append((i + 2 / 3, j + 2 / 3))
+    first = np.array(points) / count
+    return np.column_stack([first, 1.0 - first.sum(axis=1)])
+
+
+_PARTS = _triangle_parts(6)
 
 
 def end_face(
@@ -72,21 +88,59 @@ def automatic_radius(center: Array, triangles: Array, closest: Array, gaps: Arra
     """
     gap = float(gaps.min())
     size = float(np.linalg.norm(np.ptp(triangles.reshape(-1, 3), axis=0)))
+    # Where a ray just meets or just misses an edge, one place says little: the middle of what several say.
+    found = [_width_at(closest, gaps, triangles, size)]
+    for step in _ASIDE * size * np.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]]) / np.sqrt(3.0):
+        near = closest_on_triangles(center + step, triangles)
+        found.append(_width_at(near, np.linalg.norm(near - center - step, axis=1), triangles, size))
+    seen = [width for width in found if np.isfinite(width)]
+    width = float(np.median(seen)) if seen else 0.5 * size
+    radius = max(1.25 * gap, float(np.hypot(gap, width)))
+    return min(radius, max(0.45 * room, 1.25 * gap))
+
+
+def _width_at(closest: Array, gaps: Array, triangles: Array, size: float) -> float:
+    """Half width of the body below the nearest surface, or its depth there on a plate [m]; not a number where the
+    surface has a gap below."""
     normal = _touched_normal(triangles, gaps, size)
     surface = closest[int(gaps.argmin())]
-    eps = 1e-6 * size
-    depth = _depth(surface, normal, triangles, size)
+    depth = ray_length(surface, -normal, triangles, 1e-6 * size)
+    if not np.isfinite(depth):
+        return np.nan
     across = np.linalg.svd(normal[None])[2][1:]
-    width = depth
-    d = max(1e-3 * depth, 10.0 * eps)
+    d = max(1e-3 * depth, 1e-5 * size)
     while d <= 0.5 * depth:
         half = _half_width(surface - d * normal, across, triangles)
         if half <= 2.0 * d:
-            width = half
-            break
+            return half
         d *= 1.25
-    radius = max(1.25 * gap, float(np.hypot(gap, width)))
-    return min(radius, max(0.45 * room, 1.25 * gap))
+    return depth
+
+
+def nodes_of_area(mesh: QuadraticMesh, own: IntArray, center: Array, radius: float) -> IntArray:
+    """The nearest surface nodes to a center that stand for as much surface as a sphere about it cuts out.
+
+    Nodes inside the sphere would make a patch that is up to an element larger or smaller, as the mesh happens to
+    lie, and with it the stiffness of the body.
+
+    Args:
+        mesh: Of the body.
+        own: Surface nodes to choose from.
+        center: [m], shape [3].
+        radius: [m].
+    """
+    corners = mesh.nodes[mesh.surface[:, :3]]
+    area = 0.5 * np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+    # each triangle by the middles of its parts
+    share = np.mean(np.linalg.norm(np.einsum("pk,tkx->tpx", _PARTS, corners) - center, axis=-1) <= radius, axis=1)
+    wanted = float(area @ share)
+    # the midpoints of a quadratic triangle stand for its surface, a third each; its corners for none
+    weight = np.zeros(len(mesh.nodes))
+    np.add.at(weight, mesh.surface[:, 3:], area[:, None] / 3.0)
+    order = own[np.argsort(np.linalg.norm(mesh.nodes[own] - center, axis=1), kind="stable")]
+    covered = np.cumsum(weight[order])
+    # a node belongs to the patch when more than half of what it stands for does
+    return np.sort(order[covered - 0.5 * weight[order] <= wanted])
 
 
 def _half_width(start: Array, across: Array, triangles: Array) -> float:

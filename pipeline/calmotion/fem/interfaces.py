@@ -10,7 +10,7 @@ import numpy as np
 from ..errors import ShotError
 from ..shot.character import Array, Frame, IntArray, InterfaceSurface
 from .assembly import QuadraticMesh
-from .automatic_patch import automatic_radius, end_face
+from .automatic_patch import automatic_radius, end_face, nodes_of_area
 from .named_patch import named_patch
 from .nearness import closest_on_triangles
 
@@ -147,16 +147,14 @@ def _patch(
         if spans_a_plane(mesh.nodes[face]):
             extent = float(np.linalg.norm(mesh.nodes[face] - center, axis=1).max())
             return Patch(nodes=face.astype(np.int32), anchors=tuple(group), radius=extent)
-    r = np.linalg.norm(mesh.nodes[own] - center, axis=1)
-    # the tolerance takes the nodes on the rim of a face whose half width was measured as the radius
-    nodes = own[r <= radius * (1.0 + 1e-6)]
+    nodes = nodes_of_area(mesh, own, center, radius)
     if not spans_a_plane(mesh.nodes[nodes]):
         # a mesh coarser than the radius: the surface triangle that is touched is the least that holds a moment
         touched = np.intersect1d(mesh.surface[gaps <= gap + 1e-9 * size].ravel(), own)
         nodes = np.union1d(nodes, touched)
     while automatic and not spans_a_plane(mesh.nodes[nodes]) and radius < min(0.5 * size, room):
         radius *= _GROWTH
-        nodes = own[r <= radius]
+        nodes = nodes_of_area(mesh, own, center, radius)
     if not spans_a_plane(mesh.nodes[nodes]):
         raise ShotError(
             f"the surface near the anchor of {path} is too small to hold a joint",
