@@ -68,22 +68,21 @@ def excitation_of(character: Character, model: Model, run: ForwardRun, h: float)
     angular = np.gradient(omega, h, axis=0) if len(states.c) > 1 else np.zeros_like(omega)
     felt = np.einsum("tbji,tbj->tbi", R, acceleration - system.gravity)
     reach = _reach(model, run, R)
-    # joint of each component, as its parent feels it: force in world axes, moment in the axes of the joint
-    force, moment = -states.lam[:, :, :3], -states.lam[:, :, 3:]
+    force, moment = states.lam[:, :, :3], _moments(model, run, R)
     component_of = {body: k for k, body in enumerate(tree.body)}
-    carried = {joint: k for k, joint in enumerate(tree.joint)}
+    number = {joint: k for k, joint in enumerate((*tree.joint, *tree.loops))}
     result = []
     for index, anchors in enumerate(body_anchors(character, tree)):
         b = component_of[index]
         peaks = np.zeros((len(anchors.joints), 6))
         far = np.zeros(len(anchors.joints))
         for row, joint in enumerate(anchors.joints):
-            k = carried[joint]
-            if row == anchors.root or tree.parent[k] != b:
+            k = number[joint]
+            if row == anchors.root:
                 continue
             peaks[row, :3] = _peak(np.einsum("tji,tj->ti", R[:, b], force[:, k]))
-            peaks[row, 3:] = _peak(moment[:, k] @ system.rotation[k, 0].T)
-            far[row] = reach[k]
+            peaks[row, 3:] = _peak(np.einsum("tji,tj->ti", R[:, b], moment[:, k]))
+            far[row] = reach[k] if k < len(reach) else 0.0
         center = acceleration[:, b] + _carried_center(system.s[b] / system.mass[b], R[:, b], omega[:, b], angular[:, b])
         result.append(
             Excitation(
@@ -92,6 +91,15 @@ def excitation_of(character: Character, model: Model, run: ForwardRun, h: float)
             )
         )  # fmt: skip
     return tuple(result)
+
+
+def _moments(model: Model, run: ForwardRun, R: Array) -> Array:
+    """Moments that the joints transmit, world axes [N m], shape [T, J, 3]."""
+    moments = np.empty_like(run.trajectory.states.lam[:, :, 3:])
+    for k, parent in enumerate(model.system.side[:, 0]):
+        own = run.trajectory.states.lam[:, k, 3:] @ model.system.rotation[k, 0].T
+        moments[:, k] = own if parent < 0 else np.einsum("tij,tj->ti", R[:, parent], own)
+    return moments
 
 
 def highest_frequency(signal: Array, h: float) -> float:

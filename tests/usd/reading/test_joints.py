@@ -121,10 +121,22 @@ def test_a_joint_that_closes_a_loop_is_read_as_a_joint(tmp_path):
         extra.CreateBody1Rel().SetTargets([FORE])
         extra.CreateExcludeFromArticulationAttr(True)
 
-    assert len(read(tmp_path, edit).joints) == 4
+    joints = read(tmp_path, edit).joints
+    assert len(joints) == 4
+    assert [joint.closes_loop for joint in joints].count(True) == 1
 
 
-@pytest.mark.parametrize("kind", ["PrismaticJoint", "SphericalJoint", "DistanceJoint", "Joint"])
+def test_a_ball_is_read(tmp_path):
+    def edit(stage):
+        extra = UsdPhysics.SphericalJoint.Define(stage, "/Arm/joints/ball")
+        extra.CreateBody0Rel().SetTargets([BASE])
+        extra.CreateBody1Rel().SetTargets([FORE])
+
+    (ball,) = (joint for joint in read(tmp_path, edit).joints if joint.path == "/Arm/joints/ball")
+    assert ball.kind == "spherical" and ball.lower == -np.inf
+
+
+@pytest.mark.parametrize("kind", ["PrismaticJoint", "DistanceJoint", "Joint"])
 def test_other_joints_of_the_character_are_not_supported_yet(tmp_path, kind):
     def edit(stage):
         extra = getattr(UsdPhysics, kind).Define(stage, "/Arm/joints/other")

@@ -103,6 +103,7 @@ def build_character(reading: Reading, skeleton: Skeleton) -> Character:
             j.frame1,
             j.lower,
             j.upper,
+            j.closes_loop,
         )
         for j in skeleton.joints
     )

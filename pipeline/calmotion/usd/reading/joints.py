@@ -14,7 +14,7 @@ from .. import gf
 from ..transforms import Pose, axis_rotation, quaternion_from_rotation, rotation_from_quaternion
 from .context import Reading, prims_of
 
-_KINDS = {"PhysicsRevoluteJoint": "revolute", "PhysicsFixedJoint": "fixed"}
+_KINDS = {"PhysicsRevoluteJoint": "revolute", "PhysicsFixedJoint": "fixed", "PhysicsSphericalJoint": "spherical"}
 UNSUPPORTED = "unsupported"
 _HALF_TURN = np.diag([1.0, -1.0, -1.0])  # about x: turns the z axis over
 
@@ -26,10 +26,12 @@ class JointPrim:
     Attributes:
         prim: The Usd.Prim, None for a joint that the reader added.
         path: Its path.
-        kind: `revolute` or `fixed`, or `UNSUPPORTED`, which matters only where the joint is part of the character.
+        kind: `revolute`, `spherical` or `fixed`, or `UNSUPPORTED`, which matters only where the joint is part of the
+            character.
         body0, body1: Paths of the bodies, empty for the world.
         frame0, frame1: Frames in them, m.
         lower, upper: Limits [rad].
+        closes_loop: Whether the shot says that this joint closes a loop.
     """
 
     prim: Any
@@ -41,6 +43,7 @@ class JointPrim:
     frame1: Frame
     lower: float = -np.inf
     upper: float = np.inf
+    closes_loop: bool = False
 
 
 def joint_prims(stage) -> list:
@@ -102,6 +105,7 @@ def read_joint(reading: Reading, prim, poses: dict[str, Pose]) -> JointPrim | No
         Frame(position1 * meters, quaternion_from_rotation(rotation1 @ turn)),
         lower,
         upper,
+        prim.GetAttribute("physics:excludeFromArticulation").Get() is True,
     )
 
 
@@ -191,7 +195,7 @@ def refuse_unsupported(joint: JointPrim) -> None:
             "a joint of this type is not supported yet",
             path=joint.path,
             found=joint.prim.GetTypeName(),
-            remedy="Use PhysicsRevoluteJoint or PhysicsFixedJoint (two hinges make a universal joint), or disable it "
+            remedy="Use PhysicsRevoluteJoint, PhysicsSphericalJoint or PhysicsFixedJoint, or disable it "
             "with physics:jointEnabled = false",
         )
 
