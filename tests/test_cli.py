@@ -80,6 +80,16 @@ def test_help_imports_nothing_heavy():
     assert "optimize" in printed.stdout
 
 
+def test_benchmarks_take_their_own_arguments():
+    def bench(*arguments):
+        command = [sys.executable, "-m", "calmotion", "bench", *arguments]
+        return subprocess.run(command, capture_output=True, text=True, env=_environment())
+
+    done = bench("reduction", "--nodes", "400", "--modes", "6", "--shape", "slender")
+    assert done.returncode == 0 and "slender link" in done.stdout and "peak memory" in done.stdout, done.stderr
+    assert bench("nothing").returncode == 2
+
+
 def _environment():
     return os.environ | {"PYTHONPATH": os.pathsep.join(path for path in sys.path if path)}
 

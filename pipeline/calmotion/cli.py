@@ -14,6 +14,7 @@ if TYPE_CHECKING:
 
     Commands = argparse._SubParsersAction[argparse.ArgumentParser]
 
+BENCHMARKS = ("meshing", "reduction")
 DONE, FAILED, WRONG_USAGE, INTERRUPTED = 0, 1, 2, 130
 
 
@@ -66,6 +67,14 @@ def _parser() -> argparse.ArgumentParser:
     optimize.add_argument("-o", "--output", metavar="LAYER", required=True, help="USD layer to write")
     for command in (simulate, optimize):
         _run_options(command)
+    bench = commands.add_parser(
+        "bench",
+        help="measure error against run time",
+        description="Measure error against run time; `calmotion bench NAME --help` tells what each can vary.",
+    )
+    bench.add_argument("name", metavar="NAME", choices=BENCHMARKS, help=" or ".join(BENCHMARKS))
+    bench.add_argument("arguments", nargs=argparse.REMAINDER, help="its own arguments")
+    bench.set_defaults(command=_bench, json=False)
     _plugins_commands(commands)
     return parser
 
@@ -165,6 +174,12 @@ def _optimize(args: argparse.Namespace, output: Output) -> int:
     from .cli_run import run_shot
 
     return run_shot(args, "optimize", output)
+
+
+def _bench(args: argparse.Namespace, output: Output) -> int:
+    from importlib import import_module
+
+    return import_module(f".evidence.{args.name}", __package__).main(args.arguments)
 
 
 def _list_plugins(args: argparse.Namespace, output: Output) -> int:

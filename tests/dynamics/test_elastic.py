@@ -44,7 +44,7 @@ class StVenantKirchhoff(Law):
         size = len(self.A)
         stvk_forces(
             self.r, u, v, self.beta, 3, np.concatenate([np.full(3, np.nan), self.A.ravel()]), tangent,
-            np.zeros(size), np.zeros((self.r, size)), np.zeros(self.r), res, P, K,
+            np.zeros(2 * size), np.zeros((self.r, size)), np.zeros(self.r), res, P, K,
         )  # fmt: skip
 
 

@@ -20,7 +20,7 @@ def test_the_readable_force_is_the_compiled_one():
     res, P, K = np.zeros(6 + r), np.zeros((6 + r, 6 + r)), np.zeros((6 + r, 6 + r))
     size = len(gram)
     stvk_forces(
-        r, u, np.zeros(r), 0.0, 0, gram.ravel(), True, np.zeros(size), np.zeros((r, size)), np.zeros(r), res, P, K
+        r, u, np.zeros(r), 0.0, 0, gram.ravel(), True, np.zeros(2 * size), np.zeros((r, size)), np.zeros(r), res, P, K
     )
     assert np.allclose(force, res[6:], rtol=1e-12)
     assert np.allclose(stiffness, K[6:, 6:], rtol=1e-12)

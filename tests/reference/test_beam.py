@@ -60,7 +60,7 @@ def timoshenko_frequencies(material, length, height, count):
 
 
 def test_the_first_three_bending_frequencies_of_a_steel_beam_of_twenty_to_one():
-    """Within 1% of beam theory: of Timoshenko's for all three, of the slender limit for the first two.
+    """Within 0.5% of Timoshenko's beam for all three, and within 1% of the slender limit for the first two.
 
     At 20 to 1 shear and rotary inertia lower the third frequency by 2.7% against the slender limit.
     """
@@ -73,18 +73,18 @@ def test_the_first_three_bending_frequencies_of_a_steel_beam_of_twenty_to_one():
     slender = SLENDER * np.sqrt(2.1e11 * height**2 / 12.0 / (7850.0 * length**4)) / (2.0 * np.pi)
     theory = timoshenko_frequencies(steel, length, height, 3)
     # a clamped face may not contract as the beam's sections do: 4 parts in 1000 stiffer
-    assert np.allclose(bending, theory, rtol=6e-3) and (bending > theory).all()
+    assert np.allclose(bending, theory, rtol=5e-3) and (bending > theory).all()
     assert np.allclose(bending[:2], slender[:2], rtol=1e-2)
     assert 0.96 < bending[2] / slender[2] < 0.98
 
 
 def test_the_slender_limit():
-    """At 100 to 1 all three are within 1% of the slender limit, without a correction."""
+    """At 100 to 1 all three are within 0.5% of the slender limit, without a correction."""
     steel = ElasticMaterial("/Looks/Steel", 2.1e11, 0.3, 7850.0)
     model, clamped = beam((100, 1), 1.0, 0.01, steel)
     f = frequencies(model, 6, clamped).reshape(3, 2).mean(axis=1)
     slender = SLENDER * np.sqrt(2.1e11 * 1e-4 / 12.0 / 7850.0) / (2.0 * np.pi)
-    assert np.allclose(f, slender, rtol=1e-2)
+    assert np.allclose(f, slender, rtol=5e-3)
 
 
 @pytest.mark.parametrize(("poissons_ratio", "tolerance"), [(0.0, 5e-4), (0.3, 1.5e-2)])

@@ -54,7 +54,7 @@ def allocate_work(system: System) -> Work:
     return Work(
         np.zeros((len(system.parent), 3, 3)), np.zeros(3), np.zeros((3, 3)), np.zeros((r, 3, 3)), np.zeros((3, 3)),
         np.zeros((3, 3)), np.zeros((3, 3)), np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(3), np.zeros((3, 3)),
-        np.zeros((3, 3)), np.zeros(3), np.zeros((2, JOINT_ROWS)), np.zeros(pairs),
+        np.zeros((3, 3)), np.zeros(3), np.zeros((2, JOINT_ROWS)), np.zeros(2 * pairs),
         np.zeros((max(nonlinear, points), max(pairs, nonlinear))), np.zeros(nonlinear), np.zeros((points, points)),
         allocate_marker(system.size), allocate_marker(system.size),
     )  # fmt: skip

@@ -28,27 +28,46 @@ def strain_coordinates(r, u, v, beta, z):
 
 
 @kernel
+def _pair_row(r, i, l):
+    """Row of A that belongs to the pair (i, l)."""
+    k, n = min(i, l), max(i, l)
+    return r + k * r - (k * (k - 1)) // 2 + n - k
+
+
+@kernel
 def _project(r, u, at, A, size, Y):
     """Y = J(u)^T A, shape [r, size]; A starts at `at` of a flat array."""
     for i in range(r):
-        row = at + i * size
+        y = Y[i]
+        first = A[at + i * size : at + (i + 1) * size]
         for m in range(size):
-            Y[i, m] = A[row + m]
-    p = r
-    for k in range(r):
-        for l in range(k, r):
-            row = at + p * size
-            # d(u_k u_l) = u_l du_k + u_k du_l
-            a, b = u[l], u[k]
-            if l == k:
-                a = 2.0 * a
-                b = 0.0
+            y[m] = first[m]
+        # d(u_i u_l) = u_l du_i, and twice that where l is i; four rows at a time halve the traffic
+        l = 0
+        while l + 4 <= r:
+            s0, s1 = at + size * _pair_row(r, i, l), at + size * _pair_row(r, i, l + 1)
+            s2, s3 = at + size * _pair_row(r, i, l + 2), at + size * _pair_row(r, i, l + 3)
+            a0, a1, a2, a3 = A[s0 : s0 + size], A[s1 : s1 + size], A[s2 : s2 + size], A[s3 : s3 + size]
+            u0, u1, u2, u3 = u[l], u[l + 1], u[l + 2], u[l + 3]
+            if l <= i < l + 4:
+                if i == l:
+                    u0 = 2.0 * u0
+                elif i == l + 1:
+                    u1 = 2.0 * u1
+                elif i == l + 2:
+                    u2 = 2.0 * u2
+                else:
+                    u3 = 2.0 * u3
             for m in range(size):
-                Y[k, m] += a * A[row + m]
-            if b != 0.0:
-                for m in range(size):
-                    Y[l, m] += b * A[row + m]
-            p += 1
+                y[m] += u0 * a0[m] + u1 * a1[m] + u2 * a2[m] + u3 * a3[m]
+            l += 4
+        while l < r:
+            start = at + size * _pair_row(r, i, l)
+            last = A[start : start + size]
+            factor = 2.0 * u[l] if l == i else u[l]
+            for m in range(size):
+                y[m] += factor * last[m]
+            l += 1
 
 
 @kernel
@@ -71,7 +90,7 @@ def stvk_forces(r, u, v, beta, at, A, tangent, z, Y, row, res, P, K):
         u, v: Elastic coordinates and their rates, shape [r].
         beta: Retardation time of Kelvin-Voigt damping [s].
         at, A: Flat array of Gram matrices, and where this body's starts.
-        z, Y, row: Scratch, shapes [size], [r, size] and [r], with size = r + r (r + 1) / 2.
+        z, Y, row: Scratch, shapes [2 size], [r, size] and [r], with size = r + r (r + 1) / 2.
         res, P, K: Shapes [6 + r], [6 + r, 6 + r] twice.
     """
     size = r + (r * (r + 1)) // 2
@@ -97,14 +116,18 @@ def stvk_forces(r, u, v, beta, at, A, tangent, z, Y, row, res, P, K):
             _times_jacobian(r, i, Y, v, beta, row)
             for k in range(r):
                 K[6 + i, 6 + k] += row[k]
-    # stress on the pairs: d(u_k u_l) twice
+    # stress on the pairs, sums of whole rows of the symmetric A so that they run in vectors; d(u_k u_l) stands twice
+    stress = z[size:]
+    for m in range(size):
+        stress[m] = 0.0
+    for n in range(size):
+        start = at + n * size
+        t = z[n]
+        for m in range(r, size):
+            stress[m] += t * A[start + m]
     p = r
     for k in range(r):
         for l in range(k, r):
-            s = 0.0
-            start = at + p * size
-            for m in range(size):
-                s += A[start + m] * z[m]
-            K[6 + k, 6 + l] += s
-            K[6 + l, 6 + k] += s
+            K[6 + k, 6 + l] += stress[p]
+            K[6 + l, 6 + k] += stress[p]
             p += 1

@@ -1,6 +1,6 @@
 """What a mesh costs and what it is worth: time and error against element size, for links of real robots.
 
-`python -m calmotion.evidence.meshing FILE[:PRIM] ... [--sizes 2 1.4 1 0.7] [-o table.md|table.csv]` meshes each link
+`calmotion bench meshing FILE[:PRIM] ... [--sizes 2 1.4 1 0.7] [-o table.md|table.csv]` meshes each link
 with elements of several sizes, given in metres with a unit (`8mm`) or as multiples of the automatic size. Errors of
 frequencies are relative to the mesh with the most nodes, which has an error of its own: its estimate is shown too.
 """
@@ -183,7 +183,7 @@ def write(rows: Sequence[Row], path: str) -> None:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Command line; exit status 1 when no link could be meshed."""
     parser = argparse.ArgumentParser(
-        prog="python -m calmotion.evidence.meshing", description="Time and error against element size of links."
+        prog="calmotion bench meshing", description="Time and error against element size of links."
     )
     parser.add_argument("links", nargs="+", metavar="FILE[:PRIM]", help="links; all bodies without a prim")
     parser.add_argument(

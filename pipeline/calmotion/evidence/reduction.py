@@ -1,6 +1,6 @@
 """How long a reduction takes, how much memory it needs, and how exact its modes are.
 
-`python -m calmotion.evidence.reduction [--nodes 50000] [--modes 30]` reduces a slender and a bulky link of that many
+`calmotion bench reduction [--nodes 50000] [--modes 30]` reduces a slender and a bulky link of that many
 nodes, clamped at one end and with a moving interface at the other, each in a process of its own, whose peak memory is
 the one that is shown.
 """
@@ -124,7 +124,7 @@ def report(shape: str, result: dict[str, Any]) -> str:
 
 def main(arguments: list[str] | None = None) -> int:
     """The command."""
-    parser = argparse.ArgumentParser(prog="python -m calmotion.evidence.reduction", description=__doc__)
+    parser = argparse.ArgumentParser(prog="calmotion bench reduction", description=__doc__)
     parser.add_argument("--nodes", type=int, default=50000, help="nodes of the quadratic mesh, about")
     parser.add_argument("--modes", type=int, default=30, help="modes of the reduced body")
     parser.add_argument("--shape", choices=[*SHAPES], help="one of the shapes alone")
