@@ -17,7 +17,8 @@ import numpy as np
 from ..kernels import kernel
 from .assembly import assemble
 from .elimination import factor
-from .loops import factor_loops, least_multipliers, solve_system
+from .least_multipliers import least_multipliers
+from .loops import factor_loops, solve_system
 from .so3 import inverse_right_jacobian, right_jacobian, right_jacobian_derivative, turn
 
 CONVERGED, SINGULAR, NOT_CONVERGED = 0, 1, 2

@@ -14,7 +14,8 @@ import numpy as np
 from ..shot.character import Array
 from .assembly import assemble
 from .elimination import factor
-from .loops import factor_loops, least_multipliers, solve_system
+from .least_multipliers import least_multipliers
+from .loops import factor_loops, solve_system
 from .so3 import turn
 from .system import Scheme, State, System
 

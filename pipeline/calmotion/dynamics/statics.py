@@ -10,7 +10,8 @@ from ..shot.character import Array
 from . import bdf2
 from .assembly import assemble
 from .elimination import factor
-from .loops import factor_loops, least_multipliers, solve_system
+from .least_multipliers import least_multipliers
+from .loops import factor_loops, solve_system
 from .system import Scheme, State, System, allocate_state
 
 if TYPE_CHECKING:
