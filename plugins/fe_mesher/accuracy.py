@@ -12,7 +12,7 @@ from calmotion.shot import Body, Character, Frame
 _COUNT = 3  # frequencies: those that a motion excites
 _APART, _RESERVE = 1.15, 2.0  # least ratio of element sizes of two meshes that are compared; factor on what they tell
 # The estimate is 1.2 to 3 times the true error of clamped beams and plates on meshes that are nearly fine enough, and
-# more on links with many edges (`python -m calmotion.evidence.meshing` shows both), so up to twice the wanted error it
+# more on links with many edges (`calmotion bench meshing` shows both), so up to twice the wanted error it
 # counts as reached.
 _ENOUGH = 2.0 * ACCURACY
 
