@@ -6,22 +6,34 @@ positions of all nodes as unknowns, so that large rotations are in the Green str
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
-from scipy.sparse import coo_matrix, diags, identity, kron
+from scipy.sparse import coo_matrix, csc_matrix, diags, identity, kron
 from scipy.sparse.linalg import splu
+from scipy.spatial.transform import Rotation
+
+_BETTER = 0.3  # of the last correction: a kept tangent has to do better than that
 
 
 class FullOrder:
-    """Straight-sided ten-node tetrahedra of one hyperelastic material.
+    """Straight-sided ten-node tetrahedra of hyperelastic materials.
 
     Args:
         points, tets: Linear mesh, [n, 3] and [m, 4].
-        youngs_modulus, poissons_ratio, density: SI.
-        law: `stvk` or `neohookean`.
+        youngs_modulus, poissons_ratio, density: SI; a number, or one for each element, [m].
+        law: `stvk` or `neohookean` (W = mu/2 (tr C - 3) - mu ln J + lambda/2 ln^2 J).
         lumps: Extra masses [kg] by node of the linear mesh.
+        retardation: Kelvin-Voigt time [s]: stresses S of C:E + retardation C:dE/dt, for either law.
+
+    Attributes:
+        nodes: [m], shape [n', 3]: the points, then the midpoints of edges.
+        mass: Consistent, with the lumps [kg], shape [3 n', 3 n'].
     """
 
-    def __init__(self, points, tets, youngs_modulus, poissons_ratio, density, law="stvk", lumps=None):
+    def __init__(
+        self, points, tets, youngs_modulus, poissons_ratio, density, law="stvk", lumps=None, retardation=0.0
+    ):  # fmt: skip
         from skfem import Basis, ElementTetP2, MeshTet
 
         mesh = MeshTet(np.ascontiguousarray(points.T, dtype=float), np.ascontiguousarray(tets.T, dtype=np.int64))
@@ -29,12 +41,14 @@ class FullOrder:
         self.nodes = basis.doflocs.T.copy()
         self.tets = basis.element_dofs.T.astype(np.int64)
         self.gradients = np.stack([np.asarray(f[0].grad) for f in basis.basis]).transpose(2, 3, 0, 1)  # [e, q, 10, 3]
-        values = np.stack([np.asarray(f[0].value) * np.ones(basis.dx.shape) for f in basis.basis])
+        values = np.stack([np.asarray(f[0]) * np.ones(basis.dx.shape) for f in basis.basis])
         self.weights = basis.dx
-        self.mu = 0.5 * youngs_modulus / (1.0 + poissons_ratio)
-        self.lame = youngs_modulus * poissons_ratio / ((1.0 + poissons_ratio) * (1.0 - 2.0 * poissons_ratio))
-        self.law = law
-        local = density * np.einsum("aeq,beq,eq->eab", values, values, self.weights, optimize=True)
+        constants = (youngs_modulus, poissons_ratio, density)
+        modulus, ratio, density = (np.broadcast_to(np.asarray(a, dtype=float), len(self.tets)) for a in constants)
+        self.mu = (0.5 * modulus / (1.0 + ratio))[:, None]  # [e, 1]
+        self.lame = (modulus * ratio / ((1.0 + ratio) * (1.0 - 2.0 * ratio)))[:, None]
+        self.law, self.retardation = law, retardation
+        local = np.einsum("aeq,beq,eq,e->eab", values, values, self.weights, density, optimize=True)
         n = len(self.nodes)
         rows, columns = np.repeat(self.tets, 10, axis=1).ravel(), np.tile(self.tets, (1, 10)).ravel()
         scalar = coo_matrix((local.ravel(), (rows, columns)), shape=(n, n)).tocsr()
@@ -44,10 +58,12 @@ class FullOrder:
         self.mass = kron(scalar + diags(extra), identity(3), format="csr")
         dofs = (3 * self.tets[:, :, None] + np.arange(3)).reshape(-1, 30)
         self._dofs = dofs
-        self._pattern = (np.repeat(dofs, 30, axis=1).ravel(), np.tile(dofs, (1, 30)).ravel())
+        keys = 3 * n * np.tile(dofs, (1, 30)).ravel() + np.repeat(dofs, 30, axis=1).ravel()
+        keys, self._place = np.unique(keys, return_inverse=True)
+        self._rows, self._starts = keys % (3 * n), np.searchsorted(keys, 3 * n * np.arange(3 * n + 1))
 
     def deformation(self, x):
-        """F at every quadrature point, [e, q, 3, 3], of nodal positions [n, 3]."""
+        """F at every quadrature point, [e, q, 3, 3], of nodal positions [n, 3]; of velocities, its rate."""
         return np.einsum("eai,eqaj->eqij", x[self.tets], self.gradients, optimize=True)
 
     def energy(self, x):
@@ -61,14 +77,16 @@ class FullOrder:
             W = 0.5 * self.mu * (np.sum(F * F, axis=(-2, -1)) - 3.0) - self.mu * log + 0.5 * self.lame * log**2
         return float(np.sum(self.weights * W))
 
-    def forces(self, x, tangent=True):
-        """Internal force [3 n] and its derivative (sparse) at nodal positions [n, 3]."""
+    def forces(self, x, tangent=True, velocity=None):
+        """Internal force [3 n] and its derivative (sparse) at nodal positions [n, 3].
+
+        With a velocity [n, 3] and a retardation the force is also viscous; the derivative is of the elastic part.
+        """
         F = self.deformation(x)
         E3 = np.eye(3)
-        lame, mu = self.lame, self.mu
+        lame, mu = self.lame[:, :, None, None], self.mu[:, :, None, None]
         if self.law == "stvk":
-            E = 0.5 * (np.swapaxes(F, -1, -2) @ F - E3)
-            S = lame * np.trace(E, axis1=-2, axis2=-1)[..., None, None] * E3 + 2.0 * mu * E
+            S = self._stress(0.5 * (np.swapaxes(F, -1, -2) @ F - E3))
             P = F @ S
         else:
             inverse = np.linalg.inv(F)
@@ -76,27 +94,37 @@ class FullOrder:
             transposed = np.swapaxes(inverse, -1, -2)
             P = mu * (F - transposed) + lame * log * transposed
         G, w = self.gradients, self.weights
-        f = np.zeros(3 * len(self.nodes))
-        np.add.at(f, self._dofs, np.einsum("eqij,eqaj,eq->eai", P, G, w, optimize=True).reshape(-1, 30))
+        if velocity is not None and self.retardation:
+            rate = np.swapaxes(F, -1, -2) @ self.deformation(velocity)
+            P = P + self.retardation * F @ self._stress(0.5 * (rate + np.swapaxes(rate, -1, -2)))
+        local = np.einsum("eqij,eqaj,eq->eai", P, G, w, optimize=True).ravel()
+        f = np.bincount(self._dofs.ravel(), weights=local, minlength=3 * len(self.nodes))
         if not tangent:
             return f, None
+        by_lame, by_mu = w * self.lame, w * self.mu
         if self.law == "stvk":
             # dP = dF S + F (lame tr(F^T dF) + mu (dF^T F + F^T dF)), dF = e_i (x) G_a
             FG = np.einsum("eqij,eqaj->eqai", F, G)
-            K = lame * np.einsum("eqai,eqbk,eq->eaibk", FG, FG, w, optimize=True)
-            K += mu * np.einsum("eqak,eqbi,eq->eaibk", FG, FG, w, optimize=True)
+            K = np.einsum("eqai,eqbk,eq->eaibk", FG, FG, by_lame, optimize=True)
+            K += np.einsum("eqak,eqbi,eq->eaibk", FG, FG, by_mu, optimize=True)
             GG = np.einsum("eqaj,eqbj->eqab", G, G)
-            K += mu * np.einsum("eqab,eqij,eqkj,eq->eaibk", GG, F, F, w, optimize=True)
+            K += np.einsum("eqab,eqij,eqkj,eq->eaibk", GG, F, F, by_mu, optimize=True)
             geometric = np.einsum("eqaj,eqjl,eqbl,eq->eab", G, S, G, w, optimize=True)
         else:
             H = np.einsum("eqji,eqaj->eqai", inverse, G)  # F^-T G
-            K = lame * np.einsum("eqai,eqbk,eq->eaibk", H, H, w, optimize=True)
-            K += np.einsum("eqak,eqbi,eq->eaibk", H, H, w * (mu - lame * log[..., 0, 0]), optimize=True)
-            geometric = mu * np.einsum("eqaj,eqbj,eq->eab", G, G, w, optimize=True)
+            K = np.einsum("eqai,eqbk,eq->eaibk", H, H, by_lame, optimize=True)
+            K += np.einsum("eqak,eqbi,eq->eaibk", H, H, by_mu - by_lame * log[..., 0, 0], optimize=True)
+            geometric = np.einsum("eqaj,eqbj,eq->eab", G, G, by_mu, optimize=True)
         for i in range(3):
             K[:, :, i, :, i] += geometric
         size = len(f)
-        return f, coo_matrix((K.reshape(-1), self._pattern), shape=(size, size)).tocsc()
+        data = np.bincount(self._place, weights=K.ravel(), minlength=len(self._rows))
+        return f, csc_matrix((data, self._rows, self._starts), shape=(size, size))
+
+    def _stress(self, E):
+        """C : E [Pa] of strains, [e, q, 3, 3]."""
+        trace = np.trace(E, axis1=-2, axis2=-1)
+        return (self.lame * trace)[..., None, None] * np.eye(3) + 2.0 * self.mu[:, :, None, None] * E
 
     def statics(self, held, loads, steps=10):
         """Positions [n, 3] in balance with nodal forces [n, 3], nodes `held` staying where they are."""
@@ -107,50 +135,123 @@ class FullOrder:
                 f, K = self.forces(x)
                 residual = (part * loads.ravel() - f)[free]
                 dx = np.zeros(x.size)
-                dx[free] = splu(K[free][:, free].tocsc()).solve(residual)
+                dx[free] = _factor(K[free][:, free]).solve(residual)
                 x += dx.reshape(-1, 3)
                 if np.abs(dx).max() < 1e-12 * np.ptp(self.nodes):
                     break
+            else:
+                raise ArithmeticError(f"no balance at {part:.0%} of the load; take more steps")
         return x
 
-    def swing(self, held, angle, axis, step, duration, watched, gravity=(0.0, 0.0, 0.0)):
-        """Root nodes turned about an axis through the origin by angle(t); average acceleration (Newmark).
+    def swing(self, held, angle, axis, step, duration, watched, gravity=(0.0, 0.0, 0.0), start=None):
+        """Root nodes turned about an axis through the origin by angle(t).
 
-        Starts at rest, undeformed.
+        Starts at rest, undeformed or at positions `start` [n, 3]; the angle starts from zero.
 
         Returns:
             Times, and positions of the watched nodes turned back by the angle, [t, k, 3].
         """
-        from scipy.spatial.transform import Rotation
+        x = self.nodes if start is None else start
+        tips = [
+            s.turn.inv().apply(s.x[watched])
+            for s in self.march(x, np.zeros_like(x), step, round(duration / step), gravity, held, angle, axis)
+        ]
+        return step * np.arange(len(tips)), np.array(tips)
 
-        free = self._free(held)
-        M = self.mass
-        weight = M @ np.tile(gravity, len(self.nodes))
-        count = round(duration / step)
-        x, v = self.nodes.copy().ravel(), np.zeros(self.nodes.size)
-        a = np.zeros_like(v)
-        tips = [self.nodes[watched]]
-        for n in range(1, count + 1):
-            turn = Rotation.from_rotvec(np.asarray(axis) * angle(n * step))
-            led = turn.apply(self.nodes[held])
-            new = x + step * v + 0.5 * step * step * a
-            new.reshape(-1, 3)[held] = led
-            for _ in range(30):
-                acceleration = 4.0 / step**2 * (new - x - step * v) - a
-                f, K = self.forces(new.reshape(-1, 3))
-                residual = (weight - f - M @ acceleration)[free]
-                matrix = (K + 4.0 / step**2 * M)[free][:, free]
-                dx = splu(matrix.tocsc()).solve(residual)
-                new[free] += dx
-                if np.abs(dx).max() < 1e-10 * np.ptp(self.nodes):
+    def march(
+        self, x, v, step, count, gravity=(0.0, 0.0, 0.0), held=(), angle=None, axis=(0.0, 0.0, 1.0),
+        steady=0.8,
+    ):  # fmt: skip
+        """States from positions and velocities [n, 3], the first one included; generalised alpha, of second order.
+
+        `steady` is what a step leaves of motion far too fast for it. At 1 (average acceleration) energy is kept
+        where all is linear, but a long beam that spins up breaks down: its stretching grows. A tangent is kept, and
+        turned with the root, as long as it does its work (modified Newton).
+
+        Source: Chung and Hulbert 1993.
+        """
+        by_a, by_f = (2.0 * steady - 1.0) / (steady + 1.0), steady / (steady + 1.0)  # weights of the last step
+        gamma, beta = 0.5 - by_a + by_f, 0.25 * (1.0 - by_a + by_f) ** 2
+        held = np.asarray(held, dtype=np.int64)
+        free, n = self._free(held), len(self.nodes)
+        M, h = self.mass, step
+        weight = M @ np.tile(gravity, n)
+        led = _Lead(self.nodes[held], angle or (lambda t: 0.0), np.asarray(axis, dtype=float))
+        x, v, a = x.copy(), v.copy(), np.zeros((n, 3))
+        turn, _, v[held], a[held] = led(0.0)
+        f_last = self.forces(x, False, v)[0]
+        a.reshape(-1)[free] = _factor(M[free][:, free]).solve((weight - f_last - M @ a.ravel())[free])
+        yield State(0.0, x, v, a, turn)
+        inside = np.ones(n, dtype=bool)
+        inside[held] = False
+        lu, factored = None, turn
+        for k in range(1, count + 1):
+            # the guess: what bends goes on as it did, seen from the root
+            spin, since = led.spin, turn.inv()
+            turn, place, rate, acceleration = led(k * h)
+            since = turn * since
+            guess = since.apply(x + h * (v - np.cross(spin, x)))
+            guess[held] = place
+            new, own, renew, last = guess.copy(), False, lu is None, np.inf
+            for _ in range(60):
+                a_new = (new - x - h * v - (0.5 - beta) * h**2 * a) / (beta * h**2)
+                v_new = v + h * ((1.0 - gamma) * a + gamma * a_new)
+                a_new[held], v_new[held] = acceleration, rate
+                f, K = self.forces(new, renew, v_new)
+                if renew:
+                    own, renew = True, False
+                    viscous = 1.0 + self.retardation * gamma / (beta * h)
+                    matrix = (1.0 - by_f) * viscous * K + (1.0 - by_a) / (beta * h**2) * M
+                    lu, factored = _factor(matrix[free][:, free]), turn
+                inertia = M @ ((1.0 - by_a) * a_new + by_a * a).ravel()
+                residual = (weight - (1.0 - by_f) * f - by_f * f_last - inertia).reshape(-1, 3)[inside]
+                since = turn * factored.inv()
+                dx = since.apply(lu.solve(since.inv().apply(residual).ravel()).reshape(-1, 3))
+                new[inside] += dx
+                size = np.abs(dx).max()
+                if size < 1e-10 * np.ptp(self.nodes):
                     break
-            acceleration = 4.0 / step**2 * (new - x - step * v) - a
-            v = v + 0.5 * step * (a + acceleration)
-            x, a = new, acceleration
-            tips.append(turn.inv().apply(x.reshape(-1, 3)[watched]))
-        return step * np.arange(count + 1), np.array(tips)
+                renew = size > _BETTER * last
+                if renew and not own:
+                    new, size = guess.copy(), np.inf  # it has bent too far since: from the start
+                last = size
+            else:
+                raise ArithmeticError(f"no balance at {k * h:.4g} s; take a smaller step")
+            x, v, a, f_last = new, v_new, a_new, f
+            yield State(k * h, x, v, a, turn)
 
     def _free(self, held):
         free = np.ones(len(self.nodes), dtype=bool)
         free[held] = False
         return np.flatnonzero(np.repeat(free, 3))
+
+
+@dataclass(frozen=True)
+class State:
+    """Time [s], positions [m], velocities and accelerations, [n, 3], and how far the root is turned."""
+
+    time: float
+    x: np.ndarray
+    v: np.ndarray
+    a: np.ndarray
+    turn: Rotation
+
+
+class _Lead:
+    """Where nodes that turn with an angle are, and their velocities and accelerations."""
+
+    def __init__(self, nodes, angle, axis):
+        self.nodes, self.angle, self.axis = nodes, angle, axis / np.linalg.norm(axis)
+
+    def __call__(self, t, d=1e-4):
+        before, now, after = (float(self.angle(s)) for s in (t - d, t, t + d))
+        spin, acceleration = (after - before) / (2.0 * d), (after - 2.0 * now + before) / d**2
+        turn, self.spin = Rotation.from_rotvec(self.axis * now), spin * self.axis
+        place = turn.apply(self.nodes)
+        across = np.cross(self.axis, place)
+        return turn, place, spin * across, acceleration * across + spin**2 * np.cross(self.axis, across)
+
+
+def _factor(matrix):
+    """Of a symmetric matrix."""
+    return splu(matrix.tocsc(), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
