@@ -16,6 +16,27 @@ def multipliers(system, joint):
     return slice(start, start + 6)
 
 
+def constrains(system):
+    """Which rows of the joints are constraints, shape [J, 6]; a free slider has none along its axis."""
+    found = np.arange(6) < system.rows[:, None]
+    found[free_sliders(system)] = np.arange(6) != 2
+    return found
+
+
+def free_sliders(system):
+    return (system.sliding > 0) & (system.rows == 5)
+
+
+def condense(system, A):
+    """Take the lengths of free sliders, which the matrix holds in place of multipliers, out of it."""
+    A = A.copy()
+    for joint in np.flatnonzero(free_sliders(system)):
+        at = multipliers(system, joint).start + 2
+        A -= np.outer(A[:, at], A[at])
+        A[at], A[:, at] = 0.0, 0.0
+    return A
+
+
 def dense_matrix(system, blocks):
     off = offsets(system)
     A = np.zeros((size(system), size(system)))

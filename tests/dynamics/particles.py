@@ -66,13 +66,14 @@ def nonlinear(system, laws, rng, stiffness=50.0) -> System:
 
 
 def particle_system(
-    rng, parents, elastic, rows=None, stiffness=50.0, sliding=(), loops=()
+    rng, parents, elastic, rows=None, stiffness=50.0, sliding=(), loops=(), moving=()
 ) -> tuple[System, list[Particles]]:
     """A random tree of components with random joint frames and modes.
 
     Args:
         sliding: Numbers of the joints that slide.
         loops: Further joints: (component on side 0 or -1, component on side 1, rows).
+        moving: Joints whose marker of the world moves.
     """
     count, size = len(parents), max(elastic)
     parts = [random_particles(rng, r) for r in elastic]
@@ -98,6 +99,7 @@ def particle_system(
         side=side,
         rows=np.array(rows, dtype=np.int32),
         sliding=np.isin(np.arange(joints), sliding).astype(np.int32),
+        moving=np.array([moving.index(j) if j in moving else -1 for j in range(joints)], dtype=np.int32),
         mass=np.array([p.masses.sum() for p in parts]),
         s=np.array([p.masses @ p.points for p in parts]),
         Z=np.array([np.einsum("n,na,nb->ab", p.masses, p.points, p.points) for p in parts]),

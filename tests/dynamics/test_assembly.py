@@ -6,7 +6,7 @@ import pytest
 from calmotion.dynamics.assembly import allocate_work, assemble
 from calmotion.dynamics.so3 import turn
 from calmotion.dynamics.system import LINEAR, NEOHOOKEAN, STVK, Blocks, Scheme, State, allocate_blocks
-from dense import dense_matrix, join, split
+from dense import condense, constrains, dense_matrix, join, split
 from particles import nonlinear, particle_system, random_state
 from scipy.spatial.transform import Rotation
 
@@ -17,6 +17,9 @@ TREES = {
     "two roots, one floating": ([-1, -1, 0], [2, 1, 2], [6, 0, 5]),
     "bodies of large deflection": ([-1, 0, 1, 0], [2, 3, 0, 2], [6, 5, 6, 6]),
     "balls and sliders": ([-1, 0, 1, 0, -1], [0, 2, 3, 1, 2], [6, 3, 6, 6, 3], [0, 2, 3]),
+    "free sliders": ([-1, 0, 1, 0, -1], [1, 2, 3, 1, 2], [6, 5, 6, 5, 5], [1, 2, 3, 4]),
+    "loops of free sliders": ([-1, 0, 1, 0], [1, 2, 0, 2], [6, 5, 3, 3], [1, 4, 5], [(2, 3, 5), (-1, 2, 5)]),
+    "moving roots": ([-1, -1, 0, -1, -1], [2, 0, 1, 1, 2], [6, 5, 5, 3, 5], [0, 4], [(-1, 2, 3)], [0, 1, 4, 3, 5]),
     "loops": ([-1, 0, 1, 0], [1, 2, 0, 2], [5, 3, 3, 3], [6], [(2, 3, 3), (-1, 2, 5), (1, 3, 6)]),
 }
 LAWS = {"bodies of large deflection": [STVK, NEOHOOKEAN, LINEAR, LINEAR]}
@@ -27,6 +30,14 @@ def tree(name, seed):
     rng = np.random.default_rng(seed)
     system, _ = particle_system(rng, parents, elastic, rows, 50.0, *more)
     return nonlinear(system, LAWS[name], rng) if name in LAWS else system
+
+
+def put_world(work, rng):
+    """Moving markers of the world in a random motion."""
+    count = len(work.world)
+    work.world[:, :9] = rng.normal(size=(count, 9))
+    if count:
+        work.world[:, 9:] = Rotation.random(count, random_state=5).as_matrix().reshape(count, 9)
 
 
 @pytest.mark.parametrize("name", TREES)
@@ -44,6 +55,7 @@ def test_blocks_are_the_derivative_of_the_residual(name, scheme):
     Hv[:, 1:, 1:] = rng.normal(size=(count, 3, 3)) * (scheme.velocity > 0)
     angle, rate = rng.normal(size=(2, joints))
     work = allocate_work(system)
+    put_world(work, rng)
 
     def evaluate(z, tangent=False, angle=angle, rate=rate):
         x, lam = split(system, z)
@@ -59,7 +71,7 @@ def test_blocks_are_the_derivative_of_the_residual(name, scheme):
             )
             moved.V[b, : 6 + r] += dV
             accelerated[b, : 6 + r] += scheme.acceleration * dV
-        moved.lam[:] += lam * (np.arange(6) < system.rows[:, None])
+        moved.lam[:] += lam * constrains(system)
         blocks = allocate_blocks(system)
         assemble(
             system,
@@ -77,14 +89,14 @@ def test_blocks_are_the_derivative_of_the_residual(name, scheme):
             work,
             blocks,
         )
-        blocks.gap[np.arange(6) >= system.rows[:, None]] = 0.0
+        blocks.gap[~constrains(system)] = 0.0
         return blocks
 
     def rows_of(blocks: Blocks):
         return join(system, blocks.res, blocks.gap)
 
     total = dense.size(system)
-    A = dense_matrix(system, evaluate(np.zeros(total), tangent=True))
+    A = condense(system, dense_matrix(system, evaluate(np.zeros(total), tangent=True)))
     e = 1e-5
     expected = np.stack([(rows_of(evaluate(d)) - rows_of(evaluate(-d))) / (2 * e) for d in e * np.eye(total)], axis=1)
     assert np.abs(A - expected).max() < 1e-8 * max(1.0, np.abs(expected).max())
@@ -104,10 +116,11 @@ def test_blocks_are_the_derivative_of_the_residual(name, scheme):
             assert np.abs(on_bodies).max() < 1e-8
 
 
-def test_multipliers_do_no_work_on_motions_that_the_constraints_allow():
+@pytest.mark.parametrize("free", [False, True], ids=["motor", "free slider"])
+def test_multipliers_do_no_work_on_motions_that_the_constraints_allow(free):
     """The rows by the multipliers are minus the transpose of the constraints' velocity Jacobian."""
     rng = np.random.default_rng(1)
-    system, _ = particle_system(rng, [-1, 0], [2, 3])
+    system, _ = particle_system(rng, [-1, 0], [2, 3], [6, 5 if free else 6], sliding=[1] if free else [])
     state = random_state(rng, system)
     zero = np.zeros((2, system.size))
     blocks, Hv = allocate_blocks(system), np.zeros((2, 4, 4))
@@ -127,4 +140,4 @@ def test_multipliers_do_no_work_on_motions_that_the_constraints_allow():
     body[:, :3] = np.einsum("bji,bj->bi", R, V[:, :3])
     expected = -np.einsum("bai,ba->bi", blocks.Lc, body)
     expected[1] -= blocks.Lp[1].T @ body[0]
-    assert np.abs(change - expected).max() < 1e-12
+    assert np.abs(change - expected)[constrains(system)].max() < 1e-12

@@ -6,9 +6,9 @@ from calmotion.dynamics import elimination, loops
 from calmotion.dynamics.assembly import allocate_work, assemble
 from calmotion.dynamics.loops import allocate_border
 from calmotion.dynamics.system import Blocks, Scheme, allocate_blocks, allocate_factors
-from dense import dense_matrix, join, multipliers, split
+from dense import constrains, dense_matrix, join, multipliers, split
 from particles import random_state
-from test_assembly import TREES, tree
+from test_assembly import TREES, put_world, tree
 
 
 def eliminated(name):
@@ -19,6 +19,9 @@ def eliminated(name):
     Hv[:, 1:, 1:] = 50.0 * np.eye(3)
     blocks = allocate_blocks(system)
     zero, vector = np.zeros((len(system.parent), system.size)), np.zeros(len(system.rows))
+    work = allocate_work(system)
+    put_world(work, np.random.default_rng(4))
+    state.lam[~constrains(system)] = 0.0
     assemble(
         system,
         Scheme(50.0, 50.0, 1.0, 100.0),
@@ -32,12 +35,12 @@ def eliminated(name):
         vector,
         Hv,
         True,
-        allocate_work(system),
+        work,
         blocks,
     )
     A = dense_matrix(system, Blocks(*[part.copy() for part in blocks]))
-    for joint, row in enumerate(system.rows):
-        for k in range(multipliers(system, joint).start + row, multipliers(system, joint).stop):
+    for joint, constrained in enumerate(constrains(system)):
+        for k in np.flatnonzero(~constrained) + multipliers(system, joint).start:
             A[k, k] = 1.0
     factors = allocate_factors(system)
     assert elimination.factor(system, blocks, factors.lu, factors.pivots, factors.Z) == -1

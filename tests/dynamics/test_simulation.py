@@ -3,9 +3,11 @@
 import numpy as np
 import pytest
 from arms import chain, compiled
-from calmotion.dynamics import bdf2, inertia
 from calmotion.dynamics.kinematics import rigid_poses, rigid_state, target_frames
-from calmotion.dynamics.simulation import SimulationFailure, Workspace, dynamic_scheme, simulate
+from calmotion.dynamics import inertia, newton
+from calmotion.dynamics.failure import SimulationFailure
+from calmotion.dynamics.schemes import bdf2_scheme
+from calmotion.dynamics.simulation import Workspace, simulate
 from calmotion.dynamics.system import allocate_state
 from particles import particle_system
 from scipy.integrate import solve_ivp
@@ -26,23 +28,22 @@ def pendulum_tip(h):
     zero = np.zeros(1)
     for _ in range(round(10.0 / h) - 1):
         now = allocate_state(system)
-        code, _, _ = bdf2.step(
+        code, *_ = newton.step(
             system,
-            dynamic_scheme(h),
+            bdf2_scheme(h),
             h,
             states[-2],
             states[-1],
             now,
             zero,
             zero,
-            1e-10,
-            20,
+            False,
             ws.work,
             ws.blocks,
             ws.factors,
             ws.scratch,
         )
-        assert code == bdf2.CONVERGED
+        assert code == newton.CONVERGED
         states.append(now)
     last = states[-1]
     return target_frames(model, last.c[None], last.q[None], last.u[None])[0][0, 0]
@@ -171,23 +172,22 @@ def free_flight(h):
     zero = np.zeros(1)
     for _ in range(round(0.5 / h)):
         now = allocate_state(body.system)
-        code, _, _ = bdf2.step(
+        code, *_ = newton.step(
             body.system,
-            dynamic_scheme(h),
+            bdf2_scheme(h),
             h,
             states[-2],
             states[-1],
             now,
             zero,
             zero,
-            1e-10,
-            20,
+            False,
             ws.work,
             ws.blocks,
             ws.factors,
             ws.scratch,
         )
-        assert code == bdf2.CONVERGED
+        assert code == newton.CONVERGED
         states.append(now)
         R = Rotation.from_quat(np.roll(now.q[0], -1)).as_matrix()
         drift = np.maximum(drift, np.abs(body.momenta(now.c[0], R, now.u[0], now.V[0]) - before))

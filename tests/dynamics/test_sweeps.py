@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from calmotion.dynamics.kinematics import _rigid_poses
+from calmotion.dynamics.kinematics import system_poses
 from calmotion.dynamics.linearization import linearize
 from calmotion.dynamics.simulation import Workspace, simulate
 from calmotion.dynamics.sweeps import adjoint, tangent
@@ -14,12 +14,23 @@ H = 0.01
 TIMES = np.arange(0.0, 0.3 + H / 2, H)
 
 
+def moving_marker():
+    """A marker that sways and turns, at all instants, shape [T, 1, 18]."""
+    from calmotion.dynamics.world import pack
+
+    s, c = np.sin(4.0 * TIMES), np.cos(4.0 * TIMES)
+    axis = np.array([0.6, 0.0, 0.8])
+    position, velocity = np.outer(s, [0.1, 0.2, 0.0]), np.outer(4.0 * c, [0.1, 0.2, 0.0])
+    matrices = Rotation.from_rotvec(np.outer(0.4 * s, axis)).as_matrix()
+    return pack(position, velocity, np.outer(1.6 * c, axis), matrices)[:, None]
+
+
+MOVED = moving_marker()
+
+
 def rigid_start(system, angle):
-    state, count = allocate_state(system), len(system.parent)
-    c, q = np.zeros((1, count, 3)), np.zeros((1, count, 4))
-    _rigid_poses(
-        system.parent, system.sliding, system.position, system.rotation, angle[None], c, q, np.zeros((count, 3, 3))
-    )
+    state = allocate_state(system)
+    c, q = system_poses(system, angle[None], MOVED[:1] if np.any(system.moving >= 0) else None)
     state.c[:], state.q[:] = c[0], q[0]
     return state
 
@@ -45,10 +56,10 @@ def close(system, angle):
 class Case:
     """A tree with free hinges, and a random linear functional of its motion."""
 
-    def __init__(self, rows, laws=None, sliding=(), loops=(), seed=0):
+    def __init__(self, rows, laws=None, sliding=(), loops=(), moving=(), seed=0):
         rng = np.random.default_rng(seed)
         self.system, _ = particle_system(
-            rng, [-1, 0, 1, 0], [2, 0, 3, 2], rows, stiffness=3000.0, sliding=sliding, loops=loops
+            rng, [-1, 0, 1, 0], [2, 0, 3, 2], rows, 3000.0, sliding, loops, moving
         )
         if laws is not None:
             self.system = nonlinear(self.system, laws, rng, stiffness=3000.0)
@@ -57,13 +68,15 @@ class Case:
         self.dp = rng.normal(size=(4, joints))
         if loops:
             close(self.system, curves(self.p)[0][0])
+        self.world = MOVED if moving else None
         self.ws = Workspace.for_system(self.system)
         shape = (len(TIMES), 4)
         self.wc, self.wq, self.wu = (rng.normal(size=shape + (k,)) for k in (3, 4, self.system.size - 6))
 
     def simulate(self, p):
         angles, rates = curves(p)
-        return simulate(self.system, rigid_start(self.system, angles[0]), angles, rates, H, self.ws), angles, rates
+        start = rigid_start(self.system, angles[0])
+        return simulate(self.system, start, angles, rates, H, self.ws, world=self.world), angles, rates
 
     def value(self, p):
         states = self.simulate(p)[0].states
@@ -87,6 +100,8 @@ CASES = {
     "with a free hinge": ([6, 6, 5, 6], None),
     "bodies of large deflection": ([6, 6, 6, 6], [STVK, LINEAR, NEOHOOKEAN, LINEAR]),
     "sliders": ([6, 6, 6, 6], None, (0, 2, 3)),
+    "a loop closed by a free slider": ([6, 5, 3, 5], None, (0, 4), ((2, 3, 5),), (), 1),
+    "a moving root": ([6, 6, 5, 6], None, (), (), (0,)),
     "a loop": ([6, 5, 3, 5], None, (0,), ((2, 3, 3),)),
 }
 

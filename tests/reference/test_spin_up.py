@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from calmotion.dynamics.simulation import SimulationFailure
+from calmotion.dynamics.failure import SimulationFailure
 from calmotion.shot import ElasticMaterial
 from turning_beam import TurningBeam
 

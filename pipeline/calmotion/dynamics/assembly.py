@@ -11,16 +11,17 @@ from ..shot.character import Array
 from .elastic import stvk_forces
 from .inertia import body_residual, deformed_integrals, mass_matrix, position_jacobian, velocity_jacobian
 from .joints import add_skew, apply_wrench, constraint_residual, joint_kinematics, joint_tangent
-from .markers import MarkerWork, add_wrench_stiffness, allocate_marker, marker_jacobian
+from .markers import WORLD_MARKER, MarkerWork, add_wrench_stiffness, allocate_marker, marker_jacobian
 from .neohookean import neohookean_forces
-from .sliders import slide_jacobian, slide_wrench
+from .sliders import LENGTH, slide_jacobian, slide_wrench, slides_freely, turning_force
 from .so3 import matrix_of
 from .system import JOINT_ROWS, NEOHOOKEAN, STVK, System
 
 
 class Work(NamedTuple):
     """Scratch of `assemble`: rotations of all bodies, integrals of one body, two markers, small matrices, and what
-    the forces of nonlinear bodies need (empty where there is none)."""
+    the forces of nonlinear bodies and free sliders need; and `world`, the moving markers of the world at the instant
+    that is assembled (`markers.moving_marker`), shape [W, 18], which the caller sets."""
 
     R: Array
     s: Array
@@ -41,6 +42,12 @@ class Work(NamedTuple):
     rows: Array
     row: Array
     point: Array
+    force: Array
+    along: Array
+    length: Array
+    moved: Array
+    columns: Array
+    world: Array
     i: MarkerWork
     j: MarkerWork
 
@@ -56,7 +63,8 @@ def allocate_work(system: System) -> Work:
         np.zeros((3, 3)), np.zeros((3, 3)), np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(3), np.zeros((3, 3)),
         np.zeros((3, 3)), np.zeros(3), np.zeros((2, JOINT_ROWS)), np.zeros(2 * pairs),
         np.zeros((max(nonlinear, points), max(pairs, nonlinear))), np.zeros(nonlinear), np.zeros((points, points)),
-        allocate_marker(system.size), allocate_marker(system.size),
+        np.zeros(3), np.zeros(1), np.zeros(system.size), np.zeros((2, system.size)), np.zeros((system.size, 3)),
+        np.zeros((int(system.moving.max(initial=-1)) + 1, WORLD_MARKER)), allocate_marker(system.size), allocate_marker(system.size),
     )  # fmt: skip
 
 
@@ -98,16 +106,18 @@ def _joint_rows(system, scheme, joint, angle, rate, c, u, V, lam, Hv, tangent, w
     p = system.side[joint, 0]
     b = system.side[joint, 1]
     rb = system.elastic[b]
-    joint_kinematics(system, joint, angle, rate, c, u, V, w)
+    angle, rate = joint_kinematics(system, joint, angle, rate, c, u, V, w)
     constraint_residual(system, joint, angle, rate, scheme, w, blocks.gap[joint])
     # force on the component in body axes, moment in marker axes; the parent gets the opposite
+    free = slides_freely(system, joint)
     for i in range(3):
         w.tau[i] = lam[3 + i]
+        w.force[i] = w.i.R[i, 0] * lam[0] + w.i.R[i, 1] * lam[1] if free else lam[i]
     for i in range(3):
         f = 0.0
         t = 0.0
         for k in range(3):
-            f += w.R[b, k, i] * lam[k]
+            f += w.R[b, k, i] * w.force[k]
             t += w.Q[k, i] * w.tau[k]
         w.wrench[1, i] = f
         w.wrench[1, 3 + i] = t
@@ -118,7 +128,7 @@ def _joint_rows(system, scheme, joint, angle, rate, c, u, V, lam, Hv, tangent, w
         for i in range(3):
             f = 0.0
             for k in range(3):
-                f += w.R[p, k, i] * lam[k]
+                f += w.R[p, k, i] * w.force[k]
             w.wrench[0, i] = f
         marker_jacobian(rp, system.rotation[joint, 0], system.Phi[joint, 0], system.Psi[joint, 0], w.i)
         if system.sliding[joint]:
@@ -151,14 +161,29 @@ def _joint_rows(system, scheme, joint, angle, rate, c, u, V, lam, Hv, tangent, w
         rb, system.law[b], system.rotation[joint, 1], system.Phi[joint, 1], system.Psi[joint, 1], w.wrench[1, :3], t,
         -1.0, w.j, blocks.K[b],
     )  # fmt: skip
+    if free:
+        # the force on both turns with the parent-side marker
+        w.force[0], w.force[1], w.force[2] = lam[0], lam[1], 0.0
+        turning_force(n, w.force, w.j, w.R[b], w.i.R, -1.0, blocks.Nc[joint])
     if p >= 0:
         rp = system.elastic[p]
+        if free:
+            w.columns[:] = 0.0
+            turning_force(6 + rp, w.force, w.i, w.R[p], w.i.R, 1.0, w.columns)
+            for a in range(6 + rp):
+                for k in range(6 + rp):
+                    for i in range(3):
+                        blocks.K[p, a, k] += w.columns[a, i] * w.i.Jf[i, k]
         if system.sliding[joint]:
             slide_wrench(
                 6 + rp, angle, w.wrench[0, :3], w.tau, 1.0, w.R[p], w.i, blocks.K[p], w.tmp, blocks.on_parent[joint]
             )
             for i in range(3):
                 w.tau[i] = w.tmp[i]
+        if free:
+            for a in range(6 + rp):
+                blocks.Lp[joint, a, LENGTH] = blocks.on_parent[joint, a]
+                blocks.on_parent[joint, a] = 0.0
         add_wrench_stiffness(
             rp, system.law[p], system.rotation[joint, 0], system.Phi[joint, 0], system.Psi[joint, 0],
             w.wrench[0, :3], w.tau, 1.0, w.i, blocks.K[p],
@@ -172,7 +197,7 @@ def assemble(system, scheme, c, q, u, V, Vd, lam, angle, rate, Hv, tangent, w, b
     Args:
         c, q, u: Positions, see `State`.
         V, Vd: Velocities and accelerations, shape [B, N].
-        lam: Multipliers, shape [J, 6].
+        lam: Multipliers, shape [J, 6]; entry LENGTH of a free slider must be zero.
         angle, rate: Angle (or length) and rate of each joint's motor, shape [J] (0 for welds).
         Hv: How velocity follows position: Hv[b, 0, 0] the factor for c and u, Hv[b, 1:4, 1:4] the matrix of
             dphi to domega, shape [B, 4, 4].

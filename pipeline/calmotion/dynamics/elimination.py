@@ -9,6 +9,7 @@ eliminating it changes the parent's K by -Lp (D_b^-1)_multiplier-rows F. With Z 
 from __future__ import annotations
 
 from ..kernels import kernel
+from .sliders import has_row
 from .system import JOINT_ROWS
 
 
@@ -105,8 +106,9 @@ def factor(system, blocks, lu, piv, Z):
             for k in range(m):
                 A[n + i, n + k] = 0.0
         # multipliers of rows that this joint does not have are zero
-        for i in range(system.rows[b], m):
-            A[n + i, n + i] = 1.0
+        for i in range(m):
+            if not has_row(system, b, i):
+                A[n + i, n + i] = 1.0
         if not lu_factor(n + m, A, piv[b]):
             return b
         p = system.parent[b]

@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import ShotError
 from ..fem.reduced_body import Marker, ReducedBody
 from ..shot.character import WORLD, Array, Character, Frame, IntArray
 from .so3 import matrix_of
@@ -62,14 +61,20 @@ class JointArrays:
 
 
 def joint_arrays(
-    character: Character, tree: Tree, bodies: Sequence[ReducedBody], anchors: list[BodyAnchors], r_max: int
-) -> JointArrays:
-    """Joints of the tree, by component, then those that close loops."""
+    character: Character, tree: Tree, bodies: Sequence[ReducedBody], anchors: list[BodyAnchors], r_max: int,
+    moving: Sequence[int] = (),
+) -> JointArrays:  # fmt: skip
+    """Joints of the tree, by component, then those that close loops.
+
+    Args:
+        moving: Joints whose world-side frame moves as it is told, in the order of `assembly.Work.world`.
+    """
     component_of = {WORLD: -1} | {b: k for k, b in enumerate(tree.body)}
     order = [*tree.joint, *tree.loops]
     count = len(order)
     side, rows = np.zeros((count, 2), np.int32), np.zeros(count, np.int32)
     sliding, motor, sign = np.zeros(count, np.int32), np.full(count, -1, np.int32), np.ones(count)
+    moved = np.full(count, -1, np.int32)
     position, rotation = np.zeros((count, 2, 3)), np.zeros((count, 2, 3, 3))
     Phi, Psi = np.zeros((count, 2, 3, r_max)), np.zeros((count, 2, 3, r_max))
     rest = np.zeros(count)
@@ -98,17 +103,12 @@ def joint_arrays(
         sign[k] = -1.0 if flipped else 1.0
         motor[k] = motor_of.get(joint, -1)
         sliding[k] = item.kind == "prismatic"
-        if motor[k] < 0 and item.kind == "prismatic":
-            raise ShotError(
-                "a prismatic joint that nothing drives is not supported yet", path=item.path,
-                attribute="drive:linear:physics:targetPosition",
-                remedy="Apply PhysicsDriveAPI:linear to it, or replace it by hinges",
-            )  # fmt: skip
+        moved[k] = moving.index(joint) if joint in moving else -1
         rows[k] = _ROWS[item.kind] if motor[k] < 0 else 6
         rest[k] = _rest_value(character, bodies_of, position[k], rotation[k], item.kind == "prismatic")
     arrays = {
-        "side": side, "rows": rows, "sliding": sliding, "position": position, "rotation": rotation, "Phi": Phi,
-        "Psi": Psi,
+        "side": side, "rows": rows, "sliding": sliding, "moving": moved, "position": position, "rotation": rotation,
+        "Phi": Phi, "Psi": Psi,
     }  # fmt: skip
     return JointArrays(arrays, motor, sign, rest)
 

@@ -8,8 +8,9 @@ The rows (side i on the parent, j on the component; Q = R_i^T R_j, z the joint a
     no more                                                            a ball joint
     none at all                                                        a component that floats freely
 
-On a slider theta is a length: the parent-side marker is moved along its z axis by it, and the rotation is locked.
-where c is the axial vector of the skew part of E = Q R_z(-theta), and (-n_y, n_x), n = Q z, for the hinge. On the
+On a slider theta is a length: the parent-side marker is moved along its z axis by it, and the rotation is locked; a
+free one has no row along its axis (`sliders`). Here
+c is the axial vector of the skew part of E = Q R_z(-theta), and (-n_y, n_x), n = Q z, for the hinge. On the
 constraint manifold these rows are C_t + C_U T V + alpha C of Seed (31); the multipliers act through exactly the
 transpose of their velocity Jacobian, so they do no work there.
 """
@@ -19,8 +20,17 @@ from __future__ import annotations
 import math
 
 from ..kernels import kernel
-from .markers import fixed_marker, marker_values, marker_velocity_jacobian
-from .sliders import slide, slide_velocity_jacobian
+from .markers import fixed_marker, marker_values, marker_velocity_jacobian, moving_marker
+from .sliders import (
+    LENGTH,
+    free_columns,
+    free_length,
+    free_rows,
+    has_row,
+    slide,
+    slide_velocity_jacobian,
+    slides_freely,
+)
 
 
 @kernel
@@ -49,28 +59,37 @@ def _rows_by_multipliers(n, Rb, m, Q, sign, out):
 
 @kernel
 def joint_kinematics(system, joint, value, rate, c, u, V, w):
-    """Values of both markers of a joint at its motor's value and rate, and Q = R_i^T R_j into w.Q."""
+    """Values of both markers of a joint at its motor's value and rate, and Q = R_i^T R_j into w.Q.
+
+    Returns:
+        The joint's value and rate: its motor's, or the length of a free slider, whose rate its rows do not need.
+    """
     p = system.side[joint, 0]
     b = system.side[joint, 1]
-    if p < 0:
+    if p < 0 and system.moving[joint] >= 0:
+        moving_marker(w.world[system.moving[joint]], w.i)
+    elif p < 0:
         fixed_marker(system.position[joint, 0], system.rotation[joint, 0], w.i)
     else:
         marker_values(
             system.elastic[p], system.law[p], system.position[joint, 0], system.rotation[joint, 0],
             system.Phi[joint, 0], system.Psi[joint, 0], c[p], w.R[p], u[p], V[p], w.i,
         )  # fmt: skip
-    if system.sliding[joint]:
-        slide(value, rate, w.i)
     marker_values(
         system.elastic[b], system.law[b], system.position[joint, 1], system.rotation[joint, 1], system.Phi[joint, 1],
         system.Psi[joint, 1], c[b], w.R[b], u[b], V[b], w.j,
     )  # fmt: skip
+    if slides_freely(system, joint):
+        value, rate = free_length(w.i, w.j), 0.0
+    if system.sliding[joint]:
+        slide(value, rate, w.i)
     for i in range(3):
         for k in range(3):
             t = 0.0
             for n in range(3):
                 t += w.i.R[n, i] * w.j.R[n, k]
             w.Q[i, k] = t
+    return value, rate
 
 
 @kernel
@@ -85,14 +104,21 @@ def _turned_back(Q, angle, E):
 
 @kernel
 def constraint_residual(system, joint, angle, rate, scheme, w, gap):
-    """Residual of a joint's rows; leaves omega_j - theta' z in w.x, E in w.E."""
-    hinge = system.rows[joint] == 5
+    """Residual of a joint's rows; leaves omega_j - theta' z in w.x, E in w.E, and the unused part of a free slider's
+    first three rows, that along its axis, in w.along[0]."""
+    hinge = system.rows[joint] == 5 and not system.sliding[joint]
     if system.sliding[joint]:
         angle = 0.0
         rate = 0.0
     for i in range(3):
         gap[i] = scheme.gamma * (w.j.pd[i] - w.i.pd[i]) + scheme.alpha * (w.j.p[i] - w.i.p[i])
         w.x[i] = w.j.w[i]
+    if slides_freely(system, joint):
+        x, y, z = gap[0], gap[1], gap[2]
+        for i in range(2):
+            gap[i] = w.i.R[0, i] * x + w.i.R[1, i] * y + w.i.R[2, i] * z
+        w.along[0] = w.i.R[0, 2] * x + w.i.R[1, 2] * y + w.i.R[2, 2] * z
+        gap[LENGTH] = 0.0
     if not hinge:
         w.x[2] -= rate
     for i in range(3):
@@ -110,6 +136,9 @@ def constraint_residual(system, joint, angle, rate, scheme, w, gap):
     gap[3] = scheme.gamma * (w.y[0] - w.i.w[0]) + 0.5 * scheme.alpha * (E[2, 1] - E[1, 2])
     gap[4] = scheme.gamma * (w.y[1] - w.i.w[1]) + 0.5 * scheme.alpha * (E[0, 2] - E[2, 0])
     gap[5] = scheme.gamma * (w.y[2] - w.i.w[2]) + 0.5 * scheme.alpha * (E[1, 0] - E[0, 1])
+    if system.rows[joint] <= 3:
+        for i in range(system.rows[joint], 6):
+            gap[i] = 0.0
 
 
 @kernel
@@ -171,7 +200,8 @@ def joint_tangent(system, joint, value, rate, scheme, Hv, V, w, blocks):
     b = system.side[joint, 1]
     rb = system.elastic[b]
     n = 6 + rb
-    hinge, sliding = system.rows[joint] == 5, system.sliding[joint] != 0
+    sliding, free = system.sliding[joint] != 0, slides_freely(system, joint)
+    hinge = system.rows[joint] == 5 and not sliding
     gamma, alpha = scheme.gamma, scheme.alpha
     marker_velocity_jacobian(
         rb, system.law[b], system.rotation[joint, 1], system.Phi[joint, 1], system.Psi[joint, 1], V[b], w.j
@@ -240,9 +270,13 @@ def joint_tangent(system, joint, value, rate, scheme, Hv, V, w, blocks):
         for i in range(3):
             for a in range(np_):
                 blocks.Jp[joint, i, a] = w.i.Jf[i, a]
+    if free:
+        _free_slider(system, joint, w, blocks)
+        return
     # rows that this joint does not have
-    for i in range(system.rows[joint], 6):
-        blocks.gap[joint, i] = 0.0
+    for i in range(6):
+        if has_row(system, joint, i):
+            continue
         blocks.by_angle[joint, i] = 0.0
         blocks.by_rate[joint, i] = 0.0
         for a in range(n):
@@ -252,3 +286,51 @@ def joint_tangent(system, joint, value, rate, scheme, Hv, V, w, blocks):
             for a in range(6 + system.elastic[p]):
                 blocks.Lp[joint, a, i] = 0.0
                 blocks.Hp[joint, i, a] = 0.0
+
+
+@kernel
+def _free_slider(system, joint, w, blocks):
+    """Blocks of a free slider from those of a driven one at its length."""
+    p = system.side[joint, 0]
+    b = system.side[joint, 1]
+    n = 6 + system.elastic[b]
+    by_length = w.y
+    for i in range(3):
+        by_length[i] = blocks.by_angle[joint, i]
+    for i in range(6):
+        blocks.by_angle[joint, i] = 0.0
+        blocks.by_rate[joint, i] = 0.0
+    free_columns(n, w.i.R, blocks.Lc[joint])
+    for a in range(n):
+        t = 0.0
+        for i in range(3):
+            z = 0.0
+            for k in range(3):
+                z += w.i.R[k, 2] * w.R[b, k, i]
+            t += z * w.j.Jp[i, a]
+        w.length[a] = t
+        w.moved[0, a] = 0.0
+        w.moved[1, a] = 0.0
+    free_rows(n, w.i.R, w.length, w.moved, by_length, blocks.Hc[joint])
+    if p < 0:
+        return
+    n = 6 + system.elastic[p]
+    free_columns(n, w.i.R, blocks.Lp[joint])
+    # what is left of the gap across the axis, which turns with the marker
+    e0, e1 = 0.0, 0.0
+    for k in range(3):
+        d = w.j.p[k] - w.i.p[k]
+        e0 += w.i.R[k, 0] * d
+        e1 += w.i.R[k, 1] * d
+    r0, r1, r2 = blocks.gap[joint, 0], blocks.gap[joint, 1], w.along[0]
+    for a in range(n):
+        t = e0 * w.i.Jf[1, a] - e1 * w.i.Jf[0, a]
+        for i in range(3):
+            z = 0.0
+            for k in range(3):
+                z += w.i.R[k, 2] * w.R[p, k, i]
+            t -= z * w.i.Jp[i, a]
+        w.length[a] = t
+        w.moved[0, a] = r1 * w.i.Jf[2, a] - r2 * w.i.Jf[1, a]
+        w.moved[1, a] = r2 * w.i.Jf[0, a] - r0 * w.i.Jf[2, a]
+    free_rows(n, w.i.R, w.length, w.moved, by_length, blocks.Hp[joint])

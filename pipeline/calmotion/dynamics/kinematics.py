@@ -6,69 +6,78 @@ import numpy as np
 
 from ..kernels import allocating_kernel
 from ..shot.character import Array, IntArray
-from .markers import allocate_marker, marker_jacobian, marker_values
+from .markers import WORLD_MARKER, allocate_marker, marker_jacobian, marker_values
 from .model import Model
 from .so3 import matrix_of, quaternion_of
-from .system import State, allocate_state
+from .system import State, System, allocate_state
 
 
 @allocating_kernel
-def _rigid_poses(parent, sliding, position, rotation, values, c, q, R):
+def _rigid_poses(system, values, world, c, q, R):
     """Poses of all components for joint angles and lengths, shape [T, B]; R is scratch, shape [B, 3, 3]."""
-    A = np.zeros((3, 3))
+    A, near, x = np.zeros((3, 3)), np.zeros((3, 3)), np.zeros(3)
     for n in range(values.shape[0]):
-        for b in range(len(parent)):
-            p = parent[b]
-            length = values[n, b] if sliding[b] else 0.0
-            angle = 0.0 if sliding[b] else values[n, b]
+        for b in range(len(system.parent)):
+            p = system.parent[b]
+            moving = system.moving[b]
+            length = values[n, b] if system.sliding[b] else 0.0
+            angle = 0.0 if system.sliding[b] else values[n, b]
             cs, sn = np.cos(angle), np.sin(angle)
+            far = system.rotation[b, 1]
+            for i in range(3):
+                x[i] = world[n, moving, i] if moving >= 0 else system.position[b, 0, i]
+                for k in range(3):
+                    near[i, k] = world[n, moving, 9 + 3 * i + k] if moving >= 0 else system.rotation[b, 0, i, k]
             # R_b = R_p R_i R_z(angle) R_j^T
             for i in range(3):
-                x = rotation[b, 0, i, 0] * cs + rotation[b, 0, i, 1] * sn
-                y = rotation[b, 0, i, 1] * cs - rotation[b, 0, i, 0] * sn
-                z = rotation[b, 0, i, 2]
+                x[i] += near[i, 2] * length
+                y0 = near[i, 0] * cs + near[i, 1] * sn
+                y1 = near[i, 1] * cs - near[i, 0] * sn
                 for k in range(3):
-                    A[i, k] = x * rotation[b, 1, k, 0] + y * rotation[b, 1, k, 1] + z * rotation[b, 1, k, 2]
+                    A[i, k] = y0 * far[k, 0] + y1 * far[k, 1] + near[i, 2] * far[k, 2]
             for i in range(3):
-                t = position[b, 0, i] + rotation[b, 0, i, 2] * length
+                t = x[i]
                 if p >= 0:
-                    t = c[n, p, i]
-                    for k in range(3):
-                        t += R[p, i, k] * (position[b, 0, k] + rotation[b, 0, k, 2] * length)
+                    t = c[n, p, i] + R[p, i, 0] * x[0] + R[p, i, 1] * x[1] + R[p, i, 2] * x[2]
                 for k in range(3):
                     if p >= 0:
                         R[b, i, k] = R[p, i, 0] * A[0, k] + R[p, i, 1] * A[1, k] + R[p, i, 2] * A[2, k]
                     else:
                         R[b, i, k] = A[i, k]
                 for k in range(3):
-                    t -= R[b, i, k] * position[b, 1, k]
+                    t -= R[b, i, k] * system.position[b, 1, k]
                 c[n, b, i] = t
             quaternion_of(R[b], q[n, b])
 
 
-def rigid_poses(model: Model, joint_angles: Array) -> tuple[Array, Array]:
+def system_poses(system: System, joint_angles: Array, world: Array | None = None) -> tuple[Array, Array]:
+    """`rigid_poses` of a system alone."""
+    total, count = len(joint_angles), len(system.parent)
+    c, q = np.zeros((total, count, 3)), np.zeros((total, count, 4))
+    if world is None:
+        world = np.zeros((total, 0, WORLD_MARKER))
+    _rigid_poses(system, joint_angles, world, c, q, np.zeros((count, 3, 3)))
+    return c, q
+
+
+def rigid_poses(model: Model, joint_angles: Array, world: Array | None = None) -> tuple[Array, Array]:
     """Poses of the undeformed character.
 
     Args:
         joint_angles: Angles [rad] (or lengths [m]) of the components' joints, shape [T, B] or, with those of loops
             behind, [T, J]; free joints included.
+        world: Moving markers of the world, shape [T, W, 18]; needed where the system has any.
 
     Returns:
         Origins [m], shape [T, B, 3], and unit quaternions, shape [T, B, 4], world.
     """
-    system = model.system
-    total, count = len(joint_angles), len(system.parent)
-    c, q = np.zeros((total, count, 3)), np.zeros((total, count, 4))
-    _rigid_poses(
-        system.parent, system.sliding, system.position, system.rotation, joint_angles, c, q, np.zeros((count, 3, 3))
-    )
-    return c, q
+    return system_poses(model.system, joint_angles, world)
 
 
-def rigid_state(model: Model, joint_angles: Array) -> State:
-    """A state at rest in the rigid pose of joint angles (or lengths) of shape [B] or [J]."""
+def rigid_state(model: Model, joint_angles: Array, world: Array | None = None) -> State:
+    """A state at rest in the rigid pose of joint angles (or lengths) of shape [B] or [J]; `world` of shape [W, 18]."""
     state = allocate_state(model.system)
-    c, q = rigid_poses(model, joint_angles[None])
+    c, q = rigid_poses(model, joint_angles[None], None if world is None else world[None])
     state.c[:], state.q[:] = c[0], q[0]
     return state
 

@@ -6,6 +6,7 @@ import numpy as np
 
 from ..kernels import kernel
 from .loops import UNKNOWNS
+from .sliders import has_row
 from .system import JOINT_ROWS
 
 
@@ -28,6 +29,8 @@ def least_multipliers(system, border, lam):
                         t += border.free[column, joint, i] * border.null[column, s]
                 else:
                     t = border.null[UNKNOWNS * (joint - count) + i, s]
+                if not has_row(system, joint, i):
+                    t = 0.0
                 sets[s, joint, i] = t
         for _ in range(2):
             for other in range(s):

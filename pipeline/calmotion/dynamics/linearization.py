@@ -20,7 +20,9 @@ from .assembly import assemble
 from .bdf2 import position_to_velocity, velocities
 from .elimination import factor
 from .loops import UNKNOWNS, copy_rows, factor_loops
-from .simulation import SimulationFailure, Trajectory, Workspace, _instant, dynamic_scheme
+from .schemes import bdf2_scheme
+from .failure import SimulationFailure
+from .simulation import Trajectory, Workspace, instant_of
 from .statics import STATIC
 from .system import JOINT_ROWS, Blocks, System
 
@@ -36,14 +38,14 @@ class Linearization:
 
 
 @kernel
-def _linearize(system, static, scheme, h, states, angles, rates, work, blocks, scratch, data, pivots):
+def _linearize(system, static, scheme, h, states, angles, rates, world, work, blocks, scratch, data, pivots):
     """Blocks and factors of all instants; returns -1 or the component that is singular, and the instant."""
-    J, T, Wt, _, Vd, x, lam, block, border = scratch
+    J, T, Wt, Vd, block, border = scratch.J, scratch.T, scratch.Wt, scratch.Vd, scratch.block, scratch.border
     P, D, Lc, Lp, Hc, Hp, Nc, Jp, by_angle, by_rate, on_parent, lu, Z, inverse, R, Hv = data
     count, size = Vd.shape
     joints = len(system.rows)
     for n in range(len(angles)):
-        now = _instant(states, n)
+        now = instant_of(states, n)
         if n == 0:
             for b in range(count):
                 for i in range(4):
@@ -52,10 +54,11 @@ def _linearize(system, static, scheme, h, states, angles, rates, work, blocks, s
                 for i in range(size):
                     Vd[b, i] = 0.0
         else:
-            before = _instant(states, n - 1)
-            before2 = _instant(states, max(n - 2, 0))
+            before = instant_of(states, n - 1)
+            before2 = instant_of(states, max(n - 2, 0))
             velocities(system, h, now, before, before2, J, Vd)
             position_to_velocity(system, h, now, before, J, T, Wt, Hv[n])
+        copy_rows(world[n], work.world)
         # the sweeps read these in place, so they are made there
         here = Blocks(
             blocks.K, P[n], D[n], Lc[n], Lp[n], blocks.Hc, Hp[n], Nc[n], Jp[n], by_angle[n], by_rate[n], on_parent[n],
@@ -95,8 +98,13 @@ def linearize(
         previous: A linearisation of the same size whose memory is used again (it becomes invalid).
 
     Raises:
-        SimulationFailure: A singular step.
+        SimulationFailure: A singular step, or one that had to be refined: its equations are not those of the others.
+        ValueError: A simulation by another integrator than BDF2, whose sweeps these are.
     """  # fmt: skip
+    if trajectory.integrator != "bdf2":
+        raise ValueError("sweeps are those of BDF2")
+    if trajectory.refined:
+        raise SimulationFailure(trajectory.refined[0] * trajectory.h, 0, "refined")
     total, count, size, joints = len(angles), len(system.parent), system.size, len(system.rows)
     loops = joints - count
     if previous is not None and previous.data[0].shape[0] == total:
@@ -116,8 +124,8 @@ def linearize(
         pivots = np.zeros((total, count, size + JOINT_ROWS), np.int32)
     ws = workspace
     bad, instant = _linearize(
-        system, STATIC, dynamic_scheme(trajectory.h), trajectory.h, trajectory.states, angles, rates, ws.work,
-        ws.blocks, ws.scratch, data, pivots,
+        system, STATIC, bdf2_scheme(trajectory.h), trajectory.h, trajectory.states, angles, rates, trajectory.world,
+        ws.work, ws.blocks, ws.scratch, data, pivots,
     )  # fmt: skip
     if bad >= 0:
         raise SimulationFailure(instant * trajectory.h, bad, "singular")

@@ -21,6 +21,7 @@ from ..kernels import kernel
 from ..shot.character import Array, IntArray
 from .elimination import solve, solve_transposed
 from .pseudo_inverse import pseudo_inverse
+from .sliders import has_row
 from .system import JOINT_ROWS, System
 
 UNKNOWNS = JOINT_ROWS + 3
@@ -184,7 +185,7 @@ def factor_loops(system, Lc, Lp, Hc, Hp, Nc, Jp, lu, piv, Z, border, block):
         solve(system, Lp, Hp, Nc, Jp, lu, piv, Z, border.X, border.lam, block)
         # G - F A^-1 E
         joint, k = count + column // UNKNOWNS, column % UNKNOWNS
-        y[column] = 1.0 if k >= JOINT_ROWS or k >= system.rows[joint] else 0.0
+        y[column] = 1.0 if k >= JOINT_ROWS or not has_row(system, joint, k) else 0.0
         _closing_rows(system, Hc, Hp, Jp, border.X, y)
         for i in range(n):
             border.S[i, column] = y[i]

@@ -68,6 +68,21 @@ def fixed_marker(position, rotation, m):
             m.R[i, k] = rotation[i, k]
 
 
+WORLD_MARKER = 18  # entries of a moving marker of the world
+
+
+@kernel
+def moving_marker(frame, m):
+    """A marker of the world whose motion is given: position, velocity, angular velocity in its own axes, and its
+    rotation matrix by rows, shape [18]."""
+    for i in range(3):
+        m.p[i] = frame[i]
+        m.pd[i] = frame[3 + i]
+        m.w[i] = frame[6 + i]
+        for k in range(3):
+            m.R[i, k] = frame[9 + 3 * i + k]
+
+
 @kernel
 def marker_values(r, kind, position, rotation, Phi, Psi, c, Rb, u, V, m):
     """Position, velocity, rotation and angular velocity of the marker, into m."""

@@ -79,8 +79,14 @@ def rigid_body(body: Body, anchors: BodyAnchors) -> ReducedBody:
     return ReducedBody(rigid_invariants(body.mass), empty, empty, markers)
 
 
-def compile_model(character: Character, tree: Tree, bodies: Sequence[ReducedBody]) -> Model:
-    """Compile a character whose bodies are given reduced, with the markers of `body_anchors`."""
+def compile_model(
+    character: Character, tree: Tree, bodies: Sequence[ReducedBody], moving: Sequence[int] = ()
+) -> Model:
+    """Compile a character whose bodies are given reduced, with the markers of `body_anchors`.
+
+    Args:
+        moving: Joints to the world whose frame there moves as it is told (moving roots).
+    """
     anchors = body_anchors(character, tree)
     count = len(tree.body)
     r_max = max((len(body.stiffness) for body in bodies), default=0)
@@ -104,7 +110,7 @@ def compile_model(character: Character, tree: Tree, bodies: Sequence[ReducedBody
         damping[k, :r] = body.damping
         if body.elasticity is None:
             stiffness[k, :r] = body.stiffness
-    joints = joint_arrays(character, tree, bodies, anchors, r_max)
+    joints = joint_arrays(character, tree, bodies, anchors, r_max, moving)
     system = System(
         parent=np.array(tree.parent, np.int32), elastic=elastic, mass=mass, s=s, Z=Z, M3=M3, M4=M4, S=S, axial=axial,
         stiffness=stiffness, damping=damping, gravity=np.asarray(character.gravity, dtype=float),

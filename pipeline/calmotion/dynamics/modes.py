@@ -9,6 +9,7 @@ from ..shot.character import Array
 from .kinematics import rigid_state
 from .model import Model
 from .simulation import Workspace
+from .sliders import LENGTH, slides_freely
 from .statics import equilibrium, linearize
 
 
@@ -36,11 +37,17 @@ def system_frequencies(model: Model, joint_angles: Array) -> Array:
         n = int(6 + system.elastic[b])
         own, rows = slice(offset[b], offset[b] + n), slice(6 * joint, 6 * joint + 6)
         H[rows, own] = blocks.Hc[joint, :, :n]
+        free = slides_freely(system, joint)
         if p >= 0:
             m = int(6 + system.elastic[p])
             parent = slice(offset[p], offset[p] + m)
             K[own, parent] += blocks.Nc[joint, :n] @ blocks.Jp[joint, :, :m]
             H[rows, parent] = blocks.Hp[joint, :, :m]
+            if free:
+                # the parent's rows by the length, which follows the coordinates of both
+                K[parent] -= np.outer(blocks.Lp[joint, :m, LENGTH], H[6 * joint + LENGTH])
+        if free:
+            H[6 * joint + LENGTH] = 0.0
     allowed = null_space(H)
     if not allowed.shape[1]:
         return np.zeros(0)

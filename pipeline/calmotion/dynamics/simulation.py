@@ -1,43 +1,26 @@
-"""A forward simulation: static equilibrium at the start, then BDF2 over given joint angles."""
+"""A forward simulation: static equilibrium at the start, then an implicit scheme over given joint angles."""
 
 from __future__ import annotations
 
 import time
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from ..kernels import kernel
 from ..shot.character import Array
-from . import bdf2
+from . import newton
 from .assembly import Work, allocate_work
+from .failure import SimulationFailure
 from .joints import joint_kinematics
-from .loops import allocate_border
+from .loops import copy_rows
+from .markers import WORLD_MARKER
+from .newton import Scratch, allocate_scratch
+from .refinement import refined_step
+from .schemes import SCHEMES
 from .start import initial_acceleration, instant_before
 from .statics import equilibrium
-from .system import (
-    JOINT_ROWS,
-    Blocks,
-    Factors,
-    Scheme,
-    State,
-    System,
-    allocate_blocks,
-    allocate_factors,
-)
-
-NEWTON_TOLERANCE = 1e-8
-NEWTON_LIMIT = 25
-BAUMGARTE_STEPS = 0.01  # time constant of the Baumgarte term, in steps; see `baumgarte`
-
-
-class SimulationFailure(Exception):
-    """A step that could not be solved: time [s] and component, and why ("singular" or "diverged")."""
-
-    def __init__(self, time_s: float, component: int, reason: str):
-        self.time_s, self.component, self.reason = time_s, component, reason
-        super().__init__(f"{reason} at t = {time_s:.4f} s, component {component}")
+from .system import Blocks, Factors, State, System, allocate_blocks, allocate_factors
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,51 +30,28 @@ class Trajectory:
     Attributes:
         h: Step [s].
         states: Arrays of shape [T, B, ...].
-        newton_iterations: In all.
+        world: Moving markers of the world at all instants, shape [T, W, 18], see `markers.moving_marker`.
+        newton_iterations: In all: linear systems solved.
+        factorisations: In all.
         max_joint_gap: Largest position gap of a joint [m].
         wall_s: Time it took [s].
+        integrator: Name of the scheme.
+        refined: Instants that only smaller steps reached.
     """
 
     h: float
     states: State
+    world: Array
     newton_iterations: int
+    factorisations: int
     max_joint_gap: float
     wall_s: float
-
-
-def baumgarte(h: float) -> float:
-    """The coefficient alpha [1/s] for a step h.
-
-    BDF2 leaves a position drift of about h^2/3 times the third derivative of the joint gap's nonlinear part per
-    unit of time, which the term holds at that over alpha; a hundred over the step keeps gaps to nanometres; the
-    term is implicit, so it limits no step and does not stiffen the motion.
-    """
-    return 1.0 / (BAUMGARTE_STEPS * h)
-
-
-def dynamic_scheme(h: float) -> Scheme:
-    """The scheme of a BDF2 step."""
-    return Scheme(velocity=1.5 / h, acceleration=1.5 / h, gamma=1.0, alpha=baumgarte(h))
-
-
-def allocate_scratch(system: System) -> tuple[Any, ...]:
-    """(J, T, Wt, Hv, Vd, x, lam, block, border) of `bdf2.step`."""
-    count, size = len(system.parent), system.size
-    return (
-        np.zeros((3, 3)),
-        np.zeros((3, 3)),
-        np.zeros((3, 3)),
-        np.zeros((count, 4, 4)),
-        np.zeros((count, size)),
-        np.zeros((count, size)),
-        np.zeros((len(system.rows), JOINT_ROWS)),
-        np.zeros(size + JOINT_ROWS),
-        allocate_border(system),
-    )
+    integrator: str = "bdf2"
+    refined: tuple[int, ...] = ()
 
 
 @kernel
-def _instant(states, n):
+def instant_of(states, n):
     """Views of instant n of a trajectory."""
     return State(states.c[n], states.q[n], states.u[n], states.turn[n], states.V[n], states.lam[n])
 
@@ -111,24 +71,29 @@ def _largest_gap(system, angle, rate, c, u, V, work):
 
 
 @kernel
-def _advance(
-    system, scheme, h, first, last, earlier, states, angles, rates, tolerance, limit, work, blocks, factors, scratch
-):
-    """Steps first..last-1 of a trajectory; returns (code, instant, component, iterations, largest joint gap)."""
-    iterations = 0
+def _advance(system, scheme, h, first, last, earlier, states, angles, rates, world, work, blocks, factors, scratch):
+    """Steps first..last-1 of a trajectory.
+
+    Returns:
+        (code, instant, component, linear systems solved, factorisations, largest joint gap).
+    """
+    solved = 0
+    factorisations = 0
     gap = 0.0
     for n in range(first, last):
-        before = _instant(states, n - 1)
-        before2 = earlier if n == 1 else _instant(states, n - 2)
-        code, count, component = bdf2.step(
-            system, scheme, h, before2, before, _instant(states, n), angles[n], rates[n], tolerance, limit, work,
-            blocks, factors, scratch,
+        before = instant_of(states, n - 1)
+        before2 = earlier if n == 1 else instant_of(states, n - 2)
+        copy_rows(world[n], work.world)
+        code, more, count, component = newton.step(
+            system, scheme, h, before2, before, instant_of(states, n), angles[n], rates[n], False, work, blocks,
+            factors, scratch,
         )  # fmt: skip
-        iterations += count
-        if code != bdf2.CONVERGED:
-            return code, n, component, iterations, gap
+        solved += count
+        factorisations += more
+        if code != newton.CONVERGED:
+            return code, n, component, solved, factorisations, gap
         gap = max(gap, _largest_gap(system, angles[n], rates[n], states.c[n], states.u[n], states.V[n], work))
-    return bdf2.CONVERGED, last, -1, iterations, gap
+    return newton.CONVERGED, last, -1, solved, factorisations, gap
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,7 +103,7 @@ class Workspace:
     work: Work
     blocks: Blocks
     factors: Factors
-    scratch: tuple[Any, ...]
+    scratch: Scratch
 
     @classmethod
     def for_system(cls, system: System) -> Workspace:
@@ -148,9 +113,11 @@ class Workspace:
 
 def simulate(
     system: System, start: State, angles: Array, rates: Array, h: float, workspace: Workspace, progress=None,
-    settled: bool = True,
+    settled: bool = True, integrator: str = "bdf2", world: Array | None = None,
 ) -> Trajectory:  # fmt: skip
     """Simulate the system from static equilibrium, or from a state that is given.
+
+    A step that Newton's method cannot solve is approached through smaller ones (`refinement`).
 
     Args:
         system: The compiled system.
@@ -161,39 +128,54 @@ def simulate(
         progress: Called with a fraction in 0..1 now and then, or None.
         settled: False releases the system at `start` as it is, with its velocities, without looking for the
             equilibrium.
+        integrator: A name of `schemes.SCHEMES`.
+        world: Moving markers of the world, shape [T, W, 18]; needed where the system has any.
 
     Returns:
         The trajectory, T instants.
 
     Raises:
-        SimulationFailure: No equilibrium, or a step that Newton's method cannot solve.
+        SimulationFailure: No equilibrium, or a step that cannot be solved.
     """
     begin = time.perf_counter()
-    total = len(angles)
-    first, iterations = equilibrium(system, start, angles[0], workspace) if settled else (start, 0)
+    total, ws = len(angles), workspace
+    scheme = SCHEMES[integrator](h)
+    if world is None:
+        world = np.zeros((total, 0, WORLD_MARKER))
+    if world.shape[1:] != ws.work.world.shape:
+        raise ValueError(f"world must hold the motion of {len(ws.work.world)} markers")
+    ws.work.world[:] = world[0]
+    first, solved = equilibrium(system, start, angles[0], ws) if settled else (start, 0)
     states = State(*[np.zeros((total,) + part.shape) for part in first])
     for part, value in zip(states, first, strict=True):
         part[0] = value
-    ws = workspace
     earlier = State(*[part[0] for part in states])  # before the start the system rests
+    ws.scratch.memory[:] = 0.0
     if not settled:
         motors = np.gradient(rates[:3], h, axis=0)[0] if total > 2 else np.zeros_like(rates[0])
         acceleration, states.lam[0] = initial_acceleration(system, first, angles[0], rates[0], motors, ws)
         earlier, states.turn[0] = instant_before(system, first, acceleration, h)
-    gap = 0.0
-    done = 1
+        ws.scratch.memory[:2] = acceleration
+    gap, done, factorisations = 0.0, 1, 0
+    refined: list[int] = []
     chunk = total if progress is None else max(1, total // 50)
     while done < total:
         last = min(done + chunk, total)
-        code, instant, component, count, largest = _advance(
-            system, dynamic_scheme(h), h, done, last, earlier, states, angles, rates, NEWTON_TOLERANCE, NEWTON_LIMIT,
-            ws.work, ws.blocks, ws.factors, ws.scratch,
+        code, instant, component, more, factored, largest = _advance(
+            system, scheme, h, done, last, earlier, states, angles, rates, world, ws.work, ws.blocks, ws.factors,
+            ws.scratch,
         )  # fmt: skip
-        iterations += count
-        gap = max(gap, largest)
-        if code != bdf2.CONVERGED:
-            raise SimulationFailure(instant * h, component, "singular" if code == bdf2.SINGULAR else "diverged")
-        done = last
+        solved, factorisations, gap, done = solved + more, factorisations + factored, max(gap, largest), instant
+        if code != newton.CONVERGED:
+            reason = "singular" if code == newton.SINGULAR else "diverged"
+            exact = refined_step(system, integrator, h, instant, earlier, states, angles, rates, world, ws)
+            if exact is None:
+                raise SimulationFailure(instant * h, component, reason)
+            if not exact:
+                refined.append(instant)
+            done += 1
         if progress is not None:
             progress(done / total)
-    return Trajectory(h, states, iterations, gap, time.perf_counter() - begin)
+    return Trajectory(
+        h, states, world, solved, factorisations, gap, time.perf_counter() - begin, integrator, tuple(refined)
+    )

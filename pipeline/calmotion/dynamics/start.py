@@ -14,8 +14,10 @@ import numpy as np
 from ..shot.character import Array
 from .assembly import assemble
 from .elimination import factor
+from .failure import SimulationFailure
 from .least_multipliers import least_multipliers
 from .loops import factor_loops, solve_system
+from .sliders import LENGTH, slides_freely
 from .so3 import turn
 from .system import Scheme, State, System
 
@@ -40,12 +42,10 @@ def initial_acceleration(
     Raises:
         SimulationFailure: A singular system.
     """
-    from .simulation import SimulationFailure
-
-    blocks, factors = ws.blocks, ws.factors
-    x, lam, block, border = ws.scratch[5:9]
+    blocks, factors, scratch = ws.blocks, ws.factors, ws.scratch
+    x, lam, block, border = scratch.x, scratch.lam, scratch.block, scratch.border
     count = len(system.parent)
-    Hv, Vd, none = np.zeros_like(ws.scratch[3]), np.zeros_like(state.V), np.zeros_like(state.lam)
+    Hv, Vd, none = np.zeros_like(scratch.Hv), np.zeros_like(state.V), np.zeros_like(state.lam)
     assemble(
         system, VELOCITY_ONLY, state.c, state.q, state.u, state.V, Vd, none, angle, rate, Hv, True, ws.work, blocks
     )  # fmt: skip
@@ -55,6 +55,10 @@ def initial_acceleration(
     x[:] = -blocks.res
     for joint, (p, b) in enumerate(system.side):
         n = 6 + system.elastic[b]
+        if slides_freely(system, joint):
+            # at the level of accelerations its length is no unknown
+            blocks.Lp[joint, :, LENGTH] = 0.0
+            blocks.Hc[joint, LENGTH], blocks.Hp[joint, LENGTH] = 0.0, 0.0
         drift = blocks.Hc[joint, :, :n] @ moving[b, :n]
         drift += blocks.by_angle[joint] * rate[joint] + blocks.by_rate[joint] * acceleration[joint]
         blocks.Hc[joint, :, :n] = -blocks.Lc[joint, :n].T

@@ -7,11 +7,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..shot.character import Array
-from . import bdf2
 from .assembly import assemble
 from .elimination import factor
+from .failure import SimulationFailure
 from .least_multipliers import least_multipliers
 from .loops import factor_loops, solve_system
+from .newton import correct, worst_component
 from .system import Scheme, State, System, allocate_state
 
 if TYPE_CHECKING:
@@ -28,7 +29,7 @@ def linearize(system: System, state: State, angle: Array, ws: Workspace) -> None
     Args:
         angle: Angle [rad] (or length [m]) of each joint, shape [J].
     """
-    Hv, Vd = ws.scratch[3], ws.scratch[4]
+    Hv, Vd = ws.scratch.Hv, ws.scratch.Vd
     Hv[:] = 0.0
     Vd[:] = 0.0
     assemble(
@@ -49,8 +50,6 @@ def equilibrium(system: System, start: State, angle: Array, ws: Workspace) -> tu
     Raises:
         SimulationFailure: No equilibrium was found.
     """
-    from .simulation import SimulationFailure
-
     free = bool(np.any((system.rows > 0) & (system.rows < 6)))
     component = 0
     used = 0
@@ -68,7 +67,7 @@ def equilibrium(system: System, start: State, angle: Array, ws: Workspace) -> tu
 
 def _iterate(system: System, state: State, angle: Array, ws: Workspace, inertia: float) -> tuple[int, int]:
     """Newton or pseudo-transient iteration in place; (-1, iterations), or the component where it failed."""
-    x, lam, block, border, T = *ws.scratch[5:9], ws.scratch[1]
+    x, lam, block, border, T = ws.scratch.x, ws.scratch.lam, ws.scratch.block, ws.scratch.border, ws.scratch.T
     count, loops = len(system.parent), len(system.rows) > len(system.parent)
     before = allocate_state(system)
     previous = np.inf
@@ -91,14 +90,14 @@ def _iterate(system: System, state: State, angle: Array, ws: Workspace, inertia:
         )  # fmt: skip
         size = float(np.max(np.abs(x)))
         if not np.isfinite(size):
-            return bdf2._worst(system, x), iteration + 1
+            return worst_component(system, x), iteration + 1
         # a step keeps each component's turn moderate, so that the linearisation means something
         scale = min(1.0, 0.5 / max(size, 1e-300))
         x *= scale
         lam *= scale
         before.q[:] = state.q
         state.turn[:] = 0.0
-        bdf2.correct(system, before, state, ws.work.R, x, lam, T)
+        correct(system, before, state, ws.work.R, x, lam, 1.0, T)
         if size < TOLERANCE and inertia == 0.0:
             if loops:
                 least_multipliers(system, border, state.lam)
@@ -109,4 +108,4 @@ def _iterate(system: System, state: State, angle: Array, ws: Workspace, inertia:
             if inertia < 1e-6 or size < 1e-6:
                 inertia = 0.0
         previous = size
-    return bdf2._worst(system, x), LIMIT
+    return worst_component(system, x), LIMIT

@@ -12,6 +12,7 @@ from ..kernels import allocating_kernel
 from ..shot.character import Array
 from .linearization import Linearization
 from .loops import UNKNOWNS, solve_system, solve_system_transposed
+from .sliders import has_row
 from .so3 import exponential, inverse_right_jacobian, right_jacobian
 
 
@@ -75,7 +76,7 @@ def _tangent(system, h, turns, d_angle, d_rate, data, pivots, dX):
             b = system.side[j, 1]
             for i in range(6):
                 t = 0.0
-                if n > 0:
+                if n > 0 and has_row(system, j, i):
                     for k in range(6 + system.elastic[b]):
                         t += Lc[n, j, k, i] * hV[b, k]
                     if p >= 0:
@@ -187,6 +188,8 @@ def _adjoint(system, h, turns, Xbar, data, pivots, g_angle, g_rate, cbar, nubar,
             p = system.side[j, 0]
             b = system.side[j, 1]
             for i in range(6):
+                if not has_row(system, j, i):
+                    continue
                 t = lam[j, i]
                 for k in range(6 + system.elastic[b]):
                     hV[b, k] += Lc[n, j, k, i] * t

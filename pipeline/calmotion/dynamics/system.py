@@ -14,6 +14,7 @@ import numpy as np
 from ..shot.character import Array, IntArray
 
 JOINT_ROWS = 6
+BACKWARD_DIFFERENCE, NEWMARK = 0, 1  # families of time-stepping formulas
 LINEAR, STVK, NEOHOOKEAN = 0, 1, 2  # elastic laws; `finite_rotation` tells linear from nonlinear by zero
 
 
@@ -24,9 +25,10 @@ class System(NamedTuple):
         parent: Parent of each component, shape [B], -1 for the world.
         elastic: Number of elastic coordinates, shape [B].
         side: Components on the two sides of each joint, shape [J, 2].
-        rows: Number of constraint rows of each joint: 6 (weld, motor), 5 (free hinge), 3 (ball) or 0 (floating),
-            shape [J].
-        sliding: Whether what a joint's motor sets is a length along its axis instead of an angle, shape [J].
+        rows: Number of constraint rows of each joint: 6 (weld, motor), 5 (free hinge or slider), 3 (ball) or 0
+            (floating), shape [J].
+        sliding: Whether a joint has a length along its axis instead of an angle, shape [J].
+        moving: Row of `assembly.Work.world` that moves the world-side marker of a joint, -1 for none, shape [J].
         mass, s, Z, M3, M4, S: Inertia integrals, see `fem.Invariants`.
         axial: axial(S[j, k]) = int rho phi_j x phi_k, shape [B, R, R, 3].
         stiffness, damping: Diagonals, shape [B, R]; of a nonlinear body, no stiffness, and damping by mass alone.
@@ -44,6 +46,7 @@ class System(NamedTuple):
     side: IntArray
     rows: IntArray
     sliding: IntArray
+    moving: IntArray
     mass: Array
     s: Array
     Z: Array
@@ -79,12 +82,20 @@ class Scheme(NamedTuple):
         acceleration: d(acceleration)/d(velocity) [1/s]; 0 for statics.
         gamma: Weight of the constraint at velocity level: 1, or 0 for statics.
         alpha: Baumgarte coefficient [1/s]; 1 for statics. Seed (31).
+        family: BACKWARD_DIFFERENCE, or NEWMARK with the coefficients that follow.
+        newmark_beta, newmark_gamma: Of Newmark's formulas.
+        alpha_m, alpha_f: Share of the previous instant in the inertia and in the forces (generalised-alpha).
     """
 
     velocity: float
     acceleration: float
     gamma: float
     alpha: float
+    family: int = BACKWARD_DIFFERENCE
+    newmark_beta: float = 0.25
+    newmark_gamma: float = 0.5
+    alpha_m: float = 0.0
+    alpha_f: float = 0.0
 
 
 class State(NamedTuple):
@@ -97,7 +108,7 @@ class State(NamedTuple):
         turn: Rotation vector from the previous instant to this one, body axes [rad], shape [B, 3].
         V: Velocities (w in world axes, omega in body axes, v), shape [B, N].
         lam: Joint multipliers (force on the component at the joint in world axes [N], moment in the parent-side
-            joint frame [N m]), shape [J, 6].
+            joint frame [N m]), shape [J, 6]. On a free slider the force, too, is in the parent-side joint frame.
     """
 
     c: Array
@@ -119,7 +130,8 @@ class Blocks(NamedTuple):
         P: By its velocity, dV-dot included, shape [B, N, N].
         D: By its acceleration (its mass matrix), shape [B, N, N].
         Lc, Lp: By the joint's multipliers: the component's rows, its parent's rows, shape [J, N, 6].
-        Hc, Hp: The joint's constraint rows, by the component and by its parent, shape [J, 6, N].
+        Hc, Hp: The joint's constraint rows, by the component and by its parent, shape [J, 6, N]. A free slider has
+            its length in place of a multiplier and the definition of it in place of a row, see `sliders`.
         Nc: The component's rows by the turning of the parent-side marker, shape [J, N, 3].
         Jp: Turning of the parent-side marker by the parent's coordinates, shape [J, 3, N].
         by_angle, by_rate: The joint's rows by the motor's angle (or length) and rate, shape [J, 6].

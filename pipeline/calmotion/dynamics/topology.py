@@ -76,7 +76,8 @@ def _spanning(character: Character) -> tuple[list[int], list[int]]:
 
     def looseness(index: int) -> tuple[int, int]:
         joint = character.joints[index]
-        kind = 0 if index in driven else {"fixed": 1, "prismatic": 2, "revolute": 3, "spherical": 4}[joint.kind]
+        # a free slider has no stiffness of its own at rest, which a tree must have
+        kind = 0 if index in driven else {"fixed": 1, "revolute": 2, "spherical": 3, "prismatic": 4}[joint.kind]
         return (5 if joint.closes_loop else kind), index
 
     group = {index: index for index in range(WORLD, len(character.bodies))}

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from ..dynamics.model import Model, compile_model
 from ..dynamics.modes import system_frequencies
-from ..dynamics.simulation import SimulationFailure
+from ..dynamics.failure import SimulationFailure
 from ..dynamics.topology import span_tree
 from ..errors import ShotError
 from ..fem.excitation_data import Excitation

@@ -10,7 +10,8 @@ import numpy as np
 from ..dynamics.kinematics import rigid_poses, rigid_state, target_frames
 from ..dynamics.linearization import Linearization, linearize
 from ..dynamics.model import Model, rigid_model
-from ..dynamics.simulation import SimulationFailure, Trajectory, Workspace, simulate
+from ..dynamics.failure import SimulationFailure
+from ..dynamics.simulation import Trajectory, Workspace, simulate
 from ..dynamics.sweeps import adjoint, tangent
 from ..shot.character import Array, BoolArray, IntArray
 from .curves import OffsetBasis, TimeGrid

@@ -7,7 +7,8 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from ..dynamics.simulation import SimulationFailure, Workspace
+from ..dynamics.failure import SimulationFailure
+from ..dynamics.simulation import Workspace
 from ..errors import ShotError
 from ..fem.reduced_body import ReducedBody
 from ..shot import Animation, Character, MotorCurve, OptimizerStep, Result
