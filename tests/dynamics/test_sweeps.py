@@ -58,9 +58,7 @@ class Case:
 
     def __init__(self, rows, laws=None, sliding=(), loops=(), moving=(), seed=0):
         rng = np.random.default_rng(seed)
-        self.system, _ = particle_system(
-            rng, [-1, 0, 1, 0], [2, 0, 3, 2], rows, 3000.0, sliding, loops, moving
-        )
+        self.system, _ = particle_system(rng, [-1, 0, 1, 0], [2, 0, 3, 2], rows, 3000.0, sliding, loops, moving)
         if laws is not None:
             self.system = nonlinear(self.system, laws, rng, stiffness=3000.0)
         joints = len(self.system.rows)

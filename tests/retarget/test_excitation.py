@@ -8,6 +8,7 @@ from calmotion.dynamics.topology import span_tree
 from calmotion.retarget.curves import make_grid
 from calmotion.retarget.excitation import highest_frequency, rigid_bodies, shot_excitation
 from calmotion.shot import (
+    Animation,
     Body,
     Character,
     FEMesh,
@@ -27,6 +28,10 @@ LENGTH, MASS, AMPLITUDE, FREQUENCY = 0.5, 2.0, 0.3, 3.0
 
 def frame(x=0.0, rotation=IDENTITY):
     return Frame(np.array([x, 0.0, 0.0]), rotation)
+
+
+def animation(times, tracks):
+    return Animation(times, tuple(tracks), tuple(tracks))
 
 
 def turntable():
@@ -54,7 +59,9 @@ def oscillation():
     s = np.clip(times / 2.5, 0.0, 1.0)
     fade = s**3 * (10.0 - 15.0 * s + 6.0 * s * s)
     track = Track(times, AMPLITUDE * fade * np.sin(2 * np.pi * FREQUENCY * times))
-    return shot_excitation(character, [track], make_grid(times, 1 / 960, 0.0), span_tree(character), None)
+    return shot_excitation(
+        character, animation(times, [track]), make_grid(times, 1 / 960, 0.0), span_tree(character), None
+    )
 
 
 def test_accelerations_of_a_swinging_link(oscillation):
@@ -103,7 +110,9 @@ def test_a_robot_at_rest_feels_its_weight_and_nothing_else():
     character = turntable()
     times = np.arange(25) / 24.0
     tracks = [Track(times, np.full(25, 0.4))]
-    link, load = shot_excitation(character, tracks, make_grid(times, None, 0.0), span_tree(character), None)
+    link, load = shot_excitation(
+        character, animation(times, tracks), make_grid(times, None, 0.0), span_tree(character), None
+    )
     for body in (link, load):
         assert np.allclose(body.acceleration, [0.0, 0.0, 9.81], atol=1e-6)
         assert np.abs(body.angular_acceleration).max() < 1e-6 and body.frequency == 0.0

@@ -79,9 +79,7 @@ def rigid_body(body: Body, anchors: BodyAnchors) -> ReducedBody:
     return ReducedBody(rigid_invariants(body.mass), empty, empty, markers)
 
 
-def compile_model(
-    character: Character, tree: Tree, bodies: Sequence[ReducedBody], moving: Sequence[int] = ()
-) -> Model:
+def compile_model(character: Character, tree: Tree, bodies: Sequence[ReducedBody], moving: Sequence[int] = ()) -> Model:
     """Compile a character whose bodies are given reduced, with the markers of `body_anchors`.
 
     Args:

@@ -13,8 +13,9 @@ from .sliders import LENGTH, slides_freely
 from .statics import equilibrium, linearize
 
 
-def system_frequencies(model: Model, joint_angles: Array) -> Array:
-    """Undamped natural frequencies [Hz], ascending, about the equilibrium at joint angles of shape [B].
+def system_frequencies(model: Model, joint_angles: Array, world: Array | None = None) -> Array:
+    """Undamped natural frequencies [Hz], ascending, about the equilibrium at joint angles of shape [B], moving
+    roots held at `world`, shape [W, 18].
 
     Motions that the joints forbid are projected out; free joints count as motions. A negative stiffness (an
     unstable pose) gives a frequency of zero.
@@ -23,7 +24,9 @@ def system_frequencies(model: Model, joint_angles: Array) -> Array:
         SimulationFailure: No equilibrium was found.
     """
     system, workspace = model.system, Workspace.for_system(model.system)
-    state, _ = equilibrium(system, rigid_state(model, joint_angles), joint_angles, workspace)
+    if world is not None:
+        workspace.work.world[:] = world
+    state, _ = equilibrium(system, rigid_state(model, joint_angles, world), joint_angles, workspace)
     linearize(system, state, joint_angles, workspace)
     blocks = workspace.blocks
     offset = np.concatenate([[0], np.cumsum(6 + system.elastic)])

@@ -98,7 +98,7 @@ def _held(spline: CubicSpline, times: Array) -> tuple[Array, Array]:
     return spline(inside), rate
 
 
-def _pre_roll_weights(times: Array, length: float) -> tuple[Array, Array, Array]:
+def pre_roll_weights(times: Array, length: float) -> tuple[Array, Array, Array]:
     """Values, rates and accelerations at times in [-length, 0) of the quintic that leaves rest and meets the curve
     at 0 in value, rate and acceleration; columns multiply these three. It starts half a rate times length back,
     where a constant acceleration would."""
@@ -126,14 +126,14 @@ def sample_tracks(tracks: Sequence[Track], grid: TimeGrid) -> tuple[Array, Array
         spline = interpolate(track, grid.frame_times[-1])
         angles[pre:, k], rates[pre:, k] = _held(spline, times[pre:])
         if pre:
-            value, rate, _ = _pre_roll_weights(times[:pre], grid.pre_roll)
+            value, rate, _ = pre_roll_weights(times[:pre], grid.pre_roll)
             meet = np.array([angles[pre, k], rates[pre, k], float(spline(0.0, 2)) if spline.x[0] <= 0.0 else 0.0])
             angles[:pre, k], rates[:pre, k] = value @ meet, rate @ meet
     return angles, rates
 
 
 def needed_pre_roll(tracks: Sequence[Track], frame_times: Array) -> float:
-    """Length of the pre-roll [s] that a shot needs: none when it starts at rest, else a second."""
+    """Length of the pre-roll [s] that a shot needs for its tracks: none when they start at rest, else a second."""
     end = frame_times[-1]
     fine = np.linspace(0.0, end, 4 * len(frame_times))
     start, fastest = 0.0, 0.0
@@ -221,7 +221,7 @@ def make_basis(grid: TimeGrid, spacing: float, kept_ends: bool) -> OffsetBasis:
     bending = bend.T @ diags(np.repeat(0.5 * width.ravel(), 2)) @ bend
     if pre:
         meet = np.stack([splines(0.0, nu=k) @ merge for k in range(3)])
-        value, rate, curvature = _pre_roll_weights(times[:pre], grid.pre_roll)
+        value, rate, curvature = pre_roll_weights(times[:pre], grid.pre_roll)
         values, rates = np.vstack([value @ meet, values]), np.vstack([rate @ meet, rates])
         bending = bending + csr_matrix(grid.h * (curvature @ meet).T @ (curvature @ meet))
     stored = csr_matrix(values)

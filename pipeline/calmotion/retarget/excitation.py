@@ -13,24 +13,24 @@ from ..dynamics.topology import Tree
 from ..fem.excitation_data import Excitation
 from ..fem.mesh_mass import mass_of_tets
 from ..fem.reduced_body import ReducedBody
-from ..shot import Character, FEMeshes
-from ..shot.animation import Track
+from ..shot import Animation, Character, FEMeshes
 from ..shot.character import Array
 from .curves import TimeGrid, sample_tracks
 from .problem import ForwardRun, run_forward
+from .roots import sample_roots
 
 _POWER_LEFT = 1e-3  # of a signal's power may lie above the highest frequency that matters: 3% of its amplitude
 _NOTHING = 1e-9  # of gravity, or of it over a metre: an acceleration that is rounding
 
 
 def shot_excitation(
-    character: Character, tracks: Sequence[Track], grid: TimeGrid, tree: Tree, meshes: FEMeshes | None
+    character: Character, animation: Animation, grid: TimeGrid, tree: Tree, meshes: FEMeshes | None
 ) -> tuple[Excitation, ...]:
     """Excitation of every body of a shot.
 
     Args:
         character: The bodies; flexible ones count with the mass of their mesh.
-        tracks: One for each motor.
+        animation: Tracks of the motors, and moving roots.
         grid: Time grid of the shot, pre-roll included.
         tree: Of the character.
         meshes: Of the flexible bodies.
@@ -41,9 +41,11 @@ def shot_excitation(
     Raises:
         SimulationFailure: The rigid robot cannot follow the tracks.
     """
-    model = compile_model(character, tree, rigid_bodies(character, tree, meshes))
-    angles, rates = sample_tracks(tracks, grid)
-    run = run_forward(model, Workspace.for_system(model.system), angles, rates, grid.h)
+    moving = [frame.joint for frame in animation.moving]
+    model = compile_model(character, tree, rigid_bodies(character, tree, meshes), moving)
+    angles, rates = sample_tracks(animation.tracks, grid)
+    world = sample_roots(animation.moving, grid)
+    run = run_forward(model, Workspace.for_system(model.system), angles, rates, grid.h, world)
     return excitation_of(character, model, run, grid.h)
 
 

@@ -13,13 +13,13 @@ from ..shot.playback import rotation_matrices
 from .curves import DEGREE
 
 
-def rigid_motor_jacobian(model: Model, joint_angles: Array, motors: IntArray) -> Array:
+def rigid_motor_jacobian(model: Model, joint_angles: Array, motors: IntArray, world: Array | None = None) -> Array:
     """Derivative of the rigid targets' frames by motor angles, shape [T, K, 6, len(motors)].
 
     Rows 0-2: position, world axes [m/rad]; rows 3-5: turning, world axes.
     """
     system, targets = model.system, model.targets
-    c, q = rigid_poses(model, joint_angles)
+    c, q = rigid_poses(model, joint_angles, world)
     R = rotation_matrices(q)
     column = {int(motor): k for k, motor in enumerate(motors)}
     J = np.zeros((len(joint_angles), len(targets.component), 6, len(motors)))

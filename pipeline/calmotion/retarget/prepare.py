@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from ..dynamics.model import Model, compile_model
 from ..dynamics.modes import system_frequencies
+from ..dynamics.schemes import SCHEMES
 from ..dynamics.failure import SimulationFailure
 from ..dynamics.topology import span_tree
 from ..errors import ShotError
@@ -16,6 +17,7 @@ from ..shot import Animation, Character, FEMeshes
 from ..shot.character import Array
 from .bodies import reduce_bodies
 from .curves import TimeGrid, make_grid, needed_pre_roll, sample_tracks
+from .roots import root_tracks, sample_roots
 
 
 @dataclass(frozen=True)
@@ -33,12 +35,13 @@ class Options:
 
 @dataclass(frozen=True, eq=False)
 class Prepared:
-    """A shot compiled for simulation."""
+    """A shot compiled for simulation; `world` holds its moving roots, see `roots.sample_roots`."""
 
     character: Character
     bodies: Sequence[ReducedBody]
     model: Model
     grid: TimeGrid
+    world: Array
 
 
 def prepare(
@@ -60,14 +63,18 @@ def prepare(
     tree = span_tree(character)
     if bodies is None:
         bodies = reduce_bodies(character, tree, None)
-    model = compile_model(character, tree, bodies)
-    return Prepared(character, bodies, model, _grid(character, animation, options))
+    model = compile_model(character, tree, bodies, [frame.joint for frame in animation.moving])
+    grid = _grid(character, animation, options)
+    return Prepared(character, bodies, model, grid, sample_roots(animation.moving, grid))
 
 
 def _grid(character: Character, animation: Animation, options: Options) -> TimeGrid:
     pre_roll = options.pre_roll
     if pre_roll is None:
-        pre_roll = needed_pre_roll(animation.tracks, animation.frame_times)
+        pre_roll = max(
+            needed_pre_roll(tracks, animation.frame_times)
+            for tracks in (animation.tracks, root_tracks(animation.moving))
+        )
     step = options.step if options.step is not None else character.retarget.time_step
     return make_grid(animation.frame_times, step, pre_roll)
 
@@ -81,9 +88,7 @@ def excitations(
     from .excitation import shot_excitation
 
     try:
-        return shot_excitation(
-            character, animation.tracks, _grid(character, animation, options), span_tree(character), meshes
-        )
+        return shot_excitation(character, animation, _grid(character, animation, options), span_tree(character), meshes)
     except SimulationFailure:
         return None  # the flexible robot will say so, with the place
 
@@ -97,7 +102,7 @@ def first_pose_frequencies(character: Character, animation: Animation, bodies: S
     prepared = prepare(character, animation, bodies, Options(pre_roll=0.0))
     angles, _ = sample_tracks(animation.tracks, prepared.grid)
     try:
-        return system_frequencies(prepared.model, prepared.model.joint_angles(angles[0]))
+        return system_frequencies(prepared.model, prepared.model.joint_angles(angles[0]), prepared.world[0])
     except SimulationFailure as failure:
         raise failure_error(prepared, failure) from failure
 
@@ -116,12 +121,12 @@ def _refuse_unsupported(character: Character, options: Options) -> None:
                 found=value,
                 remedy=f"Set it to {str(supported).lower()} for now.",
             )
-    if options.integrator != "bdf2":
+    if options.integrator not in SCHEMES:
         raise ShotError(
-            "this integrator is not available",
+            "there is no such integrator",
             attribute="--integrator",
             found=options.integrator,
-            remedy="Use bdf2.",
+            remedy=f"Use one of {', '.join(SCHEMES)}.",
         )
 
 

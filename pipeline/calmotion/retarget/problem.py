@@ -42,16 +42,23 @@ def start_angles(model: Model, joint_angles: Array) -> Array:
     return np.where(free, model.rest_angles, joint_angles)
 
 
-def run_forward(model: Model, workspace: Workspace, angles: Array, rates: Array, h: float, progress=None) -> ForwardRun:
+def run_forward(
+    model: Model, workspace: Workspace, angles: Array, rates: Array, h: float, world: Array | None = None,
+    progress=None, integrator: str = "bdf2",
+) -> ForwardRun:  # fmt: skip
     """Simulate motor curves.
 
     Args:
         angles, rates: Of the motors, shape [T, M] [rad, rad/s].
         h: Step [s].
+        world: Moving roots, see `roots.sample_roots`.
+        integrator: A name of `schemes.SCHEMES`.
     """
     joint_angles, joint_rates = model.joint_angles(angles), model.joint_angles(rates)
-    start = rigid_state(model, start_angles(model, joint_angles[0]))
-    trajectory = simulate(model.system, start, joint_angles, joint_rates, h, workspace, progress)
+    start = rigid_state(model, start_angles(model, joint_angles[0]), None if world is None else world[0])
+    trajectory = simulate(
+        model.system, start, joint_angles, joint_rates, h, workspace, progress, integrator=integrator, world=world
+    )
     states = trajectory.states
     positions, rotations = target_frames(model, states.c, states.q, states.u)
     return ForwardRun(trajectory, joint_angles, joint_rates, positions, rotations)
@@ -72,21 +79,23 @@ class RigidMotion:
         return Reference(self.target_positions, self.target_rotations)
 
 
-def rigid_motion(model: Model, angles: Array, rates: Array, h: float) -> RigidMotion:
+def rigid_motion(model: Model, angles: Array, rates: Array, h: float, world: Array | None = None) -> RigidMotion:
     """The animation on a rigid robot: kinematics alone, or a rigid simulation where joints move freely."""
     rigid = rigid_model(model)
     if np.any(_moves_freely(rigid)):
-        run = run_forward(rigid, Workspace.for_system(rigid.system), angles, rates, h)
+        run = run_forward(rigid, Workspace.for_system(rigid.system), angles, rates, h, world)
         states = run.trajectory.states
         return RigidMotion(states.c, states.q, run.target_positions, run.target_rotations)
-    c, q = rigid_poses(rigid, model.joint_angles(angles))
+    c, q = rigid_poses(rigid, model.joint_angles(angles), world)
     positions, rotations = target_frames(rigid, c, q, np.zeros(c.shape[:2] + (0,)))
     return RigidMotion(c, q, positions, rotations)
 
 
-def compile_kernels(model: Model, workspace: Workspace, angles: Array, rates: Array, h: float) -> None:
+def compile_kernels(
+    model: Model, workspace: Workspace, angles: Array, rates: Array, h: float, world: Array | None = None
+) -> None:
     """Run every kernel once on three instants, so that compiling them is not counted as simulating."""
-    run = run_forward(model, workspace, angles[:3], rates[:3], h)
+    run = run_forward(model, workspace, angles[:3], rates[:3], h, None if world is None else world[:3])
     lin = linearize(model.system, run.trajectory, run.joint_angles, run.joint_rates, workspace)
     adjoint(lin, tangent(lin, run.joint_angles, run.joint_rates))
 
@@ -104,14 +113,15 @@ class RetargetProblem:
         smoothness: Weight of int |offset''|^2 / 2 for each motor.
         closeness: Weight of int |offset|^2 / 2 for each motor.
         gain: A predicted decrease of the root-mean-square error by less than this is not worth an iteration [m].
+        world: Moving roots.
     """
 
     def __init__(
         self, model: Model, grid: TimeGrid, angles: Array, rates: Array, objective: Objective, basis: OffsetBasis,
-        motors: IntArray, smoothness: float, closeness: float, gain: float,
+        motors: IntArray, smoothness: float, closeness: float, gain: float, world: Array | None = None,
     ):  # fmt: skip
         self.model, self.grid, self.objective, self.basis = model, grid, objective, basis
-        self.angles, self.rates, self.motors = angles, rates, motors
+        self.angles, self.rates, self.motors, self.world = angles, rates, motors, world
         self._penalty = smoothness * basis.bending + closeness * basis.closeness
         self._workspace = Workspace.for_system(model.system)
         self._run: ForwardRun | None = None
@@ -152,7 +162,9 @@ class RetargetProblem:
         """The objective; infinite where the simulation fails."""
         values, rates = self.offsets(x)
         try:
-            self._run = run_forward(self.model, self._workspace, self.angles + values, self.rates + rates, self.grid.h)
+            self._run = run_forward(
+                self.model, self._workspace, self.angles + values, self.rates + rates, self.grid.h, self.world
+            )
         except SimulationFailure:
             return np.inf
         self._residuals, self._inverse = self.objective.residuals(
@@ -195,7 +207,7 @@ class RetargetProblem:
         """The rigid robot's Gauss-Newton matrix, inverted over the entries that are not fixed."""
         if self._preconditioner is None:
             rigid = rigid_model(self.model)
-            J = rigid_motor_jacobian(rigid, self.model.joint_angles(self.angles), self.motors)
+            J = rigid_motor_jacobian(rigid, self.model.joint_angles(self.angles), self.motors, self.world)
             self._preconditioner = RigidPreconditioner(J, self.objective.weights, self.basis.values, self._penalty)
         self._preconditioner.factor(fixed)
         return self._preconditioner.solve

@@ -37,16 +37,19 @@ def simulate_shot(
 ) -> Result:
     """Simulate the shot as animated, and measure it against the rigid motion of the animator's intent."""
     prepared = prepare(character, animation, bodies, options)
-    model, grid = prepared.model, prepared.grid
+    model, grid, world = prepared.model, prepared.grid, prepared.world
     workspace = Workspace.for_system(model.system)
     angles, rates = sample_tracks(animation.current, grid)
     meant, meant_rates = sample_tracks(animation.tracks, grid)
     try:
-        rigid = rigid_motion(model, meant, meant_rates, grid.h)
+        rigid = rigid_motion(model, meant, meant_rates, grid.h, world)
         progress(0.0, "compiling kernels, once")
-        run_forward(model, workspace, angles[:3], rates[:3], grid.h)
+        run_forward(model, workspace, angles[:3], rates[:3], grid.h, world[:3], integrator=options.integrator)
         begin = time.perf_counter()
-        run = run_forward(model, workspace, angles, rates, grid.h, lambda fraction: progress(fraction, "simulating"))
+        run = run_forward(
+            model, workspace, angles, rates, grid.h, world, lambda fraction: progress(fraction, "simulating"),
+            options.integrator,
+        )  # fmt: skip
         wall = time.perf_counter() - begin
     except SimulationFailure as failure:
         raise failure_error(prepared, failure) from failure
@@ -127,8 +130,15 @@ def optimize_shot(
 ) -> Result:
     """Retarget a shot: change its motor curves so that the flexible robot moves as the rigid one was animated to."""
     settings = character.retarget
+    if options.integrator != "bdf2":
+        raise ShotError(
+            "derivatives are those of BDF2 alone",
+            attribute="--integrator",
+            found=options.integrator,
+            remedy="Leave it out, or use it with `calmotion simulate`.",
+        )
     prepared = prepare(character, animation, bodies, options)
-    model, grid = prepared.model, prepared.grid
+    model, grid, world = prepared.model, prepared.grid, prepared.world
     angles, rates = sample_tracks(animation.tracks, grid)
     spacing = options.knot_spacing or settings.knot_spacing or KNOT_SPACING
     smoothness = next(v for v in (options.smoothness, settings.smoothness, SMOOTHNESS) if v is not None)
@@ -151,13 +161,13 @@ def optimize_shot(
             remedy="Set it to true on the motors that may change.",
         )
     try:
-        rigid = rigid_motion(model, angles, rates, grid.h)
+        rigid = rigid_motion(model, angles, rates, grid.h, world)
         objective = Objective.over(model, rigid.reference, grid.times, grid.h)
         problem = RetargetProblem(
-            model, grid, angles, rates, objective, basis, motors, smoothness, CLOSENESS, gain=0.01 * tolerance
+            model, grid, angles, rates, objective, basis, motors, smoothness, CLOSENESS, 0.01 * tolerance, world
         )
         progress(0.0, "compiling kernels, once")
-        compile_kernels(model, Workspace.for_system(model.system), angles, rates, grid.h)
+        compile_kernels(model, Workspace.for_system(model.system), angles, rates, grid.h, world)
         begin = time.perf_counter()
         problem.value(np.zeros(problem.size))
         before = problem.run

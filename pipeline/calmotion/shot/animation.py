@@ -22,6 +22,23 @@ class Track:
 
 
 @dataclass(frozen=True, eq=False)
+class MovingFrame:
+    """The world-side frame of a joint, where the shot moves it: what a moving root hangs from.
+
+    Attributes:
+        joint: Index of the joint.
+        times: [s] after the first frame of the shot, strictly increasing, shape [k].
+        positions: [m], world, shape [k, 3].
+        rotations: Unit quaternions (w, x, y, z), world, neighbours of the same sign, shape [k, 4].
+    """
+
+    joint: int
+    times: Array
+    positions: Array
+    rotations: Array
+
+
+@dataclass(frozen=True, eq=False)
 class Animation:
     """The motion of a shot.
 
@@ -30,8 +47,10 @@ class Animation:
         tracks: One for each motor of the character, in its order: the animator's intent.
         current: The same where the shot already carries a layer of ours and the user asks for what is composed
             (`simulate`, the start of `optimize`); otherwise the same object as `tracks`.
+        moving: Moving roots, none for a character that stands where it is.
     """
 
     frame_times: Array
     tracks: tuple[Track, ...]
     current: tuple[Track, ...]
+    moving: tuple[MovingFrame, ...] = ()
