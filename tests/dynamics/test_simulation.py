@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 from arms import chain, compiled
-from calmotion.dynamics.kinematics import rigid_poses, rigid_state, target_frames
 from calmotion.dynamics import inertia, newton
 from calmotion.dynamics.failure import SimulationFailure
+from calmotion.dynamics.kinematics import rigid_poses, rigid_state, target_frames
 from calmotion.dynamics.schemes import bdf2_scheme
 from calmotion.dynamics.simulation import Workspace, simulate
 from calmotion.dynamics.system import allocate_state

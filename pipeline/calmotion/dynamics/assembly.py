@@ -64,7 +64,8 @@ def allocate_work(system: System) -> Work:
         np.zeros((3, 3)), np.zeros(3), np.zeros((2, JOINT_ROWS)), np.zeros(2 * pairs),
         np.zeros((max(nonlinear, points), max(pairs, nonlinear))), np.zeros(nonlinear), np.zeros((points, points)),
         np.zeros(3), np.zeros(1), np.zeros(system.size), np.zeros((2, system.size)), np.zeros((system.size, 3)),
-        np.zeros((int(system.moving.max(initial=-1)) + 1, WORLD_MARKER)), allocate_marker(system.size), allocate_marker(system.size),
+        np.zeros((int(system.moving.max(initial=-1)) + 1, WORLD_MARKER)), allocate_marker(system.size),
+        allocate_marker(system.size),
     )  # fmt: skip
 
 

@@ -19,9 +19,9 @@ from ..shot.character import Array, IntArray
 from .assembly import assemble
 from .bdf2 import position_to_velocity, velocities
 from .elimination import factor
+from .failure import SimulationFailure
 from .loops import UNKNOWNS, copy_rows, factor_loops
 from .schemes import bdf2_scheme
-from .failure import SimulationFailure
 from .simulation import Trajectory, Workspace, instant_of
 from .statics import STATIC
 from .system import JOINT_ROWS, Blocks, System

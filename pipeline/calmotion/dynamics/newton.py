@@ -184,8 +184,11 @@ def largest_entry(system, x):
     largest = 0.0
     for b in range(len(system.parent)):
         for i in range(6 + system.elastic[b]):
-            if not (abs(x[b, i]) <= largest):
-                largest = abs(x[b, i])
+            t = abs(x[b, i])
+            if not (t <= largest):
+                largest = t
+                if np.isnan(t):
+                    return t
     return largest
 
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from ..dynamics.failure import SimulationFailure
 from ..dynamics.model import Model, compile_model
 from ..dynamics.modes import system_frequencies
 from ..dynamics.schemes import SCHEMES
-from ..dynamics.failure import SimulationFailure
 from ..dynamics.topology import span_tree
 from ..errors import ShotError
 from ..fem.excitation_data import Excitation

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..dynamics.failure import SimulationFailure
 from ..dynamics.kinematics import rigid_poses, rigid_state, target_frames
 from ..dynamics.linearization import Linearization, linearize
 from ..dynamics.model import Model, rigid_model
-from ..dynamics.failure import SimulationFailure
 from ..dynamics.simulation import Trajectory, Workspace, simulate
 from ..dynamics.sweeps import adjoint, tangent
 from ..shot.character import Array, BoolArray, IntArray
