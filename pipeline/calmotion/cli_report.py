@@ -45,6 +45,7 @@ def target_errors(character: Character, simulation: Simulation, suffix: str) -> 
             f"rms_error{suffix}_m": float(position[1][k]),
             f"max_rotation_error{suffix}_rad": float(rotation[0][k]),
             f"rms_rotation_error{suffix}_rad": float(rotation[1][k]),
+            f"sag{suffix}_m": float(simulation.sag[k]) if len(simulation.sag) else None,
         }
         for k, target in enumerate(character.targets)
     ]
@@ -83,6 +84,7 @@ def run_report(run: Run, character: Character, result: Result, command: str, tot
         "parameters": result.parameters,
         "newton_iterations": final.newton_iterations,
         "max_joint_gap_m": final.max_joint_gap,
+        "refined_steps": final.refined_steps,
         "frequencies_hz": {character.bodies[table.body].path: table.frequencies for table in result.modes},
     }
     layer, recording, table, figures = run.get(WrittenLayer), run.get(Recording), run.get(CsvFile), run.get(Figures)

@@ -83,6 +83,11 @@ def print_run(report: dict[str, Any], stream: TextIO) -> None:
         kept = [motor["path"] for motor in report["motors"] if not motor["changed"]]
         if kept:
             console.print(f"motors that did not change: {', '.join(kept)}")
+    sag = max((target[f"sag{suffixes[-1]}_m"] or 0.0 for target in report["targets"]), default=0.0)
+    if sag > 1e-6:
+        console.print(f"at rest, before the motion, the targets are off by up to {length(sag)}")
+    if report["refined_steps"]:
+        console.print(f"{report['refined_steps']} steps were only reached by smaller ones: try a smaller --step")
     console.print(
         f"{report['steps']} steps of {1000 * report['step_s']:.4g} ms, {report['dof']} coordinates, "
         f"{report['modes']} of them elastic; {report['total_wall_s']:.1f} s in all"

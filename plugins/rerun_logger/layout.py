@@ -53,6 +53,8 @@ def make_blueprint(character: Character, animation: Animation, result: Result) -
     if optimized:
         tabs.append(plot("Change of the motors [deg]", "changes_deg"))
     tabs += [motor_tab(motor.path) for motor in character.motors[:MOTOR_TABS]]
+    if result.before.motion.joint_forces is not None:
+        tabs.append(reactions_tab())
     if result.steps:
         tabs.append(plot("Optimiser (choose the timeline: iteration)", "optimizer"))
     below = rrb.Horizontal(
@@ -96,6 +98,15 @@ def spatial_view(name: str, root: str, eye: rrb.EyeControls3D) -> rrb.Spatial3DV
 def plot(name: str, origin: str) -> rrb.TimeSeriesView:
     """Curves below one entity."""
     return rrb.TimeSeriesView(origin=origin, name=name, plot_legend=rrb.PlotLegend(rrb.Corner2D.RightTop))
+
+
+def reactions_tab() -> rrb.Vertical:
+    """Forces of all joints above, moments below."""
+    return rrb.Vertical(
+        plot("Joint forces [N]", "reactions/force_N"),
+        plot("Joint moments [N m]", "reactions/moment_Nm"),
+        name="Joint reactions",
+    )
 
 
 def motor_tab(path: str) -> rrb.Vertical:

@@ -96,9 +96,11 @@ def log_all(
     progress(len(motions) / (len(motions) + 1), "curves")
     log_errors(recording, character, INPUT, result.before, samples_per_plot)
     log_motors(recording, character, INPUT, result.before, samples_per_plot)
+    log_reactions(recording, character, INPUT, result.before, samples_per_plot)
     if result.after is not None:
         log_errors(recording, character, OPTIMIZED, result.after, samples_per_plot)
         log_motors(recording, character, OPTIMIZED, result.after, samples_per_plot)
+        log_reactions(recording, character, OPTIMIZED, result.after, samples_per_plot)
         log_changes(recording, character, result, samples_per_plot)
     log_progress(recording, result)
 
@@ -218,6 +220,21 @@ def log_motors(
         log_curve(
             recording, f"{entity}/torque_Nm/{root}", motion.times[rows], efforts, style.color, f"{style.label} [N m]"
         )
+
+
+def log_reactions(
+    recording: rr.RecordingStream, character: Character, root: str, simulation: Simulation, samples: int
+) -> None:
+    """Size of the force [N] and the moment [N m] that each joint transmits."""
+    rows, style, motion = thinned(simulation, samples), STYLES[root], simulation.motion
+    names = distinct_names([joint.path for joint in character.joints])
+    for kind, values in (("force_N", motion.joint_forces), ("moment_Nm", motion.joint_moments)):
+        if values is None:
+            continue
+        for j, joint in enumerate(character.joints):
+            size = np.linalg.norm(values[rows, j], axis=1)
+            color, name = style.shade(j, len(character.joints)), f"{names[joint.path]} {style.label}"
+            log_curve(recording, f"reactions/{kind}{joint.path}/{root}", motion.times[rows], size, color, name)
 
 
 def log_changes(recording: rr.RecordingStream, character: Character, result: Result, samples: int) -> None:

@@ -20,8 +20,11 @@ def columns(character: Character, result: Result) -> dict[str, Array]:
     The motion is the optimised one where there is one, else the simulated one. A motor's input is the
     animator's curve, its output the curve that was simulated.
 
+    Reactions are what each joint does to its body1, world axes, see `calmotion.shot.Motion`.
+
     Returns:
-        `time_s` [s]; positions and errors of targets [m], rotation errors [rad]; motor angles [rad], efforts [N m].
+        `time_s` [s]; positions and errors of targets [m], rotation errors [rad]; motor angles [rad], efforts [N m];
+        `<joint path>.force.x` and so on [N], `<joint path>.moment.x` and so on [N m].
     """
     simulation = result.after or result.before
     motion = simulation.motion
@@ -37,6 +40,12 @@ def columns(character: Character, result: Result) -> dict[str, Array]:
         table[f"{motor.path}.input"] = result.reference.motor_values[rows, m]
         table[f"{motor.path}.output"] = motion.motor_values[rows, m]
         table[f"{motor.path}.effort"] = motion.motor_efforts[rows, m]
+    for name, values in (("force", motion.joint_forces), ("moment", motion.joint_moments)):
+        if values is None:
+            continue
+        for j, joint in enumerate(character.joints):
+            for axis, letter in enumerate("xyz"):
+                table[f"{joint.path}.{name}.{letter}"] = values[rows, j, axis]
     return table
 
 

@@ -132,6 +132,8 @@ def motion(amplitude, offset=0.0):
         motor_efforts=10.0 * tip[:, None],
         target_positions=position[:, None],
         target_rotations=turn[:, None],
+        joint_forces=np.stack([k + np.column_stack([tip, values, zero]) for k in range(3)], axis=1),
+        joint_moments=np.stack([k - np.column_stack([tip, values, zero]) for k in range(3)], axis=1),
     )
 
 

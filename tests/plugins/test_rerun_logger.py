@@ -126,6 +126,12 @@ def test_errors_and_motor_curves_have_the_units_they_are_named_by(columns):
         np.testing.assert_allclose(np.ravel(values), np.degrees(simulation.motion.motor_values[first:, 0]))
         values = columns[f"/motors/Robot/Joints/Swing/torque_Nm/{root}", "Scalars:scalars"][1]
         np.testing.assert_allclose(np.ravel(values), simulation.motion.motor_efforts[first:, 0])
+        for name, reaction in (
+            ("force_N", simulation.motion.joint_forces),
+            ("moment_Nm", simulation.motion.joint_moments),
+        ):
+            values = columns[f"/reactions/{name}/Robot/Joints/Weld/{root}", "Scalars:scalars"][1]
+            np.testing.assert_allclose(np.ravel(values), np.linalg.norm(reaction[first:, 2], axis=1))
     change = np.ravel(columns["/changes_deg/Robot/Joints/Swing", "Scalars:scalars"][1])
     assert change.max() == pytest.approx(np.degrees(0.01), rel=1e-3)
 

@@ -25,7 +25,15 @@ def test_the_columns_are_those_of_the_contract(host, tmp_path):
     head, rows = written(host, tmp_path / "table.csv", synthetic.result())
     target, motor = "/Robot/Tip/Target", "/Robot/Joints/Swing"
     names = [f"{target}.{name}" for name in ("x", "y", "z", "error", "rotation_error")]
-    assert head == ["time_s", *names, f"{motor}.input", f"{motor}.output", f"{motor}.effort"]
+    first = ["time_s", *names, f"{motor}.input", f"{motor}.output", f"{motor}.effort"]
+    joints = [f"/Robot/Joints/{name}" for name in ("Mount", "Swing", "Weld")]
+    reactions = [f"{joint}.{kind}.{axis}" for kind in ("force", "moment") for joint in joints for axis in "xyz"]
+    assert head == [*first, *reactions]
+    expected = synthetic.motion(synthetic.CALM, 0.01)
+    judged = expected.times >= -1e-9
+    found = rows[:, len(first) :].reshape(len(rows), 2, 3, 3)
+    np.testing.assert_allclose(found[:, 0], expected.joint_forces[judged], atol=1e-11)
+    np.testing.assert_allclose(found[:, 1], expected.joint_moments[judged], atol=1e-11)
     assert rows[0, 0] == 0.0 and rows[-1, 0] == pytest.approx(1.0)
 
 

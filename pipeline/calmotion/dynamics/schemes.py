@@ -4,23 +4,19 @@ from __future__ import annotations
 
 from .system import NEWMARK, Scheme
 
-BAUMGARTE_STEPS = 0.01  # time constant of the Baumgarte term, in steps; see `baumgarte`
 SPECTRAL_RADIUS = 0.8  # of generalised-alpha at infinite frequency, where nobody says
 
 
-def baumgarte(h: float) -> float:
-    """The coefficient alpha [1/s] for a step h.
-
-    BDF2 leaves a position drift of about h^2/3 times the third derivative of the joint gap's nonlinear part per
-    unit of time, which the term holds at that over alpha; a hundred over the step keeps gaps to nanometres; the
-    term is implicit, so it limits no step and does not stiffen the motion.
-    """
-    return 1.0 / (BAUMGARTE_STEPS * h)
+# Baumgarte's coefficient alpha times the step. Each step leaves a velocity across the joints of about h^2/3 times a
+# third derivative of their motion, and gaps of that over alpha: nanometres here. The term is implicit, so that it
+# limits no step and does not stiffen the motion; the multipliers of Newmark's family, whose formulas damp them less,
+# must not follow positions as closely.
+_FIRM, _GENTLE = 1e4, 1e2
 
 
 def bdf2_scheme(h: float) -> Scheme:
     """BDF2 with step h [s]: second order, damps what the step does not resolve."""
-    return Scheme(velocity=1.5 / h, acceleration=1.5 / h, gamma=1.0, alpha=baumgarte(h))
+    return Scheme(velocity=1.5 / h, acceleration=1.5 / h, gamma=1.0, alpha=_FIRM / h)
 
 
 def generalized_alpha_scheme(h: float, spectral_radius: float = SPECTRAL_RADIUS) -> Scheme:
@@ -44,7 +40,7 @@ def newmark_scheme(h: float) -> Scheme:
 def _newmark_family(h: float, beta: float, gamma: float, alpha_m: float, alpha_f: float) -> Scheme:
     return Scheme(
         velocity=gamma / (beta * h), acceleration=(1.0 - alpha_m) / ((1.0 - alpha_f) * gamma * h), gamma=1.0,
-        alpha=baumgarte(h), family=NEWMARK, newmark_beta=beta, newmark_gamma=gamma, alpha_m=alpha_m, alpha_f=alpha_f,
+        alpha=_GENTLE / h, family=NEWMARK, newmark_beta=beta, newmark_gamma=gamma, alpha_m=alpha_m, alpha_f=alpha_f,
     )  # fmt: skip
 
 

@@ -170,7 +170,8 @@ def simulate(
             reason = "singular" if code == newton.SINGULAR else "diverged"
             exact = refined_step(system, integrator, h, instant, earlier, states, angles, rates, world, ws)
             if exact is None:
-                raise SimulationFailure(instant * h, component, reason)
+                last_state = State(*[part[instant - 1].copy() for part in states])
+                raise SimulationFailure(instant * h, component, reason, last_state)
             if not exact:
                 refined.append(instant)
             done += 1

@@ -17,6 +17,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..errors import ShotError
 from ..shot.character import Array, ElasticMaterial
 from .assembly import FEModel
 from .craig_bampton import Basis
@@ -25,6 +26,7 @@ from .modal_derivatives import Support, modal_derivatives
 
 _MODES = 4  # the lowest carry nearly all of a deflection
 _LARGE_STRAIN = 0.1  # below, the loads' bound says more about the bound than about the material
+_HOPELESS = 100.0  # times its own size: no real body bends so far, and modes about the straight one do not
 _OVERSHOOT = 2.0  # of a sudden load, against the deflection it holds at rest
 
 
@@ -44,14 +46,19 @@ class LawChoice:
 
 
 def choose_law(
-    model: FEModel, support: Support, basis: Basis, material: ElasticMaterial, excitation: Excitation, tolerance: float
-) -> LawChoice:
+    model: FEModel, support: Support, basis: Basis, material: ElasticMaterial, excitation: Excitation,
+    tolerance: float, path: str = "",
+) -> LawChoice:  # fmt: skip
     """The cheapest law whose estimated error is within the tolerance [m].
 
     Args:
         model, support, basis, material: The body; see `modal_derivatives`.
         excitation: Its loads in this shot.
         tolerance: [m].
+        path: Prim path of the body, for errors.
+
+    Raises:
+        ShotError: The body is so soft that no law helps.
     """
     count = min(_MODES, len(basis.omega_squared))
     if count == 0:
@@ -69,6 +76,16 @@ def choose_law(
     change[first, second] = change[second, first] = work_of_loads(model, fields, motion, excitation)
     root = np.sqrt(omega_squared)
     softening = float(np.linalg.norm(change / np.outer(root, root), 2))
+    size = float(np.ptp(model.mesh.nodes, axis=0).max())
+    if deflection > _HOPELESS * size:
+        raise ShotError(
+            f"this body is too soft for this shot: as a linear body it would bend by {deflection / size:.3g} times "
+            "its size",
+            path=path,
+            attribute="physics:youngsModulus",
+            found=f"{material.youngs_modulus:.3g} Pa",
+            remedy="Check it, in the stage's units, and the masses that the body carries.",
+        )
     linear_error = shortening + deflection * softening
     volume = float(model.mass.sum()) / material.density
     strain = float(np.sqrt(bend @ (omega_squared * bend) / (material.youngs_modulus * volume)))

@@ -174,5 +174,5 @@ def _candidates(fixed: FixedInterface, places: _Places, limit: float) -> tuple[A
     with all residual vectors, so that static responses are those of the full model."""
     columns = fixed.all_needed(limit, peak_loads(places.excitation)[:12])
     omega_squared, U = ritz_modes(fixed.model, columns)
-    motion = U[: 6 * len(fixed.patches)].reshape(len(fixed.patches), 6, len(U))
+    motion = U[: 6 * len(fixed.patches)].reshape(len(fixed.patches), 6, U.shape[1])
     return columns, U, places.static_model(omega_squared, columns @ U, motion)

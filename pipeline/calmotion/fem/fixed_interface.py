@@ -17,6 +17,7 @@ from .sparse_solver import SparseSolver
 from .static_loads import UNIFORM, unit_accelerations
 from .tetrahedra import Indices
 
+_DEPENDENT = 1e-12  # share of unit mass that a combination of unit columns has where it is rounding
 _FEWEST = 4  # fixed-interface modes that are always kept: two bending pairs, or bending and twist of a plate
 _MOST = 8  # and at most, when they are chosen automatically
 _CANDIDATES = 64  # at most, when the shot says what is needed
@@ -171,8 +172,12 @@ def frequency_limit(settings: FlexibleSettings, excited: float) -> float:
 
 
 def ritz_modes(model: FEModel, columns: Array) -> tuple[Array, Array]:
-    """Modes of a body in the span of columns of shape [3n, r]: omega^2 [1/s^2] ascending, and combinations [r, r]
-    that are orthonormal in mass."""
+    """Modes of a body in the span of columns of shape [3n, r].
+
+    Returns:
+        omega^2 [1/s^2] ascending, shape [m], and combinations that are orthonormal in mass, shape [r, m]; m < r where
+        columns depend on each other but for rounding.
+    """
     from scipy.linalg import eigh
 
     if columns.shape[1] == 0:
@@ -182,8 +187,11 @@ def ritz_modes(model: FEModel, columns: Array) -> tuple[Array, Array]:
     M_r = columns.T @ mass.reshape(columns.shape)
     scale = 1.0 / np.sqrt(np.diag(M_r))
     K_r = columns.T @ (model.stiffness @ columns)
-    omega_squared, U = eigh(K_r * np.outer(scale, scale), M_r * np.outer(scale, scale))
-    return omega_squared, scale[:, None] * U
+    size, directions = eigh(M_r * np.outer(scale, scale))
+    own = size > _DEPENDENT * size[-1]
+    free = scale[:, None] * (directions[:, own] / np.sqrt(size[own]))
+    omega_squared, U = eigh(free.T @ K_r @ free)
+    return omega_squared, free @ U
 
 
 def mode_signs(modes: Array) -> Array:

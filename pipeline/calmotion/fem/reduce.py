@@ -138,7 +138,7 @@ def _law(
         return "linear", (LeftOut(what, "no motion tells how far it bends"),)
     from .choose_law import choose_law
 
-    choice = choose_law(model, support, basis, settings.material, excitation, tolerance)
+    choice = choose_law(model, support, basis, settings.material, excitation, tolerance, body.path)
     if choice.law == "neohookean":
         return choice.law, ()
     if choice.law == "stvk":

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from ..dynamics.bending import most_bent
 from ..dynamics.failure import SimulationFailure
 from ..dynamics.model import Model, compile_model
 from ..dynamics.modes import system_frequencies
@@ -132,18 +133,30 @@ def _refuse_unsupported(character: Character, options: Options) -> None:
 
 def failure_error(prepared: Prepared, failure: SimulationFailure) -> ShotError:
     """A failed step in the user's words: which body, which joint, when."""
-    tree, character = prepared.model.tree, prepared.character
-    joint = character.joints[tree.joint[failure.component]]
+    tree, character, system = prepared.model.tree, prepared.character, prepared.model.system
     when = failure.time_s - prepared.grid.pre_roll
+    what = f"{_REASONS[failure.reason]} at {when:.3f} s"
+    bend = None if failure.state is None else most_bent(system, failure.state)
+    if bend is not None and bend.share > _FAR:
+        under = "just before" if failure.share == 1.0 else f"under {failure.share:.0%} of gravity"
+        return ShotError(
+            f"the simulation {what}: {under} this body bends by {1e3 * bend.distance:.3g} mm, "
+            f"{bend.share:.0%} of its length, which its modes cannot follow much further",
+            path=character.bodies[tree.body[bend.component]].path,
+            remedy="Check physics:youngsModulus (in the stage's units), the loads and the speed of the motion.",
+        )
+    joint = character.joints[tree.joint[failure.component]]
     return ShotError(
-        f"the simulation {_REASONS[failure.reason]} at {when:.3f} s, first at the joint {joint.path}",
+        f"the simulation {what}, first at the joint {joint.path}",
         path=character.bodies[tree.body[failure.component]].path,
         remedy="Try a smaller --step; check the masses, the material and the motion of this joint there.",
     )
 
 
+_FAR = 0.25  # deflection over length that explains a failure
 _REASONS = {
     "singular": "meets a singular system",
     "diverged": "diverges",
+    "refined": "can only go on with smaller steps",
     "no static equilibrium": "finds no static equilibrium",
 }

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..dynamics.model import Model
+from ..dynamics.reactions import reactions
 from ..naming import distinct_names
 from ..shot import LeftOut, Motion, Simulation
 from ..shot.character import Array
@@ -22,19 +23,23 @@ def by_body(model: Model, values: Array, axis: int = 1) -> Array:
 
 
 def _simulated_motion(model: Model, grid: TimeGrid, run: ForwardRun, motors: int) -> Motion:
-    states = run.trajectory.states
-    component = {body: k for k, body in enumerate(model.tree.body)}
+    states, tree = run.trajectory.states, model.tree
+    component = {body: k for k, body in enumerate(tree.body)}
     elastic = tuple(
         states.u[:, component[b], : model.system.elastic[component[b]]].copy() for b in range(len(component))
     )
+    found = reactions(model.system, run.trajectory, run.joint_angles, run.joint_rates)
     values, efforts = np.zeros((len(states.c), motors)), np.zeros((len(states.c), motors))
     for k, motor in enumerate(model.motor):
         if motor >= 0:
             values[:, motor] = run.joint_angles[:, k] * model.sign[k]
-            efforts[:, motor] = states.lam[:, k, 5] * model.sign[k]
+            efforts[:, motor] = found.efforts[:, k] * model.sign[k]
+    # from the system's joints and sides to the character's
+    order = np.argsort([*tree.joint, *tree.loops])
+    sign = model.sign[:, None]
     return Motion(
         grid.times, by_body(model, states.c), by_body(model, states.q), elastic, values, efforts,
-        run.target_positions, run.target_rotations,
+        run.target_positions, run.target_rotations, (sign * found.forces)[:, order], (sign * found.moments)[:, order],
     )  # fmt: skip
 
 
@@ -51,13 +56,16 @@ def reference_motion(model: Model, grid: TimeGrid, rigid: RigidMotion, angles: A
 def simulation_of(model: Model, grid: TimeGrid, run: ForwardRun, reference: Reference, motors: int) -> Simulation:
     """A forward run as a value for the user, measured against the reference."""
     turned, _ = rotation_errors(reference.rotations, run.target_rotations)
+    errors = np.linalg.norm(run.target_positions - reference.positions, axis=2)
     return Simulation(
         motion=_simulated_motion(model, grid, run, motors),
-        position_errors=np.linalg.norm(run.target_positions - reference.positions, axis=2),
+        position_errors=errors,
         rotation_errors=np.linalg.norm(turned, axis=2),
         newton_iterations=run.trajectory.newton_iterations,
         max_joint_gap=run.trajectory.max_joint_gap,
         wall_s=run.trajectory.wall_s,
+        sag=errors[0].copy(),
+        refined_steps=len(run.trajectory.refined),
     )
 
 

@@ -51,6 +51,8 @@ def sample_motion(motion: Motion, times: Array) -> Motion:
         motor_efforts=blend(motion.motor_efforts),
         target_positions=blend(motion.target_positions),
         target_rotations=blend_rotations(motion.target_rotations),
+        joint_forces=None if motion.joint_forces is None else blend(motion.joint_forces),
+        joint_moments=None if motion.joint_moments is None else blend(motion.joint_moments),
     )
 
 

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+
+import numpy as np
 
 from .character import Array
 
 
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """A motion of the whole character, one row a time step (T steps, B bodies, M motors, K targets).
+    """A motion of the whole character, one row a time step (T steps, B bodies, J joints, M motors, K targets).
 
     Attributes:
         times: [s] after the first frame of the shot, shape [T]; negative during a pre-roll.
@@ -20,6 +22,9 @@ class Motion:
         motor_efforts: Motor torques [N m], shape [T, M]; NaN in a motion that was not simulated.
         target_positions: [m], shape [T, K, 3], world.
         target_rotations: Unit quaternions, shape [T, K, 4], world.
+        joint_forces, joint_moments: What each joint does to its body1 [N], [N m], world axes, shape [T, J, 3]; the
+            moment is about the joint's frame on the body farther from the world. None in a motion that was not
+            simulated.
     """
 
     times: Array
@@ -30,6 +35,8 @@ class Motion:
     motor_efforts: Array
     target_positions: Array
     target_rotations: Array
+    joint_forces: Array | None = None
+    joint_moments: Array | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,6 +50,8 @@ class Simulation:
         newton_iterations: In all.
         max_joint_gap: Largest position gap of any joint at any step [m].
         wall_s: Time of this forward simulation alone [s].
+        sag: How far each target hangs below (or beside) the reference at rest, before it moves [m], shape [K].
+        refined_steps: Steps that only smaller ones reached.
     """
 
     motion: Motion
@@ -51,6 +60,8 @@ class Simulation:
     newton_iterations: int
     max_joint_gap: float
     wall_s: float
+    sag: Array = field(default_factory=lambda: np.zeros(0))
+    refined_steps: int = 0
 
 
 @dataclass(frozen=True, eq=False)
