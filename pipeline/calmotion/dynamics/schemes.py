@@ -11,7 +11,7 @@ SPECTRAL_RADIUS = 0.8  # of generalised-alpha at infinite frequency, where nobod
 # third derivative of their motion, and gaps of that over alpha: nanometres here. The term is implicit, so that it
 # limits no step and does not stiffen the motion; the multipliers of Newmark's family, whose formulas damp them less,
 # must not follow positions as closely.
-_FIRM, _GENTLE = 1e4, 1e2
+_FIRM, _GENTLE = 1e6, 1e2
 
 
 def bdf2_scheme(h: float) -> Scheme:

@@ -18,6 +18,7 @@ from .markers import WORLD_MARKER
 from .newton import Scratch, allocate_scratch
 from .refinement import refined_step
 from .schemes import SCHEMES
+from .so3 import matrix_of
 from .start import initial_acceleration, instant_before
 from .statics import equilibrium
 from .system import Blocks, Factors, State, System, allocate_blocks, allocate_factors
@@ -57,12 +58,14 @@ def instant_of(states, n):
 
 
 @kernel
-def _largest_gap(system, angle, rate, c, u, V, work):
+def _largest_gap(system, angle, rate, now, work):
     gap = 0.0
+    for b in range(len(system.parent)):
+        matrix_of(now.q[b], work.R[b])
     for joint in range(len(system.rows)):
         if system.rows[joint] == 0:
             continue
-        joint_kinematics(system, joint, angle[joint], rate[joint], c, u, V, work)
+        joint_kinematics(system, joint, angle[joint], rate[joint], now.c, now.u, now.V, work)
         d = 0.0
         for i in range(3):
             d += (work.j.p[i] - work.i.p[i]) ** 2
@@ -92,7 +95,7 @@ def _advance(system, scheme, h, first, last, earlier, states, angles, rates, wor
         factorisations += more
         if code != newton.CONVERGED:
             return code, n, component, solved, factorisations, gap
-        gap = max(gap, _largest_gap(system, angles[n], rates[n], states.c[n], states.u[n], states.V[n], work))
+        gap = max(gap, _largest_gap(system, angles[n], rates[n], instant_of(states, n), work))
     return newton.CONVERGED, last, -1, solved, factorisations, gap
 
 

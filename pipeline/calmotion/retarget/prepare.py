@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from ..dynamics.bending import most_bent
 from ..dynamics.failure import SimulationFailure
 from ..dynamics.model import Model, compile_model
@@ -129,6 +131,31 @@ def _refuse_unsupported(character: Character, options: Options) -> None:
             found=options.integrator,
             remedy=f"Use one of {', '.join(SCHEMES)}.",
         )
+
+
+def refuse_half_turns(prepared: Prepared, angles: Array) -> None:
+    """Motors must not turn by half a turn within a step: nothing could tell which way they went.
+
+    Args:
+        angles: Of the motors, shape [T, M].
+
+    Raises:
+        ShotError: One does.
+    """
+    character, grid = prepared.character, prepared.grid
+    for k, motor in enumerate(character.motors):
+        if character.joints[motor.joint].kind != "revolute" or len(angles) < 2:
+            continue
+        turns = np.abs(np.diff(angles[:, k]))
+        n = int(np.argmax(turns))
+        if not turns[n] < np.pi:
+            raise ShotError(
+                f"this motor turns by {np.degrees(turns[n]):.0f} degrees within one step of {1e3 * grid.h:.3g} ms",
+                path=motor.path,
+                attribute=motor.attribute,
+                found=f"at {grid.times[n]:.3f} s",
+                remedy="Use a smaller --step, or slow it down there.",
+            )
 
 
 def failure_error(prepared: Prepared, failure: SimulationFailure) -> ShotError:

@@ -17,7 +17,7 @@ from .bodies import mode_tables, skins
 from .curves import KNOT_SPACING, OffsetBasis, TimeGrid, coefficient_bounds, make_basis, sample_tracks
 from .gauss_newton import Iterate, minimize
 from .objective import Objective
-from .prepare import Options, failure_error, prepare
+from .prepare import Options, failure_error, prepare, refuse_half_turns
 from .problem import RetargetProblem, compile_kernels, rigid_motion, run_forward
 from .report import left_out_rows, reference_motion, simulation_of
 
@@ -41,6 +41,7 @@ def simulate_shot(
     workspace = Workspace.for_system(model.system)
     angles, rates = sample_tracks(animation.current, grid)
     meant, meant_rates = sample_tracks(animation.tracks, grid)
+    refuse_half_turns(prepared, angles)
     try:
         rigid = rigid_motion(model, meant, meant_rates, grid.h, world)
         progress(0.0, "compiling kernels, once")
@@ -140,6 +141,7 @@ def optimize_shot(
     prepared = prepare(character, animation, bodies, options)
     model, grid, world = prepared.model, prepared.grid, prepared.world
     angles, rates = sample_tracks(animation.tracks, grid)
+    refuse_half_turns(prepared, angles)
     spacing = options.knot_spacing or settings.knot_spacing or KNOT_SPACING
     smoothness = next(v for v in (options.smoothness, settings.smoothness, SMOOTHNESS) if v is not None)
     tolerance = options.tolerance or settings.tolerance or DEFAULT_TOLERANCE

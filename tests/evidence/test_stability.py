@@ -1,0 +1,57 @@
+"""Stiff and extreme cases run to the end or are refused with a reason, and the command says so."""
+
+import json
+
+import pytest
+from calmotion.evidence import stability
+from calmotion.evidence.stability import CASES, FAILED, REFUSED, RUNS, Case, run_case
+from calmotion.evidence.stability_map import draw_maps, outcomes
+
+# what no set of reduced coordinates about a straight arm can follow
+TOO_SOFT = [f"1e{power} Pa" for power in (4, 5, 6, 7, 8)] + ["load a million arms", "1:500, plastic"]
+TOO_FAST = ["half a turn in a frame, plastic", "100 rad/s, steps of 1/24 s"]
+
+
+@pytest.mark.parametrize("case", CASES, ids=lambda case: f"{case.group}, {case.name}")
+def test_every_case_runs_or_is_refused_with_a_reason(case):
+    outcome = run_case(case)
+    assert outcome.outcome == (REFUSED if case.name in TOO_SOFT + TOO_FAST else RUNS), outcome
+    if outcome.outcome == REFUSED:
+        # where, what, and what to do about it
+        assert outcome.why.startswith("/Arm/") and outcome.why.endswith(".") and len(outcome.why) > 100
+    else:
+        assert outcome.steps > 10 and outcome.error_m < 2.0 and outcome.gap_m < 1e-6
+
+
+def test_what_flies_away_or_is_no_number_has_failed(monkeypatch):
+    monkeypatch.setattr(stability, "REACH", 0.5)
+    assert run_case(Case("a", "b", CASES[-3].scene)).outcome == FAILED
+    monkeypatch.setattr(stability, "GAP", -1.0)
+    monkeypatch.setattr(stability, "REACH", 5.0)
+    assert "came apart" in run_case(Case("a", "b", CASES[-3].scene)).why
+
+    def broken():
+        raise ZeroDivisionError("no")
+
+    with pytest.raises(ZeroDivisionError):
+        run_case(Case("a", "b", broken))
+
+
+def test_the_command_prints_one_object_and_fails_with_its_cases(capsys, monkeypatch):
+    assert stability.main(["--json", "--only", "load a millionth"]) == 0
+    (row,) = json.loads(capsys.readouterr().out)["cases"]
+    assert row["outcome"] == RUNS and row["group"] == "mass ratio" and row["steps"] == 961
+    monkeypatch.setattr(stability, "GAP", -1.0)
+    assert stability.main(["--only", "load a millionth"]) == 1
+    assert "came apart" in capsys.readouterr().out
+
+
+def test_maps_are_drawn(tmp_path):
+    from calmotion.evidence.stability_map import MAPS
+
+    name, values, scene = MAPS["load"]
+    rows = (name, (1.0, 1e6), scene)
+    found = outcomes(rows, (1 / 48,))
+    assert [line[0].outcome for line in found] == [RUNS, REFUSED]
+    (path,) = draw_maps(str(tmp_path / "new"), {"load": rows}, (1 / 48,))
+    assert (tmp_path / "new" / "stability_load.png").read_bytes()[:4] == b"\x89PNG" and path.endswith(".png")
