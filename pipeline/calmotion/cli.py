@@ -123,7 +123,12 @@ def _run_options(command: argparse.ArgumentParser) -> None:
     model.add_argument(
         "--tolerance", metavar="LENGTH", type=_quantity("m"), help="error at the targets that does not matter (1mm)"
     )
-    model.add_argument("--integrator", metavar="NAME", default=None, help="time integrator (default: bdf2)")
+    model.add_argument(
+        "--integrator",
+        metavar="NAME",
+        default=None,
+        help="bdf2 (default, the only one for optimize), newmark, generalized-alpha, rk4 or radau",
+    )
     model.add_argument(
         "--pre-roll", metavar="TIME", type=_quantity("s"), help="time that eases into the motion (default: automatic)"
     )

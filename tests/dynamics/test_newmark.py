@@ -2,32 +2,7 @@
 
 import numpy as np
 import pytest
-from calmotion.dynamics.kinematics import system_poses
 from calmotion.dynamics.schemes import SCHEMES, generalized_alpha_scheme, newmark_scheme
-from calmotion.dynamics.simulation import Workspace, simulate
-from calmotion.dynamics.system import allocate_state
-from particles import particle_system
-
-DURATION = 0.4
-
-
-@pytest.fixture(scope="module")
-def flexible_tree():
-    """Four bodies, three of them flexible, motors and a free hinge; motion with as many steps as one asks for."""
-    rng = np.random.default_rng(0)
-    system, _ = particle_system(rng, [-1, 0, 1, 0], [2, 0, 3, 2], [6, 6, 5, 6], 3000.0)
-    reach = 6.0 * rng.normal(size=4)
-
-    def run(steps, integrator):
-        t = np.linspace(0.0, DURATION, steps + 1)
-        angles, rates = np.outer(t**4 * (3.0 - t), reach), np.outer(12.0 * t**3 - 5.0 * t**4, reach)
-        start = allocate_state(system)
-        c, q = system_poses(system, angles[:1])
-        start.c[:], start.q[:] = c[0], q[0]
-        workspace = Workspace.for_system(system)
-        return simulate(system, start, angles, rates, DURATION / steps, workspace, integrator=integrator)
-
-    return run
 
 
 @pytest.mark.parametrize("integrator", SCHEMES)

@@ -193,7 +193,8 @@ def factor_loops(system, Lc, Lp, Hc, Hp, Nc, Jp, lu, piv, Z, border, block):
             for i in range(JOINT_ROWS):
                 border.free[column, b, i] = -border.lam[b, i]
     # Whether a constraint is redundant shows in S only if its own rows are not blown up: one scale for all lengths and
-    # forces, and turns and moments by a length of the mechanism.
+    # forces, and turns and moments by a length of the mechanism. A firm Baumgarte term makes all constraint rows large
+    # against those of s.
     length = 0.0
     for joint in range(len(system.rows)):
         for k in range(2):
@@ -203,6 +204,7 @@ def factor_loops(system, Lc, Lp, Hc, Hp, Nc, Jp, lu, piv, Z, border, block):
             length = max(length, t)
     length = np.sqrt(length) if length > 0.0 else 1.0
     largest = 0.0
+    rows = 1.0
     for i in range(n):
         for k in range(n):
             if i % UNKNOWNS < JOINT_ROWS and k % UNKNOWNS < JOINT_ROWS:
@@ -210,11 +212,14 @@ def factor_loops(system, Lc, Lp, Hc, Hp, Nc, Jp, lu, piv, Z, border, block):
                 largest = max(largest, abs(border.S[i, k]))
             elif i % UNKNOWNS < JOINT_ROWS:
                 border.S[i, k] *= _unit(i, length)
+                rows = max(rows, abs(border.S[i, k]))
             elif k % UNKNOWNS < JOINT_ROWS:
                 border.S[i, k] *= _unit(k, length)
-    largest = largest if largest > 0.0 else 1.0
+    largest = largest / rows if largest > 0.0 else 1.0
     for i in range(n):
         for k in range(n):
+            if i % UNKNOWNS < JOINT_ROWS:
+                border.S[i, k] /= rows
             if k % UNKNOWNS < JOINT_ROWS:
                 border.S[i, k] /= largest
     border.rank[0] = pseudo_inverse(
@@ -223,6 +228,8 @@ def factor_loops(system, Lc, Lp, Hc, Hp, Nc, Jp, lu, piv, Z, border, block):
     for i in range(n):
         for k in range(n):
             t = border.inverse[i, k] * _unit(k, length)
+            if k % UNKNOWNS < JOINT_ROWS:
+                t /= rows
             border.inverse[i, k] = t * _unit(i, length) / largest if i % UNKNOWNS < JOINT_ROWS else t
             t = border.null[i, k]
             border.null[i, k] = t * _unit(i, length) / largest if i % UNKNOWNS < JOINT_ROWS else t

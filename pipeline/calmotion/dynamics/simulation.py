@@ -74,6 +74,16 @@ def _largest_gap(system, angle, rate, now, work):
 
 
 @kernel
+def largest_gap(system, angles, rates, states, world, work):
+    """Largest position gap of a joint over a trajectory [m]."""
+    gap = 0.0
+    for n in range(len(angles)):
+        copy_rows(world[n], work.world)
+        gap = max(gap, _largest_gap(system, angles[n], rates[n], instant_of(states, n), work))
+    return gap
+
+
+@kernel
 def _advance(system, scheme, h, first, last, earlier, states, angles, rates, world, work, blocks, factors, scratch):
     """Steps first..last-1 of a trajectory.
 

@@ -9,22 +9,14 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from ..shot.character import Array
-from .assembly import assemble
-from .elimination import factor
 from .failure import SimulationFailure
-from .least_multipliers import least_multipliers
-from .loops import factor_loops, solve_system
-from .sliders import LENGTH, slides_freely
+from .index1 import accelerations
 from .so3 import turn
-from .system import Scheme, State, System
+from .system import State, System
 
 if TYPE_CHECKING:
     from .simulation import Workspace
-
-VELOCITY_ONLY = Scheme(velocity=0.0, acceleration=0.0, gamma=1.0, alpha=0.0)
 
 
 def initial_acceleration(
@@ -42,46 +34,11 @@ def initial_acceleration(
     Raises:
         SimulationFailure: A singular system.
     """
-    blocks, factors, scratch = ws.blocks, ws.factors, ws.scratch
-    x, lam, block, border = scratch.x, scratch.lam, scratch.block, scratch.border
-    count = len(system.parent)
-    Hv, Vd, none = np.zeros_like(scratch.Hv), np.zeros_like(state.V), np.zeros_like(state.lam)
-    assemble(
-        system, VELOCITY_ONLY, state.c, state.q, state.u, state.V, Vd, none, angle, rate, Hv, True, ws.work, blocks
-    )  # fmt: skip
-    # motion of the coordinates (R^T dc, dphi, du) by the velocities
-    moving = state.V.copy()
-    moving[:, :3] = np.einsum("bik,bi->bk", ws.work.R, state.V[:, :3])
-    x[:] = -blocks.res
-    for joint, (p, b) in enumerate(system.side):
-        n = 6 + system.elastic[b]
-        if slides_freely(system, joint):
-            # at the level of accelerations its length is no unknown
-            blocks.Lp[joint, :, LENGTH] = 0.0
-            blocks.Hc[joint, LENGTH], blocks.Hp[joint, LENGTH] = 0.0, 0.0
-        drift = blocks.Hc[joint, :, :n] @ moving[b, :n]
-        drift += blocks.by_angle[joint] * rate[joint] + blocks.by_rate[joint] * acceleration[joint]
-        blocks.Hc[joint, :, :n] = -blocks.Lc[joint, :n].T
-        if p >= 0:
-            m = 6 + system.elastic[p]
-            drift += blocks.Hp[joint, :, :m] @ moving[p, :m]
-            blocks.Hp[joint, :, :m] = -blocks.Lp[joint, :m].T
-        lam[joint] = -drift
-    blocks.Nc[:], blocks.Jp[:] = 0.0, 0.0
-    blocks.K[:] = blocks.D
-    bad = factor(system, blocks, factors.lu, factors.pivots, factors.Z)
+    here = State(*[part.copy() for part in state])
+    bad = accelerations(system, here, angle, rate, acceleration, 0.0, ws.work, ws.blocks, ws.factors, ws.scratch)
     if bad >= 0:
         raise SimulationFailure(0.0, bad, "singular")
-    closing, tree = blocks.Hc[count:], (factors.lu, factors.pivots, factors.Z)
-    shared = (blocks.Lc, blocks.Lp, closing, blocks.Hp, blocks.Nc, blocks.Jp, *tree)
-    if len(system.rows) > count:
-        factor_loops(system, *shared, border, block)
-    solve_system(system, *shared, border.inverse, x, lam, border.X, border.lam, border.y, border.x, block)
-    if len(system.rows) > count:
-        least_multipliers(system, border, lam)
-    result = x.copy()
-    result[:, :3] = np.einsum("bik,bk->bi", ws.work.R, x[:, :3])
-    return result, lam.copy()
+    return ws.scratch.Vd.copy(), here.lam
 
 
 def instant_before(system: System, state: State, acceleration: Array, h: float) -> tuple[State, Array]:

@@ -38,7 +38,7 @@ class Case:
         group, name: What is extreme about it.
         scene: Makes the character, its meshes and its animation.
         step: [s], None for the automatic one.
-        integrator: A name of `dynamics.schemes.SCHEMES`.
+        integrator: One of `dynamics.integrators.INTEGRATORS`.
     """
 
     group: str
@@ -169,7 +169,7 @@ def run_case(case: Case) -> Outcome:
 
     (character, meshes), animation = case.scene()
     options = Options(step=case.step, integrator=case.integrator)
-    named = {"group": case.group, "name": case.name}
+    named: dict[str, Any] = {"group": case.group, "name": case.name}
     try:
         tree = span_tree(character)
         bodies = reduce_bodies(character, tree, meshes, None, excitations(character, animation, meshes, options))

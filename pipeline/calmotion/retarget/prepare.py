@@ -9,9 +9,9 @@ import numpy as np
 
 from ..dynamics.bending import most_bent
 from ..dynamics.failure import SimulationFailure
+from ..dynamics.integrators import INTEGRATORS, follows_roots
 from ..dynamics.model import Model, compile_model
 from ..dynamics.modes import system_frequencies
-from ..dynamics.schemes import SCHEMES
 from ..dynamics.topology import span_tree
 from ..errors import ShotError
 from ..fem.excitation_data import Excitation
@@ -55,7 +55,7 @@ def prepare(
     Raises:
         ShotError: Something the shot asks for is not supported.
     """
-    _refuse_unsupported(character, options)
+    _refuse_unsupported(character, animation, options)
     if len(animation.frame_times) < 2:
         raise ShotError(
             "a shot of one frame has no motion",
@@ -110,7 +110,7 @@ def first_pose_frequencies(character: Character, animation: Animation, bodies: S
         raise failure_error(prepared, failure) from failure
 
 
-def _refuse_unsupported(character: Character, options: Options) -> None:
+def _refuse_unsupported(character: Character, animation: Animation, options: Options) -> None:
     settings = character.retarget
     for attribute, value, supported in (
         ("calm:retarget:reference", settings.reference, "rigid"),
@@ -124,12 +124,20 @@ def _refuse_unsupported(character: Character, options: Options) -> None:
                 found=value,
                 remedy=f"Set it to {str(supported).lower()} for now.",
             )
-    if options.integrator not in SCHEMES:
+    if options.integrator not in INTEGRATORS:
         raise ShotError(
             "there is no such integrator",
             attribute="--integrator",
             found=options.integrator,
-            remedy=f"Use one of {', '.join(SCHEMES)}.",
+            remedy=f"Use one of {', '.join(INTEGRATORS)}.",
+        )
+    if animation.moving and not follows_roots(options.integrator):
+        raise ShotError(
+            "this integrator does not know of roots that move",
+            path=character.joints[animation.moving[0].joint].path,
+            attribute="--integrator",
+            found=options.integrator,
+            remedy=f"Use one of {', '.join(filter(follows_roots, INTEGRATORS))}.",
         )
 
 

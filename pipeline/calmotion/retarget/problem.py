@@ -8,10 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..dynamics.failure import SimulationFailure
+from ..dynamics.integrators import integrate
 from ..dynamics.kinematics import rigid_poses, rigid_state, target_frames
 from ..dynamics.linearization import Linearization, linearize
 from ..dynamics.model import Model, rigid_model
-from ..dynamics.simulation import Trajectory, Workspace, simulate
+from ..dynamics.simulation import Trajectory, Workspace
 from ..dynamics.sweeps import adjoint, tangent
 from ..shot.character import Array, BoolArray, IntArray
 from .curves import OffsetBasis, TimeGrid
@@ -52,11 +53,11 @@ def run_forward(
         angles, rates: Of the motors, shape [T, M] [rad, rad/s].
         h: Step [s].
         world: Moving roots, see `roots.sample_roots`.
-        integrator: A name of `schemes.SCHEMES`.
+        integrator: One of `integrators.INTEGRATORS`.
     """
     joint_angles, joint_rates = model.joint_angles(angles), model.joint_angles(rates)
     start = rigid_state(model, start_angles(model, joint_angles[0]), None if world is None else world[0])
-    trajectory = simulate(
+    trajectory = integrate(
         model.system, start, joint_angles, joint_rates, h, workspace, progress, integrator=integrator, world=world
     )
     states = trajectory.states
