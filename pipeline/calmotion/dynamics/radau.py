@@ -40,6 +40,7 @@ BUTCHER = np.array(
 DIFFERENCES = np.linalg.inv(BUTCHER)
 TOLERANCE = 1e-12  # of a Newton correction [m, rad]
 LIMIT = 30
+RANK = 1e-11  # singular values below this part of the largest count as zero
 
 
 def integrate(system: System, start: State, drive: Drive, times: Array, ws: Workspace) -> State:
@@ -199,8 +200,13 @@ class _Stepper:
                 A[rows, at] += H
                 right[at], right[rows] = -res, -gap
             if self.loops:
-                # redundant constraints: the motion is unique, of the multipliers those of least norm
-                solution = np.linalg.lstsq(A, right, rcond=1e-13)[0]
+                # Redundant constraints: the motion is unique, of the multipliers those of least norm. Which are
+                # redundant shows once accelerations and forces are the unknowns, and velocities the constraints.
+                A[:, : s * x] *= h * h
+                A[s * x :] /= h
+                right[s * x :] /= h
+                solution = np.linalg.lstsq(A, right, rcond=RANK)[0]
+                solution[: s * x] *= h * h
             else:
                 solution = np.linalg.solve(A, right)
             size = np.abs(solution[: s * x]).max()

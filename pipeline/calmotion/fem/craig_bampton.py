@@ -24,6 +24,8 @@ from .static_loads import peak_loads, unit_accelerations
 __all__ = ["Basis", "mode_signs", "reduced_basis", "rigid_patch"]
 
 _BAND = 2.0  # modes up to this times the highest excited frequency move on their own: above, by a third too little
+_ACCELERATIONS = 12  # columns of `peak_loads` before those of wrenches
+_MATTERS = 10.0  # tolerances
 _OUTPUTS = 1000  # nodes that are looked at on a body with neither targets nor moving interfaces
 
 
@@ -144,9 +146,22 @@ def _chosen(fixed: FixedInterface, places: _Places, settings: FlexibleSettings, 
     if settings.max_frequency < 0.0:
         kept |= displacement_alone(static) * _lag(static.omega_squared, limit) > tolerance
     combination, residual, error = needed_coordinates(static, kept, tolerance)
+    if places.excitation.closed and combination.shape[1]:
+        # A loop locks whatever motion of an interface its bodies have no coordinate for, and with it all that is
+        # coupled to that motion even slightly.
+        giving = _giving_way(static, tolerance)
+        combination, residual, _ = needed_coordinates(giving, kept, tolerance)
     omega_squared = np.einsum("ij,i,ij->j", combination, static.omega_squared, combination)
     basis = _basis(fixed, columns, omega_squared, U @ combination, int(residual.sum()))
     return replace(basis, cut_error_m=error)
+
+
+def _giving_way(static: StaticModel, tolerance: float) -> StaticModel:
+    """The static behaviour with every wrench so large that its response matters."""
+    alone = np.linalg.norm(static.response[:, :, _ACCELERATIONS:], axis=1).max(axis=0, initial=0.0)
+    factor = np.ones(static.loads.shape[1])
+    factor[_ACCELERATIONS:] = np.maximum(1.0, _MATTERS * tolerance / np.maximum(alone, 1e-300))
+    return replace(static, loads=static.loads * factor)
 
 
 def _lag(omega_squared: Array, limit: float) -> Array:

@@ -24,6 +24,8 @@ class Excitation:
         frequency: Highest frequency at which the motion pushes noticeably [Hz]; 0 when it is not known.
         reach: Longest distance from each interface to a target beyond it [m], shape [j]: a small turn of the
             interface moves that target by the angle times this. None: turns do not matter.
+        closed: Whether the body is part of a closed loop. Its other members may then hold its interfaces against any
+            motion, so that it must be able to give way in all of them: a rigid robot does not tell these loads.
     """
 
     acceleration: Array
@@ -33,6 +35,7 @@ class Excitation:
     moment: Array
     frequency: float = 0.0
     reach: Array | None = None
+    closed: bool = False
 
     @property
     def lever(self) -> Array:

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..dynamics.model import Model, body_anchors, compile_model, rigid_body
+from ..dynamics.reactions import reactions
 from ..dynamics.simulation import Workspace
 from ..dynamics.topology import Tree
 from ..fem.excitation_data import Excitation
@@ -69,7 +70,8 @@ def excitation_of(character: Character, model: Model, run: ForwardRun, h: float)
     angular = np.gradient(omega, h, axis=0) if len(states.c) > 1 else np.zeros_like(omega)
     felt = np.einsum("tbji,tbj->tbi", R, acceleration - system.gravity)
     reach = _reach(model, run, R)
-    force, moment = states.lam[:, :, :3], _moments(model, run, R)
+    force, moment, _ = reactions(system, run.trajectory, run.joint_angles, run.joint_rates)
+    closed = _in_loops(model)
     component_of = {body: k for k, body in enumerate(tree.body)}
     number = {joint: k for k, joint in enumerate((*tree.joint, *tree.loops))}
     result = []
@@ -77,30 +79,40 @@ def excitation_of(character: Character, model: Model, run: ForwardRun, h: float)
         b = component_of[index]
         peaks = np.zeros((len(anchors.joints), 6))
         far = np.zeros(len(anchors.joints))
-        for row, joint in enumerate(anchors.joints):
-            k = number[joint]
+        own = [number[joint] for joint in anchors.joints]
+        for row, k in enumerate(own):
             if row == anchors.root:
                 continue
             peaks[row, :3] = _peak(np.einsum("tji,tj->ti", R[:, b], force[:, k]))
             peaks[row, 3:] = _peak(np.einsum("tji,tj->ti", R[:, b], moment[:, k]))
             far[row] = reach[k] if k < len(reach) else 0.0
+            if b in closed:
+                # what is beyond it closes the loop: a turn moves it about the body's other end
+                ends = [system.position[j, int(system.side[j, 1] == b)] for j in (k, own[anchors.root])]
+                far[row] = max(far[row], float(np.linalg.norm(ends[0] - ends[1])))
         center = acceleration[:, b] + _carried_center(system.s[b] / system.mass[b], R[:, b], omega[:, b], angular[:, b])
         result.append(
             Excitation(
                 _peak(felt[:, b]), _peak(angular[:, b]), _peak(omega[:, b]), peaks[:, :3], peaks[:, 3:],
-                max(highest_frequency(center, h), highest_frequency(angular[:, b], h)), far,
+                max(highest_frequency(center, h), highest_frequency(angular[:, b], h)), far, b in closed,
             )
         )  # fmt: skip
     return tuple(result)
 
 
-def _moments(model: Model, run: ForwardRun, R: Array) -> Array:
-    """Moments that the joints transmit, world axes [N m], shape [T, J, 3]."""
-    moments = np.empty_like(run.trajectory.states.lam[:, :, 3:])
-    for k, parent in enumerate(model.system.side[:, 0]):
-        own = run.trajectory.states.lam[:, k, 3:] @ model.system.rotation[k, 0].T
-        moments[:, k] = own if parent < 0 else np.einsum("tij,tj->ti", R[:, parent], own)
-    return moments
+def _in_loops(model: Model) -> set[int]:
+    """Components that are part of a closed loop."""
+    system, found = model.system, set()
+    for joint in range(len(system.parent), len(system.rows)):
+        paths = []
+        for side in system.side[joint]:
+            path, b = [], int(side)
+            while b >= 0:
+                path.append(b)
+                b = int(system.parent[b])
+            paths.append(path)
+        found |= set(paths[0]) ^ set(paths[1])
+    return found
 
 
 def highest_frequency(signal: Array, h: float) -> float:
