@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
     Commands = argparse._SubParsersAction[argparse.ArgumentParser]
 
-BENCHMARKS = ("integrators", "meshing", "reduction", "stability")
+BENCHMARKS = ("integrators", "meshing", "reduction", "scaling", "stability")
 DONE, FAILED, WRONG_USAGE, INTERRUPTED = 0, 1, 2, 130
 
 

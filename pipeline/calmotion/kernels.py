@@ -19,6 +19,7 @@ from numba import config, njit
 from .cache import cache_folder
 
 PACKAGE = Path(__file__).parent
+FUSED = {"contract"}  # a product and a sum in one rounding; nothing that would reorder or drop terms
 
 
 @cache
@@ -37,12 +38,12 @@ def kernel(function: Callable[..., Any]) -> Any:
 
     It must not allocate: without reference counting it compiles in a fraction of the time.
     """
-    return _compile(function, _nrt=False, no_cfunc_wrapper=True)
+    return _compile(function, _nrt=False, no_cfunc_wrapper=True, fastmath=FUSED)
 
 
 def allocating_kernel(function: Callable[..., Any]) -> Any:
     """`kernel` for a function that makes arrays."""
-    return _compile(function)
+    return _compile(function, fastmath=FUSED)
 
 
 def _compile(function: Callable[..., Any], **options: Any) -> Any:

@@ -43,7 +43,7 @@ def eliminated(name):
         for k in np.flatnonzero(~constrained) + multipliers(system, joint).start:
             A[k, k] = 1.0
     factors = allocate_factors(system)
-    assert elimination.factor(system, blocks, factors.lu, factors.pivots, factors.Z) == -1
+    assert elimination.factor(system, blocks, factors.lu, factors.pivots, factors.Z, np.zeros(system.size)) == -1
     return system, blocks, factors, A
 
 
@@ -72,7 +72,7 @@ def test_singular_component_is_named():
     system, blocks, factors, _ = eliminated("flexible chain")
     blocks.K[1] = 0.0
     blocks.Lc[1] = 0.0
-    assert elimination.factor(system, blocks, factors.lu, factors.pivots, factors.Z) == 1
+    assert elimination.factor(system, blocks, factors.lu, factors.pivots, factors.Z, np.zeros(system.size)) == 1
 
 
 def test_dense_factors_solve_a_matrix_that_needs_pivoting():

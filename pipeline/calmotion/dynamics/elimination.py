@@ -86,8 +86,44 @@ def lu_solve_transposed(n, A, piv, x):
 
 
 @kernel
-def factor(system, blocks, lu, piv, Z):
+def _multiplier_rows(n, m, A, piv, Z):
+    """Z <- the last m columns of A^-T, shape [n + m, m], row by row, so that what is worked on lies together."""
+    for i in range(n + m):
+        for k in range(m):
+            Z[i, k] = 0.0
+    # U^T Y = E: of the lower triangle only the last m rows are not zero
+    for k in range(m):
+        Z[n + k, k] = 1.0
+    for i in range(n, n + m):
+        pivot = 1.0 / A[i, i]
+        for k in range(m):
+            Z[i, k] *= pivot
+        for j in range(i + 1, n + m):
+            f = A[i, j]
+            for k in range(m):
+                Z[j, k] -= f * Z[i, k]
+    for i in range(n + m - 1, 0, -1):
+        for j in range(i):
+            f = A[i, j]
+            if f != 0.0:
+                for k in range(m):
+                    Z[j, k] -= f * Z[i, k]
+    for i in range(n + m - 1, -1, -1):
+        p = piv[i]
+        if p != i:
+            for k in range(m):
+                t = Z[i, k]
+                Z[i, k] = Z[p, k]
+                Z[p, k] = t
+
+
+@kernel
+def factor(system, blocks, lu, piv, Z, row):
     """Eliminate all components; `blocks.K` of parents is overwritten by their Schur complements.
+
+    Args:
+        lu, piv, Z: Results, see `system.Factors`.
+        row: Scratch, shape [N] or longer.
 
     Returns:
         -1, or the index of the component whose block is singular.
@@ -114,12 +150,7 @@ def factor(system, blocks, lu, piv, Z):
         p = system.parent[b]
         if p < 0:
             continue
-        column = Z[b].T
-        for k in range(m):
-            for i in range(n + m):
-                column[k, i] = 0.0
-            column[k, n + k] = 1.0
-            lu_solve_transposed(n + m, A, piv[b], column[k])
+        _multiplier_rows(n, m, A, piv[b], Z[b])
         np_ = 6 + system.elastic[p]
         for k in range(m):
             x0 = 0.0
@@ -130,12 +161,16 @@ def factor(system, blocks, lu, piv, Z):
                 x1 += Z[b, i, k] * blocks.Nc[b, i, 1]
                 x2 += Z[b, i, k] * blocks.Nc[b, i, 2]
             for a in range(np_):
-                t = x0 * blocks.Jp[b, 0, a] + x1 * blocks.Jp[b, 1, a] + x2 * blocks.Jp[b, 2, a]
-                for i in range(m):
-                    t += Z[b, n + i, k] * blocks.Hp[b, i, a]
-                if t != 0.0:
-                    for i in range(np_):
-                        blocks.K[p, i, a] -= blocks.Lp[b, i, k] * t
+                row[a] = x0 * blocks.Jp[b, 0, a] + x1 * blocks.Jp[b, 1, a] + x2 * blocks.Jp[b, 2, a]
+            for i in range(m):
+                f = Z[b, n + i, k]
+                for a in range(np_):
+                    row[a] += f * blocks.Hp[b, i, a]
+            for i in range(np_):
+                f = blocks.Lp[b, i, k]
+                if f != 0.0:
+                    for a in range(np_):
+                        blocks.K[p, i, a] -= f * row[a]
     return -1
 
 

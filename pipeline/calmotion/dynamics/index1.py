@@ -89,7 +89,7 @@ def accelerations(system, state, angle, rate, acceleration, firmness, work, bloc
     blocks.Jp[:] = 0.0
     for b in range(count):
         copy_rows(blocks.D[b], blocks.K[b])
-    bad = factor(system, blocks, factors.lu, factors.pivots, factors.Z)
+    bad = factor(system, blocks, factors.lu, factors.pivots, factors.Z, scratch.block)
     if bad >= 0:
         return bad
     if joints > count:

@@ -68,7 +68,7 @@ def _linearize(system, static, scheme, h, states, angles, rates, world, work, bl
         assemble(
             system, kind, now.c, now.q, now.u, now.V, Vd, now.lam, angles[n], rates[n], Hv[n], True, work, here
         )  # fmt: skip
-        bad = factor(system, here, lu[n], pivots[n], Z[n])
+        bad = factor(system, here, lu[n], pivots[n], Z[n], block)
         if bad >= 0:
             return bad, n
         if joints > count:

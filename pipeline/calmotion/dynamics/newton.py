@@ -153,7 +153,7 @@ def _linearize(system, scheme, h, before, now, angle, rate, work, blocks, factor
     assemble(
         system, scheme, now.c, now.q, now.u, now.V, scratch.Vd, now.lam, angle, rate, scratch.Hv, True, work, blocks
     )
-    bad = factor(system, blocks, factors.lu, factors.pivots, factors.Z)
+    bad = factor(system, blocks, factors.lu, factors.pivots, factors.Z, scratch.block)
     if bad < 0 and len(system.rows) > len(system.parent):
         factor_loops(
             system, blocks.Lc, blocks.Lp, blocks.Hc[len(system.parent) :], blocks.Hp, blocks.Nc, blocks.Jp, factors.lu,

@@ -111,7 +111,7 @@ def _iterate(
         linearize(system, state, angle, ws)
         blocks, factors = ws.blocks, ws.factors
         blocks.K[:] += inertia * blocks.D
-        component = factor(system, blocks, factors.lu, factors.pivots, factors.Z)
+        component = factor(system, blocks, factors.lu, factors.pivots, factors.Z, block)
         if component >= 0:
             return component, iteration + 1
         x[:] = -blocks.res

@@ -1,0 +1,45 @@
+"""The figure of `scaling`: laws of growth, and run time against error beside Exudyn."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from .exudyn_arm import Run
+    from .scaling import Growth
+
+BLUE, COLORS = "#0072b2", {"exudyn": "#d55e00", "ours, bdf2": "#0072b2", "ours, generalized-alpha": "#e69f00"}
+
+
+def draw(folder: str, found: Sequence[Growth], peers: Sequence[Run]) -> str:
+    """Draw to `<folder>/scaling.png` and return the path."""
+    from matplotlib.figure import Figure
+
+    target = Path(folder)
+    target.mkdir(parents=True, exist_ok=True)
+    count = len(found) + bool(peers)
+    figure = Figure(figsize=(3.6 * count, 3.4), layout="constrained")
+    axes = figure.subplots(1, count, squeeze=False)[0]
+    for panel, item in zip(axes, found, strict=False):
+        panel.loglog(item.values, [1e3 * seconds for seconds in item.seconds], "o-", color=BLUE, lw=1.2, ms=4)
+        panel.set_title(f"exponent {item.exponent:.2f}", loc="left", fontsize=10)
+        panel.set_xlabel(item.name)
+        panel.set_ylabel("whole simulation [ms]" if item.name == "steps" else "step [ms]")
+    for code in dict.fromkeys(run.code for run in peers):
+        own = [run for run in peers if run.code == code]
+        times, errors = [run.wall_s for run in own], [run.error for run in own]
+        axes[-1].loglog(times, errors, "o-", color=COLORS[code], lw=1.2, ms=4, label=code)
+    if peers:
+        axes[-1].set_title("the swung arm, 14 modes", loc="left", fontsize=10)
+        axes[-1].set_xlabel("run time [s]")
+        axes[-1].set_ylabel("largest error of the tip [m]")
+        axes[-1].legend(frameon=False, fontsize=8)
+    for panel in axes:
+        panel.grid(True, which="major", lw=0.3, alpha=0.6)
+        for side in ("top", "right"):
+            panel.spines[side].set_visible(False)
+    path = target / "scaling.png"
+    figure.savefig(path, dpi=150)
+    return str(path)
