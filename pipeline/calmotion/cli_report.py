@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -9,6 +10,7 @@ from numpy.typing import NDArray
 
 from . import __version__
 from .host import CsvFile, Figures, OperatorResult, Recording, Run, WrittenLayer
+from .memory import peak_memory
 from .shot import Character, LeftOut, Result, Simulation
 from .shot.character import Array
 
@@ -76,6 +78,7 @@ def run_report(run: Run, character: Character, result: Result, command: str, tot
     report |= {
         "wall_s": result.wall_s,
         "total_wall_s": total_wall_s,
+        "peak_memory_gb": peak if math.isfinite(peak := peak_memory()) else None,
         "steps": len(final.motion.times),
         "step_s": result.step_s,
         "pre_roll_s": result.pre_roll_s,

@@ -91,6 +91,7 @@ def print_run(report: dict[str, Any], stream: TextIO) -> None:
     console.print(
         f"{report['steps']} steps of {1000 * report['step_s']:.4g} ms, {report['dof']} coordinates, "
         f"{report['modes']} of them elastic; {report['total_wall_s']:.1f} s in all"
+        + (f", {report['peak_memory_gb']:.2f} GB" if report["peak_memory_gb"] else "")
     )
     print_left_out(console, report["left_out"])
     for note in report["notes"]:

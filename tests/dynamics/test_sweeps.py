@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from calmotion.dynamics.kinematics import system_poses
-from calmotion.dynamics.linearization import linearize
+from calmotion.dynamics.linearization import bytes_of_an_instant, linearize
 from calmotion.dynamics.simulation import Workspace, simulate
 from calmotion.dynamics.sweeps import adjoint, tangent
 from calmotion.dynamics.system import LINEAR, NEOHOOKEAN, STVK, allocate_state
@@ -119,6 +119,20 @@ def test_adjoint_is_the_transpose_of_the_tangent(case):
     g_angle, g_rate = adjoint(lin, gradient)
     backward = float(np.sum(g_angle * d_angle) + np.sum(g_rate * d_rate))
     assert abs(forward - backward) < 1e-12 * abs(forward)
+
+
+def test_windows_of_a_few_instants_give_the_same_sweeps(case):
+    case, lin, gradient = case
+    d_angle, d_rate = curves(case.dp)
+    angles, rates = curves(case.p)
+    few = linearize(case.system, lin.trajectory, angles, rates, case.ws, memory=7 * bytes_of_an_instant(case.system))
+    assert len(few.pivots) == 7 and len(few.windows()) == 5 and few.windows()[-1] == (28, 31)
+    assert np.array_equal(tangent(few, d_angle, d_rate), tangent(lin, d_angle, d_rate))
+    for found, expected in zip(adjoint(few, gradient), adjoint(lin, gradient), strict=True):
+        assert np.array_equal(found, expected)
+    # what the case's other tests use has been made with the same workspace, and is whole
+    again = linearize(case.system, lin.trajectory, angles, rates, case.ws, few)
+    assert len(again.windows()) == 1
 
 
 def test_gradient_matches_central_differences_of_the_whole_simulation(case):

@@ -10,8 +10,6 @@ with h_V, h_A the part of dV, dV' that earlier instants determine.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from ..kernels import kernel
@@ -26,25 +24,20 @@ from .simulation import Trajectory, Workspace, instant_of
 from .statics import STATIC
 from .system import JOINT_ROWS, Blocks, System
 
-
-@dataclass(frozen=True, eq=False)
-class Linearization:
-    """What the sweeps need of every instant: blocks of `system.Blocks`, factors, rotations, velocity maps."""
-
-    system: System
-    trajectory: Trajectory
-    data: tuple[Array, ...]
-    pivots: IntArray
+MEMORY = 4e9  # [bytes]
 
 
 @kernel
-def _linearize(system, static, scheme, h, states, angles, rates, world, work, blocks, scratch, data, pivots):
-    """Blocks and factors of all instants; returns -1 or the component that is singular, and the instant."""
+def _linearize(
+    system, static, scheme, h, states, angles, rates, world, first, last, work, blocks, scratch, data, pivots
+):  # fmt: skip
+    """Blocks and factors of instants first..last-1; returns -1 or the component that is singular, and the instant."""
     J, T, Wt, Vd, block, border = scratch.J, scratch.T, scratch.Wt, scratch.Vd, scratch.block, scratch.border
     P, D, Lc, Lp, Hc, Hp, Nc, Jp, by_angle, by_rate, on_parent, lu, Z, inverse, R, Hv = data
     count, size = Vd.shape
     joints = len(system.rows)
-    for n in range(len(angles)):
+    for n in range(first, last):
+        at = n - first
         now = instant_of(states, n)
         if n == 0:
             for b in range(count):
@@ -57,29 +50,31 @@ def _linearize(system, static, scheme, h, states, angles, rates, world, work, bl
             before = instant_of(states, n - 1)
             before2 = instant_of(states, max(n - 2, 0))
             velocities(system, h, now, before, before2, J, Vd)
-            position_to_velocity(system, h, now, before, J, T, Wt, Hv[n])
+            position_to_velocity(system, h, now, before, J, T, Wt, Hv[at])
         copy_rows(world[n], work.world)
         # the sweeps read these in place, so they are made there
         here = Blocks(
-            blocks.K, P[n], D[n], Lc[n], Lp[n], blocks.Hc, Hp[n], Nc[n], Jp[n], by_angle[n], by_rate[n], on_parent[n],
-            blocks.res, blocks.gap,
+            blocks.K, P[at], D[at], Lc[at], Lp[at], blocks.Hc, Hp[at], Nc[at], Jp[at], by_angle[at], by_rate[at],
+            on_parent[at], blocks.res, blocks.gap,
         )  # fmt: skip
         kind = static if n == 0 else scheme
         assemble(
-            system, kind, now.c, now.q, now.u, now.V, Vd, now.lam, angles[n], rates[n], Hv[n], True, work, here
+            system, kind, now.c, now.q, now.u, now.V, Vd, now.lam, angles[n], rates[n], Hv[at], True, work, here
         )  # fmt: skip
-        bad = factor(system, here, lu[n], pivots[n], Z[n], block)
+        bad = factor(system, here, lu[at], pivots[at], Z[at], block)
         if bad >= 0:
             return bad, n
         if joints > count:
             for j in range(count, joints):
-                copy_rows(blocks.Hc[j], Hc[n, j - count])
-            factor_loops(system, Lc[n], Lp[n], Hc[n], Hp[n], Nc[n], Jp[n], lu[n], pivots[n], Z[n], border, block)
-            copy_rows(border.inverse, inverse[n])
+                copy_rows(blocks.Hc[j], Hc[at, j - count])
+            factor_loops(
+                system, Lc[at], Lp[at], Hc[at], Hp[at], Nc[at], Jp[at], lu[at], pivots[at], Z[at], border, block
+            )
+            copy_rows(border.inverse, inverse[at])
         for b in range(count):
             for i in range(3):
                 for k in range(3):
-                    R[n, b, i, k] = work.R[b, i, k]
+                    R[at, b, i, k] = work.R[b, i, k]
     return -1, 0
 
 
@@ -90,12 +85,14 @@ def linearize(
     rates: Array,
     workspace: Workspace,
     previous: Linearization | None = None,
+    memory: float = MEMORY,
 ) -> Linearization:
     """Linearise a simulation about its trajectory.
 
     Args:
         angles, rates: The joint angles (or lengths) and rates it was simulated with, shape [T, J].
         previous: A linearisation of the same size whose memory is used again (it becomes invalid).
+        memory: Most that blocks and factors may take [bytes].
 
     Raises:
         SimulationFailure: A singular step, or one that had to be refined: its equations are not those of the others.
@@ -105,28 +102,68 @@ def linearize(
         raise ValueError("sweeps are those of BDF2")
     if trajectory.refined:
         raise SimulationFailure(trajectory.refined[0] * trajectory.h, 0, "refined")
-    total, count, size, joints = len(angles), len(system.parent), system.size, len(system.rows)
-    loops = joints - count
-    if previous is not None and previous.data[0].shape[0] == total:
+    size = max(2, min(len(angles), int(memory / bytes_of_an_instant(system))))
+    if previous is not None and len(previous.pivots) == size:
         data, pivots = previous.data, previous.pivots
     else:
+        data = tuple(np.zeros((size, *shape)) for shape in _shapes(system))
+        pivots = np.zeros((size, len(system.parent), system.size + JOINT_ROWS), np.int32)
+    made = Linearization(system, trajectory, angles, rates, workspace, data, pivots)
+    made.load(0)
+    return made
 
-        def zeros(*shape: int) -> Array:
-            return np.zeros((total,) + shape)
 
-        m, border = JOINT_ROWS, UNKNOWNS * loops
-        data = (
-            zeros(count, size, size), zeros(count, size, size), zeros(joints, size, m), zeros(joints, size, m),
-            zeros(loops, m, size), zeros(joints, m, size), zeros(joints, size, 3), zeros(joints, 3, size),
-            zeros(joints, m), zeros(joints, m), zeros(joints, size), zeros(count, size + m, size + m),
-            zeros(count, size + m, m), zeros(border, border), zeros(count, 3, 3), zeros(count, 4, 4),
+def _shapes(system: System) -> list[tuple[int, ...]]:
+    """Shapes of what is kept of an instant, in the order of `Linearization.data`."""
+    count, size, joints, m = len(system.parent), system.size, len(system.rows), JOINT_ROWS
+    loops = joints - count
+    border = UNKNOWNS * loops
+    return [
+        (count, size, size), (count, size, size), (joints, size, m), (joints, size, m), (loops, m, size),
+        (joints, m, size), (joints, size, 3), (joints, 3, size), (joints, m), (joints, m), (joints, size),
+        (count, size + m, size + m), (count, size + m, m), (border, border), (count, 3, 3), (count, 4, 4),
+    ]  # fmt: skip
+
+
+def bytes_of_an_instant(system: System) -> int:
+    """What is kept of an instant takes so much memory."""
+    return 8 * sum(int(np.prod(shape)) for shape in _shapes(system))
+
+
+class Linearization:
+    """What the sweeps need of every instant: blocks of `system.Blocks`, factors, rotations, velocity maps.
+
+    Where all instants together would take too much memory they are made window by window, anew in each sweep.
+    """
+
+    def __init__(
+        self, system: System, trajectory: Trajectory, angles: Array, rates: Array, workspace: Workspace,
+        data: tuple[Array, ...], pivots: IntArray,
+    ):  # fmt: skip
+        self.system, self.trajectory, self.angles, self.rates = system, trajectory, angles, rates
+        self.workspace, self.data, self.pivots = workspace, data, pivots
+        self._loaded = -1
+
+    def windows(self) -> list[tuple[int, int]]:
+        """First instant and the one after the last of every window."""
+        total, size = len(self.angles), len(self.pivots)
+        return [(first, min(first + size, total)) for first in range(0, total, size)]
+
+    def load(self, first: int) -> None:
+        """Make the blocks of the window that starts at an instant, if they are not there.
+
+        Raises:
+            SimulationFailure: A singular step.
+        """
+        if first == self._loaded:
+            return
+        self._loaded = -1
+        trajectory, ws = self.trajectory, self.workspace
+        last = min(first + len(self.pivots), len(self.angles))
+        bad, instant = _linearize(
+            self.system, STATIC, bdf2_scheme(trajectory.h), trajectory.h, trajectory.states, self.angles, self.rates,
+            trajectory.world, first, last, ws.work, ws.blocks, ws.scratch, self.data, self.pivots,
         )  # fmt: skip
-        pivots = np.zeros((total, count, size + JOINT_ROWS), np.int32)
-    ws = workspace
-    bad, instant = _linearize(
-        system, STATIC, bdf2_scheme(trajectory.h), trajectory.h, trajectory.states, angles, rates, trajectory.world,
-        ws.work, ws.blocks, ws.scratch, data, pivots,
-    )  # fmt: skip
-    if bad >= 0:
-        raise SimulationFailure(instant * trajectory.h, bad, "singular")
-    return Linearization(system, trajectory, data, pivots)
+        if bad >= 0:
+            raise SimulationFailure(instant * trajectory.h, bad, "singular")
+        self._loaded = first

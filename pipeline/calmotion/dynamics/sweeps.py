@@ -17,10 +17,11 @@ from .so3 import exponential, inverse_right_jacobian, right_jacobian
 
 
 @allocating_kernel
-def _tangent(system, h, turns, d_angle, d_rate, data, pivots, dX):
+def _tangent(system, h, turns, d_angle, d_rate, first, last, data, pivots, dc, nu, dth, dX):
+    """Instants first..last-1, whose blocks the data hold; dc, nu, dth remember three instants, by turns."""
     P, D, Lc, Lp, Hc, Hp, Nc, Jp, by_angle, by_rate, on_parent, lu, Z, inverse, R, Hv = data
     joints = len(system.rows)
-    total, count, size = dX.shape
+    _, count, size = dX.shape
     x = np.zeros((count, size))
     lam = np.zeros((joints, 6))
     block = np.zeros(size + 6)
@@ -30,12 +31,9 @@ def _tangent(system, h, turns, d_angle, d_rate, data, pivots, dX):
     hA = np.zeros((count, size))
     tmp = np.zeros(3)
     J = np.zeros((3, 3))
-    # three instants back, by turns; translation in world axes
-    dc = np.zeros((3, count, 3))
-    nu = np.zeros((3, count, size))
-    dth = np.zeros((3, count, 3))
     c1, c2 = 2.0 / h, 0.5 / h
-    for n in range(total):
+    for n in range(first, last):
+        at = n - first
         now, one, two = n % 3, (n + 2) % 3, (n + 1) % 3
         if n == 1:
             two = one
@@ -48,8 +46,8 @@ def _tangent(system, h, turns, d_angle, d_rate, data, pivots, dX):
                     v = 0.0
                     a = 0.0
                     for k in range(3):
-                        v += R[n, b, k, i] * (c2 * dc[two, b, k] - c1 * dc[one, b, k])
-                        a += R[n, b, k, i] * (c2 * nu[two, b, k] - c1 * nu[one, b, k])
+                        v += R[at, b, k, i] * (c2 * dc[two, b, k] - c1 * dc[one, b, k])
+                        a += R[at, b, k, i] * (c2 * nu[two, b, k] - c1 * nu[one, b, k])
                     hV[b, i] = v
                     hA[b, i] = a
                 exponential(turns[n, b], J)
@@ -59,7 +57,7 @@ def _tangent(system, h, turns, d_angle, d_rate, data, pivots, dX):
                 for i in range(3):
                     t = 0.0
                     for k in range(3):
-                        t -= Hv[n, b, 1 + i, 1 + k] * tmp[k] + 0.5 / h * J[i, k] * dth[one, b, k]
+                        t -= Hv[at, b, 1 + i, 1 + k] * tmp[k] + 0.5 / h * J[i, k] * dth[one, b, k]
                     hV[b, 3 + i] = t
                     hA[b, 3 + i] = c2 * nu[two, b, 3 + i] - c1 * nu[one, b, 3 + i]
                 back = n - 2 if n > 1 else 0
@@ -69,7 +67,7 @@ def _tangent(system, h, turns, d_angle, d_rate, data, pivots, dX):
                 for i in range(m):
                     t = 0.0
                     for k in range(m):
-                        t -= P[n, b, i, k] * hV[b, k] + D[n, b, i, k] * hA[b, k]
+                        t -= P[at, b, i, k] * hV[b, k] + D[at, b, i, k] * hA[b, k]
                     x[b, i] = t
         for j in range(joints):
             p = system.side[j, 0]
@@ -78,36 +76,36 @@ def _tangent(system, h, turns, d_angle, d_rate, data, pivots, dX):
                 t = 0.0
                 if n > 0 and has_row(system, j, i):
                     for k in range(6 + system.elastic[b]):
-                        t += Lc[n, j, k, i] * hV[b, k]
+                        t += Lc[at, j, k, i] * hV[b, k]
                     if p >= 0:
                         for k in range(6 + system.elastic[p]):
-                            t += Lp[n, j, k, i] * hV[p, k]
-                lam[j, i] = t - by_angle[n, j, i] * d_angle[n, j] - by_rate[n, j, i] * d_rate[n, j]
+                            t += Lp[at, j, k, i] * hV[p, k]
+                lam[j, i] = t - by_angle[at, j, i] * d_angle[n, j] - by_rate[at, j, i] * d_rate[n, j]
             if p >= 0 and system.sliding[j]:
                 for i in range(6 + system.elastic[p]):
-                    x[p, i] -= on_parent[n, j, i] * d_angle[n, j]
+                    x[p, i] -= on_parent[at, j, i] * d_angle[n, j]
         solve_system(
-            system, Lc[n], Lp[n], Hc[n], Hp[n], Nc[n], Jp[n], lu[n], pivots[n], Z[n], inverse[n], x, lam, X, tree, y,
-            g, block,
+            system, Lc[at], Lp[at], Hc[at], Hp[at], Nc[at], Jp[at], lu[at], pivots[at], Z[at], inverse[at], x, lam, X,
+            tree, y, g, block,
         )  # fmt: skip
         for b in range(count):
             m = 6 + system.elastic[b]
             for i in range(m):
                 dX[n, b, i] = x[b, i]
             for i in range(3):
-                dc[now, b, i] = R[n, b, i, 0] * x[b, 0] + R[n, b, i, 1] * x[b, 1] + R[n, b, i, 2] * x[b, 2]
+                dc[now, b, i] = R[at, b, i, 0] * x[b, 0] + R[at, b, i, 1] * x[b, 1] + R[at, b, i, 2] * x[b, 2]
             if n == 0:
                 continue
             for i in range(3):
                 v = 0.0
                 w = 0.0
                 for k in range(3):
-                    v += R[n, b, i, k] * (Hv[n, b, 0, 0] * x[b, k] + hV[b, k])
-                    w += Hv[n, b, 1 + i, 1 + k] * x[b, 3 + k]
+                    v += R[at, b, i, k] * (Hv[at, b, 0, 0] * x[b, k] + hV[b, k])
+                    w += Hv[at, b, 1 + i, 1 + k] * x[b, 3 + k]
                 nu[now, b, i] = v
                 nu[now, b, 3 + i] = w + hV[b, 3 + i]
             for i in range(6, m):
-                nu[now, b, i] = Hv[n, b, 0, 0] * x[b, i] + hV[b, i]
+                nu[now, b, i] = Hv[at, b, 0, 0] * x[b, i] + hV[b, i]
             exponential(turns[n, b], J)
             for i in range(3):
                 tmp[i] = x[b, 3 + i]
@@ -119,11 +117,11 @@ def _tangent(system, h, turns, d_angle, d_rate, data, pivots, dX):
 
 
 @allocating_kernel
-def _adjoint(system, h, turns, Xbar, data, pivots, g_angle, g_rate, cbar, nubar, thbar):
+def _adjoint(system, h, turns, Xbar, first, last, data, pivots, g_angle, g_rate, cbar, nubar, thbar):
     """Transpose of `_tangent`; Xbar (body axes), cbar (world axes), nubar, thbar are overwritten."""
     P, D, Lc, Lp, Hc, Hp, Nc, Jp, by_angle, by_rate, on_parent, lu, Z, inverse, R, Hv = data
     joints = len(system.rows)
-    total, count, size = Xbar.shape
+    _, count, size = Xbar.shape
     x = np.zeros((count, size))
     lam = np.zeros((joints, 6))
     block = np.zeros(size + 6)
@@ -133,22 +131,23 @@ def _adjoint(system, h, turns, Xbar, data, pivots, g_angle, g_rate, cbar, nubar,
     tmp = np.zeros(3)
     J = np.zeros((3, 3))
     c1, c2 = 2.0 / h, 0.5 / h
-    for n in range(total - 1, -1, -1):
+    for n in range(last - 1, first - 1, -1):
+        at = n - first
         back = n - 2 if n > 1 else 0
         for b in range(count):
             m = 6 + system.elastic[b]
             if n > 0:
                 # velocities: dV = (beta dc, H dphi, beta du) + h_V
                 for i in range(3):
-                    cbar[n, b, i] += Hv[n, b, 0, 0] * nubar[n, b, i]
+                    cbar[n, b, i] += Hv[at, b, 0, 0] * nubar[n, b, i]
                     t = 0.0
                     for k in range(3):
-                        t += R[n, b, k, i] * nubar[n, b, k]
-                        Xbar[n, b, 3 + i] += Hv[n, b, 1 + k, 1 + i] * nubar[n, b, 3 + k]
+                        t += R[at, b, k, i] * nubar[n, b, k]
+                        Xbar[n, b, 3 + i] += Hv[at, b, 1 + k, 1 + i] * nubar[n, b, 3 + k]
                     hV[b, i] = t
                     hV[b, 3 + i] = nubar[n, b, 3 + i]
                 for i in range(6, m):
-                    Xbar[n, b, i] += Hv[n, b, 0, 0] * nubar[n, b, i]
+                    Xbar[n, b, i] += Hv[at, b, 0, 0] * nubar[n, b, i]
                     hV[b, i] = nubar[n, b, i]
                 # dtheta = J_r^-1 (dphi_n - exp^T dphi_{n-1})
                 inverse_right_jacobian(turns[n, b], J)
@@ -161,25 +160,25 @@ def _adjoint(system, h, turns, Xbar, data, pivots, g_angle, g_rate, cbar, nubar,
             for i in range(3):
                 t = Xbar[n, b, i]
                 for k in range(3):
-                    t += R[n, b, k, i] * cbar[n, b, k]
+                    t += R[at, b, k, i] * cbar[n, b, k]
                 x[b, i] = t
             for i in range(3, m):
                 x[b, i] = Xbar[n, b, i]
         lam[:] = 0.0
         solve_system_transposed(
-            system, Lc[n], Lp[n], Hc[n], Hp[n], Nc[n], Jp[n], lu[n], pivots[n], Z[n], inverse[n], x, lam, X, tree, y,
-            g, block,
+            system, Lc[at], Lp[at], Hc[at], Hp[at], Nc[at], Jp[at], lu[at], pivots[at], Z[at], inverse[at], x, lam, X,
+            tree, y, g, block,
         )  # fmt: skip
         for j in range(joints):
             p = system.side[j, 0]
             ga = 0.0
             gr = 0.0
             for i in range(6):
-                ga -= by_angle[n, j, i] * lam[j, i]
-                gr -= by_rate[n, j, i] * lam[j, i]
+                ga -= by_angle[at, j, i] * lam[j, i]
+                gr -= by_rate[at, j, i] * lam[j, i]
             if p >= 0 and system.sliding[j]:
                 for i in range(6 + system.elastic[p]):
-                    ga -= on_parent[n, j, i] * x[p, i]
+                    ga -= on_parent[at, j, i] * x[p, i]
             g_angle[n, j] = ga
             g_rate[n, j] = gr
         if n == 0:
@@ -192,29 +191,29 @@ def _adjoint(system, h, turns, Xbar, data, pivots, g_angle, g_rate, cbar, nubar,
                     continue
                 t = lam[j, i]
                 for k in range(6 + system.elastic[b]):
-                    hV[b, k] += Lc[n, j, k, i] * t
+                    hV[b, k] += Lc[at, j, k, i] * t
                 if p >= 0:
                     for k in range(6 + system.elastic[p]):
-                        hV[p, k] += Lp[n, j, k, i] * t
+                        hV[p, k] += Lp[at, j, k, i] * t
         for b in range(count):
             m = 6 + system.elastic[b]
             for i in range(m):
                 t = x[b, i]
                 for k in range(m):
-                    hV[b, k] -= P[n, b, i, k] * t
+                    hV[b, k] -= P[at, b, i, k] * t
             # h_A = (nu_{n-2} - 4 nu_{n-1}) / 2h, translation turned into body axes
             for k in range(m):
                 block[k] = 0.0
             for i in range(m):
                 t = x[b, i]
                 for k in range(m):
-                    block[k] -= D[n, b, i, k] * t
+                    block[k] -= D[at, b, i, k] * t
             for i in range(3):
                 a = 0.0
                 v = 0.0
                 for k in range(3):
-                    a += R[n, b, i, k] * block[k]
-                    v += R[n, b, i, k] * hV[b, k]
+                    a += R[at, b, i, k] * block[k]
+                    v += R[at, b, i, k] * hV[b, k]
                 nubar[n - 1, b, i] -= c1 * a
                 nubar[back, b, i] += c2 * a
                 cbar[n - 1, b, i] -= c1 * v
@@ -228,7 +227,7 @@ def _adjoint(system, h, turns, Xbar, data, pivots, g_angle, g_rate, cbar, nubar,
             for k in range(3):
                 tmp[k] = 0.0
                 for i in range(3):
-                    tmp[k] -= Hv[n, b, 1 + i, 1 + k] * hV[b, 3 + i]
+                    tmp[k] -= Hv[at, b, 1 + i, 1 + k] * hV[b, 3 + i]
             exponential(turns[n, b], J)
             for i in range(3):
                 Xbar[n - 1, b, 3 + i] += J[i, 0] * tmp[0] + J[i, 1] * tmp[1] + J[i, 2] * tmp[2]
@@ -251,8 +250,16 @@ def tangent(lin: Linearization, d_angle: Array, d_rate: Array) -> Array:
     Returns:
         (R^T dc, dphi, du) of each component, shape [T, B, N].
     """
-    dX = np.zeros((len(d_angle), len(lin.system.parent), lin.system.size))
-    _tangent(lin.system, lin.trajectory.h, lin.trajectory.states.turn, d_angle, d_rate, lin.data, lin.pivots, dX)
+    total, count, size = len(d_angle), len(lin.system.parent), lin.system.size
+    dX = np.zeros((total, count, size))
+    # of three instants: translation in world axes, velocity, turn
+    memory = np.zeros((3, count, 3)), np.zeros((3, count, size)), np.zeros((3, count, 3))
+    for first, last in lin.windows():
+        lin.load(first)
+        _tangent(
+            lin.system, lin.trajectory.h, lin.trajectory.states.turn, d_angle, d_rate, first, last, lin.data,
+            lin.pivots, *memory, dX,
+        )  # fmt: skip
     return dX
 
 
@@ -268,8 +275,11 @@ def adjoint(lin: Linearization, gradient: Array) -> tuple[Array, Array]:
     Xbar = gradient.copy()
     total, count, size = Xbar.shape
     g_angle, g_rate = np.zeros((total, len(lin.system.rows))), np.zeros((total, len(lin.system.rows)))
-    _adjoint(
-        lin.system, lin.trajectory.h, lin.trajectory.states.turn, Xbar, lin.data, lin.pivots, g_angle, g_rate,
-        np.zeros((total, count, 3)), np.zeros((total, count, size)), np.zeros((total, count, 3)),
-    )  # fmt: skip
+    memory = np.zeros((total, count, 3)), np.zeros((total, count, size)), np.zeros((total, count, 3))
+    for first, last in reversed(lin.windows()):
+        lin.load(first)
+        _adjoint(
+            lin.system, lin.trajectory.h, lin.trajectory.states.turn, Xbar, first, last, lin.data, lin.pivots,
+            g_angle, g_rate, *memory,
+        )  # fmt: skip
     return g_angle, g_rate

@@ -18,6 +18,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from ..fem.blas_threads import one_blas_thread
+from ..memory import peak_memory
 from ..shot.character import Array, ElasticMaterial, FlexibleSettings, IntArray
 
 T = TypeVar("T")
@@ -90,16 +91,6 @@ def measure(shape: str, nodes: int, modes: int) -> dict[str, Any]:
         "orthonormality": float(np.abs(X.T @ MX - np.eye(X.shape[1])).max()),
         "frequencies": (float(f[0]), float(f[-1])),
     }
-
-
-def peak_memory() -> float:
-    """Peak memory of this process [GB]; NaN where the system does not tell."""
-    try:
-        import resource
-    except ImportError:
-        return float("nan")
-    unit = 1.0 if sys.platform == "darwin" else 1024.0
-    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * unit / 1e9
 
 
 def _end(model: Any, x: float) -> Any:
