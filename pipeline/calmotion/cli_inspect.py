@@ -16,6 +16,7 @@ from .cli_run import INTERRUPTED, carry_out, conclude, problems_of, settings_of
 from .errors import ShotError
 from .host import ModeShapes, OutputPaths, ReducedBodies, Run, Source, SystemModes, open_host
 from .shot import Animation, Body, Character, LeftOut, ModeTable, Motor, Provenance, Track
+from .shot.measure import measure_of
 
 SHOWN_MODES = 10
 
@@ -128,20 +129,21 @@ def _body(body: Body, table: ModeTable | None) -> dict[str, Any]:
 
 def _motor(motor: Motor, track: Track, character: Character) -> dict[str, Any]:
     joint = character.joints[motor.joint]
+    unit = measure_of(motor).si
     speeds = np.abs(np.diff(track.values) / np.diff(track.times))
     return {
         "path": motor.path,
         "attribute": motor.attribute,
         "optimize": motor.optimize,
         "samples": len(track.times),
-        "min_rad": float(track.values.min()),
-        "max_rad": float(track.values.max()),
-        "lower_rad": joint.lower,
-        "upper_rad": joint.upper,
-        "peak_velocity_rad_s": float(speeds.max(initial=0.0)),
-        "max_velocity_rad_s": motor.max_velocity,
-        "max_acceleration_rad_s2": motor.max_acceleration,
-        "max_torque_n_m": motor.max_torque,
+        f"min_{unit}": float(track.values.min()),
+        f"max_{unit}": float(track.values.max()),
+        f"lower_{unit}": joint.lower,
+        f"upper_{unit}": joint.upper,
+        f"peak_velocity_{unit}_s": float(speeds.max(initial=0.0)),
+        f"max_velocity_{unit}_s": motor.max_velocity,
+        f"max_acceleration_{unit}_s2": motor.max_acceleration,
+        "max_force_n" if motor.linear else "max_torque_n_m": motor.max_torque,
     }
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any, TextIO
 
-from .cli_tables import angle, console_on, print_left_out, print_table
+from .cli_tables import angle, console_on, length, print_left_out, print_table
 
 
 def print_inspection(report: dict[str, Any], stream: TextIO) -> None:
@@ -37,7 +37,7 @@ def print_inspection(report: dict[str, Any], stream: TextIO) -> None:
     print_table(
         console,
         "Motors",
-        ["motor", "track", "limits", "peak speed", "speed limit", "torque limit", "optimised"],
+        ["motor", "track", "limits", "peak speed", "speed limit", "effort limit", "optimised"],
         [_motor_row(motor) for motor in report["motors"]],
     )
     print_table(
@@ -70,13 +70,16 @@ def _body_row(body: dict[str, Any]) -> list[str]:
 
 
 def _motor_row(motor: dict[str, Any]) -> list[str]:
+    linear = "min_m" in motor
+    shown, unit = (length, "m") if linear else (angle, "rad")
+    effort, newtons = (motor["max_force_n"], "N") if linear else (motor["max_torque_n_m"], "N m")
     return [
         motor["path"],
-        f"{angle(motor['min_rad'])} .. {angle(motor['max_rad'])}",
-        f"{angle(motor['lower_rad'])} .. {angle(motor['upper_rad'])}",
-        f"{angle(motor['peak_velocity_rad_s'])}/s",
-        _limit(motor["max_velocity_rad_s"], f"{angle(motor['max_velocity_rad_s'])}/s"),
-        _limit(motor["max_torque_n_m"], f"{motor['max_torque_n_m']:.4g} N m"),
+        f"{shown(motor[f'min_{unit}'])} .. {shown(motor[f'max_{unit}'])}",
+        f"{shown(motor[f'lower_{unit}'])} .. {shown(motor[f'upper_{unit}'])}",
+        f"{shown(motor[f'peak_velocity_{unit}_s'])}/s",
+        _limit(motor[f"max_velocity_{unit}_s"], f"{shown(motor[f'max_velocity_{unit}_s'])}/s"),
+        _limit(effort, f"{effort:.4g} {newtons}"),
         "yes" if motor["optimize"] else "no",
     ]
 

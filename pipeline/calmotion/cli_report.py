@@ -13,6 +13,7 @@ from .host import CsvFile, Figures, OperatorResult, Recording, Run, WrittenLayer
 from .memory import peak_memory
 from .shot import Character, LeftOut, Result, Simulation
 from .shot.character import Array
+from .shot.measure import measure_of
 
 
 def judged_steps(simulation: Simulation) -> NDArray[np.bool_]:
@@ -129,7 +130,7 @@ def _optimized(character: Character, result: Result) -> dict[str, Any]:
             {
                 "path": character.motors[curve.motor].path,
                 "changed": curve.changed,
-                "max_offset_rad": curve.max_offset,
+                f"max_offset_{measure_of(character.motors[curve.motor]).si}": curve.max_offset,
             }
             for curve in result.curves
         ],

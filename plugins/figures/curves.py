@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 from calmotion.shot import Character, Result, Simulation
+from calmotion.shot.measure import measure_of
 from calmotion.shot.playback import sample_motion
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -56,28 +57,29 @@ def plot_errors(character: Character, result: Result) -> Figure:
 
 
 def plot_motors(character: Character, result: Result, motors: Sequence[int]) -> Figure:
-    """Angle of each motor [deg] with its limits, and what the optimiser changed [deg]."""
+    """Angle of each motor [deg], or length [mm], with its limits, and what the optimiser changed."""
     columns = 2 if result.after else 1
     figure = new_figure(WIDTH, 0.6 + 1.75 * len(motors))
     grid = figure.subplots(len(motors), columns, sharex=True, squeeze=False)
     for row, m in zip(grid, motors, strict=True):
         motor = character.motors[m]
+        measure = measure_of(motor)
         for simulation, color, line, name in runs_of(result):
             rows = judged(simulation)
-            values = np.degrees(simulation.motion.motor_values[rows, m])
+            values = measure.factor * simulation.motion.motor_values[rows, m]
             row[0].plot(simulation.motion.times[rows], values, line, color=color, linewidth=1.5, label=name)
         joint = character.joints[motor.joint]
-        tidy(row[0], "angle [deg]", motor.path)
-        draw_limits(row[0], np.degrees([joint.lower, joint.upper]))
+        tidy(row[0], f"{measure.name} [{measure.unit}]", motor.path)
+        draw_limits(row[0], measure.factor * np.array([joint.lower, joint.upper]), measure.unit)
         if result.after is None:
             continue
         rows = judged(result.after)
         after = result.after.motion
         before = sample_motion(result.before.motion, after.times[rows])
-        change = np.degrees(after.motor_values[rows, m] - before.motor_values[:, m])
+        change = measure.factor * (after.motor_values[rows, m] - before.motor_values[:, m])
         row[1].plot(after.times[rows], change, color=INTENDED, linewidth=1.5)
         row[1].axhline(0.0, color=LIMIT, linewidth=0.7)
-        tidy(row[1], "change [deg]", f"largest {np.abs(change).max():.2f} deg")
+        tidy(row[1], f"change [{measure.unit}]", f"largest {np.abs(change).max():.2f} {measure.unit}")
     grid[0, 0].legend(fontsize=SMALL, loc="best", framealpha=0.85, edgecolor="none")
     for axes in grid.flat:
         axes.margins(x=0.0)
@@ -86,7 +88,7 @@ def plot_motors(character: Character, result: Result, motors: Sequence[int]) -> 
     return figure
 
 
-def draw_limits(axes: Axes, limits: np.ndarray) -> None:
+def draw_limits(axes: Axes, limits: np.ndarray, unit: str) -> None:
     """The joint's limits, as lines where they are near the curve and always as text."""
     if not np.any(np.isfinite(limits)):
         return
@@ -96,7 +98,7 @@ def draw_limits(axes: Axes, limits: np.ndarray) -> None:
         if np.isfinite(limit) and low - reach < limit < high + reach:
             axes.axhline(limit, color=LIMIT, linewidth=1.0, linestyle=":")
     text = " to ".join(f"{limit:.0f}" if np.isfinite(limit) else "none" for limit in limits)
-    axes.set_title(f"limits {text} deg", fontsize=SMALL, loc="right", color=LIMIT)
+    axes.set_title(f"limits {text} {unit}", fontsize=SMALL, loc="right", color=LIMIT)
 
 
 def plot_convergence(result: Result) -> Figure:

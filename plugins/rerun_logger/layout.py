@@ -6,7 +6,8 @@ import colorsys
 from dataclasses import dataclass
 
 import rerun.blueprint as rrb
-from calmotion.shot import Animation, Character, Result
+from calmotion.shot import Animation, Character, Motor, Result
+from calmotion.shot.measure import measure_of
 from calmotion.shot.playback import sample_motion
 from calmotion.shot.viewpoint import choose_viewpoint
 
@@ -51,8 +52,9 @@ def make_blueprint(character: Character, animation: Animation, result: Result) -
     if any(target.rotation_weight > 0.0 for target in character.targets):
         tabs.append(plot("Rotation error [deg]", "errors/rotation_deg"))
     if optimized:
-        tabs.append(plot("Change of the motors [deg]", "changes_deg"))
-    tabs += [motor_tab(motor.path) for motor in character.motors[:MOTOR_TABS]]
+        units = dict.fromkeys(measure_of(motor).unit for motor in character.motors)
+        tabs += [plot(f"Change of the motors [{unit}]", f"changes_{unit}") for unit in units]
+    tabs += [motor_tab(motor) for motor in character.motors[:MOTOR_TABS]]
     if result.before.motion.joint_forces is not None:
         tabs.append(reactions_tab())
     if result.steps:
@@ -109,11 +111,19 @@ def reactions_tab() -> rrb.Vertical:
     )
 
 
-def motor_tab(path: str) -> rrb.Vertical:
-    """Angle above, torque below."""
-    name = path.rsplit("/", 1)[-1]
+def motor_plots(motor: Motor) -> tuple[tuple[str, str], tuple[str, str]]:
+    """Names of the entities of a motor's value and effort, and their units."""
+    measure = measure_of(motor)
+    effort = measure.effort_unit.replace(" ", "")
+    return (f"{measure.name}_{measure.unit}", measure.unit), (f"{measure.effort}_{effort}", measure.effort_unit)
+
+
+def motor_tab(motor: Motor) -> rrb.Vertical:
+    """Angle (or length) above, torque (or force) below."""
+    name, measure = motor.path.rsplit("/", 1)[-1], measure_of(motor)
+    (value, unit), (effort, newtons) = motor_plots(motor)
     return rrb.Vertical(
-        plot(f"{name}: angle [deg]", f"motors{path}/angle_deg"),
-        plot(f"{name}: torque [N m]", f"motors{path}/torque_Nm"),
+        plot(f"{name}: {measure.name} [{unit}]", f"motors{motor.path}/{value}"),
+        plot(f"{name}: {measure.effort} [{newtons}]", f"motors{motor.path}/{effort}"),
         name=name,
     )

@@ -16,10 +16,11 @@ from calmotion.errors import ShotError
 from calmotion.naming import distinct_names
 from calmotion.shot import Animation, Character, Motion, Result, Simulation, SurfaceMesh
 from calmotion.shot.character import Array
+from calmotion.shot.measure import measure_of
 from calmotion.shot.playback import carriers, deformed_points, modes_of, relative_poses, sample_motion
 from calmotion.shot.shading import split_at_creases
 
-from .layout import INPUT, OPTIMIZED, REFERENCE, STYLES, make_blueprint
+from .layout import INPUT, OPTIMIZED, REFERENCE, STYLES, make_blueprint, motor_plots
 from .summary import describe, judged
 
 TIME, ITERATION = "time", "iteration"
@@ -208,18 +209,18 @@ def log_errors(
 def log_motors(
     recording: rr.RecordingStream, character: Character, root: str, simulation: Simulation, samples: int
 ) -> None:
-    """Angle [deg] and torque [N m] of each motor."""
+    """Angle [deg] and torque [N m], or length [mm] and force [N], of each motor."""
     rows, style = thinned(simulation, samples), STYLES[root]
     motion = simulation.motion
     for m, motor in enumerate(character.motors):
-        angles, efforts = np.degrees(motion.motor_values[rows, m]), motion.motor_efforts[rows, m]
-        entity = f"motors{motor.path}"
-        log_curve(
-            recording, f"{entity}/angle_deg/{root}", motion.times[rows], angles, style.color, f"{style.label} [deg]"
-        )
-        log_curve(
-            recording, f"{entity}/torque_Nm/{root}", motion.times[rows], efforts, style.color, f"{style.label} [N m]"
-        )
+        measure = measure_of(motor)
+        for (name, unit), values in zip(
+            motor_plots(motor), (measure.factor * motion.motor_values, motion.motor_efforts), strict=True
+        ):
+            label = f"{style.label} [{unit}]"
+            log_curve(
+                recording, f"motors{motor.path}/{name}/{root}", motion.times[rows], values[rows, m], style.color, label
+            )
 
 
 def log_reactions(
@@ -238,17 +239,18 @@ def log_reactions(
 
 
 def log_changes(recording: rr.RecordingStream, character: Character, result: Result, samples: int) -> None:
-    """What the optimiser added to each motor's angle [deg]."""
+    """What the optimiser added to each motor's angle [deg] or length [mm]."""
     assert result.after is not None
     rows = thinned(result.after, samples)
     after = result.after.motion
     before = sample_motion(result.before.motion, after.times[rows])
     names = distinct_names([motor.path for motor in character.motors])
     for m, motor in enumerate(character.motors):
-        change = np.degrees(after.motor_values[rows, m] - before.motor_values[:, m])
+        measure = measure_of(motor)
+        change = measure.factor * (after.motor_values[rows, m] - before.motor_values[:, m])
         color = STYLES[OPTIMIZED].shade(m, len(character.motors))
-        name = f"{names[motor.path]} [deg]"
-        log_curve(recording, f"changes_deg{motor.path}", after.times[rows], change, color, name)
+        name = f"{names[motor.path]} [{measure.unit}]"
+        log_curve(recording, f"changes_{measure.unit}{motor.path}", after.times[rows], change, color, name)
 
 
 def log_progress(recording: rr.RecordingStream, result: Result) -> None:

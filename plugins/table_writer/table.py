@@ -23,8 +23,8 @@ def columns(character: Character, result: Result) -> dict[str, Array]:
     Reactions are what each joint does to its body1, world axes, see `calmotion.shot.Motion`.
 
     Returns:
-        `time_s` [s]; positions and errors of targets [m], rotation errors [rad]; motor angles [rad], efforts [N m];
-        `<joint path>.force.x` and so on [N], `<joint path>.moment.x` and so on [N m].
+        `time_s` [s]; positions and errors of targets [m], rotation errors [rad]; motor angles [rad] or lengths [m],
+        efforts [N m] or [N]; `<joint path>.force.x` and so on [N], `<joint path>.moment.x` and so on [N m].
     """
     simulation = result.after or result.before
     motion = simulation.motion

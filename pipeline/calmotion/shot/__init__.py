@@ -1,6 +1,6 @@
 """What a shot is, as plain data in SI units: read by plugins, solved by the engine, written by plugins."""
 
-from .animation import Animation, Track
+from .animation import Animation, MovingFrame, Track
 from .character import (
     WORLD,
     Body,
@@ -50,6 +50,7 @@ __all__ = [
     "Motion",
     "Motor",
     "MotorCurve",
+    "MovingFrame",
     "OptimizerStep",
     "Provenance",
     "Result",

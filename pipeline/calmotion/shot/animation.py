@@ -14,7 +14,7 @@ class Track:
     Attributes:
         times: [s] after the first frame of the shot, strictly increasing, shape [k]. May start before 0 or end
             after the last frame when the animation does.
-        values: [rad], shape [k], not wrapped.
+        values: [rad] (or [m] of a length motor), shape [k], not wrapped.
     """
 
     times: Array

@@ -196,6 +196,8 @@ class Motor:
         attribute: Name of the attribute that holds its track.
         optimize: Whether its curve may be changed.
         max_velocity, max_acceleration, max_torque: [rad/s], [rad/s^2], [N m]; infinite when there are none.
+        linear: Whether it sets a length along the joint's axis instead of an angle: metres then stand for radians,
+            and newtons for newton metres.
     """
 
     joint: int
@@ -205,6 +207,7 @@ class Motor:
     max_velocity: float = np.inf
     max_acceleration: float = np.inf
     max_torque: float = np.inf
+    linear: bool = False
 
 
 @dataclass(frozen=True, eq=False)

@@ -18,8 +18,8 @@ class Motion:
         positions: Origins of the body frames [m], shape [T, B, 3], world.
         rotations: Unit quaternions (w, x, y, z) of the body frames, shape [T, B, 4], world.
         elastic: Elastic coordinates of each body, B arrays of shape [T, r_b] (r_b = 0 for a rigid body).
-        motor_values: Motor angles [rad], shape [T, M].
-        motor_efforts: Motor torques [N m], shape [T, M]; NaN in a motion that was not simulated.
+        motor_values: Motor angles [rad] or lengths [m], shape [T, M].
+        motor_efforts: Motor torques [N m] or forces [N], shape [T, M]; NaN in a motion that was not simulated.
         target_positions: [m], shape [T, K, 3], world.
         target_rotations: Unit quaternions, shape [T, K, 4], world.
         joint_forces, joint_moments: What each joint does to its body1 [N], [N m], world axes, shape [T, J, 3]; the
@@ -80,8 +80,8 @@ class MotorCurve:
         motor: Motor index.
         changed: False when the offset is exactly zero; such a motor is not written.
         knots: Knots of the offset's cubic spline [s], shape [n]; frames of the shot.
-        frame_values: The optimised curve at the shot's frames [rad], shape [f].
-        max_offset: Largest change [rad].
+        frame_values: The optimised curve at the shot's frames [rad or m], shape [f].
+        max_offset: Largest change [rad or m].
     """
 
     motor: int

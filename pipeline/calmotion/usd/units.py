@@ -43,6 +43,10 @@ class StageUnits:
         """Mass length^2 / s^2, to N m."""
         return value * (self.kilograms * self.meters**2)
 
+    def force(self, value):
+        """Mass length / s^2, to N."""
+        return value * (self.kilograms * self.meters)
+
     def acceleration(self, value):
         """Length / s^2, to m/s^2."""
         return value * self.meters

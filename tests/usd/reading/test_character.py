@@ -79,7 +79,7 @@ def test_what_no_motor_moves_is_left_out_with_a_note(tmp_path):
         UsdPhysics.RigidBodyAPI.Apply(drum)
         lid = UsdGeom.Cube.Define(stage, "/Lid").GetPrim()
         UsdPhysics.RigidBodyAPI.Apply(lid)
-        slide = UsdPhysics.PrismaticJoint.Define(stage, "/Slide")  # not supported, and no part of the character
+        slide = UsdPhysics.DistanceJoint.Define(stage, "/Slide")  # not supported, and no part of the character
         slide.CreateBody0Rel().SetTargets(["/Drum"])
         slide.CreateBody1Rel().SetTargets(["/Lid"])
 

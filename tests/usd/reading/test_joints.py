@@ -9,7 +9,7 @@ from calmotion.shot import WORLD
 from calmotion.usd.reading import read_shot
 from calmotion.usd.transforms import rotation_from_quaternion
 from pxr import Gf, UsdGeom, UsdPhysics
-from small_shots import BASE, ELBOW, FORE, LENGTH, SHOULDER, UPPER, write_arm
+from small_shots import BASE, ELBOW, FORE, LENGTH, SHOULDER, UPPER, Scale, write_arm
 
 
 def read(tmp_path, edit=None):
@@ -136,7 +136,24 @@ def test_a_ball_is_read(tmp_path):
     assert ball.kind == "spherical" and ball.lower == -np.inf
 
 
-@pytest.mark.parametrize("kind", ["PrismaticJoint", "DistanceJoint", "Joint"])
+@pytest.mark.parametrize("meters", [1.0, 0.01])
+def test_a_slider_is_read_with_its_axis_and_limits(tmp_path, meters):
+    def edit(stage):
+        extra = UsdPhysics.PrismaticJoint.Define(stage, "/Arm/joints/slide")
+        extra.CreateBody0Rel().SetTargets([BASE])
+        extra.CreateBody1Rel().SetTargets([FORE])
+        extra.CreateAxisAttr("X")
+        extra.CreateLowerLimitAttr(-0.2 / meters)
+        extra.CreateUpperLimitAttr(0.3 / meters)
+
+    path = write_arm(tmp_path / "arm.usda", edit, Scale(meters))
+    joints = read_shot(str(path))[0].joints
+    (slide,) = (joint for joint in joints if joint.path == "/Arm/joints/slide")
+    assert slide.kind == "prismatic" and (slide.lower, slide.upper) == pytest.approx((-0.2, 0.3))
+    assert np.allclose(axis(slide.frame0), [1, 0, 0], atol=1e-12)
+
+
+@pytest.mark.parametrize("kind", ["DistanceJoint", "Joint"])
 def test_other_joints_of_the_character_are_not_supported_yet(tmp_path, kind):
     def edit(stage):
         extra = getattr(UsdPhysics, kind).Define(stage, "/Arm/joints/other")

@@ -13,6 +13,7 @@ from .context import Reading, is_rigid_body, prims_of
 from .flexible import flexible_settings
 from .interfaces import interfaces_of
 from .joints import JointPrim, body_index, joint_prims, joint_to_world, read_joint, refuse_unsupported
+from .roots import on_moving_prim
 from .shapes import shapes_of, tets_of
 from .stillness import refuse_moving
 
@@ -38,7 +39,8 @@ class Skeleton:
 
 def animated_attributes(stage) -> list:
     """The attributes that hold the animation of the drives of a stage, whether they turn out as motors or not."""
-    found = (prim.GetAttribute(motors.ATTRIBUTE) for prim in joint_prims(stage))
+    names = (motors.ATTRIBUTE, motors.LENGTH_ATTRIBUTE)
+    found = (prim.GetAttribute(name) for prim in joint_prims(stage) for name in names)
     return [attribute for attribute in found if attribute]
 
 
@@ -79,8 +81,9 @@ def read_skeleton(reading: Reading) -> Skeleton:
     joints.sort(key=lambda j: max(far.get(j.body0, 0), far.get(j.body1, 0)))  # stable: the shot's order otherwise
     order = {id(joint): k for k, joint in enumerate(joints)}
     drives = sorted((d for d in drives if id(d.joint) in order), key=lambda d: order[id(d.joint)])
-    roots = [j.body1 for j in joints if j.body0 == ""]
-    refuse_moving(reading, [prims[b] for b in roots], [prims[b] for b in bodies if b not in roots])
+    held = {j.body1: j.path for j in joints if j.body0 == "" and j.prim is not None and not on_moving_prim(reading, j)}
+    roots = {j.body1 for j in joints if j.body0 == ""}
+    refuse_moving(reading, {prims[b]: held[b] for b in held}, [prims[b] for b in bodies if b not in roots])
     return Skeleton(bodies, {b: poses[b] for b in bodies}, joints, drives, target_prims)
 
 
@@ -171,14 +174,16 @@ def _moved(reading: Reading, bodies: list[str], joints: list[JointPrim], drives,
 
 
 def _held(reading: Reading, bodies, joints, prims, poses) -> list[JointPrim]:
-    """A joint to the world for each group of bodies that has none."""
+    """A joint to the world for each kinematic body, and for each group of bodies that has none."""
     added = []
+    anchored = {j.body1 for j in joints if j.body0 == ""}
     for group in topology.components(bodies, joints):
-        if any(j.body0 == "" and j.body1 in group for j in joints):
+        kinematic = [b for b in group if prims[b].GetAttribute("physics:kinematicEnabled").Get() and b not in anchored]
+        added += [joint_to_world(body, poses[body], reading.units.length(1.0)) for body in kinematic]
+        if kinematic or anchored.intersection(group):
             continue
-        kinematic = [b for b in group if prims[b].GetAttribute("physics:kinematicEnabled").Get()]
         carried = {j.body1 for j in joints}
-        root = next(iter(kinematic or [b for b in group if b not in carried] or group))
+        root = next(iter([b for b in group if b not in carried] or group))
         reading.note(f"{root}: no joint holds the character in the world; this body is held at its pose")
         added.append(joint_to_world(root, poses[root], reading.units.length(1.0)))
     return added

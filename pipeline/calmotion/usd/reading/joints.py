@@ -14,7 +14,11 @@ from .. import gf
 from ..transforms import Pose, axis_rotation, quaternion_from_rotation, rotation_from_quaternion
 from .context import Reading, prims_of
 
-_KINDS = {"PhysicsRevoluteJoint": "revolute", "PhysicsFixedJoint": "fixed", "PhysicsSphericalJoint": "spherical"}
+_KINDS = {
+    "PhysicsRevoluteJoint": "revolute", "PhysicsPrismaticJoint": "prismatic", "PhysicsFixedJoint": "fixed",
+    "PhysicsSphericalJoint": "spherical",
+}  # fmt: skip
+_WITH_AXIS = ("revolute", "prismatic")
 UNSUPPORTED = "unsupported"
 _HALF_TURN = np.diag([1.0, -1.0, -1.0])  # about x: turns the z axis over
 
@@ -26,11 +30,11 @@ class JointPrim:
     Attributes:
         prim: The Usd.Prim, None for a joint that the reader added.
         path: Its path.
-        kind: `revolute`, `spherical` or `fixed`, or `UNSUPPORTED`, which matters only where the joint is part of the
-            character.
+        kind: `revolute`, `prismatic`, `spherical` or `fixed`, or `UNSUPPORTED`, which matters only where the joint is
+            part of the character.
         body0, body1: Paths of the bodies, empty for the world.
         frame0, frame1: Frames in them, m.
-        lower, upper: Limits [rad].
+        lower, upper: Limits [rad or m].
         closes_loop: Whether the shot says that this joint closes a loop.
     """
 
@@ -85,16 +89,17 @@ def read_joint(reading: Reading, prim, poses: dict[str, Pose]) -> JointPrim | No
             remedy="Correct physics:body0 or physics:body1",
         )
     kind = _KINDS.get(str(prim.GetTypeName()), UNSUPPORTED)
-    turn = axis_rotation(str(prim.GetAttribute("physics:axis").Get())) if kind == "revolute" else np.eye(3)
-    lower, upper = _limits(prim) if kind == "revolute" else (-np.inf, np.inf)
+    turn = axis_rotation(str(prim.GetAttribute("physics:axis").Get())) if kind in _WITH_AXIS else np.eye(3)
+    meters = reading.units.length(1.0)
+    to_si = np.deg2rad(1.0) if kind == "revolute" else meters
+    lower, upper = _limits(prim, to_si) if kind in _WITH_AXIS else (-np.inf, np.inf)
     (body0, position0, rotation0), (body1, position1, rotation1) = ends
     if body1 == "":
-        # The world comes first. Turning the axis over keeps the sense of the angle, so limits and track stay.
+        # The world comes first. Turning the axis over keeps the sense of angle or length, so limits and track stay.
         body0, body1 = body1, body0
         position0, position1 = position1, position0
         rotation0, rotation1 = rotation1, rotation0
         turn = turn @ _HALF_TURN
-    meters = reading.units.length(1.0)
     return JointPrim(
         prim,
         path,
@@ -172,8 +177,8 @@ def _finite(prim, name: str, convert) -> Array:
     return found
 
 
-def _limits(prim) -> tuple[float, float]:
-    """Lower and upper limit [rad], infinite where there is none."""
+def _limits(prim, to_si: float) -> tuple[float, float]:
+    """Lower and upper limit [rad or m], infinite where there is none."""
     values = []
     for name, unlimited in (("physics:lowerLimit", -np.inf), ("physics:upperLimit", np.inf)):
         attribute = prim.GetAttribute(name)
@@ -181,7 +186,7 @@ def _limits(prim) -> tuple[float, float]:
         value = unlimited if value is None else float(value)
         if np.isnan(value):
             raise ShotError("is not a number", path=prim.GetPath(), attribute=name, found=value, remedy="Correct it")
-        values.append(np.deg2rad(value))
+        values.append(to_si * value)
     lower, upper = values
     if lower > upper:
         return -np.inf, np.inf  # UsdPhysics: a joint whose lower limit exceeds its upper one is not limited
@@ -195,7 +200,7 @@ def refuse_unsupported(joint: JointPrim) -> None:
             "a joint of this type is not supported yet",
             path=joint.path,
             found=joint.prim.GetTypeName(),
-            remedy="Use PhysicsRevoluteJoint, PhysicsSphericalJoint or PhysicsFixedJoint, or disable it "
+            remedy="Use a revolute, prismatic, spherical or fixed PhysicsJoint, or disable it "
             "with physics:jointEnabled = false",
         )
 

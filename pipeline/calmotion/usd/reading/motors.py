@@ -16,11 +16,23 @@ from .joints import JointPrim
 from .tracks import sample_codes
 
 ATTRIBUTE = "drive:angular:physics:targetPosition"
+LENGTH_ATTRIBUTE = "drive:linear:physics:targetPosition"
 _SCHEMA = "CalmMotorAPI"
-_REMEDY = (
-    f"Apply PhysicsDriveAPI:angular and author time samples of {ATTRIBUTE}, in degrees, or remove what makes "
-    "the joint a motor"
-)
+_DRIVES = {"revolute": "angular", "prismatic": "linear"}
+_UNITS = {"angular": "degrees", "linear": "units of length"}
+
+
+def target_attribute(kind: str) -> str:
+    """Name of the attribute with the track of a joint of a kind."""
+    return LENGTH_ATTRIBUTE if kind == "prismatic" else ATTRIBUTE
+
+
+def _remedy(kind: str) -> str:
+    drive = _DRIVES[kind]
+    return (
+        f"Apply PhysicsDriveAPI:{drive} and author time samples of {target_attribute(kind)}, in {_UNITS[drive]}, or "
+        "remove what makes the joint a motor"
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,9 +58,9 @@ def actuated_joints(stage) -> dict[str, str]:
 def read_drives(joints: list[JointPrim], actuated: dict[str, str], root: str, notes: list[str]) -> list[Drive]:
     """The driven joints.
 
-    A revolute joint with an angular drive is a motor: with samples or a spline it is animated, with a constant
-    target position it holds that. A drive without any target position and without stiffness pulls nowhere, and its
-    joint moves freely.
+    A revolute joint with an angular drive, or a prismatic one with a linear drive, is a motor: with samples or a spline
+    it is animated, with a constant target position it holds that. A drive without any target position and without
+    stiffness pulls nowhere, and its joint moves freely.
 
     Args:
         joints: The joints of the character.
@@ -61,7 +73,7 @@ def read_drives(joints: list[JointPrim], actuated: dict[str, str], root: str, no
     """
     drives: list[Drive] = []
     for joint in joints:
-        if joint.prim is None or joint.kind != "revolute":
+        if joint.prim is None or joint.kind not in _DRIVES:
             _refuse_wrong_motor(joint)
             continue
         drive = _drive(joint, actuated, notes)
@@ -78,15 +90,15 @@ def read_drives(joints: list[JointPrim], actuated: dict[str, str], root: str, no
         raise ShotError(
             "a motor without animation, and no other motor is animated either",
             path=drives[0].joint.path,
-            attribute=ATTRIBUTE,
-            remedy=_REMEDY,
+            attribute=target_attribute(drives[0].joint.kind),
+            remedy=_remedy(drives[0].joint.kind),
         )
     for drive in drives:
         if drive.joint.prim.IsInstanceProxy():
             raise ShotError(
                 "the motor is inside an instance, where its curve cannot be written",
                 path=drive.joint.path,
-                attribute=ATTRIBUTE,
+                attribute=target_attribute(drive.joint.kind),
                 remedy="Set instanceable = false on the instance above it",
             )
     return drives
@@ -98,52 +110,56 @@ def read_motor(drive: Drive, index: int, units: StageUnits) -> Motor:
     Raises:
         ShotError: A limit that is not positive.
     """
-    prim = drive.joint.prim
-    torque = units.torque(_limit(prim, "calm:motor:maxTorque"))
-    force = prim.GetAttribute("drive:angular:physics:maxForce")
+    prim, linear = drive.joint.prim, drive.joint.kind == "prismatic"
+    effort = units.force if linear else units.torque
+    to_si = units.length if linear else np.deg2rad
+    torque = effort(_limit(prim, "calm:motor:maxTorque"))
+    force = prim.GetAttribute(f"drive:{_DRIVES[drive.joint.kind]}:physics:maxForce")
     if force and force.HasAuthoredValue():
-        torque = min(torque, units.torque(_positive(prim, force.GetName(), force.Get())))
+        torque = min(torque, effort(_positive(prim, force.GetName(), force.Get())))
     return Motor(
         joint=index,
         path=drive.joint.path,
-        attribute=ATTRIBUTE,
+        attribute=target_attribute(drive.joint.kind),
         optimize=bool(schemas.value(prim, _SCHEMA, "calm:motor:optimize")),
-        max_velocity=float(np.deg2rad(_limit(prim, "calm:motor:maxVelocity"))),
-        max_acceleration=float(np.deg2rad(_limit(prim, "calm:motor:maxAcceleration"))),
+        max_velocity=float(to_si(_limit(prim, "calm:motor:maxVelocity"))),
+        max_acceleration=float(to_si(_limit(prim, "calm:motor:maxAcceleration"))),
         max_torque=torque,
+        linear=linear,
     )
 
 
 def _drive(joint: JointPrim, actuated: dict[str, str], notes: list[str]) -> Drive | None:
-    prim = joint.prim
-    has_drive = schemas.is_applied(prim, "PhysicsDriveAPI:angular")
-    attribute = prim.GetAttribute(ATTRIBUTE)
+    prim, name = joint.prim, target_attribute(joint.kind)
+    drive, unit = _DRIVES[joint.kind], _UNITS[_DRIVES[joint.kind]]
+    has_drive = schemas.is_applied(prim, f"PhysicsDriveAPI:{drive}")
+    attribute = prim.GetAttribute(name)
     if has_drive and attribute and len(sample_codes(attribute)):
         return Drive(joint, attribute, True)
     if attribute and len(sample_codes(attribute)):
         raise ShotError(
             "the target position is animated, but the joint has no drive",
             path=joint.path,
-            attribute=ATTRIBUTE,
-            remedy="Apply PhysicsDriveAPI:angular to the joint",
+            attribute=name,
+            remedy=f"Apply PhysicsDriveAPI:{drive} to the joint",
         )
     if schemas.is_applied(prim, _SCHEMA):
-        raise ShotError("a motor without animation", path=joint.path, attribute=ATTRIBUTE, remedy=_REMEDY)
+        raise ShotError("a motor without animation", path=joint.path, attribute=name, remedy=_remedy(joint.kind))
     if joint.path in actuated:
         raise ShotError(
             f"a motor without animation: the actuator {actuated[joint.path]} drives this joint",
             path=joint.path,
-            attribute=ATTRIBUTE,
-            remedy=_REMEDY,
+            attribute=name,
+            remedy=_remedy(joint.kind),
         )
     if not has_drive:
         return None
     if attribute and attribute.HasAuthoredValue():
-        notes.append(f"{joint.path}: its drive is not animated and holds {attribute.Get():g} degrees")
+        notes.append(f"{joint.path}: its drive is not animated and holds {attribute.Get():g} {unit}")
         return Drive(joint, attribute, False)
-    stiffness = prim.GetAttribute("drive:angular:physics:stiffness").Get()
+    stiffness = prim.GetAttribute(f"drive:{drive}:physics:stiffness").Get()
     if stiffness:
-        notes.append(f"{joint.path}: its drive has a stiffness but no target position and holds 0 degrees")
+        notes.append(f"{joint.path}: its drive has a stiffness but no target position and holds 0 {unit}")
         return Drive(joint, attribute, False)
     notes.append(f"{joint.path}: its drive has neither a target position nor a stiffness, so the joint moves freely")
     return None
@@ -152,10 +168,10 @@ def _drive(joint: JointPrim, actuated: dict[str, str], notes: list[str]) -> Driv
 def _refuse_wrong_motor(joint: JointPrim) -> None:
     if joint.prim is not None and schemas.is_applied(joint.prim, _SCHEMA):
         raise ShotError(
-            "a fixed joint cannot be a motor",
+            f"a {joint.kind} joint cannot be a motor",
             path=joint.path,
             found=joint.prim.GetTypeName(),
-            remedy="Remove CalmMotorAPI, or make it a PhysicsRevoluteJoint",
+            remedy="Remove CalmMotorAPI, or make it a PhysicsRevoluteJoint or PhysicsPrismaticJoint",
         )
 
 

@@ -10,10 +10,11 @@ from ...errors import ShotError
 from ...shot import Animation, Character, Provenance, Track
 from .. import stages
 from ..clock import Clock, clock_of
-from ..units import units_of
+from ..units import StageUnits, units_of
 from .character import Skeleton, animated_attributes, build_character, read_skeleton
 from .context import Reading
 from .motors import ATTRIBUTE
+from .roots import moving_frames
 from .tracks import read_track, sample_codes
 
 
@@ -39,17 +40,18 @@ def read_shot(path: str) -> tuple[Character, Animation, Provenance]:
     with stages.quiet():
         reading, clock = _start_reading(stage)
         skeleton = read_skeleton(reading)
-        tracks = _tracks(stage, skeleton, clock, reading.notes)
+        tracks = _tracks(stage, skeleton, clock, reading.notes, reading.units)
+        moving = moving_frames(reading, skeleton, clock)
         _note_dense_samples(tracks, clock, reading)
         character = build_character(reading, skeleton)
         current = tracks
         if earlier:
-            current = _tracks(composed, skeleton, clock, [])
+            current = _tracks(composed, skeleton, clock, [], reading.units)
             names = ", ".join(stages.display_name(layer, path) for layer in earlier)
             note = f"the shot carries results of Calmotion ({names}); the intent is the animation beneath them"
             character = dataclasses.replace(character, notes=(*character.notes, note))
     provenance = _provenance(path, stage, reading, clock, earlier)
-    return character, Animation(clock.frame_times(), tracks, current), provenance
+    return character, Animation(clock.frame_times(), tracks, current, moving), provenance
 
 
 def _start_reading(stage) -> tuple[Reading, Clock]:
@@ -65,11 +67,12 @@ def _start_reading(stage) -> tuple[Reading, Clock]:
     return Reading(stage, units, clock.start), clock
 
 
-def _tracks(stage, skeleton: Skeleton, clock: Clock, notes: list[str]) -> tuple[Track, ...]:
+def _tracks(stage, skeleton: Skeleton, clock: Clock, notes: list[str], units: StageUnits) -> tuple[Track, ...]:
     found = []
     for drive in skeleton.drives:
         attribute = stage.GetAttributeAtPath(drive.attribute.GetPath())
-        found.append(read_track(attribute, clock, notes))
+        to_si = units.length(1.0) if drive.joint.kind == "prismatic" else np.deg2rad(1.0)
+        found.append(read_track(attribute, clock, notes, float(to_si)))
     return tuple(found)
 
 

@@ -1,4 +1,4 @@
-"""Where the shot moves bodies by their transforms: not yet for what holds the character."""
+"""Where the shot moves bodies by their transforms although a joint holds them in the world."""
 
 from __future__ import annotations
 
@@ -11,29 +11,30 @@ from .context import Reading
 _TOLERANCE = 1e-6  # relative to the size of the transform: what single precision leaves
 
 
-def refuse_moving(reading: Reading, roots: list, others: list) -> None:
+def refuse_moving(reading: Reading, held: dict, others: list) -> None:
     """Refuse bodies that are held by the world and move in it; note where other transforms are animated.
 
     Args:
         reading: The stage.
-        roots: Prims of the bodies with a joint to the world.
+        held: Prims of the bodies with a joint to the world, and its path.
         others: Prims of the other bodies.
 
     Raises:
-        ShotError: A root body moves; moving roots come later.
+        ShotError: A body moves that a joint holds where it is.
     """
-    for prim in roots:
-        found = _moves(reading, prim)
+    for prim, joint in held.items():
+        found = moves(reading, prim)
         if found is not None:
             mover, code = found
             raise ShotError(
-                "the transform that carries the character's root is animated; moving roots are not supported yet",
+                f"the transform that carries the character's root is animated, but {joint} holds it in the world",
                 path=mover.GetPath(),
                 attribute="xformOpOrder",
                 found=f"it moves at time code {code:g}",
-                remedy="Animate the motors of the character, and leave the root and what is above it still",
+                remedy="For a root that moves set physics:kinematicEnabled on its body and remove that joint; else "
+                "leave the root and what is above it still",
             )
-    animated = [p for p in others if _codes(p)]
+    animated = [p for p in others if codes_of(p)]
     if animated:
         reading.note(
             f"{animated[0].GetPath()}: transforms of bodies are animated ({len(animated)} of them); the motion is "
@@ -41,14 +42,14 @@ def refuse_moving(reading: Reading, roots: list, others: list) -> None:
         )
 
 
-def _codes(prim) -> list[float]:
+def codes_of(prim) -> list[float]:
     from pxr import UsdGeom
 
     return list(UsdGeom.Xformable(prim).GetTimeSamples()) if prim.IsA(UsdGeom.Xformable) else []
 
 
-def _moves(reading: Reading, prim):
-    """The first prim, from a body upwards, that really moves it, with the time code; None where it stays."""
+def carriers(prim) -> list:
+    """A prim and those above it that its place depends on."""
     from pxr import UsdGeom
 
     chain, above = [], prim
@@ -57,9 +58,16 @@ def _moves(reading: Reading, prim):
         if above.IsA(UsdGeom.Xformable) and UsdGeom.Xformable(above).GetResetXformStack():
             break
         above = above.GetParent()
+    return chain
+
+
+def moves(reading: Reading, prim):
+    """The first prim, from a body upwards, that really moves it, with the time code; None where it stays."""
+    from pxr import UsdGeom
+
     start = reading.world_matrix(prim)
-    for mover in chain:
-        for code in _codes(mover):
+    for mover in carriers(prim):
+        for code in codes_of(mover):
             if code < reading.start:
                 continue
             now = matrix(UsdGeom.XformCache(code).GetLocalToWorldTransform(prim))

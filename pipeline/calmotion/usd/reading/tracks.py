@@ -1,4 +1,4 @@
-"""The samples of a drive as a track in seconds and radians."""
+"""The samples of a drive as a track in seconds, and radians or metres."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ def sample_codes(attribute) -> Array:
     return np.array(codes, dtype=np.float64)
 
 
-def read_track(attribute, clock: Clock, notes: list[str]) -> Track:
+def read_track(attribute, clock: Clock, notes: list[str], to_si: float) -> Track:
     """The track of a motor.
 
     Samples are taken where they are, also outside the shot. Where they begin after the first frame or end
@@ -26,9 +26,10 @@ def read_track(attribute, clock: Clock, notes: list[str]) -> Track:
     A constant gives two equal samples.
 
     Args:
-        attribute: The drive's target position, degrees.
+        attribute: The drive's target position, degrees or stage length.
         clock: The clock of the shot.
         notes: Sentences for the user are added here.
+        to_si: Radians, or metres, in its unit.
 
     Raises:
         ShotError: A sample that is blocked, not a number or not finite.
@@ -41,16 +42,16 @@ def read_track(attribute, clock: Clock, notes: list[str]) -> Track:
         codes = frames
     elif len(codes) == 0:
         codes = frames[[0, -1]]
-    values = np.array([_degrees(attribute, code) for code in codes])
+    values = np.array([_value(attribute, code) for code in codes])
     held = (frames < codes[0] - 1e-9, frames > codes[-1] + 1e-9)
     if len(attribute.GetTimeSamples()) > 0 and (held[0].any() or held[1].any()):
         notes.append(f"{path}: its samples do not span the shot; the first and last value are held, as USD does")
     codes = np.concatenate([frames[held[0]], codes, frames[held[1]]])
     values = np.concatenate([np.full(held[0].sum(), values[0]), values, np.full(held[1].sum(), values[-1])])
-    return Track(clock.seconds(codes), np.deg2rad(values))
+    return Track(clock.seconds(codes), to_si * values)
 
 
-def _degrees(attribute, code: float) -> float:
+def _value(attribute, code: float) -> float:
     value = attribute.Get(code)
     try:
         number = float(value)

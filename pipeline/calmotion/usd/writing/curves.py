@@ -25,7 +25,7 @@ def sample_times(frame_times: Array, samples_per_second: float | None) -> Array:
 
 
 def curve_values(curve: MotorCurve, frame_times: Array, times: Array) -> Array:
-    """A motor's curve [rad] at times within the shot, by the rule with which samples at frames are read back."""
+    """A motor's curve [rad or m] at times within the shot, by the rule with which samples at frames are read back."""
     if times is frame_times:
         return curve.frame_values
     from ...retarget.curves import interpolate
@@ -34,9 +34,10 @@ def curve_values(curve: MotorCurve, frame_times: Array, times: Array) -> Array:
 
 
 def author_curves(
-    layer, character: Character, curves: tuple[MotorCurve, ...], frame_times: Array, times: Array, clock: Clock
-) -> dict[str, int]:
-    """Author each curve as an over with time samples, degrees.
+    layer, character: Character, curves: tuple[MotorCurve, ...], frame_times: Array, times: Array, clock: Clock,
+    meters: float,
+) -> dict[str, int]:  # fmt: skip
+    """Author each curve as an over with time samples, degrees or stage length.
 
     Args:
         layer: The Sdf.Layer.
@@ -45,6 +46,7 @@ def author_curves(
         frame_times: Frames of the shot [s], shape [f].
         times: Times of the samples [s].
         clock: The clock of the shot.
+        meters: Metres in the stage's unit of length.
 
     Returns:
         Path of each attribute that was written, with its number of samples.
@@ -57,7 +59,8 @@ def author_curves(
         motor = character.motors[curve.motor]
         path = f"{motor.path}.{motor.attribute}"
         spec = attribute_spec(layer, path, Sdf.ValueTypeNames.Float)
-        for code, value in zip(codes, np.rad2deg(curve_values(curve, frame_times, times)), strict=True):
+        unit = meters if motor.linear else np.deg2rad(1.0)
+        for code, value in zip(codes, curve_values(curve, frame_times, times) / unit, strict=True):
             layer.SetTimeSample(spec.path, float(code), float(value))
         written[path] = len(codes)
     return written

@@ -78,7 +78,9 @@ def write_result(
         if role == stages.CURVES:
             times = sample_times(animation.frame_times, options.samples_per_second)
             curves = _curves_to_write(result, provenance)
-            written |= author_curves(layer, character, curves, animation.frame_times, times, clock)
+            written |= author_curves(
+                layer, character, curves, animation.frame_times, times, clock, provenance.meters_per_unit
+            )
     written |= _bake(layer, character, animation, provenance, result, options, clock)
     write_layer(layer, output, lambda temporary: _validate(temporary, written))
     return output, write_root(output, provenance, role)

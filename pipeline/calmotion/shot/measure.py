@@ -1,0 +1,35 @@
+"""How the values of a motor are shown to people: angles in degrees, lengths in millimetres."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from .character import Motor
+
+
+class Measure(NamedTuple):
+    """Words and units for one kind of motor.
+
+    Attributes:
+        name, effort: What it sets, and with what.
+        unit, effort_unit, si: Unit that is shown, unit of the effort, unit of the value in SI.
+        factor: From SI to the unit that is shown.
+    """
+
+    name: str
+    effort: str
+    unit: str
+    effort_unit: str
+    si: str
+    factor: float
+
+
+ANGLE = Measure("angle", "torque", "deg", "N m", "rad", float(np.degrees(1.0)))
+LENGTH = Measure("length", "force", "mm", "N", "m", 1e3)
+
+
+def measure_of(motor: Motor) -> Measure:
+    """The measure of a motor."""
+    return LENGTH if motor.linear else ANGLE

@@ -1,0 +1,65 @@
+"""Roots that the shot moves: kinematic bodies, and joints on prims that are no bodies and move."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ...shot import MovingFrame
+from ..clock import Clock
+from .context import Reading
+from .joints import JointPrim, read_joint
+from .stillness import carriers, codes_of, moves
+
+if TYPE_CHECKING:
+    from .character import Skeleton
+
+
+def world_side_prim(reading: Reading, joint: JointPrim):
+    """The prim, no body, that a joint's end in the world names; None where it names none."""
+    for side in (0, 1) if joint.prim is not None else ():
+        relationship = joint.prim.GetRelationship(f"physics:body{side}")
+        for target in relationship.GetForwardedTargets() if relationship else []:
+            prim = reading.stage.GetPrimAtPath(target)
+            if prim and not any(str(above.GetPath()) == joint.body1 for above in carriers(prim)):
+                return prim
+    return None
+
+
+def on_moving_prim(reading: Reading, joint: JointPrim) -> bool:
+    """Whether a joint's end in the world is on a prim that moves."""
+    prim = world_side_prim(reading, joint)
+    return prim is not None and moves(reading, prim) is not None
+
+
+def moving_frames(reading: Reading, skeleton: Skeleton, clock: Clock) -> tuple[MovingFrame, ...]:
+    """Motion of the world-side frames of the joints that the shot moves.
+
+    Raises:
+        ShotError: A transform that has no rigid pose.
+    """
+    found = []
+    for index, joint in enumerate(skeleton.joints):
+        if joint.body0 != "":
+            continue
+        prim = reading.stage.GetPrimAtPath(joint.body1) if joint.prim is None else world_side_prim(reading, joint)
+        if prim is None or moves(reading, prim) is None:
+            continue
+        frames = clock.time_codes(clock.frame_times())
+        codes = np.unique(np.concatenate([frames, *(codes_of(mover) for mover in carriers(prim))]))
+        poses = [_frame(Reading(reading.stage, reading.units, float(code)), joint, prim, skeleton) for code in codes]
+        rotations = np.array([pose.rotation for pose in poses])
+        flips = np.where(np.sum(rotations[1:] * rotations[:-1], axis=1) < 0.0, -1.0, 1.0)
+        rotations[1:] *= np.cumprod(flips)[:, None]
+        found.append(MovingFrame(index, clock.seconds(codes), np.array([pose.position for pose in poses]), rotations))
+        reading.note(f"{prim.GetPath()}: moves as its transform is animated, and carries the character")
+    return tuple(found)
+
+
+def _frame(reading: Reading, joint: JointPrim, prim, skeleton: Skeleton):
+    if joint.prim is None:
+        return reading.pose(prim).frame(reading.units.length(1.0))
+    there = read_joint(reading, joint.prim, skeleton.poses)
+    assert there is not None
+    return there.frame0
