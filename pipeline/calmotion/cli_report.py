@@ -89,6 +89,7 @@ def run_report(run: Run, character: Character, result: Result, command: str, tot
         "newton_iterations": final.newton_iterations,
         "max_joint_gap_m": final.max_joint_gap,
         "refined_steps": final.refined_steps,
+        "dead_centres_s": final.dead_centres.tolist(),
         "frequencies_hz": {character.bodies[table.body].path: table.frequencies for table in result.modes},
     }
     layer, recording, table, figures = run.get(WrittenLayer), run.get(Recording), run.get(CsvFile), run.get(Figures)

@@ -86,6 +86,12 @@ def print_run(report: dict[str, Any], stream: TextIO) -> None:
     sag = max((target[f"sag{suffixes[-1]}_m"] or 0.0 for target in report["targets"]), default=0.0)
     if sag > 1e-6:
         console.print(f"at rest, before the motion, the targets are off by up to {length(sag)}")
+    if report["dead_centres_s"]:
+        times = [f"{time:.3f}" for time in report["dead_centres_s"]]
+        more = f" and {len(times) - 5} times more" if len(times) > 5 else ""
+        console.print(
+            f"closed loops pass a dead centre, where they could go two ways, at {', '.join(times[:5])} s{more}"
+        )
     if report["refined_steps"]:
         console.print(f"{report['refined_steps']} steps were only reached by smaller ones: try a smaller --step")
     console.print(

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from calmotion.dynamics.dead_centres import dead_centres
 from calmotion.dynamics.kinematics import rigid_state, target_frames
 from calmotion.dynamics.simulation import Workspace, simulate
 from calmotion.shot import WORLD
@@ -43,6 +44,9 @@ def test_it_passes_every_singular_pose_and_converges():
         assert error(coarse, 1 / 200, time) > 3.5 * error(fine, 1 / 400, time)  # second order
     assert motion.max_joint_gap < 1e-6
     assert np.isfinite(motion.states.lam).all()
+    # all its bars level, twice in each of five turns
+    passed = dead_centres(motion.margins)
+    assert len(passed) == 10 and np.abs(fine[passed][:, 2]).max() < 0.01
 
 
 def test_its_energy_stays():

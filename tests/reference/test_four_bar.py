@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from calmotion.dynamics.dead_centres import dead_centres
 from calmotion.dynamics.kinematics import rigid_state, target_frames
 from calmotion.dynamics.simulation import Workspace, simulate
 from calmotion.shot import WORLD
@@ -57,6 +58,7 @@ def test_its_positions_are_unique_through_full_turns(turning):
     assert np.abs(tips[:, [0, 2]] - closure(angle)).max() < 1e-6
     assert np.abs(tips[:, 1]).max() < 1e-9
     assert run.max_joint_gap < 1e-6
+    assert dead_centres(run.margins) == [], "a crank-rocker driven by its crank has none"
 
 
 def test_redundant_constraints_carry_least_load(turning):

@@ -34,6 +34,7 @@ class Border(NamedTuple):
         inverse: S^+, shape [9 L, 9 L] for L loops.
         null: Columns of the null space of S, shape [9 L, 9 L].
         rank: Shape [1].
+        margin: How far S is from losing one more rank: its smallest pivot over the largest, shape [1].
         S, left, right, order, v, x, y: Scratch of `pseudo_inverse` and of the solutions.
         X, lam: Scratch of one tree solution, shapes [B, N] and [J, 6].
         free: Multipliers of the tree's joints for each unknown of the border, shape [9 L, J, 6].
@@ -43,6 +44,7 @@ class Border(NamedTuple):
     inverse: Array
     null: Array
     rank: IntArray
+    margin: Array
     S: Array
     left: Array
     right: Array
@@ -61,7 +63,8 @@ def allocate_border(system: System) -> Border:
     joints, count = len(system.rows), len(system.parent)
     n = UNKNOWNS * (joints - count)
     return Border(
-        np.zeros((n, n)), np.zeros((n, n)), np.zeros(1, np.int64), np.zeros((n, n)), np.zeros((n, n)), np.zeros((n, n)),
+        np.zeros((n, n)), np.zeros((n, n)), np.zeros(1, np.int64), np.zeros(1), np.zeros((n, n)), np.zeros((n, n)),
+        np.zeros((n, n)),
         np.zeros(n, np.int64), np.zeros(n), np.zeros(n), np.zeros(n), np.zeros((count, system.size)),
         np.zeros((joints, JOINT_ROWS)), np.zeros((n, joints, JOINT_ROWS)), np.zeros((n, joints, JOINT_ROWS)),
     )  # fmt: skip
@@ -225,6 +228,12 @@ def factor_loops(system, Lc, Lp, Hc, Hp, Nc, Jp, lu, piv, Z, border, block):
     border.rank[0] = pseudo_inverse(
         n, border.S, border.inverse, border.null, border.left, border.right, border.order, border.v, border.x
     )
+    least, most = 0.0, 0.0
+    for k in range(border.rank[0]):
+        pivot = abs(border.S[k, k])
+        least = pivot if k == 0 else min(least, pivot)
+        most = max(most, pivot)
+    border.margin[0] = least / most if most > 0.0 else 1.0
     for i in range(n):
         for k in range(n):
             t = border.inverse[i, k] * _unit(k, length)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -38,6 +38,8 @@ class Trajectory:
         wall_s: Time it took [s].
         integrator: Name of the scheme.
         refined: Instants that only smaller steps reached.
+        margins: How far the closed loops are from a pose in which they have one more way to move, shape [T]: see
+            `loops.Border`; zeros where there are none.
     """
 
     h: float
@@ -49,6 +51,7 @@ class Trajectory:
     wall_s: float
     integrator: str = "bdf2"
     refined: tuple[int, ...] = ()
+    margins: Array = field(default_factory=lambda: np.zeros(0))
 
 
 @kernel
@@ -84,7 +87,9 @@ def largest_gap(system, angles, rates, states, world, work):
 
 
 @kernel
-def _advance(system, scheme, h, first, last, earlier, states, angles, rates, world, work, blocks, factors, scratch):
+def _advance(
+    system, scheme, h, first, last, earlier, states, angles, rates, world, margins, work, blocks, factors, scratch
+):
     """Steps first..last-1 of a trajectory.
 
     Returns:
@@ -105,6 +110,7 @@ def _advance(system, scheme, h, first, last, earlier, states, angles, rates, wor
         factorisations += more
         if code != newton.CONVERGED:
             return code, n, component, solved, factorisations, gap
+        margins[n] = scratch.border.margin[0]
         gap = max(gap, _largest_gap(system, angles[n], rates[n], instant_of(states, n), work))
     return newton.CONVERGED, last, -1, solved, factorisations, gap
 
@@ -169,14 +175,14 @@ def simulate(
         acceleration, states.lam[0] = initial_acceleration(system, first, angles[0], rates[0], motors, ws)
         earlier, states.turn[0] = instant_before(system, first, acceleration, h)
         ws.scratch.memory[:2] = acceleration
-    gap, done, factorisations = 0.0, 1, 0
+    gap, done, factorisations, margins = 0.0, 1, 0, np.zeros(total)
     refined: list[int] = []
     chunk = total if progress is None else max(1, total // 50)
     while done < total:
         last = min(done + chunk, total)
         code, instant, component, more, factored, largest = _advance(
-            system, scheme, h, done, last, earlier, states, angles, rates, world, ws.work, ws.blocks, ws.factors,
-            ws.scratch,
+            system, scheme, h, done, last, earlier, states, angles, rates, world, margins, ws.work, ws.blocks,
+            ws.factors, ws.scratch,
         )  # fmt: skip
         solved, factorisations, gap, done = solved + more, factorisations + factored, max(gap, largest), instant
         if code != newton.CONVERGED:
@@ -191,5 +197,5 @@ def simulate(
         if progress is not None:
             progress(done / total)
     return Trajectory(
-        h, states, world, solved, factorisations, gap, time.perf_counter() - begin, integrator, tuple(refined)
+        h, states, world, solved, factorisations, gap, time.perf_counter() - begin, integrator, tuple(refined), margins
     )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..dynamics.dead_centres import dead_centres
 from ..dynamics.model import Model
 from ..dynamics.reactions import reactions
 from ..naming import distinct_names
@@ -66,6 +67,7 @@ def simulation_of(model: Model, grid: TimeGrid, run: ForwardRun, reference: Refe
         wall_s=run.trajectory.wall_s,
         sag=errors[0].copy(),
         refined_steps=len(run.trajectory.refined),
+        dead_centres=grid.times[dead_centres(run.trajectory.margins)],
     )
 
 

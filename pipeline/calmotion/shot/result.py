@@ -52,6 +52,7 @@ class Simulation:
         wall_s: Time of this forward simulation alone [s].
         sag: How far each target hangs below (or beside) the reference at rest, before it moves [m], shape [K].
         refined_steps: Steps that only smaller ones reached.
+        dead_centres: Times at which closed loops pass a pose in which they could branch [s], shape [n].
     """
 
     motion: Motion
@@ -62,6 +63,7 @@ class Simulation:
     wall_s: float
     sag: Array = field(default_factory=lambda: np.zeros(0))
     refined_steps: int = 0
+    dead_centres: Array = field(default_factory=lambda: np.zeros(0))
 
 
 @dataclass(frozen=True, eq=False)
