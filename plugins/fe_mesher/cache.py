@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import os
 import tempfile
@@ -33,19 +34,36 @@ def load(key: str, names: tuple[str, ...] = ("points", "tets")) -> tuple[np.ndar
         return None
 
 
-def store(key: str, **arrays: np.ndarray) -> None:
-    """Keep arrays; a reader sees all of them or nothing. A folder that cannot be written is passed over."""
-    folder = cache_folder() / FOLDER
+def store(key: str, **arrays: np.ndarray) -> tuple[np.ndarray, ...]:
+    """Keep arrays; a reader sees all of them or nothing. A folder that cannot be written is passed over.
+
+    The tetrahedraliser makes another mesh each time, so where two processes made one, both go on with that which
+    was there first: simulations of the same shot then agree.
+
+    Returns:
+        What is kept under the key from now on.
+    """
+    folder, own = cache_folder() / FOLDER, tuple(arrays.values())
     try:
         folder.mkdir(parents=True, exist_ok=True)
         handle, name = tempfile.mkstemp(dir=folder, suffix=".part")
     except OSError:
-        return
+        return own
+    path = folder / f"{key}.npz"
     try:
         with os.fdopen(handle, "wb") as file:
             np.savez(file, **arrays)  # type: ignore[arg-type]
-        os.replace(name, folder / f"{key}.npz")
+        try:
+            os.link(name, path)
+        except FileExistsError:
+            other = load(key, tuple(arrays))
+            if other is not None:
+                return other
+            os.replace(name, path)
     except OSError:
-        pass
+        # a file system without links: the last one wins
+        with contextlib.suppress(OSError):
+            os.replace(name, path)
     finally:
         Path(name).unlink(missing_ok=True)
+    return own

@@ -57,7 +57,7 @@ def tetrahedralize(
     if found is None:
         found = _run(points, triangles, element_size, envelope, passes, path, time_limit)
         if use_cache:
-            cache.store(key, points=found[0], tets=found[1])
+            found = cache.store(key, points=found[0], tets=found[1])
     return found[0], found[1]
 
 

@@ -19,6 +19,7 @@ from .bdf2 import position_to_velocity, velocities
 from .elimination import factor
 from .failure import SimulationFailure
 from .loops import UNKNOWNS, copy_rows, factor_loops
+from .reactions import reactions
 from .schemes import bdf2_scheme
 from .simulation import Trajectory, Workspace, instant_of
 from .statics import STATIC
@@ -143,6 +144,16 @@ class Linearization:
         self.system, self.trajectory, self.angles, self.rates = system, trajectory, angles, rates
         self.workspace, self.data, self.pivots = workspace, data, pivots
         self._loaded = -1
+        self._axes = np.zeros((0, len(system.rows), 3, 3))
+
+    def axes(self, wanted: bool) -> Array:
+        """Axes of the joints' parent-side markers where sliders need them for their efforts, shape [T, J, 3, 3]."""
+        total, joints = self.angles.shape
+        if len(self._axes) != total and wanted:
+            self._axes = np.zeros((total, joints, 3, 3))
+            if np.any(self.system.sliding):
+                self._axes[:] = reactions(self.system, self.trajectory, self.angles, self.rates).axes
+        return self._axes
 
     def windows(self) -> list[tuple[int, int]]:
         """First instant and the one after the last of every window."""

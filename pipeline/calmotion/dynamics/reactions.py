@@ -24,15 +24,17 @@ class Reactions(NamedTuple):
         forces: [N], shape [T, J, 3].
         moments: [N m], shape [T, J, 3].
         efforts: Along the joint's axis, as its value grows: moments [N m], or forces [N] of a slider, shape [T, J].
+        axes: Of the frame on the joint's side 0, as columns, world, shape [T, J, 3, 3].
     """
 
     forces: Array
     moments: Array
     efforts: Array
+    axes: Array
 
 
 @allocating_kernel
-def _reactions(system, states, angles, rates, world, work, forces, moments, efforts):
+def _reactions(system, states, angles, rates, world, work, forces, moments, efforts, frames):
     for n in range(len(angles)):
         copy_rows(world[n], work.world)
         for b in range(len(system.parent)):
@@ -55,6 +57,9 @@ def _reactions(system, states, angles, rates, world, work, forces, moments, effo
             for i in range(3):
                 t += axes[i, 2] * source[n, joint, i]
             efforts[n, joint] = t
+            for i in range(3):
+                for k in range(3):
+                    frames[n, joint, i, k] = axes[i, k]
 
 
 def reactions(system: System, trajectory: Trajectory, angles: Array, rates: Array) -> Reactions:
@@ -68,6 +73,9 @@ def reactions(system: System, trajectory: Trajectory, angles: Array, rates: Arra
     """
     total, joints = len(angles), len(system.rows)
     work: Work = allocate_work(system)
-    found = Reactions(np.zeros((total, joints, 3)), np.zeros((total, joints, 3)), np.zeros((total, joints)))
+    found = Reactions(
+        np.zeros((total, joints, 3)), np.zeros((total, joints, 3)), np.zeros((total, joints)),
+        np.zeros((total, joints, 3, 3)),
+    )  # fmt: skip
     _reactions(system, trajectory.states, angles, rates, trajectory.world, work, *found)
     return found

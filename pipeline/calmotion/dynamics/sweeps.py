@@ -8,16 +8,62 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..kernels import allocating_kernel
+from ..kernels import allocating_kernel, kernel
 from ..shot.character import Array
 from .linearization import Linearization
 from .loops import UNKNOWNS, solve_system, solve_system_transposed
 from .sliders import has_row
 from .so3 import exponential, inverse_right_jacobian, right_jacobian
+from .system import JOINT_ROWS
+
+
+@kernel
+def _effort_change(system, j, axes, lam_of, Jp, x, lam):
+    """Change of a driven joint's effort with the coordinates x and the multipliers lam; 0 for other joints."""
+    if system.rows[j] < JOINT_ROWS:
+        return 0.0
+    if not system.sliding[j]:
+        return lam[j, 5]
+    t = axes[j, 0, 2] * lam[j, 0] + axes[j, 1, 2] * lam[j, 1] + axes[j, 2, 2] * lam[j, 2]
+    p = system.side[j, 0]
+    if p >= 0:
+        # the axis turns with the marker: (turn x z) . f = turn_y f_x - turn_x f_y in marker axes
+        fx, fy = _across(axes, lam_of, j)
+        for a in range(6 + system.elastic[p]):
+            t += (Jp[j, 1, a] * fx - Jp[j, 0, a] * fy) * x[p, a]
+    return t
+
+
+@kernel
+def _effort_pull(system, j, axes, lam_of, Jp, bar, x, lam):
+    """Transpose of `_effort_change`."""
+    if system.rows[j] < JOINT_ROWS:
+        return
+    if not system.sliding[j]:
+        lam[j, 5] += bar
+        return
+    for i in range(3):
+        lam[j, i] += axes[j, i, 2] * bar
+    p = system.side[j, 0]
+    if p >= 0:
+        fx, fy = _across(axes, lam_of, j)
+        for a in range(6 + system.elastic[p]):
+            x[p, a] += (Jp[j, 1, a] * fx - Jp[j, 0, a] * fy) * bar
+
+
+@kernel
+def _across(axes, lam, j):
+    """Components of a joint's force along the first two axes of its parent-side marker."""
+    fx = 0.0
+    fy = 0.0
+    for i in range(3):
+        fx += axes[j, i, 0] * lam[j, i]
+        fy += axes[j, i, 1] * lam[j, i]
+    return fx, fy
 
 
 @allocating_kernel
-def _tangent(system, h, turns, d_angle, d_rate, first, last, data, pivots, dc, nu, dth, dX):
+def _tangent(system, h, turns, d_angle, d_rate, first, last, data, pivots, axes, lam_of, dc, nu, dth, dX, d_effort):
     """Instants first..last-1, whose blocks the data hold; dc, nu, dth remember three instants, by turns."""
     P, D, Lc, Lp, Hc, Hp, Nc, Jp, by_angle, by_rate, on_parent, lu, Z, inverse, R, Hv = data
     joints = len(system.rows)
@@ -88,6 +134,9 @@ def _tangent(system, h, turns, d_angle, d_rate, first, last, data, pivots, dc, n
             system, Lc[at], Lp[at], Hc[at], Hp[at], Nc[at], Jp[at], lu[at], pivots[at], Z[at], inverse[at], x, lam, X,
             tree, y, g, block,
         )  # fmt: skip
+        if len(d_effort):
+            for j in range(joints):
+                d_effort[n, j] = _effort_change(system, j, axes[n], lam_of[n], Jp[at], x, lam)
         for b in range(count):
             m = 6 + system.elastic[b]
             for i in range(m):
@@ -117,7 +166,9 @@ def _tangent(system, h, turns, d_angle, d_rate, first, last, data, pivots, dc, n
 
 
 @allocating_kernel
-def _adjoint(system, h, turns, Xbar, first, last, data, pivots, g_angle, g_rate, cbar, nubar, thbar):
+def _adjoint(
+    system, h, turns, Xbar, effort_bar, first, last, data, pivots, axes, lam_of, g_angle, g_rate, cbar, nubar, thbar
+):  # fmt: skip
     """Transpose of `_tangent`; Xbar (body axes), cbar (world axes), nubar, thbar are overwritten."""
     P, D, Lc, Lp, Hc, Hp, Nc, Jp, by_angle, by_rate, on_parent, lu, Z, inverse, R, Hv = data
     joints = len(system.rows)
@@ -165,6 +216,9 @@ def _adjoint(system, h, turns, Xbar, first, last, data, pivots, g_angle, g_rate,
             for i in range(3, m):
                 x[b, i] = Xbar[n, b, i]
         lam[:] = 0.0
+        if len(effort_bar):
+            for j in range(joints):
+                _effort_pull(system, j, axes[n], lam_of[n], Jp[at], effort_bar[n, j], x, lam)
         solve_system_transposed(
             system, Lc[at], Lp[at], Hc[at], Hp[at], Nc[at], Jp[at], lu[at], pivots[at], Z[at], inverse[at], x, lam, X,
             tree, y, g, block,
@@ -241,45 +295,52 @@ def _adjoint(system, h, turns, Xbar, first, last, data, pivots, g_angle, g_rate,
             thbar[0] = 0.0
 
 
-def tangent(lin: Linearization, d_angle: Array, d_rate: Array) -> Array:
+def tangent(lin: Linearization, d_angle: Array, d_rate: Array, efforts: bool = False) -> tuple[Array, Array]:
     """How the motion follows a change of the joint angles.
 
     Args:
         d_angle, d_rate: Change of angle [rad] (or length [m]) and rate of each joint's motor, shape [T, J].
+        efforts: Whether the change of the motors' efforts is wanted.
 
     Returns:
-        (R^T dc, dphi, du) of each component, shape [T, B, N].
+        (R^T dc, dphi, du) of each component, shape [T, B, N], and the change of the efforts of driven joints
+        (`reactions.Reactions`), shape [T, J], or [0, J] where they are not wanted.
     """
     total, count, size = len(d_angle), len(lin.system.parent), lin.system.size
     dX = np.zeros((total, count, size))
+    d_effort = np.zeros((total if efforts else 0, len(lin.system.rows)))
     # of three instants: translation in world axes, velocity, turn
     memory = np.zeros((3, count, 3)), np.zeros((3, count, size)), np.zeros((3, count, 3))
     for first, last in lin.windows():
         lin.load(first)
         _tangent(
             lin.system, lin.trajectory.h, lin.trajectory.states.turn, d_angle, d_rate, first, last, lin.data,
-            lin.pivots, *memory, dX,
+            lin.pivots, lin.axes(efforts), lin.trajectory.states.lam, *memory, dX, d_effort,
         )  # fmt: skip
-    return dX
+    return dX, d_effort
 
 
-def adjoint(lin: Linearization, gradient: Array) -> tuple[Array, Array]:
+def adjoint(lin: Linearization, gradient: Array, effort_gradient: Array | None = None) -> tuple[Array, Array]:
     """How an objective follows the joint angles.
 
     Args:
         gradient: Its derivative by (R^T dc, dphi, du) of each component at each instant, shape [T, B, N].
+        effort_gradient: Its derivative by the efforts of the joints, shape [T, J]; None where it has none.
 
     Returns:
         Its derivatives by angle and rate of each joint's motor, shape [T, J] each.
     """
     Xbar = gradient.copy()
     total, count, size = Xbar.shape
-    g_angle, g_rate = np.zeros((total, len(lin.system.rows))), np.zeros((total, len(lin.system.rows)))
+    joints = len(lin.system.rows)
+    efforts = effort_gradient is not None
+    effort_bar = np.zeros((0, joints)) if effort_gradient is None else effort_gradient
+    g_angle, g_rate = np.zeros((total, joints)), np.zeros((total, joints))
     memory = np.zeros((total, count, 3)), np.zeros((total, count, size)), np.zeros((total, count, 3))
     for first, last in reversed(lin.windows()):
         lin.load(first)
         _adjoint(
-            lin.system, lin.trajectory.h, lin.trajectory.states.turn, Xbar, first, last, lin.data, lin.pivots,
-            g_angle, g_rate, *memory,
+            lin.system, lin.trajectory.h, lin.trajectory.states.turn, Xbar, effort_bar, first, last, lin.data,
+            lin.pivots, lin.axes(efforts), lin.trajectory.states.lam, g_angle, g_rate, *memory,
         )  # fmt: skip
     return g_angle, g_rate

@@ -70,7 +70,8 @@ def excitation_of(character: Character, model: Model, run: ForwardRun, h: float)
     angular = np.gradient(omega, h, axis=0) if len(states.c) > 1 else np.zeros_like(omega)
     felt = np.einsum("tbji,tbj->tbi", R, acceleration - system.gravity)
     reach = _reach(model, run, R)
-    force, moment, _ = reactions(system, run.trajectory, run.joint_angles, run.joint_rates)
+    found = reactions(system, run.trajectory, run.joint_angles, run.joint_rates)
+    force, moment = found.forces, found.moments
     closed = _in_loops(model)
     component_of = {body: k for k, body in enumerate(tree.body)}
     number = {joint: k for k, joint in enumerate((*tree.joint, *tree.loops))}
