@@ -11,9 +11,11 @@ from numpy.typing import NDArray
 from . import __version__
 from .host import CsvFile, Figures, OperatorResult, Recording, Run, WrittenLayer
 from .memory import peak_memory
-from .shot import Character, LeftOut, Result, Simulation
+from .shot import Character, LeftOut, LimitUse, Result, Simulation
 from .shot.character import Array
 from .shot.measure import measure_of
+
+LIMIT_KEPT = 1e-6  # relative excess that is rounding
 
 
 def judged_steps(simulation: Simulation) -> NDArray[np.bool_]:
@@ -59,6 +61,23 @@ def left_out_row(row: LeftOut) -> dict[str, Any]:
     return {"what": row.what, "why": row.why, "estimated_error_m": row.estimated_error_m}
 
 
+def limit_row(character: Character, limit: LimitUse) -> dict[str, Any]:
+    """One row of `limits`."""
+    motor = character.motors[limit.motor]
+    return {
+        "path": motor.path,
+        "quantity": limit.quantity,
+        "unit": measure_of(motor).unit_of(limit.quantity),
+        "limit": limit.limit,
+        "before": limit.before,
+        "after": limit.after,
+        "time_s": limit.time_s,
+        "shown": [measure_of(motor).shown(limit.quantity, v) for v in (limit.limit, limit.before, limit.after)],
+        "exceeded": limit.excess > LIMIT_KEPT,
+        "cost_m": limit.cost_m,
+    }
+
+
 def operator_row(result: OperatorResult) -> dict[str, Any]:
     """What became of an operator."""
     return {
@@ -87,6 +106,7 @@ def run_report(run: Run, character: Character, result: Result, command: str, tot
         "modes": sum(elastic.shape[1] for elastic in final.motion.elastic),
         "parameters": result.parameters,
         "newton_iterations": final.newton_iterations,
+        "limits": [limit_row(character, limit) for limit in result.limits],
         "max_joint_gap_m": final.max_joint_gap,
         "refined_steps": final.refined_steps,
         "dead_centres_s": final.dead_centres.tolist(),
@@ -122,6 +142,9 @@ def _optimized(character: Character, result: Result) -> dict[str, Any]:
         "objective_before": result.objective_before,
         "objective_after": result.objective_after,
         "forward_simulations": result.forward_simulations,
+        "stopped": result.stopped,
+        "interrupted": result.interrupted,
+        "expected_further_gain_m": result.expected_gain_m,
         "gradients": result.gradients,
         "linearized_sweeps": result.linearized_sweeps,
         "iterations": result.iterations,

@@ -79,6 +79,12 @@ def run_shot(args: argparse.Namespace, command: str, output: Output) -> int:
     character, result = run.get(Character), run.get(Result)
     problems = [Problem(ShotError("interrupted"))] if interrupted else problems_of(run, wanted)
     report: dict[str, Any] = {}
+    if result and result.interrupted:
+        interrupted = True
+    elif result and paths.layer and not problems and command == "optimize":
+        from .retarget.checkpoint import checkpoint_path
+
+        checkpoint_path(paths.layer).unlink(missing_ok=True)
     if character and result:
         from .cli_report import run_report
 

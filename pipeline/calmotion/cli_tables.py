@@ -63,6 +63,20 @@ def print_left_out(console: Console, rows: Sequence[dict[str, Any]]) -> None:
         console.print(f"left out: {row['what']}: {row['why']}{cost}")
 
 
+def print_limits(console: Console, limits: Sequence[dict[str, Any]], optimized: bool) -> None:
+    """Limits of motors that are exceeded, or that keep the targets from their motion."""
+    rows = []
+    for row in limits:
+        if not row["exceeded"] and row["cost_m"] is None:
+            continue
+        limit, before, after = row["shown"]
+        verdict = "exceeded" if row["exceeded"] else f"costs {length(row['cost_m'])} rms"
+        values = [limit, before, after] if optimized else [limit, after]
+        rows.append([row["path"], row["quantity"], *values, f"{row['time_s']:.3f} s", verdict])
+    heads = ["limit", "before", "after"] if optimized else ["limit", "reached"]
+    print_table(console, "Limits of motors that matter", ["motor", "quantity", *heads, "at", ""], rows, texts=2)
+
+
 def print_run(report: dict[str, Any], stream: TextIO) -> None:
     """The report of `simulate` or `optimize`."""
     console = console_on(stream)
@@ -80,9 +94,14 @@ def print_run(report: dict[str, Any], stream: TextIO) -> None:
             f"iterations, {report['forward_simulations']} simulations, {report['linearized_sweeps']} linearized "
             f"sweeps, {report['wall_s']:.2f} s"
         )
+        if report["stopped"] not in ("converged", ""):
+            gain = report["expected_further_gain_m"]
+            more = "" if gain is None else f", {length(gain)} less error expected of one more iteration"
+            console.print(f"stopped: {report['stopped']}{more}")
         kept = [motor["path"] for motor in report["motors"] if not motor["changed"]]
         if kept:
             console.print(f"motors that did not change: {', '.join(kept)}")
+    print_limits(console, report["limits"], optimized)
     sag = max((target[f"sag{suffixes[-1]}_m"] or 0.0 for target in report["targets"]), default=0.0)
     if sag > 1e-6:
         console.print(f"at rest, before the motion, the targets are off by up to {length(sag)}")

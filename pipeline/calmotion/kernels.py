@@ -36,9 +36,10 @@ def kernel_folder() -> Path:
 def kernel(function: Callable[..., Any]) -> Any:
     """Compile a function with numba when it is first called, and keep the result on disk.
 
-    It must not allocate: without reference counting it compiles in a fraction of the time.
+    It must not allocate: without reference counting it compiles in a fraction of the time. It runs without the
+    interpreter's lock.
     """
-    return _compile(function, _nrt=False, no_cfunc_wrapper=True, fastmath=FUSED)
+    return _compile(function, _nrt=False, no_cfunc_wrapper=True, nogil=True, fastmath=FUSED)
 
 
 def allocating_kernel(function: Callable[..., Any]) -> Any:

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from calmotion.host import Operator, Property, RunContext
-from calmotion.host.values import ReducedBodies, Source, SystemModes
+from calmotion.host.values import OutputPaths, ReducedBodies, Source, SystemModes
 from calmotion.shot import Animation, Character, FEMeshes, Result
 
 if TYPE_CHECKING:
@@ -109,7 +109,7 @@ class OptimizeShot(Operator):
     idname = "retarget.optimize"
     label = "Optimise the motor curves"
     requires = (Character, Animation, Source)
-    uses = (ReducedBodies,)
+    uses = (ReducedBodies, OutputPaths)
     provides = (Result,)
     properties = (
         Property("max_iterations", int, 30, minimum=1, description="Most Gauss-Newton iterations"),
@@ -122,7 +122,8 @@ class OptimizeShot(Operator):
         return _wrong_command(data, "optimize")
 
     def execute(self, context: RunContext) -> Sequence[object]:
-        from calmotion.retarget.run import optimize_shot
+        from calmotion.retarget.checkpoint import checkpoint_path
+        from calmotion.retarget.optimize import optimize_shot
 
         values = context.properties
         options = _options(
@@ -131,7 +132,14 @@ class OptimizeShot(Operator):
             knot_spacing=values.knot_spacing if values.knot_spacing > 0.0 else None,
             smoothness=values.smoothness if values.smoothness >= 0.0 else None,
         )
-        return [optimize_shot(*_inputs(context), options, context.progress)]
+        paths = context.get(OutputPaths)
+        kept = checkpoint_path(paths.layer) if paths is not None and paths.layer else None
+        result = optimize_shot(*_inputs(context), options, context.progress, kept)
+        if result.interrupted:
+            context.report(
+                "warning", "interrupted: these are the best curves so far; the same command goes on from them"
+            )
+        return [result]
 
 
 def _inputs(context: RunContext) -> tuple[Character, Animation, Sequence[Any] | None]:

@@ -8,8 +8,9 @@ from calmotion.evidence.beam_arm import quintic, shot_of
 from calmotion.evidence.four_bar import COUPLER, CRANK, GROUND, ROCKER, corners, four_bar
 from calmotion.retarget.bodies import reduce_bodies
 from calmotion.retarget.curves import sample_tracks
+from calmotion.retarget.forward import run_forward
 from calmotion.retarget.prepare import Options, excitations, prepare
-from calmotion.retarget.problem import rigid_motion, run_forward
+from calmotion.retarget.reference import rigid_motion
 
 
 def test_its_corners_are_as_far_apart_as_its_bars_are_long():

@@ -1,7 +1,6 @@
 import numpy as np
 import pytest
 from calmotion.retarget.curves import (
-    coefficient_bounds,
     interpolate,
     make_basis,
     make_grid,
@@ -95,15 +94,3 @@ def test_sparse_tracks_are_interpolated_and_held(count):
     angles, rates = sample_tracks([Track(times, values)], make_grid(FRAMES, None, 0.0))
     assert angles[0, 0] == pytest.approx(values[0]) and angles[-1, 0] == pytest.approx(values[-1])
     assert rates[0, 0] == 0.0 and rates[-1, 0] == 0.0
-
-
-def test_bounds_on_coefficients_keep_the_curve_within_its_limits():
-    rng = np.random.default_rng(1)
-    grid = make_grid(FRAMES, 1 / 480, 0.0)
-    basis = make_basis(grid, 0.08, False)
-    angles, _ = sample_tracks([Track(FRAMES, np.sin(6 * FRAMES))], grid)
-    bounds = coefficient_bounds(basis, grid, angles[:, 0], -1.05, 1.05)
-    for _ in range(20):
-        p = np.where(rng.random(basis.count) < 0.5, bounds[:, 0], bounds[:, 1])
-        curve = angles[:, 0] + basis.values @ p
-        assert curve.max() <= 1.05 + 1e-12 and curve.min() >= -1.05 - 1e-12

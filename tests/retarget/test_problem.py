@@ -1,37 +1,79 @@
-"""The gradient of the whole chain, and the preconditioner against the rigid robot's own matrix."""
+"""The gradient of the whole chain: pre-roll, static start, every term, limits, loops and nonlinear materials."""
 
 import dataclasses
 
 import numpy as np
 import pytest
-from calmotion.dynamics.kinematics import rigid_poses
-from calmotion.dynamics.model import compile_model, rigid_model
 from calmotion.dynamics.topology import span_tree
-from calmotion.retarget.curves import make_basis, make_grid, sample_tracks
+from calmotion.evidence.linkage_arm import linkage_arm, performance
+from calmotion.retarget.bodies import reduce_bodies
+from calmotion.retarget.curves import make_basis, sample_curves
+from calmotion.retarget.limits import LimitTerms, motor_bounds
 from calmotion.retarget.objective import Objective
-from calmotion.retarget.preconditioner import RigidPreconditioner, rigid_motor_jacobian
-from calmotion.retarget.problem import RetargetProblem, rigid_motion
-from scipy.spatial.transform import Rotation
+from calmotion.retarget.prepare import Options, excitations, prepare
+from calmotion.retarget.problem import RetargetProblem
+from calmotion.retarget.reference import rigid_motion, static_motion
 
 
-def make_problem(arm, bodies, animation, pre_roll, smoothness=1e-6, kept=False):
-    model = compile_model(arm, span_tree(arm), bodies)
-    grid = make_grid(animation.frame_times, 1 / 240, pre_roll)
-    angles, rates = sample_tracks(animation.tracks, grid)
-    rigid = rigid_motion(model, angles, rates, grid.h)
-    objective = Objective.over(model, rigid.reference, grid.times, grid.h)
+def make_problem(character, bodies, animation, pre_roll=0.0, kept=False, limited=False, static=False, smoothness=1e-6):
+    prepared = prepare(character, animation, bodies, Options(step=1 / 240, pre_roll=pre_roll))
+    model, grid = prepared.model, prepared.grid
+    curves = sample_curves(animation.tracks, grid)
+    meant = rigid_motion(model, curves.angles, curves.rates, grid.h)
+    if static:
+        meant = static_motion(model, meant, curves.angles, grid.judged)
+    objective = Objective.over(model, meant.reference, grid.times, grid.h, animation.weights)
     basis = make_basis(grid, 0.1, kept)
-    return RetargetProblem(model, grid, angles, rates, objective, basis, np.array([0, 1]), smoothness, 1e-4, gain=1e-6)
+    limits = LimitTerms(motor_bounds(character), grid.judged, grid.h, 3.0, on=True) if limited else None
+    motors = np.arange(len(character.motors), dtype=np.int32)
+    return RetargetProblem(model, grid, curves, objective, basis, motors, smoothness, 1e-4, None, limits)
 
 
-@pytest.fixture(scope="module", params=[(0.0, False), (0.25, False), (0.0, True)], ids=["rest", "pre-roll", "kept"])
+def limited_motors(character, scale=1.0):
+    """Limits that the motion of the tests exceeds at some instants."""
+    tight = {"max_velocity": 2.0 * scale, "max_acceleration": 12.0 * scale, "max_torque": 4.0 * scale}
+    joints = tuple(dataclasses.replace(j, lower=-0.5 * scale, upper=0.3 * scale) for j in character.joints)
+    motors = tuple(dataclasses.replace(motor, **tight) for motor in character.motors)
+    return dataclasses.replace(character, motors=motors, joints=joints)
+
+
+def linkage(elasticity):
+    character, meshes = linkage_arm(modes=-1 if elasticity == "auto" else 4)
+    bodies = [
+        dataclasses.replace(b, flexible=dataclasses.replace(b.flexible, elasticity=elasticity)) if b.flexible else b
+        for b in character.bodies
+    ]
+    character, animation = dataclasses.replace(character, bodies=tuple(bodies)), performance(0.8)
+    loads = excitations(character, animation, meshes, Options())
+    return character, reduce_bodies(character, span_tree(character), meshes, None, loads), animation
+
+
+CASES = ["rest", "pre-roll", "kept", "limits", "rotation alone", "static reference", "linkage", "linkage, neohookean"]
+
+
+@pytest.fixture(scope="module", params=CASES)
 def linearized(request, arm, bodies, animation):
-    pre_roll, kept = request.param
-    problem = make_problem(arm, bodies, animation, pre_roll, kept=kept)
-    x = 0.02 * np.random.default_rng(0).normal(size=problem.size)
+    kind = request.param
+    if kind.startswith("linkage"):
+        parts = linkage("neohookean" if "neo" in kind else "stvk")
+        parts = (limited_motors(parts[0], 0.4), *parts[1:])
+        made = [make_problem(*parts, limited=True) for _ in range(2)]
+    else:
+        character = limited_motors(arm) if kind == "limits" else arm
+        if kind == "rotation alone":
+            targets = tuple(dataclasses.replace(t, position_weight=0.0, rotation_weight=1.0) for t in arm.targets)
+            character = dataclasses.replace(arm, targets=targets)
+        made = [
+            make_problem(
+                character, bodies, animation, 0.25 if kind == "pre-roll" else 0.0, kind == "kept", kind == "limits",
+                kind.startswith("static"),
+            )
+            for _ in range(2)
+        ]  # fmt: skip
+    problem, other = made
+    x = (0.005 if kind.startswith("linkage") else 0.02) * np.random.default_rng(0).normal(size=problem.size)
     problem.value(x)
     # products need what `linearize` leaves behind, so differences are taken on a second problem
-    other = make_problem(arm, bodies, animation, pre_roll, kept=kept)
     return problem, x, problem.linearize(), other
 
 
@@ -40,13 +82,14 @@ def test_gradient_matches_central_differences_of_the_whole_simulation(linearized
     rng = np.random.default_rng(1)
     for _ in range(2):
         d = rng.normal(size=len(x))
-        e = 1e-4
 
         def difference(e, d=d):
             return (other.value(x + e * d) - other.value(x - e * d)) / (2 * e)
 
+        # terms of limits have a corner in their second derivative, so that steps must be small there
+        e = 1e-4 if problem.limits is None else 1e-6
         expected = (4.0 * difference(e) - difference(2 * e)) / 3.0
-        assert abs(gradient @ d - expected) < 1e-7 * abs(expected)
+        assert abs(gradient @ d - expected) < (1e-7 if problem.limits is None else 1e-6) * abs(expected)
 
 
 def test_product_is_symmetric_and_follows_the_change_of_the_residuals(linearized):
@@ -55,8 +98,32 @@ def test_product_is_symmetric_and_follows_the_change_of_the_residuals(linearized
     a, b = rng.normal(size=(2, len(x)))
     Ha, Hb = problem.product(a), problem.product(b)
     assert abs(a @ Hb - b @ Ha) < 1e-11 * abs(a @ Hb)
-    change = np.sum(problem.push_forward(a) ** 2) + a @ problem._bend(a)
+    residuals, values = problem.push_forward(a)
+    change = np.sum(residuals**2) + a @ problem.bend(a)
+    if problem.limits is not None:
+        weights = {name: problem.limits.curvature(name, v) for name, v in problem.limited.items()}
+        assert all(np.any(w) for w in weights.values()), "every limit should act somewhere"
+        change += sum(np.sum(weights[name] * v**2) for name, v in values.items())
     assert abs(a @ Ha - change) < 1e-11 * change
+
+
+def test_model_is_the_merit_to_second_order(linearized):
+    problem, x, gradient, _ = linearized
+    if problem.limits is None:
+        pytest.skip("there are no limits")
+    from calmotion.retarget.limited_step import ModelPoint
+
+    d = np.random.default_rng(3).normal(size=len(x))
+    residuals, values = problem.push_forward(d)
+    way = ModelPoint(d, residuals, values)
+    start = ModelPoint(0.0 * d, problem.residuals, dict(problem.limited))
+    assert problem.model_value(start) == pytest.approx(problem.merit(), rel=1e-12)
+    assert problem.model_slope(start, way) == pytest.approx(gradient @ d, rel=1e-10)
+    there = start.moved(way, 1e-3)
+    e = 1e-6
+    slope = (problem.model_value(there.moved(way, e)) - problem.model_value(there.moved(way, -e))) / (2 * e)
+    assert problem.model_slope(there, way) == pytest.approx(slope, rel=1e-5)
+    assert problem.model_gradient(there) @ d == pytest.approx(problem.model_slope(there, way), rel=1e-10)
 
 
 def test_static_start_follows_the_curves(arm, bodies, animation):
@@ -66,59 +133,17 @@ def test_static_start_follows_the_curves(arm, bodies, animation):
     problem.linearize()
     d = np.zeros(problem.size)
     d[1] = 1.0  # elbow
-    change = problem.push_forward(d)
+    change, _ = problem.push_forward(d)
     assert np.abs(change[0, 1]).max() > 1e-3
 
 
-def test_rigid_jacobian_matches_central_differences(arm, bodies, animation):
-    problem = make_problem(arm, bodies, animation, 0.0)
-    rigid = rigid_model(problem.model)
-    motors = problem.angles[::40]
-    J = rigid_motor_jacobian(rigid, rigid.joint_angles(motors), np.array([0, 1]))
-    e = 1e-6
-    for k in range(2):
-        frames = []
-        for sign in (1, -1):
-            c, q = rigid_poses(rigid, rigid.joint_angles(motors + sign * e * np.eye(2)[k]))
-            R = Rotation.from_quat(np.roll(q.reshape(-1, 4), -1, axis=1)).as_matrix().reshape(c.shape[:2] + (3, 3))
-            t = rigid.targets
-            own = t.component
-            frames.append(c[:, own] + np.einsum("nkij,kj->nki", R[:, own], t.position))
-        assert np.abs((frames[0] - frames[1]) / (2 * e) - J[:, :, :3, k]).max() < 1e-8
+def test_weights_that_change_in_time_weigh_each_instant(arm, bodies, animation):
+    from calmotion.shot import WeightTrack
 
-
-def test_preconditioner_inverts_the_rigid_gauss_newton_matrix(arm, bodies, animation):
-    problem = make_problem(arm, bodies, animation, 0.0)
-    rigid = rigid_model(problem.model)
-    J = rigid_motor_jacobian(rigid, rigid.joint_angles(problem.angles), problem.motors)
-    penalty = 1e-6 * problem.basis.bending + 1e-4 * problem.basis.closeness
-    pre = RigidPreconditioner(J, problem.objective.weights, problem.basis.values, penalty)
-    B = problem.basis.values.toarray()
-    rows = np.einsum("nkia,np->nkipa", J * problem.objective.weights[..., None], B).reshape(-1, problem.size)
-    H = rows.T @ rows + np.kron(penalty.toarray(), np.eye(2))
-    H += 1e-9 * np.max(np.diag(H)) * np.eye(len(H))
-    fixed = np.zeros(problem.size, bool)
-    fixed[[3, 7]] = True
-    b = np.random.default_rng(3).normal(size=problem.size)
-    b[fixed] = 0.0
-    pre.factor(fixed)
-    free = ~fixed
-    expected = np.zeros_like(b)
-    expected[free] = np.linalg.solve(H[np.ix_(free, free)], b[free])
-    assert np.abs(pre.solve(b) - expected).max() < 1e-6 * np.abs(expected).max()
-
-
-def test_rotation_weight_alone_gives_a_consistent_gradient(arm, bodies, animation):
-    targets = tuple(dataclasses.replace(t, position_weight=0.0, rotation_weight=1.0) for t in arm.targets)
-    character = dataclasses.replace(arm, targets=targets)
-    problem = make_problem(character, bodies, animation, 0.0)
-    x = 0.02 * np.random.default_rng(5).normal(size=problem.size)
-    problem.value(x)
-    gradient = problem.linearize()
-    d, e = np.random.default_rng(6).normal(size=len(x)), 1e-4
-
-    def difference(e):
-        return (problem.value(x + e * d) - problem.value(x - e * d)) / (2 * e)
-
-    expected = (4.0 * difference(e) - difference(2 * e)) / 3.0
-    assert abs(gradient @ d - expected) < 1e-7 * abs(expected)
+    track = WeightTrack(1, False, np.array([0.5, 1.0]), np.array([0.0, 2.0]))
+    problem = make_problem(arm, bodies, dataclasses.replace(animation, weights=(track,)))
+    weights, times = problem.objective.weights, problem.grid.times
+    plain = make_problem(arm, bodies, animation).objective.weights
+    assert np.all(weights[times < 0.5, 1, :3] == 0.0)
+    assert np.allclose(weights[times > 1.0, 1, :3] ** 2, 2.0 * plain[times > 1.0, 1, :3] ** 2)
+    assert np.array_equal(weights[:, 0], plain[:, 0]) and np.array_equal(weights[:, 1, 3:], plain[:, 1, 3:])

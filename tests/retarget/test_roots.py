@@ -7,7 +7,7 @@ from calmotion.dynamics.model import body_anchors, compile_model, rigid_body
 from calmotion.dynamics.simulation import Workspace
 from calmotion.dynamics.topology import span_tree
 from calmotion.retarget.curves import make_grid, needed_pre_roll
-from calmotion.retarget.problem import run_forward
+from calmotion.retarget.forward import run_forward
 from calmotion.retarget.roots import root_tracks, sample_roots
 from calmotion.shot import Body, Character, Frame, Joint, MassProperties, Motor, Target
 from calmotion.shot.animation import MovingFrame

@@ -3,10 +3,11 @@
 import numpy as np
 import pytest
 from calmotion.host import ReducedBodies, Source, open_host
-from calmotion.retarget.curves import make_basis, sample_tracks
+from calmotion.retarget.curves import make_basis, sample_curves
 from calmotion.retarget.objective import Objective
 from calmotion.retarget.prepare import Options, prepare
-from calmotion.retarget.problem import RetargetProblem, rigid_motion
+from calmotion.retarget.problem import RetargetProblem
+from calmotion.retarget.reference import rigid_motion
 from calmotion.shot import Animation, Character
 
 
@@ -17,12 +18,12 @@ def problem(repository):
     assert all(result.success for result in run)
     character, animation = run.get(Character), run.get(Animation)
     prepared = prepare(character, animation, run.get(ReducedBodies).bodies, Options(step=1 / 120))
-    angles, rates = sample_tracks(animation.tracks, prepared.grid)
-    rigid = rigid_motion(prepared.model, angles, rates, prepared.grid.h)
+    curves = sample_curves(animation.tracks, prepared.grid)
+    rigid = rigid_motion(prepared.model, curves.angles, curves.rates, prepared.grid.h)
     objective = Objective.over(prepared.model, rigid.reference, prepared.grid.times, prepared.grid.h)
     basis = make_basis(prepared.grid, 0.2, False)
     motors = np.arange(len(character.motors), dtype=np.int32)
-    return RetargetProblem(prepared.model, prepared.grid, angles, rates, objective, basis, motors, 1e-8, 1e-4, 1e-6)
+    return RetargetProblem(prepared.model, prepared.grid, curves, objective, basis, motors, 1e-8, 1e-4)
 
 
 def test_gradient_matches_central_differences_of_the_whole_simulation(problem):

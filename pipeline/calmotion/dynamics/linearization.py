@@ -10,6 +10,10 @@ with h_V, h_A the part of dV, dV' that earlier instants determine.
 
 from __future__ import annotations
 
+import math
+import os
+from concurrent.futures import ThreadPoolExecutor
+
 import numpy as np
 
 from ..kernels import kernel
@@ -26,6 +30,12 @@ from .statics import STATIC
 from .system import JOINT_ROWS, Blocks, System
 
 MEMORY = 4e9  # [bytes]
+_FEW = 64  # instants that are not worth another thread
+
+
+def _processors() -> int:
+    """Processors that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 @kernel
@@ -110,6 +120,8 @@ def linearize(
         data = tuple(np.zeros((size, *shape)) for shape in _shapes(system))
         pivots = np.zeros((size, len(system.parent), system.size + JOINT_ROWS), np.int32)
     made = Linearization(system, trajectory, angles, rates, workspace, data, pivots)
+    if previous is not None:
+        made._helpers = previous._helpers
     made.load(0)
     return made
 
@@ -145,6 +157,7 @@ class Linearization:
         self.workspace, self.data, self.pivots = workspace, data, pivots
         self._loaded = -1
         self._axes = np.zeros((0, len(system.rows), 3, 3))
+        self._helpers: list[Workspace] = []  # one for each further processor
 
     def axes(self, wanted: bool) -> Array:
         """Axes of the joints' parent-side markers where sliders need them for their efforts, shape [T, J, 3, 3]."""
@@ -171,10 +184,27 @@ class Linearization:
         self._loaded = -1
         trajectory, ws = self.trajectory, self.workspace
         last = min(first + len(self.pivots), len(self.angles))
-        bad, instant = _linearize(
-            self.system, STATIC, bdf2_scheme(trajectory.h), trajectory.h, trajectory.states, self.angles, self.rates,
-            trajectory.world, first, last, ws.work, ws.blocks, ws.scratch, self.data, self.pivots,
-        )  # fmt: skip
-        if bad >= 0:
-            raise SimulationFailure(instant * trajectory.h, bad, "singular")
+
+        def part(start: int, end: int, own: Workspace) -> tuple[int, int]:
+            here = slice(start - first, end - first)
+            return _linearize(
+                self.system, STATIC, bdf2_scheme(trajectory.h), trajectory.h, trajectory.states, self.angles,
+                self.rates, trajectory.world, start, end, own.work, own.blocks, own.scratch,
+                tuple(array[here] for array in self.data), self.pivots[here],
+            )  # fmt: skip
+
+        # instants do not depend on each other, and kernels run without the interpreter's lock
+        share = max(_FEW, math.ceil((last - first) / _processors()))
+        starts = range(first, last, share)
+        while len(self._helpers) < len(starts) - 1:
+            self._helpers.append(Workspace.for_system(self.system))
+        with ThreadPoolExecutor(max(1, len(self._helpers))) as pool:
+            others = [
+                pool.submit(part, start, min(start + share, last), own)
+                for start, own in zip(starts[1:], self._helpers, strict=False)
+            ]
+            found = [part(first, min(first + share, last), ws), *(other.result() for other in others)]
+        for bad, instant in found:
+            if bad >= 0:
+                raise SimulationFailure(instant * trajectory.h, bad, "singular")
         self._loaded = first

@@ -79,8 +79,8 @@ class Scene:
         """
         from ..dynamics.simulation import Workspace
         from ..retarget.curves import sample_tracks
+        from ..retarget.forward import run_forward
         from ..retarget.prepare import Options, prepare
-        from ..retarget.problem import run_forward
 
         options = Options(step=step, pre_roll=0.0, integrator=integrator)
         prepared = prepare(self.character, self.animation, self.bodies, options)

@@ -11,7 +11,7 @@ from scipy.interpolate import BSpline, CubicSpline
 from scipy.sparse import csr_matrix, diags
 
 from ..shot.animation import Track
-from ..shot.character import Array, IntArray
+from ..shot.character import Array, BoolArray, IntArray
 
 DEGREE = 3
 MAX_STEP = 1.0 / 480.0
@@ -46,6 +46,11 @@ class TimeGrid:
     def frames(self) -> IntArray:
         """Index of each frame among the instants, shape [f]."""
         return self.pre_steps + self.substeps * np.arange(len(self.frame_times), dtype=np.int32)
+
+    @property
+    def judged(self) -> BoolArray:
+        """Which instants belong to the shot, shape [T]."""
+        return np.arange(len(self.times)) >= self.pre_steps
 
     @property
     def pre_roll(self) -> float:
@@ -132,6 +137,32 @@ def sample_tracks(tracks: Sequence[Track], grid: TimeGrid) -> tuple[Array, Array
     return angles, rates
 
 
+def sample_accelerations(tracks: Sequence[Track], grid: TimeGrid) -> Array:
+    """Accelerations [rad/s^2] of all tracks at the grid's instants, shape [T, M]; zero during a pre-roll."""
+    times, pre = grid.times, grid.pre_steps
+    out = np.zeros((len(times), len(tracks)))
+    for k, track in enumerate(tracks):
+        spline = interpolate(track, grid.frame_times[-1])
+        inside = (times >= spline.x[0]) & (times <= spline.x[-1])
+        inside[:pre] = False
+        out[inside, k] = spline(times[inside], 2)
+    return out
+
+
+@dataclass(frozen=True, eq=False)
+class Curves:
+    """Motor curves at the instants: angles [rad], rates [rad/s], accelerations [rad/s^2], shape [T, M] each."""
+
+    angles: Array
+    rates: Array
+    accelerations: Array
+
+
+def sample_curves(tracks: Sequence[Track], grid: TimeGrid) -> Curves:
+    """All of a shot's tracks at the grid's instants."""
+    return Curves(*sample_tracks(tracks, grid), sample_accelerations(tracks, grid))
+
+
 def needed_pre_roll(tracks: Sequence[Track], frame_times: Array) -> float:
     """Length of the pre-roll [s] that a shot needs for its tracks: none when they start at rest, else a second."""
     end = frame_times[-1]
@@ -149,16 +180,17 @@ class OffsetBasis:
 
     Attributes:
         knots: Break points [s], frames of the shot, shape [n].
-        values, rates: Basis and its rate at the grid's instants, sparse, shape [T, P].
+        values, rates, accelerations: Basis and its derivatives at the grid's instants, sparse, shape [T, P].
         at_frames: Basis at the frames, sparse, shape [f, P].
         bending: Gram matrix of the second derivatives, pre-roll included, shape [P, P] [1/s^3].
         closeness: Gram matrix of the functions themselves, pre-roll included, shape [P, P] [s].
-        support: First and last time at which each basis function acts [s], shape [P, 2].
+        support: First and last time at which each basis function acts [s], shape [P, 2]; the pre-roll counts as 0.
     """
 
     knots: Array
     values: csr_matrix
     rates: csr_matrix
+    accelerations: csr_matrix
     at_frames: csr_matrix
     bending: csr_matrix
     closeness: csr_matrix
@@ -213,7 +245,7 @@ def make_basis(grid: TimeGrid, spacing: float, kept_ends: bool) -> OffsetBasis:
         inside = np.clip(times[pre:], breaks[0], breaks[-1])
         return splines(inside, nu=order) @ merge
 
-    values, rates = sample(0), sample(1)
+    values, rates, accelerations = sample(0), sample(1), sample(2)
     # two Gauss points integrate the squared second derivative of a cubic exactly
     width = np.diff(breaks)[:, None]
     points = (0.5 * (breaks[:-1] + breaks[1:])[:, None] + 0.5 * width * np.array([-1, 1]) / math.sqrt(3)).ravel()
@@ -223,6 +255,7 @@ def make_basis(grid: TimeGrid, spacing: float, kept_ends: bool) -> OffsetBasis:
         meet = np.stack([splines(0.0, nu=k) @ merge for k in range(3)])
         value, rate, curvature = pre_roll_weights(times[:pre], grid.pre_roll)
         values, rates = np.vstack([value @ meet, values]), np.vstack([rate @ meet, rates])
+        accelerations = np.vstack([curvature @ meet, accelerations])
         bending = bending + csr_matrix(grid.h * (curvature @ meet).T @ (curvature @ meet))
     stored = csr_matrix(values)
     support = np.stack([knots[:count], knots[DEGREE + 1 :]], axis=1)
@@ -230,22 +263,6 @@ def make_basis(grid: TimeGrid, spacing: float, kept_ends: bool) -> OffsetBasis:
     support = np.array([[support[rows, 0].min(), support[rows, 1].max()] for rows in columns])
     frames = grid.frames
     return OffsetBasis(
-        breaks, stored, csr_matrix(rates), stored[frames], csr_matrix(bending), grid.h * (stored.T @ stored), support
-    )
-
-
-def coefficient_bounds(basis: OffsetBasis, grid: TimeGrid, angles: Array, lower: float, upper: float) -> Array:
-    """Bounds of one motor's coefficients that keep `angles + offset` within its limits, shape [P, 2].
-
-    A B-spline lies in the hull of its coefficients, so bounding each by the room that the input leaves over its
-    support bounds the curve at every time. Where the input itself is outside, the offset must bring it back.
-    """
-    times = grid.times
-    bounds = np.empty((basis.count, 2))
-    for k, (first, last) in enumerate(basis.support):
-        inside = angles[(times >= first - 1e-9) & (times <= last + 1e-9)]
-        low, high = lower - inside.min(), upper - inside.max()
-        if low > high:
-            low = high = 0.5 * (low + high)
-        bounds[k] = low, high
-    return bounds
+        breaks, stored, csr_matrix(rates), csr_matrix(accelerations), stored[frames], csr_matrix(bending),
+        grid.h * (stored.T @ stored), support,
+    )  # fmt: skip

@@ -16,7 +16,7 @@ from ..fem.reduced_body import ReducedBody
 from ..shot import Animation, Character, FEMeshes
 from ..shot.character import Array
 from .curves import TimeGrid, sample_tracks
-from .problem import ForwardRun, run_forward
+from .forward import ForwardRun, run_forward
 from .roots import sample_roots
 
 _POWER_LEFT = 1e-3  # of a signal's power may lie above the highest frequency that matters: 3% of its amplitude

@@ -1,24 +1,32 @@
-"""Gauss-Newton with conjugate gradients, within bounds; every accepted step lowers the objective."""
+"""Gauss-Newton in a trust region, matrix-free; every accepted step lowers the merit."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Protocol
 
 import numpy as np
 
 from ..shot.character import Array, BoolArray
+from .limited_step import LimitedStep
+from .recycling import Recycled
+from .truncated_cg import Path, conjugate_gradients
+
+PAIRS = 24  # directions that are kept for the next system
+TRIES = 10  # smaller and smaller steps before an iteration gives up
+SHARE = 0.01  # of an iteration's decrease, that it may leave to the next one
+ACCEPTED = 0.05  # least share of the predicted decrease that a step must bring
 
 
 class LeastSquares(Protocol):
     """A problem min G(x), G = 1/2 |r(x)|^2 + quadratic, that can be linearised where it was last evaluated."""
 
     def value(self, x: Array) -> float:
-        """Objective at x; infinite where it cannot be evaluated."""
+        """Merit at x; infinite where it cannot be evaluated."""
 
     def linearize(self) -> Array:
-        """Gradient at the point last accepted by `value`; products refer to the same point."""
+        """Gradient at the point last evaluated; products refer to the same point."""
 
     def product(self, direction: Array) -> Array:
         """Gauss-Newton matrix times a direction."""
@@ -26,134 +34,177 @@ class LeastSquares(Protocol):
     def precondition(self, fixed: BoolArray) -> Callable[[Array], Array]:
         """An approximate inverse of the Gauss-Newton matrix, for the entries that are not fixed."""
 
-    def gain_is_small(self, gain: float, value: float) -> bool:
-        """Whether a predicted decrease of the objective is not worth another iteration."""
+    @property
+    def limits_act(self) -> bool:
+        """Whether limits are part of the merit now, so that `limited_step` finds the step."""
+
+    def limited_step(self, fixed: BoolArray, share: float, enough: float, max_products: int) -> LimitedStep:
+        """The step to the minimum of the model with limits; may change the merit."""
+
+    def merit(self) -> float:
+        """The merit at the point evaluated last, as it is now."""
+
+    def gain(self, decrease: float, value: float) -> float:
+        """What a decrease of the merit is worth, in a measure that the user knows [m]."""
+
+    def worth(self, gain: float) -> float:
+        """The decrease of the merit that is worth so much, at the point evaluated last."""
+
+    def tighten(self) -> bool:
+        """Called at a minimum: whether the merit was changed, so that the search goes on (limits not yet kept)."""
 
 
 @dataclass(frozen=True)
 class Iterate:
-    """Objective, norm of the projected gradient, evaluations and products so far."""
+    """Merit, norm of the gradient, the gain that was predicted from there [m], evaluations and products so far."""
 
     value: float
     gradient_norm: float
+    gain: float
     evaluations: int
     products: int
 
 
 @dataclass(frozen=True, eq=False)
-class Solution:
-    """The best point found, the iterations (first the start), counts, and why it stopped."""
+class Search:
+    """Where a search stands between two iterations; it goes on from here as if it had not stopped.
+
+    Attributes:
+        x: The best point, shape [n].
+        radius: Of the trust region.
+        recycled: What earlier systems taught.
+        history: Iterates so far, first the start.
+        evaluations, gradients, products: Counts.
+        reason: Why it ended; empty while it has not.
+    """
 
     x: Array
-    history: tuple[Iterate, ...]
-    evaluations: int
-    gradients: int
-    products: int
-    reason: str
+    radius: float
+    recycled: Recycled
+    history: tuple[Iterate, ...] = ()
+    evaluations: int = 0
+    gradients: int = 0
+    products: int = 0
+    reason: str = ""
+
+    @classmethod
+    def start(cls, x: Array) -> Search:
+        """A search that has not begun."""
+        return cls(x, np.inf, Recycled.none(len(x)))
 
 
-def conjugate_gradients(
-    product: Callable[[Array], Array], b: Array, inverse: Callable[[Array], Array], tolerance: float, limit: int
-) -> tuple[Array, Array, int]:
-    """Preconditioned conjugate gradients from zero.
+@dataclass
+class _Counter:
+    """Calls of a problem."""
 
-    Returns:
-        The solution, the product of the matrix with it, and the number of products.
-    """
-    x, Ax = np.zeros_like(b), np.zeros_like(b)
-    r = b.copy()
-    z = inverse(r)
-    p, rz = z.copy(), float(r @ z)
-    target = tolerance**2 * rz
-    for used in range(limit):
-        if rz <= target or rz <= 0.0:
-            return x, Ax, used
-        Ap = product(p)
-        curvature = float(p @ Ap)
-        if curvature <= 0.0:
-            return x, Ax, used + 1
-        a = rz / curvature
-        x += a * p
-        Ax += a * Ap
-        r -= a * Ap
-        z = inverse(r)
-        new = float(r @ z)
-        p = z + (new / rz) * p
-        rz = new
-    return x, Ax, limit
+    problem: LeastSquares
+    evaluations: int = 0
+    gradients: int = 0
+    products: int = 0
+    fixed: BoolArray = field(default_factory=lambda: np.zeros(0, bool))
+
+    def value(self, x: Array) -> float:
+        self.evaluations += 1
+        return self.problem.value(x)
+
+    def gradient(self) -> Array:
+        self.gradients += 1
+        return np.where(self.fixed, 0.0, self.problem.linearize())
+
+    def product(self, d: Array) -> Array:
+        self.products += 1
+        return np.where(self.fixed, 0.0, self.problem.product(d))
 
 
 def minimize(
     problem: LeastSquares,
-    x: Array,
-    bounds: Array,
+    search: Search,
+    fixed: BoolArray,
+    gain: float,
     max_iterations: int = 30,
     max_products: int = 60,
-    on_iterate: Callable[[Iterate, Array], None] | None = None,
-) -> Solution:
-    """Minimise within bounds by projected Gauss-Newton steps.
+    on_iterate: Callable[[Search], None] | None = None,
+) -> Search:
+    """Minimise over the entries that are not fixed.
 
     Args:
-        x: Start, shape [n]; moved into the bounds first.
-        bounds: Lower and upper bound of each unknown, shape [n, 2].
-        max_products: Most conjugate-gradient products of one iteration.
-        on_iterate: Called with each iterate and the best point so far.
+        search: Where to begin or to go on.
+        fixed: Entries that keep their values, shape [n].
+        gain: A predicted gain of less ends the search [m].
+        max_iterations: Most iterations, those of earlier parts of the search included.
+        max_products: Most products of one iteration.
+        on_iterate: Called with the search after every iteration.
     """
-    lower, upper = bounds[:, 0], bounds[:, 1]
-    x = np.clip(x, lower, upper)
-    value = problem.value(x)
-    evaluations, gradients, products = 1, 0, 0
-    history: list[Iterate] = []
-    reason = "iteration limit"
-    for _ in range(max_iterations):
-        gradient = problem.linearize()
-        gradients += 1
-        fixed = ((x <= lower) & (gradient > 0.0)) | ((x >= upper) & (gradient < 0.0)) | (lower >= upper)
-        free_gradient = np.where(fixed, 0.0, gradient)
-        norm = float(np.linalg.norm(free_gradient))
-        iterate = Iterate(value, norm, evaluations, products)
-        history.append(iterate)
+    calls = _Counter(problem, search.evaluations, search.gradients, search.products, fixed)
+    x, radius, recycled, history = search.x, search.radius, search.recycled, list(search.history)
+    value = calls.value(x)
+
+    def here(reason: str = "") -> Search:
+        return Search(
+            x, radius, recycled, tuple(history), calls.evaluations, calls.gradients, calls.products, reason
+        )  # fmt: skip
+
+    while True:
+        gradient = calls.gradient()
+        norm = float(np.linalg.norm(gradient))
+        enough = problem.worth(gain)
+        if problem.limits_act:
+            limited = problem.limited_step(fixed, SHARE, enough, max_products)
+            calls.products += limited.products
+            value, predicted = problem.merit(), limited.predicted(1.0)
+        else:
+            inverse = recycled.inverse(problem.precondition(fixed))
+            path = conjugate_gradients(calls.product, gradient, inverse, radius, SHARE, enough, max_products)
+            recycled = recycled.followed_by(path.p, path.Hp, PAIRS)
+            _, predicted, _ = path.within(radius)
+        expected = problem.gain(predicted, value)
+        history.append(Iterate(value, norm, expected, calls.evaluations, calls.products))
+        if len(history) > max_iterations:
+            return here("iteration limit")
+        better = None
+        if expected >= gain:
+            if problem.limits_act:
+                better = _limited_step(calls, x, value, limited)
+            else:
+                better = _step(calls, x, value, path, radius)
+        if better is None:
+            if expected >= gain:
+                calls.value(x)  # steps that failed were evaluated last
+            if problem.tighten():
+                value, radius = problem.merit(), np.inf
+                if on_iterate is not None:
+                    on_iterate(here())
+                continue
+            return here("converged" if expected < gain else "no further decrease")
+        x, value, radius = better
         if on_iterate is not None:
-            on_iterate(iterate, x)
-        if norm == 0.0:
-            reason = "stationary"
-            break
+            on_iterate(here())
 
-        def masked(d: Array, fixed: BoolArray = fixed) -> Array:
-            return np.where(fixed, 0.0, problem.product(np.where(fixed, 0.0, d)))
 
-        # the first systems need only a direction; later ones are solved as the model becomes exact
-        accuracy = 0.1 if gradients == 1 else 0.01
-        step, curved, used = conjugate_gradients(
-            masked, -free_gradient, problem.precondition(fixed), accuracy, max_products
-        )
-        products += used
-        gain = -float(gradient @ step + 0.5 * step @ curved)
-        if problem.gain_is_small(gain, value):
-            reason = "converged"
-            break
-        length, accepted = 1.0, False
-        for _ in range(8):
-            trial = np.clip(x + length * step, lower, upper)
-            moved = trial - x
-            expected = -float(gradient @ moved)
-            trial_value = problem.value(trial)
-            evaluations += 1
-            if trial_value < value - 1e-4 * max(expected, 0.0) and expected > 0.0:
-                accepted = True
-                break
-            length *= 0.5 if length == 1.0 else 0.25
-        if not accepted:
-            problem.value(x)
-            evaluations += 1
-            reason = "no further decrease"
-            break
-        small = problem.gain_is_small(value - trial_value, trial_value)
-        x, value = trial, trial_value
-        if small:
-            history.append(Iterate(value, norm, evaluations, products))
-            if on_iterate is not None:
-                on_iterate(history[-1], x)
-            reason = "converged"
-            break
-    return Solution(x, tuple(history), evaluations, gradients, products, reason)
+def _limited_step(calls: _Counter, x: Array, value: float, limited: LimitedStep) -> tuple[Array, float, float] | None:
+    """The same where limits act: as much of the step as the simulation agrees with."""
+    t = 1.0
+    for _ in range(TRIES):
+        found, predicted = calls.value(x + t * limited.step), limited.predicted(t)
+        if predicted > 0.0 and value - found > ACCEPTED * predicted:
+            return x + t * limited.step, found, np.inf
+        t *= 0.3
+    return None
+
+
+def _step(calls: _Counter, x: Array, value: float, path: Path, radius: float) -> tuple[Array, float, float] | None:
+    """The point that a step within the region leads to, its merit, and the next region; None where none is better."""
+    size = radius
+    for _ in range(TRIES):
+        step, predicted, length = path.within(size)
+        if not predicted > 0.0:
+            return None
+        found = calls.value(x + step)
+        share = (value - found) / predicted
+        if share > ACCEPTED:
+            if share < 0.25:
+                return x + step, found, 0.5 * length
+            grown = length >= 0.99 * size and share > 0.7
+            return x + step, found, 2.5 * length if grown else max(size, 2.0 * length)
+        size = (0.1 if not np.isfinite(found) else 0.25) * length
+    return None

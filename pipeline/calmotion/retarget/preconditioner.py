@@ -2,86 +2,139 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from scipy.linalg import cho_solve_banded, cholesky_banded
 from scipy.sparse import csr_matrix
 
-from ..dynamics.kinematics import rigid_poses
+from ..dynamics.kinematics import target_jacobians
 from ..dynamics.model import Model
+from ..dynamics.motor_response import motor_responses
 from ..shot.character import Array, BoolArray, IntArray
-from ..shot.playback import rotation_matrices
 from .curves import DEGREE
 
 
-def rigid_motor_jacobian(model: Model, joint_angles: Array, motors: IntArray, world: Array | None = None) -> Array:
-    """Derivative of the rigid targets' frames by motor angles, shape [T, K, 6, len(motors)].
+@dataclass(frozen=True, eq=False)
+class RigidResponse:
+    """How the rigid robot's targets and efforts follow its motors, at some instants of a motion.
 
-    Rows 0-2: position, world axes [m/rad]; rows 3-5: turning, world axes.
+    Attributes:
+        targets: Targets' frames by motor angles, shape [T, K, 6, m]: position in world axes [m/rad], turning in the
+            target's own axes.
+        inertia: Efforts of all motors by motor accelerations [kg m^2], shape [T, M, m].
     """
-    system, targets = model.system, model.targets
-    c, q = rigid_poses(model, joint_angles, world)
-    R = rotation_matrices(q)
-    column = {int(motor): k for k, motor in enumerate(motors)}
-    J = np.zeros((len(joint_angles), len(targets.component), 6, len(motors)))
-    for k, own in enumerate(targets.component):
-        point = c[:, own] + np.einsum("nij,j->ni", R[:, own], targets.position[k])
-        b = int(own)
-        while b >= 0:
-            motor = int(model.motor[b])
-            if motor in column:
-                # the joint's frame on the component's side: its z axis is the joint axis
-                axis = np.einsum("nij,j->ni", R[:, b], system.rotation[b, 1, :, 2]) * model.sign[b]
-                origin = c[:, b] + np.einsum("nij,j->ni", R[:, b], system.position[b, 1])
-                if system.sliding[b]:
-                    J[:, k, :3, column[motor]] += axis
-                else:
-                    J[:, k, :3, column[motor]] += np.cross(axis, point - origin)
-                    J[:, k, 3:, column[motor]] += axis
-            b = int(system.parent[b])
-    return J
+
+    targets: Array
+    inertia: Array
+
+    @classmethod
+    def along(
+        cls, rigid: Model, c: Array, q: Array, joint_angles: Array, motors: IntArray, world: Array, stride: int = 1
+    ) -> RigidResponse:
+        """The response along a motion; computed at every `stride`-th instant and held in between, which is enough to
+        precondition with.
+
+        Args:
+            rigid: The rigid model.
+            c, q: Its poses, shapes [T, B, 3], [T, B, 4].
+            joint_angles: Of its joints, shape [T, J].
+            motors: Those that may change, m of them.
+            world: Moving markers, shape [T, W, 18].
+        """
+        few = slice(None, None, stride)
+        c, q = np.ascontiguousarray(c[few]), np.ascontiguousarray(q[few])
+        motions, inertia = motor_responses(rigid, c, q, joint_angles[few].copy(), motors, world[few].copy())
+        J = target_jacobians(rigid, c, q, np.zeros(c.shape[:2] + (0,)))
+        targets = np.einsum("nkia,nkam->nkim", J, motions[:, rigid.targets.component])
+        held = np.minimum(np.arange(len(joint_angles)) // stride, len(c) - 1)
+        return cls(targets[held], inertia[held])
+
+
+class BandedGram:
+    """Sums of `sum_n b_n b_n^T (x) W_n` over rows b_n of spline matrices, unknowns ordered by basis function, then
+    motor; block-banded, since at any time only DEGREE + 1 functions act."""
+
+    def __init__(self, count: int, motors: int):
+        self._blocks = np.zeros((DEGREE + 1, count, motors, motors))
+
+    def add(self, basis: csr_matrix, metric: Array) -> None:
+        """Add the rows of a matrix of shape [T, P], the metric of shape [T, M, M], symmetric."""
+        first, weights = _rows(basis)
+        last = self._blocks.shape[1] - 1
+        for i in range(DEGREE + 1):
+            for j in range(i, DEGREE + 1):
+                product = weights[:, i] * weights[:, j]
+                used = np.flatnonzero(product)
+                at = np.minimum(first[used] + i, last)
+                np.add.at(self._blocks[j - i], at, product[used, None, None] * metric[used])
+
+    def add_matrix(self, matrix: csr_matrix) -> None:
+        """Add a banded matrix of shape [P, P] for every motor."""
+        dense, count = matrix.toarray(), self._blocks.shape[1]
+        eye = np.eye(self._blocks.shape[2])
+        for d in range(DEGREE + 1):
+            self._blocks[d, : count - d] += np.diagonal(dense, d)[:, None, None] * eye
+
+    def banded(self) -> Array:
+        """The lower bands as `scipy.linalg.cholesky_banded` takes them."""
+        _, count, motors, _ = self._blocks.shape
+        banded = np.zeros(((DEGREE + 1) * motors, count * motors))
+        for d in range(DEGREE + 1):
+            for a in range(motors):
+                for b in range(motors):
+                    if d * motors + b - a >= 0:
+                        banded[d * motors + b - a, a::motors] = self._blocks[d, :, a, b]
+        return banded
+
+
+def _rows(basis: csr_matrix) -> tuple[IntArray, Array]:
+    """First function of each row and its DEGREE + 1 values; a row's functions are neighbours."""
+    dense = basis.toarray()
+    some = np.any(dense != 0.0, axis=1)
+    first = np.where(some, np.argmax(dense != 0.0, axis=1), 0)
+    columns = first[:, None] + np.arange(DEGREE + 1)
+    inside = columns < dense.shape[1]
+    values = np.take_along_axis(dense, np.where(inside, columns, 0), axis=1)
+    return first, np.where(inside, values, 0.0)
 
 
 class RigidPreconditioner:
-    """Banded Cholesky factor of `B^T (J^T W J) B + penalty`, unknowns ordered by basis function, then motor."""
+    """Banded Cholesky factor of `B^T (J^T W J) B + penalty` and of what limits add to it."""
 
-    def __init__(self, jacobian: Array, weights: Array, basis: csr_matrix, penalty: csr_matrix):
+    def __init__(self, response: RigidResponse, weights: Array, basis: csr_matrix, penalty: csr_matrix):
         """
         Args:
-            jacobian: From `rigid_motor_jacobian`, shape [T, K, 6, M].
+            response: Of the rigid robot.
             weights: Square roots of the residuals' weights, shape [T, K, 6].
             basis: Offset basis at the instants, shape [T, P].
             penalty: Matrix of the regulariser for one motor, shape [P, P].
         """
-        weighted = jacobian * weights[..., None]
-        metric = np.einsum("nkia,nkib->nab", weighted, weighted)
-        motors = metric.shape[1]
-        columns = basis.tocsc()
-        count = basis.shape[1]
-        self._width = (DEGREE + 1) * motors
-        banded = np.zeros((self._width, count * motors))
-        dense_penalty = penalty.toarray()
-        dense = columns.toarray()
-        for d in range(DEGREE + 1):
-            for i in range(count - d):
-                rows = np.flatnonzero(dense[:, i])
-                product = dense[rows, i] * dense[rows, i + d]
-                block = np.tensordot(product, metric[rows], axes=1) + dense_penalty[i, i + d] * np.eye(motors)
-                for a in range(motors):
-                    for b in range(motors):
-                        row, col = (i + d) * motors + b, i * motors + a
-                        if row >= col:
-                            banded[row - col, col] = block[a, b]
-        self._banded = banded
-        self._scale = float(np.max(banded[0]))
+        weighted = response.targets * weights[..., None]
+        self._shape = basis.shape[1], weighted.shape[3]
+        gram = BandedGram(*self._shape)
+        gram.add(basis, np.einsum("nkia,nkib->nab", weighted, weighted))
+        gram.add_matrix(penalty)
+        self._banded = gram.banded()
+        self._scale = float(np.max(self._banded[0]))
 
-    def factor(self, fixed: BoolArray) -> None:
-        """Factorise with the unknowns where `fixed` (shape [P * M], bool) is true left out."""
+    def factor(self, fixed: BoolArray, more: list[tuple[csr_matrix, Array]] | None = None) -> None:
+        """Factorise with the unknowns where `fixed` (shape [P * M], bool) is true left out.
+
+        Args:
+            more: Spline matrices and metrics of further terms, as `BandedGram.add` takes them.
+        """
         banded = self._banded.copy()
-        for d in range(1, self._width):
+        if more:
+            gram = BandedGram(*self._shape)
+            for basis, metric in more:
+                gram.add(basis, metric)
+            banded += gram.banded()
+        for d in range(1, len(banded)):
             banded[d, : banded.shape[1] - d] *= ~fixed[d:]
         banded[:, fixed] = 0.0
         # directions that no target sees get a floor, so that the factor exists
-        banded[0] += 1e-9 * self._scale
+        banded[0] += max(1e-9 * self._scale, 1e-12 * float(np.max(banded[0])))
         banded[0, fixed] = 1.0
         self._factor = cholesky_banded(banded, lower=True)
 

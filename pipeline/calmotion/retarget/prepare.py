@@ -112,18 +112,14 @@ def first_pose_frequencies(character: Character, animation: Animation, bodies: S
 
 def _refuse_unsupported(character: Character, animation: Animation, options: Options) -> None:
     settings = character.retarget
-    for attribute, value, supported in (
-        ("calm:retarget:reference", settings.reference, "rigid"),
-        ("calm:retarget:cyclic", settings.cyclic, False),
-    ):
-        if value != supported:
-            raise ShotError(
-                "this setting is not supported yet",
-                path=character.path,
-                attribute=attribute,
-                found=value,
-                remedy=f"Set it to {str(supported).lower()} for now.",
-            )
+    if settings.cyclic:
+        raise ShotError(
+            "this setting is not supported yet",
+            path=character.path,
+            attribute="calm:retarget:cyclic",
+            found=True,
+            remedy="Set it to false for now.",
+        )
     if options.integrator not in INTEGRATORS:
         raise ShotError(
             "there is no such integrator",

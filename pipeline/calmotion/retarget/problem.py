@@ -2,94 +2,43 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Collection
 
 import numpy as np
+from scipy.sparse import csr_matrix
 
 from ..dynamics.failure import SimulationFailure
-from ..dynamics.integrators import integrate
-from ..dynamics.kinematics import rigid_poses, rigid_state, target_frames
 from ..dynamics.linearization import Linearization, linearize
+from ..dynamics.markers import WORLD_MARKER
 from ..dynamics.model import Model, rigid_model
-from ..dynamics.simulation import Trajectory, Workspace
+from ..dynamics.reactions import reactions
+from ..dynamics.simulation import Workspace
 from ..dynamics.sweeps import adjoint, tangent
 from ..shot.character import Array, BoolArray, IntArray
-from .curves import OffsetBasis, TimeGrid
-from .objective import Objective, Reference
-from .preconditioner import RigidPreconditioner, rigid_motor_jacobian
+from .curves import Curves, OffsetBasis, TimeGrid
+from .forward import ForwardRun, run_forward
+from .limited_step import LimitedStep, ModelPoint, limited_step
+from .limits import LimitTerms
+from .objective import Objective
+from .preconditioner import RigidPreconditioner, RigidResponse
+from .reference import rigid_motion
 
 
-@dataclass(frozen=True, eq=False)
-class ForwardRun:
-    """One forward simulation and what the targets do in it."""
-
-    trajectory: Trajectory
-    joint_angles: Array
-    joint_rates: Array
-    target_positions: Array
-    target_rotations: Array
-
-
-def _moves_freely(model: Model) -> BoolArray:
-    """Which joints no motor holds."""
-    rows = model.system.rows
-    return (rows > 0) & (rows < 6)
-
-
-def start_angles(model: Model, joint_angles: Array) -> Array:
-    """Angles of all joints for the first pose: motors from their tracks, free joints as the shot was authored."""
-    free = _moves_freely(model)
-    return np.where(free, model.rest_angles, joint_angles)
-
-
-def run_forward(
-    model: Model, workspace: Workspace, angles: Array, rates: Array, h: float, world: Array | None = None,
-    progress=None, integrator: str = "bdf2",
-) -> ForwardRun:  # fmt: skip
-    """Simulate motor curves.
+def limited_values(
+    model: Model, names: Collection[str], curves: Curves, run: ForwardRun
+) -> dict[str, Array]:  # fmt: skip
+    """The quantities that limits are about, by name, shape [T, M] each.
 
     Args:
-        angles, rates: Of the motors, shape [T, M] [rad, rad/s].
-        h: Step [s].
-        world: Moving roots, see `roots.sample_roots`.
-        integrator: One of `integrators.INTEGRATORS`.
+        names: Which of `limits.QUANTITIES`.
+        curves: Of the motors, as simulated.
+        run: The simulation.
     """
-    joint_angles, joint_rates = model.joint_angles(angles), model.joint_angles(rates)
-    start = rigid_state(model, start_angles(model, joint_angles[0]), None if world is None else world[0])
-    trajectory = integrate(
-        model.system, start, joint_angles, joint_rates, h, workspace, progress, integrator=integrator, world=world
-    )
-    states = trajectory.states
-    positions, rotations = target_frames(model, states.c, states.q, states.u)
-    return ForwardRun(trajectory, joint_angles, joint_rates, positions, rotations)
-
-
-@dataclass(frozen=True, eq=False)
-class RigidMotion:
-    """The motion of the rigid robot: body poses (by component) and targets, shapes [T, B, ...], [T, K, ...]."""
-
-    c: Array
-    q: Array
-    target_positions: Array
-    target_rotations: Array
-
-    @property
-    def reference(self) -> Reference:
-        """The targets alone."""
-        return Reference(self.target_positions, self.target_rotations)
-
-
-def rigid_motion(model: Model, angles: Array, rates: Array, h: float, world: Array | None = None) -> RigidMotion:
-    """The animation on a rigid robot: kinematics alone, or a rigid simulation where joints move freely."""
-    rigid = rigid_model(model)
-    if np.any(_moves_freely(rigid)):
-        run = run_forward(rigid, Workspace.for_system(rigid.system), angles, rates, h, world)
-        states = run.trajectory.states
-        return RigidMotion(states.c, states.q, run.target_positions, run.target_rotations)
-    c, q = rigid_poses(rigid, model.joint_angles(angles), world)
-    positions, rotations = target_frames(rigid, c, q, np.zeros(c.shape[:2] + (0,)))
-    return RigidMotion(c, q, positions, rotations)
+    found = {"position": curves.angles, "velocity": curves.rates, "acceleration": curves.accelerations}
+    if "effort" in names:
+        efforts = reactions(model.system, run.trajectory, run.joint_angles, run.joint_rates).efforts
+        found["effort"] = model.motor_values(efforts)
+    return {name: found[name] for name in names}
 
 
 def compile_kernels(
@@ -98,7 +47,7 @@ def compile_kernels(
     """Run every kernel once on three instants, so that compiling them is not counted as simulating."""
     run = run_forward(model, workspace, angles[:3], rates[:3], h, None if world is None else world[:3])
     lin = linearize(model.system, run.trajectory, run.joint_angles, run.joint_rates, workspace)
-    adjoint(lin, tangent(lin, run.joint_angles, run.joint_rates))
+    adjoint(lin, *tangent(lin, run.joint_angles, run.joint_rates, efforts=True))
 
 
 class RetargetProblem:
@@ -107,33 +56,35 @@ class RetargetProblem:
     Args:
         model: The flexible character.
         grid: Its time grid.
-        angles, rates: The animator's curves, shape [T, M].
+        curves: The animator's curves.
         objective: Errors at the targets.
         basis: Offset splines.
         motors: Motors that may change.
         smoothness: Weight of int |offset''|^2 / 2 for each motor.
         closeness: Weight of int |offset|^2 / 2 for each motor.
-        gain: A predicted decrease of the root-mean-square error by less than this is not worth an iteration [m].
         world: Moving roots.
+        limits: Limits of the motors; None where there are none.
     """
 
     def __init__(
-        self, model: Model, grid: TimeGrid, angles: Array, rates: Array, objective: Objective, basis: OffsetBasis,
-        motors: IntArray, smoothness: float, closeness: float, gain: float, world: Array | None = None,
+        self, model: Model, grid: TimeGrid, curves: Curves, objective: Objective, basis: OffsetBasis,
+        motors: IntArray, smoothness: float, closeness: float, world: Array | None = None,
+        limits: LimitTerms | None = None,
     ):  # fmt: skip
         self.model, self.grid, self.objective, self.basis = model, grid, objective, basis
-        self.angles, self.rates, self.motors, self.world = angles, rates, motors, world
+        self.curves, self.motors, self.world, self.limits = curves, motors, world, limits
         self._penalty = smoothness * basis.bending + closeness * basis.closeness
         self._workspace = Workspace.for_system(model.system)
         self._run: ForwardRun | None = None
         self._linearization: Linearization | None = None
         self._residuals = self._inverse = self._jacobian = np.zeros(0)
+        self._limited: dict[str, Array] = {}
         self._x = np.zeros(0)
         self._preconditioner: RigidPreconditioner | None = None
-        judged = float(np.sum(objective.weights**2)) / max(1, 3 * len(model.targets.component))
-        # objective of an error of `gain` everywhere: the scale of what is worth having
-        self._gain = gain
-        self._unit = max(judged, 1e-300)
+        self._response: RigidResponse | None = None
+        # objective of an error of one metre everywhere
+        self._unit = max(float(np.sum(objective.weights**2)) / max(1, 3 * len(model.targets.component)), 1e-300)
+        self._splines = {"position": basis.values, "velocity": basis.rates, "acceleration": basis.accelerations}
 
     @property
     def size(self) -> int:
@@ -146,75 +97,209 @@ class RetargetProblem:
         assert self._run is not None
         return self._run
 
+    @property
+    def error(self) -> float:
+        """Root-mean-square error of the point evaluated last, weighted [m]."""
+        return float(np.sqrt(np.sum(self._residuals**2) / self._unit))
+
+    @property
+    def residuals(self) -> Array:
+        """Weighted residuals of the point evaluated last, shape [T, K, 6]."""
+        return self._residuals
+
+    @property
+    def limits_act(self) -> bool:
+        """Whether limits are part of the merit now."""
+        return self.limits is not None and self.limits.on
+
+    @property
+    def limited(self) -> dict[str, Array]:
+        """Values of the limited quantities at the point evaluated last, shape [T, M] each."""
+        return self._limited
+
     def offsets(self, x: Array) -> tuple[Array, Array]:
         """Offsets and their rates for all motors, shape [T, M]."""
-        coefficients = x.reshape(self.basis.count, len(self.motors))
-        values, rates = np.zeros_like(self.angles), np.zeros_like(self.rates)
-        values[:, self.motors] = self.basis.values @ coefficients
-        rates[:, self.motors] = self.basis.rates @ coefficients
-        return values, rates
+        return self._spread(self.basis.values, x), self._spread(self.basis.rates, x)
 
-    def _bend(self, x: Array) -> Array:
+    def _spread(self, spline: csr_matrix, x: Array) -> Array:
+        """Rows of a spline matrix times the coefficients, for all motors, shape [T, M]."""
+        out = np.zeros_like(self.curves.angles)
+        out[:, self.motors] = spline @ x.reshape(self.basis.count, len(self.motors))
+        return out
+
+    def _gather(self, spline: csr_matrix, by_motor: Array) -> Array:
+        """The transpose of `_spread`."""
+        return np.asarray(spline.T @ by_motor[:, self.motors]).ravel()
+
+    def bend(self, x: Array) -> Array:
         """Matrix of the regulariser times x."""
         coefficients = x.reshape(self.basis.count, len(self.motors))
         return (self._penalty @ coefficients).ravel()
 
     def value(self, x: Array) -> float:
-        """The objective; infinite where the simulation fails."""
+        """The objective and what limits add to it; infinite where the simulation fails."""
         values, rates = self.offsets(x)
+        angles, rates = self.curves.angles + values, self.curves.rates + rates
         try:
-            self._run = run_forward(
-                self.model, self._workspace, self.angles + values, self.rates + rates, self.grid.h, self.world
-            )
+            self._run = run_forward(self.model, self._workspace, angles, rates, self.grid.h, self.world)
         except SimulationFailure:
             return np.inf
         self._residuals, self._inverse = self.objective.residuals(
             self._run.target_positions, self._run.target_rotations
         )
         self._x = x.copy()
-        return 0.5 * float(np.sum(self._residuals**2)) + 0.5 * float(x @ self._bend(x))
+        if self.limits is not None:
+            self._limited = limited_values(self.model, self.limits.bounds, self.changed_curves, self._run)
+        return self.merit()
+
+    def merit(self) -> float:
+        """The merit at the point evaluated last, with the limits as they are now."""
+        return self.objective_value() + (0.0 if self.limits is None else self.limits.value(self._limited))
+
+    @property
+    def changed_curves(self) -> Curves:
+        """The motors' curves at the point evaluated last."""
+        splines = (self.basis.values, self.basis.rates, self.basis.accelerations)
+        values, rates, accelerations = (self._spread(spline, self._x) for spline in splines)
+        mine = self.curves
+        return Curves(mine.angles + values, mine.rates + rates, mine.accelerations + accelerations)
+
+    def objective_value(self) -> float:
+        """The objective at the point evaluated last, without what limits add to it."""
+        return 0.5 * float(np.sum(self._residuals**2)) + 0.5 * float(self._x @ self.bend(self._x))
 
     def linearize(self) -> Array:
-        """Gradient by the discrete adjoint, at the point evaluated last."""
+        """Linearise at the point evaluated last, and the gradient there by the discrete adjoint."""
         run = self.run
         self._linearization = linearize(
             self.model.system, run.trajectory, run.joint_angles, run.joint_rates, self._workspace, self._linearization
         )
         states = run.trajectory.states
         self._jacobian = self.objective.jacobian(states.c, states.q, states.u, self._inverse)
-        return self._pull_back(self._residuals) + self._bend(self._x)
+        return self.gradient()
 
-    def _pull_back(self, residuals: Array) -> Array:
+    def gradient(self) -> Array:
+        """Gradient of the merit where it was linearised; the limits may have changed since."""
+        pulls = {}
+        if self.limits is not None and self.limits.on:
+            pulls = {name: self.limits.gradient(name, v) for name, v in self._limited.items()}
+        return self.pull_back(self._residuals, pulls) + self.bend(self._x)
+
+    def pull_back(self, residuals: Array, limited: dict[str, Array]) -> Array:
+        """The transpose of `push_forward`: weighted residuals and limited quantities to the unknowns."""
         assert self._linearization is not None
-        by_angle, by_rate = adjoint(self._linearization, self.objective.scatter(self._jacobian, residuals))
-        g_angle, g_rate = self._by_motor(by_angle), self._by_motor(by_rate)
-        return (self.basis.values.T @ g_angle + self.basis.rates.T @ g_rate).ravel()
+        effort = limited.get("effort")
+        by_angle, by_rate = adjoint(
+            self._linearization, self.objective.scatter(self._jacobian, residuals),
+            None if effort is None else self.model.joint_angles(effort),
+        )  # fmt: skip
+        pulled = self._gather(self.basis.values, self.model.motor_values(by_angle))
+        pulled += self._gather(self.basis.rates, self.model.motor_values(by_rate))
+        for name, spline in self._splines.items():
+            if name in limited:
+                pulled += self._gather(spline, limited[name])
+        return pulled
 
-    def _by_motor(self, by_joint: Array) -> Array:
-        return self.model.motor_values(by_joint)[:, self.motors]
-
-    def push_forward(self, direction: Array) -> Array:
-        """Change of the weighted residuals along a direction, shape [T, K, 6]."""
+    def push_forward(self, direction: Array) -> tuple[Array, dict[str, Array]]:
+        """Change of the weighted residuals along a direction, shape [T, K, 6], and of the limited quantities."""
         assert self._linearization is not None
         values, rates = self.offsets(direction)
-        motion = tangent(self._linearization, self.model.joint_angles(values), self.model.joint_angles(rates))
-        return self.objective.gather(self._jacobian, motion)
+        efforts = self.limits is not None and self.limits.on and "effort" in self.limits.bounds
+        motion, effort = tangent(
+            self._linearization, self.model.joint_angles(values), self.model.joint_angles(rates), efforts
+        )
+        changes: dict[str, Array] = {}
+        if self.limits is not None and self.limits.on:
+            for name, spline in self._splines.items():
+                if name in self.limits.bounds:
+                    changes[name] = self._spread(spline, direction)
+            if efforts:
+                changes["effort"] = self.model.motor_values(effort)
+        return self.objective.gather(self._jacobian, motion), changes
 
     def product(self, direction: Array) -> Array:
         """Gauss-Newton matrix times a direction: one tangent and one adjoint sweep."""
-        return self._pull_back(self.push_forward(direction)) + self._bend(direction)
+        residuals, changes = self.push_forward(direction)
+        if self.limits is not None:
+            changes = {name: self.limits.curvature(name, self._limited[name]) * v for name, v in changes.items()}
+        return self.pull_back(residuals, changes) + self.bend(direction)
 
-    def precondition(self, fixed: BoolArray) -> Callable[[Array], Array]:
-        """The rigid robot's Gauss-Newton matrix, inverted over the entries that are not fixed."""
-        if self._preconditioner is None:
-            rigid = rigid_model(self.model)
-            J = rigid_motor_jacobian(rigid, self.model.joint_angles(self.angles), self.motors, self.world)
-            self._preconditioner = RigidPreconditioner(J, self.objective.weights, self.basis.values, self._penalty)
-        self._preconditioner.factor(fixed)
+    def model_objective(self, point: ModelPoint) -> float:
+        """The objective in the model about the point that was linearised."""
+        x = self._x + point.step
+        return 0.5 * float(np.sum(point.residuals**2)) + 0.5 * float(x @ self.bend(x))
+
+    def model_value(self, point: ModelPoint) -> float:
+        """The merit in that model."""
+        assert self.limits is not None
+        return self.model_objective(point) + self.limits.value(point.values)
+
+    def model_gradient(self, point: ModelPoint) -> Array:
+        """Its gradient."""
+        assert self.limits is not None
+        pulls = {name: self.limits.gradient(name, v) for name, v in point.values.items()}
+        return self.pull_back(point.residuals, pulls) + self.bend(self._x + point.step)
+
+    def model_slope(self, point: ModelPoint, way: ModelPoint) -> float:
+        """Its slope along a direction."""
+        assert self.limits is not None
+        slope = float(np.sum(point.residuals * way.residuals)) + float(way.step @ self.bend(self._x + point.step))
+        return slope + sum(
+            float(np.sum(self.limits.gradient(name, v) * way.values[name])) for name, v in point.values.items()
+        )
+
+    def limited_step(self, fixed: BoolArray, share: float, enough: float, max_products: int) -> LimitedStep:
+        """The step to the model's minimum where limits act."""
+        return limited_step(self, fixed, share, enough, max_products)
+
+    def precondition(self, fixed: BoolArray, values: dict[str, Array] | None = None) -> Callable[[Array], Array]:
+        """The rigid robot's Gauss-Newton matrix, inverted over the entries that are not fixed.
+
+        Args:
+            values: Limited quantities, which say which limits act; None: at the point evaluated last.
+        """
+        if self._preconditioner is None or self._response is None:
+            self._response = self._rigid_response()
+            self._preconditioner = RigidPreconditioner(
+                self._response, self.objective.weights, self.basis.values, self._penalty
+            )
+        self._preconditioner.factor(fixed, self._metrics(self._response.inertia, values or self._limited))
         return self._preconditioner.solve
 
-    def gain_is_small(self, gain: float, value: float) -> bool:
-        """Whether a decrease of the objective changes the root-mean-square error by less than `gain`."""
+    def _rigid_response(self) -> RigidResponse:
+        rigid = rigid_model(self.model)
+        motion = rigid_motion(rigid, self.curves.angles, self.curves.rates, self.grid.h, self.world)
+        world = np.zeros((len(motion.c), 0, WORLD_MARKER)) if self.world is None else self.world
+        angles = self.model.joint_angles(self.curves.angles)
+        return RigidResponse.along(rigid, motion.c, motion.q, angles, self.motors, world, _STRIDE)
+
+    def _metrics(self, inertia: Array, limited: dict[str, Array]) -> list[tuple[csr_matrix, Array]]:
+        """What active limits add to the rigid robot's matrix: its efforts are inertia times acceleration."""
+        if self.limits is None:
+            return []
+        found = []
+        for name, values in limited.items():
+            weight = self.limits.curvature(name, values)
+            if not np.any(weight):
+                continue
+            if name == "effort":
+                found.append((self.basis.accelerations, np.einsum("nma,nm,nmb->nab", inertia, weight, inertia)))
+            else:
+                found.append((self._splines[name], weight[:, self.motors, None] * np.eye(len(self.motors))))
+        return found
+
+    def gain(self, decrease: float, value: float) -> float:
+        """How much of the root-mean-square error a decrease of the merit takes away [m]."""
         now = np.sqrt(2.0 * max(value, 0.0) / self._unit)
-        then = np.sqrt(2.0 * max(value - gain, 0.0) / self._unit)
-        return bool(now - then < self._gain)
+        return float(now - np.sqrt(2.0 * max(value - decrease, 0.0) / self._unit))
+
+    def worth(self, gain: float) -> float:
+        """The decrease of the objective that takes so much of the root-mean-square error away [m], from here."""
+        return float(self._unit * gain * max(self.error, gain))
+
+    def tighten(self) -> bool:
+        """Limits come into play where they are not kept, or get new multipliers; False where there is no more to do."""
+        return self.limits is not None and self.limits.tighten(self._limited)
+
+
+_STRIDE = 8  # instants from one rigid response to the next

@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+
 import numpy as np
 
 from ..dynamics.dead_centres import dead_centres
 from ..dynamics.model import Model
 from ..dynamics.reactions import reactions
 from ..naming import distinct_names
-from ..shot import LeftOut, Motion, Simulation
+from ..shot import LeftOut, LimitUse, Motion, Simulation
 from ..shot.character import Array
 from .curves import TimeGrid
+from .forward import ForwardRun
+from .limits import Excess
 from .objective import Reference, rotation_errors
 from .prepare import Prepared
-from .problem import ForwardRun, RigidMotion
+from .reference import MeantMotion
 
 
 def by_body(model: Model, values: Array, axis: int = 1) -> Array:
@@ -44,7 +48,7 @@ def _simulated_motion(model: Model, grid: TimeGrid, run: ForwardRun, motors: int
     )  # fmt: skip
 
 
-def reference_motion(model: Model, grid: TimeGrid, rigid: RigidMotion, angles: Array) -> Motion:
+def reference_motion(model: Model, grid: TimeGrid, rigid: MeantMotion, angles: Array) -> Motion:
     """The motion that was meant; it has no efforts."""
     total = len(rigid.c)
     return Motion(
@@ -83,3 +87,22 @@ def left_out_rows(prepared: Prepared) -> list[LeftOut]:
     locked = [motor.path for motor in character.motors if not motor.optimize]
     rows += [LeftOut("optimisation of " + path, "calm:motor:optimize is false") for path in locked]
     return rows
+
+
+def limit_uses(
+    before: Sequence[Excess], after: Sequence[Excess], grid: TimeGrid,
+    costs: Mapping[tuple[int, str], float] | None = None,
+) -> tuple[LimitUse, ...]:  # fmt: skip
+    """The limits of the motors as values for the user.
+
+    Args:
+        before, after: Of the input and of the result, in the same order.
+        costs: Of limits that bind, by motor and quantity [m].
+    """
+    return tuple(
+        LimitUse(
+            item.motor, item.quantity, item.limit, first.value, item.value, float(grid.times[item.instant]),
+            item.excess, (costs or {}).get((item.motor, item.quantity)),
+        )
+        for first, item in zip(before, after, strict=True)
+    )  # fmt: skip

@@ -1,6 +1,6 @@
 """What a shot is, as plain data in SI units: read by plugins, solved by the engine, written by plugins."""
 
-from .animation import Animation, MovingFrame, Track
+from .animation import Animation, FreeTrack, MovingFrame, Track, WeightTrack
 from .character import (
     WORLD,
     Body,
@@ -21,6 +21,7 @@ from .meshes import FEMesh, FEMeshes, MeshQuality
 from .provenance import InputLayer, Provenance
 from .result import (
     LeftOut,
+    LimitUse,
     ModeTable,
     Motion,
     MotorCurve,
@@ -40,10 +41,12 @@ __all__ = [
     "FEMeshes",
     "FlexibleSettings",
     "Frame",
+    "FreeTrack",
     "InputLayer",
     "InterfaceSurface",
     "Joint",
     "LeftOut",
+    "LimitUse",
     "MassProperties",
     "MeshQuality",
     "ModeTable",
@@ -61,4 +64,5 @@ __all__ = [
     "Target",
     "TetGeometry",
     "Track",
+    "WeightTrack",
 ]

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from .character import Array
+import numpy as np
+
+from .character import Array, BoolArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,6 +41,48 @@ class MovingFrame:
 
 
 @dataclass(frozen=True, eq=False)
+class WeightTrack:
+    """How a weight of a target changes in time, linear between samples and held outside them.
+
+    Attributes:
+        target: Index of the target.
+        rotation: Whether it is the weight of the rotation instead of the position.
+        times: [s] after the first frame of the shot, strictly increasing, shape [k].
+        values: Weights, not negative, shape [k].
+    """
+
+    target: int
+    rotation: bool
+    times: Array
+    values: Array
+
+
+@dataclass(frozen=True, eq=False)
+class FreeTrack:
+    """When a motor's curve may be changed.
+
+    Attributes:
+        motor: Index of the motor.
+        times: [s] after the first frame of the shot, strictly increasing, shape [k].
+        free: Whether it may be changed from each time on, and before the first as from it, shape [k], bool.
+    """
+
+    motor: int
+    times: Array
+    free: BoolArray
+
+    def locked(self, end: float) -> list[tuple[float, float]]:
+        """The ranges of the shot, up to its end [s], in which the curve is kept."""
+        starts = [-np.inf, *self.times[1:]]
+        ends = [*self.times[1:], np.inf]
+        return [
+            (max(start, 0.0), min(stop, end))
+            for start, stop, free in zip(starts, ends, self.free, strict=True)
+            if not free and start < end and stop > 0.0
+        ]
+
+
+@dataclass(frozen=True, eq=False)
 class Animation:
     """The motion of a shot.
 
@@ -48,9 +92,13 @@ class Animation:
         current: The same where the shot already carries a layer of ours and the user asks for what is composed
             (`simulate`, the start of `optimize`); otherwise the same object as `tracks`.
         moving: Moving roots, none for a character that stands where it is.
+        weights: Weights of targets that change in time; the others are those of `Target`.
+        free: When motors may be changed, where that changes in time.
     """
 
     frame_times: Array
     tracks: tuple[Track, ...]
     current: tuple[Track, ...]
     moving: tuple[MovingFrame, ...] = ()
+    weights: tuple[WeightTrack, ...] = ()
+    free: tuple[FreeTrack, ...] = ()

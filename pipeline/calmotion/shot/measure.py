@@ -25,6 +25,18 @@ class Measure(NamedTuple):
     si: str
     factor: float
 
+    def unit_of(self, quantity: str) -> str:
+        """SI unit of a limited quantity: `position`, `velocity`, `acceleration` or `effort`."""
+        return {"velocity": f"{self.si}/s", "acceleration": f"{self.si}/s^2", "effort": self.effort_unit}.get(
+            quantity, self.si
+        )
+
+    def shown(self, quantity: str, value: float) -> str:
+        """A value of such a quantity, in SI, as text with the unit that is shown."""
+        if quantity == "effort":
+            return f"{value:.4g} {self.effort_unit}"
+        return f"{self.factor * value:.4g} {self.unit_of(quantity).replace(self.si, self.unit, 1)}"
+
 
 ANGLE = Measure("angle", "torque", "deg", "N m", "rad", float(np.degrees(1.0)))
 LENGTH = Measure("length", "force", "mm", "N", "m", 1e3)

@@ -103,6 +103,30 @@ class LeftOut:
 
 
 @dataclass(frozen=True, eq=False)
+class LimitUse:
+    """How far a motor goes within one of its limits, and what the limit costs.
+
+    Attributes:
+        motor: Motor index.
+        quantity: `position`, `velocity`, `acceleration` or `effort`.
+        limit: [rad], [rad/s], [rad/s^2] or [N m]; [m], ... of a length motor.
+        before, after: The value of the input and of the result that comes closest to the limit or exceeds it most.
+        time_s: When, in the result [s].
+        excess: (after - limit) over the size of the limit: positive where it is exceeded.
+        cost_m: By how much the root-mean-square error would fall without the limit; None where it does not bind.
+    """
+
+    motor: int
+    quantity: str
+    limit: float
+    before: float
+    after: float
+    time_s: float
+    excess: float
+    cost_m: float | None = None
+
+
+@dataclass(frozen=True, eq=False)
 class OptimizerStep:
     """One iteration of the optimiser: objective, gradient norm (projected), products and simulations so far."""
 
@@ -142,6 +166,10 @@ class Result:
         pre_roll_s: Length of the pre-roll [s].
         dof: Number of position coordinates (6 a body, and the elastic ones).
         left_out: What was left out.
+        limits: Limits of the motors.
+        stopped: Why the optimiser stopped.
+        expected_gain_m: By how much the root-mean-square error was expected to fall in one more iteration [m].
+        interrupted: Whether the user stopped it; the best curves so far are here.
     """
 
     reference: Motion
@@ -163,3 +191,7 @@ class Result:
     pre_roll_s: float
     dof: int
     left_out: tuple[LeftOut, ...] = ()
+    limits: tuple[LimitUse, ...] = ()
+    stopped: str = ""
+    expected_gain_m: float | None = None
+    interrupted: bool = False

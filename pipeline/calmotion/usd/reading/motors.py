@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from ...errors import ShotError
-from ...shot import Motor
+from ...shot import FreeTrack, Motor
 from .. import schemas
+from ..clock import Clock
 from ..units import StageUnits
 from .context import prims_of
 from .joints import JointPrim
@@ -18,6 +20,7 @@ from .tracks import sample_codes
 ATTRIBUTE = "drive:angular:physics:targetPosition"
 LENGTH_ATTRIBUTE = "drive:linear:physics:targetPosition"
 _SCHEMA = "CalmMotorAPI"
+_FREE = "calm:motor:optimize"
 _DRIVES = {"revolute": "angular", "prismatic": "linear"}
 _UNITS = {"angular": "degrees", "linear": "units of length"}
 
@@ -121,12 +124,37 @@ def read_motor(drive: Drive, index: int, units: StageUnits) -> Motor:
         joint=index,
         path=drive.joint.path,
         attribute=target_attribute(drive.joint.kind),
-        optimize=bool(schemas.value(prim, _SCHEMA, "calm:motor:optimize")),
+        optimize=_may_change(prim),
         max_velocity=float(to_si(_limit(prim, "calm:motor:maxVelocity"))),
         max_acceleration=float(to_si(_limit(prim, "calm:motor:maxAcceleration"))),
         max_torque=torque,
         linear=linear,
     )
+
+
+def _may_change(prim) -> bool:
+    """Whether a motor may be changed at all."""
+    samples = _free_samples(prim)
+    return any(value for _, value in samples) if samples else bool(schemas.value(prim, _SCHEMA, _FREE))
+
+
+def _free_samples(prim) -> list[tuple[float, bool]]:
+    attribute = prim.GetAttribute(_FREE)
+    if not attribute or not schemas.is_applied(prim, _SCHEMA):
+        return []
+    return [(code, bool(attribute.Get(code))) for code in attribute.GetTimeSamples()]
+
+
+def free_tracks(stage, motors: Sequence[Motor], clock: Clock) -> tuple[FreeTrack, ...]:
+    """When motors may be changed, of those for which the shot animates calm:motor:optimize: each sample holds until
+    the next."""
+    found = []
+    for index, motor in enumerate(motors):
+        samples = _free_samples(stage.GetPrimAtPath(motor.path))
+        if len({value for _, value in samples}) > 1:
+            codes, values = zip(*samples, strict=True)
+            found.append(FreeTrack(index, clock.seconds(np.array(codes, dtype=np.float64)), np.array(values, bool)))
+    return tuple(found)
 
 
 def _drive(joint: JointPrim, actuated: dict[str, str], notes: list[str]) -> Drive | None:

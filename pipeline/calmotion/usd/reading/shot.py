@@ -13,8 +13,9 @@ from ..clock import Clock, clock_of
 from ..units import StageUnits, units_of
 from .character import Skeleton, animated_attributes, build_character, read_skeleton
 from .context import Reading
-from .motors import ATTRIBUTE
+from .motors import ATTRIBUTE, free_tracks
 from .roots import moving_frames
+from .targets import weight_tracks
 from .tracks import read_track, sample_codes
 
 
@@ -51,7 +52,9 @@ def read_shot(path: str) -> tuple[Character, Animation, Provenance]:
             note = f"the shot carries results of Calmotion ({names}); the intent is the animation beneath them"
             character = dataclasses.replace(character, notes=(*character.notes, note))
     provenance = _provenance(path, stage, reading, clock, earlier)
-    return character, Animation(clock.frame_times(), tracks, current, moving), provenance
+    weights = weight_tracks(stage, character.targets, clock)
+    free = free_tracks(stage, character.motors, clock)
+    return character, Animation(clock.frame_times(), tracks, current, moving, weights, free), provenance
 
 
 def _start_reading(stage) -> tuple[Reading, Clock]:

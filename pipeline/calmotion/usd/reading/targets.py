@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from ...errors import ShotError
-from ...shot import Body, Frame, Joint, Target
+from ...shot import Body, Frame, Joint, Target, WeightTrack
 from .. import schemas
+from ..clock import Clock
 from ..transforms import Pose, pose_from_matrix, quaternion_from_rotation
 from .context import Reading, is_rigid_body, prims_of
 
 _SCHEMA = "CalmTargetAPI"
+WEIGHTS = ("calm:target:positionWeight", "calm:target:rotationWeight")
 _UPRIGHT = np.array([1.0, 0.0, 0.0, 0.0])
 
 
@@ -64,8 +67,8 @@ def read_target(reading: Reading, prim, body: int, pose: Pose) -> Target:
         ShotError: Weights that are negative, not finite, or both zero; a transform that shears.
     """
     own = pose_from_matrix(reading.world_matrix(prim), str(prim.GetPath()))
-    weights = [_weight(reading, prim, f"calm:target:{name}") for name in ("positionWeight", "rotationWeight")]
-    if weights == [0.0, 0.0]:
+    weights = [_weight(reading, prim, name) for name in WEIGHTS]
+    if weights == [0.0, 0.0] and not any(_varies(prim, name) for name in WEIGHTS):
         raise ShotError(
             "a target without any weight",
             path=prim.GetPath(),
@@ -107,12 +110,31 @@ def outermost_target(body: Body, index: int, joints: tuple[Joint, ...]) -> Targe
     return Target(body.path, index, Frame(np.array(position), _UPRIGHT.copy()))
 
 
-def _weight(reading: Reading, prim, name: str) -> float:
+def _varies(prim, name: str) -> bool:
     attribute = prim.GetAttribute(name)
-    if attribute and attribute.ValueMightBeTimeVarying():
-        path = attribute.GetPath()
-        reading.note(f"{path}: weights that change in time are not supported yet; the first value is used")
-    value = schemas.value(prim, _SCHEMA, name, reading.start)
+    return bool(attribute) and len(attribute.GetTimeSamples()) > 1
+
+
+def weight_tracks(stage, targets: Sequence[Target], clock: Clock) -> tuple[WeightTrack, ...]:
+    """Weights of the targets that change in time, linear between their samples as USD has it.
+
+    Raises:
+        ShotError: A sample that is negative or not finite.
+    """
+    found = []
+    for index, target in enumerate(targets):
+        prim = stage.GetPrimAtPath(target.path)
+        if not schemas.is_applied(prim, _SCHEMA):
+            continue
+        for name in filter(lambda name: _varies(prim, name), WEIGHTS):
+            attribute = prim.GetAttribute(name)
+            codes = np.array(attribute.GetTimeSamples(), dtype=np.float64)
+            values = np.array([_checked(prim, name, attribute.Get(code)) for code in codes])
+            found.append(WeightTrack(index, name == WEIGHTS[1], clock.seconds(codes), values))
+    return tuple(found)
+
+
+def _checked(prim, name: str, value: float | None) -> float:
     if value is None or not (math.isfinite(value) and value >= 0.0):
         raise ShotError(
             "a weight must not be negative",
@@ -122,3 +144,7 @@ def _weight(reading: Reading, prim, name: str) -> float:
             remedy="Author a weight of 0 or more",
         )
     return float(value)
+
+
+def _weight(reading: Reading, prim, name: str) -> float:
+    return _checked(prim, name, schemas.value(prim, _SCHEMA, name, reading.start))

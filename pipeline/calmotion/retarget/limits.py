@@ -1,0 +1,213 @@
+"""Limits of the motors as terms of an augmented Lagrangian: range, velocity, acceleration and effort at every instant.
+
+With c = (v - limit) / scale for the upper side of a quantity v (the lower one alike) and multipliers y >= 0,
+
+    sum over instants and limits of  rho h / 2 (max(0, c + y)^2 - y^2)
+
+is added to the objective, and at each minimum y <- max(0, c + y) (Hestenes 1969, Powell 1969, Rockafellar 1973). Limits
+are drawn in by a small share, so that they hold exactly where the search ends.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ..shot.character import Array, BoolArray, Character
+
+QUANTITIES = ("position", "velocity", "acceleration", "effort")
+MARGIN = 1e-4  # share of a limit by which it is drawn in
+ROUNDS = 16  # rounds of multipliers before what is exceeded is called out of reach
+GROWTH, SLOW = 10.0, 0.25  # of the penalty, where a round left more than this share of the violation
+STALLED, PATIENCE = 0.8, 3  # rounds that each leave more than this share are the last ones
+
+
+@dataclass(frozen=True, eq=False)
+class Bounds:
+    """Bounds of one quantity of all motors, shape [M] each; infinite where there are none.
+
+    Attributes:
+        lower, upper: [rad], [rad/s], [rad/s^2] or [N m] (m and N of a length motor).
+        scale: What an excess is measured by.
+    """
+
+    lower: Array
+    upper: Array
+    scale: Array
+
+
+def motor_bounds(character: Character, movable: BoolArray | None = None) -> dict[str, Bounds]:
+    """Bounds by the name of their quantity; only quantities of which some motor has one.
+
+    Args:
+        movable: Motors whose curve may change, shape [M]; of the others only the effort is bounded, since nothing
+            else of them can be changed. None: all motors, with all their limits.
+    """
+    joints = [character.joints[motor.joint] for motor in character.motors]
+    found: dict[str, Bounds] = {}
+
+    def add(name: str, lower: Array, upper: Array) -> None:
+        if movable is not None and name != "effort":
+            lower, upper = np.where(movable, lower, -np.inf), np.where(movable, upper, np.inf)
+        finite = np.isfinite(np.stack([lower, upper]))
+        size = np.max(np.where(finite, np.abs(np.stack([lower, upper])), 0.0), axis=0)
+        if np.any(finite):
+            found[name] = Bounds(lower, upper, np.where(size > 0.0, size, 1.0))
+
+    add("position", np.array([j.lower for j in joints], float), np.array([j.upper for j in joints], float))
+    for name, values in (
+        ("velocity", [m.max_velocity for m in character.motors]),
+        ("acceleration", [m.max_acceleration for m in character.motors]),
+        ("effort", [m.max_torque for m in character.motors]),
+    ):
+        upper = np.array(values, float)
+        add(name, -upper, upper)
+    return found
+
+
+@dataclass(frozen=True, eq=False)
+class Excess:
+    """How far a motor goes within one of its limits.
+
+    Attributes:
+        motor: Its index.
+        quantity: One of `QUANTITIES`.
+        limit: The limit [rad], [rad/s], [rad/s^2] or [N m].
+        value: The value that comes closest to it, or exceeds it most.
+        instant: When.
+        excess: (value - limit) / scale: positive where the limit is exceeded.
+    """
+
+    motor: int
+    quantity: str
+    limit: float
+    value: float
+    instant: int
+    excess: float
+
+
+def excesses(bounds: dict[str, Bounds], values: dict[str, Array], judged: BoolArray) -> list[Excess]:
+    """For each limit of each motor, where it comes closest.
+
+    Args:
+        values: Of each quantity, shape [T, M].
+        judged: Which instants count, shape [T].
+    """
+    found = []
+    instants = np.flatnonzero(judged)
+    for name, bound in bounds.items():
+        for motor in range(len(bound.scale)):
+            v = values[name][instants, motor]
+            ends = ((bound.upper[motor], 1.0), (bound.lower[motor], -1.0))
+            sides = [(limit, sign * (v - limit)) for limit, sign in ends if np.isfinite(limit)]
+            if sides:
+                limit, beyond = max(sides, key=lambda side: float(np.max(side[1])))
+                n = int(np.argmax(beyond))
+                share = float(beyond[n] / bound.scale[motor])
+                found.append(Excess(motor, name, float(limit), float(v[n]), int(instants[n]), share))
+    return found
+
+
+@dataclass(eq=False)
+class LimitTerms:
+    """The terms of the augmented Lagrangian, with their multipliers.
+
+    Attributes:
+        bounds: Bounds by quantity.
+        judged: Which instants count, shape [T].
+        h: Step [s].
+        rho: Penalty.
+        multipliers: By quantity, upper and lower side, shape [2, T, M].
+        rounds: How often they were updated.
+        left: Largest excess at the last update.
+        stalled: How many updates in a row hardly changed it.
+        on: Whether the terms count. They do once a minimum without them does not keep the limits: from the input,
+            which may be far beyond, that minimum is the best start.
+    """
+
+    bounds: dict[str, Bounds]
+    judged: BoolArray
+    h: float
+    rho: float
+    multipliers: dict[str, Array] = field(default_factory=dict)
+    rounds: int = 0
+    left: float = np.inf
+    stalled: int = 0
+    on: bool = False
+
+    def __post_init__(self) -> None:
+        shape = len(self.judged)
+        for name, bound in self.bounds.items():
+            self.multipliers.setdefault(name, np.zeros((2, shape, len(bound.scale))))
+
+    def _sides(self, name: str, v: Array) -> Array:
+        """c of the upper and of the lower side, shape [2, T, M]; very negative where there is no limit."""
+        bound = self.bounds[name]
+        with np.errstate(invalid="ignore"):
+            sides = np.stack([v - bound.upper, bound.lower - v]) / bound.scale + MARGIN
+        return np.where(np.isfinite(sides) & self.judged[:, None], sides, -1e30)
+
+    def value(self, values: dict[str, Array]) -> float:
+        """The sum of the terms."""
+        total = 0.0
+        for name in self.bounds if self.on else ():
+            y = self.multipliers[name]
+            total += float(np.sum(np.maximum(0.0, self._sides(name, values[name]) + y) ** 2 - y**2))
+        return 0.5 * self.rho * self.h * total
+
+    def gradient(self, name: str, v: Array) -> Array:
+        """Derivative of the terms by a quantity's values, shape [T, M]."""
+        upper, lower = np.maximum(0.0, self._sides(name, v) + self.multipliers[name])
+        return self.rho * self.h * (upper - lower) / self.bounds[name].scale
+
+    def curvature(self, name: str, v: Array) -> Array:
+        """Second derivative of the terms where they act, shape [T, M]."""
+        if not self.on:
+            return np.zeros(v.shape)
+        active = np.any(self._sides(name, v) + self.multipliers[name] > 0.0, axis=0)
+        return np.where(active, self.rho * self.h / self.bounds[name].scale ** 2, 0.0)
+
+    def excess(self, values: dict[str, Array]) -> float:
+        """Largest excess over the limits as they were drawn in, at most 0 where all are kept."""
+        return max(float(np.max(self._sides(name, values[name]))) for name in self.bounds)
+
+    def tighten(self, values: dict[str, Array]) -> bool:
+        """Switch the terms on where limits are not kept, and update them at a minimum with them: False where all are
+        kept, or nothing more can be done."""
+        if self.on:
+            return self.update(values)
+        self.on = not self.kept(values)
+        return self.on
+
+    def update(self, values: dict[str, Array]) -> bool:
+        """Multipliers after a minimum: False where all limits are kept, or nothing more can be done."""
+        excess = self.excess(values)
+        self.stalled = self.stalled + 1 if excess > STALLED * self.left else 0
+        if excess <= MARGIN or self.rounds >= ROUNDS or self.stalled >= PATIENCE:
+            return False
+        for name, y in self.multipliers.items():
+            self.multipliers[name] = np.maximum(0.0, self._sides(name, values[name]) + y)
+        if excess > SLOW * self.left:
+            self.rho *= GROWTH
+            for name in self.multipliers:
+                self.multipliers[name] /= GROWTH  # they stand for y rho
+        self.left = excess
+        self.rounds += 1
+        return True
+
+    def without(self, motor: int, quantity: str) -> LimitTerms:
+        """The same terms but for one limit of one motor."""
+        bound = self.bounds[quantity]
+        lower, upper = bound.lower.copy(), bound.upper.copy()
+        lower[motor], upper[motor] = -np.inf, np.inf
+        bounds = self.bounds | {quantity: Bounds(lower, upper, bound.scale)}
+        return LimitTerms(bounds, self.judged, self.h, self.rho, dict(self.multipliers), on=self.on)
+
+    def binds(self, motor: int, quantity: str, v: Array) -> bool:
+        """Whether a limit of a motor acts at any instant, at values of shape [T, M]."""
+        return bool(np.any(self.curvature(quantity, v)[:, motor] > 0.0))
+
+    def kept(self, values: dict[str, Array]) -> bool:
+        """Whether all limits are kept."""
+        return self.excess(values) <= MARGIN
