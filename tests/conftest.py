@@ -73,3 +73,17 @@ def make_plugin(tmp_path: Path) -> Callable[..., Path]:
 def toml(value: object) -> str:
     """A text, number or list of texts as TOML."""
     return "[" + ", ".join(toml(item) for item in value) + "]" if isinstance(value, list) else repr(value)
+
+
+def pytest_configure(config):
+    """Tests that take longer than the rest are marked `long`, and run with `pytest -m long`."""
+    config.addinivalue_line("markers", "long: takes half a minute or more; run with -m long")
+
+
+def pytest_collection_modifyitems(config, items):
+    """Skip them otherwise."""
+    if "long" in (config.getoption("-m") or ""):
+        return
+    for item in items:
+        if item.get_closest_marker("long"):
+            item.add_marker(pytest.mark.skip(reason="long; run with -m long"))

@@ -20,6 +20,8 @@ from .limits import LimitTerms
 from .problem import RetargetProblem
 from .recycling import Recycled
 
+_OF_LIMITS = ("rho", "left", "reached", "stalled", "on")
+
 
 def checkpoint_path(layer: str) -> Path:
     """The file beside a layer in which its optimisation keeps where it stands."""
@@ -71,13 +73,7 @@ class Checkpoint:
             "products": search.products, "reason": search.reason,
         }  # fmt: skip
         if limits is not None:
-            state |= {
-                "rho": limits.rho,
-                "rounds": limits.rounds,
-                "left": limits.left,
-                "stalled": limits.stalled,
-                "on": limits.on,
-            }
+            state |= {name: getattr(limits, name) for name in _OF_LIMITS}
             values |= {f"limit {name}": y for name, y in limits.multipliers.items()}
         values["state"] = np.frombuffer(json.dumps(state).encode(), np.uint8)
         try:
@@ -113,8 +109,8 @@ class Checkpoint:
             )  # fmt: skip
             if limits is not None:
                 limits.multipliers = {name: values[f"limit {name}"] for name in limits.bounds}
-                limits.rho, limits.rounds = state["rho"], state["rounds"]
-                limits.left, limits.stalled, limits.on = state["left"], state["stalled"], state["on"]
+                for name in _OF_LIMITS:
+                    setattr(limits, name, state[name])
         except (OSError, ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile):
             return None
         return search

@@ -18,9 +18,8 @@ from ..shot.character import Array, BoolArray, Character
 
 QUANTITIES = ("position", "velocity", "acceleration", "effort")
 MARGIN = 1e-4  # share of a limit by which it is drawn in
-ROUNDS = 16  # rounds of multipliers before what is exceeded is called out of reach
 GROWTH, SLOW = 10.0, 0.25  # of the penalty, where a round left more than this share of the violation
-STALLED, PATIENCE = 0.8, 3  # rounds that each leave more than this share are the last ones
+STALLED, PATIENCE = 0.8, 3  # so many minima in a row that each leave more than this share: limits are out of reach
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,9 +118,9 @@ class LimitTerms:
         h: Step [s].
         rho: Penalty.
         multipliers: By quantity, upper and lower side, shape [2, T, M].
-        rounds: How often they were updated.
         left: Largest excess at the last update.
-        stalled: How many updates in a row hardly changed it.
+        reached: Largest excess at the last minimum of the whole problem.
+        stalled: How many of these in a row hardly changed it.
         on: Whether the terms count. They do once a minimum without them does not keep the limits: from the input,
             which may be far beyond, that minimum is the best start.
     """
@@ -131,8 +130,8 @@ class LimitTerms:
     h: float
     rho: float
     multipliers: dict[str, Array] = field(default_factory=dict)
-    rounds: int = 0
     left: float = np.inf
+    reached: float = np.inf
     stalled: int = 0
     on: bool = False
 
@@ -165,8 +164,8 @@ class LimitTerms:
         """Second derivative of the terms where they act, shape [T, M]."""
         if not self.on:
             return np.zeros(v.shape)
-        active = np.any(self._sides(name, v) + self.multipliers[name] > 0.0, axis=0)
-        return np.where(active, self.rho * self.h / self.bounds[name].scale ** 2, 0.0)
+        active = np.sum(self._sides(name, v) + self.multipliers[name] > 0.0, axis=0)
+        return active * (self.rho * self.h / self.bounds[name].scale ** 2)
 
     def excess(self, values: dict[str, Array]) -> float:
         """Largest excess over the limits as they were drawn in, at most 0 where all are kept."""
@@ -175,16 +174,18 @@ class LimitTerms:
     def tighten(self, values: dict[str, Array]) -> bool:
         """Switch the terms on where limits are not kept, and update them at a minimum with them: False where all are
         kept, or nothing more can be done."""
-        if self.on:
-            return self.update(values)
-        self.on = not self.kept(values)
-        return self.on
+        if not self.on:
+            self.on = not self.kept(values)
+            return self.on
+        excess = self.excess(values)
+        self.stalled = self.stalled + 1 if excess > STALLED * self.reached else 0
+        self.reached = excess
+        return self.stalled < PATIENCE and self.update(values)
 
     def update(self, values: dict[str, Array]) -> bool:
-        """Multipliers after a minimum: False where all limits are kept, or nothing more can be done."""
+        """New multipliers after a minimum of the model; False, and none, where all limits are kept."""
         excess = self.excess(values)
-        self.stalled = self.stalled + 1 if excess > STALLED * self.left else 0
-        if excess <= MARGIN or self.rounds >= ROUNDS or self.stalled >= PATIENCE:
+        if excess <= MARGIN:
             return False
         for name, y in self.multipliers.items():
             self.multipliers[name] = np.maximum(0.0, self._sides(name, values[name]) + y)
@@ -193,7 +194,6 @@ class LimitTerms:
             for name in self.multipliers:
                 self.multipliers[name] /= GROWTH  # they stand for y rho
         self.left = excess
-        self.rounds += 1
         return True
 
     def without(self, motor: int, quantity: str) -> LimitTerms:

@@ -5,8 +5,10 @@ import dataclasses
 import numpy as np
 import pytest
 from calmotion import ShotError
-from calmotion.retarget.run import Options, optimize_shot, simulate_shot
-from calmotion.shot import Animation, Track
+from calmotion.retarget.optimize import optimize_shot
+from calmotion.retarget.prepare import Options
+from calmotion.retarget.run import simulate_shot
+from calmotion.shot import Animation, FreeTrack, Track, WeightTrack
 
 OPTIONS = Options(step=1 / 240)
 
@@ -47,19 +49,8 @@ def test_optimising_the_result_again_finds_nothing_left(result, arm, animation, 
     assert again.objective_after <= result.objective_after * (1 + 1e-6)
 
 
-def test_joints_stay_closed_and_motors_within_their_limits(arm, animation, bodies):
-    at_frames = np.array([track.values for track in animation.tracks])
-    limits = [(float(v.min()) - 0.002, float(v.max()) + 0.002) for v in at_frames]
-    joints = tuple(
-        dataclasses.replace(joint, lower=limits[k][0], upper=limits[k][1]) if k < 2 else joint
-        for k, joint in enumerate(arm.joints)
-    )
-    tight = optimize_shot(dataclasses.replace(arm, joints=joints), animation, bodies, OPTIONS, quiet)
-    values = tight.after.motion.motor_values
-    for k, (low, high) in enumerate(limits):
-        assert values[:, k].min() >= low - 1e-9 and values[:, k].max() <= high + 1e-9
-    assert tight.objective_after < tight.objective_before
-    assert max(tight.before.max_joint_gap, tight.after.max_joint_gap) < 1e-6
+def test_joints_stay_closed(result):
+    assert max(result.before.max_joint_gap, result.after.max_joint_gap) < 1e-6
 
 
 def test_locked_motors_keep_their_curves(arm, animation, bodies):
@@ -68,6 +59,46 @@ def test_locked_motors_keep_their_curves(arm, animation, bodies):
     assert not result.curves[0].changed and result.curves[1].changed
     assert np.array_equal(result.after.motion.motor_values[:, 0], result.before.motion.motor_values[:, 0])
     assert any("/Arm/Shoulder" in row.what for row in result.left_out)
+
+
+def test_a_range_in_which_a_motor_is_locked_keeps_its_curve(arm, animation, bodies):
+    lock = FreeTrack(0, np.array([0.0, 0.5, 1.0]), np.array([True, False, True]))
+    result = optimize_shot(arm, dataclasses.replace(animation, free=(lock,)), bodies, OPTIONS, quiet)
+    before, after = result.before.motion, result.after.motion
+    inside = (after.times >= 0.5) & (after.times <= 1.0)
+    assert np.array_equal(after.motor_values[inside, 0], before.motor_values[inside, 0])
+    assert np.abs(after.motor_values[~inside, 0] - before.motor_values[~inside, 0]).max() > 1e-4
+    assert judged(result.after)[1] < judged(result.before)[1]
+    with pytest.raises(ShotError, match="every motor is locked"):
+        locks = tuple(FreeTrack(k, np.array([0.0]), np.array([False])) for k in range(2))
+        optimize_shot(arm, dataclasses.replace(animation, free=locks), bodies, OPTIONS, quiet)
+
+
+def test_where_nothing_is_gained_the_curves_stay_exactly_as_they_were(arm, animation, bodies):
+    """Nothing is judged in the second half."""
+    weights = tuple(
+        WeightTrack(target, rotation, np.array([0.7, 0.75]), np.array([value, 0.0]))
+        for target, rotation, value in ((0, False, 1.0), (1, False, 1.0), (1, True, 0.05))
+    )
+    result = optimize_shot(arm, dataclasses.replace(animation, weights=weights), bodies, OPTIONS, quiet)
+    late = animation.frame_times > 1.1
+    for curve, track in zip(result.curves, animation.tracks, strict=True):
+        assert curve.changed and np.array_equal(curve.frame_values[late], track.values[late])
+    first = (result.after.motion.times >= 0.0) & (result.after.motion.times < 0.7)
+    before, after = (s.position_errors[first, 1].max() for s in (result.before, result.after))
+    assert after < 0.1 * before
+
+
+def test_a_static_reference_keeps_the_sag_and_removes_the_shake(arm, animation, bodies, result):
+    character = dataclasses.replace(arm, retarget=dataclasses.replace(arm.retarget, reference="static"))
+    found = optimize_shot(character, animation, bodies, OPTIONS, quiet)
+    assert found.before.position_errors[0].max() < 1e-9, "at rest there is nothing to correct"
+    sag = result.before.position_errors[0, 1]
+    assert sag > 1e-3
+    assert judged(found.after)[1] < 0.1 * judged(found.before)[1]
+    # the first pose is the animator's, sag and all
+    shift = found.after.motion.target_positions[0, 1] - result.reference.target_positions[0, 1]
+    assert np.linalg.norm(shift) == pytest.approx(sag, rel=0.2)
 
 
 def test_kept_ends_keep_the_first_and_last_pose(arm, animation, bodies):
@@ -93,7 +124,7 @@ def test_a_rigid_character_needs_no_change(arm, animation):
 
 @pytest.mark.parametrize(
     ("change", "attribute"),
-    [({"reference": "static"}, "calm:retarget:reference"), ({"cyclic": True}, "calm:retarget:cyclic")],
+    [({"cyclic": True}, "calm:retarget:cyclic")],
 )
 def test_settings_that_are_not_there_yet_are_refused(arm, animation, bodies, change, attribute):
     character = dataclasses.replace(arm, retarget=dataclasses.replace(arm.retarget, **change))

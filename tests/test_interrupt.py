@@ -1,0 +1,71 @@
+"""An optimisation that the user stops, or that is killed, through the command line."""
+
+import json
+import os
+import random
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+
+OPTIONS = ("--step", "10ms")
+
+
+def command(repository, layer):
+    shot = repository / "samples" / "bartender" / "bartender.usda"
+    return [sys.executable, "-m", "calmotion", "optimize", str(shot), "-o", str(layer), "--json", *OPTIONS]
+
+
+def started(repository, layer):
+    environment = os.environ | {"PYTHONPATH": str(repository / "pipeline")}
+    return subprocess.Popen(
+        command(repository, layer), env=environment, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True
+    )
+
+
+def kept(layer):
+    return layer.with_name(f".{layer.name}.checkpoint.npz")
+
+
+def test_an_interrupt_writes_the_best_so_far_and_the_same_command_goes_on(repository, tmp_path):
+    layer = tmp_path / "calm.usda"
+    process = started(repository, layer)
+    while not kept(layer).exists() and process.poll() is None:
+        time.sleep(0.01)
+    process.send_signal(signal.SIGINT)
+    out, _ = process.communicate(timeout=600)
+    early = json.loads(out)
+    assert process.returncode == 130 and early["interrupted"] and early["stopped"] == "interrupted"
+    assert layer.exists() and kept(layer).exists()
+    assert early["objective_after"] < early["objective_before"]
+    process = started(repository, layer)
+    out, _ = process.communicate(timeout=600)
+    late = json.loads(out)
+    assert process.returncode == 0 and not late["interrupted"] and late["stopped"] == "converged"
+    assert late["objective_after"] <= early["objective_after"]
+    assert not kept(layer).exists()
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["calm.usda", "calm_root.usda"]
+
+
+@pytest.mark.long
+def test_killed_at_any_moment_it_ends_at_the_same_result(repository, tmp_path):
+    whole = started(repository, tmp_path / "whole.usda")
+    begin = time.monotonic()
+    expected = json.loads(whole.communicate(timeout=600)[0])
+    seconds = time.monotonic() - begin
+    rng = random.Random(0)
+    layer = tmp_path / "calm.usda"
+    for _ in range(20):
+        process = started(repository, layer)
+        time.sleep(rng.uniform(0.0, seconds))
+        process.kill()
+        process.communicate()
+        process = started(repository, layer)
+        found = json.loads(process.communicate(timeout=600)[0])
+        assert process.returncode == 0
+        assert found["objective_after"] == pytest.approx(expected["objective_after"], rel=1e-9)
+        for one, other in zip(found["targets"], expected["targets"], strict=True):
+            assert one["max_error_after_m"] == pytest.approx(other["max_error_after_m"], rel=1e-6)
+        assert not list(tmp_path.glob(".*"))
