@@ -10,7 +10,7 @@ import time
 
 import pytest
 
-OPTIONS = ("--step", "10ms")
+OPTIONS = ("--step", "4ms")
 
 
 def command(repository, layer):

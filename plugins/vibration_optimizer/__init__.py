@@ -92,6 +92,15 @@ class SimulateShot(Operator):
     requires = (Character, Animation, Source)
     uses = (ReducedBodies,)
     provides = (Result,)
+    properties = (
+        Property(
+            "shaper",
+            str,
+            "none",
+            choices=("none", "zv", "zvd", "zv2", "zvd2", "lowpass"),
+            description="Pass the motors' tracks through an input shaper or a filter first, to compare with",
+        ),
+    )
 
     @classmethod
     def poll(cls, data: Mapping[type, Any]) -> str | None:
@@ -100,7 +109,8 @@ class SimulateShot(Operator):
     def execute(self, context: RunContext) -> Sequence[object]:
         from calmotion.retarget.run import simulate_shot
 
-        return [simulate_shot(*_inputs(context), _options(context), context.progress)]
+        options = _options(context, shaper=context.properties.shaper)
+        return [simulate_shot(*_inputs(context), options, context.progress)]
 
 
 class OptimizeShot(Operator):

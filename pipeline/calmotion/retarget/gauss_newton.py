@@ -56,7 +56,10 @@ class LeastSquares(Protocol):
 
 @dataclass(frozen=True)
 class Iterate:
-    """Merit, norm of the gradient, the gain that was predicted from there [m], evaluations and products so far."""
+    """Merit, norm of the gradient, the gain that was predicted from there [m], evaluations and products so far.
+
+    Norm and gain are NaN where the search ended before they were worked out.
+    """
 
     value: float
     gradient_norm: float
@@ -145,6 +148,9 @@ def minimize(
         )  # fmt: skip
 
     while True:
+        if len(history) >= max_iterations:
+            history.append(Iterate(value, np.nan, np.nan, calls.evaluations, calls.products))
+            return here("iteration limit")
         gradient = calls.gradient()
         norm = float(np.linalg.norm(gradient))
         enough = problem.worth(gain)
@@ -159,8 +165,6 @@ def minimize(
             _, predicted, _ = path.within(radius)
         expected = problem.gain(predicted, value)
         history.append(Iterate(value, norm, expected, calls.evaluations, calls.products))
-        if len(history) > max_iterations:
-            return here("iteration limit")
         better = None
         if expected >= gain:
             if problem.limits_act:

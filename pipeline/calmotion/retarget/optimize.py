@@ -237,9 +237,15 @@ def _search(
         left_out=tuple(rows),
         limits=limit_uses(used_before, used, grid, costs),
         stopped="interrupted" if interrupted else search.reason,
-        expected_gain_m=search.history[-1].gain if search.history else None,
+        expected_gain_m=_expected(search),
         interrupted=interrupted,
     )
+
+
+def _expected(search: Search) -> float | None:
+    """The gain that one more iteration was expected to bring [m]; None where that was not worked out."""
+    gain = search.history[-1].gain if search.history else np.nan
+    return gain if np.isfinite(gain) else None
 
 
 def _used(problem: RetargetProblem, character: Character) -> list[Excess]:

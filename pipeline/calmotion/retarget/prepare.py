@@ -25,7 +25,10 @@ from .roots import root_tracks, sample_roots
 
 @dataclass(frozen=True)
 class Options:
-    """What the user overrides; None keeps the shot's own or the automatic choice. Lengths [m], times [s]."""
+    """What the user overrides; None keeps the shot's own or the automatic choice. Lengths [m], times [s].
+
+    `shaper`, one of `shapers.SHAPERS`, is for `simulate` alone.
+    """
 
     tolerance: float | None = None
     step: float | None = None
@@ -34,6 +37,7 @@ class Options:
     knot_spacing: float | None = None
     smoothness: float | None = None
     max_iterations: int = 30
+    shaper: str = "none"
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,7 +106,11 @@ def first_pose_frequencies(character: Character, animation: Animation, bodies: S
     Raises:
         ShotError: It has no static equilibrium there.
     """
-    prepared = prepare(character, animation, bodies, Options(pre_roll=0.0))
+    return frequencies_of(prepare(character, animation, bodies, Options(pre_roll=0.0)), animation)
+
+
+def frequencies_of(prepared: Prepared, animation: Animation) -> Array:
+    """The same of a shot that is prepared."""
     angles, _ = sample_tracks(animation.tracks, prepared.grid)
     try:
         return system_frequencies(prepared.model, prepared.model.joint_angles(angles[0]), prepared.world[0])

@@ -17,10 +17,11 @@ from .curves import sample_curves, sample_tracks
 from .forward import run_forward
 from .limits import excesses, motor_bounds
 from .objective import Objective
-from .prepare import Options, Prepared, failure_error, prepare, refuse_half_turns
+from .prepare import Options, Prepared, failure_error, frequencies_of, prepare, refuse_half_turns
 from .problem import limited_values
 from .reference import MeantMotion, rigid_motion, static_motion
 from .report import left_out_rows, limit_uses, reference_motion, simulation_of
+from .shapers import lowest_damping, shaped
 
 Progress = Callable[[float, str], None]
 
@@ -49,6 +50,8 @@ def simulate_shot(
     model, grid, world = prepared.model, prepared.grid, prepared.world
     workspace = Workspace.for_system(model.system)
     curves = sample_curves(animation.current, grid)
+    if options.shaper != "none":
+        curves = shaped(curves, grid, options.shaper, frequencies_of(prepared, animation), lowest_damping(character))
     angles, rates = curves.angles, curves.rates
     meant, meant_rates = sample_tracks(animation.tracks, grid)
     refuse_half_turns(prepared, angles)

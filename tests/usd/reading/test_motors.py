@@ -119,3 +119,30 @@ def test_the_body_of_a_motor_is_moved_by_it(tmp_path):
     character, _, _ = read(tmp_path)
     joint = character.joints[character.motors[0].joint]
     assert character.bodies[joint.body1].path == UPPER
+
+
+def test_a_range_of_time_is_locked_by_samples_of_optimize(tmp_path):
+    def edit(stage):
+        prim = stage.GetPrimAtPath(ELBOW)
+        prim.AddAppliedSchema("CalmMotorAPI")
+        attribute = prim.CreateAttribute("calm:motor:optimize", Sdf.ValueTypeNames.Bool)
+        start = stage.GetStartTimeCode()
+        for code, value in ((start, True), (start + 6, False), (start + 12, True)):
+            attribute.Set(value, code)
+
+    character, animation, _ = read(tmp_path, edit)
+    assert all(motor.optimize for motor in character.motors)
+    (track,) = animation.free
+    assert character.motors[track.motor].path == ELBOW
+    ((first, last),) = track.locked(float(animation.frame_times[-1]))
+    assert np.allclose([first, last], np.array([6.0, 12.0]) / 24.0)
+
+
+def test_samples_that_lock_all_the_time_lock_the_motor(tmp_path):
+    def edit(stage):
+        prim = stage.GetPrimAtPath(ELBOW)
+        prim.AddAppliedSchema("CalmMotorAPI")
+        prim.CreateAttribute("calm:motor:optimize", Sdf.ValueTypeNames.Bool).Set(False, 3.0)
+
+    character, animation, _ = read(tmp_path, edit)
+    assert not character.motors[1].optimize and animation.free == ()

@@ -12,7 +12,11 @@ from small_shots import FORE, HAND, LENGTH, WIDTH, Scale, make_target, write_arm
 
 
 def read(tmp_path, edit=None, scale=None):
-    return read_shot(str(write_arm(tmp_path / "arm.usda", edit, scale)))[0]
+    return read_both(tmp_path, edit, scale)[0]
+
+
+def read_both(tmp_path, edit=None, scale=None):
+    return read_shot(str(write_arm(tmp_path / "arm.usda", edit, scale)))[:2]
 
 
 @pytest.mark.parametrize("scale", [Scale(), Scale(0.01, 0.001)])
@@ -52,16 +56,25 @@ def test_without_targets_the_outermost_point_of_the_leaf_is_taken(tmp_path):
     assert any("CalmTargetAPI" in note and FORE in note for note in character.notes)
 
 
-def test_weights_in_time_give_a_note_and_their_first_value(tmp_path):
+def test_weights_in_time_become_a_track(tmp_path):
     def edit(stage):
         make_target(stage)
         weight = stage.GetPrimAtPath(HAND).CreateAttribute("calm:target:positionWeight", Sdf.ValueTypeNames.Float)
         weight.Set(3.0, 0.0)
         weight.Set(9.0, 10.0)
 
-    character = read(tmp_path, edit)
+    def bad(stage):
+        edit(stage)
+        stage.GetPrimAtPath(HAND).GetAttribute("calm:target:positionWeight").Set(-1.0, 5.0)
+
+    character, animation = read_both(tmp_path, edit)
     assert character.targets[0].position_weight == 3.0
-    assert any("change in time" in note for note in character.notes)
+    (track,) = animation.weights
+    assert track.target == 0 and not track.rotation
+    assert np.allclose(np.diff(track.times) * 24.0, 10.0) and np.array_equal(track.values, [3.0, 9.0])
+    with pytest.raises(ShotError, match="negative") as caught:
+        read_both(tmp_path, bad)
+    assert caught.value.path == HAND and caught.value.attribute == "calm:target:positionWeight"
 
 
 def test_a_target_that_no_body_carries_is_refused(tmp_path):

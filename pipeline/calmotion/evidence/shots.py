@@ -1,0 +1,62 @@
+"""The shots that benchmarks of the retargeting run on: files, or characters made in code."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from ..dynamics.topology import span_tree
+from ..errors import ShotError
+from ..fem.reduced_body import ReducedBody
+from ..retarget.bodies import reduce_bodies
+from ..retarget.prepare import Options, excitations
+from ..shot import Animation, Character, FEMeshes
+
+MADE = {"linkage": "an arm with a four-bar, made in code", "arm": "two plastic links, made in code"}
+
+
+@dataclass(frozen=True, eq=False)
+class BenchShot:
+    """A shot ready to be prepared."""
+
+    name: str
+    character: Character
+    animation: Animation
+    bodies: Sequence[ReducedBody]
+
+
+def load(name: str) -> BenchShot:
+    """A shot by the name of its file, or one of `MADE`.
+
+    Raises:
+        ShotError: It cannot be read.
+    """
+    if name in MADE:
+        character, animation, meshes = _made(name)
+        loads = excitations(character, animation, meshes, Options())
+        return BenchShot(
+            name, character, animation, reduce_bodies(character, span_tree(character), meshes, None, loads)
+        )
+    from ..host import ReducedBodies, Source, open_host
+
+    run = open_host([]).run([Source(path=name, command="optimize")], [Character, Animation, ReducedBodies])
+    for result in run:
+        if result.error is not None:
+            raise result.error
+    found, animation_found, reduced = run.get(Character), run.get(Animation), run.get(ReducedBodies)
+    if found is None or animation_found is None or reduced is None:
+        raise ShotError("has nothing flexible to retarget", path=name)
+    return BenchShot(Path(name).stem, found, animation_found, reduced.bodies)
+
+
+def _made(name: str) -> tuple[Character, Animation, FEMeshes]:
+    if name == "linkage":
+        from .linkage_arm import linkage_arm, performance
+
+        return linkage_arm()[0], performance(), linkage_arm()[1]
+    from .beam_arm import beam_arm, quintic, shot_of
+
+    character, meshes = beam_arm(2, length=0.3, thickness=0.014, payload=0.2)
+    move, back = quintic(0.8, 0.4, 0.2), quintic(-1.1, 0.35, 0.9)
+    return character, shot_of(lambda t: move(t) + back(t), 2.0, motors=2), meshes

@@ -1,0 +1,79 @@
+"""What practitioners do instead: input shapers and low-pass filters on the motors' tracks.
+
+A shaper convolves every track with a few impulses, timed so that a mode of known frequency and damping cancels its own
+vibration (N. C. Singer, W. P. Seering, Preshaping command inputs to reduce system vibration, 1990): ZV with two, ZVD,
+which also forgives an error of the frequency, with three. It delays the motion and knows nothing of the targets.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+from ..errors import ShotError
+from ..shot.character import Array, Character
+from .curves import Curves, TimeGrid
+
+SHAPERS = ("none", "zv", "zvd", "zv2", "zvd2", "lowpass")
+CUTOFF = 0.5  # of the low-pass filter, over the lowest frequency
+
+
+def impulses(kind: str, frequencies: Array, damping: float) -> tuple[Array, Array]:
+    """Times [s] and amplitudes, of sum one, of a shaper.
+
+    Args:
+        kind: `zv` or `zvd` for the lowest mode, `zv2` or `zvd2` for the lowest two.
+        frequencies: Undamped, of the modes [Hz], ascending.
+        damping: Ratio of critical.
+    """
+    K = np.exp(-np.pi * damping / np.sqrt(1.0 - damping**2))
+    own = np.array([1.0, K]) if kind.startswith("zv") and "d" not in kind else np.array([1.0, 2.0 * K, K * K])
+    times, amplitudes = np.zeros(1), np.ones(1)
+    for frequency in frequencies[: 2 if kind.endswith("2") else 1]:
+        half = 0.5 / (frequency * np.sqrt(1.0 - damping**2))
+        times = (times[:, None] + half * np.arange(len(own))).ravel()
+        amplitudes = (amplitudes[:, None] * own / own.sum()).ravel()
+    return times, amplitudes
+
+
+def delay(kind: str, frequencies: Array, damping: float) -> float:
+    """Mean delay of a shaper [s]; none of a filter that runs both ways."""
+    if kind in ("none", "lowpass"):
+        return 0.0
+    times, amplitudes = impulses(kind, frequencies, damping)
+    return float(times @ amplitudes)
+
+
+def lowest_damping(character: Character) -> float:
+    """The least damping ratio of any flexible body; of Rayleigh damping a usual one, since it depends on the mode."""
+    materials = [body.flexible.material for body in character.bodies if body.flexible is not None]
+    return min((m.damping_ratio for m in materials if m.rayleigh is None), default=0.01)
+
+
+def shaped(curves: Curves, grid: TimeGrid, kind: str, frequencies: Array, damping: float) -> Curves:
+    """Curves through a shaper; before their first instant they rest.
+
+    Raises:
+        ShotError: There is no such shaper, or no frequency to shape for.
+    """
+    if kind == "none":
+        return curves
+    if kind not in SHAPERS or not len(frequencies):
+        raise ShotError(
+            "there is no such shaper" if len(frequencies) else "a rigid robot has no frequency to shape for",
+            attribute="retarget.simulate.shaper",
+            found=kind,
+            remedy=f"Use one of {', '.join(SHAPERS)}." if len(frequencies) else "Leave it out.",
+        )
+    times = grid.times
+    if kind == "lowpass":
+        from scipy.signal import butter, sosfiltfilt
+
+        sections = butter(2, CUTOFF * frequencies[0], fs=1.0 / grid.h, output="sos")
+        angles = sosfiltfilt(sections, curves.angles, axis=0, padtype="constant", padlen=min(len(times) - 1, 4000))
+    else:
+        source, angles = CubicSpline(times, curves.angles), np.zeros_like(curves.angles)
+        for late, amplitude in zip(*impulses(kind, frequencies, damping), strict=True):
+            angles += amplitude * source(np.maximum(times - late, times[0]))
+    spline = CubicSpline(times, angles)
+    return Curves(angles, spline(times, 1), spline(times, 2))
