@@ -16,9 +16,10 @@ from dataclasses import asdict, dataclass
 import numpy as np
 
 from ..dynamics.simulation import Workspace
+from ..retarget.approach import approach
 from ..retarget.curves import Curves
 from ..retarget.forward import run_forward
-from ..retarget.gauss_newton import Search, minimize
+from ..retarget.gauss_newton import minimize
 from ..retarget.prepare import Options, frequencies_of, prepare
 from ..retarget.problem import RetargetProblem
 from ..retarget.shapers import SHAPERS, delay, lowest_damping, shaped
@@ -66,7 +67,9 @@ def compare(shot: BenchShot) -> list[Row]:
         )  # fmt: skip
         name = "as animated" if kind == "none" else kind.replace("2", ", two modes")
         rows.append(_row(shot, name, delay(kind, frequencies, damping), problem, curves, run.target_positions))
-    found = minimize(problem, Search.start(np.zeros(problem.size)), np.zeros(problem.size, bool), 5e-6)
+    zero, free = np.zeros(problem.size), np.zeros(problem.size, bool)
+    problem.value(zero)
+    found = minimize(problem, approach(problem, zero, free, float(frequencies[0])), free, 5e-6)
     problem.value(found.x)
     rows.append(_row(shot, "optimised", 0.0, problem, problem.changed_curves, problem.run.target_positions))
     return rows

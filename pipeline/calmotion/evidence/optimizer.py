@@ -18,11 +18,12 @@ from functools import partial
 import numpy as np
 from scipy.optimize import minimize as quasi_newton
 
+from ..retarget.approach import approach
 from ..retarget.curves import OffsetBasis, TimeGrid, make_basis, sample_curves
 from ..retarget.gauss_newton import Search, minimize
 from ..retarget.objective import Objective
 from ..retarget.optimize import CLOSENESS, SMOOTHNESS
-from ..retarget.prepare import Options, Prepared, prepare
+from ..retarget.prepare import Options, Prepared, frequencies_of, prepare
 from ..retarget.problem import RetargetProblem
 from ..retarget.reference import rigid_motion
 from ..shot.character import Array
@@ -30,6 +31,8 @@ from .shots import MADE, BenchShot, load
 
 CLOSE = 1.01  # objectives within this factor of the converged one count as reached
 GAIN = 1e-6  # of the reference solution [m]
+UNIT = 0.01  # of the unknowns of L-BFGS, whose first step is of length one [rad]
+FAILED = 1e6  # objective of what cannot be simulated, over that of the input
 
 
 @dataclass(frozen=True)
@@ -97,6 +100,14 @@ def _largest(problem: RetargetProblem) -> float:
     return 1e3 * float(np.linalg.norm(errors, axis=2)[problem.grid.judged].max())
 
 
+def _reference(shot: BenchShot, prepared: Prepared, zero: Array) -> Search:
+    """A solution well beyond what is compared."""
+    problem, free = make_problem(shot, prepared, 0.05), np.zeros(len(zero), bool)
+    problem.value(zero)
+    start = approach(problem, zero, free, float(next(iter(frequencies_of(prepared, shot.animation)), 0.0)))
+    return minimize(problem, start, free, GAIN, 60, 200)
+
+
 def compare(shot: BenchShot, lbfgs: int) -> list[Convergence]:
     """Both methods on one shot.
 
@@ -111,7 +122,7 @@ def compare(shot: BenchShot, lbfgs: int) -> list[Convergence]:
     problem.product(np.ones(problem.size))
     problem.value(zero)
     before = _largest(problem)
-    reference = minimize(make_problem(shot, prepared, 0.05), Search.start(zero), free, GAIN, 60, 200)
+    reference = _reference(shot, prepared, zero)
     converged = problem.value(reference.x)
 
     def row(method: str, trace: list[tuple[float, float]], x: Array, evaluations: int, products: int) -> Convergence:
@@ -129,7 +140,9 @@ def compare(shot: BenchShot, lbfgs: int) -> list[Convergence]:
     def on_iterate(search: Search) -> None:
         trace.append((time.perf_counter() - begin, fresh.merit()))
 
-    found = minimize(fresh, Search.start(zero), free, 5e-6, on_iterate=on_iterate)
+    fresh.value(zero)
+    start = approach(fresh, zero, free, float(next(iter(frequencies_of(prepared, shot.animation)), 0.0)))
+    found = minimize(fresh, start, free, 5e-6, on_iterate=on_iterate)
     rows = [row("Gauss-Newton", trace, found.x, found.evaluations, found.products)]
 
     class Enough(Exception):
@@ -139,7 +152,10 @@ def compare(shot: BenchShot, lbfgs: int) -> list[Convergence]:
     other, at = make_problem(shot, prepared, 0.05), [zero]
     begin = time.perf_counter()
 
-    def both(x: Array) -> tuple[float, Array]:
+    initial = problem.value(zero)
+
+    def both(y: Array) -> tuple[float, Array]:
+        x = UNIT * y
         value = other.value(x)
         gradient = other.linearize() if np.isfinite(value) else np.zeros_like(x)
         if not best or value < min(item[1] for item in best):
@@ -147,10 +163,12 @@ def compare(shot: BenchShot, lbfgs: int) -> list[Convergence]:
         best.append((time.perf_counter() - begin, value))
         if len(best) >= lbfgs or value <= CLOSE * converged:
             raise Enough
-        return value / converged, gradient / converged
+        return min(value, FAILED * initial) / initial, UNIT * gradient / initial
 
     try:
-        quasi_newton(both, zero, jac=True, method="L-BFGS-B", options={"maxiter": lbfgs, "maxcor": 20, "ftol": 0.0})
+        quasi_newton(
+            both, zero, jac=True, method="L-BFGS-B", options={"maxiter": lbfgs, "maxcor": 20, "ftol": 0.0, "gtol": 0.0}
+        )
     except Enough:
         pass
     rows.append(row("L-BFGS", best, at[0], len(best), 0))

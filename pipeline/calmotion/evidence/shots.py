@@ -13,7 +13,11 @@ from ..retarget.bodies import reduce_bodies
 from ..retarget.prepare import Options, excitations
 from ..shot import Animation, Character, FEMeshes
 
-MADE = {"linkage": "an arm with a four-bar, made in code", "arm": "two plastic links, made in code"}
+MADE = {
+    "linkage": "an arm with a four-bar, made in code",
+    "soft-linkage": "the same with thinner links, which shakes by a quarter of a metre",
+    "arm": "two plastic links, made in code",
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,10 +55,11 @@ def load(name: str) -> BenchShot:
 
 
 def _made(name: str) -> tuple[Character, Animation, FEMeshes]:
-    if name == "linkage":
-        from .linkage_arm import linkage_arm, performance
+    if name.endswith("linkage"):
+        from .linkage_arm import SOFT, linkage_arm, performance
 
-        return linkage_arm()[0], performance(), linkage_arm()[1]
+        character, meshes = linkage_arm(thickness=SOFT) if name.startswith("soft") else linkage_arm()
+        return character, performance(), meshes
     from .beam_arm import beam_arm, quintic, shot_of
 
     character, meshes = beam_arm(2, length=0.3, thickness=0.014, payload=0.2)

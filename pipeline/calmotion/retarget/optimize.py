@@ -15,6 +15,7 @@ from ..errors import ShotError
 from ..fem.reduced_body import ReducedBody
 from ..shot import Animation, Character, LeftOut, MotorCurve, OptimizerStep, Result
 from ..shot.character import DEFAULT_TOLERANCE, Array, BoolArray, IntArray
+from .approach import approach
 from .bodies import mode_tables, skins
 from .checkpoint import Checkpoint, problem_key
 from .curves import KNOT_SPACING, Curves, OffsetBasis, TimeGrid, make_basis, sample_curves, sample_tracks
@@ -22,7 +23,7 @@ from .gauss_newton import Search, minimize
 from .limit_costs import limit_costs
 from .limits import Excess, LimitTerms, excesses, motor_bounds
 from .objective import Objective
-from .prepare import Options, Prepared, failure_error, prepare, refuse_half_turns
+from .prepare import Options, Prepared, failure_error, frequencies_of, prepare, refuse_half_turns
 from .problem import RetargetProblem, compile_kernels, limited_values
 from .pruning import block_energies, worthless
 from .reference import MeantMotion
@@ -183,7 +184,8 @@ def _search(
         problem.limits.rho = FIRST_PENALTY * max(before_value, problem.worth(1e-3 * tolerance)) / seconds
     kept = Checkpoint(checkpoint, problem_key(problem, fixed, (options, tolerance)))
     start = np.where(fixed, 0.0, _start(problem.basis, animation, problem.motors, grid))
-    search = kept.load(problem.limits) or Search.start(start)
+    resumed = kept.load(problem.limits)
+    search = resumed or Search.start(start)
     interrupted = False
 
     def on_iterate(found: Search) -> None:
@@ -194,6 +196,8 @@ def _search(
         progress(done, f"optimising: weighted error {1e3 * problem.error:.3f} mm, {search.evaluations} simulations")
 
     try:
+        if resumed is None and not np.any(start):
+            search = approach(problem, start, fixed, _lowest(prepared, animation))
         if not search.reason:
             search = minimize(
                 problem, search, fixed, WORTH * tolerance, max_iterations=options.max_iterations, on_iterate=on_iterate
@@ -240,6 +244,11 @@ def _search(
         expected_gain_m=_expected(search),
         interrupted=interrupted,
     )
+
+
+def _lowest(prepared: Prepared, animation: Animation) -> float:
+    """The lowest frequency of the first pose [Hz]; 0 where there is none."""
+    return float(next(iter(frequencies_of(prepared, animation)), 0.0))
 
 
 def _expected(search: Search) -> float | None:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection
+from copy import copy
+from dataclasses import replace
 
 import numpy as np
 from scipy.sparse import csr_matrix
@@ -258,13 +260,32 @@ class RetargetProblem:
         Args:
             values: Limited quantities, which say which limits act; None: at the point evaluated last.
         """
-        if self._preconditioner is None or self._response is None:
+        if self._response is None:
             self._response = self._rigid_response()
+        if self._preconditioner is None:
             self._preconditioner = RigidPreconditioner(
                 self._response, self.objective.weights, self.basis.values, self._penalty
             )
         self._preconditioner.factor(fixed, self._metrics(self._response.inertia, values or self._limited))
         return self._preconditioner.solve
+
+    def damped(self, retardation: float) -> RetargetProblem:
+        """The same problem without limits on a robot with more damping: a Kelvin-Voigt coefficient [s] is added."""
+        system = self.model.system
+        more = system._replace(
+            damping=system.damping + retardation * system.stiffness, retardation=system.retardation + retardation
+        )
+        other = copy(self)
+        other.model, other.limits = replace(self.model, system=more), None
+        other._linearization, other._run, other._limited = None, None, {}
+        return other
+
+    def lever(self) -> float:
+        """How far the motor that moves them most moves the targets, root-mean-square and weighted [m/rad]."""
+        if self._response is None:
+            self._response = self._rigid_response()
+        weighted = self._response.targets * self.objective.weights[..., None]
+        return float(np.sqrt(np.max(np.sum(weighted**2, axis=(0, 1, 2))) / self._unit))
 
     def _rigid_response(self) -> RigidResponse:
         rigid = rigid_model(self.model)
