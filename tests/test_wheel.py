@@ -7,6 +7,7 @@ import os
 import shutil
 import subprocess
 import sys
+import textwrap
 import venv
 from pathlib import Path
 
@@ -37,7 +38,7 @@ def installed(tmp_path_factory: pytest.TempPathFactory, repository: Path) -> Pat
     return python
 
 
-def test_a_wheel_in_an_empty_environment_optimises_a_shot(installed: Path, repository: Path, tmp_path: Path):
+def test_a_wheel_in_an_empty_environment_holds_everything(installed: Path, repository: Path, tmp_path: Path):
     environment = installed.parents[1]
     code = "import calmotion, sys; print(calmotion.__file__); print(*sys.path, sep='\\n')"
     module, *path = run(installed, "-c", code, folder=tmp_path).splitlines()
@@ -51,6 +52,24 @@ def test_a_wheel_in_an_empty_environment_optimises_a_shot(installed: Path, repos
     }
     assert all(Path(plugin["folder"]).is_relative_to(environment) for plugin in plugins)
 
+    # every module can be imported there, the schemas are registered, and a shot is read
+    code = """
+        import pkgutil, importlib, calmotion
+        for module in pkgutil.walk_packages(calmotion.__path__, "calmotion."):
+            if not module.name.endswith(("__main__", "exudyn_arm", "tetwild_worker")):
+                importlib.import_module(module.name)
+        from calmotion.usd.reading import read_shot
+        character, animation, _ = read_shot("bartender/bartender.usda")
+        print(len(character.motors), len(animation.frame_times), character.retarget.tolerance)
+    """
+    shutil.copytree(repository / "samples" / "bartender", tmp_path / "bartender")
+    motors, frames, tolerance = run(installed, "-c", textwrap.dedent(code), folder=tmp_path).split()
+    assert (int(motors), int(frames)) == (5, 97) and abs(float(tolerance) - 1e-3) < 1e-9
+
+
+@pytest.mark.long
+def test_a_wheel_in_an_empty_environment_optimises_a_shot(installed: Path, repository: Path, tmp_path: Path):
+    command = installed.parents[1] / "bin" / "calmotion"
     shutil.copytree(repository / "samples" / "bartender", tmp_path / "bartender")
     printed = run(
         command,

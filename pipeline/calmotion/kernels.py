@@ -14,7 +14,11 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from numba import config, njit
+# Compiling is most of a first run. At level 1 it takes two thirds of the time, and the kernels, whose loops are short,
+# run no slower. numba reads the level once, so it must be set before its first import; a user's own choice stays.
+os.environ.setdefault("NUMBA_OPT", "1")
+
+from numba import config, njit  # noqa: E402
 
 from .cache import cache_folder
 

@@ -4,6 +4,9 @@ A component with its joint is the block D_b = [[K, Lc], [Hc, 0]]. It touches its
 F = [[Nc Jp], [Hp]] (its rows, parent's columns) and through [0, Lp] (parent's rows, its multipliers), so
 eliminating it changes the parent's K by -Lp (D_b^-1)_multiplier-rows F. With Z = D_b^-T [0; E] that is
 -Lp (Z_x^T Nc Jp + Z_m^T Hp), and the same Z serves every later solve, plain or transposed.
+
+Within a block elastic coordinates stand first, then those of the rigid body, then multipliers: a frame is held where
+its joint is, so that the joint's rows do not have the elastic ones, and the factors keep those zeros.
 """
 
 from __future__ import annotations
@@ -11,6 +14,12 @@ from __future__ import annotations
 from ..kernels import kernel
 from .sliders import has_row
 from .system import JOINT_ROWS
+
+
+@kernel
+def place(i, r):
+    """Where coordinate i of a component with r elastic ones stands in its block."""
+    return r + i if i < 6 else i - 6
 
 
 @kernel
@@ -34,10 +43,9 @@ def lu_factor(n, A, piv):
                 A[p, j] = t
         inv = 1.0 / A[k, k]
         for i in range(k + 1, n):
-            f = A[i, k] * inv
-            if f == 0.0:
-                A[i, k] = 0.0
+            if A[i, k] == 0.0:
                 continue
+            f = A[i, k] * inv
             A[i, k] = f
             for j in range(k + 1, n):
                 A[i, j] -= f * A[k, j]
@@ -130,14 +138,18 @@ def factor(system, blocks, lu, piv, Z, row):
     """
     m = JOINT_ROWS
     for b in range(len(system.parent) - 1, -1, -1):
-        n = 6 + system.elastic[b]
+        r = system.elastic[b]
+        n = 6 + r
         A = lu[b]
         for i in range(n):
-            for k in range(n):
-                A[i, k] = blocks.K[b, i, k]
+            at = place(i, r)
+            for k in range(6):
+                A[at, r + k] = blocks.K[b, i, k]
+            for k in range(r):
+                A[at, k] = blocks.K[b, i, 6 + k]
             for k in range(m):
-                A[i, n + k] = blocks.Lc[b, i, k]
-                A[n + k, i] = blocks.Hc[b, k, i]
+                A[at, n + k] = blocks.Lc[b, i, k]
+                A[n + k, at] = blocks.Hc[b, k, i]
         for i in range(m):
             for k in range(m):
                 A[n + i, n + k] = 0.0
@@ -157,9 +169,10 @@ def factor(system, blocks, lu, piv, Z, row):
             x1 = 0.0
             x2 = 0.0
             for i in range(n):
-                x0 += Z[b, i, k] * blocks.Nc[b, i, 0]
-                x1 += Z[b, i, k] * blocks.Nc[b, i, 1]
-                x2 += Z[b, i, k] * blocks.Nc[b, i, 2]
+                z = Z[b, place(i, r), k]
+                x0 += z * blocks.Nc[b, i, 0]
+                x1 += z * blocks.Nc[b, i, 1]
+                x2 += z * blocks.Nc[b, i, 2]
             for a in range(np_):
                 row[a] = x0 * blocks.Jp[b, 0, a] + x1 * blocks.Jp[b, 1, a] + x2 * blocks.Jp[b, 2, a]
             for i in range(m):
@@ -183,20 +196,22 @@ def solve(system, Lp, Hp, Nc, Jp, lu, piv, Z, x, lam, block):
         p = system.parent[b]
         if p < 0:
             continue
-        n = 6 + system.elastic[b]
+        r = system.elastic[b]
+        n = 6 + r
         for k in range(m):
             t = 0.0
             for i in range(n):
-                t += Z[b, i, k] * x[b, i]
+                t += Z[b, place(i, r), k] * x[b, i]
             for i in range(m):
                 t += Z[b, n + i, k] * lam[b, i]
             for i in range(6 + system.elastic[p]):
                 x[p, i] -= Lp[b, i, k] * t
     for b in range(count):
         p = system.parent[b]
-        n = 6 + system.elastic[b]
+        r = system.elastic[b]
+        n = 6 + r
         for i in range(n):
-            block[i] = x[b, i]
+            block[place(i, r)] = x[b, i]
         for i in range(m):
             block[n + i] = lam[b, i]
         if p >= 0:
@@ -206,7 +221,7 @@ def solve(system, Lp, Hp, Nc, Jp, lu, piv, Z, x, lam, block):
                 for a in range(np_):
                     t += Jp[b, k, a] * x[p, a]
                 for i in range(n):
-                    block[i] -= Nc[b, i, k] * t
+                    block[place(i, r)] -= Nc[b, i, k] * t
             for i in range(m):
                 t = 0.0
                 for a in range(np_):
@@ -214,7 +229,7 @@ def solve(system, Lp, Hp, Nc, Jp, lu, piv, Z, x, lam, block):
                 block[n + i] -= t
         lu_solve(n + m, lu[b], piv[b], block)
         for i in range(n):
-            x[b, i] = block[i]
+            x[b, i] = block[place(i, r)]
         for i in range(m):
             lam[b, i] = block[n + i]
 
@@ -226,14 +241,15 @@ def solve_transposed(system, Lp, Hp, Nc, Jp, lu, piv, Z, x, lam, block):
     count = len(system.parent)
     for b in range(count - 1, -1, -1):
         p = system.parent[b]
-        n = 6 + system.elastic[b]
+        r = system.elastic[b]
+        n = 6 + r
         for i in range(n):
-            block[i] = x[b, i]
+            block[place(i, r)] = x[b, i]
         for i in range(m):
             block[n + i] = lam[b, i]
         lu_solve_transposed(n + m, lu[b], piv[b], block)
         for i in range(n):
-            x[b, i] = block[i]
+            x[b, i] = block[place(i, r)]
         for i in range(m):
             lam[b, i] = block[n + i]
         if p < 0:
@@ -252,12 +268,13 @@ def solve_transposed(system, Lp, Hp, Nc, Jp, lu, piv, Z, x, lam, block):
         p = system.parent[b]
         if p < 0:
             continue
-        n = 6 + system.elastic[b]
+        r = system.elastic[b]
+        n = 6 + r
         for k in range(m):
             t = 0.0
             for i in range(6 + system.elastic[p]):
                 t += Lp[b, i, k] * x[p, i]
             for i in range(n):
-                x[b, i] -= Z[b, i, k] * t
+                x[b, i] -= Z[b, place(i, r), k] * t
             for i in range(m):
                 lam[b, i] -= Z[b, n + i, k] * t

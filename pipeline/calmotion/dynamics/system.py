@@ -158,7 +158,8 @@ class Blocks(NamedTuple):
 
 class Factors(NamedTuple):
     """The eliminated step matrix: `lu`, `pivots` of each component with its joint, and `Z`, the transposed
-    solutions for its multipliers, shapes [B, N + 6, N + 6], [B, N + 6], [B, N + 6, 6]."""
+    solutions for its multipliers, shapes [B, N + 6, N + 6], [B, N + 6], [B, N + 6, 6]; in the order of
+    `elimination.place`."""
 
     lu: Array
     pivots: IntArray

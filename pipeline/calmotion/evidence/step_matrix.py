@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..dynamics.elimination import factor, solve
+from ..dynamics.loops import copy_rows
 from ..dynamics.system import JOINT_ROWS, Blocks, System
+from ..kernels import kernel
 from ..shot.character import Array
 
 
@@ -49,3 +52,15 @@ def split(system: System, vector: Array) -> tuple[Array, Array]:
 def flat(system: System, x: Array, lam: Array) -> Array:
     """The inverse of `split`."""
     return np.concatenate([*(x[b, : 6 + r] for b, r in enumerate(system.elastic)), lam.ravel()])
+
+
+@kernel
+def solve_again(system, blocks, factors, K, right, right_lam, x, lam, block, repeats):
+    """Factorise and solve so many times, from a loop that is compiled, as a simulation does."""
+    for _ in range(repeats):
+        for b in range(len(K)):
+            copy_rows(K[b], blocks.K[b])
+        copy_rows(right, x)
+        copy_rows(right_lam, lam)
+        factor(system, blocks, factors.lu, factors.pivots, factors.Z, block)
+        solve(system, blocks.Lp, blocks.Hp, blocks.Nc, blocks.Jp, factors.lu, factors.pivots, factors.Z, x, lam, block)
