@@ -20,8 +20,14 @@ def command(repository, layer):
 
 def started(repository, layer):
     environment = os.environ | {"PYTHONPATH": str(repository / "pipeline")}
+    # a shell that runs the tests in the background ignores interrupts, and so would its children
     return subprocess.Popen(
-        command(repository, layer), env=environment, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True
+        command(repository, layer),
+        env=environment,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+        text=True,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
     )
 
 

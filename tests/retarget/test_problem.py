@@ -87,9 +87,11 @@ def test_gradient_matches_central_differences_of_the_whole_simulation(linearized
             return (other.value(x + e * d) - other.value(x - e * d)) / (2 * e)
 
         # terms of limits have corners in their second derivative, so a step that crosses none of them must be found
-        steps = (1e-4,) if problem.limits is None else (1e-4, 3e-5, 1e-5)
+        steps = (1e-4,) if problem.limits is None else (3e-4, 1e-4, 3e-5, 1e-5)
         found = [(4.0 * difference(e) - difference(2 * e)) / 3.0 for e in steps]
-        assert min(abs(gradient @ d - value) / abs(value) for value in found) < 1e-7
+        # efforts come out of Newton's method with fewer digits than motions
+        accuracy = 1e-7 if problem.limits is None else 5e-7
+        assert min(abs(gradient @ d - value) / abs(value) for value in found) < accuracy
 
 
 def test_product_is_symmetric_and_follows_the_change_of_the_residuals(linearized):
