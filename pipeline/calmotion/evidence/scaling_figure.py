@@ -16,6 +16,7 @@ BLUE, COLORS = "#0072b2", {"exudyn": "#d55e00", "ours, bdf2": "#0072b2", "ours, 
 def draw(folder: str, found: Sequence[Growth], peers: Sequence[Run]) -> str:
     """Draw to `<folder>/scaling.png` and return the path."""
     from matplotlib.figure import Figure
+    from matplotlib.ticker import NullFormatter
 
     target = Path(folder)
     target.mkdir(parents=True, exist_ok=True)
@@ -26,6 +27,10 @@ def draw(folder: str, found: Sequence[Growth], peers: Sequence[Run]) -> str:
         panel.loglog(item.values, [1e3 * seconds for seconds in item.seconds], "o-", color=BLUE, lw=1.2, ms=4)
         panel.set_title(f"exponent {item.exponent:.2f}", loc="left", fontsize=10)
         panel.set_xlabel(item.name)
+        # the measured values, where they are: labels of a logarithmic axis run into each other over a short range
+        panel.set_xticks(item.values, [f"{value:,}" for value in item.values])
+        panel.xaxis.set_minor_formatter(NullFormatter())
+        panel.yaxis.set_minor_formatter(NullFormatter())
         panel.set_ylabel("whole simulation [ms]" if item.name == "steps" else "step [ms]")
     for code in dict.fromkeys(run.code for run in peers):
         own = [run for run in peers if run.code == code]
