@@ -11,7 +11,6 @@ import argparse
 import json
 import sys
 import time
-from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
 from functools import partial
 
@@ -28,6 +27,7 @@ from ..retarget.problem import RetargetProblem
 from ..retarget.reference import rigid_motion
 from ..shot.character import Array
 from .shots import MADE, BenchShot, load
+from .timing import median_time
 
 CLOSE = 1.01  # objectives within this factor of the converged one count as reached
 GAIN = 1e-6  # of the reference solution [m]
@@ -71,17 +71,6 @@ class Cost:
     forward_s: float
     gradient: float
     product: float
-
-
-def median_time(action: Callable[[], object], repeats: int = 5) -> float:
-    """Median time of an action [s], the first call not counted."""
-    action()
-    times = []
-    for _ in range(repeats):
-        begin = time.perf_counter()
-        action()
-        times.append(time.perf_counter() - begin)
-    return float(np.median(times))
 
 
 def make_problem(shot: BenchShot, prepared: Prepared, spacing: float) -> RetargetProblem:

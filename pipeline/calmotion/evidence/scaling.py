@@ -15,7 +15,7 @@ import argparse
 import json
 import sys
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
@@ -30,6 +30,7 @@ from ..retarget.bodies import reduce_bodies
 from ..shot import Body, Character
 from ..shot.character import Array
 from .beam_arm import beam_arm
+from .timing import median_time
 
 STEP = 1.0 / 480.0
 BODIES, DURATIONS, MODES = (4, 8, 16, 32, 64, 128), (1_000, 10_000, 100_000), (4, 8, 16, 32, 64)
@@ -180,18 +181,9 @@ def against_splu(repeats: int = 200) -> Sparse:
     ours()
     difference = float(np.abs(flat(system, x, lam) - theirs).max() / np.abs(theirs).max())
     return Sparse(
-        matrix.shape[0], matrix.nnz, step_time(model, 400), _median(ours, max(5, repeats // INSIDE)) / INSIDE,
-        _median(lambda: splu(matrix).solve(right), max(5, repeats // 10)), difference,
+        matrix.shape[0], matrix.nnz, step_time(model, 400), median_time(ours, max(5, repeats // INSIDE)) / INSIDE,
+        median_time(lambda: splu(matrix).solve(right), max(5, repeats // 10)), difference,
     )  # fmt: skip
-
-
-def _median(action: Callable[[], Any], repeats: int) -> float:
-    times = []
-    for _ in range(repeats):
-        begin = time.perf_counter()
-        action()
-        times.append(time.perf_counter() - begin)
-    return float(np.median(times))
 
 
 @one_blas_thread()
