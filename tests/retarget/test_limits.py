@@ -28,7 +28,6 @@ def with_limits(arm, **limits):
 @pytest.fixture(scope="module")
 def free(arm, animation, bodies):
     """The optimum without limits, and the largest value of each quantity of each motor in it."""
-    result = optimize_shot(with_limits(arm, max_velocity=[1e6, 1e6]), animation, bodies, OPTIONS, quiet)
     wide = with_limits(arm, max_velocity=[1e6] * 2, max_acceleration=[1e6] * 2, max_torque=[1e6] * 2)
     result = optimize_shot(wide, animation, bodies, OPTIONS, quiet)
     return result, {

@@ -22,7 +22,7 @@ from ..retarget.curves import OffsetBasis, TimeGrid, make_basis, sample_curves
 from ..retarget.gauss_newton import Search, minimize
 from ..retarget.objective import Objective
 from ..retarget.optimize import CLOSENESS, SMOOTHNESS
-from ..retarget.prepare import Options, Prepared, frequencies_of, prepare
+from ..retarget.prepare import Options, Prepared, lowest_frequency, prepare
 from ..retarget.problem import RetargetProblem
 from ..retarget.reference import rigid_motion
 from ..shot.character import Array
@@ -93,7 +93,7 @@ def _reference(shot: BenchShot, prepared: Prepared, zero: Array) -> Search:
     """A solution well beyond what is compared."""
     problem, free = make_problem(shot, prepared, 0.05), np.zeros(len(zero), bool)
     problem.value(zero)
-    start = approach(problem, zero, free, float(next(iter(frequencies_of(prepared, shot.animation)), 0.0)))
+    start = approach(problem, zero, free, lowest_frequency(prepared, shot.animation))
     return minimize(problem, start, free, GAIN, 60, 200)
 
 
@@ -130,7 +130,7 @@ def compare(shot: BenchShot, lbfgs: int) -> list[Convergence]:
         trace.append((time.perf_counter() - begin, fresh.merit()))
 
     fresh.value(zero)
-    start = approach(fresh, zero, free, float(next(iter(frequencies_of(prepared, shot.animation)), 0.0)))
+    start = approach(fresh, zero, free, lowest_frequency(prepared, shot.animation))
     found = minimize(fresh, start, free, 5e-6, on_iterate=on_iterate)
     rows = [row("Gauss-Newton", trace, found.x, found.evaluations, found.products)]
 

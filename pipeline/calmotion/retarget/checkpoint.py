@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import json
 import os
-import tempfile
 import zipfile
 from dataclasses import astuple, dataclass
 from pathlib import Path
@@ -76,20 +76,17 @@ class Checkpoint:
             state |= {name: getattr(limits, name) for name in _OF_LIMITS}
             values |= {f"limit {name}": y for name, y in limits.multipliers.items()}
         values["state"] = np.frombuffer(json.dumps(state).encode(), np.uint8)
+        # one name for what is not whole yet: what a killed process leaves is written over
+        partial = self.path.with_name(self.path.name + ".part")
         try:
-            handle, name = tempfile.mkstemp(dir=self.path.parent, prefix=self.path.name, suffix=".part")
-        except OSError:
-            return
-        try:
-            with os.fdopen(handle, "wb") as file:
+            with open(partial, "wb") as file:
                 np.savez(file, **values)  # type: ignore[arg-type]
                 file.flush()
                 os.fsync(file.fileno())
-            os.replace(name, self.path)
+            os.replace(partial, self.path)
         except OSError:
-            pass
-        finally:
-            Path(name).unlink(missing_ok=True)
+            with contextlib.suppress(OSError):
+                partial.unlink(missing_ok=True)
 
     def load(self, limits: LimitTerms | None) -> Search | None:
         """The search that was kept, its multipliers put into the limits; None where there is none of this problem."""
@@ -114,8 +111,3 @@ class Checkpoint:
         except (OSError, ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile):
             return None
         return search
-
-    def remove(self) -> None:
-        """Forget what was kept."""
-        if self.path is not None:
-            self.path.unlink(missing_ok=True)

@@ -23,7 +23,7 @@ from .gauss_newton import Search, minimize
 from .limit_costs import limit_costs
 from .limits import Excess, LimitTerms, excesses, motor_bounds
 from .objective import Objective
-from .prepare import Options, Prepared, failure_error, frequencies_of, prepare, refuse_half_turns
+from .prepare import Options, Prepared, failure_error, lowest_frequency, prepare, refuse_half_turns
 from .problem import RetargetProblem, compile_kernels, limited_values
 from .pruning import block_energies, worthless
 from .reference import MeantMotion
@@ -197,7 +197,7 @@ def _search(
 
     try:
         if resumed is None and not np.any(start):
-            search = approach(problem, start, fixed, _lowest(prepared, animation))
+            search = approach(problem, start, fixed, lowest_frequency(prepared, animation))
         if not search.reason:
             search = minimize(
                 problem, search, fixed, WORTH * tolerance, max_iterations=options.max_iterations, on_iterate=on_iterate
@@ -244,11 +244,6 @@ def _search(
         expected_gain_m=_expected(search),
         interrupted=interrupted,
     )
-
-
-def _lowest(prepared: Prepared, animation: Animation) -> float:
-    """The lowest frequency of the first pose [Hz]; 0 where there is none."""
-    return float(next(iter(frequencies_of(prepared, animation)), 0.0))
 
 
 def _expected(search: Search) -> float | None:

@@ -118,6 +118,11 @@ def frequencies_of(prepared: Prepared, animation: Animation) -> Array:
         raise failure_error(prepared, failure) from failure
 
 
+def lowest_frequency(prepared: Prepared, animation: Animation) -> float:
+    """The lowest of them [Hz]; 0 where there is none."""
+    return float(next(iter(frequencies_of(prepared, animation)), 0.0))
+
+
 def _refuse_unsupported(character: Character, animation: Animation, options: Options) -> None:
     settings = character.retarget
     if settings.cyclic:

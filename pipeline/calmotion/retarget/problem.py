@@ -80,7 +80,7 @@ class RetargetProblem:
         self._run: ForwardRun | None = None
         self._linearization: Linearization | None = None
         self._residuals = self._inverse = self._jacobian = np.zeros(0)
-        self._limited: dict[str, Array] = {}
+        self._limited: dict[str, Array] | None = None
         self._x = np.zeros(0)
         self._preconditioner: RigidPreconditioner | None = None
         self._response: RigidResponse | None = None
@@ -117,6 +117,9 @@ class RetargetProblem:
     @property
     def limited(self) -> dict[str, Array]:
         """Values of the limited quantities at the point evaluated last, shape [T, M] each."""
+        if self._limited is None:
+            bounds = {} if self.limits is None else self.limits.bounds
+            self._limited = limited_values(self.model, bounds, self.changed_curves, self.run)
         return self._limited
 
     def offsets(self, x: Array) -> tuple[Array, Array]:
@@ -150,13 +153,14 @@ class RetargetProblem:
             self._run.target_positions, self._run.target_rotations
         )
         self._x = x.copy()
-        if self.limits is not None:
-            self._limited = limited_values(self.model, self.limits.bounds, self.changed_curves, self._run)
+        self._limited = None
         return self.merit()
 
     def merit(self) -> float:
         """The merit at the point evaluated last, with the limits as they are now."""
-        return self.objective_value() + (0.0 if self.limits is None else self.limits.value(self._limited))
+        if self.limits is None or not self.limits.on:
+            return self.objective_value()
+        return self.objective_value() + self.limits.value(self.limited)
 
     @property
     def changed_curves(self) -> Curves:
@@ -184,7 +188,7 @@ class RetargetProblem:
         """Gradient of the merit where it was linearised; the limits may have changed since."""
         pulls = {}
         if self.limits is not None and self.limits.on:
-            pulls = {name: self.limits.gradient(name, v) for name, v in self._limited.items()}
+            pulls = {name: self.limits.gradient(name, v) for name, v in self.limited.items()}
         return self.pull_back(self._residuals, pulls) + self.bend(self._x)
 
     def pull_back(self, residuals: Array, limited: dict[str, Array]) -> Array:
@@ -223,7 +227,7 @@ class RetargetProblem:
         """Gauss-Newton matrix times a direction: one tangent and one adjoint sweep."""
         residuals, changes = self.push_forward(direction)
         if self.limits is not None:
-            changes = {name: self.limits.curvature(name, self._limited[name]) * v for name, v in changes.items()}
+            changes = {name: self.limits.curvature(name, self.limited[name]) * v for name, v in changes.items()}
         return self.pull_back(residuals, changes) + self.bend(direction)
 
     def model_objective(self, point: ModelPoint) -> float:
@@ -266,7 +270,7 @@ class RetargetProblem:
             self._preconditioner = RigidPreconditioner(
                 self._response, self.objective.weights, self.basis.values, self._penalty
             )
-        self._preconditioner.factor(fixed, self._metrics(self._response.inertia, values or self._limited))
+        self._preconditioner.factor(fixed, self._metrics(self._response.inertia, values))
         return self._preconditioner.solve
 
     def damped(self, retardation: float) -> RetargetProblem:
@@ -277,7 +281,7 @@ class RetargetProblem:
         )
         other = copy(self)
         other.model, other.limits = replace(self.model, system=more), None
-        other._linearization, other._run, other._limited = None, None, {}
+        other._linearization, other._run, other._limited = None, None, None
         return other
 
     def lever(self) -> float:
@@ -294,12 +298,12 @@ class RetargetProblem:
         angles = self.model.joint_angles(self.curves.angles)
         return RigidResponse.along(rigid, motion.c, motion.q, angles, self.motors, world, _STRIDE)
 
-    def _metrics(self, inertia: Array, limited: dict[str, Array]) -> list[tuple[csr_matrix, Array]]:
+    def _metrics(self, inertia: Array, limited: dict[str, Array] | None) -> list[tuple[csr_matrix, Array]]:
         """What active limits add to the rigid robot's matrix: its efforts are inertia times acceleration."""
-        if self.limits is None:
+        if self.limits is None or not self.limits.on:
             return []
         found = []
-        for name, values in limited.items():
+        for name, values in (limited or self.limited).items():
             weight = self.limits.curvature(name, values)
             if not np.any(weight):
                 continue
@@ -320,7 +324,7 @@ class RetargetProblem:
 
     def tighten(self) -> bool:
         """Limits come into play where they are not kept, or get new multipliers; False where there is no more to do."""
-        return self.limits is not None and self.limits.tighten(self._limited)
+        return self.limits is not None and self.limits.tighten(self.limited)
 
 
 _STRIDE = 8  # instants from one rigid response to the next
