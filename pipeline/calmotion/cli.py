@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
     Commands = argparse._SubParsersAction[argparse.ArgumentParser]
 
-BENCHMARKS = ("baselines", "integrators", "meshing", "optimizer", "reduction", "scaling", "stability")
+BENCHMARKS = ("baselines", "gradients", "integrators", "meshing", "optimizer", "reduction", "scaling", "stability")
 DONE, FAILED, WRONG_USAGE, INTERRUPTED = 0, 1, 2, 130
 
 

@@ -125,6 +125,13 @@ class OptimizeShot(Operator):
         Property("max_iterations", int, 30, minimum=1, description="Most Gauss-Newton iterations"),
         Property("knot_spacing", float, -1.0, unit="s", description="Distance of the spline's knots, -1: the shot's"),
         Property("smoothness", float, -1.0, description="Weight of the offsets' second derivative, -1: the shot's"),
+        Property(
+            "adjoint",
+            str,
+            "discrete",
+            choices=("discrete", "continuous"),
+            description="Where gradients come from; the continuous one is not exact, and knows nothing of efforts",
+        ),
     )
 
     @classmethod
@@ -141,6 +148,7 @@ class OptimizeShot(Operator):
             max_iterations=values.max_iterations,
             knot_spacing=values.knot_spacing if values.knot_spacing > 0.0 else None,
             smoothness=values.smoothness if values.smoothness >= 0.0 else None,
+            adjoint=values.adjoint,
         )
         paths = context.get(OutputPaths)
         kept = checkpoint_path(paths.layer) if paths is not None and paths.layer else None

@@ -49,6 +49,20 @@ def test_optimising_the_result_again_finds_nothing_left(result, arm, animation, 
     assert again.objective_after <= result.objective_after * (1 + 1e-6)
 
 
+def test_the_continuous_adjoint_leads_to_the_same_curves(result, arm, animation, bodies):
+    found = optimize_shot(arm, animation, bodies, dataclasses.replace(OPTIONS, adjoint="continuous"), quiet)
+    assert found.objective_after < 1.02 * result.objective_after
+    offsets = [a.frame_values - b.frame_values for a, b in zip(found.curves, result.curves, strict=True)]
+    assert 0.0 < np.abs(offsets).max() < 0.05 * max(curve.max_offset for curve in result.curves)
+    motors = tuple(dataclasses.replace(motor, max_torque=50.0) for motor in arm.motors)
+    with pytest.raises(ShotError, match="efforts?") as error:
+        optimize_shot(
+            dataclasses.replace(arm, motors=motors), animation, bodies,
+            dataclasses.replace(OPTIONS, adjoint="continuous"), quiet,
+        )  # fmt: skip
+    assert error.value.attribute == "retarget.optimize.adjoint" and "discrete" in error.value.remedy
+
+
 def test_joints_stay_closed(result):
     assert max(result.before.max_joint_gap, result.after.max_joint_gap) < 1e-6
 

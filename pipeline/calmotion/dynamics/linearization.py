@@ -40,7 +40,8 @@ def _processors() -> int:
 
 @kernel
 def _linearize(
-    system, static, scheme, h, states, angles, rates, world, first, last, work, blocks, scratch, data, pivots
+    system, static, scheme, continuous, h, states, angles, rates, world, first, last, work, blocks, scratch, data,
+    pivots,
 ):  # fmt: skip
     """Blocks and factors of instants first..last-1; returns -1 or the component that is singular, and the instant."""
     J, T, Wt, Vd, block, border = scratch.J, scratch.T, scratch.Wt, scratch.Vd, scratch.block, scratch.border
@@ -61,7 +62,13 @@ def _linearize(
             before = instant_of(states, n - 1)
             before2 = instant_of(states, max(n - 2, 0))
             velocities(system, h, now, before, before2, J, Vd)
-            position_to_velocity(system, h, now, before, J, T, Wt, Hv[at])
+            if continuous:
+                for b in range(count):
+                    for i in range(4):
+                        for k in range(4):
+                            Hv[at, b, i, k] = scheme.velocity if i == k else 0.0
+            else:
+                position_to_velocity(system, h, now, before, J, T, Wt, Hv[at])
         copy_rows(world[n], work.world)
         # the sweeps read these in place, so they are made there
         here = Blocks(
@@ -97,6 +104,7 @@ def linearize(
     workspace: Workspace,
     previous: Linearization | None = None,
     memory: float = MEMORY,
+    continuous: bool = False,
 ) -> Linearization:
     """Linearise a simulation about its trajectory.
 
@@ -104,6 +112,7 @@ def linearize(
         angles, rates: The joint angles (or lengths) and rates it was simulated with, shape [T, J].
         previous: A linearisation of the same size whose memory is used again (it becomes invalid).
         memory: Most that blocks and factors may take [bytes].
+        continuous: For `continuous_adjoint`: a step's velocities follow its positions by 3/2h alone.
 
     Raises:
         SimulationFailure: A singular step, or one that had to be refined: its equations are not those of the others.
@@ -119,7 +128,7 @@ def linearize(
     else:
         data = tuple(np.zeros((size, *shape)) for shape in _shapes(system))
         pivots = np.zeros((size, len(system.parent), system.size + JOINT_ROWS), np.int32)
-    made = Linearization(system, trajectory, angles, rates, workspace, data, pivots)
+    made = Linearization(system, trajectory, angles, rates, workspace, data, pivots, continuous)
     if previous is not None:
         made._helpers = previous._helpers
     made.load(0)
@@ -151,8 +160,9 @@ class Linearization:
 
     def __init__(
         self, system: System, trajectory: Trajectory, angles: Array, rates: Array, workspace: Workspace,
-        data: tuple[Array, ...], pivots: IntArray,
+        data: tuple[Array, ...], pivots: IntArray, continuous: bool = False,
     ):  # fmt: skip
+        self.continuous = continuous
         self.system, self.trajectory, self.angles, self.rates = system, trajectory, angles, rates
         self.workspace, self.data, self.pivots = workspace, data, pivots
         self._loaded = -1
@@ -188,8 +198,8 @@ class Linearization:
         def part(start: int, end: int, own: Workspace) -> tuple[int, int]:
             here = slice(start - first, end - first)
             return _linearize(
-                self.system, STATIC, bdf2_scheme(trajectory.h), trajectory.h, trajectory.states, self.angles,
-                self.rates, trajectory.world, start, end, own.work, own.blocks, own.scratch,
+                self.system, STATIC, bdf2_scheme(trajectory.h), self.continuous, trajectory.h, trajectory.states,
+                self.angles, self.rates, trajectory.world, start, end, own.work, own.blocks, own.scratch,
                 tuple(array[here] for array in self.data), self.pivots[here],
             )  # fmt: skip
 

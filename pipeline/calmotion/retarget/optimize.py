@@ -159,9 +159,19 @@ def _problem(
     objective = Objective.over(prepared.model, meant.reference, grid.times, grid.h, animation.weights)
     bounds = motor_bounds(character, movable)
     limits = LimitTerms(bounds, grid.judged, grid.h, 1.0) if bounds else None
+    continuous = options.adjoint == "continuous"
+    if continuous and "effort" in bounds:
+        raise ShotError(
+            "the continuous adjoint cannot keep limits of effort",
+            path=character.path,
+            attribute="retarget.optimize.adjoint",
+            found=options.adjoint,
+            remedy="Use the discrete one.",
+        )
     problem = RetargetProblem(
-        prepared.model, grid, curves, objective, basis, motors, smoothness, CLOSENESS, prepared.world, limits
-    )
+        prepared.model, grid, curves, objective, basis, motors, smoothness, CLOSENESS, prepared.world, limits,
+        continuous,
+    )  # fmt: skip
     return problem, fixed
 
 

@@ -27,7 +27,7 @@ from .roots import root_tracks, sample_roots
 class Options:
     """What the user overrides; None keeps the shot's own or the automatic choice. Lengths [m], times [s].
 
-    `shaper`, one of `shapers.SHAPERS`, is for `simulate` alone.
+    `shaper`, one of `shapers.SHAPERS`, is for `simulate` alone; `adjoint` is discrete or continuous.
     """
 
     tolerance: float | None = None
@@ -38,6 +38,7 @@ class Options:
     smoothness: float | None = None
     max_iterations: int = 30
     shaper: str = "none"
+    adjoint: str = "discrete"
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.sparse import csr_matrix
 
+from ..dynamics.continuous_adjoint import continuous_adjoint
 from ..dynamics.failure import SimulationFailure
 from ..dynamics.linearization import Linearization, linearize
 from ..dynamics.markers import WORLD_MARKER
@@ -66,12 +67,13 @@ class RetargetProblem:
         closeness: Weight of int |offset|^2 / 2 for each motor.
         world: Moving roots.
         limits: Limits of the motors; None where there are none.
+        continuous: Whether gradients are those of the continuous adjoint, which are not exact.
     """
 
     def __init__(
         self, model: Model, grid: TimeGrid, curves: Curves, objective: Objective, basis: OffsetBasis,
         motors: IntArray, smoothness: float, closeness: float, world: Array | None = None,
-        limits: LimitTerms | None = None,
+        limits: LimitTerms | None = None, continuous: bool = False,
     ):  # fmt: skip
         self.model, self.grid, self.objective, self.basis = model, grid, objective, basis
         self.curves, self.motors, self.world, self.limits = curves, motors, world, limits
@@ -79,6 +81,8 @@ class RetargetProblem:
         self._workspace = Workspace.for_system(model.system)
         self._run: ForwardRun | None = None
         self._linearization: Linearization | None = None
+        self._continuous = continuous
+        self._for_continuous: Linearization | None = None
         self._residuals = self._inverse = self._jacobian = np.zeros(0)
         self._limited: dict[str, Array] | None = None
         self._x = np.zeros(0)
@@ -175,21 +179,36 @@ class RetargetProblem:
         return 0.5 * float(np.sum(self._residuals**2)) + 0.5 * float(self._x @ self.bend(self._x))
 
     def linearize(self) -> Array:
-        """Linearise at the point evaluated last, and the gradient there by the discrete adjoint."""
+        """Linearise at the point evaluated last, and the gradient there."""
+        self._linearization = self._linearized(self._linearization)
+        return self.gradient()
+
+    def _linearized(self, previous: Linearization | None, continuous: bool = False) -> Linearization:
         run = self.run
-        self._linearization = linearize(
-            self.model.system, run.trajectory, run.joint_angles, run.joint_rates, self._workspace, self._linearization
-        )
         states = run.trajectory.states
         self._jacobian = self.objective.jacobian(states.c, states.q, states.u, self._inverse)
-        return self.gradient()
+        return linearize(
+            self.model.system, run.trajectory, run.joint_angles, run.joint_rates, self._workspace, previous,
+            continuous=continuous,
+        )  # fmt: skip
 
     def gradient(self) -> Array:
         """Gradient of the merit where it was linearised; the limits may have changed since."""
-        pulls = {}
-        if self.limits is not None and self.limits.on:
-            pulls = {name: self.limits.gradient(name, v) for name, v in self.limited.items()}
-        return self.pull_back(self._residuals, pulls) + self.bend(self._x)
+        if self._continuous:
+            return self.continuous_gradient()
+        return self.pull_back(self._residuals, self._limit_pulls()) + self.bend(self._x)
+
+    def continuous_gradient(self) -> Array:
+        """The same by the continuous adjoint, with a linearisation of its own; limits of effort are beyond it."""
+        self._for_continuous = self._linearized(self._for_continuous, continuous=True)
+        density = self.objective.scatter(self._jacobian, self._residuals)
+        by_angle, by_rate = continuous_adjoint(self._for_continuous, density)
+        return self._to_unknowns(by_angle, by_rate, self._limit_pulls()) + self.bend(self._x)
+
+    def _limit_pulls(self) -> dict[str, Array]:
+        if self.limits is None or not self.limits.on:
+            return {}
+        return {name: self.limits.gradient(name, v) for name, v in self.limited.items()}
 
     def pull_back(self, residuals: Array, limited: dict[str, Array]) -> Array:
         """The transpose of `push_forward`: weighted residuals and limited quantities to the unknowns."""
@@ -199,6 +218,10 @@ class RetargetProblem:
             self._linearization, self.objective.scatter(self._jacobian, residuals),
             None if effort is None else self.model.joint_angles(effort),
         )  # fmt: skip
+        return self._to_unknowns(by_angle, by_rate, limited)
+
+    def _to_unknowns(self, by_angle: Array, by_rate: Array, limited: dict[str, Array]) -> Array:
+        """Derivatives by the joints' angles and rates, shape [T, J], and by limited curves, gathered by unknown."""
         pulled = self._gather(self.basis.values, self.model.motor_values(by_angle))
         pulled += self._gather(self.basis.rates, self.model.motor_values(by_rate))
         for name, spline in self._splines.items():
@@ -281,7 +304,7 @@ class RetargetProblem:
         )
         other = copy(self)
         other.model, other.limits = replace(self.model, system=more), None
-        other._linearization, other._run, other._limited = None, None, None
+        other._linearization, other._for_continuous, other._run, other._limited = None, None, None, None
         return other
 
     def lever(self) -> float:
