@@ -51,6 +51,7 @@ def target_errors(character: Character, simulation: Simulation, suffix: str) -> 
             f"max_rotation_error{suffix}_rad": float(rotation[0][k]),
             f"rms_rotation_error{suffix}_rad": float(rotation[1][k]),
             f"sag{suffix}_m": float(simulation.sag[k]) if len(simulation.sag) else None,
+            f"seam{suffix}_m": float(simulation.seam[k]) if len(simulation.seam) else None,
         }
         for k, target in enumerate(character.targets)
     ]
@@ -99,7 +100,7 @@ def run_report(run: Run, character: Character, result: Result, command: str, tot
         "wall_s": result.wall_s,
         "total_wall_s": total_wall_s,
         "peak_memory_gb": peak if math.isfinite(peak := peak_memory()) else None,
-        "steps": len(final.motion.times),
+        "steps": round((float(final.motion.times[-1]) + result.pre_roll_s) / result.step_s) + 1,
         "step_s": result.step_s,
         "pre_roll_s": result.pre_roll_s,
         "dof": result.dof,
@@ -109,6 +110,7 @@ def run_report(run: Run, character: Character, result: Result, command: str, tot
         "limits": [limit_row(character, limit) for limit in result.limits],
         "max_joint_gap_m": final.max_joint_gap,
         "refined_steps": final.refined_steps,
+        "loop_growth": final.growth,
         "dead_centres_s": final.dead_centres.tolist(),
         "frequencies_hz": {character.bodies[table.body].path: table.frequencies for table in result.modes},
     }

@@ -105,6 +105,14 @@ def print_run(report: dict[str, Any], stream: TextIO) -> None:
     sag = max((target[f"sag{suffixes[-1]}_m"] or 0.0 for target in report["targets"]), default=0.0)
     if sag > 1e-6:
         console.print(f"at rest, before the motion, the targets are off by up to {length(sag)}")
+    seams = [target[f"seam{suffixes[-1]}_m"] for target in report["targets"]]
+    if seams and seams[0] is not None:
+        console.print(f"where the loop begins again the targets are {length(max(seams))} from where they began")
+        if report["loop_growth"] > 1.0:
+            console.print(
+                f"the robot would not stay in this loop: a disturbance grows {report['loop_growth']:.3g}-fold from one "
+                "to the next"
+            )
     if report["dead_centres_s"]:
         times = [f"{time:.3f}" for time in report["dead_centres_s"]]
         more = f" and {len(times) - 5} times more" if len(times) > 5 else ""

@@ -73,7 +73,11 @@ def animation():
 
 
 @pytest.fixture(scope="session")
-def bodies(arm):
+def meshes():
     points, tets = link()
-    meshes = FEMeshes(tuple(FEMesh(k, points, tets, MeshQuality(0.0, 0.0, 0.0)) for k in range(2)))
+    return FEMeshes(tuple(FEMesh(k, points, tets, MeshQuality(0.0, 0.0, 0.0)) for k in range(2)))
+
+
+@pytest.fixture(scope="session")
+def bodies(arm, meshes):
     return reduce_bodies(arm, span_tree(arm), meshes)

@@ -5,8 +5,8 @@ import dataclasses
 import numpy as np
 import pytest
 from calmotion.dynamics.topology import span_tree
-from calmotion.retarget.curves import make_grid
 from calmotion.retarget.excitation import highest_frequency, rigid_bodies, shot_excitation
+from calmotion.retarget.time_grid import make_grid
 from calmotion.shot import (
     Animation,
     Body,

@@ -7,7 +7,7 @@ from calmotion.evidence.shots import load
 from calmotion.retarget.approach import FAR, approach
 from calmotion.retarget.gauss_newton import Search, minimize
 from calmotion.retarget.optimize import optimize_shot
-from calmotion.retarget.prepare import Options, frequencies_of, prepare
+from calmotion.retarget.prepare import Options, modes_of, prepare
 
 OPTIONS = Options(step=1 / 120)
 
@@ -44,7 +44,7 @@ def test_the_way_through_damped_problems_is_shorter(shot):
     zero, free = np.zeros(problem.size), np.zeros(problem.size, bool)
     problem.value(zero)
     assert problem.error > FAR * problem.lever()
-    start = approach(problem, zero, free, float(frequencies_of(prepared, shot.animation)[0]))
+    start = approach(problem, zero, free, float(modes_of(prepared, shot.animation)[0][0]))
     near = problem.value(start.x)
     # as much work as the approach took, spent on the problem itself; a product is a fifth of a simulation
     direct = minimize(problem, Search.start(zero), free, 1e-6, max_iterations=8)

@@ -134,14 +134,3 @@ def test_a_rigid_character_needs_no_change(arm, animation):
     result = simulate_shot(rigid, animation, None, OPTIONS, quiet)
     assert judged(result.before).max() < 1e-4
     assert any("finite elements" in row.what for row in result.left_out)
-
-
-@pytest.mark.parametrize(
-    ("change", "attribute"),
-    [({"cyclic": True}, "calm:retarget:cyclic")],
-)
-def test_settings_that_are_not_there_yet_are_refused(arm, animation, bodies, change, attribute):
-    character = dataclasses.replace(arm, retarget=dataclasses.replace(arm.retarget, **change))
-    with pytest.raises(ShotError) as error:
-        simulate_shot(character, animation, bodies, OPTIONS, quiet)
-    assert error.value.attribute == attribute and error.value.path == "/Arm" and error.value.remedy

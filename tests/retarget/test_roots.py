@@ -6,9 +6,10 @@ from calmotion.dynamics.kinematics import rigid_poses
 from calmotion.dynamics.model import body_anchors, compile_model, rigid_body
 from calmotion.dynamics.simulation import Workspace
 from calmotion.dynamics.topology import span_tree
-from calmotion.retarget.curves import make_grid, needed_pre_roll
+from calmotion.retarget.curves import needed_pre_roll
 from calmotion.retarget.forward import run_forward
 from calmotion.retarget.roots import root_tracks, sample_roots
+from calmotion.retarget.time_grid import make_grid
 from calmotion.shot import Body, Character, Frame, Joint, MassProperties, Motor, Target
 from calmotion.shot.animation import MovingFrame
 from scipy.spatial.transform import Rotation
@@ -46,6 +47,21 @@ def test_velocities_are_those_of_the_motion(pre_roll):
     assert np.abs(shown[:, :3] - swaying(0.4).positions).max() < 1e-12
     if pre_roll:
         assert np.abs(world[0, 3:9]).max() < 1e-12, "a pre-roll starts at rest"
+
+
+def test_a_root_that_loops_is_smooth_at_the_seam():
+    wave = 2.0 * np.pi * FRAMES
+    rotations = Rotation.from_rotvec(np.outer(0.4 * np.sin(wave + 0.3), AXIS))
+    walked = np.outer(0.2 * np.sin(wave), [1.0, 0.5, 0.0])
+    root = MovingFrame(0, FRAMES, walked, np.roll(rotations.as_quat(), 1, axis=1))
+    grid = make_grid(FRAMES, 1e-3, 0.0, cyclic=True)
+    world, h = sample_roots([root], grid)[:, 0], grid.h
+    R = Rotation.from_matrix(world[:, 9:].reshape(-1, 3, 3))
+    spin = (R[1:-1].inv() * R[:-2]).apply((R[:-2].inv() * R[2:]).as_rotvec() / (2.0 * h))
+    assert np.abs(spin - world[1:-1, 6:9]).max() < 1e-4
+    assert np.abs((world[2:, :3] - world[:-2, :3]) / (2.0 * h) - world[1:-1, 3:6]).max() < 1e-4
+    assert np.abs(world[:2] - world[-2:]).max() < 1e-9
+    assert np.abs(world[grid.frames, :3] - walked).max() < 1e-12
 
 
 def test_a_root_in_motion_at_the_start_asks_for_a_pre_roll():

@@ -3,13 +3,15 @@
 import numpy as np
 import pytest
 from calmotion import ShotError
-from calmotion.retarget.curves import make_grid, sample_curves
+from calmotion.retarget.curves import sample_curves
 from calmotion.retarget.shapers import delay, impulses, shaped
+from calmotion.retarget.time_grid import make_grid
 from calmotion.shot import Track
 from scipy.signal import lsim
 
 FRAMES = np.arange(73) / 24.0
 FREQUENCIES, DAMPING = np.array([3.0, 5.0]), 0.02
+RATIOS = np.full(2, DAMPING)
 
 
 def left_over(times, amplitudes, frequency):
@@ -21,16 +23,16 @@ def left_over(times, amplitudes, frequency):
 
 @pytest.mark.parametrize(("kind", "modes"), [("zv", 1), ("zvd", 1), ("zv2", 2), ("zvd2", 2)])
 def test_a_shaper_cancels_its_modes(kind, modes):
-    times, amplitudes = impulses(kind, FREQUENCIES, DAMPING)
+    times, amplitudes = impulses(kind, FREQUENCIES, RATIOS)
     assert amplitudes.sum() == pytest.approx(1.0) and np.all(amplitudes > 0.0)
     for frequency in FREQUENCIES[:modes]:
         assert left_over(times, amplitudes, frequency) < 1e-12
     assert left_over(times, amplitudes, 1.7 * FREQUENCIES[-1]) > 1e-2
-    assert delay(kind, FREQUENCIES, DAMPING) == pytest.approx(times @ amplitudes)
+    assert delay(kind, FREQUENCIES, RATIOS) == pytest.approx(times @ amplitudes)
 
 
 def test_zvd_forgives_an_error_of_the_frequency_that_zv_does_not():
-    zv, zvd = (left_over(*impulses(kind, FREQUENCIES, DAMPING), 1.05 * FREQUENCIES[0]) for kind in ("zv", "zvd"))
+    zv, zvd = (left_over(*impulses(kind, FREQUENCIES, RATIOS), 1.05 * FREQUENCIES[0]) for kind in ("zv", "zvd"))
     assert zvd < 0.15 * zv
 
 
@@ -50,26 +52,26 @@ def vibration(curves, grid, frequency):
 
 def test_shaped_curves_arrive_later_and_leave_the_mode_at_rest(parts):
     curves, grid = parts
-    found = shaped(curves, grid, "zvd", FREQUENCIES, DAMPING)
+    found = shaped(curves, grid, "zvd", FREQUENCIES, RATIOS)
     assert vibration(found, grid, FREQUENCIES[0]) < 0.02 * vibration(curves, grid, FREQUENCIES[0])
     assert found.angles[-1, 0] == pytest.approx(curves.angles[-1, 0])
     middle = [np.interp(0.5, c.angles[:, 0], grid.times) for c in (curves, found)]
-    assert middle[1] - middle[0] == pytest.approx(delay("zvd", FREQUENCIES, DAMPING), rel=0.1)
+    assert middle[1] - middle[0] == pytest.approx(delay("zvd", FREQUENCIES, RATIOS), rel=0.1)
     rates = np.gradient(found.angles[:, 0], grid.h)
     assert np.abs(rates - found.rates[:, 0]).max() < 0.02 * np.abs(rates).max()
 
 
 def test_a_low_pass_filter_takes_the_mode_out_of_the_motion_without_delay(parts):
     curves, grid = parts
-    found = shaped(curves, grid, "lowpass", FREQUENCIES, DAMPING)
+    found = shaped(curves, grid, "lowpass", FREQUENCIES, RATIOS)
     assert vibration(found, grid, FREQUENCIES[0]) < 0.5 * vibration(curves, grid, FREQUENCIES[0])
     middle = [np.interp(0.5, c.angles[:, 0], grid.times) for c in (curves, found)]
-    assert abs(middle[1] - middle[0]) < 0.02 and delay("lowpass", FREQUENCIES, DAMPING) == 0.0
-    assert shaped(curves, grid, "none", FREQUENCIES, DAMPING) is curves
+    assert abs(middle[1] - middle[0]) < 0.02 and delay("lowpass", FREQUENCIES, RATIOS) == 0.0
+    assert shaped(curves, grid, "none", FREQUENCIES, RATIOS) is curves
 
 
 def test_what_cannot_be_shaped_is_refused(parts):
     for kind, frequencies in (("zvx", FREQUENCIES), ("zv", np.zeros(0))):
         with pytest.raises(ShotError) as error:
-            shaped(*parts, kind, frequencies, DAMPING)
+            shaped(*parts, kind, frequencies, RATIOS)
         assert error.value.remedy and error.value.found == kind

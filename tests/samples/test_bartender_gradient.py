@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 from calmotion.host import ReducedBodies, Source, open_host
-from calmotion.retarget.curves import make_basis, sample_curves
+from calmotion.retarget.curves import sample_curves
 from calmotion.retarget.objective import Objective
+from calmotion.retarget.offset_basis import make_basis
 from calmotion.retarget.prepare import Options, prepare
 from calmotion.retarget.problem import RetargetProblem
 from calmotion.retarget.reference import rigid_motion
@@ -20,7 +21,7 @@ def problem(repository):
     prepared = prepare(character, animation, run.get(ReducedBodies).bodies, Options(step=1 / 120))
     curves = sample_curves(animation.tracks, prepared.grid)
     rigid = rigid_motion(prepared.model, curves.angles, curves.rates, prepared.grid.h)
-    objective = Objective.over(prepared.model, rigid.reference, prepared.grid.times, prepared.grid.h)
+    objective = Objective.over(prepared.model, rigid.reference, prepared.grid)
     basis = make_basis(prepared.grid, 0.2, False)
     motors = np.arange(len(character.motors), dtype=np.int32)
     return RetargetProblem(prepared.model, prepared.grid, curves, objective, basis, motors, 1e-8, 1e-4)

@@ -105,6 +105,7 @@ def linearize(
     previous: Linearization | None = None,
     memory: float = MEMORY,
     continuous: bool = False,
+    begin: int = 0,
 ) -> Linearization:
     """Linearise a simulation about its trajectory.
 
@@ -113,6 +114,7 @@ def linearize(
         previous: A linearisation of the same size whose memory is used again (it becomes invalid).
         memory: Most that blocks and factors may take [bytes].
         continuous: For `continuous_adjoint`: a step's velocities follow its positions by 3/2h alone.
+        begin: First instant whose equations count: 0, the static start, or 2 where two instants were given.
 
     Raises:
         SimulationFailure: A singular step, or one that had to be refined: its equations are not those of the others.
@@ -128,10 +130,10 @@ def linearize(
     else:
         data = tuple(np.zeros((size, *shape)) for shape in _shapes(system))
         pivots = np.zeros((size, len(system.parent), system.size + JOINT_ROWS), np.int32)
-    made = Linearization(system, trajectory, angles, rates, workspace, data, pivots, continuous)
+    made = Linearization(system, trajectory, angles, rates, workspace, data, pivots, continuous, begin)
     if previous is not None:
         made._helpers = previous._helpers
-    made.load(0)
+    made.load(begin)
     return made
 
 
@@ -160,9 +162,9 @@ class Linearization:
 
     def __init__(
         self, system: System, trajectory: Trajectory, angles: Array, rates: Array, workspace: Workspace,
-        data: tuple[Array, ...], pivots: IntArray, continuous: bool = False,
+        data: tuple[Array, ...], pivots: IntArray, continuous: bool = False, begin: int = 0,
     ):  # fmt: skip
-        self.continuous = continuous
+        self.continuous, self._begin = continuous, begin
         self.system, self.trajectory, self.angles, self.rates = system, trajectory, angles, rates
         self.workspace, self.data, self.pivots = workspace, data, pivots
         self._loaded = -1
@@ -181,7 +183,7 @@ class Linearization:
     def windows(self) -> list[tuple[int, int]]:
         """First instant and the one after the last of every window."""
         total, size = len(self.angles), len(self.pivots)
-        return [(first, min(first + size, total)) for first in range(0, total, size)]
+        return [(first, min(first + size, total)) for first in range(self._begin, total, size)]
 
     def load(self, first: int) -> None:
         """Make the blocks of the window that starts at an instant, if they are not there.

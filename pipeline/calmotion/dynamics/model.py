@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from ..fem.reduced_body import Marker, ReducedBody, rigid_invariants
-from ..shot.character import Array, Body, Character, IntArray
+from ..shot.character import Array, Body, BoolArray, Character, IntArray
 from .joint_arrays import BodyAnchors, body_anchors, joint_arrays, rotation_matrix
 from .system import LINEAR, NEOHOOKEAN, STVK, System
 from .topology import Tree, span_tree
@@ -198,3 +198,29 @@ __all__ = [
     "rigid_model",
     "span_tree",
 ]
+
+
+def moves_freely(model: Model) -> BoolArray:
+    """Which joints no motor holds."""
+    rows = model.system.rows
+    return (rows > 0) & (rows < 6)
+
+
+def start_angles(model: Model, joint_angles: Array) -> Array:
+    """Angles of all joints for the first pose: motors from their tracks, free joints as the shot was authored."""
+    free = moves_freely(model)
+    return np.where(free, model.rest_angles, joint_angles)
+
+
+def with_damping(model: Model, ratio: float, frequency: float) -> Model:
+    """A model with more damping: Kelvin-Voigt's, which grows with the frequency.
+
+    Args:
+        ratio: Of critical, at the given frequency.
+        frequency: [Hz], not zero.
+    """
+    system, retardation = model.system, ratio / (np.pi * frequency)
+    more = system._replace(
+        damping=system.damping + retardation * system.stiffness, retardation=system.retardation + retardation
+    )
+    return replace(model, system=more)

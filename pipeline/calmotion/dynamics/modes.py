@@ -1,4 +1,4 @@
-"""Natural frequencies of the whole character about a static equilibrium, joints held by their motors."""
+"""Natural modes of the whole character about a static equilibrium, joints held by their motors."""
 
 from __future__ import annotations
 
@@ -13,12 +13,13 @@ from .sliders import LENGTH, slides_freely
 from .statics import equilibrium, linearize
 
 
-def system_frequencies(model: Model, joint_angles: Array, world: Array | None = None) -> Array:
-    """Undamped natural frequencies [Hz], ascending, about the equilibrium at joint angles of shape [B], moving
-    roots held at `world`, shape [W, 18].
+def system_modes(model: Model, joint_angles: Array, world: Array | None = None) -> tuple[Array, Array]:
+    """Undamped natural frequencies [Hz], ascending, and damping ratios of their modes, about the equilibrium at joint
+    angles of shape [B], moving roots held at `world`, shape [W, 18].
 
     Motions that the joints forbid are projected out; free joints count as motions. A negative stiffness (an
-    unstable pose) gives a frequency of zero.
+    unstable pose) gives a frequency of zero, and a ratio of zero. Modes couple through the damping; ratios are those
+    of each mode by itself.
 
     Raises:
         SimulationFailure: No equilibrium was found.
@@ -31,11 +32,12 @@ def system_frequencies(model: Model, joint_angles: Array, world: Array | None = 
     blocks = workspace.blocks
     offset = np.concatenate([[0], np.cumsum(6 + system.elastic)])
     total = int(offset[-1])
-    K, M, H = np.zeros((total, total)), np.zeros((total, total)), np.zeros((6 * len(system.rows), total))
+    (K, M, C), H = np.zeros((3, total, total)), np.zeros((6 * len(system.rows), total))
     for b, r in enumerate(system.elastic):
         own = slice(offset[b], offset[b] + 6 + r)
         K[own, own] = blocks.K[b, : 6 + r, : 6 + r]
         M[own, own] = blocks.D[b, : 6 + r, : 6 + r]
+        C[own, own] = blocks.P[b, : 6 + r, : 6 + r]
     for joint, (p, b) in enumerate(system.side):
         n = int(6 + system.elastic[b])
         own, rows = slice(offset[b], offset[b] + n), slice(6 * joint, 6 * joint + 6)
@@ -53,8 +55,10 @@ def system_frequencies(model: Model, joint_angles: Array, world: Array | None = 
             H[6 * joint + LENGTH] = 0.0
     allowed = null_space(H)
     if not allowed.shape[1]:
-        return np.zeros(0)
+        return np.zeros(0), np.zeros(0)
     stiffness = allowed.T @ K @ allowed
     # symmetric up to what the moments' axes leave, which vanishes on allowed motions
-    values = eigh(0.5 * (stiffness + stiffness.T), allowed.T @ M @ allowed, eigvals_only=True)
-    return np.sqrt(np.maximum(values, 0.0)) / (2.0 * np.pi)
+    values, shapes = eigh(0.5 * (stiffness + stiffness.T), allowed.T @ M @ allowed)
+    omega = np.sqrt(np.maximum(values, 0.0))
+    damping = np.einsum("ik,ij,jk->k", shapes, allowed.T @ C @ allowed, shapes)
+    return omega / (2.0 * np.pi), np.where(omega > 0.0, damping / np.maximum(2.0 * omega, 1e-300), 0.0)

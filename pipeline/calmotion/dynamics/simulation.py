@@ -158,7 +158,6 @@ def simulate(
     """
     begin = time.perf_counter()
     total, ws = len(angles), workspace
-    scheme = SCHEMES[integrator](h)
     if world is None:
         world = np.zeros((total, 0, WORLD_MARKER))
     if world.shape[1:] != ws.work.world.shape:
@@ -175,7 +174,44 @@ def simulate(
         acceleration, states.lam[0] = initial_acceleration(system, first, angles[0], rates[0], motors, ws)
         earlier, states.turn[0] = instant_before(system, first, acceleration, h)
         ws.scratch.memory[:2] = acceleration
-    gap, done, factorisations, margins = 0.0, 1, 0, np.zeros(total)
+    return _march(
+        system, integrator, 1, earlier, states, angles, rates, world, h, ws, progress, solved, begin
+    )  # fmt: skip
+
+
+def simulate_on(
+    system: System, before2: State, before: State, angles: Array, rates: Array, h: float, workspace: Workspace,
+    world: Array | None = None,
+) -> Trajectory:  # fmt: skip
+    """Go on from two instants by BDF2.
+
+    Args:
+        before2, before: The states of instants 0 and 1.
+        angles, rates: As `simulate` takes them, instants 0 and 1 included.
+
+    Returns:
+        The trajectory, T instants, the two that were given included.
+
+    Raises:
+        SimulationFailure: A step that cannot be solved.
+    """
+    begin, total, ws = time.perf_counter(), len(angles), workspace
+    if world is None:
+        world = np.zeros((total, 0, WORLD_MARKER))
+    states = State(*[np.zeros((total,) + part.shape) for part in before])
+    for part, first, second in zip(states, before2, before, strict=True):
+        part[0], part[1] = first, second
+    ws.scratch.memory[:] = (before.V - before2.V) / h
+    return _march(system, "bdf2", 2, before2, states, angles, rates, world, h, ws, None, 0, begin)
+
+
+def _march(
+    system: System, integrator: str, done: int, earlier: State, states: State, angles: Array, rates: Array,
+    world: Array, h: float, ws: Workspace, progress, solved: int, begin: float,
+) -> Trajectory:  # fmt: skip
+    """All steps from instant `done` on, into `states`; `earlier` is the one before the first."""
+    total, scheme = len(angles), SCHEMES[integrator](h)
+    gap, factorisations, margins = 0.0, 0, np.zeros(total)
     refined: list[int] = []
     chunk = total if progress is None else max(1, total // 50)
     while done < total:

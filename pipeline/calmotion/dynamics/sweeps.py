@@ -63,7 +63,9 @@ def _across(axes, lam, j):
 
 
 @allocating_kernel
-def _tangent(system, h, turns, d_angle, d_rate, first, last, data, pivots, axes, lam_of, dc, nu, dth, dX, d_effort):
+def tangent_sweep(
+    system, h, turns, d_angle, d_rate, first, last, data, pivots, axes, lam_of, dc, nu, dth, dX, d_effort
+):
     """Instants first..last-1, whose blocks the data hold; dc, nu, dth remember three instants, by turns."""
     P, D, Lc, Lp, Hc, Hp, Nc, Jp, by_angle, by_rate, on_parent, lu, Z, inverse, R, Hv = data
     joints = len(system.rows)
@@ -166,10 +168,10 @@ def _tangent(system, h, turns, d_angle, d_rate, first, last, data, pivots, axes,
 
 
 @allocating_kernel
-def _adjoint(
+def adjoint_sweep(
     system, h, turns, Xbar, effort_bar, first, last, data, pivots, axes, lam_of, g_angle, g_rate, cbar, nubar, thbar
 ):  # fmt: skip
-    """Transpose of `_tangent`; Xbar (body axes), cbar (world axes), nubar, thbar are overwritten."""
+    """Transpose of `tangent_sweep`; Xbar (body axes), cbar (world axes), nubar, thbar are overwritten."""
     P, D, Lc, Lp, Hc, Hp, Nc, Jp, by_angle, by_rate, on_parent, lu, Z, inverse, R, Hv = data
     joints = len(system.rows)
     _, count, size = Xbar.shape
@@ -313,7 +315,7 @@ def tangent(lin: Linearization, d_angle: Array, d_rate: Array, efforts: bool = F
     memory = np.zeros((3, count, 3)), np.zeros((3, count, size)), np.zeros((3, count, 3))
     for first, last in lin.windows():
         lin.load(first)
-        _tangent(
+        tangent_sweep(
             lin.system, lin.trajectory.h, lin.trajectory.states.turn, d_angle, d_rate, first, last, lin.data,
             lin.pivots, lin.axes(efforts), lin.trajectory.states.lam, *memory, dX, d_effort,
         )  # fmt: skip
@@ -339,7 +341,7 @@ def adjoint(lin: Linearization, gradient: Array, effort_gradient: Array | None =
     memory = np.zeros((total, count, 3)), np.zeros((total, count, size)), np.zeros((total, count, 3))
     for first, last in reversed(lin.windows()):
         lin.load(first)
-        _adjoint(
+        adjoint_sweep(
             lin.system, lin.trajectory.h, lin.trajectory.states.turn, Xbar, effort_bar, first, last, lin.data,
             lin.pivots, lin.axes(efforts), lin.trajectory.states.lam, g_angle, g_rate, *memory,
         )  # fmt: skip

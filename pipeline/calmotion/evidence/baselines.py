@@ -20,9 +20,9 @@ from ..retarget.approach import approach
 from ..retarget.curves import Curves
 from ..retarget.forward import run_forward
 from ..retarget.gauss_newton import minimize
-from ..retarget.prepare import Options, frequencies_of, prepare
+from ..retarget.prepare import Options, modes_of, prepare
 from ..retarget.problem import RetargetProblem
-from ..retarget.shapers import SHAPERS, delay, lowest_damping, shaped
+from ..retarget.shapers import SHAPERS, delay, shaped
 from ..shot.character import Array
 from .optimizer import make_problem
 from .shots import MADE, BenchShot, load
@@ -56,8 +56,7 @@ def compare(shot: BenchShot) -> list[Row]:
     """All methods on one shot."""
     prepared = prepare(shot.character, shot.animation, shot.bodies, Options())
     problem = make_problem(shot, prepared, 0.05)
-    frequencies = frequencies_of(prepared, shot.animation)
-    damping = lowest_damping(shot.character)
+    frequencies, damping = modes_of(prepared, shot.animation)
     workspace = Workspace.for_system(prepared.model.system)
     rows = []
     for kind in SHAPERS:

@@ -191,9 +191,9 @@ def damping(counts: Sequence[int] = (10, 20, 40, 80, 160)) -> list[tuple[int, fl
     scene = Scene(beam_arm(modes=1, elasticity="linear", damping=0.0, gravity=0.0), shot_of(quintic(0.0, 1.0), 1.0))
     prepared = prepare(scene.character, scene.animation, scene.bodies, Options(pre_roll=0.0))
     model, periods, found = prepared.model, 10, []
-    from ..dynamics.modes import system_frequencies
+    from ..dynamics.modes import system_modes
 
-    frequency = float(system_frequencies(model, np.zeros(len(model.motor)))[0])
+    frequency = float(system_modes(model, np.zeros(len(model.motor)))[0][0])
     for count in counts:
         h = 1.0 / (frequency * count)
         start = rigid_state(model, np.zeros(len(model.motor)))

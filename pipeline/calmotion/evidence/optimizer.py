@@ -18,9 +18,10 @@ import numpy as np
 from scipy.optimize import minimize as quasi_newton
 
 from ..retarget.approach import approach
-from ..retarget.curves import OffsetBasis, TimeGrid, make_basis, sample_curves
+from ..retarget.curves import sample_curves
 from ..retarget.gauss_newton import Search, minimize
 from ..retarget.objective import Objective
+from ..retarget.offset_basis import OffsetBasis, make_basis
 from ..retarget.optimize import CLOSENESS, SMOOTHNESS
 from ..retarget.prepare import Options, Prepared, lowest_frequency, prepare
 from ..retarget.problem import RetargetProblem
@@ -77,8 +78,8 @@ def make_problem(shot: BenchShot, prepared: Prepared, spacing: float) -> Retarge
     """The problem without limits, knots `spacing` [s] apart."""
     model, grid, world = prepared.model, prepared.grid, prepared.world
     curves = sample_curves(shot.animation.tracks, grid)
-    meant = rigid_motion(model, curves.angles, curves.rates, grid.h, world)
-    objective = Objective.over(model, meant.reference, grid.times, grid.h, shot.animation.weights)
+    meant = rigid_motion(model, curves.angles, curves.rates, grid.h, world, grid.cyclic)
+    objective = Objective.over(model, meant.reference, grid, shot.animation.weights)
     basis: OffsetBasis = make_basis(grid, spacing, False)
     motors = np.array([k for k, motor in enumerate(shot.character.motors) if motor.optimize], dtype=np.int32)
     return RetargetProblem(model, grid, curves, objective, basis, motors, SMOOTHNESS, CLOSENESS, world)
@@ -174,8 +175,7 @@ def costs(shot: BenchShot) -> list[Cost]:
     rows: list[Cost] = []
     # every instant may carry a knot here, so that there can be more unknowns than frames times motors
     grid = prepared.grid
-    fine = TimeGrid(grid.times[grid.judged], 1, grid.pre_steps, grid.h)
-    prepared = replace(prepared, grid=fine)
+    prepared = replace(prepared, grid=replace(grid, frame_times=grid.times[grid.pre_steps :], substeps=1))
     for wanted in (10, 50, 200, 2000):
         problem = make_problem(shot, prepared, end * motors / wanted)
         if rows and problem.size == rows[-1].unknowns:

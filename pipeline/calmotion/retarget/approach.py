@@ -31,8 +31,7 @@ def approach(problem: RetargetProblem, start: Array, fixed: BoolArray, frequency
     x = start
     if problem.error > FAR * problem.lever() and frequency > 0.0:
         for ratio in DAMPING:
-            # Kelvin-Voigt damping grows with the frequency: this is the coefficient for the lowest one
-            damped = problem.damped(ratio / (np.pi * frequency))
+            damped = problem.damped(ratio, frequency)
             if not np.isfinite(damped.value(x)):
                 continue
             found = minimize(damped, Search.start(x), fixed, GAIN * damped.error, max_iterations=STEPS)

@@ -15,9 +15,10 @@ from ..fem.mesh_mass import mass_of_tets
 from ..fem.reduced_body import ReducedBody
 from ..shot import Animation, Character, FEMeshes
 from ..shot.character import Array
-from .curves import TimeGrid, sample_tracks
+from .curves import sample_tracks
 from .forward import ForwardRun, run_forward
 from .roots import sample_roots
+from .time_grid import TimeGrid
 
 _POWER_LEFT = 1e-3  # of a signal's power may lie above the highest frequency that matters: 3% of its amplitude
 _NOTHING = 1e-9  # of gravity, or of it over a metre: an acceleration that is rounding

@@ -13,6 +13,7 @@ from ..dynamics.so3 import inverse_right_jacobian, logarithm, matrix_of
 from ..kernels import allocating_kernel
 from ..shot import WeightTrack
 from ..shot.character import Array
+from .time_grid import TimeGrid
 
 
 @allocating_kernel
@@ -64,25 +65,19 @@ class Objective:
 
     @classmethod
     def over(
-        cls, model: Model, reference: Reference, times: Array, h: float, changing: Sequence[WeightTrack] = ()
+        cls, model: Model, reference: Reference, grid: TimeGrid, changing: Sequence[WeightTrack] = ()
     ) -> Objective:
         """The objective with the model's weights, judged from time 0 on (the pre-roll is not).
 
         Args:
-            times: Of the instants [s], shape [T].
-            h: Step [s].
             changing: Weights that change in time, instead of the model's.
         """
-        t = model.targets
+        t, times = model.targets, grid.times
         weights = np.empty((len(times), len(t.component), 2))
         weights[:] = np.stack([t.position_weight, t.rotation_weight], axis=1)
         for track in changing:
             weights[:, track.target, int(track.rotation)] = np.interp(times, track.times, track.values)
-        # trapezoidal rule over the judged instants
-        quadrature = np.where(times >= -1e-12, h, 0.0)
-        first = int(np.argmax(quadrature > 0.0))
-        quadrature[[first, -1]] *= 0.5
-        return cls(model, reference, np.sqrt(quadrature[:, None, None] * np.repeat(weights, 3, axis=2)))
+        return cls(model, reference, np.sqrt(grid.quadrature[:, None, None] * np.repeat(weights, 3, axis=2)))
 
     def residuals(self, positions: Array, rotations: Array) -> tuple[Array, Array]:
         """Weighted residuals, shape [T, K, 6], and the inverse right Jacobians of the rotation errors."""

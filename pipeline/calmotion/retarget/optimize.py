@@ -18,21 +18,24 @@ from ..shot.character import DEFAULT_TOLERANCE, Array, BoolArray, IntArray
 from .approach import approach
 from .bodies import mode_tables, skins
 from .checkpoint import Checkpoint, problem_key
-from .curves import KNOT_SPACING, Curves, OffsetBasis, TimeGrid, make_basis, sample_curves, sample_tracks
+from .curves import Curves, sample_curves, sample_tracks
 from .gauss_newton import Search, minimize
 from .limit_costs import limit_costs
 from .limits import Excess, LimitTerms, excesses, motor_bounds
 from .objective import Objective
+from .offset_basis import OffsetBasis, make_basis
 from .prepare import Options, Prepared, failure_error, lowest_frequency, prepare, refuse_half_turns
 from .problem import RetargetProblem, compile_kernels, limited_values
 from .pruning import block_energies, worthless
 from .reference import MeantMotion
 from .report import left_out_rows, limit_uses, reference_motion, simulation_of
 from .run import Progress, meant_motion
+from .time_grid import TimeGrid
 
 SMOOTHNESS = 1e-10
 CLOSENESS = 1e-4  # an offset of 0.1 rad weighs as much as an error of 1 mm [m^2/rad^2]
 UNCHANGED = 1e-5  # an offset that stays below this angle [rad] is none
+KNOT_SPACING = 0.05
 WORTH = 0.005  # of the tolerance: what an iteration must be expected to gain
 PRUNED = 0.02  # of the tolerance: what offsets that are dropped may cost together
 FIRST_PENALTY = 1e3  # of limits, over the objective of the input for each second
@@ -84,7 +87,9 @@ def locked_coefficients(animation: Animation, basis: OffsetBasis, motors: IntArr
     for track in animation.free:
         if track.motor in column:
             for start, stop in track.locked(end):
-                fixed[(first < stop) & (last > start), column[track.motor]] = True
+                # functions of a loop that begin before it also act at its end
+                for late in (0.0, end) if basis.wraps else (0.0,):
+                    fixed[(first + late < stop) & (last + late > start), column[track.motor]] = True
     return fixed.ravel()
 
 
@@ -156,13 +161,13 @@ def _problem(
             attribute="calm:motor:optimize",
             remedy="Set it to true on the motors that may change.",
         )
-    objective = Objective.over(prepared.model, meant.reference, grid.times, grid.h, animation.weights)
+    objective = Objective.over(prepared.model, meant.reference, grid, animation.weights)
     bounds = motor_bounds(character, movable)
     limits = LimitTerms(bounds, grid.judged, grid.h, 1.0) if bounds else None
     continuous = options.adjoint == "continuous"
-    if continuous and "effort" in bounds:
+    if continuous and ("effort" in bounds or grid.cyclic):
         raise ShotError(
-            "the continuous adjoint cannot keep limits of effort",
+            f"the continuous adjoint {'plays a shot once' if grid.cyclic else 'cannot keep limits of effort'}",
             path=character.path,
             attribute="retarget.optimize.adjoint",
             found=options.adjoint,
@@ -183,11 +188,8 @@ def _search(
     tolerance = options.tolerance or character.retarget.tolerance or DEFAULT_TOLERANCE
     begin = time.perf_counter()
     if not np.isfinite(problem.value(np.zeros(problem.size))):
-        raise ShotError(
-            "the simulation of the input diverges",
-            path=character.path,
-            remedy="Run `calmotion simulate` on the shot to see where, or try a smaller --step.",
-        )
+        assert problem.failure is not None
+        raise failure_error(prepared, problem.failure)
     before, before_value, used_before = problem.run, problem.objective_value(), _used(problem, character)
     if problem.limits is not None:
         seconds = float(grid.frame_times[-1])
@@ -220,7 +222,7 @@ def _search(
         progress(0.95, "interrupted: writing the best so far")
     curves, x = _curves(problem, len(character.motors), search.x)
     problem.value(x)
-    run, after_value, used = problem.run, problem.objective_value(), _used(problem, character)
+    run, after_value, used, growth = problem.run, problem.objective_value(), _used(problem, character), problem.growth
     costs = {} if interrupted else limit_costs(problem, fixed)
     wall = time.perf_counter() - begin
     rows = left_out_rows(prepared)
@@ -232,7 +234,7 @@ def _search(
     return Result(
         reference=reference_motion(model, grid, meant, problem.curves.angles),
         before=simulation_of(model, grid, before, meant.reference, len(character.motors)),
-        after=simulation_of(model, grid, run, meant.reference, len(character.motors)),
+        after=simulation_of(model, grid, run, meant.reference, len(character.motors), growth),
         skins=skins(prepared.bodies),
         modes=mode_tables(prepared.bodies),
         curves=curves,
@@ -246,7 +248,7 @@ def _search(
         parameters=problem.size,
         wall_s=wall,
         step_s=grid.h,
-        pre_roll_s=grid.pre_roll,
+        pre_roll_s=0.0 if grid.cyclic else grid.pre_roll,
         dof=model.dof,
         left_out=tuple(rows),
         limits=limit_uses(used_before, used, grid, costs),

@@ -11,7 +11,7 @@ from ..dynamics.bending import most_bent
 from ..dynamics.failure import SimulationFailure
 from ..dynamics.integrators import INTEGRATORS, follows_roots
 from ..dynamics.model import Model, compile_model
-from ..dynamics.modes import system_frequencies
+from ..dynamics.modes import system_modes
 from ..dynamics.topology import span_tree
 from ..errors import ShotError
 from ..fem.excitation_data import Excitation
@@ -19,8 +19,10 @@ from ..fem.reduced_body import ReducedBody
 from ..shot import Animation, Character, FEMeshes
 from ..shot.character import Array
 from .bodies import reduce_bodies
-from .curves import TimeGrid, make_grid, needed_pre_roll, sample_tracks
+from .curves import needed_pre_roll, sample_tracks
 from .roots import root_tracks, sample_roots
+from .steady import refuse_open_loops
+from .time_grid import TimeGrid, make_grid
 
 
 @dataclass(frozen=True)
@@ -84,7 +86,7 @@ def _grid(character: Character, animation: Animation, options: Options) -> TimeG
             for tracks in (animation.tracks, root_tracks(animation.moving))
         )
     step = options.step if options.step is not None else character.retarget.time_step
-    return make_grid(animation.frame_times, step, pre_roll)
+    return make_grid(animation.frame_times, step, pre_roll, character.retarget.cyclic)
 
 
 def excitations(
@@ -107,33 +109,34 @@ def first_pose_frequencies(character: Character, animation: Animation, bodies: S
     Raises:
         ShotError: It has no static equilibrium there.
     """
-    return frequencies_of(prepare(character, animation, bodies, Options(pre_roll=0.0)), animation)
+    return modes_of(prepare(character, animation, bodies, Options(pre_roll=0.0)), animation)[0]
 
 
-def frequencies_of(prepared: Prepared, animation: Animation) -> Array:
-    """The same of a shot that is prepared."""
+def modes_of(prepared: Prepared, animation: Animation) -> tuple[Array, Array]:
+    """The same of a shot that is prepared, and the damping ratios of these modes."""
     angles, _ = sample_tracks(animation.tracks, prepared.grid)
     try:
-        return system_frequencies(prepared.model, prepared.model.joint_angles(angles[0]), prepared.world[0])
+        return system_modes(prepared.model, prepared.model.joint_angles(angles[0]), prepared.world[0])
     except SimulationFailure as failure:
         raise failure_error(prepared, failure) from failure
 
 
 def lowest_frequency(prepared: Prepared, animation: Animation) -> float:
     """The lowest of them [Hz]; 0 where there is none."""
-    return float(next(iter(frequencies_of(prepared, animation)), 0.0))
+    return float(next(iter(modes_of(prepared, animation)[0]), 0.0))
 
 
 def _refuse_unsupported(character: Character, animation: Animation, options: Options) -> None:
-    settings = character.retarget
-    if settings.cyclic:
-        raise ShotError(
-            "this setting is not supported yet",
-            path=character.path,
-            attribute="calm:retarget:cyclic",
-            found=True,
-            remedy="Set it to false for now.",
-        )
+    if character.retarget.cyclic:
+        refuse_open_loops(character, animation)
+        if options.integrator != "bdf2":
+            raise ShotError(
+                "shots that loop are simulated by BDF2 alone",
+                path=character.path,
+                attribute="--integrator",
+                found=options.integrator,
+                remedy="Leave it out, or set calm:retarget:cyclic to false.",
+            )
     if options.integrator not in INTEGRATORS:
         raise ShotError(
             "there is no such integrator",
@@ -204,4 +207,5 @@ _REASONS = {
     "diverged": "diverges",
     "refined": "can only go on with smaller steps",
     "no static equilibrium": "finds no static equilibrium",
+    "does not settle": "finds no motion that repeats itself",
 }

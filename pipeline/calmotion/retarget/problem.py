@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection
 from copy import copy
-from dataclasses import replace
 
 import numpy as np
 from scipy.sparse import csr_matrix
@@ -13,18 +12,22 @@ from ..dynamics.continuous_adjoint import continuous_adjoint
 from ..dynamics.failure import SimulationFailure
 from ..dynamics.linearization import Linearization, linearize
 from ..dynamics.markers import WORLD_MARKER
-from ..dynamics.model import Model, rigid_model
+from ..dynamics.model import Model, rigid_model, with_damping
+from ..dynamics.periodic import Monodromy, periodic_adjoint, periodic_tangent
 from ..dynamics.reactions import reactions
 from ..dynamics.simulation import Workspace
 from ..dynamics.sweeps import adjoint, tangent
 from ..shot.character import Array, BoolArray, IntArray
-from .curves import Curves, OffsetBasis, TimeGrid
+from .curves import Curves
 from .forward import ForwardRun, run_forward
 from .limited_step import LimitedStep, ModelPoint, limited_step
 from .limits import LimitTerms
 from .objective import Objective
+from .offset_basis import OffsetBasis
 from .preconditioner import RigidPreconditioner, RigidResponse
 from .reference import rigid_motion
+from .steady import SteadyState
+from .time_grid import TimeGrid
 
 
 def limited_values(
@@ -79,7 +82,10 @@ class RetargetProblem:
         self.curves, self.motors, self.world, self.limits = curves, motors, world, limits
         self._penalty = smoothness * basis.bending + closeness * basis.closeness
         self._workspace = Workspace.for_system(model.system)
+        self._steady = SteadyState(model, world, grid.h, self._workspace) if grid.cyclic else None
+        self._monodromy: Monodromy | None = None
         self._run: ForwardRun | None = None
+        self.failure: SimulationFailure | None = None  # of the last point that could not be simulated
         self._linearization: Linearization | None = None
         self._continuous = continuous
         self._for_continuous: Linearization | None = None
@@ -112,6 +118,11 @@ class RetargetProblem:
     def residuals(self) -> Array:
         """Weighted residuals of the point evaluated last, shape [T, K, 6]."""
         return self._residuals
+
+    @property
+    def growth(self) -> float:
+        """By how much a disturbance of the loop simulated last grows at most from one to the next; 0 if none loops."""
+        return 0.0 if self._steady is None else self._steady.growth
 
     @property
     def limits_act(self) -> bool:
@@ -150,8 +161,11 @@ class RetargetProblem:
         values, rates = self.offsets(x)
         angles, rates = self.curves.angles + values, self.curves.rates + rates
         try:
-            self._run = run_forward(self.model, self._workspace, angles, rates, self.grid.h, self.world)
-        except SimulationFailure:
+            self._run = run_forward(
+                self.model, self._workspace, angles, rates, self.grid.h, self.world, steady=self._steady
+            )
+        except SimulationFailure as failure:
+            self.failure = failure
             return np.inf
         self._residuals, self._inverse = self.objective.residuals(
             self._run.target_positions, self._run.target_rotations
@@ -181,6 +195,8 @@ class RetargetProblem:
     def linearize(self) -> Array:
         """Linearise at the point evaluated last, and the gradient there."""
         self._linearization = self._linearized(self._linearization)
+        if self._steady is not None:
+            self._monodromy = self._steady.known = Monodromy.of(self._linearization)
         return self.gradient()
 
     def _linearized(self, previous: Linearization | None, continuous: bool = False) -> Linearization:
@@ -189,7 +205,7 @@ class RetargetProblem:
         self._jacobian = self.objective.jacobian(states.c, states.q, states.u, self._inverse)
         return linearize(
             self.model.system, run.trajectory, run.joint_angles, run.joint_rates, self._workspace, previous,
-            continuous=continuous,
+            continuous=continuous, begin=2 if self.grid.cyclic else 0,
         )  # fmt: skip
 
     def gradient(self) -> Array:
@@ -214,10 +230,14 @@ class RetargetProblem:
         """The transpose of `push_forward`: weighted residuals and limited quantities to the unknowns."""
         assert self._linearization is not None
         effort = limited.get("effort")
-        by_angle, by_rate = adjoint(
-            self._linearization, self.objective.scatter(self._jacobian, residuals),
+        given = (
+            self.objective.scatter(self._jacobian, residuals),
             None if effort is None else self.model.joint_angles(effort),
         )  # fmt: skip
+        if self._monodromy is None:
+            by_angle, by_rate = adjoint(self._linearization, *given)
+        else:
+            by_angle, by_rate = periodic_adjoint(self._linearization, self._monodromy, *given)
         return self._to_unknowns(by_angle, by_rate, limited)
 
     def _to_unknowns(self, by_angle: Array, by_rate: Array, limited: dict[str, Array]) -> Array:
@@ -234,9 +254,11 @@ class RetargetProblem:
         assert self._linearization is not None
         values, rates = self.offsets(direction)
         efforts = self.limits is not None and self.limits.on and "effort" in self.limits.bounds
-        motion, effort = tangent(
-            self._linearization, self.model.joint_angles(values), self.model.joint_angles(rates), efforts
-        )
+        given = self.model.joint_angles(values), self.model.joint_angles(rates), efforts
+        if self._monodromy is None:
+            motion, effort = tangent(self._linearization, *given)
+        else:
+            motion, effort = periodic_tangent(self._linearization, self._monodromy, *given)
         changes: dict[str, Array] = {}
         if self.limits is not None and self.limits.on:
             for name, spline in self._splines.items():
@@ -291,20 +313,18 @@ class RetargetProblem:
             self._response = self._rigid_response()
         if self._preconditioner is None:
             self._preconditioner = RigidPreconditioner(
-                self._response, self.objective.weights, self.basis.values, self._penalty
+                self._response, self.objective.weights, self.basis, self._penalty
             )
         self._preconditioner.factor(fixed, self._metrics(self._response.inertia, values))
         return self._preconditioner.solve
 
-    def damped(self, retardation: float) -> RetargetProblem:
-        """The same problem without limits on a robot with more damping: a Kelvin-Voigt coefficient [s] is added."""
-        system = self.model.system
-        more = system._replace(
-            damping=system.damping + retardation * system.stiffness, retardation=system.retardation + retardation
-        )
+    def damped(self, ratio: float, frequency: float) -> RetargetProblem:
+        """The same problem without limits on a robot with more damping, see `model.with_damping`."""
         other = copy(self)
-        other.model, other.limits = replace(self.model, system=more), None
+        other.model, other.limits = with_damping(self.model, ratio, frequency), None
         other._linearization, other._for_continuous, other._run, other._limited = None, None, None, None
+        other._monodromy = None
+        other._steady = None if self._steady is None else self._steady.for_model(other.model)
         return other
 
     def lever(self) -> float:
@@ -316,7 +336,7 @@ class RetargetProblem:
 
     def _rigid_response(self) -> RigidResponse:
         rigid = rigid_model(self.model)
-        motion = rigid_motion(rigid, self.curves.angles, self.curves.rates, self.grid.h, self.world)
+        motion = rigid_motion(rigid, self.curves.angles, self.curves.rates, self.grid.h, self.world, self.grid.cyclic)
         world = np.zeros((len(motion.c), 0, WORLD_MARKER)) if self.world is None else self.world
         angles = self.model.joint_angles(self.curves.angles)
         return RigidResponse.along(rigid, motion.c, motion.q, angles, self.motors, world, _STRIDE)

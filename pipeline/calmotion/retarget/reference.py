@@ -7,13 +7,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..dynamics.kinematics import rigid_poses, target_frames
-from ..dynamics.model import Model, rigid_model
+from ..dynamics.model import Model, moves_freely, rigid_model
 from ..dynamics.simulation import Workspace
 from ..dynamics.statics import equilibrium
 from ..dynamics.system import State, allocate_state
 from ..shot.character import Array, BoolArray
-from .forward import moves_freely, run_forward
+from .forward import run_forward
 from .objective import Reference
+from .steady import SteadyState
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,11 +32,15 @@ class MeantMotion:
         return Reference(self.target_positions, self.target_rotations)
 
 
-def rigid_motion(model: Model, angles: Array, rates: Array, h: float, world: Array | None = None) -> MeantMotion:
+def rigid_motion(
+    model: Model, angles: Array, rates: Array, h: float, world: Array | None = None, cyclic: bool = False
+) -> MeantMotion:
     """The animation on a rigid robot: kinematics alone, or a rigid simulation where joints move freely."""
     rigid = rigid_model(model)
     if np.any(moves_freely(rigid)):
-        run = run_forward(rigid, Workspace.for_system(rigid.system), angles, rates, h, world)
+        workspace = Workspace.for_system(rigid.system)
+        steady = SteadyState(rigid, world, h, workspace) if cyclic else None
+        run = run_forward(rigid, workspace, angles, rates, h, world, steady=steady)
         states = run.trajectory.states
         return MeantMotion(states.c, states.q, run.target_positions, run.target_rotations)
     c, q = rigid_poses(rigid, model.joint_angles(angles), world)

@@ -12,12 +12,12 @@ from ..dynamics.reactions import reactions
 from ..naming import distinct_names
 from ..shot import LeftOut, LimitUse, Motion, Simulation
 from ..shot.character import Array
-from .curves import TimeGrid
 from .forward import ForwardRun
 from .limits import Excess
 from .objective import Reference, rotation_errors
 from .prepare import Prepared
 from .reference import MeantMotion
+from .time_grid import TimeGrid
 
 
 def by_body(model: Model, values: Array, axis: int = 1) -> Array:
@@ -29,9 +29,9 @@ def by_body(model: Model, values: Array, axis: int = 1) -> Array:
 
 def _simulated_motion(model: Model, grid: TimeGrid, run: ForwardRun, motors: int) -> Motion:
     states, tree = run.trajectory.states, model.tree
-    component = {body: k for k, body in enumerate(tree.body)}
+    component, shown = {body: k for k, body in enumerate(tree.body)}, _shown(grid)
     elastic = tuple(
-        states.u[:, component[b], : model.system.elastic[component[b]]].copy() for b in range(len(component))
+        states.u[shown, component[b], : model.system.elastic[component[b]]].copy() for b in range(len(component))
     )
     found = reactions(model.system, run.trajectory, run.joint_angles, run.joint_rates)
     values, efforts = np.zeros((len(states.c), motors)), np.zeros((len(states.c), motors))
@@ -42,36 +42,49 @@ def _simulated_motion(model: Model, grid: TimeGrid, run: ForwardRun, motors: int
     # from the system's joints and sides to the character's
     order = np.argsort([*tree.joint, *tree.loops])
     sign = model.sign[:, None]
+    forces, moments = (sign * part for part in (found.forces, found.moments))
     return Motion(
-        grid.times, by_body(model, states.c), by_body(model, states.q), elastic, values, efforts,
-        run.target_positions, run.target_rotations, (sign * found.forces)[:, order], (sign * found.moments)[:, order],
+        grid.times[shown], by_body(model, states.c[shown]), by_body(model, states.q[shown]), elastic, values[shown],
+        efforts[shown], run.target_positions[shown], run.target_rotations[shown], forces[shown][:, order],
+        moments[shown][:, order],
     )  # fmt: skip
+
+
+def _shown(grid: TimeGrid) -> slice:
+    """Instants that the user gets: all, but of a shot that loops not the one before it."""
+    return slice(1 if grid.cyclic else 0, None)
 
 
 def reference_motion(model: Model, grid: TimeGrid, rigid: MeantMotion, angles: Array) -> Motion:
     """The motion that was meant; it has no efforts."""
-    total = len(rigid.c)
+    shown = _shown(grid)
+    times, angles = grid.times[shown], angles[shown]
     return Motion(
-        grid.times, by_body(model, rigid.c), by_body(model, rigid.q),
-        tuple(np.zeros((total, 0)) for _ in model.tree.body), angles, np.full_like(angles, np.nan),
-        rigid.target_positions, rigid.target_rotations,
+        times, by_body(model, rigid.c[shown]), by_body(model, rigid.q[shown]),
+        tuple(np.zeros((len(times), 0)) for _ in model.tree.body), angles, np.full_like(angles, np.nan),
+        rigid.target_positions[shown], rigid.target_rotations[shown],
     )  # fmt: skip
 
 
-def simulation_of(model: Model, grid: TimeGrid, run: ForwardRun, reference: Reference, motors: int) -> Simulation:
+def simulation_of(
+    model: Model, grid: TimeGrid, run: ForwardRun, reference: Reference, motors: int, growth: float = 0.0
+) -> Simulation:
     """A forward run as a value for the user, measured against the reference."""
     turned, _ = rotation_errors(reference.rotations, run.target_rotations)
-    errors = np.linalg.norm(run.target_positions - reference.positions, axis=2)
+    off = run.target_positions - reference.positions
+    errors, shown = np.linalg.norm(off, axis=2), _shown(grid)
     return Simulation(
         motion=_simulated_motion(model, grid, run, motors),
-        position_errors=errors,
-        rotation_errors=np.linalg.norm(turned, axis=2),
+        position_errors=errors[shown],
+        rotation_errors=np.linalg.norm(turned, axis=2)[shown],
         newton_iterations=run.trajectory.newton_iterations,
         max_joint_gap=run.trajectory.max_joint_gap,
         wall_s=run.trajectory.wall_s,
-        sag=errors[0].copy(),
+        sag=np.zeros(0) if grid.cyclic else errors[0].copy(),
         refined_steps=len(run.trajectory.refined),
         dead_centres=grid.times[dead_centres(run.trajectory.margins)],
+        growth=growth,
+        seam=np.linalg.norm(off[-1] - off[shown][0], axis=1) if grid.cyclic else np.zeros(0),
     )
 
 
@@ -82,8 +95,8 @@ def left_out_rows(prepared: Prepared) -> list[LeftOut]:
     names = ", ".join(distinct_names(rigid).values())
     rows = [LeftOut("finite elements of " + names, "rigid: no CalmFlexibleBodyAPI")] if rigid else []
     rows += [row for body in prepared.bodies for row in body.left_out]
-    if grid.pre_steps == 0:
-        rows.append(LeftOut("pre-roll", "the shot starts at rest"))
+    if grid.pre_steps == 0 or grid.cyclic:
+        rows.append(LeftOut("pre-roll", "the shot loops" if grid.cyclic else "the shot starts at rest"))
     locked = [motor.path for motor in character.motors if not motor.optimize]
     rows += [LeftOut("optimisation of " + path, "calm:motor:optimize is false") for path in locked]
     return rows

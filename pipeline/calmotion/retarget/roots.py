@@ -12,7 +12,10 @@ from ..dynamics.so3 import right_jacobian
 from ..dynamics.world import pack
 from ..shot.animation import MovingFrame, Track
 from ..shot.character import Array
-from .curves import TimeGrid, interpolate, pre_roll_weights
+from .curves import held_curve, looped_curve
+from .time_grid import TimeGrid, over_grid, pre_roll_weights
+
+LOOPS = 3  # on either side of the one that is interpolated
 
 
 def sample_roots(moving: Sequence[MovingFrame], grid: TimeGrid) -> Array:
@@ -28,36 +31,49 @@ def sample_roots(moving: Sequence[MovingFrame], grid: TimeGrid) -> Array:
 
 
 def _sampled(frame: MovingFrame, grid: TimeGrid) -> Array:
+    read = looped_curve if grid.cyclic else held_curve
+    axes = [over_grid(grid, read(Track(frame.times, column), grid.end)) for column in frame.positions.T]
+    position, velocity = (np.stack([axis[k] for axis in axes], axis=1) for k in range(2))
+    if grid.cyclic:
+        rotation, spin = _looped_rotation(frame, grid)
+    else:
+        rotation, spin = _eased_rotation(frame, grid)
+    return pack(position, velocity, spin, rotation.as_matrix())
+
+
+def _looped_rotation(frame: MovingFrame, grid: TimeGrid) -> tuple[Rotation, Array]:
+    """Rotations and angular velocities, in their own axes, of a root that loops."""
+    inner = (frame.times >= 0.0) & (frame.times < grid.end - 1e-9)
+    times, quaternions = frame.times[inner], frame.rotations[inner]
+    # loops on both sides make the interpolant periodic, as the influence of its ends dies out in a few samples
+    around = range(-LOOPS, LOOPS + 1)
+    times = np.concatenate([times + k * grid.end for k in around])
+    turning = _rotation_spline(MovingFrame(frame.joint, times, frame.positions, np.tile(quaternions, (len(around), 1))))
+    inside = np.mod(grid.times, grid.end)
+    # RotationSpline gives rates in the frame's own axes
+    return turning(inside), turning(inside, 1)
+
+
+def _eased_rotation(frame: MovingFrame, grid: TimeGrid) -> tuple[Rotation, Array]:
+    """The same of one that plays once, after a pre-roll."""
     times, pre = grid.times, grid.pre_steps
-    position, velocity = np.zeros((2, len(times), 3))
-    axes = [interpolate(Track(frame.times, column), grid.frame_times[-1]) for column in frame.positions.T]
     turning = _rotation_spline(frame)
     first, last = frame.times[0], frame.times[-1]
     shown = times[pre:]
     inside, held = np.clip(shown, first, last), (shown < first) | (shown > last)
-    for i, axis in enumerate(axes):
-        clipped = np.clip(shown, axis.x[0], axis.x[-1])
-        position[pre:, i], velocity[pre:, i] = axis(clipped), np.where(held, 0.0, axis(clipped, 1))
-    rotation = turning(inside)
-    # RotationSpline gives rates in the frame's own axes
-    spin = np.where(held[:, None], 0.0, turning(inside, 1))
+    rotation, spin = turning(inside), np.where(held[:, None], 0.0, turning(inside, 1))
     if not pre:
-        return pack(position, velocity, spin, rotation.as_matrix())
+        return rotation, spin
+    # rotation vectors from the first pose, by the quintic of `over_grid`: at 0 their rates are the angular velocity's
     value, rate, _ = pre_roll_weights(times[:pre], grid.pre_roll)
-    starts = first <= 0.0
-    bend = np.array([float(axis(0.0, 2)) if starts else 0.0 for axis in axes])
-    position[:pre] = value @ np.stack([position[pre], velocity[pre], bend])
-    velocity[:pre] = rate @ np.stack([position[pre], velocity[pre], bend])
-    # rotation vectors from the first pose, by the same quintic: at 0 their rates are the angular velocity's
     start = rotation[0]
-    turn_rates = np.stack([np.zeros(3), spin[0], turning(0.0, 2) if starts else np.zeros(3)])
+    turn_rates = np.stack([np.zeros(3), spin[0], turning(0.0, 2) if first <= 0.0 else np.zeros(3)])
     theta, slope = value @ turn_rates, rate @ turn_rates
     spins, J = np.zeros_like(theta), np.zeros((3, 3))
     for n in range(pre):
         right_jacobian(theta[n], J)
         spins[n] = J @ slope[n]
-    matrices = np.concatenate([(start * Rotation.from_rotvec(theta)).as_matrix(), rotation.as_matrix()])
-    return pack(position, velocity, np.concatenate([spins, spin]), matrices)
+    return Rotation.concatenate([start * Rotation.from_rotvec(theta), rotation]), np.concatenate([spins, spin])
 
 
 def _rotation_spline(frame: MovingFrame) -> RotationSpline:
@@ -65,6 +81,11 @@ def _rotation_spline(frame: MovingFrame) -> RotationSpline:
     if len(times) == 1:
         times, rotations = np.array([times[0], times[0] + 1.0]), Rotation.concatenate([rotations, rotations])
     return RotationSpline(times, rotations)
+
+
+def root_at(frame: MovingFrame, time: float) -> Rotation:
+    """How a root is turned at a time [s]."""
+    return _rotation_spline(frame)(np.clip(time, frame.times[0], frame.times[-1]))
 
 
 def root_tracks(moving: Sequence[MovingFrame]) -> list[Track]:

@@ -17,11 +17,12 @@ from .curves import sample_curves, sample_tracks
 from .forward import run_forward
 from .limits import excesses, motor_bounds
 from .objective import Objective
-from .prepare import Options, Prepared, failure_error, frequencies_of, prepare, refuse_half_turns
+from .prepare import Options, Prepared, failure_error, modes_of, prepare, refuse_half_turns
 from .problem import limited_values
 from .reference import MeantMotion, rigid_motion, static_motion
 from .report import left_out_rows, limit_uses, reference_motion, simulation_of
-from .shapers import lowest_damping, shaped
+from .shapers import shaped
+from .steady import SteadyState
 
 Progress = Callable[[float, str], None]
 
@@ -32,10 +33,10 @@ def meant_motion(prepared: Prepared, angles: Array, rates: Array) -> MeantMotion
     Args:
         angles, rates: The animator's, shape [T, M].
     """
-    rigid = rigid_motion(prepared.model, angles, rates, prepared.grid.h, prepared.world)
+    rigid = rigid_motion(prepared.model, angles, rates, prepared.grid.h, prepared.world, prepared.grid.cyclic)
     if prepared.character.retarget.reference == "rigid":
         return rigid
-    return static_motion(prepared.model, rigid, angles, prepared.grid.judged, prepared.world)
+    return static_motion(prepared.model, rigid, angles, prepared.grid.times >= 0.0, prepared.world)
 
 
 def simulate_shot(
@@ -51,7 +52,7 @@ def simulate_shot(
     workspace = Workspace.for_system(model.system)
     curves = sample_curves(animation.current, grid)
     if options.shaper != "none":
-        curves = shaped(curves, grid, options.shaper, frequencies_of(prepared, animation), lowest_damping(character))
+        curves = shaped(curves, grid, options.shaper, *modes_of(prepared, animation))
     angles, rates = curves.angles, curves.rates
     meant, meant_rates = sample_tracks(animation.tracks, grid)
     refuse_half_turns(prepared, angles)
@@ -60,20 +61,23 @@ def simulate_shot(
         progress(0.0, "compiling kernels, once")
         run_forward(model, workspace, angles[:3], rates[:3], grid.h, world[:3], integrator=options.integrator)
         begin = time.perf_counter()
+        steady = SteadyState(model, world, grid.h, workspace) if grid.cyclic else None
         run = run_forward(
             model, workspace, angles, rates, grid.h, world, lambda fraction: progress(fraction, "simulating"),
-            options.integrator,
+            options.integrator, steady,
         )  # fmt: skip
         wall = time.perf_counter() - begin
     except SimulationFailure as failure:
         raise failure_error(prepared, failure) from failure
-    objective = Objective.over(model, reference.reference, grid.times, grid.h, animation.weights)
+    objective = Objective.over(model, reference.reference, grid, animation.weights)
     bounds = motor_bounds(character)
     used = excesses(bounds, limited_values(model, bounds, curves, run), grid.judged)
     residuals, _ = objective.residuals(run.target_positions, run.target_rotations)
     return Result(
         reference=reference_motion(model, grid, reference, meant),
-        before=simulation_of(model, grid, run, reference.reference, len(character.motors)),
+        before=simulation_of(
+            model, grid, run, reference.reference, len(character.motors), steady.growth if steady else 0.0
+        ),
         after=None,
         skins=skins(prepared.bodies),
         modes=mode_tables(prepared.bodies),
@@ -88,7 +92,7 @@ def simulate_shot(
         parameters=0,
         wall_s=wall,
         step_s=grid.h,
-        pre_roll_s=grid.pre_roll,
+        pre_roll_s=0.0 if grid.cyclic else grid.pre_roll,
         dof=model.dof,
         left_out=tuple(left_out_rows(prepared)),
         limits=limit_uses(used, used, grid),

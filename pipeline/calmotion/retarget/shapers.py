@@ -11,32 +11,34 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from ..errors import ShotError
-from ..shot.character import Array, Character
-from .curves import Curves, TimeGrid
+from ..shot.character import Array
+from .curves import Curves
+from .time_grid import TimeGrid
 
 SHAPERS = ("none", "zv", "zvd", "zv2", "zvd2", "lowpass")
 CUTOFF = 0.5  # of the low-pass filter, over the lowest frequency
 
 
-def impulses(kind: str, frequencies: Array, damping: float) -> tuple[Array, Array]:
+def impulses(kind: str, frequencies: Array, damping: Array) -> tuple[Array, Array]:
     """Times [s] and amplitudes, of sum one, of a shaper.
 
     Args:
         kind: `zv` or `zvd` for the lowest mode, `zv2` or `zvd2` for the lowest two.
         frequencies: Undamped, of the modes [Hz], ascending.
-        damping: Ratio of critical.
+        damping: Their ratios of critical.
     """
-    K = np.exp(-np.pi * damping / np.sqrt(1.0 - damping**2))
-    own = np.array([1.0, K]) if kind.startswith("zv") and "d" not in kind else np.array([1.0, 2.0 * K, K * K])
     times, amplitudes = np.zeros(1), np.ones(1)
-    for frequency in frequencies[: 2 if kind.endswith("2") else 1]:
-        half = 0.5 / (frequency * np.sqrt(1.0 - damping**2))
+    count = 2 if kind.endswith("2") else 1
+    for frequency, ratio in zip(frequencies[:count], damping[:count], strict=True):
+        K = np.exp(-np.pi * ratio / np.sqrt(1.0 - ratio**2))
+        own = np.array([1.0, 2.0 * K, K * K]) if "d" in kind else np.array([1.0, K])
+        half = 0.5 / (frequency * np.sqrt(1.0 - ratio**2))
         times = (times[:, None] + half * np.arange(len(own))).ravel()
         amplitudes = (amplitudes[:, None] * own / own.sum()).ravel()
     return times, amplitudes
 
 
-def delay(kind: str, frequencies: Array, damping: float) -> float:
+def delay(kind: str, frequencies: Array, damping: Array) -> float:
     """Mean delay of a shaper [s]; none of a filter that runs both ways."""
     if kind in ("none", "lowpass"):
         return 0.0
@@ -44,13 +46,7 @@ def delay(kind: str, frequencies: Array, damping: float) -> float:
     return float(times @ amplitudes)
 
 
-def lowest_damping(character: Character) -> float:
-    """The least damping ratio of any flexible body; of Rayleigh damping a usual one, since it depends on the mode."""
-    materials = [body.flexible.material for body in character.bodies if body.flexible is not None]
-    return min((m.damping_ratio for m in materials if m.rayleigh is None), default=0.01)
-
-
-def shaped(curves: Curves, grid: TimeGrid, kind: str, frequencies: Array, damping: float) -> Curves:
+def shaped(curves: Curves, grid: TimeGrid, kind: str, frequencies: Array, damping: Array) -> Curves:
     """Curves through a shaper; before their first instant they rest.
 
     Raises:

@@ -53,6 +53,10 @@ class Simulation:
         sag: How far each target hangs below (or beside) the reference at rest, before it moves [m], shape [K].
         refined_steps: Steps that only smaller ones reached.
         dead_centres: Times at which closed loops pass a pose in which they could branch [s], shape [n].
+        seam: How far each target is, where a shot that loops begins again, from where it began [m], shape [K]; empty
+            for one that plays once.
+        growth: By how much a disturbance of such a motion grows at most from one loop to the next; where that is more
+            than 1 the robot would not stay in it.
     """
 
     motion: Motion
@@ -64,6 +68,8 @@ class Simulation:
     sag: Array = field(default_factory=lambda: np.zeros(0))
     refined_steps: int = 0
     dead_centres: Array = field(default_factory=lambda: np.zeros(0))
+    seam: Array = field(default_factory=lambda: np.zeros(0))
+    growth: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
