@@ -33,7 +33,7 @@ MEMORY = 4e9  # [bytes]
 _FEW = 64  # instants that are not worth another thread
 
 
-def _processors() -> int:
+def processors() -> int:
     """Processors that this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
@@ -206,7 +206,7 @@ class Linearization:
             )  # fmt: skip
 
         # instants do not depend on each other, and kernels run without the interpreter's lock
-        share = max(_FEW, math.ceil((last - first) / _processors()))
+        share = max(_FEW, math.ceil((last - first) / processors()))
         starts = range(first, last, share)
         while len(self._helpers) < len(starts) - 1:
             self._helpers.append(Workspace.for_system(self.system))

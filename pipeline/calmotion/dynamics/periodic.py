@@ -14,13 +14,14 @@ serves the derivatives, too (Newton-Picard: Lust, Roose, Spence, Champneys 1998,
 from __future__ import annotations
 
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, fields
 
 import numpy as np
 
 from ..shot.character import Array
 from .failure import SimulationFailure
-from .linearization import Linearization, linearize
+from .linearization import Linearization, linearize, processors
 from .markers import WORLD_MARKER
 from .simulation import Trajectory, Workspace, simulate_on
 from .so3 import logarithm, matrix_of, turn
@@ -165,17 +166,20 @@ class Monodromy:
             return adjoint_from(lin, nothing, Memory.of(system, vector).scaled(1.0 / SWAY))[2].scaled(SWAY).vector
 
         Q, largest = np.zeros((length, 0)), 0.0
-        while Q.shape[1] < length:
-            found = np.stack([forth(rng.normal(size=length)) for _ in range(BLOCK)], axis=1)
-            largest = max(largest, float(np.linalg.norm(found, axis=0).max()))
-            for _ in range(2):  # twice is enough
-                found -= Q @ (Q.T @ found)
-            more, sizes, _ = np.linalg.svd(found, full_matrices=False)
-            more = more[:, sizes > NOTHING * largest]
-            Q = np.concatenate([Q, more], axis=1)
-            if more.shape[1] < BLOCK:
-                break
-        return cls(Q, np.stack([back(column) for column in Q.T]) if Q.shape[1] else np.zeros((0, length)))
+        # sweeps do not depend on each other, and run without the interpreter's lock
+        with ThreadPoolExecutor(processors() if len(lin.windows()) == 1 else 1) as pool:
+            while Q.shape[1] < length:
+                found = np.stack(list(pool.map(forth, rng.normal(size=(BLOCK, length)))), axis=1)
+                largest = max(largest, float(np.linalg.norm(found, axis=0).max()))
+                for _ in range(2):  # twice is enough
+                    found -= Q @ (Q.T @ found)
+                more, sizes, _ = np.linalg.svd(found, full_matrices=False)
+                more = more[:, sizes > NOTHING * largest]
+                Q = np.concatenate([Q, more], axis=1)
+                if more.shape[1] < BLOCK:
+                    break
+            rows = list(pool.map(back, Q.T))
+        return cls(Q, np.stack(rows) if rows else np.zeros((0, length)))
 
     @property
     def growth(self) -> float:
