@@ -123,7 +123,7 @@ class OptimizeShot(Operator):
     provides = (Result,)
     properties = (
         Property("max_iterations", int, 30, minimum=1, description="Most Gauss-Newton iterations"),
-        Property("knot_spacing", float, -1.0, unit="s", description="Distance of the spline's knots, -1: the shot's"),
+        Property("knot_spacing", float, -1.0, unit="s", description="Distance of the spline's knots, -1: the shot's, or where its motion needs them"),
         Property("smoothness", float, -1.0, description="Weight of the offsets' second derivative, -1: the shot's"),
         Property(
             "adjoint",

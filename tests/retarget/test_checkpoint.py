@@ -4,11 +4,12 @@ import dataclasses
 
 import numpy as np
 import pytest
-from calmotion.retarget import optimize
+from calmotion.retarget import adaptive_knots, optimize
 from calmotion.retarget.checkpoint import checkpoint_path
 from calmotion.retarget.optimize import optimize_shot
 from calmotion.retarget.prepare import Options
 from calmotion.retarget.problem import RetargetProblem
+from posed import jerking
 
 OPTIONS = Options(step=1 / 240)
 
@@ -61,6 +62,25 @@ def test_a_killed_search_ends_at_the_same_result(
     for one, other in zip(again.curves, whole.curves, strict=True):
         assert np.abs(one.frame_values - other.frame_values).max() < 1e-9
     assert [p.name for p in tmp_path.iterdir()] == ["kept.npz"], "no part of a file is left"
+
+
+@pytest.mark.parametrize("evaluations", [5, 7, 9])
+def test_a_search_that_was_killed_on_finer_knots_goes_on_with_them(
+    arm, bodies, tmp_path, monkeypatch, evaluations
+):  # fmt: skip
+    monkeypatch.setattr(adaptive_knots, "FIRST", 0.1)
+    path = tmp_path / "kept.npz"
+    direct = optimize_shot(arm, jerking(), bodies, OPTIONS, quiet)
+    with monkeypatch.context() as patch:
+        stopping(patch, evaluations, Killed())
+        with pytest.raises(Killed):
+            optimize_shot(arm, jerking(), bodies, OPTIONS, quiet, path)
+    again = optimize_shot(arm, jerking(), bodies, OPTIONS, quiet, path)
+    assert again.parameters == direct.parameters
+    assert again.objective_after == pytest.approx(direct.objective_after, rel=1e-9)
+    for one, other in zip(again.curves, direct.curves, strict=True):
+        assert np.abs(one.frame_values - other.frame_values).max() < 1e-9
+        assert np.array_equal(one.knots, other.knots)
 
 
 def test_an_interrupt_keeps_the_best_so_far(limited, animation, bodies, whole, tmp_path, monkeypatch):

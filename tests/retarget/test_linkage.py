@@ -58,7 +58,7 @@ def test_a_problem_with_more_damping_differs_in_nothing_else(shot):
     problem = make_problem(shot, prepared, 0.2)
     x = np.zeros(problem.size)
     value = problem.value(x)
-    more = problem.damped(0.02)
+    more = problem.damped(0.2, 10.0 / np.pi)
     assert more.value(x) < 0.7 * value, "it shakes less"
-    assert problem.damped(0.0).value(x) == pytest.approx(value, rel=1e-12)
+    assert problem.damped(0.0, 3.0).value(x) == pytest.approx(value, rel=1e-12)
     assert problem.value(x) == pytest.approx(value, rel=1e-12), "the problem itself stays as it was"

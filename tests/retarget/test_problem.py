@@ -7,14 +7,9 @@ import pytest
 from calmotion.dynamics.topology import span_tree
 from calmotion.evidence.linkage_arm import linkage_arm, performance
 from calmotion.retarget.bodies import reduce_bodies
-from calmotion.retarget.curves import sample_curves
-from calmotion.retarget.limits import LimitTerms, motor_bounds
-from calmotion.retarget.objective import Objective
-from calmotion.retarget.offset_basis import make_basis
-from calmotion.retarget.prepare import Options, excitations, prepare
-from calmotion.retarget.problem import RetargetProblem
-from calmotion.retarget.reference import rigid_motion, static_motion
+from calmotion.retarget.prepare import Options, excitations
 from calmotion.shot import Track
+from posed import make_problem
 
 
 def looped(character, animation):
@@ -27,20 +22,6 @@ def looped(character, animation):
     )
     character = dataclasses.replace(character, retarget=dataclasses.replace(character.retarget, cyclic=True))
     return character, dataclasses.replace(animation, tracks=tracks, current=tracks)
-
-
-def make_problem(character, bodies, animation, pre_roll=0.0, kept=False, limited=False, static=False, smoothness=1e-6):
-    prepared = prepare(character, animation, bodies, Options(step=1 / 240, pre_roll=pre_roll))
-    model, grid = prepared.model, prepared.grid
-    curves = sample_curves(animation.tracks, grid)
-    meant = rigid_motion(model, curves.angles, curves.rates, grid.h)
-    if static:
-        meant = static_motion(model, meant, curves.angles, grid.judged)
-    objective = Objective.over(model, meant.reference, grid, animation.weights)
-    basis = make_basis(grid, 0.1, kept)
-    limits = LimitTerms(motor_bounds(character), grid.judged, grid.h, 3.0, on=True) if limited else None
-    motors = np.arange(len(character.motors), dtype=np.int32)
-    return RetargetProblem(model, grid, curves, objective, basis, motors, smoothness, 1e-4, None, limits)
 
 
 def limited_motors(character, scale=1.0):

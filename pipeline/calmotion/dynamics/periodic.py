@@ -28,7 +28,7 @@ from .so3 import logarithm, matrix_of, turn
 from .sweeps import adjoint_sweep, tangent_sweep
 from .system import State, System
 
-CLOSED = 1e-11  # distance of end and start at which a loop counts as closed [m, rad]
+CLOSED = 1e-12  # distance of end and start at which a loop counts as closed [m, rad]
 NEARLY = 1e-8  # and where rounding keeps it from getting there
 LIMIT = 30
 SLOW = 0.3  # shrinking of that distance by less than this asks for a new derivative

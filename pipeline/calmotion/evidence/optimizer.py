@@ -22,7 +22,7 @@ from ..retarget.curves import sample_curves
 from ..retarget.gauss_newton import Search, minimize
 from ..retarget.objective import Objective
 from ..retarget.offset_basis import OffsetBasis, make_basis
-from ..retarget.optimize import CLOSENESS, SMOOTHNESS
+from ..retarget.posing import CLOSENESS, SMOOTHNESS
 from ..retarget.prepare import Options, Prepared, lowest_frequency, prepare
 from ..retarget.problem import RetargetProblem
 from ..retarget.reference import rigid_motion

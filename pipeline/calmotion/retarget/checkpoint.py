@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from .. import __version__
-from ..shot.character import Array, BoolArray
+from ..shot.character import Array, BoolArray, IntArray
 from .gauss_newton import Iterate, Search
 from .limits import LimitTerms
 from .problem import RetargetProblem
@@ -60,12 +60,12 @@ class Checkpoint:
     path: Path | None
     key: str
 
-    def save(self, search: Search, limits: LimitTerms | None) -> None:
+    def save(self, search: Search, limits: LimitTerms | None, breaks: IntArray) -> None:
         """Replace what the file holds. A folder that cannot be written is passed over: the run itself goes on."""
         if self.path is None:
             return
-        values: dict[str, Array] = {
-            "x": search.x, "p": search.recycled.p, "Hp": search.recycled.Hp,
+        values: dict[str, Any] = {
+            "x": search.x, "breaks": breaks, "p": search.recycled.p, "Hp": search.recycled.Hp,
             "history": np.array([astuple(iterate) for iterate in search.history], float),
         }  # fmt: skip
         state: dict[str, object] = {
@@ -88,8 +88,9 @@ class Checkpoint:
             with contextlib.suppress(OSError):
                 partial.unlink(missing_ok=True)
 
-    def load(self, limits: LimitTerms | None) -> Search | None:
-        """The search that was kept, its multipliers put into the limits; None where there is none of this problem."""
+    def load(self, limits: LimitTerms | None) -> tuple[Search, IntArray] | None:
+        """The search that was kept and the frames that carry knots in it, its multipliers put into the limits; None
+        where there is none of this problem."""
         if self.path is None:
             return None
         try:
@@ -110,4 +111,4 @@ class Checkpoint:
                     setattr(limits, name, state[name])
         except (OSError, ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile):
             return None
-        return search
+        return search, values["breaks"]

@@ -24,11 +24,13 @@ class OffsetBasis:
         knots: Their times [s], shape [n].
         values, rates, accelerations: Basis and its derivatives at the grid's instants, sparse, shape [T, P].
         at_frames: Basis at the frames, sparse, shape [f, P].
+        bend: Second derivatives at the two Gauss points of each interval between knots, shape [2 (n - 1), P].
         bending: Gram matrix of the second derivatives, pre-roll included, shape [P, P] [1/s^3].
         closeness: Gram matrix of the functions themselves, pre-roll included, shape [P, P] [s].
         support: First and last time at which each basis function acts [s], shape [P, 2]; the pre-roll counts as 0.
             In a loop it may begin before 0: it then also acts at the end.
         wraps: Whether the last functions are neighbours of the first.
+        kept_ends: Whether the offset vanishes at the first and last frame.
     """
 
     breaks: IntArray
@@ -37,10 +39,12 @@ class OffsetBasis:
     rates: csr_matrix
     accelerations: csr_matrix
     at_frames: csr_matrix
+    bend: csr_matrix
     bending: csr_matrix
     closeness: csr_matrix
     support: Array
     wraps: bool
+    kept_ends: bool
 
     @property
     def count(self) -> int:
@@ -103,8 +107,9 @@ def basis_on(grid: TimeGrid, breaks: IntArray, kept_ends: bool) -> OffsetBasis:
         before = csr_matrix(accelerations[: grid.pre_steps])
         bending = bending + grid.h * (before.T @ before)
     return OffsetBasis(
-        breaks, knots, stored, csr_matrix(rates), csr_matrix(accelerations), stored[grid.frames], csr_matrix(bending),
-        grid.h * (near.T @ near), support, wraps,
+        breaks, knots, stored, csr_matrix(rates), csr_matrix(accelerations), stored[grid.frames], bend,
+        csr_matrix(bending),
+        grid.h * (near.T @ near), support, wraps, kept_ends,
     )  # fmt: skip
 
 

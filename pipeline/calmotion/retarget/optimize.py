@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -14,41 +14,30 @@ from ..dynamics.simulation import Workspace
 from ..errors import ShotError
 from ..fem.reduced_body import ReducedBody
 from ..shot import Animation, Character, LeftOut, MotorCurve, OptimizerStep, Result
-from ..shot.character import DEFAULT_TOLERANCE, Array, BoolArray, IntArray
+from ..shot.character import DEFAULT_TOLERANCE, Array, BoolArray
+from .adaptive_knots import carried, useful_knots, wanted_breaks
 from .approach import approach
 from .bodies import mode_tables, skins
 from .checkpoint import Checkpoint, problem_key
-from .curves import Curves, sample_curves, sample_tracks
+from .curves import sample_curves
 from .gauss_newton import Search, minimize
 from .limit_costs import limit_costs
-from .limits import Excess, LimitTerms, excesses, motor_bounds
-from .objective import Objective
-from .offset_basis import OffsetBasis, make_basis
+from .limits import Excess, excesses, motor_bounds
+from .offset_basis import OffsetBasis, basis_on
+from .posing import locked_coefficients, pose
 from .prepare import Options, Prepared, failure_error, lowest_frequency, prepare, refuse_half_turns
 from .problem import RetargetProblem, compile_kernels, limited_values
 from .pruning import block_energies, worthless
+from .recycling import Recycled
 from .reference import MeantMotion
 from .report import left_out_rows, limit_uses, reference_motion, simulation_of
 from .run import Progress, meant_motion
-from .time_grid import TimeGrid
 
-SMOOTHNESS = 1e-10
-CLOSENESS = 1e-4  # an offset of 0.1 rad weighs as much as an error of 1 mm [m^2/rad^2]
 UNCHANGED = 1e-5  # an offset that stays below this angle [rad] is none
-KNOT_SPACING = 0.05
 WORTH = 0.005  # of the tolerance: what an iteration must be expected to gain
+FINER = 0.01  # of the tolerance: what finer knots must promise
 PRUNED = 0.02  # of the tolerance: what offsets that are dropped may cost together
 FIRST_PENALTY = 1e3  # of limits, over the objective of the input for each second
-
-
-def _start(basis: OffsetBasis, animation: Animation, motors: IntArray, grid: TimeGrid) -> Array:
-    """Coefficients of the offset that the shot already carries, zero when it carries none."""
-    if animation.current is animation.tracks:
-        return np.zeros(basis.count * len(motors))
-    meant, _ = sample_tracks([animation.tracks[k] for k in motors], grid)
-    current, _ = sample_tracks([animation.current[k] for k in motors], grid)
-    coefficients, *_ = np.linalg.lstsq(basis.values.toarray(), current - meant, rcond=None)
-    return coefficients.ravel()
 
 
 def _curves(problem: RetargetProblem, motors: int, x: Array) -> tuple[tuple[MotorCurve, ...], Array]:
@@ -67,30 +56,13 @@ def _curves(problem: RetargetProblem, motors: int, x: Array) -> tuple[tuple[Moto
             values = input_at_frames + basis.at_frames @ coefficients[:, column[motor]]
         elif motor in column:
             coefficients[:, column[motor]] = 0.0
-        curves.append(MotorCurve(motor, changed, basis.knots, values, largest if changed else 0.0))
+        knots = useful_knots(basis, coefficients[:, column[motor]]) if changed else basis.knots[[0, -1]]
+        curves.append(MotorCurve(motor, changed, knots, values, largest if changed else 0.0))
     return tuple(curves), coefficients.ravel()
 
 
 def _progress_of(search: Search) -> tuple[OptimizerStep, ...]:
     return tuple(OptimizerStep(i.value, i.gradient_norm, i.evaluations, 2 * i.products) for i in search.history)
-
-
-def locked_coefficients(animation: Animation, basis: OffsetBasis, motors: IntArray, end: float) -> BoolArray:
-    """Coefficients that would change a curve where the shot locks it, ordered by basis function, then motor.
-
-    Args:
-        end: Last frame of the shot [s].
-    """
-    fixed = np.zeros((basis.count, len(motors)), bool)
-    first, last = basis.support.T
-    column = {int(motor): k for k, motor in enumerate(motors)}
-    for track in animation.free:
-        if track.motor in column:
-            for start, stop in track.locked(end):
-                # functions of a loop that begin before it also act at its end
-                for late in (0.0, end) if basis.wraps else (0.0,):
-                    fixed[(first + late < stop) & (last + late > start), column[track.motor]] = True
-    return fixed.ravel()
 
 
 def optimize_shot(
@@ -125,66 +97,27 @@ def optimize_shot(
     refuse_half_turns(prepared, curves.angles)
     try:
         meant = meant_motion(prepared, curves.angles, curves.rates)
-        problem, fixed = _problem(prepared, animation, curves, meant, options)
+        posed = pose(prepared, animation, curves, meant, options)
         progress(0.0, "compiling kernels, once")
         compile_kernels(
             model, Workspace.for_system(model.system), curves.angles, curves.rates, grid.h, prepared.world
         )  # fmt: skip
-        return _search(prepared, animation, problem, fixed, meant, options, progress, checkpoint)
+        return _search(prepared, animation, posed, meant, options, progress, checkpoint)
     except SimulationFailure as failure:
         raise failure_error(prepared, failure) from failure
 
 
-def _problem(
-    prepared: Prepared, animation: Animation, curves: Curves, meant: MeantMotion, options: Options
-) -> tuple[RetargetProblem, BoolArray]:
-    """The problem, and which of its unknowns stay as they are."""
-    character, grid, settings = prepared.character, prepared.grid, prepared.character.retarget
-    spacing = options.knot_spacing or settings.knot_spacing or KNOT_SPACING
-    smoothness = next(v for v in (options.smoothness, settings.smoothness, SMOOTHNESS) if v is not None)
-    basis = make_basis(grid, spacing, settings.endpoints == "kept")
-    movable = np.array([motor.optimize for motor in character.motors], bool)
-    motors = np.flatnonzero(movable).astype(np.int32)
-    if not basis.count:
-        raise ShotError(
-            "the shot is too short to change anything between its kept end poses",
-            path=character.path,
-            attribute="calm:retarget:endpoints",
-            found=settings.endpoints,
-            remedy="Set it to free, or lengthen the shot to five frames or more.",
-        )
-    fixed = locked_coefficients(animation, basis, motors, float(grid.frame_times[-1]))
-    if not len(motors) or np.all(fixed):
-        raise ShotError(
-            "every motor is locked, so there is nothing to optimise",
-            path=character.path,
-            attribute="calm:motor:optimize",
-            remedy="Set it to true on the motors that may change.",
-        )
-    objective = Objective.over(prepared.model, meant.reference, grid, animation.weights)
-    bounds = motor_bounds(character, movable)
-    limits = LimitTerms(bounds, grid.judged, grid.h, 1.0) if bounds else None
-    continuous = options.adjoint == "continuous"
-    if continuous and ("effort" in bounds or grid.cyclic):
-        raise ShotError(
-            f"the continuous adjoint {'plays a shot once' if grid.cyclic else 'cannot keep limits of effort'}",
-            path=character.path,
-            attribute="retarget.optimize.adjoint",
-            found=options.adjoint,
-            remedy="Use the discrete one.",
-        )
-    problem = RetargetProblem(
-        prepared.model, grid, curves, objective, basis, motors, smoothness, CLOSENESS, prepared.world, limits,
-        continuous,
-    )  # fmt: skip
-    return problem, fixed
-
-
 def _search(
-    prepared: Prepared, animation: Animation, problem: RetargetProblem, fixed: BoolArray, meant: MeantMotion,
+    prepared: Prepared, animation: Animation, posed: tuple[RetargetProblem, Array, bool], meant: MeantMotion,
     options: Options, progress: Progress, checkpoint: Path | None,
 ) -> Result:  # fmt: skip
     character, grid, model = prepared.character, prepared.grid, prepared.model
+    problem, start, adaptive = posed
+
+    def fixed_on(basis: OffsetBasis) -> BoolArray:
+        return locked_coefficients(animation, basis, problem.motors, grid.end)
+
+    fixed = fixed_on(problem.basis)
     tolerance = options.tolerance or character.retarget.tolerance or DEFAULT_TOLERANCE
     begin = time.perf_counter()
     if not np.isfinite(problem.value(np.zeros(problem.size))):
@@ -195,26 +128,36 @@ def _search(
         seconds = float(grid.frame_times[-1])
         problem.limits.rho = FIRST_PENALTY * max(before_value, problem.worth(1e-3 * tolerance)) / seconds
     kept = Checkpoint(checkpoint, problem_key(problem, fixed, (options, tolerance)))
-    start = np.where(fixed, 0.0, _start(problem.basis, animation, problem.motors, grid))
     resumed = kept.load(problem.limits)
-    search = resumed or Search.start(start)
-    interrupted = False
+    search, interrupted = Search.start(start), False
+    if resumed is not None:
+        search, breaks = resumed
+        problem = problem.on_basis(basis_on(grid, breaks, problem.basis.kept_ends), search.x)
+        fixed = fixed_on(problem.basis)
 
     def on_iterate(found: Search) -> None:
         nonlocal search
         search = found
-        kept.save(search, problem.limits)
+        kept.save(search, problem.limits, problem.basis.breaks)
         done = min(0.9, 0.1 + 0.12 * len(search.history))
         progress(done, f"optimising: weighted error {1e3 * problem.error:.3f} mm, {search.evaluations} simulations")
 
     try:
         if resumed is None and not np.any(start):
             search = approach(problem, start, fixed, lowest_frequency(prepared, animation))
-        if not search.reason:
-            search = minimize(
-                problem, search, fixed, WORTH * tolerance, max_iterations=options.max_iterations, on_iterate=on_iterate
-            )
-            kept.save(search, problem.limits)
+        while True:
+            if not search.reason:
+                search = minimize(
+                    problem, search, fixed, WORTH * tolerance, options.max_iterations, on_iterate=on_iterate
+                )
+                kept.save(search, problem.limits, problem.basis.breaks)
+            if not adaptive or search.reason == "iteration limit":
+                break
+            finer = _finer(problem, search, fixed_on, FINER * tolerance)
+            if finer is None:
+                break
+            problem, search = finer
+            fixed = fixed_on(problem.basis)
         progress(0.9, "leaving out offsets that gain nothing")
         search = _pruned(problem, search, fixed, tolerance, options.max_iterations)
     except KeyboardInterrupt:
@@ -256,6 +199,23 @@ def _search(
         expected_gain_m=_expected(search),
         interrupted=interrupted,
     )
+
+
+def _finer(
+    problem: RetargetProblem, search: Search, fixed_on: Callable[[OffsetBasis], BoolArray], gain: float
+) -> tuple[RetargetProblem, Search] | None:
+    """The problem and its search on finer knots; None where these would gain too little."""
+    if not problem.linearized_at(search.x):
+        problem.value(search.x)
+        problem.linearize()
+        search = replace(search, evaluations=search.evaluations + 1, gradients=search.gradients + 1)
+    breaks = wanted_breaks(problem, search.x, fixed_on, gain)
+    if breaks is None:
+        return None
+    basis = basis_on(problem.grid, breaks, problem.basis.kept_ends)
+    x = carried(problem.basis, basis, search.x, len(problem.motors))
+    begin = replace(search, x=x, radius=np.inf, recycled=Recycled.none(len(x)), reason="")
+    return problem.on_basis(basis, x), begin
 
 
 def _expected(search: Search) -> float | None:

@@ -78,9 +78,9 @@ class RetargetProblem:
         motors: IntArray, smoothness: float, closeness: float, world: Array | None = None,
         limits: LimitTerms | None = None, continuous: bool = False,
     ):  # fmt: skip
-        self.model, self.grid, self.objective, self.basis = model, grid, objective, basis
+        self.model, self.grid, self.objective = model, grid, objective
         self.curves, self.motors, self.world, self.limits = curves, motors, world, limits
-        self._penalty = smoothness * basis.bending + closeness * basis.closeness
+        self._smoothness, self._closeness = smoothness, closeness
         self._workspace = Workspace.for_system(model.system)
         self._steady = SteadyState(model, world, grid.h, self._workspace) if grid.cyclic else None
         self._monodromy: Monodromy | None = None
@@ -91,12 +91,30 @@ class RetargetProblem:
         self._for_continuous: Linearization | None = None
         self._residuals = self._inverse = self._jacobian = np.zeros(0)
         self._limited: dict[str, Array] | None = None
-        self._x = np.zeros(0)
-        self._preconditioner: RigidPreconditioner | None = None
+        self._x = self._linearized_x = np.zeros(0)
+        self._preconditioner: RigidPreconditioner | None
         self._response: RigidResponse | None = None
+        self._use(basis)
         # objective of an error of one metre everywhere
         self._unit = max(float(np.sum(objective.weights**2)) / max(1, 3 * len(model.targets.component)), 1e-300)
+
+    def _use(self, basis: OffsetBasis) -> None:
+        self.basis = basis
+        self._penalty = self._smoothness * basis.bending + self._closeness * basis.closeness
         self._splines = {"position": basis.values, "velocity": basis.rates, "acceleration": basis.accelerations}
+        self._preconditioner = None
+
+    def on_basis(self, basis: OffsetBasis, x: Array) -> RetargetProblem:
+        """The same problem, evaluated and linearised where this one was, over other splines.
+
+        Args:
+            x: The same point in coefficients of the new basis.
+        """
+        other = copy(self)
+        other._use(basis)
+        other._x = x
+        other._linearized_x = np.zeros(0)
+        return other
 
     @property
     def size(self) -> int:
@@ -195,9 +213,14 @@ class RetargetProblem:
     def linearize(self) -> Array:
         """Linearise at the point evaluated last, and the gradient there."""
         self._linearization = self._linearized(self._linearization)
+        self._linearized_x = self._x
         if self._steady is not None:
             self._monodromy = self._steady.known = Monodromy.of(self._linearization)
         return self.gradient()
+
+    def linearized_at(self, x: Array) -> bool:
+        """Whether this is the point evaluated last, and linearised."""
+        return np.array_equal(x, self._x) and np.array_equal(x, self._linearized_x)
 
     def _linearized(self, previous: Linearization | None, continuous: bool = False) -> Linearization:
         run = self.run

@@ -1,0 +1,37 @@
+"""Retargeting problems of small shots, for the tests."""
+
+import numpy as np
+from calmotion.retarget.curves import sample_curves
+from calmotion.retarget.limits import LimitTerms, motor_bounds
+from calmotion.retarget.objective import Objective
+from calmotion.retarget.offset_basis import make_basis
+from calmotion.retarget.prepare import Options, prepare
+from calmotion.retarget.problem import RetargetProblem
+from calmotion.retarget.reference import rigid_motion, static_motion
+from calmotion.shot import Animation, Track
+
+FINE_FRAMES = np.arange(181) / 120.0
+
+
+def make_problem(character, bodies, animation, pre_roll=0.0, kept=False, limited=False, static=False, smoothness=1e-6):
+    prepared = prepare(character, animation, bodies, Options(step=1 / 240, pre_roll=pre_roll))
+    model, grid = prepared.model, prepared.grid
+    curves = sample_curves(animation.tracks, grid)
+    meant = rigid_motion(model, curves.angles, curves.rates, grid.h)
+    if static:
+        meant = static_motion(model, meant, curves.angles, grid.judged)
+    objective = Objective.over(model, meant.reference, grid, animation.weights)
+    basis = make_basis(grid, 0.1, kept)
+    limits = LimitTerms(motor_bounds(character), grid.judged, grid.h, 3.0, on=True) if limited else None
+    motors = np.arange(len(character.motors), dtype=np.int32)
+    return RetargetProblem(model, grid, curves, objective, basis, motors, smoothness, 1e-4, None, limits)
+
+
+def jerking(at=0.6):
+    """A short blow amid a slow move."""
+    s = np.clip((FINE_FRAMES - at) / 0.12, 0.0, 1.0)
+    blow = s**3 * (10.0 - 15.0 * s + 6.0 * s * s)
+    slow = np.clip((FINE_FRAMES - 0.05) / 1.3, 0.0, 1.0)
+    slow = slow**3 * (10.0 - 15.0 * slow + 6.0 * slow * slow)
+    tracks = (Track(FINE_FRAMES, 0.2 * slow), Track(FINE_FRAMES, 0.1 * slow + 0.25 * blow))
+    return Animation(FINE_FRAMES, tracks, tracks)
