@@ -121,9 +121,15 @@ def test_simulate_reports_without_before_and_after(run):
     status, out, _ = run("simulate", "shot.usda", "--json")
     report = json.loads(out)
     assert status == 0 and not [key for key in report if "before" in key or "after" in key]
-    assert {"path", "max_error_m", "rms_error_m", "max_rotation_error_rad", "rms_rotation_error_rad", "sag_m"} == set(
-        report["targets"][0]
-    )
+    assert {
+        "path",
+        "max_error_m",
+        "rms_error_m",
+        "max_rotation_error_rad",
+        "rms_rotation_error_rad",
+        "sag_m",
+        "seam_m",
+    } == set(report["targets"][0])
     assert report["newton_iterations"] == 400 and report["layer"] is None
 
 

@@ -65,6 +65,9 @@ def _parser() -> argparse.ArgumentParser:
     optimize = _shot_command(commands, "optimize", _optimize, "find motor curves that do not shake, and write them")
     simulate.add_argument("-o", "--output", metavar="LAYER", help="USD layer to write")
     optimize.add_argument("-o", "--output", metavar="LAYER", required=True, help="USD layer to write")
+    simulate.add_argument(
+        "--shaper", metavar="KIND", help="pass the tracks through zv, zvd, zv2, zvd2 or lowpass first, to compare with"
+    )
     for command in (simulate, optimize):
         _run_options(command)
     bench = commands.add_parser(

@@ -107,9 +107,8 @@ def print_error(error: ShotError, output: Output) -> None:
 
 def tell_error(error: ShotError) -> None:
     """Print an error on stderr: the problem, then where, what was found, what to do."""
-    place = error.path + (f".{error.attribute}" if error.attribute else "")
     lines = [f"error: {error.problem}"]
-    lines += [f"  at:    {place}"] if place else []
+    lines += [f"  at:    {error.place}"] if error.place else []
     lines += [f"  found: {error.found}"] if error.found is not None else []
     lines += [f"  do:    {error.remedy}"] if error.remedy else []
     print("\n".join(lines), file=sys.stderr, flush=True)

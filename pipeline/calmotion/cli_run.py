@@ -68,6 +68,7 @@ def run_shot(args: argparse.Namespace, command: str, output: Output) -> int:
         tolerance=args.tolerance,
         step=args.step,
         pre_roll=args.pre_roll,
+        shaper=getattr(args, "shaper", None),
         **({"integrator": args.integrator} if args.integrator else {}),
     )
     with ProgressDisplay(args.quiet) as display:

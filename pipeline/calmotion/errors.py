@@ -25,10 +25,14 @@ class ShotError(Exception):
         self.remedy = remedy
         super().__init__(self.message())
 
+    @property
+    def place(self) -> str:
+        """Where: prim path and attribute, as far as they are known."""
+        return ".".join(filter(None, (self.path, self.attribute)))
+
     def message(self) -> str:
         """The error as one line of text: place, problem, what was found, remedy."""
-        place = self.path + (f".{self.attribute}" if self.attribute else "")
-        text = f"{place}: {self.problem}" if place else self.problem
+        text = f"{self.place}: {self.problem}" if self.place else self.problem
         if self.found is not None:
             text += f" (found {self.found})"
         return f"{text}. {self.remedy}" if self.remedy else f"{text}."

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from calmotion.host import Operator, Property, RunContext
-from calmotion.host.values import OutputPaths, ReducedBodies, Source, SystemModes
+from calmotion.host import NotAsked, Operator, Property, RunContext
+from calmotion.host.values import OutputPaths, ReducedBodies, ShapedTracks, Source, SystemModes
 from calmotion.shot import Animation, Character, FEMeshes, Result
 
 if TYPE_CHECKING:
@@ -84,23 +85,38 @@ class FindSystemModes(Operator):
         return [SystemModes(first_pose_frequencies(*_inputs(context)))]
 
 
+class ShapeTracks(Operator):
+    """What practitioners do otherwise: the motors' tracks through an input shaper or a low-pass filter."""
+
+    idname = "retarget.shape"
+    label = "Shape the motors' tracks"
+    requires = (Character, Animation, Source)
+    uses = (ReducedBodies,)
+    provides = (ShapedTracks,)
+    properties = (
+        Property("cutoff", float, 0.5, minimum=0.01, description="Of the low-pass filter, over the lowest frequency"),
+    )
+
+    @classmethod
+    def poll(cls, data: Mapping[type, Any]) -> str | None:
+        source = data.get(Source)
+        return NotAsked("no --shaper was asked for") if source is None or not source.shaper else None
+
+    def execute(self, context: RunContext) -> Sequence[object]:
+        from calmotion.retarget.run import shape_tracks
+
+        kind, cutoff = context.get(Source).shaper or "", context.properties.cutoff
+        return [ShapedTracks(shape_tracks(*_inputs(context), _options(context), kind, cutoff))]
+
+
 class SimulateShot(Operator):
     """The shot as animated, on the flexible robot."""
 
     idname = "retarget.simulate"
     label = "Simulate the shot"
     requires = (Character, Animation, Source)
-    uses = (ReducedBodies,)
+    uses = (ReducedBodies, ShapedTracks)
     provides = (Result,)
-    properties = (
-        Property(
-            "shaper",
-            str,
-            "none",
-            choices=("none", "zv", "zvd", "zv2", "zvd2", "lowpass"),
-            description="Pass the motors' tracks through an input shaper or a filter first, to compare with",
-        ),
-    )
 
     @classmethod
     def poll(cls, data: Mapping[type, Any]) -> str | None:
@@ -109,8 +125,11 @@ class SimulateShot(Operator):
     def execute(self, context: RunContext) -> Sequence[object]:
         from calmotion.retarget.run import simulate_shot
 
-        options = _options(context, shaper=context.properties.shaper)
-        return [simulate_shot(*_inputs(context), options, context.progress)]
+        character, animation, bodies = _inputs(context)
+        shaped = context.get(ShapedTracks)
+        if shaped is not None:
+            animation = replace(animation, current=shaped.tracks)
+        return [simulate_shot(character, animation, bodies, _options(context), context.progress)]
 
 
 class OptimizeShot(Operator):
@@ -123,7 +142,13 @@ class OptimizeShot(Operator):
     provides = (Result,)
     properties = (
         Property("max_iterations", int, 30, minimum=1, description="Most Gauss-Newton iterations"),
-        Property("knot_spacing", float, -1.0, unit="s", description="Distance of the spline's knots, -1: the shot's, or where its motion needs them"),
+        Property(
+            "knot_spacing",
+            float,
+            -1.0,
+            unit="s",
+            description="Distance of the spline's knots, -1: the shot's, or where its motion needs them",
+        ),
         Property("smoothness", float, -1.0, description="Weight of the offsets' second derivative, -1: the shot's"),
         Property(
             "adjoint",
@@ -178,7 +203,7 @@ def _options(context: RunContext, **more: Any) -> Options:
     )
 
 
-OPERATORS = (ReduceFlexibleBodies, FindSystemModes, SimulateShot, OptimizeShot)
+OPERATORS = (ReduceFlexibleBodies, FindSystemModes, ShapeTracks, SimulateShot, OptimizeShot)
 
 
 def register(host: Any) -> None:

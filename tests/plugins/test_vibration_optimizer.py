@@ -3,7 +3,7 @@ import dataclasses
 import numpy as np
 import pytest
 from calmotion import ShotError
-from calmotion.host import ReducedBodies, Source, SystemModes
+from calmotion.host import NotAsked, ReducedBodies, ShapedTracks, Source, SystemModes
 from calmotion.shot import Character, Result
 from calmotion.testing import host_with, run_operator, small_shot
 
@@ -75,3 +75,16 @@ def test_locked_motors_only_are_refused(host):
             host, "retarget.optimize", [dataclasses.replace(character, motors=motors), animation, source("optimize")]
         )
     assert error.value.attribute == "calm:motor:optimize"
+
+
+def test_shaped_tracks_are_simulated_where_they_are_asked_for(host):
+    character, animation = small_shot()
+    (plain,) = run_operator(host, "retarget.simulate", [character, animation, source("simulate")])
+    assert isinstance(host.operators["retarget.shape"].poll({Source: source("simulate")}), NotAsked)
+    late = tuple(dataclasses.replace(track, times=track.times + 0.2) for track in animation.tracks)
+    (shaped,) = run_operator(host, "retarget.simulate", [character, animation, source("simulate"), ShapedTracks(late)])
+    assert shaped.before.position_errors.max() > 10 * plain.before.position_errors.max()
+    asked = dataclasses.replace(source("simulate"), shaper="zvd")
+    with pytest.raises(ShotError, match="rigid robot has no frequency") as error:
+        run_operator(host, "retarget.shape", [character, animation, asked])
+    assert error.value.place == "--shaper"

@@ -67,7 +67,8 @@ def test_a_low_pass_filter_takes_the_mode_out_of_the_motion_without_delay(parts)
     assert vibration(found, grid, FREQUENCIES[0]) < 0.5 * vibration(curves, grid, FREQUENCIES[0])
     middle = [np.interp(0.5, c.angles[:, 0], grid.times) for c in (curves, found)]
     assert abs(middle[1] - middle[0]) < 0.02 and delay("lowpass", FREQUENCIES, RATIOS) == 0.0
-    assert shaped(curves, grid, "none", FREQUENCIES, RATIOS) is curves
+    lower = shaped(curves, grid, "lowpass", FREQUENCIES, RATIOS, 0.2)
+    assert vibration(lower, grid, FREQUENCIES[0]) < vibration(found, grid, FREQUENCIES[0])
 
 
 def test_what_cannot_be_shaped_is_refused(parts):

@@ -59,13 +59,15 @@ def compare(shot: BenchShot) -> list[Row]:
     frequencies, damping = modes_of(prepared, shot.animation)
     workspace = Workspace.for_system(prepared.model.system)
     rows = []
-    for kind in SHAPERS:
-        curves = shaped(problem.curves, prepared.grid, kind, frequencies, damping)
+    for kind in ("as animated", *SHAPERS):
+        curves, late = problem.curves, 0.0
+        if kind in SHAPERS:
+            curves = shaped(problem.curves, prepared.grid, kind, frequencies, damping)
+            late = delay(kind, frequencies, damping)
         run = run_forward(
             prepared.model, workspace, curves.angles, curves.rates, prepared.grid.h, prepared.world
         )  # fmt: skip
-        name = "as animated" if kind == "none" else kind.replace("2", ", two modes")
-        rows.append(_row(shot, name, delay(kind, frequencies, damping), problem, curves, run.target_positions))
+        rows.append(_row(shot, kind.replace("2", ", two modes"), late, problem, curves, run.target_positions))
     zero, free = np.zeros(problem.size), np.zeros(problem.size, bool)
     problem.value(zero)
     found = minimize(problem, approach(problem, zero, free, float(frequencies[0])), free, 5e-6)

@@ -2,7 +2,7 @@
 
 from .errors import HostError, PlanError, PluginError, SettingError
 from .manifest import Manifest, read_manifest
-from .operators import Operator, Record, RunContext
+from .operators import NotAsked, Operator, Record, RunContext
 from .plan import Plan
 from .properties import Property, PropertyValues
 from .registry import Host, Plugin, PluginState, open_host
@@ -16,6 +16,7 @@ from .values import (
     OutputPaths,
     Recording,
     ReducedBodies,
+    ShapedTracks,
     Source,
     SystemModes,
     WrittenLayer,
@@ -28,6 +29,7 @@ __all__ = [
     "Host",
     "HostError",
     "Manifest",
+    "NotAsked",
     "Operator",
     "OperatorResult",
     "Outcome",
@@ -42,6 +44,7 @@ __all__ = [
     "Record",
     "Recording",
     "ReducedBodies",
+    "ShapedTracks",
     "Run",
     "RunContext",
     "SettingError",

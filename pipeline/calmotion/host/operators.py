@@ -65,6 +65,10 @@ class RunContext:
         self.records.append(Record(level, text))
 
 
+class NotAsked(str):
+    """A reason of a poll that is no news: what nobody asked for is not listed among what was left out."""
+
+
 class Operator:
     """Base of the operators that plugins register.
 
@@ -86,7 +90,8 @@ class Operator:
 
     @classmethod
     def poll(cls, data: Mapping[type, Any]) -> str | None:
-        """None when it runs on this data, else the reason why it is left out, as a clause for the user."""
+        """None when it runs on this data, else the reason why it is left out, as a clause for the user (`NotAsked`
+        where that is no news)."""
         return None
 
     def execute(self, context: RunContext) -> Sequence[object]:

@@ -10,7 +10,7 @@ from enum import StrEnum
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from .errors import PluginError
-from .operators import Operator, Record, RunContext
+from .operators import NotAsked, Operator, Record, RunContext
 from .plan import Plan
 from .properties import PropertyValues
 
@@ -160,14 +160,17 @@ class Run:
             return False  # it fails by itself when its turn comes
 
     def left_out(self) -> tuple[LeftOut, ...]:
-        """What the polls left out, for the report; not an operator whose values another one made."""
+        """What the polls left out, for the report; not an operator whose values another one made, or that nobody asked
+        for."""
         from ..shot import LeftOut
 
         made = {cls.idname: all(kind in self.data for kind in cls.provides) for cls in self.plan.operators}
         return tuple(
             LeftOut(result.label, result.reason)
             for result in self.results
-            if result.outcome == Outcome.LEFT_OUT and not made[result.idname]
+            if result.outcome == Outcome.LEFT_OUT
+            and not made[result.idname]
+            and not isinstance(result.reason, NotAsked)
         )
 
     def failures(self) -> list[OperatorResult]:

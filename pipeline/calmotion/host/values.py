@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from ..fem import ReducedBody
-    from ..shot import ModeTable
+    from ..shot import ModeTable, Track
     from ..shot.character import Array
 
 
@@ -22,6 +22,7 @@ class Source:
         step: Time step [s], or None for automatic.
         integrator: Name of the integrator.
         pre_roll: Length of the pre-roll [s], or None for automatic.
+        shaper: Input shaper or filter through which `simulate` passes the motors' tracks first, or None.
     """
 
     path: str
@@ -30,6 +31,7 @@ class Source:
     step: float | None = None
     integrator: str = "bdf2"
     pre_roll: float | None = None
+    shaper: str | None = None
 
 
 @dataclass(frozen=True)
@@ -90,6 +92,13 @@ class ReducedBodies:
 
     bodies: tuple[ReducedBody, ...]
     modes: tuple[ModeTable, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class ShapedTracks:
+    """The motors' tracks after an input shaper or a filter, in the motors' order."""
+
+    tracks: tuple[Track, ...]
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from .. import __version__
-from ..shot.character import Array, BoolArray, IntArray
+from ..shot.character import BoolArray, IntArray
 from .gauss_newton import Iterate, Search
 from .limits import LimitTerms
 from .problem import RetargetProblem

@@ -29,7 +29,7 @@ from .time_grid import TimeGrid, make_grid
 class Options:
     """What the user overrides; None keeps the shot's own or the automatic choice. Lengths [m], times [s].
 
-    `shaper`, one of `shapers.SHAPERS`, is for `simulate` alone; `adjoint` is discrete or continuous.
+    `adjoint` is discrete or continuous.
     """
 
     tolerance: float | None = None
@@ -39,7 +39,6 @@ class Options:
     knot_spacing: float | None = None
     smoothness: float | None = None
     max_iterations: int = 30
-    shaper: str = "none"
     adjoint: str = "discrete"
 
 

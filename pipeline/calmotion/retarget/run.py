@@ -10,7 +10,7 @@ import numpy as np
 from ..dynamics.failure import SimulationFailure
 from ..dynamics.simulation import Workspace
 from ..fem.reduced_body import ReducedBody
-from ..shot import Animation, Character, Result
+from ..shot import Animation, Character, Result, Track
 from ..shot.character import Array
 from .bodies import mode_tables, skins
 from .curves import sample_curves, sample_tracks
@@ -39,6 +39,25 @@ def meant_motion(prepared: Prepared, angles: Array, rates: Array) -> MeantMotion
     return static_motion(prepared.model, rigid, angles, prepared.grid.times >= 0.0, prepared.world)
 
 
+def shape_tracks(
+    character: Character, animation: Animation, bodies: Sequence[ReducedBody] | None, options: Options, kind: str,
+    cutoff: float,
+) -> tuple[Track, ...]:  # fmt: skip
+    """The shot's tracks through an input shaper or a filter, sampled at the steps of its simulation.
+
+    Args:
+        kind: One of `shapers.SHAPERS`.
+        cutoff: Of the low-pass filter, over the lowest frequency.
+
+    Raises:
+        ShotError: There is no such shaper, or nothing to shape for.
+    """
+    prepared = prepare(character, animation, bodies, options)
+    grid, curves = prepared.grid, sample_curves(animation.current, prepared.grid)
+    found = shaped(curves, grid, kind, *modes_of(prepared, animation), cutoff)
+    return tuple(Track(grid.times, column) for column in found.angles.T)
+
+
 def simulate_shot(
     character: Character,
     animation: Animation,
@@ -51,8 +70,6 @@ def simulate_shot(
     model, grid, world = prepared.model, prepared.grid, prepared.world
     workspace = Workspace.for_system(model.system)
     curves = sample_curves(animation.current, grid)
-    if options.shaper != "none":
-        curves = shaped(curves, grid, options.shaper, *modes_of(prepared, animation))
     angles, rates = curves.angles, curves.rates
     meant, meant_rates = sample_tracks(animation.tracks, grid)
     refuse_half_turns(prepared, angles)

@@ -15,8 +15,8 @@ from ..shot.character import Array
 from .curves import Curves
 from .time_grid import TimeGrid
 
-SHAPERS = ("none", "zv", "zvd", "zv2", "zvd2", "lowpass")
-CUTOFF = 0.5  # of the low-pass filter, over the lowest frequency
+SHAPERS = ("zv", "zvd", "zv2", "zvd2", "lowpass")
+CUTOFF = 0.5  # of the low-pass filter, over the lowest frequency, where nobody says
 
 
 def impulses(kind: str, frequencies: Array, damping: Array) -> tuple[Array, Array]:
@@ -40,24 +40,24 @@ def impulses(kind: str, frequencies: Array, damping: Array) -> tuple[Array, Arra
 
 def delay(kind: str, frequencies: Array, damping: Array) -> float:
     """Mean delay of a shaper [s]; none of a filter that runs both ways."""
-    if kind in ("none", "lowpass"):
+    if kind == "lowpass":
         return 0.0
     times, amplitudes = impulses(kind, frequencies, damping)
     return float(times @ amplitudes)
 
 
-def shaped(curves: Curves, grid: TimeGrid, kind: str, frequencies: Array, damping: Array) -> Curves:
+def shaped(
+    curves: Curves, grid: TimeGrid, kind: str, frequencies: Array, damping: Array, cutoff: float = CUTOFF
+) -> Curves:
     """Curves through a shaper; before their first instant they rest.
 
     Raises:
         ShotError: There is no such shaper, or no frequency to shape for.
     """
-    if kind == "none":
-        return curves
     if kind not in SHAPERS or not len(frequencies):
         raise ShotError(
             "there is no such shaper" if len(frequencies) else "a rigid robot has no frequency to shape for",
-            attribute="retarget.simulate.shaper",
+            attribute="--shaper",
             found=kind,
             remedy=f"Use one of {', '.join(SHAPERS)}." if len(frequencies) else "Leave it out.",
         )
@@ -65,7 +65,7 @@ def shaped(curves: Curves, grid: TimeGrid, kind: str, frequencies: Array, dampin
     if kind == "lowpass":
         from scipy.signal import butter, sosfiltfilt
 
-        sections = butter(2, CUTOFF * frequencies[0], fs=1.0 / grid.h, output="sos")
+        sections = butter(2, cutoff * frequencies[0], fs=1.0 / grid.h, output="sos")
         angles = sosfiltfilt(sections, curves.angles, axis=0, padtype="constant", padlen=min(len(times) - 1, 4000))
     else:
         source, angles = CubicSpline(times, curves.angles), np.zeros_like(curves.angles)
