@@ -118,6 +118,11 @@ def _run_options(command: argparse.ArgumentParser) -> None:
     outputs.add_argument(
         "--samples-per-second", metavar="HZ", help="write denser samples than the frames, for linear interpolation"
     )
+    outputs.add_argument(
+        "--splines",
+        action="store_true",
+        help="write motor curves as splines with the optimiser's knots, not as samples",
+    )
     outputs.add_argument("--csv", metavar="FILE", help="table of targets and motors, one row a time step")
     outputs.add_argument("--rrd", metavar="FILE", help="recording for the rerun viewer")
     outputs.add_argument("--figures", metavar="DIR", help="folder for figures")

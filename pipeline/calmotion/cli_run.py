@@ -44,7 +44,7 @@ def settings_of(args: argparse.Namespace) -> Settings:
 
 
 def _options_of_the_writer(args: argparse.Namespace) -> Settings:
-    given = {"bake": args.bake, "samples_per_second": args.samples_per_second}
+    given = {"bake": args.bake, "samples_per_second": args.samples_per_second, "splines": args.splines or None}
     chosen: dict[str, object] = {name: value for name, value in given.items() if value is not None}
     return {"usd.write": chosen} if chosen else {}
 

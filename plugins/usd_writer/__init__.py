@@ -26,6 +26,9 @@ class WriteResult(Operator):
             description="Least density of the motor samples, for consumers that interpolate linearly; -1: the frames.",
         ),
         Property(
+            "splines", bool, False, description="Motor curves as splines with the optimiser's knots, not samples."
+        ),
+        Property(
             "bake",
             str,
             "none",
@@ -53,7 +56,7 @@ class WriteResult(Operator):
             context.get(Provenance),
             context.get(Result),
             str(context.get(OutputPaths).layer),
-            WriteOptions(samples_per_second=rate if rate > 0.0 else None, bake=values.bake),
+            WriteOptions(samples_per_second=rate if rate > 0.0 else None, splines=values.splines, bake=values.bake),
         )
         context.report("info", f"{root} opens {layer} with the shot")
         return (WrittenLayer(layer=layer, root=root),)

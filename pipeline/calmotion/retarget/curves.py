@@ -74,6 +74,11 @@ def looped_curve(track: Track, end: float) -> Sample:
     return sample
 
 
+def curve_of(track: Track, end: float, cyclic: bool) -> Sample:
+    """A track over a shot that plays once, or loops."""
+    return (looped_curve if cyclic else held_curve)(track, end)
+
+
 def open_by(track: Track, end: float, turning: bool) -> float:
     """How far the ends of a loop are apart [rad or m].
 
@@ -97,8 +102,7 @@ class Curves:
 
 def sample_curves(tracks: Sequence[Track], grid: TimeGrid) -> Curves:
     """Tracks at the grid's instants, pre-roll included."""
-    read = looped_curve if grid.cyclic else held_curve
-    columns = [over_grid(grid, read(track, grid.end)) for track in tracks]
+    columns = [over_grid(grid, curve_of(track, grid.end, grid.cyclic)) for track in tracks]
     empty = np.zeros((len(grid.times), 0))
     return Curves(*(np.stack(parts, axis=1) if columns else empty for parts in zip(*columns, strict=True)))
 

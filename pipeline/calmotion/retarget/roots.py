@@ -12,7 +12,7 @@ from ..dynamics.so3 import right_jacobian
 from ..dynamics.world import pack
 from ..shot.animation import MovingFrame, Track
 from ..shot.character import Array
-from .curves import held_curve, looped_curve
+from .curves import curve_of
 from .time_grid import TimeGrid, over_grid, pre_roll_weights
 
 LOOPS = 3  # on either side of the one that is interpolated
@@ -31,8 +31,9 @@ def sample_roots(moving: Sequence[MovingFrame], grid: TimeGrid) -> Array:
 
 
 def _sampled(frame: MovingFrame, grid: TimeGrid) -> Array:
-    read = looped_curve if grid.cyclic else held_curve
-    axes = [over_grid(grid, read(Track(frame.times, column), grid.end)) for column in frame.positions.T]
+    axes = [
+        over_grid(grid, curve_of(Track(frame.times, column), grid.end, grid.cyclic)) for column in frame.positions.T
+    ]
     position, velocity = (np.stack([axis[k] for axis in axes], axis=1) for k in range(2))
     if grid.cyclic:
         rotation, spin = _looped_rotation(frame, grid)

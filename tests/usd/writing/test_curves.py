@@ -35,7 +35,15 @@ def test_values_are_degrees_at_the_time_codes_of_the_stage():
     layer = Sdf.Layer.CreateAnonymous(".usda")
     motor = SimpleNamespace(path="/arm/elbow", attribute="drive:angular:physics:targetPosition", linear=False)
     clock = Clock(start=101, end=113, time_codes_per_second=24, frames_per_second=24)
-    written = author_curves(layer, SimpleNamespace(motors=[motor]), (CURVE,), FRAMES, FRAMES, clock, 0.01)
+    written = author_curves(
+        layer,
+        SimpleNamespace(motors=[motor], retarget=SimpleNamespace(cyclic=False)),
+        (CURVE,),
+        FRAMES,
+        FRAMES,
+        clock,
+        0.01,
+    )
     path = f"{motor.path}.{motor.attribute}"
     assert written == {path: 13}
     assert layer.ListTimeSamplesForPath(path) == list(range(101, 114))
@@ -47,7 +55,15 @@ def test_values_of_length_motors_are_in_the_stage_s_unit():
     layer = Sdf.Layer.CreateAnonymous(".usda")
     motor = SimpleNamespace(path="/arm/slide", attribute="drive:linear:physics:targetPosition", linear=True)
     clock = Clock(start=101, end=113, time_codes_per_second=24, frames_per_second=24)
-    author_curves(layer, SimpleNamespace(motors=[motor]), (CURVE,), FRAMES, FRAMES, clock, 0.01)
+    author_curves(
+        layer,
+        SimpleNamespace(motors=[motor], retarget=SimpleNamespace(cyclic=False)),
+        (CURVE,),
+        FRAMES,
+        FRAMES,
+        clock,
+        0.01,
+    )
     path = f"{motor.path}.{motor.attribute}"
     assert layer.QueryTimeSample(path, 105) == pytest.approx(100.0 * CURVE.frame_values[4], rel=1e-6)
 

@@ -24,13 +24,13 @@ def sample_times(frame_times: Array, samples_per_second: float | None) -> Array:
     return frame_times[0] + steps * (frame / parts)
 
 
-def curve_values(curve: MotorCurve, frame_times: Array, times: Array) -> Array:
+def curve_values(curve: MotorCurve, frame_times: Array, times: Array, cyclic: bool = False) -> Array:
     """A motor's curve [rad or m] at times within the shot, by the rule with which samples at frames are read back."""
     if times is frame_times:
         return curve.frame_values
-    from ...retarget.curves import interpolate
+    from ...retarget.curves import curve_of
 
-    return interpolate(Track(frame_times, curve.frame_values), float(frame_times[-1]))(times)
+    return curve_of(Track(frame_times, curve.frame_values), float(frame_times[-1]), cyclic)(times, 0)
 
 
 def author_curves(
@@ -60,7 +60,8 @@ def author_curves(
         path = f"{motor.path}.{motor.attribute}"
         spec = attribute_spec(layer, path, Sdf.ValueTypeNames.Float)
         unit = meters if motor.linear else np.deg2rad(1.0)
-        for code, value in zip(codes, curve_values(curve, frame_times, times) / unit, strict=True):
+        values = curve_values(curve, frame_times, times, character.retarget.cyclic)
+        for code, value in zip(codes, values / unit, strict=True):
             layer.SetTimeSample(spec.path, float(code), float(value))
         written[path] = len(codes)
     return written

@@ -41,7 +41,9 @@ def author_origin(
     layer.customLayerData = {**layer.customLayerData, METADATA_KEY: entry}
 
 
-def settings_of(character: Character, result: Result, bake: str, samples_per_second: float | None) -> dict:
+def settings_of(
+    character: Character, result: Result, bake: str, samples_per_second: float | None, splines: bool = False
+) -> dict:
     """The settings that a result was computed and written with, as plain values that USD stores."""
     asked = character.retarget
     found: dict[str, object] = {
@@ -51,6 +53,7 @@ def settings_of(character: Character, result: Result, bake: str, samples_per_sec
         "endpoints": asked.endpoints,
         "cyclic": asked.cyclic,
         "bake": bake,
+        "splines": splines,
     }
     for name, value in (
         ("tolerance_m", asked.tolerance),

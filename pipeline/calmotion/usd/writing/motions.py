@@ -57,7 +57,7 @@ def rigid_motion(character: Character, animation: Animation, result: Result) -> 
     from ...dynamics.kinematics import rigid_poses
     from ...dynamics.model import body_anchors, compile_model, rigid_body
     from ...dynamics.topology import span_tree
-    from ...retarget.curves import interpolate
+    from ...retarget.curves import curve_of
 
     times = animation.frame_times
     # Kinematics do not depend on mass, so a flexible body whose mass its mesh decides gets any.
@@ -80,7 +80,8 @@ def rigid_motion(character: Character, animation: Animation, result: Result) -> 
     if result.curves:
         angles = np.stack([curve.frame_values for curve in result.curves], axis=1)
     else:
-        angles = np.stack([interpolate(t, float(times[-1]))(times) for t in animation.tracks], axis=1)
+        cyclic = character.retarget.cyclic
+        angles = np.stack([curve_of(t, float(times[-1]), cyclic)(times, 0) for t in animation.tracks], axis=1)
     positions, rotations = rigid_poses(model, model.joint_angles(angles))
     back = np.argsort(np.asarray(tree.body))  # from components to bodies
     return BakedMotion(times, positions[:, back], rotations[:, back], None)

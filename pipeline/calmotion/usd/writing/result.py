@@ -13,6 +13,7 @@ from ..layers import refuse_input_as_output, write_layer
 from . import bake, metadata, motions
 from .curves import author_curves, sample_times
 from .root import keeps_earlier_curves, root_path, write_root
+from .splines import author_splines
 
 BAKES = ("none", "motors", "simulated")
 
@@ -23,11 +24,13 @@ class WriteOptions:
 
     Attributes:
         samples_per_second: Density of the motor samples [1/s]; None: the shot's frames.
+        splines: Whether motor curves are written as splines instead of samples.
         bake: `none`, `motors` (body transforms of a rigid robot with the new curves) or `simulated` (the predicted
             motion, deformed meshes included).
     """
 
     samples_per_second: float | None = None
+    splines: bool = False
     bake: str = "none"
 
 
@@ -56,6 +59,13 @@ def write_result(
     from pxr import Sdf
 
     options = options or WriteOptions()
+    if options.splines and options.samples_per_second is not None:
+        raise ShotError(
+            "curves are written as splines or as samples, not as both",
+            attribute="--splines",
+            found="--samples-per-second as well",
+            remedy="Leave one of them out",
+        )
     refuse_inputs(provenance, output)
     role = stages.MOTION if result.after is None else stages.CURVES
     clock = Clock(
@@ -70,19 +80,21 @@ def write_result(
         layer,
         role,
         provenance,
-        settings=metadata.settings_of(character, result, options.bake, options.samples_per_second),
+        settings=metadata.settings_of(character, result, options.bake, options.samples_per_second, options.splines),
         errors=metadata.errors_of(character, result),
     )
     with Sdf.ChangeBlock():
         written: dict[str, int] = {}
+        knots: dict[str, int] = {}
         if role == stages.CURVES:
-            times = sample_times(animation.frame_times, options.samples_per_second)
-            curves = _curves_to_write(result, provenance)
-            written |= author_curves(
-                layer, character, curves, animation.frame_times, times, clock, provenance.meters_per_unit
-            )
+            curves, meters = _curves_to_write(result, provenance), provenance.meters_per_unit
+            if options.splines:
+                knots |= author_splines(layer, character, animation, curves, clock, meters)
+            else:
+                times = sample_times(animation.frame_times, options.samples_per_second)
+                written |= author_curves(layer, character, curves, animation.frame_times, times, clock, meters)
     written |= _bake(layer, character, animation, provenance, result, options, clock)
-    write_layer(layer, output, lambda temporary: _validate(temporary, written))
+    write_layer(layer, output, lambda temporary: _validate(temporary, written, knots))
     return output, write_root(output, provenance, role)
 
 
@@ -128,8 +140,8 @@ def _bake(
     return written
 
 
-def _validate(temporary: str, written: dict[str, int]) -> None:
-    """Reopen what was written: every attribute must be there, with all its samples."""
+def _validate(temporary: str, written: dict[str, int], knots: dict[str, int]) -> None:
+    """Reopen what was written: every attribute must be there, with all its samples, or all knots of its spline."""
     from pxr import Sdf
 
     layer = Sdf.Layer.OpenAsAnonymous(temporary)
@@ -139,3 +151,8 @@ def _validate(temporary: str, written: dict[str, int]) -> None:
         found = layer.GetNumTimeSamplesForPath(Sdf.Path(path))
         if found != count:
             raise ShotError("what was written has lost samples", path=path, found=f"{found} of {count}")
+    for path, count in knots.items():
+        spec = layer.GetAttributeAtPath(Sdf.Path(path))
+        found = len(spec.GetSpline().GetKnots()) if spec and spec.HasSpline() else 0
+        if found != count:
+            raise ShotError("what was written has lost knots", path=path, found=f"{found} of {count}")

@@ -1,0 +1,93 @@
+"""Motor curves as splines: the animator's curve and the optimiser's offset in one, exactly."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...shot import Animation, Character, MotorCurve
+from ...shot.character import Array
+from ..clock import Clock
+from .curves import attribute_spec
+
+SAME = 1e-9  # times that are closer are one [s]
+
+
+def hermite(
+    animation: Animation, curve: MotorCurve, cyclic: bool
+) -> tuple[Array, Array, Array]:  # fmt: skip
+    """A motor's curve as a cubic between knots: times [s], values [rad or m] and slopes, shape [n] each.
+
+    Knots are where the animation has samples and where the offset has knots; between them both are cubics.
+    """
+    from ...retarget.curves import curve_of
+    from ...shot import Track
+
+    frames, track = animation.frame_times, animation.tracks[curve.motor]
+    end = float(frames[-1])
+    base = curve_of(track, end, cyclic)
+    # frames hold the offset exactly, as its knots lie on them
+    offset = curve_of(Track(frames, curve.frame_values - base(frames, 0)), end, cyclic)
+    inner = track.times[(track.times > SAME) & (track.times < end - SAME)]
+    times = np.unique(np.concatenate([[0.0, end], inner, curve.knots if curve.changed else []]))
+    times = times[np.concatenate([[True], np.diff(times) > SAME])]
+    return times, base(times, 0) + offset(times, 0), base(times, 1) + offset(times, 1)
+
+
+def author_splines(
+    layer, character: Character, animation: Animation, curves: tuple[MotorCurve, ...], clock: Clock, meters: float
+) -> dict[str, int]:  # fmt: skip
+    """Author each curve as an over with a spline, degrees or stage length; one of a shot that loops repeats itself.
+
+    Args:
+        layer: The Sdf.Layer.
+        curves: Those to write.
+        clock: The clock of the shot.
+        meters: Metres in the stage's unit of length.
+
+    Returns:
+        Path of each attribute that was written, with its number of knots.
+    """
+    from pxr import Sdf, Ts
+
+    written = {}
+    for curve in curves:
+        motor, cyclic = character.motors[curve.motor], character.retarget.cyclic
+        times, values, slopes = hermite(animation, curve, cyclic)
+        unit = meters if motor.linear else np.deg2rad(1.0)
+        # slopes of a spline are by time code
+        spline = bezier(clock.time_codes(times), values / unit, slopes / (unit * clock.time_codes_per_second), "float")
+        if cyclic:
+            forever = Ts.Extrapolation(Ts.ExtrapLoopRepeat)
+            spline.SetPreExtrapolation(forever)
+            spline.SetPostExtrapolation(forever)
+        path = f"{motor.path}.{motor.attribute}"
+        attribute_spec(layer, path, Sdf.ValueTypeNames.Float).SetSpline(spline)
+        written[path] = len(times)
+    return written
+
+
+def bezier(times: Array, values: Array, slopes: Array, kind: str):
+    """A Ts.Spline that is the cubic Hermite interpolant: tangents as long as a third of their interval.
+
+    Args:
+        times: Time codes, ascending, shape [n].
+        values, slopes: Values and their derivatives by time code.
+        kind: Type of its values, that of the attribute.
+    """
+    from pxr import Ts
+
+    spline, width = Ts.Spline(kind), np.diff(times) / 3.0
+    spline.SetCurveType(Ts.CurveTypeBezier)
+    for k in range(len(times)):
+        knot = Ts.Knot(kind)
+        knot.SetTime(float(times[k]))
+        knot.SetValue(float(values[k]))
+        knot.SetNextInterpolation(Ts.InterpCurve)
+        if k > 0:
+            knot.SetPreTanWidth(float(width[k - 1]))
+            knot.SetPreTanSlope(float(slopes[k]))
+        if k < len(times) - 1:
+            knot.SetPostTanWidth(float(width[k]))
+            knot.SetPostTanSlope(float(slopes[k]))
+        spline.SetKnot(knot)
+    return spline
