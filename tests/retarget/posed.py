@@ -1,5 +1,7 @@
 """Retargeting problems of small shots, for the tests."""
 
+import dataclasses
+
 import numpy as np
 from calmotion.retarget.curves import sample_curves
 from calmotion.retarget.limits import LimitTerms, motor_bounds
@@ -35,3 +37,15 @@ def jerking(at=0.6):
     slow = slow**3 * (10.0 - 15.0 * slow + 6.0 * slow * slow)
     tracks = (Track(FINE_FRAMES, 0.2 * slow), Track(FINE_FRAMES, 0.1 * slow + 0.25 * blow))
     return Animation(FINE_FRAMES, tracks, tracks)
+
+
+def looped(character, animation):
+    """A loop out of a shot that ends where it does not begin: the moves, and back again."""
+    tracks = tuple(
+        Track(
+            track.times, track.values - np.linspace(0.0, 1.0, len(track.values)) * (track.values[-1] - track.values[0])
+        )
+        for track in animation.tracks
+    )
+    character = dataclasses.replace(character, retarget=dataclasses.replace(character.retarget, cyclic=True))
+    return character, dataclasses.replace(animation, tracks=tracks, current=tracks)

@@ -8,20 +8,7 @@ from calmotion.dynamics.topology import span_tree
 from calmotion.evidence.linkage_arm import linkage_arm, performance
 from calmotion.retarget.bodies import reduce_bodies
 from calmotion.retarget.prepare import Options, excitations
-from calmotion.shot import Track
-from posed import make_problem
-
-
-def looped(character, animation):
-    """A loop out of a shot that ends where it does not begin: the moves, and back again."""
-    tracks = tuple(
-        Track(
-            track.times, track.values - np.linspace(0.0, 1.0, len(track.values)) * (track.values[-1] - track.values[0])
-        )
-        for track in animation.tracks
-    )
-    character = dataclasses.replace(character, retarget=dataclasses.replace(character.retarget, cyclic=True))
-    return character, dataclasses.replace(animation, tracks=tracks, current=tracks)
+from posed import looped, make_problem
 
 
 def limited_motors(character, scale=1.0):

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass
 
 from ..dynamics.integrators import integrate
 from ..dynamics.kinematics import rigid_state, target_frames
 from ..dynamics.model import Model, start_angles
+from ..dynamics.reactions import reactions
 from ..dynamics.simulation import Trajectory, Workspace
 from ..shot.character import Array
+from .curves import Curves
 from .steady import SteadyState
 
 
@@ -47,3 +50,20 @@ def run_forward(
     states = trajectory.states
     positions, rotations = target_frames(model, states.c, states.q, states.u)
     return ForwardRun(trajectory, joint_angles, joint_rates, positions, rotations)
+
+
+def limited_values(
+    model: Model, names: Collection[str], curves: Curves, run: ForwardRun
+) -> dict[str, Array]:  # fmt: skip
+    """The quantities that limits are about, by name, shape [T, M] each.
+
+    Args:
+        names: Which of `limits.QUANTITIES`.
+        curves: Of the motors, as simulated.
+        run: The simulation.
+    """
+    found = {"position": curves.angles, "velocity": curves.rates, "acceleration": curves.accelerations}
+    if "effort" in names:
+        efforts = reactions(model.system, run.trajectory, run.joint_angles, run.joint_rates).efforts
+        found["effort"] = model.motor_values(efforts)
+    return {name: found[name] for name in names}

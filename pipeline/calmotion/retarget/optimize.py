@@ -20,18 +20,20 @@ from .approach import approach
 from .bodies import mode_tables, skins
 from .checkpoint import Checkpoint, problem_key
 from .curves import sample_curves
+from .forward import limited_values
 from .gauss_newton import Search, minimize
 from .limit_costs import limit_costs
 from .limits import Excess, excesses, motor_bounds
 from .offset_basis import OffsetBasis, basis_on
 from .posing import locked_coefficients, pose
 from .prepare import Options, Prepared, failure_error, lowest_frequency, prepare, refuse_half_turns
-from .problem import RetargetProblem, compile_kernels, limited_values
+from .problem import RetargetProblem
 from .pruning import block_energies, worthless
 from .recycling import Recycled
 from .reference import MeantMotion
 from .report import left_out_rows, limit_uses, reference_motion, simulation_of
 from .run import Progress, meant_motion
+from .simulator import compile_kernels
 
 UNCHANGED = 1e-5  # an offset that stays below this angle [rad] is none
 WORTH = 0.005  # of the tolerance: what an iteration must be expected to gain

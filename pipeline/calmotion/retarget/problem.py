@@ -2,58 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection
+from collections.abc import Callable
 from copy import copy
 
 import numpy as np
 from scipy.sparse import csr_matrix
 
-from ..dynamics.continuous_adjoint import continuous_adjoint
 from ..dynamics.failure import SimulationFailure
-from ..dynamics.linearization import Linearization, linearize
 from ..dynamics.markers import WORLD_MARKER
 from ..dynamics.model import Model, rigid_model, with_damping
-from ..dynamics.periodic import Monodromy, periodic_adjoint, periodic_tangent
-from ..dynamics.reactions import reactions
-from ..dynamics.simulation import Workspace
-from ..dynamics.sweeps import adjoint, tangent
 from ..shot.character import Array, BoolArray, IntArray
 from .curves import Curves
-from .forward import ForwardRun, run_forward
+from .forward import ForwardRun, limited_values
 from .limited_step import LimitedStep, ModelPoint, limited_step
 from .limits import LimitTerms
 from .objective import Objective
 from .offset_basis import OffsetBasis
 from .preconditioner import RigidPreconditioner, RigidResponse
 from .reference import rigid_motion
-from .steady import SteadyState
+from .simulator import Simulator
 from .time_grid import TimeGrid
-
-
-def limited_values(
-    model: Model, names: Collection[str], curves: Curves, run: ForwardRun
-) -> dict[str, Array]:  # fmt: skip
-    """The quantities that limits are about, by name, shape [T, M] each.
-
-    Args:
-        names: Which of `limits.QUANTITIES`.
-        curves: Of the motors, as simulated.
-        run: The simulation.
-    """
-    found = {"position": curves.angles, "velocity": curves.rates, "acceleration": curves.accelerations}
-    if "effort" in names:
-        efforts = reactions(model.system, run.trajectory, run.joint_angles, run.joint_rates).efforts
-        found["effort"] = model.motor_values(efforts)
-    return {name: found[name] for name in names}
-
-
-def compile_kernels(
-    model: Model, workspace: Workspace, angles: Array, rates: Array, h: float, world: Array | None = None
-) -> None:
-    """Run every kernel once on three instants, so that compiling them is not counted as simulating."""
-    run = run_forward(model, workspace, angles[:3], rates[:3], h, None if world is None else world[:3])
-    lin = linearize(model.system, run.trajectory, run.joint_angles, run.joint_rates, workspace)
-    adjoint(lin, *tangent(lin, run.joint_angles, run.joint_rates, efforts=True))
 
 
 class RetargetProblem:
@@ -78,17 +46,13 @@ class RetargetProblem:
         motors: IntArray, smoothness: float, closeness: float, world: Array | None = None,
         limits: LimitTerms | None = None, continuous: bool = False,
     ):  # fmt: skip
-        self.model, self.grid, self.objective = model, grid, objective
+        self.grid, self.objective = grid, objective
         self.curves, self.motors, self.world, self.limits = curves, motors, world, limits
         self._smoothness, self._closeness = smoothness, closeness
-        self._workspace = Workspace.for_system(model.system)
-        self._steady = SteadyState(model, world, grid.h, self._workspace) if grid.cyclic else None
-        self._monodromy: Monodromy | None = None
+        self._simulator = Simulator(model, grid.h, world, grid.cyclic)
         self._run: ForwardRun | None = None
         self.failure: SimulationFailure | None = None  # of the last point that could not be simulated
-        self._linearization: Linearization | None = None
         self._continuous = continuous
-        self._for_continuous: Linearization | None = None
         self._residuals = self._inverse = self._jacobian = np.zeros(0)
         self._limited: dict[str, Array] | None = None
         self._x = self._linearized_x = np.zeros(0)
@@ -122,6 +86,11 @@ class RetargetProblem:
         return self.basis.count * len(self.motors)
 
     @property
+    def model(self) -> Model:
+        """The robot."""
+        return self._simulator.model
+
+    @property
     def run(self) -> ForwardRun:
         """The simulation of the point evaluated last."""
         assert self._run is not None
@@ -140,7 +109,7 @@ class RetargetProblem:
     @property
     def growth(self) -> float:
         """By how much a disturbance of the loop simulated last grows at most from one to the next; 0 if none loops."""
-        return 0.0 if self._steady is None else self._steady.growth
+        return self._simulator.growth
 
     @property
     def limits_act(self) -> bool:
@@ -179,9 +148,7 @@ class RetargetProblem:
         values, rates = self.offsets(x)
         angles, rates = self.curves.angles + values, self.curves.rates + rates
         try:
-            self._run = run_forward(
-                self.model, self._workspace, angles, rates, self.grid.h, self.world, steady=self._steady
-            )
+            self._run = self._simulator.run(angles, rates)
         except SimulationFailure as failure:
             self.failure = failure
             return np.inf
@@ -212,24 +179,18 @@ class RetargetProblem:
 
     def linearize(self) -> Array:
         """Linearise at the point evaluated last, and the gradient there."""
-        self._linearization = self._linearized(self._linearization)
+        self._simulator.linearize(self.run)
         self._linearized_x = self._x
-        if self._steady is not None:
-            self._monodromy = self._steady.known = Monodromy.of(self._linearization)
+        self._differentiate()
         return self.gradient()
 
     def linearized_at(self, x: Array) -> bool:
         """Whether this is the point evaluated last, and linearised."""
         return np.array_equal(x, self._x) and np.array_equal(x, self._linearized_x)
 
-    def _linearized(self, previous: Linearization | None, continuous: bool = False) -> Linearization:
-        run = self.run
-        states = run.trajectory.states
+    def _differentiate(self) -> None:
+        states = self.run.trajectory.states
         self._jacobian = self.objective.jacobian(states.c, states.q, states.u, self._inverse)
-        return linearize(
-            self.model.system, run.trajectory, run.joint_angles, run.joint_rates, self._workspace, previous,
-            continuous=continuous, begin=2 if self.grid.cyclic else 0,
-        )  # fmt: skip
 
     def gradient(self) -> Array:
         """Gradient of the merit where it was linearised; the limits may have changed since."""
@@ -239,10 +200,10 @@ class RetargetProblem:
 
     def continuous_gradient(self) -> Array:
         """The same by the continuous adjoint, with a linearisation of its own; limits of effort are beyond it."""
-        self._for_continuous = self._linearized(self._for_continuous, continuous=True)
+        self._differentiate()
         density = self.objective.scatter(self._jacobian, self._residuals)
-        by_angle, by_rate = continuous_adjoint(self._for_continuous, density)
-        return self._to_unknowns(by_angle, by_rate, self._limit_pulls()) + self.bend(self._x)
+        pulls = self._simulator.continuous_adjoint(self.run, density)
+        return self._to_unknowns(*pulls, self._limit_pulls()) + self.bend(self._x)
 
     def _limit_pulls(self) -> dict[str, Array]:
         if self.limits is None or not self.limits.on:
@@ -251,22 +212,12 @@ class RetargetProblem:
 
     def pull_back(self, residuals: Array, limited: dict[str, Array]) -> Array:
         """The transpose of `push_forward`: weighted residuals and limited quantities to the unknowns."""
-        assert self._linearization is not None
-        effort = limited.get("effort")
-        given = (
-            self.objective.scatter(self._jacobian, residuals),
-            None if effort is None else self.model.joint_angles(effort),
-        )  # fmt: skip
-        if self._monodromy is None:
-            by_angle, by_rate = adjoint(self._linearization, *given)
-        else:
-            by_angle, by_rate = periodic_adjoint(self._linearization, self._monodromy, *given)
-        return self._to_unknowns(by_angle, by_rate, limited)
+        pulls = self._simulator.adjoint(self.objective.scatter(self._jacobian, residuals), limited.get("effort"))
+        return self._to_unknowns(*pulls, limited)
 
-    def _to_unknowns(self, by_angle: Array, by_rate: Array, limited: dict[str, Array]) -> Array:
-        """Derivatives by the joints' angles and rates, shape [T, J], and by limited curves, gathered by unknown."""
-        pulled = self._gather(self.basis.values, self.model.motor_values(by_angle))
-        pulled += self._gather(self.basis.rates, self.model.motor_values(by_rate))
+    def _to_unknowns(self, by_value: Array, by_rate: Array, limited: dict[str, Array]) -> Array:
+        """Derivatives by the motors' values and rates, and by limited curves, shape [T, M], gathered by unknown."""
+        pulled = self._gather(self.basis.values, by_value) + self._gather(self.basis.rates, by_rate)
         for name, spline in self._splines.items():
             if name in limited:
                 pulled += self._gather(spline, limited[name])
@@ -274,21 +225,15 @@ class RetargetProblem:
 
     def push_forward(self, direction: Array) -> tuple[Array, dict[str, Array]]:
         """Change of the weighted residuals along a direction, shape [T, K, 6], and of the limited quantities."""
-        assert self._linearization is not None
-        values, rates = self.offsets(direction)
         efforts = self.limits is not None and self.limits.on and "effort" in self.limits.bounds
-        given = self.model.joint_angles(values), self.model.joint_angles(rates), efforts
-        if self._monodromy is None:
-            motion, effort = tangent(self._linearization, *given)
-        else:
-            motion, effort = periodic_tangent(self._linearization, self._monodromy, *given)
+        motion, effort = self._simulator.tangent(*self.offsets(direction), efforts)
         changes: dict[str, Array] = {}
         if self.limits is not None and self.limits.on:
             for name, spline in self._splines.items():
                 if name in self.limits.bounds:
                     changes[name] = self._spread(spline, direction)
             if efforts:
-                changes["effort"] = self.model.motor_values(effort)
+                changes["effort"] = effort
         return self.objective.gather(self._jacobian, motion), changes
 
     def product(self, direction: Array) -> Array:
@@ -344,10 +289,8 @@ class RetargetProblem:
     def damped(self, ratio: float, frequency: float) -> RetargetProblem:
         """The same problem without limits on a robot with more damping, see `model.with_damping`."""
         other = copy(self)
-        other.model, other.limits = with_damping(self.model, ratio, frequency), None
-        other._linearization, other._for_continuous, other._run, other._limited = None, None, None, None
-        other._monodromy = None
-        other._steady = None if self._steady is None else self._steady.for_model(other.model)
+        other._simulator = self._simulator.of(with_damping(self.model, ratio, frequency))
+        other._run, other._limited, other.limits = None, None, None
         return other
 
     def lever(self) -> float:

@@ -14,11 +14,10 @@ from ..shot import Animation, Character, Result, Track
 from ..shot.character import Array
 from .bodies import mode_tables, skins
 from .curves import sample_curves, sample_tracks
-from .forward import run_forward
+from .forward import limited_values, run_forward
 from .limits import excesses, motor_bounds
 from .objective import Objective
 from .prepare import Options, Prepared, failure_error, modes_of, prepare, refuse_half_turns
-from .problem import limited_values
 from .reference import MeantMotion, rigid_motion, static_motion
 from .report import left_out_rows, limit_uses, reference_motion, simulation_of
 from .shapers import shaped

@@ -1,0 +1,100 @@
+"""The motions of a robot for motor curves, from rest or in a loop, and their derivatives."""
+
+from __future__ import annotations
+
+from ..dynamics.continuous_adjoint import continuous_adjoint
+from ..dynamics.linearization import Linearization, linearize
+from ..dynamics.model import Model
+from ..dynamics.periodic import Monodromy, periodic_adjoint, periodic_tangent
+from ..dynamics.simulation import Workspace
+from ..dynamics.sweeps import adjoint, tangent
+from ..shot.character import Array
+from .forward import ForwardRun, run_forward
+from .steady import SteadyState
+
+
+def compile_kernels(
+    model: Model, workspace: Workspace, angles: Array, rates: Array, h: float, world: Array | None = None
+) -> None:
+    """Run every kernel once on three instants, so that compiling them is not counted as simulating."""
+    run = run_forward(model, workspace, angles[:3], rates[:3], h, None if world is None else world[:3])
+    lin = linearize(model.system, run.trajectory, run.joint_angles, run.joint_rates, workspace)
+    adjoint(lin, *tangent(lin, run.joint_angles, run.joint_rates, efforts=True))
+
+
+class Simulator:
+    """One robot over one time grid.
+
+    Args:
+        model: The robot.
+        h: Step [s].
+        world: Moving roots, shape [T, W, 18].
+        cyclic: Whether the shot loops.
+    """
+
+    def __init__(self, model: Model, h: float, world: Array | None, cyclic: bool):
+        self.model, self.h, self.world = model, h, world
+        self._workspace = Workspace.for_system(model.system)
+        self._steady = SteadyState(model, world, h, self._workspace) if cyclic else None
+        self._linearization: Linearization | None = None
+        self._for_continuous: Linearization | None = None
+        self._monodromy: Monodromy | None = None
+
+    def of(self, model: Model) -> Simulator:
+        """The same of another model of the same character; its loops begin near those of this one."""
+        other = Simulator(model, self.h, self.world, False)
+        if self._steady is not None:
+            other._steady = self._steady.for_model(model)
+        return other
+
+    def run(self, angles: Array, rates: Array) -> ForwardRun:
+        """Simulate motor curves of shape [T, M].
+
+        Raises:
+            SimulationFailure: They cannot be simulated.
+        """
+        return run_forward(self.model, self._workspace, angles, rates, self.h, self.world, steady=self._steady)
+
+    @property
+    def growth(self) -> float:
+        """By how much a disturbance of the loop simulated last grows at most from one to the next; 0 if none loops."""
+        return 0.0 if self._steady is None else self._steady.growth
+
+    def linearize(self, run: ForwardRun) -> None:
+        """Linearise about a run, for `tangent` and `adjoint`."""
+        self._linearization = self._linearized(run, self._linearization)
+        if self._steady is not None:
+            self._monodromy = self._steady.known = Monodromy.of(self._linearization)
+
+    def _linearized(self, run: ForwardRun, previous: Linearization | None, continuous: bool = False) -> Linearization:
+        return linearize(
+            self.model.system, run.trajectory, run.joint_angles, run.joint_rates, self._workspace, previous,
+            continuous=continuous, begin=0 if self._steady is None else 2,
+        )  # fmt: skip
+
+    def tangent(self, values: Array, rates: Array, efforts: bool) -> tuple[Array, Array]:
+        """Change of the components' coordinates, shape [T, B, N], and where wanted of the motors' efforts, [T, M], with
+        the motors' values and rates, shape [T, M]."""
+        assert self._linearization is not None
+        given = self.model.joint_angles(values), self.model.joint_angles(rates), efforts
+        if self._monodromy is None:
+            motion, effort = tangent(self._linearization, *given)
+        else:
+            motion, effort = periodic_tangent(self._linearization, self._monodromy, *given)
+        return motion, self.model.motor_values(effort)
+
+    def adjoint(self, gradient: Array, effort: Array | None) -> tuple[Array, Array]:
+        """The transpose of `tangent`: derivatives by the motors' values and rates, shape [T, M] each."""
+        assert self._linearization is not None
+        given = gradient, None if effort is None else self.model.joint_angles(effort)
+        if self._monodromy is None:
+            found = adjoint(self._linearization, *given)
+        else:
+            found = periodic_adjoint(self._linearization, self._monodromy, *given)
+        return self.model.motor_values(found[0]), self.model.motor_values(found[1])
+
+    def continuous_adjoint(self, run: ForwardRun, gradient: Array) -> tuple[Array, Array]:
+        """The same by the continuous adjoint, with a linearisation of its own, of a shot that plays once."""
+        self._for_continuous = self._linearized(run, self._for_continuous, continuous=True)
+        found = continuous_adjoint(self._for_continuous, gradient)
+        return self.model.motor_values(found[0]), self.model.motor_values(found[1])
