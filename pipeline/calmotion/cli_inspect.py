@@ -95,6 +95,7 @@ def inspect_report(run: Run) -> dict[str, Any]:
             for target in character.targets
         ],
         "system_frequencies_hz": modes.frequencies[:SHOWN_MODES].tolist() if modes else [],
+        "system_damping_ratios": modes.damping[:SHOWN_MODES].tolist() if modes else [],
         "mode_shapes": list(shapes.paths) if (shapes := run.get(ModeShapes)) else [],
         "notes": list(character.notes),
         "left_out": [left_out_row(row) for row in (*run.left_out(), *_without(reduced))],

@@ -48,8 +48,9 @@ def print_inspection(report: dict[str, Any], stream: TextIO) -> None:
         texts=2,
     )
     if report["system_frequencies_hz"]:
-        shown = ", ".join(f"{value:.4g}" for value in report["system_frequencies_hz"])
-        console.print(f"frequencies of the whole character in its first pose: {shown}, ... Hz")
+        modes = zip(report["system_frequencies_hz"], report["system_damping_ratios"], strict=True)
+        shown = ", ".join(f"{frequency:.4g} Hz ({ratio:.2g})" for frequency, ratio in modes)
+        console.print(f"modes of the whole character in its first pose, and their damping ratios: {shown}, ...")
     print_left_out(console, report["left_out"])
     if report["mode_shapes"]:
         console.print(f"mode shapes: {', '.join(report['mode_shapes'])}", soft_wrap=True)

@@ -66,7 +66,7 @@ class ReduceFlexibleBodies(Operator):
 
 
 class FindSystemModes(Operator):
-    """Natural frequencies of the whole character in its first pose."""
+    """Natural modes of the whole character in its first pose."""
 
     idname = "dynamics.modes"
     label = "Find the frequencies of the character"
@@ -79,10 +79,10 @@ class FindSystemModes(Operator):
         return _nothing_flexible(data)
 
     def execute(self, context: RunContext) -> Sequence[object]:
-        from calmotion.retarget.prepare import first_pose_frequencies
+        from calmotion.retarget.prepare import first_pose_modes
 
         context.progress(0.0, "compiling kernels, once")
-        return [SystemModes(first_pose_frequencies(*_inputs(context)))]
+        return [SystemModes(*first_pose_modes(*_inputs(context)))]
 
 
 class ShapeTracks(Operator):

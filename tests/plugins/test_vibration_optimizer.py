@@ -62,7 +62,8 @@ def test_properties_reach_the_optimiser(host, repository):
     assert result.gradients == 1 and result.objective_after < result.objective_before
     moving = [curve for curve in result.curves if curve.changed]
     assert moving and np.all(np.diff(moving[0].knots) > 0.15)
-    frequencies = run.get(SystemModes).frequencies
+    frequencies, damping = run.get(SystemModes).frequencies, run.get(SystemModes).damping
+    assert damping.shape == frequencies.shape and np.all(damping > 0.0) and damping[0] < 0.02
     assert np.all(np.diff(frequencies) >= 0.0) and frequencies[0] > 0.1
     assert len(run.get(ReducedBodies).bodies) == len(character.bodies)
 

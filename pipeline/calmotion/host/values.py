@@ -103,6 +103,12 @@ class ShapedTracks:
 
 @dataclass(frozen=True, eq=False)
 class SystemModes:
-    """Natural frequencies of the whole character in its first pose, motors held [Hz], ascending."""
+    """Natural modes of the whole character in its first pose, motors held.
+
+    Attributes:
+        frequencies: [Hz], ascending.
+        damping: Their ratios of critical.
+    """
 
     frequencies: Array
+    damping: Array

@@ -102,17 +102,19 @@ def excitations(
         return None  # the flexible robot will say so, with the place
 
 
-def first_pose_frequencies(character: Character, animation: Animation, bodies: Sequence[ReducedBody] | None) -> Array:
-    """Natural frequencies of the whole character in its first pose, motors held [Hz], ascending.
+def first_pose_modes(
+    character: Character, animation: Animation, bodies: Sequence[ReducedBody] | None
+) -> tuple[Array, Array]:
+    """Natural frequencies of the whole character in its first pose, motors held [Hz], ascending, and damping ratios.
 
     Raises:
         ShotError: It has no static equilibrium there.
     """
-    return modes_of(prepare(character, animation, bodies, Options(pre_roll=0.0)), animation)[0]
+    return modes_of(prepare(character, animation, bodies, Options(pre_roll=0.0)), animation)
 
 
 def modes_of(prepared: Prepared, animation: Animation) -> tuple[Array, Array]:
-    """The same of a shot that is prepared, and the damping ratios of these modes."""
+    """The same of a shot that is prepared."""
     angles, _ = sample_tracks(animation.tracks, prepared.grid)
     try:
         return system_modes(prepared.model, prepared.model.joint_angles(angles[0]), prepared.world[0])
