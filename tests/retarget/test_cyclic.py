@@ -78,10 +78,13 @@ def test_it_is_what_a_well_damped_robot_comes_to_in_many_loops(looping, dance, m
     assert np.abs(long.before.motion.target_positions[240:601] - found.before.motion.target_positions).max() > 1e-4
 
 
-def test_other_integrators_are_refused(looping, dance, bodies):
+def test_what_a_loop_cannot_do_is_refused(looping, dance, bodies):
     with pytest.raises(ShotError, match="BDF2 alone") as error:
         simulate_shot(looping, dance, bodies, dataclasses.replace(OPTIONS, integrator="newmark"), quiet)
     assert error.value.attribute == "--integrator"
+    with pytest.raises(ShotError, match="ease into") as error:
+        simulate_shot(looping, dance, bodies, dataclasses.replace(OPTIONS, pre_roll=0.5), quiet)
+    assert error.value.attribute == "--pre-roll"
 
 
 def test_a_range_locked_at_the_seam_is_locked_on_both_sides_of_it(looping, dance, bodies):

@@ -130,6 +130,14 @@ def lowest_frequency(prepared: Prepared, animation: Animation) -> float:
 def _refuse_unsupported(character: Character, animation: Animation, options: Options) -> None:
     if character.retarget.cyclic:
         refuse_open_loops(character, animation)
+        if options.pre_roll:
+            raise ShotError(
+                "a shot that loops has no beginning to ease into",
+                path=character.path,
+                attribute="--pre-roll",
+                found=f"{options.pre_roll:g} s",
+                remedy="Leave it out, or set calm:retarget:cyclic to false.",
+            )
         if options.integrator != "bdf2":
             raise ShotError(
                 "shots that loop are simulated by BDF2 alone",
