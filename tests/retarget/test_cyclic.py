@@ -112,3 +112,13 @@ def test_whole_turns_of_a_loop_are_no_jump(looping, dance, bodies):
     assert found.before.seam.max() < 1e-3
     # the forearm feels the same pull all the way: its tip is off by the centrifugal stretch and the sway alone
     assert 1e-3 < found.before.position_errors[:, 1].max() < 0.2
+
+
+def test_a_loop_that_is_not_found_says_what_to_do(looping, dance, bodies, monkeypatch):
+    from calmotion.dynamics import periodic
+
+    monkeypatch.setattr(periodic, "LIMIT", 1)
+    for job in (simulate_shot, optimize_shot):
+        with pytest.raises(ShotError, match="repeats itself") as error:
+            job(looping, dance, bodies, OPTIONS, quiet)
+        assert error.value.attribute == "calm:retarget:cyclic" and "calm:damping:ratio" in error.value.remedy

@@ -191,6 +191,15 @@ def refuse_half_turns(prepared: Prepared, angles: Array) -> None:
 def failure_error(prepared: Prepared, failure: SimulationFailure) -> ShotError:
     """A failed step in the user's words: which body, which joint, when."""
     tree, character, system = prepared.model.tree, prepared.character, prepared.model.system
+    if failure.reason == "does not settle":
+        return ShotError(
+            "no motion of the robot was found that repeats itself, loop after loop",
+            path=character.path,
+            attribute="calm:retarget:cyclic",
+            found=True,
+            remedy="Raise calm:damping:ratio, slow the loop down where it shakes most, or set calm:retarget:cyclic to "
+            "false.",
+        )
     when = failure.time_s - prepared.grid.pre_roll
     what = f"{_REASONS[failure.reason]} at {when:.3f} s"
     bend = None if failure.state is None else most_bent(system, failure.state)
@@ -216,5 +225,4 @@ _REASONS = {
     "diverged": "diverges",
     "refined": "can only go on with smaller steps",
     "no static equilibrium": "finds no static equilibrium",
-    "does not settle": "finds no motion that repeats itself",
 }
