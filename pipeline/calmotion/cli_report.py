@@ -100,7 +100,7 @@ def run_report(run: Run, character: Character, result: Result, command: str, tot
         "wall_s": result.wall_s,
         "total_wall_s": total_wall_s,
         "peak_memory_gb": peak if math.isfinite(peak := peak_memory()) else None,
-        "steps": round((float(final.motion.times[-1]) + result.pre_roll_s) / result.step_s) + 1,
+        "steps": len(final.motion.times),
         "step_s": result.step_s,
         "pre_roll_s": result.pre_roll_s,
         "dof": result.dof,

@@ -23,15 +23,15 @@ from ..kernels import allocating_kernel, kernel
 from ..shot.character import Array
 from .linearization import Linearization
 from .loops import UNKNOWNS, solve_system_transposed
-from .sliders import has_row
+from .sweeps import pull_on_motors, pull_on_velocities
 
 
 @kernel
-def _turned(R, x, sign, y):
-    """y[:3] += sign R x[:3]."""
+def _turned(R, x, y):
+    """y[:3] += R x[:3]."""
     for i in range(3):
         for k in range(3):
-            y[i] += sign * R[i, k] * x[k]
+            y[i] += R[i, k] * x[k]
 
 
 @allocating_kernel
@@ -77,7 +77,7 @@ def _sweep(system, h, density, first, last, data, pivots, g_angle, g_rate, momen
             system, Lc[at], Lp[at], Hc[at], Hp[at], Nc[at], Jp[at], lu[at], pivots[at], Z[at], inverse[at], x, lam, X,
             tree, y, g, block,
         )  # fmt: skip
-        _by_motors(system, x, lam, h, by_angle[at], by_rate[at], on_parent[at], g_angle[n], g_rate[n])
+        pull_on_motors(system, x, lam, h, by_angle[at], by_rate[at], on_parent[at], g_angle[n], g_rate[n])
         # S^T mu_xi = P^T mu + H_v^T mu_lambda - old, in body axes; P holds beta D
         for b in range(count):
             m = 6 + system.elastic[b]
@@ -89,42 +89,15 @@ def _sweep(system, h, density, first, last, data, pivots, g_angle, g_rate, momen
                     d += D[at, b, i, k] * x[b, i]
                 mu[b, k] = t
                 old[b, k] = d
-        for j in range(joints):
-            p = system.side[j, 0]
-            b = system.side[j, 1]
-            for i in range(6):
-                if not has_row(system, j, i):
-                    continue
-                for k in range(6 + system.elastic[b]):
-                    mu[b, k] -= Lc[at, j, k, i] * lam[j, i]
-                if p >= 0:
-                    for k in range(6 + system.elastic[p]):
-                        mu[p, k] -= Lp[at, j, k, i] * lam[j, i]
+        pull_on_velocities(system, Lc[at], Lp[at], lam, -1.0, mu)
         for b in range(count):
             m = 6 + system.elastic[b]
             for i in range(m):
                 momentum[now, b, i] = old[b, i] if i >= 3 else 0.0
                 mu_xi[now, b, i] = mu[b, i] if i >= 6 else 0.0
-            _turned(R[at, b], old[b], 1.0, momentum[now, b])
-            _turned(R[at, b], mu[b], 1.0, mu_xi[now, b])
-            _turned(R[at, b], mu[b, 3:], 1.0, mu_xi[now, b, 3:])
-
-
-@kernel
-def _by_motors(system, mu, lam, weight, by_angle, by_rate, on_parent, g_angle, g_rate):
-    """Minus the parts of the equations by angle and rate of each motor, times the multipliers and a weight."""
-    for j in range(len(system.rows)):
-        p = system.side[j, 0]
-        a = 0.0
-        r = 0.0
-        for i in range(6):
-            a += by_angle[j, i] * lam[j, i]
-            r += by_rate[j, i] * lam[j, i]
-        if p >= 0 and system.sliding[j]:
-            for i in range(6 + system.elastic[p]):
-                a += on_parent[j, i] * mu[p, i]
-        g_angle[j] = -weight * a
-        g_rate[j] = -weight * r
+            _turned(R[at, b], old[b], momentum[now, b])
+            _turned(R[at, b], mu[b], mu_xi[now, b])
+            _turned(R[at, b], mu[b, 3:], mu_xi[now, b, 3:])
 
 
 @allocating_kernel
@@ -147,7 +120,7 @@ def _start(system, data, pivots, mu_xi, g_angle, g_rate):
         system, Lc[0], Lp[0], Hc[0], Hp[0], Nc[0], Jp[0], lu[0], pivots[0], Z[0], inverse[0], x, lam, X, tree, y, g,
         block,
     )  # fmt: skip
-    _by_motors(system, x, lam, 1.0, by_angle[0], by_rate[0], on_parent[0], g_angle, g_rate)
+    pull_on_motors(system, x, lam, 1.0, by_angle[0], by_rate[0], on_parent[0], g_angle, g_rate)
 
 
 def continuous_adjoint(lin: Linearization, gradient: Array) -> tuple[Array, Array]:

@@ -14,11 +14,11 @@ from ..shot.character import Array
 from . import radau, runge_kutta
 from .drives import hermite_drive, stage_inputs
 from .failure import SimulationFailure
-from .markers import WORLD_MARKER
 from .schemes import SCHEMES
-from .simulation import Trajectory, Workspace, largest_gap, simulate
+from .simulation import Trajectory, Workspace, copy_of_instant, largest_gap, simulate
 from .statics import equilibrium
 from .system import State, System
+from .world import rooted
 
 INTEGRATORS = (*SCHEMES, "rk4", "radau")
 BLOWN_UP = 1e6  # velocity [m/s, rad/s]
@@ -58,9 +58,9 @@ def integrate(
             system, h, states, inputs, ws.work, ws.blocks, ws.factors, ws.scratch, slopes, BLOWN_UP
         )
         if component >= 0:
-            last = State(*[part[instant - 1].copy() for part in states])
+            last = copy_of_instant(states, instant - 1)
             raise SimulationFailure(instant * h, component, "diverged", last)
-    world = np.zeros((total, 0, WORLD_MARKER))
+    world = rooted(None, total)
     gap = largest_gap(system, angles, rates, states, world, ws.work)
     if progress is not None:
         progress(1.0)

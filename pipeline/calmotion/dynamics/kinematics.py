@@ -6,10 +6,11 @@ import numpy as np
 
 from ..kernels import allocating_kernel
 from ..shot.character import Array, IntArray
-from .markers import WORLD_MARKER, allocate_marker, marker_jacobian, marker_values
+from .markers import allocate_marker, marker_jacobian, marker_values
 from .model import Model
 from .so3 import matrix_of, quaternion_of
 from .system import State, System, allocate_state
+from .world import rooted
 
 
 @allocating_kernel
@@ -54,9 +55,7 @@ def system_poses(system: System, joint_angles: Array, world: Array | None = None
     """`rigid_poses` of a system alone."""
     total, count = len(joint_angles), len(system.parent)
     c, q = np.zeros((total, count, 3)), np.zeros((total, count, 4))
-    if world is None:
-        world = np.zeros((total, 0, WORLD_MARKER))
-    _rigid_poses(system, joint_angles, world, c, q, np.zeros((count, 3, 3)))
+    _rigid_poses(system, joint_angles, rooted(world, total), c, q, np.zeros((count, 3, 3)))
     return c, q
 
 

@@ -188,18 +188,6 @@ def rigid_model(model: Model) -> Model:
     return Model(rigid, model.tree, model.motor, model.sign, targets, model.rest_angles)
 
 
-__all__ = [
-    "BodyAnchors",
-    "Model",
-    "Targets",
-    "body_anchors",
-    "compile_model",
-    "rigid_body",
-    "rigid_model",
-    "span_tree",
-]
-
-
 def moves_freely(model: Model) -> BoolArray:
     """Which joints no motor holds."""
     rows = model.system.rows
@@ -224,3 +212,15 @@ def with_damping(model: Model, ratio: float, frequency: float) -> Model:
         damping=system.damping + retardation * system.stiffness, retardation=system.retardation + retardation
     )
     return replace(model, system=more)
+
+
+__all__ = [
+    "BodyAnchors",
+    "Model",
+    "Targets",
+    "body_anchors",
+    "compile_model",
+    "rigid_body",
+    "rigid_model",
+    "span_tree",
+]

@@ -22,10 +22,9 @@ import numpy as np
 from ..shot.character import Array
 from .failure import SimulationFailure
 from .linearization import Linearization, linearize, processors
-from .markers import WORLD_MARKER
-from .simulation import Trajectory, Workspace, simulate_on
+from .simulation import Trajectory, Workspace, copy_of_instant, simulate_on
 from .so3 import logarithm, matrix_of, turn
-from .sweeps import adjoint_sweep, tangent_sweep
+from .sweeps import sweep_back, sweep_forth
 from .system import State, System
 
 CLOSED = 1e-12  # distance of end and start at which a loop counts as closed [m, rad]
@@ -89,17 +88,11 @@ def tangent_from(
     """
     total, count, size = len(d_angle), len(lin.system.parent), lin.system.size
     dX = np.zeros((total, count, size))
-    d_effort = np.zeros((total if efforts else 0, len(lin.system.rows)))
     dc, nu, dth = np.zeros((3, count, 3)), np.zeros((3, count, size)), np.zeros((3, count, 3))
     dc[:2], nu[:2], dth[1] = start.shift, start.velocity, start.turn
     nu[:2, np.arange(size) >= 6 + lin.system.elastic[:, None]] = 0.0  # what pads it
     dX[1, :, 3:6], dX[:2, :, 6:] = start.turned, start.elastic
-    for first, last in lin.windows():
-        lin.load(first)
-        tangent_sweep(
-            lin.system, lin.trajectory.h, lin.trajectory.states.turn, d_angle, d_rate, first, last, lin.data,
-            lin.pivots, lin.axes(efforts), lin.trajectory.states.lam, dc, nu, dth, dX, d_effort,
-        )  # fmt: skip
+    d_effort = sweep_forth(lin, d_angle, d_rate, efforts, (dc, nu, dth), dX)
     ends = [(total - 2) % 3, (total - 1) % 3]
     end = Memory(dc[ends], dX[-1, :, 3:6].copy(), dX[-2:, :, 6:].copy(), nu[ends], dth[ends[1]].copy())
     return dX, d_effort, end
@@ -120,20 +113,11 @@ def adjoint_from(
     Xbar = gradient.copy()
     Xbar[:2] = 0.0
     total, count, size = Xbar.shape
-    joints = len(lin.system.rows)
-    efforts = effort_gradient is not None
-    effort_bar = np.zeros((0, joints)) if effort_gradient is None else effort_gradient
-    g_angle, g_rate = np.zeros((total, joints)), np.zeros((total, joints))
     cbar, nubar, thbar = np.zeros((total, count, 3)), np.zeros((total, count, size)), np.zeros((total, count, 3))
     cbar[-2:], nubar[-2:], thbar[-1] = end.shift, end.velocity, end.turn
     Xbar[-1, :, 3:6] += end.turned
     Xbar[-2:, :, 6:] += end.elastic
-    for first, last in reversed(lin.windows()):
-        lin.load(first)
-        adjoint_sweep(
-            lin.system, lin.trajectory.h, lin.trajectory.states.turn, Xbar, effort_bar, first, last, lin.data,
-            lin.pivots, lin.axes(efforts), lin.trajectory.states.lam, g_angle, g_rate, cbar, nubar, thbar,
-        )  # fmt: skip
+    g_angle, g_rate = sweep_back(lin, Xbar, effort_gradient, (cbar, nubar, thbar))
     start = Memory(cbar[:2], Xbar[1, :, 3:6], Xbar[:2, :, 6:], nubar[:2], thbar[1])
     return g_angle, g_rate, start
 
@@ -214,10 +198,6 @@ class Loop:
     gap: float
 
 
-def _instant(states: State, n: int) -> State:
-    return State(*[part[n].copy() for part in states])
-
-
 def opening(system: System, states: State) -> Memory:
     """What leads from the first two instants of a trajectory to its last two."""
     R0, R1, apart = np.zeros((3, 3)), np.zeros((3, 3)), np.zeros((len(system.parent), 3))
@@ -262,10 +242,9 @@ def find_loop(
     Raises:
         SimulationFailure: A step that cannot be solved, or no periodic motion was found ("does not settle").
     """
-    roots = np.zeros((len(angles), 0, WORLD_MARKER)) if world is None else world
 
     def play(first: State, second: State) -> Loop:
-        trajectory = simulate_on(system, first, second, angles, rates, h, ws, roots)
+        trajectory = simulate_on(system, first, second, angles, rates, h, ws, world)
         apart = opening(system, trajectory.states)
         return Loop(trajectory, apart, float(np.max(np.abs(apart.scaled(1.0 / SWAY).vector))))
 
@@ -297,7 +276,7 @@ def _step(
     states, part = loop.trajectory.states, 1.0
     while part >= least:
         try:
-            found = play(*moved(system, _instant(states, 0), _instant(states, 1), change.times(part)))
+            found = play(*moved(system, copy_of_instant(states, 0), copy_of_instant(states, 1), change.times(part)))
         except SimulationFailure:
             found = None
         if found is not None and found.gap < (1.0 - 0.25 * part) * loop.gap:

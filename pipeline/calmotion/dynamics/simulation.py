@@ -14,7 +14,6 @@ from .assembly import Work, allocate_work
 from .failure import SimulationFailure
 from .joints import joint_kinematics
 from .loops import copy_rows
-from .markers import WORLD_MARKER
 from .newton import Scratch, allocate_scratch
 from .refinement import refined_step
 from .schemes import SCHEMES
@@ -22,6 +21,7 @@ from .so3 import matrix_of
 from .start import initial_acceleration, instant_before
 from .statics import equilibrium
 from .system import Blocks, Factors, State, System, allocate_blocks, allocate_factors
+from .world import rooted
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,6 +58,11 @@ class Trajectory:
 def instant_of(states, n):
     """Views of instant n of a trajectory."""
     return State(states.c[n], states.q[n], states.u[n], states.turn[n], states.V[n], states.lam[n])
+
+
+def copy_of_instant(states: State, n: int) -> State:
+    """Instant n of a trajectory by itself."""
+    return State(*[part[n].copy() for part in states])
 
 
 @kernel
@@ -158,8 +163,7 @@ def simulate(
     """
     begin = time.perf_counter()
     total, ws = len(angles), workspace
-    if world is None:
-        world = np.zeros((total, 0, WORLD_MARKER))
+    world = rooted(world, total)
     if world.shape[1:] != ws.work.world.shape:
         raise ValueError(f"world must hold the motion of {len(ws.work.world)} markers")
     ws.work.world[:] = world[0]
@@ -174,9 +178,7 @@ def simulate(
         acceleration, states.lam[0] = initial_acceleration(system, first, angles[0], rates[0], motors, ws)
         earlier, states.turn[0] = instant_before(system, first, acceleration, h)
         ws.scratch.memory[:2] = acceleration
-    return _march(
-        system, integrator, 1, earlier, states, angles, rates, world, h, ws, progress, solved, begin
-    )  # fmt: skip
+    return _march(system, integrator, 1, earlier, states, angles, rates, world, h, ws, progress, solved, begin)
 
 
 def simulate_on(
@@ -196,13 +198,11 @@ def simulate_on(
         SimulationFailure: A step that cannot be solved.
     """
     begin, total, ws = time.perf_counter(), len(angles), workspace
-    if world is None:
-        world = np.zeros((total, 0, WORLD_MARKER))
     states = State(*[np.zeros((total,) + part.shape) for part in before])
     for part, first, second in zip(states, before2, before, strict=True):
         part[0], part[1] = first, second
     ws.scratch.memory[:] = (before.V - before2.V) / h
-    return _march(system, "bdf2", 2, before2, states, angles, rates, world, h, ws, None, 0, begin)
+    return _march(system, "bdf2", 2, before2, states, angles, rates, rooted(world, total), h, ws, None, 0, begin)
 
 
 def _march(
@@ -225,7 +225,7 @@ def _march(
             reason = "singular" if code == newton.SINGULAR else "diverged"
             exact = refined_step(system, integrator, h, instant, earlier, states, angles, rates, world, ws)
             if exact is None:
-                last_state = State(*[part[instant - 1].copy() for part in states])
+                last_state = copy_of_instant(states, instant - 1)
                 raise SimulationFailure(instant * h, component, reason, last_state)
             if not exact:
                 refined.append(instant)

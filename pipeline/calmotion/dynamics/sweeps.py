@@ -62,10 +62,43 @@ def _across(axes, lam, j):
     return fx, fy
 
 
+@kernel
+def pull_on_motors(system, x, lam, weight, by_angle, by_rate, on_parent, g_angle, g_rate):
+    """Derivatives by angle and rate of each motor, shape [J], from the multipliers of a transposed step: minus a weight
+    times the parts of its equations by them."""
+    for j in range(len(system.rows)):
+        p = system.side[j, 0]
+        ga = 0.0
+        gr = 0.0
+        for i in range(6):
+            ga -= by_angle[j, i] * lam[j, i]
+            gr -= by_rate[j, i] * lam[j, i]
+        if p >= 0 and system.sliding[j]:
+            for i in range(6 + system.elastic[p]):
+                ga -= on_parent[j, i] * x[p, i]
+        g_angle[j] = weight * ga
+        g_rate[j] = weight * gr
+
+
+@kernel
+def pull_on_velocities(system, Lc, Lp, lam, sign, y):
+    """y += sign L lam, shape [B, N]: L is minus the transpose of the constraints by velocity."""
+    for j in range(len(system.rows)):
+        p = system.side[j, 0]
+        b = system.side[j, 1]
+        for i in range(6):
+            if not has_row(system, j, i):
+                continue
+            t = sign * lam[j, i]
+            for k in range(6 + system.elastic[b]):
+                y[b, k] += Lc[j, k, i] * t
+            if p >= 0:
+                for k in range(6 + system.elastic[p]):
+                    y[p, k] += Lp[j, k, i] * t
+
+
 @allocating_kernel
-def tangent_sweep(
-    system, h, turns, d_angle, d_rate, first, last, data, pivots, axes, lam_of, dc, nu, dth, dX, d_effort
-):
+def _tangent(system, h, turns, d_angle, d_rate, first, last, data, pivots, axes, lam_of, dc, nu, dth, dX, d_effort):
     """Instants first..last-1, whose blocks the data hold; dc, nu, dth remember three instants, by turns."""
     P, D, Lc, Lp, Hc, Hp, Nc, Jp, by_angle, by_rate, on_parent, lu, Z, inverse, R, Hv = data
     joints = len(system.rows)
@@ -168,10 +201,10 @@ def tangent_sweep(
 
 
 @allocating_kernel
-def adjoint_sweep(
+def _adjoint(
     system, h, turns, Xbar, effort_bar, first, last, data, pivots, axes, lam_of, g_angle, g_rate, cbar, nubar, thbar
 ):  # fmt: skip
-    """Transpose of `tangent_sweep`; Xbar (body axes), cbar (world axes), nubar, thbar are overwritten."""
+    """Transpose of `_tangent`; Xbar (body axes), cbar (world axes), nubar, thbar are overwritten."""
     P, D, Lc, Lp, Hc, Hp, Nc, Jp, by_angle, by_rate, on_parent, lu, Z, inverse, R, Hv = data
     joints = len(system.rows)
     _, count, size = Xbar.shape
@@ -225,32 +258,10 @@ def adjoint_sweep(
             system, Lc[at], Lp[at], Hc[at], Hp[at], Nc[at], Jp[at], lu[at], pivots[at], Z[at], inverse[at], x, lam, X,
             tree, y, g, block,
         )  # fmt: skip
-        for j in range(joints):
-            p = system.side[j, 0]
-            ga = 0.0
-            gr = 0.0
-            for i in range(6):
-                ga -= by_angle[at, j, i] * lam[j, i]
-                gr -= by_rate[at, j, i] * lam[j, i]
-            if p >= 0 and system.sliding[j]:
-                for i in range(6 + system.elastic[p]):
-                    ga -= on_parent[at, j, i] * x[p, i]
-            g_angle[n, j] = ga
-            g_rate[n, j] = gr
+        pull_on_motors(system, x, lam, 1.0, by_angle[at], by_rate[at], on_parent[at], g_angle[n], g_rate[n])
         if n == 0:
             continue
-        for j in range(joints):
-            p = system.side[j, 0]
-            b = system.side[j, 1]
-            for i in range(6):
-                if not has_row(system, j, i):
-                    continue
-                t = lam[j, i]
-                for k in range(6 + system.elastic[b]):
-                    hV[b, k] += Lc[at, j, k, i] * t
-                if p >= 0:
-                    for k in range(6 + system.elastic[p]):
-                        hV[p, k] += Lp[at, j, k, i] * t
+        pull_on_velocities(system, Lc[at], Lp[at], lam, 1.0, hV)
         for b in range(count):
             m = 6 + system.elastic[b]
             for i in range(m):
@@ -310,16 +321,27 @@ def tangent(lin: Linearization, d_angle: Array, d_rate: Array, efforts: bool = F
     """
     total, count, size = len(d_angle), len(lin.system.parent), lin.system.size
     dX = np.zeros((total, count, size))
-    d_effort = np.zeros((total if efforts else 0, len(lin.system.rows)))
-    # of three instants: translation in world axes, velocity, turn
     memory = np.zeros((3, count, 3)), np.zeros((3, count, size)), np.zeros((3, count, 3))
+    return dX, sweep_forth(lin, d_angle, d_rate, efforts, memory, dX)
+
+
+def sweep_forth(
+    lin: Linearization, d_angle: Array, d_rate: Array, efforts: bool, memory: tuple[Array, Array, Array], dX: Array
+) -> Array:
+    """The tangent over all windows, into dX, shape [T, B, N]; the change of the efforts, as `tangent` returns it.
+
+    Args:
+        memory: Translation in world axes, velocity and turn of three instants, by turns, shapes [3, B, 3], [3, B, N],
+            [3, B, 3]; what comes before the first window on entry, what the last one leaves on return.
+    """
+    d_effort = np.zeros((len(d_angle) if efforts else 0, len(lin.system.rows)))
     for first, last in lin.windows():
         lin.load(first)
-        tangent_sweep(
+        _tangent(
             lin.system, lin.trajectory.h, lin.trajectory.states.turn, d_angle, d_rate, first, last, lin.data,
             lin.pivots, lin.axes(efforts), lin.trajectory.states.lam, *memory, dX, d_effort,
         )  # fmt: skip
-    return dX, d_effort
+    return d_effort
 
 
 def adjoint(lin: Linearization, gradient: Array, effort_gradient: Array | None = None) -> tuple[Array, Array]:
@@ -334,14 +356,27 @@ def adjoint(lin: Linearization, gradient: Array, effort_gradient: Array | None =
     """
     Xbar = gradient.copy()
     total, count, size = Xbar.shape
-    joints = len(lin.system.rows)
+    memory = np.zeros((total, count, 3)), np.zeros((total, count, size)), np.zeros((total, count, 3))
+    return sweep_back(lin, Xbar, effort_gradient, memory)
+
+
+def sweep_back(
+    lin: Linearization, Xbar: Array, effort_gradient: Array | None, memory: tuple[Array, Array, Array]
+) -> tuple[Array, Array]:
+    """The transpose of `sweep_forth`; derivatives by angle and rate of each joint's motor, shape [T, J] each.
+
+    Args:
+        Xbar: Derivative by the components' coordinates, shape [T, B, N]; overwritten.
+        memory: Derivatives by translation, velocity and turn of all instants, shapes [T, B, 3], [T, B, N], [T, B, 3];
+            overwritten.
+    """
+    total, joints = len(Xbar), len(lin.system.rows)
     efforts = effort_gradient is not None
     effort_bar = np.zeros((0, joints)) if effort_gradient is None else effort_gradient
     g_angle, g_rate = np.zeros((total, joints)), np.zeros((total, joints))
-    memory = np.zeros((total, count, 3)), np.zeros((total, count, size)), np.zeros((total, count, 3))
     for first, last in reversed(lin.windows()):
         lin.load(first)
-        adjoint_sweep(
+        _adjoint(
             lin.system, lin.trajectory.h, lin.trajectory.states.turn, Xbar, effort_bar, first, last, lin.data,
             lin.pivots, lin.axes(efforts), lin.trajectory.states.lam, g_angle, g_rate, *memory,
         )  # fmt: skip

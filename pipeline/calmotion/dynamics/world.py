@@ -21,6 +21,11 @@ def pack(positions: Array, velocities: Array, spins: Array, matrices: Array) -> 
     return out
 
 
+def rooted(world: Array | None, total: int) -> Array:
+    """Moving markers at all instants, shape [T, W, 18]: those given, or none."""
+    return np.zeros((total, 0, WORLD_MARKER)) if world is None else world
+
+
 def between(world: Array, h: float, share: float) -> Array:
     """Markers at a share of the way between two instants h [s] apart, shape [2, W, 18]; cubic in position and turn."""
     if world.shape[1] == 0:

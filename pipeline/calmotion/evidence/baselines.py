@@ -15,14 +15,13 @@ from dataclasses import asdict, dataclass
 
 import numpy as np
 
-from ..dynamics.simulation import Workspace
 from ..retarget.approach import approach
 from ..retarget.curves import Curves
-from ..retarget.forward import run_forward
 from ..retarget.gauss_newton import minimize
 from ..retarget.prepare import Options, modes_of, prepare
 from ..retarget.problem import RetargetProblem
 from ..retarget.shapers import SHAPERS, delay, shaped
+from ..retarget.simulator import Simulator
 from ..shot.character import Array
 from .optimizer import make_problem
 from .shots import MADE, BenchShot, load
@@ -57,16 +56,14 @@ def compare(shot: BenchShot) -> list[Row]:
     prepared = prepare(shot.character, shot.animation, shot.bodies, Options())
     problem = make_problem(shot, prepared, 0.05)
     frequencies, damping = modes_of(prepared, shot.animation)
-    workspace = Workspace.for_system(prepared.model.system)
+    simulator = Simulator(prepared.model, prepared.grid.h, prepared.world, prepared.grid.cyclic)
     rows = []
     for kind in ("as animated", *SHAPERS):
         curves, late = problem.curves, 0.0
         if kind in SHAPERS:
             curves = shaped(problem.curves, prepared.grid, kind, frequencies, damping)
             late = delay(kind, frequencies, damping)
-        run = run_forward(
-            prepared.model, workspace, curves.angles, curves.rates, prepared.grid.h, prepared.world
-        )  # fmt: skip
+        run = simulator.run(curves.angles, curves.rates)
         rows.append(_row(shot, kind.replace("2", ", two modes"), late, problem, curves, run.target_positions))
     zero, free = np.zeros(problem.size), np.zeros(problem.size, bool)
     problem.value(zero)

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING
+
+from .drawing import mark_measured, plain, save
 
 if TYPE_CHECKING:
     from .gradients import GradientError
@@ -15,10 +16,7 @@ COLORS = {"discrete": "#0072b2", "continuous": "#d55e00"}
 def draw(folder: str, found: Sequence[GradientError]) -> str:
     """Draw to `<folder>/gradients.png` and return the path."""
     from matplotlib.figure import Figure
-    from matplotlib.ticker import NullFormatter
 
-    target = Path(folder)
-    target.mkdir(parents=True, exist_ok=True)
     shots = list(dict.fromkeys(row.shot for row in found))
     figure = Figure(figsize=(0.8 + 4.2 * len(shots), 3.8), layout="constrained")
     axes = figure.subplots(1, len(shots), squeeze=False, sharey=True)[0]
@@ -33,15 +31,9 @@ def draw(folder: str, found: Sequence[GradientError]) -> str:
         times = [row.forward_s + row.gradient_s for row in rows]
         panel.loglog(times, [row.floor for row in rows], ":", color="#777777", lw=1.2, label="floor of the differences")
         panel.set_title(f"{shot}, steps of 1/{1.0 / rows[0].step_s:.0f} to 1/{1.0 / rows[-1].step_s:.0f} s", fontsize=9)
-        # the measured times, where they are: labels of a logarithmic axis run into each other over a short range
-        panel.set_xticks(times, [f"{seconds:.2g}" for seconds in times])
-        panel.xaxis.set_minor_formatter(NullFormatter())
+        mark_measured(panel, times, [f"{seconds:.2g}" for seconds in times])
         panel.set_xlabel("simulation and gradient [s]")
-        panel.grid(True, which="major", lw=0.3, alpha=0.6)
-        for side in ("top", "right"):
-            panel.spines[side].set_visible(False)
+    plain(axes)
     axes[0].set_ylabel("error of directional derivatives, relative")
     axes[-1].legend(frameon=False, fontsize=8, loc="center left", bbox_to_anchor=(1.0, 0.5))
-    path = target / "gradients.png"
-    figure.savefig(path, dpi=150)
-    return str(path)
+    return save(figure, folder, "gradients")

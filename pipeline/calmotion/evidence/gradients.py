@@ -90,19 +90,9 @@ def errors(shot: BenchShot, steps: tuple[int, ...] = STEPS) -> list[GradientErro
         same, floor = _differences(problem, directions)
         forward = median_time(partial(problem.value, np.zeros(problem.size)), REPEATS)
         for name, gradient in (("discrete", problem.linearize), ("continuous", problem.continuous_gradient)):
-            found = directions @ gradient()
-            rows.append(
-                GradientError(
-                    shot.name,
-                    name,
-                    problem.grid.h,
-                    forward,
-                    median_time(gradient, REPEATS),
-                    float(np.max(np.abs(found - same))) / scale,
-                    float(np.max(np.abs(found - judge))) / scale,
-                    floor,
-                )  # fmt: skip
-            )
+            found, seconds = directions @ gradient(), median_time(gradient, REPEATS)
+            off, fine = (float(np.max(np.abs(found - values))) / scale for values in (same, judge))
+            rows.append(GradientError(shot.name, name, problem.grid.h, forward, seconds, off, fine, floor))
     return rows
 
 

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..shot.character import Array
+from .drawing import plain, save
 
 if TYPE_CHECKING:
     from .integrators import Measured
@@ -24,8 +24,6 @@ def draw(
     """Draw to `<folder>/integrators.png` and return the path."""
     from matplotlib.figure import Figure
 
-    target = Path(folder)
-    target.mkdir(parents=True, exist_ok=True)
     figure = Figure(figsize=(10.5, 7.5), layout="constrained")
     axes = figure.subplots(2, 2).ravel()
     for panel, (name, rows) in zip(axes[:2], measured.items(), strict=True):
@@ -44,13 +42,8 @@ def draw(
     axes[3].set_title("Damping ratio that BDF2 adds", loc="left", fontsize=10)
     axes[3].set_xlabel("steps in a period")
     axes[3].legend(frameon=False, fontsize=8)
-    for panel in axes:
-        panel.grid(True, which="major", lw=0.3, alpha=0.6)
-        for side in ("top", "right"):
-            panel.spines[side].set_visible(False)
-    path = target / "integrators.png"
-    figure.savefig(path, dpi=150)
-    return str(path)
+    plain(axes)
+    return save(figure, folder, "integrators")
 
 
 def _errors(panel: Any, name: str, rows: list[Measured]) -> None:

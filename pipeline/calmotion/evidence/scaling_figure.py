@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING
+
+from .drawing import mark_measured, plain, save
 
 if TYPE_CHECKING:
     from .exudyn_arm import Run
@@ -18,8 +19,6 @@ def draw(folder: str, found: Sequence[Growth], peers: Sequence[Run]) -> str:
     from matplotlib.figure import Figure
     from matplotlib.ticker import NullFormatter
 
-    target = Path(folder)
-    target.mkdir(parents=True, exist_ok=True)
     count = len(found) + bool(peers)
     figure = Figure(figsize=(3.6 * count, 3.4), layout="constrained")
     axes = figure.subplots(1, count, squeeze=False)[0]
@@ -27,9 +26,7 @@ def draw(folder: str, found: Sequence[Growth], peers: Sequence[Run]) -> str:
         panel.loglog(item.values, [1e3 * seconds for seconds in item.seconds], "o-", color=BLUE, lw=1.2, ms=4)
         panel.set_title(f"exponent {item.exponent:.2f}", loc="left", fontsize=10)
         panel.set_xlabel(item.name)
-        # the measured values, where they are: labels of a logarithmic axis run into each other over a short range
-        panel.set_xticks(item.values, [f"{value:,}" for value in item.values])
-        panel.xaxis.set_minor_formatter(NullFormatter())
+        mark_measured(panel, item.values, [f"{value:,}" for value in item.values])
         panel.yaxis.set_minor_formatter(NullFormatter())
         panel.set_ylabel("whole simulation [ms]" if item.name == "steps" else "step [ms]")
     for code in dict.fromkeys(run.code for run in peers):
@@ -41,10 +38,5 @@ def draw(folder: str, found: Sequence[Growth], peers: Sequence[Run]) -> str:
         axes[-1].set_xlabel("run time [s]")
         axes[-1].set_ylabel("largest error of the tip [m]")
         axes[-1].legend(frameon=False, fontsize=8)
-    for panel in axes:
-        panel.grid(True, which="major", lw=0.3, alpha=0.6)
-        for side in ("top", "right"):
-            panel.spines[side].set_visible(False)
-    path = target / "scaling.png"
-    figure.savefig(path, dpi=150)
-    return str(path)
+    plain(axes)
+    return save(figure, folder, "scaling")

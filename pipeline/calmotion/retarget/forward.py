@@ -17,13 +17,17 @@ from .steady import SteadyState
 
 @dataclass(frozen=True, eq=False)
 class ForwardRun:
-    """One forward simulation and what the targets do in it."""
+    """One forward simulation and what the targets do in it.
+
+    `growth` is that of `Monodromy` for a loop, 0 for a shot that plays once.
+    """
 
     trajectory: Trajectory
     joint_angles: Array
     joint_rates: Array
     target_positions: Array
     target_rotations: Array
+    growth: float = 0.0
 
 
 def run_forward(
@@ -49,12 +53,11 @@ def run_forward(
         )
     states = trajectory.states
     positions, rotations = target_frames(model, states.c, states.q, states.u)
-    return ForwardRun(trajectory, joint_angles, joint_rates, positions, rotations)
+    growth = 0.0 if steady is None else steady.growth
+    return ForwardRun(trajectory, joint_angles, joint_rates, positions, rotations, growth)
 
 
-def limited_values(
-    model: Model, names: Collection[str], curves: Curves, run: ForwardRun
-) -> dict[str, Array]:  # fmt: skip
+def limited_values(model: Model, names: Collection[str], curves: Curves, run: ForwardRun) -> dict[str, Array]:
     """The quantities that limits are about, by name, shape [T, M] each.
 
     Args:

@@ -127,8 +127,7 @@ def _search(
         raise failure_error(prepared, problem.failure)
     before, before_value, used_before = problem.run, problem.objective_value(), _used(problem, character)
     if problem.limits is not None:
-        seconds = float(grid.frame_times[-1])
-        problem.limits.rho = FIRST_PENALTY * max(before_value, problem.worth(1e-3 * tolerance)) / seconds
+        problem.limits.rho = FIRST_PENALTY * max(before_value, problem.worth(1e-3 * tolerance)) / grid.end
     kept = Checkpoint(checkpoint, problem_key(problem, fixed, (options, tolerance)))
     resumed = kept.load(problem.limits)
     search, interrupted = Search.start(start), False
@@ -167,7 +166,7 @@ def _search(
         progress(0.95, "interrupted: writing the best so far")
     curves, x = _curves(problem, len(character.motors), search.x)
     problem.value(x)
-    run, after_value, used, growth = problem.run, problem.objective_value(), _used(problem, character), problem.growth
+    run, after_value, used = problem.run, problem.objective_value(), _used(problem, character)
     costs = {} if interrupted else limit_costs(problem, fixed)
     wall = time.perf_counter() - begin
     rows = left_out_rows(prepared)
@@ -179,7 +178,7 @@ def _search(
     return Result(
         reference=reference_motion(model, grid, meant, problem.curves.angles),
         before=simulation_of(model, grid, before, meant.reference, len(character.motors)),
-        after=simulation_of(model, grid, run, meant.reference, len(character.motors), growth),
+        after=simulation_of(model, grid, run, meant.reference, len(character.motors)),
         skins=skins(prepared.bodies),
         modes=mode_tables(prepared.bodies),
         curves=curves,
@@ -193,7 +192,7 @@ def _search(
         parameters=problem.size,
         wall_s=wall,
         step_s=grid.h,
-        pre_roll_s=0.0 if grid.cyclic else grid.pre_roll,
+        pre_roll_s=grid.pre_roll,
         dof=model.dof,
         left_out=tuple(rows),
         limits=limit_uses(used_before, used, grid, costs),
@@ -246,7 +245,7 @@ def _pruned(
         return search
     held = fixed | dropped
     begin = replace(search, x=np.where(held, 0.0, search.x), reason="", radius=np.inf)
-    limits, found = problem.limits, begin
+    limits = problem.limits
     found = minimize(problem, begin, held, WORTH * tolerance, max_iterations=max_iterations + 3)
     after = problem.value(found.x)
     if after <= value + 2.0 * budget and (limits is None or limits.kept(problem.limited)):

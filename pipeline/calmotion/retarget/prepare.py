@@ -200,7 +200,7 @@ def failure_error(prepared: Prepared, failure: SimulationFailure) -> ShotError:
             remedy="Raise calm:damping:ratio, slow the loop down where it shakes most, or set calm:retarget:cyclic to "
             "false.",
         )
-    when = failure.time_s - prepared.grid.pre_roll
+    when = failure.time_s + prepared.grid.times[0]
     what = f"{_REASONS[failure.reason]} at {when:.3f} s"
     bend = None if failure.state is None else most_bent(system, failure.state)
     if bend is not None and bend.share > _FAR:

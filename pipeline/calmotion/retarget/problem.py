@@ -9,8 +9,8 @@ import numpy as np
 from scipy.sparse import csr_matrix
 
 from ..dynamics.failure import SimulationFailure
-from ..dynamics.markers import WORLD_MARKER
 from ..dynamics.model import Model, rigid_model, with_damping
+from ..dynamics.world import rooted
 from ..shot.character import Array, BoolArray, IntArray
 from .curves import Curves
 from .forward import ForwardRun, limited_values
@@ -107,14 +107,14 @@ class RetargetProblem:
         return self._residuals
 
     @property
-    def growth(self) -> float:
-        """By how much a disturbance of the loop simulated last grows at most from one to the next; 0 if none loops."""
-        return self._simulator.growth
+    def _acting(self) -> LimitTerms | None:
+        """The limits where they are part of the merit now."""
+        return self.limits if self.limits is not None and self.limits.on else None
 
     @property
     def limits_act(self) -> bool:
         """Whether limits are part of the merit now."""
-        return self.limits is not None and self.limits.on
+        return self._acting is not None
 
     @property
     def limited(self) -> dict[str, Array]:
@@ -161,9 +161,8 @@ class RetargetProblem:
 
     def merit(self) -> float:
         """The merit at the point evaluated last, with the limits as they are now."""
-        if self.limits is None or not self.limits.on:
-            return self.objective_value()
-        return self.objective_value() + self.limits.value(self.limited)
+        value, limits = self.objective_value(), self._acting
+        return value if limits is None else value + limits.value(self.limited)
 
     @property
     def changed_curves(self) -> Curves:
@@ -206,9 +205,8 @@ class RetargetProblem:
         return self._to_unknowns(*pulls, self._limit_pulls()) + self.bend(self._x)
 
     def _limit_pulls(self) -> dict[str, Array]:
-        if self.limits is None or not self.limits.on:
-            return {}
-        return {name: self.limits.gradient(name, v) for name, v in self.limited.items()}
+        limits = self._acting
+        return {} if limits is None else {name: limits.gradient(name, v) for name, v in self.limited.items()}
 
     def pull_back(self, residuals: Array, limited: dict[str, Array]) -> Array:
         """The transpose of `push_forward`: weighted residuals and limited quantities to the unknowns."""
@@ -225,15 +223,11 @@ class RetargetProblem:
 
     def push_forward(self, direction: Array) -> tuple[Array, dict[str, Array]]:
         """Change of the weighted residuals along a direction, shape [T, K, 6], and of the limited quantities."""
-        efforts = self.limits is not None and self.limits.on and "effort" in self.limits.bounds
-        motion, effort = self._simulator.tangent(*self.offsets(direction), efforts)
-        changes: dict[str, Array] = {}
-        if self.limits is not None and self.limits.on:
-            for name, spline in self._splines.items():
-                if name in self.limits.bounds:
-                    changes[name] = self._spread(spline, direction)
-            if efforts:
-                changes["effort"] = effort
+        bounds = {} if self._acting is None else self._acting.bounds
+        motion, effort = self._simulator.tangent(*self.offsets(direction), "effort" in bounds)
+        changes = {name: self._spread(spline, direction) for name, spline in self._splines.items() if name in bounds}
+        if "effort" in bounds:
+            changes["effort"] = effort
         return self.objective.gather(self._jacobian, motion), changes
 
     def product(self, direction: Array) -> Array:
@@ -303,17 +297,17 @@ class RetargetProblem:
     def _rigid_response(self) -> RigidResponse:
         rigid = rigid_model(self.model)
         motion = rigid_motion(rigid, self.curves.angles, self.curves.rates, self.grid.h, self.world, self.grid.cyclic)
-        world = np.zeros((len(motion.c), 0, WORLD_MARKER)) if self.world is None else self.world
         angles = self.model.joint_angles(self.curves.angles)
+        world = rooted(self.world, len(motion.c))
         return RigidResponse.along(rigid, motion.c, motion.q, angles, self.motors, world, _STRIDE)
 
     def _metrics(self, inertia: Array, limited: dict[str, Array] | None) -> list[tuple[csr_matrix, Array]]:
         """What active limits add to the rigid robot's matrix: its efforts are inertia times acceleration."""
-        if self.limits is None or not self.limits.on:
+        limits, found = self._acting, []
+        if limits is None:
             return []
-        found = []
         for name, values in (limited or self.limited).items():
-            weight = self.limits.curvature(name, values)
+            weight = limits.curvature(name, values)
             if not np.any(weight):
                 continue
             if name == "effort":

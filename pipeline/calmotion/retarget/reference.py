@@ -12,9 +12,8 @@ from ..dynamics.simulation import Workspace
 from ..dynamics.statics import equilibrium
 from ..dynamics.system import State, allocate_state
 from ..shot.character import Array, BoolArray
-from .forward import run_forward
 from .objective import Reference
-from .steady import SteadyState
+from .simulator import Simulator
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,9 +37,7 @@ def rigid_motion(
     """The animation on a rigid robot: kinematics alone, or a rigid simulation where joints move freely."""
     rigid = rigid_model(model)
     if np.any(moves_freely(rigid)):
-        workspace = Workspace.for_system(rigid.system)
-        steady = SteadyState(rigid, world, h, workspace) if cyclic else None
-        run = run_forward(rigid, workspace, angles, rates, h, world, steady=steady)
+        run = Simulator(rigid, h, world, cyclic).run(angles, rates)
         states = run.trajectory.states
         return MeantMotion(states.c, states.q, run.target_positions, run.target_rotations)
     c, q = rigid_poses(rigid, model.joint_angles(angles), world)

@@ -66,9 +66,7 @@ def reference_motion(model: Model, grid: TimeGrid, rigid: MeantMotion, angles: A
     )  # fmt: skip
 
 
-def simulation_of(
-    model: Model, grid: TimeGrid, run: ForwardRun, reference: Reference, motors: int, growth: float = 0.0
-) -> Simulation:
+def simulation_of(model: Model, grid: TimeGrid, run: ForwardRun, reference: Reference, motors: int) -> Simulation:
     """A forward run as a value for the user, measured against the reference."""
     turned, _ = rotation_errors(reference.rotations, run.target_rotations)
     off = run.target_positions - reference.positions
@@ -83,7 +81,7 @@ def simulation_of(
         sag=np.zeros(0) if grid.cyclic else errors[0].copy(),
         refined_steps=len(run.trajectory.refined),
         dead_centres=grid.times[dead_centres(run.trajectory.margins)],
-        growth=growth,
+        growth=run.growth,
         seam=np.linalg.norm(off[-1] - off[shown][0], axis=1) if grid.cyclic else np.zeros(0),
     )
 
@@ -95,7 +93,7 @@ def left_out_rows(prepared: Prepared) -> list[LeftOut]:
     names = ", ".join(distinct_names(rigid).values())
     rows = [LeftOut("finite elements of " + names, "rigid: no CalmFlexibleBodyAPI")] if rigid else []
     rows += [row for body in prepared.bodies for row in body.left_out]
-    if grid.pre_steps == 0 or grid.cyclic:
+    if not grid.pre_roll:
         rows.append(LeftOut("pre-roll", "the shot loops" if grid.cyclic else "the shot starts at rest"))
     locked = [motor.path for motor in character.motors if not motor.optimize]
     rows += [LeftOut("optimisation of " + path, "calm:motor:optimize is false") for path in locked]

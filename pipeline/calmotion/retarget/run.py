@@ -91,9 +91,7 @@ def simulate_shot(
     residuals, _ = objective.residuals(run.target_positions, run.target_rotations)
     return Result(
         reference=reference_motion(model, grid, reference, meant),
-        before=simulation_of(
-            model, grid, run, reference.reference, len(character.motors), steady.growth if steady else 0.0
-        ),
+        before=simulation_of(model, grid, run, reference.reference, len(character.motors)),
         after=None,
         skins=skins(prepared.bodies),
         modes=mode_tables(prepared.bodies),
@@ -108,7 +106,7 @@ def simulate_shot(
         parameters=0,
         wall_s=wall,
         step_s=grid.h,
-        pre_roll_s=0.0 if grid.cyclic else grid.pre_roll,
+        pre_roll_s=grid.pre_roll,
         dof=model.dof,
         left_out=tuple(left_out_rows(prepared)),
         limits=limit_uses(used, used, grid),

@@ -55,11 +55,6 @@ class Simulator:
         """
         return run_forward(self.model, self._workspace, angles, rates, self.h, self.world, steady=self._steady)
 
-    @property
-    def growth(self) -> float:
-        """By how much a disturbance of the loop simulated last grows at most from one to the next; 0 if none loops."""
-        return 0.0 if self._steady is None else self._steady.growth
-
     def linearize(self, run: ForwardRun) -> None:
         """Linearise about a run, for `tangent` and `adjoint`."""
         self._linearization = self._linearized(run, self._linearization)

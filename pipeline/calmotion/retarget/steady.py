@@ -9,11 +9,11 @@ from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation, Slerp
 
 from ..dynamics.kinematics import rigid_state
-from ..dynamics.markers import WORLD_MARKER
 from ..dynamics.model import Model, start_angles
 from ..dynamics.periodic import Monodromy, find_loop
-from ..dynamics.simulation import Trajectory, Workspace, simulate
+from ..dynamics.simulation import Trajectory, Workspace, copy_of_instant, simulate
 from ..dynamics.system import State
+from ..dynamics.world import rooted
 from ..errors import ShotError
 from ..shot import Animation, Character, Track
 from ..shot.character import Array
@@ -55,7 +55,7 @@ class SteadyState:
             self.model.system, (start[0], start[1]), joint_angles, joint_rates, self.h, self._workspace, self.world,
             self.known,
         )  # fmt: skip
-        self._start = [State(*[part[n].copy() for part in loop.trajectory.states]) for n in (0, 1)]
+        self._start = [copy_of_instant(loop.trajectory.states, n) for n in (0, 1)]
         return loop.trajectory
 
     @property
@@ -66,11 +66,10 @@ class SteadyState:
     def _from_rest(self, joint_angles: Array, joint_rates: Array) -> list[State]:
         """The last two instants of a loop after one that got up to speed."""
         model, h = self.model, self.h
-        roots = np.zeros((len(joint_angles), 0, WORLD_MARKER)) if self.world is None else self.world
-        angles, rates, world = eased(joint_angles, joint_rates, roots, h)
+        angles, rates, world = eased(joint_angles, joint_rates, rooted(self.world, len(joint_angles)), h)
         state = rigid_state(model, start_angles(model, angles[0]), world[0])
         states = simulate(model.system, state, angles, rates, h, self._workspace, world=world).states
-        return [State(*[part[n].copy() for part in states]) for n in (-2, -1)]
+        return [copy_of_instant(states, n) for n in (-2, -1)]
 
 
 def eased(angles: Array, rates: Array, world: Array, h: float) -> tuple[Array, Array, Array]:

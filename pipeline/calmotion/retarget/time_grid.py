@@ -60,8 +60,8 @@ class TimeGrid:
 
     @property
     def pre_roll(self) -> float:
-        """Length of the pre-roll [s]."""
-        return self.pre_steps * self.h
+        """Length of the pre-roll [s]; a shot that loops has none."""
+        return 0.0 if self.cyclic else self.pre_steps * self.h
 
     @property
     def end(self) -> float:

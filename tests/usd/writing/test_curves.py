@@ -15,6 +15,15 @@ FRAMES = np.arange(13) / 24.0
 CURVE = MotorCurve(0, True, FRAMES, 0.3 * np.sin(9.0 * FRAMES), 0.3)
 
 
+def authored(path, attribute, linear):
+    """A layer with the curve of a motor, the path of its attribute, and what was written."""
+    layer = Sdf.Layer.CreateAnonymous(".usda")
+    motor = SimpleNamespace(path=path, attribute=attribute, linear=linear)
+    character = SimpleNamespace(motors=[motor], retarget=SimpleNamespace(cyclic=False))
+    clock = Clock(start=101, end=113, time_codes_per_second=24, frames_per_second=24)
+    return layer, f"{path}.{attribute}", author_curves(layer, character, (CURVE,), FRAMES, FRAMES, clock, 0.01)
+
+
 @pytest.mark.parametrize(("rate", "parts"), [(24.0, 1), (25.0, 2), (96.0, 4), (1.0, 1)])
 def test_samples_are_at_least_as_dense_as_asked_for_and_hold_the_frames(rate, parts):
     times = sample_times(FRAMES, rate)
@@ -32,19 +41,7 @@ def test_between_frames_a_curve_is_what_its_frames_are_read_back_as():
 
 
 def test_values_are_degrees_at_the_time_codes_of_the_stage():
-    layer = Sdf.Layer.CreateAnonymous(".usda")
-    motor = SimpleNamespace(path="/arm/elbow", attribute="drive:angular:physics:targetPosition", linear=False)
-    clock = Clock(start=101, end=113, time_codes_per_second=24, frames_per_second=24)
-    written = author_curves(
-        layer,
-        SimpleNamespace(motors=[motor], retarget=SimpleNamespace(cyclic=False)),
-        (CURVE,),
-        FRAMES,
-        FRAMES,
-        clock,
-        0.01,
-    )
-    path = f"{motor.path}.{motor.attribute}"
+    layer, path, written = authored("/arm/elbow", "drive:angular:physics:targetPosition", linear=False)
     assert written == {path: 13}
     assert layer.ListTimeSamplesForPath(path) == list(range(101, 114))
     assert layer.QueryTimeSample(path, 105) == pytest.approx(np.rad2deg(CURVE.frame_values[4]), abs=1e-5)
@@ -52,19 +49,7 @@ def test_values_are_degrees_at_the_time_codes_of_the_stage():
 
 
 def test_values_of_length_motors_are_in_the_stage_s_unit():
-    layer = Sdf.Layer.CreateAnonymous(".usda")
-    motor = SimpleNamespace(path="/arm/slide", attribute="drive:linear:physics:targetPosition", linear=True)
-    clock = Clock(start=101, end=113, time_codes_per_second=24, frames_per_second=24)
-    author_curves(
-        layer,
-        SimpleNamespace(motors=[motor], retarget=SimpleNamespace(cyclic=False)),
-        (CURVE,),
-        FRAMES,
-        FRAMES,
-        clock,
-        0.01,
-    )
-    path = f"{motor.path}.{motor.attribute}"
+    layer, path, _ = authored("/arm/slide", "drive:linear:physics:targetPosition", linear=True)
     assert layer.QueryTimeSample(path, 105) == pytest.approx(100.0 * CURVE.frame_values[4], rel=1e-6)
 
 

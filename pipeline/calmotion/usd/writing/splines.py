@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...shot import Animation, Character, MotorCurve
+from ...shot import Animation, Character, MotorCurve, Track
 from ...shot.character import Array
 from ..clock import Clock
 from .curves import attribute_spec
@@ -12,15 +12,12 @@ from .curves import attribute_spec
 SAME = 1e-9  # times that are closer are one [s]
 
 
-def hermite(
-    animation: Animation, curve: MotorCurve, cyclic: bool
-) -> tuple[Array, Array, Array]:  # fmt: skip
+def hermite(animation: Animation, curve: MotorCurve, cyclic: bool) -> tuple[Array, Array, Array]:
     """A motor's curve as a cubic between knots: times [s], values [rad or m] and slopes, shape [n] each.
 
     Knots are where the animation has samples and where the offset has knots; between them both are cubics.
     """
     from ...retarget.curves import curve_of
-    from ...shot import Track
 
     frames, track = animation.frame_times, animation.tracks[curve.motor]
     end = float(frames[-1])
