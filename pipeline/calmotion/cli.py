@@ -61,6 +61,12 @@ def _parser() -> argparse.ArgumentParser:
     inspect.add_argument(
         "--modes", metavar="DIR", help="folder for the mode shapes of the flexible bodies (.vtu, .png) and their table"
     )
+    inspect.add_argument(
+        "--strict",
+        action="store_true",
+        help="a gate before publishing: check everything that costs little, with USD's validators as well, list all "
+        "that is found, and end with status 1 if that is anything",
+    )
     simulate = _shot_command(commands, "simulate", _simulate, "simulate as animated")
     optimize = _shot_command(commands, "optimize", _optimize, "find motor curves that do not shake, and write them")
     simulate.add_argument("-o", "--output", metavar="LAYER", help="USD layer to write")

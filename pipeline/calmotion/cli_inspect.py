@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import dataclasses
 from collections.abc import Sequence
 from typing import Any, TextIO
 
@@ -12,10 +13,10 @@ from . import __version__
 from .cli_output import Output, Problem
 from .cli_progress import ProgressDisplay
 from .cli_report import left_out_row, operator_row
-from .cli_run import INTERRUPTED, carry_out, conclude, problems_of, settings_of
+from .cli_run import FAILED, INTERRUPTED, carry_out, conclude, problems_of, settings_of
 from .errors import ShotError
-from .host import ModeShapes, OutputPaths, ReducedBodies, Run, Source, SystemModes, open_host
-from .shot import Animation, Body, Character, LeftOut, ModeTable, Motor, Provenance, Track
+from .host import HostError, ModeShapes, OutputPaths, ReducedBodies, Run, Source, SystemModes, open_host
+from .shot import Animation, Body, Character, Findings, LeftOut, ModeTable, Motor, Provenance, Track
 from .shot.measure import measure_of
 
 SHOWN_MODES = 10
@@ -29,22 +30,32 @@ def inspect_shot(args: argparse.Namespace, output: Output) -> int:
         SettingError: When an option or setting does not fit.
     """
     host = open_host(args.plugins)
-    wanted: list[type] = [Character, Animation, Provenance]
+    # a gate is asked before the costly work, so it does none
+    wanted: list[type] = [Findings] if args.strict else [Character, Animation, Provenance]
     if args.modes:
         wanted.append(ModeShapes)
+    optional = [Character, Animation, Provenance] if args.strict else [ReducedBodies, SystemModes]
     with ProgressDisplay(args.quiet) as display:
         run = host.run(
-            [Source(path=args.shot, command="inspect"), OutputPaths(modes=args.modes)],
+            [Source(path=args.shot, command="check" if args.strict else "inspect"), OutputPaths(modes=args.modes)],
             wanted,
-            optional=[ReducedBodies, SystemModes],
+            optional=optional,
             settings=settings_of(args),
             progress=display,
         )
         interrupted = carry_out(run, display)
     problems = [Problem(ShotError("interrupted"))] if interrupted else problems_of(run, wanted)
-    report = inspect_report(run) if all(run.get(kind) for kind in wanted) else {}
-    status = conclude(report, problems, output, None if args.quiet else _print)
-    return INTERRUPTED if interrupted else status
+    findings = run.get(Findings)
+    if findings is not None:
+        # what the reader refuses is among the findings, with the rest
+        problems = [problem for problem in problems if isinstance(problem.error, HostError)]
+    report = inspect_report(run) if all(run.get(kind) for kind in (Character, Animation, Provenance)) else {}
+    if findings is not None:
+        report |= {"shot": args.shot, "findings": [dataclasses.asdict(finding) for finding in findings.items]}
+    status = conclude(report, problems, output, None if args.quiet and not args.strict else _print)
+    if interrupted:
+        return INTERRUPTED
+    return FAILED if findings is not None and findings.items else status
 
 
 def inspect_report(run: Run) -> dict[str, Any]:

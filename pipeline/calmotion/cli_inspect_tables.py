@@ -3,14 +3,34 @@
 from __future__ import annotations
 
 import math
-from typing import Any, TextIO
+from typing import TYPE_CHECKING, Any, TextIO
 
 from .cli_tables import angle, console_on, length, print_left_out, print_table
+from .shot.finding import ERROR, WARNING
+
+if TYPE_CHECKING:
+    from rich.console import Console
 
 
 def print_inspection(report: dict[str, Any], stream: TextIO) -> None:
-    """Print what is in a shot."""
+    """Print what is in a shot, and what a check found."""
     console = console_on(stream)
+    (_print_findings if "findings" in report else _print_contents)(console, report)
+
+
+def _print_findings(console: Console, report: dict[str, Any]) -> None:
+    for finding in report["findings"]:
+        place = ".".join(filter(None, (finding["path"], finding["attribute"])))
+        console.print(f"{finding['level']}: {place}", markup=False, highlight=False, soft_wrap=True)
+        for label in ("problem", "found", "remedy", "rule"):
+            if finding[label]:
+                console.print(f"  {label}: {finding[label]}", markup=False, highlight=False, soft_wrap=True)
+    levels = [finding["level"] for finding in report["findings"]]
+    counts = ", ".join(f"{levels.count(level)} {level}s" for level in (ERROR, WARNING))
+    console.print(f"{report['shot']}: {counts if levels else 'nothing was found'}", markup=False, soft_wrap=True)
+
+
+def _print_contents(console: Console, report: dict[str, Any]) -> None:
     units = report["units"]
     console.print(
         f"{report['shot']}: {report['character']}, {report['frames']} frames, {report['duration_s']:.4g} s",

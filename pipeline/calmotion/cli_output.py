@@ -11,7 +11,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any, TextIO
 
-from .errors import ShotError
+from .errors import ShotError, each
 
 
 @dataclass(frozen=True)
@@ -99,10 +99,12 @@ def _descriptor(stream: TextIO) -> int | None:
 
 def print_error(error: ShotError, output: Output) -> None:
     """Print an error: as the JSON object, or on stderr in lines for a person."""
+    single = each(error)
     if output.json:
-        output.object({"error": error.as_dict()})
+        output.object({"error": single[0].as_dict(), "errors": [one.as_dict() for one in single]})
     else:
-        tell_error(error)
+        for one in single:
+            tell_error(one)
 
 
 def tell_error(error: ShotError) -> None:

@@ -10,7 +10,7 @@ from typing import Any, TextIO
 
 from .cli_output import Output, Problem
 from .cli_progress import ProgressDisplay
-from .errors import ShotError
+from .errors import ShotError, each
 from .host import (
     CsvFile,
     Figures,
@@ -144,7 +144,7 @@ def carry_out(run: Run, display: ProgressDisplay) -> bool:
 
 def problems_of(run: Run, wanted: list[type]) -> list[Problem]:
     """What went wrong: operators that raised, else wanted values that were left out for another reason."""
-    problems = [_problem(result) for result in run.failures()]
+    problems = [problem for result in run.failures() for problem in _problems(result)]
     if problems:
         return problems
     for kind in wanted:
@@ -155,17 +155,17 @@ def problems_of(run: Run, wanted: list[type]) -> list[Problem]:
     return problems
 
 
-def _problem(result: OperatorResult) -> Problem:
+def _problems(result: OperatorResult) -> list[Problem]:
     error = result.error
     # A ShotError is the user's to solve; anything else is the plugin's, and its author needs the traceback.
     if isinstance(error, ShotError):
-        return Problem(error, result.idname, result.plugin)
+        return [Problem(one, result.idname, result.plugin) for one in each(error)]
     raised = HostError(
         f"the operator {result.idname} of the plugin {result.plugin} raised {type(error).__name__}",
         found=str(error) or None,
         remedy="Report this to the plugin's maintainer, with the traceback.",
     )
-    return Problem(raised, result.idname, result.plugin, result.traceback)
+    return [Problem(raised, result.idname, result.plugin, result.traceback)]
 
 
 def conclude(

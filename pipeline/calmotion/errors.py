@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 
 class ShotError(Exception):
     """A shot that cannot be processed.
@@ -46,3 +48,36 @@ class ShotError(Exception):
             "found": "" if self.found is None else str(self.found),
             "remedy": self.remedy,
         }
+
+
+class ShotErrors(ShotError):
+    """Several problems of one shot, found at once; its own fields are those of the first.
+
+    Args:
+        errors: Two or more.
+    """
+
+    def __init__(self, errors: Sequence[ShotError]):
+        self.errors = tuple(errors)
+        first = self.errors[0]
+        super().__init__(
+            first.problem, path=first.path, attribute=first.attribute, found=first.found, remedy=first.remedy
+        )
+
+    def message(self) -> str:
+        """One line each."""
+        return "\n".join(error.message() for error in self.errors)
+
+
+def each(error: ShotError) -> tuple[ShotError, ...]:
+    """The single problems of an error."""
+    return error.errors if isinstance(error, ShotErrors) else (error,)
+
+
+def raise_all(errors: Sequence[ShotError]) -> None:
+    """Raise what was found, if anything, as one error."""
+    single = [one for error in errors for one in each(error)]
+    if len(single) == 1:
+        raise single[0]
+    if single:
+        raise ShotErrors(single)

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from calmotion.host import Operator, OutputPaths, RunContext, Source
-from calmotion.shot import Animation, Character, Provenance
+from calmotion.shot import Animation, Character, Findings, MotorTracks, Provenance
 
 
 class ReadShot(Operator):
@@ -15,7 +15,7 @@ class ReadShot(Operator):
     idname = "usd.read"
     label = "Read the shot"
     requires = (Source,)
-    uses = (OutputPaths,)
+    uses = (OutputPaths, MotorTracks)
     provides = (Character, Animation, Provenance)
 
     def execute(self, context: RunContext) -> Sequence[object]:
@@ -24,7 +24,11 @@ class ReadShot(Operator):
         from calmotion.usd.reading import read_shot
         from calmotion.usd.writing import refuse_inputs
 
-        character, animation, provenance = read_shot(context.get(Source).path)
+        source = context.get(Source)
+        # what a robot is can be looked at before anything animates it
+        character, animation, provenance = read_shot(
+            source.path, still=source.command == "inspect", given=context.get(MotorTracks)
+        )
         outputs = context.get(OutputPaths)
         if outputs is not None and outputs.layer:
             refuse_inputs(provenance, outputs.layer)
@@ -33,11 +37,31 @@ class ReadShot(Operator):
         return character, animation, provenance
 
 
+class ValidateShot(Operator):
+    """Lists everything that is wrong with a shot at once, by our rules and those of USD."""
+
+    idname = "usd.validate"
+    label = "Check the shot"
+    requires = (Source,)
+    provides = (Findings,)
+
+    def execute(self, context: RunContext) -> Sequence[object]:
+        """The findings."""
+        from calmotion.usd.validation import validate_shot
+
+        return (validate_shot(context.get(Source).path),)
+
+
+OPERATORS = (ReadShot, ValidateShot)
+
+
 def register(host: Any) -> None:
-    """Register the operator."""
-    host.register_operator(ReadShot)
+    """Register the operators."""
+    for operator in OPERATORS:
+        host.register_operator(operator)
 
 
 def unregister(host: Any) -> None:
     """Undo `register`."""
-    host.unregister_operator(ReadShot)
+    for operator in reversed(OPERATORS):
+        host.unregister_operator(operator)

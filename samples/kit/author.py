@@ -129,6 +129,7 @@ def author_body(
         api.CreateMassAttr(mass)
         api.CreateCenterOfMassAttr(Gf.Vec3f(*np.round(center, DIGITS).tolist()))
         api.CreateDiagonalInertiaAttr(Gf.Vec3f(*(float(f"{value:.4g}") for value in inertia)))
+        api.CreatePrincipalAxesAttr(Gf.Quatf(1.0))  # USD's validators want both or neither
     for target in body.targets:
         author_target(stage, f"{root}/{body.name}/{target.name}", target)
 

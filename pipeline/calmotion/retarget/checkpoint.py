@@ -35,7 +35,8 @@ def problem_key(problem: RetargetProblem, fixed: BoolArray, settings: object) ->
     basis, curves, objective = problem.basis, problem.curves, problem.objective
     reference = objective.reference
     arrays: list[Any] = [np.asarray(part) for part in problem.model.system]
-    arrays += [curves.angles, curves.rates, curves.accelerations, basis.values.data, basis.knots, problem.motors, fixed]
+    arrays += [curves.angles, curves.rates, curves.accelerations]
+    arrays += [basis.values.data, basis.knots, problem.coupling, fixed]
     arrays += [objective.weights, reference.positions, reference.rotations]
     if problem.world is not None:
         arrays.append(problem.world)

@@ -31,7 +31,7 @@ from .problem import RetargetProblem
 from .pruning import block_energies, worthless
 from .recycling import Recycled
 from .reference import MeantMotion
-from .report import left_out_rows, limit_uses, reference_motion, simulation_of
+from .report import left_out_rows, limit_uses, performed_motion, reference_motion, simulation_of
 from .run import Progress, meant_motion
 from .simulator import compile_kernels
 
@@ -46,20 +46,16 @@ def _curves(problem: RetargetProblem, motors: int, x: Array) -> tuple[tuple[Moto
     """The curves of all motors, and the coefficients with negligible offsets set to exactly zero."""
     basis, grid = problem.basis, problem.grid
     coefficients = x.reshape(basis.count, len(problem.motors)).copy()
-    offsets = basis.values @ coefficients
-    column = {int(motor): k for k, motor in enumerate(problem.motors)}
+    coefficients[:, np.max(np.abs(basis.values @ coefficients), axis=0) <= UNCHANGED] = 0.0
+    by_motor = coefficients @ problem.coupling.T
+    largest = np.max(np.abs(basis.values @ by_motor), axis=0)
     curves = []
     for motor in range(motors):
-        input_at_frames = problem.curves.angles[grid.frames, motor]
-        largest = float(np.max(np.abs(offsets[:, column[motor]]))) if motor in column else 0.0
-        changed = largest > UNCHANGED
-        values = input_at_frames
+        values, own, changed = problem.curves.angles[grid.frames, motor], by_motor[:, motor], bool(largest[motor] > 0.0)
         if changed:
-            values = input_at_frames + basis.at_frames @ coefficients[:, column[motor]]
-        elif motor in column:
-            coefficients[:, column[motor]] = 0.0
-        knots = useful_knots(basis, coefficients[:, column[motor]]) if changed else basis.knots[[0, -1]]
-        curves.append(MotorCurve(motor, changed, knots, values, largest if changed else 0.0))
+            values = values + basis.at_frames @ own
+        knots = useful_knots(basis, own) if changed else basis.knots[[0, -1]]
+        curves.append(MotorCurve(motor, changed, knots, values, float(largest[motor])))
     return tuple(curves), coefficients.ravel()
 
 
@@ -173,7 +169,7 @@ def _search(
     rows += [
         LeftOut("changes of " + character.motors[curve.motor].path, "they would gain less than 2% of the tolerance")
         for curve in curves
-        if not curve.changed and character.motors[curve.motor].optimize
+        if not curve.changed and curve.motor in problem.motors
     ]
     return Result(
         reference=reference_motion(model, grid, meant, problem.curves.angles),
@@ -199,6 +195,7 @@ def _search(
         stopped="interrupted" if interrupted else search.reason,
         expected_gain_m=_expected(search),
         interrupted=interrupted,
+        performed=performed_motion(prepared, problem.changed_curves),
     )
 
 

@@ -8,6 +8,7 @@ from ..errors import ShotError
 from ..shot import Animation
 from ..shot.character import Array, BoolArray, IntArray
 from .adaptive_knots import breaks_for, first_breaks, fitted
+from .coupling import coupling_of, leaders
 from .curves import Curves, sample_tracks
 from .limits import LimitTerms, motor_bounds
 from .objective import Objective
@@ -33,8 +34,8 @@ def pose(
         ShotError: Nothing may change, or options contradict each other.
     """
     character, grid, settings = prepared.character, prepared.grid, prepared.character.retarget
-    movable = np.array([motor.optimize for motor in character.motors], bool)
-    motors = np.flatnonzero(movable).astype(np.int32)
+    motors = leaders(character)
+    coupling = coupling_of(character, motors)
     kept_ends, offsets = settings.endpoints == "kept", carried_offsets(prepared, animation, motors)
     spacing = options.knot_spacing or settings.knot_spacing
     if spacing:
@@ -58,7 +59,7 @@ def pose(
             attribute="calm:motor:optimize",
             remedy="Set it to true on the motors that may change.",
         )
-    bounds = motor_bounds(character, movable)
+    bounds = motor_bounds(character, np.any(coupling, axis=1))
     continuous = options.adjoint == "continuous"
     if continuous and ("effort" in bounds or grid.cyclic):
         raise ShotError(
@@ -72,7 +73,7 @@ def pose(
     problem = RetargetProblem(
         prepared.model, grid, curves, Objective.over(prepared.model, meant.reference, grid, animation.weights), basis,
         motors, smoothness, CLOSENESS, prepared.world,
-        LimitTerms(bounds, grid.judged, grid.h, 1.0) if bounds else None, continuous,
+        LimitTerms(bounds, grid.judged, grid.h, 1.0) if bounds else None, continuous, coupling,
     )  # fmt: skip
     start = fitted(basis, offsets).ravel() if np.any(offsets) else np.zeros(problem.size)
     return problem, np.where(fixed, 0.0, start), not spacing

@@ -50,6 +50,10 @@ class RigidResponse:
         held = np.minimum(np.arange(len(joint_angles)) // stride, len(c) - 1)
         return cls(targets[held], inertia[held])
 
+    def coupled(self, coupling: Array) -> RigidResponse:
+        """The response to motors that move others with them; `coupling` of shape [m, leaders]."""
+        return RigidResponse(self.targets @ coupling, self.inertia @ coupling)
+
 
 class BandedGram:
     """Sums of `sum_n b_n b_n^T (x) W_n` over rows b_n of spline matrices, unknowns ordered by basis function, then

@@ -33,21 +33,23 @@ class RetargetProblem:
         curves: The animator's curves.
         objective: Errors at the targets.
         basis: Offset splines.
-        motors: Motors that may change.
+        motors: Motors that may change, m of them.
         smoothness: Weight of int |offset''|^2 / 2 for each motor.
         closeness: Weight of int |offset|^2 / 2 for each motor.
         world: Moving roots.
         limits: Limits of the motors; None where there are none.
         continuous: Whether gradients are those of the continuous adjoint, which are not exact.
+        coupling: By how much each motor changes with each of `motors`, shape [M, m]; None: they alone, as they do.
     """
 
     def __init__(
         self, model: Model, grid: TimeGrid, curves: Curves, objective: Objective, basis: OffsetBasis,
         motors: IntArray, smoothness: float, closeness: float, world: Array | None = None,
-        limits: LimitTerms | None = None, continuous: bool = False,
+        limits: LimitTerms | None = None, continuous: bool = False, coupling: Array | None = None,
     ):  # fmt: skip
         self.grid, self.objective = grid, objective
         self.curves, self.motors, self.world, self.limits = curves, motors, world, limits
+        self.coupling = np.eye(curves.angles.shape[1])[:, motors] if coupling is None else coupling
         self._smoothness, self._closeness = smoothness, closeness
         self._simulator = Simulator(model, grid.h, world, grid.cyclic)
         self._run: ForwardRun | None = None
@@ -130,13 +132,12 @@ class RetargetProblem:
 
     def _spread(self, spline: csr_matrix, x: Array) -> Array:
         """Rows of a spline matrix times the coefficients, for all motors, shape [T, M]."""
-        out = np.zeros_like(self.curves.angles)
-        out[:, self.motors] = spline @ x.reshape(self.basis.count, len(self.motors))
-        return out
+        coefficients = x.reshape(self.basis.count, len(self.motors))
+        return np.asarray(spline @ (coefficients @ self.coupling.T))
 
     def _gather(self, spline: csr_matrix, by_motor: Array) -> Array:
         """The transpose of `_spread`."""
-        return np.asarray(spline.T @ by_motor[:, self.motors]).ravel()
+        return np.asarray(spline.T @ (by_motor @ self.coupling)).ravel()
 
     def bend(self, x: Array) -> Array:
         """Matrix of the regulariser times x."""
@@ -298,8 +299,9 @@ class RetargetProblem:
         rigid = rigid_model(self.model)
         motion = rigid_motion(rigid, self.curves.angles, self.curves.rates, self.grid.h, self.world, self.grid.cyclic)
         angles = self.model.joint_angles(self.curves.angles)
-        world = rooted(self.world, len(motion.c))
-        return RigidResponse.along(rigid, motion.c, motion.q, angles, self.motors, world, _STRIDE)
+        world, moved = rooted(self.world, len(motion.c)), np.flatnonzero(np.any(self.coupling, axis=1)).astype(np.int32)
+        response = RigidResponse.along(rigid, motion.c, motion.q, angles, moved, world, _STRIDE)
+        return response.coupled(self.coupling[moved])
 
     def _metrics(self, inertia: Array, limited: dict[str, Array] | None) -> list[tuple[csr_matrix, Array]]:
         """What active limits add to the rigid robot's matrix: its efforts are inertia times acceleration."""
@@ -313,7 +315,7 @@ class RetargetProblem:
             if name == "effort":
                 found.append((self.basis.accelerations, np.einsum("nma,nm,nmb->nab", inertia, weight, inertia)))
             else:
-                found.append((self._splines[name], weight[:, self.motors, None] * np.eye(len(self.motors))))
+                found.append((self._splines[name], np.einsum("ma,nm,mb->nab", self.coupling, weight, self.coupling)))
         return found
 
     def gain(self, decrease: float, value: float) -> float:

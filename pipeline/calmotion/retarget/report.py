@@ -7,16 +7,18 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from ..dynamics.dead_centres import dead_centres
+from ..dynamics.failure import SimulationFailure
 from ..dynamics.model import Model
 from ..dynamics.reactions import reactions
 from ..naming import distinct_names
 from ..shot import LeftOut, LimitUse, Motion, Simulation
 from ..shot.character import Array
+from .curves import Curves
 from .forward import ForwardRun
 from .limits import Excess
 from .objective import Reference, rotation_errors
 from .prepare import Prepared
-from .reference import MeantMotion
+from .reference import MeantMotion, rigid_motion
 from .time_grid import TimeGrid
 
 
@@ -64,6 +66,16 @@ def reference_motion(model: Model, grid: TimeGrid, rigid: MeantMotion, angles: A
         tuple(np.zeros((len(times), 0)) for _ in model.tree.body), angles, np.full_like(angles, np.nan),
         rigid.target_positions[shown], rigid.target_rotations[shown],
     )  # fmt: skip
+
+
+def performed_motion(prepared: Prepared, curves: Curves) -> Motion | None:
+    """A rigid robot performing curves; None where a linkage cannot follow them."""
+    model, grid = prepared.model, prepared.grid
+    try:
+        rigid = rigid_motion(model, curves.angles, curves.rates, grid.h, prepared.world, grid.cyclic)
+    except SimulationFailure:
+        return None
+    return reference_motion(model, grid, rigid, curves.angles)
 
 
 def simulation_of(model: Model, grid: TimeGrid, run: ForwardRun, reference: Reference, motors: int) -> Simulation:

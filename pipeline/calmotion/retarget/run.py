@@ -19,7 +19,7 @@ from .limits import excesses, motor_bounds
 from .objective import Objective
 from .prepare import Options, Prepared, failure_error, modes_of, prepare, refuse_half_turns
 from .reference import MeantMotion, rigid_motion, static_motion
-from .report import left_out_rows, limit_uses, reference_motion, simulation_of
+from .report import left_out_rows, limit_uses, performed_motion, reference_motion, simulation_of
 from .shapers import shaped
 from .steady import SteadyState
 
@@ -110,4 +110,5 @@ def simulate_shot(
         dof=model.dof,
         left_out=tuple(left_out_rows(prepared)),
         limits=limit_uses(used, used, grid),
+        performed=performed_motion(prepared, curves),
     )

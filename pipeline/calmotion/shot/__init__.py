@@ -1,12 +1,13 @@
 """What a shot is, as plain data in SI units: read by plugins, solved by the engine, written by plugins."""
 
-from .animation import Animation, FreeTrack, MovingFrame, Track, WeightTrack
+from .animation import Animation, FreeTrack, MotorTracks, MovingFrame, Track, WeightTrack
 from .character import (
     WORLD,
     Body,
     Character,
     ElasticMaterial,
     FlexibleSettings,
+    Follows,
     Frame,
     InterfaceSurface,
     Joint,
@@ -17,6 +18,7 @@ from .character import (
     Target,
     TetGeometry,
 )
+from .finding import Finding, Findings
 from .meshes import FEMesh, FEMeshes, MeshQuality
 from .provenance import InputLayer, Provenance
 from .result import (
@@ -40,6 +42,9 @@ __all__ = [
     "FEMesh",
     "FEMeshes",
     "FlexibleSettings",
+    "Finding",
+    "Findings",
+    "Follows",
     "Frame",
     "FreeTrack",
     "InputLayer",
@@ -53,6 +58,7 @@ __all__ = [
     "Motion",
     "Motor",
     "MotorCurve",
+    "MotorTracks",
     "MovingFrame",
     "OptimizerStep",
     "Provenance",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,6 +22,21 @@ class Track:
 
     times: Array
     values: Array
+
+
+@dataclass(frozen=True, eq=False)
+class MotorTracks:
+    """Tracks that come from beside the shot, such as a motion capture.
+
+    Attributes:
+        origin: Where they come from, for messages.
+        times: [s] after the first frame of the shot, strictly increasing, shape [k].
+        values: [rad or m] by the path of the motor's joint, or by its name where that is the only one, shape [k].
+    """
+
+    origin: str
+    times: Array
+    values: Mapping[str, Array]
 
 
 @dataclass(frozen=True, eq=False)

@@ -186,6 +186,21 @@ class Joint:
     closes_loop: bool = False
 
 
+@dataclass(frozen=True)
+class Follows:
+    """How one motor is geared to another: value = offset + ratio * value of the leader.
+
+    Attributes:
+        leader: Index of the motor that leads, which follows none itself.
+        ratio: [-], or [m/rad] and [rad/m] between an angle and a length.
+        offset: [rad or m].
+    """
+
+    leader: int
+    ratio: float
+    offset: float
+
+
 @dataclass(frozen=True, eq=False)
 class Motor:
     """A driven joint.
@@ -194,20 +209,25 @@ class Motor:
         joint: Index of the joint.
         path: Prim path of the joint.
         attribute: Name of the attribute that holds its track.
+        source: Where the track is: `drive` (the target position of its drive), `bodies` (the transforms of the bodies
+            that it joins), or `skeleton` (a joint of a UsdSkel animation).
         optimize: Whether its curve may be changed.
         max_velocity, max_acceleration, max_torque: [rad/s], [rad/s^2], [N m]; infinite when there are none.
         linear: Whether it sets a length along the joint's axis instead of an angle: metres then stand for radians,
             and newtons for newton metres.
+        follows: The motor that it is geared to, or None; it then has no curve of its own.
     """
 
     joint: int
     path: str
     attribute: str
+    source: str = "drive"
     optimize: bool = True
     max_velocity: float = np.inf
     max_acceleration: float = np.inf
     max_torque: float = np.inf
     linear: bool = False
+    follows: Follows | None = None
 
 
 @dataclass(frozen=True, eq=False)

@@ -176,6 +176,8 @@ class Result:
         stopped: Why the optimiser stopped.
         expected_gain_m: By how much the root-mean-square error was expected to fall in one more iteration [m].
         interrupted: Whether the user stopped it; the best curves so far are here.
+        performed: A rigid robot performing the curves that were found (or simulated); same times. None where a
+            linkage cannot follow them rigidly.
     """
 
     reference: Motion
@@ -201,3 +203,4 @@ class Result:
     stopped: str = ""
     expected_gain_m: float | None = None
     interrupted: bool = False
+    performed: Motion | None = None

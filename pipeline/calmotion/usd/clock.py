@@ -41,6 +41,11 @@ class Clock:
         count = int(np.floor((self.end - self.start) / self.time_codes_per_second * self.frames_per_second + 1e-6))
         return np.arange(count + 1) / self.frames_per_second
 
+    def merged(self, time_codes: Array) -> Array:
+        """Time codes and those of the frames, ascending; one next to another is the same."""
+        every = np.union1d(self.time_codes(self.frame_times()), time_codes)
+        return np.asarray(every[np.concatenate([[True], np.diff(every) > 1e-6])], dtype=np.float64)
+
 
 def clock_of(stage, sample_codes: Array) -> Clock:
     """The clock of a stage.

@@ -21,6 +21,14 @@ def quaternion(value) -> Array:
     return np.array([float(value.GetReal()), *(float(x) for x in value.GetImaginary())])
 
 
+def quaternions(value) -> Array:
+    """A Vt array of quaternions as (w, x, y, z), shape [n, 4]; empty for None."""
+    if value is None or len(value) == 0:
+        return np.zeros((0, 4))
+    # Vt keeps the real part last
+    return np.roll(np.array(value, dtype=np.float64).reshape(-1, 4), 1, axis=1)
+
+
 def matrix(value) -> Array:
     """A Gf.Matrix4d as the matrix that maps column vectors, shape [4, 4]."""
     return np.array(value, dtype=np.float64).T.copy()
@@ -50,6 +58,22 @@ def to_points(value: Array):
     """A Vt.Vec3fArray of points [n, 3]."""
     from pxr import Vt
 
+    return Vt.Vec3fArray.FromNumpy(np.ascontiguousarray(value, dtype=np.float32))
+
+
+def to_quaternions(value: Array):
+    """A Vt.QuatfArray of quaternions (w, x, y, z), shape [n, 4]."""
+    from pxr import Vt
+
+    return Vt.QuatfArray.FromNumpy(np.ascontiguousarray(np.roll(value, -1, axis=1), dtype=np.float32))
+
+
+def to_vectors(value: Array, kind):
+    """A Vt array of vectors [n, 3] as the value of an attribute of type Float3Array or Half3Array."""
+    from pxr import Sdf, Vt
+
+    if kind == Sdf.ValueTypeNames.Half3Array:
+        return Vt.Vec3hArray.FromNumpy(np.ascontiguousarray(value, dtype=np.float16))
     return Vt.Vec3fArray.FromNumpy(np.ascontiguousarray(value, dtype=np.float32))
 
 

@@ -8,7 +8,7 @@ import re
 from contextlib import contextmanager
 from pathlib import Path
 
-from ..errors import ShotError
+from ..errors import ShotError, raise_all
 from ..shot import InputLayer
 from . import schemas
 
@@ -93,8 +93,7 @@ def open_stage(path: str, *, muted: tuple[str, ...] = ()):
         if muted:
             stage.MuteAndUnmuteLayers(list(muted), [])
         errors = stage.GetCompositionErrors()
-    for error in errors:
-        _refuse(error, path)
+    raise_all([refusal for error in errors if (refusal := _refusal(error, path))])
     return stage
 
 
@@ -103,17 +102,17 @@ def _last_quoted(text: str) -> str:
     return quoted[-1] if quoted else ""
 
 
-def _refuse(error, shot: str) -> None:
-    """Raise a ShotError for a composition error that means something of the shot is missing."""
+def _refusal(error, shot: str) -> ShotError | None:
+    """What to say of a composition error that means that something of the shot is missing."""
     if type(error).__name__ not in _REFUSED:
-        return
+        return None
     text = str(error).strip()
     site = re.search(r"<(/[^>]*)>\.?\s*$", text)
     prim = site.group(1) if site else str(error.rootSite.path)
     assets = re.findall(r"@([^@]*)@", text)
     arc = next((name for name in _ARCS if name in text.lower()), "reference")
     if arc == "sublayer":
-        raise ShotError(
+        return ShotError(
             "names a sublayer that cannot be opened",
             path=assets[-1] if assets else shot,
             attribute=_ARCS[arc],
@@ -129,7 +128,7 @@ def _refuse(error, shot: str) -> None:
         problem = f"its {arc} cannot be opened"
         remedy = f"Put the file there, or correct or remove the {arc}"
         found = f"@{assets[0]}@, introduced by {assets[1]}" if len(assets) > 1 else text
-    raise ShotError(problem, path=prim, attribute=_ARCS[arc], found=found, remedy=remedy)
+    return ShotError(problem, path=prim, attribute=_ARCS[arc], found=found, remedy=remedy)
 
 
 def role_of(layer) -> str:

@@ -86,16 +86,17 @@ def test_an_animated_target_without_the_drive_schema_is_refused(tmp_path):
     assert caught.value.path == ELBOW
 
 
-def test_an_actuator_of_a_conversion_makes_a_motor_that_must_be_animated(tmp_path):
+def test_an_actuator_of_a_conversion_makes_a_motor_that_holds_its_pose_until_it_is_animated(tmp_path):
     def edit(stage):
         clear(stage, ELBOW)
         stage.GetPrimAtPath(ELBOW).RemoveAPI(UsdPhysics.DriveAPI, "angular")
         actuator = stage.DefinePrim("/Arm/actuator", "MjcActuator")
         actuator.CreateRelationship("mjc:target").SetTargets([ELBOW])
 
-    with pytest.raises(ShotError, match="motor without animation") as caught:
-        read(tmp_path, edit)
-    assert caught.value.path == ELBOW and "/Arm/actuator" in caught.value.problem
+    character, animation, _ = read(tmp_path, edit)
+    assert [motor.path for motor in character.motors] == [SHOULDER, ELBOW]
+    assert np.allclose(animation.tracks[1].values, 0.0, atol=1e-7)
+    assert any("/Arm/actuator" in note for note in character.notes)
 
 
 def test_a_motor_inside_an_instance_is_refused(tmp_path):

@@ -2,16 +2,10 @@
 
 from __future__ import annotations
 
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
-from calmotion import ShotError
-from calmotion.shot import Motion, MotorCurve
-from calmotion.usd.reading import read_shot
-from calmotion.usd.writing.motions import rigid_motion, simulated_motion
-from pxr import UsdPhysics
-from small_shots import BASE, ELBOW, FORE, LENGTH, TARGET_POSITION, make_flexible, write_arm
+from calmotion.shot import Motion
+from calmotion.usd.writing.motions import simulated_motion
 
 
 def motion(times: np.ndarray) -> Motion:
@@ -37,47 +31,3 @@ def test_an_interrupted_run_gives_the_frames_it_reached():
 def test_frames_that_are_no_steps_are_a_mistake_of_ours():
     with pytest.raises(ValueError, match="not steps"):
         simulated_motion(motion(np.arange(100) / 100.0), np.arange(20) / 24.0)
-
-
-def shot(tmp_path, edit=None):
-    character, animation, _ = read_shot(str(write_arm(tmp_path / "arm.usda", edit)))
-    return character, animation
-
-
-def test_without_curves_the_rigid_robot_performs_the_animation(tmp_path):
-    character, animation = shot(tmp_path)
-    found = rigid_motion(character, animation, SimpleNamespace(curves=()))
-    fore = [b.path for b in character.bodies].index(FORE)
-    shoulder = animation.tracks[0].values
-    expected = np.stack([LENGTH * np.cos(shoulder), 0 * shoulder, 1.0 - LENGTH * np.sin(shoulder)], axis=1)
-    assert np.allclose(found.positions[:, fore], expected, atol=1e-6)
-    assert found.elastic is None
-
-
-def test_a_flexible_body_of_unknown_mass_is_moved_all_the_same(tmp_path):
-    def edit(stage):
-        make_flexible(stage)
-        stage.GetPrimAtPath(FORE).RemoveProperty("physics:mass")
-
-    character, animation = shot(tmp_path, edit)
-    curves = tuple(MotorCurve(k, True, np.zeros(0), 0.0 * animation.frame_times, 0.0) for k in range(2))
-    found = rigid_motion(character, animation, SimpleNamespace(curves=curves))
-    assert np.allclose(found.positions[:, 2], [LENGTH, 0, 1], atol=1e-6)
-
-
-def free_elbow(stage) -> None:
-    stage.GetPrimAtPath(ELBOW).GetAttribute(TARGET_POSITION).Clear()
-
-
-def loop(stage) -> None:
-    joint = UsdPhysics.RevoluteJoint.Define(stage, "/Arm/joints/loop")
-    joint.CreateBody0Rel().SetTargets([BASE])
-    joint.CreateBody1Rel().SetTargets([FORE])
-
-
-@pytest.mark.parametrize("edit", [free_elbow, loop])
-def test_joints_that_only_a_simulation_moves_are_refused(tmp_path, edit):
-    character, animation = shot(tmp_path, edit)
-    with pytest.raises(ShotError) as caught:
-        rigid_motion(character, animation, SimpleNamespace(curves=()))
-    assert caught.value.remedy

@@ -13,6 +13,7 @@ from calmotion.retarget.run import Options, simulate_shot
 from calmotion.shot import MotorCurve
 from calmotion.usd.reading import read_shot
 from calmotion.usd.writing import WriteOptions, write_result
+from performing import performed, tracks_of
 from pxr import Sdf, Usd, UsdGeom
 
 
@@ -31,7 +32,7 @@ class Written:
         )
 
 
-def with_curves(animation, result):
+def with_curves(character, animation, result):
     """A result whose shoulder curve changed by a bump, and whose elbow did not."""
     values = np.interp(animation.frame_times, animation.tracks[0].times, animation.tracks[0].values)
     bump = 0.1 * np.sin(np.pi * animation.frame_times / animation.frame_times[-1]) ** 2
@@ -39,7 +40,10 @@ def with_curves(animation, result):
         MotorCurve(0, True, animation.frame_times[::2], values + bump, 0.1),
         MotorCurve(1, False, animation.frame_times[::2], values, 0.0),
     )
-    return dataclasses.replace(result, after=result.before, curves=curves, objective_after=0.0)
+    return dataclasses.replace(
+        result, after=result.before, curves=curves, objective_after=0.0,
+        performed=performed(character, animation, tracks_of(animation, curves)),
+    )  # fmt: skip
 
 
 @pytest.fixture(scope="module")
@@ -56,7 +60,7 @@ def optimised(simulated, tmp_path):
     _, character, animation, _, result = simulated
     shot = shots.write_arm(tmp_path / "shot.usda")
     _, _, provenance = read_shot(str(shot))
-    return Written(shot, character, animation, provenance, with_curves(animation, result))
+    return Written(shot, character, animation, provenance, with_curves(character, animation, result))
 
 
 def digest(path):

@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from ...errors import ShotError
-from ...shot import Body, Character, Joint
+import numpy as np
+
+from ...errors import ShotError, raise_all
+from ...shot import Body, Character, Joint, RetargetSettings
+from ..clock import Clock
 from ..transforms import Pose
 from . import mass, motors, scene, targets, topology
 from .context import Reading, is_rigid_body, prims_of
 from .flexible import flexible_settings
 from .interfaces import interfaces_of
 from .joints import JointPrim, body_index, joint_prims, joint_to_world, read_joint, refuse_unsupported
+from .posed_motors import posed_joints
 from .roots import on_moving_prim
 from .shapes import shapes_of, tets_of
 from .stillness import refuse_moving
@@ -37,27 +42,29 @@ class Skeleton:
     targets: list[tuple[Any, str]]
 
 
-def animated_attributes(stage) -> list:
-    """The attributes that hold the animation of the drives of a stage, whether they turn out as motors or not."""
-    names = (motors.ATTRIBUTE, motors.LENGTH_ATTRIBUTE)
-    found = (prim.GetAttribute(name) for prim in joint_prims(stage) for name in names)
-    return [attribute for attribute in found if attribute]
-
-
-def read_skeleton(reading: Reading) -> Skeleton:
+def read_skeleton(reading: Reading, clock: Clock, still: bool, given: Sequence[str] = ()) -> Skeleton:
     """Find the bodies, joints and motors of the character; what no motor reaches is left out.
 
+    Args:
+        clock: The clock of the shot.
+        still: Whether nothing has to be animated.
+        given: Joints whose tracks are given beside the shot.
+
     Raises:
-        ShotError: No bodies, no joints, no motors, or what `read_joint` and `read_drives` refuse.
+        ShotError: No bodies, no joints or no motors. What is wrong with single ones is kept in the reading.
     """
     stage = reading.stage
     root_file = stage.GetRootLayer().identifier
     prims = {str(p.GetPath()): p for p in prims_of(stage) if is_rigid_body(p)}
     if not prims:
+        skeletons = [p for p in prims_of(stage) if p.GetTypeName() == "Skeleton"]
         raise ShotError(
             "no bodies: the shot has no prim with PhysicsRigidBodyAPI",
-            path=root_file,
-            remedy="Apply PhysicsRigidBodyAPI to the moving parts of the character",
+            path=skeletons[0].GetPath() if skeletons else root_file,
+            found="a skinned character without physics" if skeletons else None,
+            remedy="Make a robot of it with `calmotion rig`, and open what that writes"
+            if skeletons
+            else "Apply PhysicsRigidBodyAPI to the moving parts of the character",
         )
     found = joint_prims(stage)
     if not found:
@@ -66,15 +73,24 @@ def read_skeleton(reading: Reading) -> Skeleton:
             path=topology.common_path(list(prims)),
             remedy="Connect the bodies with joints, and the first one with the world",
         )
-    poses = {path: reading.pose(prim) for path, prim in prims.items()}
-    joints = [joint for prim in found if (joint := read_joint(reading, prim, poses))]
-    drives = motors.read_drives(joints, motors.actuated_joints(stage), topology.common_path(list(prims)), reading.notes)
-    target_prims = targets.target_prims(stage)
+    poses: dict[str, Pose] = {}
+    for path, prim in prims.items():
+        with reading.going_on():
+            poses[path] = reading.pose(prim)
+    raise_all(reading.problems)  # joints refer to poses
+    joints = []
+    for prim in found:
+        with reading.going_on():
+            joints += [joint for joint in [read_joint(reading, prim, poses)] if joint]
+    root = topology.common_path(list(prims))
+    drives = motors.read_drives(reading, joints, root, posed_joints(reading, joints, clock), given, still)
+    target_prims = targets.target_prims(reading)
     bodies = _moved(reading, list(prims), joints, drives, [body for _, body in target_prims])
     kept = set(bodies)
     joints = [j for j in joints if (j.body0 or j.body1) in kept]
     for joint in joints:
-        refuse_unsupported(joint)
+        with reading.going_on():
+            refuse_unsupported(joint)
     joints += _held(reading, bodies, joints, prims, poses)
     far = topology.distances(bodies, joints)
     bodies = list(far)
@@ -83,7 +99,10 @@ def read_skeleton(reading: Reading) -> Skeleton:
     drives = sorted((d for d in drives if id(d.joint) in order), key=lambda d: order[id(d.joint)])
     held = {j.body1: j.path for j in joints if j.body0 == "" and j.prim is not None and not on_moving_prim(reading, j)}
     roots = {j.body1 for j in joints if j.body0 == ""}
-    refuse_moving(reading, {prims[b]: held[b] for b in held}, [prims[b] for b in bodies if b not in roots])
+    posing = any(drive.source == motors.BODIES for drive in drives)
+    with reading.going_on():
+        others = [] if posing else [prims[b] for b in bodies if b not in roots]
+        refuse_moving(reading, {prims[b]: held[b] for b in held}, others)
     return Skeleton(bodies, {b: poses[b] for b in bodies}, joints, drives, target_prims)
 
 
@@ -91,11 +110,15 @@ def build_character(reading: Reading, skeleton: Skeleton) -> Character:
     """Read geometry, mass, materials, targets and settings of a skeleton.
 
     Raises:
-        ShotError: A body without mass, or what the readers of the parts refuse.
+        ShotError: Everything that is wrong with the shot, what `read_skeleton` kept included.
     """
     numbers = {path: k for k, path in enumerate(skeleton.bodies)}
     touching = {path: [j.path for j in skeleton.joints if path in (j.body0, j.body1)] for path in skeleton.bodies}
-    bodies = tuple(_body(reading, path, skeleton.poses[path], touching[path]) for path in skeleton.bodies)
+    found = []
+    for path in skeleton.bodies:
+        with reading.going_on():
+            found.append(_body(reading, path, skeleton.poses[path], touching[path]))
+    bodies = tuple(found)
     joints = tuple(
         Joint(
             j.path,
@@ -111,26 +134,38 @@ def build_character(reading: Reading, skeleton: Skeleton) -> Character:
         for j in skeleton.joints
     )
     order = {id(joint): k for k, joint in enumerate(skeleton.joints)}
-    chosen = tuple(
-        targets.read_target(reading, prim, numbers[body], skeleton.poses[body])
-        for prim, body in skeleton.targets
-        if body in numbers
-    )
+    placed = []
+    for prim, body in skeleton.targets:
+        if body in numbers:
+            with reading.going_on():
+                placed.append(targets.read_target(reading, prim, numbers[body], skeleton.poses[body]))
+    chosen = tuple(placed)
+    driven = []
+    index = {drive.joint.path: k for k, drive in enumerate(skeleton.drives)}
+    for drive in skeleton.drives:
+        with reading.going_on():
+            driven.append(motors.read_motor(drive, order[id(drive.joint)], index, reading))
+    root = topology.common_path(skeleton.bodies)
+    gravity, settings = np.zeros(3), RetargetSettings()
+    with reading.going_on():
+        gravity = scene.gravity(reading)
+    with reading.going_on():
+        settings = scene.retarget_settings(reading, root)
+    raise_all(reading.problems)
     if not chosen:
         outer = topology.leaves(skeleton.bodies, skeleton.joints)
         chosen = tuple(targets.outermost_target(bodies[numbers[b]], numbers[b], joints) for b in outer)
         reading.note(f"no CalmTargetAPI: the outermost point of {', '.join(outer)} is taken as target")
-    root = topology.common_path(skeleton.bodies)
     default = reading.stage.GetDefaultPrim()
     whole = default and all(b.startswith(f"{default.GetPath()}/") for b in skeleton.bodies)
     return Character(
         path=str(default.GetPath()) if whole else root,
         bodies=bodies,
         joints=joints,
-        motors=tuple(motors.read_motor(d, order[id(d.joint)], reading.units) for d in skeleton.drives),
+        motors=tuple(driven),
         targets=chosen,
-        gravity=scene.gravity(reading),
-        retarget=scene.retarget_settings(reading, root),
+        gravity=gravity,
+        retarget=settings,
         notes=tuple(reading.notes),
     )
 

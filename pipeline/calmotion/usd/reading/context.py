@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any
 
+from ...errors import ShotError
 from ..gf import matrix
 from ..schemas import is_applied
 from ..transforms import Pose, pose_from_matrix
@@ -21,12 +23,16 @@ class Reading:
         units: Its units.
         start: Time code of the first frame.
         notes: Sentences for the user about what was decided where the shot was silent.
+        problems: What is wrong with the shot, as far as it was read.
+        doubts: What can be processed, but not as it is authored; notes for the user, too.
     """
 
     stage: Any
     units: StageUnits
     start: float
     notes: list[str] = field(default_factory=list)
+    problems: list[ShotError] = field(default_factory=list)
+    doubts: list[ShotError] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         from pxr import UsdGeom
@@ -37,6 +43,23 @@ class Reading:
         """Keep a sentence for the user, once."""
         if text not in self.notes:
             self.notes.append(text)
+
+    def doubt(self, problem: ShotError) -> None:
+        """Keep what can be processed, but not as it is authored, and tell the user."""
+        self.doubts.append(problem)
+        self.note(problem.message())
+
+    @contextmanager
+    def going_on(self) -> Iterator[None]:
+        """Keep the problem that ends this block, so that one reading finds all of them."""
+        try:
+            yield
+        except ShotError as problem:
+            self.problems.append(problem)
+
+    def at(self, code: float) -> Reading:
+        """The same stage at another time code; what it notes is not kept."""
+        return Reading(self.stage, self.units, code)
 
     def world_matrix(self, prim):
         """Local-to-world matrix [4, 4] of a prim at the first frame, stage units, mapping column vectors."""

@@ -1,4 +1,4 @@
-"""Motors: which joints are driven, by which attribute, within which limits."""
+"""Motors: which joints are driven, and where the track of each is."""
 
 from __future__ import annotations
 
@@ -9,20 +9,25 @@ from typing import Any
 import numpy as np
 
 from ...errors import ShotError
-from ...shot import FreeTrack, Motor
+from ...shot import Follows, FreeTrack, Motor
 from .. import schemas
 from ..clock import Clock
 from ..units import StageUnits
-from .context import prims_of
-from .joints import JointPrim
+from .context import Reading, prims_of
+from .gearing import Gear, read_gear, resolve
+from .joints import JointPrim, refuse_unsupported
+from .motor_limits import effort_limit, own_limit, velocity_limit
 from .tracks import sample_codes
 
 ATTRIBUTE = "drive:angular:physics:targetPosition"
 LENGTH_ATTRIBUTE = "drive:linear:physics:targetPosition"
+SKEL_JOINT = "calm:motor:skelJoint"
+DRIVE, BODIES, SKELETON, HELD, GEARED, GIVEN = "drive", "bodies", "skeleton", "held", "geared", "given"
 _SCHEMA = "CalmMotorAPI"
 _FREE = "calm:motor:optimize"
 _DRIVES = {"revolute": "angular", "prismatic": "linear"}
 _UNITS = {"angular": "degrees", "linear": "units of length"}
+_WRITTEN_AS = {BODIES: "xformOpOrder", SKELETON: SKEL_JOINT}
 
 
 def target_attribute(kind: str) -> str:
@@ -30,105 +35,167 @@ def target_attribute(kind: str) -> str:
     return LENGTH_ATTRIBUTE if kind == "prismatic" else ATTRIBUTE
 
 
+def to_si(kind: str, units: StageUnits) -> float:
+    """Radians or metres in the unit of that attribute."""
+    return float(units.length(1.0) if kind == "prismatic" else np.deg2rad(1.0))
+
+
 def _remedy(kind: str) -> str:
     drive = _DRIVES[kind]
     return (
         f"Apply PhysicsDriveAPI:{drive} and author time samples of {target_attribute(kind)}, in {_UNITS[drive]}, or "
-        "remove what makes the joint a motor"
+        "animate the transforms of the bodies that it joins, or remove what makes the joint a motor"
     )
 
 
 @dataclass(frozen=True, eq=False)
 class Drive:
-    """A joint that is driven: the joint, the attribute with its track, whether that is animated."""
+    """A joint that is driven.
+
+    Attributes:
+        joint: The joint.
+        source: Where its track is: `DRIVE` (samples or a spline of the target position), `BODIES` (transforms of the
+            bodies), `SKELETON` (a joint of a UsdSkel animation), `HELD` (nowhere: it holds a value), `GEARED` (another
+            motor's), `GIVEN` (beside the shot).
+        held: The value that it holds [rad or m]; None: that of the pose in which the bodies stand.
+        skel_joint: The joint of the skeleton.
+        gear: How it follows another motor.
+    """
 
     joint: JointPrim
-    attribute: Any
-    animated: bool
+    source: str
+    held: float | None = None
+    skel_joint: str = ""
+    gear: Gear | None = None
+
+    def attribute(self, stage) -> Any:
+        """The target position of its drive, on a stage; invalid where the joint has no drive."""
+        return stage.GetPrimAtPath(self.joint.path).GetAttribute(target_attribute(self.joint.kind))
 
 
 def actuated_joints(stage) -> dict[str, str]:
-    """Joints that an actuator of a MuJoCo conversion names, with its path (usd-core does not know its type)."""
+    """Joints that an actuator of a MuJoCo conversion drives, itself or by a tendon, with the actuator's path (usd-core
+    does not know these types)."""
     found = {}
     for prim in prims_of(stage):
-        if prim.GetTypeName() == "MjcActuator":
-            relationship = prim.GetRelationship("mjc:target")
-            for target in relationship.GetTargets() if relationship else []:
-                found[str(target)] = str(prim.GetPath())
+        if prim.GetTypeName() != "MjcActuator":
+            continue
+        relationship = prim.GetRelationship("mjc:target")
+        for target in relationship.GetTargets() if relationship else []:
+            named = stage.GetPrimAtPath(target)
+            path = named.GetRelationship("mjc:path") if named else None
+            for joint in path.GetTargets() if path else [target]:
+                found[str(joint)] = str(prim.GetPath())
     return found
 
 
-def read_drives(joints: list[JointPrim], actuated: dict[str, str], root: str, notes: list[str]) -> list[Drive]:
+def read_drives(
+    reading: Reading, joints: list[JointPrim], root: str, posed: Sequence[str], given: Sequence[str], still: bool
+) -> list[Drive]:
     """The driven joints.
 
-    A revolute joint with an angular drive, or a prismatic one with a linear drive, is a motor: with samples or a spline
-    it is animated, with a constant target position it holds that. A drive without any target position and without
-    stiffness pulls nowhere, and its joint moves freely.
+    A revolute joint with an angular drive, or a prismatic one with a linear drive, is a motor, and one that an actuator
+    of a MuJoCo conversion names. A drive without any target position and without stiffness pulls nowhere, and its joint
+    moves freely.
 
     Args:
         joints: The joints of the character.
-        actuated: See `actuated_joints`.
         root: Path of the character, for the message.
-        notes: Sentences for the user are added here.
+        posed: Joints whose bodies the shot moves relative to each other, by their transforms; where there are any, the
+            motors that hold still are read from the bodies as well.
+        given: Joints whose tracks are given beside the shot.
+        still: Whether a character that is not animated at all may be read.
 
     Raises:
-        ShotError: No motors; a motor without animation; a motor inside an instance, where nothing can be written.
+        ShotError: No motors; none that is animated; a motor inside an instance, where nothing can be written.
     """
-    drives: list[Drive] = []
+    kinds = {joint.path: joint.kind for joint in joints}
+    actuated, drives, gears = actuated_joints(reading.stage), {}, {}
     for joint in joints:
-        if joint.prim is None or joint.kind not in _DRIVES:
-            _refuse_wrong_motor(joint)
-            continue
-        drive = _drive(joint, actuated, notes)
-        if drive is not None:
-            drives.append(drive)
-    if not drives:
+        with reading.going_on():
+            if joint.prim is None or joint.kind not in _DRIVES:
+                _refuse_wrong_motor(joint)
+                continue
+            gear = read_gear(joint, kinds, reading.units)
+            if gear is not None:
+                gears[joint.path] = gear
+            drive = _drive(joint, actuated, reading, posed, given, still or gear is not None)
+            if drive is not None:
+                drives[joint.path] = drive
+    with reading.going_on():
+        _engage(drives, resolve(gears), {joint.path: joint for joint in joints}, reading)
+    found = [drives[joint.path] for joint in joints if joint.path in drives]
+    if reading.problems:
+        return found
+    if not found:
+        for joint in joints:
+            refuse_unsupported(joint)
         raise ShotError(
             "no motors: none of its joints is driven",
             path=root,
             remedy="Apply PhysicsDriveAPI:angular to the revolute joints that motors drive, and author time samples "
             f"of {ATTRIBUTE}, in degrees",
         )
-    if not any(drive.animated for drive in drives):
+    if not still and all(drive.source in (HELD, GEARED) for drive in found):
         raise ShotError(
             "a motor without animation, and no other motor is animated either",
-            path=drives[0].joint.path,
-            attribute=target_attribute(drives[0].joint.kind),
-            remedy=_remedy(drives[0].joint.kind),
+            path=found[0].joint.path,
+            attribute=target_attribute(found[0].joint.kind),
+            remedy=_remedy(found[0].joint.kind),
         )
-    for drive in drives:
+    for drive in found:
         if drive.joint.prim.IsInstanceProxy():
-            raise ShotError(
-                "the motor is inside an instance, where its curve cannot be written",
-                path=drive.joint.path,
-                attribute=target_attribute(drive.joint.kind),
-                remedy="Set instanceable = false on the instance above it",
+            reading.problems.append(
+                ShotError(
+                    "the motor is inside an instance, where its curve cannot be written",
+                    path=drive.joint.path,
+                    attribute=target_attribute(drive.joint.kind),
+                    remedy="Set instanceable = false on the instance above it",
+                )
             )
-    return drives
+    return found
 
 
-def read_motor(drive: Drive, index: int, units: StageUnits) -> Motor:
-    """The motor of a drive, `index` its joint's, limits in SI.
+def _engage(drives: dict[str, Drive], gears: dict[str, Gear], joints: dict[str, JointPrim], reading: Reading) -> None:
+    """Make motors of the joints that are geared to motors."""
+    for path, gear in gears.items():
+        if gear.leader not in drives:
+            raise ShotError(
+                "the joint is geared to one that no motor drives",
+                path=path,
+                found=gear.leader,
+                remedy="Make that one a motor, or remove the gear and close a loop of bodies and joints instead",
+            )
+        if path in drives and drives[path].source not in (HELD, GEARED):
+            reading.note(f"{path}: it is geared to {gear.leader}, so its own animation is not used")
+        drives[path] = Drive(joints[path], GEARED, gear=gear)
+
+
+def read_motor(drive: Drive, index: int, motors: dict[str, int], reading: Reading) -> Motor:
+    """The motor of a drive, limits in SI.
+
+    Args:
+        drive: The drive.
+        index: Of its joint.
+        motors: Index of each motor, by the path of its joint.
 
     Raises:
         ShotError: A limit that is not positive.
     """
-    prim, linear = drive.joint.prim, drive.joint.kind == "prismatic"
-    effort = units.force if linear else units.torque
-    to_si = units.length if linear else np.deg2rad
-    torque = effort(_limit(prim, "calm:motor:maxTorque"))
-    force = prim.GetAttribute(f"drive:{_DRIVES[drive.joint.kind]}:physics:maxForce")
-    if force and force.HasAuthoredValue():
-        torque = min(torque, effort(_positive(prim, force.GetName(), force.Get())))
+    prim, kind, linear = drive.joint.prim, _DRIVES[drive.joint.kind], drive.joint.kind == "prismatic"
+    from_stage = reading.units.length if linear else np.deg2rad
+    gear = drive.gear
     return Motor(
         joint=index,
         path=drive.joint.path,
-        attribute=target_attribute(drive.joint.kind),
+        attribute=_WRITTEN_AS.get(drive.source, target_attribute(drive.joint.kind)),
+        source=drive.source if drive.source in _WRITTEN_AS else DRIVE,
         optimize=_may_change(prim),
-        max_velocity=float(to_si(_limit(prim, "calm:motor:maxVelocity"))),
-        max_acceleration=float(to_si(_limit(prim, "calm:motor:maxAcceleration"))),
-        max_torque=torque,
+        max_velocity=velocity_limit(drive.joint, kind, reading.units, reading.notes),
+        max_acceleration=float(from_stage(own_limit(prim, "calm:motor:maxAcceleration"))),
+        max_torque=effort_limit(drive.joint, kind, reading.units, reading.notes),
         linear=linear,
+        follows=None if gear is None else Follows(motors[gear.leader], gear.ratio, gear.offset),
     )
 
 
@@ -157,13 +224,18 @@ def free_tracks(stage, motors: Sequence[Motor], clock: Clock) -> tuple[FreeTrack
     return tuple(found)
 
 
-def _drive(joint: JointPrim, actuated: dict[str, str], notes: list[str]) -> Drive | None:
+def _drive(
+    joint: JointPrim, actuated: dict[str, str], reading: Reading, posed: Sequence[str], given: Sequence[str],
+    still: bool,
+) -> Drive | None:  # fmt: skip
     prim, name = joint.prim, target_attribute(joint.kind)
     drive, unit = _DRIVES[joint.kind], _UNITS[_DRIVES[joint.kind]]
-    has_drive = schemas.is_applied(prim, f"PhysicsDriveAPI:{drive}")
+    has_drive, ours = schemas.is_applied(prim, f"PhysicsDriveAPI:{drive}"), schemas.is_applied(prim, _SCHEMA)
+    if joint.path in given:
+        return Drive(joint, GIVEN)
     attribute = prim.GetAttribute(name)
     if has_drive and attribute and len(sample_codes(attribute)):
-        return Drive(joint, attribute, True)
+        return Drive(joint, DRIVE)
     if attribute and len(sample_codes(attribute)):
         raise ShotError(
             "the target position is animated, but the joint has no drive",
@@ -171,25 +243,29 @@ def _drive(joint: JointPrim, actuated: dict[str, str], notes: list[str]) -> Driv
             attribute=name,
             remedy=f"Apply PhysicsDriveAPI:{drive} to the joint",
         )
-    if schemas.is_applied(prim, _SCHEMA):
-        raise ShotError("a motor without animation", path=joint.path, attribute=name, remedy=_remedy(joint.kind))
-    if joint.path in actuated:
-        raise ShotError(
-            f"a motor without animation: the actuator {actuated[joint.path]} drives this joint",
-            path=joint.path,
-            attribute=name,
-            remedy=_remedy(joint.kind),
-        )
-    if not has_drive:
+    skel_joint = str(schemas.value(prim, _SCHEMA, SKEL_JOINT) or "") if ours else ""
+    if not (has_drive or ours or joint.path in actuated):
         return None
-    if attribute and attribute.HasAuthoredValue():
-        notes.append(f"{joint.path}: its drive is not animated and holds {attribute.Get():g} {unit}")
-        return Drive(joint, attribute, False)
+    if joint.path in posed:
+        return Drive(joint, BODIES)
+    if skel_joint:
+        return Drive(joint, SKELETON, skel_joint=skel_joint)
+    if posed:
+        return Drive(joint, BODIES)
+    if ours and not still:
+        raise ShotError("a motor without animation", path=joint.path, attribute=name, remedy=_remedy(joint.kind))
+    if has_drive and attribute and attribute.HasAuthoredValue():
+        reading.note(f"{joint.path}: its drive is not animated and holds {attribute.Get():g} {unit}")
+        return Drive(joint, HELD, held=float(attribute.Get()) * to_si(joint.kind, reading.units))
+    if ours or joint.path in actuated:
+        what = f"the actuator {actuated[joint.path]}" if joint.path in actuated else "a motor"
+        reading.note(f"{joint.path}: {what} drives it, nothing animates it, and it holds the pose of its bodies")
+        return Drive(joint, HELD)
     stiffness = prim.GetAttribute(f"drive:{drive}:physics:stiffness").Get()
     if stiffness:
-        notes.append(f"{joint.path}: its drive has a stiffness but no target position and holds 0 {unit}")
-        return Drive(joint, attribute, False)
-    notes.append(f"{joint.path}: its drive has neither a target position nor a stiffness, so the joint moves freely")
+        reading.note(f"{joint.path}: its drive has a stiffness but no target position and holds 0 {unit}")
+        return Drive(joint, HELD, held=0.0)
+    reading.note(f"{joint.path}: its drive has neither a target position nor a stiffness, so the joint moves freely")
     return None
 
 
@@ -201,19 +277,3 @@ def _refuse_wrong_motor(joint: JointPrim) -> None:
             found=joint.prim.GetTypeName(),
             remedy="Remove CalmMotorAPI, or make it a PhysicsRevoluteJoint or PhysicsPrismaticJoint",
         )
-
-
-def _limit(prim, name: str) -> float:
-    return _positive(prim, name, schemas.value(prim, _SCHEMA, name))
-
-
-def _positive(prim, name: str, value) -> float:
-    if value is None or not value > 0.0:
-        raise ShotError(
-            "a limit must be positive",
-            path=prim.GetPath(),
-            attribute=name,
-            found=value,
-            remedy="Correct the limit, or remove the attribute (then there is none)",
-        )
-    return float(value)

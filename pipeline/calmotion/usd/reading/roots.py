@@ -6,8 +6,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...shot import MovingFrame
+from ...shot import Frame, MovingFrame
 from ..clock import Clock
+from ..transforms import Pose
 from .context import Reading
 from .joints import JointPrim, read_joint
 from .stillness import carriers, codes_of, moves
@@ -48,7 +49,7 @@ def moving_frames(reading: Reading, skeleton: Skeleton, clock: Clock) -> tuple[M
             continue
         frames = clock.time_codes(clock.frame_times())
         codes = np.unique(np.concatenate([frames, *(codes_of(mover) for mover in carriers(prim))]))
-        poses = [_frame(Reading(reading.stage, reading.units, float(code)), joint, prim, skeleton) for code in codes]
+        poses = [world_frame(reading.at(float(code)), joint, prim, skeleton.poses) for code in codes]
         rotations = np.array([pose.rotation for pose in poses])
         flips = np.where(np.sum(rotations[1:] * rotations[:-1], axis=1) < 0.0, -1.0, 1.0)
         rotations[1:] *= np.cumprod(flips)[:, None]
@@ -57,9 +58,15 @@ def moving_frames(reading: Reading, skeleton: Skeleton, clock: Clock) -> tuple[M
     return tuple(found)
 
 
-def _frame(reading: Reading, joint: JointPrim, prim, skeleton: Skeleton):
+def world_frame(reading: Reading, joint: JointPrim, prim, poses: dict[str, Pose]) -> Frame:
+    """The world-side frame of a joint at the time of a reading.
+
+    Args:
+        prim: What carries it.
+        poses: Poses of the bodies where the joints were read, stage units.
+    """
     if joint.prim is None:
         return reading.pose(prim).frame(reading.units.length(1.0))
-    there = read_joint(reading, joint.prim, skeleton.poses)
+    there = read_joint(reading, joint.prim, poses)
     assert there is not None
     return there.frame0

@@ -3,23 +3,32 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
-from ...errors import ShotError
-from ...shot import Animation, Character, Provenance, Track
+from ...errors import raise_all
+from ...shot import Animation, Character, MotorTracks, MovingFrame, Provenance, Track
 from .. import stages
 from ..clock import Clock, clock_of
-from ..units import StageUnits, units_of
-from .character import Skeleton, animated_attributes, build_character, read_skeleton
-from .context import Reading
-from .motors import ATTRIBUTE, free_tracks
+from ..units import units_of
+from .character import Skeleton, build_character, read_skeleton
+from .context import Reading, is_rigid_body, prims_of
+from .given_tracks import given_joints, given_track
+from .joints import joint_prims
+from .motors import ATTRIBUTE, BODIES, DRIVE, GIVEN, HELD, LENGTH_ATTRIBUTE, Drive, free_tracks, to_si
+from .posed_motors import joint_motions, pose_codes, posed_track
 from .roots import moving_frames
+from .skeletal_motors import hinge_stacks, skeletal_tracks
+from .stillness import carriers, codes_of
 from .targets import weight_tracks
 from .tracks import read_track, sample_codes
 
 
-def read_shot(path: str) -> tuple[Character, Animation, Provenance]:
+def read_shot(
+    path: str, *, still: bool = False, given: MotorTracks | None = None
+) -> tuple[Character, Animation, Provenance]:
     """Read a shot.
 
     Layers that Calmotion wrote earlier are muted for the character and for the intent; what they composed to is
@@ -27,56 +36,123 @@ def read_shot(path: str) -> tuple[Character, Animation, Provenance]:
 
     Args:
         path: A .usda, .usdc, .usd or .usdz file.
+        still: Whether a character that nothing animates is read as well; its animation is then one frame.
+        given: Tracks from beside the shot, which replace those of the motors that they name.
 
     Returns:
         The character, its animation, and what a writer must know.
 
     Raises:
-        ShotError: The shot cannot be processed; with prim path, attribute and remedy.
+        ShotError: The shot cannot be processed; with prim path, attribute and remedy. A `ShotErrors` where several
+            things are wrong.
     """
     composed = stages.open_stage(path)
     stages.refuse_own_layer(composed, path)
     earlier = stages.earlier_layers(composed)
     stage = stages.open_stage(path, muted=earlier) if earlier else composed
     with stages.quiet():
-        reading, clock = _start_reading(stage)
-        skeleton = read_skeleton(reading)
-        tracks = _tracks(stage, skeleton, clock, reading.notes, reading.units)
-        moving = moving_frames(reading, skeleton, clock)
-        _note_dense_samples(tracks, clock, reading)
-        character = build_character(reading, skeleton)
+        read = read_stage(stage, still, given)
+        reading, clock, character, tracks = read.reading, read.clock, read.character, read.tracks
         current = tracks
         if earlier:
-            current = _tracks(composed, skeleton, clock, [], reading.units)
+            # a motion that we predicted is no animation, but curves of bodies and skeletons are
+            motions = stages.earlier_layers(composed, (stages.MOTION,))
+            result = stages.open_stage(path, muted=motions) if motions else composed
+            asked = Reading(result, reading.units, clock.start)
+            current = motor_tracks(asked, read.skeleton.drives, clock, given, result=True)
+            raise_all(asked.problems)
             names = ", ".join(stages.display_name(layer, path) for layer in earlier)
             note = f"the shot carries results of Calmotion ({names}); the intent is the animation beneath them"
             character = dataclasses.replace(character, notes=(*character.notes, note))
     provenance = _provenance(path, stage, reading, clock, earlier)
     weights = weight_tracks(stage, character.targets, clock)
     free = free_tracks(stage, character.motors, clock)
-    return character, Animation(clock.frame_times(), tracks, current, moving, weights, free), provenance
+    return character, Animation(clock.frame_times(), tracks, current, read.moving, weights, free), provenance
 
 
-def _start_reading(stage) -> tuple[Reading, Clock]:
-    """The reading context at the first frame, and the clock of the shot."""
+@dataclass(frozen=True, eq=False)
+class StageReading:
+    """What one stage says, before layers of ours are taken into account."""
+
+    reading: Reading
+    clock: Clock
+    skeleton: Skeleton
+    character: Character
+    tracks: tuple[Track, ...]
+    moving: tuple[MovingFrame, ...]
+
+
+def read_stage(stage, still: bool = False, given: MotorTracks | None = None) -> StageReading:
+    """Read a composed stage; arguments and errors as for `read_shot`."""
     units = units_of(stage)
-    codes = [sample_codes(attribute) for attribute in animated_attributes(stage)]
-    every = np.concatenate(codes) if codes else np.zeros(0)
-    if len(every) == 0:
-        # Nothing is animated, so there is no shot; let the skeleton say precisely what is missing.
-        read_skeleton(Reading(stage, units, float(stage.GetStartTimeCode())))
-        raise ShotError("nothing is animated", path=stage.GetRootLayer().identifier, attribute=ATTRIBUTE)
-    clock = clock_of(stage, every)
-    return Reading(stage, units, clock.start), clock
+    clock = shot_clock(stage, given)
+    reading = Reading(stage, units, clock.start)
+    skeleton = read_skeleton(reading, clock, still, given_joints(stage, given))
+    tracks = motor_tracks(reading, skeleton.drives, clock, given)
+    moving = moving_frames(reading, skeleton, clock)
+    _note_dense_samples(tracks, clock, reading)
+    return StageReading(reading, clock, skeleton, build_character(reading, skeleton), tracks, moving)
 
 
-def _tracks(stage, skeleton: Skeleton, clock: Clock, notes: list[str], units: StageUnits) -> tuple[Track, ...]:
-    found = []
-    for drive in skeleton.drives:
-        attribute = stage.GetAttributeAtPath(drive.attribute.GetPath())
-        to_si = units.length(1.0) if drive.joint.kind == "prismatic" else np.deg2rad(1.0)
-        found.append(read_track(attribute, clock, notes, float(to_si)))
-    return tuple(found)
+def shot_clock(stage, given: MotorTracks | None) -> Clock:
+    """The clock of a shot: its range is that of the stage, else of the samples of its drives, else of those of bodies
+    and skeletons; one frame where nothing is animated."""
+    from pxr import UsdSkel
+
+    names = (ATTRIBUTE, LENGTH_ATTRIBUTE)
+    drives = [prim.GetAttribute(name) for prim in joint_prims(stage) for name in names]
+    codes = [code for attribute in drives if attribute for code in sample_codes(attribute)]
+    if given is not None:
+        rate, start = stage.GetTimeCodesPerSecond(), stage.GetStartTimeCode()
+        codes += [start + rate * t for t in given.times[[0, -1]]]
+    if not codes:
+        for prim in prims_of(stage):
+            if is_rigid_body(prim):
+                codes += [code for carrier in carriers(prim) for code in codes_of(carrier)]
+            elif prim.IsA(UsdSkel.Animation):
+                codes += prim.GetAttribute("rotations").GetTimeSamples()
+    if not codes:
+        start = float(stage.GetStartTimeCode())
+        return Clock(start, start, float(stage.GetTimeCodesPerSecond()), float(stage.GetFramesPerSecond()))
+    return clock_of(stage, np.array(codes, dtype=np.float64))
+
+
+def motor_tracks(
+    reading: Reading, drives: Sequence[Drive], clock: Clock, given: MotorTracks | None = None, result: bool = False
+) -> tuple[Track, ...]:
+    """The tracks of the motors, from wherever each has its own.
+
+    Args:
+        reading: The stage that is asked; problems and notes are kept in it.
+        result: Whether that stage carries curves of ours: then a motor that held still may be animated.
+    """
+    stage, notes = reading.stage, reading.notes
+    found: dict[str, Track] = {}
+    posed = [d for d in drives if d.source == BODIES or (d.source == HELD and d.held is None)]
+    bodies = [drive.joint for drive in posed]
+    codes = pose_codes(stage, bodies, clock)
+    if len(codes) == 0:
+        codes = np.unique([clock.start, clock.end])
+    for joint, motion in zip(bodies, joint_motions(reading, bodies, codes), strict=True):
+        found[joint.path] = posed_track(motion, joint, codes, clock, reading)
+    for stack in hinge_stacks(reading, drives):
+        with reading.going_on():
+            found |= skeletal_tracks(stack, clock, reading)
+    for drive in drives:
+        unit, path = to_si(drive.joint.kind, reading.units), drive.joint.path
+        attribute = drive.attribute(stage)
+        with reading.going_on():
+            if drive.source == DRIVE or (result and attribute and len(sample_codes(attribute))):
+                found[path] = read_track(attribute, clock, notes, unit)
+            elif drive.source == GIVEN and given is not None:
+                found[path] = given_track(given, drive.joint)
+            elif drive.source == HELD and drive.held is not None:
+                found[path] = Track(clock.seconds([clock.start, clock.end]), np.full(2, drive.held))
+    for drive in drives:
+        if drive.gear is not None and drive.gear.leader in found:
+            led = found[drive.gear.leader]
+            found[drive.joint.path] = Track(led.times, drive.gear.offset + drive.gear.ratio * led.values)
+    return tuple(found[drive.joint.path] for drive in drives if drive.joint.path in found)
 
 
 def _note_dense_samples(tracks: tuple[Track, ...], clock: Clock, reading: Reading) -> None:

@@ -20,38 +20,39 @@ WEIGHTS = ("calm:target:positionWeight", "calm:target:rotationWeight")
 _UPRIGHT = np.array([1.0, 0.0, 0.0, 0.0])
 
 
-def target_prims(stage) -> list[tuple[Any, str]]:
-    """The prims with CalmTargetAPI, each with the path of the body that carries it.
+def target_prims(reading: Reading) -> list[tuple[Any, str]]:
+    """The prims with CalmTargetAPI, each with the path of the body that carries it; one that none carries, or that has
+    no transform, is kept as a problem of the reading."""
+    found = []
+    for prim in prims_of(reading.stage):
+        if schemas.is_applied(prim, _SCHEMA):
+            with reading.going_on():
+                found.append((prim, _carrier(prim)))
+    return found
 
-    Raises:
-        ShotError: One that is not below a rigid body, or has no transform.
-    """
+
+def _carrier(prim) -> str:
     from pxr import UsdGeom
 
-    found = []
-    for prim in prims_of(stage):
-        if not schemas.is_applied(prim, _SCHEMA):
-            continue
-        body = prim
-        while body and not is_rigid_body(body):
-            body = body.GetParent()
-        if not body:
-            raise ShotError(
-                "a target must be carried by a body",
-                path=prim.GetPath(),
-                attribute="apiSchemas",
-                found=_SCHEMA,
-                remedy="Move the prim below a prim with PhysicsRigidBodyAPI, or remove CalmTargetAPI",
-            )
-        if not prim.IsA(UsdGeom.Xformable):
-            raise ShotError(
-                "a target needs a transform",
-                path=prim.GetPath(),
-                found=prim.GetTypeName() or "a prim without a type",
-                remedy="Make it an Xform",
-            )
-        found.append((prim, str(body.GetPath())))
-    return found
+    body = prim
+    while body and not is_rigid_body(body):
+        body = body.GetParent()
+    if not body:
+        raise ShotError(
+            "a target must be carried by a body",
+            path=prim.GetPath(),
+            attribute="apiSchemas",
+            found=_SCHEMA,
+            remedy="Move the prim below a prim with PhysicsRigidBodyAPI, or remove CalmTargetAPI",
+        )
+    if not prim.IsA(UsdGeom.Xformable):
+        raise ShotError(
+            "a target needs a transform",
+            path=prim.GetPath(),
+            found=prim.GetTypeName() or "a prim without a type",
+            remedy="Make it an Xform",
+        )
+    return str(body.GetPath())
 
 
 def read_target(reading: Reading, prim, body: int, pose: Pose) -> Target:

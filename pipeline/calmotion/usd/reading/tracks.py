@@ -39,7 +39,9 @@ def read_track(attribute, clock: Clock, notes: list[str], to_si: float) -> Track
     codes = np.array(attribute.GetTimeSamples(), dtype=np.float64)
     if len(codes) == 0 and attribute.HasSpline():
         notes.append(f"{path}: the spline is read at its knots and at the frames of the shot, and smooth between them")
-        codes = _knots_and_frames(attribute, frames)
+        knots = np.array(list(attribute.GetSpline().GetKnots().keys()), dtype=np.float64)
+        # at these a C2 one is read back exactly
+        codes = clock.merged(knots[(knots > frames[0]) & (knots < frames[-1])])
     elif len(codes) == 0:
         codes = frames[[0, -1]]
     values = np.array([_value(attribute, code) for code in codes])
@@ -49,14 +51,6 @@ def read_track(attribute, clock: Clock, notes: list[str], to_si: float) -> Track
     codes = np.concatenate([frames[held[0]], codes, frames[held[1]]])
     values = np.concatenate([np.full(held[0].sum(), values[0]), values, np.full(held[1].sum(), values[-1])])
     return Track(clock.seconds(codes), to_si * values)
-
-
-def _knots_and_frames(attribute, frames: Array) -> Array:
-    """Time codes at which a spline is evaluated: at these a C2 one is read back exactly."""
-    knots = np.array(list(attribute.GetSpline().GetKnots().keys()), dtype=np.float64)
-    codes = np.union1d(frames, knots[(knots > frames[0]) & (knots < frames[-1])])
-    # a knot next to a frame is that frame
-    return codes[np.concatenate([[True], np.diff(codes) > 1e-6])]
 
 
 def _value(attribute, code: float) -> float:

@@ -12,10 +12,13 @@ from ..transforms import Pose, pose_from_matrix, rotation_from_quaternion
 from .curves import attribute_spec
 from .motions import BakedMotion
 
+_EQUAL = 1e-6  # of matrices, over the size of their entries: what single precision leaves
 _OP = "xformOp:transform:calmotion"  # a name of our own: never the type of an op that the shot has
 
 
-def bake_bodies(layer, stage, character: Character, motion: BakedMotion, clock: Clock, meters: float) -> dict[str, int]:
+def bake_bodies(
+    layer, stage, character: Character, motion: BakedMotion, clock: Clock, meters: float, changed: bool = False
+) -> dict[str, int]:
     """Author one matrix for each body and frame, relative to its parent prim, in place of its other transform ops.
 
     Args:
@@ -25,6 +28,7 @@ def bake_bodies(layer, stage, character: Character, motion: BakedMotion, clock: 
         motion: What to bake.
         clock: The clock of the shot.
         meters: Metres per unit of the stage.
+        changed: Whether bodies that move, relative to their parent prim, as they are animated are left out.
 
     Returns:
         Path of each attribute that was written, with its number of samples.
@@ -43,6 +47,8 @@ def bake_bodies(layer, stage, character: Character, motion: BakedMotion, clock: 
         local = worlds[body.path]
         if not reset:
             local = np.linalg.inv(_parent_matrices(stage, prim.GetParent(), worlds, poses, codes, clock.start)) @ local
+        if changed and _same(local, prim, codes):
+            continue
         spec = attribute_spec(layer, f"{body.path}.{_OP}", Sdf.ValueTypeNames.Matrix4d)
         for code, matrix in zip(codes, local, strict=True):
             layer.SetTimeSample(spec.path, float(code), gf.to_matrix(matrix))
@@ -134,6 +140,15 @@ def _parent_matrices(
     at_start = gf.matrix(UsdGeom.XformCache(Usd.TimeCode(start)).GetLocalToWorldTransform(parent))
     path = str(carrier.GetPath())
     return worlds[path] @ np.linalg.inv(poses[path].matrix()) @ at_start
+
+
+def _same(local: Array, prim, codes: Array) -> bool:
+    """Whether local matrices, shape [f, 4, 4], are those that a prim is animated with."""
+    from pxr import UsdGeom
+
+    xform = UsdGeom.Xformable(prim)
+    authored = np.array([gf.matrix(xform.GetLocalTransformation(float(code))) for code in codes])
+    return bool(np.max(np.abs(local - authored)) <= _EQUAL * max(1.0, float(np.max(np.abs(authored)))))
 
 
 def _local_to_world(prim, code: float) -> Array:

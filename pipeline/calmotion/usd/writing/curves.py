@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import numpy as np
 
-from ...shot import Character, MotorCurve, Track
+from ...shot import Character, Motor, MotorCurve, Track
 from ...shot.character import Array
 from ..clock import Clock
+from ..schemas import is_applied
 
 
 def sample_times(frame_times: Array, samples_per_second: float | None) -> Array:
@@ -65,6 +68,19 @@ def author_curves(
             layer.SetTimeSample(spec.path, float(code), float(value))
         written[path] = len(codes)
     return written
+
+
+def ensure_drives(layer, stage, motors: Iterable[Motor]) -> None:
+    """Apply the drives that motors' attributes belong to, where the shot has none (motors that an actuator of another
+    dialect makes)."""
+    from pxr import Sdf
+
+    for motor in motors:
+        drive = f"PhysicsDriveAPI:{motor.attribute.split(':')[1]}"
+        if not is_applied(stage.GetPrimAtPath(motor.path), drive):
+            schemas = Sdf.TokenListOp()
+            schemas.prependedItems = [drive]
+            Sdf.CreatePrimInLayer(layer, motor.path).SetInfo("apiSchemas", schemas)
 
 
 def attribute_spec(layer, path: str, kind, uniform: bool = False):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from dataclasses import dataclass
+from typing import Any
 
 from ...errors import ShotError
 from ...shot import Animation, Character, MotorCurve, Provenance, Result
@@ -11,8 +12,9 @@ from .. import stages
 from ..clock import Clock
 from ..layers import refuse_input_as_output, write_layer
 from . import bake, metadata, motions
-from .curves import author_curves, sample_times
+from .curves import author_curves, ensure_drives, sample_times
 from .root import keeps_earlier_curves, root_path, write_root
+from .skeletal import author_skeletons
 from .splines import author_splines
 
 BAKES = ("none", "motors", "simulated")
@@ -83,17 +85,13 @@ def write_result(
         settings=metadata.settings_of(character, result, options.bake, options.samples_per_second, options.splines),
         errors=metadata.errors_of(character, result),
     )
-    with Sdf.ChangeBlock():
-        written: dict[str, int] = {}
-        knots: dict[str, int] = {}
-        if role == stages.CURVES:
-            curves, meters = _curves_to_write(result, provenance), provenance.meters_per_unit
-            if options.splines:
-                knots |= author_splines(layer, character, animation, curves, clock, meters)
-            else:
-                times = sample_times(animation.frame_times, options.samples_per_second)
-                written |= author_curves(layer, character, curves, animation.frame_times, times, clock, meters)
-    written |= _bake(layer, character, animation, provenance, result, options, clock)
+    muted = stages.earlier_layers(stages.open_stage(provenance.shot)) if provenance.earlier_layers else ()
+    shot = _Shot(stages.open_stage(provenance.shot, muted=muted), character, animation, clock, provenance)
+    written: dict[str, int] = {}
+    knots: dict[str, int] = {}
+    if role == stages.CURVES:
+        written, knots = _write_curves(layer, shot, result, options)
+    written |= _bake(layer, shot, result, options)
     write_layer(layer, output, lambda temporary: _validate(temporary, written, knots))
     return output, write_root(output, provenance, role)
 
@@ -117,26 +115,89 @@ def _curves_to_write(result: Result, provenance: Provenance) -> tuple[MotorCurve
     return tuple(curve for curve in result.curves if curve.changed or every)
 
 
-def _bake(
-    layer, character, animation, provenance, result: Result, options: WriteOptions, clock: Clock
-) -> dict[str, int]:
+@dataclass(frozen=True, eq=False)
+class _Shot:
+    """The shot that a result is written over: its stage, layers of ours muted, and what was read from it."""
+
+    stage: Any
+    character: Character
+    animation: Animation
+    clock: Clock
+    provenance: Provenance
+
+    @property
+    def meters(self) -> float:
+        return self.provenance.meters_per_unit
+
+
+def _write_curves(layer, shot: _Shot, result: Result, options: WriteOptions) -> tuple[dict[str, int], dict[str, int]]:
+    """Author motor curves where they came from: attributes with their number of samples, and of knots."""
+    character, animation, clock = shot.character, shot.animation, shot.clock
+    curves: dict[str, tuple[MotorCurve, ...]] = {"drive": (), "bodies": (), "skeleton": ()}
+    for curve in _curves_to_write(result, shot.provenance):
+        curves[character.motors[curve.motor].source] += (curve,)
+    elsewhere = curves["bodies"] or curves["skeleton"]
+    if elsewhere and (options.splines or (curves["bodies"] and options.samples_per_second is not None)):
+        motor = character.motors[elsewhere[0].motor]
+        raise ShotError(
+            "this motor is animated by the transforms of its bodies or by a skeleton, where curves are samples at the "
+            "frames",
+            path=motor.path,
+            attribute=motor.attribute,
+            found="--splines" if options.splines else "--samples-per-second",
+            remedy="Leave the option out, or animate the motor by its drive",
+        )
+    ensure_drives(layer, shot.stage, [character.motors[curve.motor] for curve in curves["drive"]])
+    times = sample_times(animation.frame_times, options.samples_per_second)
+    written: dict[str, int] = {}
+    knots: dict[str, int] = {}
+    if options.splines:
+        knots = author_splines(layer, character, animation, curves["drive"], clock, shot.meters)
+    else:
+        written = author_curves(layer, character, curves["drive"], animation.frame_times, times, clock, shot.meters)
+    if curves["skeleton"]:
+        written |= author_skeletons(layer, shot.stage, character, animation, curves["skeleton"], times, clock)
+    if curves["bodies"] and options.bake != "motors":
+        motion = _performed(shot, result)
+        written |= bake.bake_bodies(layer, shot.stage, character, motion, clock, shot.meters, changed=True)
+    return written, knots
+
+
+def _performed(shot: _Shot, result: Result) -> motions.BakedMotion:
+    if result.performed is None:
+        raise ShotError(
+            "a rigid robot cannot perform these curves: its linkage does not close",
+            path=shot.character.path,
+            attribute="bake",
+            remedy="Use --bake=simulated",
+        )
+    return motions.simulated_motion(result.performed, shot.animation.frame_times)
+
+
+def _bake(layer, shot: _Shot, result: Result, options: WriteOptions) -> dict[str, int]:
     """Author what is baked into the layer; see `WriteOptions.bake`."""
     if options.bake not in BAKES:
         raise ShotError("unknown bake", found=options.bake, remedy=f"Use one of {', '.join(BAKES)}")
-    simulation = result.after or result.before
     simulated_only = result.after is None
     if options.bake == "none" and not simulated_only:
         return {}
+    posed = next((motor for motor in shot.character.motors if motor.source == "bodies"), None)
+    if posed is not None and options.bake == "simulated" and not simulated_only:
+        raise ShotError(
+            "this motor's curve is the motion of its bodies, which the predicted motion would take the place of",
+            path=posed.path,
+            attribute=posed.attribute,
+            found="--bake=simulated",
+            remedy="Leave it out, and then run `calmotion simulate --bake=simulated` on the root layer",
+        )
     if options.bake == "motors":
-        motion = motions.rigid_motion(character, animation, result)
+        motion = _performed(shot, result)
     else:
-        motion = motions.simulated_motion(simulation.motion, animation.frame_times)
-    muted = stages.earlier_layers(stages.open_stage(provenance.shot)) if provenance.earlier_layers else ()
-    stage = stages.open_stage(provenance.shot, muted=muted)
-    meters = provenance.meters_per_unit
-    written = bake.bake_bodies(layer, stage, character, motion, clock, meters)
+        motion = motions.simulated_motion((result.after or result.before).motion, shot.animation.frame_times)
+    written = bake.bake_bodies(layer, shot.stage, shot.character, motion, shot.clock, shot.meters)
     if options.bake == "simulated":
-        written |= bake.bake_points(layer, stage, character, result.skins, motion, clock, meters)
+        points = bake.bake_points(layer, shot.stage, shot.character, result.skins, motion, shot.clock, shot.meters)
+        written |= points
     return written
 
 

@@ -31,7 +31,8 @@ def hermite(animation: Animation, curve: MotorCurve, cyclic: bool) -> tuple[Arra
 
 
 def author_splines(
-    layer, character: Character, animation: Animation, curves: tuple[MotorCurve, ...], clock: Clock, meters: float
+    layer, character: Character, animation: Animation, curves: tuple[MotorCurve, ...], clock: Clock,
+    meters: float,
 ) -> dict[str, int]:  # fmt: skip
     """Author each curve as an over with a spline, degrees or stage length; one of a shot that loops repeats itself.
 

@@ -1,0 +1,98 @@
+"""The words that USD physics files in the wild use for what we read, and which of them wins.
+
+For each quantity the spellings are in order of priority: ours, then UsdPhysics, Newton, MuJoCo (`mjc:`, of the
+mujoco-usd-converter), PhysX. The first one that is authored is taken. None of the last three is known to usd-core, so
+all are read by name.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+USD, SI = "usd", "si"  # degrees and stage units, or radians and stage units as MuJoCo has them
+
+
+@dataclass(frozen=True)
+class Spelling:
+    """One dialect's word for a quantity of a joint.
+
+    Attributes:
+        dialect: Whose it is.
+        attribute: Name; `{drive}` stands for angular or linear, `{axis}` for the instance of a multiple-apply schema.
+        angles: `USD` or `SI`: whether angles in it are degrees or radians.
+        sign: Factor that turns its convention into ours.
+    """
+
+    dialect: str
+    attribute: str
+    angles: str = USD
+    sign: float = 1.0
+
+
+EFFORT_LIMIT = (
+    Spelling("Calmotion", "calm:motor:maxTorque"),
+    Spelling("UsdPhysics", "drive:{drive}:physics:maxForce"),
+    Spelling("MuJoCo", "mjc:actuatorfrcrange:max"),
+)
+VELOCITY_LIMIT = (
+    Spelling("Calmotion", "calm:motor:maxVelocity"),
+    Spelling("Newton", "newton:velocityLimit"),
+    Spelling("PhysX", "physxJoint:maxJointVelocity"),
+)
+
+MIMIC_AXES = ("rotX", "rotY", "rotZ", "transX", "transY", "transZ", "X", "Y", "Z")
+
+
+@dataclass(frozen=True)
+class GearSpelling:
+    """One dialect's words for a joint that is geared to another: value = sign (offset + ratio * leader).
+
+    Attributes:
+        leader: Name of the relationship to the joint that leads.
+        offset, ratio: Names of the attributes.
+        enabled: Name of the attribute that switches it off, or empty.
+        default_ratio: Where none is authored.
+    """
+
+    dialect: str
+    leader: str
+    offset: str
+    ratio: str
+    enabled: str = ""
+    default_ratio: float = 1.0
+    angles: str = USD
+    sign: float = 1.0
+
+
+GEARS = (
+    GearSpelling("Newton", "newton:mimicJoint", "newton:mimicCoef0", "newton:mimicCoef1", "newton:mimicEnabled"),
+    GearSpelling("MuJoCo", "mjc:target", "mjc:coef0", "mjc:coef1", angles=SI),
+    # PhysX: value + gearing * leader + offset = 0
+    *(
+        GearSpelling(
+            "PhysX", f"physxMimicJoint:{axis}:referenceJoint", f"physxMimicJoint:{axis}:offset",
+            f"physxMimicJoint:{axis}:gearing", sign=-1.0,
+        )
+        for axis in MIMIC_AXES
+    ),
+)  # fmt: skip
+
+
+def authored(prim, spelling: Spelling, drive: str) -> tuple[str, Any] | None:
+    """Name and value of an attribute where it is authored on a joint."""
+    name = spelling.attribute.format(drive=drive)
+    attribute = prim.GetAttribute(name)
+    if not attribute or not attribute.HasAuthoredValue():
+        return None
+    return name, attribute.Get()
+
+
+def elsewhere(prim, spellings: tuple[Spelling, ...], drive: str) -> tuple[str, Any, Spelling] | None:
+    """The first spelling that is authored and says something finite."""
+    for spelling in spellings:
+        found = authored(prim, spelling, drive)
+        if found is not None and found[1] is not None and not math.isinf(found[1]):
+            return *found, spelling
+    return None

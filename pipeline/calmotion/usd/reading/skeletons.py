@@ -1,0 +1,153 @@
+"""UsdSkel skeletons: their joints, poses at rest, and the animation that is bound to them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from ...errors import ShotError
+from ...shot.character import Array
+from .. import gf
+from ..transforms import pose_from_matrix
+from .context import prims_of
+
+
+@dataclass(frozen=True, eq=False)
+class BoundSkeleton:
+    """A skeleton with its animation.
+
+    Attributes:
+        prim: The Skeleton.
+        query: Its UsdSkel.SkeletonQuery.
+        animation: The SkelAnimation, or None.
+        joints: Its joints, `Hip/Knee` and so on.
+        rest: Local transforms at rest, stage units, mapping column vectors, shape [j, 4, 4].
+    """
+
+    prim: Any
+    query: Any
+    animation: Any
+    joints: tuple[str, ...]
+    rest: Array
+    _posed: dict[float, Array] = field(default_factory=dict)
+
+    def parent(self, joint: int) -> int:
+        """Index of the joint above one, -1 for none."""
+        return int(self.query.GetTopology().GetParent(joint))
+
+    def chain(self, joint: int) -> list[int]:
+        """A joint and those above it, the topmost first."""
+        found = []
+        while joint >= 0:
+            found.append(joint)
+            joint = self.parent(joint)
+        return found[::-1]
+
+    def codes(self) -> Array:
+        """Time codes of the samples of its animation."""
+        query = self.query.GetAnimQuery()
+        return np.array(query.GetJointTransformTimeSamples() if query else [], dtype=np.float64)
+
+    def locals_at(self, code: float) -> Array:
+        """Local transforms of all joints, shape [j, 4, 4]."""
+        if code not in self._posed:
+            found = self.query.ComputeJointLocalTransforms(code)
+            self._posed[code] = np.array([gf.matrix(m) for m in found])
+        return self._posed[code]
+
+    def placement(self, code: float) -> Array:
+        """From the skeleton's space to the world, shape [4, 4]."""
+        from pxr import UsdGeom
+
+        return gf.matrix(UsdGeom.XformCache(code).GetLocalToWorldTransform(self.prim))
+
+    def in_skeleton(self, local: Array) -> Array:
+        """Transforms in the skeleton's space out of local ones, shape [j, 4, 4]."""
+        found = np.empty_like(local)
+        for joint in range(len(local)):
+            above = self.parent(joint)
+            found[joint] = local[joint] if above < 0 else found[above] @ local[joint]
+        return found
+
+    def local_rotations(self, joint: int, codes: Array) -> Array:
+        """Rotations of a joint in its parent's axes, shape [n, 3, 3]."""
+        place = f"{self.prim.GetPath()} ({self.joints[joint]})"
+        return np.array([pose_from_matrix(self.locals_at(float(c))[joint], place).rotation for c in codes])
+
+
+def bound_skeletons(stage) -> list[BoundSkeleton]:
+    """The skeletons of a stage, those that nothing is bound to as well.
+
+    Raises:
+        ShotError: One whose joints are no tree, or without a pose at rest.
+    """
+    from pxr import Usd, UsdSkel
+
+    cache, found = UsdSkel.Cache(), []
+    for prim in prims_of(stage):
+        if prim.IsA(UsdSkel.Root):
+            cache.Populate(UsdSkel.Root(prim), Usd.TraverseInstanceProxies())
+    for prim in prims_of(stage):
+        if not prim.IsA(UsdSkel.Skeleton):
+            continue
+        query = cache.GetSkelQuery(UsdSkel.Skeleton(prim))
+        if not query:
+            raise ShotError(
+                "the skeleton cannot be read: its joints are no tree, or lists of different lengths belong to them",
+                path=prim.GetPath(),
+                attribute="joints",
+                remedy="Name every joint after the one above it (Hip, Hip/Knee), with one transform each",
+            )
+        found.append(_bound(prim, query))
+    return found
+
+
+def _bound(prim, query) -> BoundSkeleton:
+    animation = query.GetAnimQuery()
+    joints = tuple(str(joint) for joint in query.GetJointOrder())
+    rest = query.ComputeJointLocalTransforms(0.0, True)  # at rest
+    if len(rest) != len(joints):
+        bind = query.GetJointWorldBindTransforms()
+        if len(bind) != len(joints):
+            raise ShotError(
+                "a skeleton without a pose at rest",
+                path=prim.GetPath(),
+                attribute="restTransforms",
+                found=f"{len(rest)} transforms for {len(joints)} joints",
+                remedy="Author restTransforms or bindTransforms, one for each joint",
+            )
+        topology = query.GetTopology()
+        rest = [
+            bind[k] * bind[topology.GetParent(k)].GetInverse() if topology.GetParent(k) >= 0 else bind[k]
+            for k in range(len(joints))
+        ]
+    return BoundSkeleton(
+        prim, query, animation.GetPrim() if animation else None, joints, np.array([gf.matrix(m) for m in rest])
+    )
+
+
+def skeleton_with(skeletons: list[BoundSkeleton], token: str, path: str, attribute: str) -> tuple[BoundSkeleton, int]:
+    """The skeleton that has a joint, and its index there.
+
+    Args:
+        token: The joint, as the skeleton names it, or the last part of that where it is unique.
+        path, attribute: What names it, for the message.
+
+    Raises:
+        ShotError: None has it, or several do.
+    """
+    places = [(s, k) for s in skeletons for k, joint in enumerate(s.joints) if joint == token]
+    if not places:
+        places = [(s, k) for s in skeletons for k, joint in enumerate(s.joints) if joint.split("/")[-1] == token]
+    if len(places) != 1:
+        known = ", ".join(joint for s in skeletons for joint in s.joints)
+        raise ShotError(
+            "several joints of skeletons have this name" if places else "no skeleton of the shot has this joint",
+            path=path,
+            attribute=attribute,
+            found=token,
+            remedy=f"Name one of {known}" if known else "Bind a Skeleton with an animation, or remove the attribute",
+        )
+    return places[0]

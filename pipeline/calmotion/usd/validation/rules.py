@@ -1,0 +1,105 @@
+"""Our rules: functions from a stage to findings."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterator
+
+import numpy as np
+
+from ...errors import ShotError, each
+from ...shot.finding import ERROR, WARNING, Finding
+from .. import schemas
+from ..reading.context import is_rigid_body, prims_of
+from ..reading.shot import StageReading, read_stage
+
+READABLE, SCHEMAS, PLACES, LIMITS = "ShotIsReadable", "SchemasAreKnown", "SchemasFit", "AnimationKeepsLimits"
+_NAMESPACE = "calm:"
+_FREE_NAMES = ("calm:interface:",)  # relationships of subsets, which need no schema
+
+
+def unreadable(stage) -> Iterator[Finding]:
+    """What the reader refuses, what it reads otherwise than it is animated, and motors animated beyond their limits."""
+    try:
+        read = read_stage(stage)
+    except ShotError as error:
+        yield from (finding_of(one, ERROR, READABLE) for one in each(error))
+        return
+    yield from (finding_of(one, WARNING, READABLE) for one in read.reading.doubts)
+    yield from _beyond_limits(read)
+
+
+def finding_of(error: ShotError, level: str, rule: str) -> Finding:
+    """A problem as a finding."""
+    found = "" if error.found is None else str(error.found)
+    return Finding(level, rule, error.path, error.attribute, error.problem, found, error.remedy)
+
+
+def _beyond_limits(read: StageReading) -> Iterator[Finding]:
+    for motor, track in zip(read.character.motors, read.tracks, strict=True):
+        joint = read.character.joints[motor.joint]
+        unit = read.reading.units.meters if motor.linear else np.deg2rad(1.0)
+        low, high = float(track.values.min()), float(track.values.max())
+        for value, limit, beyond in ((low, joint.lower, low < joint.lower), (high, joint.upper, high > joint.upper)):
+            if beyond and abs(value - limit) > 1e-6:
+                yield Finding(
+                    WARNING, LIMITS, motor.path, motor.attribute, "the animation goes beyond the limit of the joint",
+                    f"{value / unit:.6g}, limit {limit / unit:.6g}", "Animate within the limit, or correct it",
+                )  # fmt: skip
+
+
+def unknown_names(stage) -> Iterator[Finding]:
+    """Attributes in our namespace that no schema of ours has, or whose schema is not applied: nothing reads them."""
+    owners = _owners()
+    for prim in prims_of(stage):
+        for prop in prim.GetAuthoredProperties():
+            name = prop.GetName()
+            if not name.startswith(_NAMESPACE) or name.startswith(_FREE_NAMES):
+                continue
+            place = str(prim.GetPath())
+            if name not in owners:
+                near = difflib.get_close_matches(name, owners, 1, 0.6)
+                remedy = f"Did you mean {near[0]}?" if near else f"The names are {', '.join(sorted(owners))}"
+                yield Finding(WARNING, SCHEMAS, place, name, "no schema of Calmotion has this attribute", "", remedy)
+            elif not schemas.is_applied(prim, owners[name]):
+                yield Finding(
+                    WARNING, SCHEMAS, place, name, f"is not read, since {owners[name]} is not applied", "",
+                    f"Apply {owners[name]}, or remove the attribute",
+                )  # fmt: skip
+
+
+def _owners() -> dict[str, str]:
+    from pxr import Usd
+
+    registry, found = Usd.SchemaRegistry(), {}
+    for schema in schemas.NAMES:
+        definition = registry.FindAppliedAPIPrimDefinition(schema)
+        for name in definition.GetPropertyNames() if definition else ():
+            found[str(name)] = schema
+    return found
+
+
+def misplaced(stage) -> Iterator[Finding]:
+    """Schemas of ours on prims that they say nothing about; USD does not enforce that."""
+    from pxr import UsdGeom, UsdPhysics, UsdShade
+
+    fits = {
+        "CalmFlexibleBodyAPI": (is_rigid_body, "a body (PhysicsRigidBodyAPI)"),
+        "CalmDampingAPI": (lambda prim: prim.IsA(UsdShade.Material), "a Material"),
+        "CalmMotorAPI": (lambda prim: prim.IsA(UsdPhysics.Joint), "a joint"),
+        "CalmTargetAPI": (lambda prim: prim.IsA(UsdGeom.Xformable), "an Xform"),
+    }
+    for prim in prims_of(stage):
+        for schema, (allowed, what) in fits.items():
+            if schemas.is_applied(prim, schema) and not allowed(prim):
+                yield Finding(
+                    WARNING, PLACES, str(prim.GetPath()), "apiSchemas", f"{schema} belongs on {what}",
+                    str(prim.GetTypeName()) or "a prim without a type", "Move it there, or remove it",
+                )  # fmt: skip
+
+
+RULES = {
+    READABLE: (unreadable, "The shot can be processed, its motors can do what is animated, within their limits."),
+    SCHEMAS: (unknown_names, "Every attribute in the namespace calm: is one that is read."),
+    PLACES: (misplaced, "Schemas of Calmotion are on prims that they are about."),
+}

@@ -1,0 +1,99 @@
+"""Running our rules and USD's validators over a shot."""
+
+from __future__ import annotations
+
+from ...errors import ShotError, each
+from ...shot.finding import ERROR, WARNING, Finding, Findings
+from .. import stages
+from .rules import READABLE, RULES, finding_of
+
+_PLUGIN = "calmotion"
+
+
+def validate_shot(path: str) -> Findings:
+    """Everything that is wrong with a shot, at once.
+
+    Args:
+        path: File of the shot.
+
+    Returns:
+        Findings of our rules and of every validator that this USD has, errors first, else by place.
+    """
+    try:
+        stage = stages.open_stage(path)
+        stages.refuse_own_layer(stage, path)
+    except ShotError as error:
+        return Findings(tuple(finding_of(one, ERROR, READABLE) for one in each(error)))
+    muted = stages.earlier_layers(stage)
+    if muted:
+        stage = stages.open_stage(path, muted=muted)
+    with stages.quiet():
+        found = [finding for rule, _ in RULES.values() for finding in rule(stage)]
+        found += _of_usd(stage)
+    return Findings(tuple(sorted(dict.fromkeys(found), key=lambda f: (f.level != ERROR, f.path, f.attribute))))
+
+
+def _of_usd(stage) -> list[Finding]:
+    """What USD's own validators find."""
+    from pxr import UsdValidation
+
+    registry = UsdValidation.ValidationRegistry()
+    names = [m.name for m in registry.GetAllValidatorMetadata() if not m.name.startswith(f"{_PLUGIN}:")]
+    context = UsdValidation.ValidationContext(registry.GetOrLoadValidatorsByName(names))
+    kinds = {UsdValidation.ValidationErrorType.Error: ERROR, UsdValidation.ValidationErrorType.Warn: WARNING}
+    found = []
+    for error in context.Validate(stage):
+        level = kinds.get(error.GetType())
+        if level is None:
+            continue
+        path, attribute = _place(error, stage)
+        rule = str(error.GetIdentifier()).rpartition(".")[0]
+        found.append(Finding(level, rule, path, attribute, error.GetMessage().strip().rstrip(".")))
+    return found
+
+
+def _place(error, stage) -> tuple[str, str]:
+    for site in error.GetSites():
+        if site.IsProperty():
+            path = site.GetProperty().GetPath()
+            return str(path.GetPrimPath()), path.name
+        if site.IsPrim():
+            return str(site.GetPrim().GetPath()), ""
+        if site.GetLayer():
+            return site.GetLayer().identifier, ""
+    return stage.GetRootLayer().identifier, ""
+
+
+def register_validators() -> None:
+    """Register our rules in USD's validation framework, as stage validators; calling it again does nothing."""
+    from pxr import UsdValidation
+
+    registry = UsdValidation.ValidationRegistry()
+    for name, (rule, text) in RULES.items():
+        full = f"{_PLUGIN}:{name}"
+        if registry.HasValidator(full):
+            continue
+        metadata = UsdValidation.ValidatorMetadata(
+            name=full, doc=text, keywords=[_PLUGIN], schemaTypes=[], isTimeDependent=False, isSuite=False
+        )
+        registry.RegisterStageValidator(metadata, _as_validator(name, rule))
+
+
+def _as_validator(name: str, rule):
+    from pxr import Sdf, UsdValidation
+
+    kinds = {ERROR: UsdValidation.ValidationErrorType.Error, WARNING: UsdValidation.ValidationErrorType.Warn}
+
+    def validate(stage, times):
+        errors = []
+        for finding in rule(stage):
+            text = ShotError(
+                finding.problem, attribute=finding.attribute, found=finding.found or None, remedy=finding.remedy
+            ).message()
+            valid = Sdf.Path.IsValidPathString(finding.path) and stage.GetPrimAtPath(finding.path)
+            place = Sdf.Path(finding.path) if valid else Sdf.Path.absoluteRootPath
+            site = UsdValidation.ValidationErrorSite(stage, place)
+            errors.append(UsdValidation.ValidationError(name, kinds[finding.level], [site], text))
+        return errors
+
+    return validate

@@ -1,0 +1,108 @@
+"""Motor curves as joint rotations of the UsdSkel animation that they came from."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...retarget.curves import curve_of
+from ...shot import Animation, Character, MotorCurve
+from ...shot.character import Array
+from .. import gf
+from ..clock import Clock
+from ..reading.character import read_skeleton
+from ..reading.context import Reading
+from ..reading.skeletal_motors import HingeStack, hinge_stacks
+from ..transforms import quaternion_from_rotation
+from ..units import units_of
+from .curves import attribute_spec, curve_values
+
+
+def author_skeletons(
+    layer, stage, character: Character, animation: Animation, curves: tuple[MotorCurve, ...], times: Array,
+    clock: Clock,
+) -> dict[str, int]:  # fmt: skip
+    """Author the rotations of every SkelAnimation whose joints the curves turn; its other joints keep theirs.
+
+    What the motors cannot follow of a joint is kept: its rotation L becomes D(new) D(old)^T L.
+
+    Args:
+        layer: The Sdf.Layer.
+        stage: The shot, layers of ours muted.
+        character, animation: The shot as read.
+        curves: Those to write, all of motors whose source is a skeleton.
+        times: Of the samples [s].
+        clock: The clock of the shot.
+
+    Returns:
+        Path of each attribute that was written, with its number of samples.
+    """
+    changed = {character.motors[curve.motor].path: curve for curve in curves}
+    reading = Reading(stage, units_of(stage), clock.start)
+    drives = read_skeleton(reading, clock, still=True).drives
+    index = {motor.path: k for k, motor in enumerate(character.motors)}
+    turned: dict[str, list[tuple[HingeStack, Array]]] = {}
+    for stack in hinge_stacks(reading, drives):
+        if not any(drive.joint.path in changed for drive in stack.drives):
+            continue
+        old, new = (np.zeros((len(times), len(stack.drives))) for _ in range(2))
+        for k, drive in enumerate(stack.drives):
+            path = drive.joint.path
+            track = animation.tracks[index[path]]
+            old[:, k] = curve_of(track, float(animation.frame_times[-1]), character.retarget.cyclic)(times, 0)
+            new[:, k] = old[:, k]
+            if path in changed:
+                new[:, k] = curve_values(changed[path], animation.frame_times, times, character.retarget.cyclic)
+        change = stack.turned(new) @ np.swapaxes(stack.turned(old), 1, 2)
+        codes = clock.time_codes(times)
+        rotations = change @ stack.skeleton.local_rotations(stack.joint, codes)
+        turned.setdefault(str(stack.skeleton.animation.GetPath()), []).append((stack, rotations))
+    written: dict[str, int] = {}
+    for name, parts in turned.items():
+        written |= dict(_author(layer, stage, name, parts, clock, times))
+    return written
+
+
+def _author(layer, stage, name: str, parts: list[tuple[HingeStack, Array]], clock: Clock, times: Array):
+    """Write one animation; yields what was written."""
+    from pxr import Sdf, UsdSkel
+
+    animation = UsdSkel.Animation(stage.GetPrimAtPath(name))
+    joints = [str(joint) for joint in animation.GetJointsAttr().Get()]
+    more = [stack for stack, _ in parts if stack.skeleton.joints[stack.joint] not in joints]
+    rotations = attribute_spec(layer, f"{name}.rotations", Sdf.ValueTypeNames.QuatfArray)
+    last: dict[int, Array] = {}
+    for n, code in enumerate(clock.time_codes(times)):
+        found = gf.quaternions(animation.GetRotationsAttr().Get(float(code)))
+        found = np.concatenate([found, [_at_rest(stack) for stack in more]]) if more else found
+        for stack, turns in parts:
+            token = stack.skeleton.joints[stack.joint]
+            k = joints.index(token) if token in joints else len(joints) + more.index(stack)
+            # neighbours of the same sign, as USD interpolates between them
+            near = last.get(k, found[k])
+            quaternion = quaternion_from_rotation(turns[n])
+            found[k] = last[k] = quaternion if quaternion @ near >= 0.0 else -quaternion
+        layer.SetTimeSample(rotations.path, float(code), gf.to_quaternions(found))
+    yield str(rotations.path), len(times)
+    if more:
+        _lengthen(layer, animation, name, joints, more, clock)
+
+
+def _at_rest(stack: HingeStack) -> Array:
+    return quaternion_from_rotation(stack.rest)
+
+
+def _lengthen(layer, animation, name: str, joints: list[str], more: list[HingeStack], clock: Clock) -> None:
+    """Add joints that the animation did not have, at rest but for their rotations."""
+    from pxr import Sdf, Vt
+
+    names = [*joints, *(stack.skeleton.joints[stack.joint] for stack in more)]
+    attribute_spec(layer, f"{name}.joints", Sdf.ValueTypeNames.TokenArray, uniform=True).default = Vt.TokenArray(names)
+    rests = np.array([stack.skeleton.rest[stack.joint] for stack in more])
+    for attribute, kind, extra in (
+        (animation.GetTranslationsAttr(), Sdf.ValueTypeNames.Float3Array, rests[:, :3, 3]),
+        (animation.GetScalesAttr(), Sdf.ValueTypeNames.Half3Array, np.linalg.norm(rests[:, :3, :3], axis=1)),
+    ):
+        spec = attribute_spec(layer, f"{name}.{attribute.GetName()}", kind)
+        for code in attribute.GetTimeSamples() or [clock.start]:
+            own = gf.points(attribute.Get(code))
+            layer.SetTimeSample(spec.path, float(code), gf.to_vectors(np.concatenate([own, extra]), kind))

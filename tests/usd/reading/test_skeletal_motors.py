@@ -1,0 +1,103 @@
+"""Motors that are animated by a skeleton."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from calmotion import ShotError
+from calmotion.usd.reading import read_shot
+from calmotion.usd.reading.skeletal_motors import follow
+from posed_shots import ARM, skeletal
+from pxr import Sdf
+from scipy.spatial.transform import Rotation
+from small_shots import ELBOW, FRAMES, SHOULDER, Scale, angles, write_arm
+
+FRAME = np.arange(FRAMES + 1)
+
+
+def read(tmp_path, edit, scale=None):
+    return read_shot(str(write_arm(tmp_path / "arm.usda", edit, scale)))[:2]
+
+
+@pytest.mark.parametrize("scale", [Scale(), Scale(0.01, 0.001)], ids=["m", "cm"])
+def test_angles_follow_from_a_skeleton_that_stands_elsewhere(tmp_path, scale):
+    character, animation = read(tmp_path, skeletal, scale)
+    assert [motor.source for motor in character.motors] == ["skeleton", "skeleton"]
+    for track, meant in zip(animation.tracks, angles(FRAME), strict=True):
+        # rotations of a skeleton are in single precision
+        assert np.abs(track.values - np.radians(meant)).max() < 3e-6
+    assert not any("off the axes" in note for note in character.notes)
+
+
+def test_a_joint_that_the_animation_leaves_out_rests(tmp_path):
+    _, animation = read(tmp_path, lambda stage: skeletal(stage, sparse=True))
+    assert np.abs(animation.tracks[0].values).max() < 3e-6
+    assert np.abs(animation.tracks[1].values - np.radians(angles(FRAME)[1])).max() < 3e-6
+
+
+def test_what_a_hinge_cannot_do_is_reported(tmp_path):
+    character, _ = read(tmp_path, lambda stage: skeletal(stage, off_axis=4.0))
+    note = next(note for note in character.notes if "off the axes" in note)
+    assert ELBOW in note and "4 degrees" in note
+
+
+def test_a_joint_may_be_named_by_its_last_part(tmp_path):
+    def edit(stage):
+        skeletal(stage)
+        stage.GetPrimAtPath(SHOULDER).GetAttribute("calm:motor:skelJoint").Set("arm")
+
+    _, animation = read(tmp_path, edit)
+    assert np.abs(animation.tracks[0].values - np.radians(angles(FRAME)[0])).max() < 3e-6
+
+
+def test_a_joint_that_no_skeleton_has_is_refused_with_those_there_are(tmp_path):
+    def edit(stage):
+        skeletal(stage)
+        stage.GetPrimAtPath(ELBOW).GetAttribute("calm:motor:skelJoint").Set("root/leg")
+
+    with pytest.raises(ShotError, match="no skeleton of the shot has this joint") as caught:
+        read(tmp_path, edit)
+    assert caught.value.path == ELBOW and caught.value.attribute == "calm:motor:skelJoint"
+    assert ARM in caught.value.remedy
+
+
+def test_motors_of_one_joint_must_carry_each_other(tmp_path):
+    def edit(stage):
+        skeletal(stage)
+        # the shoulder carries the elbow: these do. A third motor on the base does not.
+        stage.GetPrimAtPath(ELBOW).GetAttribute("calm:motor:skelJoint").Set(ARM)
+        Sdf.CopySpec(stage.GetRootLayer(), SHOULDER, stage.GetRootLayer(), "/Arm/joints/other")
+        other = stage.GetPrimAtPath("/Arm/joints/other")
+        other.GetRelationship("physics:body0").SetTargets(["/Arm/base"])
+        other.GetRelationship("physics:body1").SetTargets(["/Arm/fore"])
+
+    with pytest.raises(ShotError, match="must carry each other") as caught:
+        read(tmp_path, edit)
+    assert "/Arm/joints/other" in caught.value.found
+
+
+AXES = {
+    "one": np.array([[0.0, 0.6, 0.8]]),
+    "two": np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0]]),
+    "three": np.eye(3),
+    "three askew": np.array([[1.0, 0.0, 0.0], [0.6, 0.8, 0.0], [0.0, 0.6, 0.8]]),
+}
+
+
+@pytest.mark.parametrize("axes", AXES.values(), ids=AXES.keys())
+def test_hinges_in_a_row_are_found_again(axes):
+    times = np.linspace(0.0, 2.0, 60)
+    meant = np.stack([0.9 * np.sin((1.0 + k) * times + k) for k in range(len(axes))], axis=1)
+    turn = Rotation.identity(len(times))
+    for k, axis in enumerate(axes):
+        turn = turn * Rotation.from_rotvec(meant[:, k, None] * axis)
+    found, off = follow(axes, turn.as_matrix())
+    assert np.abs(found - meant).max() < 1e-9 and off.max() < 1e-9
+
+
+def test_a_hinge_takes_the_part_about_its_axis_and_tells_the_rest():
+    axis = np.array([[0.0, 0.0, 1.0]])
+    swing = Rotation.from_rotvec([0.05, 0.0, 0.0])
+    turn = Rotation.from_rotvec(np.linspace(0.0, 12.0, 50)[:, None] * axis) * swing
+    found, off = follow(axis, turn.as_matrix())
+    assert np.allclose(found[:, 0], np.linspace(0.0, 12.0, 50)) and np.allclose(off, 0.05)

@@ -1,0 +1,135 @@
+"""Curves go back to where they came from: transforms of bodies, joints of a skeleton, drives that the shot lacks."""
+
+from __future__ import annotations
+
+import hashlib
+
+import numpy as np
+import pytest
+from calmotion import ShotError
+from calmotion.usd.reading import read_shot
+from calmotion.usd.writing import WriteOptions, write_result
+from performing import result_with, tracks_of, worst_gap
+from posed_shots import ANIMATION, ARM, FOREARM, posed, posed_by_pivots, skeletal
+from pxr import Sdf, Usd, UsdSkel
+from small_shots import ELBOW, FORE, FRAMES, SHOULDER, TARGET_POSITION, UPPER, write_arm
+
+MOTOR = {"shoulder": 0, "elbow": 1}
+
+
+def written(tmp_path, edit, bumps, **options):
+    """The shot, what was written over it, and what is read back from the root layer."""
+    shot = write_arm(tmp_path / "arm.usda", edit)
+    before = hashlib.sha256(shot.read_bytes()).hexdigest()
+    character, animation, provenance = read_shot(str(shot))
+    result = result_with(character, animation, bumps)
+    layer, root = write_result(
+        character, animation, provenance, result, str(tmp_path / "calm.usda"), WriteOptions(**options)
+    )
+    assert hashlib.sha256(shot.read_bytes()).hexdigest() == before
+    return animation, result, layer, root, read_shot(root)
+
+
+def properties(layer):
+    found = []
+    Sdf.Layer.FindOrOpen(layer).Traverse("/", lambda path: found.append(str(path)) if path.IsPropertyPath() else None)
+    return sorted(found)
+
+
+@pytest.mark.parametrize("edit", [posed, posed_by_pivots], ids=lambda edit: edit.__name__)
+@pytest.mark.parametrize("motor", MOTOR)
+def test_bodies_perform_the_new_curves(tmp_path, edit, motor):
+    animation, result, layer, root, (character, again, _) = written(tmp_path, edit, {MOTOR[motor]: 0.1})
+    for track, meant in zip(again.tracks, animation.tracks, strict=True):
+        assert np.abs(track.values - meant.values).max() < 1e-9
+    for track, curve in zip(again.current, result.curves, strict=True):
+        assert np.abs(track.values - curve.frame_values).max() < 1e-9
+    far, turned = worst_gap(root, character, again, tracks_of(animation, result.curves))
+    assert far < 1e-8 and turned < 1e-8
+    # the elbow moves the forearm alone
+    moved = {path.split(".")[0] for path in properties(layer)}
+    assert moved == ({FORE} if motor == "elbow" else {UPPER, FORE})
+
+
+def test_a_skeleton_performs_the_new_curves_and_keeps_its_other_joints(tmp_path):
+    animation, result, layer, root, (_, again, _) = written(tmp_path, skeletal, {1: 0.1})
+    assert properties(layer) == [f"{ANIMATION}.rotations"]
+    for track, meant in zip(again.tracks, animation.tracks, strict=True):
+        assert np.abs(track.values - meant.values).max() == 0.0
+    for track, curve in zip(again.current, result.curves, strict=True):
+        assert np.abs(track.values - curve.frame_values).max() < 3e-6
+    stages = [Usd.Stage.Open(str(path)) for path in (tmp_path / "arm.usda", root)]
+    before, after = (UsdSkel.Animation(stage.GetPrimAtPath(ANIMATION)) for stage in stages)
+    assert list(after.GetJointsAttr().Get()) == [ARM, FOREARM]
+    for frame in range(FRAMES + 1):
+        assert after.GetRotationsAttr().Get(frame)[0] == before.GetRotationsAttr().Get(frame)[0]
+        assert after.GetTranslationsAttr().Get(frame) == before.GetTranslationsAttr().Get(frame)
+
+
+def test_what_a_hinge_cannot_do_stays_in_the_skeleton(tmp_path):
+    def edit(stage):
+        skeletal(stage, off_axis=4.0)
+
+    _, result, _, root, (_, again, _) = written(tmp_path, edit, {1: 0.1})
+    assert np.abs(again.current[1].values - result.curves[1].frame_values).max() < 3e-6
+    # read as somebody else's animation, the written one is off the axis as the shot was
+    flat = Usd.Stage.Open(root).Flatten()
+    flat.customLayerData = {}
+    flat.Export(str(tmp_path / "flat.usda"))
+    character, _, _ = read_shot(str(tmp_path / "flat.usda"))
+    assert any("4 degrees" in note for note in character.notes)
+
+
+def test_a_sparse_animation_stays_sparse_unless_a_joint_is_missing(tmp_path):
+    def edit(stage):
+        skeletal(stage, sparse=True)
+
+    _, _, layer, _, _ = written(tmp_path, edit, {1: 0.1})
+    assert properties(layer) == [f"{ANIMATION}.rotations"]
+
+
+def test_a_joint_that_the_animation_lacks_is_added_at_rest(tmp_path):
+    def edit(stage):
+        skeletal(stage, sparse=True)
+
+    _, result, layer, root, (_, again, _) = written(tmp_path, edit, {0: 0.1})
+    stage = Usd.Stage.Open(root)
+    animation = UsdSkel.Animation(stage.GetPrimAtPath(ANIMATION))
+    assert list(animation.GetJointsAttr().Get()) == [FOREARM, ARM]
+    parts = (animation.GetRotationsAttr(), animation.GetTranslationsAttr(), animation.GetScalesAttr())
+    assert [len(part.Get(5)) for part in parts] == [2, 2, 2]
+    for track, curve in zip(again.current, result.curves, strict=True):
+        assert np.abs(track.values - curve.frame_values).max() < 3e-6
+
+
+def test_denser_samples_of_a_skeleton_follow_the_curve(tmp_path):
+    _, _, layer, _, (_, again, _) = written(tmp_path, skeletal, {1: 0.1}, samples_per_second=96.0)
+    assert len(Sdf.Layer.FindOrOpen(layer).ListTimeSamplesForPath(f"{ANIMATION}.rotations")) == 4 * FRAMES + 1
+
+
+@pytest.mark.parametrize(
+    ("edit", "options", "found"),
+    [
+        (skeletal, {"splines": True}, "--splines"),
+        (posed, {"splines": True}, "--splines"),
+        (posed, {"samples_per_second": 96.0}, "--samples-per-second"),
+        (posed, {"bake": "simulated"}, "--bake=simulated"),
+    ],
+)
+def test_what_such_curves_cannot_be_written_as_is_refused(tmp_path, edit, options, found):
+    with pytest.raises(ShotError) as caught:
+        written(tmp_path, edit, {1: 0.1}, **options)
+    assert caught.value.found == found and caught.value.path in (SHOULDER, ELBOW) and caught.value.remedy
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["arm.usda"]
+
+
+def test_a_motor_of_an_actuator_gets_the_drive_that_its_curve_needs(tmp_path):
+    def edit(stage):
+        prim = stage.GetPrimAtPath(ELBOW)
+        prim.GetAttribute(TARGET_POSITION).Clear()
+        prim.RemoveAppliedSchema("PhysicsDriveAPI:angular")
+        actuator = stage.DefinePrim("/Arm/actuator", "MjcActuator")
+        actuator.CreateRelationship("mjc:target").SetTargets([ELBOW])
+
+    _, result, _, _, (_, again, _) = written(tmp_path, edit, {1: 0.1})
+    assert np.abs(again.current[1].values - result.curves[1].frame_values).max() < 1e-6
