@@ -76,6 +76,8 @@ def _parser() -> argparse.ArgumentParser:
     )
     for command in (simulate, optimize):
         _run_options(command)
+    rig = _shot_command(commands, "rig", _rig, "make a robot of a skinned character: bodies, joints, motors, targets")
+    rig.add_argument("-o", "--output", metavar="LAYER", required=True, help="USD layer to write; it opens the shot")
     bench = commands.add_parser(
         "bench",
         help="measure error against run time",
@@ -193,6 +195,12 @@ def _optimize(args: argparse.Namespace, output: Output) -> int:
     from .cli_run import run_shot
 
     return run_shot(args, "optimize", output)
+
+
+def _rig(args: argparse.Namespace, output: Output) -> int:
+    from .cli_rig import rig
+
+    return rig(args, output)
 
 
 def _bench(args: argparse.Namespace, output: Output) -> int:

@@ -11,6 +11,7 @@ from calmotion.testing import check_plugin
         "figures",
         "mode_shapes",
         "rerun_logger",
+        "skel_rigger",
         "table_writer",
         "usd_reader",
         "usd_writer",

@@ -54,6 +54,38 @@ class WrittenLayer:
 
 
 @dataclass(frozen=True)
+class RiggedJoint:
+    """What became of one joint of a skeleton: the body that turns with it, the joints that turn that, and the angle
+    [rad] that they leave of the animation."""
+
+    joint: str
+    body: str
+    motors: tuple[str, ...]
+    off: float
+
+
+@dataclass(frozen=True)
+class Rig:
+    """A robot that was made of a skinned character.
+
+    Attributes:
+        layer: Path of the layer, which opens with the shot beneath it.
+        robot: Prim path of the robot.
+        joints: What turns, each with its motors.
+        bodies: Number of bodies, servos included.
+        mass: Of all of them [kg].
+        targets: Prim paths.
+    """
+
+    layer: str
+    robot: str
+    joints: tuple[RiggedJoint, ...]
+    bodies: int
+    mass: float
+    targets: tuple[str, ...]
+
+
+@dataclass(frozen=True)
 class Recording:
     """Path of a rerun recording."""
 

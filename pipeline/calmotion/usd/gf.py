@@ -61,6 +61,13 @@ def to_points(value: Array):
     return Vt.Vec3fArray.FromNumpy(np.ascontiguousarray(value, dtype=np.float32))
 
 
+def to_quaternion(value: Array):
+    """A Gf.Quatf of a quaternion (w, x, y, z), shape [4]."""
+    from pxr import Gf
+
+    return Gf.Quatf(float(value[0]), Gf.Vec3f(*(float(x) for x in value[1:])))
+
+
 def to_quaternions(value: Array):
     """A Vt.QuatfArray of quaternions (w, x, y, z), shape [n, 4]."""
     from pxr import Vt

@@ -13,7 +13,7 @@ from ..shot import InputLayer
 from . import schemas
 
 METADATA_KEY = "calmotion"
-CURVES, MOTION, ROOT = "curves", "motion", "root"  # roles of layers that we write
+CURVES, MOTION, ROOT, RIG = "curves", "motion", "root", "rig"  # roles of layers that we write
 
 _ARCS = {"reference": "references", "payload": "payload", "sublayer": "subLayers"}
 _REFUSED = (

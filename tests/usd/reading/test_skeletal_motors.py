@@ -6,10 +6,8 @@ import numpy as np
 import pytest
 from calmotion import ShotError
 from calmotion.usd.reading import read_shot
-from calmotion.usd.reading.skeletal_motors import follow
 from posed_shots import ARM, skeletal
 from pxr import Sdf
-from scipy.spatial.transform import Rotation
 from small_shots import ELBOW, FRAMES, SHOULDER, Scale, angles, write_arm
 
 FRAME = np.arange(FRAMES + 1)
@@ -74,30 +72,3 @@ def test_motors_of_one_joint_must_carry_each_other(tmp_path):
     with pytest.raises(ShotError, match="must carry each other") as caught:
         read(tmp_path, edit)
     assert "/Arm/joints/other" in caught.value.found
-
-
-AXES = {
-    "one": np.array([[0.0, 0.6, 0.8]]),
-    "two": np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0]]),
-    "three": np.eye(3),
-    "three askew": np.array([[1.0, 0.0, 0.0], [0.6, 0.8, 0.0], [0.0, 0.6, 0.8]]),
-}
-
-
-@pytest.mark.parametrize("axes", AXES.values(), ids=AXES.keys())
-def test_hinges_in_a_row_are_found_again(axes):
-    times = np.linspace(0.0, 2.0, 60)
-    meant = np.stack([0.9 * np.sin((1.0 + k) * times + k) for k in range(len(axes))], axis=1)
-    turn = Rotation.identity(len(times))
-    for k, axis in enumerate(axes):
-        turn = turn * Rotation.from_rotvec(meant[:, k, None] * axis)
-    found, off = follow(axes, turn.as_matrix())
-    assert np.abs(found - meant).max() < 1e-9 and off.max() < 1e-9
-
-
-def test_a_hinge_takes_the_part_about_its_axis_and_tells_the_rest():
-    axis = np.array([[0.0, 0.0, 1.0]])
-    swing = Rotation.from_rotvec([0.05, 0.0, 0.0])
-    turn = Rotation.from_rotvec(np.linspace(0.0, 12.0, 50)[:, None] * axis) * swing
-    found, off = follow(axis, turn.as_matrix())
-    assert np.allclose(found[:, 0], np.linspace(0.0, 12.0, 50)) and np.allclose(off, 0.05)

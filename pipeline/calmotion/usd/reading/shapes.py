@@ -53,7 +53,7 @@ def shapes_of(reading: Reading, body_prim, pose: Pose) -> list[Shape]:
             _pass_over(reading, prim, body_prim)
         kind = str(prim.GetTypeName())
         if kind == "Mesh":
-            points, triangles = _mesh(prim, reading.start)
+            points, triangles = mesh_geometry(prim, reading.start)
             moments = None
         elif kind in primitives.TYPES:
             points, triangles, moments = primitives.solid(prim, reading.start)
@@ -166,7 +166,7 @@ def _check_indices(prim, name: str, found: IntArray, count: int) -> None:
         )
 
 
-def _mesh(prim, time: float) -> tuple[Array, IntArray]:
+def mesh_geometry(prim, time: float) -> tuple[Array, IntArray]:
     """Points and right-handed triangles of a Mesh, its polygons cut up, its holes left out."""
     points = finite_points(prim, time)
     counts = gf.indices(prim.GetAttribute("faceVertexCounts").Get(time))

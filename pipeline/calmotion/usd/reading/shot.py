@@ -19,6 +19,7 @@ from .given_tracks import given_joints, given_track
 from .joints import joint_prims
 from .motors import ATTRIBUTE, BODIES, DRIVE, GIVEN, HELD, LENGTH_ATTRIBUTE, Drive, free_tracks, to_si
 from .posed_motors import joint_motions, pose_codes, posed_track
+from .provenance import provenance_of
 from .roots import moving_frames
 from .skeletal_motors import hinge_stacks, skeletal_tracks
 from .stillness import carriers, codes_of
@@ -64,7 +65,7 @@ def read_shot(
             names = ", ".join(stages.display_name(layer, path) for layer in earlier)
             note = f"the shot carries results of Calmotion ({names}); the intent is the animation beneath them"
             character = dataclasses.replace(character, notes=(*character.notes, note))
-    provenance = _provenance(path, stage, reading, clock, earlier)
+    provenance = provenance_of(path, stage, clock, earlier)
     weights = weight_tracks(stage, character.targets, clock)
     free = free_tracks(stage, character.motors, clock)
     return character, Animation(clock.frame_times(), tracks, current, read.moving, weights, free), provenance
@@ -163,22 +164,3 @@ def _note_dense_samples(tracks: tuple[Track, ...], clock: Clock, reading: Readin
             f"the animation is sampled more densely than its {clock.frames_per_second:g} frames a second, at which "
             "curves are written unless more samples are asked for"
         )
-
-
-def _provenance(path: str, stage, reading: Reading, clock: Clock, earlier: tuple[str, ...]) -> Provenance:
-    from pxr import UsdGeom
-
-    default = stage.GetDefaultPrim()
-    return Provenance(
-        shot=path,
-        layers=stages.input_layers(stage, path),
-        meters_per_unit=reading.units.meters,
-        kilograms_per_unit=reading.units.kilograms,
-        up_axis=str(UsdGeom.GetStageUpAxis(stage)),
-        time_codes_per_second=clock.time_codes_per_second,
-        frames_per_second=clock.frames_per_second,
-        start_time_code=clock.start,
-        end_time_code=clock.end,
-        default_prim=default.GetName() if default else "",
-        earlier_layers=tuple(stages.display_name(layer, path) for layer in earlier),
-    )

@@ -1,10 +1,10 @@
 """Motors' tracks out of a UsdSkel animation.
 
-A motor names a joint of a skeleton. The bodies as authored stand where the skeleton is at rest, and turn with it: with
-L(t) the joint's rotation in its parent's axes, D = L(t) L(rest)^T turns the robot's body about axes fixed in the body
-before it. One motor takes the part of D about its axis; two or three that name the same joint, one carrying the next,
-take a product of rotations about theirs, D = exp(a_1 q_1) exp(a_2 q_2) ..., found by Gauss-Newton from one frame to
-the next.
+A motor names a joint of a skeleton. The bodies as authored stand where the skeleton is at rest, or as at the first
+frame (`calm:motor:skelPose`), and turn with it: with L(t) the joint's rotation in its parent's axes, the product
+D = L(t) L(there)^T turns the robot's body about axes fixed in the body before it. One motor takes the part of D about
+its axis; two or three that name the same joint, one carrying the next, take a product of rotations about theirs
+(`rig.hinge_rows`).
 """
 
 from __future__ import annotations
@@ -15,17 +15,19 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...errors import ShotError
+from ...rig.hinge_rows import follow
 from ...shot import Track
 from ...shot.character import Array
+from .. import schemas
 from ..clock import Clock
 from ..transforms import pose_from_matrix, rotation_from_quaternion
 from .context import Reading
 from .motors import SKEL_JOINT, SKELETON, Drive
-from .posed_motors import OFF_AXIS, joint_motions
+from .posed_motors import OFF_ANCHOR, OFF_AXIS, joint_motions
 from .skeletons import BoundSkeleton, bound_skeletons, skeleton_with
 
+SKEL_POSE = "calm:motor:skelPose"
 MOST = 3  # motors that one joint of a skeleton takes
-_STEPS, _SMALL = 60, 1e-13
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,20 +37,17 @@ class HingeStack:
     Attributes:
         skeleton, joint: Which one.
         drives: The motors, from the body that carries them outwards.
-        axes: Their axes in the axes of the joint's parent, at rest, shape [m, 3].
-        start: Their angles in the pose in which the bodies stand [rad], shape [m].
+        reference: Rotation of the joint in its parent's axes where the bodies stand, shape [3, 3].
+        axes: Their axes in the axes of the joint's parent there, shape [m, 3].
+        start: Their angles there [rad], shape [m].
     """
 
     skeleton: BoundSkeleton
     joint: int
     drives: tuple[Drive, ...]
+    reference: Array
     axes: Array
     start: Array
-
-    @property
-    def rest(self) -> Array:
-        """Rotation of the joint at rest, shape [3, 3]."""
-        return pose_from_matrix(self.skeleton.rest[self.joint], str(self.skeleton.prim.GetPath())).rotation
 
     def turned(self, angles: Array) -> Array:
         """D at angles of the motors [rad], shape [n, m] to [n, 3, 3]."""
@@ -112,13 +111,27 @@ def _outwards(stack: list[Drive]) -> tuple[Drive, ...]:
 
 
 def _stack(reading: Reading, skeleton: BoundSkeleton, joint: int, drives: tuple[Drive, ...]) -> HingeStack:
-    place = skeleton.placement(reading.start)
-    above = skeleton.parent(joint)
-    parent = place if above < 0 else place @ skeleton.in_skeleton(skeleton.rest)[above]
-    turn = pose_from_matrix(parent, str(skeleton.prim.GetPath())).rotation
+    place, above, path = skeleton.placement(reading.start), skeleton.parent(joint), str(skeleton.prim.GetPath())
+    standing = skeleton.rest if _stands_at_rest(drives) else skeleton.locals_at(reading.start)
+    parent = place if above < 0 else place @ skeleton.in_skeleton(standing)[above]
+    turn, reference = (pose_from_matrix(m, path).rotation for m in (parent, standing[joint]))
     axes = [turn.T @ _axis(reading, drive) for drive in drives]
     motions = joint_motions(reading, [d.joint for d in drives], np.array([reading.start]))
-    return HingeStack(skeleton, joint, drives, np.array(axes), np.array([m.values[0] for m in motions]))
+    return HingeStack(skeleton, joint, drives, reference, np.array(axes), np.array([m.values[0] for m in motions]))
+
+
+def _stands_at_rest(drives: tuple[Drive, ...]) -> bool:
+    """Whether the bodies stand where the skeleton is at rest."""
+    poses = {str(schemas.value(drive.joint.prim, "CalmMotorAPI", SKEL_POSE)) for drive in drives}
+    if len(poses) > 1 or not poses <= {"rest", "start"}:
+        raise ShotError(
+            "the bodies of one joint stand in one pose of the skeleton, rest or start",
+            path=drives[0].joint.path,
+            attribute=SKEL_POSE,
+            found=", ".join(sorted(poses)),
+            remedy="Correct the values",
+        )
+    return poses == {"rest"}
 
 
 def _axis(reading: Reading, drive: Drive) -> Array:
@@ -132,8 +145,9 @@ def skeletal_tracks(stack: HingeStack, clock: Clock, reading: Reading) -> dict[s
     """Tracks of the motors of a stack, by the path of their joint; a doubt where they cannot follow the skeleton."""
     samples = stack.skeleton.codes()
     codes = clock.merged(samples[(samples >= clock.start) & (samples <= clock.end)])
-    D = stack.skeleton.local_rotations(stack.joint, codes) @ stack.rest.T
+    D = stack.skeleton.local_rotations(stack.joint, codes) @ stack.reference.T
     angles, off = follow(stack.axes, D)
+    _doubt_stretch(stack, codes, reading)
     worst = int(np.argmax(off))
     if off[worst] > OFF_AXIS:
         names = ", ".join(drive.joint.path for drive in stack.drives)
@@ -153,62 +167,20 @@ def skeletal_tracks(stack: HingeStack, clock: Clock, reading: Reading) -> dict[s
     }
 
 
-def follow(axes: Array, D: Array) -> tuple[Array, Array]:
-    """Angles of hinges in a row whose product of rotations comes nearest to given ones.
-
-    Args:
-        axes: Unit axes, each in the axes of the first one's base with all angles zero, shape [m, 3], m up to 3.
-        D: Rotations, neighbours less than half a turn apart, shape [n, 3, 3].
-
-    Returns:
-        Angles, unwrapped [rad], shape [n, m], and the angles of rotation that are left [rad], shape [n].
-    """
-    from scipy.spatial.transform import Rotation
-
-    turns = Rotation.from_matrix(D)
-    if len(axes) == 1:
-        quaternion = turns.as_quat()
-        angles = np.unwrap(2.0 * np.arctan2(quaternion[:, :3] @ axes[0], quaternion[:, 3]))[:, None]
-    else:
-        angles, q = np.zeros((len(D), len(axes))), _first(axes, turns[0])
-        for n in range(len(D)):
-            q = _nearest(axes, turns[n], q)
-            angles[n] = q
-    return angles, (_product(axes, angles).inv() * turns).magnitude()
-
-
-def _product(axes: Array, angles: Array):
-    from scipy.spatial.transform import Rotation
-
-    turn = Rotation.identity(len(angles))
-    for k, axis in enumerate(axes):
-        turn = turn * Rotation.from_rotvec(angles[:, k, None] * axis)
-    return turn
-
-
-def _first(axes: Array, turn) -> Array:
-    """Angles for the first rotation: the smallest of those that Gauss-Newton finds from several starts."""
-    starts = [np.zeros(len(axes)), *(s * 1.5 * e for e in np.eye(len(axes)) for s in (-1.0, 1.0))]
-    found = [_nearest(axes, turn, start) for start in starts]
-    left = [float((_product(axes, q[None]).inv() * turn).magnitude()[0]) for q in found]
-    good = [k for k in range(len(found)) if left[k] < min(left) + 1e-6]
-    return found[min(good, key=lambda k: float(np.abs(found[k]).max()))]
-
-
-def _nearest(axes: Array, turn, q: Array) -> Array:
-    """Angles of the product nearest to a rotation, by damped Gauss-Newton."""
-    from scipy.spatial.transform import Rotation
-
-    for _ in range(_STEPS):
-        left = Rotation.identity()
-        columns = []
-        for k, axis in enumerate(axes):
-            columns.append(left.apply(axis))
-            left = left * Rotation.from_rotvec(q[k] * axis)
-        J = np.array(columns).T
-        error = (turn * left.inv()).as_rotvec()
-        step = np.linalg.solve(J.T @ J + 1e-9 * np.eye(len(axes)), J.T @ error)
-        q = q + step * min(1.0, 0.7 / max(float(np.max(np.abs(step))), 1e-300))
-        if np.max(np.abs(step)) < _SMALL:
-            break
-    return q
+def _doubt_stretch(stack: HingeStack, codes: Array, reading: Reading) -> None:
+    """A doubt where the animation moves a joint of the skeleton away from the one above it."""
+    places = np.array([stack.skeleton.locals_at(float(code))[stack.joint, :3, 3] for code in codes])
+    scale = np.linalg.det(stack.skeleton.placement(reading.start)[:3, :3]) ** (1.0 / 3.0)
+    moved = reading.units.length(scale * np.linalg.norm(places - places[0], axis=1))
+    worst = int(np.argmax(moved))
+    if moved[worst] > OFF_ANCHOR:
+        reading.doubt(
+            ShotError(
+                f"{stack.skeleton.joints[stack.joint]} of {stack.skeleton.prim.GetPath()} is moved away from the joint "
+                "above it, which the robot will not do",
+                path=stack.drives[0].joint.path,
+                attribute=SKEL_JOINT,
+                found=f"{1e3 * moved[worst]:.3g} mm at time code {codes[worst]:g}",
+                remedy="Animate rotations alone",
+            )
+        )

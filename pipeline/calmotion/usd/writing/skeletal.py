@@ -12,7 +12,7 @@ from ..clock import Clock
 from ..reading.character import read_skeleton
 from ..reading.context import Reading
 from ..reading.skeletal_motors import HingeStack, hinge_stacks
-from ..transforms import quaternion_from_rotation
+from ..transforms import pose_from_matrix, quaternion_from_rotation
 from ..units import units_of
 from .curves import attribute_spec, curve_values
 
@@ -88,7 +88,8 @@ def _author(layer, stage, name: str, parts: list[tuple[HingeStack, Array]], cloc
 
 
 def _at_rest(stack: HingeStack) -> Array:
-    return quaternion_from_rotation(stack.rest)
+    rest = pose_from_matrix(stack.skeleton.rest[stack.joint], stack.drives[0].joint.path)
+    return quaternion_from_rotation(rest.rotation)
 
 
 def _lengthen(layer, animation, name: str, joints: list[str], more: list[HingeStack], clock: Clock) -> None:

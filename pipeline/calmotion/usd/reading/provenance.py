@@ -1,0 +1,35 @@
+"""Where a shot came from, for what is written over it."""
+
+from __future__ import annotations
+
+from ...shot import Provenance
+from .. import stages
+from ..clock import Clock
+from ..units import units_of
+
+
+def provenance_of(path: str, stage, clock: Clock, earlier: tuple[str, ...] = ()) -> Provenance:
+    """The provenance of a shot.
+
+    Args:
+        path: Its file, as it was given.
+        stage: Its stage.
+        clock: Its clock.
+        earlier: Identifiers of the layers of ours that it carries.
+    """
+    from pxr import UsdGeom
+
+    default, units = stage.GetDefaultPrim(), units_of(stage)
+    return Provenance(
+        shot=path,
+        layers=stages.input_layers(stage, path),
+        meters_per_unit=units.meters,
+        kilograms_per_unit=units.kilograms,
+        up_axis=str(UsdGeom.GetStageUpAxis(stage)),
+        time_codes_per_second=clock.time_codes_per_second,
+        frames_per_second=clock.frames_per_second,
+        start_time_code=clock.start,
+        end_time_code=clock.end,
+        default_prim=default.GetName() if default else "",
+        earlier_layers=tuple(stages.display_name(layer, path) for layer in earlier),
+    )

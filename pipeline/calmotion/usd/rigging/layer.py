@@ -1,0 +1,278 @@
+"""The layer that makes a robot of a skeleton: bodies, joints, motors and targets, authored with UsdPhysics."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+
+import numpy as np
+
+from ...rig.links import Link, tip_of
+from ...rig.materials import Material
+from ...shot import MassProperties, Provenance
+from ...shot.character import Array, IntArray
+from .. import gf
+from ..reading.moments import sum_of, surface_moments
+from ..reading.skeletons import BoundSkeleton
+from ..stages import RIG
+from ..transforms import Pose, pose_from_matrix, quaternion_from_rotation
+from ..units import units_of
+from ..writing.metadata import author_origin, author_stage_metadata
+from ..writing.root import relative_asset
+
+_STILL = 1e-6  # of a matrix, over its size: a root that moves less stands
+_SERVO = 0.1  # radius of gyration of a servo, over the size of the link that it turns
+
+
+class RobotLayer:
+    """A robot that is authored into an anonymous layer; everything is in stage units, in the world.
+
+    Args:
+        stage: The skinned character.
+        skeleton: Its skeleton.
+        codes: Time codes of the animation, the first frame first.
+        links: What to make bodies of.
+        material: What they are made of.
+        name: Name of that material.
+    """
+
+    def __init__(
+        self, stage, skeleton: BoundSkeleton, codes: Array, links: Sequence[Link], material: Material, name: str
+    ):
+        from pxr import Sdf, Usd, UsdGeom
+
+        self.layer = Sdf.Layer.CreateAnonymous(".usda")
+        # what is authored is known to be where it will be: over the shot
+        self._stage = Usd.Stage.CreateInMemory()
+        self._stage.GetRootLayer().TransferContent(self.layer)
+        self._units, self._skeleton, self._codes, self._links = units_of(stage), skeleton, codes, links
+        self._material, self._material_name = material, name
+        default = stage.GetDefaultPrim()
+        top = str(default.GetPath()) if default else ""
+        taken = {str(child.GetName()) for child in (default or stage.GetPseudoRoot()).GetAllChildren()}
+        self.robot = f"{top}/{next(n for n in _names('Robot') if n not in taken)}"
+        self._clock_start = float(codes[0])
+        self._up = str(UsdGeom.GetStageUpAxis(stage))
+        self._poses = [self._pose(link, 0) for link in links]
+        self.motors: list[str] = []
+        self.motors_of: list[list[str]] = [[] for _ in links]
+        self.targets: list[str] = []
+        self.body_count, self.mass = 0, 0.0
+
+    def body(self, link: int) -> str:
+        """Path of the body of a link."""
+        return f"{self.robot}/{self._links[link].name}"
+
+    def _worlds(self, n: int) -> Array:
+        """World matrices of the skeleton's joints at one of the time codes."""
+        code = float(self._codes[n])
+        found: Array = self._skeleton.placement(code) @ self._skeleton.in_skeleton(self._skeleton.locals_at(code))
+        return found
+
+    def _pose(self, link: Link, n: int) -> Pose:
+        return pose_from_matrix(self._worlds(n)[link.joint], str(self._skeleton.prim.GetPath()))
+
+    def author(self, servo_share: float, flexible: Sequence[str], targets: Sequence[int]) -> None:
+        """Author the robot.
+
+        Args:
+            servo_share: Mass of a servo between two hinges, over that of the link that they turn.
+            flexible: Names of the links that bend.
+            targets: The links whose tips are targets.
+        """
+        from pxr import UsdGeom
+
+        for path in _above(self.robot):
+            self._stage.OverridePrim(path)
+        robot = UsdGeom.Xform.Define(self._stage, self.robot)
+        robot.SetResetXformStack(True)
+        # the skin is what renders; the parts are for who asks for them
+        robot.CreatePurposeAttr(UsdGeom.Tokens.guide)
+        UsdGeom.Scope.Define(self._stage, f"{self.robot}/joints")
+        self._author_material()
+        masses = [self._mass_of(k) for k in range(len(self._links))]
+        lightest = min(m.mass for m in masses if m is not None)
+        for k, link in enumerate(self._links):
+            known = masses[k]
+            load = known.mass if known is not None else lightest
+            self._author_link(k, known or self._servo(k, servo_share * load), link.name in flexible)
+            if link.parent < 0:
+                self._hold(k)
+            else:
+                self._hinge(k, servo_share * load)
+        for k in targets:
+            self._author_target(k)
+
+    def _author_material(self) -> None:
+        from pxr import Sdf, UsdPhysics, UsdShade
+
+        self._solid = UsdShade.Material.Define(self._stage, f"{self.robot}/materials/{self._material_name}")
+        prim, units, given = self._solid.GetPrim(), self._units, self._material
+        UsdPhysics.MaterialAPI.Apply(prim).CreateDensityAttr(given.density / units.density(1.0))
+        prim.AddAppliedSchema("PhysicsVolumeDeformableMaterialAPI")
+        prim.AddAppliedSchema("CalmDampingAPI")
+        for name, value in (
+            ("physics:youngsModulus", given.youngs_modulus / units.pressure(1.0)),
+            ("physics:poissonsRatio", given.poissons_ratio),
+            ("calm:damping:ratio", given.damping_ratio),
+        ):
+            prim.CreateAttribute(name, Sdf.ValueTypeNames.Float, custom=False).Set(value)
+
+    def _mass_of(self, k: int) -> MassProperties | None:
+        """Mass properties of a link in its own frame, stage units; None for one without geometry."""
+        density = self._material.density / self._units.density(1.0)
+        pose = self._poses[k]
+        solids = [surface_moments(pose.to_local(x), triangles) for x, triangles in self._links[k].pieces]
+        return sum_of([solid.mass_properties(density) for solid in solids]) if solids else None
+
+    def _servo(self, k: int, mass: float) -> MassProperties:
+        """A servo as heavy as asked for, about where it turns."""
+        clouds = [self._poses[k].to_local(x) for link in self._links for x, _ in link.pieces if link.parent == k]
+        clouds += [self._poses[k].to_local(x) for x, _ in self._links[k].pieces]
+        size = max((float(np.max(np.ptp(x, axis=0))) for x in clouds), default=1.0)
+        return MassProperties(mass, np.zeros(3), mass * (_SERVO * size) ** 2 * np.eye(3))
+
+    def _author_link(self, k: int, mass: MassProperties, flexible: bool) -> None:
+        from pxr import UsdPhysics, UsdShade
+
+        prim = self._author_body(self.body(k), self._poses[k], None if flexible else mass)
+        self.mass += self._units.mass(mass.mass) if flexible else 0.0
+        for number, (points, triangles) in enumerate(self._links[k].pieces):
+            name = "skin" if number == 0 else f"skin_{number + 1}"
+            self._author_mesh(f"{self.body(k)}/{name}", self._poses[k].to_local(points), triangles)
+        if self._links[k].pieces:
+            UsdShade.MaterialBindingAPI.Apply(prim).Bind(self._solid, materialPurpose="physics")
+        if flexible:
+            prim.AddAppliedSchema("CalmFlexibleBodyAPI")
+        if self._links[k].parent < 0 and self._moves(k):
+            UsdPhysics.RigidBodyAPI(prim).CreateKinematicEnabledAttr(True)
+
+    def _author_body(self, path: str, pose: Pose, mass: MassProperties | None):
+        from pxr import Gf, UsdGeom, UsdPhysics
+
+        xform = UsdGeom.Xform.Define(self._stage, path)
+        rigid = pose.matrix()
+        rigid[:3, :3] = pose.rotation
+        xform.AddTransformOp().Set(gf.to_matrix(rigid))
+        prim = xform.GetPrim()
+        UsdPhysics.RigidBodyAPI.Apply(prim)
+        self.body_count += 1
+        if mass is not None:
+            moments, axes = np.linalg.eigh(mass.inertia)
+            axes[:, 0] *= np.linalg.det(axes)
+            api = UsdPhysics.MassAPI.Apply(prim)
+            api.CreateMassAttr(mass.mass)
+            api.CreateCenterOfMassAttr(Gf.Vec3f(*mass.center.tolist()))
+            api.CreateDiagonalInertiaAttr(Gf.Vec3f(*moments.tolist()))
+            api.CreatePrincipalAxesAttr(gf.to_quaternion(quaternion_from_rotation(axes)))
+            self.mass += self._units.mass(mass.mass)
+        return prim
+
+    def _author_mesh(self, path: str, points: Array, triangles: IntArray) -> None:
+        from pxr import UsdGeom, Vt
+
+        mesh = UsdGeom.Mesh.Define(self._stage, path)
+        mesh.CreatePointsAttr(gf.to_points(points))
+        mesh.CreateFaceVertexCountsAttr(Vt.IntArray(len(triangles), 3))
+        mesh.CreateFaceVertexIndicesAttr(Vt.IntArray.FromNumpy(np.ascontiguousarray(triangles.ravel(), np.int32)))
+        mesh.CreateSubdivisionSchemeAttr(UsdGeom.Tokens.none)
+        mesh.CreateExtentAttr(gf.to_points(np.stack([points.min(axis=0), points.max(axis=0)])))
+
+    def _moves(self, k: int) -> bool:
+        """Whether the animation moves a root."""
+        first = self._worlds(0)[self._links[k].joint]
+        size = max(1.0, float(np.max(np.abs(first))))
+        joint = self._links[k].joint
+        return any(np.max(np.abs(self._worlds(n)[joint] - first)) > _STILL * size for n in range(len(self._codes)))
+
+    def _hold(self, k: int) -> None:
+        """Hold a root in the world, or let the animation carry it."""
+        from pxr import UsdGeom, UsdPhysics
+
+        if not self._moves(k):
+            joint = UsdPhysics.FixedJoint.Define(self._stage, f"{self.robot}/joints/{self._links[k].name}")
+            joint.CreateBody1Rel().SetTargets([self.body(k)])
+            self._place(joint, Pose(np.eye(3), np.zeros(3), np.ones(3)), self._poses[k], self._poses[k])
+            return
+        op = UsdGeom.Xformable(self._stage.GetPrimAtPath(self.body(k))).GetOrderedXformOps()[0]
+        for n, code in enumerate(self._codes):
+            pose = self._pose(self._links[k], n)
+            op.Set(gf.to_matrix(Pose(pose.rotation, pose.position, np.ones(3)).matrix()), float(code))
+
+    def _hinge(self, k: int, servo: float) -> None:
+        """The hinges of a link, with a servo between each two."""
+        from pxr import Sdf, UsdPhysics
+
+        link, pose = self._links[k], self._poses[k]
+        above = self._skeleton.parent(link.joint)
+        carrier = pose_from_matrix(self._worlds(0)[above], str(self._skeleton.prim.GetPath())).rotation
+        body0, pose0 = self.body(link.parent), self._poses[link.parent]
+        for number, axis in enumerate(link.hinges.axes):
+            last = number == len(link.hinges.axes) - 1
+            body1 = self.body(k) if last else f"{self.body(k)}_servo{number + 1}"
+            if not last:
+                self._author_body(body1, pose, self._servo(k, servo))
+            frame = Pose(_turned_to(carrier @ axis), pose.position, np.ones(3))
+            name = link.name if len(link.hinges.axes) == 1 else f"{link.name}_{number + 1}"
+            path = f"{self.robot}/joints/{name}"
+            joint = UsdPhysics.RevoluteJoint.Define(self._stage, path)
+            joint.CreateAxisAttr("Z")
+            joint.CreateBody0Rel().SetTargets([body0])
+            joint.CreateBody1Rel().SetTargets([body1])
+            self._place(joint, pose0, pose, frame)
+            prim = joint.GetPrim()
+            UsdPhysics.DriveAPI.Apply(prim, "angular")
+            prim.AddAppliedSchema("CalmMotorAPI")
+            for attribute, value in (("skelJoint", self._skeleton.joints[link.joint]), ("skelPose", "start")):
+                created = prim.CreateAttribute(f"calm:motor:{attribute}", Sdf.ValueTypeNames.Token, custom=False)
+                created.SetVariability(Sdf.VariabilityUniform)
+                created.Set(value)
+            self.motors.append(path)
+            self.motors_of[k].append(path)
+            body0, pose0 = body1, pose
+
+    def _place(self, joint, pose0: Pose, pose1: Pose, frame: Pose) -> None:
+        """Frames of a joint in both of its bodies, from that in the world."""
+        from pxr import Gf
+
+        for side, pose in ((0, pose0), (1, pose1)):
+            at = pose.to_local(frame.position[None])[0]
+            turn = gf.to_quaternion(quaternion_from_rotation(pose.rotation.T @ frame.rotation))
+            (joint.CreateLocalPos0Attr, joint.CreateLocalPos1Attr)[side](Gf.Vec3f(*at.tolist()))
+            (joint.CreateLocalRot0Attr, joint.CreateLocalRot1Attr)[side](turn)
+
+    def _author_target(self, k: int) -> None:
+        from pxr import Gf, UsdGeom
+
+        tip = self._poses[k].to_local(tip_of(self._links[k], self._poses[k].position)[None])[0]
+        path = f"{self.body(k)}/target"
+        xform = UsdGeom.Xform.Define(self._stage, path)
+        xform.AddTranslateOp().Set(Gf.Vec3d(*tip.tolist()))
+        xform.GetPrim().AddAppliedSchema("CalmTargetAPI")
+        self.targets.append(path)
+
+    def finish(self, provenance: Provenance, output: str) -> None:
+        """Take what was authored into the layer, and put the shot beneath it."""
+        self.layer.TransferContent(self._stage.GetRootLayer())
+        author_stage_metadata(self.layer, provenance)
+        author_origin(self.layer, RIG, provenance)
+        self.layer.subLayerPaths = [relative_asset(provenance.shot, os.path.dirname(os.path.realpath(output)))]
+        self.layer.documentation = f"Makes a robot of the skinned character in {os.path.basename(provenance.shot)}."
+
+
+def _names(stem: str):
+    yield stem
+    yield from (f"{stem}_{k}" for k in range(2, 1000))
+
+
+def _above(path: str) -> list[str]:
+    parts = path.strip("/").split("/")[:-1]
+    return ["/" + "/".join(parts[: k + 1]) for k in range(len(parts))]
+
+
+def _turned_to(axis: Array) -> Array:
+    """A rotation that takes z to a unit axis, shape [3, 3]."""
+    side = np.eye(3)[int(np.argmin(np.abs(axis)))]
+    x = np.cross(side, axis)
+    x /= np.linalg.norm(x)
+    return np.stack([x, np.cross(axis, x), axis], axis=1)

@@ -1,0 +1,153 @@
+"""The rigger's table of contents: a file with a skinned character becomes a layer that makes a robot of it."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...errors import ShotError
+from ...host.values import Rig, RiggedJoint
+from ...rig.cutting import cut_skin
+from ...rig.links import Link, make_links, targets_of
+from ...rig.materials import MATERIALS
+from ...shot.character import Array
+from .. import stages
+from ..clock import Clock
+from ..layers import refuse_input_as_output, write_layer
+from ..reading.context import is_rigid_body, prims_of
+from ..reading.provenance import provenance_of
+from ..reading.shot import read_shot, shot_clock
+from ..reading.skeletons import BoundSkeleton, bound_skeletons
+from ..transforms import pose_from_matrix
+from .layer import RobotLayer
+from .skins import read_skin
+
+
+@dataclass(frozen=True)
+class RigOptions:
+    """How a robot is made.
+
+    Attributes:
+        material: Name of the material of its links, one of `rig.materials.MATERIALS`.
+        angle_tolerance: What the hinges of a joint may leave of its rotation [rad].
+        servo_share: Mass of a servo between two hinges, over that of the link that they turn.
+        flexible: Names of the links that bend, `all`, or empty.
+    """
+
+    material: str = "nylon"
+    angle_tolerance: float = float(np.radians(0.05))
+    servo_share: float = 0.05
+    flexible: tuple[str, ...] = ()
+
+
+def rig_shot(path: str, output: str, options: RigOptions | None = None) -> Rig:
+    """Make a robot of a skinned character.
+
+    The bodies stand as the skeleton does at the first frame. Each joint that turns gets the fewest hinges that follow
+    it, each with a motor that names the joint of the skeleton, so that the animation stays where it is and results are
+    written back to it. A root that moves is carried by its transform.
+
+    Args:
+        path: File of the shot.
+        output: Layer to write; it has the shot as its sublayer.
+
+    Raises:
+        ShotError: No skeleton is animated, the shot has physics already, a name is wrong, or nothing can be written.
+    """
+    options = options or RigOptions()
+    if options.material not in MATERIALS:
+        raise ShotError("there is no such material", found=options.material, remedy=f"Use {', '.join(MATERIALS)}")
+    stage = stages.open_stage(path)
+    refuse_input_as_output(output, [layer.realPath for layer in stage.GetUsedLayers(True) if layer.realPath])
+    bodies = [prim for prim in prims_of(stage) if is_rigid_body(prim)]
+    if bodies:
+        raise ShotError(
+            "the shot has physics already",
+            path=bodies[0].GetPath(),
+            found="PhysicsRigidBodyAPI",
+            remedy="Name the file of the skinned character without a robot",
+        )
+    with stages.quiet():
+        skeleton, clock = _animated_skeleton(stage, path)
+        codes = clock.merged(np.array([c for c in skeleton.codes() if clock.start <= c <= clock.end]))
+        links = _links(stage, skeleton, codes, options.angle_tolerance)
+        layer = RobotLayer(stage, skeleton, codes, links, MATERIALS[options.material], options.material)
+        names = [link.name for link in links]
+        flexible = names if options.flexible == ("all",) else list(options.flexible)
+        unknown = [name for name in flexible if name not in names]
+        if unknown:
+            raise ShotError(
+                "there is no such link",
+                attribute="rig.skeleton.flexible",
+                found=unknown[0],
+                remedy=f"Use {', '.join(names)}, or all",
+            )
+        layer.author(options.servo_share, flexible, targets_of(links, skeleton.joints))
+    layer.finish(provenance_of(path, stage, clock), output)
+    write_layer(layer.layer, output, lambda temporary: _validate(temporary, len(layer.motors)))
+    joints = tuple(
+        RiggedJoint(skeleton.joints[link.joint], layer.body(k), tuple(layer.motors_of[k]), float(link.hinges.off.max()))
+        for k, link in enumerate(links)
+        if link.parent >= 0
+    )
+    return Rig(output, layer.robot, joints, layer.body_count, layer.mass, tuple(layer.targets))
+
+
+def _animated_skeleton(stage, path: str) -> tuple[BoundSkeleton, Clock]:
+    """The one skeleton that is animated, and the clock of the shot."""
+    skeletons = bound_skeletons(stage)
+    animated = [skeleton for skeleton in skeletons if len(skeleton.codes())]
+    if not animated:
+        place = str(skeletons[0].prim.GetPath()) if skeletons else path
+        raise ShotError(
+            "the skeleton is not animated" if skeletons else "the shot has no skeleton",
+            path=place,
+            attribute="skel:animationSource" if skeletons else "",
+            remedy="Bind a SkelAnimation with time samples to it"
+            if skeletons
+            else "Name the file of a character with a UsdSkel Skeleton and a skinned mesh",
+        )
+    if len(animated) > 1:
+        raise ShotError(
+            "several skeletons are animated, and a robot is made of one",
+            path=animated[1].prim.GetPath(),
+            found=", ".join(str(skeleton.prim.GetPath()) for skeleton in animated),
+            remedy="Deactivate the others in a layer over the shot",
+        )
+    return animated[0], shot_clock(stage, None)
+
+
+def _links(stage, skeleton: BoundSkeleton, codes: Array, tolerance: float) -> list[Link]:
+    skin = read_skin(stage, skeleton, float(codes[0]))
+    if len(skin.triangles) == 0:
+        raise ShotError(
+            "no mesh is skinned to the skeleton, so its bodies have no geometry",
+            path=skeleton.prim.GetPath(),
+            remedy="Bind a Mesh to it with SkelBindingAPI, joint indices and weights",
+        )
+    pieces = cut_skin(skin.points, skin.triangles, skin.weights)
+    if not pieces:
+        raise ShotError(
+            "the skin encloses no volume, so its bodies have no mass",
+            path=skin.meshes[0],
+            attribute="points",
+            remedy="Bind a mesh with an inside to the skeleton",
+        )
+    place = str(skeleton.prim.GetPath())
+    count = len(skeleton.joints)
+    rotations = np.array(
+        [[pose_from_matrix(m, place).rotation for m in skeleton.locals_at(float(code))] for code in codes]
+    )
+    turns = rotations @ np.swapaxes(rotations[0], 1, 2)
+    return make_links(skeleton.joints, [skeleton.parent(k) for k in range(count)], turns, pieces, tolerance)
+
+
+def _validate(temporary: str, motors: int) -> None:
+    """Read what was written: it must load, with all of its motors."""
+    character, _, _ = read_shot(temporary)
+    if len(character.motors) != motors:
+        raise ShotError(
+            "what was written has lost motors", path=os.path.basename(temporary), found=len(character.motors)
+        )

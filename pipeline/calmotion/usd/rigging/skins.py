@@ -1,0 +1,90 @@
+"""The skin of a skeleton as it is posed at a time: points, triangles, and how much each joint moves each point."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...errors import ShotError
+from ...shot.character import Array, IntArray
+from .. import gf
+from ..reading.context import prims_of
+from ..reading.shapes import mesh_geometry
+from ..reading.skeletons import BoundSkeleton
+
+
+@dataclass(frozen=True, eq=False)
+class Skin:
+    """All meshes that a skeleton moves.
+
+    Attributes:
+        points: World, stage units, shape [n, 3].
+        triangles: Shape [m, 3].
+        weights: By joint of the skeleton, shape [n, j].
+        meshes: Paths of the meshes.
+    """
+
+    points: Array
+    triangles: IntArray
+    weights: Array
+    meshes: tuple[str, ...]
+
+
+def read_skin(stage, skeleton: BoundSkeleton, code: float) -> Skin:
+    """The skin of a skeleton at a time code.
+
+    Raises:
+        ShotError: A mesh that cannot be skinned.
+    """
+    from pxr import Usd, UsdSkel
+
+    cache, every = UsdSkel.Cache(), Usd.TraverseInstanceProxies()
+    parts, names = [], []
+    for prim in prims_of(stage):
+        if not prim.IsA(UsdSkel.Root):
+            continue
+        cache.Populate(UsdSkel.Root(prim), every)
+        for binding in cache.ComputeSkelBindings(UsdSkel.Root(prim), every):
+            if binding.GetSkeleton().GetPrim() != skeleton.prim:
+                continue
+            for target in binding.GetSkinningTargets():
+                if target.GetPrim().GetTypeName() == "Mesh" and str(target.GetPrim().GetPath()) not in names:
+                    parts.append(_skinned(skeleton, target, code))
+                    names.append(str(target.GetPrim().GetPath()))
+    if not parts:
+        return Skin(np.zeros((0, 3)), np.zeros((0, 3), np.int32), np.zeros((0, len(skeleton.joints))), ())
+    offsets = np.cumsum([0, *(len(points) for points, _, _ in parts[:-1])])
+    return Skin(
+        np.concatenate([points for points, _, _ in parts]),
+        np.concatenate([triangles + offset for (_, triangles, _), offset in zip(parts, offsets, strict=True)]),
+        np.concatenate([weights for _, _, weights in parts]),
+        tuple(names),
+    )
+
+
+def _skinned(skeleton: BoundSkeleton, target, code: float) -> tuple[Array, IntArray, Array]:
+    prim = target.GetPrim()
+    rest, triangles = mesh_geometry(prim, code)
+    points = gf.to_points(rest)
+    influences = target.ComputeVaryingJointInfluences(len(rest), code)
+    transforms = skeleton.query.ComputeSkinningTransforms(code)
+    if not influences or not target.ComputeSkinnedPoints(transforms, points, code):
+        raise ShotError(
+            "the mesh is bound to a skeleton, but cannot be skinned",
+            path=prim.GetPath(),
+            attribute="primvars:skel:jointIndices",
+            remedy="Author as many joint indices and weights as its points need, of joints that there are",
+        )
+    width = target.GetNumInfluencesPerComponent()
+    order = target.GetJointOrder()
+    own = [str(joint) for joint in order] if order else list(skeleton.joints)
+    of_skeleton = np.array([skeleton.joints.index(joint) if joint in skeleton.joints else -1 for joint in own])
+    indices = of_skeleton[gf.indices(influences[0])].reshape(-1, width)
+    shares = np.array(influences[1], dtype=np.float64).reshape(-1, width)
+    weights = np.zeros((len(rest), len(skeleton.joints)))
+    for column in range(width):
+        used = np.flatnonzero(indices[:, column] >= 0)
+        np.add.at(weights, (used, indices[used, column]), shares[used, column])
+    place = skeleton.placement(code)
+    return gf.points(points) @ place[:3, :3].T + place[:3, 3], triangles, weights

@@ -1,0 +1,69 @@
+"""Robots out of skinned characters."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from calmotion.host import NotAsked, Operator, OutputPaths, Property, Rig, RunContext, Source
+from calmotion.rig.materials import MATERIALS
+
+
+class RigSkeleton(Operator):
+    """Bodies cut from the skin by its weights, the fewest hinges that follow each joint, masses of a material."""
+
+    idname = "rig.skeleton"
+    label = "Make a robot of the skeleton"
+    requires = (Source, OutputPaths)
+    provides = (Rig,)
+    properties = (
+        Property("material", str, "nylon", choices=tuple(MATERIALS), description="What the links are made of"),
+        Property(
+            "angle_tolerance",
+            float,
+            0.05,
+            unit="deg",
+            minimum=0.0,
+            maximum=45.0,
+            description="What the hinges of a joint may leave of its rotation: more of it needs fewer hinges",
+        ),
+        Property(
+            "servo_share",
+            float,
+            0.05,
+            minimum=1e-4,
+            maximum=10.0,
+            description="Mass of a servo between two hinges, over that of the link that they turn",
+        ),
+        Property("flexible", str, "none", description="Links that bend: all, none, or names with commas between"),
+    )
+
+    @classmethod
+    def poll(cls, data: Mapping[type, Any]) -> str | None:
+        return None if data[Source].command == "rig" else NotAsked("the command is another")
+
+    def execute(self, context: RunContext) -> Sequence[object]:
+        """What was made."""
+        import numpy as np
+        from calmotion.usd.rigging import RigOptions, rig_shot
+
+        values, output = context.properties, context.get(OutputPaths).layer
+        assert output is not None  # the command line asks for it
+        names = [] if values.flexible == "none" else [name.strip() for name in values.flexible.split(",")]
+        options = RigOptions(
+            material=values.material,
+            angle_tolerance=float(np.radians(values.angle_tolerance)),
+            servo_share=values.servo_share,
+            flexible=tuple(filter(None, names)),
+        )
+        return (rig_shot(context.get(Source).path, output, options),)
+
+
+def register(host: Any) -> None:
+    """Register the operator."""
+    host.register_operator(RigSkeleton)
+
+
+def unregister(host: Any) -> None:
+    """Undo `register`."""
+    host.unregister_operator(RigSkeleton)
