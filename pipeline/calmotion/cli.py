@@ -14,7 +14,9 @@ if TYPE_CHECKING:
 
     Commands = argparse._SubParsersAction[argparse.ArgumentParser]
 
-BENCHMARKS = ("baselines", "gradients", "integrators", "meshing", "optimizer", "reduction", "scaling", "stability")
+BENCHMARKS = (
+    "baselines", "gradients", "integrators", "meshing", "optimizer", "reading", "reduction", "scaling", "stability"
+)  # fmt: skip
 DONE, FAILED, WRONG_USAGE, INTERRUPTED = 0, 1, 2, 130
 
 

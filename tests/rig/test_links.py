@@ -5,12 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from calmotion.rig.links import make_links, targets_of, tip_of
+from calmotion.usd.reading.moments import surface_moments
 from scipy.spatial.transform import Rotation
 from tubes import tube
 
 JOINTS = ("hips", "hips/spine", "hips/spine/arm", "hips/spine/arm/hand", "hips/spine/arm/hand/finger", "hips/leg")
 PARENTS = (-1, 0, 1, 2, 3, 0)
-PIECE = tube(cells=2)
+LENGTH = 6.0
+POINTS, TRIANGLES = tube(cells=12, length=LENGTH)
 
 
 def turns(moving, count=12):
@@ -21,15 +23,35 @@ def turns(moving, count=12):
     return found
 
 
-def links(moving, pieces=range(6)):
-    return make_links(JOINTS, PARENTS, turns(moving), {joint: PIECE for joint in pieces}, 1e-6)
+def weights(pieces):
+    """Slices of the tube, of equal length, for some of the joints."""
+    found = np.zeros((len(POINTS), len(JOINTS)))
+    slices = np.clip((POINTS[:, 0] / LENGTH * len(pieces)).astype(int), 0, len(pieces) - 1)
+    found[np.arange(len(POINTS)), np.array(pieces)[slices]] = 1.0
+    return found
+
+
+def links(moving, pieces=tuple(range(6)), joints=JOINTS, parents=PARENTS):
+    count = len(joints)
+    return make_links(joints, parents, turns(moving)[:, :count], (POINTS, TRIANGLES), weights(pieces)[:, :count], 1e-6)
+
+
+def volume(link):
+    return surface_moments(*link.piece).volume if link.piece else 0.0
 
 
 def test_a_joint_that_rests_is_part_of_the_one_above_it():
     found = links((2, 4))
     assert [JOINTS[link.joint] for link in found] == ["hips", "hips/spine/arm", "hips/spine/arm/hand/finger"]
     assert [link.parent for link in found] == [-1, 0, 1]
-    assert [len(link.pieces) for link in found] == [3, 2, 1]  # hips, spine, leg; arm, hand; finger
+    # hips, spine and leg; arm and hand; finger
+    assert np.argsort([-volume(link) for link in found]).tolist() == [0, 1, 2]
+    assert sum(volume(link) for link in found) == pytest.approx(LENGTH * 0.04)
+
+
+def test_what_rests_together_is_cut_as_one_solid():
+    (whole,) = links(())
+    assert len(whole.piece[0]) == len(POINTS)
 
 
 def test_a_joint_that_turns_nothing_is_left_out():
@@ -39,14 +61,13 @@ def test_a_joint_that_turns_nothing_is_left_out():
 
 def test_a_joint_without_geometry_that_carries_some_is_kept():
     found = links((1, 2), pieces=(0, 3))
-    assert [(JOINTS[link.joint], len(link.pieces)) for link in found] == [
-        ("hips", 1), ("hips/spine", 0), ("hips/spine/arm", 1)
+    assert [(JOINTS[link.joint], link.piece is not None) for link in found] == [
+        ("hips", True), ("hips/spine", False), ("hips/spine/arm", True)
     ]  # fmt: skip
 
 
 def test_names_are_unique_and_can_be_names_of_prims():
-    joints = ("a b", "a b/1", "a b/1/a.b")
-    found = make_links(joints, (-1, 0, 1), turns((1, 2))[:, :3], {k: PIECE for k in range(3)}, 1e-6)
+    found = links((1, 2), (0, 1, 2), ("a b", "a b/1", "a b/1/a.b"), (-1, 0, 1))
     assert [link.name for link in found] == ["a_b", "_1", "a_b_2"]
 
 
@@ -56,5 +77,4 @@ def test_targets_are_hands_rather_than_their_fingers_and_the_ends_of_other_limbs
 
 
 def test_a_tip_is_the_far_end_of_a_link():
-    (link, *_) = links((2,))
-    assert tip_of(link, np.zeros(3)) == pytest.approx([2.0, 0.0, 0.0])
+    assert tip_of((POINTS, TRIANGLES), np.zeros(3))[0] > 0.9 * LENGTH

@@ -6,7 +6,9 @@ import numpy as np
 from calmotion.retarget.curves import sample_curves
 from calmotion.retarget.prepare import Options, prepare
 from calmotion.retarget.report import performed_motion
-from calmotion.shot import MotorCurve, Result, Track
+from calmotion.shot import MotorCurve, Result, Simulation, Track
+from calmotion.usd.reading import read_shot
+from calmotion.usd.reading.skeletons import bound_skeletons
 from calmotion.usd.writing.motions import simulated_motion
 from pxr import Usd, UsdGeom
 
@@ -36,8 +38,6 @@ def result_with(character, animation, bumps) -> Result:
     """A result whose curves have bumps; nothing in it is simulated."""
     curves = curves_of(animation, bumps)
     motion = performed(character, animation, tracks_of(animation, curves))
-    from calmotion.shot import Simulation
-
     shape = motion.target_positions.shape[:2]
     simulation = Simulation(motion, np.zeros(shape), np.zeros(shape), 0, 0.0, 0.0)
     return Result(
@@ -62,6 +62,31 @@ def worst_gap(path, character, animation, tracks=None) -> tuple[float, float]:
             w, *v = motion.rotations[n, k]
             ours = rotation(w, np.array(v))
             turned = max(turned, float(np.abs(axes.T - ours).max()))
+    return far, turned
+
+
+def followed(path, robot):
+    """How far the robot is from the skeleton, over all frames and links: [m], and in rotation matrices."""
+    character, animation, _ = read_shot(str(path))
+    motion = simulated_motion(performed(character, animation, animation.tracks), animation.frame_times)
+    stage = Usd.Stage.Open(str(path))
+    meters = UsdGeom.GetStageMetersPerUnit(stage)
+    (skeleton,) = bound_skeletons(stage)
+    start, rate = stage.GetStartTimeCode(), stage.GetTimeCodesPerSecond()
+    links = {name.split("/")[-1]: k for k, name in enumerate(skeleton.joints)}
+    far, turned = 0.0, 0.0
+    for n, time in enumerate(motion.times):
+        code = start + rate * time
+        worlds = skeleton.placement(code) @ skeleton.in_skeleton(skeleton.locals_at(code))
+        for b, body in enumerate(character.bodies):
+            joint = links.get(body.path.split("/")[-1])
+            if joint is None:
+                continue  # a servo
+            w, *v = motion.rotations[n, b]
+            axes = worlds[joint, :3, :3] / np.linalg.norm(worlds[joint, :3, :3], axis=0)
+            far = max(far, float(np.linalg.norm(worlds[joint, :3, 3] * meters - motion.positions[n, b])))
+            turned = max(turned, float(np.abs(axes - rotation(w, np.array(v))).max()))
+    assert any(body.path.startswith(robot) for body in character.bodies)
     return far, turned
 
 

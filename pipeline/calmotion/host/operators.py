@@ -13,6 +13,9 @@ from .properties import Property, PropertyValues
 
 T = TypeVar("T")
 LEVELS = ("info", "warning")
+TIMEOUT = Property(
+    "timeout", float, -1.0, unit="s", minimum=1e-3, description="Longest time that it may take; -1: its own limit"
+)
 
 
 @dataclass(frozen=True)
@@ -33,6 +36,8 @@ class RunContext:
         properties: Values of its properties.
         on_progress: Called with a fraction in 0..1 and a message.
         records: What it reported so far.
+        results: What became of the operators before it.
+        fraction: How far it said that it is, 0..1.
     """
 
     operator: type[Operator]
@@ -40,6 +45,8 @@ class RunContext:
     properties: PropertyValues
     on_progress: Callable[[float, str], None] = lambda fraction, message: None
     records: list[Record] = field(default_factory=list)
+    results: Sequence[Any] = ()
+    fraction: float = 0.0
 
     def get(self, kind: type[T]) -> T:
         """The value of a type; None for one of `uses` that nobody provided.
@@ -56,7 +63,8 @@ class RunContext:
 
     def progress(self, fraction: float, message: str = "") -> None:
         """Say how far the operator is, 0..1."""
-        self.on_progress(min(max(float(fraction), 0.0), 1.0), message)
+        self.fraction = min(max(float(fraction), 0.0), 1.0)
+        self.on_progress(self.fraction, message)
 
     def report(self, level: str, text: str) -> None:
         """Tell the user something; `level` is `info` or `warning`."""
@@ -79,6 +87,8 @@ class Operator:
         uses: Types that are made first where some operator provides them and its poll says yes.
         provides: Types that it makes.
         properties: What can be set.
+        timeout: Longest time that it may take [s]; None for any. Users can set it for every operator, as
+            `<idname>.timeout`.
     """
 
     idname: ClassVar[str] = ""
@@ -87,6 +97,7 @@ class Operator:
     uses: ClassVar[tuple[type, ...]] = ()
     provides: ClassVar[tuple[type, ...]] = ()
     properties: ClassVar[tuple[Property, ...]] = ()
+    timeout: ClassVar[float | None] = None
 
     @classmethod
     def poll(cls, data: Mapping[type, Any]) -> str | None:
@@ -129,6 +140,10 @@ def check_operator(cls: object) -> None:
         refuse("a type stands in two of requires, uses and provides", ", ".join(sorted(k.__name__ for k in both)))
     if not (isinstance(cls.properties, tuple) and all(isinstance(p, Property) for p in cls.properties)):
         refuse("properties must be a tuple of Property", repr(cls.properties))
+    if any(p.name == TIMEOUT.name for p in cls.properties):
+        refuse(f"{TIMEOUT.name} is a property of every operator", remedy="Give the property another name.")
+    if not (cls.timeout is None or (isinstance(cls.timeout, (int, float)) and cls.timeout > 0.0)):
+        refuse("timeout must be a positive number of seconds, or None", repr(cls.timeout))
     if len({p.name for p in cls.properties}) != len(cls.properties):
         refuse("two properties have the same name", ", ".join(p.name for p in cls.properties))
     for declared in cls.properties:

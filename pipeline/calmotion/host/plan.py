@@ -113,5 +113,5 @@ def _missing(kind: type, needed: Operators, known: set[type], broken: Sequence[s
         kind = lacking[0]
     users = sorted(cls.idname for cls in needed if kind in cls.requires)
     problem = f"no operator provides {kind.__name__}" + (f", which {', '.join(users)} needs" if users else "")
-    remedy = f"Plugins that failed: {'; '.join(broken)}" if broken else "Install a plugin that provides it."
+    remedy = f"Plugins that are not there: {'; '.join(broken)}" if broken else "Install a plugin that provides it."
     return PlanError(problem, remedy=remedy.rstrip("."))

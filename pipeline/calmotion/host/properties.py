@@ -66,14 +66,20 @@ class Property:
     def _check_range(self, value: Any) -> None:
         if self.choices and value not in self.choices:
             raise SettingError(
-                "this is not one of the choices", found=repr(value), remedy=f"Choose one of {', '.join(self.choices)}."
+                "this is not one of the choices",
+                found=repr(value),
+                remedy=f"{nearest(str(value), self.choices)}Choose one of {', '.join(self.choices)}.",
             )
         if self.kind in (bool, str):
             return
         low = self.minimum is not None and not value >= self.minimum
         high = self.maximum is not None and not value <= self.maximum
         if low or high or value != value:
-            raise SettingError("the value is out of range", found=value, remedy=f"Choose a value {self.range_text()}.")
+            bound = self.minimum if low or value != value else self.maximum
+            near = "" if bound is None else f"The nearest allowed one is {bound:g}{f' {self.unit}' * bool(self.unit)}. "
+            raise SettingError(
+                "the value is out of range", found=value, remedy=f"{near}Choose a value {self.range_text()}."
+            )
 
     def range_text(self) -> str:
         """The range as text, such as `from 0 to 1 m`; empty when there is none."""
@@ -98,6 +104,14 @@ class Property:
                 raise PluginError(f"property {self.name} has a default of the wrong type", found=repr(self.default))
         except SettingError as error:
             raise PluginError(f"property {self.name} has a wrong default: {error}") from error
+
+
+def nearest(found: str, known: Iterable[str]) -> str:
+    """A sentence with the known name that is most like one that is not known; empty where none is like it."""
+    from difflib import get_close_matches
+
+    near = get_close_matches(found, list(known), 1, 0.6)
+    return f"Did you mean {near[0]}? " if near else ""
 
 
 class PropertyValues(Mapping[str, Any]):
@@ -138,7 +152,11 @@ def values_of(properties: Iterable[Property], given: Mapping[str, object], place
     for name, value in given.items():
         if name not in declared:
             known = ", ".join(declared) or "none"
-            raise SettingError("there is no such property", path=f"{place}.{name}", remedy=f"It has: {known}.")
+            raise SettingError(
+                "there is no such property",
+                path=f"{place}.{name}",
+                remedy=f"{nearest(name, declared)}It has: {known}.",
+            )
         try:
             values[name] = declared[name].read(value)
         except SettingError as error:

@@ -11,13 +11,14 @@ from types import ModuleType
 from typing import Any
 
 from .. import __version__
+from .choices import disabled_plugins
 from .discovery import Location, discover
 from .errors import PluginError, SettingError
 from .loading import import_plugin
 from .manifest import Manifest, check_requirements, read_manifest
-from .operators import Operator, check_operator
+from .operators import TIMEOUT, Operator, check_operator
 from .plan import Plan, make_plan
-from .properties import PropertyValues, values_of
+from .properties import PropertyValues, nearest, values_of
 from .run import Run
 from .settings import Settings
 
@@ -28,6 +29,7 @@ class PluginState(StrEnum):
     FOUND = "found"
     REGISTERED = "registered"
     FAILED = "failed"
+    DISABLED = "disabled"
 
 
 REGISTERED = PluginState.REGISTERED
@@ -203,13 +205,19 @@ class Host:
             if idname not in operators:
                 known = ", ".join(name for name, cls in operators.items() if cls.properties)
                 raise SettingError(
-                    "there is no such operator", path=idname, remedy=f"The operators with properties are: {known}."
+                    "there is no such operator",
+                    path=idname,
+                    remedy=f"{nearest(idname, operators)}The operators with properties are: {known}.",
                 )
-        return {name: values_of(cls.properties, settings.get(name, {}), name) for name, cls in operators.items()}
+        return {
+            name: values_of((*cls.properties, TIMEOUT), settings.get(name, {}), name)
+            for name, cls in operators.items()
+        }
 
     def plan(self, given: Iterable[type], wanted: Iterable[type], optional: Iterable[type] = ()) -> Plan:
         """Which operators run, in which order; see `plan.make_plan`."""
         broken = [f"{plugin.id} ({plugin.error})" for plugin in self.failures()]
+        broken += [f"{plugin.id} (disabled)" for plugin in self.plugins if plugin.state is PluginState.DISABLED]
         return make_plan(tuple(self.operators.values()), tuple(given), tuple(wanted), tuple(optional), broken)
 
     def run(
@@ -248,11 +256,13 @@ def open_host(folders: Iterable[str | Path] = (), environment: Mapping[str, str]
         environment: Environment variables; the process's own when None.
 
     Raises:
-        SettingError: When a named folder holds no plugin.
+        SettingError: When a named folder holds no plugin, or the file with the user's choices cannot be read.
     """
-    host = Host()
+    host, disabled = Host(), disabled_plugins(environment)
     for location in discover(folders, environment):
-        host.add(location)
+        plugin = host.add(location)
+        if plugin.id in disabled and plugin.state is PluginState.FOUND:
+            plugin.state = PluginState.DISABLED
     for plugin in host.plugins:
         host.load(plugin)
     return host

@@ -10,7 +10,8 @@ from enum import StrEnum
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from .errors import PluginError
-from .operators import NotAsked, Operator, Record, RunContext
+from .limited import call_within
+from .operators import TIMEOUT, NotAsked, Operator, Record, RunContext
 from .plan import Plan
 from .properties import PropertyValues
 
@@ -42,6 +43,7 @@ class OperatorResult:
         traceback: Where, or empty.
         duration: [s].
         records: What it reported.
+        progress: How far it came, 0..1; 1 for one that is done.
     """
 
     idname: str
@@ -53,6 +55,7 @@ class OperatorResult:
     traceback: str = ""
     duration: float = 0.0
     records: tuple[Record, ...] = ()
+    progress: float = 0.0
 
     @property
     def success(self) -> bool:
@@ -111,7 +114,11 @@ class Run:
             return self._result(cls, Outcome.BLOCKED, reason=f"there is no {names}")
         start = time.perf_counter()
         context = RunContext(
-            cls, dict(self.data), self._properties[cls.idname], lambda f, m: self._progress(cls.label, f, m)
+            cls,
+            dict(self.data),
+            self._properties[cls.idname],
+            lambda f, m: self._progress(cls.label, f, m),
+            results=tuple(self.results),
         )
         try:
             reason = _poll(cls, self.data)
@@ -119,7 +126,7 @@ class Run:
                 return self._result(cls, Outcome.LEFT_OUT, reason=reason)
             self._refuse_rivals(cls)
             self._progress(cls.label, 0.0, "")
-            values = _checked(cls, cls().execute(context))
+            values = _checked(cls, self._execute(cls, context))
             self._progress(cls.label, 1.0, "")
         except Exception as error:
             self._failed |= set(cls.provides)
@@ -131,10 +138,18 @@ class Run:
                 traceback="".join(traceback.format_exception(error)),
                 duration=time.perf_counter() - start,
                 records=tuple(context.records),
+                progress=context.fraction,
             )
         self.data.update(values)
         duration = time.perf_counter() - start
-        return self._result(cls, Outcome.DONE, duration=duration, records=tuple(context.records))
+        return self._result(cls, Outcome.DONE, duration=duration, records=tuple(context.records), progress=1.0)
+
+    def _execute(self, cls: type[Operator], context: RunContext) -> object:
+        asked = context.properties[TIMEOUT.name]
+        limit = asked if asked > 0.0 else cls.timeout
+        if limit is None:
+            return cls().execute(context)
+        return call_within(limit, lambda: cls().execute(context), cls.idname)
 
     def _result(self, cls: type[Operator], outcome: Outcome, **fields: Any) -> OperatorResult:
         return OperatorResult(cls.idname, cls.label, self._owners[cls.idname], outcome, **fields)

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ..shot.character import Array, IntArray
+from .cutting import cut_skin
 from .hinge_rows import HingeRow, hinges_for
 
 Piece = tuple[Array, IntArray]  # points [n, 3] and triangles [m, 3]
@@ -25,18 +26,18 @@ class Link:
         name: Unique among the links.
         parent: Index of the link that carries it, -1 for one that the world or the animation carries.
         hinges: How it turns on that.
-        pieces: Its geometry, in the world, as the shot begins; of joints that rest on it, too.
+        piece: Its geometry, in the world, as the shot begins, or None.
     """
 
     joint: int
     name: str
     parent: int
     hinges: HingeRow
-    pieces: tuple[Piece, ...]
+    piece: Piece | None
 
 
 def make_links(
-    joints: Sequence[str], parents: Sequence[int], turns: Array, pieces: Mapping[int, Piece], tolerance: float
+    joints: Sequence[str], parents: Sequence[int], turns: Array, skin: Piece, weights: Array, tolerance: float
 ) -> list[Link]:
     """Links, each after the one that carries it.
 
@@ -46,29 +47,32 @@ def make_links(
         joints: Names, `Hip/Knee` and so on, parents first.
         parents: Index of the joint above each, -1 for none.
         turns: Rotation of each joint in its parent's axes since the first frame, shape [n, j, 3, 3].
-        pieces: Geometry by joint.
+        skin: Of all joints.
+        weights: How much each joint moves each point of it, shape [points, j].
         tolerance: What hinges may leave of a rotation [rad].
     """
-    bearing = set(pieces)
+    bearing = set(cut_skin(*skin, weights))
     for joint in reversed(range(len(joints))):
         if joint in bearing and parents[joint] >= 0:
             bearing.add(parents[joint])
     links: list[Link] = []
-    link_of: dict[int, int] = {}
-    geometry: dict[int, list[Piece]] = {}
+    link_of = np.full(len(joints), -1)
     names: set[str] = set()
     for joint, name in enumerate(joints):
-        above = link_of.get(parents[joint], -1)
+        above = int(link_of[parents[joint]]) if parents[joint] >= 0 else -1
+        link_of[joint] = above
         if joint in bearing:
             row = hinges_for(turns[:, joint], tolerance) if parents[joint] >= 0 else HingeRow(*_none(len(turns)))
             if parents[joint] < 0 or len(row.axes):
-                geometry[len(links)] = []
                 link_of[joint] = len(links)
-                links.append(Link(joint, _unique(name, names), above, row, ()))
-        link_of.setdefault(joint, above)
-        if joint in pieces:
-            geometry[link_of[joint]].append(pieces[joint])
-    return [Link(link.joint, link.name, link.parent, link.hinges, tuple(geometry[k])) for k, link in enumerate(links)]
+                links.append(Link(joint, _unique(name, names), above, row, None))
+    # what rests together is cut as one
+    together = np.zeros((len(weights), len(links)))
+    for joint, link in enumerate(link_of):
+        if link >= 0:
+            together[:, link] += weights[:, joint]
+    pieces = cut_skin(*skin, together)
+    return [replace(link, piece=pieces.get(k)) for k, link in enumerate(links)]
 
 
 def _none(count: int) -> tuple[Array, Array, Array]:
@@ -89,14 +93,14 @@ def _unique(joint: str, taken: set[str]) -> str:
 def targets_of(links: Sequence[Link], joints: Sequence[str]) -> list[int]:
     """The links whose motion matters: hands, feet and head by their names, else the outermost of each limb."""
     carried = {link.parent for link in links}
-    named = [k for k, link in enumerate(links) if _WORDS.search(joints[link.joint].split("/")[-1]) and link.pieces]
-    outer = [k for k in range(len(links)) if k not in carried and links[k].pieces and links[k].parent >= 0]
+    named = [k for k, link in enumerate(links) if _WORDS.search(joints[link.joint].split("/")[-1]) and link.piece]
+    outer = [k for k in range(len(links)) if k not in carried and links[k].piece and links[k].parent >= 0]
     found = []
     for k in outer:
         chain = _chain(links, k)
         # the fingers of a hand are as good as the hand
         found.append(next((above for above in chain if above in named), k))
-    return sorted(dict.fromkeys(found)) or [k for k, link in enumerate(links) if link.pieces][-1:]
+    return sorted(dict.fromkeys(found)) or [k for k, link in enumerate(links) if link.piece][-1:]
 
 
 def _chain(links: Sequence[Link], k: int) -> list[int]:
@@ -107,8 +111,8 @@ def _chain(links: Sequence[Link], k: int) -> list[int]:
     return chain
 
 
-def tip_of(link: Link, origin: Array) -> Array:
+def tip_of(piece: Piece, origin: Array) -> Array:
     """The middle of the end of a link that is farthest from where it turns, world, shape [3]."""
-    cloud = np.concatenate([points for points, _ in link.pieces])
-    away = np.linalg.norm(cloud - origin, axis=1)
-    return np.asarray(cloud[away >= (1.0 - _TIP) * away.max()].mean(axis=0), dtype=np.float64)
+    points, _ = piece
+    away = np.linalg.norm(points - origin, axis=1)
+    return np.asarray(points[away >= (1.0 - _TIP) * away.max()].mean(axis=0), dtype=np.float64)

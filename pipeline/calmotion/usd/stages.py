@@ -93,8 +93,23 @@ def open_stage(path: str, *, muted: tuple[str, ...] = ()):
         if muted:
             stage.MuteAndUnmuteLayers(list(muted), [])
         errors = stage.GetCompositionErrors()
-    raise_all([refusal for error in errors if (refusal := _refusal(error, path))])
+    raise_all(_alike([refusal for error in errors if (refusal := _refusal(error, path))]))
     return stage
+
+
+def _alike(errors: list[ShotError]) -> list[ShotError]:
+    """One error for all prims that lack the same file."""
+    groups: dict[tuple, list[ShotError]] = {}
+    for error in errors:
+        groups.setdefault((error.problem, error.attribute, str(error.found), error.remedy), []).append(error)
+    found = []
+    for (problem, attribute, _, remedy), group in groups.items():
+        more = f", here and at {len(group) - 1} other prims" if len(group) > 1 else ""
+        paths = sorted(error.path for error in group)
+        found.append(
+            ShotError(problem + more, path=paths[0], attribute=attribute, found=group[0].found, remedy=remedy)
+        )
+    return found
 
 
 def _last_quoted(text: str) -> str:
@@ -129,6 +144,19 @@ def _refusal(error, shot: str) -> ShotError | None:
         remedy = f"Put the file there, or correct or remove the {arc}"
         found = f"@{assets[0]}@, introduced by {assets[1]}" if len(assets) > 1 else text
     return ShotError(problem, path=prim, attribute=_ARCS[arc], found=found, remedy=remedy)
+
+
+def files_named_by(path: str) -> tuple[str, ...]:
+    """The files that a layer names as sublayers, references and payloads; none for one that cannot be opened."""
+    from pxr import Sdf, Tf, UsdUtils
+
+    try:
+        with quiet():
+            layer = Sdf.Layer.FindOrOpen(path)
+            named = [] if layer is None else [n for kind in UsdUtils.ExtractExternalReferences(path) for n in kind]
+    except Tf.ErrorException:
+        return ()
+    return tuple(layer.ComputeAbsolutePath(name) for name in named)
 
 
 def role_of(layer) -> str:

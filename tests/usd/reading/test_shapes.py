@@ -192,3 +192,10 @@ def test_two_tet_meshes_on_a_body_are_refused(tmp_path):
 
     with pytest.raises(ShotError, match="one TetMesh"):
         body(tmp_path, FORE, edit)
+
+
+def test_a_body_of_guides_alone_is_shown_by_them(tmp_path):
+    def edit(stage):
+        UsdGeom.Imageable(stage.GetPrimAtPath(FORE)).CreatePurposeAttr("guide")
+
+    assert [surface.visible for surface in body(tmp_path, FORE, edit).surfaces] == [True]

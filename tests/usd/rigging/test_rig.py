@@ -10,10 +10,8 @@ import pytest
 from calmotion import ShotError
 from calmotion.usd import gf
 from calmotion.usd.reading import read_shot
-from calmotion.usd.reading.skeletons import bound_skeletons
 from calmotion.usd.rigging import RigOptions, rig_shot
-from calmotion.usd.writing.motions import simulated_motion
-from performing import performed, result_with, rotation
+from performing import followed, result_with
 from pxr import Gf, Usd, UsdGeom, UsdSkel, Vt
 
 FRAMES, RATE = 24, 24.0
@@ -83,31 +81,6 @@ def _skin(stage, root, skeleton, step, meters):
     owner = np.clip(np.floor(points[:, 0] / step + 1e-9), 0, 2).astype(int)
     binding.CreateJointIndicesPrimvar(False, 1).Set(Vt.IntArray([int(k) for k in owner]))
     binding.CreateJointWeightsPrimvar(False, 1).Set(Vt.FloatArray([1.0] * len(owner)))
-
-
-def followed(path, robot):
-    """How far the robot is from the skeleton, over all frames and links: [m], and in rotation matrices."""
-    character, animation, _ = read_shot(str(path))
-    motion = simulated_motion(performed(character, animation, animation.tracks), animation.frame_times)
-    stage = Usd.Stage.Open(str(path))
-    meters = UsdGeom.GetStageMetersPerUnit(stage)
-    (skeleton,) = bound_skeletons(stage)
-    start, rate = stage.GetStartTimeCode(), stage.GetTimeCodesPerSecond()
-    links = {name.split("/")[-1]: k for k, name in enumerate(skeleton.joints)}
-    far, turned = 0.0, 0.0
-    for n, time in enumerate(motion.times):
-        code = start + rate * time
-        worlds = skeleton.placement(code) @ skeleton.in_skeleton(skeleton.locals_at(code))
-        for b, body in enumerate(character.bodies):
-            joint = links.get(body.path.split("/")[-1])
-            if joint is None:
-                continue  # a servo
-            w, *v = motion.rotations[n, b]
-            axes = worlds[joint, :3, :3] / np.linalg.norm(worlds[joint, :3, :3], axis=0)
-            far = max(far, float(np.linalg.norm(worlds[joint, :3, 3] * meters - motion.positions[n, b])))
-            turned = max(turned, float(np.abs(axes - rotation(w, np.array(v))).max()))
-    assert any(body.path.startswith(robot) for body in character.bodies)
-    return far, turned
 
 
 def test_joints_get_the_fewest_hinges_that_follow_them(tmp_path):

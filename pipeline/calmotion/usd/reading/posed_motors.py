@@ -125,8 +125,25 @@ def posed_joints(reading: Reading, joints: Sequence[JointPrim], clock: Clock) ->
     codes = pose_codes(reading.stage, able, clock)
     if len(codes) == 0:
         return []
+    driven = _driven_by_hand(reading, able, codes)
     motions = joint_motions(reading, able, codes)
-    return [j.path for j, motion in zip(able, motions, strict=True) if np.ptp(motion.values) > MOVED]
+    return [
+        joint.path
+        for joint, motion in zip(able, motions, strict=True)
+        if np.ptp(motion.values) > MOVED and driven.intersection((joint.body0, joint.body1))
+    ]
+
+
+def _driven_by_hand(reading: Reading, joints: Sequence[JointPrim], codes: Array) -> set[str]:
+    """Bodies that the shot moves in the world, but for roots: what only a root turns away from is not animated."""
+    bodies = sorted({end for joint in joints for end in (joint.body0, joint.body1) if end})
+    poses = _poses(reading.stage, bodies, codes, reading.units)
+    return {
+        path
+        for path, (R, p) in poses.items()
+        if max(np.max(np.ptp(R, axis=0)), np.max(np.ptp(p, axis=0))) > MOVED
+        and not reading.stage.GetPrimAtPath(path).GetAttribute("physics:kinematicEnabled").Get()
+    }
 
 
 def posed_track(motion: JointMotion, joint: JointPrim, codes: Array, clock: Clock, reading: Reading) -> Track:

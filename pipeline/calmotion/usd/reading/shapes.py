@@ -48,6 +48,7 @@ def shapes_of(reading: Reading, body_prim, pose: Pose) -> list[Shape]:
         ShotError: Geometry that is not finite or whose faces do not fit its points.
     """
     shapes: list[Shape] = []
+    purposes = _shown_purposes(body_prim)
     for prim in prims_below(body_prim, _is_elsewhere):
         if prim.GetTypeName() == "PointInstancer":
             _pass_over(reading, prim, body_prim)
@@ -75,7 +76,7 @@ def shapes_of(reading: Reading, body_prim, pose: Pose) -> list[Shape]:
             points=placed,
             triangles=triangles,
             color=_color(prim, reading.start),
-            visible=_is_visible(prim, reading.start) and not _is_copy(placed, triangles, shapes),
+            visible=_is_visible(prim, reading.start, purposes) and not _is_copy(placed, triangles, shapes),
             displaced=len(placed) if writable else 0,
         )
         collider = is_applied(prim, "PhysicsCollisionAPI")
@@ -189,13 +190,20 @@ def mesh_geometry(prim, time: float) -> tuple[Array, IntArray]:
     return points, triangles
 
 
-def _is_visible(prim, time: float) -> bool:
+def _shown_purposes(body_prim) -> set[str]:
+    """Purposes of the geometry by which a body is shown: guides and proxies where it has nothing else."""
+    from pxr import UsdGeom
+
+    geometry = [p for p in prims_below(body_prim, _is_elsewhere) if p.IsA(UsdGeom.Gprim)]
+    found = {str(UsdGeom.Imageable(prim).ComputePurpose()) for prim in geometry}
+    return found - {"guide", "proxy"} or found
+
+
+def _is_visible(prim, time: float, purposes: set[str]) -> bool:
     from pxr import UsdGeom
 
     image = UsdGeom.Imageable(prim)
-    if image.ComputePurpose() in (UsdGeom.Tokens.guide, UsdGeom.Tokens.proxy):
-        return False
-    return image.ComputeVisibility(time) != UsdGeom.Tokens.invisible
+    return str(image.ComputePurpose()) in purposes and image.ComputeVisibility(time) != UsdGeom.Tokens.invisible
 
 
 def _is_copy(points: Array, triangles: IntArray, earlier: list[Shape]) -> bool:

@@ -12,7 +12,7 @@ from ...rig.materials import Material
 from ...shot import MassProperties, Provenance
 from ...shot.character import Array, IntArray
 from .. import gf
-from ..reading.moments import sum_of, surface_moments
+from ..reading.moments import surface_moments
 from ..reading.skeletons import BoundSkeleton
 from ..stages import RIG
 from ..transforms import Pose, pose_from_matrix, quaternion_from_rotation
@@ -120,16 +120,16 @@ class RobotLayer:
 
     def _mass_of(self, k: int) -> MassProperties | None:
         """Mass properties of a link in its own frame, stage units; None for one without geometry."""
+        piece = self._links[k].piece
+        if piece is None:
+            return None
         density = self._material.density / self._units.density(1.0)
-        pose = self._poses[k]
-        solids = [surface_moments(pose.to_local(x), triangles) for x, triangles in self._links[k].pieces]
-        return sum_of([solid.mass_properties(density) for solid in solids]) if solids else None
+        return surface_moments(self._poses[k].to_local(piece[0]), piece[1]).mass_properties(density)
 
     def _servo(self, k: int, mass: float) -> MassProperties:
         """A servo as heavy as asked for, about where it turns."""
-        clouds = [self._poses[k].to_local(x) for link in self._links for x, _ in link.pieces if link.parent == k]
-        clouds += [self._poses[k].to_local(x) for x, _ in self._links[k].pieces]
-        size = max((float(np.max(np.ptp(x, axis=0))) for x in clouds), default=1.0)
+        near = [self._links[k], *(link for link in self._links if link.parent == k)]
+        size = max((float(np.max(np.ptp(link.piece[0], axis=0))) for link in near if link.piece), default=1.0)
         return MassProperties(mass, np.zeros(3), mass * (_SERVO * size) ** 2 * np.eye(3))
 
     def _author_link(self, k: int, mass: MassProperties, flexible: bool) -> None:
@@ -137,10 +137,9 @@ class RobotLayer:
 
         prim = self._author_body(self.body(k), self._poses[k], None if flexible else mass)
         self.mass += self._units.mass(mass.mass) if flexible else 0.0
-        for number, (points, triangles) in enumerate(self._links[k].pieces):
-            name = "skin" if number == 0 else f"skin_{number + 1}"
-            self._author_mesh(f"{self.body(k)}/{name}", self._poses[k].to_local(points), triangles)
-        if self._links[k].pieces:
+        piece = self._links[k].piece
+        if piece is not None:
+            self._author_mesh(f"{self.body(k)}/skin", self._poses[k].to_local(piece[0]), piece[1])
             UsdShade.MaterialBindingAPI.Apply(prim).Bind(self._solid, materialPurpose="physics")
         if flexible:
             prim.AddAppliedSchema("CalmFlexibleBodyAPI")
@@ -244,7 +243,9 @@ class RobotLayer:
     def _author_target(self, k: int) -> None:
         from pxr import Gf, UsdGeom
 
-        tip = self._poses[k].to_local(tip_of(self._links[k], self._poses[k].position)[None])[0]
+        piece, pose = self._links[k].piece, self._poses[k]
+        assert piece is not None  # targets are links with geometry
+        tip = pose.to_local(tip_of(piece, pose.position)[None])[0]
         path = f"{self.body(k)}/target"
         xform = UsdGeom.Xform.Define(self._stage, path)
         xform.AddTranslateOp().Set(Gf.Vec3d(*tip.tolist()))

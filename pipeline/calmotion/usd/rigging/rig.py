@@ -9,7 +9,6 @@ import numpy as np
 
 from ...errors import ShotError
 from ...host.values import Rig, RiggedJoint
-from ...rig.cutting import cut_skin
 from ...rig.links import Link, make_links, targets_of
 from ...rig.materials import MATERIALS
 from ...shot.character import Array
@@ -127,21 +126,21 @@ def _links(stage, skeleton: BoundSkeleton, codes: Array, tolerance: float) -> li
             path=skeleton.prim.GetPath(),
             remedy="Bind a Mesh to it with SkelBindingAPI, joint indices and weights",
         )
-    pieces = cut_skin(skin.points, skin.triangles, skin.weights)
-    if not pieces:
+    place = str(skeleton.prim.GetPath())
+    rotations = np.array(
+        [[pose_from_matrix(m, place).rotation for m in skeleton.locals_at(float(code))] for code in codes]
+    )
+    turns = rotations @ np.swapaxes(rotations[0], 1, 2)
+    parents = [skeleton.parent(k) for k in range(len(skeleton.joints))]
+    links = make_links(skeleton.joints, parents, turns, (skin.points, skin.triangles), skin.weights, tolerance)
+    if not any(link.piece for link in links):
         raise ShotError(
             "the skin encloses no volume, so its bodies have no mass",
             path=skin.meshes[0],
             attribute="points",
             remedy="Bind a mesh with an inside to the skeleton",
         )
-    place = str(skeleton.prim.GetPath())
-    count = len(skeleton.joints)
-    rotations = np.array(
-        [[pose_from_matrix(m, place).rotation for m in skeleton.locals_at(float(code))] for code in codes]
-    )
-    turns = rotations @ np.swapaxes(rotations[0], 1, 2)
-    return make_links(skeleton.joints, [skeleton.parent(k) for k in range(count)], turns, pieces, tolerance)
+    return links
 
 
 def _validate(temporary: str, motors: int) -> None:
