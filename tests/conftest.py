@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+import tempfile
 import textwrap
 from collections.abc import Callable
 from pathlib import Path
@@ -76,7 +77,9 @@ def toml(value: object) -> str:
 
 
 def pytest_configure(config):
-    """Tests that take longer than the rest are marked `long`, and run with `pytest -m long`."""
+    """Tests that take longer than the rest are marked `long`, and run with `pytest -m long`; what the user of this
+    machine has disabled plays no part."""
+    os.environ["CALMOTION_CONFIG"] = os.path.join(tempfile.gettempdir(), "no-calmotion-config-here")
     config.addinivalue_line("markers", "long: takes half a minute or more; run with -m long")
 
 

@@ -99,6 +99,13 @@ def _shot_command(commands: Commands, name: str, function: Callable[..., int], t
     command.add_argument("--json", action="store_true", help="print one JSON object on stdout, and nothing else there")
     command.add_argument("--quiet", action="store_true", help="print nothing but errors (and the object of --json)")
     _plugin_options(command)
+    command.add_argument(
+        "--run",
+        metavar="OPERATOR",
+        action="append",
+        default=[],
+        help="run this operator of a plugin as well, such as curves.export; may be repeated",
+    )
     command.add_argument("--settings", metavar="FILE", help="TOML file with a table for each operator")
     command.add_argument(
         "--set",
@@ -136,6 +143,11 @@ def _run_options(command: argparse.ArgumentParser) -> None:
     outputs.add_argument("--csv", metavar="FILE", help="table of targets and motors, one row a time step")
     outputs.add_argument("--rrd", metavar="FILE", help="recording for the rerun viewer")
     outputs.add_argument("--figures", metavar="DIR", help="folder for figures")
+    command.add_argument(
+        "--motion",
+        metavar="FILE",
+        help="motion from beside the shot onto motors, such as a BVH file (--set bvh.read.map=...)",
+    )
     model = command.add_argument_group("simulation")
     model.add_argument("--step", metavar="TIME", type=_quantity("s"), help="time step, in s or with a unit (2ms)")
     model.add_argument(
@@ -168,7 +180,8 @@ def _quantity(unit: str) -> Callable[[str], float]:
 
 
 def _plugins_commands(commands: Commands) -> None:
-    plugins = commands.add_parser("plugins", help="list and check plugins", description="List and check plugins.")
+    text = "list, check, disable and begin plugins"
+    plugins = commands.add_parser("plugins", help=text, description=f"{text.capitalize()}.")
     actions = plugins.add_subparsers(title="commands", required=True, metavar="COMMAND")
     listing = actions.add_parser("list", help="every plugin, its state, its operators and their properties")
     listing.set_defaults(command=_list_plugins)
@@ -177,7 +190,18 @@ def _plugins_commands(commands: Commands) -> None:
     check = actions.add_parser("check", help="check that a plugin keeps to the rules")
     check.set_defaults(command=_check_plugin)
     check.add_argument("folder", metavar="DIR", help="folder of the plugin")
-    for command in (listing, check):
+    choices = []
+    for name, text in (("enable", "load a plugin again"), ("disable", "do not load a plugin any more")):
+        choice = actions.add_parser(name, help=text)
+        choice.set_defaults(command=_choose_plugin, enabled=name == "enable")
+        choice.add_argument("id", metavar="ID", help="id of the plugin, as `calmotion plugins list` shows it")
+        _plugin_options(choice)
+        choices.append(choice)
+    new = actions.add_parser("new", help="begin a plugin: a folder with an operator, a manifest and a passing test")
+    new.set_defaults(command=_new_plugin)
+    new.add_argument("name", metavar="NAME", help="id of the plugin: a-z, 0-9 and _")
+    new.add_argument("--folder", metavar="DIR", default=".", help="where the folder NAME is made (default: here)")
+    for command in (listing, check, *choices, new):
         command.add_argument("--json", action="store_true", help="print one JSON object on stdout")
 
 
@@ -215,6 +239,18 @@ def _list_plugins(args: argparse.Namespace, output: Output) -> int:
     from .cli_plugins import list_plugins
 
     return list_plugins(args, output)
+
+
+def _choose_plugin(args: argparse.Namespace, output: Output) -> int:
+    from .cli_plugins import choose_plugin
+
+    return choose_plugin(args, output)
+
+
+def _new_plugin(args: argparse.Namespace, output: Output) -> int:
+    from .cli_plugins import new_plugin
+
+    return new_plugin(args, output)
 
 
 def _check_plugin(args: argparse.Namespace, output: Output) -> int:

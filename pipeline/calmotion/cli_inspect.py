@@ -13,7 +13,7 @@ from . import __version__
 from .cli_output import Output, Problem
 from .cli_progress import ProgressDisplay
 from .cli_report import left_out_row, operator_row
-from .cli_run import FAILED, INTERRUPTED, carry_out, conclude, problems_of, settings_of
+from .cli_run import FAILED, INTERRUPTED, asked_for, carry_out, conclude, problems_of, settings_of, tell_failures
 from .errors import ShotError
 from .host import HostError, ModeShapes, OutputPaths, ReducedBodies, Run, Source, SystemModes, open_host
 from .shot import Animation, Body, Character, Findings, LeftOut, ModeTable, Motor, Provenance, Track
@@ -34,6 +34,8 @@ def inspect_shot(args: argparse.Namespace, output: Output) -> int:
     wanted: list[type] = [Findings] if args.strict else [Character, Animation, Provenance]
     if args.modes:
         wanted.append(ModeShapes)
+    wanted += asked_for(host, args)
+    tell_failures(host, args.quiet)
     optional = [Character, Animation, Provenance] if args.strict else [ReducedBodies, SystemModes]
     with ProgressDisplay(args.quiet) as display:
         run = host.run(

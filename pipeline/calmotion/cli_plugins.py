@@ -1,4 +1,4 @@
-"""`calmotion plugins list` and `calmotion plugins check`."""
+"""`calmotion plugins list`, `check`, `enable`, `disable` and `new`."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from .cli_output import Output
-from .host import Operator, Plugin, Property, open_host
+from .host import Operator, Plugin, Property, SettingError, nearest, open_host
 
 
 def list_plugins(args: argparse.Namespace, output: Output) -> int:
@@ -103,3 +103,47 @@ def check_plugins(args: argparse.Namespace, output: Output) -> int:
         if not problems:
             print(f"{args.folder}: keeps to the rules", file=output.stream)
     return 1 if problems else 0
+
+
+def choose_plugin(args: argparse.Namespace, output: Output) -> int:
+    """Enable or disable a plugin for all later runs.
+
+    Raises:
+        SettingError: There is no plugin of this id, or the choice cannot be kept.
+    """
+    from .host.choices import choose, disabled_plugins
+
+    if args.id not in disabled_plugins():
+        known = [plugin.id for plugin in open_host(args.plugins).plugins]
+        if args.id not in known:
+            raise SettingError(
+                "there is no such plugin",
+                path="ID",
+                found=args.id,
+                remedy=f"{nearest(args.id, known)}The plugins are {', '.join(known)}.",
+            )
+    file = choose(args.id, args.enabled)
+    state = "enabled" if args.enabled else "disabled"
+    if output.json:
+        output.object({"id": args.id, "state": state, "file": str(file)})
+    else:
+        print(f"{args.id} is {state} (kept in {file})", file=output.stream)
+    return 0
+
+
+def new_plugin(args: argparse.Namespace, output: Output) -> int:
+    """Begin a plugin.
+
+    Raises:
+        PluginError: The name is none for a plugin, or the folder is there already.
+    """
+    from .host.template import write_template
+
+    folder = write_template(args.name, Path(args.folder))
+    if output.json:
+        output.object({"id": args.name, "folder": str(folder)})
+        return 0
+    print(f"made {folder}; next:", file=output.stream)
+    for line in (f"pip install -e {folder}", f"pytest {folder}", f"calmotion plugins check {folder / args.name}"):
+        print(f"    {line}", file=output.stream)
+    return 0

@@ -8,7 +8,7 @@ from typing import Any, TextIO
 from . import __version__
 from .cli_output import Output, Problem
 from .cli_progress import ProgressDisplay
-from .cli_run import INTERRUPTED, carry_out, conclude, problems_of, settings_of
+from .cli_run import INTERRUPTED, asked_for, carry_out, conclude, problems_of, settings_of, tell_failures
 from .errors import ShotError
 from .host import OutputPaths, Rig, Run, Source, open_host
 
@@ -22,10 +22,12 @@ def rig(args: argparse.Namespace, output: Output) -> int:
     """
     host = open_host(args.plugins)
     given = [Source(path=args.shot, command="rig"), OutputPaths(layer=args.output)]
+    wanted = [Rig, *asked_for(host, args)]
+    tell_failures(host, args.quiet)
     with ProgressDisplay(args.quiet) as display:
-        run = host.run(given, [Rig], settings=settings_of(args), progress=display)
+        run = host.run(given, wanted, settings=settings_of(args), progress=display)
         interrupted = carry_out(run, display)
-    problems = [Problem(ShotError("interrupted"))] if interrupted else problems_of(run, [Rig])
+    problems = [Problem(ShotError("interrupted"))] if interrupted else problems_of(run, wanted)
     status = conclude(_report(run), problems, output, None if args.quiet else _print)
     return INTERRUPTED if interrupted else status
 

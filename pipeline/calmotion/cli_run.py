@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -25,6 +26,7 @@ from .host import (
     Source,
     WrittenLayer,
     merge,
+    nearest,
     open_host,
     read_assignment,
     read_settings_file,
@@ -61,7 +63,7 @@ def run_shot(args: argparse.Namespace, command: str, output: Output) -> int:
 
     paths = OutputPaths(layer=args.output, rrd=args.rrd, csv=args.csv, figures=args.figures)
     host = open_host(args.plugins)
-    wanted = [Character, Result, *_wanted_files(host, paths)]
+    wanted = [Character, Result, *_wanted_files(host, paths), *asked_for(host, args)]
     source = Source(
         path=args.shot,
         command=command,
@@ -69,8 +71,11 @@ def run_shot(args: argparse.Namespace, command: str, output: Output) -> int:
         step=args.step,
         pre_roll=args.pre_roll,
         shaper=getattr(args, "shaper", None),
+        motion=args.motion,
         **({"integrator": args.integrator} if args.integrator else {}),
     )
+    _refuse_unreadable_motion(source, host)
+    tell_failures(host, args.quiet)
     with ProgressDisplay(args.quiet) as display:
         settings = merge([settings_of(args), _options_of_the_writer(args)])
         run = host.run([source, paths], wanted, settings=settings, progress=display)
@@ -92,6 +97,51 @@ def run_shot(args: argparse.Namespace, command: str, output: Output) -> int:
         report = run_report(run, character, result, command, time.perf_counter() - start)
     status = conclude(report, problems, output, None if args.quiet else _print_run)
     return INTERRUPTED if interrupted else status
+
+
+def asked_for(host: Host, args: argparse.Namespace) -> list[type]:
+    """What the operators make that the user asked for by name.
+
+    Raises:
+        SettingError: There is no such operator.
+    """
+    kinds: list[type] = []
+    for idname in args.run:
+        if idname not in host.operators:
+            known = ", ".join(host.operators)
+            raise SettingError(
+                "there is no such operator",
+                path="--run",
+                found=idname,
+                remedy=f"{nearest(idname, host.operators)}The operators are {known}",
+            )
+        kinds += host.operators[idname].provides
+    return kinds
+
+
+def _refuse_unreadable_motion(source: Source, host: Host) -> None:
+    """Refuse a motion that no plugin reads, before anything costly.
+
+    Raises:
+        SettingError: None does.
+    """
+    from .shot import MotorTracks
+
+    readers = host.providers(MotorTracks)
+    if source.motion is not None and all(cls.poll({Source: source}) is not None for cls in readers):
+        raise SettingError(
+            "no plugin reads this motion",
+            path="--motion",
+            found=source.motion,
+            remedy="Name a .bvh file, or a plugin that provides MotorTracks with --plugins",
+        )
+
+
+def tell_failures(host: Host, quiet: bool) -> None:
+    """Tell of plugins that could not be loaded, each with its own traceback; the run goes on without them."""
+    for plugin in host.failures() if not quiet else ():
+        print(plugin.traceback, end="", file=sys.stderr)
+        print(f"warning: the plugin {plugin.id} is not used: {plugin.error}", file=sys.stderr, flush=True)
 
 
 def _wanted_files(host: Host, paths: OutputPaths) -> list[type]:

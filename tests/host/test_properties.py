@@ -48,3 +48,23 @@ def test_an_unknown_property_is_refused_with_the_known_ones():
 def test_a_declaration_that_cannot_be_right_is_refused(wrong):
     with pytest.raises(PluginError):
         wrong.check()
+
+
+@pytest.mark.parametrize(
+    ("declared", "value", "near"),
+    [
+        (SIZE, "11", "10 m"),
+        (SIZE, "-2", "1e-06 m"),
+        (COUNT, 0, "1"),
+        (Property("kind", str, "linear", choices=("linear", "stvk")), "linaer", "linear"),
+    ],
+)
+def test_the_nearest_right_value_is_named(declared, value, near):
+    with pytest.raises(SettingError) as refused:
+        values_of([declared], {declared.name: value}, "fe.mesh")
+    assert near in refused.value.remedy.split(". ")[0] + refused.value.remedy.split("? ")[0]
+
+
+def test_the_nearest_name_is_named():
+    with pytest.raises(SettingError, match="Did you mean size"):
+        values_of([SIZE, COUNT], {"sise": 1.0}, "fe.mesh")

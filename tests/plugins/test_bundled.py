@@ -1,5 +1,7 @@
 """Every bundled plugin keeps the rules that authors of plugins are held to."""
 
+import ast
+
 import pytest
 from calmotion.testing import check_plugin
 
@@ -7,6 +9,8 @@ from calmotion.testing import check_plugin
 @pytest.mark.parametrize(
     "name",
     [
+        "bvh_reader",
+        "csv_export",
         "fe_mesher",
         "figures",
         "mode_shapes",
@@ -25,3 +29,12 @@ def test_bundled_plugin_conforms(repository, name):
 def test_no_bundled_plugin_is_missing_here(repository):
     found = {manifest.parent.name for manifest in (repository / "plugins").glob("*/plugin.toml")}
     assert found == set(test_bundled_plugin_conforms.pytestmark[0].args[1])
+
+
+@pytest.mark.parametrize("name", ["bvh_reader", "csv_export"])
+def test_plugins_from_outside_use_what_others_may_use_too(repository, name):
+    public = ("calmotion.errors", "calmotion.host", "calmotion.shot", "calmotion.retarget.commanded")
+    for file in (repository / "plugins" / name).glob("*.py"):
+        for node in ast.walk(ast.parse(file.read_text())):
+            if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("calmotion"):
+                assert node.module.startswith(public), f"{file.name} imports {node.module}"

@@ -4,7 +4,7 @@ from .errors import HostError, PlanError, PluginError, SettingError
 from .manifest import Manifest, read_manifest
 from .operators import NotAsked, Operator, Record, RunContext
 from .plan import Plan
-from .properties import Property, PropertyValues
+from .properties import Property, PropertyValues, nearest
 from .registry import Host, Plugin, PluginState, open_host
 from .run import OperatorResult, Outcome, Run
 from .settings import Settings, merge, read_assignment, read_settings_file
@@ -57,6 +57,7 @@ __all__ = [
     "SystemModes",
     "WrittenLayer",
     "merge",
+    "nearest",
     "open_host",
     "parse_quantity",
     "read_assignment",

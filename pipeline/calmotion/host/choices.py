@@ -36,7 +36,7 @@ def disabled_plugins(environment: Mapping[str, str] | None = None) -> frozenset[
     file = configuration_folder(environment) / FILE_NAME
     try:
         found = tomllib.loads(file.read_text(encoding="utf-8")).get("disabled", [])
-    except FileNotFoundError:
+    except (FileNotFoundError, NotADirectoryError):
         return frozenset()
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
         raise SettingError(

@@ -23,6 +23,7 @@ class Source:
         integrator: Name of the integrator.
         pre_roll: Length of the pre-roll [s], or None for automatic.
         shaper: Input shaper or filter through which `simulate` passes the motors' tracks first, or None.
+        motion: File with a motion that replaces tracks of motors, or None.
     """
 
     path: str
@@ -32,6 +33,7 @@ class Source:
     integrator: str = "bdf2"
     pre_roll: float | None = None
     shaper: str | None = None
+    motion: str | None = None
 
 
 @dataclass(frozen=True)

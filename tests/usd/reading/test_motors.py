@@ -96,7 +96,7 @@ def test_an_actuator_of_a_conversion_makes_a_motor_that_holds_its_pose_until_it_
     character, animation, _ = read(tmp_path, edit)
     assert [motor.path for motor in character.motors] == [SHOULDER, ELBOW]
     assert np.allclose(animation.tracks[1].values, 0.0, atol=1e-7)
-    assert any("/Arm/actuator" in note for note in character.notes)
+    assert any(ELBOW in note and "an actuator drives it" in note for note in character.notes)
 
 
 def test_a_motor_inside_an_instance_is_refused(tmp_path):

@@ -13,7 +13,7 @@ from ...shot import Body, Character, Joint, RetargetSettings
 from ..clock import Clock
 from ..transforms import Pose
 from . import mass, motors, scene, targets, topology
-from .context import Reading, is_rigid_body, prims_of
+from .context import Reading, grouped, is_rigid_body, prims_of
 from .flexible import flexible_settings
 from .interfaces import interfaces_of
 from .joints import JointPrim, body_index, joint_prims, joint_to_world, read_joint, refuse_unsupported
@@ -166,7 +166,7 @@ def build_character(reading: Reading, skeleton: Skeleton) -> Character:
         targets=chosen,
         gravity=gravity,
         retarget=settings,
-        notes=tuple(reading.notes),
+        notes=grouped(reading.notes),
     )
 
 

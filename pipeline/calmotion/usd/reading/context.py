@@ -70,6 +70,22 @@ class Reading:
         return pose_from_matrix(self.world_matrix(prim), str(prim.GetPath()))
 
 
+def grouped(notes: list[str]) -> tuple[str, ...]:
+    """Notes with those that say the same of several prims put into one."""
+    groups: dict[str, list[str]] = {}
+    for note in notes:
+        place, colon, text = note.partition(": ")
+        groups.setdefault(text if colon and place.startswith("/") else note, []).append(place)
+    found = []
+    for text, places in groups.items():
+        if text.startswith(places[0]) and len(places) == 1:
+            found.append(text)
+        else:
+            more = f" and {len(places) - 1} others" if len(places) > 1 else ""
+            found.append(f"{places[0]}{more}: {text}")
+    return tuple(found)
+
+
 def prims_of(stage) -> Iterator:
     """Every prim of a stage in depth-first order, those inside instances too."""
     from pxr import Usd

@@ -258,8 +258,8 @@ def _drive(
         reading.note(f"{joint.path}: its drive is not animated and holds {attribute.Get():g} {unit}")
         return Drive(joint, HELD, held=float(attribute.Get()) * to_si(joint.kind, reading.units))
     if ours or joint.path in actuated:
-        what = f"the actuator {actuated[joint.path]}" if joint.path in actuated else "a motor"
-        reading.note(f"{joint.path}: {what} drives it, nothing animates it, and it holds the pose of its bodies")
+        what = "an actuator drives it" if joint.path in actuated else "it is a motor"
+        reading.note(f"{joint.path}: {what}, nothing animates it, and it holds the pose of its bodies")
         return Drive(joint, HELD)
     stiffness = prim.GetAttribute(f"drive:{drive}:physics:stiffness").Get()
     if stiffness:

@@ -1,0 +1,62 @@
+"""Motion captures onto motors: run with `--motion FILE.bvh --set bvh.read.map="RightArm.Zrotation=shoulder"`."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from calmotion.host import NotAsked, Operator, Property, RunContext, Source
+from calmotion.shot import MotorTracks
+
+
+class ReadMotion(Operator):
+    """Channels of a BVH file as tracks of motors, beginning with the shot."""
+
+    idname = "bvh.read"
+    label = "Read the motion"
+    requires = (Source,)
+    provides = (MotorTracks,)
+    properties = (
+        Property(
+            "map",
+            str,
+            "",
+            description="Which channel drives which motor, with a factor and an offset if need be: "
+            '"RightArm.Zrotation=shoulder, RightForeArm.Yrotation=elbow*-1+90deg"',
+        ),
+        Property("unit", float, 0.01, unit="m", minimum=1e-9, description="Length of the file's unit, for positions"),
+        Property("start", float, 0.0, unit="s", minimum=0.0, description="Time in the file at which the shot begins"),
+    )
+
+    @classmethod
+    def poll(cls, data: Mapping[type, Any]) -> str | None:
+        """Only for files that are named `.bvh`."""
+        motion = data[Source].motion
+        if motion is None:
+            return NotAsked("no --motion was asked for")
+        return None if motion.lower().endswith(".bvh") else NotAsked("the motion is no BVH file")
+
+    def execute(self, context: RunContext) -> Sequence[object]:
+        """The tracks."""
+        from .bvh import read_bvh
+        from .mapping import mapped_tracks, read_mapping
+
+        path, values = context.get(Source).motion, context.properties
+        assert path is not None  # poll
+        motion = read_bvh(path)
+        tracks = mapped_tracks(motion, read_mapping(values.map, motion), unit=values.unit, start=values.start)
+        context.report(
+            "info", f"{path}: {len(tracks.values)} of {len(motion.channels)} channels drive motors, "
+            f"{tracks.times[-1]:.4g} s"
+        )  # fmt: skip
+        return (tracks,)
+
+
+def register(host: Any) -> None:
+    """Register the operator."""
+    host.register_operator(ReadMotion)
+
+
+def unregister(host: Any) -> None:
+    """Undo `register`."""
+    host.unregister_operator(ReadMotion)

@@ -1,0 +1,102 @@
+"""The BVH format: a hierarchy of joints with channels, then a row of numbers for each frame."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from calmotion.errors import ShotError
+from calmotion.shot.character import Array
+
+_AXES = ("Xposition", "Yposition", "Zposition", "Xrotation", "Yrotation", "Zrotation")
+
+
+@dataclass(frozen=True, eq=False)
+class BvhMotion:
+    """A motion as it stands in the file.
+
+    Attributes:
+        path: The file.
+        channels: `Joint.Xrotation` and so on, in the order of the columns.
+        frame_time: [s].
+        frames: Degrees, or the file's unit of length, shape [frames, channels].
+    """
+
+    path: str
+    channels: tuple[str, ...]
+    frame_time: float
+    frames: Array
+
+
+def read_bvh(path: str) -> BvhMotion:
+    """Read a file.
+
+    Raises:
+        ShotError: It cannot be read, or is not BVH; with the line.
+    """
+    try:
+        with open(path, encoding="utf-8", errors="replace") as stream:
+            lines = stream.read().splitlines()
+    except OSError as error:
+        raise ShotError(
+            "the motion cannot be read", path=path, found=error.strerror, remedy="Check the file"
+        ) from error
+    if not lines or lines[0].strip().upper() != "HIERARCHY":
+        raise _wrong(path, 1, "a BVH file begins with HIERARCHY", lines[0] if lines else "nothing")
+    motion = next((n for n, line in enumerate(lines) if line.strip().upper() == "MOTION"), None)
+    if motion is None:
+        raise _wrong(path, len(lines), "there is no MOTION", lines[-1])
+    channels = tuple(_channels(path, lines[1:motion]))
+    count = _number(path, lines, motion + 1, "Frames:")
+    frame_time = _number(path, lines, motion + 2, "Frame Time:")
+    if not frame_time > 0.0:
+        raise _wrong(path, motion + 3, "the frame time must be positive", lines[motion + 2])
+    rows = [row for row in enumerate(lines[motion + 3 :], motion + 4) if row[1].strip()]
+    if len(rows) != int(count) or not rows:
+        raise _wrong(path, motion + 2, "the number of frames is another", f"{count:g} said, {len(rows)} there")
+    return BvhMotion(path, channels, frame_time, np.array([_row(path, n, line, len(channels)) for n, line in rows]))
+
+
+def _channels(path: str, lines: list[str]) -> Iterator[str]:
+    """Names of the channels of all joints, of which nothing else matters here."""
+    joint, seen = "", set()
+    for number, line in enumerate(lines, 2):
+        words = line.split()
+        if not words:
+            continue
+        if words[0].upper() in ("ROOT", "JOINT"):
+            joint = " ".join(words[1:])
+            if not joint or joint in seen:
+                raise _wrong(path, number, "every joint has a name of its own", line)
+            seen.add(joint)
+        elif words[0].upper() == "CHANNELS":
+            axes = words[2:]
+            known = all(axis in _AXES for axis in axes)
+            if not joint or not known or len(words) < 2 or words[1] != str(len(axes)):
+                raise _wrong(path, number, f"channels are some of {', '.join(_AXES)}, and their number", line)
+            yield from (f"{joint}.{axis}" for axis in axes)
+
+
+def _number(path: str, lines: list[str], index: int, label: str) -> float:
+    text = lines[index].strip() if index < len(lines) else ""
+    try:
+        if not text.lower().startswith(label.lower()):
+            raise ValueError
+        return float(text[len(label) :])
+    except ValueError:
+        raise _wrong(path, index + 1, f"here stands `{label}` and a number", text or "nothing") from None
+
+
+def _row(path: str, number: int, line: str, count: int) -> list[float]:
+    try:
+        row = [float(word) for word in line.split()]
+    except ValueError:
+        row = []
+    if len(row) != count or not np.all(np.isfinite(row)):
+        raise _wrong(path, number, f"a frame has {count} finite numbers", line[:60])
+    return row
+
+
+def _wrong(path: str, number: int, problem: str, found: str) -> ShotError:
+    return ShotError(problem, path=path, attribute=f"line {number}", found=found, remedy="Export the motion again")

@@ -1,0 +1,95 @@
+"""Which channel drives which motor: `channel=motor*factor+offset`, with commas between."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+
+import numpy as np
+from calmotion.errors import ShotError
+from calmotion.host import SettingError, nearest, parse_quantity
+from calmotion.shot import MotorTracks
+from calmotion.shot.character import Array
+
+from .bvh import BvhMotion
+
+_ENTRY = re.compile(
+    r"(?P<channel>[^=]+)=(?P<motor>[^*+]+?)(\*(?P<factor>[-+.\deE]+?))?(\+(?P<offset>-?[.\d]+ ?[a-z]*))?"
+)
+
+
+@dataclass(frozen=True)
+class Entry:
+    """Motor = factor * channel + offset, the offset in rad or m."""
+
+    channel: str
+    motor: str
+    factor: float
+    offset: float
+
+
+def read_mapping(text: str, motion: BvhMotion) -> list[Entry]:
+    """The entries of a mapping.
+
+    Raises:
+        SettingError: It is empty, or an entry is not of that form, or names a channel that the file does not have.
+    """
+    entries = [part.strip() for part in text.split(",") if part.strip()]
+    if not entries:
+        raise _wrong("no motor is driven by this motion", None, f"The channels are {', '.join(motion.channels)}")
+    return [_entry(part, motion) for part in entries]
+
+
+def _entry(text: str, motion: BvhMotion) -> Entry:
+    match = _ENTRY.fullmatch(text.replace(" ", ""))
+    if not match:
+        raise _wrong("this is no entry of a mapping", text, "Write it like RightArm.Zrotation=shoulder*-1+90deg")
+    channel, motor = match["channel"], match["motor"]
+    if channel not in motion.channels:
+        known = ", ".join(motion.channels)
+        raise _wrong(
+            "the motion has no such channel", channel, f"{nearest(channel, motion.channels)}The channels are {known}"
+        )
+    turns = channel.endswith("rotation")
+    try:
+        factor = float(match["factor"] or 1.0)
+        offset = parse_quantity(match["offset"] or "0", "rad" if turns else "m")
+    except (ValueError, ShotError) as error:
+        raise _wrong("this is no entry of a mapping", text, str(error)) from None
+    return Entry(channel, motor, factor, offset)
+
+
+def _wrong(problem: str, found: str | None, remedy: str) -> SettingError:
+    return SettingError(problem, path="bvh.read.map", found=found, remedy=remedy)
+
+
+def mapped_tracks(motion: BvhMotion, entries: list[Entry], *, unit: float, start: float) -> MotorTracks:
+    """The tracks of the motors that a mapping names.
+
+    Angles are unwrapped, since a file may jump by a turn where an angle passes 180 degrees.
+
+    Args:
+        unit: Length of the file's unit [m].
+        start: Time in the file at which the shot begins [s].
+
+    Raises:
+        ShotError: The motion ends before that.
+    """
+    times = np.arange(len(motion.frames), dtype=np.float64) * motion.frame_time - start
+    if times[-1] <= 0.0:
+        raise ShotError(
+            "the motion ends before the shot begins",
+            path=motion.path,
+            attribute="bvh.read.start",
+            found=f"{start:g} s, and it lasts {times[-1] + start:.4g} s",
+            remedy="Begin earlier",
+        )
+    values: dict[str, Array] = {}
+    for entry in entries:
+        column = motion.frames[:, motion.channels.index(entry.channel)]
+        turns = entry.channel.endswith("rotation")
+        own = np.unwrap(np.radians(column)) if turns else unit * column
+        if entry.motor in values:
+            raise SettingError("two channels drive one motor", path="bvh.read.map", found=entry.motor)
+        values[entry.motor] = entry.factor * own + entry.offset
+    return MotorTracks(motion.path, times, values)

@@ -1,0 +1,158 @@
+"""BVH motions onto motors."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from calmotion.errors import ShotError
+from calmotion.host import SettingError, Source
+from calmotion.shot import MotorTracks
+from calmotion.testing import host_with, run_operator
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "usd"))
+
+import small_shots as shots  # noqa: E402
+
+HEAD = """HIERARCHY
+ROOT Hips
+{
+  OFFSET 0 0 0
+  CHANNELS 6 Xposition Yposition Zposition Zrotation Xrotation Yrotation
+  JOINT Arm
+  {
+    OFFSET 0 1 0
+    CHANNELS 3 Zrotation Xrotation Yrotation
+    End Site
+    {
+      OFFSET 0 1 0
+    }
+  }
+}
+MOTION
+"""
+FRAMES = 48
+TIMES = np.arange(FRAMES) / 24.0
+
+
+def bvh(path, arm=None, frames=FRAMES):
+    arm = 20.0 * np.sin(TIMES) if arm is None else arm
+    rows = [f"{100 * np.cos(t):.9f} 90 0 0 0 0 {angle:.9f} 5 0" for t, angle in zip(TIMES, arm, strict=True)]
+    path.write_text(HEAD + f"Frames: {frames}\nFrame Time: {1 / 24:.12f}\n" + "\n".join(rows) + "\n")
+    return path
+
+
+@pytest.fixture
+def read(repository):
+    def run(path, **settings):
+        host = host_with(repository / "plugins" / "bvh_reader")
+        source = Source(path="robot.usda", command="optimize", motion=str(path))
+        (found,) = run_operator(host, "bvh.read", [source], {"bvh.read": settings})
+        assert isinstance(found, MotorTracks)
+        return found
+
+    return run
+
+
+def test_channels_become_tracks_with_factor_and_offset(read, tmp_path):
+    found = read(bvh(tmp_path / "a.bvh"), map="Arm.Zrotation=/Arm/shoulder*-0.5+90deg, Arm.Xrotation = elbow")
+    assert np.allclose(found.times, TIMES)
+    assert np.allclose(found.values["/Arm/shoulder"], np.pi / 2 - 0.5 * np.radians(20.0 * np.sin(TIMES)), atol=1e-9)
+    assert np.allclose(found.values["elbow"], np.radians(5.0))
+
+
+def test_positions_are_lengths(read, tmp_path):
+    found = read(bvh(tmp_path / "a.bvh"), map="Hips.Xposition=slide+20mm", unit="1cm")
+    assert np.allclose(found.values["slide"], np.cos(TIMES) + 0.02, atol=1e-8)
+
+
+def test_angles_that_jump_by_a_turn_are_unwrapped(read, tmp_path):
+    turning = 30.0 * np.arange(FRAMES)
+    found = read(bvh(tmp_path / "a.bvh", (turning + 180.0) % 360.0 - 180.0), map="Arm.Zrotation=wheel")
+    assert np.allclose(found.values["wheel"], np.radians(turning))
+
+
+def test_a_shot_may_begin_later_in_the_motion(read, tmp_path):
+    assert read(bvh(tmp_path / "a.bvh"), map="Arm.Zrotation=a", start="500ms").times[0] == -0.5
+    with pytest.raises(ShotError, match="ends before"):
+        read(bvh(tmp_path / "a.bvh"), map="Arm.Zrotation=a", start="5s")
+
+
+@pytest.mark.parametrize(
+    ("mapping", "problem", "remedy"),
+    [
+        ("", "no motor is driven", "Arm.Zrotation"),
+        ("Arm.Zrotaton=a", "no such channel", "Did you mean Arm.Zrotation?"),
+        ("Arm.Zrotation", "no entry of a mapping", "*-1+90deg"),
+        ("Arm.Zrotation=a*x", "no entry of a mapping", "*-1+90deg"),
+        ("Arm.Zrotation=a+3mm", "no entry of a mapping", "unit"),
+        ("Arm.Zrotation=a,Arm.Xrotation=a", "two channels drive one motor", ""),
+    ],
+)
+def test_a_wrong_mapping_is_refused_with_what_there_is(read, tmp_path, mapping, problem, remedy):
+    with pytest.raises(SettingError, match=problem) as refused:
+        read(bvh(tmp_path / "a.bvh"), map=mapping)
+    assert refused.value.path == "bvh.read.map" and remedy in refused.value.remedy
+
+
+BROKEN = {
+    "empty": "",
+    "not BVH": "solid cube",
+    "no motion": HEAD.replace("MOTION\n", ""),
+    "no frames": HEAD,
+    "frames that are missing": HEAD + "Frames: 2\nFrame Time: 0.04\n0 0 0 0 0 0 0 0 0\n",
+    "a row that is short": HEAD + "Frames: 1\nFrame Time: 0.04\n0 0 0\n",
+    "a row that is no number": HEAD + "Frames: 1\nFrame Time: 0.04\n0 0 0 0 0 x 0 0 0\n",
+    "a value that is not finite": HEAD + "Frames: 1\nFrame Time: 0.04\n0 0 0 0 0 nan 0 0 0\n",
+    "a frame time of zero": HEAD + "Frames: 1\nFrame Time: 0\n0 0 0 0 0 0 0 0 0\n",
+    "a channel that is none": HEAD.replace("3 Zrotation", "3 Wrotation") + "Frames: 0\nFrame Time: 0.04\n",
+    "a wrong number of channels": HEAD.replace("3 Zrotation", "4 Zrotation") + "Frames: 0\nFrame Time: 0.04\n",
+    "a name that comes twice": HEAD.replace("JOINT Arm", "JOINT Hips") + "Frames: 0\nFrame Time: 0.04\n",
+}
+
+
+@pytest.mark.parametrize("text", BROKEN.values(), ids=BROKEN.keys())
+def test_a_broken_file_is_refused_by_its_line(read, tmp_path, text):
+    (tmp_path / "a.bvh").write_text(text)
+    with pytest.raises(ShotError) as refused:
+        read(tmp_path / "a.bvh", map="Arm.Zrotation=a")
+    assert refused.value.path.endswith("a.bvh") and refused.value.attribute.startswith("line")
+
+
+def test_a_robot_performs_a_motion_capture(calmotion, tmp_path):
+    def still(stage):
+        for path in (shots.SHOULDER, shots.ELBOW):
+            stage.GetPrimAtPath(path).GetAttribute(shots.TARGET_POSITION).Clear()
+        stage.GetPrimAtPath(shots.ELBOW).GetAttribute(shots.TARGET_POSITION).Set(10.0)
+        shots.make_flexible(stage, youngsModulus=4e7)
+        shots.make_target(stage)
+
+    shot = shots.write_arm(tmp_path / "arm.usda", still)
+    bvh(tmp_path / "wave.bvh")
+    done = calmotion(
+        "optimize", shot, "-o", tmp_path / "calm.usda", "--json", "--motion", tmp_path / "wave.bvh",
+        "--set", "bvh.read.map=Arm.Zrotation=shoulder", "--set", "retarget.optimize.max_iterations=2",
+        "--step", "10ms", "--run", "curves.export", "--set", f"curves.export.file={tmp_path / 'curves.csv'}",
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    report = json.loads(done.stdout)
+    assert report["max_error_after_m"] < report["max_error_before_m"]
+    table = np.genfromtxt(tmp_path / "curves.csv", delimiter=",", comments="#", skip_header=6)
+    shoulder = np.interp(TIMES[TIMES <= table[-1, 0]], table[:, 0], table[:, 1])
+    assert np.abs(shoulder - np.radians(20.0 * np.sin(TIMES[: len(shoulder)]))).max() < 0.05
+
+
+def test_a_motion_that_no_plugin_reads_is_refused_before_the_work(calmotion, tmp_path):
+    shot = shots.write_arm(tmp_path / "arm.usda")
+    done = calmotion("simulate", shot, "--motion", "wave.fbx")
+    assert done.returncode == 2 and ".bvh" in done.stderr
+
+
+def test_a_motor_that_no_joint_is_is_refused_with_the_file(calmotion, tmp_path):
+    shot = shots.write_arm(tmp_path / "arm.usda")
+    bvh(tmp_path / "wave.bvh")
+    done = calmotion("simulate", shot, "--motion", tmp_path / "wave.bvh", "--set", "bvh.read.map=Arm.Zrotation=knee")
+    assert done.returncode == 1 and "no joint has this name" in done.stderr and "knee" in done.stderr

@@ -1,0 +1,10 @@
+"""Notes for the user."""
+
+from calmotion.usd.reading.context import grouped
+
+
+def test_notes_that_say_the_same_of_several_prims_are_one():
+    notes = ["/a/b: it holds 3: still", "the shot has no scene; gravity: down", "/c: it holds 3: still", "/d: moves"]
+    assert grouped(notes) == (
+        "/a/b and 1 others: it holds 3: still", "the shot has no scene; gravity: down", "/d: moves"
+    )  # fmt: skip
