@@ -1,15 +1,22 @@
 """Puts the bundled plugins and the USD schemas into the wheel as package data."""
 
+from pathlib import Path
 from typing import Any
 
 from hatchling.builders.hooks.plugin.interface import BuildHookInterface
 
-BUNDLED = {"plugins": "calmotion/bundled/plugins", "usd_schemas": "calmotion/bundled/usd_schemas"}
+TARGET = "calmotion/bundled"
 
 
 class BundledFiles(BuildHookInterface):
     """An editable install needs no copy: the package finds both folders in the checkout."""
 
     def initialize(self, version: str, build_data: dict[str, Any]) -> None:
-        if version != "editable":
-            build_data["force_include"].update(BUNDLED)
+        if version == "editable":
+            return
+        included = {"usd_schemas": f"{TARGET}/usd_schemas"}
+        # plugins/blender is an extension of Blender, not of ours, and under another licence
+        for manifest in sorted(Path(self.root, "plugins").glob("*/plugin.toml")):
+            name = manifest.parent.name
+            included[f"plugins/{name}"] = f"{TARGET}/plugins/{name}"
+        build_data["force_include"].update(included)

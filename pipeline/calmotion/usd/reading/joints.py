@@ -89,7 +89,7 @@ def read_joint(reading: Reading, prim, poses: dict[str, Pose]) -> JointPrim | No
             remedy="Correct physics:body0 or physics:body1",
         )
     kind = _KINDS.get(str(prim.GetTypeName()), UNSUPPORTED)
-    turn = axis_rotation(str(prim.GetAttribute("physics:axis").Get())) if kind in _WITH_AXIS else np.eye(3)
+    turn = axis_rotation(_axis(prim)) if kind in _WITH_AXIS else np.eye(3)
     meters = reading.units.length(1.0)
     to_si = np.deg2rad(1.0) if kind == "revolute" else meters
     lower, upper = _limits(prim, to_si) if kind in _WITH_AXIS else (-np.inf, np.inf)
@@ -167,6 +167,15 @@ def _end(reading: Reading, prim, side: int, poses: dict[str, Pose]) -> tuple[str
     if not path:
         return "", world, pose.rotation @ rotation
     return path, poses[path].to_local(world[None])[0], poses[path].rotation.T @ pose.rotation @ rotation
+
+
+def _axis(prim) -> str:
+    axis = prim.GetAttribute("physics:axis").Get()
+    if axis not in ("X", "Y", "Z"):
+        raise ShotError(
+            "there is no such axis", path=prim.GetPath(), attribute="physics:axis", found=axis, remedy="Use X, Y or Z"
+        )
+    return str(axis)
 
 
 def _finite(prim, name: str, convert) -> Array:

@@ -143,6 +143,7 @@ def read_drives(
             attribute=target_attribute(found[0].joint.kind),
             remedy=_remedy(found[0].joint.kind),
         )
+    _refuse_rivals(found, reading)
     for drive in found:
         if drive.joint.prim.IsInstanceProxy():
             reading.problems.append(
@@ -154,6 +155,24 @@ def read_drives(
                 )
             )
     return found
+
+
+def _refuse_rivals(drives: Sequence[Drive], reading: Reading) -> None:
+    """Two motors between the same bodies cannot both have their way."""
+    first: dict[frozenset[str], Drive] = {}
+    for drive in drives:
+        pair = frozenset((drive.joint.body0, drive.joint.body1))
+        rival = first.setdefault(pair, drive)
+        if rival is not drive:
+            reading.problems.append(
+                ShotError(
+                    "two motors are between the same two bodies, and cannot both have their way",
+                    path=drive.joint.path,
+                    attribute=target_attribute(drive.joint.kind),
+                    found=rival.joint.path,
+                    remedy="Remove one of the joints, or the drive of one of them",
+                )
+            )
 
 
 def _engage(drives: dict[str, Drive], gears: dict[str, Gear], joints: dict[str, JointPrim], reading: Reading) -> None:

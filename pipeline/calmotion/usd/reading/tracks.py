@@ -9,6 +9,9 @@ from ...shot import Track
 from ...shot.character import Array
 from ..clock import Clock
 
+MOST = 1_000_000  # samples of one motor
+_CLOSE = 1e-4  # samples closer than this share of a frame are at one time
+
 
 def sample_codes(attribute) -> Array:
     """Time codes of the samples of an attribute; the knots of its spline where it has no samples."""
@@ -36,6 +39,7 @@ def read_track(attribute, clock: Clock, notes: list[str], to_si: float) -> Track
     """
     path = attribute.GetPath()
     frames = clock.time_codes(clock.frame_times())
+    _refuse_too_many(attribute)
     codes = np.array(attribute.GetTimeSamples(), dtype=np.float64)
     if len(codes) == 0 and attribute.HasSpline():
         notes.append(f"{path}: the spline is read at its knots and at the frames of the shot, and smooth between them")
@@ -44,6 +48,7 @@ def read_track(attribute, clock: Clock, notes: list[str], to_si: float) -> Track
         codes = clock.merged(knots[(knots > frames[0]) & (knots < frames[-1])])
     elif len(codes) == 0:
         codes = frames[[0, -1]]
+    codes = _apart(codes, clock, path, notes)
     values = np.array([_value(attribute, code) for code in codes])
     held = (frames < codes[0] - 1e-9, frames > codes[-1] + 1e-9)
     if len(attribute.GetTimeSamples()) > 0 and (held[0].any() or held[1].any()):
@@ -51,6 +56,30 @@ def read_track(attribute, clock: Clock, notes: list[str], to_si: float) -> Track
     codes = np.concatenate([frames[held[0]], codes, frames[held[1]]])
     values = np.concatenate([np.full(held[0].sum(), values[0]), values, np.full(held[1].sum(), values[-1])])
     return Track(clock.seconds(codes), to_si * values)
+
+
+def _refuse_too_many(attribute) -> None:
+    count = attribute.GetNumTimeSamples()
+    if count > MOST:
+        raise ShotError(
+            f"has more samples than can be meant (at most {MOST})",
+            path=attribute.GetPrimPath(),
+            attribute=attribute.GetName(),
+            found=count,
+            remedy="Sample it at the rate of the frames, or of the motor controller",
+        )
+
+
+def _apart(codes: Array, clock: Clock, path, notes: list[str]) -> Array:
+    """Time codes without those that another follows at once: nothing smooth goes through two values there."""
+    least = _CLOSE * clock.time_codes_per_second / clock.frames_per_second
+    follows = np.append(np.diff(codes) < least, False)
+    if follows.any():
+        notes.append(
+            f"{path}: of samples at nearly the same time the last counts ({int(follows.sum())} left out, the first at "
+            f"time code {codes[follows][0]:.9g})"
+        )
+    return codes[~follows]
 
 
 def _value(attribute, code: float) -> float:
