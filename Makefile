@@ -1,5 +1,6 @@
 # make demo     optimise the bartender sample, and print the errors before and after
 # make test     lint, types and tests
+# make fuzz     ten minutes of random damage to shots and manifests
 # make samples  build the sample characters again
 # make clean    remove what was built, and the environment
 #
@@ -20,11 +21,11 @@ PYTHON ?= $(shell for python in python3 python3.13 python3.12 python3.11 python;
 
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
-.PHONY: help demo test samples clean
+.PHONY: help demo test fuzz samples clean
 .DELETE_ON_ERROR:
 
 help:
-	@sed -n 's/^# \{0,1\}//p' Makefile | sed -n '1,6p'
+	@sed -n 's/^# \{0,1\}//p' Makefile | sed -n '1,7p'
 
 demo: $(INSTALLED)
 	@mkdir -p build
@@ -42,6 +43,9 @@ test: $(INSTALLED_DEV)
 	check mypy $(RUN) -m mypy; \
 	check pytest $(RUN) -m pytest -n 2 -q; \
 	echo "== summary"; printf "$$summary"; exit $$status
+
+fuzz: $(INSTALLED_DEV)
+	CALMOTION_FUZZ=$${CALMOTION_FUZZ:-600} $(RUN) -m pytest -q -x tests/fuzz
 
 samples: $(INSTALLED)
 	@for script in samples/*/build.py; do echo "$$script"; $(RUN) "$$script" || exit 1; done

@@ -9,6 +9,8 @@ import numpy as np
 from ..errors import ShotError
 from ..shot.character import Array
 
+MOST_FRAMES = 10_000_000  # a day at 120 frames a second
+SHORTEST = 1e-6  # [s]
 _COARSEST = 10.0  # time codes in a second, below which they are not frames
 
 
@@ -87,4 +89,22 @@ def clock_of(stage, sample_codes: Array) -> Clock:
             found=f"startTimeCode {start}, endTimeCode {end}" if authored else "samples at one time code only",
             remedy="Author startTimeCode and a later endTimeCode in the root layer, and animate within them",
         )
-    return Clock(float(start), float(end), rate, float(frames))
+    clock = Clock(float(start), float(end), rate, float(frames))
+    seconds = (clock.end - clock.start) / rate
+    if not seconds * frames < MOST_FRAMES:
+        raise ShotError(
+            f"the shot has more frames than can be meant (at most {MOST_FRAMES})",
+            path=root.identifier,
+            attribute="endTimeCode",
+            found=f"startTimeCode {start:g}, endTimeCode {end:g} at {rate:g} a second, {frames:g} frames a second",
+            remedy="Author the range and the rates of the shot in the root layer",
+        )
+    if not seconds > SHORTEST:
+        raise ShotError(
+            "the shot is too short to hold a motion",
+            path=root.identifier,
+            attribute="endTimeCode",
+            found=f"{seconds:g} s",
+            remedy="Author the range and the rates of the shot in the root layer",
+        )
+    return clock

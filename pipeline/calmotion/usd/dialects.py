@@ -9,7 +9,8 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
+
+from ..errors import ShotError
 
 USD, SI = "usd", "si"  # degrees and stage units, or radians and stage units as MuJoCo has them
 
@@ -80,19 +81,38 @@ GEARS = (
 )  # fmt: skip
 
 
-def authored(prim, spelling: Spelling, drive: str) -> tuple[str, Any] | None:
+def number_of(prim, name: str) -> float | None:
+    """A number that is authored by name, in whatever type; None where there is no value.
+
+    Raises:
+        ShotError: It is no number.
+    """
+    attribute = prim.GetAttribute(name)
+    value = attribute.Get() if attribute and attribute.HasAuthoredValue() else None
+    if value is None:
+        return None
+    if isinstance(value, bool) or not isinstance(value, (int, float)):
+        raise ShotError(
+            "is not a number",
+            path=prim.GetPath(),
+            attribute=name,
+            found=f"{value} ({attribute.GetTypeName() or 'of an unknown type'})",
+            remedy="Author it as float",
+        )
+    return float(value)
+
+
+def authored(prim, spelling: Spelling, drive: str) -> tuple[str, float] | None:
     """Name and value of an attribute where it is authored on a joint."""
     name = spelling.attribute.format(drive=drive)
-    attribute = prim.GetAttribute(name)
-    if not attribute or not attribute.HasAuthoredValue():
-        return None
-    return name, attribute.Get()
+    value = number_of(prim, name)
+    return None if value is None else (name, value)
 
 
-def elsewhere(prim, spellings: tuple[Spelling, ...], drive: str) -> tuple[str, Any, Spelling] | None:
+def elsewhere(prim, spellings: tuple[Spelling, ...], drive: str) -> tuple[str, float, Spelling] | None:
     """The first spelling that is authored and says something finite."""
     for spelling in spellings:
         found = authored(prim, spelling, drive)
-        if found is not None and found[1] is not None and not math.isinf(found[1]):
+        if found is not None and not math.isinf(found[1]):
             return *found, spelling
     return None

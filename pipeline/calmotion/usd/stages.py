@@ -39,6 +39,26 @@ def quiet():
         del delegate
 
 
+@contextmanager
+def refused_by_usd(stage):
+    """What USD itself cannot evaluate, as a ShotError with the place that USD names."""
+    from pxr import Tf
+
+    try:
+        yield
+    except Tf.ErrorException as error:
+        lines = [line for line in str(error).splitlines() if line.strip()]
+        text = lines[0].rpartition(" : ")[2].strip().strip("'") if lines else "an error without words"
+        site = re.search(r"<(/[^>.]*)\.?([^>]*)>", text)
+        raise ShotError(
+            "USD cannot evaluate the shot",
+            path=site.group(1) if site else stage.GetRootLayer().identifier,
+            attribute=site.group(2) if site else "",
+            found=text,
+            remedy="Mend what it names; usdview and `calmotion inspect --strict` tell more",
+        ) from error
+
+
 def open_layer(path: str):
     """The root layer of a shot.
 

@@ -9,6 +9,7 @@ import numpy as np
 from ..errors import ShotError
 from ..shot.character import Array, Frame
 
+_HUGE = 1e30
 _SHEAR_TOLERANCE = 1e-4  # xforms are often authored in single precision
 
 
@@ -53,8 +54,7 @@ def pose_from_matrix(matrix: Array, path: str) -> Pose:
         ShotError: The matrix shears, or is singular or not finite.
     """
     linear = matrix[:3, :3]
-    if not np.all(np.isfinite(matrix)):
-        raise ShotError("its transform is not finite", path=path, attribute="xformOpOrder", remedy="Correct it")
+    refuse_infinite(matrix, path)
     scale = np.linalg.norm(linear, axis=0)
     if np.min(scale) <= 1e-12 * max(1.0, float(np.max(scale))):
         raise ShotError(
@@ -77,6 +77,22 @@ def pose_from_matrix(matrix: Array, path: str) -> Pose:
     # Remove what single precision left: the nearest rotation.
     u, _, vt = np.linalg.svd(rotation)
     return Pose(u @ vt, matrix[:3, 3].copy(), scale)
+
+
+def refuse_infinite(matrix: Array, path: str) -> None:
+    """Refuse a transform with values that are not finite, or so large that their products are not.
+
+    Raises:
+        ShotError: It has.
+    """
+    if not np.all(np.abs(matrix) < _HUGE):
+        raise ShotError(
+            "its transform is not finite",
+            path=path,
+            attribute="xformOpOrder",
+            found=f"{float(np.max(np.abs(matrix))):g}",
+            remedy="Correct it",
+        )
 
 
 def quaternion_from_rotation(rotation: Array) -> Array:

@@ -74,4 +74,13 @@ def units_of(stage) -> StageUnits:
                 found=found,
                 remedy=f"Author a positive {name} in the root layer",
             )
+    up = str(UsdGeom.GetStageUpAxis(stage))
+    if up not in ("X", "Y", "Z"):
+        raise ShotError(
+            "there is no such up axis",
+            path=stage.GetRootLayer().identifier,
+            attribute="upAxis",
+            found=up or "an empty name",
+            remedy="Author Y or Z in the root layer",
+        )
     return units

@@ -185,6 +185,14 @@ def _body(reading: Reading, path: str, pose: Pose, joints: list[str]) -> Body:
                 attribute="physics:mass",
                 remedy="Apply PhysicsMassAPI and author physics:mass, or physics:density where the body has geometry",
             )
+    if properties is not None and not (np.isfinite(properties.mass) and np.all(np.isfinite(properties.inertia))):
+        raise ShotError(
+            "its mass, or the inertia that follows from its geometry, is not finite",
+            path=path,
+            attribute="physics:mass",
+            found=properties.mass,
+            remedy="Author a mass, and correct sizes and densities of its geometry",
+        )
     return Body(
         path=path,
         rest=pose.frame(reading.units.length(1.0)),

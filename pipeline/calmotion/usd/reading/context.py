@@ -10,7 +10,7 @@ from typing import Any
 from ...errors import ShotError
 from ..gf import matrix
 from ..schemas import is_applied
-from ..transforms import Pose, pose_from_matrix
+from ..transforms import Pose, pose_from_matrix, refuse_infinite
 from ..units import StageUnits
 
 
@@ -62,8 +62,11 @@ class Reading:
         return Reading(self.stage, self.units, code)
 
     def world_matrix(self, prim):
-        """Local-to-world matrix [4, 4] of a prim at the first frame, stage units, mapping column vectors."""
-        return matrix(self._xforms.GetLocalToWorldTransform(prim))
+        """Local-to-world matrix [4, 4] of a prim at the first frame, stage units, mapping column vectors; a ShotError
+        where it is not finite."""
+        found = matrix(self._xforms.GetLocalToWorldTransform(prim))
+        refuse_infinite(found, str(prim.GetPath()))
+        return found
 
     def pose(self, prim) -> Pose:
         """World pose of a prim at the first frame, stage units; a ShotError if it shears."""

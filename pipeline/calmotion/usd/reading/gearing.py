@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...errors import ShotError
-from ..dialects import GEARS, SI, GearSpelling
+from ..dialects import GEARS, SI, GearSpelling, number_of
 from ..units import StageUnits
 from .joints import JointPrim
 
@@ -43,7 +43,8 @@ def read_gear(joint: JointPrim, kinds: dict[str, str], units: StageUnits) -> Gea
     for spelling in GEARS if joint.prim is not None else ():
         relationship = joint.prim.GetRelationship(spelling.leader)
         targets = relationship.GetForwardedTargets() if relationship else []
-        if not targets or (spelling.enabled and _value(joint.prim, spelling.enabled, True) is False):
+        switch = joint.prim.GetAttribute(spelling.enabled) if spelling.enabled else None
+        if not targets or (switch and switch.Get() is False):
             continue
         leader = str(targets[0])
         if len(targets) > 1 or leader == joint.path or kinds.get(leader) not in ("revolute", "prismatic"):
@@ -71,14 +72,9 @@ def _to_si(kind: str, spelling: GearSpelling, units: StageUnits) -> float:
     return 1.0 if spelling.angles == SI else float(np.deg2rad(1.0))
 
 
-def _value(prim, name: str, fallback):
-    attribute = prim.GetAttribute(name)
-    value = attribute.Get() if attribute else None
-    return fallback if value is None else value
-
-
 def _number(prim, name: str, fallback: float) -> float:
-    value = float(_value(prim, name, fallback))
+    value = number_of(prim, name)
+    value = fallback if value is None else value
     if not math.isfinite(value):
         raise ShotError("is not finite", path=prim.GetPath(), attribute=name, found=value, remedy="Correct the value")
     return value

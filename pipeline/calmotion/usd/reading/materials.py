@@ -7,6 +7,7 @@ import math
 from ...errors import ShotError
 from ...shot import ElasticMaterial
 from .. import schemas
+from ..dialects import number_of
 from .context import Reading, is_rigid_body, prims_below
 
 _SCHEMA = "PhysicsVolumeDeformableMaterialAPI"  # of the AOUSD proposal; usd-core does not define it
@@ -67,13 +68,12 @@ def _material(reading: Reading, prim) -> ElasticMaterial:
 
 
 def _number(prim, name: str, allowed, problem: str) -> float:
-    attribute = prim.GetAttribute(name)
-    value = attribute.Get() if attribute else None
+    value = number_of(prim, name)
     if value is None:
         raise ShotError("is not authored", path=prim.GetPath(), attribute=name, remedy=_REMEDY)
     if not (math.isfinite(value) and allowed(value)):
         raise ShotError(problem, path=prim.GetPath(), attribute=name, found=value, remedy="Correct the value")
-    return float(value)
+    return value
 
 
 def _rayleigh(prim, name: str) -> float | None:

@@ -222,7 +222,7 @@ def _color(prim, time: float) -> tuple[float, float, float] | None:
     from pxr import UsdGeom, UsdShade
 
     primvar = UsdGeom.PrimvarsAPI(prim).FindPrimvarWithInheritance("displayColor")
-    if primvar and primvar.HasValue():
+    if primvar and primvar.HasValue() and str(primvar.GetTypeName()).endswith("3f[]"):
         values = gf.points(primvar.Get(time))
         if len(values):
             return tuple(float(x) for x in values[0])  # type: ignore[return-value]

@@ -25,6 +25,7 @@ from .skeletal_motors import hinge_stacks, skeletal_tracks
 from .stillness import carriers, codes_of
 from .targets import weight_tracks
 from .tracks import read_track, sample_codes
+from .well_formed import broken_transforms, wrong_types
 
 
 def read_shot(
@@ -85,14 +86,17 @@ class StageReading:
 
 def read_stage(stage, still: bool = False, given: MotorTracks | None = None) -> StageReading:
     """Read a composed stage; arguments and errors as for `read_shot`."""
-    units = units_of(stage)
-    clock = shot_clock(stage, given)
-    reading = Reading(stage, units, clock.start)
-    skeleton = read_skeleton(reading, clock, still, given_joints(stage, given))
-    tracks = motor_tracks(reading, skeleton.drives, clock, given)
-    moving = moving_frames(reading, skeleton, clock)
-    _note_dense_samples(tracks, clock, reading)
-    return StageReading(reading, clock, skeleton, build_character(reading, skeleton), tracks, moving)
+    with stages.refused_by_usd(stage):
+        raise_all(list(wrong_types(stage)))
+        raise_all(list(broken_transforms(stage)))
+        units = units_of(stage)
+        clock = shot_clock(stage, given)
+        reading = Reading(stage, units, clock.start)
+        skeleton = read_skeleton(reading, clock, still, given_joints(stage, given))
+        tracks = motor_tracks(reading, skeleton.drives, clock, given)
+        moving = moving_frames(reading, skeleton, clock)
+        _note_dense_samples(tracks, clock, reading)
+        return StageReading(reading, clock, skeleton, build_character(reading, skeleton), tracks, moving)
 
 
 def shot_clock(stage, given: MotorTracks | None) -> Clock:

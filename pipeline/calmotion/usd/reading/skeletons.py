@@ -53,9 +53,25 @@ class BoundSkeleton:
     def locals_at(self, code: float) -> Array:
         """Local transforms of all joints, shape [j, 4, 4]."""
         if code not in self._posed:
-            found = self.query.ComputeJointLocalTransforms(code)
-            self._posed[code] = np.array([gf.matrix(m) for m in found])
+            self._posed[code] = np.array([gf.matrix(m) for m in self._computed(code)])
         return self._posed[code]
+
+    def _computed(self, code: float):
+        from pxr import Tf
+
+        try:
+            found = self.query.ComputeJointLocalTransforms(code)
+        except Tf.ErrorException:
+            found = ()
+        if len(found) != len(self.joints):
+            raise ShotError(
+                "its animation cannot be evaluated: translations, rotations and scales must be as many as its joints",
+                path=(self.animation or self.prim).GetPath(),
+                attribute="rotations",
+                found=f"at time code {code:g}",
+                remedy="Author one of each for every joint that it names",
+            )
+        return found
 
     def placement(self, code: float) -> Array:
         """From the skeleton's space to the world, shape [4, 4]."""

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable
+from typing import Any
+
 from ...errors import ShotError, each
 from ...shot.finding import ERROR, WARNING, Finding, Findings
 from .. import stages
@@ -28,9 +31,20 @@ def validate_shot(path: str) -> Findings:
     if muted:
         stage = stages.open_stage(path, muted=muted)
     with stages.quiet():
-        found = [finding for rule, _ in RULES.values() for finding in rule(stage)]
-        found += _of_usd(stage)
+        found = []
+        for name, (rule, _) in RULES.items():
+            found += _checked(name, stage, rule)
+        found += _checked("usdValidation", stage, _of_usd)
     return Findings(tuple(sorted(dict.fromkeys(found), key=lambda f: (f.level != ERROR, f.path, f.attribute))))
+
+
+def _checked(name: str, stage, rule: Callable[[Any], Iterable[Finding]]) -> list[Finding]:
+    """What a rule finds; that USD cannot evaluate the shot is a finding, too."""
+    try:
+        with stages.refused_by_usd(stage):
+            return list(rule(stage))
+    except ShotError as error:
+        return [finding_of(error, ERROR, name)]
 
 
 def _of_usd(stage) -> list[Finding]:

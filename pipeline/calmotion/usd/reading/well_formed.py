@@ -1,0 +1,120 @@
+"""Properties of other types than their schemas say, and transforms that cannot be evaluated: found before anything is
+read, so that readers need not ask."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from ...errors import ShotError
+from ..schemas import NAMES
+from .context import prims_of
+
+_RESET, _INVERSE = "!resetXformStack!", "!invert!"
+
+
+def wrong_types(stage) -> Iterator[ShotError]:
+    """Authored properties of schemas that are read, and whose type is another than the schema's.
+
+    USD takes such opinions without a word, and gives values of whatever type was authored. Names of ours count also
+    where their schema is not applied.
+    """
+    from pxr import Sdf
+
+    ours = _ours()
+    for prim in prims_of(stage):
+        definition = prim.GetPrimDefinition()
+        for prop in prim.GetAuthoredProperties():
+            name = prop.GetName()
+            wanted = ours.get(name) or _type_of(definition, name)
+            if not wanted:
+                continue
+            for spec in prop.GetPropertyStack():
+                found = str(spec.typeName) if isinstance(spec, Sdf.AttributeSpec) else "rel"
+                if found != wanted and not _alike(found, wanted):
+                    yield ShotError(
+                        "is authored with another type than its schema says",
+                        path=prim.GetPath(),
+                        attribute=name,
+                        found=f"{found or 'no type'} in {spec.layer.identifier}",
+                        remedy=f"Author it as {wanted}",
+                    )
+                    break
+
+
+def broken_transforms(stage) -> Iterator[ShotError]:
+    """Prims whose order of transform operations names what is none."""
+    from pxr import Tf, UsdGeom
+
+    for prim in prims_of(stage):
+        order = prim.GetAttribute("xformOpOrder")
+        if not order or not order.HasAuthoredValue() or not prim.IsA(UsdGeom.Xformable):
+            continue
+        names = [str(name) for name in order.Get() or ()]
+        operations = [(name, name.removeprefix(_INVERSE)) for name in names if name != _RESET]
+        wrong = [name for name, op in operations if not op.startswith("xformOp:") or not prim.HasAttribute(op)]
+        try:
+            if not wrong:
+                UsdGeom.Xformable(prim).GetLocalTransformation()
+        except Tf.ErrorException as error:
+            wrong = [str(error).strip().splitlines()[0].rpartition(" : ")[2]]
+        if wrong:
+            yield ShotError(
+                "names transform operations that do not exist, or are of a wrong type",
+                path=prim.GetPath(),
+                attribute="xformOpOrder",
+                found=", ".join(dict.fromkeys(wrong)) or "an empty name",
+                remedy="Correct the order, or author the operations",
+            )
+
+
+def _type_of(definition, name: str) -> str:
+    """Type of a property of a schema, `rel` for a relationship; empty for one that the schema does not have."""
+    from pxr import Sdf
+
+    kind = definition.GetSpecType(name)
+    if kind == Sdf.SpecTypeRelationship:
+        return "rel"
+    if kind != Sdf.SpecTypeAttribute:
+        return ""
+    return str(definition.GetAttributeDefinition(name).GetTypeName())
+
+
+def _ours() -> dict[str, str]:
+    """Type of every property of our schemas."""
+    from pxr import Usd
+
+    registry, found = Usd.SchemaRegistry(), {}
+    for schema in NAMES:
+        definition = registry.FindAppliedAPIPrimDefinition(schema)
+        for name in definition.GetPropertyNames() if definition else ():
+            found[str(name)] = _type_of(definition, str(name))
+    return found
+
+
+def _alike(found: str, wanted: str) -> bool:
+    """Whether values of two types are the same in Python, such as of `point3f[]` and `float3[]`, or of float and
+    double."""
+    from pxr import Sdf
+
+    one, other = (Sdf.ValueTypeNames.Find(name) for name in (found, wanted))
+    if not one or not other:
+        return False
+    if one.type == other.type:
+        return True
+    groups = (("half", "float", "double"), ("token", "string"), ("int", "uint", "int64", "uint64"))
+    for group in groups:
+        if found in group and wanted in group:
+            return True
+    return _shape(found) == _shape(wanted) is not None
+
+
+def _shape(name: str) -> tuple[str, str] | None:
+    """What kind of vector, quaternion or matrix of reals a type is, whatever its precision and role."""
+    for role in ("point", "vector", "normal", "color", "texCoord", "float", "double", "half"):
+        rest = name.removeprefix(role)
+        if rest != name and rest[:1] in ("2", "3", "4"):
+            return rest[:1], "[]" * name.endswith("[]")
+    for role in ("quat", "matrix"):
+        if name.startswith(role):
+            return role + (name[6:7] if role == "matrix" else ""), "[]" * name.endswith("[]")
+    return None
