@@ -2,6 +2,7 @@
 # make test     lint, types and tests
 # make fuzz     ten minutes of random damage to shots and manifests
 # make samples  build the sample characters again
+# make blender  the extension of Blender as a zip (make blender-test tests it; needs Python 3.11)
 # make clean    remove what was built, and the environment
 #
 # Needs make and Python 3.11 to 3.13 with pip; PYTHON=... chooses one.
@@ -21,11 +22,11 @@ PYTHON ?= $(shell for python in python3 python3.13 python3.12 python3.11 python;
 
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
-.PHONY: help demo test fuzz samples clean
+.PHONY: help demo test fuzz samples blender blender-test clean
 .DELETE_ON_ERROR:
 
 help:
-	@sed -n 's/^# \{0,1\}//p' Makefile | sed -n '1,7p'
+	@sed -n 's/^# \{0,1\}//p' Makefile | sed -n '1,8p'
 
 demo: $(INSTALLED)
 	@mkdir -p build
@@ -47,11 +48,25 @@ test: $(INSTALLED_DEV)
 fuzz: $(INSTALLED_DEV)
 	CALMOTION_FUZZ=$${CALMOTION_FUZZ:-600} $(RUN) -m pytest -q -x tests/fuzz
 
+blender: $(MADE)
+	@mkdir -p dist
+	cd plugins/blender && $(CURDIR)/$(RUN) -m zipfile -c $(CURDIR)/dist/calmotion_blender.zip *.py *.toml README.md LICENSE
+
+# Blender's Python module is large, wants an older NumPy and is GPL: it gets an environment of its own.
+BLENDER_VENV ?= .venv-blender
+$(BLENDER_VENV)/.installed:
+	python3.11 -m venv --clear $(BLENDER_VENV)
+	$(BLENDER_VENV)/bin/python -m pip install --quiet bpy==5.0.1
+	@touch $@
+
+blender-test: $(INSTALLED_DEV) $(BLENDER_VENV)/.installed
+	CALMOTION_BLENDER_PYTHON=$(CURDIR)/$(BLENDER_VENV)/bin/python $(RUN) -m pytest -q tests/blender
+
 samples: $(INSTALLED)
 	@for script in samples/*/build.py; do echo "$$script"; $(RUN) "$$script" || exit 1; done
 
 clean:
-	rm -rf $(VENV) build dist .mypy_cache .pytest_cache .ruff_cache
+	rm -rf $(VENV) $(BLENDER_VENV) build dist .mypy_cache .pytest_cache .ruff_cache
 	find pipeline plugins samples tests -name __pycache__ -type d -prune -exec rm -rf {} +
 
 # The interpreter that the environment was made with may be gone: then it is made again.

@@ -98,6 +98,9 @@ def _shot_command(commands: Commands, name: str, function: Callable[..., int], t
     command.add_argument("shot", metavar="SHOT", help="USD file of the shot")
     command.add_argument("--json", action="store_true", help="print one JSON object on stdout, and nothing else there")
     command.add_argument("--quiet", action="store_true", help="print nothing but errors (and the object of --json)")
+    command.add_argument(
+        "--progress", action="store_true", help="tell progress on stderr in lines for a program (tabs between fields)"
+    )
     _plugin_options(command)
     command.add_argument(
         "--run",

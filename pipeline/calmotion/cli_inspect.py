@@ -37,7 +37,7 @@ def inspect_shot(args: argparse.Namespace, output: Output) -> int:
     wanted += asked_for(host, args)
     tell_failures(host, args.quiet)
     optional = [Character, Animation, Provenance] if args.strict else [ReducedBodies, SystemModes]
-    with ProgressDisplay(args.quiet) as display:
+    with ProgressDisplay(args.quiet, args.progress) as display:
         run = host.run(
             [Source(path=args.shot, command="check" if args.strict else "inspect"), OutputPaths(modes=args.modes)],
             wanted,

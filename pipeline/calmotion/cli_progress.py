@@ -1,4 +1,7 @@
-"""Progress of a run on stderr: bars on a terminal, one line an operator in a log, nothing when quiet."""
+"""Progress of a run on stderr: bars on a terminal, one line an operator in a log, lines for a program where it asks.
+
+A program that runs calmotion reads lines `progress<tab>stage<tab>fraction<tab>message`.
+"""
 
 from __future__ import annotations
 
@@ -15,13 +18,13 @@ if TYPE_CHECKING:
 class ProgressDisplay:
     """Shows stages as they come; use as a context, call as the host's progress callback."""
 
-    def __init__(self, quiet: bool):
-        self._quiet = quiet
+    def __init__(self, quiet: bool, machine: bool = False):
+        self._quiet, self._machine = quiet, machine
         self._bars: Progress | None = None
         self._tasks: dict[str, TaskID] = {}
 
     def __enter__(self) -> ProgressDisplay:
-        if not self._quiet and sys.stderr.isatty():
+        if not self._quiet and not self._machine and sys.stderr.isatty():
             from rich.console import Console
             from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
@@ -39,6 +42,9 @@ class ProgressDisplay:
 
     def __call__(self, stage: str, fraction: float, message: str) -> None:
         """Show how far a stage is, 0..1."""
+        if self._machine:
+            line = "\t".join(("progress", stage, f"{fraction:.4f}", message)).replace("\n", " ")
+            print(line, file=sys.stderr, flush=True)
         if self._bars is None:
             return
         if stage not in self._tasks:

@@ -24,7 +24,7 @@ def rig(args: argparse.Namespace, output: Output) -> int:
     given = [Source(path=args.shot, command="rig"), OutputPaths(layer=args.output)]
     wanted = [Rig, *asked_for(host, args)]
     tell_failures(host, args.quiet)
-    with ProgressDisplay(args.quiet) as display:
+    with ProgressDisplay(args.quiet, args.progress) as display:
         run = host.run(given, wanted, settings=settings_of(args), progress=display)
         interrupted = carry_out(run, display)
     problems = [Problem(ShotError("interrupted"))] if interrupted else problems_of(run, wanted)

@@ -76,7 +76,7 @@ def run_shot(args: argparse.Namespace, command: str, output: Output) -> int:
     )
     _refuse_unreadable_motion(source, host)
     tell_failures(host, args.quiet)
-    with ProgressDisplay(args.quiet) as display:
+    with ProgressDisplay(args.quiet, args.progress) as display:
         settings = merge([settings_of(args), _options_of_the_writer(args)])
         run = host.run([source, paths], wanted, settings=settings, progress=display)
         _prepare_folders(args.shot, paths)

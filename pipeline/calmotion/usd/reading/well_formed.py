@@ -9,23 +9,25 @@ from ...errors import ShotError
 from ..schemas import NAMES
 from .context import prims_of
 
+_PHYSICS = ("PhysicsMassAPI", "PhysicsRigidBodyAPI", "PhysicsCollisionAPI", "PhysicsMaterialAPI")
+_DRIVE, _DRIVES = "PhysicsDriveAPI", ("angular", "linear")
 _RESET, _INVERSE = "!resetXformStack!", "!invert!"
 
 
 def wrong_types(stage) -> Iterator[ShotError]:
     """Authored properties of schemas that are read, and whose type is another than the schema's.
 
-    USD takes such opinions without a word, and gives values of whatever type was authored. Names of ours count also
-    where their schema is not applied.
+    USD takes such opinions without a word, and gives values of whatever type was authored. Names of ours, and of
+    masses and drives, count also where their schema is not applied.
     """
     from pxr import Sdf
 
-    ours = _ours()
+    known = _known()
     for prim in prims_of(stage):
         definition = prim.GetPrimDefinition()
         for prop in prim.GetAuthoredProperties():
             name = prop.GetName()
-            wanted = ours.get(name) or _type_of(definition, name)
+            wanted = known.get(name) or _type_of(definition, name)
             if not wanted:
                 continue
             for spec in prop.GetPropertyStack():
@@ -79,15 +81,19 @@ def _type_of(definition, name: str) -> str:
     return str(definition.GetAttributeDefinition(name).GetTypeName())
 
 
-def _ours() -> dict[str, str]:
-    """Type of every property of our schemas."""
+def _known() -> dict[str, str]:
+    """Type of every property of our schemas, and of those of UsdPhysics that are read wherever they are authored."""
     from pxr import Usd
 
-    registry, found = Usd.SchemaRegistry(), {}
-    for schema in NAMES:
+    registry = Usd.SchemaRegistry()
+    found: dict[str, str] = {}
+    for schema in (*NAMES, *_PHYSICS, _DRIVE):
         definition = registry.FindAppliedAPIPrimDefinition(schema)
-        for name in definition.GetPropertyNames() if definition else ():
-            found[str(name)] = _type_of(definition, str(name))
+        for name in map(str, definition.GetPropertyNames() if definition else ()):
+            if schema == _DRIVE:
+                found |= {name.replace("__INSTANCE_NAME__", drive): _type_of(definition, name) for drive in _DRIVES}
+            else:
+                found[name] = _type_of(definition, name)
     return found
 
 

@@ -1,0 +1,140 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The operators: optimise, and cancel."""
+
+from __future__ import annotations
+
+import shutil
+import tempfile
+from pathlib import Path
+
+import bpy
+
+from .bring_back import bring_back
+from .character import armature_of, export_character
+from .pipeline import PipelineRun, job_for
+from .preferences import command_of, preferences_of
+
+_RUNNING: dict[str, PipelineRun] = {}  # by the name of the scene; one for each
+
+
+class CALMOTION_OT_optimize(bpy.types.Operator):
+    """Take the shake out of the character's animation, as a new action"""
+
+    bl_idname = "calmotion.optimize"
+    bl_label = "Optimize Motion"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Where an animated armature is selected and nothing runs."""
+        if context.scene.name in _RUNNING:
+            cls.poll_message_set("Calmotion is running")
+            return False
+        armature = armature_of(context)
+        if armature is None or armature.animation_data is None or armature.animation_data.action is None:
+            cls.poll_message_set("Select an armature with an action")
+            return False
+        return True
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        """Run to the end, and wait for it."""
+        run = self._begin(context)
+        if run is None:
+            return {"CANCELLED"}
+        run.wait()
+        return self._finish(context)
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        """Run beside Blender, with progress; Escape cancels."""
+        if self._begin(context) is None:
+            return {"CANCELLED"}
+        self._timer = context.window_manager.event_timer_add(0.2, window=context.window)
+        context.window_manager.modal_handler_add(self)
+        return {"RUNNING_MODAL"}
+
+    def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        """Show how far it is."""
+        run, settings = self._run, context.scene.calmotion
+        if event.type == "ESC" and event.value == "PRESS":
+            run.cancel()
+            settings.status = "cancelling"
+        if event.type != "TIMER":
+            return {"PASS_THROUGH"}
+        settings.progress, settings.status = run.fraction, run.message
+        for area in context.screen.areas if context.screen else ():
+            area.tag_redraw()
+        if run.running:
+            return {"PASS_THROUGH"}
+        context.window_manager.event_timer_remove(self._timer)
+        return self._finish(context)
+
+    def _begin(self, context: bpy.types.Context) -> PipelineRun | None:
+        """Export, and start the process; None where that cannot be done, which is reported."""
+        command, settings = command_of(context), context.scene.calmotion
+        if command is None:
+            self.report({"ERROR"}, "calmotion was not found: name its command in the preferences of the extension")
+            return None
+        armature = armature_of(context)
+        assert armature is not None  # poll
+        self._armature, self._folder = armature.name, _folder(context)
+        shot = export_character(context, armature, self._folder / "shot.usda")
+        job = job_for(
+            command, shot, self._folder, robot=bpy.path.abspath(settings.robot_layer) if settings.robot_layer else "",
+            material=settings.material, flexible=settings.flexible, tolerance=settings.tolerance,
+        )  # fmt: skip
+        self._run = _RUNNING[context.scene.name] = PipelineRun(job).start()
+        return self._run
+
+    def _finish(self, context: bpy.types.Context) -> set[str]:
+        """Bring the result back, or tell what went wrong."""
+        run, settings = _RUNNING.pop(context.scene.name), context.scene.calmotion
+        settings.progress, settings.status = 0.0, run.outcome or ""
+        try:
+            if run.outcome == "cancelled":
+                self.report({"WARNING"}, "Calmotion was cancelled; the animation is as it was")
+                return {"CANCELLED"}
+            if run.outcome != "done":
+                for error in run.errors:
+                    self.report({"ERROR"}, error)
+                return {"CANCELLED"}
+            armature = bpy.data.objects[self._armature]
+            try:
+                action, changed = bring_back(context, armature, run.job.root)
+            except RuntimeError as error:
+                self.report({"ERROR"}, str(error))
+                return {"CANCELLED"}
+            before, after = (1e3 * run.report[f"max_error_{when}_m"] for when in ("before", "after"))
+            settings.status = f"{before:.3g} mm -> {after:.3g} mm"
+            self.report({"INFO"}, f"{action.name}: {len(changed)} bones changed, error {settings.status}")
+            return {"FINISHED"}
+        finally:
+            preferences = preferences_of(context)
+            if not (bpy.data.filepath and (preferences is None or preferences.keep_files)):
+                shutil.rmtree(self._folder, ignore_errors=True)
+
+
+class CALMOTION_OT_cancel(bpy.types.Operator):
+    """Stop the optimisation; the animation stays as it was"""
+
+    bl_idname = "calmotion.cancel"
+    bl_label = "Cancel"
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """While it runs."""
+        return context.scene.name in _RUNNING
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        """Ask the process to stop."""
+        _RUNNING[context.scene.name].cancel()
+        return {"FINISHED"}
+
+
+def _folder(context: bpy.types.Context) -> Path:
+    """Where files go: beside the .blend file, or nowhere that lasts while there is none."""
+    if bpy.data.filepath:
+        blend = Path(bpy.data.filepath)
+        folder = blend.parent / f"{blend.stem}_calmotion"
+        folder.mkdir(exist_ok=True)
+        return folder
+    return Path(tempfile.mkdtemp(prefix="calmotion-"))

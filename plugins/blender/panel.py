@@ -1,0 +1,37 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The panel in the sidebar of the 3D view."""
+
+from __future__ import annotations
+
+import bpy
+
+from .preferences import command_of
+
+
+class CALMOTION_PT_panel(bpy.types.Panel):
+    """Settings, the button, and how far it is."""
+
+    bl_idname = "CALMOTION_PT_panel"
+    bl_label = "Calmotion"
+    bl_space_type = "VIEW_3D"
+    bl_region_type = "UI"
+    bl_category = "Calmotion"
+
+    def draw(self, context: bpy.types.Context) -> None:
+        """Draw it."""
+        layout, settings = self.layout, context.scene.calmotion
+        layout.use_property_split = True
+        layout.prop(settings, "robot_layer")
+        made = layout.column()
+        made.active = not settings.robot_layer
+        made.prop(settings, "material")
+        made.prop(settings, "flexible")
+        layout.prop(settings, "tolerance")
+        if command_of(context) is None:
+            layout.label(text="calmotion was not found: see the preferences", icon="ERROR")
+        layout.operator("calmotion.optimize", icon="ANIM_DATA")
+        if bpy.ops.calmotion.cancel.poll():
+            layout.progress(factor=settings.progress, text=settings.status)
+            layout.operator("calmotion.cancel", icon="CANCEL")
+        elif settings.status:
+            layout.label(text=settings.status)

@@ -1,0 +1,47 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Where Calmotion is on this machine."""
+
+from __future__ import annotations
+
+import os
+import shlex
+import shutil
+
+import bpy
+
+COMMAND_VARIABLE = "CALMOTION_COMMAND"
+
+
+class CalmotionPreferences(bpy.types.AddonPreferences):
+    """Preferences of the extension."""
+
+    bl_idname = __package__
+
+    command: bpy.props.StringProperty(
+        name="Command",
+        description="How calmotion is started, such as /opt/calmotion/bin/calmotion; empty: as a shell finds it",
+    )
+    keep_files: bpy.props.BoolProperty(
+        name="Keep Files", description="Keep the exported shot and the layers beside the .blend file", default=True
+    )
+
+    def draw(self, context: bpy.types.Context) -> None:
+        """Show them."""
+        self.layout.prop(self, "command")
+        self.layout.prop(self, "keep_files")
+
+
+def preferences_of(context: bpy.types.Context) -> CalmotionPreferences | None:
+    """The preferences; None where the extension was registered by hand."""
+    addon = context.preferences.addons.get(__package__)
+    return addon.preferences if addon else None
+
+
+def command_of(context: bpy.types.Context) -> list[str] | None:
+    """The words that start calmotion: of the preferences, the environment, or as a shell finds it; None without one."""
+    preferences = preferences_of(context)
+    words = shlex.split((preferences.command if preferences else "") or os.environ.get(COMMAND_VARIABLE, ""))
+    if not words:
+        found = shutil.which("calmotion")
+        return [found] if found else None
+    return words if shutil.which(words[0]) else None

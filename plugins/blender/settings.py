@@ -1,0 +1,39 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What the user chooses for a scene."""
+
+from __future__ import annotations
+
+import bpy
+
+MATERIALS = ("nylon", "pla", "abs", "pom", "polycarbonate", "aluminium")  # those of `calmotion rig`
+
+
+class CalmotionSettings(bpy.types.PropertyGroup):
+    """Settings of a scene."""
+
+    robot_layer: bpy.props.StringProperty(
+        name="Robot",
+        description="USD layer with bodies, joints and motors over the exported character; empty: make one of the skin",
+        subtype="FILE_PATH",
+    )
+    material: bpy.props.EnumProperty(
+        name="Material",
+        description="What the links of a robot that is made of the skin are made of",
+        items=[(name, name.capitalize(), "") for name in MATERIALS],
+    )
+    flexible: bpy.props.StringProperty(
+        name="Flexible",
+        description="Bones whose links bend: names with commas between, or all",
+        default="all",
+    )
+    tolerance: bpy.props.FloatProperty(
+        name="Tolerance",
+        description="Error at the targets that does not matter",
+        default=0.001,
+        min=1e-6,
+        soft_max=0.1,
+        precision=4,
+        unit="LENGTH",
+    )
+    status: bpy.props.StringProperty(name="Status", options={"SKIP_SAVE", "HIDDEN"})
+    progress: bpy.props.FloatProperty(name="Progress", min=0.0, max=1.0, options={"SKIP_SAVE", "HIDDEN"})

@@ -1,0 +1,163 @@
+"""Run by Blender's Python, with the folder of the extension, a folder for files, and the zip to install (or -)."""
+
+import math
+import os
+import sys
+from pathlib import Path
+
+import bpy
+from mathutils import Quaternion
+
+BONES, LENGTH, WIDTH = ("root", "upper", "hand"), 0.4, 0.015
+
+
+def character(folder: Path) -> bpy.types.Object:
+    """An arm of three bones with a skin; the two outer ones wave."""
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    scene = bpy.context.scene
+    scene.frame_start, scene.frame_end, scene.render.fps = 1, 25, 24
+    armature = bpy.data.armatures.new("Rig")
+    rig = bpy.data.objects.new("Rig", armature)
+    scene.collection.objects.link(rig)
+    bpy.context.view_layer.objects.active = rig
+    bpy.ops.object.mode_set(mode="EDIT")
+    above = None
+    for k, name in enumerate(BONES):
+        bone = armature.edit_bones.new(name)
+        bone.head, bone.tail, bone.parent = (k * LENGTH, 0, 1), ((k + 1) * LENGTH, 0, 1), above
+        above = bone
+    bpy.ops.object.mode_set(mode="OBJECT")
+    skin = bpy.data.objects.new("Skin", tube())
+    scene.collection.objects.link(skin)
+    for name in BONES:
+        skin.vertex_groups.new(name=name)
+    for vertex in skin.data.vertices:
+        owner = min(len(BONES) - 1, int(vertex.co.x / LENGTH - 1e-6))
+        skin.vertex_groups[BONES[owner]].add([vertex.index], 1.0, "REPLACE")
+    skin.parent = rig
+    skin.modifiers.new("Armature", "ARMATURE").object = rig
+    rig.animation_data_create()
+    rig.animation_data.action = bpy.data.actions.new("Wave")
+    for frame in range(1, 26):
+        turn = 2.0 * math.pi * (frame - 1) / 24.0
+        for name, angle in (("upper", 0.5 * math.sin(turn)), ("hand", 0.6 * (1.0 - math.cos(turn)))):
+            bone = rig.pose.bones[name]
+            bone.rotation_mode = "XYZ" if name == "hand" else "QUATERNION"
+            if name == "hand":
+                bone.rotation_euler = (angle, 0.0, 0.0)
+                bone.keyframe_insert("rotation_euler", frame=frame)
+            else:
+                bone.rotation_quaternion = Quaternion((1, 0, 0), angle)
+                bone.keyframe_insert("rotation_quaternion", frame=frame)
+    rig.select_set(True)
+    bpy.ops.wm.save_as_mainfile(filepath=str(folder / "scene.blend"))
+    return rig
+
+
+def tube() -> bpy.types.Mesh:
+    """A closed box along x, in slices."""
+    slices = 24
+    xs = [len(BONES) * LENGTH * k / slices for k in range(slices + 1)]
+    points = [(x, y * WIDTH, 1 + z * WIDTH) for x in xs for y, z in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
+    sides = [(i, k, (k + 1) % 4) for i in range(slices) for k in range(4)]
+    faces = [(4 * i + k, 4 * i + n, 4 * i + 4 + n, 4 * i + 4 + k) for i, k, n in sides]
+    faces += [(3, 2, 1, 0), tuple(4 * slices + k for k in range(4))]
+    mesh = bpy.data.meshes.new("Skin")
+    mesh.from_pydata(points, [], faces)
+    return mesh
+
+
+def curves(action: bpy.types.Action) -> dict[str, list[float]]:
+    """Values of the curves of an action, by their path and index."""
+    if hasattr(action, "layers"):
+        found = [
+            c for layer in action.layers for strip in layer.strips for bag in strip.channelbags for c in bag.fcurves
+        ]
+    else:
+        found = list(action.fcurves)
+    return {f"{c.data_path}[{c.array_index}]": [point.co[1] for point in c.keyframe_points] for c in found}
+
+
+def check_optimize(folder: Path) -> None:
+    """The whole way there and back, through the operator."""
+    rig = character(folder)
+    old = rig.animation_data.action
+    before, objects = curves(old), set(bpy.data.objects.keys())
+    settings = bpy.context.scene.calmotion
+    settings.flexible, settings.material, settings.tolerance = "upper, hand", "nylon", 0.0005
+    assert bpy.ops.calmotion.optimize.poll()
+    assert bpy.ops.calmotion.optimize() == {"FINISHED"}, settings.status
+    new = rig.animation_data.action
+    assert new is not old and new.name == "Wave_calm", new.name
+    assert curves(old) == before, "the action of the animator is kept"
+    after = curves(new)
+    assert set(after) == set(before) and all(len(values) == 25 for values in after.values()), after.keys()
+    changes = {p: max(abs(a - b) for a, b in zip(before[p], after[p], strict=True)) for p in before}
+    moved = {path for path, change in changes.items() if change > 1e-4}
+    assert moved and max(changes.values()) < 0.2, changes
+    assert set(bpy.data.objects.keys()) == objects and len(bpy.data.armatures) == 1, "what was imported is gone"
+    assert (folder / "scene_calmotion" / "calm.usda").is_file()
+    assert "->" in settings.status
+    error_before, error_after = (float(part.split()[0]) for part in settings.status.split(" -> "))
+    assert error_after < 0.2 * error_before, settings.status
+    print("optimised:", settings.status, sorted(moved))
+
+
+def export_again(folder: Path) -> None:
+    """Export what was brought back, beside what was optimised, for the test outside to compare."""
+    from calmotion_extension.character import export_character
+
+    export_character(bpy.context, bpy.data.objects["Rig"], folder / "again.usda")
+    for name in ("shot.usda", "robot.usda", "calm.usda", "calm_root.usda"):
+        kept = name.replace("calm_root", "optimised_root")
+        (folder.parent / kept).write_text((folder / "scene_calmotion" / name).read_text())
+
+
+def check_wrong_bone(folder: Path) -> None:
+    """A bone that is not there is told, and nothing changes."""
+    rig = character(folder)
+    bpy.context.scene.calmotion.flexible = "elbow"
+    old = rig.animation_data.action
+    try:
+        result = bpy.ops.calmotion.optimize()
+    except RuntimeError as error:  # Blender raises what an operator reports as an error
+        assert "no such link" in str(error) and "upper" in str(error), error
+    else:
+        raise AssertionError(result)
+    assert rig.animation_data.action is old
+    assert bpy.ops.calmotion.optimize.poll(), "it can be run again"
+
+
+def check_poll() -> None:
+    """Without an armature there is nothing to do."""
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    assert not bpy.ops.calmotion.optimize.poll() and not bpy.ops.calmotion.cancel.poll()
+
+
+def main() -> None:
+    extension, folder, archive = Path(sys.argv[-3]), Path(sys.argv[-2]), sys.argv[-1]
+    if archive == "-":
+        sys.path.insert(0, str(folder))
+        os.symlink(extension, folder / "calmotion_extension")
+        import calmotion_extension
+
+        calmotion_extension.register()
+        (folder / "work").mkdir()
+        check_poll()
+        check_optimize(folder / "work")
+        export_again(folder / "work")
+        check_wrong_bone(folder / "work")
+        calmotion_extension.unregister()
+        assert not hasattr(bpy.types.Scene, "calmotion") and not hasattr(bpy.types, "CALMOTION_OT_optimize")
+        calmotion_extension.register()
+        calmotion_extension.unregister()
+    else:
+        bpy.ops.wm.read_factory_settings(use_empty=True)
+        bpy.ops.extensions.package_install_files(filepath=archive, repo="user_default", enable_on_install=True)
+        names = [addon.module for addon in bpy.context.preferences.addons]
+        assert any(name.endswith(".calmotion") for name in names), names
+        assert hasattr(bpy.types.Scene, "calmotion")
+    print("all is well")
+
+
+main()

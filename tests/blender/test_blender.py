@@ -1,0 +1,203 @@
+"""The extension of Blender: what can be checked without Blender, and, where there is one, the whole way.
+
+`make blender-test` makes an environment with Blender's Python module and runs all of it; otherwise name its interpreter
+with CALMOTION_BLENDER_PYTHON.
+"""
+
+from __future__ import annotations
+
+import ast
+import importlib.util
+import os
+import re
+import subprocess
+import sys
+import time
+import tomllib
+import zipfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+from calmotion.usd import schemas
+
+schemas.register()
+
+HERE = Path(__file__).resolve().parent
+EXTENSION = HERE.parents[1] / "plugins" / "blender"
+BLENDER = os.environ.get("CALMOTION_BLENDER_PYTHON", "")
+needs_blender = pytest.mark.skipif(not BLENDER, reason="no Blender: see make blender-test")
+
+
+@pytest.fixture(scope="module")
+def pipeline():
+    """The module that runs calmotion, which does not need Blender."""
+    spec = importlib.util.spec_from_file_location("blender_pipeline", EXTENSION / "pipeline.py")
+    module = importlib.util.module_from_spec(spec)
+    sys.modules["blender_pipeline"] = module
+    spec.loader.exec_module(module)
+    return module
+
+
+def test_the_manifest_says_what_blender_asks_for():
+    manifest = tomllib.loads((EXTENSION / "blender_manifest.toml").read_text())
+    assert manifest["schema_version"] == "1.0.0" and manifest["type"] == "add-on"
+    assert re.fullmatch(r"\d+\.\d+\.\d+", manifest["version"])
+    assert len(manifest["tagline"]) <= 64 and manifest["tagline"][-1].isalnum()
+    assert manifest["license"] == ["SPDX:GPL-3.0-or-later"]
+    assert all(len(text) <= 64 and text[-1].isalnum() for text in manifest["permissions"].values())
+
+
+def test_the_licence_is_kept_apart(repository):
+    assert "GNU GENERAL PUBLIC LICENSE" in (EXTENSION / "LICENSE").read_text()
+    for file in EXTENSION.glob("*.py"):
+        assert file.read_text().startswith("# SPDX-License-Identifier: GPL-3.0-or-later")
+    outside = [f for f in (repository / "pipeline").rglob("*.py")] + [*(repository / "plugins").glob("[!b]*/*.py")]
+    for file in outside:
+        names = [
+            n for node in ast.walk(ast.parse(file.read_text())) if isinstance(node, ast.Import) for n in node.names
+        ]
+        assert not any(name.name == "bpy" for name in names), file
+
+
+def test_materials_are_those_of_the_rigger():
+    from calmotion.rig.materials import MATERIALS
+
+    (node,) = [n for n in ast.parse((EXTENSION / "settings.py").read_text()).body if isinstance(n, ast.Assign)]
+    assert set(ast.literal_eval(node.value)) == set(MATERIALS)
+
+
+def script(tmp_path: Path, text: str) -> list[str]:
+    """A program that stands in for calmotion."""
+    file = tmp_path / "program.py"
+    file.write_text("import sys, json, time\n" + text)
+    return [sys.executable, str(file)]
+
+
+def job(pipeline, command, tmp_path, **options):
+    settings = {"robot": "", "material": "pla", "flexible": "a, b", "tolerance": 0.001} | options
+    return pipeline.job_for(command, tmp_path / "shot.usda", tmp_path, **settings)
+
+
+def test_a_skin_is_rigged_and_then_optimised(pipeline, tmp_path):
+    rig, optimize = job(pipeline, ["calmotion"], tmp_path).commands
+    assert rig[:3] == ("calmotion", "rig", str(tmp_path / "shot.usda")) and "rig.skeleton.flexible=a,b" in rig
+    assert optimize[1:3] == ("optimize", str(tmp_path / "robot.usda")) and "0.001m" in optimize
+
+
+def test_a_robot_of_one_s_own_is_put_over_the_shot(pipeline, tmp_path):
+    from pxr import Sdf, Usd
+
+    (tmp_path / "shot.usda").write_text(
+        '#usda 1.0\n(\n    endTimeCode = 25\n    metersPerUnit = 1\n    timeCodesPerSecond = 24\n    upAxis = "Z"\n)\n'
+        'def Xform "root"\n{\n}\n'
+    )
+    (tmp_path / "own.usda").write_text('#usda 1.0\nover "root"\n{\n    def Xform "Robot"\n    {\n    }\n}\n')
+    (command,) = job(pipeline, ["calmotion"], tmp_path, robot=str(tmp_path / "own.usda")).commands
+    stage = Usd.Stage.Open(str(tmp_path / "robot.usda"))
+    assert command[1] == "optimize" and stage.GetPrimAtPath("/root/Robot")
+    assert stage.GetEndTimeCode() == 25 and stage.GetTimeCodesPerSecond() == 24
+    assert Sdf.Layer.FindOrOpen(str(tmp_path / "robot.usda")).pseudoRoot.GetInfo("metersPerUnit") == 1.0
+
+
+def test_progress_and_the_report_are_read(pipeline, tmp_path):
+    command = script(tmp_path, """
+print("note: something", file=sys.stderr)
+print("progress\\tMesh\\t0.5\\tlink 3", file=sys.stderr, flush=True)
+print(json.dumps({"max_error_after_m": 0.001}))
+""")  # fmt: skip
+    run = pipeline.PipelineRun(job(pipeline, command, tmp_path)).start()
+    run.wait(30.0)
+    assert run.outcome == "done" and run.fraction == 1.0 and run.report == {"max_error_after_m": 0.001}
+
+
+def test_errors_are_told_with_place_and_remedy(pipeline, tmp_path):
+    command = script(tmp_path, """
+print(json.dumps({"errors": [{"path": "/a", "attribute": "b", "problem": "is wrong", "remedy": "Mend it"}]}))
+sys.exit(1)
+""")  # fmt: skip
+    run = pipeline.PipelineRun(job(pipeline, command, tmp_path)).start()
+    run.wait(30.0)
+    assert run.outcome == "failed" and run.errors == ["/a.b: is wrong. Mend it"]
+
+
+def test_a_program_that_dies_without_words_is_told(pipeline, tmp_path):
+    run = pipeline.PipelineRun(job(pipeline, script(tmp_path, "sys.exit(3)"), tmp_path)).start()
+    run.wait(30.0)
+    assert run.outcome == "failed" and "status 3" in run.errors[0]
+    run = pipeline.PipelineRun(job(pipeline, ["/no/such/program"], tmp_path)).start()
+    run.wait(30.0)
+    assert run.outcome == "failed" and "cannot be started" in run.errors[0]
+
+
+def test_cancelling_stops_the_program(pipeline, tmp_path):
+    command = script(tmp_path, "print('progress\\t\\t0.1\\t', file=sys.stderr, flush=True)\ntime.sleep(60)\n")
+    run = pipeline.PipelineRun(job(pipeline, command, tmp_path)).start()
+    end = time.monotonic() + 30.0
+    while run.fraction == 0.0 and time.monotonic() < end:
+        time.sleep(0.05)
+    run.cancel()
+    run.wait(30.0)
+    assert run.outcome == "cancelled" and not run.running
+
+
+def test_the_real_program_tells_its_progress(pipeline, repository, tmp_path, monkeypatch):
+    sys.path.insert(0, str(HERE.parent / "usd"))
+    import small_shots
+
+    shot = small_shots.write_arm(tmp_path / "robot.usda", small_shots.make_flexible)
+    (tmp_path / "shot.usda").write_text(shot.read_text())
+    monkeypatch.setenv("PYTHONPATH", str(repository / "pipeline"))
+    program = [sys.executable, "-c", f"import sys; sys.path.insert(0, {str(repository / 'pipeline')!r}); "
+               "from calmotion.cli import main; sys.exit(main())"]  # fmt: skip
+    (_, optimize) = job(pipeline, program, tmp_path).commands
+    run = pipeline.PipelineRun(pipeline.Job((optimize,), tmp_path / "calm_root.usda")).start()
+    seen = set()
+    while run.running:
+        seen.add(run.message)
+        time.sleep(0.01)
+    assert run.outcome == "done", run.errors
+    assert run.report["targets"] and len(seen) > 2 and (tmp_path / "calm_root.usda").is_file()
+
+
+def blender(*arguments: object, **variables: str) -> str:
+    done = subprocess.run(
+        [BLENDER, *map(str, arguments)], env=os.environ | variables, capture_output=True, text=True, timeout=900
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    return done.stdout
+
+
+def validator() -> Path:
+    """Blender's own validator and builder of extensions."""
+    printed = blender("-c", "import bpy; print(bpy.utils.system_resource('SCRIPTS'))")
+    return Path(printed.strip().splitlines()[-1]) / "addons_core" / "bl_pkg" / "cli" / "blender_ext.py"
+
+
+@needs_blender
+def test_the_whole_way_there_and_back(tmp_path):
+    from calmotion.usd.reading.skeletons import bound_skeletons
+    from pxr import Usd
+
+    printed = blender(
+        HERE / "in_blender.py", EXTENSION, tmp_path, "-", CALMOTION_COMMAND=f"{sys.executable} -m calmotion"
+    )
+    assert "all is well" in printed
+    # what Blender exports of the new action is what the optimised layer says
+    stages = [Usd.Stage.Open(str(tmp_path / name)) for name in ("optimised_root.usda", "work/again.usda")]
+    (meant,), (back,) = (bound_skeletons(stage) for stage in stages)
+    for code in range(1, 26):
+        assert np.abs(meant.locals_at(float(code)) - back.locals_at(float(code))).max() < 2e-5
+
+
+@needs_blender
+def test_blender_accepts_and_installs_the_package(tmp_path):
+    extension = validator()
+    blender(extension, "validate", EXTENSION)
+    blender(extension, "build", "--source-dir", EXTENSION, "--output-dir", tmp_path)
+    (archive,) = tmp_path.glob("*.zip")
+    blender(extension, "validate", archive)
+    assert {"blender_manifest.toml", "__init__.py", "LICENSE"} <= set(zipfile.ZipFile(archive).namelist())
+    user = tmp_path / "user"
+    printed = blender(HERE / "in_blender.py", EXTENSION, tmp_path, archive, BLENDER_USER_RESOURCES=str(user))
+    assert "all is well" in printed
