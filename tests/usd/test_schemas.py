@@ -85,3 +85,33 @@ def test_what_is_committed_is_what_usdgenschema_makes(tmp_path):
         for placeholder, value in places.items():
             made = made.replace(placeholder, value)
         assert made == (FOLDER / name).read_text(), f"{name} differs: generate it again"
+
+
+ALONE = """
+import sys
+from pxr import Usd, UsdPhysics, UsdValidation
+stage = Usd.Stage.CreateInMemory()
+joint = UsdPhysics.RevoluteJoint.Define(stage, "/joint").GetPrim()
+assert joint.ApplyAPI("CalmMotorAPI") and joint.HasAPI("CalmMotorAPI")
+assert joint.GetAttribute("calm:motor:maxTorque").Get() == float("inf")
+assert joint.GetAttribute("calm:motor:skelPose").Get() == "rest"
+assert list(joint.GetAttribute("calm:motor:skelPose").GetMetadata("allowedTokens")) == ["rest", "start"]
+assert "calmotion" not in sys.modules
+shot = Usd.Stage.Open(sys.argv[1])
+registry = UsdValidation.ValidationRegistry()
+found = UsdValidation.ValidationContext(registry.GetOrLoadAllValidators()).Validate(shot)
+print([error.GetMessage() for error in found])
+target = next(
+    prim for prim in shot.Traverse() if prim.HasAPI("CalmTargetAPI"))
+assert target.GetAttribute("calm:target:rotationWeight").IsDefined()
+"""
+
+
+def test_usd_alone_knows_the_schemas_by_the_search_path(repository):
+    """As usdview and other applications use them: without any code of ours."""
+    environment = {k: v for k, v in os.environ.items() if k != "PYTHONPATH"} | {"PXR_PLUGINPATH_NAME": str(FOLDER)}
+    shot = repository / "samples" / "bartender" / "bartender.usda"
+    command = [sys.executable, "-c", ALONE, str(shot)]
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=120)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.strip() == "[]", "the sample is valid under USD's own validators"

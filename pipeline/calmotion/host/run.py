@@ -51,7 +51,7 @@ class OperatorResult:
     plugin: str
     outcome: Outcome
     reason: str = ""
-    error: Exception | None = None
+    error: Exception | SystemExit | None = None
     traceback: str = ""
     duration: float = 0.0
     records: tuple[Record, ...] = ()
@@ -128,12 +128,12 @@ class Run:
             self._progress(cls.label, 0.0, "")
             values = _checked(cls, self._execute(cls, context))
             self._progress(cls.label, 1.0, "")
-        except Exception as error:
+        except (Exception, SystemExit) as error:  # a plugin does not end the host
             self._failed |= set(cls.provides)
             return self._result(
                 cls,
                 Outcome.FAILED,
-                reason=str(error),
+                reason=str(error) or type(error).__name__,
                 error=error,
                 traceback="".join(traceback.format_exception(error)),
                 duration=time.perf_counter() - start,
