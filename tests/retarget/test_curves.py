@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from calmotion.retarget.curves import interpolate, looped_curve, needed_pre_roll, open_by, sample_tracks
+from calmotion.retarget.curves import curve_of, interpolate, looped_curve, needed_pre_roll, open_by, sample_tracks
 from calmotion.retarget.time_grid import make_grid
 from calmotion.shot import Track
 
@@ -50,3 +50,30 @@ def test_loops_that_do_not_close_are_noticed():
     almost = Track(FRAMES, FRAMES * (2 * np.pi + 0.01))
     assert open_by(almost, 1.0, turning=True) == pytest.approx(0.01)
     assert open_by(almost, 1.0, turning=False) == pytest.approx(2 * np.pi + 0.01)
+
+
+def test_a_corner_is_kept_and_the_rest_is_smooth():
+    values = np.where(FRAMES < 0.5, FRAMES**2, 0.25 - 2.0 * (FRAMES - 0.5))
+    curve = curve_of(Track(FRAMES, values, np.array([0.5])), 1.0, False)
+    fine = np.linspace(0.0, 1.0, 501)
+    assert np.allclose(curve(fine, 0), np.where(fine < 0.5, fine**2, 0.25 - 2.0 * (fine - 0.5)), atol=1e-12)
+    assert curve(np.array([0.5 - 1e-9]), 1) == pytest.approx(1.0) and curve(np.array([0.5]), 1) == pytest.approx(-2.0)
+    rounded = curve_of(Track(FRAMES, values), 1.0, False)
+    assert np.abs(rounded(fine, 0) - curve(fine, 0)).max() > 1e-3, "without it the corner would be rounded"
+
+
+def test_what_is_held_before_and_after_corners_is_at_rest():
+    track = Track(np.array([0.25, 0.5, 0.75]), np.array([0.0, 1.0, 0.0]), np.array([0.5]))
+    curve = curve_of(track, 1.0, False)
+    assert np.allclose(curve(np.array([0.0, 0.1, 0.9, 1.0]), 1), 0.0)
+    assert np.allclose(curve(track.times, 0), track.values)
+
+
+def test_a_loop_keeps_its_corners():
+    values = np.abs(FRAMES - 0.5)
+    curve = curve_of(Track(FRAMES, values, np.array([0.5])), 1.0, True)
+    fine = np.linspace(0.3, 0.7, 201)
+    assert np.allclose(curve(fine, 0), np.abs(fine - 0.5), atol=1e-3)
+    assert np.allclose(curve(fine + 2.0, 0), curve(fine, 0))
+    across = curve(np.array([1.0 - 1e-9, 1.0 + 1e-9]), 1)
+    assert np.abs(np.diff(across)) < 1e-5, "its seam is no corner"

@@ -4,9 +4,21 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..shot import Animation, Character, Result, Track
+from ..shot import Animation, Character, MotorCurve, Result, Track
 from ..shot.character import Array
 from .curves import curve_of
+from .time_grid import Sample
+
+
+def optimized_curve(animation: Animation, curve: MotorCurve, cyclic: bool) -> Sample:
+    """The curve of a motor in a result: the animator's, corners and all, and the smooth offset."""
+    end = float(animation.frame_times[-1])
+    base = curve_of(animation.tracks[curve.motor], end, cyclic)
+    if not curve.changed:
+        return base
+    # frames hold the offset exactly, as its knots lie on them
+    offset = curve_of(Track(animation.frame_times, curve.frame_values - base(animation.frame_times, 0)), end, cyclic)
+    return lambda times, order: base(times, order) + offset(times, order)
 
 
 def commanded_values(character: Character, animation: Animation, result: Result, times: Array) -> Array:
@@ -16,6 +28,9 @@ def commanded_values(character: Character, animation: Animation, result: Result,
         times: [s] after the first frame, within the shot, shape [n].
     """
     end, cyclic = float(animation.frame_times[-1]), character.retarget.cyclic
-    tracks = [Track(animation.frame_times, curve.frame_values) for curve in result.curves] or animation.current
-    columns = [curve_of(track, end, cyclic)(np.asarray(times, np.float64), 0) for track in tracks]
+    if result.curves:
+        curves = [optimized_curve(animation, curve, cyclic) for curve in result.curves]
+    else:
+        curves = [curve_of(track, end, cyclic) for track in animation.current]
+    columns = [curve(np.asarray(times, np.float64), 0) for curve in curves]
     return np.stack(columns, axis=1) if columns else np.zeros((len(times), 0))

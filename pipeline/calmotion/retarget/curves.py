@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.interpolate import CubicSpline
+from scipy.interpolate import CubicSpline, PPoly
 
 from ..shot.animation import Track
 from ..shot.character import Array
@@ -15,11 +15,13 @@ from .time_grid import Sample, TimeGrid, over_grid
 PRE_ROLL = 1.0
 AT_REST = 1e-3  # share of the shot's fastest motor below which a start counts as being at rest
 TURN = 2.0 * np.pi
+SAME = 1e-9  # times that are closer are one [s]
 CLOSED = 1e-4  # by how much the ends of a loop may differ [rad or m]
 
 
-def interpolate(track: Track, end: float) -> CubicSpline:
-    """The C2 cubic interpolant through a track's samples; constant outside them, as USD holds the value.
+def interpolate(track: Track, end: float) -> PPoly:
+    """The cubic interpolant through a track's samples, C2 but for its corners; constant outside them, as USD holds the
+    value.
 
     The end conditions are not-a-knot where the samples cover the shot, so that a spline sampled at the frames is
     read back exactly; where the value is held before or after, the slope there is zero.
@@ -31,6 +33,8 @@ def interpolate(track: Track, end: float) -> CubicSpline:
     if len(times) == 1:
         times, values = np.array([times[0], times[0] + 1.0]), np.repeat(values, 2)
     held_before, held_after = times[0] > 1e-9, times[-1] < end - 1e-9
+    if len(track.corners):
+        return _pieces(times, values, track.corners, held_before, held_after)
     left = (1, 0.0) if held_before else "not-a-knot"
     right = (1, 0.0) if held_after else "not-a-knot"
     if len(times) < 4 and not (held_before or held_after):
@@ -39,6 +43,20 @@ def interpolate(track: Track, end: float) -> CubicSpline:
         # one condition too many for a line: both ends at rest
         left = right = (1, 0.0)
     return CubicSpline(times, values, bc_type=(left, right))
+
+
+def _pieces(times: Array, values: Array, corners: Array, held_before: bool, held_after: bool) -> PPoly:
+    """Cubic interpolants between corners, put together."""
+    at = np.searchsorted(times, np.concatenate([[-np.inf], np.sort(corners), [np.inf]]) - SAME)
+    at = np.unique(np.clip(at, 0, len(times) - 1))
+    parts = []
+    for first, last in zip(at[:-1], at[1:], strict=True):
+        inside = slice(first, last + 1)
+        # what is held before or after begins and ends at rest
+        left = (1, 0.0) if first == 0 and held_before else "not-a-knot"
+        right = (1, 0.0) if last == len(times) - 1 and held_after else "not-a-knot"
+        parts.append(CubicSpline(times[inside], values[inside], bc_type=(left, right)))
+    return PPoly(np.concatenate([part.c for part in parts], axis=1), times[at[0] : at[-1] + 1])
 
 
 def held_curve(track: Track, end: float) -> Sample:
@@ -65,7 +83,14 @@ def looped_curve(track: Track, end: float) -> Sample:
     gain = TURN * np.round((ends[1] - ends[0]) / TURN)
     values = np.concatenate([ends[:1], np.asarray(track.values, float)[inner], ends[1:]]) - gain * times / end
     values[-1] = values[0]
-    spline = CubicSpline(times, values, bc_type="periodic")
+    corners = track.corners[(track.corners >= 0.0) & (track.corners <= end)]
+    if len(corners):
+        # loops on both sides make what is beside the corners periodic, too
+        around = np.array([-end, 0.0, end])[:, None]
+        three = Track((times[:-1] + around).ravel(), np.tile(values[:-1], 3), (corners + around).ravel())
+        spline = interpolate(three, 0.0)
+    else:
+        spline = CubicSpline(times, values, bc_type="periodic")
 
     def sample(times: Array, order: int) -> Array:
         found = np.asarray(spline(np.mod(times, end), order))

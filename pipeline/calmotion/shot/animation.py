@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -18,10 +18,12 @@ class Track:
         times: [s] after the first frame of the shot, strictly increasing, shape [k]. May start before 0 or end
             after the last frame when the animation does.
         values: [rad] (or [m] of a length motor), shape [k], not wrapped.
+        corners: Times among these at which the curve may have a corner, as a spline was authored; smooth elsewhere.
     """
 
     times: Array
     values: Array
+    corners: Array = field(default_factory=lambda: np.zeros(0))
 
 
 @dataclass(frozen=True, eq=False)

@@ -49,6 +49,35 @@ class Clock:
         return np.asarray(every[np.concatenate([[True], np.diff(every) > 1e-6])], dtype=np.float64)
 
 
+def still_clock(stage) -> Clock:
+    """The clock of a stage in which nothing is animated: one frame, the first.
+
+    Raises:
+        ShotError: A rate that is not positive.
+    """
+    authored = float(stage.GetStartTimeCode())
+    start = authored if np.isfinite(authored) else 0.0
+    return Clock(start, start, *_rates(stage))
+
+
+def _rates(stage) -> tuple[float, float]:
+    """Time codes and frames in a second; the latter as authored, else by the rule of `clock_of`."""
+    rate = float(stage.GetTimeCodesPerSecond())
+    unauthored = rate if rate >= _COARSEST else float(stage.GetFramesPerSecond())
+    layers = [layer for layer in (stage.GetSessionLayer(), stage.GetRootLayer()) if layer]
+    frames = next((x.framesPerSecond for x in layers if x.HasFramesPerSecond()), unauthored)
+    for name, found in (("timeCodesPerSecond", rate), ("framesPerSecond", frames)):
+        if not (np.isfinite(found) and found > 0.0):
+            raise ShotError(
+                "must be positive",
+                path=stage.GetRootLayer().identifier,
+                attribute=name,
+                found=found,
+                remedy="Author a positive rate",
+            )
+    return rate, float(frames)
+
+
 def clock_of(stage, sample_codes: Array) -> Clock:
     """The clock of a stage.
 
@@ -73,14 +102,7 @@ def clock_of(stage, sample_codes: Array) -> Clock:
         start = float(np.min(sample_codes))
     if end is None and len(sample_codes):
         end = float(np.max(sample_codes))
-    rate = float(stage.GetTimeCodesPerSecond())
-    unauthored = rate if rate >= _COARSEST else float(stage.GetFramesPerSecond())
-    frames = next((x.framesPerSecond for x in layers if x.HasFramesPerSecond()), unauthored)
-    for name, found in (("timeCodesPerSecond", rate), ("framesPerSecond", frames)):
-        if not (np.isfinite(found) and found > 0.0):
-            raise ShotError(
-                "must be positive", path=root.identifier, attribute=name, found=found, remedy="Author a positive rate"
-            )
+    rate, frames = _rates(stage)
     if start is None or end is None or not end > start:
         raise ShotError(
             "the shot has no duration",

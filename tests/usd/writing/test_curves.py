@@ -6,12 +6,14 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from calmotion.shot import MotorCurve, Track
+from calmotion.shot import Animation, MotorCurve, Track
 from calmotion.usd.clock import Clock
 from calmotion.usd.writing.curves import attribute_spec, author_curves, curve_values, sample_times
 from pxr import Sdf
 
 FRAMES = np.arange(13) / 24.0
+BASE = Track(FRAMES, 0.1 * FRAMES**2)
+ANIMATION = Animation(FRAMES, (BASE,), (BASE,))
 CURVE = MotorCurve(0, True, FRAMES, 0.3 * np.sin(9.0 * FRAMES), 0.3)
 
 
@@ -21,7 +23,7 @@ def authored(path, attribute, linear):
     motor = SimpleNamespace(path=path, attribute=attribute, linear=linear)
     character = SimpleNamespace(motors=[motor], retarget=SimpleNamespace(cyclic=False))
     clock = Clock(start=101, end=113, time_codes_per_second=24, frames_per_second=24)
-    return layer, f"{path}.{attribute}", author_curves(layer, character, (CURVE,), FRAMES, FRAMES, clock, 0.01)
+    return layer, f"{path}.{attribute}", author_curves(layer, character, ANIMATION, (CURVE,), FRAMES, clock, 0.01)
 
 
 @pytest.mark.parametrize(("rate", "parts"), [(24.0, 1), (25.0, 2), (96.0, 4), (1.0, 1)])
@@ -36,8 +38,8 @@ def test_between_frames_a_curve_is_what_its_frames_are_read_back_as():
 
     times = sample_times(FRAMES, 240.0)
     read_back = interpolate(Track(FRAMES, CURVE.frame_values), 0.5)
-    assert np.array_equal(curve_values(CURVE, FRAMES, times), read_back(times))
-    assert curve_values(CURVE, FRAMES, FRAMES) is CURVE.frame_values
+    assert np.allclose(curve_values(ANIMATION, CURVE, times, False), read_back(times))
+    assert curve_values(ANIMATION, CURVE, FRAMES, False) is CURVE.frame_values
 
 
 def test_values_are_degrees_at_the_time_codes_of_the_stage():

@@ -7,7 +7,9 @@ import pytest
 from calmotion.retarget.curves import curve_of
 from calmotion.shot import Animation, MotorCurve, Track
 from calmotion.usd.clock import Clock
+from calmotion.usd.reading.context import Reading
 from calmotion.usd.reading.tracks import read_track
+from calmotion.usd.units import StageUnits
 from calmotion.usd.writing.splines import author_splines, hermite
 from pxr import Sdf, Usd
 
@@ -73,16 +75,18 @@ def test_what_was_written_is_read_back_as_the_same_curve(cyclic):
     author_splines(layer, character, animation, (curve,), CLOCK, 0.01)
     stage = Usd.Stage.Open(layer)
     attribute = stage.GetAttributeAtPath(f"{motor.path}.{motor.attribute}")
-    notes = []
-    read = read_track(attribute, CLOCK, notes, 0.01)
+    reading = Reading(stage, StageUnits(1.0, 1.0), 101.0)
+    read = read_track(attribute, CLOCK, reading, 0.01)
     meant = curve_of(sparse(), 2.0, cyclic)(FINE, 0) + offset(cyclic)(FINE)
     assert np.abs(curve_of(read, 2.0, cyclic)(FINE, 0) - meant).max() < 1e-6
-    assert len(notes) == 1 and "knots" in notes[0]
+    assert len(reading.notes) == 1 and "knots" in reading.notes[0] and not len(read.corners)
 
 
 def test_a_curve_that_did_not_change_has_the_animation_s_knots_alone():
     base = sparse()
     values = curve_of(base, 2.0, False)(FRAMES, 0)
-    times, found, slopes = hermite(Animation(FRAMES, (base,), (base,)), MotorCurve(0, False, KNOTS, values, 0.0), False)
+    times, found, before, after = hermite(
+        Animation(FRAMES, (base,), (base,)), MotorCurve(0, False, KNOTS, values, 0.0), False
+    )
     assert np.array_equal(times, base.times) and np.allclose(found, base.values)
-    assert np.allclose(slopes, curve_of(base, 2.0, False)(times, 1))
+    assert np.allclose(after, curve_of(base, 2.0, False)(times, 1)) and np.array_equal(before, after)

@@ -11,7 +11,7 @@ import numpy as np
 from ...errors import raise_all
 from ...shot import Animation, Character, MotorTracks, MovingFrame, Provenance, Track
 from .. import stages
-from ..clock import Clock, clock_of
+from ..clock import Clock, clock_of, still_clock
 from ..units import units_of
 from .character import Skeleton, build_character, read_skeleton
 from .context import Reading, is_rigid_body, prims_of
@@ -117,8 +117,7 @@ def shot_clock(stage, given: MotorTracks | None) -> Clock:
             elif prim.IsA(UsdSkel.Animation):
                 codes += prim.GetAttribute("rotations").GetTimeSamples()
     if not codes:
-        start = float(stage.GetStartTimeCode())
-        return Clock(start, start, float(stage.GetTimeCodesPerSecond()), float(stage.GetFramesPerSecond()))
+        return still_clock(stage)
     return clock_of(stage, np.array(codes, dtype=np.float64))
 
 
@@ -131,7 +130,7 @@ def motor_tracks(
         reading: The stage that is asked; problems and notes are kept in it.
         result: Whether that stage carries curves of ours: then a motor that held still may be animated.
     """
-    stage, notes = reading.stage, reading.notes
+    stage = reading.stage
     found: dict[str, Track] = {}
     posed = [d for d in drives if d.source == BODIES or (d.source == HELD and d.held is None)]
     bodies = [drive.joint for drive in posed]
@@ -148,7 +147,7 @@ def motor_tracks(
         attribute = drive.attribute(stage)
         with reading.going_on():
             if drive.source == DRIVE or (result and attribute and len(sample_codes(attribute))):
-                found[path] = read_track(attribute, clock, notes, unit)
+                found[path] = read_track(attribute, clock, reading, unit)
             elif drive.source == GIVEN and given is not None:
                 found[path] = given_track(given, drive.joint)
             elif drive.source == HELD and drive.held is not None:
@@ -156,7 +155,7 @@ def motor_tracks(
     for drive in drives:
         if drive.gear is not None and drive.gear.leader in found:
             led = found[drive.gear.leader]
-            found[drive.joint.path] = Track(led.times, drive.gear.offset + drive.gear.ratio * led.values)
+            found[drive.joint.path] = Track(led.times, drive.gear.offset + drive.gear.ratio * led.values, led.corners)
     return tuple(found[drive.joint.path] for drive in drives if drive.joint.path in found)
 
 

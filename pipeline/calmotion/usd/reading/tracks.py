@@ -8,6 +8,8 @@ from ...errors import ShotError
 from ...shot import Track
 from ...shot.character import Array
 from ..clock import Clock
+from .context import Reading
+from .splines import read_spline, value_at
 
 MOST = 1_000_000  # samples of one motor
 _CLOSE = 1e-4  # samples closer than this share of a frame are at one time
@@ -21,35 +23,32 @@ def sample_codes(attribute) -> Array:
     return np.array(codes, dtype=np.float64)
 
 
-def read_track(attribute, clock: Clock, notes: list[str], to_si: float) -> Track:
+def read_track(attribute, clock: Clock, reading: Reading, to_si: float) -> Track:
     """The track of a motor.
 
     Samples are taken where they are, also outside the shot. Where they begin after the first frame or end
-    before the last, USD holds the value, so frames with that value are added. A spline is evaluated at its knots and
-    at the frames. A constant gives two equal samples.
+    before the last, USD holds the value, so frames with that value are added. For splines see `read_spline`. A
+    constant gives two equal samples.
 
     Args:
         attribute: The drive's target position, degrees or stage length.
         clock: The clock of the shot.
-        notes: Sentences for the user are added here.
+        reading: Notes and doubts for the user are kept in it.
         to_si: Radians, or metres, in its unit.
 
     Raises:
-        ShotError: A sample that is blocked, not a number or not finite.
+        ShotError: A sample that is blocked, not a number or not finite, or too many of them.
     """
-    path = attribute.GetPath()
+    path, notes = attribute.GetPath(), reading.notes
     frames = clock.time_codes(clock.frame_times())
     _refuse_too_many(attribute)
     codes = np.array(attribute.GetTimeSamples(), dtype=np.float64)
     if len(codes) == 0 and attribute.HasSpline():
-        notes.append(f"{path}: the spline is read at its knots and at the frames of the shot, and smooth between them")
-        knots = np.array(list(attribute.GetSpline().GetKnots().keys()), dtype=np.float64)
-        # at these a C2 one is read back exactly
-        codes = clock.merged(knots[(knots > frames[0]) & (knots < frames[-1])])
-    elif len(codes) == 0:
+        return read_spline(attribute, clock, reading, to_si)
+    if len(codes) == 0:
         codes = frames[[0, -1]]
     codes = _apart(codes, clock, path, notes)
-    values = np.array([_value(attribute, code) for code in codes])
+    values = np.array([value_at(attribute, code) for code in codes])
     held = (frames < codes[0] - 1e-9, frames > codes[-1] + 1e-9)
     if len(attribute.GetTimeSamples()) > 0 and (held[0].any() or held[1].any()):
         notes.append(f"{path}: its samples do not span the shot; the first and last value are held, as USD does")
@@ -80,20 +79,3 @@ def _apart(codes: Array, clock: Clock, path, notes: list[str]) -> Array:
             f"time code {codes[follows][0]:.9g})"
         )
     return codes[~follows]
-
-
-def _value(attribute, code: float) -> float:
-    value = attribute.Get(code)
-    try:
-        number = float(value)
-    except (TypeError, ValueError):
-        number = np.nan
-    if not np.isfinite(number):
-        raise ShotError(
-            "a sample of the animation is not a finite number",
-            path=attribute.GetPrimPath(),
-            attribute=attribute.GetName(),
-            found=f"{'a block' if value is None else value} at time code {code:g}",
-            remedy="Correct or remove the sample",
-        )
-    return number

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from ...shot import Character, Motor, MotorCurve, Track
+from ...shot import Animation, Character, Motor, MotorCurve
 from ...shot.character import Array
 from ..clock import Clock
 from ..schemas import is_applied
@@ -27,26 +27,25 @@ def sample_times(frame_times: Array, samples_per_second: float | None) -> Array:
     return frame_times[0] + steps * (frame / parts)
 
 
-def curve_values(curve: MotorCurve, frame_times: Array, times: Array, cyclic: bool = False) -> Array:
-    """A motor's curve [rad or m] at times within the shot, by the rule with which samples at frames are read back."""
-    if times is frame_times:
+def curve_values(animation: Animation, curve: MotorCurve, times: Array, cyclic: bool) -> Array:
+    """A motor's curve [rad or m] at times within the shot."""
+    if times is animation.frame_times:
         return curve.frame_values
-    from ...retarget.curves import curve_of
+    from ...retarget.commanded import optimized_curve
 
-    return curve_of(Track(frame_times, curve.frame_values), float(frame_times[-1]), cyclic)(times, 0)
+    return optimized_curve(animation, curve, cyclic)(times, 0)
 
 
 def author_curves(
-    layer, character: Character, curves: tuple[MotorCurve, ...], frame_times: Array, times: Array, clock: Clock,
+    layer, character: Character, animation: Animation, curves: tuple[MotorCurve, ...], times: Array, clock: Clock,
     meters: float,
 ) -> dict[str, int]:  # fmt: skip
     """Author each curve as an over with time samples, degrees or stage length.
 
     Args:
         layer: The Sdf.Layer.
-        character: The character.
+        character, animation: The shot.
         curves: Those to write.
-        frame_times: Frames of the shot [s], shape [f].
         times: Times of the samples [s].
         clock: The clock of the shot.
         meters: Metres in the stage's unit of length.
@@ -63,7 +62,7 @@ def author_curves(
         path = f"{motor.path}.{motor.attribute}"
         spec = attribute_spec(layer, path, Sdf.ValueTypeNames.Float)
         unit = meters if motor.linear else np.deg2rad(1.0)
-        values = curve_values(curve, frame_times, times, character.retarget.cyclic)
+        values = curve_values(animation, curve, times, character.retarget.cyclic)
         for code, value in zip(codes, values / unit, strict=True):
             layer.SetTimeSample(spec.path, float(code), float(value))
         written[path] = len(codes)

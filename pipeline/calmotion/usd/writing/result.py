@@ -149,12 +149,12 @@ def _write_curves(layer, shot: _Shot, result: Result, options: WriteOptions) -> 
         )
     ensure_drives(layer, shot.stage, [character.motors[curve.motor] for curve in curves["drive"]])
     times = sample_times(animation.frame_times, options.samples_per_second)
-    written: dict[str, int] = {}
-    knots: dict[str, int] = {}
-    if options.splines:
-        knots = author_splines(layer, character, animation, curves["drive"], clock, shot.meters)
-    else:
-        written = author_curves(layer, character, curves["drive"], animation.frame_times, times, clock, shot.meters)
+    # what was authored with corners keeps them: samples would be read back without
+    cornered = tuple(curve for curve in curves["drive"] if len(animation.tracks[curve.motor].corners))
+    splines = curves["drive"] if options.splines else cornered
+    knots = author_splines(layer, character, animation, splines, clock, shot.meters)
+    samples = tuple(curve for curve in curves["drive"] if curve not in splines)
+    written = author_curves(layer, character, animation, samples, times, clock, shot.meters)
     if curves["skeleton"]:
         written |= author_skeletons(layer, shot.stage, character, animation, curves["skeleton"], times, clock)
     if curves["bodies"] and options.bake != "motors":

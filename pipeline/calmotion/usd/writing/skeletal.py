@@ -51,7 +51,7 @@ def author_skeletons(
             old[:, k] = curve_of(track, float(animation.frame_times[-1]), character.retarget.cyclic)(times, 0)
             new[:, k] = old[:, k]
             if path in changed:
-                new[:, k] = curve_values(changed[path], animation.frame_times, times, character.retarget.cyclic)
+                new[:, k] = curve_values(animation, changed[path], times, character.retarget.cyclic)
         change = stack.turned(new) @ np.swapaxes(stack.turned(old), 1, 2)
         codes = clock.time_codes(times)
         rotations = change @ stack.skeleton.local_rotations(stack.joint, codes)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...shot import Animation, Character, MotorCurve, Track
+from ...shot import Animation, Character, MotorCurve
 from ...shot.character import Array
 from ..clock import Clock
 from .curves import attribute_spec
@@ -12,22 +12,23 @@ from .curves import attribute_spec
 SAME = 1e-9  # times that are closer are one [s]
 
 
-def hermite(animation: Animation, curve: MotorCurve, cyclic: bool) -> tuple[Array, Array, Array]:
-    """A motor's curve as a cubic between knots: times [s], values [rad or m] and slopes, shape [n] each.
+def hermite(animation: Animation, curve: MotorCurve, cyclic: bool) -> tuple[Array, Array, Array, Array]:
+    """A motor's curve as a cubic between knots: times [s], values [rad or m], and slopes before and after each, which
+    differ at corners; shape [n] each.
 
     Knots are where the animation has samples and where the offset has knots; between them both are cubics.
     """
-    from ...retarget.curves import curve_of
+    from ...retarget.commanded import optimized_curve
 
-    frames, track = animation.frame_times, animation.tracks[curve.motor]
-    end = float(frames[-1])
-    base = curve_of(track, end, cyclic)
-    # frames hold the offset exactly, as its knots lie on them
-    offset = curve_of(Track(frames, curve.frame_values - base(frames, 0)), end, cyclic)
+    track, end = animation.tracks[curve.motor], float(animation.frame_times[-1])
+    whole = optimized_curve(animation, curve, cyclic)
     inner = track.times[(track.times > SAME) & (track.times < end - SAME)]
     times = np.unique(np.concatenate([[0.0, end], inner, curve.knots if curve.changed else []]))
     times = times[np.concatenate([[True], np.diff(times) > SAME])]
-    return times, base(times, 0) + offset(times, 0), base(times, 1) + offset(times, 1)
+    after = whole(times, 1)
+    corner = np.isclose(times[:, None], track.corners, rtol=0.0, atol=SAME).any(axis=1)
+    before = np.where(corner, whole(times - 0.1 * SAME, 1), after)
+    return times, whole(times, 0), before, after
 
 
 def author_splines(
@@ -50,10 +51,10 @@ def author_splines(
     written = {}
     for curve in curves:
         motor, cyclic = character.motors[curve.motor], character.retarget.cyclic
-        times, values, slopes = hermite(animation, curve, cyclic)
+        times, values, before, after = hermite(animation, curve, cyclic)
         unit = meters if motor.linear else np.deg2rad(1.0)
-        # slopes of a spline are by time code
-        spline = bezier(clock.time_codes(times), values / unit, slopes / (unit * clock.time_codes_per_second), "float")
+        slope = unit * clock.time_codes_per_second  # those of a spline are by time code
+        spline = bezier(clock.time_codes(times), values / unit, before / slope, after / slope, "float")
         if cyclic:
             forever = Ts.Extrapolation(Ts.ExtrapLoopRepeat)
             spline.SetPreExtrapolation(forever)
@@ -64,12 +65,13 @@ def author_splines(
     return written
 
 
-def bezier(times: Array, values: Array, slopes: Array, kind: str):
+def bezier(times: Array, values: Array, before: Array, after: Array, kind: str):
     """A Ts.Spline that is the cubic Hermite interpolant: tangents as long as a third of their interval.
 
     Args:
         times: Time codes, ascending, shape [n].
-        values, slopes: Values and their derivatives by time code.
+        values: Shape [n].
+        before, after: Derivatives by time code on either side of each, shape [n].
         kind: Type of its values, that of the attribute.
     """
     from pxr import Ts
@@ -83,9 +85,9 @@ def bezier(times: Array, values: Array, slopes: Array, kind: str):
         knot.SetNextInterpolation(Ts.InterpCurve)
         if k > 0:
             knot.SetPreTanWidth(float(width[k - 1]))
-            knot.SetPreTanSlope(float(slopes[k]))
+            knot.SetPreTanSlope(float(before[k]))
         if k < len(times) - 1:
             knot.SetPostTanWidth(float(width[k]))
-            knot.SetPostTanSlope(float(slopes[k]))
+            knot.SetPostTanSlope(float(after[k]))
         spline.SetKnot(knot)
     return spline
