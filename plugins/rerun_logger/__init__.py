@@ -43,6 +43,7 @@ class LogRecording(Operator):
             context.get(Result),
             samples_per_plot=context.properties.samples_per_plot,
             progress=context.progress,
+            operators=context.results,
         )
         return (Recording(path),)
 

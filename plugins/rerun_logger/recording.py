@@ -7,12 +7,13 @@ from __future__ import annotations
 
 import contextlib
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
 import rerun as rr
 from calmotion.errors import ShotError
+from calmotion.host import OperatorResult
 from calmotion.naming import distinct_names
 from calmotion.shot import Animation, Character, Motion, Result, Simulation, SurfaceMesh
 from calmotion.shot.character import Array
@@ -37,6 +38,7 @@ def write_recording(
     *,
     samples_per_plot: int = 2000,
     progress: Progress = lambda fraction, message: None,
+    operators: Sequence[OperatorResult] = (),
 ) -> None:
     """Write a .rrd file, whole or not at all.
 
@@ -50,6 +52,7 @@ def write_recording(
         result: Of `simulate` (then nothing is logged as optimised) or of `optimize`.
         samples_per_plot: Largest number of samples of a curve.
         progress: Called with a fraction in 0..1 and a message.
+        operators: What became of the operators of the run so far.
 
     Raises:
         ShotError: When the file cannot be written.
@@ -60,6 +63,8 @@ def write_recording(
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
         recording.save(str(partial), default_blueprint=make_blueprint(character, animation, result))
+        summary = rr.TextDocument(describe(character, result, operators), media_type="text/markdown")
+        recording.log("summary", summary, static=True)
         log_all(recording, character, animation, result, samples_per_plot, progress)
         recording.flush()
         recording.disconnect()
@@ -85,7 +90,6 @@ def log_all(
     progress: Progress,
 ) -> None:
     """Everything, in the order of the entity tree."""
-    recording.log("summary", rr.TextDocument(describe(character, result), media_type="text/markdown"), static=True)
     motions = {INPUT: result.before.motion, REFERENCE: result.reference}
     if result.after is not None:
         motions[OPTIMIZED] = result.after.motion

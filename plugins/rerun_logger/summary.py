@@ -2,21 +2,30 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
+from calmotion.host import OperatorResult
 from calmotion.naming import distinct_names
 from calmotion.shot import Character, Result, Simulation
 
 HEAD = "| target | largest before | largest after | rms before | rms after |\n|---|---:|---:|---:|---:|"
 
 
-def describe(character: Character, result: Result) -> str:
-    """The summary as Markdown; positions in mm, rotations in degrees."""
+def describe(character: Character, result: Result, operators: Sequence[OperatorResult] = ()) -> str:
+    """The summary as Markdown; positions in mm, rotations in degrees.
+
+    Args:
+        operators: What became of the operators of the run so far.
+    """
     parts = [f"# {character.path}", errors_table(character, result), sizes(character, result)]
     parts.append(left_out(result))
     if character.notes:
         parts.append("## Notes on the shot\n" + "\n".join(f"- {note}" for note in character.notes))
     if result.steps:
         parts.append(progress_table(result))
+    if operators:
+        parts.append(operators_table(operators))
     return "\n\n".join(parts) + "\n"
 
 
@@ -75,6 +84,15 @@ def left_out(result: Result) -> str:
         cost = "none" if item.estimated_error_m is None else f"{1e3 * item.estimated_error_m:.3g} mm"
         rows.append(f"| {item.what} | {item.why} | {cost} |")
     return "## Left out\n" + "\n".join(rows)
+
+
+def operators_table(operators: Sequence[OperatorResult]) -> str:
+    """What ran, what did not and why, and how long each took."""
+    rows = ["| operator | plugin | outcome | time | why |", "|---|---|---|---:|---|"]
+    for step in operators:
+        time = f"{step.duration:.2f} s" if step.duration else ""
+        rows.append(f"| `{step.idname}` | {step.plugin} | {step.outcome} | {time} | {step.reason} |")
+    return "## Run\n" + "\n".join(rows)
 
 
 def progress_table(result: Result) -> str:

@@ -215,3 +215,23 @@ def test_writing_a_recording_leaves_no_trace_in_the_home_folder(tmp_path):
         [sys.executable, "-c", code, *folders, str(tmp_path / "out.rrd")], env=environment, check=True, timeout=120
     )
     assert (tmp_path / "out.rrd").is_file() and not list(home.rglob("*rerun*"))
+
+
+def test_the_summary_tells_what_ran_and_what_did_not(tmp_path):
+    from calmotion.host import OperatorResult, Outcome
+
+    steps = (
+        OperatorResult("usd.read", "Read the shot", "usd_reader", Outcome.DONE, duration=1.25, progress=1.0),
+        OperatorResult("fe.mesh", "Mesh", "fe_mesher", Outcome.LEFT_OUT, reason="no body is flexible"),
+    )
+    module = host_with(PLUGIN).plugin("rerun_logger").module
+    recording = __import__(f"{module.__name__}.recording", fromlist=["write_recording"])
+    path = str(tmp_path / "run.rrd")
+    recording.write_recording(
+        path, synthetic.character(), synthetic.animation(), synthetic.result(), operators=steps
+    )
+    text = str(
+        next(value for (entity, _), (_, value) in read(path).items() if entity == "/summary" and "## Run" in str(value))
+    )
+    assert "| `usd.read` | usd_reader | done | 1.25 s |  |" in text
+    assert "| `fe.mesh` | fe_mesher | left out |  | no body is flexible |" in text

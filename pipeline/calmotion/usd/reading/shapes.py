@@ -172,7 +172,7 @@ def mesh_geometry(prim, time: float) -> tuple[Array, IntArray]:
     points = finite_points(prim, time)
     counts = gf.indices(prim.GetAttribute("faceVertexCounts").Get(time))
     corners = gf.indices(prim.GetAttribute("faceVertexIndices").Get(time))
-    if int(counts.sum()) != len(corners):
+    if int(counts.min(initial=0)) < 0 or int(counts.sum()) != len(corners):
         raise ShotError(
             "the faces use another number of corners than there are",
             path=prim.GetPath(),
