@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import math
-import os
-import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 from calmotion.errors import ShotError
+from calmotion.files import write_whole
 from calmotion.retarget.commanded import commanded_values
 from calmotion.shot import Animation, Character, Motor, Provenance, Result
 
@@ -40,7 +39,7 @@ def write_table(
         ",".join([f"{time:.9g}", *(f"{value:.12g}" for value in row)])
         for time, row in zip(times, values * units, strict=True)
     ]
-    _write(Path(file), "\n".join(lines) + "\n")
+    _write(file, "\n".join(lines) + "\n")
     return len(times)
 
 
@@ -67,23 +66,14 @@ def _limits(motor: Motor, character: Character, angle: str) -> str:
     return ", ".join(f"{name} {value:.9g} {u}" for name, value, u in shown if math.isfinite(value)) or "none"
 
 
-def _write(target: Path, text: str) -> None:
-    temporary = ""
+def _write(target: str, text: str) -> None:
     try:
-        target.parent.mkdir(parents=True, exist_ok=True)
-        handle, temporary = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}.")
-        with os.fdopen(handle, "w", encoding="utf-8") as stream:
-            stream.write(text)
-        os.replace(temporary, target)
-        temporary = ""
+        write_whole(target, text)
     except OSError as error:
         raise ShotError(
             "the curves cannot be written",
-            path=str(target),
+            path=target,
             attribute="curves.export.file",
             found=error.strerror,
             remedy="Choose another file",
         ) from error
-    finally:
-        if temporary and os.path.exists(temporary):
-            os.unlink(temporary)

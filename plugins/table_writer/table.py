@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import csv
-import os
-import tempfile
+import io
 from collections.abc import Mapping
-from pathlib import Path
 
 import numpy as np
 from calmotion.errors import ShotError
+from calmotion.files import write_whole
 from calmotion.shot import Character, Result
 from calmotion.shot.character import Array
 
@@ -55,26 +54,13 @@ def write_table(path: str, table: Mapping[str, Array]) -> None:
     Raises:
         ShotError: When the file cannot be written.
     """
-    values = np.column_stack(list(table.values()))
-    target = Path(path)
-    temporary = ""
+    text = io.StringIO(newline="")
+    writer = csv.writer(text)
+    writer.writerow(table)
+    writer.writerows([f"{value:.12g}" for value in row] for row in np.column_stack(list(table.values())))
     try:
-        handle, temporary = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}.", suffix=".tmp")
-        with os.fdopen(handle, "w", newline="", encoding="utf-8") as file:
-            writer = csv.writer(file)
-            writer.writerow(table)
-            writer.writerows([f"{value:.12g}" for value in row] for row in values)
-            file.flush()
-            os.fsync(file.fileno())
-        # mkstemp makes files that only the owner reads; a table is as public as any other new file.
-        umask = os.umask(0)
-        os.umask(umask)
-        os.chmod(temporary, 0o666 & ~umask)
-        os.replace(temporary, target)
+        write_whole(path, text.getvalue())
     except OSError as error:
         raise ShotError(
             "the table cannot be written", path=path, found=error.strerror, remedy="Choose another file for --csv."
         ) from error
-    finally:
-        if temporary and os.path.exists(temporary):
-            os.unlink(temporary)

@@ -65,7 +65,8 @@ def test_a_table_is_replaced_whole_and_readable_like_any_new_file(host, tmp_path
 
 
 def test_a_table_that_cannot_be_written_is_refused_by_name(host, tmp_path):
-    path = tmp_path / "absent" / "table.csv"
+    (tmp_path / "taken").write_text("a file where a folder should be")
+    path = tmp_path / "taken" / "table.csv"
     with pytest.raises(ShotError) as refused:
         written(host, path, synthetic.result())
     assert refused.value.path == str(path) and "--csv" in refused.value.remedy

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import os
 import sys
-import tempfile
 import tomllib
 from collections.abc import Mapping
 from pathlib import Path
 
+from ..files import write_whole
 from .errors import SettingError
 
 FOLDER_VARIABLE = "CALMOTION_CONFIG"
@@ -63,15 +63,9 @@ def choose(plugin_id: str, enabled: bool, environment: Mapping[str, str] | None 
     kept = kept - {plugin_id} if enabled else kept | {plugin_id}
     file = configuration_folder(environment) / FILE_NAME
     names = ", ".join(f'"{name}"' for name in sorted(kept))
-    temporary = ""
+    head = "# Plugins that are not loaded; `calmotion plugins enable ID` takes one off the list.\n"
     try:
-        file.parent.mkdir(parents=True, exist_ok=True)
-        handle, temporary = tempfile.mkstemp(dir=file.parent, prefix=f".{FILE_NAME}.")
-        with os.fdopen(handle, "w", encoding="utf-8") as stream:
-            stream.write("# Plugins that are not loaded; `calmotion plugins enable ID` takes one off the list.\n")
-            stream.write(f"disabled = [{names}]\n")
-        os.replace(temporary, file)
-        temporary = ""
+        write_whole(file, f"{head}disabled = [{names}]\n")
     except OSError as error:
         raise SettingError(
             "the choice of plugins cannot be kept",
@@ -79,7 +73,4 @@ def choose(plugin_id: str, enabled: bool, environment: Mapping[str, str] | None 
             found=error.strerror,
             remedy=f"Make the folder writable, or name another with {FOLDER_VARIABLE}.",
         ) from error
-    finally:
-        if temporary and os.path.exists(temporary):
-            os.unlink(temporary)
     return file

@@ -8,7 +8,7 @@ from calmotion import ShotError
 from calmotion.usd.reading import read_shot
 from performing import worst_gap
 from posed_shots import pose, posed, posed_by_pivots, still_drives
-from pxr import Gf, UsdGeom
+from pxr import Gf, UsdGeom, UsdPhysics
 from small_shots import ELBOW, FORE, FRAMES, SHOULDER, TARGET_POSITION, UPPER, Scale, angles, write_arm
 
 FRAME = np.arange(FRAMES + 1)
@@ -129,3 +129,26 @@ def test_a_character_that_nothing_animates_is_read_where_that_is_allowed(tmp_pat
         read_shot(path)
     character, animation, _ = read_shot(path, still=True)
     assert len(character.motors) == 2 and all(np.ptp(track.values) < 1e-9 for track in animation.tracks)
+
+
+def test_a_length_follows_from_bodies_that_slide(tmp_path):
+    lift = 0.05 * (1.0 - np.cos(2.0 * np.pi * FRAME / FRAMES))
+
+    def edit(stage):
+        stage.RemovePrim(ELBOW)
+        joint = UsdPhysics.PrismaticJoint.Define(stage, ELBOW)
+        joint.CreateBody0Rel().SetTargets([UPPER])
+        joint.CreateBody1Rel().SetTargets([FORE])
+        joint.CreateAxisAttr("X")
+        joint.CreateLocalPos0Attr(Gf.Vec3f(40.0, 0, 0))  # of a shot in centimetres
+        UsdPhysics.DriveAPI.Apply(joint.GetPrim(), "linear")
+        stage.GetPrimAtPath(SHOULDER).GetAttribute(TARGET_POSITION).Clear()
+        op = UsdGeom.Xformable(stage.GetPrimAtPath(FORE)).GetOrderedXformOps()[0]
+        for frame in range(FRAMES + 1):
+            op.Set(Gf.Vec3d(40.0 + 100.0 * lift[frame], 0, 100.0), frame)
+
+    path, character, animation = read(tmp_path, edit, Scale(0.01, 1.0))
+    (motor,) = (motor for motor in character.motors if motor.linear)
+    assert motor.source == "bodies" and motor.path == ELBOW
+    assert np.abs(animation.tracks[character.motors.index(motor)].values - lift).max() < 1e-9
+    assert max(worst_gap(path, character, animation)) < 1e-6

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import os
 
 import numpy as np
 import pytest
@@ -11,7 +12,7 @@ from calmotion.usd.reading import read_shot
 from calmotion.usd.writing import WriteOptions, write_result
 from performing import result_with, tracks_of, worst_gap
 from posed_shots import ANIMATION, ARM, FOREARM, posed, posed_by_pivots, skeletal
-from pxr import Sdf, Usd, UsdSkel
+from pxr import Sdf, Usd, UsdSkel, UsdUtils
 from small_shots import ELBOW, FORE, FRAMES, SHOULDER, TARGET_POSITION, UPPER, write_arm
 
 MOTOR = {"shoulder": 0, "elbow": 1}
@@ -133,3 +134,37 @@ def test_a_motor_of_an_actuator_gets_the_drive_that_its_curve_needs(tmp_path):
 
     _, result, _, _, (_, again, _) = written(tmp_path, edit, {1: 0.1})
     assert np.abs(again.current[1].values - result.curves[1].frame_values).max() < 1e-6
+
+
+def test_a_motor_that_follows_another_is_not_written_and_follows_when_read_again(tmp_path):
+    def edit(stage):
+        stage.GetPrimAtPath(ELBOW).CreateRelationship("newton:mimicJoint").SetTargets([SHOULDER])
+
+    shot = write_arm(tmp_path / "arm.usda", edit)
+    character, animation, provenance = read_shot(str(shot))
+    result = result_with(character, animation, {0: 0.1, 1: 0.1})
+    layer, root = write_result(character, animation, provenance, result, str(tmp_path / "calm.usda"))
+    assert properties(layer) == [f"{SHOULDER}.{TARGET_POSITION}"]
+    _, again, _ = read_shot(root)
+    assert np.abs(again.current[1].values - again.current[0].values).max() < 1e-9
+    assert np.abs(again.current[1].values - result.curves[1].frame_values).max() < 1e-6
+
+
+@pytest.mark.parametrize("edit", [None, posed, skeletal], ids=["drives", "bodies", "skeleton"])
+def test_a_package_is_written_over_like_any_shot(tmp_path, edit):
+    loose = write_arm(tmp_path / "arm.usda", edit)
+    assert UsdUtils.CreateNewUsdzPackage(str(loose), str(tmp_path / "arm.usdz"))
+    loose.unlink()
+    shot = tmp_path / "arm.usdz"
+    shot.chmod(0o444)
+    before = hashlib.sha256(shot.read_bytes()).hexdigest()
+    character, animation, provenance = read_shot(str(shot))
+    result = result_with(character, animation, {1: 0.1})
+    (tmp_path / "out").mkdir()
+    layer, root = write_result(character, animation, provenance, result, str(tmp_path / "out" / "calm.usda"))
+    assert hashlib.sha256(shot.read_bytes()).hexdigest() == before
+    opened = Sdf.Layer.FindOrOpen(root)
+    assert [os.path.basename(path) for path in opened.subLayerPaths] == ["calm.usda", "arm.usdz"]
+    _, again, _ = read_shot(root)
+    for track, curve in zip(again.current, result.curves, strict=True):
+        assert np.abs(track.values - curve.frame_values).max() < 1e-5

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -12,6 +13,7 @@ from ...errors import ShotError
 from ...shot import Follows, FreeTrack, Motor
 from .. import schemas
 from ..clock import Clock
+from ..dialects import number_of
 from ..units import StageUnits
 from .context import Reading, prims_of
 from .gearing import Gear, read_gear, resolve
@@ -273,9 +275,12 @@ def _drive(
         return Drive(joint, BODIES)
     if ours and not still:
         raise ShotError("a motor without animation", path=joint.path, attribute=name, remedy=_remedy(joint.kind))
-    if has_drive and attribute and attribute.HasAuthoredValue():
-        reading.note(f"{joint.path}: its drive is not animated and holds {attribute.Get():g} {unit}")
-        return Drive(joint, HELD, held=float(attribute.Get()) * to_si(joint.kind, reading.units))
+    held = number_of(prim, name) if has_drive else None
+    if held is not None:
+        if not math.isfinite(held):
+            raise ShotError("is not finite", path=joint.path, attribute=name, found=held, remedy="Correct the value")
+        reading.note(f"{joint.path}: its drive is not animated and holds {held:g} {unit}")
+        return Drive(joint, HELD, held=held * to_si(joint.kind, reading.units))
     if ours or joint.path in actuated:
         what = "an actuator drives it" if joint.path in actuated else "it is a motor"
         reading.note(f"{joint.path}: {what}, nothing animates it, and it holds the pose of its bodies")

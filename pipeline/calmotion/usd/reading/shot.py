@@ -151,7 +151,8 @@ def motor_tracks(
             elif drive.source == GIVEN and given is not None:
                 found[path] = given_track(given, drive.joint)
             elif drive.source == HELD and drive.held is not None:
-                found[path] = Track(clock.seconds([clock.start, clock.end]), np.full(2, drive.held))
+                ends = np.unique([clock.start, clock.end])
+                found[path] = Track(clock.seconds(ends), np.full(len(ends), drive.held))
     for drive in drives:
         if drive.gear is not None and drive.gear.leader in found:
             led = found[drive.gear.leader]

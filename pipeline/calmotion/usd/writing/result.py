@@ -109,10 +109,12 @@ def refuse_inputs(provenance: Provenance, output: str) -> None:
         refuse_input_as_output(name, inputs)
 
 
-def _curves_to_write(result: Result, provenance: Provenance) -> tuple[MotorCurve, ...]:
-    """The curves that changed; all of them where curves of an earlier result would show through."""
+def _curves_to_write(character: Character, result: Result, provenance: Provenance) -> tuple[MotorCurve, ...]:
+    """The curves that changed, all of them where curves of an earlier result would show through; never those of motors
+    that are geared to others, which follow by themselves."""
     every = keeps_earlier_curves(provenance)
-    return tuple(curve for curve in result.curves if curve.changed or every)
+    own = (curve for curve in result.curves if character.motors[curve.motor].follows is None)
+    return tuple(curve for curve in own if curve.changed or every)
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,7 +136,7 @@ def _write_curves(layer, shot: _Shot, result: Result, options: WriteOptions) -> 
     """Author motor curves where they came from: attributes with their number of samples, and of knots."""
     character, animation, clock = shot.character, shot.animation, shot.clock
     curves: dict[str, tuple[MotorCurve, ...]] = {"drive": (), "bodies": (), "skeleton": ()}
-    for curve in _curves_to_write(result, shot.provenance):
+    for curve in _curves_to_write(character, result, shot.provenance):
         curves[character.motors[curve.motor].source] += (curve,)
     elsewhere = curves["bodies"] or curves["skeleton"]
     if elsewhere and (options.splines or (curves["bodies"] and options.samples_per_second is not None)):
