@@ -1,6 +1,9 @@
 """Every bundled plugin keeps the rules that authors of plugins are held to."""
 
 import ast
+import os
+import subprocess
+import sys
 
 import pytest
 from calmotion.testing import check_plugin
@@ -38,3 +41,13 @@ def test_plugins_from_outside_use_what_others_may_use_too(repository, name):
         for node in ast.walk(ast.parse(file.read_text())):
             if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("calmotion"):
                 assert node.module.startswith(public), f"{file.name} imports {node.module}"
+
+
+def test_registering_them_all_imports_nothing_heavy(repository):
+    code = (
+        "import sys; from calmotion.host import open_host; host = open_host(); assert not host.failures();"
+        "print(*{'scipy', 'pxr', 'rerun', 'numba', 'matplotlib', 'trimesh', 'skfem'} & set(sys.modules))"
+    )
+    environment = os.environ | {"PYTHONPATH": str(repository / "pipeline")}
+    done = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True)
+    assert done.returncode == 0 and done.stdout.strip() == "", done.stdout + done.stderr
