@@ -89,8 +89,10 @@ def simulate_shot(
     bounds = motor_bounds(character)
     used = excesses(bounds, limited_values(model, bounds, curves, run), grid.judged)
     residuals, _ = objective.residuals(run.target_positions, run.target_rotations)
+    intent = reference_motion(model, grid, reference, meant)
+    as_meant = animation.current is animation.tracks and character.retarget.reference == "rigid"
     return Result(
-        reference=reference_motion(model, grid, reference, meant),
+        reference=intent,
         before=simulation_of(model, grid, run, reference.reference, len(character.motors)),
         after=None,
         skins=skins(prepared.bodies),
@@ -110,5 +112,5 @@ def simulate_shot(
         dof=model.dof,
         left_out=tuple(left_out_rows(prepared)),
         limits=limit_uses(used, used, grid),
-        performed=performed_motion(prepared, curves),
+        performed=intent if as_meant else performed_motion(prepared, curves),
     )

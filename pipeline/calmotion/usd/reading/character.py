@@ -73,24 +73,16 @@ def read_skeleton(reading: Reading, clock: Clock, still: bool, given: Sequence[s
             path=topology.common_path(list(prims)),
             remedy="Connect the bodies with joints, and the first one with the world",
         )
-    poses: dict[str, Pose] = {}
-    for path, prim in prims.items():
-        with reading.going_on():
-            poses[path] = reading.pose(prim)
+    poses = dict(reading.each(prims, lambda path: (path, reading.pose(prims[path]))))
     raise_all(reading.problems)  # joints refer to poses
-    joints = []
-    for prim in found:
-        with reading.going_on():
-            joints += [joint for joint in [read_joint(reading, prim, poses)] if joint]
+    joints = [joint for joint in reading.each(found, lambda prim: read_joint(reading, prim, poses)) if joint]
     root = topology.common_path(list(prims))
     drives = motors.read_drives(reading, joints, root, posed_joints(reading, joints, clock), given, still)
     target_prims = targets.target_prims(reading)
     bodies = _moved(reading, list(prims), joints, drives, [body for _, body in target_prims])
     kept = set(bodies)
     joints = [j for j in joints if (j.body0 or j.body1) in kept]
-    for joint in joints:
-        with reading.going_on():
-            refuse_unsupported(joint)
+    reading.each(joints, refuse_unsupported)
     joints += _held(reading, bodies, joints, prims, poses)
     far = topology.distances(bodies, joints)
     bodies = list(far)
@@ -114,11 +106,9 @@ def build_character(reading: Reading, skeleton: Skeleton) -> Character:
     """
     numbers = {path: k for k, path in enumerate(skeleton.bodies)}
     touching = {path: [j.path for j in skeleton.joints if path in (j.body0, j.body1)] for path in skeleton.bodies}
-    found = []
-    for path in skeleton.bodies:
-        with reading.going_on():
-            found.append(_body(reading, path, skeleton.poses[path], touching[path]))
-    bodies = tuple(found)
+    bodies = tuple(
+        reading.each(skeleton.bodies, lambda path: _body(reading, path, skeleton.poses[path], touching[path]))
+    )
     joints = tuple(
         Joint(
             j.path,
@@ -134,17 +124,16 @@ def build_character(reading: Reading, skeleton: Skeleton) -> Character:
         for j in skeleton.joints
     )
     order = {id(joint): k for k, joint in enumerate(skeleton.joints)}
-    placed = []
-    for prim, body in skeleton.targets:
-        if body in numbers:
-            with reading.going_on():
-                placed.append(targets.read_target(reading, prim, numbers[body], skeleton.poses[body]))
-    chosen = tuple(placed)
-    driven = []
+    chosen = tuple(
+        reading.each(
+            [(prim, body) for prim, body in skeleton.targets if body in numbers],
+            lambda found: targets.read_target(reading, found[0], numbers[found[1]], skeleton.poses[found[1]]),
+        )
+    )
     index = {drive.joint.path: k for k, drive in enumerate(skeleton.drives)}
-    for drive in skeleton.drives:
-        with reading.going_on():
-            driven.append(motors.read_motor(drive, order[id(drive.joint)], index, reading))
+    driven = reading.each(
+        skeleton.drives, lambda drive: motors.read_motor(drive, order[id(drive.joint)], index, reading)
+    )
     root = topology.common_path(skeleton.bodies)
     gravity, settings = np.zeros(3), RetargetSettings()
     with reading.going_on():

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, TypeVar
 
 from ...errors import ShotError
 from ..gf import matrix
 from ..schemas import is_applied
 from ..transforms import Pose, pose_from_matrix, refuse_infinite
 from ..units import StageUnits
+
+T = TypeVar("T")
+R = TypeVar("R")
 
 
 @dataclass(eq=False)
@@ -56,6 +59,14 @@ class Reading:
             yield
         except ShotError as problem:
             self.problems.append(problem)
+
+    def each(self, items: Iterable[T], read: Callable[[T], R]) -> list[R]:
+        """What is read of each item, the problems of some kept and the others read all the same."""
+        found = []
+        for item in items:
+            with self.going_on():
+                found.append(read(item))
+        return found
 
     def at(self, code: float) -> Reading:
         """The same stage at another time code; what it notes is not kept."""

@@ -10,12 +10,12 @@ from typing import Any
 import numpy as np
 
 from ...errors import ShotError
-from ...shot import Follows, FreeTrack, Motor
+from ...shot import Follows, Motor
 from .. import schemas
-from ..clock import Clock
 from ..dialects import number_of
 from ..units import StageUnits
 from .context import Reading, prims_of
+from .free_ranges import may_change
 from .gearing import Gear, read_gear, resolve
 from .joints import JointPrim, refuse_unsupported
 from .motor_limits import effort_limit, own_limit, velocity_limit
@@ -26,7 +26,6 @@ LENGTH_ATTRIBUTE = "drive:linear:physics:targetPosition"
 SKEL_JOINT = "calm:motor:skelJoint"
 DRIVE, BODIES, SKELETON, HELD, GEARED, GIVEN = "drive", "bodies", "skeleton", "held", "geared", "given"
 _SCHEMA = "CalmMotorAPI"
-_FREE = "calm:motor:optimize"
 _DRIVES = {"revolute": "angular", "prismatic": "linear"}
 _UNITS = {"angular": "degrees", "linear": "units of length"}
 _WRITTEN_AS = {BODIES: "xformOpOrder", SKELETON: SKEL_JOINT}
@@ -211,38 +210,13 @@ def read_motor(drive: Drive, index: int, motors: dict[str, int], reading: Readin
         path=drive.joint.path,
         attribute=_WRITTEN_AS.get(drive.source, target_attribute(drive.joint.kind)),
         source=drive.source if drive.source in _WRITTEN_AS else DRIVE,
-        optimize=_may_change(prim),
+        optimize=may_change(prim),
         max_velocity=velocity_limit(drive.joint, kind, reading.units, reading.notes),
         max_acceleration=float(from_stage(own_limit(prim, "calm:motor:maxAcceleration"))),
         max_torque=effort_limit(drive.joint, kind, reading.units, reading.notes),
         linear=linear,
         follows=None if gear is None else Follows(motors[gear.leader], gear.ratio, gear.offset),
     )
-
-
-def _may_change(prim) -> bool:
-    """Whether a motor may be changed at all."""
-    samples = _free_samples(prim)
-    return any(value for _, value in samples) if samples else bool(schemas.value(prim, _SCHEMA, _FREE))
-
-
-def _free_samples(prim) -> list[tuple[float, bool]]:
-    attribute = prim.GetAttribute(_FREE)
-    if not attribute or not schemas.is_applied(prim, _SCHEMA):
-        return []
-    return [(code, bool(attribute.Get(code))) for code in attribute.GetTimeSamples()]
-
-
-def free_tracks(stage, motors: Sequence[Motor], clock: Clock) -> tuple[FreeTrack, ...]:
-    """When motors may be changed, of those for which the shot animates calm:motor:optimize: each sample holds until
-    the next."""
-    found = []
-    for index, motor in enumerate(motors):
-        samples = _free_samples(stage.GetPrimAtPath(motor.path))
-        if len({value for _, value in samples}) > 1:
-            codes, values = zip(*samples, strict=True)
-            found.append(FreeTrack(index, clock.seconds(np.array(codes, dtype=np.float64)), np.array(values, bool)))
-    return tuple(found)
 
 
 def _drive(

@@ -15,9 +15,10 @@ from ..clock import Clock, clock_of, still_clock
 from ..units import units_of
 from .character import Skeleton, build_character, read_skeleton
 from .context import Reading, is_rigid_body, prims_of
+from .free_ranges import free_tracks
 from .given_tracks import given_joints, given_track
 from .joints import joint_prims
-from .motors import ATTRIBUTE, BODIES, DRIVE, GIVEN, HELD, LENGTH_ATTRIBUTE, Drive, free_tracks, to_si
+from .motors import ATTRIBUTE, BODIES, DRIVE, GIVEN, HELD, LENGTH_ATTRIBUTE, Drive, to_si
 from .posed_motors import joint_motions, pose_codes, posed_track
 from .provenance import provenance_of
 from .roots import moving_frames
