@@ -1,33 +1,32 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Bringing an optimised animation back: the rotations of the bones that changed, as keys of a new action."""
+"""Bringing an optimised animation back: what changed of bones or objects, as keys of new actions."""
 
 from __future__ import annotations
 
 import math
+import re
 from pathlib import Path
 
 import bpy
 from mathutils import Matrix, Quaternion
 
-CHANGED = 2e-5  # a bone whose rotation differs by less is as it was [rad]
+CHANGED = 2e-5  # what differs by less is as it was [rad or m]
 _PATHS = {"QUATERNION": "rotation_quaternion", "AXIS_ANGLE": "rotation_axis_angle"}
 
 
-def bring_back(
-    context: bpy.types.Context, armature: bpy.types.Object, root: Path
-) -> tuple[bpy.types.Action, list[str]]:
-    """Put the animation of a USD layer onto an armature.
+def bring_back(context: bpy.types.Context, character: bpy.types.Object, root: Path) -> list[str]:
+    """Put the animation of a USD layer onto a character.
 
-    The action that it had is kept, and copied; in the copy, the curves of the bones that changed are replaced.
+    Actions that it had are kept, and copied; in the copies, the curves of what changed are replaced.
 
     Args:
         root: Layer that opens the result with its shot.
 
     Returns:
-        The new action, and the names of the bones that changed.
+        The names of the bones or objects that changed.
 
     Raises:
-        RuntimeError: The layer holds no armature with these bones.
+        RuntimeError: The layer does not hold this character.
     """
     scene, frame = context.scene, context.scene.frame_current
     before, names = set(bpy.data.objects), {kind: set(getattr(bpy.data, kind)) for kind in _KINDS}
@@ -37,20 +36,73 @@ def bring_back(
     )  # fmt: skip
     imported = [obj for obj in bpy.data.objects if obj not in before]
     try:
-        source = _matching(imported, armature)
         frames = range(scene.frame_start, scene.frame_end + 1)
-        new: dict[str, list[Quaternion]] = {bone.name: [] for bone in armature.pose.bones}
-        old: dict[str, list[Quaternion]] = {bone.name: [] for bone in armature.pose.bones}
-        for number in frames:
-            scene.frame_set(number)
-            for bone in armature.pose.bones:
-                new[bone.name].append(_basis(armature, source, bone.name).to_quaternion())
-                old[bone.name].append(_basis(armature, armature, bone.name).to_quaternion())
-        changed = [name for name in new if max(map(_apart, old[name], new[name])) > CHANGED]
-        return _key(armature, {name: new[name] for name in changed}, frames), changed
+        put = _put_on_bones if character.type == "ARMATURE" else _put_on_objects
+        return put(context, character, imported, frames)
     finally:
         _remove(imported, names)
         scene.frame_set(frame)
+
+
+def _put_on_bones(
+    context: bpy.types.Context, armature: bpy.types.Object, imported: list[bpy.types.Object], frames: range
+) -> list[str]:
+    source = _matching(imported, armature)
+    new: dict[str, list[Quaternion]] = {bone.name: [] for bone in armature.pose.bones}
+    old: dict[str, list[Quaternion]] = {bone.name: [] for bone in armature.pose.bones}
+    for number in frames:
+        context.scene.frame_set(number)
+        for bone in armature.pose.bones:
+            new[bone.name].append(_basis(armature, source, bone.name).to_quaternion())
+            old[bone.name].append(_basis(armature, armature, bone.name).to_quaternion())
+    changed = [name for name in new if max(map(_apart, old[name], new[name])) > CHANGED]
+    data, action = _copied_action(armature)
+    for name in changed:
+        bone = armature.pose.bones[name]
+        _key_rotations(bone, data, action, bone.path_from_id(), new[name], frames)
+    return changed
+
+
+def _put_on_objects(
+    context: bpy.types.Context, top: bpy.types.Object, imported: list[bpy.types.Object], frames: range
+) -> list[str]:
+    """Transforms come in by a cache, so they are looked up frame by frame."""
+    parts = [top, *top.children_recursive]
+    sources = {_exported_name(re.sub(r"\.\d{3}$", "", obj.name)): obj for obj in imported}
+    pairs = [(part, sources[_exported_name(part.name)]) for part in parts if _exported_name(part.name) in sources]
+    if not pairs:
+        raise RuntimeError("the optimised layer holds none of the objects of this character")
+    new: dict[str, list[Matrix]] = {part.name: [] for part, _ in pairs}
+    old: dict[str, list[Matrix]] = {part.name: [] for part, _ in pairs}
+    for number in frames:
+        context.scene.frame_set(number)
+        graph = context.evaluated_depsgraph_get()
+        worlds = {part.name: source.evaluated_get(graph).matrix_world.copy() for part, source in pairs}
+        for part, _ in pairs:
+            above = part.parent.matrix_world if part.parent else Matrix()
+            meant = worlds.get(part.parent.name, above) if part.parent else above
+            new[part.name].append((meant @ part.matrix_parent_inverse).inverted() @ worlds[part.name])
+            old[part.name].append(part.matrix_basis.copy())
+    changed = [name for name in new if any(_differ(a, b) for a, b in zip(old[name], new[name], strict=True))]
+    for name in changed:
+        part = bpy.data.objects[name]
+        data, action = _copied_action(part)
+        _key_rotations(part, data, action, "", [matrix.to_quaternion() for matrix in new[name]], frames)
+        _forget(action, data, "location")
+        for number, matrix in zip(frames, new[name], strict=True):
+            part.location = matrix.to_translation()
+            part.keyframe_insert("location", frame=number)
+    return changed
+
+
+def _exported_name(name: str) -> str:
+    """The name of an object as USD has it."""
+    return re.sub(r"\W", "_", name)
+
+
+def _differ(one: Matrix, other: Matrix) -> bool:
+    far = (one.to_translation() - other.to_translation()).length
+    return far > CHANGED or _apart(one.to_quaternion(), other.to_quaternion()) > CHANGED
 
 
 _KINDS = ("armatures", "actions", "meshes", "materials")
@@ -79,31 +131,40 @@ def _apart(one: Quaternion, other: Quaternion) -> float:
     return 2.0 * math.atan2(math.sqrt(sum(c * c for c in difference[1:])), abs(difference[0]))
 
 
-def _key(armature: bpy.types.Object, rotations: dict[str, list[Quaternion]], frames: range) -> bpy.types.Action:
-    """A copy of the armature's action in which bones have these rotations."""
-    data = armature.animation_data or armature.animation_data_create()
+def _copied_action(obj: bpy.types.Object) -> tuple[bpy.types.AnimData, bpy.types.Action]:
+    """A copy of an object's action, which takes its place; a new one where it had none."""
+    data = obj.animation_data or obj.animation_data_create()
     slot = getattr(getattr(data, "action_slot", None), "identifier", None)
     if data.action is not None:
         action = data.action.copy()
         action.name = f"{data.action.name}_calm"
+        data.action.use_fake_user = True
     else:
-        action = bpy.data.actions.new(f"{armature.name}_calm")
-    action.use_fake_user = True
+        action = bpy.data.actions.new(f"{obj.name}_calm")
     data.action = action
     if slot is not None:  # from Blender 4.4 on, an action holds the curves of several things
         data.action_slot = next((s for s in action.slots if s.identifier == slot), None)
-    for name, turns in rotations.items():
-        bone = armature.pose.bones[name]
-        path = _PATHS.get(bone.rotation_mode, "rotation_euler")
-        _forget(action, data, bone.path_from_id(path))
-        previous = None
-        for frame, turn in zip(frames, turns, strict=True):
-            previous = _set(bone, path, turn, previous)
-            bone.keyframe_insert(path, frame=frame, group=name)
-    return action
+    return data, action
 
 
-def _set(bone: bpy.types.PoseBone, path: str, turn: Quaternion, previous: object) -> object:
+def _key_rotations(
+    target: bpy.types.PoseBone | bpy.types.Object, data: bpy.types.AnimData, action: bpy.types.Action, place: str,
+    turns: list[Quaternion], frames: range,
+) -> None:  # fmt: skip
+    """Key the rotation of a bone or an object at every frame, in place of the curves that it had.
+
+    Args:
+        place: Path of the bone within the armature; empty for an object.
+    """
+    name = _PATHS.get(target.rotation_mode, "rotation_euler")
+    _forget(action, data, f"{place}.{name}".lstrip("."))
+    previous = None
+    for frame, turn in zip(frames, turns, strict=True):
+        previous = _set(target, name, turn, previous)
+        target.keyframe_insert(name, frame=frame)
+
+
+def _set(bone: bpy.types.PoseBone | bpy.types.Object, path: str, turn: Quaternion, previous: object) -> object:
     """Turn a bone as its mode has it, near the previous value; that value."""
     if path == "rotation_quaternion":
         value = turn.copy()

@@ -8,33 +8,48 @@ from pathlib import Path
 import bpy
 
 
-def armature_of(context: bpy.types.Context) -> bpy.types.Object | None:
-    """The armature that is selected, or that what is selected belongs to."""
+def character_of(context: bpy.types.Context) -> bpy.types.Object | None:
+    """The character that is selected: its armature, or the topmost object of what is parented to each other."""
     for obj in (context.active_object, *context.selected_objects):
+        top = obj
         while obj is not None:
             if obj.type == "ARMATURE":
                 return obj
             found = obj.find_armature()
-            obj = found if found is not None else obj.parent
+            top, obj = obj, found if found is not None else obj.parent
+        if top is not None and any(part.animation_data and part.animation_data.action for part in parts_of(top)):
+            return top
     return None
 
 
-def export_character(context: bpy.types.Context, armature: bpy.types.Object, path: Path) -> Path:
-    """Write an armature and what it moves, with its animation, in metres; the selection stays as it was."""
+def is_animated(character: bpy.types.Object) -> bool:
+    """Whether some part of a character has an action."""
+    return any(part.animation_data and part.animation_data.action for part in parts_of(character))
+
+
+def parts_of(character: bpy.types.Object) -> list[bpy.types.Object]:
+    """A character and all that it moves, each after what moves it."""
+    parts = [character, *character.children_recursive]
+    moved = [obj for obj in bpy.context.scene.objects if obj not in parts and obj.find_armature() is character]
+    return parts + moved if character.type == "ARMATURE" else parts
+
+
+def export_character(context: bpy.types.Context, character: bpy.types.Object, path: Path) -> Path:
+    """Write a character, with its animation, in metres; the selection stays as it was."""
     active, selected = context.view_layer.objects.active, list(context.selected_objects)
-    moved = [obj for obj in context.scene.objects if obj.find_armature() is armature or obj.parent is armature]
+    parts = parts_of(character)
     try:
         for obj in selected:
             obj.select_set(False)
-        for obj in (armature, *moved):
+        for obj in parts:
             obj.select_set(True)
-        context.view_layer.objects.active = armature
+        context.view_layer.objects.active = character
         bpy.ops.wm.usd_export(
             filepath=str(path), selected_objects_only=True, export_animation=True, export_armatures=True,
             export_materials=False, convert_scene_units="METERS", evaluation_mode="RENDER",
         )  # fmt: skip
     finally:
-        for obj in (armature, *moved):
+        for obj in parts:
             obj.select_set(False)
         for obj in selected:
             obj.select_set(True)

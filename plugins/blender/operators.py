@@ -10,7 +10,7 @@ from pathlib import Path
 import bpy
 
 from .bring_back import bring_back
-from .character import armature_of, export_character
+from .character import character_of, export_character, is_animated
 from .pipeline import PipelineRun, job_for
 from .preferences import command_of, preferences_of
 
@@ -26,13 +26,16 @@ class CALMOTION_OT_optimize(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """Where an animated armature is selected and nothing runs."""
+        """Where an animated character is selected and nothing runs."""
         if context.scene.name in _RUNNING:
             cls.poll_message_set("Calmotion is running")
             return False
-        armature = armature_of(context)
-        if armature is None or armature.animation_data is None or armature.animation_data.action is None:
-            cls.poll_message_set("Select an armature with an action")
+        character = character_of(context)
+        if character is None or not is_animated(character):
+            cls.poll_message_set("Select an armature with an action, or a part of animated objects")
+            return False
+        if character.type != "ARMATURE" and not context.scene.calmotion.robot_layer:
+            cls.poll_message_set("Objects need a layer with their robot: name it above")
             return False
         return True
 
@@ -74,10 +77,10 @@ class CALMOTION_OT_optimize(bpy.types.Operator):
         if command is None:
             self.report({"ERROR"}, "calmotion was not found: name its command in the preferences of the extension")
             return None
-        armature = armature_of(context)
-        assert armature is not None  # poll
-        self._armature, self._folder = armature.name, _folder(context)
-        shot = export_character(context, armature, self._folder / "shot.usda")
+        character = character_of(context)
+        assert character is not None  # poll
+        self._character, self._folder = character.name, _folder(context)
+        shot = export_character(context, character, self._folder / "shot.usda")
         job = job_for(
             command, shot, self._folder, robot=bpy.path.abspath(settings.robot_layer) if settings.robot_layer else "",
             material=settings.material, flexible=settings.flexible, tolerance=settings.tolerance,
@@ -97,15 +100,14 @@ class CALMOTION_OT_optimize(bpy.types.Operator):
                 for error in run.errors:
                     self.report({"ERROR"}, error)
                 return {"CANCELLED"}
-            armature = bpy.data.objects[self._armature]
             try:
-                action, changed = bring_back(context, armature, run.job.root)
+                changed = bring_back(context, bpy.data.objects[self._character], run.job.root)
             except RuntimeError as error:
                 self.report({"ERROR"}, str(error))
                 return {"CANCELLED"}
             before, after = (1e3 * run.report[f"max_error_{when}_m"] for when in ("before", "after"))
             settings.status = f"{before:.3g} mm -> {after:.3g} mm"
-            self.report({"INFO"}, f"{action.name}: {len(changed)} bones changed, error {settings.status}")
+            self.report({"INFO"}, f"{len(changed)} of the bones or objects changed, error {settings.status}")
             return {"FINISHED"}
         finally:
             preferences = preferences_of(context)

@@ -128,6 +128,92 @@ def check_wrong_bone(folder: Path) -> None:
     assert bpy.ops.calmotion.optimize.poll(), "it can be run again"
 
 
+ROBOT = """#usda 1.0
+over "root"
+{
+    over "Base" (
+        prepend apiSchemas = ["PhysicsRigidBodyAPI", "PhysicsMassAPI"]
+    )
+    {
+        float physics:mass = 1
+
+        over "Arm" (
+            prepend apiSchemas = ["PhysicsRigidBodyAPI", "CalmFlexibleBodyAPI", "MaterialBindingAPI"]
+        )
+        {
+            rel material:binding:physics = </root/Rubber>
+
+            def Xform "tip" (
+                prepend apiSchemas = ["CalmTargetAPI"]
+            )
+            {
+                double3 xformOp:translate = (0.6, 0, 0)
+                uniform token[] xformOpOrder = ["xformOp:translate"]
+            }
+        }
+    }
+
+    def Material "Rubber" (
+        prepend apiSchemas = ["PhysicsVolumeDeformableMaterialAPI"]
+    )
+    {
+        float physics:youngsModulus = 2e8
+        float physics:poissonsRatio = 0.4
+        float physics:density = 1100
+    }
+
+    def PhysicsFixedJoint "stand"
+    {
+        rel physics:body1 = </root/Base>
+    }
+
+    def PhysicsRevoluteJoint "hinge" (
+        prepend apiSchemas = ["PhysicsDriveAPI:angular"]
+    )
+    {
+        uniform token physics:axis = "Y"
+        rel physics:body0 = </root/Base>
+        rel physics:body1 = </root/Base/Arm>
+    }
+}
+"""
+
+
+def check_objects(folder: Path) -> None:
+    """A character of objects that are parented to each other, with a robot of its own."""
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    scene = bpy.context.scene
+    scene.frame_start, scene.frame_end, scene.render.fps = 1, 25, 24
+    base = bpy.data.objects.new("Base", None)
+    mesh = bpy.data.meshes.new("Arm")
+    corners = [(x, y, z) for x in (0.0, 0.6) for y in (-0.01, 0.01) for z in (-0.01, 0.01)]
+    mesh.from_pydata(corners, [], [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)])
+    arm = bpy.data.objects.new("Arm", mesh)
+    arm.parent = base
+    for obj in (base, arm):
+        scene.collection.objects.link(obj)
+    for frame in range(1, 26):
+        arm.rotation_euler = (0.0, 0.6 * (1.0 - math.cos(2.0 * math.pi * (frame - 1) / 24.0)), 0.0)
+        arm.keyframe_insert("rotation_euler", frame=frame)
+    bpy.ops.wm.save_as_mainfile(filepath=str(folder / "objects.blend"))
+    bpy.context.view_layer.objects.active = arm
+    arm.select_set(True)
+    assert not bpy.ops.calmotion.optimize.poll(), "objects need a robot"
+    (folder / "robot_of_objects.usda").write_text(ROBOT)
+    scene.calmotion.robot_layer = str(folder / "robot_of_objects.usda")
+    old = arm.animation_data.action
+    before = curves(old)
+    assert bpy.ops.calmotion.optimize() == {"FINISHED"}, scene.calmotion.status
+    new = arm.animation_data.action
+    assert new is not old and curves(old) == before and base.animation_data is None
+    bent = max(abs(a - b) for a, b in zip(before["rotation_euler[1]"], curves(new)["rotation_euler[1]"], strict=True))
+    assert 1e-4 < bent < 0.3, bent
+    error_before, error_after = (float(part.split()[0]) for part in scene.calmotion.status.split(" -> "))
+    assert error_after < 0.2 * error_before, scene.calmotion.status
+    assert {obj.name for obj in bpy.data.objects} == {"Base", "Arm"}
+    print("objects:", scene.calmotion.status)
+
+
 def check_poll() -> None:
     """Without an armature there is nothing to do."""
     bpy.ops.wm.read_factory_settings(use_empty=True)
@@ -147,6 +233,7 @@ def main() -> None:
         check_optimize(folder / "work")
         export_again(folder / "work")
         check_wrong_bone(folder / "work")
+        check_objects(folder / "work")
         calmotion_extension.unregister()
         assert not hasattr(bpy.types.Scene, "calmotion") and not hasattr(bpy.types, "CALMOTION_OT_optimize")
         calmotion_extension.register()

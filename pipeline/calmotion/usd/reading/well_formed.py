@@ -20,10 +20,11 @@ def wrong_types(stage) -> Iterator[ShotError]:
     USD takes such opinions without a word, and gives values of whatever type was authored. Names of ours, and of
     masses and drives, count also where their schema is not applied.
     """
-    from pxr import Sdf
+    from pxr import Sdf, Usd
 
     known = _known()
-    for prim in prims_of(stage):
+    # also classes and what nothing defines: a material is bound wherever it is
+    for prim in stage.Traverse(Usd.TraverseInstanceProxies(Usd.PrimIsActive)):
         definition = prim.GetPrimDefinition()
         for prop in prim.GetAuthoredProperties():
             name = prop.GetName()
