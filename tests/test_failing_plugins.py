@@ -29,7 +29,9 @@ HEAD = """
 FAILING = {
     "raises": ("1 / 0", "", ("mark.make", "marker", "ZeroDivisionError", "maintainer", "Traceback")),
     "hangs": (
-        "time.sleep(120)", "timeout = 0.5", ("mark.make", "marker", "did not end within 0.5 s", "plugins disable")
+        "time.sleep(120)",
+        "timeout = 0.5",
+        ("mark.make", "marker", "did not end within 0.5 s", "plugins disable"),
     ),  # fmt: skip
     "returns the wrong type": ("return ('a mark',)", "", ("mark.make", "marker", "must return (Mark)", "str for Mark")),
     "returns nothing": ("pass", "", ("mark.make", "marker", "sequence of (Mark)", "in the order of")),

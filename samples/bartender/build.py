@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import sys
 from pathlib import Path
 
@@ -12,7 +11,7 @@ if str(HERE.parent) not in sys.path:
 
 from bartender import model, motion  # noqa: E402
 from kit import author, robot  # noqa: E402
-from pxr import Sdf, UsdGeom  # noqa: E402
+from pxr import UsdGeom  # noqa: E402
 
 ROOT = "/Bartender"
 MATERIALS = f"{ROOT}/Materials"
@@ -39,15 +38,7 @@ def build(path: str | Path) -> None:
     UsdGeom.Xform.Define(stage, f"{ROOT}/Bar")
     for part in model.scenery():
         author.author_part(stage, f"{ROOT}/Bar/{part.name}", part, model.LOOKS, MATERIALS)
-    save(stage.GetRootLayer(), Path(path))
-
-
-def save(layer: Sdf.Layer, path: Path) -> None:
-    """Export beside the destination, then rename."""
-    partial = path.with_name(f".{path.stem}.partial.usda")
-    if not layer.Export(str(partial)):
-        raise OSError(f"cannot write {partial}")
-    os.replace(partial, path)
+    author.save(stage.GetRootLayer(), Path(path))
 
 
 if __name__ == "__main__":

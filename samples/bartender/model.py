@@ -8,13 +8,13 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from kit.author import Look, Plastic
+from kit.parts import printed_link as link
 from kit.robot import BodySpec, DriveSpec, JointSpec, Part, TargetSpec
 from kit.shapes import Section, Shape, arc_slab, ball, cylinder, lathe, skin
 
 SHOULDER = (0.0, -0.15, 0.10)
 UPPER, FORE, GRIP = 0.32, 0.30, 0.078  # shoulder to elbow, elbow to wrist, palm to cup
 SERVO = 0.036  # radius of the elbow's case; the upper arm ends where it begins
-THICK, SLIM = 0.022, 0.011
 
 NYLON = Plastic("Nylon", youngs_modulus=1.9e9, poissons_ratio=0.38, density=1080.0, damping_ratio=0.015)
 
@@ -28,15 +28,6 @@ LOOKS = {
     "Glass": Look((0.72, 0.83, 0.86), 0.1),
     "Walnut": Look((0.17, 0.075, 0.03), 0.5),
 }
-
-
-def link(end: float) -> Shape:
-    """A printed link along x: a chunky block about each joint, a slender beam between them."""
-    slim = [0.052 + (end - 0.097) * k / 9 for k in range(10)]
-    stations = [(-0.026, 0.019), (-0.023, THICK), (-0.008, THICK), (0.008, THICK), (0.026, THICK), (0.038, 0.015)]
-    stations += [(x, SLIM) for x in slim]
-    stations += [(end - 0.032, 0.015), (end - 0.020, THICK), (end - 0.010, THICK), (end - 0.003, THICK), (end, 0.019)]
-    return skin([Section(x, half, half) for x, half in stations], axis="x", sides=12, squareness=5.0)
 
 
 def cup() -> Shape:

@@ -5,8 +5,10 @@ The calm schemas and the deformable material are applied by name, so building ne
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 from pxr import Gf, Sdf, Usd, UsdGeom, UsdPhysics, UsdShade, Vt
@@ -36,10 +38,10 @@ class Plastic:
     damping_ratio: float
 
 
-def new_stage(root: str, frames: tuple[int, int], rate: float) -> Usd.Stage:
-    """An empty stage in metres and kilograms, z up, with its root as default prim and gravity."""
+def new_stage(root: str, frames: tuple[int, int], rate: float, up: str = "Z") -> Usd.Stage:
+    """An empty stage in metres and kilograms, z or y up, with its root as default prim and gravity."""
     stage = Usd.Stage.CreateInMemory(".usda")
-    UsdGeom.SetStageUpAxis(stage, UsdGeom.Tokens.z)
+    UsdGeom.SetStageUpAxis(stage, up)
     UsdGeom.SetStageMetersPerUnit(stage, 1.0)
     UsdPhysics.SetStageKilogramsPerUnit(stage, 1.0)
     stage.SetTimeCodesPerSecond(rate)
@@ -51,7 +53,7 @@ def new_stage(root: str, frames: tuple[int, int], rate: float) -> Usd.Stage:
     stage.SetDefaultPrim(prim)
     UsdPhysics.ArticulationRootAPI.Apply(prim)
     scene = UsdPhysics.Scene.Define(stage, "/PhysicsScene")
-    scene.CreateGravityDirectionAttr(Gf.Vec3f(0, 0, -1))
+    scene.CreateGravityDirectionAttr(Gf.Vec3f(0, 0, -1) if up == "Z" else Gf.Vec3f(0, -1, 0))
     scene.CreateGravityMagnitudeAttr(9.81)
     return stage
 
@@ -104,14 +106,15 @@ def author_part(stage: Usd.Stage, path: str, part: Part, looks: Mapping[str, Loo
 
 
 def author_body(
-    stage: Usd.Stage, root: str, body: BodySpec, pose: Pose, looks: Mapping[str, Look], scope: str, plastic: Plastic
-) -> None:
-    """A body at its pose, with its meshes, mass or elastic material, and targets."""
+    stage: Usd.Stage, root: str, body: BodySpec, pose: Pose, looks: Mapping[str, Look], scope: str, plastic: Plastic,
+    motion: Mapping[int, Pose] | None = None,
+) -> None:  # fmt: skip
+    """A body at its pose, or moving through poses by frame, with its meshes, mass or elastic material, and targets."""
     xform = UsdGeom.Xform.Define(stage, f"{root}/{body.name}")
-    xform.AddTranslateOp().Set(Gf.Vec3d(*np.round(pose.position, 9).tolist()))
-    turn = pose.rotation / np.linalg.norm(pose.rotation)
-    orient = xform.AddOrientOp(UsdGeom.XformOp.PrecisionDouble)
-    orient.Set(Gf.Quatd(*np.round(turn, 12).tolist()))
+    place, orient = xform.AddTranslateOp(), xform.AddOrientOp(UsdGeom.XformOp.PrecisionDouble)
+    set_pose(place, orient, pose, Usd.TimeCode.Default())
+    for frame, there in (motion or {}).items():
+        set_pose(place, orient, there, frame)
     prim = xform.GetPrim()
     UsdPhysics.RigidBodyAPI.Apply(prim)
     for part in body.parts:
@@ -134,6 +137,13 @@ def author_body(
         author_target(stage, f"{root}/{body.name}/{target.name}", target)
 
 
+def set_pose(place: UsdGeom.XformOp, orient: UsdGeom.XformOp, pose: Pose, time: Usd.TimeCode | int) -> None:
+    """Author a pose, rounded so that every machine writes the same."""
+    turn = pose.rotation / np.linalg.norm(pose.rotation)
+    place.Set(Gf.Vec3d(*(np.round(pose.position, 9) + 0.0).tolist()), time)
+    orient.Set(Gf.Quatd(*(np.round(turn, 12) + 0.0).tolist()), time)
+
+
 def author_target(stage: Usd.Stage, path: str, target: TargetSpec) -> None:
     """A target frame below its body."""
     xform = UsdGeom.Xform.Define(stage, path)
@@ -144,7 +154,7 @@ def author_target(stage: Usd.Stage, path: str, target: TargetSpec) -> None:
 
 
 def author_joint(stage: Usd.Stage, root: str, scope: str, joint: JointSpec, frames: Sequence[int]) -> None:
-    """A weld, or a revolute joint whose drive carries the animation."""
+    """A weld, or a revolute joint whose drive carries the animation; without frames the bodies carry it."""
     path = f"{scope}/{joint.name}"
     kind = UsdPhysics.FixedJoint if joint.drive is None else UsdPhysics.RevoluteJoint
     prim = kind.Define(stage, path)
@@ -165,10 +175,19 @@ def author_joint(stage: Usd.Stage, root: str, scope: str, joint: JointSpec, fram
     drive.CreateMaxForceAttr(joint.drive.max_torque)
     drive.CreateStiffnessAttr(50.0)
     drive.CreateDampingAttr(0.5)
-    target = drive.CreateTargetPositionAttr()
-    for frame, value in zip(frames, joint.drive.track, strict=True):
-        target.Set(value, frame)
+    if frames:
+        target = drive.CreateTargetPositionAttr()
+        for frame, value in zip(frames, joint.drive.track, strict=True):
+            target.Set(value, frame)
     prim.GetPrim().AddAppliedSchema("CalmMotorAPI")
     create(prim.GetPrim(), "calm:motor:maxVelocity", joint.drive.max_velocity)
     create(prim.GetPrim(), "calm:motor:maxAcceleration", joint.drive.max_acceleration)
     create(prim.GetPrim(), "calm:motor:maxTorque", joint.drive.max_torque)
+
+
+def save(layer: Sdf.Layer, path: Path) -> None:
+    """Export beside the destination, then rename."""
+    partial = path.with_name(f".{path.stem}.partial.usda")
+    if not layer.Export(str(partial)):
+        raise OSError(f"cannot write {partial}")
+    os.replace(partial, path)

@@ -26,6 +26,10 @@ class Shape:
         """The same shape, translated [m]."""
         return Shape(self.points + np.asarray(offset, dtype=float), self.faces)
 
+    def mirrored(self) -> Shape:
+        """The same shape, mirrored in the plane x = 0; still outward."""
+        return Shape(self.points * np.array([-1.0, 1.0, 1.0]), tuple(face[::-1] for face in self.faces))
+
 
 @dataclass(frozen=True)
 class Section:

@@ -227,9 +227,7 @@ def test_the_summary_tells_what_ran_and_what_did_not(tmp_path):
     module = host_with(PLUGIN).plugin("rerun_logger").module
     recording = __import__(f"{module.__name__}.recording", fromlist=["write_recording"])
     path = str(tmp_path / "run.rrd")
-    recording.write_recording(
-        path, synthetic.character(), synthetic.animation(), synthetic.result(), operators=steps
-    )
+    recording.write_recording(path, synthetic.character(), synthetic.animation(), synthetic.result(), operators=steps)
     text = str(
         next(value for (entity, _), (_, value) in read(path).items() if entity == "/summary" and "## Run" in str(value))
     )

@@ -210,8 +210,7 @@ class Host:
                     remedy=f"{nearest(idname, operators)}The operators with properties are: {known}.",
                 )
         return {
-            name: values_of((*cls.properties, TIMEOUT), settings.get(name, {}), name)
-            for name, cls in operators.items()
+            name: values_of((*cls.properties, TIMEOUT), settings.get(name, {}), name) for name, cls in operators.items()
         }
 
     def plan(self, given: Iterable[type], wanted: Iterable[type], optional: Iterable[type] = ()) -> Plan:

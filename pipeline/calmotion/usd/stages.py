@@ -126,9 +126,7 @@ def _alike(errors: list[ShotError]) -> list[ShotError]:
     for (problem, attribute, _, remedy), group in groups.items():
         more = f", here and at {len(group) - 1} other prims" if len(group) > 1 else ""
         paths = sorted(error.path for error in group)
-        found.append(
-            ShotError(problem + more, path=paths[0], attribute=attribute, found=group[0].found, remedy=remedy)
-        )
+        found.append(ShotError(problem + more, path=paths[0], attribute=attribute, found=group[0].found, remedy=remedy))
     return found
 
 

@@ -82,9 +82,10 @@ class BoundSkeleton:
     def in_skeleton(self, local: Array) -> Array:
         """Transforms in the skeleton's space out of local ones, shape [j, 4, 4]."""
         found = np.empty_like(local)
-        for joint in range(len(local)):
-            above = self.parent(joint)
-            found[joint] = local[joint] if above < 0 else found[above] @ local[joint]
+        with np.errstate(invalid="ignore", over="ignore"):  # what is not finite is refused with its place afterwards
+            for joint in range(len(local)):
+                above = self.parent(joint)
+                found[joint] = local[joint] if above < 0 else found[above] @ local[joint]
         return found
 
     def local_rotations(self, joint: int, codes: Array) -> Array:
