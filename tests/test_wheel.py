@@ -56,7 +56,7 @@ def test_a_wheel_in_an_empty_environment_holds_everything(installed: Path, repos
     code = """
         import pkgutil, importlib, calmotion
         for module in pkgutil.walk_packages(calmotion.__path__, "calmotion."):
-            if not module.name.endswith(("__main__", "exudyn_arm", "tetwild_worker")):
+            if not module.name.endswith(("__main__", "exudyn_arm", "tetwild_worker", "pytest_plugin")):
                 importlib.import_module(module.name)
         from calmotion.usd.reading import read_shot
         character, animation, _ = read_shot("bartender/bartender.usda")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from calmotion.naming import distinct_names
 from calmotion.shot import Animation, Character, Motion, Result, Simulation
 from calmotion.shot.character import Array
 from calmotion.shot.playback import sample_motion
@@ -55,7 +56,10 @@ def draw_filmstrip(character: Character, animation: Animation, result: Result, c
     probe = fit_camera(view, cloud, PANEL, PANEL, 0.0).project(cloud)[:, :2]
     aspect = float(np.clip(np.ptp(probe[:, 1]) / max(np.ptp(probe[:, 0]), 1e-9), 0.35, 1.8))
     camera = fit_camera(view, cloud, SMOOTH * PANEL, round(SMOOTH * PANEL * aspect))
-    magnifier = choose_magnifier(reference, motions, camera)
+    targets = farthest_targets(result.before, times)
+    paths = [target.path for target in character.targets]
+    names = distinct_names(paths)
+    magnifier = choose_magnifier(reference, motions, targets, camera)
     figure = new_figure(WIDTH, 0.55 + len(runs) * (0.22 + aspect * WIDTH / len(times)))
     grid = figure.subplots(len(runs), len(times), squeeze=False)
     for row, (run, color, name), motion in zip(grid, runs, motions, strict=True):
@@ -65,27 +69,39 @@ def draw_filmstrip(character: Character, animation: Animation, result: Result, c
             draw_trails(axes, character, result.reference, times[column], camera, INTENDED, 1.0)
             draw_trails(axes, character, run.motion, times[column], camera, color, 1.4)
             if magnifier.useful:
-                draw_magnifier(axes, magnifier, model, motion, reference, column, camera, color, picture, SMOOTH)
+                target = int(targets[column])
+                draw_magnifier(
+                    axes, magnifier, model, motion, reference, column, target, camera, color, picture, SMOOTH
+                )
             axes.set_axis_off()
             axes.set_xlim(0, camera.size[0])
             axes.set_ylim(camera.size[1], 0)
-            error = largest_error(run, times[column])
-            axes.set_title(f"{times[column]:.2f} s, {error}", fontsize=SMALL, color=color, pad=2)
+            title = f"{times[column]:.2f} s"
+            if len(targets):
+                error = error_at(run, int(targets[column]), times[column])
+                title += f", {names[paths[targets[column]]]} {1e3 * error:.{1 if error > 1e-3 else 2}f} mm off"
+            axes.set_title(title, fontsize=SMALL, color=color, pad=2)
         place = {"ha": "right", "va": "center", "transform": row[0].transAxes, "rotation": 90}
         row[0].text(0.0, 0.5, name, fontsize=NORMAL, color=color, fontweight="bold", **place)
-    text = "Simulated motion over what was meant (green), when the input is farthest off"
+    text = "Simulated motion over what was meant (green) when the input is farthest off"
     if magnifier.useful:
-        text += f"; in the boxes {character.targets[magnifier.target].path}, {magnifier.factor:g} times as large"
+        text += f"; in the boxes the target named above, {magnifier.factor:g} times as large"
     figure.suptitle(text, fontsize=NORMAL, color=TEXT)
     return figure
 
 
-def largest_error(run: Simulation, time: float) -> str:
-    """The largest position error of any target at a time, as text."""
-    if not run.position_errors.shape[1]:
-        return "no target"
-    value = np.interp(time, run.motion.times, run.position_errors.max(axis=1))
-    return f"{1e3 * value:.1f} mm off"
+def farthest_targets(run: Simulation, times: Array) -> Array:
+    """The target that is farthest off at each of the times, shape [n]; empty where there are no targets."""
+    errors = run.position_errors
+    if not errors.shape[1]:
+        return np.empty(0, dtype=int)
+    at = [[error_at(run, target, time) for target in range(errors.shape[1])] for time in times]
+    return np.argmax(at, axis=1)
+
+
+def error_at(run: Simulation, target: int, time: float) -> float:
+    """Position error of a target at a time [m]."""
+    return float(np.interp(time, run.motion.times, run.position_errors[:, target]))
 
 
 def draw_trails(

@@ -1,4 +1,4 @@
-"""The surroundings of one target, enlarged in a corner of its panel, since a shake is small beside a character."""
+"""The surroundings of a target, enlarged in a corner of its panel, since a shake is small beside a character."""
 
 from __future__ import annotations
 
@@ -21,9 +21,8 @@ REACH = 0.40  # of the inset: how far from its middle the target may stray
 
 @dataclass(frozen=True)
 class Magnifier:
-    """Which target is enlarged, and how much."""
+    """How much is enlarged."""
 
-    target: int
     factor: float
 
     @property
@@ -37,16 +36,15 @@ def inset_side(camera: Camera) -> int:
     return round(INSET * min(camera.size))
 
 
-def choose_magnifier(reference: Motion, motions: list[Motion], camera: Camera) -> Magnifier:
-    """The target that strays farthest, and the enlargement (a multiple of one half) at which it stays in sight."""
-    if not reference.target_positions.shape[1]:
-        return Magnifier(0, 0.0)
-    meant = camera.project(reference.target_positions)[..., :2]
-    strays = [np.linalg.norm(camera.project(m.target_positions)[..., :2] - meant, axis=-1).max(axis=0) for m in motions]
-    farthest = np.max(strays, axis=0)
-    target = int(np.argmax(farthest))
-    fits = REACH * inset_side(camera) / max(float(farthest[target]), 1e-9)
-    return Magnifier(target, float(np.floor(2.0 * min(fits, LARGEST)) / 2.0))
+def choose_magnifier(reference: Motion, motions: list[Motion], targets: Array, camera: Camera) -> Magnifier:
+    """The enlargement (a multiple of one half) at which a target for each row of the motions stays in sight."""
+    if not len(targets):
+        return Magnifier(0.0)
+    rows = np.arange(len(targets))
+    meant = camera.project(reference.target_positions[rows, targets])[:, :2]
+    strays = [camera.project(m.target_positions[rows, targets])[:, :2] - meant for m in motions]
+    fits = REACH * inset_side(camera) / max(float(np.linalg.norm(strays, axis=-1).max()), 1e-9)
+    return Magnifier(float(np.floor(2.0 * min(fits, LARGEST)) / 2.0))
 
 
 def draw_magnifier(
@@ -56,6 +54,7 @@ def draw_magnifier(
     motion: Motion,
     reference: Motion,
     row: int,
+    target: int,
     camera: Camera,
     color: str,
     drawn: Array,
@@ -65,15 +64,16 @@ def draw_magnifier(
 
     Args:
         axes: The panel, in pixels of the camera.
-        magnifier: What is enlarged.
+        magnifier: How much is enlarged.
         model, motion, reference, row: What is drawn in the panel.
+        target: Whose surroundings.
         camera: The panel's camera.
         color: Of the frame and of the target's place.
         drawn: The panel's picture, `smooth` times smaller than the camera's.
         smooth: Pixels of the camera for one of the picture.
     """
     side = inset_side(camera)
-    place = camera.project(reference.target_positions[row, magnifier.target])[:2]
+    place = camera.project(reference.target_positions[row, target])[:2]
     shift = 0.5 * side - magnifier.factor * (place - camera.center)
     enlarged = Camera(camera.eye, camera.axes, magnifier.factor * camera.scale, shift, (side, side))
     picture = draw_over_ghost(model, motion, reference, row, enlarged, smooth)
@@ -82,7 +82,7 @@ def draw_magnifier(
     frame = Rectangle((left, top), side, side, fill=False, edgecolor=color, linewidth=1.0, zorder=4, clip_on=False)
     axes.add_patch(frame)
     for moved, tint in ((reference, INTENDED), (motion, color)):
-        spot = enlarged.project(moved.target_positions[row, magnifier.target])[:2]
+        spot = enlarged.project(moved.target_positions[row, target])[:2]
         axes.plot(left + spot[0], top + spot[1], "o", color=tint, markersize=3.0, zorder=5)
 
 

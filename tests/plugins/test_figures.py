@@ -168,10 +168,22 @@ def test_the_magnifier_keeps_the_straying_target_in_sight(figures):
     motion, reference = result.before.motion, result.reference
     view = choose_viewpoint(character, result.skins, motion)
     camera = figures.scene.fit_camera(view, motion.target_positions[:, 0], 600, 400)
-    magnifier = figures.magnifier.choose_magnifier(reference, [motion], camera)
-    assert magnifier.target == 0 and magnifier.useful
+    magnifier = figures.magnifier.choose_magnifier(reference, [motion], np.zeros(len(motion.times), int), camera)
+    assert magnifier.useful
     gap = camera.project(motion.target_positions[:, 0])[:, :2] - camera.project(reference.target_positions[:, 0])[:, :2]
     assert magnifier.factor * np.linalg.norm(gap, axis=1).max() <= 0.4 * figures.magnifier.inset_side(camera)
+
+
+def test_the_box_shows_the_target_that_is_farthest_off_at_that_instant(figures):
+    before = synthetic.result().before
+    times = before.motion.times
+    both = np.stack([np.where(times < 0.5, 2e-3, 1e-3), np.full(len(times), 1.5e-3)], axis=1)
+    before = dataclasses.replace(before, position_errors=both)
+    found = figures.filmstrip.farthest_targets(before, np.array([0.25, 0.75]))
+    assert found.tolist() == [0, 1]
+    assert figures.filmstrip.error_at(before, 1, 0.3) == pytest.approx(1.5e-3)
+    nothing = dataclasses.replace(before, position_errors=both[:, :0])
+    assert len(figures.filmstrip.farthest_targets(nothing, np.array([0.25]))) == 0
 
 
 def test_the_magnifier_stands_in_the_emptiest_corner_and_not_over_the_target(figures):
