@@ -38,11 +38,11 @@ class Plastic:
     damping_ratio: float
 
 
-def new_stage(root: str, frames: tuple[int, int], rate: float, up: str = "Z") -> Usd.Stage:
-    """An empty stage in metres and kilograms, z or y up, with its root as default prim and gravity."""
+def new_stage(root: str, frames: tuple[int, int], rate: float, up: str = "Z", unit: float = 1.0) -> Usd.Stage:
+    """An empty stage in kilograms and units of `unit` metres, with its root as default prim and gravity."""
     stage = Usd.Stage.CreateInMemory(".usda")
     UsdGeom.SetStageUpAxis(stage, up)
-    UsdGeom.SetStageMetersPerUnit(stage, 1.0)
+    UsdGeom.SetStageMetersPerUnit(stage, unit)
     UsdPhysics.SetStageKilogramsPerUnit(stage, 1.0)
     stage.SetTimeCodesPerSecond(rate)
     stage.SetFramesPerSecond(rate)
@@ -54,8 +54,13 @@ def new_stage(root: str, frames: tuple[int, int], rate: float, up: str = "Z") ->
     UsdPhysics.ArticulationRootAPI.Apply(prim)
     scene = UsdPhysics.Scene.Define(stage, "/PhysicsScene")
     scene.CreateGravityDirectionAttr(Gf.Vec3f(0, 0, -1) if up == "Z" else Gf.Vec3f(0, -1, 0))
-    scene.CreateGravityMagnitudeAttr(9.81)
+    scene.CreateGravityMagnitudeAttr(9.81 * per_metre(stage))
     return stage
+
+
+def per_metre(stage: Usd.Stage) -> float:
+    """Stage units in a metre. Everything here is given in SI and written in the stage's units."""
+    return float(round(1.0 / UsdGeom.GetStageMetersPerUnit(stage)))
 
 
 def author_looks(stage: Usd.Stage, scope: str, looks: Mapping[str, Look]) -> None:
@@ -77,9 +82,9 @@ def author_plastic(stage: Usd.Stage, scope: str, plastic: Plastic) -> None:
     prim = UsdShade.Material.Define(stage, f"{scope}/{plastic.name}").GetPrim()
     prim.AddAppliedSchema("PhysicsVolumeDeformableMaterialAPI")
     prim.AddAppliedSchema("CalmDampingAPI")
-    create(prim, "physics:youngsModulus", plastic.youngs_modulus)
+    create(prim, "physics:youngsModulus", plastic.youngs_modulus / per_metre(stage))
     create(prim, "physics:poissonsRatio", plastic.poissons_ratio)
-    create(prim, "physics:density", plastic.density)
+    create(prim, "physics:density", plastic.density / per_metre(stage) ** 3)
     create(prim, "calm:damping:ratio", plastic.damping_ratio)
 
 
@@ -93,7 +98,7 @@ def create(prim: Usd.Prim, name: str, value: float) -> None:
 def author_part(stage: Usd.Stage, path: str, part: Part, looks: Mapping[str, Look], scope: str) -> UsdGeom.Mesh:
     """A mesh with its display color and its look."""
     mesh = UsdGeom.Mesh.Define(stage, path)
-    points = np.round(part.shape.points, DIGITS).astype(np.float32)
+    points = np.round(part.shape.points * per_metre(stage), DIGITS).astype(np.float32)
     mesh.CreatePointsAttr(Vt.Vec3fArray.FromNumpy(points))
     mesh.CreateFaceVertexCountsAttr([len(face) for face in part.shape.faces])
     mesh.CreateFaceVertexIndicesAttr([index for face in part.shape.faces for index in face])
@@ -112,9 +117,10 @@ def author_body(
     """A body at its pose, or moving through poses by frame, with its meshes, mass or elastic material, and targets."""
     xform = UsdGeom.Xform.Define(stage, f"{root}/{body.name}")
     place, orient = xform.AddTranslateOp(), xform.AddOrientOp(UsdGeom.XformOp.PrecisionDouble)
-    set_pose(place, orient, pose, Usd.TimeCode.Default())
+    scale = per_metre(stage)
+    set_pose(place, orient, pose, scale, Usd.TimeCode.Default())
     for frame, there in (motion or {}).items():
-        set_pose(place, orient, there, frame)
+        set_pose(place, orient, there, scale, frame)
     prim = xform.GetPrim()
     UsdPhysics.RigidBodyAPI.Apply(prim)
     for part in body.parts:
@@ -122,7 +128,7 @@ def author_body(
     if body.mass is None:
         prim.AddAppliedSchema("CalmFlexibleBodyAPI")
         if body.interface_radius is not None:
-            create(prim, "calm:flexible:interfaceRadius", body.interface_radius)
+            create(prim, "calm:flexible:interfaceRadius", body.interface_radius * scale)
         binding = UsdShade.MaterialBindingAPI.Apply(prim)
         material = UsdShade.Material.Get(stage, f"{scope}/{plastic.name}")
         binding.Bind(material, UsdShade.Tokens.weakerThanDescendants, "physics")
@@ -130,51 +136,54 @@ def author_body(
         mass, center, inertia = mass_properties(body)
         api = UsdPhysics.MassAPI.Apply(prim)
         api.CreateMassAttr(mass)
-        api.CreateCenterOfMassAttr(Gf.Vec3f(*np.round(center, DIGITS).tolist()))
-        api.CreateDiagonalInertiaAttr(Gf.Vec3f(*(float(f"{value:.4g}") for value in inertia)))
+        api.CreateCenterOfMassAttr(Gf.Vec3f(*np.round(center * scale, DIGITS).tolist()))
+        api.CreateDiagonalInertiaAttr(Gf.Vec3f(*(float(f"{value * scale**2:.4g}") for value in inertia)))
         api.CreatePrincipalAxesAttr(Gf.Quatf(1.0))  # USD's validators want both or neither
     for target in body.targets:
         author_target(stage, f"{root}/{body.name}/{target.name}", target)
 
 
-def set_pose(place: UsdGeom.XformOp, orient: UsdGeom.XformOp, pose: Pose, time: Usd.TimeCode | int) -> None:
+def set_pose(
+    place: UsdGeom.XformOp, orient: UsdGeom.XformOp, pose: Pose, scale: float, time: Usd.TimeCode | int
+) -> None:
     """Author a pose, rounded so that every machine writes the same."""
     turn = pose.rotation / np.linalg.norm(pose.rotation)
-    place.Set(Gf.Vec3d(*(np.round(pose.position, 9) + 0.0).tolist()), time)
+    place.Set(Gf.Vec3d(*(np.round(pose.position * scale, 9) + 0.0).tolist()), time)
     orient.Set(Gf.Quatd(*(np.round(turn, 12) + 0.0).tolist()), time)
 
 
 def author_target(stage: Usd.Stage, path: str, target: TargetSpec) -> None:
     """A target frame below its body."""
     xform = UsdGeom.Xform.Define(stage, path)
-    xform.AddTranslateOp().Set(Gf.Vec3d(*target.position))
+    xform.AddTranslateOp().Set(Gf.Vec3d(*(value * per_metre(stage) for value in target.position)))
     xform.GetPrim().AddAppliedSchema("CalmTargetAPI")
     create(xform.GetPrim(), "calm:target:positionWeight", target.position_weight)
     create(xform.GetPrim(), "calm:target:rotationWeight", target.rotation_weight)
 
 
 def author_joint(stage: Usd.Stage, root: str, scope: str, joint: JointSpec, frames: Sequence[int]) -> None:
-    """A weld, or a revolute joint whose drive carries the animation; without frames the bodies carry it."""
-    path = f"{scope}/{joint.name}"
-    kind = UsdPhysics.FixedJoint if joint.drive is None else UsdPhysics.RevoluteJoint
+    """A weld, a passive hinge, or one whose drive carries the animation; without frames the bodies carry it."""
+    path, scale = f"{scope}/{joint.name}", per_metre(stage)
+    kind = UsdPhysics.RevoluteJoint if joint.axis else UsdPhysics.FixedJoint
     prim = kind.Define(stage, path)
     if joint.parent:
         prim.CreateBody0Rel().SetTargets([f"{root}/{joint.parent}"])
     prim.CreateBody1Rel().SetTargets([f"{root}/{joint.child}"])
-    prim.CreateLocalPos0Attr(Gf.Vec3f(*joint.anchor_parent))
+    prim.CreateLocalPos0Attr(Gf.Vec3f(*(value * scale for value in joint.anchor_parent)))
     prim.CreateLocalRot0Attr(Gf.Quatf(1.0))
-    prim.CreateLocalPos1Attr(Gf.Vec3f(*joint.anchor_child))
+    prim.CreateLocalPos1Attr(Gf.Vec3f(*(value * scale for value in joint.anchor_child)))
     prim.CreateLocalRot1Attr(Gf.Quatf(1.0))
+    if joint.axis:
+        prim.CreateAxisAttr(joint.axis)
     if joint.drive is None:
         return
-    prim.CreateAxisAttr(joint.drive.axis)
     prim.CreateLowerLimitAttr(joint.drive.lower)
     prim.CreateUpperLimitAttr(joint.drive.upper)
     drive = UsdPhysics.DriveAPI.Apply(prim.GetPrim(), UsdPhysics.Tokens.angular)
     drive.CreateTypeAttr(UsdPhysics.Tokens.force)
-    drive.CreateMaxForceAttr(joint.drive.max_torque)
-    drive.CreateStiffnessAttr(50.0)
-    drive.CreateDampingAttr(0.5)
+    drive.CreateMaxForceAttr(joint.drive.max_torque * scale**2)
+    drive.CreateStiffnessAttr(50.0 * scale**2)
+    drive.CreateDampingAttr(0.5 * scale**2)
     if frames:
         target = drive.CreateTargetPositionAttr()
         for frame, value in zip(frames, joint.drive.track, strict=True):
@@ -182,7 +191,7 @@ def author_joint(stage: Usd.Stage, root: str, scope: str, joint: JointSpec, fram
     prim.GetPrim().AddAppliedSchema("CalmMotorAPI")
     create(prim.GetPrim(), "calm:motor:maxVelocity", joint.drive.max_velocity)
     create(prim.GetPrim(), "calm:motor:maxAcceleration", joint.drive.max_acceleration)
-    create(prim.GetPrim(), "calm:motor:maxTorque", joint.drive.max_torque)
+    create(prim.GetPrim(), "calm:motor:maxTorque", joint.drive.max_torque * scale**2)
 
 
 def save(layer: Sdf.Layer, path: Path) -> None:

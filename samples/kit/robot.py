@@ -1,4 +1,4 @@
-"""A robot as a build script describes it, and its pose by forward kinematics. SI units, z up."""
+"""A robot as a build script describes it, and its pose by forward kinematics. SI units."""
 
 from __future__ import annotations
 
@@ -60,7 +60,11 @@ class DriveSpec:
 
 @dataclass(frozen=True)
 class JointSpec:
-    """A joint; anchors are in the frames of the two bodies [m]. Parents come before children."""
+    """A joint; anchors are in the frames of the two bodies [m]. Parents come before children.
+
+    One with a drive turns about the drive's axis. One with a passive axis turns as the others make it: its angles
+    [deg] are then given for posing, unless its child stands already and it closes a loop.
+    """
 
     name: str
     parent: str
@@ -68,6 +72,13 @@ class JointSpec:
     anchor_parent: Vector
     anchor_child: Vector
     drive: DriveSpec | None = None
+    passive: str | None = None
+    angles: tuple[float, ...] = ()
+
+    @property
+    def axis(self) -> str | None:
+        """What it turns about, if it turns."""
+        return self.drive.axis if self.drive else self.passive
 
 
 @dataclass(frozen=True)
@@ -95,11 +106,13 @@ def pose_bodies(joints: Sequence[JointSpec], sample: int) -> dict[str, Pose]:
     """World pose of every body with the drives at one sample of their tracks."""
     poses = {"": Pose(np.zeros(3))}
     for joint in joints:
+        if joint.child in poses:
+            continue
         parent = poses[joint.parent]
         rotation = parent.rotation
-        if joint.drive is not None:
-            half = 0.5 * np.radians(joint.drive.track[sample])
-            axis = np.array(AXIS_VECTORS[joint.drive.axis])
+        if joint.axis:
+            half = 0.5 * np.radians((joint.drive.track if joint.drive else joint.angles)[sample])
+            axis = np.array(AXIS_VECTORS[joint.axis])
             rotation = multiply(rotation, np.concatenate([[np.cos(half)], np.sin(half) * axis]))
         anchor = parent.position + turn(parent.rotation, joint.anchor_parent)
         poses[joint.child] = Pose(anchor - turn(rotation, joint.anchor_child), rotation)
