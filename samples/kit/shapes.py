@@ -26,6 +26,11 @@ class Shape:
         """The same shape, translated [m]."""
         return Shape(self.points + np.asarray(offset, dtype=float), self.faces)
 
+    def turned(self, forward: tuple[float, float]) -> Shape:
+        """The same shape, turned about y so that x points along (x, z), of unit length."""
+        x, z = forward
+        return Shape(self.points @ np.array([[x, 0.0, z], [0.0, 1.0, 0.0], [-z, 0.0, x]]), self.faces)
+
     def mirrored(self) -> Shape:
         """The same shape, mirrored in the plane x = 0; still outward."""
         return Shape(self.points * np.array([-1.0, 1.0, 1.0]), tuple(face[::-1] for face in self.faces))

@@ -15,7 +15,11 @@ from pxr import Gf, Usd, UsdGeom, UsdPhysics
 
 SAMPLES = Path(__file__).resolve().parents[2] / "samples"
 
-KINDS = {"bartender": ("Z", 1.0, "drive", 24.0), "dancer": ("Y", 1.0, "bodies", 30.0)}
+KINDS = {
+    "bartender": ("Z", 1.0, "drive", 24.0),
+    "dancer": ("Y", 1.0, "bodies", 30.0),
+    "rapper": ("Z", 0.01, "drive", 24.0),
+}
 """Up axis, metres per unit, what animates the motors, and frames per second."""
 
 each_sample = pytest.mark.parametrize("name", KINDS)
@@ -122,7 +126,8 @@ def test_the_authored_poses_close_every_joint_at_the_first_frame(name):
         if not prim.IsA(UsdPhysics.Joint):
             continue
         on0, on1 = joint_frames(UsdPhysics.Joint(prim), cache)
-        assert (on0.ExtractTranslation() - on1.ExtractTranslation()).GetLength() < 1e-6, prim.GetPath()
+        gap = (on0.ExtractTranslation() - on1.ExtractTranslation()).GetLength()
+        assert gap * UsdGeom.GetStageMetersPerUnit(stage) < 1e-6, prim.GetPath()
         turn = (on1 * on0.GetInverse()).ExtractRotation()
         if not prim.IsA(UsdPhysics.RevoluteJoint):
             assert turn.GetAngle() < 1e-4, prim.GetPath()
@@ -161,8 +166,15 @@ def test_joints_of_a_flexible_link_lie_inside_its_ends(name):
 
 
 @pytest.mark.long
-@pytest.mark.parametrize(("name", "fold"), [("dancer", 10.0)])
-def test_the_shake_falls_and_a_simulation_of_what_was_written_agrees(name, fold, calmotion, tmp_path):
+@pytest.mark.parametrize(
+    ("name", "mains", "fold"),
+    [
+        ("bartender", {"CupTarget"}, 10.0),
+        ("dancer", {"LeftHandTarget", "RightHandTarget"}, 10.0),
+        ("rapper", {"HandTarget"}, 35.0),
+    ],
+)
+def test_the_shake_falls_and_a_simulation_of_what_was_written_agrees(name, mains, fold, calmotion, tmp_path):
     run = calmotion("optimize", path_of(name), "-o", tmp_path / "calm.usda", "--json")
     assert run.returncode == 0, run.stdout + run.stderr
     told = json.loads(run.stdout)
@@ -170,7 +182,8 @@ def test_the_shake_falls_and_a_simulation_of_what_was_written_agrees(name, fold,
     assert again.returncode == 0, again.stdout + again.stderr
     measured = {row["path"]: row["max_error_m"] for row in json.loads(again.stdout)["targets"]}
     for row in told["targets"]:
-        assert row["max_error_before_m"] > 0.01, "the input should shake visibly"
-        assert fold * measured[row["path"]] < row["max_error_before_m"]
+        if row["path"].rpartition("/")[2] in mains:
+            assert row["max_error_before_m"] > 0.02, "the input should shake visibly"
+            assert fold * measured[row["path"]] < row["max_error_before_m"]
         assert measured[row["path"]] == pytest.approx(row["max_error_after_m"], rel=1e-3, abs=1e-6)
     assert not [limit for limit in told["limits"] if limit["exceeded"]]
