@@ -5,16 +5,17 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from calmotion.host import Figures, Operator, OutputPaths, Property, RunContext
+from calmotion.host import Figures, Operator, OutputPaths, Property, RunContext, SystemModes
 from calmotion.shot import Animation, Character, Result
 
 
 class PlotFigures(Operator):
-    """Errors over time, motor curves with their limits, the optimiser's convergence, and the motion in pictures."""
+    """Errors over time and by frequency, motor curves with their limits, convergence, and the motion in pictures."""
 
     idname = "figures.plot"
     label = "Draw the figures"
     requires = (Character, Animation, Result, OutputPaths)
+    uses = (SystemModes,)
     provides = (Figures,)
     properties = (
         Property("dpi", int, 150, minimum=30, maximum=600, description="Resolution of the figures, dots an inch."),
@@ -34,6 +35,7 @@ class PlotFigures(Operator):
             context.get(Character),
             context.get(Animation),
             context.get(Result),
+            modes=context.get(SystemModes),
             dpi=context.properties.dpi,
             instants=context.properties.instants,
             progress=context.progress,

@@ -29,10 +29,15 @@ def runs_of(result: Result) -> list[tuple[Simulation, str, str, str]]:
     return runs + ([(result.after, AFTER, "-", "after")] if result.after else [])
 
 
+def worst_targets(result: Result) -> list[int]:
+    """The targets with the largest errors of the input, as many as a figure has room for, in the shot's order."""
+    largest = result.before.position_errors[judged(result.before)].max(axis=0)
+    return sorted(np.argsort(-largest, kind="stable")[:MOST_TARGETS].tolist())
+
+
 def plot_errors(character: Character, result: Result) -> Figure:
     """Distance of each target to where it was meant to be [mm], and its rotation error [deg] where that counts."""
-    largest = result.before.position_errors[judged(result.before)].max(axis=0)
-    shown = sorted(np.argsort(-largest, kind="stable")[:MOST_TARGETS].tolist())
+    shown = worst_targets(result)
     panels = [(k, False) for k in shown]
     panels += [(k, True) for k in shown if character.targets[k].rotation_weight > 0.0]
     figure = new_figure(WIDTH, 0.6 + 1.9 * len(panels))

@@ -6,10 +6,12 @@ from collections.abc import Callable
 from pathlib import Path
 
 from calmotion.errors import ShotError
+from calmotion.host import SystemModes
 from calmotion.shot import Animation, Character, Result
 
 from .curves import plot_convergence, plot_errors, plot_motors
 from .filmstrip import draw_filmstrip
+from .spectra import plot_spectra
 from .style import save
 
 MOTORS_ON_A_PAGE = 8
@@ -22,6 +24,7 @@ def draw_figures(
     animation: Animation,
     result: Result,
     *,
+    modes: SystemModes | None = None,
     dpi: int = 150,
     instants: int = 5,
     progress: Progress = lambda fraction, message: None,
@@ -33,6 +36,7 @@ def draw_figures(
         character: The character.
         animation: For the times of its frames.
         result: Of `simulate` (then without what comes after) or of `optimize`.
+        modes: Frequencies to mark in the spectra.
         dpi: Dots an inch.
         instants: Number of instants in the filmstrip.
         progress: Called with a fraction in 0..1 and a message.
@@ -50,6 +54,8 @@ def draw_figures(
         if character.targets:
             progress(0.0, "errors")
             written.append(save(plot_errors(character, result), target / "errors.png", dpi))
+            progress(0.1, "spectra")
+            written.append(save(plot_spectra(character, result, modes), target / "spectra.png", dpi))
         for page, first in enumerate(range(0, len(character.motors), MOTORS_ON_A_PAGE)):
             progress(0.2, "motors")
             motors = range(first, min(first + MOTORS_ON_A_PAGE, len(character.motors)))

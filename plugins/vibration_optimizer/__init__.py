@@ -71,11 +71,14 @@ class FindSystemModes(Operator):
     idname = "dynamics.modes"
     label = "Find the frequencies of the character"
     requires = (Character, Animation)
-    uses = (ReducedBodies,)
+    uses = (ReducedBodies, Source, OutputPaths)
     provides = (SystemModes,)
 
     @classmethod
     def poll(cls, data: Mapping[type, Any]) -> str | None:
+        source, paths = data.get(Source), data.get(OutputPaths)
+        if source is not None and source.command != "inspect" and paths is not None and not paths.figures:
+            return NotAsked("only figures show frequencies, and none are asked for")
         return _nothing_flexible(data)
 
     def execute(self, context: RunContext) -> Sequence[object]:

@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 import synthetic
 from calmotion.errors import ShotError
-from calmotion.host import OutputPaths, PluginError
+from calmotion.host import OutputPaths, PluginError, SystemModes
+from calmotion.shot.spectrum import error_spectrum
 from calmotion.shot.viewpoint import choose_viewpoint
 from calmotion.testing import check_plugin, host_with, run_operator
 
@@ -40,10 +41,10 @@ def test_the_plugin_keeps_to_the_rules():
     assert check_plugin(PLUGIN) == []
 
 
-def test_an_optimised_result_gives_four_pictures_and_nothing_else(tmp_path):
+def test_an_optimised_result_gives_five_pictures_and_nothing_else(tmp_path):
     paths = draw(tmp_path / "new" / "folder", synthetic.result(), {"figures.plot": {"dpi": 60}})
     names = [Path(path).name for path in paths]
-    assert names == ["errors.png", "motors.png", "convergence.png", "filmstrip.png"]
+    assert names == ["errors.png", "spectra.png", "motors.png", "convergence.png", "filmstrip.png"]
     assert sorted(path.name for path in (tmp_path / "new" / "folder").iterdir()) == sorted(names)
     for path in paths:
         picture = matplotlib.image.imread(path)
@@ -53,7 +54,7 @@ def test_an_optimised_result_gives_four_pictures_and_nothing_else(tmp_path):
 def test_a_simulation_alone_has_no_convergence_and_draws_twice_the_same(tmp_path):
     result = synthetic.result(optimized=False)
     first, second = (draw(tmp_path / name, result, {"figures.plot": {"dpi": 60}}) for name in "ab")
-    assert [Path(path).name for path in first] == ["errors.png", "motors.png", "filmstrip.png"]
+    assert [Path(path).name for path in first] == ["errors.png", "spectra.png", "motors.png", "filmstrip.png"]
     for one, other in zip(first, second, strict=True):
         assert Path(one).read_bytes() == Path(other).read_bytes()
 
@@ -70,6 +71,25 @@ def test_errors_are_drawn_in_millimetres_and_degrees_from_the_first_frame_on(fig
     assert f"largest {1e3 * result.before.position_errors.max():.2f} mm" in lines_of(position)["before"].get_label()
     assert "[mm]" in position.get_ylabel() and "[deg]" in rotation.get_ylabel()
     assert position.get_title(loc="left") == "/Robot/Tip/Target"
+
+
+def test_spectra_are_drawn_in_millimetres_with_the_modes_marked(figures):
+    result, modes = synthetic.result(), SystemModes(np.array([4.0, 900.0]), np.array([0.01, 0.02]))
+    (axes,) = figures.spectra.plot_spectra(synthetic.character(), result, modes).axes
+    for name, run in (("before", result.before), ("after", result.after)):
+        frequencies, amplitudes = error_spectrum(run.motion, result.reference, 0)
+        drawn = lines_of(axes)[name].get_data()
+        np.testing.assert_allclose(drawn, [frequencies[1:], 1e3 * amplitudes[1:]])
+    assert lines_of(axes)["modes in the first pose"].get_xdata() == [4.0, 4.0]
+    assert [text.get_text() for text in axes.texts] == ["4.0"], "modes beyond the figure are not marked"
+    assert "[mm]" in axes.get_ylabel() and "[Hz]" in axes.get_xlabel()
+    (bare,) = figures.spectra.plot_spectra(synthetic.character(), result, None).axes
+    assert not bare.texts and set(lines_of(bare)) == {"before", "after"}
+
+
+def test_labels_too_near_to_stand_apart_are_written_as_one(figures):
+    assert figures.spectra.grouped([1.0, 1.4, 1.9, 5.0], 0.6) == [[1.0, 1.4, 1.9], [5.0]]
+    assert figures.spectra.grouped([], 1.0) == []
 
 
 def test_motor_curves_show_limits_and_the_change(figures):

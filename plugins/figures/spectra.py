@@ -1,0 +1,60 @@
+"""The shake by frequency, before and after, with the character's own frequencies marked."""
+
+from __future__ import annotations
+
+from calmotion.host import SystemModes
+from calmotion.shot import Character, Result
+from calmotion.shot.spectrum import error_spectrum, highest_frequency
+from matplotlib.figure import Figure
+
+from .curves import WIDTH, runs_of, worst_targets
+from .style import LIMIT, SMALL, new_figure, tidy
+
+DECADES = 5.0
+NEAR = 0.05  # of the width: labels nearer than this are written as one
+ROOM = 1.15  # beyond the highest frequency of interest
+
+
+def plot_spectra(character: Character, result: Result, modes: SystemModes | None) -> Figure:
+    """Amplitude of the position error of each target [mm] by frequency [Hz]."""
+    shown = worst_targets(result)
+    figure = new_figure(WIDTH, 0.7 + 2.1 * len(shown))
+    all_axes = figure.subplots(len(shown), 1, sharex=True, squeeze=False)[:, 0]
+    end = 1.0
+    for axes, k in zip(all_axes, shown, strict=True):
+        largest = 0.0
+        for simulation, color, line, name in runs_of(result):
+            frequencies, amplitudes = error_spectrum(simulation.motion, result.reference, k)
+            axes.semilogy(frequencies[1:], 1e3 * amplitudes[1:], line, color=color, linewidth=1.5, label=name)
+            largest = max(largest, 1e3 * float(amplitudes.max(initial=0.0)))
+            end = max(end, ROOM * highest_frequency(frequencies, amplitudes)) if name != "after" else end
+        tidy(axes, "amplitude [mm]", character.targets[k].path)
+        if largest > 0.0:
+            axes.set_ylim(largest * 10.0**-DECADES, 3.0 * largest)
+        axes.margins(x=0.0)
+    marked = [] if modes is None else [float(f) for f in modes.frequencies if f < end]
+    for axes in all_axes:
+        axes.set_xlim(0.0, end)
+        for n, frequency in enumerate(marked):
+            label = "modes in the first pose" if n == 0 else None
+            axes.axvline(frequency, color=LIMIT, linewidth=1.0, linestyle=":", label=label)
+        for group in grouped(marked, NEAR * end):
+            axes.annotate(
+                ", ".join(f"{frequency:.1f}" for frequency in group), (group[-1], 1.0),
+                xycoords=("data", "axes fraction"), xytext=(2, -2), textcoords="offset points",
+                fontsize=SMALL - 1.0, color=LIMIT, va="top",
+            )  # fmt: skip
+        axes.legend(fontsize=SMALL, loc="upper right", framealpha=0.85, edgecolor="none")
+    all_axes[-1].set_xlabel("frequency [Hz]", fontsize=SMALL)
+    return figure
+
+
+def grouped(values: list[float], gap: float) -> list[list[float]]:
+    """Ascending values in groups, each value nearer than `gap` to the one before it."""
+    groups: list[list[float]] = []
+    for value in values:
+        if groups and value - groups[-1][-1] < gap:
+            groups[-1].append(value)
+        else:
+            groups.append([value])
+    return groups
