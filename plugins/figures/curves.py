@@ -18,11 +18,6 @@ MOST_TARGETS = 8
 WIDTH = 9.0
 
 
-def judged(simulation: Simulation) -> slice:
-    """The rows from the first frame of the shot on."""
-    return slice(int(np.searchsorted(simulation.motion.times, -1e-9)), None)
-
-
 def runs_of(result: Result) -> list[tuple[Simulation, str, str, str]]:
     """What was simulated, with color, line style and name."""
     runs = [(result.before, BEFORE, "--" if result.after else "-", "before" if result.after else "as animated")]
@@ -31,7 +26,7 @@ def runs_of(result: Result) -> list[tuple[Simulation, str, str, str]]:
 
 def worst_targets(result: Result) -> list[int]:
     """The targets with the largest errors of the input, as many as a figure has room for, in the shot's order."""
-    largest = result.before.position_errors[judged(result.before)].max(axis=0)
+    largest = result.before.position_errors[result.before.motion.judged].max(axis=0)
     return sorted(np.argsort(-largest, kind="stable")[:MOST_TARGETS].tolist())
 
 
@@ -44,7 +39,7 @@ def plot_errors(character: Character, result: Result) -> Figure:
     all_axes = figure.subplots(len(panels), 1, sharex=True, squeeze=False)[:, 0]
     for axes, (k, rotation) in zip(all_axes, panels, strict=True):
         for simulation, color, line, name in runs_of(result):
-            rows = judged(simulation)
+            rows = simulation.motion.judged
             errors = simulation.rotation_errors if rotation else simulation.position_errors
             values = np.degrees(errors[rows, k]) if rotation else 1e3 * errors[rows, k]
             unit = "deg" if rotation else "mm"
@@ -70,7 +65,7 @@ def plot_motors(character: Character, result: Result, motors: Sequence[int]) -> 
         motor = character.motors[m]
         measure = measure_of(motor)
         for simulation, color, line, name in runs_of(result):
-            rows = judged(simulation)
+            rows = simulation.motion.judged
             values = measure.factor * simulation.motion.motor_values[rows, m]
             row[0].plot(simulation.motion.times[rows], values, line, color=color, linewidth=1.5, label=name)
         joint = character.joints[motor.joint]
@@ -78,7 +73,7 @@ def plot_motors(character: Character, result: Result, motors: Sequence[int]) -> 
         draw_limits(row[0], measure.factor * np.array([joint.lower, joint.upper]), measure.unit)
         if result.after is None:
             continue
-        rows = judged(result.after)
+        rows = result.after.motion.judged
         after = result.after.motion
         before = sample_motion(result.before.motion, after.times[rows])
         change = measure.factor * (after.motor_values[rows, m] - before.motor_values[:, m])

@@ -51,6 +51,8 @@ def make_blueprint(character: Character, animation: Animation, result: Result) -
     tabs = [plot("Position error [mm]", "errors/position_mm")]
     if any(target.rotation_weight > 0.0 for target in character.targets):
         tabs.append(plot("Rotation error [deg]", "errors/rotation_deg"))
+    if character.targets:
+        tabs.append(rrb.BarChartView(origin="spectra", name="Spectra [mm over Hz]"))
     if optimized:
         units = dict.fromkeys(measure_of(motor).unit for motor in character.motors)
         tabs += [plot(f"Change of the motors [{unit}]", f"changes_{unit}") for unit in units]

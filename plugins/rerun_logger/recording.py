@@ -20,9 +20,10 @@ from calmotion.shot.character import Array
 from calmotion.shot.measure import measure_of
 from calmotion.shot.playback import carriers, deformed_points, modes_of, relative_poses, sample_motion
 from calmotion.shot.shading import split_at_creases
+from calmotion.shot.spectrum import error_spectrum, highest_frequency
 
 from .layout import INPUT, OPTIMIZED, REFERENCE, STYLES, make_blueprint, motor_plots
-from .summary import describe, judged
+from .summary import describe
 
 TIME, ITERATION = "time", "iteration"
 GHOST = (70, 160, 130, 70)
@@ -102,6 +103,7 @@ def log_all(
     log_errors(recording, character, INPUT, result.before, samples_per_plot)
     log_motors(recording, character, INPUT, result.before, samples_per_plot)
     log_reactions(recording, character, INPUT, result.before, samples_per_plot)
+    log_spectra(recording, character, result)
     if result.after is not None:
         log_errors(recording, character, OPTIMIZED, result.after, samples_per_plot)
         log_motors(recording, character, OPTIMIZED, result.after, samples_per_plot)
@@ -180,7 +182,7 @@ def log_trails(recording: rr.RecordingStream, root: str, character: Character, m
 
 def thinned(simulation: Simulation, samples: int) -> slice:
     """Rows of a simulation to plot: the judged ones, every n-th."""
-    rows = judged(simulation)
+    rows = simulation.motion.judged
     count = len(simulation.motion.times) - rows.start
     return slice(rows.start, None, max(1, int(np.ceil(count / samples))))
 
@@ -208,6 +210,26 @@ def log_errors(
         if target.rotation_weight > 0.0:
             turns = np.degrees(simulation.rotation_errors[rows, k])
             log_curve(recording, f"errors/rotation_deg/{root}{target.path}", times, turns, color, f"{name} [deg]")
+
+
+def log_spectra(recording: rr.RecordingStream, character: Character, result: Result) -> None:
+    """Amplitude of each target's error [mm] by frequency [Hz], as far as something happens in the input."""
+    for k, target in enumerate(character.targets):
+        end = highest_frequency(*error_spectrum(result.before.motion, result.reference, k))
+        for root, simulation in ((INPUT, result.before), (OPTIMIZED, result.after)):
+            if simulation is None:
+                continue
+            frequencies, amplitudes = error_spectrum(simulation.motion, result.reference, k)
+            shown = slice(1, int(np.searchsorted(frequencies, end, side="right")))
+            if shown.stop <= 1:
+                continue
+            bars = rr.BarChart(
+                1e3 * amplitudes[shown],
+                abscissa=frequencies[shown],
+                widths=np.full(shown.stop - 1, frequencies[1], dtype=np.float32),
+                color=STYLES[root].shade(k, len(character.targets)),
+            )
+            recording.log(f"spectra/{root}{target.path}", bars, static=True)
 
 
 def log_motors(

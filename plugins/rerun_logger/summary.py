@@ -29,11 +29,6 @@ def describe(character: Character, result: Result, operators: Sequence[OperatorR
     return "\n\n".join(parts) + "\n"
 
 
-def judged(simulation: Simulation) -> slice:
-    """The rows of a simulation that are judged: those from the first frame of the shot on."""
-    return slice(int(np.searchsorted(simulation.motion.times, -1e-9)), None)
-
-
 def errors_table(character: Character, result: Result) -> str:
     """One row for each target."""
     names = distinct_names([target.path for target in character.targets])
@@ -51,7 +46,7 @@ def error_cell(simulation: Simulation | None, target: int, rotation: bool, measu
     """Position error, and rotation error where it counts."""
     if simulation is None:
         return "-"
-    rows = judged(simulation)
+    rows = simulation.motion.judged
     text = f"{1e3 * measure(simulation.position_errors[rows, target]):.2f} mm"
     if rotation:
         text += f", {np.degrees(measure(simulation.rotation_errors[rows, target])):.2f}°"

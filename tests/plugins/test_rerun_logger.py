@@ -13,6 +13,7 @@ import pytest
 import synthetic
 from calmotion.errors import ShotError
 from calmotion.host import OutputPaths, PluginError, Recording
+from calmotion.shot.spectrum import error_spectrum
 from calmotion.testing import check_plugin, host_with, run_operator
 
 pytest.importorskip("rerun")
@@ -48,6 +49,11 @@ def read(path):
         times = None if pieces[0][0] is None else np.concatenate([piece[0] for piece in pieces])
         merged[key] = (times, [value for piece in pieces for value in piece[1]])
     return merged
+
+
+def tensor_of(cell):
+    """The numbers of a tensor as it stands in a column."""
+    return cell["buffer"]
 
 
 @pytest.fixture(scope="module")
@@ -134,6 +140,18 @@ def test_errors_and_motor_curves_have_the_units_they_are_named_by(columns):
             np.testing.assert_allclose(np.ravel(values), np.linalg.norm(reaction[first:, 2], axis=1))
     change = np.ravel(columns["/changes_deg/Robot/Joints/Swing", "Scalars:scalars"][1])
     assert change.max() == pytest.approx(np.degrees(0.01), rel=1e-3)
+
+
+def test_spectra_are_bars_in_millimetres_over_hertz(columns):
+    result = synthetic.result()
+    for root, simulation in (("input", result.before), ("optimized", result.after)):
+        entity = f"/spectra/{root}/Robot/Tip/Target"
+        frequencies, amplitudes = error_spectrum(simulation.motion, result.reference, 0)
+        (bars,), (abscissa,) = (columns[entity, f"BarChart:{name}"][1][0] for name in ("values", "abscissa"))
+        values = np.array(tensor_of(bars))
+        assert 10 < len(values) < len(frequencies)
+        np.testing.assert_allclose(values, 1e3 * amplitudes[1 : len(values) + 1])
+        np.testing.assert_allclose(tensor_of(abscissa), frequencies[1 : len(values) + 1])
 
 
 def test_progress_is_a_series_over_iterations(columns):

@@ -38,6 +38,11 @@ class Motion:
     joint_forces: Array | None = None
     joint_moments: Array | None = None
 
+    @property
+    def judged(self) -> slice:
+        """The rows from the first frame of the shot on: what lies before is a pre-roll."""
+        return slice(int(np.searchsorted(self.times, -1e-9)), None)
+
 
 @dataclass(frozen=True, eq=False)
 class Simulation:

@@ -27,7 +27,7 @@ def error_spectrum(motion: Motion, reference: Motion, target: int) -> tuple[Arra
 
     Source: Harris, On the use of windows for harmonic analysis with the discrete Fourier transform (1978).
     """
-    rows = motion.times >= -1e-9
+    rows = motion.judged
     times = motion.times[rows]
     if len(times) < 4:
         return np.zeros(0), np.zeros(0)
