@@ -12,6 +12,7 @@ from calmotion.shot.playback import sample_motion
 from calmotion.shot.viewpoint import choose_viewpoint
 
 INPUT, OPTIMIZED, REFERENCE = "input", "optimized", "reference"
+TIME = "time"  # the timeline of the shot
 BACKGROUND = (236, 238, 241)
 MOTOR_TABS = 12
 # Half the vertical opening angle of rerun's eye is about 27 degrees; the radius is that of a whole box's diagonal.
@@ -41,13 +42,14 @@ STYLES = {
 }
 
 
-def make_blueprint(character: Character, animation: Animation, result: Result) -> rrb.Blueprint:
-    """The views that fit what the result holds."""
+def make_blueprint(character: Character, animation: Animation, result: Result, scale: float) -> rrb.Blueprint:
+    """The views that fit what the result holds; `scale` is the deviation of the strongest color [m]."""
     optimized = result.after is not None
     eye = choose_eye(character, animation, result)
-    views = [spatial_view("Input, simulated (intended: green)", INPUT, eye)]
+    legend = f"intended: green; the redder, the farther off, up to {1e3 * scale:.3g} mm"
+    views = [spatial_view(f"Input, simulated ({legend})", INPUT, eye)]
     if optimized:
-        views.append(spatial_view("Optimised (intended: green)", OPTIMIZED, eye))
+        views.append(spatial_view(f"Optimised ({legend})", OPTIMIZED, eye))
     tabs = [plot("Position error [mm]", "errors/position_mm")]
     if any(target.rotation_weight > 0.0 for target in character.targets):
         tabs.append(plot("Rotation error [deg]", "errors/rotation_deg"))
@@ -70,7 +72,7 @@ def make_blueprint(character: Character, animation: Animation, result: Result) -
         rrb.Vertical(rrb.Horizontal(*views), below, row_shares=[3, 2]),
         rrb.SelectionPanel(state="hidden"),
         rrb.BlueprintPanel(state="collapsed"),
-        rrb.TimePanel(state="collapsed", timeline="time", loop_mode="all"),
+        rrb.TimePanel(state="collapsed", timeline=TIME, loop_mode="all"),
         auto_views=False,
     )
 

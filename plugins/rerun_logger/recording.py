@@ -1,4 +1,4 @@
-"""The recording itself. With `layout.py`, all that talks to rerun, which changes with every minor version.
+"""The recording itself. With `bodies.py` and `layout.py`, all that talks to rerun, which changes every minor version.
 
 Only rerun's viewer binds sockets or reports on its use. It is never started here: a recording is a file.
 """
@@ -15,19 +15,18 @@ import rerun as rr
 from calmotion.errors import ShotError
 from calmotion.host import OperatorResult
 from calmotion.naming import distinct_names
-from calmotion.shot import Animation, Character, Motion, Result, Simulation, SurfaceMesh
+from calmotion.shot import Animation, Character, Motion, Result, Simulation
 from calmotion.shot.character import Array
 from calmotion.shot.measure import measure_of
-from calmotion.shot.playback import carriers, deformed_points, modes_of, relative_poses, sample_motion
-from calmotion.shot.shading import split_at_creases
+from calmotion.shot.playback import sample_motion
 from calmotion.shot.spectrum import error_spectrum, highest_frequency
 
-from .layout import INPUT, OPTIMIZED, REFERENCE, STYLES, make_blueprint, motor_plots
+from .bodies import log_bodies
+from .deviation import largest_deviation
+from .layout import INPUT, OPTIMIZED, REFERENCE, STYLES, TIME, make_blueprint, motor_plots
 from .summary import describe
 
-TIME, ITERATION = "time", "iteration"
-GHOST = (70, 160, 130, 70)
-DEFAULT_COLOR = (0.55, 0.55, 0.57)
+ITERATION = "iteration"
 Progress = Callable[[float, str], None]
 
 
@@ -63,10 +62,11 @@ def write_recording(
     recording = rr.RecordingStream("calmotion", recording_id=f"{target.stem}{character.path}")
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
-        recording.save(str(partial), default_blueprint=make_blueprint(character, animation, result))
+        scale = largest_deviation(character, result, animation.frame_times)
+        recording.save(str(partial), default_blueprint=make_blueprint(character, animation, result, scale))
         summary = rr.TextDocument(describe(character, result, operators), media_type="text/markdown")
         recording.log("summary", summary, static=True)
-        log_all(recording, character, animation, result, samples_per_plot, progress)
+        log_all(recording, character, animation, result, scale, samples_per_plot, progress)
         recording.flush()
         recording.disconnect()
         with partial.open("rb+") as file:
@@ -87,6 +87,7 @@ def log_all(
     character: Character,
     animation: Animation,
     result: Result,
+    scale: float,
     samples_per_plot: int,
     progress: Progress,
 ) -> None:
@@ -94,10 +95,11 @@ def log_all(
     motions = {INPUT: result.before.motion, REFERENCE: result.reference}
     if result.after is not None:
         motions[OPTIMIZED] = result.after.motion
+    meant = sample_motion(result.reference, animation.frame_times)
     for count, (root, motion) in enumerate(motions.items()):
         progress(count / (len(motions) + 1), f"{root} in 3D")
         at_frames = sample_motion(motion, animation.frame_times)
-        log_bodies(recording, root, character, result, at_frames)
+        log_bodies(recording, root, character, result, at_frames, meant, scale)
         log_trails(recording, root, character, at_frames)
     progress(len(motions) / (len(motions) + 1), "curves")
     log_errors(recording, character, INPUT, result.before, samples_per_plot)
@@ -110,61 +112,6 @@ def log_all(
         log_reactions(recording, character, OPTIMIZED, result.after, samples_per_plot)
         log_changes(recording, character, result, samples_per_plot)
     log_progress(recording, result)
-
-
-def log_bodies(recording: rr.RecordingStream, root: str, character: Character, result: Result, motion: Motion) -> None:
-    """A transform for each body and frame, its meshes once, and the vertices of those that bend."""
-    frames = rr.TimeColumn(TIME, duration=motion.times)
-    # transforms add up along the entity tree, which mirrors the prims'
-    for index, (body, carrier) in enumerate(zip(character.bodies, carriers(character.bodies), strict=True)):
-        positions, rotations = relative_poses(motion, index, carrier)
-        columns = rr.Transform3D.columns(translation=positions, quaternion=rotations[:, [1, 2, 3, 0]])
-        recording.send_columns(root + body.path, [frames], columns)
-        if root == REFERENCE and stands_still(motion, index):
-            continue
-        for s, surface in enumerate(body.surfaces):
-            if surface.visible and len(surface.triangles):
-                entity = root + (surface.path if surface.path != body.path else f"{body.path}/mesh")
-                modes = modes_of(result.skins[index], s)
-                log_mesh(
-                    recording, entity, surface, deformed_points(surface.points, modes, motion.elastic[index]), frames
-                )
-
-
-def stands_still(motion: Motion, body: int) -> bool:
-    """Whether a body never moves, so that its ghost would only tint it."""
-    return bool(
-        np.ptp(motion.positions[:, body], axis=0).max() < 1e-9
-        and np.ptp(motion.rotations[:, body], axis=0).max() < 1e-9
-    )
-
-
-def log_mesh(recording: rr.RecordingStream, entity: str, surface: SurfaceMesh, points: Array, frames) -> None:
-    """One surface; `points` has one row when it does not deform, else one a frame."""
-    sources, triangles, normals = split_at_creases(surface.points, surface.triangles)
-    ghost = entity.startswith(REFERENCE)
-    fixed = {
-        "triangle_indices": triangles,
-        "vertex_normals": normals.astype(np.float32),
-        "albedo_factor": GHOST if ghost else display_color(surface.color),
-    }
-    if len(points) == 1:
-        fixed["vertex_positions"] = points[0, sources].astype(np.float32)
-        recording.log(entity, rr.Mesh3D.from_fields(**fixed), static=True)
-        return
-    # A static component would hide one that changes over time, so the positions are left out of it.
-    recording.log(entity, rr.Mesh3D.from_fields(**fixed), static=True)
-    moving = points[:, sources].astype(np.float32)
-    columns = rr.Mesh3D.columns(vertex_positions=moving.reshape(-1, 3)).partition([len(sources)] * len(moving))
-    recording.send_columns(entity, [frames], columns)
-
-
-def display_color(color: tuple[float, float, float] | None) -> tuple[int, int, int, int]:
-    """A linear color as rerun shows it: 8 bits in sRGB."""
-    linear = np.clip(np.array(color if color is not None else DEFAULT_COLOR, dtype=float), 0.0, 1.0)
-    encoded = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1.0 / 2.4) - 0.055)
-    red, green, blue = (255.0 * encoded).round().astype(int).tolist()
-    return red, green, blue, 255
 
 
 def log_trails(recording: rr.RecordingStream, root: str, character: Character, motion: Motion) -> None:

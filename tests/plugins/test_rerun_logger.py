@@ -13,6 +13,7 @@ import pytest
 import synthetic
 from calmotion.errors import ShotError
 from calmotion.host import OutputPaths, PluginError, Recording
+from calmotion.shot.playback import sample_motion, world_points
 from calmotion.shot.spectrum import error_spectrum
 from calmotion.testing import check_plugin, host_with, run_operator
 
@@ -110,6 +111,33 @@ def test_vertices_of_a_flexible_body_follow_its_modes_and_rigid_ones_stay(column
     np.testing.assert_allclose(shapes[:, ~tip], np.broadcast_to(shapes[0, ~tip], shapes[:, ~tip].shape), atol=1e-7)
     times, shapes = columns["/input/Robot/Tip/Ball", "Mesh3D:vertex_positions"]
     assert times is None and len(shapes) == 1
+
+
+def test_what_is_off_takes_the_color_of_the_input_and_what_is_not_keeps_its_own(columns):
+    result, frames = synthetic.result(), synthetic.animation().frame_times
+    character = synthetic.character()
+    motions = [sample_motion(motion, frames) for motion in (result.before.motion, result.reference)]
+
+    def off(body):
+        places = [
+            np.array(
+                [world_points(character.bodies[body], body, result.skins[body], m, k)[0] for k in range(len(frames))]
+            )
+            for m in motions
+        ]
+        return np.linalg.norm(places[0] - places[1], axis=2)
+
+    scale = max(off(body).max() for body in range(len(character.bodies)))
+    times, colors = columns["/input/Robot/Tip/Ball", "Mesh3D:vertex_colors"]
+    np.testing.assert_allclose(times, frames, atol=2e-9)
+    found = np.array([[(c >> 24, c >> 16 & 255, c >> 8 & 255) for c in row] for row in colors], dtype=float)
+    own, strongest = found[0].min(axis=0), np.array([213.0, 94.0, 0.0])
+    share = off(2).mean(axis=1) / scale
+    expected = own + share[:, None] * (strongest - own)
+    assert share.max() > 0.8 and np.abs(found.mean(axis=1) - expected).max() < 3.0
+    assert ("/input/Robot/Tip/Ball", "Mesh3D:albedo_factor") not in columns, "it would be multiplied in"
+    assert ("/input/Robot/Base/Box", "Mesh3D:albedo_factor") in columns, "what stands still is never off"
+    assert ("/input/Robot/Base/Box", "Mesh3D:vertex_colors") not in columns
 
 
 def test_normals_of_a_box_are_those_of_its_faces(columns):

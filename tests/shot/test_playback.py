@@ -9,6 +9,7 @@ from calmotion.shot import Body, Motion
 from calmotion.shot.playback import (
     carriers,
     deformed_points,
+    deviations,
     relative_poses,
     rotation_matrices,
     sample_motion,
@@ -75,3 +76,29 @@ def test_a_nested_body_is_placed_in_the_body_above_it():
     outer, inner = rotation_matrices(q[:, 1]), rotation_matrices(rotations)
     assert np.abs(outer @ inner - rotation_matrices(q[:, 0])).max() < 1e-14
     assert np.abs(np.einsum("fij,fj->fi", outer, positions) + c[:, 1] - c[:, 0]).max() < 1e-14
+
+
+def test_deviations_are_the_distances_of_the_points_at_each_row():
+    rng = np.random.default_rng(3)
+    points, modes = rng.normal(size=(5, 3)), rng.normal(size=(5, 3, 2))
+    half = np.sqrt(0.5)
+
+    def motion(turned, place, elastic):
+        none = np.zeros((1, 0))
+        return Motion(
+            times=np.zeros(1),
+            positions=np.array([[[0.0, 0.0, 0.0], place]]),
+            rotations=np.array([[[1.0, 0.0, 0.0, 0.0], turned]]),
+            elastic=(none, elastic),
+            motor_values=none,
+            motor_efforts=none,
+            target_positions=np.zeros((1, 0, 3)),
+            target_rotations=np.zeros((1, 0, 4)),
+        )
+
+    bent = np.array([[0.3, -0.2]])
+    one = motion([half, 0.0, 0.0, half], [1.0, 2.0, 3.0], bent)  # a quarter turn about z: (x, y) to (-y, x)
+    other = motion([1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 0.0], np.zeros((1, 0)))
+    shape = points + modes @ bent[0]
+    expected = np.stack([-shape[:, 1] + 1.0, shape[:, 0] + 2.0, shape[:, 2] + 3.0], axis=1) - points
+    np.testing.assert_allclose(deviations(points, modes, 1, one, other)[0], np.linalg.norm(expected, axis=1))

@@ -119,6 +119,27 @@ def relative_poses(motion: Motion, body: int, carrier: int) -> tuple[Array, Arra
     return np.einsum("fji,fj->fi", turned, offset), np.concatenate([real, imaginary], axis=1)
 
 
+def deviations(surface: Array, modes: Array | None, body: int, motion: Motion, reference: Motion) -> Array:
+    """How far each point of a surface is from where it was meant to be.
+
+    Args:
+        surface: Undeformed points, body axes [m], shape [n, 3].
+        modes: Displacement of the points [m per unit], shape [n, 3, r], or None for a rigid body.
+        body: Index of the body.
+        motion: f rows.
+        reference: f rows at the same times.
+
+    Returns:
+        Distances [m], shape [f, n].
+    """
+    places = []
+    for moved in (motion, reference):
+        points = deformed_points(surface, modes, moved.elastic[body])
+        turned = np.einsum("fij,fnj->fni", rotation_matrices(moved.rotations[:, body]), points)
+        places.append(turned + moved.positions[:, body, None])
+    return np.linalg.norm(places[0] - places[1], axis=2)
+
+
 def world_points(body: Body, index: int, skin: Skin | None, motion: Motion, row: int) -> list[Array]:
     """World positions of the points of each surface of a body at one row of a motion.
 

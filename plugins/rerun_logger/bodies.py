@@ -1,0 +1,98 @@
+"""Bodies in 3D: a transform a frame, each mesh once, and of its vertices and colors what changes."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import rerun as rr
+from calmotion.shot import Character, Motion, Result, SurfaceMesh
+from calmotion.shot.character import Array
+from calmotion.shot.playback import carriers, deformed_points, modes_of, relative_poses
+from calmotion.shot.shading import split_at_creases
+from numpy.typing import NDArray
+
+from .deviation import deviation_colors
+from .layout import REFERENCE, TIME
+
+GHOST = (70, 160, 130, 70)
+DEFAULT_COLOR = (0.55, 0.55, 0.57)
+
+
+def log_bodies(
+    recording: rr.RecordingStream,
+    root: str,
+    character: Character,
+    result: Result,
+    motion: Motion,
+    meant: Motion,
+    scale: float,
+) -> None:
+    """A transform for each body and frame, its meshes once, the vertices of those that bend, the colors of those off.
+
+    Args:
+        motion, meant: At the shot's frames.
+        scale: Deviation that has the whole color change [m].
+    """
+    frames = rr.TimeColumn(TIME, duration=motion.times)
+    # transforms add up along the entity tree, which mirrors the prims'
+    for index, (body, carrier) in enumerate(zip(character.bodies, carriers(character.bodies), strict=True)):
+        positions, rotations = relative_poses(motion, index, carrier)
+        columns = rr.Transform3D.columns(translation=positions, quaternion=rotations[:, [1, 2, 3, 0]])
+        recording.send_columns(root + body.path, [frames], columns)
+        if root == REFERENCE and stands_still(motion, index):
+            continue
+        for s, surface in enumerate(body.surfaces):
+            if surface.visible and len(surface.triangles):
+                entity = root + (surface.path if surface.path != body.path else f"{body.path}/mesh")
+                modes = modes_of(result.skins[index], s)
+                points = deformed_points(surface.points, modes, motion.elastic[index])
+                color, colors = GHOST, None
+                if root != REFERENCE:
+                    color = display_color(surface.color)
+                    colors = deviation_colors(color, surface.points, modes, index, motion, meant, scale)
+                log_mesh(recording, entity, surface, points, color, colors, frames)
+
+
+def stands_still(motion: Motion, body: int) -> bool:
+    """Whether a body never moves, so that its ghost would only tint it."""
+    return bool(
+        np.ptp(motion.positions[:, body], axis=0).max() < 1e-9
+        and np.ptp(motion.rotations[:, body], axis=0).max() < 1e-9
+    )
+
+
+def log_mesh(
+    recording: rr.RecordingStream,
+    entity: str,
+    surface: SurfaceMesh,
+    points: Array,
+    color: tuple[int, int, int, int],
+    colors: NDArray[np.uint8] | None,
+    frames: rr.TimeColumn,
+) -> None:
+    """One surface; `points` has one row when it does not deform, else one a frame, as `colors` has if there are any."""
+    sources, triangles, normals = split_at_creases(surface.points, surface.triangles)
+    fixed: dict[str, Any] = {"triangle_indices": triangles, "vertex_normals": normals.astype(np.float32)}
+    changing: dict[str, Any] = {}
+    # A static component would hide one that changes over time, so each is either here or there.
+    if len(points) == 1:
+        fixed["vertex_positions"] = points[0, sources].astype(np.float32)
+    else:
+        changing["vertex_positions"] = points[:, sources].astype(np.float32).reshape(-1, 3)
+    if colors is None:
+        fixed["albedo_factor"] = color
+    else:
+        changing["vertex_colors"] = colors[:, sources].reshape(-1, 4)
+    recording.log(entity, rr.Mesh3D.from_fields(**fixed), static=True)
+    if changing:
+        count = len(next(iter(changing.values()))) // len(sources)
+        recording.send_columns(entity, [frames], rr.Mesh3D.columns(**changing).partition([len(sources)] * count))
+
+
+def display_color(color: tuple[float, float, float] | None) -> tuple[int, int, int, int]:
+    """A linear color as rerun shows it: 8 bits in sRGB."""
+    linear = np.clip(np.array(color if color is not None else DEFAULT_COLOR, dtype=float), 0.0, 1.0)
+    encoded = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1.0 / 2.4) - 0.055)
+    red, green, blue = (255.0 * encoded).round().astype(int).tolist()
+    return red, green, blue, 255

@@ -1,0 +1,52 @@
+"""Deviation from what was meant, as a color of the surfaces: the part's own where there is none, vermillion at most."""
+
+from __future__ import annotations
+
+import numpy as np
+from calmotion.shot import Character, Motion, Result
+from calmotion.shot.character import Array
+from calmotion.shot.playback import deviations, modes_of, sample_motion
+from numpy.typing import NDArray
+
+from .layout import INPUT, STYLES
+
+SEEN = 1.0 / 64.0  # a smaller share of the whole color change is not told from none
+OFF = np.array(STYLES[INPUT].color, dtype=float)
+
+
+def largest_deviation(character: Character, result: Result, times: Array) -> float:
+    """By how much any visible point of the input is off at most, at the given times [m]."""
+    motion, reference = sample_motion(result.before.motion, times), sample_motion(result.reference, times)
+    largest = 0.0
+    for index, body in enumerate(character.bodies):
+        for s, surface in enumerate(body.surfaces):
+            if surface.visible and len(surface.triangles):
+                modes = modes_of(result.skins[index], s)
+                largest = max(largest, float(deviations(surface.points, modes, index, motion, reference).max()))
+    return largest
+
+
+def deviation_colors(
+    color: tuple[int, int, int, int],
+    points: Array,
+    modes: Array | None,
+    body: int,
+    motion: Motion,
+    reference: Motion,
+    scale: float,
+) -> NDArray[np.uint8] | None:
+    """Colors of the points of a surface at each frame, shape [f, n, 4], or None where the deviation cannot be seen.
+
+    Args:
+        color: The surface's own, 8 bits.
+        points, modes, body, motion, reference: As for `deviations`.
+        scale: Deviation that has the whole color change [m].
+    """
+    share = deviations(points, modes, body, motion, reference) / max(scale, 1e-12)
+    if share.max(initial=0.0) < SEEN:
+        return None
+    own = np.array(color[:3], dtype=float)
+    mixed = own + np.clip(share, 0.0, 1.0)[..., None] * (OFF - own)
+    found = np.full((*share.shape, 4), 255, dtype=np.uint8)
+    found[..., :3] = mixed.round()
+    return found
