@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from calmotion.host import Operator, OutputPaths, Property, Recording, RunContext
+from calmotion.host import Operator, OutputPaths, Property, Recording, RunContext, SystemModes
 from calmotion.shot import Animation, Character, Result
 
 
@@ -15,6 +15,7 @@ class LogRecording(Operator):
     idname = "rerun.log"
     label = "Write the rerun recording"
     requires = (Character, Animation, Result, OutputPaths)
+    uses = (SystemModes,)
     provides = (Recording,)
     properties = (
         Property(
@@ -44,6 +45,7 @@ class LogRecording(Operator):
             samples_per_plot=context.properties.samples_per_plot,
             progress=context.progress,
             operators=context.results,
+            system=context.get(SystemModes),
         )
         return (Recording(path),)
 

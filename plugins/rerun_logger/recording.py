@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 import rerun as rr
 from calmotion.errors import ShotError
-from calmotion.host import OperatorResult
+from calmotion.host import OperatorResult, SystemModes
 from calmotion.naming import distinct_names
 from calmotion.shot import Animation, Character, Motion, Result, Simulation
 from calmotion.shot.character import Array
@@ -39,6 +39,7 @@ def write_recording(
     samples_per_plot: int = 2000,
     progress: Progress = lambda fraction, message: None,
     operators: Sequence[OperatorResult] = (),
+    system: SystemModes | None = None,
 ) -> None:
     """Write a .rrd file, whole or not at all.
 
@@ -53,6 +54,7 @@ def write_recording(
         samples_per_plot: Largest number of samples of a curve.
         progress: Called with a fraction in 0..1 and a message.
         operators: What became of the operators of the run so far.
+        system: Natural modes of the whole character.
 
     Raises:
         ShotError: When the file cannot be written.
@@ -64,7 +66,7 @@ def write_recording(
         target.parent.mkdir(parents=True, exist_ok=True)
         scale = largest_deviation(character, result, animation.frame_times)
         recording.save(str(partial), default_blueprint=make_blueprint(character, animation, result, scale))
-        summary = rr.TextDocument(describe(character, result, operators), media_type="text/markdown")
+        summary = rr.TextDocument(describe(character, result, operators, system), media_type="text/markdown")
         recording.log("summary", summary, static=True)
         log_all(recording, character, animation, result, scale, samples_per_plot, progress)
         recording.flush()

@@ -5,20 +5,29 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from calmotion.host import OperatorResult
+from calmotion.host import OperatorResult, SystemModes
 from calmotion.naming import distinct_names
 from calmotion.shot import Character, Result, Simulation
 
 HEAD = "| target | largest before | largest after | rms before | rms after |\n|---|---:|---:|---:|---:|"
 
 
-def describe(character: Character, result: Result, operators: Sequence[OperatorResult] = ()) -> str:
+SHOWN_MODES = 6
+
+
+def describe(
+    character: Character,
+    result: Result,
+    operators: Sequence[OperatorResult] = (),
+    system: SystemModes | None = None,
+) -> str:
     """The summary as Markdown; positions in mm, rotations in degrees.
 
     Args:
         operators: What became of the operators of the run so far.
+        system: Natural modes of the whole character.
     """
-    parts = [f"# {character.path}", errors_table(character, result), sizes(character, result)]
+    parts = [f"# {character.path}", errors_table(character, result), sizes(character, result, system)]
     parts.append(left_out(result))
     if character.notes:
         parts.append("## Notes on the shot\n" + "\n".join(f"- {note}" for note in character.notes))
@@ -53,12 +62,15 @@ def error_cell(simulation: Simulation | None, target: int, rotation: bool, measu
     return text
 
 
-def sizes(character: Character, result: Result) -> str:
+def sizes(character: Character, result: Result, system: SystemModes | None) -> str:
     """Size of the model and cost of the run."""
     lines = [
         f"- {len(character.bodies)} bodies, {len(character.motors)} motors, {result.dof} position coordinates",
         f"- time step {1e3 * result.step_s:g} ms, pre-roll {result.pre_roll_s:g} s",
     ]
+    if system is not None:
+        found = ", ".join(f"{f:.1f}" for f in system.frequencies[:SHOWN_MODES])
+        lines.append(f"- modes of the whole character in its first pose: {found} Hz")
     names = distinct_names([body.path for body in character.bodies])
     for table in result.modes:
         shown = ", ".join(f"{f:.1f}" for f in table.frequencies[:6])

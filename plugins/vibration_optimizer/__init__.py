@@ -77,8 +77,9 @@ class FindSystemModes(Operator):
     @classmethod
     def poll(cls, data: Mapping[type, Any]) -> str | None:
         source, paths = data.get(Source), data.get(OutputPaths)
-        if source is not None and source.command != "inspect" and paths is not None and not paths.figures:
-            return NotAsked("only figures show frequencies, and none are asked for")
+        if source is not None and source.command != "inspect" and paths is not None:
+            if not paths.figures and not paths.rrd:
+                return NotAsked("only figures and recordings show frequencies, and none are asked for")
         return _nothing_flexible(data)
 
     def execute(self, context: RunContext) -> Sequence[object]:

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 import synthetic
 from calmotion.errors import ShotError
-from calmotion.host import OutputPaths, PluginError, Recording
+from calmotion.host import OutputPaths, PluginError, Recording, SystemModes
 from calmotion.shot.playback import sample_motion, world_points
 from calmotion.shot.spectrum import error_spectrum
 from calmotion.testing import check_plugin, host_with, run_operator
@@ -200,6 +200,14 @@ def test_the_summary_names_what_was_left_out_and_the_errors(columns):
     assert "modes above 40 Hz" in text and "0.02 mm" in text
     assert f"{1e3 * result.before.position_errors.max():.2f} mm" in text
     assert f"{1e3 * result.after.position_errors.max():.2f} mm" in text
+
+
+def test_the_summary_names_the_characters_frequencies_where_they_are_known(tmp_path):
+    modes = SystemModes(np.array([3.25, 12.5]), np.array([0.01, 0.02]))
+    given = [synthetic.character(), synthetic.animation(), synthetic.result(), modes]
+    run_operator(host_with(PLUGIN), "rerun.log", [*given, OutputPaths(rrd=str(tmp_path / "out.rrd"))])
+    text = read(tmp_path / "out.rrd")["/summary", "TextDocument:text"][1][0][0]
+    assert "in its first pose: 3.2, 12.5 Hz" in text
 
 
 def test_the_recording_carries_its_own_layout(tmp_path):

@@ -3,7 +3,7 @@ import dataclasses
 import numpy as np
 import pytest
 from calmotion import ShotError
-from calmotion.host import NotAsked, ReducedBodies, ShapedTracks, Source, SystemModes
+from calmotion.host import NotAsked, OutputPaths, ReducedBodies, ShapedTracks, Source, SystemModes
 from calmotion.shot import Character, Result
 from calmotion.testing import host_with, run_operator, small_shot
 
@@ -89,3 +89,13 @@ def test_shaped_tracks_are_simulated_where_they_are_asked_for(host):
     with pytest.raises(ShotError, match="rigid robot has no frequency") as error:
         run_operator(host, "retarget.shape", [character, animation, asked])
     assert error.value.place == "--shaper"
+
+
+def test_frequencies_are_sought_only_where_something_shows_them(host):
+    poll = host.operators["dynamics.modes"].poll
+    character, _ = small_shot(flexible=True)
+    asked = {Character: character, Source: source("optimize")}
+    assert isinstance(poll(asked | {OutputPaths: OutputPaths(layer="calm.usda", csv="calm.csv")}), NotAsked)
+    assert poll(asked | {OutputPaths: OutputPaths(figures="pictures")}) is None
+    assert poll(asked | {OutputPaths: OutputPaths(rrd="calm.rrd")}) is None
+    assert poll({Character: character, Source: source("inspect"), OutputPaths: OutputPaths()}) is None
