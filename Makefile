@@ -1,7 +1,7 @@
 # make demo     optimise the bartender sample, and print the errors before and after
 # make test     lint, types and tests
 # make fuzz     ten minutes of random damage to shots and manifests
-# make samples  build the sample characters again
+# make samples  build the sample characters again (make pictures optimises and draws them)
 # make blender  the extension of Blender as a zip (make blender-test tests it; needs Python 3.11)
 # make clean    remove what was built, and the environment
 #
@@ -22,7 +22,7 @@ PYTHON ?= $(shell for python in python3 python3.13 python3.12 python3.11 python;
 
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
-.PHONY: help demo test fuzz samples blender blender-test clean
+.PHONY: help demo test fuzz samples pictures blender blender-test clean
 .DELETE_ON_ERROR:
 
 help:
@@ -64,6 +64,9 @@ blender-test: $(INSTALLED_DEV) $(BLENDER_VENV)/.installed
 
 samples: $(INSTALLED)
 	@for script in samples/*/build.py; do echo "$$script"; $(RUN) "$$script" || exit 1; done
+
+pictures: $(INSTALLED)
+	$(RUN) samples/pictures.py
 
 clean:
 	rm -rf $(VENV) $(BLENDER_VENV) build dist .mypy_cache .pytest_cache .ruff_cache
