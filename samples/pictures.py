@@ -11,7 +11,8 @@ from PIL import Image
 
 HERE = Path(__file__).resolve().parent
 DPI = 125  # 1500 pixels across
-COLORS = 160  # a palette is a third of the size, and nobody sees it in flat shades
+COLORS = 255  # a palette is a third of the size
+ROUNDS = 4  # of k-means over the palette; without them the few pixels of the marks take other colors
 
 
 def picture(name: str) -> None:
@@ -21,7 +22,8 @@ def picture(name: str) -> None:
         command = [sys.executable, "-m", "calmotion", "optimize", str(shot), "-o", str(layer)]
         subprocess.run([*command, "--figures", folder, "--set", f"figures.plot.dpi={DPI}"], check=True)
         strip = Image.open(Path(folder) / "filmstrip.png").convert("RGB")
-    strip.quantize(COLORS, dither=Image.Dither.NONE).save(HERE / name / f"{name}.png", optimize=True)
+    flat = strip.quantize(COLORS, kmeans=ROUNDS, dither=Image.Dither.NONE)
+    flat.save(HERE / name / f"{name}.png", optimize=True)
 
 
 if __name__ == "__main__":
