@@ -63,7 +63,7 @@ def prepare(character: Character, skins: tuple[Skin | None, ...]) -> Model:
     parts, colors = [], []
     for index, body in enumerate(character.bodies):
         for s, surface in enumerate(body.surfaces):
-            if not surface.visible or not len(surface.triangles):
+            if not surface.drawn:
                 continue
             sources, triangles, normals = split_at_creases(surface.points, surface.triangles)
             modes = modes_of(skins[index], s)

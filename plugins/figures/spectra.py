@@ -27,7 +27,8 @@ def plot_spectra(character: Character, result: Result, modes: SystemModes | None
             frequencies, amplitudes = error_spectrum(simulation.motion, result.reference, k)
             axes.semilogy(frequencies[1:], 1e3 * amplitudes[1:], line, color=color, linewidth=1.5, label=name)
             largest = max(largest, 1e3 * float(amplitudes.max(initial=0.0)))
-            end = max(end, ROOM * highest_frequency(frequencies, amplitudes)) if name != "after" else end
+            if simulation is result.before:
+                end = max(end, ROOM * highest_frequency(frequencies, amplitudes))
         tidy(axes, "amplitude [mm]", character.targets[k].path)
         if largest > 0.0:
             axes.set_ylim(largest * 10.0**-DECADES, 3.0 * largest)

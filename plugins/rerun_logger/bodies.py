@@ -43,7 +43,7 @@ def log_bodies(
         if root == REFERENCE and stands_still(motion, index):
             continue
         for s, surface in enumerate(body.surfaces):
-            if surface.visible and len(surface.triangles):
+            if surface.drawn:
                 entity = root + (surface.path if surface.path != body.path else f"{body.path}/mesh")
                 modes = modes_of(result.skins[index], s)
                 points = deformed_points(surface.points, modes, motion.elastic[index])

@@ -20,7 +20,7 @@ def largest_deviation(character: Character, result: Result, times: Array) -> flo
     largest = 0.0
     for index, body in enumerate(character.bodies):
         for s, surface in enumerate(body.surfaces):
-            if surface.visible and len(surface.triangles):
+            if surface.drawn:
                 modes = modes_of(result.skins[index], s)
                 largest = max(largest, float(deviations(surface.points, modes, index, motion, reference).max()))
     return largest

@@ -97,12 +97,11 @@ def log_all(
     motions = {INPUT: result.before.motion, REFERENCE: result.reference}
     if result.after is not None:
         motions[OPTIMIZED] = result.after.motion
-    meant = sample_motion(result.reference, animation.frame_times)
-    for count, (root, motion) in enumerate(motions.items()):
+    at_frames = {root: sample_motion(motion, animation.frame_times) for root, motion in motions.items()}
+    for count, (root, motion) in enumerate(at_frames.items()):
         progress(count / (len(motions) + 1), f"{root} in 3D")
-        at_frames = sample_motion(motion, animation.frame_times)
-        log_bodies(recording, root, character, result, at_frames, meant, scale)
-        log_trails(recording, root, character, at_frames)
+        log_bodies(recording, root, character, result, motion, at_frames[REFERENCE], scale)
+        log_trails(recording, root, character, motion)
     progress(len(motions) / (len(motions) + 1), "curves")
     log_errors(recording, character, INPUT, result.before, samples_per_plot)
     log_motors(recording, character, INPUT, result.before, samples_per_plot)

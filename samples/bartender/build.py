@@ -12,26 +12,18 @@ if str(HERE.parent) not in sys.path:
 from bartender import model, motion  # noqa: E402
 from kit import character  # noqa: E402
 
-TOLERANCE = 0.001
-NOTE = "A serving robot with two slender plastic links, drawn for Calmotion. Built by samples/bartender/build.py."
-
-
-def build(path: str | Path) -> None:
-    """Write the sample to a .usda file, whole or not at all."""
-    found = character.Character(
-        name="Bartender",
-        note=NOTE,
-        bodies=model.bodies(),
-        joints=model.joints(motion.tracks()),
-        looks=model.LOOKS,
-        plastic=model.NYLON,
-        scenery=("Bar", model.scenery()),
-        frames=motion.FRAMES,
-        rate=motion.RATE,
-        tolerance=TOLERANCE,
-    )
-    character.write(found, path)
-
+CHARACTER = character.Character(
+    name="Bartender",
+    note="A serving robot with two slender plastic links, drawn for Calmotion. Built by samples/bartender/build.py.",
+    bodies=model.bodies(),
+    joints=model.joints(motion.tracks()),
+    looks=model.LOOKS,
+    plastic=model.NYLON,
+    scenery=("Bar", model.scenery()),
+    frames=motion.FRAMES,
+    rate=motion.RATE,
+    tolerance=0.001,
+)
 
 if __name__ == "__main__":
-    build(sys.argv[1] if len(sys.argv) > 1 else HERE / "bartender.usda")
+    character.main(CHARACTER, HERE)

@@ -15,28 +15,20 @@ if str(HERE.parent) not in sys.path:
 from dancer import model, motion  # noqa: E402
 from kit import character  # noqa: E402
 
-TOLERANCE = 0.001
-NOTE = "A dancer that waves two slender arms, drawn for Calmotion. Built by samples/dancer/build.py."
-
-
-def build(path: str | Path) -> None:
-    """Write the sample to a .usda file, whole or not at all."""
-    found = character.Character(
-        name="Dancer",
-        note=NOTE,
-        bodies=model.bodies(),
-        joints=model.joints(motion.tracks()),
-        looks=model.LOOKS,
-        plastic=model.NYLON,
-        scenery=("Set", model.scenery()),
-        frames=motion.FRAMES,
-        rate=motion.RATE,
-        tolerance=TOLERANCE,
-        up="Y",
-        posed=True,
-    )
-    character.write(found, path)
-
+CHARACTER = character.Character(
+    name="Dancer",
+    note="A dancer that waves two slender arms, drawn for Calmotion. Built by samples/dancer/build.py.",
+    bodies=model.bodies(),
+    joints=model.joints(motion.tracks()),
+    looks=model.LOOKS,
+    plastic=model.NYLON,
+    scenery=("Set", model.scenery()),
+    frames=motion.FRAMES,
+    rate=motion.RATE,
+    tolerance=0.001,
+    up="Y",
+    posed=True,
+)
 
 if __name__ == "__main__":
-    build(sys.argv[1] if len(sys.argv) > 1 else HERE / "dancer.usda")
+    character.main(CHARACTER, HERE)

@@ -59,9 +59,8 @@ def _arm(name: str, side: float) -> tuple[BodySpec, ...]:
             f"{name}Hand",
             (
                 Part("Pom", ball(POM).moved(out(POM + 0.018)), "Rose"),
-                Part("Cuff", lathe([(0.02, -0.004), (0.023, 0.0), (0.023, 0.02), (0.02, 0.024)], axis="x")
-                     if side > 0.0 else
-                     lathe([(0.02, -0.004), (0.023, 0.0), (0.023, 0.02), (0.02, 0.024)], axis="x").mirrored(), "Gold"),
+                _sided(Part("Cuff", lathe([(0.02, -0.004), (0.023, 0.0), (0.023, 0.02), (0.02, 0.024)], axis="x"),
+                            "Gold"), side),
             ),
             0.15,
             targets=(TargetSpec(f"{name}HandTarget", out(POM + 0.018)),),

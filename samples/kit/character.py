@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -44,6 +45,11 @@ class Character:
     up: str = "Z"
     unit: float = 1.0
     posed: bool = False
+
+
+def main(character: Character, folder: Path) -> None:
+    """What a build script does: write to the file named on its command line, else beside itself."""
+    write(character, sys.argv[1] if len(sys.argv) > 1 else folder / f"{folder.name}.usda")
 
 
 def write(character: Character, path: str | Path) -> None:

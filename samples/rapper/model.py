@@ -64,6 +64,18 @@ def _pair(name: str, start: Vector, end: Vector, half: float, look: str) -> tupl
     )
 
 
+def _lever(name: str, mass: float) -> BodySpec:
+    """The crank at the shoulder, or the lever at the elbow."""
+    return BodySpec(
+        name,
+        (
+            *_pair("Arm", (0.0, 0.0, 0.0), LEVER, 0.017, "Steel"),
+            Part("Pin", cylinder(0.007, 2.0 * ROD_AT + 0.03, axis="y").moved(LEVER), "Gold"),
+        ),
+        mass,
+    )
+
+
 def _figure() -> BodySpec:
     hoodie = skin(
         [Section(0.80, 0.10, 0.155), Section(0.82, 0.125, 0.18), Section(0.90, 0.125, 0.18), Section(1.10, 0.12, 0.18),
@@ -141,27 +153,13 @@ def bodies() -> tuple[BodySpec, ...]:
             targets=(TargetSpec("ElbowTarget", (UPPER - HUB, 0.0, 0.0), position_weight=0.2),),
         ),
         BodySpec("ElbowCase", (Part("Case", cylinder(HUB, 0.062, axis="y"), "Steel"),), 0.12),
-        BodySpec(
-            "Crank",
-            (
-                *_pair("Arm", (0.0, 0.0, 0.0), LEVER, 0.017, "Steel"),
-                Part("Pin", cylinder(0.007, 2.0 * ROD_AT + 0.03, axis="y").moved(LEVER), "Gold"),
-            ),
-            0.25,
-        ),
+        _lever("Crank", 0.25),
         BodySpec(
             "Rods",
             _pair("Rod", (0.0, 0.0, 0.0), (UPPER, 0.0, 0.0), 0.008, "Black"),
             0.10,
         ),
-        BodySpec(
-            "Lever",
-            (
-                *_pair("Arm", (0.0, 0.0, 0.0), LEVER, 0.017, "Steel"),
-                Part("Pin", cylinder(0.007, 2.0 * ROD_AT + 0.03, axis="y").moved(LEVER), "Gold"),
-            ),
-            0.12,
-        ),
+        _lever("Lever", 0.12),
         BodySpec("Forearm", (Part("Link", printed_link(FORE, SLIM), "Ivory"),), None, interface_radius=0.028),
         BodySpec(
             "Hand",

@@ -113,6 +113,11 @@ class SurfaceMesh:
     visible: bool = True
     displaced: int = 0
 
+    @property
+    def drawn(self) -> bool:
+        """Whether pictures show anything of it."""
+        return self.visible and len(self.triangles) > 0
+
 
 @dataclass(frozen=True, eq=False)
 class InterfaceSurface:
