@@ -21,15 +21,15 @@ def write_whole(path: str | Path, text: str) -> None:
             file.write(text)
             file.flush()
             os.fsync(file.fileno())
-        # mkstemp makes files that only the owner reads; this one is as public as any other new file
-        os.chmod(temporary, 0o666 & ~_umask())
+        make_public(temporary)
         os.replace(temporary, target)
     except BaseException:
         os.unlink(temporary)
         raise
 
 
-def _umask() -> int:
+def make_public(path: str) -> None:
+    """Give a file of mkstemp, which only its owner reads, the permissions of any other new file."""
     mask = os.umask(0)
     os.umask(mask)
-    return mask
+    os.chmod(path, 0o666 & ~mask)

@@ -17,7 +17,7 @@ def character_of(context: bpy.types.Context) -> bpy.types.Object | None:
                 return obj
             found = obj.find_armature()
             top, obj = obj, found if found is not None else obj.parent
-        if top is not None and any(part.animation_data and part.animation_data.action for part in parts_of(top)):
+        if top is not None and is_animated(top):
             return top
     return None
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from calmotion.shot import Character, Motion, Result
 from calmotion.shot.character import Array
-from calmotion.shot.playback import deviations, modes_of, sample_motion
+from calmotion.shot.playback import deviations, modes_of
 from numpy.typing import NDArray
 
 from .layout import INPUT, STYLES
@@ -14,9 +14,8 @@ SEEN = 1.0 / 64.0  # a smaller share of the whole color change is not told from 
 OFF = np.array(STYLES[INPUT].color, dtype=float)
 
 
-def largest_deviation(character: Character, result: Result, times: Array) -> float:
-    """By how much any visible point of the input is off at most, at the given times [m]."""
-    motion, reference = sample_motion(result.before.motion, times), sample_motion(result.reference, times)
+def largest_deviation(character: Character, result: Result, motion: Motion, reference: Motion) -> float:
+    """By how much any visible point of a motion is off at most [m]; both at the shot's frames."""
     largest = 0.0
     for index, body in enumerate(character.bodies):
         for s, surface in enumerate(body.surfaces):

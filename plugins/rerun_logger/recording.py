@@ -64,11 +64,15 @@ def write_recording(
     recording = rr.RecordingStream("calmotion", recording_id=f"{target.stem}{character.path}")
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
-        scale = largest_deviation(character, result, animation.frame_times)
+        motions = {INPUT: result.before.motion, REFERENCE: result.reference}
+        if result.after is not None:
+            motions[OPTIMIZED] = result.after.motion
+        at_frames = {root: sample_motion(motion, animation.frame_times) for root, motion in motions.items()}
+        scale = largest_deviation(character, result, at_frames[INPUT], at_frames[REFERENCE])
         recording.save(str(partial), default_blueprint=make_blueprint(character, animation, result, scale))
         summary = rr.TextDocument(describe(character, result, operators, system), media_type="text/markdown")
         recording.log("summary", summary, static=True)
-        log_all(recording, character, animation, result, scale, samples_per_plot, progress)
+        log_all(recording, character, at_frames, result, scale, samples_per_plot, progress)
         recording.flush()
         recording.disconnect()
         with partial.open("rb+") as file:
@@ -87,22 +91,18 @@ def write_recording(
 def log_all(
     recording: rr.RecordingStream,
     character: Character,
-    animation: Animation,
+    at_frames: dict[str, Motion],
     result: Result,
     scale: float,
     samples_per_plot: int,
     progress: Progress,
 ) -> None:
     """Everything, in the order of the entity tree."""
-    motions = {INPUT: result.before.motion, REFERENCE: result.reference}
-    if result.after is not None:
-        motions[OPTIMIZED] = result.after.motion
-    at_frames = {root: sample_motion(motion, animation.frame_times) for root, motion in motions.items()}
     for count, (root, motion) in enumerate(at_frames.items()):
-        progress(count / (len(motions) + 1), f"{root} in 3D")
+        progress(count / (len(at_frames) + 1), f"{root} in 3D")
         log_bodies(recording, root, character, result, motion, at_frames[REFERENCE], scale)
         log_trails(recording, root, character, motion)
-    progress(len(motions) / (len(motions) + 1), "curves")
+    progress(len(at_frames) / (len(at_frames) + 1), "curves")
     log_errors(recording, character, INPUT, result.before, samples_per_plot)
     log_motors(recording, character, INPUT, result.before, samples_per_plot)
     log_reactions(recording, character, INPUT, result.before, samples_per_plot)
@@ -162,12 +162,11 @@ def log_errors(
 
 def log_spectra(recording: rr.RecordingStream, character: Character, result: Result) -> None:
     """Amplitude of each target's error [mm] by frequency [Hz], as far as something happens in the input."""
+    simulations = {INPUT: result.before} | ({OPTIMIZED: result.after} if result.after else {})
     for k, target in enumerate(character.targets):
-        end = highest_frequency(*error_spectrum(result.before.motion, result.reference, k))
-        for root, simulation in ((INPUT, result.before), (OPTIMIZED, result.after)):
-            if simulation is None:
-                continue
-            frequencies, amplitudes = error_spectrum(simulation.motion, result.reference, k)
+        spectra = {root: error_spectrum(run.motion, result.reference, k) for root, run in simulations.items()}
+        end = highest_frequency(*spectra[INPUT])
+        for root, (frequencies, amplitudes) in spectra.items():
             shown = slice(1, int(np.searchsorted(frequencies, end, side="right")))
             if shown.stop <= 1:
                 continue

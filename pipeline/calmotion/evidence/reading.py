@@ -14,6 +14,7 @@ import time
 from collections.abc import Iterator, Sequence
 from dataclasses import astuple, dataclass, fields
 from pathlib import Path
+from typing import Any
 
 from ..errors import ShotError, each
 from ..host import Host, OutputPaths, Rig, Source, open_host
@@ -85,17 +86,20 @@ def _read(host: Host, path: Path) -> tuple[str, Character, Animation]:
             raise
     with tempfile.TemporaryDirectory() as folder:
         layer = Path(folder) / "rig.usda"
-        run = host.run([Source(path=str(path), command="rig"), OutputPaths(layer=str(layer))], [Rig]).finish()
-        for failure in run.failures():
-            raise failure.error or ShotError(failure.reason)
+        _carried_out(host, [Source(path=str(path), command="rig"), OutputPaths(layer=str(layer))], [Rig])
         return RIGGED, *_loaded(host, layer)
 
 
 def _loaded(host: Host, path: Path) -> tuple[Character, Animation]:
-    run = host.run([Source(path=str(path), command="inspect")], [Character, Animation]).finish()
+    data = _carried_out(host, [Source(path=str(path), command="inspect")], [Character, Animation])
+    return data[Character], data[Animation]
+
+
+def _carried_out(host: Host, given: list, wanted: list) -> Any:
+    run = host.run(given, wanted).finish()
     for failure in run.failures():
         raise failure.error or ShotError(failure.reason)
-    return run.data[Character], run.data[Animation]
+    return run.data
 
 
 def table(rows: Sequence[Row]) -> str:

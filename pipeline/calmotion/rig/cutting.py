@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..fem.closed_surfaces import close
+from ..fem.tetrahedra import surface_volume
 from ..shot.character import Array, IntArray
 
 _FLAT = 1e-7  # volume over the whole skin's, below which a piece is no body
@@ -34,14 +35,9 @@ def cut_skin(points: Array, triangles: IntArray, weights: Array) -> dict[int, tu
         used, own = np.unique(faces[owners == joint], return_inverse=True)
         closure = close(places[used], own.reshape(-1, 3))
         piece = closure.points, closure.triangles.astype(np.int32)
-        volume = _volume(*piece)
+        volume = surface_volume(*piece)
         if volume < 0.0:
             piece = piece[0], piece[1][:, ::-1].copy()
         pieces[int(joint)] = (*piece, abs(volume))
     least = _FLAT * sum(volume for *_, volume in pieces.values())
     return {joint: (x, t) for joint, (x, t, volume) in pieces.items() if volume > least}
-
-
-def _volume(points: Array, triangles: IntArray) -> float:
-    a, b, c = (points[triangles[:, k]] - points.mean(axis=0) for k in range(3))
-    return float(np.einsum("ij,ij->", np.cross(a, b), c)) / 6.0

@@ -44,8 +44,10 @@ class Clock:
         return np.arange(count + 1) / self.frames_per_second
 
     def merged(self, time_codes: Array) -> Array:
-        """Time codes and those of the frames, ascending; one next to another is the same."""
-        every = np.union1d(self.time_codes(self.frame_times()), time_codes)
+        """Those time codes that are within the shot, and those of the frames, ascending; one next to another is the
+        same."""
+        inside = time_codes[(time_codes >= self.start) & (time_codes <= self.end)]
+        every = np.union1d(self.time_codes(self.frame_times()), inside)
         return np.asarray(every[np.concatenate([[True], np.diff(every) > 1e-6])], dtype=np.float64)
 
 

@@ -21,15 +21,11 @@ class Spelling:
 
     Attributes:
         dialect: Whose it is.
-        attribute: Name; `{drive}` stands for angular or linear, `{axis}` for the instance of a multiple-apply schema.
-        angles: `USD` or `SI`: whether angles in it are degrees or radians.
-        sign: Factor that turns its convention into ours.
+        attribute: Name; `{drive}` stands for angular or linear.
     """
 
     dialect: str
     attribute: str
-    angles: str = USD
-    sign: float = 1.0
 
 
 EFFORT_LIMIT = (

@@ -7,6 +7,7 @@ import tempfile
 from collections.abc import Callable, Iterable
 
 from ..errors import ShotError
+from ..files import make_public
 
 EXTENSIONS = (".usda", ".usdc", ".usd")
 
@@ -63,7 +64,7 @@ def write_layer(layer, output: str, validate: Callable[[str], None]) -> None:
         if Sdf.Layer.OpenAsAnonymous(temporary) is None:
             raise OSError("what was written cannot be opened again")
         validate(temporary)
-        os.chmod(temporary, 0o666 & ~_umask())  # mkstemp makes private files
+        make_public(temporary)
         os.replace(temporary, output)
         temporary = None
         _flush(folder)
@@ -80,12 +81,6 @@ def write_layer(layer, output: str, validate: Callable[[str], None]) -> None:
     opened = Sdf.Layer.Find(output)
     if opened is not None:
         opened.Reload(True)
-
-
-def _umask() -> int:
-    mask = os.umask(0)
-    os.umask(mask)
-    return mask
 
 
 def _flush(path: str) -> None:

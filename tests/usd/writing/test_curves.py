@@ -38,7 +38,7 @@ def test_between_frames_a_curve_is_what_its_frames_are_read_back_as():
 
     times = sample_times(FRAMES, 240.0)
     read_back = interpolate(Track(FRAMES, CURVE.frame_values), 0.5)
-    assert np.allclose(curve_values(ANIMATION, CURVE, times, False), read_back(times))
+    assert np.abs(curve_values(ANIMATION, CURVE, times, False) - read_back(times)).max() < 1e-14
     assert curve_values(ANIMATION, CURVE, FRAMES, False) is CURVE.frame_values
 
 

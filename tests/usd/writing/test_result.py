@@ -10,10 +10,9 @@ import pytest
 import small_shots as shots
 from calmotion import ShotError
 from calmotion.retarget.run import Options, simulate_shot
-from calmotion.shot import MotorCurve
 from calmotion.usd.reading import read_shot
 from calmotion.usd.writing import WriteOptions, write_result
-from performing import performed, tracks_of
+from performing import curves_of, performed, tracks_of
 from pxr import Sdf, Usd, UsdGeom
 
 
@@ -34,12 +33,7 @@ class Written:
 
 def with_curves(character, animation, result):
     """A result whose shoulder curve changed by a bump, and whose elbow did not."""
-    values = np.interp(animation.frame_times, animation.tracks[0].times, animation.tracks[0].values)
-    bump = 0.1 * np.sin(np.pi * animation.frame_times / animation.frame_times[-1]) ** 2
-    curves = (
-        MotorCurve(0, True, animation.frame_times[::2], values + bump, 0.1),
-        MotorCurve(1, False, animation.frame_times[::2], values, 0.0),
-    )
+    curves = curves_of(animation, {0: 0.1})
     return dataclasses.replace(
         result, after=result.before, curves=curves, objective_after=0.0,
         performed=performed(character, animation, tracks_of(animation, curves)),

@@ -48,8 +48,7 @@ def pose_codes(stage, joints: Sequence[JointPrim], clock: Clock) -> Array:
             found.update(codes_of(prim))
     if not found:
         return np.zeros(0)
-    inside = np.array([code for code in found if clock.start <= code <= clock.end])
-    return clock.merged(inside)
+    return clock.merged(np.array(list(found)))
 
 
 def joint_motions(reading: Reading, joints: Sequence[JointPrim], codes: Array) -> list[JointMotion]:

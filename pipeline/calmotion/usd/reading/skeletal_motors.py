@@ -143,8 +143,7 @@ def _axis(reading: Reading, drive: Drive) -> Array:
 
 def skeletal_tracks(stack: HingeStack, clock: Clock, reading: Reading) -> dict[str, Track]:
     """Tracks of the motors of a stack, by the path of their joint; a doubt where they cannot follow the skeleton."""
-    samples = stack.skeleton.codes()
-    codes = clock.merged(samples[(samples >= clock.start) & (samples <= clock.end)])
+    codes = clock.merged(stack.skeleton.codes())
     D = stack.skeleton.local_rotations(stack.joint, codes) @ stack.reference.T
     angles, off = follow(stack.axes, D)
     _doubt_stretch(stack, codes, reading)

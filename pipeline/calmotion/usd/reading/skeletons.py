@@ -37,14 +37,6 @@ class BoundSkeleton:
         """Index of the joint above one, -1 for none."""
         return int(self.query.GetTopology().GetParent(joint))
 
-    def chain(self, joint: int) -> list[int]:
-        """A joint and those above it, the topmost first."""
-        found = []
-        while joint >= 0:
-            found.append(joint)
-            joint = self.parent(joint)
-        return found[::-1]
-
     def codes(self) -> Array:
         """Time codes of the samples of its animation."""
         query = self.query.GetAnimQuery()

@@ -39,7 +39,7 @@ class RobotLayer:
     def __init__(
         self, stage, skeleton: BoundSkeleton, codes: Array, links: Sequence[Link], material: Material, name: str
     ):
-        from pxr import Sdf, Usd, UsdGeom
+        from pxr import Sdf, Usd
 
         self.layer = Sdf.Layer.CreateAnonymous(".usda")
         # what is authored is known to be where it will be: over the shot
@@ -51,8 +51,10 @@ class RobotLayer:
         top = str(default.GetPath()) if default else ""
         taken = {str(child.GetName()) for child in (default or stage.GetPseudoRoot()).GetAllChildren()}
         self.robot = f"{top}/{next(n for n in _names('Robot') if n not in taken)}"
-        self._clock_start = float(codes[0])
-        self._up = str(UsdGeom.GetStageUpAxis(stage))
+        # world matrices of the skeleton's joints at each time code
+        self._worlds: list[Array] = [
+            skeleton.placement(code) @ skeleton.in_skeleton(skeleton.locals_at(code)) for code in map(float, codes)
+        ]
         self._poses = [self._pose(link, 0) for link in links]
         self.motors: list[str] = []
         self.motors_of: list[list[str]] = [[] for _ in links]
@@ -63,14 +65,8 @@ class RobotLayer:
         """Path of the body of a link."""
         return f"{self.robot}/{self._links[link].name}"
 
-    def _worlds(self, n: int) -> Array:
-        """World matrices of the skeleton's joints at one of the time codes."""
-        code = float(self._codes[n])
-        found: Array = self._skeleton.placement(code) @ self._skeleton.in_skeleton(self._skeleton.locals_at(code))
-        return found
-
     def _pose(self, link: Link, n: int) -> Pose:
-        return pose_from_matrix(self._worlds(n)[link.joint], str(self._skeleton.prim.GetPath()))
+        return pose_from_matrix(self._worlds[n][link.joint], str(self._skeleton.prim.GetPath()))
 
     def author(self, servo_share: float, flexible: Sequence[str], targets: Sequence[int]) -> None:
         """Author the robot.
@@ -179,10 +175,10 @@ class RobotLayer:
 
     def _moves(self, k: int) -> bool:
         """Whether the animation moves a root."""
-        first = self._worlds(0)[self._links[k].joint]
-        size = max(1.0, float(np.max(np.abs(first))))
         joint = self._links[k].joint
-        return any(np.max(np.abs(self._worlds(n)[joint] - first)) > _STILL * size for n in range(len(self._codes)))
+        first = self._worlds[0][joint]
+        size = max(1.0, float(np.max(np.abs(first))))
+        return any(np.max(np.abs(world[joint] - first)) > _STILL * size for world in self._worlds)
 
     def _hold(self, k: int) -> None:
         """Hold a root in the world, or let the animation carry it."""
@@ -204,7 +200,7 @@ class RobotLayer:
 
         link, pose = self._links[k], self._poses[k]
         above = self._skeleton.parent(link.joint)
-        carrier = pose_from_matrix(self._worlds(0)[above], str(self._skeleton.prim.GetPath())).rotation
+        carrier = pose_from_matrix(self._worlds[0][above], str(self._skeleton.prim.GetPath())).rotation
         body0, pose0 = self.body(link.parent), self._poses[link.parent]
         for number, axis in enumerate(link.hinges.axes):
             last = number == len(link.hinges.axes) - 1

@@ -70,7 +70,7 @@ def rig_shot(path: str, output: str, options: RigOptions | None = None) -> Rig:
         )
     with stages.quiet():
         skeleton, clock = _animated_skeleton(stage, path)
-        codes = clock.merged(np.array([c for c in skeleton.codes() if clock.start <= c <= clock.end]))
+        codes = clock.merged(skeleton.codes())
         links = _links(stage, skeleton, codes, options.angle_tolerance)
         layer = RobotLayer(stage, skeleton, codes, links, MATERIALS[options.material], options.material)
         names = [link.name for link in links]
