@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from calmotion.errors import ShotError
+from calmotion.fem.damping import modal_damping
 from calmotion.fem.integrals import inertia_integrals
-from calmotion.fem.reduce import modal_damping
 from calmotion.naming import distinct_names
 from calmotion.shot import Body
 
@@ -41,7 +41,8 @@ def write_modes(
     Returns:
         Paths of the files: `<body>.vtu` (quadratic tetrahedra in metres; a vector field for each mode, whose largest
         displacement is a tenth of the body's size), `<body>.png`, and `modes.csv` (effective masses are those that a
-        mode carries when the root of the body is shaken along an axis of its frame).
+        mode carries when the root of the body is shaken along an axis of its frame; damping is that of the body by
+        itself, carrying nothing).
 
     Raises:
         ShotError: The folder cannot be written, or a body cannot be reduced.

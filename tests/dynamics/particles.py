@@ -108,7 +108,7 @@ def particle_system(
         S=pad((size, size, 3, 3), S),
         axial=pad((size, size, 3), [axial(s) for s in S]),
         stiffness=pad((size,), [np.full(r, stiffness) * (1 + np.arange(r)) for r in elastic]),
-        damping=pad((size,), [np.full(r, 0.4) for r in elastic]),
+        damping=pad((size, size), [0.35 * np.eye(r) + 0.05 for r in elastic]),
         law=np.zeros(count, dtype=np.int32),
         retardation=np.zeros(count),
         lame=np.zeros((count, 2)),

@@ -48,7 +48,7 @@ def by_particles(system, part, state):
     acceleration = a + np.cross(al, y) + np.cross(om, np.cross(om, y)) + 2 * np.cross(om, yv) + yvd
     force = part.masses[:, None] * acceleration
     r = len(u)
-    elastic = np.einsum("nij,ni->j", part.modes, force) + system.stiffness[0, :r] * u + system.damping[0, :r] * v
+    elastic = np.einsum("nij,ni->j", part.modes, force) + system.stiffness[0, :r] * u + system.damping[0, :r, :r] @ v
     return np.concatenate([force.sum(0), np.cross(y, force).sum(0), elastic])
 
 
@@ -80,7 +80,7 @@ def test_power_of_the_rows_is_the_rate_of_energy():
     r = 4
     system, part, (a, om, al, u, v, vd), integrals = component(r)
     w = np.array([0.4, -0.7, 0.2])
-    k, d = system.stiffness[0, :r], system.damping[0, :r]
+    k, d = system.stiffness[0, :r], system.damping[0, :r, :r]
 
     def energy(t):
         # everything in axes turning with the body: the origin's acceleration in them is a - om x w
@@ -92,7 +92,7 @@ def test_power_of_the_rows_is_the_rate_of_energy():
     e = 1e-5
     rate = (energy(e) - energy(-e)) / (2 * e)
     rows = residual(system, r, (a, om, al, u, v, vd), integrals)[0]
-    power = np.concatenate([w, om, v]) @ rows - np.sum(d * v**2)
+    power = np.concatenate([w, om, v]) @ rows - v @ d @ v
     assert abs(power - rate) < 1e-8 * abs(rate)
 
 

@@ -1,9 +1,14 @@
 import numpy as np
 import pytest
 from arms import chain, compiled
-from calmotion.dynamics.modes import system_modes
+from calmotion.dynamics.model import compile_model
+from calmotion.dynamics.modes import elastic_modes, system_modes
 from calmotion.dynamics.simulation import Workspace
 from calmotion.dynamics.statics import equilibrium
+from calmotion.dynamics.topology import span_tree
+from calmotion.evidence.beam_arm import beam_arm
+from calmotion.evidence.four_bar import four_bar
+from calmotion.retarget.bodies import reduce_bodies
 from particles import particle_system
 from test_sweeps import rigid_start
 
@@ -29,5 +34,41 @@ def test_equilibrium_is_a_minimum_of_the_potential_seen_by_the_modes():
     state, _ = equilibrium(system, rigid_start(system, np.zeros(1)), np.zeros(1), Workspace.for_system(system))
     assert not state.u.any()
     found, ratios = system_modes(SimpleNamespace(system=system), np.zeros(1))
-    assert ratios == pytest.approx(system.damping[0] / (2 * np.sqrt(system.stiffness[0])))
+    assert ratios == pytest.approx(np.diag(system.damping[0]) / (2 * np.sqrt(system.stiffness[0])))
     assert found == pytest.approx(np.sqrt(system.stiffness[0]) / (2 * np.pi))
+
+
+def reduced(made):
+    character, meshes = made
+    tree = span_tree(character)
+    return compile_model(character, tree, reduce_bodies(character, tree, meshes))
+
+
+def test_elastic_modes_are_those_of_the_undeformed_character():
+    model = reduced(beam_arm(links=2, gravity=0.0, elasticity="linear", modes=8))
+    omega, shapes = elastic_modes(model)
+    found, _ = system_modes(model, np.zeros(len(model.motor)))
+    assert omega / (2 * np.pi) == pytest.approx(found, rel=1e-9)
+    assert [shape.shape for shape in shapes] == [(8, 16), (8, 16), (0, 16)]
+    energy = sum(
+        (shape**2 * model.system.stiffness[b, : len(shape), None]).sum(axis=0) for b, shape in enumerate(shapes)
+    )
+    assert energy == pytest.approx(omega**2, rel=1e-9), "all energy is elastic, and the modes have mass one"
+
+
+@pytest.mark.parametrize(
+    "made",
+    [beam_arm(payload=0.5, damping=0.03, gravity=0.0, elasticity="linear", modes=8), four_bar(modes=7, damping=0.03)],
+    ids=["a link with a load", "a coupler in a loop"],
+)
+def test_a_character_with_one_flexible_body_vibrates_with_the_ratio_of_its_material(made):
+    model = reduced(made)
+    _, ratios = system_modes(model, model.rest_angles)
+    assert len(ratios) and ratios == pytest.approx(np.full(len(ratios), 0.03), rel=0.01)
+
+
+@pytest.mark.parametrize("law", ["linear", "stvk"])
+def test_slow_modes_of_a_chain_have_about_the_ratio(law):
+    model = reduced(beam_arm(links=2, damping=0.03, gravity=0.0, elasticity=law, modes=8))
+    _, ratios = system_modes(model, model.rest_angles)
+    assert np.all((0.015 < ratios[:4]) & (ratios[:4] < 0.06))

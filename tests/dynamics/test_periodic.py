@@ -46,9 +46,8 @@ class Looping(Case):
         super().__init__(*arguments)
         self.p[1:] *= 0.5
         system = self.system
-        self.system = system._replace(
-            damping=system.damping + 0.5 * np.sqrt(3000.0), retardation=system.retardation + 2e-3
-        )
+        more = 0.5 * np.sqrt(3000.0) * np.eye(system.damping.shape[1])
+        self.system = system._replace(damping=system.damping + more, retardation=system.retardation + 2e-3)
         self.known = None
         self.start = self.warmed()
         rng = np.random.default_rng(5)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from calmotion.errors import ShotError
 from calmotion.fem import Anchor, rigid_invariants
-from calmotion.fem.reduce import modal_damping, reduce_body
+from calmotion.fem.reduce import reduce_body
 from calmotion.shot import Body, FlexibleSettings, MassProperties, SurfaceMesh
 
 SIZE = (0.6, 0.02, 0.02)
@@ -89,12 +89,6 @@ def test_the_same_body_reduces_to_the_same_numbers(mesh, body, anchors):
     assert np.array_equal(one.stiffness, two.stiffness)
     assert np.array_equal(one.invariants.S, two.invariants.S)
     assert np.array_equal(one.markers[0].Phi, two.markers[0].Phi)
-
-
-def test_damping_is_modal_or_rayleigh(plastic):
-    omega_squared = np.array([4.0, 9.0])
-    assert np.allclose(modal_damping(omega_squared, plastic), 2 * 0.01 * np.array([2.0, 3.0]))
-    assert np.allclose(modal_damping(omega_squared, replace(plastic, rayleigh=(0.5, 0.1))), [0.9, 1.4])
 
 
 @pytest.mark.parametrize(

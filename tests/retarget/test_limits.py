@@ -36,7 +36,7 @@ def free(arm, animation, bodies):
 
 
 @pytest.mark.parametrize("quantity", list(UNIT))
-@pytest.mark.parametrize("share", [0.95, 0.8])
+@pytest.mark.parametrize("share", [0.95, 0.85])
 def test_limits_that_bind_are_kept_and_cost_no_more_than_they_must(arm, animation, bodies, free, quantity, share):
     without, largest = free
     character = with_limits(arm, **{UNIT[quantity]: share * np.array(largest[quantity])})
@@ -47,7 +47,7 @@ def test_limits_that_bind_are_kept_and_cost_no_more_than_they_must(arm, animatio
         assert use.excess <= 1e-6 and abs(use.after) <= abs(use.limit) * (1 + 1e-6)
     assert max(abs(use.after / use.limit) for use in uses) > 0.999, "the limits should bind"
     assert 0.99 * without.objective_after < result.objective_after < 0.2 * result.objective_before
-    if quantity != "effort":
+    if quantity != "effort" and result.objective_after > 1.01 * without.objective_after:
         assert max(use.cost_m or 0.0 for use in uses) > 0.0
     # the values that the user gets are those that were limited
     motion = result.after.motion

@@ -113,13 +113,14 @@ def body_residual(r, mass, M3, S, axial, stiffness, damping, a, om, al, u, v, vd
                 t -= B[j, n, i] * om[n]
             res[3 + i] += 2.0 * v[j] * t + vd[j] * (B[j, k, m] - B[j, m, k])
     for j in range(r):
-        t = vd[j] + stiffness[j] * u[j] + damping[j] * v[j]
+        t = vd[j] + stiffness[j] * u[j]
         for i in range(3):
             t += M3[j, i] * a[i]
             for k in range(3):
                 t += W[i, k] * B[j, k, i]
         for k in range(r):
-            t += 2.0 * v[k] * (om[0] * axial[k, j, 0] + om[1] * axial[k, j, 1] + om[2] * axial[k, j, 2])
+            turning = om[0] * axial[k, j, 0] + om[1] * axial[k, j, 1] + om[2] * axial[k, j, 2]
+            t += v[k] * (damping[j, k] + 2.0 * turning)
         res[6 + j] = t
 
 
@@ -219,8 +220,8 @@ def velocity_jacobian(r, M3, axial, damping, om, v, s, Z, B, P):
                 g += 2.0 * v[l] * axial[l, j, i]
             P[6 + j, 3 + i] = g
         for k in range(r):
-            P[6 + j, 6 + k] = 2.0 * (om[0] * axial[k, j, 0] + om[1] * axial[k, j, 1] + om[2] * axial[k, j, 2])
-        P[6 + j, 6 + j] += damping[j]
+            turning = om[0] * axial[k, j, 0] + om[1] * axial[k, j, 1] + om[2] * axial[k, j, 2]
+            P[6 + j, 6 + k] = 2.0 * turning + damping[j, k]
 
 
 @kernel

@@ -75,8 +75,7 @@ def rigid_body(body: Body, anchors: BodyAnchors) -> ReducedBody:
     assert body.mass is not None
     none = np.zeros((3, 0))
     markers = tuple(Marker(frame.position, frame.rotation, none, none) for frame in anchors.frames)
-    empty = np.zeros(0)
-    return ReducedBody(rigid_invariants(body.mass), empty, empty, markers)
+    return ReducedBody(rigid_invariants(body.mass), np.zeros(0), np.zeros((0, 0)), markers)
 
 
 def compile_model(character: Character, tree: Tree, bodies: Sequence[ReducedBody], moving: Sequence[int] = ()) -> Model:
@@ -94,7 +93,7 @@ def compile_model(character: Character, tree: Tree, bodies: Sequence[ReducedBody
 
     mass, s, Z, M3, M4 = zeros(), zeros(3), zeros(3, 3), zeros(r_max, 3), zeros(r_max, 3, 3)
     S, axial = zeros(r_max, r_max, 3, 3), zeros(r_max, r_max, 3)
-    stiffness, damping = zeros(r_max), zeros(r_max)
+    stiffness, damping = zeros(r_max), zeros(r_max, r_max)
     elastic = np.zeros(count, np.int32)
     for k, b in enumerate(tree.body):
         body = bodies[b]
@@ -105,7 +104,7 @@ def compile_model(character: Character, tree: Tree, bodies: Sequence[ReducedBody
         for i in range(3):
             j, m = (i + 1) % 3, (i + 2) % 3
             axial[k, :r, :r, i] = integrals.S[:, :, j, m] - integrals.S[:, :, m, j]
-        damping[k, :r] = body.damping
+        damping[k, :r, :r] = body.damping
         if body.elasticity is None:
             stiffness[k, :r] = body.stiffness
     joints = joint_arrays(character, tree, bodies, anchors, r_max, moving)
@@ -174,7 +173,7 @@ def rigid_model(model: Model) -> Model:
         S=np.ascontiguousarray(system.S[:, :none, :none]),
         axial=np.ascontiguousarray(system.axial[:, :none, :none]),
         stiffness=np.ascontiguousarray(system.stiffness[:, :none]),
-        damping=np.ascontiguousarray(system.damping[:, :none]),
+        damping=np.ascontiguousarray(system.damping[:, :none, :none]),
         law=np.full_like(system.law, LINEAR),
         data=np.zeros(0),
         Phi=np.ascontiguousarray(system.Phi[..., :none]),
@@ -208,9 +207,8 @@ def with_damping(model: Model, ratio: float, frequency: float) -> Model:
         frequency: [Hz], not zero.
     """
     system, retardation = model.system, ratio / (np.pi * frequency)
-    more = system._replace(
-        damping=system.damping + retardation * system.stiffness, retardation=system.retardation + retardation
-    )
+    added = retardation * system.stiffness[:, :, None] * np.eye(system.stiffness.shape[1])
+    more = system._replace(damping=system.damping + added, retardation=system.retardation + retardation)
     return replace(model, system=more)
 
 

@@ -1,4 +1,4 @@
-"""Natural modes of the whole character about a static equilibrium, joints held by their motors."""
+"""Natural modes of the whole character, joints held by their motors."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from .model import Model
 from .simulation import Workspace
 from .sliders import LENGTH, slides_freely
 from .statics import equilibrium, linearize
+from .system import State, System
 
 
 def system_modes(model: Model, joint_angles: Array, world: Array | None = None) -> tuple[Array, Array]:
@@ -28,6 +29,29 @@ def system_modes(model: Model, joint_angles: Array, world: Array | None = None) 
     if world is not None:
         workspace.work.world[:] = world
     state, _ = equilibrium(system, rigid_state(model, joint_angles, world), joint_angles, workspace)
+    omega, shapes, C = _natural_modes(system, state, joint_angles, workspace)
+    damping = np.einsum("ik,ij,jk->k", shapes, C, shapes)
+    return omega / (2.0 * np.pi), np.where(omega > 0.0, damping / np.maximum(2.0 * omega, 1e-300), 0.0)
+
+
+def elastic_modes(model: Model) -> tuple[Array, list[Array]]:
+    """Natural modes of the undeformed character in the pose in which the shot was authored, without gravity.
+
+    Returns:
+        Angular frequencies [rad/s], ascending, shape [n]; and for each component its elastic coordinates in the modes,
+        shape [r, n]. The modes have mass one; those of frequency zero deform nothing.
+    """
+    system = model.system._replace(gravity=np.zeros(3))
+    angles = model.rest_angles
+    omega, shapes, _ = _natural_modes(system, rigid_state(model, angles), angles, Workspace.for_system(system))
+    ends = np.cumsum(6 + system.elastic)
+    return omega, [shapes[end - r : end] for end, r in zip(ends, system.elastic, strict=True)]
+
+
+def _natural_modes(
+    system: System, state: State, joint_angles: Array, workspace: Workspace
+) -> tuple[Array, Array, Array]:
+    """Angular frequencies [rad/s], modes of mass one, shape [N, n], and damping, shape [N, N], in all coordinates."""
     linearize(system, state, joint_angles, workspace)
     blocks = workspace.blocks
     offset = np.concatenate([[0], np.cumsum(6 + system.elastic)])
@@ -55,10 +79,8 @@ def system_modes(model: Model, joint_angles: Array, world: Array | None = None) 
             H[6 * joint + LENGTH] = 0.0
     allowed = null_space(H)
     if not allowed.shape[1]:
-        return np.zeros(0), np.zeros(0)
+        return np.zeros(0), np.zeros((total, 0)), C
     stiffness = allowed.T @ K @ allowed
     # symmetric up to what the moments' axes leave, which vanishes on allowed motions
     values, shapes = eigh(0.5 * (stiffness + stiffness.T), allowed.T @ M @ allowed)
-    omega = np.sqrt(np.maximum(values, 0.0))
-    damping = np.einsum("ik,ij,jk->k", shapes, allowed.T @ C @ allowed, shapes)
-    return omega / (2.0 * np.pi), np.where(omega > 0.0, damping / np.maximum(2.0 * omega, 1e-300), 0.0)
+    return np.sqrt(np.maximum(values, 0.0)), allowed @ shapes, C

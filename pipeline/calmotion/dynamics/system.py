@@ -31,7 +31,8 @@ class System(NamedTuple):
         moving: Row of `assembly.Work.world` that moves the world-side marker of a joint, -1 for none, shape [J].
         mass, s, Z, M3, M4, S: Inertia integrals, see `fem.Invariants`.
         axial: axial(S[j, k]) = int rho phi_j x phi_k, shape [B, R, R, 3].
-        stiffness, damping: Diagonals, shape [B, R]; of a nonlinear body, no stiffness, and damping by mass alone.
+        stiffness: Diagonal, shape [B, R]; zero for a nonlinear body.
+        damping: Symmetric, shape [B, R, R]; of a nonlinear body, what goes by mass.
         law: Elastic law: LINEAR, STVK, NEOHOOKEAN, shape [B].
         retardation: Kelvin-Voigt coefficient of nonlinear bodies [s], shape [B].
         lame: Lame's constants [Pa], shape [B, 2], where the law is NEOHOOKEAN.

@@ -101,7 +101,7 @@ def arm_scene() -> Scene:
 
 def four_bar_scene() -> Scene:
     """A four-bar with a flexible coupler, whose crank makes a turn in a second."""
-    return Scene(four_bar(modes=7, damping=0.05), shot_of(quintic(2.0 * np.pi, 1.0, LATER), LATER + 1.0, rate=RATE))
+    return Scene(four_bar(modes=7, damping=0.1), shot_of(quintic(2.0 * np.pi, 1.0, LATER), LATER + 1.0, rate=RATE))
 
 
 def stiff_scene() -> Scene:

@@ -8,11 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import ShotError
-from ..shot.character import DEFAULT_TOLERANCE, Array, Body, ElasticMaterial, SurfaceMesh
+from ..shot.character import DEFAULT_TOLERANCE, Body, ElasticMaterial, SurfaceMesh
 from ..shot.meshes import FEMesh
 from ..shot.result import LeftOut
 from .assembly import FEModel, QuadraticMesh, assemble
 from .craig_bampton import Basis, reduced_basis
+from .damping import damped
 from .embedding import Embedding, embed
 from .excitation_data import Excitation, patch_excitation
 from .integrals import inertia_integrals
@@ -20,7 +21,7 @@ from .interfaces import Anchor, Patch, interface_patches
 from .modal_derivatives import Support
 from .reduced_body import Marker, ReducedBody
 
-__all__ = ["Anchor", "LinearModes", "linear_modes", "modal_damping", "reduce_body"]
+__all__ = ["Anchor", "LinearModes", "linear_modes", "reduce_body"]
 
 
 def reduce_body(
@@ -43,7 +44,8 @@ def reduce_body(
         tolerance: Error that does not matter [m].
 
     Returns:
-        The reduced body, markers in the order of the anchors, skins in the order of the surfaces.
+        The reduced body, damped as one that carries nothing; markers in the order of the anchors, skins in the order
+        of the surfaces.
 
     Raises:
         ShotError: A material that is none, or an anchor off the body.
@@ -55,18 +57,18 @@ def reduce_body(
     left_out = _modes_left_out(basis, body, excitation)
     assert body.flexible is not None
     material = body.flexible.material
-    elasticity, damping = None, modal_damping(basis.omega_squared, material)
+    elasticity = None
     law, without = _law(model, linear.support, basis, body, excitation, tolerance)
     left_out += without
     if law != "linear" and len(basis.omega_squared):
         from .large_deflection import large_deflection
 
-        basis, elasticity, by_mass = large_deflection(model, linear.support, basis, material, law)
-        damping = np.full(len(basis.omega_squared), by_mass)
-    return ReducedBody(
+        basis, elasticity = large_deflection(model, linear.support, basis, material, law)
+    r = len(basis.omega_squared)
+    reduced = ReducedBody(
         invariants=inertia_integrals(model.mesh.nodes, model.mass, basis.modes),
         stiffness=basis.omega_squared,
-        damping=damping,
+        damping=np.zeros((r, r)),
         markers=_markers(model.mesh, anchors, moving, basis),
         skin=tuple(embed(model.mesh, surface.points).displacements(basis.modes) for surface in surfaces),
         nodes=len(model.mesh.nodes),
@@ -74,6 +76,7 @@ def reduce_body(
         elasticity=elasticity,
         left_out=left_out,
     )
+    return damped(reduced, material)
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,14 +147,6 @@ def _law(
     if choice.law == "stvk":
         what = f"nonlinear material of {body.path}"
     return choice.law, (LeftOut(what, choice.reason, choice.error_m),)
-
-
-def modal_damping(omega_squared: Array, material: ElasticMaterial) -> Array:
-    """Diagonal of the reduced damping [1/s]: 2 zeta omega, or a + b omega^2 (Rayleigh)."""
-    if material.rayleigh is not None:
-        a, b = material.rayleigh
-        return a + b * omega_squared
-    return 2.0 * material.damping_ratio * np.sqrt(np.maximum(omega_squared, 0.0))
 
 
 def _points(mesh: QuadraticMesh, anchors: Sequence[Anchor]) -> Embedding:

@@ -84,7 +84,7 @@ class ReducedBody:
     Attributes:
         invariants: Inertia integrals.
         stiffness: Diagonal of the reduced stiffness about the undeformed state, omega_j^2 [1/s^2], shape [r].
-        damping: Diagonal of the reduced damping [1/s], shape [r]; with `elasticity`, its part by mass.
+        damping: Reduced damping [1/s], symmetric, shape [r, r]; with `elasticity`, its part by mass.
         markers: One for each anchor that was asked for, in that order.
         skin: One array for each surface that was asked for: displacement of its points, shape [n, 3, r].
         nodes, elements: Size of the finite-element mesh; 0 for a rigid body.

@@ -8,7 +8,7 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 from ..dynamics.joint_arrays import BodyAnchors
-from ..dynamics.model import body_anchors, rigid_body
+from ..dynamics.model import body_anchors, compile_model, rigid_body
 from ..dynamics.topology import Tree, span_tree
 from ..errors import ShotError
 from ..fem.excitation_data import Excitation
@@ -64,6 +64,20 @@ def reduce_bodies(
         excitation = None if excitations is None else excitations[index]
         parts = (mesh_of[index], body, frames, body.surfaces, anchors.root, excitation, allowed / flexible)
         result.append(cached_reduction(parts, partial(reduce_body, *parts)))
+    return _damped(character, tree, result) if flexible else result
+
+
+def _damped(character: Character, tree: Tree, bodies: Sequence[ReducedBody]) -> list[ReducedBody]:
+    """The bodies, damped so that the character's modes have the ratios of their materials."""
+    from ..dynamics.modes import elastic_modes
+    from ..fem.damping import damped
+
+    omega, shapes = elastic_modes(compile_model(character, tree, bodies))
+    result = list(bodies)
+    for b, shape in zip(tree.body, shapes, strict=True):
+        flexible = character.bodies[b].flexible
+        if flexible is not None:
+            result[b] = damped(bodies[b], flexible.material, omega, shape)
     return result
 
 

@@ -55,7 +55,7 @@ class ElasticMaterial:
         youngs_modulus: [Pa].
         poissons_ratio: [-].
         density: [kg/m^3].
-        damping_ratio: Fraction of critical damping of each mode, used when `rayleigh` is None.
+        damping_ratio: Fraction of critical damping of each mode of the character, used when `rayleigh` is None.
         rayleigh: (mass [1/s], stiffness [s]) coefficients, or None.
     """
 
