@@ -105,7 +105,10 @@ def plot_convergence(result: Result) -> Figure:
     """Objective and gradient at each iteration, over the work done so far."""
     figure = new_figure(WIDTH, 3.2)
     work = [step.forward_simulations + step.linearized_sweeps for step in result.steps]
-    panels = (("objective", "objective", AFTER), ("gradient_norm", "norm of the projected gradient", INTENDED))
+    panels = (
+        ("objective", "objective [m² s]", AFTER),
+        ("gradient_norm", "norm of the projected gradient [m² s/rad]", INTENDED),
+    )
     for axes, (name, title, color) in zip(figure.subplots(1, 2), panels, strict=True):
         axes.semilogy(work, [getattr(step, name) for step in result.steps], color=color, marker="o", markersize=4)
         tidy(axes, "", title)

@@ -14,7 +14,7 @@ from calmotion.shot.viewpoint import choose_viewpoint
 INPUT, OPTIMIZED, REFERENCE = "input", "optimized", "reference"
 TIME = "time"  # the timeline of the shot
 BACKGROUND = (236, 238, 241)
-MOTOR_TABS = 12
+MOTOR_TABS = 16
 # Half the vertical opening angle of rerun's eye is about 27 degrees; the radius is that of a whole box's diagonal.
 DISTANCE = 1.4
 

@@ -16,6 +16,7 @@ from calmotion.host import OutputPaths, PluginError, Recording, SystemModes
 from calmotion.shot.playback import sample_motion, world_points
 from calmotion.shot.spectrum import error_spectrum
 from calmotion.testing import check_plugin, host_with, run_operator
+from recordings import read_recording
 
 pytest.importorskip("rerun")
 
@@ -28,30 +29,6 @@ def write(path, result, settings=None):
     return run_operator(host_with(PLUGIN), "rerun.log", values, settings)
 
 
-def read(path):
-    """Component columns by entity and name: (seconds, iterations or None; list of values)."""
-    from rerun.chunk import RrdReader
-
-    columns = {}
-    for chunk in RrdReader(str(path)).stream():
-        table = chunk.to_record_batch()
-        names = table.schema.names
-        index = next((table.column(names.index(t)) for t in ("time", "iteration") if t in names), None)
-        if index is not None:
-            kind = str(index.type)
-            index = np.array(index.cast("int64")) * (1e-9 if kind.startswith("duration") else 1)
-        for name in names:
-            if ":" in name:
-                columns.setdefault((chunk.entity_path, name), []).append(
-                    (index, table.column(names.index(name)).to_pylist())
-                )
-    merged = {}
-    for key, pieces in columns.items():
-        times = None if pieces[0][0] is None else np.concatenate([piece[0] for piece in pieces])
-        merged[key] = (times, [value for piece in pieces for value in piece[1]])
-    return merged
-
-
 def tensor_of(cell):
     """The numbers of a tensor as it stands in a column."""
     return cell["buffer"]
@@ -61,7 +38,7 @@ def tensor_of(cell):
 def columns(tmp_path_factory):
     path = tmp_path_factory.mktemp("recording") / "out.rrd"
     assert write(path, synthetic.result()) == (Recording(str(path)),)
-    return read(path)
+    return read_recording(path)
 
 
 def test_the_plugin_keeps_to_the_rules():
@@ -206,7 +183,7 @@ def test_the_summary_names_the_characters_frequencies_where_they_are_known(tmp_p
     modes = SystemModes(np.array([3.25, 12.5]), np.array([0.01, 0.02]))
     given = [synthetic.character(), synthetic.animation(), synthetic.result(), modes]
     run_operator(host_with(PLUGIN), "rerun.log", [*given, OutputPaths(rrd=str(tmp_path / "out.rrd"))])
-    text = read(tmp_path / "out.rrd")["/summary", "TextDocument:text"][1][0][0]
+    text = read_recording(tmp_path / "out.rrd")["/summary", "TextDocument:text"][1][0][0]
     assert "in its first pose: 3.2, 12.5 Hz" in text
 
 
@@ -220,14 +197,14 @@ def test_the_recording_carries_its_own_layout(tmp_path):
 
 def test_a_simulation_alone_logs_nothing_as_optimised(tmp_path):
     write(tmp_path / "out.rrd", synthetic.result(optimized=False))
-    entities = {entity for entity, _ in read(tmp_path / "out.rrd")}
+    entities = {entity for entity, _ in read_recording(tmp_path / "out.rrd")}
     assert not [e for e in entities if "optimize" in e or "change" in e]
     assert "/input/Robot/Link/Beam" in entities and "/reference/Robot/Link/Beam" in entities
 
 
 def test_long_curves_are_thinned_and_the_frames_kept(tmp_path):
     write(tmp_path / "out.rrd", synthetic.result(), {"rerun.log": {"samples_per_plot": 50}})
-    columns = read(tmp_path / "out.rrd")
+    columns = read_recording(tmp_path / "out.rrd")
     times = columns["/errors/position_mm/input/Robot/Tip/Target", "Scalars:scalars"][0]
     assert 25 < len(times) <= 50
     assert len(columns["/input/Robot/Tip", "Transform3D:translation"][0]) == synthetic.FRAMES
@@ -283,7 +260,7 @@ def test_the_summary_tells_what_ran_and_what_did_not(tmp_path):
     path = str(tmp_path / "run.rrd")
     recording.write_recording(path, synthetic.character(), synthetic.animation(), synthetic.result(), operators=steps)
     text = str(
-        next(value for (entity, _), (_, value) in read(path).items() if entity == "/summary" and "## Run" in str(value))
+        next(value for (entity, _), (_, value) in read_recording(path).items() if entity == "/summary" and "## Run" in str(value))
     )
     assert "| `usd.read` | usd_reader | done | 1.25 s |  |" in text
     assert "| `fe.mesh` | fe_mesher | left out |  | no body is flexible |" in text
