@@ -154,7 +154,15 @@ def _run_options(command: argparse.ArgumentParser) -> None:
     model = command.add_argument_group("simulation")
     model.add_argument("--step", metavar="TIME", type=_quantity("s"), help="time step, in s or with a unit (2ms)")
     model.add_argument(
-        "--tolerance", metavar="LENGTH", type=_quantity("m"), help="error at the targets that does not matter (1mm)"
+        "--tolerance",
+        metavar="LENGTH",
+        type=_quantity("m"),
+        help="error at the targets that does not matter (1mm); the time step then follows from it",
+    )
+    model.add_argument(
+        "--verify",
+        action="store_true",
+        help="measure the error of the result against a finer run: several times the time",
     )
     model.add_argument(
         "--integrator",

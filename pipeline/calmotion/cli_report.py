@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import __version__
-from .host import CsvFile, Figures, OperatorResult, Recording, Run, WrittenLayer
+from .host import CsvFile, Figures, OperatorResult, Recording, Run, Verification, WrittenLayer
 from .memory import peak_memory
 from .shot import Character, LeftOut, LimitUse, Result, Simulation
 from .shot.character import Array
@@ -112,6 +112,7 @@ def run_report(run: Run, character: Character, result: Result, command: str, tot
         "refined_steps": final.refined_steps,
         "loop_growth": final.growth,
         "dead_centres_s": final.dead_centres.tolist(),
+        **_accuracy(run, result),
         "frequencies_hz": {character.bodies[table.body].path: table.frequencies for table in result.modes},
     }
     layer, recording, table, figures = run.get(WrittenLayer), run.get(Recording), run.get(CsvFile), run.get(Figures)
@@ -126,6 +127,18 @@ def run_report(run: Run, character: Character, result: Result, command: str, tot
         "operators": [operator_row(row) for row in run.results],
     }
     return report
+
+
+def _accuracy(run: Run, result: Result) -> dict[str, Any]:
+    """How far the targets are from where a finer simulation has them: estimated, and measured with `--verify`."""
+    accuracy, verified = result.accuracy, run.get(Verification)
+    return {
+        "estimated_error_m": accuracy.estimated_m if accuracy else None,
+        "estimated_step_error_m": accuracy.step_m if accuracy else None,
+        "verified_error_m": verified.error_m if verified else None,
+        "verified_step_s": verified.step_s if verified else None,
+        "verified_modes": verified.modes if verified else None,
+    }
 
 
 def _simulated(character: Character, result: Result) -> dict[str, Any]:

@@ -24,6 +24,7 @@ from .host import (
     SettingError,
     Settings,
     Source,
+    Verification,
     WrittenLayer,
     merge,
     nearest,
@@ -64,6 +65,7 @@ def run_shot(args: argparse.Namespace, command: str, output: Output) -> int:
     paths = OutputPaths(layer=args.output, rrd=args.rrd, csv=args.csv, figures=args.figures)
     host = open_host(args.plugins)
     wanted = [Character, Result, *_wanted_files(host, paths), *asked_for(host, args)]
+    wanted += [Verification] if args.verify else []
     source = Source(
         path=args.shot,
         command=command,
@@ -72,6 +74,7 @@ def run_shot(args: argparse.Namespace, command: str, output: Output) -> int:
         pre_roll=args.pre_roll,
         shaper=getattr(args, "shaper", None),
         motion=args.motion,
+        verify=args.verify,
         **({"integrator": args.integrator} if args.integrator else {}),
     )
     _refuse_unreadable_motion(source, host)

@@ -77,6 +77,21 @@ def print_limits(console: Console, limits: Sequence[dict[str, Any]], optimized: 
     print_table(console, "Limits of motors that matter", ["motor", "quantity", *heads, "at", ""], rows, texts=2)
 
 
+def print_accuracy(console: Console, report: dict[str, Any]) -> None:
+    """How far the simulation itself may be off."""
+    if report["estimated_error_m"] is not None:
+        step = length(report["estimated_step_error_m"])
+        console.print(
+            f"simulated to about {length(report['estimated_error_m'])} at the targets ({step} of it the time step), "
+            "the finite-element mesh not counted"
+        )
+    if report["verified_error_m"] is not None:
+        console.print(
+            f"verified: a run with steps of {1000 * report['verified_step_s']:.4g} ms and {report['verified_modes']} "
+            f"elastic coordinates has the targets within {length(report['verified_error_m'])}"
+        )
+
+
 def print_run(report: dict[str, Any], stream: TextIO) -> None:
     """The report of `simulate` or `optimize`."""
     console = console_on(stream)
@@ -126,6 +141,7 @@ def print_run(report: dict[str, Any], stream: TextIO) -> None:
         f"{report['modes']} of them elastic; {report['total_wall_s']:.1f} s in all"
         + (f", {report['peak_memory_gb']:.2f} GB" if report["peak_memory_gb"] else "")
     )
+    print_accuracy(console, report)
     print_left_out(console, report["left_out"])
     for note in report["notes"]:
         console.print(f"note: {note}")

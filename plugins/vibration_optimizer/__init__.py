@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from calmotion.host import NotAsked, Operator, Property, RunContext
-from calmotion.host.values import OutputPaths, ReducedBodies, ShapedTracks, Source, SystemModes
+from calmotion.host.values import OutputPaths, ReducedBodies, ShapedTracks, Source, SystemModes, Verification
 from calmotion.shot import Animation, Character, FEMeshes, Result
 
 if TYPE_CHECKING:
@@ -127,13 +127,13 @@ class SimulateShot(Operator):
         return _wrong_command(data, "simulate")
 
     def execute(self, context: RunContext) -> Sequence[object]:
-        from calmotion.retarget.run import simulate_shot
+        from calmotion.retarget.to_tolerance import simulate_to_tolerance
 
         character, animation, bodies = _inputs(context)
         shaped = context.get(ShapedTracks)
         if shaped is not None:
             animation = replace(animation, current=shaped.tracks)
-        return [simulate_shot(character, animation, bodies, _options(context), context.progress)]
+        return [simulate_to_tolerance(character, animation, bodies, _options(context), context.progress)]
 
 
 class OptimizeShot(Operator):
@@ -169,7 +169,7 @@ class OptimizeShot(Operator):
 
     def execute(self, context: RunContext) -> Sequence[object]:
         from calmotion.retarget.checkpoint import checkpoint_path
-        from calmotion.retarget.optimize import optimize_shot
+        from calmotion.retarget.to_tolerance import optimize_to_tolerance
 
         values = context.properties
         options = _options(
@@ -181,12 +181,36 @@ class OptimizeShot(Operator):
         )
         paths = context.get(OutputPaths)
         kept = checkpoint_path(paths.layer) if paths is not None and paths.layer else None
-        result = optimize_shot(*_inputs(context), options, context.progress, kept)
+        result = optimize_to_tolerance(*_inputs(context), options, context.progress, kept)
         if result.interrupted:
             context.report(
                 "warning", "interrupted: these are the best curves so far; the same command goes on from them"
             )
         return [result]
+
+
+class VerifyResult(Operator):
+    """The result against a finer run of the same curves: a quarter of the step, a tenth of what the modes leave out."""
+
+    idname = "retarget.verify"
+    label = "Compare with a finer run"
+    requires = (Character, Animation, Source, Result)
+    uses = (FEMeshes, ShapedTracks)
+    provides = (Verification,)
+
+    @classmethod
+    def poll(cls, data: Mapping[type, Any]) -> str | None:
+        source = data.get(Source)
+        return NotAsked("no --verify was asked for") if source is None or not source.verify else None
+
+    def execute(self, context: RunContext) -> Sequence[object]:
+        from calmotion.retarget.verify import verify
+
+        animation, shaped = context.get(Animation), context.get(ShapedTracks)
+        if shaped is not None:
+            animation = replace(animation, current=shaped.tracks)
+        character, meshes, result = context.get(Character), context.get(FEMeshes), context.get(Result)
+        return [Verification(*verify(character, animation, meshes, result, _options(context), context.progress))]
 
 
 def _inputs(context: RunContext) -> tuple[Character, Animation, Sequence[Any] | None]:
@@ -207,7 +231,7 @@ def _options(context: RunContext, **more: Any) -> Options:
     )
 
 
-OPERATORS = (ReduceFlexibleBodies, FindSystemModes, ShapeTracks, SimulateShot, OptimizeShot)
+OPERATORS = (ReduceFlexibleBodies, FindSystemModes, ShapeTracks, SimulateShot, OptimizeShot, VerifyResult)
 
 
 def register(host: Any) -> None:

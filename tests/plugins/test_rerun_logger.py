@@ -260,7 +260,11 @@ def test_the_summary_tells_what_ran_and_what_did_not(tmp_path):
     path = str(tmp_path / "run.rrd")
     recording.write_recording(path, synthetic.character(), synthetic.animation(), synthetic.result(), operators=steps)
     text = str(
-        next(value for (entity, _), (_, value) in read_recording(path).items() if entity == "/summary" and "## Run" in str(value))
+        next(
+            value
+            for (entity, _), (_, value) in read_recording(path).items()
+            if entity == "/summary" and "## Run" in str(value)
+        )
     )
     assert "| `usd.read` | usd_reader | done | 1.25 s |  |" in text
     assert "| `fe.mesh` | fe_mesher | left out |  | no body is flexible |" in text

@@ -3,7 +3,7 @@ import dataclasses
 import numpy as np
 import pytest
 from calmotion import ShotError
-from calmotion.host import NotAsked, OutputPaths, ReducedBodies, ShapedTracks, Source, SystemModes
+from calmotion.host import NotAsked, OutputPaths, ReducedBodies, ShapedTracks, Source, SystemModes, Verification
 from calmotion.shot import Character, Result
 from calmotion.testing import host_with, run_operator, small_shot
 
@@ -66,6 +66,22 @@ def test_properties_reach_the_optimiser(host, repository):
     assert damping.shape == frequencies.shape and np.all(damping > 0.0) and damping[0] < 0.02
     assert np.all(np.diff(frequencies) >= 0.0) and frequencies[0] > 0.1
     assert len(run.get(ReducedBodies).bodies) == len(character.bodies)
+
+
+def test_a_result_is_verified_where_that_is_asked_for(host, repository):
+    plugins = repository / "plugins"
+    both = host_with(plugins / "fe_mesher", plugins / "vibration_optimizer")
+    character, animation = small_shot(flexible=True)
+    asked = Source(path="shot.usda", command="simulate", tolerance=1e-5, verify=True)
+    run = both.run([character, animation, asked], [Result, Verification])
+    outcomes = {result.idname: (result.outcome, result.error) for result in run}
+    assert outcomes["retarget.verify"][0] == "done", outcomes
+    found, verified = run.get(Result), run.get(Verification)
+    assert found.accuracy.step_m <= 0.5e-5 and verified.step_s == pytest.approx(found.step_s / 4)
+    assert 0.0 < verified.error_m < 1e-5
+    poll = host.operators["retarget.verify"].poll
+    assert isinstance(poll({Source: dataclasses.replace(asked, verify=False)}), NotAsked)
+    assert poll({Source: asked}) is None
 
 
 def test_locked_motors_only_are_refused(host):

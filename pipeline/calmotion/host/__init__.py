@@ -21,6 +21,7 @@ from .values import (
     ShapedTracks,
     Source,
     SystemModes,
+    Verification,
     WrittenLayer,
 )
 
@@ -55,6 +56,7 @@ __all__ = [
     "Settings",
     "Source",
     "SystemModes",
+    "Verification",
     "WrittenLayer",
     "merge",
     "nearest",

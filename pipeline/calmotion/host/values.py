@@ -24,6 +24,7 @@ class Source:
         pre_roll: Length of the pre-roll [s], or None for automatic.
         shaper: Input shaper or filter through which `simulate` passes the motors' tracks first, or None.
         motion: File with a motion that replaces tracks of motors, or None.
+        verify: Whether the result is to be compared with a finer run.
     """
 
     path: str
@@ -34,6 +35,7 @@ class Source:
     pre_roll: float | None = None
     shaper: str | None = None
     motion: str | None = None
+    verify: bool = False
 
 
 @dataclass(frozen=True)
@@ -133,6 +135,21 @@ class ShapedTracks:
     """The motors' tracks after an input shaper or a filter, in the motors' order."""
 
     tracks: tuple[Track, ...]
+
+
+@dataclass(frozen=True)
+class Verification:
+    """A run compared with a finer one of the same curves.
+
+    Attributes:
+        error_m: Largest distance of any target, at any frame, to where the finer run has it [m].
+        step_s: Step of the finer run [s].
+        modes: Its elastic coordinates.
+    """
+
+    error_m: float
+    step_s: float
+    modes: int
 
 
 @dataclass(frozen=True, eq=False)

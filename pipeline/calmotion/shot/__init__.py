@@ -22,6 +22,7 @@ from .finding import Finding, Findings
 from .meshes import FEMesh, FEMeshes, MeshQuality
 from .provenance import InputLayer, Provenance
 from .result import (
+    Accuracy,
     LeftOut,
     LimitUse,
     ModeTable,
@@ -35,6 +36,7 @@ from .result import (
 
 __all__ = [
     "WORLD",
+    "Accuracy",
     "Animation",
     "Body",
     "Character",

@@ -158,6 +158,24 @@ class ModeTable:
     mass: float
 
 
+@dataclass(frozen=True)
+class Accuracy:
+    """How far the targets of a simulated motion are from where a finer simulation would have them.
+
+    Attributes:
+        step_m: Estimated error of the time step [m].
+        left_out_m: Estimated error of what the reduced bodies do without [m].
+    """
+
+    step_m: float
+    left_out_m: float
+
+    @property
+    def estimated_m(self) -> float:
+        """Of both [m]. The finite-element mesh is not in it."""
+        return self.step_m + self.left_out_m
+
+
 @dataclass(frozen=True, eq=False)
 class Result:
     """What a run computed. `simulate` fills `before` alone; `optimize` also `after` and what follows it.
@@ -183,6 +201,7 @@ class Result:
         interrupted: Whether the user stopped it; the best curves so far are here.
         performed: A rigid robot performing the curves that were found (or simulated); same times. None where a
             linkage cannot follow them rigidly.
+        accuracy: Of the motion that counts, `after` or else `before`; None where it was not estimated.
     """
 
     reference: Motion
@@ -209,3 +228,4 @@ class Result:
     expected_gain_m: float | None = None
     interrupted: bool = False
     performed: Motion | None = None
+    accuracy: Accuracy | None = None

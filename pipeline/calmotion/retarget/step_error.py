@@ -1,0 +1,96 @@
+"""The error of the time step at the targets, from two simulations of the same curves by different steps."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..dynamics.failure import SimulationFailure
+from ..dynamics.simulation import Workspace
+from ..errors import ShotError
+from ..fem.reduced_body import ReducedBody
+from ..shot import Animation, Character
+from ..shot.character import Array
+from .curves import sample_tracks
+from .forward import run_forward
+from .prepare import Options, failure_error, prepare
+from .steady import SteadyState
+
+ORDER = 2  # of BDF2; the global error goes with this power of the step
+
+
+@dataclass(frozen=True, eq=False)
+class StepRun:
+    """Where one simulation has the targets at the shot's frames.
+
+    Attributes:
+        step: [s].
+        positions: [m], shape [f, K, 3]; infinite where the simulation failed.
+    """
+
+    step: float
+    positions: Array
+
+
+def simulate_at(
+    character: Character, animation: Animation, bodies: Sequence[ReducedBody] | None, options: Options, step: float
+) -> StepRun:
+    """One simulation of an animation's current curves; other arguments as of `simulate_shot`.
+
+    Raises:
+        ShotError: The shot cannot be simulated by this step.
+    """
+    prepared = prepare(character, animation, bodies, replace(options, step=step))
+    model, grid = prepared.model, prepared.grid
+    workspace = Workspace.for_system(model.system)
+    angles, rates = sample_tracks(animation.current, grid)
+    steady = SteadyState(model, prepared.world, grid.h, workspace) if grid.cyclic else None
+    try:
+        run = run_forward(model, workspace, angles, rates, grid.h, prepared.world, None, options.integrator, steady)
+    except SimulationFailure as failure:
+        raise failure_error(prepared, failure) from failure
+    return StepRun(grid.h, run.target_positions[grid.frames])
+
+
+def step_error(coarse: StepRun, fine: StepRun) -> float:
+    """Error of the finer of two runs at any target [m], by Richardson's extrapolation."""
+    ratio = (coarse.step / fine.step) ** ORDER - 1.0
+    off = np.linalg.norm(coarse.positions - fine.positions, axis=2)
+    return float(np.max(off, initial=0.0)) / ratio
+
+
+def largest_step(
+    run: Callable[[float], StepRun], first: float, last: float, allowed: Callable[[StepRun], float]
+) -> tuple[float, float]:
+    """The largest step, of those that halve the first, whose error is allowed.
+
+    Args:
+        run: Simulates by a step [s]; may raise ShotError where that is too large.
+        first, last: Steps to begin and to end with [s].
+        allowed: Error at the targets [m] that may be, from the finest run so far.
+
+    Returns:
+        The step [s] and its estimated error [m]; where not even the last is fine enough, that and its error.
+    """
+    step, coarse = first, run_or_none(run, first)
+    while True:
+        fine = run_or_none(run, 0.5 * step)
+        if coarse is not None and fine is not None:
+            error, enough = step_error(coarse, fine), allowed(fine)
+            if 2.0**ORDER * error <= enough:
+                return step, 2.0**ORDER * error
+            if error <= enough or 0.5 * step <= last:
+                return 0.5 * step, error
+        elif 0.5 * step <= last:
+            return 0.5 * step, np.inf
+        step, coarse = 0.5 * step, fine
+
+
+def run_or_none(run: Callable[[float], StepRun], step: float) -> StepRun | None:
+    """The run by a step, None where that fails."""
+    try:
+        return run(step)
+    except ShotError:
+        return None

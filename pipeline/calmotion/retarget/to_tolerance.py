@@ -1,0 +1,147 @@
+"""Simulate or retarget a shot to a tolerance: the time step follows from the error that it causes at the targets.
+
+Where no tolerance is asked for, the step is that of `time_grid.make_grid`; its error is estimated all the same after an
+optimisation, where one more simulation costs next to nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+
+from ..fem.reduced_body import ReducedBody
+from ..shot import Accuracy, Animation, Character, OptimizerStep, Result, Track
+from .curves import sample_tracks
+from .optimize import optimize_shot
+from .prepare import Options, prepare
+from .run import Progress, meant_motion, simulate_shot
+from .step_error import ORDER, StepRun, largest_step, run_or_none, simulate_at, step_error
+
+SHARE = 0.5  # of the tolerance, that the time step may take
+FIRST, LAST = 1.0 / 60.0, 1.0 / 30720.0  # steps that are tried [s]
+OF_SHAKE = 0.05  # of the input's own error: how well that need be known before it is taken away
+MARGIN, MOST = 0.8, 3  # by which a step that was too large is made too small, and how often that is done
+Bodies = Sequence[ReducedBody] | None
+
+
+def simulate_to_tolerance(
+    character: Character, animation: Animation, bodies: Bodies, options: Options, progress: Progress
+) -> Result:
+    """As `simulate_shot`, with a time step that keeps the tolerance where one is asked for and no step is."""
+    if not _chooses(character, options):
+        return simulate_shot(character, animation, bodies, options, progress)
+    progress(0.0, "choosing the time step")
+    trial = partial(simulate_at, character, animation, bodies, options)
+    step, error = largest_step(trial, FIRST, LAST, lambda run: _allowed(options))
+    result = simulate_shot(character, animation, bodies, replace(options, step=step), progress)
+    return replace(result, accuracy=Accuracy(error, _left_out(bodies)))
+
+
+def optimize_to_tolerance(
+    character: Character, animation: Animation, bodies: Bodies, options: Options, progress: Progress,
+    checkpoint: Path | None = None,
+) -> Result:  # fmt: skip
+    """As `optimize_shot`, likewise.
+
+    The search begins with a step at which the input's shake is known well enough to be taken away. What is left of it
+    afterwards is known far better; where the tolerance asks for more, the search goes on with a finer step.
+    """
+    run = partial(optimize_shot, character, bodies=bodies, progress=progress, checkpoint=checkpoint)
+    if not _chooses(character, options):
+        found = run(animation, options=options)
+        return found if found.interrupted else _estimated(found, character, animation, bodies, options)
+    progress(0.0, "choosing the time step")
+    intended = _intended(character, animation, bodies, options)
+
+    def allowed(tried: StepRun) -> float:
+        shake = np.linalg.norm(tried.positions - intended, axis=2)
+        return max(_allowed(options), OF_SHAKE * float(shake.max(initial=0.0)))
+
+    trial = partial(simulate_at, character, replace(animation, current=animation.tracks), bodies, options)
+    step, _ = largest_step(trial, FIRST, LAST, allowed)
+    result: Result | None = None
+    for _ in range(MOST):
+        found = run(animation, options=replace(options, step=step))
+        result = found if result is None else _added(result, found)
+        if result.interrupted:
+            return result
+        result = _estimated(result, character, animation, bodies, options)
+        assert result.accuracy is not None
+        if result.accuracy.step_m <= _allowed(options) or step <= LAST:
+            break
+        step = max(LAST, MARGIN * result.step_s * (_allowed(options) / result.accuracy.step_m) ** (1.0 / ORDER))
+        animation = replace(animation, current=found_tracks(result, animation))
+    assert result is not None
+    return result
+
+
+def _chooses(character: Character, options: Options) -> bool:
+    """Whether the step is to follow from the tolerance."""
+    if options.tolerance is None or options.step is not None or character.retarget.time_step is not None:
+        return False
+    return options.integrator == "bdf2" and not character.retarget.cyclic
+
+
+def _allowed(options: Options) -> float:
+    assert options.tolerance is not None
+    return SHARE * options.tolerance
+
+
+def _left_out(bodies: Bodies) -> float:
+    """Estimated error of what the bodies do without [m]; along a chain it adds up."""
+    return sum(row.estimated_error_m or 0.0 for body in bodies or () for row in body.left_out)
+
+
+def _intended(character: Character, animation: Animation, bodies: Bodies, options: Options) -> np.ndarray:
+    """Where the targets are meant to be at the frames [m], shape [f, K, 3]."""
+    prepared = prepare(character, animation, bodies, replace(options, step=FIRST))
+    meant = meant_motion(prepared, *sample_tracks(animation.tracks, prepared.grid))
+    return meant.reference.positions[prepared.grid.frames]
+
+
+def found_tracks(result: Result, animation: Animation) -> tuple[Track, ...]:
+    """The curves that were found: samples at the frames hold them exactly."""
+    return tuple(
+        Track(animation.frame_times, curve.frame_values) if curve.changed else track
+        for curve, track in zip(result.curves, animation.tracks, strict=True)
+    )
+
+
+def _estimated(result: Result, character: Character, animation: Animation, bodies: Bodies, options: Options) -> Result:
+    """The result with its accuracy, from a simulation of the curves that were found by twice the step."""
+    assert result.after is not None
+    motion = result.after.motion
+    at_frames = np.searchsorted(motion.times, animation.frame_times - 1e-9)
+    fine = StepRun(result.step_s, motion.target_positions[at_frames])
+    trial = partial(
+        simulate_at, character, replace(animation, current=found_tracks(result, animation)), bodies, options
+    )
+    coarse = run_or_none(trial, 2.0 * result.step_s)
+    if coarse is None or coarse.step < 1.5 * fine.step:  # it fails, or a frame is no longer than the step
+        coarse, fine = fine, trial(0.5 * result.step_s)
+    return replace(result, accuracy=Accuracy(step_error(coarse, fine), _left_out(bodies)))
+
+
+def _added(first: Result, then: Result) -> Result:
+    """A search that went on: its last part, with the work of both."""
+    done = first.steps[-1]
+    steps = tuple(
+        OptimizerStep(
+            s.objective, s.gradient_norm, done.forward_simulations + s.forward_simulations,
+            done.linearized_sweeps + s.linearized_sweeps,
+        )
+        for s in then.steps
+    )  # fmt: skip
+    return replace(
+        then,
+        steps=first.steps + steps,
+        gradients=first.gradients + then.gradients,
+        linearized_sweeps=first.linearized_sweeps + then.linearized_sweeps,
+        forward_simulations=first.forward_simulations + then.forward_simulations,
+        iterations=first.iterations + then.iterations,
+        wall_s=first.wall_s + then.wall_s,
+    )

@@ -1,0 +1,97 @@
+"""Tolerances: the step follows from them, and what comes out keeps them against a far finer run."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+from calmotion.retarget import to_tolerance
+from calmotion.retarget.prepare import Options
+from calmotion.retarget.step_error import simulate_at
+from calmotion.retarget.to_tolerance import found_tracks, optimize_to_tolerance, simulate_to_tolerance
+from calmotion.retarget.verify import verify
+
+FINE = 1 / 7680
+
+
+def quiet(fraction, message):
+    pass
+
+
+def off_by(result, character, animation, bodies):
+    """Largest distance of a target at a frame to where a far finer step has it."""
+    simulation = result.after or result.before
+    if result.after is not None:
+        animation = dataclasses.replace(animation, current=found_tracks(result, animation))
+    fine = simulate_at(character, animation, bodies, Options(), FINE)
+    frames = np.searchsorted(simulation.motion.times, animation.frame_times - 1e-9)
+    return np.linalg.norm(simulation.motion.target_positions[frames] - fine.positions, axis=2).max()
+
+
+def test_a_simulation_keeps_its_tolerance_by_a_step_no_smaller_than_it_must(arm, animation, bodies):
+    steps = []
+    for tolerance in (1e-2, 1e-3, 1e-4):
+        result = simulate_to_tolerance(arm, animation, bodies, Options(tolerance=tolerance), quiet)
+        off = off_by(result, arm, animation, bodies)
+        assert off < tolerance and off < 1.5 * result.accuracy.step_m
+        steps.append(result.step_s)
+        coarser = simulate_at(arm, animation, bodies, Options(), 4.0 * result.step_s)
+        fine = simulate_at(arm, animation, bodies, Options(), FINE)
+        assert np.linalg.norm(coarser.positions - fine.positions, axis=2).max() > 0.5 * tolerance
+    assert steps[0] > steps[1] > steps[2]
+
+
+def test_a_step_or_no_tolerance_leaves_the_step_as_it_is(arm, animation, bodies):
+    for options in (Options(step=1 / 240, tolerance=1e-5), Options()):
+        result = simulate_to_tolerance(arm, animation, bodies, options, quiet)
+        assert result.step_s == pytest.approx(options.step or 1 / 480) and result.accuracy is None
+    slow = dataclasses.replace(arm, retarget=dataclasses.replace(arm.retarget, time_step=1 / 120))
+    assert simulate_to_tolerance(slow, animation, bodies, Options(tolerance=1e-5), quiet).step_s == pytest.approx(
+        1 / 120
+    )
+
+
+@pytest.mark.parametrize("tolerance", [1e-3, 2e-5])
+def test_an_optimisation_keeps_its_tolerance(arm, animation, bodies, tolerance):
+    result = optimize_to_tolerance(arm, animation, bodies, Options(tolerance=tolerance), quiet)
+    off = off_by(result, arm, animation, bodies)
+    assert off < tolerance and off < 1.5 * result.accuracy.step_m <= 0.75 * tolerance
+    assert result.objective_after < 0.1 * result.objective_before
+    assert result.accuracy.left_out_m == sum(row.estimated_error_m or 0.0 for b in bodies for row in b.left_out)
+
+
+def test_a_search_that_goes_on_counts_all_its_work(arm, animation, bodies, monkeypatch):
+    parts = []
+    plain = to_tolerance.optimize_shot
+
+    def counted(*arguments, **named):
+        parts.append(plain(*arguments, **named))
+        return parts[-1]
+
+    monkeypatch.setattr(to_tolerance, "optimize_shot", counted)
+    result = optimize_to_tolerance(arm, animation, bodies, Options(tolerance=2e-5), quiet)
+    assert len(parts) == 2 and result.step_s == parts[1].step_s < parts[0].step_s
+    for name in ("forward_simulations", "linearized_sweeps", "iterations", "gradients"):
+        assert getattr(result, name) == sum(getattr(part, name) for part in parts)
+    work = [step.forward_simulations + step.linearized_sweeps for step in result.steps]
+    assert work == sorted(work) and len(work) == sum(len(part.steps) for part in parts)
+    assert parts[1].steps[0].objective < 1.5 * parts[0].objective_after, "it goes on from what was found"
+
+
+def test_an_optimisation_without_a_tolerance_tells_the_error_of_its_step(arm, animation, bodies):
+    options = Options(step=1 / 240)
+    result = optimize_to_tolerance(arm, animation, bodies, options, quiet)
+    assert result.step_s == pytest.approx(1 / 240)
+    assert off_by(result, arm, animation, bodies) == pytest.approx(result.accuracy.step_m, rel=0.5)
+
+
+def test_verifying_measures_the_distance_to_a_finer_run(arm, animation, meshes, bodies):
+    options = Options(tolerance=1e-3)
+    result = simulate_to_tolerance(arm, animation, bodies, options, quiet)
+    error, step, modes = verify(arm, animation, meshes, result, options, quiet)
+    assert step == pytest.approx(result.step_s / 4) and modes > 6
+    assert 0.3 * result.accuracy.step_m < error < 5e-3
+    moved = dataclasses.replace(
+        result.before.motion, target_positions=result.before.motion.target_positions + [0.02, 0.0, 0.0]
+    )
+    wrong = dataclasses.replace(result, before=dataclasses.replace(result.before, motion=moved))
+    assert verify(arm, animation, meshes, wrong, options, quiet)[0] == pytest.approx(0.02, abs=1.1 * error)
