@@ -56,10 +56,15 @@ class ReduceFlexibleBodies(Operator):
         character, meshes, animation = context.get(Character), context.get(FEMeshes), context.get(Animation)
         if context.properties.elasticity != "shot":
             character = with_elasticity(character, context.properties.elasticity)
-        loads, tolerance = None, None
-        if animation is not None and context.get(Source) is not None:
+        loads, tolerance, source = None, None, context.get(Source)
+        if animation is not None and source is not None:
             context.progress(0.0, "compiling kernels, once")
             options = _options(context)
+            if source.command == "simulate" and source.tolerance is not None:
+                from calmotion.retarget.settled_bodies import settled_bodies
+
+                settled, error = settled_bodies(character, animation, meshes, options, context.progress)
+                return [ReducedBodies(tuple(settled), mode_tables(settled), error)]
             loads, tolerance = excitations(character, animation, meshes, options), options.tolerance
         bodies = reduce_bodies(character, span_tree(character), meshes, context.progress, loads, tolerance)
         return [ReducedBodies(tuple(bodies), mode_tables(bodies))]
@@ -133,7 +138,9 @@ class SimulateShot(Operator):
         shaped = context.get(ShapedTracks)
         if shaped is not None:
             animation = replace(animation, current=shaped.tracks)
-        return [simulate_to_tolerance(character, animation, bodies, _options(context), context.progress)]
+        reduced = context.get(ReducedBodies)
+        error = None if reduced is None else reduced.error_m
+        return [simulate_to_tolerance(character, animation, bodies, _options(context), context.progress, error)]
 
 
 class OptimizeShot(Operator):
@@ -195,7 +202,7 @@ class VerifyResult(Operator):
     idname = "retarget.verify"
     label = "Compare with a finer run"
     requires = (Character, Animation, Source, Result)
-    uses = (FEMeshes, ShapedTracks)
+    uses = (FEMeshes, ReducedBodies, ShapedTracks)
     provides = (Verification,)
 
     @classmethod
@@ -209,8 +216,9 @@ class VerifyResult(Operator):
         animation, shaped = context.get(Animation), context.get(ShapedTracks)
         if shaped is not None:
             animation = replace(animation, current=shaped.tracks)
-        character, meshes, result = context.get(Character), context.get(FEMeshes), context.get(Result)
-        return [Verification(*verify(character, animation, meshes, result, _options(context), context.progress))]
+        character, _, bodies = _inputs(context)
+        meshes, result, options = context.get(FEMeshes), context.get(Result), _options(context)
+        return [Verification(*verify(character, animation, meshes, bodies, result, options, context.progress))]
 
 
 def _inputs(context: RunContext) -> tuple[Character, Animation, Sequence[Any] | None]:

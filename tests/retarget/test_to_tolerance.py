@@ -87,11 +87,11 @@ def test_an_optimisation_without_a_tolerance_tells_the_error_of_its_step(arm, an
 def test_verifying_measures_the_distance_to_a_finer_run(arm, animation, meshes, bodies):
     options = Options(tolerance=1e-3)
     result = simulate_to_tolerance(arm, animation, bodies, options, quiet)
-    error, step, modes = verify(arm, animation, meshes, result, options, quiet)
+    error, step, modes = verify(arm, animation, meshes, bodies, result, options, quiet)
     assert step == pytest.approx(result.step_s / 4) and modes > 6
     assert 0.3 * result.accuracy.step_m < error < 5e-3
     moved = dataclasses.replace(
         result.before.motion, target_positions=result.before.motion.target_positions + [0.02, 0.0, 0.0]
     )
     wrong = dataclasses.replace(result, before=dataclasses.replace(result.before, motion=moved))
-    assert verify(arm, animation, meshes, wrong, options, quiet)[0] == pytest.approx(0.02, abs=1.1 * error)
+    assert verify(arm, animation, meshes, bodies, wrong, options, quiet)[0] == pytest.approx(0.02, abs=1.1 * error)

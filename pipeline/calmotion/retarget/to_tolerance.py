@@ -29,16 +29,21 @@ Bodies = Sequence[ReducedBody] | None
 
 
 def simulate_to_tolerance(
-    character: Character, animation: Animation, bodies: Bodies, options: Options, progress: Progress
-) -> Result:
-    """As `simulate_shot`, with a time step that keeps the tolerance where one is asked for and no step is."""
+    character: Character, animation: Animation, bodies: Bodies, options: Options, progress: Progress,
+    left_out_m: float | None = None,
+) -> Result:  # fmt: skip
+    """As `simulate_shot`, with a time step that keeps the tolerance where one is asked for and no step is.
+
+    Args:
+        left_out_m: Error of what the bodies do without where it is known better than their own estimates [m].
+    """
     if not _chooses(character, options):
         return simulate_shot(character, animation, bodies, options, progress)
     progress(0.0, "choosing the time step")
     trial = partial(simulate_at, character, animation, bodies, options)
     step, error = largest_step(trial, FIRST, LAST, lambda run: _allowed(options))
     result = simulate_shot(character, animation, bodies, replace(options, step=step), progress)
-    return replace(result, accuracy=Accuracy(error, _left_out(bodies)))
+    return replace(result, accuracy=Accuracy(error, _left_out(bodies) if left_out_m is None else left_out_m))
 
 
 def optimize_to_tolerance(

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
 from ..dynamics.topology import span_tree
+from ..fem.reduced_body import ReducedBody
 from ..shot import Animation, Character, FEMeshes, Result
 from ..shot.character import DEFAULT_TOLERANCE
 from .bodies import reduce_bodies
@@ -16,17 +19,19 @@ from .step_error import simulate_at
 from .to_tolerance import found_tracks
 
 STEP, TOLERANCE = 0.25, 0.1  # of those of the result
+FINER, MOST = 0.1, 4  # a reduction that is no finer than the result's is tried again with this share of its tolerance
 
 
 def verify(
-    character: Character, animation: Animation, meshes: FEMeshes | None, result: Result, options: Options,
-    progress: Progress,
+    character: Character, animation: Animation, meshes: FEMeshes | None, reduced: Sequence[ReducedBody] | None,
+    result: Result, options: Options, progress: Progress,
 ) -> tuple[float, float, int]:  # fmt: skip
     """Largest distance of any target, at any frame, to where a finer run has it.
 
     Args:
         character, animation: The shot; its current curves are those of a result of `simulate`.
         meshes: Of its flexible bodies.
+        reduced: The bodies of the result; None where all are rigid.
         options: Those of the result.
 
     Returns:
@@ -39,12 +44,23 @@ def verify(
     if result.after is not None:
         animation = replace(animation, current=found_tracks(result, animation))
     bodies = None
-    if any(body.flexible for body in character.bodies):
+    if reduced is not None and any(body.flexible for body in character.bodies):
         allowed = TOLERANCE * (options.tolerance or character.retarget.tolerance or DEFAULT_TOLERANCE)
         loads = excitations(character, animation, meshes, options)
-        bodies = reduce_bodies(character, span_tree(character), meshes, progress, loads, allowed)
+        reduce = partial(reduce_bodies, character, span_tree(character), meshes, progress, loads)
+        bodies = reduce(tolerance=allowed)
+        for _ in range(MOST):
+            if _coordinates(bodies) > _coordinates(reduced):
+                break
+            allowed *= FINER
+            bodies = reduce(tolerance=allowed)
     progress(0.5, "simulating with a finer step")
     fine = simulate_at(character, animation, bodies, options, STEP * result.step_s)
     at_frames = np.searchsorted(simulation.motion.times, animation.frame_times - 1e-9)
     off = np.linalg.norm(simulation.motion.target_positions[at_frames] - fine.positions, axis=2)
-    return float(np.max(off, initial=0.0)), fine.step, sum(len(body.stiffness) for body in bodies or ())
+    return float(np.max(off, initial=0.0)), fine.step, _coordinates(bodies or ())
+
+
+def _coordinates(bodies: Sequence[ReducedBody]) -> int:
+    """Elastic coordinates of all bodies."""
+    return sum(len(body.stiffness) for body in bodies)

@@ -1,0 +1,74 @@
+"""Reduced bodies fine enough for a simulation: the tolerance of the reduction falls until the motion no longer changes.
+
+What a reduction leaves out is estimated for each body by itself, at rest. In a robot that shakes it also shifts
+frequencies, and a small shift makes the motions part in time; only the simulation itself tells by how much.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import partial
+
+import numpy as np
+
+from ..dynamics.topology import span_tree
+from ..fem.reduced_body import ReducedBody
+from ..shot import Animation, Character, FEMeshes
+from .bodies import reduce_bodies
+from .prepare import Options, excitations
+from .step_error import simulate_at
+from .time_grid import MAX_STEP
+
+SHARE = 0.4  # of the tolerance, that what is left out may take
+FINER, MOST = 0.1, 6  # each tolerance of the reduction over the last, and how many there are
+
+
+def settled_bodies(
+    character: Character, animation: Animation, meshes: FEMeshes | None, options: Options,
+    progress: Callable[[float, str], None],
+) -> tuple[list[ReducedBody], float]:  # fmt: skip
+    """Bodies whose reduction moves no target by more than the tolerance, in the shot as it is animated.
+
+    Args:
+        options: With a tolerance.
+
+    Returns:
+        The bodies, and how far a target is from where the last coarser reduction had it [m]. That one would often do,
+        but where two reductions agree by chance the finer is the safer.
+
+    Raises:
+        ShotError: A body cannot be reduced, or the shot not be simulated.
+    """
+    assert options.tolerance is not None
+    loads = excitations(character, animation, meshes, options)
+    tree = span_tree(character)
+    reduce = partial(reduce_bodies, character, tree, meshes, None, loads)
+
+    def places(bodies: Sequence[ReducedBody]) -> np.ndarray:
+        return simulate_at(character, animation, bodies, options, options.step or MAX_STEP).positions
+
+    tolerance = options.tolerance
+    bodies, off = reduce(tolerance=tolerance), 0.0
+    found = places(bodies)
+    for k in range(MOST):
+        progress((k + 1) / (MOST + 1), f"a reduction to {1e3 * tolerance:.2g} mm")
+        tolerance *= FINER
+        finer = reduce(tolerance=tolerance)
+        if _same(bodies, finer):
+            continue
+        then = places(finer)
+        off = float(np.max(np.linalg.norm(then - found, axis=2), initial=0.0))
+        bodies, found = finer, then
+        if off <= SHARE * options.tolerance:
+            break
+    return bodies, off
+
+
+def _same(one: Sequence[ReducedBody], other: Sequence[ReducedBody]) -> bool:
+    """Whether two reductions are of the same coordinates and laws."""
+    return all(
+        np.array_equal(a.stiffness, b.stiffness)
+        and (a.elasticity is None) == (b.elasticity is None)
+        and (a.elasticity is None or b.elasticity is None or a.elasticity.law == b.elasticity.law)
+        for a, b in zip(one, other, strict=True)
+    )

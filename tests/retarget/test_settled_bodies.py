@@ -1,0 +1,38 @@
+"""A reduction that is fine enough for the simulation: against one far finer, and no finer than it must be."""
+
+import numpy as np
+import pytest
+from calmotion.dynamics.topology import span_tree
+from calmotion.retarget.bodies import reduce_bodies
+from calmotion.retarget.prepare import Options, excitations
+from calmotion.retarget.settled_bodies import settled_bodies
+from calmotion.retarget.step_error import simulate_at
+
+STEP = 1 / 480
+
+
+@pytest.fixture(scope="module")
+def fine(arm, animation, meshes):
+    loads = excitations(arm, animation, meshes, Options())
+    bodies = reduce_bodies(arm, span_tree(arm), meshes, None, loads, 1e-8)
+    return bodies, simulate_at(arm, animation, bodies, Options(), STEP).positions
+
+
+@pytest.mark.parametrize("tolerance", [1e-2, 1e-3, 1e-4])
+def test_the_motion_keeps_the_tolerance_against_a_far_finer_reduction(arm, animation, meshes, fine, tolerance):
+    bodies, error = settled_bodies(arm, animation, meshes, Options(tolerance=tolerance, step=STEP), lambda *_: None)
+    found = simulate_at(arm, animation, bodies, Options(), STEP).positions
+    assert np.linalg.norm(found - fine[1], axis=2).max() < tolerance and error <= 0.4 * tolerance
+    if tolerance > 5e-4:
+        assert sum(len(body.stiffness) for body in bodies) < sum(len(body.stiffness) for body in fine[0])
+
+
+def test_a_tighter_tolerance_keeps_more(arm, animation, meshes):
+    counts = [
+        sum(
+            len(body.stiffness)
+            for body in settled_bodies(arm, animation, meshes, Options(tolerance=t, step=STEP), lambda *_: None)[0]
+        )
+        for t in (1e-2, 1e-5)
+    ]
+    assert counts[0] < counts[1]
