@@ -27,5 +27,5 @@ def picture(name: str) -> None:
 
 
 if __name__ == "__main__":
-    for wanted in sys.argv[1:] or sorted(path.parent.name for path in HERE.glob("*/build.py")):
+    for wanted in sys.argv[1:] or sorted(path.parent.name for path in HERE.glob("*/motion.py")):
         picture(wanted)

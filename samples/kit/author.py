@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 from pxr import Gf, Sdf, Usd, UsdGeom, UsdPhysics, UsdShade, Vt
 
-from .robot import BodySpec, JointSpec, Part, Pose, TargetSpec, mass_properties
+from .robot import BodySpec, DriveSpec, JointSpec, Part, Pose, TargetSpec, mass_properties
 
 DIGITS = 6
 
@@ -38,7 +38,7 @@ class Plastic:
     damping_ratio: float
 
 
-def new_stage(root: str, frames: tuple[int, int], rate: float, up: str = "Z", unit: float = 1.0) -> Usd.Stage:
+def new_stage(root: str, frames: Sequence[int], rate: float, up: str = "Z", unit: float = 1.0) -> Usd.Stage:
     """An empty stage in kilograms and units of `unit` metres, with its root as default prim and gravity."""
     stage = Usd.Stage.CreateInMemory(".usda")
     UsdGeom.SetStageUpAxis(stage, up)
@@ -46,12 +46,12 @@ def new_stage(root: str, frames: tuple[int, int], rate: float, up: str = "Z", un
     UsdPhysics.SetStageKilogramsPerUnit(stage, 1.0)
     stage.SetTimeCodesPerSecond(rate)
     stage.SetFramesPerSecond(rate)
-    stage.SetStartTimeCode(frames[0])
-    stage.SetEndTimeCode(frames[1])
+    if frames:
+        stage.SetStartTimeCode(frames[0])
+        stage.SetEndTimeCode(frames[-1])
     prim = UsdGeom.Xform.Define(stage, f"/{root}").GetPrim()
     Usd.ModelAPI(prim).SetKind("assembly")
     stage.SetDefaultPrim(prim)
-    UsdPhysics.ArticulationRootAPI.Apply(prim)
     scene = UsdPhysics.Scene.Define(stage, "/PhysicsScene")
     scene.CreateGravityDirectionAttr(Gf.Vec3f(0, 0, -1) if up == "Z" else Gf.Vec3f(0, -1, 0))
     scene.CreateGravityMagnitudeAttr(9.81 * per_metre(stage))
@@ -115,12 +115,8 @@ def author_body(
     motion: Mapping[int, Pose] | None = None,
 ) -> None:  # fmt: skip
     """A body at its pose, or moving through poses by frame, with its meshes, mass or elastic material, and targets."""
-    xform = UsdGeom.Xform.Define(stage, f"{root}/{body.name}")
-    place, orient = xform.AddTranslateOp(), xform.AddOrientOp(UsdGeom.XformOp.PrecisionDouble)
-    scale = per_metre(stage)
-    set_pose(place, orient, pose, scale, Usd.TimeCode.Default())
-    for frame, there in (motion or {}).items():
-        set_pose(place, orient, there, scale, frame)
+    scale, xform = per_metre(stage), UsdGeom.Xform.Define(stage, f"{root}/{body.name}")
+    author_pose(xform, pose, scale, motion)
     prim = xform.GetPrim()
     UsdPhysics.RigidBodyAPI.Apply(prim)
     for part in body.parts:
@@ -143,6 +139,16 @@ def author_body(
         author_target(stage, f"{root}/{body.name}/{target.name}", target)
 
 
+def author_pose(
+    xform: UsdGeom.Xformable, pose: Pose, scale: float, motion: Mapping[int, Pose] | None = None
+) -> None:  # fmt: skip
+    """Where a body stands, and its poses by frame if it is animated."""
+    place, orient = xform.AddTranslateOp(), xform.AddOrientOp(UsdGeom.XformOp.PrecisionDouble)
+    set_pose(place, orient, pose, scale, Usd.TimeCode.Default())
+    for frame, there in (motion or {}).items():
+        set_pose(place, orient, there, scale, frame)
+
+
 def set_pose(
     place: UsdGeom.XformOp, orient: UsdGeom.XformOp, pose: Pose, scale: float, time: Usd.TimeCode | int
 ) -> None:
@@ -161,8 +167,8 @@ def author_target(stage: Usd.Stage, path: str, target: TargetSpec) -> None:
     create(xform.GetPrim(), "calm:target:rotationWeight", target.rotation_weight)
 
 
-def author_joint(stage: Usd.Stage, root: str, scope: str, joint: JointSpec, frames: Sequence[int]) -> None:
-    """A weld, a passive hinge, or one whose drive carries the animation; without frames the bodies carry it."""
+def author_joint(stage: Usd.Stage, root: str, scope: str, joint: JointSpec) -> None:
+    """A weld, a passive hinge, or one with a drive."""
     path, scale = f"{scope}/{joint.name}", per_metre(stage)
     kind = UsdPhysics.RevoluteJoint if joint.axis else UsdPhysics.FixedJoint
     prim = kind.Define(stage, path)
@@ -184,14 +190,20 @@ def author_joint(stage: Usd.Stage, root: str, scope: str, joint: JointSpec, fram
     drive.CreateMaxForceAttr(joint.drive.max_torque * scale**2)
     drive.CreateStiffnessAttr(50.0 * scale**2)
     drive.CreateDampingAttr(0.5 * scale**2)
-    if frames:
-        target = drive.CreateTargetPositionAttr()
-        for frame, value in zip(frames, joint.drive.track, strict=True):
-            target.Set(value, frame)
     prim.GetPrim().AddAppliedSchema("CalmMotorAPI")
     create(prim.GetPrim(), "calm:motor:maxVelocity", joint.drive.max_velocity)
     create(prim.GetPrim(), "calm:motor:maxAcceleration", joint.drive.max_acceleration)
     create(prim.GetPrim(), "calm:motor:maxTorque", joint.drive.max_torque * scale**2)
+
+
+def author_track(prim: Usd.Prim, drive: DriveSpec, frames: Sequence[int]) -> None:
+    """The animation of a drive; without frames the angle that it holds."""
+    target = UsdPhysics.DriveAPI(prim, UsdPhysics.Tokens.angular).CreateTargetPositionAttr()
+    if not frames:
+        target.Set(drive.track[0])
+        return
+    for frame, value in zip(frames, drive.track, strict=True):
+        target.Set(value, frame)
 
 
 def save(layer: Sdf.Layer, path: Path) -> None:

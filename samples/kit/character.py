@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from pxr import UsdGeom
+from pxr import Usd, UsdGeom, UsdPhysics
 
 from . import author, robot
 
@@ -17,16 +17,16 @@ JOINTS = "Joints"
 
 @dataclass(frozen=True)
 class Character:
-    """A robot with its performance.
+    """A robot with its performance, or at rest.
 
     Attributes:
         name: Of the root prim.
         note: The comment of the layer.
-        bodies, joints: Parents before children; tracks have a value for each frame.
+        bodies, joints: Parents before children; tracks have a value for each frame, and one without frames.
         looks: Materials by name.
         plastic: What the flexible bodies are made of.
         scenery: Name of a group of parts, and the parts; they have no physics.
-        frames, rate: Time codes, and how many of them a second.
+        frames, rate: Time codes, and how many of them a second. Without frames nothing is animated.
         tolerance: Of the retargeting [m].
         up, unit: Up axis, and metres in a unit of the stage.
         posed: Whether the transforms of the bodies are animated instead of the drives.
@@ -38,27 +38,28 @@ class Character:
     joints: Sequence[robot.JointSpec]
     looks: Mapping[str, author.Look]
     plastic: author.Plastic
-    scenery: tuple[str, Sequence[robot.Part]]
-    frames: Sequence[int]
     rate: float
     tolerance: float
+    frames: Sequence[int] = ()
+    scenery: tuple[str, Sequence[robot.Part]] | None = None
     up: str = "Z"
     unit: float = 1.0
     posed: bool = False
 
 
-def main(character: Character, folder: Path) -> None:
-    """What a build script does: write to the file named on its command line, else beside itself."""
-    write(character, sys.argv[1] if len(sys.argv) > 1 else folder / f"{folder.name}.usda")
+def destination(folder: Path) -> Path:
+    """Where a build script writes: to the file named on its command line, else beside itself."""
+    return Path(sys.argv[1]) if len(sys.argv) > 1 else folder / f"{folder.name}.usda"
 
 
 def write(character: Character, path: str | Path) -> None:
     """Write it; the same character always gives the same bytes."""
     root, frames = f"/{character.name}", character.frames
     scope = f"{root}/{MATERIALS}"
-    stage = author.new_stage(character.name, (frames[0], frames[-1]), character.rate, character.up, character.unit)
+    stage = author.new_stage(character.name, frames, character.rate, character.up, character.unit)
     stage.GetRootLayer().comment = character.note
     prim = stage.GetDefaultPrim()
+    UsdPhysics.ArticulationRootAPI.Apply(prim)
     prim.AddAppliedSchema("CalmRetargetAPI")
     author.create(prim, "calm:retarget:tolerance", character.tolerance * author.per_metre(stage))
     author.author_looks(stage, scope, character.looks)
@@ -73,9 +74,18 @@ def write(character: Character, path: str | Path) -> None:
         author.author_body(stage, root, body, pose, character.looks, scope, character.plastic, motion)
     UsdGeom.Scope.Define(stage, f"{root}/{JOINTS}")
     for joint in character.joints:
-        author.author_joint(stage, root, f"{root}/{JOINTS}", joint, () if character.posed else frames)
-    group, parts = character.scenery
-    UsdGeom.Xform.Define(stage, f"{root}/{group}")
-    for part in parts:
-        author.author_part(stage, f"{root}/{group}/{part.name}", part, character.looks, scope)
+        author.author_joint(stage, root, f"{root}/{JOINTS}", joint)
+        if joint.drive and not character.posed:
+            author.author_track(stage.GetPrimAtPath(f"{root}/{JOINTS}/{joint.name}"), joint.drive, frames)
+    if character.scenery:
+        author_scenery(stage, character.name, *character.scenery, character.looks)
     author.save(stage.GetRootLayer(), Path(path))
+
+
+def author_scenery(
+    stage: Usd.Stage, name: str, group: str, parts: Sequence[robot.Part], looks: Mapping[str, author.Look]
+) -> None:
+    """Parts in a group below the root prim `name`."""
+    UsdGeom.Xform.Define(stage, f"/{name}/{group}")
+    for part in parts:
+        author.author_part(stage, f"/{name}/{group}/{part.name}", part, looks, f"/{name}/{MATERIALS}")

@@ -30,4 +30,4 @@ CHARACTER = character.Character(
 )
 
 if __name__ == "__main__":
-    character.main(CHARACTER, HERE)
+    character.write(CHARACTER, character.destination(HERE))
