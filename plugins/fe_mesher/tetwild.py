@@ -10,11 +10,13 @@ from pathlib import Path
 
 import numpy as np
 from calmotion.errors import ShotError
+from calmotion.fem.tetrahedra import flat_tets
 
 from . import cache
 
 _REMEDY = "Simplify or repair the Mesh, author a larger calm:flexible:elementSize, or give a TetMesh or a mesh file"
 _STOP_ENERGY = 10.0
+_TRIES = 3  # to get a mesh without flat elements
 # Passes that improve the elements. Where tens of thousands of triangles decide what there is to mesh, a few angles stay
 # below a degree however many passes there are, and passes are all that the time goes to.
 _PASSES, _DENSE_PASSES, _DENSE = 80, 12, 15_000
@@ -26,7 +28,8 @@ def tetrahedralize(
 ) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
     """Tetrahedra of a closed surface.
 
-    fTetWild is not deterministic, so the first mesh of a surface is kept and used ever after.
+    fTetWild is not deterministic, so the first mesh of a surface is kept and used ever after; where it has an element
+    without volume, as happens now and then, it is made again.
 
     Args:
         points: [m], shape [n, 3].
@@ -54,9 +57,13 @@ def tetrahedralize(
     }
     key = cache.cache_key(points, triangles, settings)
     found = cache.load(key) if use_cache else None
-    if found is None:
-        found = _run(points, triangles, element_size, envelope, passes, path, time_limit)
-        if use_cache:
+    if found is None or flat_tets(*found).any():
+        for _ in range(_TRIES):
+            found = _run(points, triangles, element_size, envelope, passes, path, time_limit)
+            if not flat_tets(*found).any():
+                break
+        assert found is not None
+        if use_cache and not flat_tets(*found).any():
             found = cache.store(key, points=found[0], tets=found[1])
     return found[0], found[1]
 

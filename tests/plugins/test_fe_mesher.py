@@ -167,6 +167,23 @@ def test_a_mesher_that_crashes_or_hangs_takes_only_itself_down(package, monkeypa
     assert caught.value.path == "/Arm/link" and "elementSize" in caught.value.remedy
 
 
+@pytest.mark.parametrize("kept", [False, True])
+def test_a_mesh_with_a_flat_element_is_made_again(package, monkeypatch, tmp_path, kept):
+    monkeypatch.setenv("CALMOTION_CACHE", str(tmp_path))
+    tetwild = package("tetwild")
+    flat = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0]]), np.array([[0, 1, 2, 3]])
+    whole = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]), flat[1]
+    if kept:  # by an earlier version
+        monkeypatch.setattr(tetwild.cache, "load", lambda key: flat)
+    made = [flat, whole]
+    monkeypatch.setattr(tetwild, "_run", lambda *arguments: made.pop(0))
+    cube = box()
+    found = tetwild.tetrahedralize(
+        np.array(cube.vertices), np.array(cube.faces), 0.01, 1e-3, "/Arm/link", 60.0, True
+    )  # fmt: skip
+    assert np.array_equal(found[0], whole[0]) and not made
+
+
 def test_the_mesher_needs_no_viewer_library(host):
     run(host, link(surface(box((0.05, 0.02, 0.02))), element_size=0.01))
     assert not {"pyvista", "vtk", "vtkmodules"} & set(sys.modules)

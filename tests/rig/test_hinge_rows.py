@@ -50,6 +50,12 @@ def test_a_hinge_takes_the_part_about_its_axis_and_tells_the_rest():
     assert np.allclose(found[:, 0], np.linspace(0.0, 12.0, 50)) and np.allclose(off, 0.05)
 
 
+@pytest.mark.parametrize("angle", [-3.1, -1.7, 1.7, 3.1])
+def test_a_hinge_begins_within_half_a_turn(angle):
+    axis = np.array([[0.0, 0.6, 0.8]])
+    assert follow(axis, Rotation.from_rotvec(angle * axis).as_matrix())[0] == pytest.approx(angle)
+
+
 def test_a_joint_that_rests_needs_no_hinge():
     row = hinges_for(np.tile(np.eye(3), (5, 1, 1)), 1e-5)
     assert row.axes.shape == (0, 3) and row.angles.shape == (5, 0)

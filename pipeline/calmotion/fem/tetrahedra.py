@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import ShotError
-from ..shot.character import Array, IntArray
+from ..shot.character import Array, BoolArray, IntArray
 from ..shot.meshes import MeshQuality
 
 Indices = NDArray[np.integer[Any]]  # of any width, inside the engine
@@ -58,6 +58,13 @@ def surface_area(points: Array, triangles: Indices) -> float:
     return float(0.5 * np.linalg.norm(np.cross(x[:, 1] - x[:, 0], x[:, 2] - x[:, 0]), axis=1).sum())
 
 
+def flat_tets(points: Array, tets: IntArray) -> BoolArray:
+    """Which tetrahedra have no volume, but for rounding; points of shape [n, 3], tetrahedra [m, 4]."""
+    x = points[tets]
+    edge = np.linalg.norm(x[:, [1, 2, 3, 2, 3, 3]] - x[:, [0, 0, 0, 1, 1, 2]], axis=-1).max(axis=1)
+    return np.abs(tet_volumes(points, tets)) <= 1e-9 * edge**3
+
+
 def oriented_tets(points: Array, tets: IntArray, path: str = "") -> tuple[IntArray, int]:
     """The tetrahedra with corners swapped where that makes a volume positive.
 
@@ -83,10 +90,7 @@ def oriented_tets(points: Array, tets: IntArray, path: str = "") -> tuple[IntArr
         )  # fmt: skip
     if not np.isfinite(points[tets]).all():
         raise ShotError("a point is not finite", path=path, attribute="points", remedy=remedy)
-    volumes = tet_volumes(points, tets)
-    x = points[tets]
-    edge = np.linalg.norm(x[:, [1, 2, 3, 2, 3, 3]] - x[:, [0, 0, 0, 1, 1, 2]], axis=-1).max(axis=1)
-    flat = np.abs(volumes) <= 1e-9 * edge**3
+    volumes, flat = tet_volumes(points, tets), flat_tets(points, tets)
     if flat.any():
         element = int(np.flatnonzero(flat)[0])
         raise ShotError(

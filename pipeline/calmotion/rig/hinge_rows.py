@@ -109,7 +109,7 @@ def follow(axes: Array, D: Array) -> tuple[Array, Array]:
     """
     turns = Rotation.from_matrix(D)
     if len(axes) == 1:
-        quaternion = turns.as_quat()
+        quaternion = turns.as_quat(canonical=True)  # or else the first angle may be a whole turn off
         angles = np.unwrap(2.0 * np.arctan2(quaternion[:, :3] @ axes[0], quaternion[:, 3]))[:, None]
     else:
         angles, q = np.zeros((len(D), len(axes))), _first(axes, D[0])

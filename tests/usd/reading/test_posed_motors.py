@@ -50,6 +50,12 @@ def test_many_turns_are_unwrapped(tmp_path):
         assert np.abs(track.values - np.radians(meant)).max() < 1e-6
 
 
+@pytest.mark.parametrize("first", [-92.0, 120.0, 179.0, -179.0])
+def test_an_angle_beyond_a_quarter_turn_is_read_as_it_is(tmp_path, first):
+    _, _, animation = read(tmp_path, lambda stage: posed(stage, turn=lambda frame: (first + 0.01 * frame, -first)))
+    assert np.degrees([track.values[0] for track in animation.tracks]) == pytest.approx([first, -first])
+
+
 def test_sparse_samples_follow_what_usd_composes_at_the_frames(tmp_path):
     path, character, animation = read(tmp_path, lambda stage: posed(stage, frames=(0, 7.5, 24)))
     assert 7.5 / 24 in animation.tracks[0].times

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import hashlib
 import os
 
@@ -65,6 +66,28 @@ def test_a_skeleton_performs_the_new_curves_and_keeps_its_other_joints(tmp_path)
     for frame in range(FRAMES + 1):
         assert after.GetRotationsAttr().Get(frame)[0] == before.GetRotationsAttr().Get(frame)[0]
         assert after.GetTranslationsAttr().Get(frame) == before.GetTranslationsAttr().Get(frame)
+
+
+def test_a_skeleton_whose_first_frame_changes_counts_angles_from_where_it_was(tmp_path):
+    """Bodies that stand as the skeleton does at the first frame stand where it was before we changed it."""
+
+    def edit(stage):
+        skeletal(stage)
+        for path in (SHOULDER, ELBOW):
+            stage.GetPrimAtPath(path).CreateAttribute("calm:motor:skelPose", Sdf.ValueTypeNames.Token).Set("start")
+
+    shot = write_arm(tmp_path / "arm.usda", edit)
+    character, animation, provenance = read_shot(str(shot))
+    result = result_with(character, animation, {1: 0.1})
+    curves = tuple(
+        dataclasses.replace(c, frame_values=c.frame_values + 0.05) if c.changed else c for c in result.curves
+    )
+    result = dataclasses.replace(result, curves=curves)
+    _, root = write_result(character, animation, provenance, result, str(tmp_path / "calm.usda"), WriteOptions())
+    _, again, _ = read_shot(root)
+    assert abs(again.current[1].values[0] - animation.tracks[1].values[0] - 0.05) < 3e-6
+    for track, curve in zip(again.current, curves, strict=True):
+        assert np.abs(track.values - curve.frame_values).max() < 3e-6
 
 
 def test_what_a_hinge_cannot_do_stays_in_the_skeleton(tmp_path):

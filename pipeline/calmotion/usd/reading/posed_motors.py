@@ -83,7 +83,7 @@ def _about_z(R: Array, x: Array, slides: bool) -> JointMotion:
     turn = Rotation.from_matrix(R)
     if slides:
         return JointMotion(x[:, 2].copy(), turn.magnitude(), np.linalg.norm(x[:, :2], axis=1))
-    quaternion = turn.as_quat()
+    quaternion = turn.as_quat(canonical=True)  # or else the first angle may be a whole turn off
     angle = np.unwrap(2.0 * np.arctan2(quaternion[:, 2], quaternion[:, 3]))
     tilt = 2.0 * np.arctan2(np.linalg.norm(quaternion[:, :2], axis=1), np.linalg.norm(quaternion[:, 2:], axis=1))
     return JointMotion(angle, tilt, np.linalg.norm(x, axis=1))

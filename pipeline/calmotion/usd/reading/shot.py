@@ -22,7 +22,7 @@ from .motors import ATTRIBUTE, BODIES, DRIVE, GIVEN, HELD, LENGTH_ATTRIBUTE, Dri
 from .posed_motors import joint_motions, pose_codes, posed_track
 from .provenance import provenance_of
 from .roots import moving_frames
-from .skeletal_motors import hinge_stacks, skeletal_tracks
+from .skeletal_motors import HingeStack, hinge_stacks, performed_on, skeletal_tracks
 from .stillness import carriers, codes_of
 from .targets import weight_tracks
 from .tracks import read_track, sample_codes
@@ -62,7 +62,8 @@ def read_shot(
             motions = stages.earlier_layers(composed, (stages.MOTION,))
             result = stages.open_stage(path, muted=motions) if motions else composed
             asked = Reading(result, reading.units, clock.start)
-            current = motor_tracks(asked, read.skeleton.drives, clock, given, result=True)
+            standing = hinge_stacks(reading, read.skeleton.drives)
+            current = motor_tracks(asked, read.skeleton.drives, clock, given, standing)
             raise_all(asked.problems)
             names = ", ".join(stages.display_name(layer, path) for layer in earlier)
             note = f"the shot carries results of Calmotion ({names}); the intent is the animation beneath them"
@@ -123,13 +124,15 @@ def shot_clock(stage, given: MotorTracks | None) -> Clock:
 
 
 def motor_tracks(
-    reading: Reading, drives: Sequence[Drive], clock: Clock, given: MotorTracks | None = None, result: bool = False
-) -> tuple[Track, ...]:
+    reading: Reading, drives: Sequence[Drive], clock: Clock, given: MotorTracks | None = None,
+    standing: Sequence[HingeStack] | None = None,
+) -> tuple[Track, ...]:  # fmt: skip
     """The tracks of the motors, from wherever each has its own.
 
     Args:
         reading: The stage that is asked; problems and notes are kept in it.
-        result: Whether that stage carries curves of ours: then a motor that held still may be animated.
+        standing: Where that stage carries curves of ours, the skeletons' joints as the bodies stand without them; then
+            a motor that held still may be animated.
     """
     stage = reading.stage
     found: dict[str, Track] = {}
@@ -140,14 +143,15 @@ def motor_tracks(
         codes = np.unique([clock.start, clock.end])
     for joint, motion in zip(bodies, joint_motions(reading, bodies, codes), strict=True):
         found[joint.path] = posed_track(motion, joint, codes, clock, reading)
-    for stack in hinge_stacks(reading, drives):
+    stacks = hinge_stacks(reading, drives) if standing is None else performed_on(standing, stage)
+    for stack in stacks:
         with reading.going_on():
             found |= skeletal_tracks(stack, clock, reading)
     for drive in drives:
         unit, path = to_si(drive.joint.kind, reading.units), drive.joint.path
         attribute = drive.attribute(stage)
         with reading.going_on():
-            if drive.source == DRIVE or (result and attribute and len(sample_codes(attribute))):
+            if drive.source == DRIVE or (standing is not None and attribute and len(sample_codes(attribute))):
                 found[path] = read_track(attribute, clock, reading, unit)
             elif drive.source == GIVEN and given is not None:
                 found[path] = given_track(given, drive.joint)

@@ -10,7 +10,7 @@ its axis; two or three that name the same joint, one carrying the next, take a p
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -90,6 +90,13 @@ def hinge_stacks(reading: Reading, drives: Sequence[Drive]) -> list[HingeStack]:
                 )
             found.append(_stack(reading, skeleton, joint, _outwards(stack)))
     return found
+
+
+def performed_on(stacks: Sequence[HingeStack], stage) -> list[HingeStack]:
+    """The same motors on the skeletons of another stage, a result of ours: where the bodies stand, and so the pose
+    that angles count from, is that of the stage without our layers."""
+    skeletons = {skeleton.prim.GetPath(): skeleton for skeleton in bound_skeletons(stage)} if stacks else {}
+    return [replace(stack, skeleton=skeletons[stack.skeleton.prim.GetPath()]) for stack in stacks]
 
 
 def _outwards(stack: list[Drive]) -> tuple[Drive, ...]:
