@@ -15,7 +15,8 @@ if TYPE_CHECKING:
     Commands = argparse._SubParsersAction[argparse.ArgumentParser]
 
 BENCHMARKS = (
-    "baselines", "gradients", "integrators", "meshing", "optimizer", "reading", "reduction", "scaling", "stability"
+    "baselines", "gradients", "integrators", "meshing", "optimizer", "reading", "reduction", "scaling", "stability",
+    "tolerances", "work-precision",
 )  # fmt: skip
 DONE, FAILED, WRONG_USAGE, INTERRUPTED = 0, 1, 2, 130
 
@@ -243,7 +244,7 @@ def _rig(args: argparse.Namespace, output: Output) -> int:
 def _bench(args: argparse.Namespace, output: Output) -> int:
     from importlib import import_module
 
-    return import_module(f".evidence.{args.name}", __package__).main(args.arguments)
+    return import_module(f".evidence.{args.name.replace('-', '_')}", __package__).main(args.arguments)
 
 
 def _list_plugins(args: argparse.Namespace, output: Output) -> int:

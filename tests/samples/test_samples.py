@@ -12,6 +12,7 @@ import pytest
 from calmotion.usd.reading import read_shot
 from calmotion.usd.validation import validate_shot
 from pxr import Gf, Usd, UsdGeom, UsdPhysics
+from sample_recordings import check_recording
 
 SAMPLES = Path(__file__).resolve().parents[2] / "samples"
 
@@ -184,7 +185,11 @@ def test_joints_of_a_flexible_link_lie_inside_its_ends(name):
 def test_the_shake_falls_and_a_simulation_of_what_was_written_agrees(
     name, mains, fold, untouched, calmotion, tmp_path
 ):  # fmt: skip
-    run = calmotion("optimize", path_of(name), "-o", tmp_path / "calm.usda", "--json")
+    table, recording = tmp_path / "calm.csv", tmp_path / "calm.rrd"
+    run = calmotion(
+        "optimize", path_of(name), "-o", tmp_path / "calm.usda", "--json", "--csv", table, "--rrd", recording,
+        "--set", "rerun.log.samples_per_plot=100000",
+    )  # fmt: skip
     assert run.returncode == 0, run.stdout + run.stderr
     told = json.loads(run.stdout)
     again = calmotion("simulate", told["root_layer"], "--json")
@@ -196,4 +201,5 @@ def test_the_shake_falls_and_a_simulation_of_what_was_written_agrees(
             assert fold * measured[row["path"]] < row["max_error_before_m"]
         assert measured[row["path"]] == pytest.approx(row["max_error_after_m"], rel=1e-3, abs=1e-6)
     assert not [limit for limit in told["limits"] if limit["exceeded"]]
+    check_recording(recording, table, path_of(name), "optimized")
     assert untouched <= {row["path"].rpartition("/")[2] for row in told["motors"] if row["max_offset_rad"] == 0.0}

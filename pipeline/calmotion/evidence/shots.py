@@ -6,6 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+
 from ..dynamics.topology import span_tree
 from ..errors import ShotError
 from ..fem.reduced_body import ReducedBody
@@ -28,6 +30,47 @@ class BenchShot:
     character: Character
     animation: Animation
     bodies: Sequence[ReducedBody]
+
+
+@dataclass(frozen=True, eq=False)
+class Unreduced:
+    """A shot with its meshes, to be reduced in one way and another; `path` is that of its file.
+
+    Attributes:
+        edge: Mean edge of the elements [m].
+    """
+
+    name: str
+    path: str
+    character: Character
+    animation: Animation
+    meshes: FEMeshes
+    edge: float
+
+
+def load_unreduced(path: str, element_size: float | None = None) -> Unreduced:
+    """A shot by its file.
+
+    Args:
+        element_size: Edge of the elements [m]; None: automatic.
+
+    Raises:
+        ShotError: It cannot be read, or nothing is flexible.
+    """
+    from ..host import Source, open_host
+
+    settings: dict[str, dict[str, object]] = {} if element_size is None else {"fe.mesh": {"element_size": element_size}}
+    run = open_host([]).run(
+        [Source(path=path, command="simulate")], [Character, Animation, FEMeshes], settings=settings
+    )
+    for result in run:
+        if result.error is not None:
+            raise result.error
+    character, animation, meshes = run.get(Character), run.get(Animation), run.get(FEMeshes)
+    if character is None or animation is None or meshes is None:
+        raise ShotError("has nothing flexible to reduce", path=path)
+    edges = [np.linalg.norm(m.points[m.tets[:, 0]] - m.points[m.tets[:, 1]], axis=1) for m in meshes.meshes]
+    return Unreduced(Path(path).stem, path, character, animation, meshes, float(np.mean(np.concatenate(edges))))
 
 
 def load(name: str) -> BenchShot:

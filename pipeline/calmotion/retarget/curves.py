@@ -127,9 +127,10 @@ class Curves:
 
 def sample_curves(tracks: Sequence[Track], grid: TimeGrid) -> Curves:
     """Tracks at the grid's instants, pre-roll included."""
+    if not tracks:
+        return Curves(*[np.zeros((len(grid.times), 0))] * 3)
     columns = [over_grid(grid, curve_of(track, grid.end, grid.cyclic)) for track in tracks]
-    empty = np.zeros((len(grid.times), 0))
-    return Curves(*(np.stack(parts, axis=1) if columns else empty for parts in zip(*columns, strict=True)))
+    return Curves(*(np.stack(parts, axis=1) for parts in zip(*columns, strict=True)))
 
 
 def sample_tracks(tracks: Sequence[Track], grid: TimeGrid) -> tuple[Array, Array]:

@@ -9,9 +9,10 @@ import numpy as np
 
 from ..dynamics.failure import SimulationFailure
 from ..dynamics.simulation import Workspace
+from ..errors import ShotError
 from ..fem.reduced_body import ReducedBody
 from ..shot import Animation, Character, Result, Track
-from ..shot.character import Array
+from ..shot.character import DEFAULT_TOLERANCE, Array
 from .bodies import mode_tables, skins
 from .curves import sample_curves, sample_tracks
 from .forward import limited_values, run_forward
@@ -24,6 +25,7 @@ from .shapers import shaped
 from .steady import SteadyState
 
 Progress = Callable[[float, str], None]
+CLOSED = 0.1  # of the error that does not matter: joints that come apart by less are closed
 
 
 def meant_motion(prepared: Prepared, angles: Array, rates: Array) -> MeantMotion:
@@ -85,6 +87,7 @@ def simulate_shot(
         wall = time.perf_counter() - begin
     except SimulationFailure as failure:
         raise failure_error(prepared, failure) from failure
+    _refuse_open_joints(prepared, run.trajectory.max_joint_gap, options)
     objective = Objective.over(model, reference.reference, grid, animation.weights)
     bounds = motor_bounds(character)
     used = excesses(bounds, limited_values(model, bounds, curves, run), grid.judged)
@@ -114,3 +117,16 @@ def simulate_shot(
         limits=limit_uses(used, used, grid),
         performed=intent if as_meant else performed_motion(prepared, curves),
     )
+
+
+def _refuse_open_joints(prepared: Prepared, gap: float, options: Options) -> None:
+    """BDF2 keeps joints closed; the others hold them together in velocity, and drift where steps are coarse."""
+    character = prepared.character
+    if gap > CLOSED * (options.tolerance or character.retarget.tolerance or DEFAULT_TOLERANCE):
+        raise ShotError(
+            f"its joints come apart by {1e3 * gap:.2g} mm in the simulation",
+            path=character.path,
+            attribute="--integrator",
+            found=f"{options.integrator} with steps of {1e3 * prepared.grid.h:.3g} ms",
+            remedy="Use a smaller --step, or bdf2, which keeps them closed.",
+        )

@@ -25,7 +25,7 @@ FINER, MOST = 0.1, 6  # each tolerance of the reduction over the last, and how m
 
 def settled_bodies(
     character: Character, animation: Animation, meshes: FEMeshes | None, options: Options,
-    progress: Callable[[float, str], None],
+    progress: Callable[[float, str], None] = lambda fraction, message: None,
 ) -> tuple[list[ReducedBody], float]:  # fmt: skip
     """Bodies whose reduction moves no target by more than the tolerance, in the shot as it is animated.
 

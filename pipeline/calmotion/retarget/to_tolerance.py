@@ -40,10 +40,15 @@ def simulate_to_tolerance(
     if not _chooses(character, options):
         return simulate_shot(character, animation, bodies, options, progress)
     progress(0.0, "choosing the time step")
-    trial = partial(simulate_at, character, animation, bodies, options)
-    step, error = largest_step(trial, FIRST, LAST, lambda run: _allowed(options))
+    step, error = chosen_step(character, animation, bodies, options)
     result = simulate_shot(character, animation, bodies, replace(options, step=step), progress)
     return replace(result, accuracy=Accuracy(error, _left_out(bodies) if left_out_m is None else left_out_m))
+
+
+def chosen_step(character: Character, animation: Animation, bodies: Bodies, options: Options) -> tuple[float, float]:
+    """The step of a simulation to a tolerance, and its estimated error [s], [m]; arguments as of `simulate_shot`."""
+    trial = partial(simulate_at, character, animation, bodies, options)
+    return largest_step(trial, FIRST, LAST, lambda run: _allowed(options))
 
 
 def optimize_to_tolerance(

@@ -1,0 +1,241 @@
+"""Error against run time: every choice of the simulation, measured against a reference that is itself measured.
+
+`calmotion bench work-precision [SHOT ...] [--csv FILE] [--figures DIR]` simulates each shot as animated by many
+settings: step and integrator, reduction, elastic law, elements, and what `--tolerance` chooses. The error is the
+largest distance of any target, at any frame, to a reference with a far smaller step and far more coordinates; how far
+that is from its own limit is its error bar, below which nothing is told apart. Times are medians of the simulation.
+"""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import json
+import os
+import platform
+import sys
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, replace
+from functools import partial
+
+import numpy as np
+
+from ..dynamics.topology import span_tree
+from ..errors import ShotError
+from ..fem.reduced_body import ReducedBody
+from ..retarget.bodies import reduce_bodies, with_elasticity
+from ..retarget.prepare import Options, excitations
+from ..retarget.settled_bodies import settled_bodies
+from ..retarget.step_error import StepRun, simulate_at, step_error
+from ..retarget.time_grid import MAX_STEP
+from ..retarget.to_tolerance import chosen_step
+from ..shot.character import Array
+from .shots import Unreduced, load_unreduced
+from .timing import median_time
+
+SAMPLES = tuple(f"samples/{name}/{name}.usda" for name in ("bartender", "dancer", "rapper", "drummer", "boxer"))
+STEPS = (1 / 60, 1 / 120, 1 / 240, 1 / 480, 1 / 960, 1 / 1920)
+FEW_STEPS = {"radau": (1 / 60, 1 / 120, 1 / 240)}  # of higher order, and dearer
+MODES = (1, 2, 4, 8, 16)
+TOLERANCES = (1e-2, 1e-3, 1e-4)
+BASE, FINEST = 1e-4, 1e-6  # reductions: of the runs that vary something else, and of the reference [m]
+REFERENCE_STEP = 1 / 3840
+ELEMENTS = (2.0, 1.4, 1.0, 0.7)  # edge lengths over those of the mesh that the shot gets
+REPEATS = 3
+
+
+@dataclass(frozen=True)
+class Point:
+    """One setting of one shot.
+
+    Attributes:
+        shot, series, setting: Names; series `default` and `tolerance` are what the program chooses.
+        step_s: [s].
+        coordinates: Elastic ones.
+        wall_s: Median time of the simulation alone [s].
+        error_m: Against the reference [m]; NaN where the simulation failed.
+        why: The reason of a failure.
+    """
+
+    shot: str
+    series: str
+    setting: str
+    step_s: float
+    coordinates: int
+    wall_s: float
+    error_m: float
+    why: str = ""
+
+
+@dataclass(frozen=True)
+class Reference:
+    """Where the targets are at the frames [m], shape [f, K, 3], and how far that may be from its limit [m]."""
+
+    positions: Array
+    bar_m: float
+
+
+class Bench:
+    """One shot, its reductions kept."""
+
+    def __init__(self, shot: Unreduced, repeats: int = REPEATS):
+        self.shot, self.repeats = shot, repeats
+        self.tree = span_tree(shot.character)
+        self.loads = excitations(shot.character, shot.animation, shot.meshes, Options())
+
+    def bodies(self, tolerance: float, law: str | None = None, modes: int = -1) -> list[ReducedBody]:
+        """The shot's bodies, reduced to a tolerance [m], or to as many modes."""
+        character = self.shot.character if law is None else with_elasticity(self.shot.character, law)
+        if modes >= 0:
+            character = replace(
+                character,
+                bodies=tuple(
+                    b if b.flexible is None else replace(b, flexible=replace(b.flexible, mode_count=modes))
+                    for b in character.bodies
+                ),
+            )
+        return reduce_bodies(character, self.tree, self.shot.meshes, None, self.loads, tolerance)
+
+    def run(self, bodies: Sequence[ReducedBody], step: float, integrator: str = "bdf2") -> StepRun:
+        """One simulation of the shot as animated."""
+        options = Options(integrator=integrator)
+        return simulate_at(self.shot.character, self.shot.animation, bodies, options, step)
+
+    def reference(self) -> Reference:
+        """The finest run; its bar is the estimated error of its step, and what ten times the tolerance changes."""
+        bodies = self.bodies(FINEST)
+        fine, coarse = self.run(bodies, REFERENCE_STEP), self.run(bodies, 2.0 * REFERENCE_STEP)
+        other = self.run(self.bodies(10.0 * FINEST), 2.0 * REFERENCE_STEP)
+        return Reference(fine.positions, step_error(coarse, fine) + distance(other.positions, coarse.positions))
+
+    def measure(
+        self, reference: Reference, series: str, setting: str, bodies: Sequence[ReducedBody], step: float,
+        integrator: str = "bdf2",
+    ) -> Point:  # fmt: skip
+        """Error and time of one setting."""
+        coordinates = sum(len(body.stiffness) for body in bodies)
+        named = partial(Point, self.shot.name, series, setting, step, coordinates)
+        try:
+            error = distance(self.run(bodies, step, integrator).positions, reference.positions)
+        except ShotError as failed:
+            return named(float("nan"), float("nan"), str(failed))
+        return named(median_time(lambda: self.run(bodies, step, integrator), self.repeats), error)
+
+
+def distance(one: Array, other: Array) -> float:
+    """Largest distance of any target at any frame [m]."""
+    return float(np.max(np.linalg.norm(one - other, axis=2), initial=0.0))
+
+
+def forward_points(bench: Bench, reference: Reference) -> list[Point]:
+    """Steps and integrators, modes, laws."""
+    base = bench.bodies(BASE)
+    points = [
+        bench.measure(reference, integrator, f"1/{1 / step:.0f} s", base, step, integrator)
+        for integrator in ("bdf2", "newmark", "generalized-alpha", "radau")
+        for step in FEW_STEPS.get(integrator, STEPS)
+    ]
+    fine = 0.5 * MAX_STEP
+    for count in MODES:
+        points.append(bench.measure(reference, "modes", f"{count} modes", bench.bodies(BASE, modes=count), fine))
+    for law in ("linear", "stvk", "neohookean"):
+        points.append(bench.measure(reference, "law", law, bench.bodies(BASE, law), fine))
+    return points
+
+
+def chosen_points(bench: Bench, reference: Reference, tolerances: Sequence[float] = TOLERANCES) -> list[Point]:
+    """What the program chooses: with no tolerance asked for, and for some."""
+    shot = bench.shot
+    default = bench.bodies(shot.character.retarget.tolerance or 1e-3)
+    points = [bench.measure(reference, "default", "default", default, MAX_STEP)]
+    for tolerance in tolerances:
+        options = Options(tolerance=tolerance)
+        bodies, _ = settled_bodies(shot.character, shot.animation, shot.meshes, options)
+        step, _ = chosen_step(shot.character, shot.animation, bodies, options)
+        points.append(bench.measure(reference, "tolerance", f"{1e3 * tolerance:g} mm", bodies, step))
+    return points
+
+
+def element_points(bench: Bench, factors: Sequence[float] = ELEMENTS) -> list[Point]:
+    """Sizes of elements, against the smallest of them: a finer mesh is another body, with its own limit."""
+    benches = [Bench(load_unreduced(bench.shot.path, factor * bench.shot.edge), bench.repeats) for factor in factors]
+    fine = 0.5 * MAX_STEP
+    runs = [(other, other.bodies(BASE)) for other in benches]
+    finest = Reference(runs[-1][0].run(runs[-1][1], fine).positions, 0.0)
+    return [
+        other.measure(finest, "elements", f"{1e3 * factor * bench.shot.edge:.3g} mm", bodies, fine)
+        for factor, (other, bodies) in zip(factors[:-1], runs[:-1], strict=True)
+    ]
+
+
+def machine() -> dict[str, object]:
+    """What the times were measured on."""
+    return {
+        "processor": platform.processor() or platform.machine(),
+        "cores": os.cpu_count(),
+        "system": platform.platform(),
+        "python": platform.python_version(),
+        "numpy": np.__version__,
+    }
+
+
+def write_csv(path: str, points: Sequence[Point]) -> None:
+    """One row a point."""
+    with open(path, "w", newline="", encoding="utf-8") as file:
+        writer = csv.DictWriter(file, list(Point.__dataclass_fields__))
+        writer.writeheader()
+        writer.writerows(asdict(point) for point in points)
+
+
+def print_points(points: Sequence[Point], bar: float) -> None:
+    """The table of one shot for a person."""
+    from ..cli_tables import console_on, length, print_table
+
+    rows = [
+        [p.series, p.setting, f"1/{1 / p.step_s:.0f} s", str(p.coordinates), f"{p.wall_s:.3f} s", length(p.error_m)]
+        for p in points
+    ]
+    title = f"{points[0].shot}: against a reference that is known to {length(bar)}"
+    heads = ["choice", "setting", "step", "coordinates", "simulation", "error"]
+    print_table(console_on(sys.stdout), title, heads, rows, texts=2)
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """The command."""
+    parser = argparse.ArgumentParser(prog="calmotion bench work-precision", description=__doc__)
+    parser.add_argument("shots", metavar="SHOT", nargs="*", default=list(SAMPLES), help="USD file (default: samples)")
+    parser.add_argument("--json", action="store_true", help="print one JSON object on stdout, and nothing else there")
+    parser.add_argument("--csv", metavar="FILE", help="also write a table")
+    parser.add_argument("--figures", metavar="DIR", help="also draw error against run time, to this folder")
+    parser.add_argument("--elements", action="store_true", help="also vary the size of elements, which takes long")
+    parser.add_argument("--repeats", type=int, default=REPEATS, help="of which times are the median")
+    options = parser.parse_args(arguments)
+    points: list[Point] = []
+    bars: dict[str, float] = {}
+    for name in options.shots:
+        bench = Bench(load_unreduced(name), options.repeats)
+        reference = bench.reference()
+        own = forward_points(bench, reference) + chosen_points(bench, reference)
+        own += element_points(bench) if options.elements else []
+        bars[bench.shot.name] = reference.bar_m
+        points += own
+        if not options.json:
+            print_points(own, reference.bar_m)
+    figures: list[str] = []
+    if options.csv:
+        write_csv(options.csv, points)
+    if options.figures:
+        from .work_precision_figure import draw
+
+        figures = [draw(options.figures, [p for p in points if p.shot == shot], bar) for shot, bar in bars.items()]
+    if options.json:
+        rows = [asdict(point) for point in points]
+        print(json.dumps({"machine": machine(), "reference_error_m": bars, "points": rows, "figures": figures}))
+    else:
+        for figure in figures:
+            print(f"wrote {figure}")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,80 @@
+"""The figure of `work_precision`: error against run time, the Pareto front, and what the program chooses."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from .drawing import plain, save
+from .integrator_figure import COLORS
+
+if TYPE_CHECKING:
+    from .work_precision import Point
+
+STYLES = {
+    **{name: (color, "o-") for name, color in COLORS.items()},
+    "modes": ("#56b4e9", "s--"),
+    "law": ("#cc79a7", "^:"),
+    "elements": ("#999999", "v--"),
+}
+SHORT = {"linear": "lin", "stvk": "StVK", "neohookean": "nH"}
+
+
+def front(points: Sequence[Point]) -> list[Point]:
+    """Those than which none is both faster and better, by run time."""
+    found: list[Point] = []
+    for point in sorted(points, key=lambda p: (p.wall_s, p.error_m)):
+        if np.isfinite(point.error_m) and (not found or point.error_m < found[-1].error_m):
+            found.append(point)
+    return found
+
+
+def draw(folder: str, points: Sequence[Point], bar: float) -> str:
+    """Draw one shot to `<folder>/work_precision_<shot>.png` and return the path.
+
+    Args:
+        points: All of one shot.
+        bar: Error of the reference [m].
+    """
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(8.0, 5.6), layout="constrained")
+    axes = figure.add_subplot()
+    comparable = [p for p in points if p.series != "elements" and np.isfinite(p.error_m)]
+    best = front(comparable)
+    axes.step(
+        [p.wall_s for p in best], [1e3 * p.error_m for p in best], where="post", color="0.8", lw=5, zorder=0,
+        label="Pareto front",
+    )  # fmt: skip
+    for series, (color, style) in STYLES.items():
+        own = [p for p in points if p.series == series and np.isfinite(p.error_m)]
+        if not own:
+            continue
+        label = "elements (against the finest mesh)" if series == "elements" else series
+        axes.loglog(
+            [p.wall_s for p in own], [1e3 * p.error_m for p in own], style, color=color, ms=4, lw=1, label=label
+        )
+        if series == "law":
+            for p in own:
+                axes.annotate(
+                    SHORT[p.setting], (p.wall_s, 1e3 * p.error_m), (4, 4), textcoords="offset points", fontsize=7
+                )
+    chosen = [p for p in points if p.series == "tolerance"]
+    axes.loglog(
+        [p.wall_s for p in chosen], [1e3 * p.error_m for p in chosen], "D", color="black", ms=6, label="--tolerance"
+    )
+    for p in chosen:
+        axes.annotate(p.setting, (p.wall_s, 1e3 * p.error_m), (6, -10), textcoords="offset points", fontsize=8)
+    for p in points:
+        if p.series == "default":
+            axes.loglog(p.wall_s, 1e3 * p.error_m, "*", color="black", ms=14, label="default")
+    axes.axhspan(axes.get_ylim()[0], 1e3 * bar, color="0.93", zorder=-1)
+    axes.annotate("error of the reference", (0.01, 1e3 * bar), xycoords=("axes fraction", "data"), fontsize=7, va="top")
+    axes.set_xlabel("run time of the simulation [s]")
+    axes.set_ylabel("largest error of any target [mm]")
+    axes.set_title(f"{points[0].shot}, simulated as animated", loc="left", fontsize=10)
+    axes.legend(frameon=False, fontsize=8, loc="upper right")
+    plain([axes])
+    return save(figure, folder, f"work_precision_{points[0].shot}")

@@ -1,0 +1,44 @@
+"""Tolerances of the optimisation, measured: they are kept, and one that is not is told."""
+
+import csv
+import dataclasses
+import json
+
+import pytest
+from calmotion.evidence import tolerances, work_precision
+from calmotion.evidence.beam_arm import beam_arm, quintic, shot_of
+from calmotion.evidence.shots import Unreduced
+from calmotion.evidence.tolerances import kept
+
+
+@pytest.fixture(scope="module")
+def shot():
+    character, meshes = beam_arm(payload=0.1, damping=0.02)
+    return Unreduced("arm", "arm.usda", character, shot_of(quintic(0.8, 0.35, 0.1), 0.75), meshes, 0.05)
+
+
+@pytest.fixture(scope="module")
+def rows(shot):
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(work_precision, "REFERENCE_STEP", 1 / 1920)
+        return [kept(shot, tolerance) for tolerance in (1e-2, 1e-3)]
+
+
+def test_results_keep_their_tolerance(rows):
+    for row, tolerance in zip(rows, (1e-2, 1e-3), strict=True):
+        assert row.kept and row.error_m <= row.tolerance_m == tolerance
+        assert row.shake_after_m < 0.2 * row.shake_before_m
+    assert rows[1].coordinates >= rows[0].coordinates
+
+
+def test_the_command_tells_whether_they_are_kept(shot, rows, monkeypatch, capsys, tmp_path):
+    found = list(rows)
+    monkeypatch.setattr(tolerances, "load_unreduced", lambda path: shot)
+    monkeypatch.setattr(tolerances, "kept", lambda shot, tolerance: found.pop(0))
+    arguments = ["arm.usda", "--tolerances", "0.01", "0.001", "--json", "--csv", str(tmp_path / "rows.csv")]
+    assert tolerances.main(arguments) == 0
+    assert [row["kept"] for row in json.loads(capsys.readouterr().out)["rows"]] == [True, True]
+    with open(tmp_path / "rows.csv", newline="") as file:
+        assert [float(row["error_m"]) for row in csv.DictReader(file)] == [row.error_m for row in rows]
+    found += [rows[0], dataclasses.replace(rows[1], error_m=2e-3)]
+    assert tolerances.main(arguments) == 1
