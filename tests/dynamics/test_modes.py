@@ -1,3 +1,5 @@
+import dataclasses
+
 import numpy as np
 import pytest
 from arms import chain, compiled
@@ -72,3 +74,11 @@ def test_slow_modes_of_a_chain_have_about_the_ratio(law):
     model = reduced(beam_arm(links=2, damping=0.03, gravity=0.0, elasticity=law, modes=8))
     _, ratios = system_modes(model, model.rest_angles)
     assert np.all((0.015 < ratios[:4]) & (ratios[:4] < 0.06))
+
+
+def test_what_hangs_free_has_no_elastic_frequency():
+    character, meshes = beam_arm(links=5, gravity=0.0, elasticity="linear", modes=8)
+    omega, shapes = elastic_modes(reduced((dataclasses.replace(character, motors=()), meshes)))
+    slow = omega < 1e-12 * omega[-1]
+    assert np.flatnonzero(slow).tolist() == [0, 1, 2, 3, 4], "the hinges turn without a force, to rounding"
+    assert max(np.abs(shape[:, slow]).max(initial=0.0) for shape in shapes) < 1e-9

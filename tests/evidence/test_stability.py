@@ -5,7 +5,6 @@ import json
 import pytest
 from calmotion.evidence import stability
 from calmotion.evidence.stability import CASES, FAILED, REFUSED, RUNS, Case, run_case
-from calmotion.evidence.stability_map import draw_maps, outcomes
 
 # what no set of reduced coordinates about a straight arm can follow
 TOO_SOFT = [f"1e{power} Pa" for power in (4, 5, 6, 7, 8)] + ["load a million arms", "1:500, plastic"]
@@ -44,14 +43,3 @@ def test_the_command_prints_one_object_and_fails_with_its_cases(capsys, monkeypa
     monkeypatch.setattr(stability, "GAP", -1.0)
     assert stability.main(["--only", "load a millionth"]) == 1
     assert "came apart" in capsys.readouterr().out
-
-
-def test_maps_are_drawn(tmp_path):
-    from calmotion.evidence.stability_map import MAPS
-
-    name, values, scene = MAPS["load"]
-    rows = (name, (1.0, 1e6), scene)
-    found = outcomes(rows, (1 / 48,))
-    assert [line[0].outcome for line in found] == [RUNS, REFUSED]
-    (path,) = draw_maps(str(tmp_path / "new"), {"load": rows}, (1 / 48,))
-    assert (tmp_path / "new" / "stability_load.png").read_bytes()[:4] == b"\x89PNG" and path.endswith(".png")

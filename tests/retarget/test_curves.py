@@ -77,3 +77,8 @@ def test_a_loop_keeps_its_corners():
     assert np.allclose(curve(fine + 2.0, 0), curve(fine, 0))
     across = curve(np.array([1.0 - 1e-9, 1.0 + 1e-9]), 1)
     assert np.abs(np.diff(across)) < 1e-5, "its seam is no corner"
+
+
+def test_a_shot_without_motors_has_curves_of_none():
+    angles, rates = sample_tracks([], make_grid(FRAMES, None, 0.0))
+    assert angles.shape == rates.shape == (len(make_grid(FRAMES, None, 0.0).times), 0)

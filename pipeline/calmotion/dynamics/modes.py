@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.linalg import eigh, null_space
+from scipy.linalg import cholesky, eigh, null_space, solve_triangular, svd
 
 from ..shot.character import Array
 from .kinematics import rigid_state
@@ -37,21 +37,52 @@ def system_modes(model: Model, joint_angles: Array, world: Array | None = None) 
 def elastic_modes(model: Model) -> tuple[Array, list[Array]]:
     """Natural modes of the undeformed character in the pose in which the shot was authored, without gravity.
 
+    From the singular values of a root of the stiffness: squares of frequencies would be known only to a rounding of
+    the largest, which leaves nothing of slow modes, and a frequency to motions of free joints that have none.
+
     Returns:
         Angular frequencies [rad/s], ascending, shape [n]; and for each component its elastic coordinates in the modes,
-        shape [r, n]. The modes have mass one; those of frequency zero deform nothing.
+        shape [r, n]. The modes have mass one; those of frequency zero, up to rounding, deform nothing.
     """
     system = model.system._replace(gravity=np.zeros(3))
     angles = model.rest_angles
-    omega, shapes, _ = _natural_modes(system, rigid_state(model, angles), angles, Workspace.for_system(system))
+    K, M, _, allowed = _matrices(system, rigid_state(model, angles), angles, Workspace.for_system(system))
     ends = np.cumsum(6 + system.elastic)
-    return omega, [shapes[end - r : end] for end, r in zip(ends, system.elastic, strict=True)]
+    parts = [slice(end - r, end) for end, r in zip(ends, system.elastic, strict=True)]
+    size = allowed.shape[1]
+    if not size:
+        return np.zeros(0), [np.zeros((int(r), 0)) for r in system.elastic]
+    unit = solve_triangular(cholesky(allowed.T @ M @ allowed, lower=True), allowed.T, lower=True).T
+    _, roots, turned = svd(np.concatenate([_root(K[own, own]) @ unit[own] for own in parts]))
+    omega = np.zeros(size)
+    omega[: len(roots)] = roots
+    shapes = unit @ turned.T
+    return omega[::-1], [shapes[own, ::-1] for own in parts]
+
+
+def _root(K: Array) -> Array:
+    """A matrix whose square (transposed times itself) is a stiffness, shape [r, r]."""
+    values, vectors = eigh(K) if len(K) else (np.zeros(0), K)
+    return np.sqrt(np.maximum(values, 0.0))[:, None] * vectors.T
 
 
 def _natural_modes(
     system: System, state: State, joint_angles: Array, workspace: Workspace
 ) -> tuple[Array, Array, Array]:
     """Angular frequencies [rad/s], modes of mass one, shape [N, n], and damping, shape [N, N], in all coordinates."""
+    K, M, C, allowed = _matrices(system, state, joint_angles, workspace)
+    if not allowed.shape[1]:
+        return np.zeros(0), allowed, C
+    stiffness = allowed.T @ K @ allowed
+    # symmetric up to what the moments' axes leave, which vanishes on allowed motions
+    values, shapes = eigh(0.5 * (stiffness + stiffness.T), allowed.T @ M @ allowed)
+    return np.sqrt(np.maximum(values, 0.0)), allowed @ shapes, C
+
+
+def _matrices(
+    system: System, state: State, joint_angles: Array, workspace: Workspace
+) -> tuple[Array, Array, Array, Array]:
+    """Stiffness, mass and damping in all coordinates, shape [N, N], and the motions that joints allow, [N, n]."""
     linearize(system, state, joint_angles, workspace)
     blocks = workspace.blocks
     offset = np.concatenate([[0], np.cumsum(6 + system.elastic)])
@@ -77,10 +108,4 @@ def _natural_modes(
                 K[parent] -= np.outer(blocks.Lp[joint, :m, LENGTH], H[6 * joint + LENGTH])
         if free:
             H[6 * joint + LENGTH] = 0.0
-    allowed = null_space(H)
-    if not allowed.shape[1]:
-        return np.zeros(0), np.zeros((total, 0)), C
-    stiffness = allowed.T @ K @ allowed
-    # symmetric up to what the moments' axes leave, which vanishes on allowed motions
-    values, shapes = eigh(0.5 * (stiffness + stiffness.T), allowed.T @ M @ allowed)
-    return np.sqrt(np.maximum(values, 0.0)), allowed @ shapes, C
+    return K, M, C, null_space(H)

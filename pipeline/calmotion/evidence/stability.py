@@ -1,7 +1,8 @@
 """Stiff and extreme scenes: each must run to its end, or be refused with a reason; never a NaN, never silent.
 
-`calmotion bench stability [--json] [--figures DIR]` runs every case of `CASES` through the engine as a shot would be,
-and prints what became of it. With --figures it also draws maps over stiffness, step and speed.
+`calmotion bench stability [--json] [--csv FILE] [--figures DIR] [--only TEXT]` runs every case of `CASES` through the
+engine as a shot would be, then every cell of the maps over stiffness, speed, load and step by each integrator
+(`stability_map`), and prints what became of them. It ends with exit status 1 when a case or a cell fails.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import partial
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -21,6 +22,10 @@ from ..errors import ShotError
 from ..shot import Animation, Body, Character, FEMeshes, Frame, Joint, MassProperties
 from ..shot.character import Array
 from .beam_arm import IDENTITY, beam_arm, quintic, shot_of
+
+if TYPE_CHECKING:
+    from ..fem.reduced_body import ReducedBody
+    from ..retarget.prepare import Options
 
 RUNS, REFUSED, FAILED = "runs", "refused", "failed"
 GAP = 1e-6  # largest position gap of a joint that counts as none [m]
@@ -165,25 +170,37 @@ def run_case(case: Case) -> Outcome:
     from ..dynamics.topology import span_tree
     from ..retarget.bodies import reduce_bodies
     from ..retarget.prepare import Options, excitations
-    from ..retarget.run import simulate_shot
 
     (character, meshes), animation = case.scene()
     options = Options(step=case.step, integrator=case.integrator)
-    named: dict[str, Any] = {"group": case.group, "name": case.name}
     try:
         tree = span_tree(character)
         bodies = reduce_bodies(character, tree, meshes, None, excitations(character, animation, meshes, options))
+    except ShotError as error:
+        return Outcome(case.group, case.name, REFUSED, str(error))
+    return judged(case.group, case.name, character, animation, bodies, options)
+
+
+def judged(
+    group: str, name: str, character: Character, animation: Animation, bodies: Sequence[ReducedBody], options: Options,
+    gap: float | None = None,
+) -> Outcome:  # fmt: skip
+    """Simulate a shot and say what became of it.
+
+    Args:
+        group, name: Of the outcome.
+        gap: Largest position gap of a joint that counts as none [m]; None: `GAP`.
+    """
+    from ..retarget.run import simulate_shot
+
+    allowed = GAP if gap is None else gap
+    try:
         result = simulate_shot(character, animation, bodies, options, lambda fraction, message: None)
     except ShotError as error:
-        return Outcome(**named, outcome=REFUSED, why=str(error))
+        return Outcome(group, name, REFUSED, str(error))
     except Exception as error:  # whatever it is, it is what this looks for
-        return Outcome(**named, outcome=FAILED, why=f"{type(error).__name__}: {error}")
+        return Outcome(group, name, FAILED, f"{type(error).__name__}: {error}")
     motion, simulation = result.before.motion, result.before
-    steps = len(motion.times)
-    numbers: dict[str, Any] = {
-        "steps": steps, "newton": simulation.newton_iterations / steps, "gap_m": simulation.max_joint_gap,
-        "error_m": float(simulation.position_errors.max()), "wall_s": simulation.wall_s,
-    }  # fmt: skip
     parts = (motion.positions, motion.rotations, motion.target_positions, motion.motor_efforts, *motion.elastic)
     reach = sum(float(np.linalg.norm(joint.frame0.position)) for joint in character.joints if joint.body0 >= 0)
     wrong = ""
@@ -191,11 +208,15 @@ def run_case(case: Case) -> Outcome:
         wrong = "not a number"
     elif np.linalg.norm(motion.target_positions, axis=2).max() > REACH * reach:
         wrong = "the target flew away"
-    elif simulation.max_joint_gap > GAP:
+    elif simulation.max_joint_gap > allowed:
         wrong = f"a joint came apart by {simulation.max_joint_gap:.1e} m"
     elif np.abs(np.linalg.norm(motion.rotations, axis=2) - 1.0).max() > NORM:
         wrong = "a quaternion lost its length"
-    return Outcome(**named, outcome=FAILED if wrong else RUNS, why=wrong, **numbers)
+    steps = len(motion.times)
+    return Outcome(
+        group, name, FAILED if wrong else RUNS, wrong, steps, simulation.newton_iterations / steps,
+        float(simulation.position_errors.max()), simulation.max_joint_gap, simulation.wall_s,
+    )  # fmt: skip
 
 
 def print_outcomes(outcomes: Sequence[Outcome]) -> None:
@@ -221,30 +242,45 @@ def _numbers(outcome: Outcome) -> list[str]:
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """The command: exit status 1 when a case fails."""
+    """The command: exit status 1 when a case or a cell fails."""
+    from .stability_map import MAPS, all_cells, print_cells, write_csv
+
     parser = argparse.ArgumentParser(prog="calmotion bench stability", description=__doc__)
     parser.add_argument("--json", action="store_true", help="print one JSON object on stdout, and nothing else there")
+    parser.add_argument("--csv", metavar="FILE", help="also write the cells of the maps as a table")
+    parser.add_argument("--figures", metavar="DIR", help="also draw the maps, to this folder")
     parser.add_argument(
-        "--figures", metavar="DIR", help="also draw maps over stiffness, step and speed, to this folder"
+        "--only",
+        metavar="TEXT",
+        default="",
+        help="cases and maps (`map load`) whose name contains a text",
     )
-    parser.add_argument("--only", metavar="TEXT", default="", help="cases whose group or name contain a text")
     options = parser.parse_args(arguments)
     begin = time.perf_counter()
-    chosen = [case for case in CASES if options.only.lower() in f"{case.group} {case.name}".lower()]
-    outcomes = [run_case(case) for case in chosen]
+    only = options.only.lower()
+    outcomes = [run_case(case) for case in CASES if only in f"{case.group} {case.name}".lower()]
+    maps = {name: rows for name, rows in MAPS.items() if only in f"map {name}"}
+    cells = all_cells(maps)
     figures: list[str] = []
-    if options.figures:
-        from .stability_map import draw_maps
+    if options.figures and cells:
+        from .stability_figure import draw_map
 
-        figures = draw_maps(options.figures)
+        figures = [
+            draw_map(options.figures, name, rows[0], [cell for cell in cells if cell.map == name])
+            for name, rows in maps.items()
+        ]
+    if options.csv:
+        write_csv(options.csv, cells)
     if options.json:
-        rows = [asdict(outcome) for outcome in outcomes]
-        print(json.dumps({"cases": rows, "figures": figures, "total_wall_s": time.perf_counter() - begin}))
+        report = {"cases": [asdict(outcome) for outcome in outcomes], "cells": [asdict(cell) for cell in cells]}
+        print(json.dumps(report | {"figures": figures, "total_wall_s": time.perf_counter() - begin}))
     else:
         print_outcomes(outcomes)
-        for figure in figures:
-            print(f"wrote {figure}")
-    return int(any(outcome.outcome == FAILED for outcome in outcomes))
+        print_cells(cells)
+        for path in [*figures, *([options.csv] if options.csv else [])]:
+            print(f"wrote {path}")
+    fates = [outcome.outcome for outcome in outcomes] + [cell.outcome for cell in cells]
+    return int(FAILED in fates)
 
 
 if __name__ == "__main__":
