@@ -21,6 +21,8 @@ PYTHON ?= $(shell for python in python3 python3.13 python3.12 python3.11 python;
 	command -v $$python >/dev/null 2>&1 && $$python -c '$(CHECK)' >/dev/null 2>&1 && echo $$python && break; done)
 
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
+# Two processes test at a time; threads of linear algebra that wait for each other would make that several times slower.
+test: export OPENBLAS_NUM_THREADS := 1
 
 .PHONY: help demo test fuzz samples pictures blender blender-test clean
 .DELETE_ON_ERROR:

@@ -7,7 +7,7 @@ from hypothesis import HealthCheck, Phase, settings
 
 SLOW = [HealthCheck.too_slow, HealthCheck.data_too_large, HealthCheck.filter_too_much]
 settings.register_profile(
-    "few", max_examples=10, derandomize=True, deadline=None, database=None, suppress_health_check=SLOW,
+    "few", max_examples=6, derandomize=True, deadline=None, database=None, suppress_health_check=SLOW,
     # a failure is told at once; the thorough run makes it as small as it can, which takes minutes
     phases=(Phase.explicit, Phase.generate),
 )  # fmt: skip

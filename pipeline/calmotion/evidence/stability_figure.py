@@ -44,7 +44,7 @@ def draw_map(folder: str, name: str, quantity: str, cells: Sequence[Cell]) -> st
         panel.set_yticks(range(len(values)), [f"{value:g}" for value in values])
         panel.tick_params(length=0, labelsize=8, colors=INK)
         brief = min(steps[integrator]) < 0.999 * BRIEFLY
-        note = f", below {step_name(BRIEFLY)} s {BEGINNING} steps" if brief else ""
+        note = f" (below {step_name(BRIEFLY)} s: {BEGINNING} steps, before the arm moves)" if brief else ""
         panel.set_title(integrator + note, fontsize=9, color=INK)
         for side in panel.spines.values():
             side.set_visible(False)
