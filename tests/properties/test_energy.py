@@ -25,6 +25,9 @@ H = 1.0 / 960.0
 RELEASED = round(0.3 / H)
 SLACK = 4e-3  # the fastest of the moves takes 150 steps, whose velocities are off by half a thousandth
 SHAKY = 1e-12  # of the weight times the reach: energies below this are rounding
+# A release starts from two instants that are a parabola apart, which vibrations faster than the steps are not: they
+# begin with an energy that is none of the robot's. Compared with this share of the weight times the reach, it is slack.
+UNRESOLVED = 1e-3
 
 
 def prepared_for(shot, pre_roll):
@@ -32,9 +35,9 @@ def prepared_for(shot, pre_roll):
     return prepare(shot.character, shot.animation, bodies, Options(step=H, pre_roll=pre_roll))
 
 
-def scale(shot, system, kinetic, total, done=0.0):
-    """The largest energy that moves about [J]."""
-    rounding = SHAKY * np.sum(system.mass) * np.linalg.norm(system.gravity) * reach(shot.character)
+def scale(shot, system, kinetic, total, done=0.0, share=SHAKY):
+    """The largest energy that moves about, at least a share of the weight times the reach [J]."""
+    rounding = share * np.sum(system.mass) * np.linalg.norm(system.gravity) * reach(shot.character)
     return max(kinetic.max(), np.ptp(total - kinetic), np.ptp(done), rounding)
 
 
@@ -63,7 +66,7 @@ def test_what_nothing_drives_never_gains_energy(shot):
     except SimulationFailure:
         assume(False)
     kinetic, total = energy(system, run.states)
-    assert np.all(total - total[0] <= SLACK * scale(shot, system, kinetic, total))
+    assert np.all(total - total[0] <= SLACK * scale(shot, system, kinetic, total, share=UNRESOLVED))
 
 
 @given(shots(kinds=("fixed", "revolute motor", "prismatic motor", "hinge"), stuff=st.one_of(lumps(), beams())))
