@@ -8,7 +8,8 @@ import pytest
 from calmotion.dynamics.integrators import INTEGRATORS
 from calmotion.evidence import stability, stability_map
 from calmotion.evidence.stability import FAILED, REFUSED, RUNS
-from calmotion.evidence.stability_map import MAPS, STEPS, Cell, all_cells, cells_of, largest_steps, within, write_csv
+from calmotion.evidence.stability_map import MAPS, STEPS, Cell, all_cells, cells_of, largest_steps, within
+from calmotion.evidence.tables import write_rows
 
 
 def rows_of(name, *values):
@@ -77,6 +78,6 @@ def test_the_command_writes_cells_table_and_pictures(capsys, monkeypatch, tmp_pa
 
 
 def test_a_table_keeps_the_reasons(tmp_path):
-    write_csv(str(tmp_path / "a.csv"), [cell(1.0, 0.5, REFUSED)])
+    write_rows(str(tmp_path / "a.csv"), Cell, [cell(1.0, 0.5, REFUSED)])
     (row,) = csv.DictReader((tmp_path / "a.csv").open())
     assert row["why"] == "why" and row["error_m"] == "" and all_cells({}) == []

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from calmotion.fem.damping import PAIRED_MODES, damped, modal_damping
+from calmotion.fem.damping import EXACT_MODES, damped, modal_damping
 from calmotion.fem.reduced_body import Elasticity, Invariants, ReducedBody
 from calmotion.shot import ElasticMaterial
 from scipy.linalg import eigh
@@ -62,9 +62,9 @@ def test_a_nonlinear_body_has_the_ratio_up_to_its_last_paired_mode_and_more_abov
     found = damped(body(law), MATERIAL, omega, shapes)
     retardation = found.elasticity.retardation
     _, ratio = ratios_of(loaded_mass(), found.damping + retardation * np.diag(OMEGA**2))
-    assert ratio[:PAIRED_MODES] == pytest.approx(np.full(PAIRED_MODES, 0.02), rel=1e-6)
-    assert ratio[PAIRED_MODES:] == pytest.approx(0.5 * retardation * omega[PAIRED_MODES:], rel=1e-3)
-    assert np.linalg.matrix_rank(found.damping, tol=1e-9) == PAIRED_MODES - 1, "above them no coordinate is resisted"
+    assert ratio[:EXACT_MODES] == pytest.approx(np.full(EXACT_MODES, 0.02), rel=1e-6)
+    assert ratio[EXACT_MODES:] == pytest.approx(0.5 * retardation * omega[EXACT_MODES:], rel=1e-3)
+    assert np.linalg.matrix_rank(found.damping, tol=1e-9) == EXACT_MODES - 1, "above them no coordinate is resisted"
 
 
 def test_modes_of_others_and_motions_of_frequency_zero_do_not_matter():

@@ -22,6 +22,7 @@ from ..errors import ShotError
 from ..shot import Animation, Body, Character, FEMeshes, Frame, Joint, MassProperties
 from ..shot.character import Array
 from .beam_arm import IDENTITY, beam_arm, quintic, shot_of
+from .tables import write_rows
 
 if TYPE_CHECKING:
     from ..fem.reduced_body import ReducedBody
@@ -243,7 +244,7 @@ def _numbers(outcome: Outcome) -> list[str]:
 
 def main(arguments: list[str] | None = None) -> int:
     """The command: exit status 1 when a case or a cell fails."""
-    from .stability_map import MAPS, all_cells, print_cells, write_csv
+    from .stability_map import MAPS, Cell, all_cells, print_cells
 
     parser = argparse.ArgumentParser(prog="calmotion bench stability", description=__doc__)
     parser.add_argument("--json", action="store_true", help="print one JSON object on stdout, and nothing else there")
@@ -270,7 +271,7 @@ def main(arguments: list[str] | None = None) -> int:
             for name, rows in maps.items()
         ]
     if options.csv:
-        write_csv(options.csv, cells)
+        write_rows(options.csv, Cell, cells)
     if options.json:
         report = {"cases": [asdict(outcome) for outcome in outcomes], "cells": [asdict(cell) for cell in cells]}
         print(json.dumps(report | {"figures": figures, "total_wall_s": time.perf_counter() - begin}))

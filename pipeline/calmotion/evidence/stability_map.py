@@ -6,14 +6,13 @@ can afford (`STEPS`); a cell that takes longer than `PATIENCE` has failed.
 
 from __future__ import annotations
 
-import csv
 import signal
 import sys
 import threading
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass, fields, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -179,11 +178,3 @@ def print_cells(cells: Sequence[Cell]) -> None:
     for cell in cells:
         if cell.outcome == FAILED:
             console.print(f"{cell.map} {cell.value:g}, {step_name(cell.step_s)} s, {cell.integrator}: {cell.why}")
-
-
-def write_csv(path: str, cells: Sequence[Cell]) -> None:
-    """A row a cell."""
-    with open(path, "w", newline="", encoding="utf-8") as file:
-        writer = csv.DictWriter(file, [field.name for field in fields(Cell)])
-        writer.writeheader()
-        writer.writerows(asdict(cell) for cell in cells)

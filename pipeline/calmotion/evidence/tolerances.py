@@ -8,21 +8,20 @@ at any frame, between the two.
 from __future__ import annotations
 
 import argparse
-import csv
 import json
 import sys
 import time
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 
-import numpy as np
-
 from ..dynamics.topology import span_tree
 from ..retarget.bodies import reduce_bodies
 from ..retarget.prepare import Options, excitations
+from ..retarget.step_error import distance, frames_of
 from ..retarget.to_tolerance import found_tracks, optimize_to_tolerance
 from .shots import Unreduced, load_unreduced
-from .work_precision import SAMPLES, Bench, distance, machine
+from .tables import write_rows
+from .work_precision import SAMPLES, Bench, machine
 
 TOLERANCES = (1e-2, 1e-3, 1e-4, 1e-5)
 
@@ -67,12 +66,10 @@ def kept(shot: Unreduced, tolerance: float) -> Kept:
     result = optimize_to_tolerance(character, animation, bodies, options, lambda fraction, message: None)
     wall = time.perf_counter() - begin
     assert result.after is not None and result.accuracy is not None
-    motion = result.after.motion
-    frames = np.searchsorted(motion.times, animation.frame_times - 1e-9)
     found = replace(animation, current=found_tracks(result, animation))
-    reference = Bench(replace(shot, animation=found)).reference()
+    reference, own = Bench(replace(shot, animation=found)).reference(), frames_of(result, animation.frame_times)
     return Kept(
-        shot.name, tolerance, distance(motion.target_positions[frames], reference.positions), reference.bar_m,
+        shot.name, tolerance, distance(own.positions, reference.positions), reference.bar_m,
         result.accuracy.estimated_m, result.step_s, sum(len(body.stiffness) for body in bodies), wall,
         *(float(run.position_errors[run.motion.judged].max()) for run in (result.before, result.after)),
     )  # fmt: skip
@@ -112,10 +109,7 @@ def main(arguments: list[str] | None = None) -> int:
         if not options.json:
             print_rows(rows[-len(options.tolerances) :])
     if options.csv:
-        with open(options.csv, "w", newline="", encoding="utf-8") as file:
-            writer = csv.DictWriter(file, list(Kept.__dataclass_fields__))
-            writer.writeheader()
-            writer.writerows(asdict(row) for row in rows)
+        write_rows(options.csv, Kept, rows)
     if options.json:
         print(json.dumps({"machine": machine(), "rows": [asdict(row) | {"kept": row.kept} for row in rows]}))
     return int(not all(row.kept for row in rows))

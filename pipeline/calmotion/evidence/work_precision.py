@@ -9,7 +9,6 @@ that is from its own limit is its error bar, below which nothing is told apart. 
 from __future__ import annotations
 
 import argparse
-import csv
 import json
 import os
 import platform
@@ -26,11 +25,12 @@ from ..fem.reduced_body import ReducedBody
 from ..retarget.bodies import reduce_bodies, with_elasticity
 from ..retarget.prepare import Options, excitations
 from ..retarget.settled_bodies import settled_bodies
-from ..retarget.step_error import StepRun, simulate_at, step_error
+from ..retarget.step_error import StepRun, distance, simulate_at, step_error
 from ..retarget.time_grid import MAX_STEP
 from ..retarget.to_tolerance import chosen_step
 from ..shot.character import Array
 from .shots import Unreduced, load_unreduced
+from .tables import write_rows
 from .timing import median_time
 
 SAMPLES = tuple(f"samples/{name}/{name}.usda" for name in ("bartender", "dancer", "rapper", "drummer", "boxer"))
@@ -122,11 +122,6 @@ class Bench:
         return named(median_time(lambda: self.run(bodies, step, integrator), self.repeats), error)
 
 
-def distance(one: Array, other: Array) -> float:
-    """Largest distance of any target at any frame [m]."""
-    return float(np.max(np.linalg.norm(one - other, axis=2), initial=0.0))
-
-
 def forward_points(bench: Bench, reference: Reference) -> list[Point]:
     """Steps and integrators, modes, laws."""
     base = bench.bodies(BASE)
@@ -146,7 +141,7 @@ def forward_points(bench: Bench, reference: Reference) -> list[Point]:
 def chosen_points(bench: Bench, reference: Reference, tolerances: Sequence[float] = TOLERANCES) -> list[Point]:
     """What the program chooses: with no tolerance asked for, and for some."""
     shot = bench.shot
-    default = bench.bodies(shot.character.retarget.tolerance or 1e-3)
+    default = bench.bodies(shot.character.retarget.allowed())
     points = [bench.measure(reference, "default", "default", default, MAX_STEP)]
     for tolerance in tolerances:
         options = Options(tolerance=tolerance)
@@ -177,14 +172,6 @@ def machine() -> dict[str, object]:
         "python": platform.python_version(),
         "numpy": np.__version__,
     }
-
-
-def write_csv(path: str, points: Sequence[Point]) -> None:
-    """One row a point."""
-    with open(path, "w", newline="", encoding="utf-8") as file:
-        writer = csv.DictWriter(file, list(Point.__dataclass_fields__))
-        writer.writeheader()
-        writer.writerows(asdict(point) for point in points)
 
 
 def print_points(points: Sequence[Point], bar: float) -> None:
@@ -223,7 +210,7 @@ def main(arguments: list[str] | None = None) -> int:
             print_points(own, reference.bar_m)
     figures: list[str] = []
     if options.csv:
-        write_csv(options.csv, points)
+        write_rows(options.csv, Point, points)
     if options.figures:
         from .work_precision_figure import draw
 

@@ -14,7 +14,7 @@ import numpy as np
 from ..shot.character import Array, ElasticMaterial
 from .reduced_body import ReducedBody
 
-PAIRED_MODES = 6  # of the lowest: two or three bending pairs, or bending and twist
+EXACT_MODES = 6  # of the lowest: two or three bending pairs, or bending and twist
 TAKES_PART = 0.1  # of a mode's elastic energy, that makes it one of the body
 
 
@@ -25,7 +25,7 @@ def damped(
 
     A ratio of critical damping is met exactly by modes in which no other flexible body takes part. Where several do,
     each resists by itself, and the mode has about the ratio, within a factor of two. A nonlinear body has it in its
-    lowest modes, as many as are paired; above them, where modal damping would resist the shortening of a link as it
+    lowest modes, `EXACT_MODES`; above them, where modal damping would resist the shortening of a link as it
     bends, which costs a real one nothing, it has Kelvin-Voigt damping, which grows with the frequency.
 
     Args:
@@ -56,10 +56,10 @@ def damped(
 
 
 def _retardation(ratio: float, omega: Array) -> float:
-    """The Kelvin-Voigt coefficient [s] that gives the last of the paired modes its ratio."""
+    """The Kelvin-Voigt coefficient [s] that gives the last of the lowest modes its ratio."""
     if not len(omega):
         return 0.0
-    return float(2.0 * ratio / omega[min(PAIRED_MODES, len(omega)) - 1])
+    return float(2.0 * ratio / omega[min(EXACT_MODES, len(omega)) - 1])
 
 
 def modal_damping(omega_squared: Array, material: ElasticMaterial) -> Array:

@@ -14,7 +14,6 @@ from ..errors import ShotError
 from ..fem.excitation_data import Excitation
 from ..fem.reduced_body import ReducedBody
 from ..shot import Body, Character, FEMeshes, ModeTable, Skin
-from ..shot.character import DEFAULT_TOLERANCE
 
 if TYPE_CHECKING:
     from ..fem.interfaces import Anchor
@@ -41,7 +40,7 @@ def reduce_bodies(
         ShotError: A flexible body without a mesh, or one that cannot be reduced.
     """
     mesh_of = {} if meshes is None else {mesh.body: mesh for mesh in meshes.meshes}
-    allowed = tolerance or character.retarget.tolerance or DEFAULT_TOLERANCE
+    allowed = character.retarget.allowed(tolerance)
     # what bodies along a chain leave out adds up
     flexible = sum(body.flexible is not None for body in character.bodies)
     result = []
@@ -64,20 +63,22 @@ def reduce_bodies(
         excitation = None if excitations is None else excitations[index]
         parts = (mesh_of[index], body, frames, body.surfaces, anchors.root, excitation, allowed / flexible)
         result.append(cached_reduction(parts, partial(reduce_body, *parts)))
-    return _damped(character, tree, result) if flexible else result
+    return _damped(character, tree, result)
 
 
 def _damped(character: Character, tree: Tree, bodies: Sequence[ReducedBody]) -> list[ReducedBody]:
     """The bodies, damped so that the character's modes have the ratios of their materials."""
+    materials = {k: b.flexible.material for k, b in enumerate(character.bodies) if b.flexible is not None}
+    if all(material.rayleigh is not None for material in materials.values()):
+        return list(bodies)  # these do not know of modes
     from ..dynamics.modes import elastic_modes
     from ..fem.damping import damped
 
     omega, shapes = elastic_modes(compile_model(character, tree, bodies))
     result = list(bodies)
     for b, shape in zip(tree.body, shapes, strict=True):
-        flexible = character.bodies[b].flexible
-        if flexible is not None:
-            result[b] = damped(bodies[b], flexible.material, omega, shape)
+        if b in materials:
+            result[b] = damped(bodies[b], materials[b], omega, shape)
     return result
 
 
@@ -101,7 +102,7 @@ def flexible_modes(
 
     tree = span_tree(character)
     anchors = body_anchors(character, tree)
-    allowed = tolerance or character.retarget.tolerance or DEFAULT_TOLERANCE
+    allowed = character.retarget.allowed(tolerance)
     for mesh in meshes.meshes:
         body, own = character.bodies[mesh.body], anchors[mesh.body]
         excitation = None if excitations is None else excitations[mesh.body]

@@ -14,7 +14,7 @@ from ..dynamics.simulation import Workspace
 from ..errors import ShotError
 from ..fem.reduced_body import ReducedBody
 from ..shot import Animation, Character, LeftOut, MotorCurve, OptimizerStep, Result
-from ..shot.character import DEFAULT_TOLERANCE, Array, BoolArray
+from ..shot.character import Array, BoolArray
 from .adaptive_knots import carried, useful_knots, wanted_breaks
 from .approach import approach
 from .bodies import mode_tables, skins
@@ -116,7 +116,7 @@ def _search(
         return locked_coefficients(animation, basis, problem.motors, grid.end)
 
     fixed = fixed_on(problem.basis)
-    tolerance = options.tolerance or character.retarget.tolerance or DEFAULT_TOLERANCE
+    tolerance = character.retarget.allowed(options.tolerance)
     begin = time.perf_counter()
     if not np.isfinite(problem.value(np.zeros(problem.size))):
         assert problem.failure is not None

@@ -12,7 +12,7 @@ from ..dynamics.simulation import Workspace
 from ..errors import ShotError
 from ..fem.reduced_body import ReducedBody
 from ..shot import Animation, Character, Result, Track
-from ..shot.character import DEFAULT_TOLERANCE, Array
+from ..shot.character import Array
 from .bodies import mode_tables, skins
 from .curves import sample_curves, sample_tracks
 from .forward import limited_values, run_forward
@@ -122,7 +122,7 @@ def simulate_shot(
 def _refuse_open_joints(prepared: Prepared, gap: float, options: Options) -> None:
     """BDF2 keeps joints closed; the others hold them together in velocity, and drift where steps are coarse."""
     character = prepared.character
-    if gap > CLOSED * (options.tolerance or character.retarget.tolerance or DEFAULT_TOLERANCE):
+    if gap > CLOSED * character.retarget.allowed(options.tolerance):
         raise ShotError(
             f"its joints come apart by {1e3 * gap:.2g} mm in the simulation",
             path=character.path,

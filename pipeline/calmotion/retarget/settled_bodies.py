@@ -16,7 +16,7 @@ from ..fem.reduced_body import ReducedBody
 from ..shot import Animation, Character, FEMeshes
 from .bodies import reduce_bodies
 from .prepare import Options, excitations
-from .step_error import simulate_at
+from .step_error import distance, simulate_at
 from .time_grid import MAX_STEP
 
 SHARE = 0.4  # of the tolerance, that what is left out may take
@@ -57,7 +57,7 @@ def settled_bodies(
         if _same(bodies, finer):
             continue
         then = places(finer)
-        off = float(np.max(np.linalg.norm(then - found, axis=2), initial=0.0))
+        off = distance(then, found)
         bodies, found = finer, then
         if off <= SHARE * options.tolerance:
             break

@@ -11,7 +11,7 @@ from ..dynamics.failure import SimulationFailure
 from ..dynamics.simulation import Workspace
 from ..errors import ShotError
 from ..fem.reduced_body import ReducedBody
-from ..shot import Animation, Character
+from ..shot import Animation, Character, Result
 from ..shot.character import Array
 from .curves import sample_tracks
 from .forward import run_forward
@@ -54,11 +54,22 @@ def simulate_at(
     return StepRun(grid.h, run.target_positions[grid.frames])
 
 
+def frames_of(result: Result, frame_times: Array) -> StepRun:
+    """The motion of a result that counts, at the frames [s]."""
+    motion = (result.after or result.before).motion
+    # times are sums of steps, so a frame may come out a rounding later
+    return StepRun(result.step_s, motion.target_positions[np.searchsorted(motion.times, frame_times - 1e-9)])
+
+
+def distance(one: Array, other: Array) -> float:
+    """Largest distance of any target at any frame [m], between places of shape [f, K, 3]."""
+    return float(np.max(np.linalg.norm(one - other, axis=2), initial=0.0))
+
+
 def step_error(coarse: StepRun, fine: StepRun) -> float:
     """Error of the finer of two runs at any target [m], by Richardson's extrapolation."""
     ratio = (coarse.step / fine.step) ** ORDER - 1.0
-    off = np.linalg.norm(coarse.positions - fine.positions, axis=2)
-    return float(np.max(off, initial=0.0)) / ratio
+    return distance(coarse.positions, fine.positions) / ratio
 
 
 def largest_step(

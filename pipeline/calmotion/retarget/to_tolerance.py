@@ -11,15 +11,14 @@ from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
-import numpy as np
-
 from ..fem.reduced_body import ReducedBody
 from ..shot import Accuracy, Animation, Character, OptimizerStep, Result, Track
+from ..shot.character import Array
 from .curves import sample_tracks
 from .optimize import optimize_shot
 from .prepare import Options, prepare
 from .run import Progress, meant_motion, simulate_shot
-from .step_error import ORDER, StepRun, largest_step, run_or_none, simulate_at, step_error
+from .step_error import ORDER, StepRun, distance, frames_of, largest_step, run_or_none, simulate_at, step_error
 
 SHARE = 0.5  # of the tolerance, that the time step may take
 FIRST, LAST = 1.0 / 60.0, 1.0 / 30720.0  # steps that are tried [s]
@@ -68,8 +67,7 @@ def optimize_to_tolerance(
     intended = _intended(character, animation, bodies, options)
 
     def allowed(tried: StepRun) -> float:
-        shake = np.linalg.norm(tried.positions - intended, axis=2)
-        return max(_allowed(options), OF_SHAKE * float(shake.max(initial=0.0)))
+        return max(_allowed(options), OF_SHAKE * distance(tried.positions, intended))
 
     trial = partial(simulate_at, character, replace(animation, current=animation.tracks), bodies, options)
     step, _ = largest_step(trial, FIRST, LAST, allowed)
@@ -106,7 +104,7 @@ def _left_out(bodies: Bodies) -> float:
     return sum(row.estimated_error_m or 0.0 for body in bodies or () for row in body.left_out)
 
 
-def _intended(character: Character, animation: Animation, bodies: Bodies, options: Options) -> np.ndarray:
+def _intended(character: Character, animation: Animation, bodies: Bodies, options: Options) -> Array:
     """Where the targets are meant to be at the frames [m], shape [f, K, 3]."""
     prepared = prepare(character, animation, bodies, replace(options, step=FIRST))
     meant = meant_motion(prepared, *sample_tracks(animation.tracks, prepared.grid))
@@ -123,10 +121,7 @@ def found_tracks(result: Result, animation: Animation) -> tuple[Track, ...]:
 
 def _estimated(result: Result, character: Character, animation: Animation, bodies: Bodies, options: Options) -> Result:
     """The result with its accuracy, from a simulation of the curves that were found by twice the step."""
-    assert result.after is not None
-    motion = result.after.motion
-    at_frames = np.searchsorted(motion.times, animation.frame_times - 1e-9)
-    fine = StepRun(result.step_s, motion.target_positions[at_frames])
+    fine = frames_of(result, animation.frame_times)
     trial = partial(
         simulate_at, character, replace(animation, current=found_tracks(result, animation)), bodies, options
     )

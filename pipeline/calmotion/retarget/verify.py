@@ -6,16 +6,13 @@ from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 
-import numpy as np
-
 from ..dynamics.topology import span_tree
 from ..fem.reduced_body import ReducedBody
 from ..shot import Animation, Character, FEMeshes, Result
-from ..shot.character import DEFAULT_TOLERANCE
 from .bodies import reduce_bodies
 from .prepare import Options, excitations
 from .run import Progress
-from .step_error import simulate_at
+from .step_error import distance, frames_of, simulate_at
 from .to_tolerance import found_tracks
 
 STEP, TOLERANCE = 0.25, 0.1  # of those of the result
@@ -40,12 +37,11 @@ def verify(
     Raises:
         ShotError: The finer run is not possible.
     """
-    simulation = result.after or result.before
     if result.after is not None:
         animation = replace(animation, current=found_tracks(result, animation))
     bodies = None
     if reduced is not None and any(body.flexible for body in character.bodies):
-        allowed = TOLERANCE * (options.tolerance or character.retarget.tolerance or DEFAULT_TOLERANCE)
+        allowed = TOLERANCE * character.retarget.allowed(options.tolerance)
         loads = excitations(character, animation, meshes, options)
         reduce = partial(reduce_bodies, character, span_tree(character), meshes, progress, loads)
         bodies = reduce(tolerance=allowed)
@@ -56,9 +52,8 @@ def verify(
             bodies = reduce(tolerance=allowed)
     progress(0.5, "simulating with a finer step")
     fine = simulate_at(character, animation, bodies, options, STEP * result.step_s)
-    at_frames = np.searchsorted(simulation.motion.times, animation.frame_times - 1e-9)
-    off = np.linalg.norm(simulation.motion.target_positions[at_frames] - fine.positions, axis=2)
-    return float(np.max(off, initial=0.0)), fine.step, _coordinates(bodies or ())
+    own = frames_of(result, animation.frame_times)
+    return distance(own.positions, fine.positions), fine.step, _coordinates(bodies or ())
 
 
 def _coordinates(bodies: Sequence[ReducedBody]) -> int:

@@ -109,14 +109,19 @@ def follow(axes: Array, D: Array) -> tuple[Array, Array]:
     """
     turns = Rotation.from_matrix(D)
     if len(axes) == 1:
-        quaternion = turns.as_quat(canonical=True)  # or else the first angle may be a whole turn off
-        angles = np.unwrap(2.0 * np.arctan2(quaternion[:, :3] @ axes[0], quaternion[:, 3]))[:, None]
+        angles = about(axes[0], turns)[:, None]
     else:
         angles, q = np.zeros((len(D), len(axes))), _first(axes, D[0])
         for n in range(len(D)):
             q = _nearest(axes, D[n], q)
             angles[n] = q
     return angles, (_product(axes, angles).inv() * turns).magnitude()
+
+
+def about(axis: Array, turns: Rotation) -> Array:
+    """The part of rotations about a unit axis, unwrapped from within half a turn [rad], shape [n]."""
+    quaternion = turns.as_quat(canonical=True)  # or else the first angle may be a whole turn off
+    return np.unwrap(2.0 * np.arctan2(quaternion[:, :3] @ axis, quaternion[:, 3]))
 
 
 def _product(axes: Array, angles: Array):

@@ -278,6 +278,10 @@ class RetargetSettings:
     endpoints: str = "free"
     cyclic: bool = False
 
+    def allowed(self, asked: float | None = None) -> float:
+        """Error at the targets that does not matter [m]: what is asked for, else the shot's own, else 1 mm."""
+        return asked or self.tolerance or DEFAULT_TOLERANCE
+
 
 @dataclass(frozen=True, eq=False)
 class Character:

@@ -80,11 +80,12 @@ def joint_motions(reading: Reading, joints: Sequence[JointPrim], codes: Array) -
 def _about_z(R: Array, x: Array, slides: bool) -> JointMotion:
     from scipy.spatial.transform import Rotation
 
+    from ...rig.hinge_rows import about
+
     turn = Rotation.from_matrix(R)
     if slides:
         return JointMotion(x[:, 2].copy(), turn.magnitude(), np.linalg.norm(x[:, :2], axis=1))
-    quaternion = turn.as_quat(canonical=True)  # or else the first angle may be a whole turn off
-    angle = np.unwrap(2.0 * np.arctan2(quaternion[:, 2], quaternion[:, 3]))
+    quaternion, angle = turn.as_quat(), about(np.array([0.0, 0.0, 1.0]), turn)
     tilt = 2.0 * np.arctan2(np.linalg.norm(quaternion[:, :2], axis=1), np.linalg.norm(quaternion[:, 2:], axis=1))
     return JointMotion(angle, tilt, np.linalg.norm(x, axis=1))
 
