@@ -40,7 +40,7 @@ class TetrahedralizeFlexibleBodies(Operator):
     def poll(cls, data: Mapping[type, Any]) -> str | None:
         """Left out where nothing bends."""
         character = data.get(Character)
-        if character is not None and not any(body.flexible for body in character.bodies):
+        if character is not None and not any(body.bends for body in character.bodies):
             return "no body is flexible"
         return None
 
@@ -56,7 +56,7 @@ class TetrahedralizeFlexibleBodies(Operator):
             time_limit=context.properties.time_limit,
             cache=context.properties.cache,
         )
-        flexible = [index for index, body in enumerate(character.bodies) if body.flexible]
+        flexible = [index for index, body in enumerate(character.bodies) if body.bends]
         meshes = []
         for done, index in enumerate(flexible):
             body = character.bodies[index]

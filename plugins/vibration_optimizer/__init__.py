@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 def _nothing_flexible(data: Mapping[type, Any]) -> str | None:
     character = data.get(Character)
-    if character is not None and not any(body.flexible for body in character.bodies):
+    if character is not None and not any(body.bends for body in character.bodies):
         return "nothing is flexible: no body has CalmFlexibleBodyAPI"
     return None
 

@@ -17,7 +17,7 @@ class Tree:
         parent: Parent component of each, -1 for the world.
         joint: Joint that carries each component.
         flipped: Whether the component is `body0` of that joint, so that its angle runs backwards.
-        loops: Joints that are not in the tree: each closes a loop.
+        loops: Joints that are not in the tree: each closes a loop; without those that are redundant.
     """
 
     body: tuple[int, ...]
@@ -67,7 +67,8 @@ def span_tree(character: Character) -> Tree:
                 path=item.path,
                 remedy="Add a joint to its neighbour, or a PhysicsFixedJoint with an empty body0.",
             )
-    return Tree(tuple(body), tuple(parent), tuple(joint_of), tuple(flipped), tuple(loops))
+    needed = tuple(index for index in loops if not character.joints[index].redundant)
+    return Tree(tuple(body), tuple(parent), tuple(joint_of), tuple(flipped), needed)
 
 
 def _spanning(character: Character) -> tuple[list[int], list[int]]:

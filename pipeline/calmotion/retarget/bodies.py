@@ -42,12 +42,12 @@ def reduce_bodies(
     mesh_of = {} if meshes is None else {mesh.body: mesh for mesh in meshes.meshes}
     allowed = character.retarget.allowed(tolerance)
     # what bodies along a chain leave out adds up
-    flexible = sum(body.flexible is not None for body in character.bodies)
+    flexible = sum(body.bends for body in character.bodies)
     result = []
     for index, (body, anchors) in enumerate(zip(character.bodies, body_anchors(character, tree), strict=True)):
         if progress is not None:
             progress(index / len(character.bodies), body.path)
-        if body.flexible is None:
+        if not body.bends:
             result.append(rigid_body(body, anchors))
             continue
         if index not in mesh_of:
@@ -68,7 +68,7 @@ def reduce_bodies(
 
 def _damped(character: Character, tree: Tree, bodies: Sequence[ReducedBody]) -> list[ReducedBody]:
     """The bodies, damped so that the character's modes have the ratios of their materials."""
-    materials = {k: b.flexible.material for k, b in enumerate(character.bodies) if b.flexible is not None}
+    materials = {k: b.flexible.material for k, b in enumerate(character.bodies) if b.flexible is not None and b.bends}
     if all(material.rayleigh is not None for material in materials.values()):
         return list(bodies)  # these do not know of modes
     from ..dynamics.modes import elastic_modes

@@ -8,8 +8,8 @@ from ..shot.character import Array, Character, IntArray
 
 
 def leaders(character: Character) -> IntArray:
-    """Motors whose curves may change and follow no other."""
-    own = [motor.optimize and motor.follows is None for motor in character.motors]
+    """Motors whose curves may change and follow no other; not those that are idle."""
+    own = [motor.optimize and not motor.idle and motor.follows is None for motor in character.motors]
     return np.flatnonzero(own).astype(np.int32)
 
 

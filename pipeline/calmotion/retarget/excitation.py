@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -42,12 +43,22 @@ def shot_excitation(
     Raises:
         SimulationFailure: The rigid robot cannot follow the tracks.
     """
-    moving = [frame.joint for frame in animation.moving]
-    model = compile_model(character, tree, rigid_bodies(character, tree, meshes), moving)
+    model, run = rigid_run(character, animation, grid, tree, rigid_bodies(character, tree, meshes))
+    return excitation_of(character, model, run, grid.h)
+
+
+def rigid_run(
+    character: Character, animation: Animation, grid: TimeGrid, tree: Tree, bodies: Sequence[ReducedBody]
+) -> tuple[Model, ForwardRun]:
+    """The animation on a robot of rigid bodies, see `rigid_bodies`: its model and its motion.
+
+    Raises:
+        SimulationFailure: It cannot follow the tracks.
+    """
+    model = compile_model(character, tree, bodies, [frame.joint for frame in animation.moving])
     angles, rates = sample_tracks(animation.tracks, grid)
     world = sample_roots(animation.moving, grid)
-    run = run_forward(model, Workspace.for_system(model.system), angles, rates, grid.h, world)
-    return excitation_of(character, model, run, grid.h)
+    return model, run_forward(model, Workspace.for_system(model.system), angles, rates, grid.h, world)
 
 
 def rigid_bodies(character: Character, tree: Tree, meshes: FEMeshes | None) -> list[ReducedBody]:
@@ -55,7 +66,7 @@ def rigid_bodies(character: Character, tree: Tree, meshes: FEMeshes | None) -> l
     mesh_of = {} if meshes is None else {mesh.body: mesh for mesh in meshes.meshes}
     result = []
     for index, (body, anchors) in enumerate(zip(character.bodies, body_anchors(character, tree), strict=True)):
-        if body.flexible is not None and index in mesh_of:
+        if body.flexible is not None and body.bends and index in mesh_of:
             mesh, own = mesh_of[index], None if body.mass is None else body.mass.mass
             body = replace(body, mass=mass_of_tets(mesh.points, mesh.tets, body.flexible.material.density, own))
         result.append(rigid_body(body, anchors))
@@ -81,10 +92,10 @@ def excitation_of(character: Character, model: Model, run: ForwardRun, h: float)
         b = component_of[index]
         peaks = np.zeros((len(anchors.joints), 6))
         far = np.zeros(len(anchors.joints))
-        own = [number[joint] for joint in anchors.joints]
+        own = [number.get(joint, -1) for joint in anchors.joints]
         for row, k in enumerate(own):
-            if row == anchors.root:
-                continue
+            if row == anchors.root or k < 0:
+                continue  # a redundant joint carries nothing
             peaks[row, :3] = _peak(np.einsum("tji,tj->ti", R[:, b], force[:, k]))
             peaks[row, 3:] = _peak(np.einsum("tji,tj->ti", R[:, b], moment[:, k]))
             far[row] = reach[k] if k < len(reach) else 0.0

@@ -173,8 +173,8 @@ def _search(
     ]
     return Result(
         reference=reference_motion(model, grid, meant, problem.curves.angles),
-        before=simulation_of(model, grid, before, meant.reference, len(character.motors)),
-        after=simulation_of(model, grid, run, meant.reference, len(character.motors)),
+        before=simulation_of(prepared, before, meant.reference),
+        after=simulation_of(prepared, run, meant.reference),
         skins=skins(prepared.bodies),
         modes=mode_tables(prepared.bodies),
         curves=curves,

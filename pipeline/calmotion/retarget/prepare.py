@@ -73,11 +73,12 @@ def prepare(
     if bodies is None:
         bodies = reduce_bodies(character, tree, None)
     model = compile_model(character, tree, bodies, [frame.joint for frame in animation.moving])
-    grid = _grid(character, animation, options)
+    grid = grid_of(character, animation, options)
     return Prepared(character, bodies, model, grid, sample_roots(animation.moving, grid))
 
 
-def _grid(character: Character, animation: Animation, options: Options) -> TimeGrid:
+def grid_of(character: Character, animation: Animation, options: Options) -> TimeGrid:
+    """The time grid of a shot, with its pre-roll."""
     pre_roll = options.pre_roll
     if pre_roll is None:
         pre_roll = max(
@@ -97,7 +98,7 @@ def excitations(
     from .excitation import shot_excitation
 
     try:
-        return shot_excitation(character, animation, _grid(character, animation, options), span_tree(character), meshes)
+        return shot_excitation(character, animation, grid_of(character, animation, options), span_tree(character), meshes)
     except SimulationFailure:
         return None  # the flexible robot will say so, with the place
 

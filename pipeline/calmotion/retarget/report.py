@@ -29,7 +29,7 @@ def by_body(model: Model, values: Array, axis: int = 1) -> Array:
     return np.take(values, order, axis=axis)
 
 
-def _simulated_motion(model: Model, grid: TimeGrid, run: ForwardRun, motors: int) -> Motion:
+def _simulated_motion(model: Model, grid: TimeGrid, run: ForwardRun, motors: int, joints: int) -> Motion:
     states, tree = run.trajectory.states, model.tree
     component, shown = {body: k for k, body in enumerate(tree.body)}, _shown(grid)
     elastic = tuple(
@@ -41,15 +41,18 @@ def _simulated_motion(model: Model, grid: TimeGrid, run: ForwardRun, motors: int
         if motor >= 0:
             values[:, motor] = run.joint_angles[:, k] * model.sign[k]
             efforts[:, motor] = found.efforts[:, k] * model.sign[k]
-    # from the system's joints and sides to the character's
-    order = np.argsort([*tree.joint, *tree.loops])
-    sign = model.sign[:, None]
-    forces, moments = (sign * part for part in (found.forces, found.moments))
+    forces, moments = (_by_joint(model, joints, part[shown]) for part in (found.forces, found.moments))
     return Motion(
         grid.times[shown], by_body(model, states.c[shown]), by_body(model, states.q[shown]), elastic, values[shown],
-        efforts[shown], run.target_positions[shown], run.target_rotations[shown], forces[shown][:, order],
-        moments[shown][:, order],
+        efforts[shown], run.target_positions[shown], run.target_rotations[shown], forces, moments,
     )  # fmt: skip
+
+
+def _by_joint(model: Model, joints: int, values: Array) -> Array:
+    """From the system's joints and sides to the character's, shape [T, J, 3]; a joint that is left out carries none."""
+    out = np.zeros((len(values), joints, 3))
+    out[:, [*model.tree.joint, *model.tree.loops]] = model.sign[:, None] * values
+    return out
 
 
 def _shown(grid: TimeGrid) -> slice:
@@ -78,13 +81,14 @@ def performed_motion(prepared: Prepared, curves: Curves) -> Motion | None:
     return reference_motion(model, grid, rigid, curves.angles)
 
 
-def simulation_of(model: Model, grid: TimeGrid, run: ForwardRun, reference: Reference, motors: int) -> Simulation:
+def simulation_of(prepared: Prepared, run: ForwardRun, reference: Reference) -> Simulation:
     """A forward run as a value for the user, measured against the reference."""
+    model, grid, character = prepared.model, prepared.grid, prepared.character
     turned, _ = rotation_errors(reference.rotations, run.target_rotations)
     off = run.target_positions - reference.positions
     errors, shown = np.linalg.norm(off, axis=2), _shown(grid)
     return Simulation(
-        motion=_simulated_motion(model, grid, run, motors),
+        motion=_simulated_motion(model, grid, run, len(character.motors), len(character.joints)),
         position_errors=errors[shown],
         rotation_errors=np.linalg.norm(turned, axis=2)[shown],
         newton_iterations=run.trajectory.newton_iterations,

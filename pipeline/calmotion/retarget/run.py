@@ -96,7 +96,7 @@ def simulate_shot(
     as_meant = animation.current is animation.tracks and character.retarget.reference == "rigid"
     return Result(
         reference=intent,
-        before=simulation_of(model, grid, run, reference.reference, len(character.motors)),
+        before=simulation_of(prepared, run, reference.reference),
         after=None,
         skins=skins(prepared.bodies),
         modes=mode_tables(prepared.bodies),

@@ -40,7 +40,7 @@ def verify(
     if result.after is not None:
         animation = replace(animation, current=found_tracks(result, animation))
     bodies = None
-    if reduced is not None and any(body.flexible for body in character.bodies):
+    if reduced is not None and any(body.bends for body in character.bodies):
         allowed = TOLERANCE * character.retarget.allowed(options.tolerance)
         loads = excitations(character, animation, meshes, options)
         reduce = partial(reduce_bodies, character, span_tree(character), meshes, progress, loads)

@@ -21,6 +21,7 @@ from .character import (
 from .finding import Finding, Findings
 from .meshes import FEMesh, FEMeshes, MeshQuality
 from .provenance import InputLayer, Provenance
+from .needs import Need, Needs
 from .result import (
     Accuracy,
     LeftOut,
@@ -62,6 +63,8 @@ __all__ = [
     "MotorCurve",
     "MotorTracks",
     "MovingFrame",
+    "Need",
+    "Needs",
     "OptimizerStep",
     "Provenance",
     "Result",

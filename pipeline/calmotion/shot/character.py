@@ -155,6 +155,9 @@ class Body:
         tets: Tetrahedra authored in the shot, or None.
         flexible: Settings, or None for a rigid body.
         interfaces: Parts of the surface that name the joint which holds them.
+        stiff: Whether it is simulated as rigid although it is flexible, since this shot hardly bends it; it then has a
+            `mass`.
+        straight: Whether it never turns in this shot, so that its inertia does not change.
     """
 
     path: str
@@ -164,6 +167,13 @@ class Body:
     tets: TetGeometry | None = None
     flexible: FlexibleSettings | None = None
     interfaces: tuple[InterfaceSurface, ...] = ()
+    stiff: bool = False
+    straight: bool = False
+
+    @property
+    def bends(self) -> bool:
+        """Whether it is simulated as flexible."""
+        return self.flexible is not None and not self.stiff
 
 
 @dataclass(frozen=True, eq=False)
@@ -178,6 +188,7 @@ class Joint:
         frame0, frame1: The joint frame in body0 (in the world for -1) and in body1.
         lower, upper: Limits [rad or m], infinite when there are none.
         closes_loop: Whether the shot asks that this joint, rather than another, be the one that closes a loop.
+        redundant: Whether it is left out of the dynamics, since other joints hold all that it would hold.
     """
 
     path: str
@@ -189,6 +200,7 @@ class Joint:
     lower: float = -np.inf
     upper: float = np.inf
     closes_loop: bool = False
+    redundant: bool = False
 
 
 @dataclass(frozen=True)
@@ -221,6 +233,7 @@ class Motor:
         linear: Whether it sets a length along the joint's axis instead of an angle: metres then stand for radians,
             and newtons for newton metres.
         follows: The motor that it is geared to, or None; it then has no curve of its own.
+        idle: Whether its curve stays as it is although it may change, since it moves no target.
     """
 
     joint: int
@@ -233,6 +246,7 @@ class Motor:
     max_torque: float = np.inf
     linear: bool = False
     follows: Follows | None = None
+    idle: bool = False
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,0 +1,57 @@
+"""What a shot needs of all that could be simulated, decided before anything heavy is loaded or computed."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from .character import Character
+from .result import LeftOut
+
+KINDS = ("bodies", "turning", "loops", "modes", "elasticity", "motors", "ranges")  # what can be forced on or off
+AUTO, ON, OFF = "auto", "on", "off"
+
+
+@dataclass(frozen=True)
+class Need:
+    """One thing that a shot may need.
+
+    Attributes:
+        kind: One of `KINDS`, or `step` and `knots`, which have options of their own.
+        what: The thing, in the user's words.
+        needed: Whether it is there.
+        why: The reason.
+        estimated_error_m: What leaving it out costs at the targets, or would cost [m]; None: nothing, or not known.
+        forced: Whether the user chose.
+    """
+
+    kind: str
+    what: str
+    needed: bool
+    why: str
+    estimated_error_m: float | None = None
+    forced: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class Needs:
+    """What a shot needs.
+
+    Attributes:
+        character: The shot's character, marked with what is left out of it.
+        rows: Every decision.
+        forced: Kinds that the user forced, `on` or `off`.
+    """
+
+    character: Character
+    rows: tuple[Need, ...] = ()
+    forced: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def left_out(self) -> tuple[LeftOut, ...]:
+        """What is left out, for the report."""
+        return tuple(LeftOut(row.what, row.why, row.estimated_error_m) for row in self.rows if not row.needed)
+
+    def choice(self, kind: str) -> str:
+        """`auto`, `on` or `off`."""
+        return self.forced.get(kind, AUTO)
