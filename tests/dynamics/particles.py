@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from calmotion.dynamics.system import LINEAR, NEOHOOKEAN, STVK, System, allocate_state
+from calmotion.dynamics.system import LINEAR, NEOHOOKEAN, STVK, System, allocate_state, components
 from scipy.spatial.transform import Rotation
 
 POINTS = 4
@@ -35,6 +35,11 @@ def axial(T):
     return np.stack([T[..., 1, 2] - T[..., 2, 1], T[..., 2, 0] - T[..., 0, 2], T[..., 0, 1] - T[..., 1, 0]], axis=-1)
 
 
+def moments(part: Particles):
+    """X x phi_j of each particle, shape [n, r, 3]."""
+    return np.cross(part.points[:, None], part.modes.transpose(0, 2, 1))
+
+
 def nonlinear(system, laws, rng, stiffness=50.0) -> System:
     """The system with random nonlinear elasticity: a law for each component, LINEAR keeps what it has."""
     starts, arrays, size = [], [], 0
@@ -56,6 +61,8 @@ def nonlinear(system, laws, rng, stiffness=50.0) -> System:
     kept = np.where(law[:, None] == LINEAR, 1.0, 0.0)
     return system._replace(
         law=law,
+        stvk=components(law == STVK),
+        neohookean=components(law == NEOHOOKEAN),
         stiffness=system.stiffness * kept,
         retardation=np.where(law == LINEAR, 0.0, 0.02),
         lame=lame,
@@ -63,6 +70,12 @@ def nonlinear(system, laws, rng, stiffness=50.0) -> System:
         data_start=np.array(starts, dtype=np.int64),
         data=np.concatenate(arrays),
     )
+
+
+def without_turning(system, straight) -> System:
+    """The system, these components being told never to turn."""
+    chosen = np.isin(np.arange(len(system.parent)), straight)
+    return system._replace(turning=components(~chosen), straight=components(chosen))
 
 
 def particle_system(
@@ -107,9 +120,14 @@ def particle_system(
         M4=pad((size, 3, 3), [np.einsum("n,na,nbj->jab", p.masses, p.points, p.modes) for p in parts]),
         S=pad((size, size, 3, 3), S),
         axial=pad((size, size, 3), [axial(s) for s in S]),
+        axial0=pad((size, 3), [np.einsum("n,nja->ja", p.masses, moments(p)) for p in parts]),
+        turning=np.arange(count, dtype=np.int32),
+        straight=np.zeros(0, dtype=np.int32),
         stiffness=pad((size,), [np.full(r, stiffness) * (1 + np.arange(r)) for r in elastic]),
         damping=pad((size, size), [0.35 * np.eye(r) + 0.05 for r in elastic]),
         law=np.zeros(count, dtype=np.int32),
+        stvk=np.zeros(0, dtype=np.int32),
+        neohookean=np.zeros(0, dtype=np.int32),
         retardation=np.zeros(count),
         lame=np.zeros((count, 2)),
         points=np.zeros(count, dtype=np.int32),

@@ -7,7 +7,7 @@ from calmotion.dynamics.assembly import allocate_work, assemble
 from calmotion.dynamics.so3 import turn
 from calmotion.dynamics.system import LINEAR, NEOHOOKEAN, STVK, Blocks, Scheme, State, allocate_blocks
 from dense import condense, constrains, dense_matrix, join, split
-from particles import nonlinear, particle_system, random_state
+from particles import nonlinear, particle_system, random_state, without_turning
 from scipy.spatial.transform import Rotation
 
 TREES = {
@@ -20,15 +20,20 @@ TREES = {
     "free sliders": ([-1, 0, 1, 0, -1], [1, 2, 3, 1, 2], [6, 5, 6, 5, 5], [1, 2, 3, 4]),
     "loops of free sliders": ([-1, 0, 1, 0], [1, 2, 0, 2], [6, 5, 3, 3], [1, 4, 5], [(2, 3, 5), (-1, 2, 5)]),
     "moving roots": ([-1, -1, 0, -1, -1], [2, 0, 1, 1, 2], [6, 5, 5, 3, 5], [0, 4], [(-1, 2, 3)], [0, 1, 4, 3, 5]),
+    "some bodies never turn": ([-1, 0, 1, 0], [2, 3, 0, 2], [6, 5, 6, 6]),
+    "no body ever turns": ([-1, 0, 1, 0], [2, 3, 0, 2], [6, 6, 6, 6], [0, 2]),
     "loops": ([-1, 0, 1, 0], [1, 2, 0, 2], [5, 3, 3, 3], [6], [(2, 3, 3), (-1, 2, 5), (1, 3, 6)]),
 }
-LAWS = {"bodies of large deflection": [STVK, NEOHOOKEAN, LINEAR, LINEAR]}
+LARGE = [STVK, NEOHOOKEAN, LINEAR, LINEAR]
+LAWS = {"bodies of large deflection": LARGE, "no body ever turns": LARGE}
+STRAIGHT = {"some bodies never turn": (1, 2), "no body ever turns": (0, 1, 2, 3)}
 
 
 def tree(name, seed):
     parents, elastic, rows, *more = TREES[name]
     rng = np.random.default_rng(seed)
     system, _ = particle_system(rng, parents, elastic, rows, 50.0, *more)
+    system = without_turning(system, STRAIGHT.get(name, ()))
     return nonlinear(system, LAWS[name], rng) if name in LAWS else system
 
 

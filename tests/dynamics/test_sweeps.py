@@ -8,7 +8,7 @@ from calmotion.dynamics.reactions import reactions
 from calmotion.dynamics.simulation import Workspace, simulate
 from calmotion.dynamics.sweeps import adjoint, tangent
 from calmotion.dynamics.system import LINEAR, NEOHOOKEAN, STVK, allocate_state
-from particles import nonlinear, particle_system
+from particles import nonlinear, particle_system, without_turning
 from scipy.spatial.transform import Rotation
 
 H = 0.01
@@ -57,9 +57,10 @@ def close(system, angle):
 class Case:
     """A tree with free hinges, and a random linear functional of its motion."""
 
-    def __init__(self, rows, laws=None, sliding=(), loops=(), moving=(), seed=0):
+    def __init__(self, rows, laws=None, sliding=(), loops=(), moving=(), seed=0, straight=()):
         rng = np.random.default_rng(seed)
         self.system, _ = particle_system(rng, [-1, 0, 1, 0], [2, 0, 3, 2], rows, 3000.0, sliding, loops, moving)
+        self.system = without_turning(self.system, straight)
         if laws is not None:
             self.system = nonlinear(self.system, laws, rng, stiffness=3000.0)
         joints = len(self.system.rows)
@@ -101,6 +102,7 @@ CASES = {
     "sliders": ([6, 6, 6, 6], None, (0, 2, 3)),
     "a loop closed by a free slider": ([6, 5, 3, 5], None, (0, 4), ((2, 3, 5),), (), 1),
     "a moving root": ([6, 6, 5, 6], None, (), (), (0,)),
+    "bodies that never turn": ([6, 6, 5, 6], [STVK, LINEAR, LINEAR, LINEAR], (3,), (), (), 0, (0, 2, 3)),
     "a loop": ([6, 5, 3, 5], None, (0,), ((2, 3, 3),)),
 }
 

@@ -8,6 +8,12 @@ import numpy as np
 
 from ..kernels import kernel
 from ..shot.character import Array
+from .constant_inertia import (
+    straight_mass_matrix,
+    straight_position_jacobian,
+    straight_residual,
+    straight_velocity_jacobian,
+)
 from .elastic import stvk_forces
 from .inertia import body_residual, deformed_integrals, mass_matrix, position_jacobian, velocity_jacobian
 from .joints import add_skew, apply_wrench, constraint_residual, joint_kinematics, joint_tangent
@@ -15,7 +21,7 @@ from .markers import WORLD_MARKER, MarkerWork, add_wrench_stiffness, allocate_ma
 from .neohookean import neohookean_forces
 from .sliders import LENGTH, slide_jacobian, slide_wrench, slides_freely, turning_force
 from .so3 import matrix_of
-from .system import JOINT_ROWS, NEOHOOKEAN, STVK, System
+from .system import JOINT_ROWS, System
 
 
 class Work(NamedTuple):
@@ -55,8 +61,8 @@ class Work(NamedTuple):
 def allocate_work(system: System) -> Work:
     """Scratch for one system."""
     r = system.size - 6
-    pairs = r + r * (r + 1) // 2 if np.any(system.law == STVK) else 0
-    points = 18 if np.any(system.law == NEOHOOKEAN) else 0
+    pairs = r + r * (r + 1) // 2 if len(system.stvk) else 0
+    points = 18 if len(system.neohookean) else 0
     nonlinear = r if pairs or points else 0
     return Work(
         np.zeros((len(system.parent), 3, 3)), np.zeros(3), np.zeros((3, 3)), np.zeros((r, 3, 3)), np.zeros((3, 3)),
@@ -70,35 +76,83 @@ def allocate_work(system: System) -> Work:
 
 
 @kernel
-def _body_rows(system, b, ydd_world, V, Vd, u, w, res):
-    """Inertia, elastic and gravity rows of component b; leaves its integrals in the scratch."""
+def _acceleration_less_gravity(system, b, Vd, w):
+    """a = R^T (c'' - g) of component b into the scratch."""
     for i in range(3):
         t = 0.0
         for k in range(3):
-            t += w.R[b, k, i] * (ydd_world[k] - system.gravity[k])
+            t += w.R[b, k, i] * (Vd[b, k] - system.gravity[k])
         w.a[i] = t
+
+
+@kernel
+def _turning_rows(system, b, u, V, Vd, tangent, w, blocks):
+    """Inertia, linear elastic and gravity rows of a component that turns."""
     r = system.elastic[b]
+    _acceleration_less_gravity(system, b, Vd, w)
     deformed_integrals(r, system.s[b], system.Z[b], system.M3[b], system.M4[b], system.S[b], u[b], w.s, w.Z, w.B)
     body_residual(
         r, system.mass[b], system.M3[b], system.S[b], system.axial[b], system.stiffness[b], system.damping[b],
-        w.a, V[b, 3:6], Vd[b, 3:6], u[b], V[b, 6:], Vd[b, 6:], w.s, w.Z, w.B, w.W, w.tmp, res,
+        w.a, V[b, 3:6], Vd[b, 3:6], u[b], V[b, 6:], Vd[b, 6:], w.s, w.Z, w.B, w.W, w.tmp, blocks.res[b],
+    )  # fmt: skip
+    if not tangent:
+        return
+    mass_matrix(r, system.mass[b], system.M3[b], w.s, w.Z, w.B, blocks.D[b])
+    velocity_jacobian(
+        r, system.M3[b], system.axial[b], system.damping[b], V[b, 3:6], V[b, 6:], w.s, w.Z, w.B, blocks.P[b]
+    )
+    position_jacobian(
+        r, system.M3[b], system.S[b], system.axial[b], system.stiffness[b], w.a, V[b, 3:6], V[b, 6:], Vd[b, 6:],
+        w.B, w.W, blocks.D[b], w.E, w.T, w.tmp, blocks.K[b],
     )  # fmt: skip
 
 
 @kernel
-def _add_elastic_forces(system, b, u, v, tangent, w, res, P, K):
-    """Forces of a body of nonlinear material; a linear one has its own in `body_residual`."""
+def _straight_rows(system, b, u, V, Vd, tangent, w, blocks):
+    """The same of a component that never turns."""
     r = system.elastic[b]
-    if system.law[b] == STVK:
-        stvk_forces(
-            r, u, v, system.retardation[b], system.data_start[b], system.data, tangent, w.strain, w.rows, w.row, res,
-            P, K,
-        )  # fmt: skip
-    elif system.law[b] == NEOHOOKEAN:
-        neohookean_forces(
-            r, u, v, system.lame[b, 0], system.lame[b, 1], system.retardation[b], system.data_start[b],
-            system.points[b], system.data, tangent, w.point, w.rows, res, P, K,
-        )  # fmt: skip
+    _acceleration_less_gravity(system, b, Vd, w)
+    straight_residual(
+        r, system.mass[b], system.s[b], system.Z[b], system.M3[b], system.axial0[b], system.stiffness[b],
+        system.damping[b], w.a, Vd[b, 3:6], u[b], V[b, 6:], Vd[b, 6:], w.s, blocks.res[b],
+    )  # fmt: skip
+    if not tangent:
+        return
+    straight_mass_matrix(r, system.mass[b], w.s, system.Z[b], system.M3[b], system.axial0[b], blocks.D[b])
+    straight_velocity_jacobian(r, system.damping[b], blocks.P[b])
+    straight_position_jacobian(r, system.M3[b], system.stiffness[b], w.a, Vd[b, 3:6], blocks.D[b], blocks.K[b])
+
+
+@kernel
+def _add_stvk_forces(system, b, u, v, tangent, w, blocks):
+    """Elastic rows of a body of this law; those of a linear one stand with its inertia."""
+    stvk_forces(
+        system.elastic[b], u, v, system.retardation[b], system.data_start[b], system.data, tangent, w.strain, w.rows,
+        w.row, blocks.res[b], blocks.P[b], blocks.K[b],
+    )  # fmt: skip
+
+
+@kernel
+def _add_neohookean_forces(system, b, u, v, tangent, w, blocks):
+    """The same of a Neo-Hookean body."""
+    neohookean_forces(
+        system.elastic[b], u, v, system.lame[b, 0], system.lame[b, 1], system.retardation[b], system.data_start[b],
+        system.points[b], system.data, tangent, w.point, w.rows, blocks.res[b], blocks.P[b], blocks.K[b],
+    )  # fmt: skip
+
+
+@kernel
+def _follow_positions(n, acceleration, Hv, D, P, K):
+    """Tangents by what follows: accelerations follow velocities, into P, and these follow positions, into K."""
+    beta = Hv[0, 0]
+    for i in range(n):
+        for k in range(n):
+            P[i, k] += acceleration * D[i, k]
+        for k in range(3):
+            K[i, k] += beta * P[i, k]
+            K[i, 3 + k] += P[i, 3] * Hv[1, 1 + k] + P[i, 4] * Hv[2, 1 + k] + P[i, 5] * Hv[3, 1 + k]
+        for k in range(6, n):
+            K[i, k] += beta * P[i, k]
 
 
 @kernel
@@ -208,31 +262,16 @@ def assemble(system, scheme, c, q, u, V, Vd, lam, angle, rate, Hv, tangent, w, b
     count = len(system.parent)
     for b in range(count):
         matrix_of(q[b], w.R[b])
-    for b in range(count):
-        r = system.elastic[b]
-        n = 6 + r
-        _body_rows(system, b, Vd[b], V, Vd, u, w, blocks.res[b])
-        if not tangent:
-            _add_elastic_forces(system, b, u[b], V[b, 6:], False, w, blocks.res[b], blocks.P[b], blocks.K[b])
-        else:
-            D, P, K = blocks.D[b], blocks.P[b], blocks.K[b]
-            mass_matrix(r, system.mass[b], system.M3[b], w.s, w.Z, w.B, D)
-            velocity_jacobian(
-                r, system.M3[b], system.axial[b], system.damping[b], V[b, 3:6], V[b, 6:], w.s, w.Z, w.B, P
-            )
-            position_jacobian(
-                r, system.M3[b], system.S[b], system.axial[b], system.stiffness[b], w.a, V[b, 3:6], V[b, 6:],
-                Vd[b, 6:], w.B, w.W, D, w.E, w.T, w.tmp, K,
-            )  # fmt: skip
-            _add_elastic_forces(system, b, u[b], V[b, 6:], True, w, blocks.res[b], P, K)
-            beta = Hv[b, 0, 0]
-            for i in range(n):
-                for k in range(n):
-                    P[i, k] += scheme.acceleration * D[i, k]
-                for k in range(3):
-                    K[i, k] += beta * P[i, k]
-                    K[i, 3 + k] += P[i, 3] * Hv[b, 1, 1 + k] + P[i, 4] * Hv[b, 2, 1 + k] + P[i, 5] * Hv[b, 3, 1 + k]
-                for k in range(6, n):
-                    K[i, k] += beta * P[i, k]
+    for b in system.turning:
+        _turning_rows(system, b, u, V, Vd, tangent, w, blocks)
+    for b in system.straight:
+        _straight_rows(system, b, u, V, Vd, tangent, w, blocks)
+    for b in system.stvk:
+        _add_stvk_forces(system, b, u[b], V[b, 6:], tangent, w, blocks)
+    for b in system.neohookean:
+        _add_neohookean_forces(system, b, u[b], V[b, 6:], tangent, w, blocks)
+    if tangent:
+        for b in range(count):
+            _follow_positions(6 + system.elastic[b], scheme.acceleration, Hv[b], blocks.D[b], blocks.P[b], blocks.K[b])
     for joint in range(len(system.rows)):
         _joint_rows(system, scheme, joint, angle[joint], rate[joint], c, u, V, lam[joint], Hv, tangent, w, blocks)

@@ -125,8 +125,8 @@ def body_residual(r, mass, M3, S, axial, stiffness, damping, a, om, al, u, v, vd
 
 
 @kernel
-def mass_matrix(r, mass, M3, s, Z, B, D):
-    """D, shape [6 + r, 6 + r]: the rows by (a, alpha, v'), symmetric. Formulation, section 1."""
+def rigid_mass_matrix(mass, s, Z, D):
+    """The part of `mass_matrix` by (a, alpha), shape [6, 6]."""
     trace = Z[0, 0] + Z[1, 1] + Z[2, 2]
     for i in range(3):
         for k in range(3):
@@ -145,6 +145,12 @@ def mass_matrix(r, mass, M3, s, Z, B, D):
     for i in range(3):
         for k in range(3):
             D[i, 3 + k] = D[3 + k, i]
+
+
+@kernel
+def mass_matrix(r, mass, M3, s, Z, B, D):
+    """D, shape [6 + r, 6 + r]: the rows by (a, alpha, v'), symmetric. Formulation, section 1."""
+    rigid_mass_matrix(mass, s, Z, D)
     for j in range(r):
         for i in range(3):
             k, m = (i + 1) % 3, (i + 2) % 3

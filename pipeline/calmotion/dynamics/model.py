@@ -11,7 +11,7 @@ import numpy as np
 from ..fem.reduced_body import Marker, ReducedBody, rigid_invariants
 from ..shot.character import Array, Body, BoolArray, Character, IntArray
 from .joint_arrays import BodyAnchors, body_anchors, joint_arrays, rotation_matrix
-from .system import LINEAR, NEOHOOKEAN, STVK, System
+from .system import LINEAR, NEOHOOKEAN, STVK, System, components
 from .topology import Tree, span_tree
 
 
@@ -92,7 +92,7 @@ def compile_model(character: Character, tree: Tree, bodies: Sequence[ReducedBody
         return np.zeros((count,) + shape)
 
     mass, s, Z, M3, M4 = zeros(), zeros(3), zeros(3, 3), zeros(r_max, 3), zeros(r_max, 3, 3)
-    S, axial = zeros(r_max, r_max, 3, 3), zeros(r_max, r_max, 3)
+    S, axial, axial0 = zeros(r_max, r_max, 3, 3), zeros(r_max, r_max, 3), zeros(r_max, 3)
     stiffness, damping = zeros(r_max), zeros(r_max, r_max)
     elastic = np.zeros(count, np.int32)
     for k, b in enumerate(tree.body):
@@ -104,13 +104,16 @@ def compile_model(character: Character, tree: Tree, bodies: Sequence[ReducedBody
         for i in range(3):
             j, m = (i + 1) % 3, (i + 2) % 3
             axial[k, :r, :r, i] = integrals.S[:, :, j, m] - integrals.S[:, :, m, j]
+            axial0[k, :r, i] = integrals.M4[:, j, m] - integrals.M4[:, m, j]
         damping[k, :r, :r] = body.damping
         if body.elasticity is None:
             stiffness[k, :r] = body.stiffness
     joints = joint_arrays(character, tree, bodies, anchors, r_max, moving)
+    straight = np.array([character.bodies[b].straight for b in tree.body], bool)
     system = System(
         parent=np.array(tree.parent, np.int32), elastic=elastic, mass=mass, s=s, Z=Z, M3=M3, M4=M4, S=S, axial=axial,
-        stiffness=stiffness, damping=damping, gravity=np.asarray(character.gravity, dtype=float),
+        axial0=axial0, turning=components(~straight), straight=components(straight), stiffness=stiffness,
+        damping=damping, gravity=np.asarray(character.gravity, dtype=float),
         **_elastic_laws([bodies[b] for b in tree.body]), **joints.arrays,
     )  # fmt: skip
     targets = _targets(character, tree, bodies, anchors, r_max)
@@ -134,7 +137,8 @@ def _elastic_laws(bodies: Sequence[ReducedBody]) -> dict[str, Any]:
         size += item.data.size
     data = np.concatenate(arrays) if arrays else np.zeros(0)
     return {
-        "law": law, "retardation": retardation, "lame": lame, "points": points, "data_start": start, "data": data,
+        "law": law, "stvk": components(law == STVK), "neohookean": components(law == NEOHOOKEAN),
+        "retardation": retardation, "lame": lame, "points": points, "data_start": start, "data": data,
     }  # fmt: skip
 
 
@@ -172,9 +176,12 @@ def rigid_model(model: Model) -> Model:
         M4=np.ascontiguousarray(system.M4[:, :none]),
         S=np.ascontiguousarray(system.S[:, :none, :none]),
         axial=np.ascontiguousarray(system.axial[:, :none, :none]),
+        axial0=np.ascontiguousarray(system.axial0[:, :none]),
         stiffness=np.ascontiguousarray(system.stiffness[:, :none]),
         damping=np.ascontiguousarray(system.damping[:, :none, :none]),
         law=np.full_like(system.law, LINEAR),
+        stvk=system.stvk[:none],
+        neohookean=system.neohookean[:none],
         data=np.zeros(0),
         Phi=np.ascontiguousarray(system.Phi[..., :none]),
         Psi=np.ascontiguousarray(system.Psi[..., :none]),

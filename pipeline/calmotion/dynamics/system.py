@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..shot.character import Array, IntArray
+from ..shot.character import Array, BoolArray, IntArray
 
 JOINT_ROWS = 6
 BACKWARD_DIFFERENCE, NEWMARK = 0, 1  # families of time-stepping formulas
@@ -31,9 +31,12 @@ class System(NamedTuple):
         moving: Row of `assembly.Work.world` that moves the world-side marker of a joint, -1 for none, shape [J].
         mass, s, Z, M3, M4, S: Inertia integrals, see `fem.Invariants`.
         axial: axial(S[j, k]) = int rho phi_j x phi_k, shape [B, R, R, 3].
+        axial0: axial(M4[j]) = int rho X x phi_j, shape [B, R, 3].
+        turning, straight: Components with the inertia of `inertia`, and those with that of `constant_inertia`.
         stiffness: Diagonal, shape [B, R]; zero for a nonlinear body.
         damping: Symmetric, shape [B, R, R]; of a nonlinear body, what goes by mass.
         law: Elastic law: LINEAR, STVK, NEOHOOKEAN, shape [B].
+        stvk, neohookean: Components of these laws.
         retardation: Kelvin-Voigt coefficient of nonlinear bodies [s], shape [B].
         lame: Lame's constants [Pa], shape [B, 2], where the law is NEOHOOKEAN.
         points: Number of cubature points, shape [B].
@@ -55,9 +58,14 @@ class System(NamedTuple):
     M4: Array
     S: Array
     axial: Array
+    axial0: Array
+    turning: IntArray
+    straight: IntArray
     stiffness: Array
     damping: Array
     law: IntArray
+    stvk: IntArray
+    neohookean: IntArray
     retardation: Array
     lame: Array
     points: IntArray
@@ -165,6 +173,11 @@ class Factors(NamedTuple):
     lu: Array
     pivots: IntArray
     Z: Array
+
+
+def components(chosen: BoolArray) -> IntArray:
+    """Numbers of the components that are chosen by an array of shape [B]."""
+    return np.flatnonzero(chosen).astype(np.int32)
 
 
 def allocate_state(system: System) -> State:
