@@ -15,9 +15,10 @@ if TYPE_CHECKING:
     Commands = argparse._SubParsersAction[argparse.ArgumentParser]
 
 BENCHMARKS = (
-    "baselines", "gradients", "integrators", "meshing", "optimizer", "reading", "reduction", "scaling", "stability",
-    "tolerances", "work-precision",
+    "baselines", "gradients", "integrators", "meshing", "needs", "optimizer", "reading", "reduction", "scaling",
+    "stability", "tolerances", "work-precision",
 )  # fmt: skip
+NEEDS = ("bodies", "turning", "loops", "modes", "elasticity", "motors", "ranges")  # those of `shot.needs`
 DONE, FAILED, WRONG_USAGE, INTERRUPTED = 0, 1, 2, 130
 
 
@@ -79,6 +80,8 @@ def _parser() -> argparse.ArgumentParser:
     )
     for command in (simulate, optimize):
         _run_options(command)
+    for command in (inspect, simulate, optimize):
+        _needs_options(command)
     rig = _shot_command(commands, "rig", _rig, "make a robot of a skinned character: bodies, joints, motors, targets")
     rig.add_argument("-o", "--output", metavar="LAYER", required=True, help="USD layer to write; it opens the shot")
     bench = commands.add_parser(
@@ -174,6 +177,15 @@ def _run_options(command: argparse.ArgumentParser) -> None:
     model.add_argument(
         "--pre-roll", metavar="TIME", type=_quantity("s"), help="time that eases into the motion (default: automatic)"
     )
+
+
+def _needs_options(command: argparse.ArgumentParser) -> None:
+    group = command.add_argument_group("what a shot needs, otherwise decided by the tolerance")
+    for flag, text in (("--keep", "do not leave out"), ("--leave-out", "leave out")):
+        group.add_argument(
+            flag, metavar="KIND", action="append", default=[], choices=("all", *NEEDS),
+            help=f"{text} {', '.join(NEEDS[:-1])}, {NEEDS[-1]} or all; may be repeated",
+        )  # fmt: skip
 
 
 def _quantity(unit: str) -> Callable[[str], float]:

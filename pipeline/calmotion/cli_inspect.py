@@ -15,8 +15,8 @@ from .cli_progress import ProgressDisplay
 from .cli_report import left_out_row, operator_row
 from .cli_run import FAILED, INTERRUPTED, asked_for, carry_out, conclude, problems_of, settings_of, tell_failures
 from .errors import ShotError
-from .host import HostError, ModeShapes, OutputPaths, ReducedBodies, Run, Source, SystemModes, open_host
-from .shot import Animation, Body, Character, Findings, LeftOut, ModeTable, Motor, Provenance, Track
+from .host import HostError, ModeShapes, OutputPaths, PlannedStep, ReducedBodies, Run, Source, SystemModes, open_host
+from .shot import Animation, Body, Character, Findings, LeftOut, ModeTable, Motor, Needs, Provenance, Track
 from .shot.measure import measure_of
 
 SHOWN_MODES = 10
@@ -36,7 +36,7 @@ def inspect_shot(args: argparse.Namespace, output: Output) -> int:
         wanted.append(ModeShapes)
     wanted += asked_for(host, args)
     tell_failures(host, args.quiet)
-    optional = [Character, Animation, Provenance] if args.strict else [ReducedBodies, SystemModes]
+    optional = [Character, Animation, Provenance] if args.strict else [Needs, ReducedBodies, SystemModes, PlannedStep]
     with ProgressDisplay(args.quiet, args.progress) as display:
         run = host.run(
             [Source(path=args.shot, command="check" if args.strict else "inspect"), OutputPaths(modes=args.modes)],
@@ -63,9 +63,10 @@ def inspect_shot(args: argparse.Namespace, output: Output) -> int:
 def inspect_report(run: Run) -> dict[str, Any]:
     """The object of `inspect --json`; SI units and radians, as the names of the keys say."""
     character, animation, provenance = run.data[Character], run.data[Animation], run.data[Provenance]
-    reduced, modes = run.get(ReducedBodies), run.get(SystemModes)
+    reduced, modes, needs = run.get(ReducedBodies), run.get(SystemModes), run.get(Needs)
     tables = {table.body: table for table in reduced.modes} if reduced else {}
     names = [body.path for body in character.bodies]
+    bends = [body.bends for body in (needs.character if needs else character).bodies]
     return {
         "command": "inspect",
         "version": __version__,
@@ -83,7 +84,7 @@ def inspect_report(run: Run) -> dict[str, Any]:
         "duration_s": float(animation.frame_times[-1]),
         "character": character.path,
         "gravity_m_s2": character.gravity,
-        "bodies": [_body(body, tables.get(index)) for index, body in enumerate(character.bodies)],
+        "bodies": [_body(body, tables.get(index), bends[index]) for index, body in enumerate(character.bodies)],
         "joints": [
             {
                 "path": joint.path,
@@ -111,20 +112,24 @@ def inspect_report(run: Run) -> dict[str, Any]:
         "system_damping_ratios": modes.damping[:SHOWN_MODES].tolist() if modes else [],
         "mode_shapes": list(shapes.paths) if (shapes := run.get(ModeShapes)) else [],
         "notes": list(character.notes),
-        "left_out": [left_out_row(row) for row in (*run.left_out(), *_without(reduced))],
+        "needs": [dataclasses.asdict(row) for row in needs.rows] if needs else [],
+        "left_out": [left_out_row(row) for row in (*run.left_out(), *_without(needs, reduced, run.get(PlannedStep)))],
         "operators": [operator_row(row) for row in run.results],
     }
 
 
-def _without(reduced: ReducedBodies | None) -> Sequence[LeftOut]:
-    """What the flexible bodies do without."""
-    return [row for body in reduced.bodies for row in body.left_out] if reduced else []
+def _without(needs: Needs | None, reduced: ReducedBodies | None, step: PlannedStep | None) -> Sequence[LeftOut]:
+    """What the shot and its flexible bodies do without."""
+    rows = list(needs.left_out) if needs else []
+    rows += [row for body in reduced.bodies for row in body.left_out] if reduced else []
+    return [*rows, step.row] if step else rows
 
 
-def _body(body: Body, table: ModeTable | None) -> dict[str, Any]:
+def _body(body: Body, table: ModeTable | None, bends: bool) -> dict[str, Any]:
     report: dict[str, Any] = {
         "path": body.path,
         "kind": "flexible" if body.flexible else "rigid",
+        "simulated": "flexible" if bends else "rigid",
         # The mesh's mass is the one that is simulated, so it beats the one of the shot.
         "mass_kg": table.mass if table else body.mass.mass if body.mass else None,
     }

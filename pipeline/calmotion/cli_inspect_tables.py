@@ -83,7 +83,7 @@ def _body_row(body: dict[str, Any]) -> list[str]:
     shown = ", ".join(frequencies[:6]) + (", ..." if len(frequencies) > 6 else "")
     return [
         body["path"],
-        body["kind"],
+        body["kind"] if body["kind"] == body["simulated"] else f"{body['kind']}, here {body['simulated']}",
         "-" if body["mass_kg"] is None else f"{body['mass_kg']:.4g} kg",
         str(body.get("elements", "-")),
         f"{shown} Hz" if shown else "-",

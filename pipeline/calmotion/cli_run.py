@@ -37,13 +37,22 @@ FAILED, INTERRUPTED = 1, 130
 
 
 def settings_of(args: argparse.Namespace) -> Settings:
-    """Settings from `--settings` and `--set`, the latter stronger.
+    """Settings from `--settings`, `--keep` and `--leave-out`, and `--set`, each stronger than the one before.
 
     Raises:
         SettingError: When a file or an assignment cannot be read.
     """
     file = [read_settings_file(args.settings)] if args.settings else []
-    return merge([*file, *(read_assignment(text) for text in args.set)])
+    return merge([*file, _forced_needs(args), *(read_assignment(text) for text in args.set)])
+
+
+def _forced_needs(args: argparse.Namespace) -> Settings:
+    from .shot.needs import KINDS, OFF, ON
+
+    forced: dict[str, object] = {}
+    for given, choice in ((getattr(args, "leave_out", []), OFF), (getattr(args, "keep", []), ON)):
+        forced |= {kind: choice for name in given for kind in (KINDS if name == "all" else (name,))}
+    return {"needs.analyse": forced} if forced else {}
 
 
 def _options_of_the_writer(args: argparse.Namespace) -> Settings:

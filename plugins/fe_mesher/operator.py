@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from calmotion.host import Operator, Property, RunContext
-from calmotion.shot import Character, FEMeshes
+from calmotion.shot import Character, FEMeshes, Needs
 
 
 class TetrahedralizeFlexibleBodies(Operator):
@@ -15,6 +15,7 @@ class TetrahedralizeFlexibleBodies(Operator):
     idname = "fe.mesh"
     label = "Tetrahedralise flexible bodies"
     requires = (Character,)
+    uses = (Needs,)
     provides = (FEMeshes,)
     properties = (
         Property(
@@ -39,9 +40,11 @@ class TetrahedralizeFlexibleBodies(Operator):
     @classmethod
     def poll(cls, data: Mapping[type, Any]) -> str | None:
         """Left out where nothing bends."""
-        character = data.get(Character)
-        if character is not None and not any(body.bends for body in character.bodies):
+        character, needs = data.get(Character), data.get(Needs)
+        if character is not None and not any(body.flexible for body in character.bodies):
             return "no body is flexible"
+        if needs is not None and not any(body.bends for body in needs.character.bodies):
+            return "nothing bends noticeably in this shot"
         return None
 
     def execute(self, context: RunContext) -> Sequence[object]:
@@ -50,7 +53,8 @@ class TetrahedralizeFlexibleBodies(Operator):
         from .accuracy import carrier_of
         from .body_mesh import MeshOptions, mesh_body
 
-        character = context.get(Character)
+        needs = context.get(Needs)
+        character = context.get(Character) if needs is None else needs.character
         options = MeshOptions(
             element_size=context.properties.element_size,
             time_limit=context.properties.time_limit,

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from calmotion.host import ModeShapes, Operator, OutputPaths, Property, RunContext, Source
-from calmotion.shot import Animation, Character, FEMeshes
+from calmotion.shot import Animation, Character, FEMeshes, Needs
 
 
 class WriteModeShapes(Operator):
@@ -15,7 +15,7 @@ class WriteModeShapes(Operator):
     idname = "modes.write"
     label = "Write the mode shapes"
     requires = (Character, FEMeshes, OutputPaths)
-    uses = (Animation, Source)
+    uses = (Animation, Source, Needs)
     provides = (ModeShapes,)
     properties = (
         Property("dpi", int, 150, minimum=30, maximum=600, description="Resolution of the pictures, dots an inch."),
@@ -35,7 +35,8 @@ class WriteModeShapes(Operator):
 
         from .writing import write_modes
 
-        character, meshes, animation = context.get(Character), context.get(FEMeshes), context.get(Animation)
+        meshes, animation, needs = context.get(FEMeshes), context.get(Animation), context.get(Needs)
+        character = context.get(Character) if needs is None else needs.character
         source = context.get(Source)
         options = Options() if source is None else Options(tolerance=source.tolerance, step=source.step)
         loads = None if animation is None else excitations(character, animation, meshes, options)

@@ -4,21 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from calmotion.host import NotAsked, Operator, Property, RunContext
 from calmotion.host.values import OutputPaths, ReducedBodies, ShapedTracks, Source, SystemModes, Verification
-from calmotion.shot import Animation, Character, FEMeshes, Result
+from calmotion.shot import Animation, Character, FEMeshes, Needs, Result
 
-if TYPE_CHECKING:
-    from calmotion.retarget.prepare import Options
-
-
-def _nothing_flexible(data: Mapping[type, Any]) -> str | None:
-    character = data.get(Character)
-    if character is not None and not any(body.bends for body in character.bodies):
-        return "nothing is flexible: no body has CalmFlexibleBodyAPI"
-    return None
+from .inputs import character_of, inputs, nothing_flexible, options_of, with_needs
+from .needs import AnalyseNeeds, PlanStep
 
 
 def _wrong_command(data: Mapping[type, Any], command: str) -> str | None:
@@ -32,7 +25,7 @@ class ReduceFlexibleBodies(Operator):
     idname = "fem.reduce"
     label = "Reduce flexible bodies"
     requires = (Character,)
-    uses = (FEMeshes, Animation, Source)
+    uses = (FEMeshes, Animation, Source, Needs)
     provides = (ReducedBodies,)
     properties = (
         Property(
@@ -46,20 +39,20 @@ class ReduceFlexibleBodies(Operator):
 
     @classmethod
     def poll(cls, data: Mapping[type, Any]) -> str | None:
-        return _nothing_flexible(data)
+        return nothing_flexible(data)
 
     def execute(self, context: RunContext) -> Sequence[object]:
         from calmotion.dynamics.topology import span_tree
         from calmotion.retarget.bodies import mode_tables, reduce_bodies, with_elasticity
         from calmotion.retarget.prepare import excitations
 
-        character, meshes, animation = context.get(Character), context.get(FEMeshes), context.get(Animation)
+        character, meshes, animation = character_of(context), context.get(FEMeshes), context.get(Animation)
         if context.properties.elasticity != "shot":
             character = with_elasticity(character, context.properties.elasticity)
         loads, tolerance, source = None, None, context.get(Source)
         if animation is not None and source is not None:
             context.progress(0.0, "compiling kernels, once")
-            options = _options(context)
+            options = options_of(context)
             if source.command == "simulate" and source.tolerance is not None:
                 from calmotion.retarget.settled_bodies import settled_bodies
 
@@ -76,7 +69,7 @@ class FindSystemModes(Operator):
     idname = "dynamics.modes"
     label = "Find the frequencies of the character"
     requires = (Character, Animation)
-    uses = (ReducedBodies, Source, OutputPaths)
+    uses = (ReducedBodies, Source, OutputPaths, Needs)
     provides = (SystemModes,)
 
     @classmethod
@@ -85,13 +78,13 @@ class FindSystemModes(Operator):
         if source is not None and source.command != "inspect" and paths is not None:
             if not paths.figures and not paths.rrd:
                 return NotAsked("only figures and recordings show frequencies, and none are asked for")
-        return _nothing_flexible(data)
+        return nothing_flexible(data)
 
     def execute(self, context: RunContext) -> Sequence[object]:
         from calmotion.retarget.prepare import first_pose_modes
 
         context.progress(0.0, "compiling kernels, once")
-        return [SystemModes(*first_pose_modes(*_inputs(context)))]
+        return [SystemModes(*first_pose_modes(*inputs(context)))]
 
 
 class ShapeTracks(Operator):
@@ -100,7 +93,7 @@ class ShapeTracks(Operator):
     idname = "retarget.shape"
     label = "Shape the motors' tracks"
     requires = (Character, Animation, Source)
-    uses = (ReducedBodies,)
+    uses = (ReducedBodies, Needs)
     provides = (ShapedTracks,)
     properties = (
         Property("cutoff", float, 0.5, minimum=0.01, description="Of the low-pass filter, over the lowest frequency"),
@@ -115,7 +108,7 @@ class ShapeTracks(Operator):
         from calmotion.retarget.run import shape_tracks
 
         kind, cutoff = context.get(Source).shaper or "", context.properties.cutoff
-        return [ShapedTracks(shape_tracks(*_inputs(context), _options(context), kind, cutoff))]
+        return [ShapedTracks(shape_tracks(*inputs(context), options_of(context), kind, cutoff))]
 
 
 class SimulateShot(Operator):
@@ -124,7 +117,7 @@ class SimulateShot(Operator):
     idname = "retarget.simulate"
     label = "Simulate the shot"
     requires = (Character, Animation, Source)
-    uses = (ReducedBodies, ShapedTracks)
+    uses = (ReducedBodies, ShapedTracks, Needs)
     provides = (Result,)
 
     @classmethod
@@ -134,13 +127,14 @@ class SimulateShot(Operator):
     def execute(self, context: RunContext) -> Sequence[object]:
         from calmotion.retarget.to_tolerance import simulate_to_tolerance
 
-        character, animation, bodies = _inputs(context)
+        character, animation, bodies = inputs(context)
         shaped = context.get(ShapedTracks)
         if shaped is not None:
             animation = replace(animation, current=shaped.tracks)
         reduced = context.get(ReducedBodies)
         error = None if reduced is None else reduced.error_m
-        return [simulate_to_tolerance(character, animation, bodies, _options(context), context.progress, error)]
+        result = simulate_to_tolerance(character, animation, bodies, options_of(context), context.progress, error)
+        return [with_needs(result, context)]
 
 
 class OptimizeShot(Operator):
@@ -149,7 +143,7 @@ class OptimizeShot(Operator):
     idname = "retarget.optimize"
     label = "Optimise the motor curves"
     requires = (Character, Animation, Source)
-    uses = (ReducedBodies, OutputPaths)
+    uses = (ReducedBodies, OutputPaths, Needs)
     provides = (Result,)
     properties = (
         Property("max_iterations", int, 30, minimum=1, description="Most Gauss-Newton iterations"),
@@ -178,22 +172,23 @@ class OptimizeShot(Operator):
         from calmotion.retarget.checkpoint import checkpoint_path
         from calmotion.retarget.to_tolerance import optimize_to_tolerance
 
-        values = context.properties
-        options = _options(
+        values, needs = context.properties, context.get(Needs)
+        options = options_of(
             context,
             max_iterations=values.max_iterations,
             knot_spacing=values.knot_spacing if values.knot_spacing > 0.0 else None,
             smoothness=values.smoothness if values.smoothness >= 0.0 else None,
             adjoint=values.adjoint,
+            ranges="auto" if needs is None else needs.choice("ranges"),
         )
         paths = context.get(OutputPaths)
         kept = checkpoint_path(paths.layer) if paths is not None and paths.layer else None
-        result = optimize_to_tolerance(*_inputs(context), options, context.progress, kept)
+        result = optimize_to_tolerance(*inputs(context), options, context.progress, kept)
         if result.interrupted:
             context.report(
                 "warning", "interrupted: these are the best curves so far; the same command goes on from them"
             )
-        return [result]
+        return [with_needs(result, context)]
 
 
 class VerifyResult(Operator):
@@ -202,7 +197,7 @@ class VerifyResult(Operator):
     idname = "retarget.verify"
     label = "Compare with a finer run"
     requires = (Character, Animation, Source, Result)
-    uses = (FEMeshes, ReducedBodies, ShapedTracks)
+    uses = (FEMeshes, ReducedBodies, ShapedTracks, Needs)
     provides = (Verification,)
 
     @classmethod
@@ -216,30 +211,21 @@ class VerifyResult(Operator):
         animation, shaped = context.get(Animation), context.get(ShapedTracks)
         if shaped is not None:
             animation = replace(animation, current=shaped.tracks)
-        character, _, bodies = _inputs(context)
-        meshes, result, options = context.get(FEMeshes), context.get(Result), _options(context)
+        character, _, bodies = inputs(context)
+        meshes, result, options = context.get(FEMeshes), context.get(Result), options_of(context)
         return [Verification(*verify(character, animation, meshes, bodies, result, options, context.progress))]
 
 
-def _inputs(context: RunContext) -> tuple[Character, Animation, Sequence[Any] | None]:
-    reduced = context.get(ReducedBodies)
-    return context.get(Character), context.get(Animation), None if reduced is None else reduced.bodies
-
-
-def _options(context: RunContext, **more: Any) -> Options:
-    from calmotion.retarget.prepare import Options
-
-    source = context.get(Source)
-    return Options(
-        tolerance=source.tolerance,
-        step=source.step,
-        pre_roll=source.pre_roll,
-        integrator=source.integrator,
-        **more,
-    )
-
-
-OPERATORS = (ReduceFlexibleBodies, FindSystemModes, ShapeTracks, SimulateShot, OptimizeShot, VerifyResult)
+OPERATORS = (
+    AnalyseNeeds,
+    PlanStep,
+    ReduceFlexibleBodies,
+    FindSystemModes,
+    ShapeTracks,
+    SimulateShot,
+    OptimizeShot,
+    VerifyResult,
+)
 
 
 def register(host: Any) -> None:

@@ -8,7 +8,7 @@ import pytest
 from calmotion.evidence import tolerances, work_precision
 from calmotion.evidence.beam_arm import beam_arm, quintic, shot_of
 from calmotion.evidence.shots import Unreduced
-from calmotion.evidence.tolerances import kept
+from calmotion.evidence.tolerances import Tolerances
 
 
 @pytest.fixture(scope="module")
@@ -21,7 +21,17 @@ def shot():
 def rows(shot):
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(work_precision, "REFERENCE_STEP", 1 / 1920)
-        return [kept(shot, tolerance) for tolerance in (1e-2, 1e-3)]
+        return [Tolerances(shot).kept(tolerance, "optimize") for tolerance in (1e-2, 1e-3)]
+
+
+def test_simulations_keep_their_tolerance(shot):
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(work_precision, "REFERENCE_STEP", 1 / 1920)
+        measured = Tolerances(shot)
+        found = [measured.kept(tolerance) for tolerance in (1e-2, 1e-3, 1e-4)]
+    assert all(row.kept and row.reference_m < 0.1 * row.tolerance_m for row in found)
+    assert found[2].step_s < found[0].step_s
+    assert found[0].shake_after_m == found[0].shake_before_m
 
 
 def test_results_keep_their_tolerance(rows):
@@ -34,8 +44,17 @@ def test_results_keep_their_tolerance(rows):
 def test_the_command_tells_whether_they_are_kept(shot, rows, monkeypatch, capsys, tmp_path):
     found = list(rows)
     monkeypatch.setattr(tolerances, "load_unreduced", lambda path: shot)
-    monkeypatch.setattr(tolerances, "kept", lambda shot, tolerance: found.pop(0))
-    arguments = ["arm.usda", "--tolerances", "0.01", "0.001", "--json", "--csv", str(tmp_path / "rows.csv")]
+    monkeypatch.setattr(Tolerances, "kept", lambda self, tolerance, command: found.pop(0))
+    arguments = [
+        "arm.usda",
+        "--tolerances",
+        "0.01",
+        "0.001",
+        "--optimize",
+        "--json",
+        "--csv",
+        str(tmp_path / "rows.csv"),
+    ]
     assert tolerances.main(arguments) == 0
     assert [row["kept"] for row in json.loads(capsys.readouterr().out)["rows"]] == [True, True]
     with open(tmp_path / "rows.csv", newline="") as file:

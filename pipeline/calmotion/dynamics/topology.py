@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from ..errors import ShotError
-from ..shot.character import WORLD, Character
+from ..shot.character import WORLD, Character, IntArray
 
 
 @dataclass(frozen=True)
@@ -69,6 +70,23 @@ def span_tree(character: Character) -> Tree:
             )
     needed = tuple(index for index in loops if not character.joints[index].redundant)
     return Tree(tuple(body), tuple(parent), tuple(joint_of), tuple(flipped), needed)
+
+
+def loop_members(parent: Sequence[int] | IntArray, ends: Sequence[int] | IntArray) -> set[int]:
+    """Components of the loop that a joint between two of them closes.
+
+    Args:
+        parent: Of each component, -1 for the world.
+        ends: The two components, -1 for the world.
+    """
+    paths = []
+    for end in ends:
+        path, b = set(), int(end)
+        while b >= 0:
+            path.add(b)
+            b = int(parent[b])
+        paths.append(path)
+    return paths[0] ^ paths[1]
 
 
 def _spanning(character: Character) -> tuple[list[int], list[int]]:

@@ -13,7 +13,8 @@ from ..errors import ShotError
 from ..fem.reduced_body import ReducedBody
 from ..retarget.bodies import reduce_bodies
 from ..retarget.prepare import Options, excitations
-from ..shot import Animation, Character, FEMeshes
+from ..shot import Animation, Character, FEMeshes, Needs
+from ..shot.needs import ON
 
 MADE = {
     "linkage": "an arm with a four-bar, made in code",
@@ -59,7 +60,12 @@ def load_unreduced(path: str, element_size: float | None = None) -> Unreduced:
     """
     from ..host import Source, open_host
 
-    settings: dict[str, dict[str, object]] = {} if element_size is None else {"fe.mesh": {"element_size": element_size}}
+    # everything is kept, so that what could be left out can be compared with it
+    settings: dict[str, dict[str, object]] = {
+        "needs.analyse": dict.fromkeys(("bodies", "turning", "loops", "motors"), ON)
+    }
+    if element_size is not None:
+        settings["fe.mesh"] = {"element_size": element_size}
     run = open_host([]).run(
         [Source(path=path, command="simulate")], [Character, Animation, FEMeshes], settings=settings
     )
@@ -87,14 +93,14 @@ def load(name: str) -> BenchShot:
         )
     from ..host import ReducedBodies, Source, open_host
 
-    run = open_host([]).run([Source(path=name, command="optimize")], [Character, Animation, ReducedBodies])
+    run = open_host([]).run([Source(path=name, command="optimize")], [Character, Animation, Needs, ReducedBodies])
     for result in run:
         if result.error is not None:
             raise result.error
-    found, animation_found, reduced = run.get(Character), run.get(Animation), run.get(ReducedBodies)
-    if found is None or animation_found is None or reduced is None:
+    needs, animation_found, reduced = run.get(Needs), run.get(Animation), run.get(ReducedBodies)
+    if needs is None or animation_found is None or reduced is None:
         raise ShotError("has nothing flexible to retarget", path=name)
-    return BenchShot(Path(name).stem, found, animation_found, reduced.bodies)
+    return BenchShot(Path(name).stem, needs.character, animation_found, reduced.bodies)
 
 
 def _made(name: str) -> tuple[Character, Animation, FEMeshes]:

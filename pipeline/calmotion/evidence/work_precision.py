@@ -16,6 +16,7 @@ import sys
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import partial
+from itertools import pairwise
 
 import numpy as np
 
@@ -25,7 +26,7 @@ from ..fem.reduced_body import ReducedBody
 from ..retarget.bodies import reduce_bodies, with_elasticity
 from ..retarget.prepare import Options, excitations
 from ..retarget.settled_bodies import settled_bodies
-from ..retarget.step_error import StepRun, distance, simulate_at, step_error
+from ..retarget.step_error import StepRun, distance, simulate_at
 from ..retarget.time_grid import MAX_STEP
 from ..retarget.to_tolerance import chosen_step
 from ..shot.character import Array
@@ -102,11 +103,17 @@ class Bench:
         return simulate_at(self.shot.character, self.shot.animation, bodies, options, step)
 
     def reference(self) -> Reference:
-        """The finest run; its bar is the estimated error of its step, and what ten times the tolerance changes."""
+        """The finest run, its step extrapolated to zero.
+
+        Its bar is what is left of the step's error, which falls by eight where that is halved, and what ten times the
+        tolerance of the reduction changes.
+        """
         bodies = self.bodies(FINEST)
-        fine, coarse = self.run(bodies, REFERENCE_STEP), self.run(bodies, 2.0 * REFERENCE_STEP)
+        runs = [self.run(bodies, factor * REFERENCE_STEP) for factor in (1.0, 2.0, 4.0)]
+        limits = [fine.positions + (fine.positions - coarse.positions) / 3.0 for fine, coarse in pairwise(runs)]
         other = self.run(self.bodies(10.0 * FINEST), 2.0 * REFERENCE_STEP)
-        return Reference(fine.positions, step_error(coarse, fine) + distance(other.positions, coarse.positions))
+        bar = distance(limits[0], limits[1]) / 7.0 + distance(other.positions, runs[1].positions)
+        return Reference(limits[0], bar)
 
     def measure(
         self, reference: Reference, series: str, setting: str, bodies: Sequence[ReducedBody], step: float,

@@ -123,7 +123,8 @@ def linear_modes(
         excitation = patch_excitation(excitation, [patch.anchors for patch in moving], positions, centers)
     basis = reduced_basis(
         model, support.root, support.patches, support.centers, settings, excitation=excitation,
-        tolerance=tolerance if excitation is not None else None, targets=_points(model.mesh, anchors).displacements,
+        tolerance=settings.modes_share * tolerance if excitation is not None else None,
+        targets=_points(model.mesh, anchors).displacements,
     )  # fmt: skip
     return LinearModes(model, support, moving, basis, excitation)
 

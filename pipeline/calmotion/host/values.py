@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from ..fem import ReducedBody
-    from ..shot import ModeTable, Track
+    from ..shot import LeftOut, ModeTable, Track
     from ..shot.character import Array
 
 
@@ -152,6 +152,13 @@ class Verification:
     error_m: float
     step_s: float
     modes: int
+
+
+@dataclass(frozen=True, eq=False)
+class PlannedStep:
+    """The time step that a simulation of the shot would take: what it leaves out."""
+
+    row: LeftOut
 
 
 @dataclass(frozen=True, eq=False)

@@ -61,6 +61,8 @@ def reduce_bodies(
 
         frames = fem_anchors(character, body, anchors)
         excitation = None if excitations is None else excitations[index]
+        # what has no bearing on the reduction does not make it another one
+        body = replace(body, straight=False)
         parts = (mesh_of[index], body, frames, body.surfaces, anchors.root, excitation, allowed / flexible)
         result.append(cached_reduction(parts, partial(reduce_body, *parts)))
     return _damped(character, tree, result)

@@ -10,7 +10,7 @@ import numpy as np
 from ..dynamics.model import Model, body_anchors, compile_model, rigid_body
 from ..dynamics.reactions import reactions
 from ..dynamics.simulation import Workspace
-from ..dynamics.topology import Tree
+from ..dynamics.topology import Tree, loop_members
 from ..fem.excitation_data import Excitation
 from ..fem.mesh_mass import mass_of_tets
 from ..fem.reduced_body import ReducedBody
@@ -115,17 +115,9 @@ def excitation_of(character: Character, model: Model, run: ForwardRun, h: float)
 
 def _in_loops(model: Model) -> set[int]:
     """Components that are part of a closed loop."""
-    system, found = model.system, set()
-    for joint in range(len(system.parent), len(system.rows)):
-        paths = []
-        for side in system.side[joint]:
-            path, b = [], int(side)
-            while b >= 0:
-                path.append(b)
-                b = int(system.parent[b])
-            paths.append(path)
-        found |= set(paths[0]) ^ set(paths[1])
-    return found
+    system = model.system
+    closing = range(len(system.parent), len(system.rows))
+    return set().union(*(loop_members(system.parent, system.side[joint]) for joint in closing))
 
 
 def highest_frequency(signal: Array, h: float) -> float:

@@ -29,7 +29,7 @@ from .time_grid import TimeGrid, make_grid
 class Options:
     """What the user overrides; None keeps the shot's own or the automatic choice. Lengths [m], times [s].
 
-    `adjoint` is discrete or continuous.
+    `adjoint` is discrete or continuous; `ranges` is auto, on (the whole shot is searched) or off (see `quiet_ranges`).
     """
 
     tolerance: float | None = None
@@ -40,6 +40,7 @@ class Options:
     smoothness: float | None = None
     max_iterations: int = 30
     adjoint: str = "discrete"
+    ranges: str = "auto"
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,7 +99,8 @@ def excitations(
     from .excitation import shot_excitation
 
     try:
-        return shot_excitation(character, animation, grid_of(character, animation, options), span_tree(character), meshes)
+        grid, tree = grid_of(character, animation, options), span_tree(character)
+        return shot_excitation(character, animation, grid, tree, meshes)
     except SimulationFailure:
         return None  # the flexible robot will say so, with the place
 

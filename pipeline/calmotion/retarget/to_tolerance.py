@@ -12,13 +12,14 @@ from functools import partial
 from pathlib import Path
 
 from ..fem.reduced_body import ReducedBody
-from ..shot import Accuracy, Animation, Character, OptimizerStep, Result, Track
+from ..shot import Accuracy, Animation, Character, LeftOut, OptimizerStep, Result, Track
 from ..shot.character import Array
 from .curves import sample_tracks
 from .optimize import optimize_shot
 from .prepare import Options, prepare
 from .run import Progress, meant_motion, simulate_shot
 from .step_error import ORDER, StepRun, distance, frames_of, largest_step, run_or_none, simulate_at, step_error
+from .time_grid import MAX_STEP
 
 SHARE = 0.5  # of the tolerance, that the time step may take
 FIRST, LAST = 1.0 / 60.0, 1.0 / 30720.0  # steps that are tried [s]
@@ -41,7 +42,39 @@ def simulate_to_tolerance(
     progress(0.0, "choosing the time step")
     step, error = chosen_step(character, animation, bodies, options)
     result = simulate_shot(character, animation, bodies, replace(options, step=step), progress)
-    return replace(result, accuracy=Accuracy(error, _left_out(bodies) if left_out_m is None else left_out_m))
+    accuracy = Accuracy(error, _left_out(bodies) if left_out_m is None else left_out_m)
+    return _with_step(replace(result, accuracy=accuracy), character, options)
+
+
+def _with_step(result: Result, character: Character, options: Options) -> Result:
+    """The result with its time step among what was left out: finer ones, and what they would change."""
+    assert result.accuracy is not None
+    row = step_row(character, options, result.step_s, result.accuracy.step_m)
+    return replace(result, left_out=(*result.left_out, row))
+
+
+def step_row(character: Character, options: Options, step: float, error: float | None) -> LeftOut:
+    """Why steps [s] are no shorter, and their error at the targets [m]."""
+    if options.step is not None:
+        why = "the step was asked for"
+    elif character.retarget.time_step is not None:
+        why = "calm:retarget:timeStep says so"
+    elif _chooses(character, options):
+        why = f"they keep the tolerance of {1e3 * (options.tolerance or 0.0):g} mm"
+    else:
+        why = "at 1/480 s motions of 10 Hz are simulated to better than a percent"
+    return LeftOut(f"time steps shorter than {1e3 * step:.3g} ms", why, error)
+
+
+def planned_step(character: Character, animation: Animation, bodies: Bodies, options: Options) -> LeftOut:
+    """The step that a simulation of the shot as animated would take, and why, by simulating it."""
+    if _chooses(character, options):
+        return step_row(character, options, *chosen_step(character, animation, bodies, options))
+    trial = partial(simulate_at, character, animation, bodies, options)
+    fine = trial(options.step or character.retarget.time_step or MAX_STEP)
+    coarse = run_or_none(trial, 2.0 * fine.step)
+    error = None if coarse is None or coarse.step < 1.5 * fine.step else step_error(coarse, fine)
+    return step_row(character, options, fine.step, error)
 
 
 def chosen_step(character: Character, animation: Animation, bodies: Bodies, options: Options) -> tuple[float, float]:
@@ -128,7 +161,8 @@ def _estimated(result: Result, character: Character, animation: Animation, bodie
     coarse = run_or_none(trial, 2.0 * result.step_s)
     if coarse is None or coarse.step < 1.5 * fine.step:  # it fails, or a frame is no longer than the step
         coarse, fine = fine, trial(0.5 * result.step_s)
-    return replace(result, accuracy=Accuracy(step_error(coarse, fine), _left_out(bodies)))
+    accuracy = Accuracy(step_error(coarse, fine), _left_out(bodies))
+    return _with_step(replace(result, accuracy=accuracy), character, options)
 
 
 def _added(first: Result, then: Result) -> Result:

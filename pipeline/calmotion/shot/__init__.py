@@ -20,8 +20,8 @@ from .character import (
 )
 from .finding import Finding, Findings
 from .meshes import FEMesh, FEMeshes, MeshQuality
-from .provenance import InputLayer, Provenance
 from .needs import Need, Needs
+from .provenance import InputLayer, Provenance
 from .result import (
     Accuracy,
     LeftOut,

@@ -80,6 +80,7 @@ class FlexibleSettings:
         mesh_file: External mesh file, resolved; empty when the geometry is in the shot.
         mesh_scale: Metres per unit of that file.
         elasticity: `auto`, `linear`, `stvk` or `neohookean`.
+        modes_share: Of the tolerance, that modes which are left out may take when they are chosen automatically.
     """
 
     material: ElasticMaterial
@@ -90,6 +91,7 @@ class FlexibleSettings:
     mesh_file: str = ""
     mesh_scale: float = 1.0
     elasticity: str = "auto"
+    modes_share: float = 1.0
 
 
 @dataclass(frozen=True, eq=False)

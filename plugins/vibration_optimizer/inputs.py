@@ -1,0 +1,60 @@
+"""What the operators read of a run, in the engine's words."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+from calmotion.host import RunContext
+from calmotion.host.values import ReducedBodies, Source
+from calmotion.shot import Animation, Character, Needs, Result
+
+if TYPE_CHECKING:
+    from calmotion.retarget.prepare import Options
+
+
+def nothing_flexible(data: Mapping[type, Any]) -> str | None:
+    character, needs = data.get(Character), data.get(Needs)
+    if character is not None and not any(body.flexible for body in character.bodies):
+        return "nothing is flexible: no body has CalmFlexibleBodyAPI"
+    if needs is not None and not any(body.bends for body in needs.character.bodies):
+        return "nothing bends noticeably in this shot"
+    return None
+
+
+def inputs(context: RunContext) -> tuple[Character, Animation, Sequence[Any] | None]:
+    reduced = context.get(ReducedBodies)
+    return character_of(context), context.get(Animation), None if reduced is None else reduced.bodies
+
+
+def character_of(context: RunContext) -> Character:
+    """The character, marked with what the shot does not need of it."""
+    needs = context.get(Needs)
+    return context.get(Character) if needs is None else needs.character
+
+
+def with_needs(result: Result, context: RunContext) -> Result:
+    """The result, with what the shot does not need among what is left out."""
+    needs, accuracy = context.get(Needs), result.accuracy
+    if needs is None:
+        return result
+    if accuracy is not None:
+        more = sum(row.estimated_error_m or 0.0 for row in needs.left_out)
+        accuracy = replace(accuracy, left_out_m=accuracy.left_out_m + more)
+    return replace(result, left_out=(*needs.left_out, *result.left_out), accuracy=accuracy)
+
+
+def options_of(context: RunContext, **more: Any) -> Options:
+    from calmotion.retarget.prepare import Options
+
+    source = context.get(Source)
+    if source is None:
+        return Options(**more)
+    return Options(
+        tolerance=source.tolerance,
+        step=source.step,
+        pre_roll=source.pre_roll,
+        integrator=source.integrator,
+        **more,
+    )
