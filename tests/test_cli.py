@@ -301,11 +301,13 @@ def test_inspecting_a_rigid_shot_imports_neither_finite_elements_nor_rerun(tmp_p
     status, modules = json.loads(done.stderr.splitlines()[-1])
     report = json.loads(done.stdout)
     assert status == 0 and report["motors"][0]["max_rad"] == pytest.approx(np.pi / 6)
-    assert report["bodies"] == [{"path": "/Robot/Link", "kind": "rigid", "mass_kg": 2.0}]
+    assert report["bodies"] == [{"path": "/Robot/Link", "kind": "rigid", "simulated": "rigid", "mass_kg": 2.0}]
     assert {row["what"] for row in report["left_out"]} == {
         "Tetrahedralise flexible bodies",
         "Reduce flexible bodies",
         "Find the frequencies of the character",
+        "Find out which time step the shot needs",
+        "closed loops",
     }
     heavy = ("rerun", "skfem", "trimesh", "pytetwild", "meshio", "numba", "matplotlib", "calmotion.fem")
     assert not [name for name in modules if name.startswith(heavy)]

@@ -11,7 +11,7 @@ from calmotion.host.values import ReducedBodies, Source
 from calmotion.shot import Animation, Character, Needs, Result
 
 if TYPE_CHECKING:
-    from calmotion.retarget.prepare import Options
+    from calmotion.retarget.options import Options
 
 
 def nothing_flexible(data: Mapping[type, Any]) -> str | None:
@@ -46,7 +46,7 @@ def with_needs(result: Result, context: RunContext) -> Result:
 
 
 def options_of(context: RunContext, **more: Any) -> Options:
-    from calmotion.retarget.prepare import Options
+    from calmotion.retarget.options import Options
 
     source = context.get(Source)
     if source is None:

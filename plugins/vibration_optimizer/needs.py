@@ -10,7 +10,7 @@ from calmotion.host.values import OutputPaths, PlannedStep, ReducedBodies, Sourc
 from calmotion.shot import Animation, Character, Needs
 from calmotion.shot.needs import AUTO, KINDS, OFF, ON
 
-from .inputs import inputs, options_of
+from .inputs import inputs, nothing_flexible, options_of
 
 _FORCED = {
     "bodies": "Finite elements of all flexible bodies, or of none",
@@ -58,8 +58,15 @@ class PlanStep(Operator):
 
     @classmethod
     def poll(cls, data: Mapping[type, Any]) -> str | None:
-        source = data.get(Source)
-        return None if source is None or source.command == "inspect" else NotAsked("other commands take it")
+        source, character = data.get(Source), data.get(Character)
+        if source is not None and source.command != "inspect":
+            return NotAsked("other commands take it")
+        reason = nothing_flexible(data)
+        if reason is None or character is None:
+            return None
+        driven = {motor.joint for motor in character.motors}
+        free = any(k not in driven and joint.kind != "fixed" for k, joint in enumerate(character.joints))
+        return None if free else f"{reason}, and motors alone decide where it is"
 
     def execute(self, context: RunContext) -> Sequence[object]:
         from calmotion.retarget.to_tolerance import planned_step

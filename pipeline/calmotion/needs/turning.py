@@ -9,12 +9,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..dynamics.topology import Tree
 from ..shot import Animation, Character
-from .bending import Stiffness
+
+if TYPE_CHECKING:
+    from .bending import Stiffness
 
 STILL = 1e-9  # changes of an angle [rad] that are rounding
 

@@ -20,27 +20,12 @@ from ..shot import Animation, Character, FEMeshes
 from ..shot.character import Array
 from .bodies import reduce_bodies
 from .curves import needed_pre_roll, sample_tracks
+from .options import Options
 from .roots import root_tracks, sample_roots
 from .steady import refuse_open_loops
 from .time_grid import TimeGrid, make_grid
 
-
-@dataclass(frozen=True)
-class Options:
-    """What the user overrides; None keeps the shot's own or the automatic choice. Lengths [m], times [s].
-
-    `adjoint` is discrete or continuous; `ranges` is auto, on (the whole shot is searched) or off (see `quiet_ranges`).
-    """
-
-    tolerance: float | None = None
-    step: float | None = None
-    pre_roll: float | None = None
-    integrator: str = "bdf2"
-    knot_spacing: float | None = None
-    smoothness: float | None = None
-    max_iterations: int = 30
-    adjoint: str = "discrete"
-    ranges: str = "auto"
+__all__ = ["Options", "Prepared", "prepare"]
 
 
 @dataclass(frozen=True, eq=False)

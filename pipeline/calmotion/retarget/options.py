@@ -1,0 +1,23 @@
+"""What the user overrides of a run; it imports nothing heavy."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Options:
+    """What the user overrides; None keeps the shot's own or the automatic choice. Lengths [m], times [s].
+
+    `adjoint` is discrete or continuous; `ranges` is auto, on (the whole shot is searched) or off (see `quiet_ranges`).
+    """
+
+    tolerance: float | None = None
+    step: float | None = None
+    pre_roll: float | None = None
+    integrator: str = "bdf2"
+    knot_spacing: float | None = None
+    smoothness: float | None = None
+    max_iterations: int = 30
+    adjoint: str = "discrete"
+    ranges: str = "auto"
