@@ -1,7 +1,8 @@
 """Puts a layer of ours over a shot that somebody else made: `python compose.py OVERS SHOT OUT`.
 
-OUT gets the shot's time range and units, and sublayers OVERS over SHOT with paths relative to it. The robots that
-such layers are for are not part of this repository; `g1_arms.usda` is for a Unitree G1 upper body converted from MJCF.
+OUT gets the shot's time range and units (those of OVERS where the motion is there), and sublayers OVERS over SHOT with paths relative to it. The robots that
+such layers are for are not part of this repository; `g1_arms.usda` is for a Unitree G1 upper body converted from MJCF,
+`iiwa_reach.usda` for a KUKA LBR iiwa 14.
 """
 
 from __future__ import annotations
@@ -22,8 +23,10 @@ def compose(overs: Path, shot: Path, out: Path) -> Path:
     stage = Usd.Stage.Open(str(shot))
     layer = Sdf.Layer.CreateAnonymous(".usda")
     layer.defaultPrim = stage.GetRootLayer().defaultPrim
-    layer.startTimeCode, layer.endTimeCode = stage.GetStartTimeCode(), stage.GetEndTimeCode()
-    layer.timeCodesPerSecond, layer.framesPerSecond = stage.GetTimeCodesPerSecond(), stage.GetFramesPerSecond()
+    own = Usd.Stage.Open(str(overs), Usd.Stage.LoadNone)
+    timed = own if own.HasAuthoredTimeCodeRange() else stage
+    layer.startTimeCode, layer.endTimeCode = timed.GetStartTimeCode(), timed.GetEndTimeCode()
+    layer.timeCodesPerSecond, layer.framesPerSecond = timed.GetTimeCodesPerSecond(), timed.GetFramesPerSecond()
     composed = Usd.Stage.Open(layer)
     UsdGeom.SetStageMetersPerUnit(composed, UsdGeom.GetStageMetersPerUnit(stage))
     UsdPhysics.SetStageKilogramsPerUnit(composed, UsdPhysics.GetStageKilogramsPerUnit(stage))

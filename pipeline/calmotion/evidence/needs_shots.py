@@ -69,8 +69,8 @@ def steel_arm() -> NeedsShot:
 
 
 def mixed_arm() -> NeedsShot:
-    """A plastic link on one of thick steel."""
-    character, meshes = beam_arm(2, length=0.3, thickness=0.014, payload=0.2)
+    """A plastic link, always of the same modes, on one of thick steel."""
+    character, meshes = beam_arm(2, length=0.3, thickness=0.014, payload=0.2, modes=8)
     settings = FlexibleSettings(ElasticMaterial("/Arm/Steel", 2.1e11, 0.3, 7800.0))
     bodies = (replace(character.bodies[0], flexible=settings), *character.bodies[1:])
     thick = FEMesh(0, *beam_mesh(0.3, 0.08, 8), MeshQuality(0.0, 0.0, 0.0))
@@ -81,7 +81,7 @@ def mixed_arm() -> NeedsShot:
 def gantry(masts: int = 3) -> NeedsShot:
     """A carriage on a slider, with plastic masts and loads on it that sway but never turn."""
     material = ElasticMaterial("/Gantry/Plastic", 1.8e9, 0.35, 1200.0, 0.01)
-    settings = FlexibleSettings(material, mode_count=24)
+    settings = FlexibleSettings(material, mode_count=24, elasticity="linear")
     # a mast stands along z: the beam's x axis is turned there
     upright = np.roll(np.array([0.0, -np.sqrt(0.5), 0.0, np.sqrt(0.5)]), 1)
     bodies = [Body("/Gantry/Carriage", _frame(0.0), MassProperties(5.0, np.zeros(3), 0.05 * np.eye(3)))]
