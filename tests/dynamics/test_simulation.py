@@ -7,7 +7,7 @@ from calmotion.dynamics import inertia, newton
 from calmotion.dynamics.failure import SimulationFailure
 from calmotion.dynamics.kinematics import rigid_poses, rigid_state, target_frames
 from calmotion.dynamics.schemes import bdf2_scheme
-from calmotion.dynamics.simulation import Workspace, simulate
+from calmotion.dynamics.simulation import Workspace, simulate, simulate_from
 from calmotion.dynamics.system import allocate_state
 from particles import particle_system
 from scipy.integrate import solve_ivp
@@ -216,3 +216,29 @@ def test_failure_names_time_and_component():
             Workspace.for_system(model.system),
         )
     assert error.value.time_s == pytest.approx(0.03) and error.value.component == 1
+
+
+@pytest.mark.parametrize("first", [2, 3, 40])
+def test_a_simulation_that_goes_on_from_a_known_one_is_that_of_the_whole(first):
+    model, h = compiled(chain(3, driven=(0, 1, 2), length=0.3)), 1 / 240
+    system, ws = model.system, Workspace.for_system(model.system)
+    times = h * np.arange(120)
+    motors = np.stack([np.sin(3 * times), 1 - np.cos(4 * times), 0.5 * np.sin(5 * times)], axis=1)
+    late = np.maximum(0.0, times - times[first - 1])[:, None]
+    start = rigid_state(model, model.joint_angles(motors)[0])
+
+    def whole(motors, workspace):
+        curves = model.joint_angles(motors), model.joint_angles(np.gradient(motors, h, axis=0))
+        # differences look ahead, and what comes before must not change
+        curves[1][: first + 1] = model.joint_angles(np.ones((first + 1, 3)))
+        return curves, simulate(system, start, *curves, h, workspace)
+
+    _, known = whole(motors, ws)
+    curves, expected = whole(motors + late**2, Workspace.for_system(system))
+    found = simulate_from(system, known, first, *curves, ws)
+    for part, one, other in zip(known.states._fields, found.states, expected.states, strict=True):
+        assert np.array_equal(one, other), part
+    assert np.array_equal(found.costs, expected.costs) and found.max_joint_gap == expected.max_joint_gap
+    assert found.newton_iterations == expected.newton_iterations > known.newton_iterations // 2
+    assert found.factorisations == expected.factorisations == expected.costs[:, 1].sum()
+    assert found.wall_s > 0.0 and np.array_equal(known.states.c[:first], found.states.c[:first])

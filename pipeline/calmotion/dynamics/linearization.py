@@ -114,7 +114,8 @@ def linearize(
         previous: A linearisation of the same size whose memory is used again (it becomes invalid).
         memory: Most that blocks and factors may take [bytes].
         continuous: For `continuous_adjoint`: a step's velocities follow its positions by 3/2h alone.
-        begin: First instant whose equations count: 0, the static start, or 2 where two instants were given.
+        begin: First instant whose equations count: 0, the static start, 2 where two instants were given, or one before
+            which nothing changes; derivatives by what acts before it are then zero.
 
     Raises:
         SimulationFailure: A singular step, or one that had to be refined: its equations are not those of the others.
@@ -124,7 +125,7 @@ def linearize(
         raise ValueError("sweeps are those of BDF2")
     if trajectory.refined:
         raise SimulationFailure(trajectory.refined[0] * trajectory.h, 0, "refined")
-    size = max(2, min(len(angles), int(memory / bytes_of_an_instant(system))))
+    size = max(2, min(len(angles) - begin, int(memory / bytes_of_an_instant(system))))
     if previous is not None and len(previous.pivots) == size:
         data, pivots = previous.data, previous.pivots
     else:
@@ -170,6 +171,10 @@ class Linearization:
         self._loaded = -1
         self._axes = np.zeros((0, len(system.rows), 3, 3))
         self._helpers: list[Workspace] = []  # one for each further processor
+
+    def is_of(self, trajectory: Trajectory, begin: int) -> bool:
+        """Whether it is that of a simulation from an instant on."""
+        return self.trajectory is trajectory and self._begin == begin
 
     def axes(self, wanted: bool) -> Array:
         """Axes of the joints' parent-side markers where sliders need them for their efforts, shape [T, J, 3, 3]."""

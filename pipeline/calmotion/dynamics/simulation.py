@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from ..kernels import kernel
 from ..shot.character import Array
-from . import newton
+from . import bdf2, newton
 from .assembly import Work, allocate_work
 from .failure import SimulationFailure
 from .joints import joint_kinematics
@@ -40,6 +41,8 @@ class Trajectory:
         refined: Instants that only smaller steps reached.
         margins: How far the closed loops are from a pose in which they have one more way to move, shape [T]: see
             `loops.Border`; zeros where there are none.
+        costs: Of each instant: linear systems solved, factorisations, largest position gap of a joint [m]; shape
+            [T, 3], empty where they were not counted.
     """
 
     h: float
@@ -52,6 +55,7 @@ class Trajectory:
     integrator: str = "bdf2"
     refined: tuple[int, ...] = ()
     margins: Array = field(default_factory=lambda: np.zeros(0))
+    costs: Array = field(default_factory=lambda: np.zeros((0, 3)))
 
 
 @kernel
@@ -93,16 +97,10 @@ def largest_gap(system, angles, rates, states, world, work):
 
 @kernel
 def _advance(
-    system, scheme, h, first, last, earlier, states, angles, rates, world, margins, work, blocks, factors, scratch
-):
-    """Steps first..last-1 of a trajectory.
-
-    Returns:
-        (code, instant, component, linear systems solved, factorisations, largest joint gap).
-    """
-    solved = 0
-    factorisations = 0
-    gap = 0.0
+    system, scheme, h, first, last, earlier, states, angles, rates, world, margins, costs, work, blocks, factors,
+    scratch,
+):  # fmt: skip
+    """Steps first..last-1 of a trajectory, with their margins and costs; returns (code, instant, component)."""
     for n in range(first, last):
         before = instant_of(states, n - 1)
         before2 = earlier if n == 1 else instant_of(states, n - 2)
@@ -111,13 +109,21 @@ def _advance(
             system, scheme, h, before2, before, instant_of(states, n), angles[n], rates[n], False, work, blocks,
             factors, scratch,
         )  # fmt: skip
-        solved += count
-        factorisations += more
+        costs[n, 0] += count
+        costs[n, 1] += more
         if code != newton.CONVERGED:
-            return code, n, component, solved, factorisations, gap
+            return code, n, component
         margins[n] = scratch.border.margin[0]
-        gap = max(gap, _largest_gap(system, angles[n], rates[n], instant_of(states, n), work))
-    return newton.CONVERGED, last, -1, solved, factorisations, gap
+        costs[n, 2] = _largest_gap(system, angles[n], rates[n], instant_of(states, n), work)
+    return newton.CONVERGED, last, -1
+
+
+@kernel
+def _recall(system, h, states, n, scratch):
+    """What a step of BDF2 remembers after instant n >= 1 of a trajectory."""
+    now, before, before2 = instant_of(states, n), instant_of(states, n - 1), instant_of(states, max(n - 2, 0))
+    bdf2.velocities(system, h, now, before, before2, scratch.J, scratch.Vd)
+    copy_rows(scratch.Vd, scratch.memory[0])
 
 
 @dataclass(frozen=True, eq=False)
@@ -178,7 +184,11 @@ def simulate(
         acceleration, states.lam[0] = initial_acceleration(system, first, angles[0], rates[0], motors, ws)
         earlier, states.turn[0] = instant_before(system, first, acceleration, h)
         ws.scratch.memory[:2] = acceleration
-    return _march(system, integrator, 1, earlier, states, angles, rates, world, h, ws, progress, solved, begin)
+    margins, costs = np.zeros(total), np.zeros((total, 3))
+    costs[0, 0] = solved
+    return _march(
+        system, integrator, 1, earlier, states, angles, rates, world, h, ws, progress, margins, costs, begin
+    )  # fmt: skip
 
 
 def simulate_on(
@@ -202,36 +212,70 @@ def simulate_on(
     for part, first, second in zip(states, before2, before, strict=True):
         part[0], part[1] = first, second
     ws.scratch.memory[:] = (before.V - before2.V) / h
-    return _march(system, "bdf2", 2, before2, states, angles, rates, rooted(world, total), h, ws, None, 0, begin)
+    return _march(
+        system, "bdf2", 2, before2, states, angles, rates, rooted(world, total), h, ws, None, np.zeros(total),
+        np.zeros((total, 3)), begin,
+    )  # fmt: skip
+
+
+def simulate_from(
+    system: System, known: Trajectory, first: int, angles: Array, rates: Array, workspace: Workspace
+) -> Trajectory:
+    """What `simulate` finds by BDF2, where a simulation is known that begins alike.
+
+    Args:
+        known: By BDF2 from static equilibrium; not changed.
+        first: Its instants before this one are kept, two or more, the last of them not a refined one.
+        angles, rates: As `simulate` takes them; up to `first` those of the known simulation.
+
+    Returns:
+        The trajectory, to the last bit that of a whole simulation; the time that its beginning took is the share that
+        it had in the known one.
+
+    Raises:
+        SimulationFailure: A step that cannot be solved.
+    """
+    begin, total, ws = time.perf_counter(), len(angles), workspace
+    states = State(*[np.zeros_like(part) for part in known.states])
+    margins, costs = np.zeros(total), np.zeros((total, 3))
+    for part, value in zip((*states, margins, costs), (*known.states, known.margins, known.costs), strict=True):
+        part[:first] = value[:first]
+    begin -= known.wall_s * float(costs[:, 0].sum()) / max(1.0, float(known.costs[:, 0].sum()))
+    ws.scratch.memory[:] = 0.0
+    _recall(system, known.h, states, first - 1, ws.scratch)
+    return _march(
+        system, "bdf2", first, copy_of_instant(states, 0), states, angles, rates, known.world, known.h, ws, None,
+        margins, costs, begin, [n for n in known.refined if n < first],
+    )  # fmt: skip
 
 
 def _march(
     system: System, integrator: str, done: int, earlier: State, states: State, angles: Array, rates: Array,
-    world: Array, h: float, ws: Workspace, progress, solved: int, begin: float,
+    world: Array, h: float, ws: Workspace, progress, margins: Array, costs: Array, begin: float,
+    before: Sequence[int] = (),
 ) -> Trajectory:  # fmt: skip
-    """All steps from instant `done` on, into `states`; `earlier` is the one before the first."""
-    total, scheme = len(angles), SCHEMES[integrator](h)
-    gap, factorisations, margins = 0.0, 0, np.zeros(total)
-    refined: list[int] = []
+    """All steps from instant `done` on, into `states`, `margins` and `costs`; `earlier` is the instant before the
+    first, and `before` those before `done` that were refined."""
+    total, scheme, refined = len(angles), SCHEMES[integrator](h), list(before)
     chunk = total if progress is None else max(1, total // 50)
     while done < total:
         last = min(done + chunk, total)
-        code, instant, component, more, factored, largest = _advance(
-            system, scheme, h, done, last, earlier, states, angles, rates, world, margins, ws.work, ws.blocks,
+        code, done, component = _advance(
+            system, scheme, h, done, last, earlier, states, angles, rates, world, margins, costs, ws.work, ws.blocks,
             ws.factors, ws.scratch,
         )  # fmt: skip
-        solved, factorisations, gap, done = solved + more, factorisations + factored, max(gap, largest), instant
         if code != newton.CONVERGED:
             reason = "singular" if code == newton.SINGULAR else "diverged"
-            exact = refined_step(system, integrator, h, instant, earlier, states, angles, rates, world, ws)
+            exact = refined_step(system, integrator, h, done, earlier, states, angles, rates, world, ws)
             if exact is None:
-                last_state = copy_of_instant(states, instant - 1)
-                raise SimulationFailure(instant * h, component, reason, last_state)
+                raise SimulationFailure(done * h, component, reason, copy_of_instant(states, done - 1))
             if not exact:
-                refined.append(instant)
+                refined.append(done)
             done += 1
         if progress is not None:
             progress(done / total)
+    solved, factorisations = (int(part) for part in costs[:, :2].sum(axis=0))
     return Trajectory(
-        h, states, world, solved, factorisations, gap, time.perf_counter() - begin, integrator, tuple(refined), margins
-    )
+        h, states, world, solved, factorisations, float(costs[:, 2].max()), time.perf_counter() - begin, integrator,
+        tuple(refined), margins, costs,
+    )  # fmt: skip

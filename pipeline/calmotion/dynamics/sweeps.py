@@ -1,7 +1,8 @@
 """Tangent and discrete adjoint sweeps of a linearised simulation; compiled.
 
 The adjoint is the exact transpose of the tangent's recursion, the static start included, so gradients hold to
-rounding: Seed (39) for the discretised system.
+rounding: Seed (39) for the discretised system. A linearisation that begins later leaves out what comes before: nothing
+moves there, so that the tangent starts from zero.
 """
 
 from __future__ import annotations
@@ -312,7 +313,8 @@ def tangent(lin: Linearization, d_angle: Array, d_rate: Array, efforts: bool = F
     """How the motion follows a change of the joint angles.
 
     Args:
-        d_angle, d_rate: Change of angle [rad] (or length [m]) and rate of each joint's motor, shape [T, J].
+        d_angle, d_rate: Change of angle [rad] (or length [m]) and rate of each joint's motor, shape [T, J]; what comes
+            before the linearisation begins does not count.
         efforts: Whether the change of the motors' efforts is wanted.
 
     Returns:
@@ -352,7 +354,8 @@ def adjoint(lin: Linearization, gradient: Array, effort_gradient: Array | None =
         effort_gradient: Its derivative by the efforts of the joints, shape [T, J]; None where it has none.
 
     Returns:
-        Its derivatives by angle and rate of each joint's motor, shape [T, J] each.
+        Its derivatives by angle and rate of each joint's motor, shape [T, J] each; zero before the linearisation
+        begins.
     """
     Xbar = gradient.copy()
     total, count, size = Xbar.shape

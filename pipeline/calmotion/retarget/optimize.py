@@ -28,17 +28,18 @@ from .offset_basis import OffsetBasis, basis_on
 from .posing import locked_coefficients, pose
 from .prepare import Options, Prepared, failure_error, lowest_frequency, prepare, refuse_half_turns
 from .problem import RetargetProblem
-from .pruning import block_energies, worthless
+from .pruning import UNCHANGED, block_energies, worthless
+from .quiet_ranges import first_change, left_out_on, quiet_ranges, quiet_rows, with_gains
 from .recycling import Recycled
 from .reference import MeantMotion
 from .report import left_out_rows, limit_uses, performed_motion, reference_motion, simulation_of
 from .run import Progress, meant_motion
 from .simulator import compile_kernels
 
-UNCHANGED = 1e-5  # an offset that stays below this angle [rad] is none
 WORTH = 0.005  # of the tolerance: what an iteration must be expected to gain
 FINER = 0.01  # of the tolerance: what finer knots must promise
 PRUNED = 0.02  # of the tolerance: what offsets that are dropped may cost together
+MISSED = 0.01  # of the tolerance: what changes in ranges that were left out may gain together
 FIRST_PENALTY = 1e3  # of limits, over the objective of the input for each second
 
 
@@ -112,25 +113,36 @@ def _search(
     character, grid, model = prepared.character, prepared.grid, prepared.model
     problem, start, adaptive = posed
 
-    def fixed_on(basis: OffsetBasis) -> BoolArray:
+    def locked_on(basis: OffsetBasis) -> BoolArray:
         return locked_coefficients(animation, basis, problem.motors, grid.end)
 
-    fixed = fixed_on(problem.basis)
+    def fixed_on(basis: OffsetBasis) -> BoolArray:
+        return locked_on(basis) | left_out_on(basis, quiet, len(problem.motors))
+
+    def fix() -> BoolArray:
+        problem.hold(first_change(grid, problem.basis, fixed_on))
+        return fixed_on(problem.basis)
+
     tolerance = character.retarget.allowed(options.tolerance)
     begin = time.perf_counter()
+    problem.hold(0)
     if not np.isfinite(problem.value(np.zeros(problem.size))):
         assert problem.failure is not None
         raise failure_error(prepared, problem.failure)
     before, before_value, used_before = problem.run, problem.objective_value(), _used(problem, character)
     if problem.limits is not None:
         problem.limits.rho = FIRST_PENALTY * max(before_value, problem.worth(1e-3 * tolerance)) / grid.end
-    kept = Checkpoint(checkpoint, problem_key(problem, fixed, (options, tolerance)))
+    kept = Checkpoint(checkpoint, problem_key(problem, locked_on(problem.basis), (options, tolerance)))
+    frequency = lowest_frequency(prepared, animation)
+    quiet = quiet_ranges(problem, start, frequency, tolerance)
     resumed = kept.load(problem.limits)
-    search, interrupted = Search.start(start), False
+    search, interrupted = Search.start(np.where(fixed_on(problem.basis), 0.0, start)), False
     if resumed is not None:
         search, breaks = resumed
         problem = problem.on_basis(basis_on(grid, breaks, problem.basis.kept_ends), search.x)
-        fixed = fixed_on(problem.basis)
+        if np.any(search.x[left_out_on(problem.basis, quiet, len(problem.motors))]):
+            quiet = ()  # it had gone on with them
+    fixed = fix()
 
     def on_iterate(found: Search) -> None:
         nonlocal search
@@ -141,31 +153,38 @@ def _search(
 
     try:
         if resumed is None and not np.any(start):
-            search = approach(problem, start, fixed, lowest_frequency(prepared, animation))
+            search = approach(problem, start, fixed, frequency)
         while True:
             if not search.reason:
                 search = minimize(
                     problem, search, fixed, WORTH * tolerance, options.max_iterations, on_iterate=on_iterate
                 )
                 kept.save(search, problem.limits, problem.basis.breaks)
-            if not adaptive or search.reason == "iteration limit":
+            if search.reason == "iteration limit":
                 break
-            finer = _finer(problem, search, fixed_on, FINER * tolerance)
-            if finer is None:
-                break
-            problem, search = finer
-            fixed = fixed_on(problem.basis)
+            finer = _finer(problem, search, fixed_on, FINER * tolerance) if adaptive else None
+            if finer is not None:
+                problem, search = finer
+            else:
+                if quiet:
+                    quiet, search = with_gains(problem, search, quiet, locked_on)
+                if sum(item.gain for item in quiet) <= MISSED * tolerance:
+                    break
+                quiet, search = (), _afresh(search, search.x)
+            fixed = fix()
+        fixed = fix()
         progress(0.9, "leaving out offsets that gain nothing")
         search = _pruned(problem, search, fixed, tolerance, options.max_iterations)
     except KeyboardInterrupt:
         interrupted = True
         progress(0.95, "interrupted: writing the best so far")
     curves, x = _curves(problem, len(character.motors), search.x)
+    problem.forget()
     problem.value(x)
     run, after_value, used = problem.run, problem.objective_value(), _used(problem, character)
     costs = {} if interrupted else limit_costs(problem, fixed)
     wall = time.perf_counter() - begin
-    rows = left_out_rows(prepared)
+    rows = left_out_rows(prepared) + quiet_rows(quiet)
     rows += [
         LeftOut("changes of " + character.motors[curve.motor].path, "they would gain less than 2% of the tolerance")
         for curve in curves
@@ -211,9 +230,14 @@ def _finer(
     if breaks is None:
         return None
     basis = basis_on(problem.grid, breaks, problem.basis.kept_ends)
-    x = carried(problem.basis, basis, search.x, len(problem.motors))
-    begin = replace(search, x=x, radius=np.inf, recycled=Recycled.none(len(x)), reason="")
-    return problem.on_basis(basis, x), begin
+    # what does not change stays exactly so
+    x = np.where(fixed_on(basis), 0.0, carried(problem.basis, basis, search.x, len(problem.motors)))
+    return problem.on_basis(basis, x), _afresh(search, x)
+
+
+def _afresh(search: Search, x: Array) -> Search:
+    """A search that goes on over other coefficients."""
+    return replace(search, x=x, radius=np.inf, recycled=Recycled.none(len(x)), reason="")
 
 
 def _expected(search: Search) -> float | None:

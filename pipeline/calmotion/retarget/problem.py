@@ -126,6 +126,14 @@ class RetargetProblem:
             self._limited = limited_values(self.model, bounds, self.changed_curves, self.run)
         return self._limited
 
+    def hold(self, first: int) -> None:
+        """From now on only coefficients change that act from an instant on: see `Simulator.hold`."""
+        self._simulator.hold(first)
+
+    def forget(self) -> None:
+        """The next point is simulated from the start of the shot."""
+        self._simulator.forget()
+
     def offsets(self, x: Array) -> tuple[Array, Array]:
         """Offsets and their rates for all motors, shape [T, M]."""
         return self._spread(self.basis.values, x), self._spread(self.basis.rates, x)
@@ -272,13 +280,10 @@ class RetargetProblem:
         Args:
             values: Limited quantities, which say which limits act; None: at the point evaluated last.
         """
-        if self._response is None:
-            self._response = self._rigid_response()
+        response = self._rigid()
         if self._preconditioner is None:
-            self._preconditioner = RigidPreconditioner(
-                self._response, self.objective.weights, self.basis, self._penalty
-            )
-        self._preconditioner.factor(fixed, self._metrics(self._response.inertia, values))
+            self._preconditioner = RigidPreconditioner(response, self.objective.weights, self.basis, self._penalty)
+        self._preconditioner.factor(fixed, self._metrics(response.inertia, values))
         return self._preconditioner.solve
 
     def damped(self, ratio: float, frequency: float) -> RetargetProblem:
@@ -290,10 +295,19 @@ class RetargetProblem:
 
     def lever(self) -> float:
         """How far the motor that moves them most moves the targets, root-mean-square and weighted [m/rad]."""
+        weighted = self._rigid().targets * self.objective.weights[..., None]
+        return float(np.sqrt(np.max(np.sum(weighted**2, axis=(0, 1, 2))) / self._unit))
+
+    def rigid_gradient(self) -> Array:
+        """Gradient of the errors at the point evaluated last if the robot were rigid: each is answered as it occurs."""
+        weighted = self.objective.weights * self._residuals
+        pulls = np.einsum("nkim,nki->nm", self._rigid().targets, weighted)
+        return np.asarray(self.basis.values.T @ pulls).ravel()
+
+    def _rigid(self) -> RigidResponse:
         if self._response is None:
             self._response = self._rigid_response()
-        weighted = self._response.targets * self.objective.weights[..., None]
-        return float(np.sqrt(np.max(np.sum(weighted**2, axis=(0, 1, 2))) / self._unit))
+        return self._response
 
     def _rigid_response(self) -> RigidResponse:
         rigid = rigid_model(self.model)

@@ -6,6 +6,7 @@ import numpy as np
 
 from ..shot.character import Array, BoolArray
 
+UNCHANGED = 1e-5  # an offset that stays below this angle [rad] is none
 BLOCK = 8  # neighbouring coefficients of a motor that vanish together; four already make a curve vanish
 
 

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from ..dynamics.continuous_adjoint import continuous_adjoint
+from ..dynamics.kinematics import target_frames
 from ..dynamics.linearization import Linearization, linearize
 from ..dynamics.model import Model
 from ..dynamics.periodic import Monodromy, periodic_adjoint, periodic_tangent
-from ..dynamics.simulation import Workspace
+from ..dynamics.simulation import Workspace, simulate_from
 from ..dynamics.sweeps import adjoint, tangent
 from ..shot.character import Array
 from .forward import ForwardRun, run_forward
@@ -39,12 +42,28 @@ class Simulator:
         self._linearization: Linearization | None = None
         self._for_continuous: Linearization | None = None
         self._monodromy: Monodromy | None = None
+        self._first: int | None = None
+        self._known: ForwardRun | None = None  # the last motion, where simulations go on from it
+
+    def hold(self, first: int) -> None:
+        """From now on motor curves stay as they are before an instant.
+
+        Simulations then go on from the first instant at which they differ from the one before, and derivatives by what
+        acts before the instant are not worked out: they are zero. Loops have no beginning that could stay.
+        """
+        if self._steady is None:
+            self._first = first
+
+    def forget(self) -> None:
+        """The next motion is simulated from its start, also where its beginning is known."""
+        self._known = None
 
     def of(self, model: Model) -> Simulator:
         """The same of another model of the same character; its loops begin near those of this one."""
         other = Simulator(model, self.h, self.world, False)
         if self._steady is not None:
             other._steady = self._steady.for_model(model)
+        other._first = self._first
         return other
 
     def run(self, angles: Array, rates: Array) -> ForwardRun:
@@ -53,18 +72,51 @@ class Simulator:
         Raises:
             SimulationFailure: They cannot be simulated.
         """
-        return run_forward(self.model, self._workspace, angles, rates, self.h, self.world, steady=self._steady)
+        known = self._known
+        if known is None:
+            run = run_forward(self.model, self._workspace, angles, rates, self.h, self.world, steady=self._steady)
+        else:
+            run = self._gone_on(known, angles, rates)
+        if self._first is not None:
+            self._known = run
+        return run
+
+    def _gone_on(self, known: ForwardRun, angles: Array, rates: Array) -> ForwardRun:
+        """The motion that goes on from a known one; that one itself where nothing is different."""
+        joint_angles, joint_rates = self.model.joint_angles(angles), self.model.joint_angles(rates)
+        same = np.all(joint_angles == known.joint_angles, axis=1) & np.all(joint_rates == known.joint_rates, axis=1)
+        if np.all(same):
+            return known
+        first = int(np.argmin(same))
+        if first < 2 or first - 1 in known.trajectory.refined:
+            return run_forward(self.model, self._workspace, angles, rates, self.h, self.world)
+        trajectory = simulate_from(
+            self.model.system, known.trajectory, first, joint_angles, joint_rates, self._workspace
+        )  # fmt: skip
+        states = trajectory.states
+        positions, rotations = target_frames(self.model, states.c[first:], states.q[first:], states.u[first:])
+        return ForwardRun(
+            trajectory, joint_angles, joint_rates, np.concatenate([known.target_positions[:first], positions]),
+            np.concatenate([known.target_rotations[:first], rotations]),
+        )  # fmt: skip
 
     def linearize(self, run: ForwardRun) -> None:
         """Linearise about a run, for `tangent` and `adjoint`."""
-        self._linearization = self._linearized(run, self._linearization)
+        begin = 2 if self._steady is not None else self._first or 0
+        previous, self._linearization = self._linearization, None  # whose memory is used again, also where this fails
+        if previous is not None and self._known is run and previous.is_of(run.trajectory, begin):
+            self._linearization = previous
+            return
+        self._linearization = self._linearized(run, previous, begin)
         if self._steady is not None:
             self._monodromy = self._steady.known = Monodromy.of(self._linearization)
 
-    def _linearized(self, run: ForwardRun, previous: Linearization | None, continuous: bool = False) -> Linearization:
+    def _linearized(
+        self, run: ForwardRun, previous: Linearization | None, begin: int, continuous: bool = False
+    ) -> Linearization:
         return linearize(
             self.model.system, run.trajectory, run.joint_angles, run.joint_rates, self._workspace, previous,
-            continuous=continuous, begin=0 if self._steady is None else 2,
+            continuous=continuous, begin=begin,
         )  # fmt: skip
 
     def tangent(self, values: Array, rates: Array, efforts: bool) -> tuple[Array, Array]:
@@ -90,6 +142,6 @@ class Simulator:
 
     def continuous_adjoint(self, run: ForwardRun, gradient: Array) -> tuple[Array, Array]:
         """The same by the continuous adjoint, with a linearisation of its own, of a shot that plays once."""
-        self._for_continuous = self._linearized(run, self._for_continuous, continuous=True)
+        self._for_continuous = self._linearized(run, self._for_continuous, 0, continuous=True)
         found = continuous_adjoint(self._for_continuous, gradient)
         return self.model.motor_values(found[0]), self.model.motor_values(found[1])
