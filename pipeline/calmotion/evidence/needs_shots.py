@@ -101,7 +101,8 @@ def gantry(masts: int = 3) -> NeedsShot:
     character = Character(
         "/Gantry", tuple(bodies), tuple(joints), motors, tuple(targets), np.array([0.0, 0.0, -9.81])
     )  # fmt: skip
-    return NeedsShot("gantry", character, shot_of(quintic(0.5, 0.5, 0.2), 2.0), FEMeshes(tuple(meshes)))
+    made = FEMeshes(tuple(meshes))
+    return NeedsShot("gantry", _with_geometry(character, made), shot_of(quintic(0.5, 0.5, 0.2), 2.0), made)
 
 
 def clevis_arm(links: int = 6) -> NeedsShot:
@@ -131,7 +132,7 @@ def clevis_arm(links: int = 6) -> NeedsShot:
     move, back = quintic(0.15, 0.4, 0.2), quintic(-0.2, 0.4, 0.9)
     animation = shot_of(lambda t: move(t) + back(t), 2.0, links)
     meshes = FEMeshes((replace(meshes.meshes[0], body=links),))
-    return NeedsShot("clevis arm", character, animation, meshes)
+    return NeedsShot("clevis arm", _with_geometry(character, meshes), animation, meshes)
 
 
 def arm_with_head() -> NeedsShot:

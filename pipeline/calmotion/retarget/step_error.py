@@ -19,6 +19,7 @@ from .prepare import Options, failure_error, prepare
 from .steady import SteadyState
 
 ORDER = 2  # of BDF2; the global error goes with this power of the step
+MARGIN, WORTH = 0.9, 1.1  # of a step between two that were tried; how much longer it must be than the shorter of them
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,7 +76,7 @@ def step_error(coarse: StepRun, fine: StepRun) -> float:
 def largest_step(
     run: Callable[[float], StepRun], first: float, last: float, allowed: Callable[[StepRun], float]
 ) -> tuple[float, float]:
-    """The largest step, of those that halve the first, whose error is allowed.
+    """The largest step whose error is allowed: by halving the first, and then between two of these by the order.
 
     Args:
         run: Simulates by a step [s]; may raise ShotError where that is too large.
@@ -92,11 +93,21 @@ def largest_step(
             error, enough = step_error(coarse, fine), allowed(fine)
             if 2.0**ORDER * error <= enough:
                 return step, 2.0**ORDER * error
-            if error <= enough or 0.5 * step <= last:
+            if error <= enough:
+                return _between(0.5 * step, error, enough)
+            if 0.5 * step <= last:
                 return 0.5 * step, error
         elif 0.5 * step <= last:
             return 0.5 * step, np.inf
         step, coarse = 0.5 * step, fine
+
+
+def _between(step: float, error: float, enough: float) -> tuple[float, float]:
+    """A step [s] up to twice as long as one whose error is allowed, and its error."""
+    longer = MARGIN * np.sqrt(enough / error) if error > 0.0 else 2.0
+    if longer <= WORTH:
+        return step, error
+    return longer * step, longer**ORDER * error
 
 
 def run_or_none(run: Callable[[float], StepRun], step: float) -> StepRun | None:

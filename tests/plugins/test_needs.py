@@ -1,0 +1,98 @@
+"""The analysis of needs in the pipeline: what it leaves out is not run, and everything can be forced."""
+
+from argparse import Namespace
+
+import pytest
+from calmotion.cli_run import settings_of
+from calmotion.evidence.needs_shots import clevis_arm, mixed_arm, steel_arm
+from calmotion.host import NotAsked, OutputPaths, PlannedStep, Source
+from calmotion.shot import Character, FEMeshes, Needs, Result
+from calmotion.shot.needs import KINDS, OFF, ON
+from calmotion.testing import host_with, run_operator, small_shot
+
+
+@pytest.fixture(scope="module")
+def host(repository):
+    plugins = repository / "plugins"
+    return host_with(plugins / "fe_mesher", plugins / "vibration_optimizer")
+
+
+def _source(command="simulate", **more):
+    return Source(path="shot.usda", command=command, step=1 / 120, **more)
+
+
+def _outcomes(run):
+    return {result.idname: (str(result.outcome), result.reason) for result in run.results}
+
+
+def test_what_hardly_bends_is_neither_meshed_nor_reduced(host):
+    shot = steel_arm()
+    run = host.run([shot.character, shot.animation, _source()], [Result]).finish()
+    for idname in ("fe.mesh", "fem.reduce"):
+        assert _outcomes(run)[idname] == ("left out", "nothing bends noticeably in this shot")
+    result = run.get(Result)
+    assert run.get(FEMeshes) is None and result.skins == (None,) * 3
+    rows = {row.what: row for row in result.left_out}
+    row = rows["finite elements of /Arm/Link0"]
+    assert "bends by at most" in row.why and 0.0 < row.estimated_error_m < 1e-3
+    assert "closed loops" in rows
+    assert sum("finite elements of /Arm/Link0" in row.what for row in result.left_out) == 1
+
+
+def test_kept_it_is_simulated_as_flexible(host):
+    shot = mixed_arm()
+    given = [shot.character, shot.animation, _source()]
+    lean = host.run(given, [FEMeshes]).finish()
+    assert [mesh.body for mesh in lean.get(FEMeshes).meshes] == [1]
+    full = host.run(given, [FEMeshes], settings={"needs.analyse": {"bodies": "on"}}).finish()
+    assert [mesh.body for mesh in full.get(FEMeshes).meshes] == [0, 1]
+
+
+def test_what_is_left_out_counts_in_the_accuracy(host):
+    shot = steel_arm()
+    given = [shot.character, shot.animation, Source(path="shot.usda", command="simulate", tolerance=1e-3)]
+    result = host.run(given, [Result]).finish().get(Result)
+    costs = [row.estimated_error_m for row in result.left_out if row.what.startswith("finite elements of /Arm/Link")]
+    assert result.accuracy.left_out_m == pytest.approx(sum(costs))
+    steps = [row for row in result.left_out if "time steps shorter" in row.what]
+    assert len(steps) == 1 and "tolerance of 1 mm" in steps[0].why
+    assert steps[0].estimated_error_m == result.accuracy.step_m
+
+
+def test_mode_shapes_need_finite_elements(host):
+    shot = steel_arm()
+    given = [shot.character, shot.animation, _source("inspect"), OutputPaths(modes="somewhere")]
+    (needs,) = run_operator(host, "needs.analyse", given)
+    assert needs.character.bodies[0].bends and needs.forced == {"bodies": ON}
+
+
+def test_forces_of_a_joint_that_is_left_out_are_zero_and_the_others_carry_them(host):
+    shot = clevis_arm(1)
+    result = host.run([shot.character, shot.animation, _source()], [Result]).finish().get(Result)
+    forces = result.before.motion.joint_forces
+    assert not forces[:, 1].any() and abs(forces[:, 0]).max() > 5.0
+
+
+def test_an_inspection_plans_the_step_where_one_matters(host):
+    shot = mixed_arm()
+    run = host.run([shot.character, shot.animation, _source("inspect")], [Needs, PlannedStep]).finish()
+    row = run.get(PlannedStep).row
+    assert row.what == "time steps shorter than 8.33 ms" and row.why == "the step was asked for"
+    assert 0.0 < row.estimated_error_m < 0.1
+    poll = host.operators["needs.step"].poll
+    character, _ = small_shot()
+    assert "motors alone" in poll({Character: character, Source: _source("inspect")})
+    assert isinstance(poll({Source: _source("simulate")}), NotAsked)
+
+
+def test_keep_and_leave_out_become_settings():
+    args = Namespace(settings=None, set=[], keep=["modes"], leave_out=["all"])
+    assert settings_of(args) == {"needs.analyse": dict.fromkeys(KINDS, OFF) | {"modes": ON}}
+    stronger = Namespace(settings=None, set=["needs.analyse.modes=auto"], keep=["modes"], leave_out=[])
+    assert settings_of(stronger) == {"needs.analyse": {"modes": "auto"}}
+    assert settings_of(Namespace(settings=None, set=[])) == {}
+
+
+def test_kinds_that_are_none_are_wrong_usage(calmotion):
+    wrong = calmotion("simulate", "shot.usda", "--keep", "everything")
+    assert wrong.returncode == 2 and "turning" in wrong.stderr
