@@ -9,6 +9,7 @@ from typing import Any
 from calmotion.host import NotAsked, Operator, Property, RunContext
 from calmotion.host.values import OutputPaths, ReducedBodies, ShapedTracks, Source, SystemModes, Verification
 from calmotion.shot import Animation, Character, FEMeshes, Needs, Result
+from calmotion.shot.needs import AUTO
 
 from .inputs import character_of, inputs, nothing_flexible, options_of, with_needs
 from .needs import AnalyseNeeds, PlanStep
@@ -179,7 +180,8 @@ class OptimizeShot(Operator):
             knot_spacing=values.knot_spacing if values.knot_spacing > 0.0 else None,
             smoothness=values.smoothness if values.smoothness >= 0.0 else None,
             adjoint=values.adjoint,
-            ranges="auto" if needs is None else needs.choice("ranges"),
+            ranges=AUTO if needs is None else needs.choice("ranges"),
+            motors=AUTO if needs is None else needs.choice("motors"),
         )
         paths = context.get(OutputPaths)
         kept = checkpoint_path(paths.layer) if paths is not None and paths.layer else None

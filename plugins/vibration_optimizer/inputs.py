@@ -42,7 +42,9 @@ def with_needs(result: Result, context: RunContext) -> Result:
     if accuracy is not None:
         more = sum(row.estimated_error_m or 0.0 for row in needs.left_out)
         accuracy = replace(accuracy, left_out_m=accuracy.left_out_m + more)
-    return replace(result, left_out=(*needs.left_out, *result.left_out), accuracy=accuracy)
+    # a search tells more of its motors
+    rows = needs.left_out if result.after is None else needs.left_out_but("motors")
+    return replace(result, left_out=(*rows, *result.left_out), accuracy=accuracy)
 
 
 def options_of(context: RunContext, **more: Any) -> Options:

@@ -13,8 +13,9 @@ from ..dynamics.failure import SimulationFailure
 from ..dynamics.simulation import Workspace
 from ..errors import ShotError
 from ..fem.reduced_body import ReducedBody
-from ..shot import Animation, Character, LeftOut, MotorCurve, OptimizerStep, Result
+from ..shot import Animation, Character, MotorCurve, OptimizerStep, Result
 from ..shot.character import Array, BoolArray
+from ..shot.needs import OFF
 from .adaptive_knots import carried, useful_knots, wanted_breaks
 from .approach import approach
 from .bodies import mode_tables, skins
@@ -22,6 +23,7 @@ from .checkpoint import Checkpoint, problem_key
 from .curves import sample_curves
 from .forward import limited_values
 from .gauss_newton import Search, minimize
+from .idle_motors import idle_gain, idle_motors
 from .limit_costs import limit_costs
 from .limits import Excess, excesses, motor_bounds
 from .offset_basis import OffsetBasis, basis_on
@@ -29,16 +31,15 @@ from .posing import locked_coefficients, pose
 from .prepare import Options, Prepared, failure_error, lowest_frequency, prepare, refuse_half_turns
 from .problem import RetargetProblem
 from .pruning import UNCHANGED, block_energies, worthless
-from .quiet_ranges import first_change, left_out_on, quiet_ranges, quiet_rows, with_gains
+from .quiet_ranges import first_change, left_out_on, quiet_ranges, with_gains
 from .recycling import Recycled
 from .reference import MeantMotion
 from .report import left_out_rows, limit_uses, performed_motion, reference_motion, simulation_of
 from .run import Progress, meant_motion
+from .search_rows import FINER, PRUNED, search_rows
 from .simulator import compile_kernels
 
 WORTH = 0.005  # of the tolerance: what an iteration must be expected to gain
-FINER = 0.01  # of the tolerance: what finer knots must promise
-PRUNED = 0.02  # of the tolerance: what offsets that are dropped may cost together
 MISSED = 0.01  # of the tolerance: what changes in ranges that were left out may gain together
 FIRST_PENALTY = 1e3  # of limits, over the objective of the input for each second
 
@@ -134,9 +135,9 @@ def _search(
         problem.limits.rho = FIRST_PENALTY * max(before_value, problem.worth(1e-3 * tolerance)) / grid.end
     kept = Checkpoint(checkpoint, problem_key(problem, locked_on(problem.basis), (options, tolerance)))
     frequency = lowest_frequency(prepared, animation)
-    quiet = quiet_ranges(problem, start, frequency, tolerance)
+    quiet = quiet_ranges(problem, start, frequency, tolerance, options.ranges)
     resumed = kept.load(problem.limits)
-    search, interrupted = Search.start(np.where(fixed_on(problem.basis), 0.0, start)), False
+    search, interrupted, idle = Search.start(np.where(fixed_on(problem.basis), 0.0, start)), False, None
     if resumed is not None:
         search, breaks = resumed
         problem = problem.on_basis(basis_on(grid, breaks, problem.basis.kept_ends), search.x)
@@ -168,10 +169,12 @@ def _search(
             else:
                 if quiet:
                     quiet, search = with_gains(problem, search, quiet, locked_on)
-                if sum(item.gain for item in quiet) <= MISSED * tolerance:
+                if options.ranges == OFF or sum(item.gain for item in quiet) <= MISSED * tolerance:
                     break
                 quiet, search = (), _afresh(search, search.x)
             fixed = fix()
+        if len(idle_motors(character)):
+            search, idle = _looked_at_idle(problem, search, character)
         fixed = fix()
         progress(0.9, "leaving out offsets that gain nothing")
         search = _pruned(problem, search, fixed, tolerance, options.max_iterations)
@@ -184,12 +187,7 @@ def _search(
     run, after_value, used = problem.run, problem.objective_value(), _used(problem, character)
     costs = {} if interrupted else limit_costs(problem, fixed)
     wall = time.perf_counter() - begin
-    rows = left_out_rows(prepared) + quiet_rows(quiet)
-    rows += [
-        LeftOut("changes of " + character.motors[curve.motor].path, "they would gain less than 2% of the tolerance")
-        for curve in curves
-        if not curve.changed and curve.motor in problem.motors
-    ]
+    rows = left_out_rows(prepared) + search_rows(problem, character, curves, quiet, options, idle)
     return Result(
         reference=reference_motion(model, grid, meant, problem.curves.angles),
         before=simulation_of(prepared, before, meant.reference),
@@ -215,6 +213,7 @@ def _search(
         expected_gain_m=_expected(search),
         interrupted=interrupted,
         performed=performed_motion(prepared, problem.changed_curves),
+        idle_gain_m=idle,
     )
 
 
@@ -233,6 +232,15 @@ def _finer(
     # what does not change stays exactly so
     x = np.where(fixed_on(basis), 0.0, carried(problem.basis, basis, search.x, len(problem.motors)))
     return problem.on_basis(basis, x), _afresh(search, x)
+
+
+def _looked_at_idle(problem: RetargetProblem, search: Search, character: Character) -> tuple[Search, float | None]:
+    """What idle motors promise where the search ended; they act at any time of the shot."""
+    problem.hold(0)
+    problem.value(search.x)
+    problem.linearize()
+    counted = replace(search, evaluations=search.evaluations + 1, gradients=search.gradients + 1)
+    return counted, idle_gain(problem, character)
 
 
 def _afresh(search: Search, x: Array) -> Search:

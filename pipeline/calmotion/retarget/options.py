@@ -9,7 +9,8 @@ from dataclasses import dataclass
 class Options:
     """What the user overrides; None keeps the shot's own or the automatic choice. Lengths [m], times [s].
 
-    `adjoint` is discrete or continuous; `ranges` is auto, on (the whole shot is searched) or off (see `quiet_ranges`).
+    `adjoint` is discrete or continuous; `ranges` is auto, on (the whole shot is searched) or off (see
+    `quiet_ranges`: without looking back); `motors` likewise (see `idle_motors`).
     """
 
     tolerance: float | None = None
@@ -21,3 +22,4 @@ class Options:
     max_iterations: int = 30
     adjoint: str = "discrete"
     ranges: str = "auto"
+    motors: str = "auto"

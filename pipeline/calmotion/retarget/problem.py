@@ -82,6 +82,18 @@ class RetargetProblem:
         other._linearized_x = np.zeros(0)
         return other
 
+    def over_motors(self, motors: IntArray, coupling: Array) -> RetargetProblem:
+        """The same problem without limits, linearised where this one was, over offsets of other motors, now zero.
+
+        Args:
+            motors, coupling: As of `RetargetProblem`.
+        """
+        other = copy(self)
+        other.motors, other.coupling, other.limits, other._response = motors, coupling, None, None
+        other._use(self.basis)
+        other._x = np.zeros(other.size)
+        return other
+
     @property
     def size(self) -> int:
         """Number of unknowns."""

@@ -14,7 +14,9 @@ from pathlib import Path
 from ..fem.reduced_body import ReducedBody
 from ..shot import Accuracy, Animation, Character, LeftOut, OptimizerStep, Result, Track
 from ..shot.character import Array
+from ..shot.needs import OFF
 from .curves import sample_tracks
+from .idle_motors import ENOUGH
 from .optimize import optimize_shot
 from .prepare import Options, prepare
 from .run import Progress, meant_motion, simulate_shot
@@ -92,7 +94,7 @@ def optimize_to_tolerance(
     The search begins with a step at which the input's shake is known well enough to be taken away. What is left of it
     afterwards is known far better; where the tolerance asks for more, the search goes on with a finer step.
     """
-    run = partial(optimize_shot, character, bodies=bodies, progress=progress, checkpoint=checkpoint)
+    run = partial(_searched, character, bodies=bodies, progress=progress, checkpoint=checkpoint)
     if not _chooses(character, options):
         found = run(animation, options=options)
         return found if found.interrupted else _estimated(found, character, animation, bodies, options)
@@ -118,6 +120,21 @@ def optimize_to_tolerance(
         animation = replace(animation, current=found_tracks(result, animation))
     assert result is not None
     return result
+
+
+def _searched(
+    character: Character, animation: Animation, bodies: Bodies, options: Options, progress: Progress,
+    checkpoint: Path | None,
+) -> Result:  # fmt: skip
+    """One search; where motors that were left out of it promise too much it goes on with them."""
+    found = optimize_shot(character, animation, bodies, options, progress, checkpoint)
+    enough = ENOUGH * character.retarget.allowed(options.tolerance)
+    if found.interrupted or found.idle_gain_m is None or found.idle_gain_m <= enough or options.motors == OFF:
+        return found
+    motors = tuple(replace(motor, idle=False) for motor in character.motors)
+    animation = replace(animation, current=found_tracks(found, animation))
+    every = replace(character, motors=motors)
+    return _added(found, optimize_shot(every, animation, bodies, options, progress, checkpoint))
 
 
 def _chooses(character: Character, options: Options) -> bool:

@@ -50,7 +50,12 @@ class Needs:
     @property
     def left_out(self) -> tuple[LeftOut, ...]:
         """What is left out, for the report."""
-        return tuple(LeftOut(row.what, row.why, row.estimated_error_m) for row in self.rows if not row.needed)
+        return self.left_out_but()
+
+    def left_out_but(self, *kinds: str) -> tuple[LeftOut, ...]:
+        """The same without some kinds."""
+        rows = (row for row in self.rows if not row.needed and row.kind not in kinds)
+        return tuple(LeftOut(row.what, row.why, row.estimated_error_m) for row in rows)
 
     def choice(self, kind: str) -> str:
         """`auto`, `on` or `off`."""

@@ -202,6 +202,8 @@ class Result:
         performed: A rigid robot performing the curves that were found (or simulated); same times. None where a
             linkage cannot follow them rigidly.
         accuracy: Of the motion that counts, `after` or else `before`; None where it was not estimated.
+        idle_gain_m: By how much the root-mean-square error would fall with the motors that were left out of the search
+            since they move no target [m]; None where there are none.
     """
 
     reference: Motion
@@ -229,3 +231,4 @@ class Result:
     interrupted: bool = False
     performed: Motion | None = None
     accuracy: Accuracy | None = None
+    idle_gain_m: float | None = None
