@@ -55,9 +55,7 @@ def root_mean_square(result):
 
 @pytest.fixture(scope="module")
 def everywhere(arm, bodies):
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(optimize, "quiet_ranges", lambda *a: quiet_ranges(*a, ranges="on"))
-        return optimize_shot(still(arm), pausing(), bodies, OPTIONS, quiet)
+    return optimize_shot(still(arm), pausing(), bodies, dataclasses.replace(OPTIONS, ranges="on"), quiet)
 
 
 def test_a_hold_before_a_move_is_left_out_and_costs_nothing(arm, bodies, everywhere, monkeypatch):

@@ -40,9 +40,9 @@ class NeedsShot:
     meshes: FEMeshes
 
 
-def _swing(seconds: float = 2.0, motors: int = 2) -> Animation:
+def _swing(seconds: float = 2.0, motors: int = 2, rate: float = 24.0) -> Animation:
     move, back = quintic(0.8, 0.4, 0.2), quintic(-1.1, 0.35, 0.9)
-    return shot_of(lambda t: move(t) + back(t), seconds, motors)
+    return shot_of(lambda t: move(t) + back(t), seconds, motors, rate)
 
 
 def _with_geometry(character: Character, meshes: FEMeshes) -> Character:
@@ -54,10 +54,16 @@ def _with_geometry(character: Character, meshes: FEMeshes) -> Character:
     return replace(character, bodies=tuple(bodies))
 
 
-def plastic_arm() -> NeedsShot:
-    """Two plastic links that swing."""
+def plastic_arm(rate: float = 24.0) -> NeedsShot:
+    """Two plastic links that swing, animated at so many frames a second."""
     character, meshes = beam_arm(2, length=0.3, thickness=0.014, payload=0.2)
-    return NeedsShot("arm", _with_geometry(character, meshes), _swing(), meshes)
+    return NeedsShot("arm", _with_geometry(character, meshes), _swing(rate=rate), meshes)
+
+
+def firm_arm() -> NeedsShot:
+    """The same of thicker plastic, which bends by less than a twentieth of that."""
+    character, meshes = beam_arm(2, length=0.3, thickness=0.03, payload=0.1)
+    return NeedsShot("firm arm", _with_geometry(character, meshes), _swing(), meshes)
 
 
 def steel_arm() -> NeedsShot:
@@ -135,23 +141,32 @@ def clevis_arm(links: int = 6) -> NeedsShot:
     return NeedsShot("clevis arm", _with_geometry(character, meshes), animation, meshes)
 
 
-def arm_with_head() -> NeedsShot:
-    """The plastic arm with a head on its elbow: two motors that nod and shake it, and no target on it."""
+def arm_with_head(features: int = 0) -> NeedsShot:
+    """The plastic arm with a head on its elbow: two motors that nod and shake it, and no target on it.
+
+    Args:
+        features: Further motors on the head, such as those of eyes, lids and jaw.
+    """
     shot = plastic_arm()
     character, count = shot.character, len(shot.character.bodies)
     skull = MassProperties(0.02, np.array([0.03, 0.0, 0.0]), 1e-5 * np.eye(3))
-    bodies = (*character.bodies, Body("/Arm/Neck", _frame(0.3), skull), Body("/Arm/Head", _frame(0.3), skull))
-    joints = (
+    small = MassProperties(1e-3, np.zeros(3), 1e-7 * np.eye(3))
+    bodies = (
+        *character.bodies, Body("/Arm/Neck", _frame(0.3), skull), Body("/Arm/Head", _frame(0.3), skull),
+        *(Body(f"/Arm/Feature{k}", _frame(0.3), small) for k in range(features)),
+    )  # fmt: skip
+    joints = [
         *character.joints,
         Joint("/Arm/Nod", "revolute", 0, count, _frame(0.3, rotation=LIFTS), _frame(0.0, rotation=LIFTS)),
         Joint("/Arm/Shake", "revolute", count, count + 1, _frame(0.0), _frame(0.0)),
-    )
-    motors = (
-        *character.motors,
-        *(Motor(len(joints) - 2 + k, joints[len(joints) - 2 + k].path, _ANGLE) for k in (0, 1)),
-    )
-    character = replace(character, bodies=bodies, joints=joints, motors=motors)
-    return NeedsShot("arm with a head", character, _swing(motors=4), shot.meshes)
+    ]
+    joints += [
+        Joint(f"/Arm/Turn{k}", "revolute", count + 1, count + 2 + k, _frame(0.0), _frame(0.0)) for k in range(features)
+    ]
+    own = range(len(character.joints), len(joints))
+    motors = (*character.motors, *(Motor(k, joints[k].path, _ANGLE) for k in own))
+    character = replace(character, bodies=bodies, joints=tuple(joints), motors=motors)
+    return NeedsShot("arm with a head", character, _swing(motors=len(motors)), shot.meshes)
 
 
 def held_arm() -> NeedsShot:

@@ -26,9 +26,10 @@ from ..shot import Result
 from .fresh_cache import fresh_cache
 from .shots import Unreduced, load_unreduced
 from .tables import write_rows
-from .work_precision import SAMPLES, Bench, Reference, machine
+from .work_precision import FINEST, SAMPLES, Bench, Reference, machine
 
 TOLERANCES = (1e-2, 1e-3, 1e-4, 1e-5)
+FINER = 1e-3  # tolerance of the reference's reduction over the tightest that is measured
 
 
 @dataclass(frozen=True)
@@ -66,10 +67,15 @@ class Kept:
 
 
 class Tolerances:
-    """One shot to several tolerances; the reference of its input is made once."""
+    """One shot to several tolerances; the reference of its input is made once.
 
-    def __init__(self, shot: Unreduced):
-        self.shot = shot
+    Args:
+        shot: The shot.
+        finest: Tolerance of the reference's reduction [m], far below those that are measured.
+    """
+
+    def __init__(self, shot: Unreduced, finest: float = FINEST):
+        self.shot, self.finest = shot, finest
         self._reference: Reference | None = None
 
     def kept(self, tolerance: float, command: str = "simulate") -> Kept:
@@ -81,11 +87,11 @@ class Tolerances:
         wall = time.perf_counter() - begin
         assert result.accuracy is not None
         if result.after is None:
-            self._reference = self._reference or Bench(shot).reference()
+            self._reference = self._reference or Bench(shot).reference(self.finest)
             reference = self._reference
         else:
             found = replace(animation, current=found_tracks(result, animation))
-            reference = Bench(replace(shot, animation=found)).reference()
+            reference = Bench(replace(shot, animation=found)).reference(self.finest)
         runs = (result.before, result.after or result.before)
         return Kept(
             shot.name, command, tolerance,
@@ -141,7 +147,7 @@ def main(arguments: list[str] | None = None) -> int:
     options = parser.parse_args(arguments)
     rows: list[Kept] = []
     for path in options.shots:
-        shot = Tolerances(load_unreduced(path))
+        shot = Tolerances(load_unreduced(path), FINER * min(options.tolerances))
         own = [shot.kept(tolerance, "optimize" if options.optimize else "simulate") for tolerance in options.tolerances]
         rows += own
         if not options.json:

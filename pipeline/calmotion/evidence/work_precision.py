@@ -102,16 +102,19 @@ class Bench:
         options = Options(integrator=integrator)
         return simulate_at(self.shot.character, self.shot.animation, bodies, options, step)
 
-    def reference(self) -> Reference:
+    def reference(self, finest: float = FINEST) -> Reference:
         """The finest run, its step extrapolated to zero.
 
         Its bar is what is left of the step's error, which falls by eight where that is halved, and what ten times the
         tolerance of the reduction changes.
+
+        Args:
+            finest: Tolerance of the reduction [m].
         """
-        bodies = self.bodies(FINEST)
+        bodies = self.bodies(finest)
         runs = [self.run(bodies, factor * REFERENCE_STEP) for factor in (1.0, 2.0, 4.0)]
         limits = [fine.positions + (fine.positions - coarse.positions) / 3.0 for fine, coarse in pairwise(runs)]
-        other = self.run(self.bodies(10.0 * FINEST), 2.0 * REFERENCE_STEP)
+        other = self.run(self.bodies(10.0 * finest), 2.0 * REFERENCE_STEP)
         bar = distance(limits[0], limits[1]) / 7.0 + distance(other.positions, runs[1].positions)
         return Reference(limits[0], bar)
 

@@ -1,7 +1,7 @@
 """Motors that were left out of a search since they move no target: what they promise where it ended.
 
 On a rigid robot they move none. On a flexible one they could still act by their inertia, as a counterweight does; the
-gradient over their offsets, which the adjoint knows anyway, and a few steps of conjugate gradients tell how much.
+gradient over their offsets, which the adjoint knows anyway, and two steps of conjugate gradients tell how much.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from ..shot.character import IntArray
 from .coupling import coupling_of
 from .problem import RetargetProblem
 
-STEPS = 8  # of conjugate gradients
+STEPS = 2  # of conjugate gradients
 ENOUGH = 0.05  # of the tolerance: what they must promise to be taken into the search after all
 
 
