@@ -11,7 +11,7 @@ import argparse
 import json
 import sys
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import partial
 
@@ -22,9 +22,9 @@ from ..needs.analysis import analyse
 from ..retarget.bodies import reduce_bodies
 from ..retarget.optimize import optimize_shot
 from ..retarget.prepare import Options, excitations
-from ..retarget.settled_bodies import settled_bodies
+from ..retarget.run import simulate_shot
 from ..retarget.step_error import StepRun, distance, frames_of
-from ..retarget.to_tolerance import simulate_to_tolerance
+from ..shot import Result
 from ..shot.needs import KINDS, ON
 from .fresh_cache import fresh_cache
 from .needs_shots import (
@@ -42,7 +42,6 @@ from .tables import write_rows
 from .work_precision import machine
 
 REPEATS = 3
-TOLERANCE = 1e-3  # of the simulations [m]
 
 
 @dataclass(frozen=True)
@@ -96,26 +95,16 @@ def run(shot: NeedsShot, command: str, forced: Mapping[str, str], options: Optio
     optimizes = command == "optimize"
     needs = analyse(shot.character, shot.animation, options, forced, optimizes)
     options = replace(options, ranges=needs.choice("ranges"), motors=needs.choice("motors"))
-    character, bodies, error = needs.character, None, 0.0
+    character, bodies = needs.character, None
     if any(body.bends for body in character.bodies):
+        loads = excitations(character, shot.animation, shot.meshes, options)
         # finite elements anew each time, as for a user who comes with a new character
         with fresh_cache():
-            if optimizes or "modes" in forced:
-                loads = excitations(character, shot.animation, shot.meshes, options)
-                bodies = reduce_bodies(character, span_tree(character), shot.meshes, None, loads)
-            else:
-                bodies, error = settled_bodies(character, shot.animation, shot.meshes, options)
-    quiet = lambda fraction, message: None  # noqa: E731  (a callback, twice)
-    if optimizes:
-        result = optimize_shot(character, shot.animation, bodies, options, quiet)
-    else:
-        result = simulate_to_tolerance(character, shot.animation, bodies, options, quiet, error)
+            bodies = reduce_bodies(character, span_tree(character), shot.meshes, None, loads)
+    work: Callable[..., Result] = optimize_shot if optimizes else simulate_shot
+    result = work(character, shot.animation, bodies, options, lambda fraction, message: None)
     whole = time.perf_counter() - begin
-    estimated = sum(row.estimated_error_m or 0.0 for row in needs.left_out)
-    if result.accuracy is not None:
-        estimated += result.accuracy.estimated_m
-    else:
-        estimated += sum(row.estimated_error_m or 0.0 for row in result.left_out)
+    estimated = sum(row.estimated_error_m or 0.0 for row in (*needs.left_out, *result.left_out))
     return Outcome(frames_of(result, shot.animation.frame_times), result.wall_s, whole, estimated)
 
 
@@ -130,7 +119,7 @@ def pair(
         given: Options of both.
         more: Options of the run that has it, where these make it.
     """
-    options = given or (Options() if command == "optimize" else Options(tolerance=TOLERANCE))
+    options = given or Options()
     lean = partial(run, shot, command, {}, options)
     full = partial(run, shot, command, forced, more or options)
     full(), lean()  # compile
@@ -143,21 +132,21 @@ def pair(
 
 def pairs(repeats: int = REPEATS) -> list[partial[Pair]]:
     """Every pair, one kind of thing each, and then everything, to be measured when called."""
-    finest, finer_steps = Options(knot_spacing=1.0 / 60.0), Options(tolerance=TOLERANCE, step=1.0 / 15360.0)
+    finest, finer_steps = Options(knot_spacing=1.0 / 60.0), Options(step=1.0 / 3840.0)
     everything = dict.fromkeys(KINDS, ON)
     return [
         partial(pair, "bodies", mixed_arm(), "simulate", {"bodies": ON}, repeats),
         partial(pair, "turning", gantry(), "simulate", {"turning": ON}, repeats),
         partial(pair, "loops", clevis_arm(), "simulate", {"loops": ON}, repeats),
-        partial(pair, "modes", plastic_arm(), "simulate", {"modes": ON}, repeats),
+        partial(pair, "modes", firm_arm(), "simulate", {"modes": ON}, repeats),
         partial(pair, "elasticity", firm_arm(), "simulate", {"elasticity": ON}, repeats),
         partial(pair, "motors", arm_with_head(6), "optimize", {"motors": ON}, repeats),
         partial(pair, "ranges", held_arm(), "optimize", {"ranges": ON}, repeats),
         partial(pair, "knots", plastic_arm(60.0), "optimize", {}, repeats, None, finest),
-        partial(pair, "step", plastic_arm(), "simulate", {}, repeats, None, finer_steps),
+        partial(pair, "step", firm_arm(), "simulate", {}, repeats, None, finer_steps),
         partial(pair, "everything", steel_arm(), "simulate", everything, repeats),
         partial(pair, "everything", gantry(), "simulate", everything, repeats),
-        partial(pair, "everything", plastic_arm(), "simulate", everything, repeats),
+        partial(pair, "everything", firm_arm(), "simulate", everything, repeats),
     ]
 
 
