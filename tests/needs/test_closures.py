@@ -1,6 +1,7 @@
 """Loops: redundant rows by Gruebler's count, and joints that hold nothing."""
 
-import numpy as np
+from dataclasses import replace
+
 import pytest
 from calmotion.dynamics.topology import span_tree
 from calmotion.evidence.linkage_arm import linkage_arm, performance
@@ -8,6 +9,7 @@ from calmotion.evidence.needs_shots import NeedsShot, clevis_arm, plastic_arm
 from calmotion.needs.closures import Closures, closures_of
 from calmotion.retarget.excitation import rigid_bodies, rigid_run
 from calmotion.retarget.prepare import Options, grid_of
+from calmotion.shot import Motor
 
 
 def _of(shot):
@@ -41,14 +43,18 @@ def test_the_second_pin_of_a_clevis_holds_nothing(links):
     assert all("Right" in name for name in names) and len(names) == links
 
 
-def test_pins_that_are_out_of_line_are_no_second_pins():
+def test_nor_does_a_ball_on_the_axis_of_a_hinge():
     shot = clevis_arm(1)
     joints = list(shot.character.joints)
-    frame = joints[1].frame0
-    tilted = type(frame)(frame.position, np.array([np.sqrt(0.5), 0.0, 0.0, np.sqrt(0.5)]))
-    from dataclasses import replace
-
-    joints[1] = replace(joints[1], kind="spherical", frame0=tilted)
+    joints[1] = replace(joints[1], kind="spherical")
     found, _ = _of(replace(shot, character=replace(shot.character, joints=tuple(joints))))
-    # a ball on the hinge's axis still holds nothing
-    assert found.redundant == found.joints
+    assert found.redundant_rows == 3 and found.redundant == found.joints
+
+
+def test_a_motor_on_a_second_pin_is_kept_for_its_effort():
+    shot = clevis_arm(1)
+    motors = (*shot.character.motors, Motor(1, shot.character.joints[1].path, shot.character.motors[0].attribute))
+    tracks = shot.animation.tracks * 2
+    animation = replace(shot.animation, tracks=tracks, current=tracks)
+    found, _ = _of(replace(shot, character=replace(shot.character, motors=motors), animation=animation))
+    assert found.redundant_rows == 6 and found.redundant == ()

@@ -40,9 +40,8 @@ def analyse(
     """
     forced = {kind: choice for kind, choice in forced.items() if choice != AUTO}
     choice = partial(_choice, forced)
-    character = _asked(character, forced)
     if len(animation.frame_times) < 2:
-        return Needs(character, (), forced)
+        return Needs(_asked(character, forced), (), forced)
     tree = span_tree(character)
     allowed = SHARE * character.retarget.allowed(options.tolerance)
     rows: list[Need] = [Need("loops", "closed loops", False, "no joint closes one")]
@@ -54,10 +53,10 @@ def analyse(
         try:
             character, rows, stiffness = decide(character, animation, options, tree, choice, allowed, changes)
         except SimulationFailure:
-            return Needs(character, (), forced)
+            return Needs(_asked(character, forced), (), forced)
     found = _turning(turning_of(character, animation, tree, stiffness, changes), choice("turning"), allowed)
     character, more = _straight(character, found)
-    return Needs(character, (*rows, *more), forced)
+    return Needs(_asked(character, forced), (*rows, *more), forced)
 
 
 def _choice(forced: Mapping[str, str], kind: str) -> str:

@@ -23,6 +23,8 @@ from .closures import closures_of
 from .influence import NOTHING, influence
 from .solid import solid_of
 
+STEP = 1.0 / 100.0  # of the rigid robot's simulation [s]: loads are those of the animation, and safe bounds follow
+
 
 def decide(
     character: Character, animation: Animation, options: Options, tree: Tree, choice: Callable[[str], str],
@@ -47,7 +49,7 @@ def decide(
     rough = replace(character, bodies=tuple(_with_mass(k, body, known) for k, body in enumerate(character.bodies)))
     anchors = body_anchors(rough, tree)
     rigid = [rigid_body(body, own) for body, own in zip(rough.bodies, anchors, strict=True)]
-    grid = grid_of(character, animation, options)
+    grid = grid_of(character, animation, replace(options, step=STEP))
     model, run = rigid_run(character, animation, grid, tree, rigid)
     character, rows = _motors(character, model, run, choice("motors")) if changes else (character, [])
     # loads of one body depend on the masses of all
