@@ -14,10 +14,16 @@ def test_long_paths_are_named_by_as_few_last_names_as_tell_them_apart():
 
 
 def test_the_accuracy_is_told_where_it_is_known():
-    none = dict.fromkeys(("estimated_error_m", "estimated_step_error_m", "verified_error_m"))
-    told = {"estimated_error_m": 3e-4, "estimated_step_error_m": 1e-4, "verified_error_m": 2e-4}
+    names = ("estimated_error_m", "estimated_step_error_m", "estimated_mesh_error_m", "verified_error_m")
+    none = dict.fromkeys(names)
+    told = none | {"estimated_error_m": 3e-4, "estimated_step_error_m": 1e-4, "verified_error_m": 2e-4}
+    with_mesh = told | {"estimated_mesh_error_m": 5e-4, "verified_error_m": None}
     for report, expected in (
         (none, ""),
+        (
+            with_mesh,
+            "simulated to about 0.3 mm at the targets (0.1 mm of it the time step), the finite elements to 0.5 mm\n",
+        ),
         (
             told | {"verified_step_s": 5e-4, "verified_modes": 44},
             "simulated to about 0.3 mm at the targets (0.1 mm of it the time step), "

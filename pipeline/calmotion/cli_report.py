@@ -135,6 +135,7 @@ def _accuracy(run: Run, result: Result) -> dict[str, Any]:
     return {
         "estimated_error_m": accuracy.estimated_m if accuracy else None,
         "estimated_step_error_m": accuracy.step_m if accuracy else None,
+        "estimated_mesh_error_m": accuracy.mesh_m if accuracy else None,
         "verified_error_m": verified.error_m if verified else None,
         "verified_step_s": verified.step_s if verified else None,
         "verified_modes": verified.modes if verified else None,

@@ -80,11 +80,10 @@ def print_limits(console: Console, limits: Sequence[dict[str, Any]], optimized: 
 def print_accuracy(console: Console, report: dict[str, Any]) -> None:
     """How far the simulation itself may be off."""
     if report["estimated_error_m"] is not None:
-        step = length(report["estimated_step_error_m"])
-        console.print(
-            f"simulated to about {length(report['estimated_error_m'])} at the targets ({step} of it the time step), "
-            "the finite-element mesh not counted"
-        )
+        error, step = length(report["estimated_error_m"]), length(report["estimated_step_error_m"])
+        mesh = report["estimated_mesh_error_m"]
+        more = "the finite-element mesh not counted" if mesh is None else f"the finite elements to {length(mesh)}"
+        console.print(f"simulated to about {error} at the targets ({step} of it the time step), {more}")
     if report["verified_error_m"] is not None:
         console.print(
             f"verified: a run with steps of {1000 * report['verified_step_s']:.4g} ms and {report['verified_modes']} "

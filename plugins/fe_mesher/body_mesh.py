@@ -103,7 +103,7 @@ def _accurate(index: int, body: Body, solid: Solid, options: MeshOptions, carrie
     if known is not None:
         size, error, nodes = (float(value) for value in known)
         mesh = filled(index, body, solid, shape, size, options)
-        return _with_remarks(mesh, remark(Accuracy(error, int(nodes))))
+        return _judged(mesh, Accuracy(error, int(nodes)))
     size = element_size(shape)
     mesh = filled(index, body, solid, shape, size, options)
     found = estimate(mesh.points, mesh.tets, body, carrier)
@@ -116,11 +116,12 @@ def _accurate(index: int, body: Body, solid: Solid, options: MeshOptions, carrie
         found = compared(before, estimate(mesh.points, mesh.tets, body, carrier))
     if options.cache:
         cache.store(key, size=np.array(size), error=np.array(found.error), nodes=np.array(found.nodes))
-    return _with_remarks(mesh, remark(found))
+    return _judged(mesh, found)
 
 
-def _with_remarks(mesh: FEMesh, remarks: tuple[str, ...]) -> FEMesh:
-    return replace(mesh, quality=replace(mesh.quality, repairs=mesh.quality.repairs + remarks))
+def _judged(mesh: FEMesh, found: Accuracy) -> FEMesh:
+    repairs = mesh.quality.repairs + remark(found)
+    return replace(mesh, quality=replace(mesh.quality, repairs=repairs, frequency_error=found.error))
 
 
 def filled(index: int, body: Body, solid: Solid, shape: Shape, size: float, options: MeshOptions) -> FEMesh:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from boxes import box_tets
 from calmotion.fem.assembly import assemble
-from calmotion.fem.choose_law import choose_law, work_of_loads
+from calmotion.fem.choose_law import choose_law, deflection_of, work_of_loads
 from calmotion.fem.craig_bampton import reduced_basis
 from calmotion.fem.excitation_data import Excitation
 from calmotion.fem.modal_derivatives import Support
@@ -52,6 +52,14 @@ def test_at_rest_everything_is_linear():
     still = Excitation(np.zeros(3), np.zeros(3), np.zeros(3), np.zeros((1, 3)), np.zeros((1, 3)))
     choice = choose_law(*arm(1e6), still, 1e-6)
     assert choice.law == "linear" and choice.error_m == 0.0
+
+
+def test_a_deflection_is_bounded_by_twice_that_of_a_beam_at_rest_and_a_little_more():
+    model, _, basis, _ = arm(1.8e9)
+    none = np.zeros(3)
+    loads = Excitation(none, none, none, np.array([[0.0, 0.0, 2.0]]), np.zeros((1, 3)))
+    at_rest = 2.0 * LENGTH**3 / (3.0 * 1.8e9 * 0.02**4 / 12.0)
+    assert 2.0 * at_rest < deflection_of(model, basis, loads) < 3.0 * at_rest
 
 
 def test_the_work_of_loads_is_that_of_their_sum_at_worst():

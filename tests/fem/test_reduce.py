@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from calmotion.errors import ShotError
 from calmotion.fem import Anchor, rigid_invariants
+from calmotion.fem.excitation_data import Excitation
 from calmotion.fem.reduce import reduce_body
 from calmotion.shot import Body, FlexibleSettings, MassProperties, SurfaceMesh
 
@@ -104,3 +105,17 @@ def test_a_material_that_is_none_is_refused(mesh, body, anchors, field, value):
 def test_a_body_that_nothing_carries_is_refused(mesh, body, anchors):
     with pytest.raises(ShotError, match="needs a joint that carries it"):
         reduce_body(mesh, body, anchors, [], 2)
+
+
+def test_what_a_mesh_is_off_by_is_a_part_of_the_deflection(mesh, body, anchors):
+    none = np.zeros(3)
+    force = np.zeros((2, 3))
+    force[0, 2] = 2.0
+    loads = Excitation(none, none, none, force, np.zeros((2, 3)))
+    judged = replace(mesh, quality=replace(mesh.quality, frequency_error=0.01))
+    error = reduce_body(judged, body, anchors, [], 1, loads).mesh_error_m
+    # two percent of the stiffness, of twice the deflection at rest
+    at_rest = 2.0 * 0.6**3 / (3.0 * 1.8e9 * 0.02**4 / 12.0)
+    assert 0.04 * at_rest < error < 0.06 * at_rest
+    assert reduce_body(mesh, body, anchors, [], 1, loads).mesh_error_m is None
+    assert reduce_body(judged, body, anchors, [], 1).mesh_error_m is None

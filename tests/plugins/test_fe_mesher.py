@@ -364,6 +364,7 @@ def test_the_size_that_accuracy_needs_is_found_once_and_kept(host, package, own_
         monkeypatch.setattr(package(module), name, lambda *arguments: pytest.fail("worked again"))
     (again,) = run(host, body)
     assert np.array_equal(first.tets, again.tets) and first.quality.repairs == again.quality.repairs
+    assert 0.0 < first.quality.frequency_error == again.quality.frequency_error < 0.05
 
 
 def test_a_mesh_that_is_not_fine_enough_is_made_again_and_what_is_missing_is_told(host, package, monkeypatch):
@@ -381,6 +382,7 @@ def test_a_mesh_that_is_not_fine_enough_is_made_again_and_what_is_missing_is_tol
     (mesh,) = run(host, link(surface(box((0.2, 0.02, 0.02)))), cache=False)
     assert len(sizes) == 2 and sizes[1] == pytest.approx(0.5 * sizes[0])
     assert any("up to 3% too high (5000 nodes)" in repair for repair in mesh.quality.repairs)
+    assert mesh.quality.frequency_error == 0.03
 
 
 def test_two_meshes_may_show_that_the_estimate_is_too_high_but_never_that_it_is_too_low(package):

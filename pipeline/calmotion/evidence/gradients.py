@@ -107,7 +107,7 @@ def main(arguments: list[str] | None = None) -> int:
     for name in options.shots:
         found += errors(load(name))
         if not options.json:
-            _print_table(found, found[-1].shot)
+            print_gradients(found, found[-1].shot)
     figures = []
     if options.figures:
         from .gradient_figure import draw
@@ -121,7 +121,7 @@ def main(arguments: list[str] | None = None) -> int:
     return 0
 
 
-def _print_table(found: Sequence[GradientError], name: str) -> None:
+def print_gradients(found: Sequence[GradientError], name: str) -> None:
     """The table of one shot for a person."""
     from ..cli_tables import console_on, print_table
 

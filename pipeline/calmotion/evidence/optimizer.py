@@ -223,6 +223,8 @@ def print_tables(converged: list[Convergence], timed: list[Cost], name: str) -> 
     ]  # fmt: skip
     heads = ["method", "largest error", "objective / converged", "simulations", "products", "cost to 1% [simulations]"]
     print_table(console, f"{name}: convergence", heads, rows)
+    if not timed:
+        return
     rows = [
         [str(row.unknowns), f"{row.forward_s:.3f} s", f"{row.gradient:.2f}", f"{row.product:.2f}"]
         for row in timed

@@ -17,6 +17,7 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import partial
 from itertools import pairwise
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -34,6 +35,10 @@ from .shots import Unreduced, load_unreduced
 from .tables import write_rows
 from .timing import median_time
 
+if TYPE_CHECKING:
+    from .gradients import GradientError
+    from .optimizer import Convergence
+
 SAMPLES = tuple(f"samples/{name}/{name}.usda" for name in ("bartender", "dancer", "rapper", "drummer", "boxer"))
 STEPS = (1 / 60, 1 / 120, 1 / 240, 1 / 480, 1 / 960, 1 / 1920)
 FEW_STEPS = {"radau": (1 / 60, 1 / 120, 1 / 240)}  # of higher order, and dearer
@@ -43,6 +48,7 @@ BASE, FINEST = 1e-4, 1e-6  # reductions: of the runs that vary something else, a
 REFERENCE_STEP = 1 / 3840
 ELEMENTS = (2.0, 1.4, 1.0, 0.7)  # edge lengths over those of the mesh that the shot gets
 REPEATS = 3
+LBFGS = 200  # most evaluations of the quasi-Newton method
 
 
 @dataclass(frozen=True)
@@ -205,9 +211,16 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--csv", metavar="FILE", help="also write a table")
     parser.add_argument("--figures", metavar="DIR", help="also draw error against run time, to this folder")
     parser.add_argument("--elements", action="store_true", help="also vary the size of elements, which takes long")
+    parser.add_argument(
+        "--optimizer",
+        action="store_true",
+        help="also judge both adjoints by differences, and Gauss-Newton beside L-BFGS, which takes long",
+    )
     parser.add_argument("--repeats", type=int, default=REPEATS, help="of which times are the median")
     options = parser.parse_args(arguments)
     points: list[Point] = []
+    gradients: list[GradientError] = []
+    converged: list[Convergence] = []
     bars: dict[str, float] = {}
     for name in options.shots:
         bench = Bench(load_unreduced(name), options.repeats)
@@ -218,6 +231,17 @@ def main(arguments: list[str] | None = None) -> int:
         points += own
         if not options.json:
             print_points(own, reference.bar_m)
+        if options.optimizer:
+            from .gradients import errors, print_gradients
+            from .optimizer import compare, print_tables
+            from .shots import load
+
+            posed = load(name)
+            gradients += errors(posed)
+            converged += compare(posed, LBFGS)
+            if not options.json:
+                print_gradients(gradients, posed.name)
+                print_tables(converged, [], posed.name)
     figures: list[str] = []
     if options.csv:
         write_rows(options.csv, Point, points)
@@ -225,9 +249,16 @@ def main(arguments: list[str] | None = None) -> int:
         from .work_precision_figure import draw
 
         figures = [draw(options.figures, [p for p in points if p.shot == shot], bar) for shot, bar in bars.items()]
+        if gradients:
+            from .gradient_figure import draw as draw_gradients
+
+            figures.append(draw_gradients(options.figures, gradients))
     if options.json:
         rows = [asdict(point) for point in points]
-        print(json.dumps({"machine": machine(), "reference_error_m": bars, "points": rows, "figures": figures}))
+        found = {"machine": machine(), "reference_error_m": bars, "points": rows, "figures": figures}
+        if options.optimizer:
+            found |= {"gradients": [asdict(r) for r in gradients], "optimizers": [asdict(r) for r in converged]}
+        print(json.dumps(found))
     else:
         for figure in figures:
             print(f"wrote {figure}")

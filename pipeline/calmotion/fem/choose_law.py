@@ -66,7 +66,7 @@ def choose_law(
     fields, motion = modal_derivatives(model, support, basis, count, material, "stvk")
     modes = basis.modes[:, :, :count]
     omega_squared = basis.omega_squared[:count]
-    bend = _OVERSHOOT * work_of_loads(model, modes, basis.patch_motion[:, :, :count], excitation) / omega_squared
+    bend = _amplitudes(model, basis, excitation, count)
     first, second = np.triu_indices(count)
     twice = np.where(first == second, 1.0, 2.0)
     pairs = twice * bend[first] * bend[second]
@@ -97,6 +97,19 @@ def choose_law(
     if stvk_error <= tolerance or strain <= _LARGE_STRAIN:
         return LawChoice("stvk", f"{because}; it is strained by {strain:.1%}", stvk_error)
     return LawChoice("neohookean", f"{because}; it is strained by {strain:.0%}", 0.0)
+
+
+def _amplitudes(model: FEModel, basis: Basis, excitation: Excitation, count: int) -> Array:
+    """How far the loads deflect the first modes at most, shape [count]."""
+    work = work_of_loads(model, basis.modes[:, :, :count], basis.patch_motion[:, :, :count], excitation)
+    return _OVERSHOOT * work / basis.omega_squared[:count]
+
+
+def deflection_of(model: FEModel, basis: Basis, excitation: Excitation) -> float:
+    """How far the loads deflect a linear body at its interfaces, at most [m]."""
+    count = min(_MODES, len(basis.omega_squared))
+    amplitudes = _amplitudes(model, basis, excitation, count)
+    return _reach(basis.modes[:, :, :count], basis.patch_motion[:, :, :count], amplitudes)
 
 
 def work_of_loads(model: FEModel, fields: Array, motion: Array, excitation: Excitation) -> Array:

@@ -75,6 +75,7 @@ def reduce_body(
         elements=len(model.mesh.tets),
         elasticity=elasticity,
         left_out=left_out,
+        mesh_error_m=_mesh_error(mesh, linear),
     )
     return damped(reduced, material)
 
@@ -148,6 +149,16 @@ def _law(
     if choice.law == "stvk":
         what = f"nonlinear material of {body.path}"
     return choice.law, (LeftOut(what, choice.reason, choice.error_m),)
+
+
+def _mesh_error(mesh: FEMesh, linear: LinearModes) -> float | None:
+    """What elements that are too stiff take from the deflection [m]: stiffness goes by the square of a frequency."""
+    error = mesh.quality.frequency_error
+    if error is None or linear.excitation is None:
+        return None
+    from .choose_law import deflection_of
+
+    return 2.0 * error * deflection_of(linear.model, linear.basis, linear.excitation)
 
 
 def _points(mesh: QuadraticMesh, anchors: Sequence[Anchor]) -> Embedding:

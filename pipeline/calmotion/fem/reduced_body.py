@@ -90,6 +90,8 @@ class ReducedBody:
         nodes, elements: Size of the finite-element mesh; 0 for a rigid body.
         elasticity: None for a linear body.
         left_out: What this body does without, and what that costs.
+        mesh_error_m: What its finite-element mesh is estimated to be off by in the shot [m]; None where that is not
+            known.
     """
 
     invariants: Invariants
@@ -101,6 +103,7 @@ class ReducedBody:
     elements: int = 0
     elasticity: Elasticity | None = None
     left_out: tuple[LeftOut, ...] = ()
+    mesh_error_m: float | None = None
 
     @property
     def frequencies(self) -> Array:

@@ -44,7 +44,7 @@ def simulate_to_tolerance(
     progress(0.0, "choosing the time step")
     step, error = chosen_step(character, animation, bodies, options)
     result = simulate_shot(character, animation, bodies, replace(options, step=step), progress)
-    accuracy = Accuracy(error, _left_out(bodies) if left_out_m is None else left_out_m)
+    accuracy = Accuracy(error, _left_out(bodies) if left_out_m is None else left_out_m, _mesh_error(bodies))
     return _with_step(replace(result, accuracy=accuracy), character, options)
 
 
@@ -154,6 +154,13 @@ def _left_out(bodies: Bodies) -> float:
     return sum(row.estimated_error_m or 0.0 for body in bodies or () for row in body.left_out)
 
 
+def _mesh_error(bodies: Bodies) -> float | None:
+    """That of their meshes [m]; None where nothing is flexible, or one of them is not known."""
+    errors = [body.mesh_error_m for body in bodies or () if len(body.stiffness)]
+    known = [error for error in errors if error is not None]
+    return sum(known) if errors and len(known) == len(errors) else None
+
+
 def _intended(character: Character, animation: Animation, bodies: Bodies, options: Options) -> Array:
     """Where the targets are meant to be at the frames [m], shape [f, K, 3]."""
     prepared = prepare(character, animation, bodies, replace(options, step=FIRST))
@@ -178,7 +185,7 @@ def _estimated(result: Result, character: Character, animation: Animation, bodie
     coarse = run_or_none(trial, 2.0 * result.step_s)
     if coarse is None or coarse.step < 1.5 * fine.step:  # it fails, or a frame is no longer than the step
         coarse, fine = fine, trial(0.5 * result.step_s)
-    accuracy = Accuracy(step_error(coarse, fine), _left_out(bodies))
+    accuracy = Accuracy(step_error(coarse, fine), _left_out(bodies), _mesh_error(bodies))
     return _with_step(replace(result, accuracy=accuracy), character, options)
 
 

@@ -16,12 +16,14 @@ class MeshQuality:
         volume: [m^3].
         volume_error: Relative difference to the volume of the (repaired) input surface; 0 for authored tetrahedra.
         repairs: What was repaired, as sentences.
+        frequency_error: By what part the first frequencies are estimated to be too high; None where that is not known.
     """
 
     min_dihedral_deg: float
     volume: float
     volume_error: float
     repairs: tuple[str, ...] = ()
+    frequency_error: float | None = None
 
 
 @dataclass(frozen=True, eq=False)

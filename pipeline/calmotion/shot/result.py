@@ -164,15 +164,17 @@ class Accuracy:
 
     Attributes:
         step_m: Estimated error of the time step [m].
-        left_out_m: Estimated error of what the reduced bodies do without [m].
+        left_out_m: Estimated error of what the shot and the reduced bodies do without [m].
+        mesh_m: Estimated error of the finite-element meshes [m]; None where it is not known.
     """
 
     step_m: float
     left_out_m: float
+    mesh_m: float | None = None
 
     @property
     def estimated_m(self) -> float:
-        """Of both [m]. The finite-element mesh is not in it."""
+        """Of both [m]. The mesh is not in it: another one is another robot, and no tolerance refines it."""
         return self.step_m + self.left_out_m
 
 
