@@ -5,8 +5,10 @@ import json
 
 import numpy as np
 import pytest
-from calmotion.evidence import work_precision
+from calmotion.evidence import gradients, optimizer, shots, work_precision
 from calmotion.evidence.beam_arm import beam_arm, quintic, shot_of
+from calmotion.evidence.gradients import GradientError
+from calmotion.evidence.optimizer import Convergence
 from calmotion.evidence.shots import Unreduced
 from calmotion.evidence.work_precision import Bench, Point, chosen_points, distance, forward_points
 from calmotion.evidence.work_precision_figure import front
@@ -90,3 +92,28 @@ def test_the_command_writes_a_table_a_picture_and_one_object(bench, reference, p
         assert [float(row["error_m"]) for row in csv.DictReader(file)] == [point.error_m for point in points]
     (figure,) = report["figures"]
     assert (tmp_path / "work_precision_arm.png").samefile(figure)
+
+
+def test_adjoints_and_optimisers_are_part_of_the_report_where_that_is_asked_for(
+    bench, reference, points, monkeypatch, capsys, tmp_path
+):
+    rows = [
+        GradientError("arm", name, 0.1 / k, 1.0, 0.4, 1e-9, error / k, 1e-10)
+        for name, error in (("discrete", 1e-2), ("continuous", 2e-2))
+        for k in (1, 2)
+    ]
+    found = Convergence("arm", "Gauss-Newton", 0.1, 1.0, 1.0, 30.0, 1.0, 9, 60, 1.2, 12.0)
+    monkeypatch.setattr(work_precision, "load_unreduced", lambda path: bench.shot)
+    monkeypatch.setattr(Bench, "reference", lambda self: reference)
+    monkeypatch.setattr(work_precision, "forward_points", lambda bench, reference: points)
+    monkeypatch.setattr(work_precision, "chosen_points", lambda bench, reference: [])
+    monkeypatch.setattr(shots, "load", lambda name: bench.shot)
+    monkeypatch.setattr(gradients, "errors", lambda shot: rows)
+    monkeypatch.setattr(optimizer, "compare", lambda shot, most: [found])
+    assert work_precision.main(["arm.usda", "--optimizer", "--json", "--figures", str(tmp_path)]) == 0
+    report = json.loads(capsys.readouterr().out)
+    assert [row["fine"] for row in report["gradients"]] == [row.fine for row in rows]
+    assert report["optimizers"][0]["simulations"] == 12.0 and len(report["figures"]) == 2
+    assert work_precision.main(["arm.usda", "--optimizer"]) == 0
+    shown = capsys.readouterr().out
+    assert "gradients against central differences" in shown and "Gauss-Newton" in shown
