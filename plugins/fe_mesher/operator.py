@@ -7,6 +7,7 @@ from typing import Any
 
 from calmotion.host import Operator, Property, RunContext
 from calmotion.shot import Character, FEMeshes, Needs
+from calmotion.shot.needs import nothing_bends
 
 
 class TetrahedralizeFlexibleBodies(Operator):
@@ -40,12 +41,7 @@ class TetrahedralizeFlexibleBodies(Operator):
     @classmethod
     def poll(cls, data: Mapping[type, Any]) -> str | None:
         """Left out where nothing bends."""
-        character, needs = data.get(Character), data.get(Needs)
-        if character is not None and not any(body.flexible for body in character.bodies):
-            return "no body is flexible"
-        if needs is not None and not any(body.bends for body in needs.character.bodies):
-            return "nothing bends noticeably in this shot"
-        return None
+        return nothing_bends(data)
 
     def execute(self, context: RunContext) -> Sequence[object]:
         """The meshes, in the order of the bodies."""

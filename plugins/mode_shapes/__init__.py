@@ -7,6 +7,7 @@ from typing import Any
 
 from calmotion.host import ModeShapes, Operator, OutputPaths, Property, RunContext, Source
 from calmotion.shot import Animation, Character, FEMeshes, Needs
+from calmotion.shot.needs import nothing_bends
 
 
 class WriteModeShapes(Operator):
@@ -24,10 +25,9 @@ class WriteModeShapes(Operator):
 
     @classmethod
     def poll(cls, data: Mapping[type, Any]) -> str | None:
-        paths, character = data.get(OutputPaths), data.get(Character)
-        if character is not None and not any(body.flexible for body in character.bodies):
-            return "nothing is flexible: no body has CalmFlexibleBodyAPI"
-        return None if paths and paths.modes else "no mode shapes are asked for (--modes)"
+        paths = data.get(OutputPaths)
+        asked = None if paths and paths.modes else "no mode shapes are asked for (--modes)"
+        return nothing_bends(data) or asked
 
     def execute(self, context: RunContext) -> Sequence[object]:
         from calmotion.retarget.bodies import flexible_modes

@@ -9,9 +9,9 @@ from typing import Any
 from calmotion.host import NotAsked, Operator, Property, RunContext
 from calmotion.host.values import OutputPaths, ReducedBodies, ShapedTracks, Source, SystemModes, Verification
 from calmotion.shot import Animation, Character, FEMeshes, Needs, Result
-from calmotion.shot.needs import AUTO
+from calmotion.shot.needs import AUTO, nothing_bends
 
-from .inputs import character_of, inputs, nothing_flexible, options_of, with_needs
+from .inputs import character_of, inputs, options_of, with_needs
 from .needs import AnalyseNeeds, PlanStep
 
 
@@ -40,7 +40,7 @@ class ReduceFlexibleBodies(Operator):
 
     @classmethod
     def poll(cls, data: Mapping[type, Any]) -> str | None:
-        return nothing_flexible(data)
+        return nothing_bends(data)
 
     def execute(self, context: RunContext) -> Sequence[object]:
         from calmotion.dynamics.topology import span_tree
@@ -79,7 +79,7 @@ class FindSystemModes(Operator):
         if source is not None and source.command != "inspect" and paths is not None:
             if not paths.figures and not paths.rrd:
                 return NotAsked("only figures and recordings show frequencies, and none are asked for")
-        return nothing_flexible(data)
+        return nothing_bends(data)
 
     def execute(self, context: RunContext) -> Sequence[object]:
         from calmotion.retarget.prepare import first_pose_modes

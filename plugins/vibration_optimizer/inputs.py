@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -12,15 +12,6 @@ from calmotion.shot import Animation, Character, Needs, Result
 
 if TYPE_CHECKING:
     from calmotion.retarget.options import Options
-
-
-def nothing_flexible(data: Mapping[type, Any]) -> str | None:
-    character, needs = data.get(Character), data.get(Needs)
-    if character is not None and not any(body.flexible for body in character.bodies):
-        return "nothing is flexible: no body has CalmFlexibleBodyAPI"
-    if needs is not None and not any(body.bends for body in needs.character.bodies):
-        return "nothing bends noticeably in this shot"
-    return None
 
 
 def inputs(context: RunContext) -> tuple[Character, Animation, Sequence[Any] | None]:

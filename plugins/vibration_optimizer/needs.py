@@ -8,9 +8,9 @@ from typing import Any
 from calmotion.host import NotAsked, Operator, Property, RunContext
 from calmotion.host.values import OutputPaths, PlannedStep, ReducedBodies, Source
 from calmotion.shot import Animation, Character, Needs
-from calmotion.shot.needs import AUTO, KINDS, OFF, ON
+from calmotion.shot.needs import AUTO, KINDS, OFF, ON, nothing_bends
 
-from .inputs import inputs, nothing_flexible, options_of
+from .inputs import inputs, options_of
 
 _FORCED = {
     "bodies": "Finite elements of all flexible bodies, or of none",
@@ -61,7 +61,7 @@ class PlanStep(Operator):
         source, character = data.get(Source), data.get(Character)
         if source is not None and source.command != "inspect":
             return NotAsked("other commands take it")
-        reason = nothing_flexible(data)
+        reason = nothing_bends(data)
         if reason is None or character is None:
             return None
         driven = {motor.joint for motor in character.motors}

@@ -80,7 +80,7 @@ def test_the_plugin_keeps_to_the_rules():
 
 
 def test_a_character_that_does_not_bend_is_left_out(host):
-    with pytest.raises(PluginError, match="no body is flexible"):
+    with pytest.raises(PluginError, match="nothing is flexible"):
         run(host, Body("/Arm/link", REST, None, (surface(box()),)))
 
 

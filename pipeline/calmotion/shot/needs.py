@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Any
 
 from .character import Character
 from .result import LeftOut
@@ -60,3 +61,17 @@ class Needs:
     def choice(self, kind: str) -> str:
         """`auto`, `on` or `off`."""
         return self.forced.get(kind, AUTO)
+
+
+def nothing_bends(data: Mapping[type, Any]) -> str | None:
+    """The reason why a step for flexible bodies is not needed, None where it is.
+
+    Args:
+        data: What is known of the run, by type.
+    """
+    character, needs = data.get(Character), data.get(Needs)
+    if character is not None and not any(body.flexible for body in character.bodies):
+        return "nothing is flexible: no body has CalmFlexibleBodyAPI"
+    if needs is not None and not any(body.bends for body in needs.character.bodies):
+        return "nothing bends noticeably in this shot"
+    return None
