@@ -425,6 +425,9 @@ def test_tetrahedra_that_do_not_fill_the_surface_are_refused(host, package, monk
 def links_of(shared_data, *names):
     """Surfaces of links of a real robot, in their body frames, as the reader gives them."""
     pytest.importorskip("pxr")
+    from calmotion.usd import schemas
+
+    schemas.register()  # before USD is used, as it reads schemas once in a process
     from pxr import Usd, UsdGeom
 
     file = shared_data / "converted" / "g1_dual_arm" / "g1_dual_arm.usda"
