@@ -3,6 +3,7 @@
 from argparse import Namespace
 
 import pytest
+from calmotion.cli import NEEDS
 from calmotion.cli_run import settings_of
 from calmotion.evidence.needs_shots import clevis_arm, mixed_arm, steel_arm
 from calmotion.host import NotAsked, OutputPaths, PlannedStep, Source
@@ -91,6 +92,10 @@ def test_keep_and_leave_out_become_settings():
     stronger = Namespace(settings=None, set=["needs.analyse.modes=auto"], keep=["modes"], leave_out=[])
     assert settings_of(stronger) == {"needs.analyse": {"modes": "auto"}}
     assert settings_of(Namespace(settings=None, set=[])) == {}
+
+
+def test_the_command_line_knows_every_kind():
+    assert NEEDS == KINDS
 
 
 def test_kinds_that_are_none_are_wrong_usage(calmotion):
