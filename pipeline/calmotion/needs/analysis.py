@@ -55,7 +55,7 @@ def analyse(
         except SimulationFailure:
             return Needs(_asked(character, forced), (), forced)
     found = _turning(turning_of(character, animation, tree, stiffness, changes), choice("turning"), allowed)
-    character, more = _straight(character, found)
+    character, more = _straight(character, found, "turning" in forced)
     return Needs(_asked(character, forced), (*rows, *more), forced)
 
 
@@ -93,7 +93,7 @@ def _turning(found: list[Turning], choice: str, allowed: float) -> list[Turning]
     ]
 
 
-def _straight(character: Character, found: list[Turning]) -> tuple[Character, list[Need]]:
+def _straight(character: Character, found: list[Turning], forced: bool) -> tuple[Character, list[Need]]:
     """The character with its bodies marked, and a row for each reason."""
     bodies = tuple(replace(b, straight=not t.turns) for b, t in zip(character.bodies, found, strict=True))
     names = distinct_names([body.path for body in bodies])
@@ -104,5 +104,5 @@ def _straight(character: Character, found: list[Turning]) -> tuple[Character, li
     for (turns, why), members in groups.items():
         errors = [error for k in members if (error := found[k].error_m) is not None]
         what = "turning of " + ", ".join(names[bodies[k].path] for k in members)
-        rows.append(Need("turning", what, turns, why, sum(errors) if errors else None, why.startswith("forced")))
+        rows.append(Need("turning", what, turns, why, sum(errors) if errors else None, forced))
     return replace(character, bodies=bodies), rows

@@ -18,9 +18,7 @@ _STEEP = 1.5  # slope of the middle line against the axis
 _STATIONS, _FINEST = 40, 600  # least number on the axis, and largest along the body
 _WINDOW = 0.125  # of the axis, over which the slope of the middle line is taken
 _LOST = 0.05  # of the volume, that sections may miss or count twice
-_PUNCH = (
-    0.6  # radii of a round bar that gives as much as the material around a rigid disc: half-space, bound for all ways
-)
+_PUNCH = 0.6  # radii of a round bar that gives at least as much as the half-space around a rigid disc, every way
 _SHEAR = 5.0 / 6.0
 
 

@@ -47,15 +47,15 @@ def closures_of(rigid: Model, run: ForwardRun) -> Closures:
         return Closures()
     at = np.unique(np.linspace(0, total - 1, min(INSTANTS, total)).astype(int))
     rows = [_rows(rigid, run, n) for n in at]
-    spare = min(sum(map(len, by_joint)) - _rank(by_joint) for by_joint in rows)
+    ranks = [_rank(by_joint) for by_joint in rows]  # that leaving out what is redundant does not change
+    spare = min(sum(map(len, by_joint)) - rank for by_joint, rank in zip(rows, ranks, strict=True))
     redundant: list[int] = []
     for joint in reversed(loops):
         if rigid.motor[joint] >= 0:
             continue  # its motor's effort is of interest
         without = {joint, *redundant}
         rest = [[r for j, r in enumerate(by_joint) if j not in without] for by_joint in rows]
-        kept = [r for r in ([r for j, r in enumerate(b) if j not in redundant] for b in rows)]
-        if all(_rank(one) == _rank(other) for one, other in zip(rest, kept, strict=True)):
+        if [_rank(by_joint) for by_joint in rest] == ranks:
             redundant.append(joint)
     return Closures(tuple(loops), spare, tuple(sorted(redundant)))
 
