@@ -10,9 +10,9 @@ from calmotion.fem.embedding import embed
 from calmotion.fem.excitation_data import Excitation
 from calmotion.fem.interfaces import Anchor
 from calmotion.fem.reduce import linear_modes
-from calmotion.fem.static_loads import peak_loads, unit_accelerations
+from calmotion.fem.static_loads import OVERSHOOT, peak_loads, unit_accelerations
 from calmotion.fem.tetrahedra import boundary_triangles, oriented_tets
-from calmotion.needs.bending import OVERSHOOT, Stiffness, static_reach
+from calmotion.needs.bending import Stiffness, static_reach
 
 from .solids import PLASTIC, STEEL, body_of, box, frame, inside_out, joined, rotated, tube
 

@@ -23,11 +23,11 @@ from .assembly import FEModel
 from .craig_bampton import Basis
 from .excitation_data import Excitation
 from .modal_derivatives import Support, modal_derivatives
+from .static_loads import OVERSHOOT
 
 _MODES = 4  # the lowest carry nearly all of a deflection
 _LARGE_STRAIN = 0.1  # below, the loads' bound says more about the bound than about the material
 _HOPELESS = 100.0  # times its own size: no real body bends so far, and modes about the straight one do not
-_OVERSHOOT = 2.0  # of a sudden load, against the deflection it holds at rest
 
 
 @dataclass(frozen=True)
@@ -102,7 +102,7 @@ def choose_law(
 def _amplitudes(model: FEModel, basis: Basis, excitation: Excitation, count: int) -> Array:
     """How far the loads deflect the first modes at most, shape [count]."""
     work = work_of_loads(model, basis.modes[:, :, :count], basis.patch_motion[:, :, :count], excitation)
-    return _OVERSHOOT * work / basis.omega_squared[:count]
+    return OVERSHOOT * work / basis.omega_squared[:count]
 
 
 def deflection_of(model: FEModel, basis: Basis, excitation: Excitation) -> float:

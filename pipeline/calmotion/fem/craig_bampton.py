@@ -19,12 +19,11 @@ from .excitation_data import Excitation
 from .fixed_interface import FixedInterface, frequency_limit, mode_signs, ritz_modes
 from .residual_flexibility import StaticModel, displacement_alone, largest_displacement, needed_coordinates
 from .rigid_patch import rigid_patch
-from .static_loads import peak_loads, unit_accelerations
+from .static_loads import ACCELERATIONS, peak_loads, unit_accelerations
 
 __all__ = ["Basis", "mode_signs", "reduced_basis", "rigid_patch"]
 
 _BAND = 2.0  # modes up to this times the highest excited frequency move on their own: above, by a third too little
-_ACCELERATIONS = 12  # columns of `peak_loads` before those of wrenches
 _MATTERS = 10.0  # tolerances
 _OUTPUTS = 1000  # nodes that are looked at on a body with neither targets nor moving interfaces
 
@@ -158,9 +157,9 @@ def _chosen(fixed: FixedInterface, places: _Places, settings: FlexibleSettings, 
 
 def _giving_way(static: StaticModel, tolerance: float) -> StaticModel:
     """The static behaviour with every wrench so large that its response matters."""
-    alone = np.linalg.norm(static.response[:, :, _ACCELERATIONS:], axis=1).max(axis=0, initial=0.0)
+    alone = np.linalg.norm(static.response[:, :, ACCELERATIONS:], axis=1).max(axis=0, initial=0.0)
     factor = np.ones(static.loads.shape[1])
-    factor[_ACCELERATIONS:] = np.maximum(1.0, _MATTERS * tolerance / np.maximum(alone, 1e-300))
+    factor[ACCELERATIONS:] = np.maximum(1.0, _MATTERS * tolerance / np.maximum(alone, 1e-300))
     return replace(static, loads=static.loads * factor)
 
 
@@ -187,7 +186,7 @@ def _with_error(basis: Basis, places: _Places, limit: float) -> Basis:
 def _candidates(fixed: FixedInterface, places: _Places, limit: float) -> tuple[Array, Array, StaticModel]:
     """Columns, their combinations, and the static behaviour of more modes than are needed up to a frequency [Hz];
     with all residual vectors, so that static responses are those of the full model."""
-    columns = fixed.all_needed(limit, peak_loads(places.excitation)[:12])
+    columns = fixed.all_needed(limit, peak_loads(places.excitation)[:ACCELERATIONS])
     omega_squared, U = ritz_modes(fixed.model, columns)
     motion = U[: 6 * len(fixed.patches)].reshape(len(fixed.patches), 6, U.shape[1])
     return columns, U, places.static_model(omega_squared, columns @ U, motion)

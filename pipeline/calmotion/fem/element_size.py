@@ -18,7 +18,7 @@ _ERROR = 0.12
 _REGULAR, _FACE = 0.118, 0.433  # volume of a regular tetrahedron and area of a regular triangle of edge 1
 _NODES = 0.8  # for each tetrahedron inside and each triangle outside, of beams and plates; small features add more
 _RAYS = 200
-_THIN = 0.25  # of the surface is on walls that are as thin as that: they bend first
+THIN = 0.25  # of the surface is on walls that are as thin as that: they bend first
 _FORM = 2e-3  # of the diagonal; at twice that, real links lost 1% of volume and with it up to 6% of a frequency
 _WALL = 0.2  # of the thickness: the widest envelope that leaves a wall its stiffness
 _LEAST = 2e-4  # of the diagonal; below, the tetrahedraliser takes minutes for a box
@@ -51,7 +51,7 @@ def shape_of(points: Array, triangles: Indices) -> Shape:
     """
     walls = wall_thickness(points, triangles)
     return Shape(
-        thickness=float(np.quantile(walls, _THIN)),
+        thickness=float(np.quantile(walls, THIN)),
         length=float(np.ptp(points, axis=0).max()),
         volume=surface_volume(points, triangles),
         area=surface_area(points, triangles),

@@ -7,6 +7,8 @@ import numpy as np
 from ..shot.character import Array
 from .excitation_data import Excitation
 
+ACCELERATIONS = 12  # leading entries of `peak_loads`, before those of wrenches
+OVERSHOOT = 2.0  # of a sudden load, against the deflection it holds at rest
 UNIFORM = 6  # of the unit accelerations the first six are those of a frame that starts from rest
 _PAIRS = ((0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1))
 

@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..fem.element_size import wall_thickness
+from ..fem.element_size import THIN, wall_thickness
 from ..fem.excitation_data import Excitation
-from ..fem.static_loads import peak_loads, unit_accelerations
+from ..fem.static_loads import ACCELERATIONS, OVERSHOOT, peak_loads, unit_accelerations
 from ..shot.character import Array, Body, ElasticMaterial
 from .beam import Beam, beam_between, stub
 from .grips import grip_radius
@@ -25,10 +25,8 @@ if TYPE_CHECKING:
     from ..dynamics.joint_arrays import BodyAnchors
 
 SAFETY = 4.0  # on what a beam is softer than a compact solid: for sections that change fast, and grips at an edge
-OVERSHOOT = 2.0  # of a sudden load, against the deflection it holds at rest
 _SHORTEST = 1e-6  # axis [m]; nearer to the root nothing moves
-_RAYS, _THIN = 100, 0.25  # as for the mesh: a quarter of the surface is on walls that are thinner
-_ACCELERATIONS = 12  # leading rows of `peak_loads`
+_RAYS = 100
 
 
 @dataclass(frozen=True)
@@ -65,7 +63,7 @@ def static_reach(body: Body, anchors: BodyAnchors, excitation: Excitation) -> St
     places = np.array([frame.position for frame in anchors.frames]).reshape(-1, 3)
     count = len(anchors.joints)
     root = places[anchors.root]
-    wall = float(np.quantile(wall_thickness(solid.points, solid.triangles, _RAYS), _THIN))
+    wall = float(np.quantile(wall_thickness(solid.points, solid.triangles, _RAYS), THIN))
     held = _grip(solid, body, places[:count], anchors.root)
     if held is None:
         return None
@@ -103,7 +101,7 @@ class _Loads:
 
     @staticmethod
     def of(beam: Beam, places: Array, root: int, excitation: Excitation) -> _Loads:
-        peaks = peak_loads(excitation)[:_ACCELERATIONS]
+        peaks = peak_loads(excitation)[:ACCELERATIONS]
         force = beam.mass[:, None] * (np.abs(unit_accelerations(beam.center)) @ peaks)
         omega = excitation.angular_velocity
         twist = float(np.linalg.norm(excitation.angular_acceleration) + omega @ omega)
