@@ -1,7 +1,7 @@
 """Unit accelerations, and their peaks."""
 
 import numpy as np
-from calmotion.fem.excitation_data import Excitation, patch_excitation
+from calmotion.fem.excitation_data import Excitation, askew, patch_excitation
 from calmotion.fem.static_loads import peak_loads, unit_accelerations
 
 
@@ -48,3 +48,15 @@ def test_wrenches_of_a_patch_bound_those_of_its_interfaces_together():
 def test_turns_do_not_matter_without_a_reach():
     item = Excitation(*np.ones((3, 3)), np.ones((2, 3)), np.ones((2, 3)))
     assert np.array_equal(item.lever, np.zeros(2))
+
+
+def test_a_body_that_has_turned_meets_a_part_of_every_load_from_every_side():
+    force, moment = np.array([[3.0, 4.0, 0.0]]), np.array([[0.0, 0.0, 2.0]])
+    item = Excitation(np.array([0.0, 9.81, 0.0]), np.zeros(3), np.array([0.0, 5.0, 0.0]), force, moment)
+    found = askew(item, 0.1, 0.2)
+    assert np.allclose(found.acceleration, [0.981, 9.81, 0.981]) and np.allclose(found.angular_velocity, [0.5, 5, 0.5])
+    assert np.allclose(found.force, [[3.0, 4.0, 0.5]])
+    # the force has moved aside by 0.1 of 0.2 m; a tenth of the moment is more
+    assert np.allclose(found.moment, [[0.2, 0.2, 2.0]])
+    assert np.allclose(askew(item, 7.0, 0.2).force, 5.0)  # no more than all of it
+    assert np.array_equal(askew(item, 0.0, 0.2).force, force)

@@ -14,11 +14,11 @@ STEP = 1 / 480
 @pytest.fixture(scope="module")
 def fine(arm, animation, meshes):
     loads = excitations(arm, animation, meshes, Options())
-    bodies = reduce_bodies(arm, span_tree(arm), meshes, None, loads, 1e-8)
+    bodies = reduce_bodies(arm, span_tree(arm), meshes, None, loads, 1e-6)
     return bodies, simulate_at(arm, animation, bodies, Options(), STEP).positions
 
 
-@pytest.mark.parametrize("tolerance", [1e-2, 1e-3, 1e-4])
+@pytest.mark.parametrize("tolerance", [1e-2, 1e-3, pytest.param(1e-4, marks=pytest.mark.long)])
 def test_the_motion_keeps_the_tolerance_against_a_far_finer_reduction(arm, animation, meshes, fine, tolerance):
     bodies, error = settled_bodies(arm, animation, meshes, Options(tolerance=tolerance, step=STEP), lambda *_: None)
     found = simulate_at(arm, animation, bodies, Options(), STEP).positions
@@ -33,6 +33,6 @@ def test_a_tighter_tolerance_keeps_more(arm, animation, meshes):
             len(body.stiffness)
             for body in settled_bodies(arm, animation, meshes, Options(tolerance=t, step=STEP), lambda *_: None)[0]
         )
-        for t in (1e-2, 1e-5)
+        for t in (1e-2, 1e-3)
     ]
     assert counts[0] < counts[1]

@@ -29,7 +29,7 @@ from .tables import write_rows
 from .work_precision import FINEST, SAMPLES, Bench, Reference, machine
 
 TOLERANCES = (1e-2, 1e-3, 1e-4, 1e-5)
-FINER = 1e-3  # tolerance of the reference's reduction over the tightest that is measured
+FINER = 1e-2  # tolerance of the reference's reduction over the tightest that is measured
 
 
 @dataclass(frozen=True)

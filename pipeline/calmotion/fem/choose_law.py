@@ -63,7 +63,8 @@ def choose_law(
     count = min(_MODES, len(basis.omega_squared))
     if count == 0:
         return LawChoice("linear", "it has no elastic coordinates", 0.0)
-    fields, motion = modal_derivatives(model, support, basis, count, material, "stvk")
+    second_order = modal_derivatives(model, support, basis, count, material, "stvk")
+    fields, motion = second_order.fields, second_order.motion
     modes = basis.modes[:, :, :count]
     omega_squared = basis.omega_squared[:count]
     bend = _amplitudes(model, basis, excitation, count)

@@ -15,7 +15,7 @@ import numpy as np
 from ..shot.character import Array, FlexibleSettings, IntArray
 from .assembly import FEModel
 from .blas_threads import one_blas_thread
-from .excitation_data import Excitation
+from .excitation_data import Excitation, askew
 from .fixed_interface import FixedInterface, frequency_limit, mode_signs, ritz_modes
 from .residual_flexibility import StaticModel, displacement_alone, largest_displacement, needed_coordinates
 from .rigid_patch import rigid_patch
@@ -39,6 +39,9 @@ class Basis:
         residual: How many of the modes stand for those that were left out, by their static response.
         cut_error_m: Bound of the static displacement that is missing at the targets [m]; None when nobody said what
             excites the body.
+        patch_squares: Second order of a rotation that each mode holds of each patch (see `patch_rotation`), shape
+            [p, 6, r]; None where every patch moves as a rigid one.
+        excitation: The loads that were looked at when modes were chosen by a tolerance: those of the shot, met askew.
     """
 
     modes: Array
@@ -46,6 +49,8 @@ class Basis:
     patch_motion: Array
     residual: int = 0
     cut_error_m: float | None = None
+    patch_squares: Array | None = None
+    excitation: Excitation | None = None
 
 
 @one_blas_thread()
@@ -141,6 +146,9 @@ def _chosen(fixed: FixedInterface, places: _Places, settings: FlexibleSettings, 
     """As many of all candidates as the tolerance needs."""
     limit = frequency_limit(settings, _BAND * places.excitation.frequency)
     columns, U, static = _candidates(fixed, places, limit)
+    size = float(np.linalg.norm(np.ptp(fixed.model.mesh.nodes, axis=0)))
+    places = replace(places, excitation=askew(places.excitation, largest_displacement(static.response) / size, size))
+    columns, U, static = _candidates(fixed, places, limit)
     kept = static.omega_squared <= (2.0 * np.pi * limit) ** 2
     if settings.max_frequency < 0.0:
         kept |= displacement_alone(static) * _lag(static.omega_squared, limit) > tolerance
@@ -152,7 +160,7 @@ def _chosen(fixed: FixedInterface, places: _Places, settings: FlexibleSettings, 
         combination, residual, _ = needed_coordinates(giving, kept, tolerance)
     omega_squared = np.einsum("ij,i,ij->j", combination, static.omega_squared, combination)
     basis = _basis(fixed, columns, omega_squared, U @ combination, int(residual.sum()))
-    return replace(basis, cut_error_m=error)
+    return replace(basis, cut_error_m=error, excitation=places.excitation)
 
 
 def _giving_way(static: StaticModel, tolerance: float) -> StaticModel:

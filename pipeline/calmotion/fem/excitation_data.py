@@ -43,6 +43,31 @@ class Excitation:
         return np.zeros(len(self.force)) if self.reach is None else self.reach
 
 
+def askew(excitation: Excitation, angle: float, size: float) -> Excitation:
+    """The excitation of a body that has turned by an angle in any direction as it bends, and so meets its loads askew.
+
+    A rigid robot that swings in a plane never twists a link; one that bends does, as the load beyond it moves aside.
+
+    Args:
+        angle: [rad].
+        size: Of the body, for the moments of forces [m].
+    """
+    share = min(angle, 1.0)
+
+    def every_way(load: Array) -> Array:
+        return np.maximum(np.abs(load), share * np.linalg.norm(load, axis=-1, keepdims=True))
+
+    lever = share * size * np.linalg.norm(excitation.force, axis=-1, keepdims=True)
+    return replace(
+        excitation,
+        acceleration=every_way(excitation.acceleration),
+        angular_acceleration=every_way(excitation.angular_acceleration),
+        angular_velocity=every_way(excitation.angular_velocity),
+        force=every_way(excitation.force),
+        moment=np.maximum(every_way(excitation.moment), lever),
+    )
+
+
 def patch_excitation(
     excitation: Excitation, anchors: Sequence[Sequence[int]], positions: Array, centers: Sequence[Array]
 ) -> Excitation:

@@ -6,21 +6,24 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..shot.character import ElasticMaterial
+from ..shot.character import DEFAULT_TOLERANCE, ElasticMaterial
 from .assembly import FEModel
 from .choose_law import work_of_loads
 from .craig_bampton import Basis
 from .elastic_forms import GradientRule, lame_constants, strain_gram
 from .excitation_data import Excitation
-from .modal_derivatives import Support, extended_basis
+from .modal_derivatives import NEGLIGIBLE, Support, extended_basis
+from .patch_rotation import spring_rows, springs
 from .reduced_body import Elasticity
 
-PAIRED_MODES = 12  # modes that may have derivatives
+PAIRED_MODES = 16  # modes that may have derivatives
+_LEFT = 1e-3  # share of the derivatives' strain energy that may be missing, by the tolerance over the body's size
+_FINEST = 1e-6  # below, what is missing is rounding
 
 
 def large_deflection(
     model: FEModel, support: Support, basis: Basis, material: ElasticMaterial, law: str,
-    excitation: Excitation | None = None,
+    excitation: Excitation | None = None, tolerance: float = DEFAULT_TOLERANCE,
 ) -> tuple[Basis, Elasticity]:  # fmt: skip
     """A body's basis with modal derivatives, and its elastic law in it.
 
@@ -31,16 +34,23 @@ def large_deflection(
         material: Elastic constants.
         law: `stvk` or `neohookean`.
         excitation: Its loads in this shot, by moving patch; None when they are not known.
+        tolerance: Error that does not matter [m].
 
     Returns:
         The extended basis, and the law without damping.
     """
     if excitation is not None:
-        basis = _by_deflection(model, basis, excitation)
-    extended = extended_basis(model, support, basis, PAIRED_MODES, material, law)
+        basis = _by_deflection(model, basis, basis.excitation or excitation)
+    size = float(np.ptp(model.mesh.nodes, axis=0).max())
+    negligible = float(np.clip(np.sqrt(_LEFT * tolerance / size), _FINEST, NEGLIGIBLE))
+    extended = extended_basis(model, support, basis, PAIRED_MODES, material, law, negligible)
     lame = lame_constants(material.youngs_modulus, material.poissons_ratio)
     if law == "stvk":
         gram = strain_gram(GradientRule(model.mesh, 4), extended.modes, *lame)
+        if extended.patch_squares is not None:
+            roots = springs(model.mesh.nodes, support.patches, support.centers, material.youngs_modulus)
+            rows = spring_rows(roots, extended.patch_squares, extended.patch_motion[:, 3:])
+            gram += rows.T @ rows
         return extended, Elasticity(law, 0.0, gram.ravel(), 0, lame)
     from .cubature import neohookean_cubature
 

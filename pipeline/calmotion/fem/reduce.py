@@ -63,7 +63,7 @@ def reduce_body(
     if law != "linear" and len(basis.omega_squared):
         from .large_deflection import large_deflection
 
-        basis, elasticity = large_deflection(model, linear.support, basis, material, law, excitation)
+        basis, elasticity = large_deflection(model, linear.support, basis, material, law, excitation, tolerance)
     r = len(basis.omega_squared)
     reduced = ReducedBody(
         invariants=inertia_integrals(model.mesh.nodes, model.mass, basis.modes),

@@ -1,0 +1,47 @@
+"""Reduced links of large deflection against their unreduced meshes, with a rigid patch at the end."""
+
+import numpy as np
+import pytest
+from boxes import box_tets
+from calmotion.fem.assembly import assemble
+from calmotion.fem.craig_bampton import reduced_basis
+from calmotion.fem.large_deflection import large_deflection
+from calmotion.fem.modal_derivatives import Support
+from calmotion.fem.reduced_poses import equilibrium
+from calmotion.shot import ElasticMaterial, FlexibleSettings
+from full_order import FullOrder
+from rigid_patch import pull
+
+LENGTH, WIDE, HIGH = 0.3, 0.03, 0.02
+TIP = np.array([LENGTH, 0.0, 0.0])
+MATERIAL = ElasticMaterial("/Looks/Plastic", 2e9, 0.35, 1200.0, damping_ratio=0.0)
+
+
+def ends(nodes):
+    """The clamped face, and a last element that is rigid through and through."""
+    return np.flatnonzero(nodes[:, 0] < 1e-9), np.flatnonzero(nodes[:, 0] > LENGTH * 11 / 12 - 1e-9)
+
+
+@pytest.fixture(scope="module")
+def link():
+    points, tets = box_tets((12, 2, 1), (LENGTH, WIDE, HIGH), (0.0, -WIDE / 2, -HIGH / 2))
+    model = assemble(points, tets, MATERIAL)
+    root, patch = ends(model.mesh.nodes)
+    support = Support(root, [patch], [TIP])
+    basis = reduced_basis(model, root, [patch], [TIP], FlexibleSettings(MATERIAL, mode_count=16))
+    reduced, law = large_deflection(model, support, basis, MATERIAL, "stvk", tolerance=1e-6)
+    return reduced, law.data, FullOrder(points, tets, 2e9, 0.35, 1200.0)
+
+
+@pytest.mark.parametrize("force", [(0.0, 90.0, 120.0), (300.0, 0.0, 200.0), (-200.0, 60.0, 80.0)])
+def test_a_link_bends_as_its_mesh_does(link, force):
+    """Across, under tension and under compression: by 24 to 34 mm of 300 mm."""
+    reduced, data, full = link
+    moved, turn = pull(full, *ends(full.nodes), TIP, force)
+    motion = reduced.patch_motion[0]
+    r = motion.shape[1]
+    u = equilibrium(data.reshape(r + r * (r + 1) // 2, -1), np.asarray(force) @ motion[:3], np.zeros(r), steps=6)
+    distance, angle = np.linalg.norm(moved), np.linalg.norm(turn)
+    assert 0.02 < distance < 0.06
+    assert np.allclose(motion[:3] @ u, moved, rtol=0, atol=2e-4 * distance)
+    assert np.allclose(motion[3:] @ u, np.sin(angle) / angle * turn, rtol=0, atol=2e-3 * angle)
