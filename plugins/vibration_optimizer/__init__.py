@@ -54,11 +54,14 @@ class ReduceFlexibleBodies(Operator):
         if animation is not None and source is not None:
             context.progress(0.0, "compiling kernels, once")
             options = options_of(context)
-            if source.command == "simulate" and source.tolerance is not None:
+            if source.command != "inspect" and source.tolerance is not None:
                 from calmotion.retarget.settled_bodies import settled_bodies
 
-                settled, error = settled_bodies(character, animation, meshes, options, context.progress)
-                return [ReducedBodies(tuple(settled), mode_tables(settled), error)]
+                search = source.command == "optimize"
+                settled, error = settled_bodies(
+                    character, animation, meshes, options, context.progress, retargeted=search
+                )
+                return [ReducedBodies(tuple(settled), mode_tables(settled), None if search else error)]
             loads, tolerance = excitations(character, animation, meshes, options), options.tolerance
         bodies = reduce_bodies(character, span_tree(character), meshes, context.progress, loads, tolerance)
         return [ReducedBodies(tuple(bodies), mode_tables(bodies))]

@@ -36,3 +36,12 @@ def test_a_tighter_tolerance_keeps_more(arm, animation, meshes):
         for t in (1e-2, 1e-3)
     ]
     assert counts[0] < counts[1]
+
+
+def test_a_shake_that_will_be_taken_away_need_not_be_known_as_well(arm, animation, meshes):
+    def count(tolerance, **kwargs):
+        options = Options(tolerance=tolerance, step=STEP)
+        return sum(len(body.stiffness) for body in settled_bodies(arm, animation, meshes, options, **kwargs)[0])
+
+    loose = count(1e-3, retargeted=True)
+    assert count(1e-2) <= loose < count(1e-3)

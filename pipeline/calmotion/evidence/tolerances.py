@@ -15,10 +15,8 @@ import time
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 
-from ..dynamics.topology import span_tree
 from ..needs.analysis import analyse
-from ..retarget.bodies import reduce_bodies
-from ..retarget.prepare import Options, excitations
+from ..retarget.prepare import Options
 from ..retarget.settled_bodies import settled_bodies
 from ..retarget.step_error import distance, frames_of
 from ..retarget.to_tolerance import found_tracks, optimize_to_tolerance, simulate_to_tolerance
@@ -110,8 +108,7 @@ class Tolerances:
             bodies, error = settled_bodies(character, animation, shot.meshes, options)
             result = simulate_to_tolerance(character, animation, bodies, options, quiet, error)
         else:
-            loads = excitations(character, animation, shot.meshes, options)
-            bodies = reduce_bodies(character, span_tree(character), shot.meshes, None, loads, options.tolerance)
+            bodies, _ = settled_bodies(character, animation, shot.meshes, options, retargeted=True)
             result = optimize_to_tolerance(character, animation, bodies, options, quiet)
         return result, sum(len(body.stiffness) for body in bodies), more
 

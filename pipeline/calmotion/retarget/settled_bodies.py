@@ -18,6 +18,7 @@ from .bodies import reduce_bodies
 from .prepare import Options, excitations
 from .step_error import distance, simulate_at
 from .time_grid import MAX_STEP
+from .to_tolerance import OF_SHAKE, intended_motion
 
 SHARE = 0.4  # of the tolerance, that what is left out may take
 FINER, MOST = 0.1, 6  # each tolerance of the reduction over the last, and how many there are
@@ -25,12 +26,14 @@ FINER, MOST = 0.1, 6  # each tolerance of the reduction over the last, and how m
 
 def settled_bodies(
     character: Character, animation: Animation, meshes: FEMeshes | None, options: Options,
-    progress: Callable[[float, str], None] = lambda fraction, message: None,
+    progress: Callable[[float, str], None] = lambda fraction, message: None, *, retargeted: bool = False,
 ) -> tuple[list[ReducedBody], float]:  # fmt: skip
     """Bodies whose reduction moves no target by more than the tolerance, in the shot as it is animated.
 
     Args:
         options: With a tolerance.
+        retargeted: The shot's shake will be taken away: a twentieth of it may change as well, as what is left of it
+            afterwards is known far better.
 
     Returns:
         The bodies, and how far a target is from where the last coarser reduction had it [m]. That one would often do,
@@ -49,7 +52,9 @@ def settled_bodies(
 
     tolerance = options.tolerance
     bodies, off = reduce(tolerance=tolerance), 0.0
-    found = places(bodies)
+    found, allowed = places(bodies), SHARE * options.tolerance
+    if retargeted:
+        allowed = max(allowed, OF_SHAKE * distance(found, intended_motion(character, animation, bodies, options)))
     for k in range(MOST):
         progress((k + 1) / (MOST + 1), f"a reduction to {1e3 * tolerance:.2g} mm")
         tolerance *= FINER
@@ -59,7 +64,7 @@ def settled_bodies(
         then = places(finer)
         off = distance(then, found)
         bodies, found = finer, then
-        if off <= SHARE * options.tolerance:
+        if off <= allowed:
             break
     return bodies, off
 

@@ -44,7 +44,8 @@ def simulate_to_tolerance(
     progress(0.0, "choosing the time step")
     step, error = chosen_step(character, animation, bodies, options)
     result = simulate_shot(character, animation, bodies, replace(options, step=step), progress)
-    accuracy = Accuracy(error, _left_out(bodies) if left_out_m is None else left_out_m, _mesh_error(bodies))
+    left_out = _left_out(bodies) if left_out_m is None else left_out_m
+    accuracy = Accuracy(error, left_out, _mesh_error(bodies), options.tolerance)
     return _with_step(replace(result, accuracy=accuracy), character, options)
 
 
@@ -99,7 +100,7 @@ def optimize_to_tolerance(
         found = run(animation, options=options)
         return found if found.interrupted else _estimated(found, character, animation, bodies, options)
     progress(0.0, "choosing the time step")
-    intended = _intended(character, animation, bodies, options)
+    intended = intended_motion(character, animation, bodies, options)
 
     def allowed(tried: StepRun) -> float:
         return max(_allowed(options), OF_SHAKE * distance(tried.positions, intended))
@@ -161,7 +162,7 @@ def _mesh_error(bodies: Bodies) -> float | None:
     return sum(known) if errors and len(known) == len(errors) else None
 
 
-def _intended(character: Character, animation: Animation, bodies: Bodies, options: Options) -> Array:
+def intended_motion(character: Character, animation: Animation, bodies: Bodies, options: Options) -> Array:
     """Where the targets are meant to be at the frames [m], shape [f, K, 3]."""
     prepared = prepare(character, animation, bodies, replace(options, step=FIRST))
     meant = meant_motion(prepared, *sample_tracks(animation.tracks, prepared.grid))
@@ -185,7 +186,7 @@ def _estimated(result: Result, character: Character, animation: Animation, bodie
     coarse = run_or_none(trial, 2.0 * result.step_s)
     if coarse is None or coarse.step < 1.5 * fine.step:  # it fails, or a frame is no longer than the step
         coarse, fine = fine, trial(0.5 * result.step_s)
-    accuracy = Accuracy(step_error(coarse, fine), _left_out(bodies), _mesh_error(bodies))
+    accuracy = Accuracy(step_error(coarse, fine), _left_out(bodies), _mesh_error(bodies), options.tolerance)
     return _with_step(replace(result, accuracy=accuracy), character, options)
 
 

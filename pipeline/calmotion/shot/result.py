@@ -166,11 +166,13 @@ class Accuracy:
         step_m: Estimated error of the time step [m].
         left_out_m: Estimated error of what the shot and the reduced bodies do without [m].
         mesh_m: Estimated error of the finite-element meshes [m]; None where it is not known.
+        asked_m: The tolerance that was asked for [m]; None where the shot's own or the usual one holds.
     """
 
     step_m: float
     left_out_m: float
     mesh_m: float | None = None
+    asked_m: float | None = None
 
     @property
     def estimated_m(self) -> float:
