@@ -104,12 +104,12 @@ class Tolerances:
         needs = analyse(shot.character, animation, options, {}, command == "optimize")
         character, more = needs.character, sum(row.estimated_error_m or 0.0 for row in needs.left_out)
         quiet = lambda fraction, message: None  # noqa: E731  (a callback, twice)
-        if command == "simulate":
-            bodies, error = settled_bodies(character, animation, shot.meshes, options)
-            result = simulate_to_tolerance(character, animation, bodies, options, quiet, error)
-        else:
-            bodies, _ = settled_bodies(character, animation, shot.meshes, options, retargeted=True)
+        search = command == "optimize"
+        bodies, error = settled_bodies(character, animation, shot.meshes, options, retargeted=search)
+        if search:
             result = optimize_to_tolerance(character, animation, bodies, options, quiet)
+        else:
+            result = simulate_to_tolerance(character, animation, bodies, options, quiet, error)
         return result, sum(len(body.stiffness) for body in bodies), more
 
 
