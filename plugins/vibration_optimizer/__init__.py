@@ -58,10 +58,9 @@ class ReduceFlexibleBodies(Operator):
                 from calmotion.retarget.settled_bodies import settled_bodies
 
                 search = source.command == "optimize"
-                settled, error = settled_bodies(
-                    character, animation, meshes, options, context.progress, retargeted=search
-                )
-                return [ReducedBodies(tuple(settled), mode_tables(settled), None if search else error)]
+                settled = settled_bodies(character, animation, meshes, options, context.progress, retargeted=search)
+                error = None if search else settled.error_m
+                return [ReducedBodies(settled.bodies, mode_tables(settled.bodies), error, settled.known)]
             loads, tolerance = excitations(character, animation, meshes, options), options.tolerance
         bodies = reduce_bodies(character, span_tree(character), meshes, context.progress, loads, tolerance)
         return [ReducedBodies(tuple(bodies), mode_tables(bodies))]
@@ -136,8 +135,10 @@ class SimulateShot(Operator):
         if shaped is not None:
             animation = replace(animation, current=shaped.tracks)
         reduced = context.get(ReducedBodies)
-        error = None if reduced is None else reduced.error_m
-        result = simulate_to_tolerance(character, animation, bodies, options_of(context), context.progress, error)
+        error, known = (None, None) if reduced is None else (reduced.error_m, reduced.known)
+        result = simulate_to_tolerance(
+            character, animation, bodies, options_of(context), context.progress, error, known
+        )
         return [with_needs(result, context)]
 
 
@@ -188,7 +189,9 @@ class OptimizeShot(Operator):
         )
         paths = context.get(OutputPaths)
         kept = checkpoint_path(paths.layer) if paths is not None and paths.layer else None
-        result = optimize_to_tolerance(*inputs(context), options, context.progress, kept)
+        reduced = context.get(ReducedBodies)
+        known = None if reduced is None else reduced.known
+        result = optimize_to_tolerance(*inputs(context), options, context.progress, kept, known)
         if result.interrupted:
             context.report(
                 "warning", "interrupted: these are the best curves so far; the same command goes on from them"

@@ -20,9 +20,11 @@ def fine(arm, animation, meshes):
 
 @pytest.mark.parametrize("tolerance", [1e-2, 1e-3, pytest.param(1e-4, marks=pytest.mark.long)])
 def test_the_motion_keeps_the_tolerance_against_a_far_finer_reduction(arm, animation, meshes, fine, tolerance):
-    bodies, error = settled_bodies(arm, animation, meshes, Options(tolerance=tolerance, step=STEP), lambda *_: None)
+    settled = settled_bodies(arm, animation, meshes, Options(tolerance=tolerance, step=STEP))
+    bodies = settled.bodies
     found = simulate_at(arm, animation, bodies, Options(), STEP).positions
-    assert np.linalg.norm(found - fine[1], axis=2).max() < tolerance and error <= 0.4 * tolerance
+    assert np.linalg.norm(found - fine[1], axis=2).max() < tolerance and settled.error_m <= 0.4 * tolerance
+    np.testing.assert_array_equal(settled.known.run.positions, found)
     if tolerance > 5e-4:
         assert sum(len(body.stiffness) for body in bodies) < sum(len(body.stiffness) for body in fine[0])
 
@@ -31,7 +33,7 @@ def test_a_tighter_tolerance_keeps_more(arm, animation, meshes):
     counts = [
         sum(
             len(body.stiffness)
-            for body in settled_bodies(arm, animation, meshes, Options(tolerance=t, step=STEP), lambda *_: None)[0]
+            for body in settled_bodies(arm, animation, meshes, Options(tolerance=t, step=STEP)).bodies
         )
         for t in (1e-2, 1e-3)
     ]
@@ -41,7 +43,7 @@ def test_a_tighter_tolerance_keeps_more(arm, animation, meshes):
 def test_a_shake_that_will_be_taken_away_need_not_be_known_as_well(arm, animation, meshes):
     def count(tolerance, **kwargs):
         options = Options(tolerance=tolerance, step=STEP)
-        return sum(len(body.stiffness) for body in settled_bodies(arm, animation, meshes, options, **kwargs)[0])
+        return sum(len(body.stiffness) for body in settled_bodies(arm, animation, meshes, options, **kwargs).bodies)
 
     loose = count(1e-3, retargeted=True)
     assert count(1e-2) <= loose < count(1e-3)

@@ -71,6 +71,27 @@ def _project(r, u, at, A, size, Y):
 
 
 @kernel
+def _stress(size, at, A, z, stress):
+    """stress = A z, shape [size]: sums of rows of the symmetric A, as they run in vectors and dot products do not."""
+    for m in range(size):
+        stress[m] = 0.0
+    n = 0
+    while n + 4 <= size:
+        start = at + n * size
+        a0, a1 = A[start : start + size], A[start + size : start + 2 * size]
+        a2, a3 = A[start + 2 * size : start + 3 * size], A[start + 3 * size : start + 4 * size]
+        z0, z1, z2, z3 = z[n], z[n + 1], z[n + 2], z[n + 3]
+        for m in range(size):
+            stress[m] += z0 * a0[m] + z1 * a1[m] + z2 * a2[m] + z3 * a3[m]
+        n += 4
+    while n < size:
+        last, factor = A[at + n * size : at + (n + 1) * size], z[n]
+        for m in range(size):
+            stress[m] += factor * last[m]
+        n += 1
+
+
+@kernel
 def _times_jacobian(r, i, Y, w, scale, row):
     """row += scale * Y[i] J(w), shape [r]: the pairs of J(w) alone, without the part of single coordinates."""
     p = r
@@ -95,14 +116,18 @@ def stvk_forces(r, u, v, beta, at, A, tangent, z, Y, row, res, P, K):
     """
     size = r + (r * (r + 1)) // 2
     strain_coordinates(r, u, v, beta, z)
-    _project(r, u, at, A, size, Y)
-    for i in range(r):
-        t = 0.0
-        for m in range(size):
-            t += Y[i, m] * z[m]
-        res[6 + i] += t
+    stress = z[size:]
+    _stress(size, at, A, z, stress)
+    p = r
+    for k in range(r):
+        res[6 + k] += stress[k]
+        for l in range(k, r):
+            res[6 + k] += stress[p] * u[l]
+            res[6 + l] += stress[p] * u[k]
+            p += 1
     if not tangent:
         return
+    _project(r, u, at, A, size, Y)
     for i in range(r):
         for k in range(r):
             row[k] = Y[i, k]
@@ -116,15 +141,6 @@ def stvk_forces(r, u, v, beta, at, A, tangent, z, Y, row, res, P, K):
             _times_jacobian(r, i, Y, v, beta, row)
             for k in range(r):
                 K[6 + i, 6 + k] += row[k]
-    # stress on the pairs, sums of whole rows of the symmetric A so that they run in vectors; d(u_k u_l) stands twice
-    stress = z[size:]
-    for m in range(size):
-        stress[m] = 0.0
-    for n in range(size):
-        start = at + n * size
-        t = z[n]
-        for m in range(r, size):
-            stress[m] += t * A[start + m]
     p = r
     for k in range(r):
         for l in range(k, r):

@@ -105,12 +105,13 @@ class Tolerances:
         character, more = needs.character, sum(row.estimated_error_m or 0.0 for row in needs.left_out)
         quiet = lambda fraction, message: None  # noqa: E731  (a callback, twice)
         search = command == "optimize"
-        bodies, error = settled_bodies(character, animation, shot.meshes, options, retargeted=search)
+        settled = settled_bodies(character, animation, shot.meshes, options, retargeted=search)
+        bodies, known = settled.bodies, settled.known
         if search:
-            result = optimize_to_tolerance(character, animation, bodies, options, quiet)
+            result = optimize_to_tolerance(character, animation, bodies, options, quiet, known=known)
         else:
-            result = simulate_to_tolerance(character, animation, bodies, options, quiet, error)
-        return result, sum(len(body.stiffness) for body in bodies), more
+            result = simulate_to_tolerance(character, animation, bodies, options, quiet, settled.error_m, known)
+        return result, sum(u.shape[1] for u in result.before.motion.elastic), more
 
 
 def print_rows(rows: Sequence[Kept]) -> None:

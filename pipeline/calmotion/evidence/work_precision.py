@@ -25,11 +25,12 @@ from ..dynamics.topology import span_tree
 from ..errors import ShotError
 from ..fem.reduced_body import ReducedBody
 from ..retarget.bodies import reduce_bodies, with_elasticity
+from ..retarget.motion_subspace import HeldBodies, Known
 from ..retarget.prepare import Options, excitations
 from ..retarget.settled_bodies import settled_bodies
 from ..retarget.step_error import StepRun, distance, simulate_at
 from ..retarget.time_grid import MAX_STEP
-from ..retarget.to_tolerance import chosen_step
+from ..retarget.to_tolerance import chosen_step, held_to_tolerance
 from ..shot.character import Array
 from .shots import Unreduced, load_unreduced
 from .tables import write_rows
@@ -112,16 +113,18 @@ class Bench:
         """The finest run, its step extrapolated to zero.
 
         Its bar is what is left of the step's error, which falls by eight where that is halved, and what ten times the
-        tolerance of the reduction changes.
+        tolerance of the reduction changes, and what holding its bodies to the directions that the shot needs does.
 
         Args:
             finest: Tolerance of the reduction [m].
         """
-        bodies = self.bodies(finest)
-        runs = [self.run(bodies, factor * REFERENCE_STEP) for factor in (1.0, 2.0, 4.0)]
+        shot, bodies = self.shot, self.bodies(finest)
+        known = Known(shot.animation, self.run(bodies, MAX_STEP))
+        other = self.run(self.bodies(10.0 * finest), MAX_STEP)
+        held = HeldBodies(shot.character, bodies, Options(), lambda item: finest, [known])
+        runs = [self.run(held.bodies or bodies, factor * REFERENCE_STEP) for factor in (1.0, 2.0, 4.0)]
         limits = [fine.positions + (fine.positions - coarse.positions) / 3.0 for fine, coarse in pairwise(runs)]
-        other = self.run(self.bodies(10.0 * finest), 2.0 * REFERENCE_STEP)
-        bar = distance(limits[0], limits[1]) / 7.0 + distance(other.positions, runs[1].positions)
+        bar = distance(limits[0], limits[1]) / 7.0 + distance(other.positions, known.run.positions) + held.error_m
         return Reference(limits[0], bar)
 
     def measure(
@@ -157,12 +160,15 @@ def forward_points(bench: Bench, reference: Reference) -> list[Point]:
 def chosen_points(bench: Bench, reference: Reference, tolerances: Sequence[float] = TOLERANCES) -> list[Point]:
     """What the program chooses: with no tolerance asked for, and for some."""
     shot = bench.shot
+    character, animation = shot.character, shot.animation
     default = bench.bodies(shot.character.retarget.allowed())
     points = [bench.measure(reference, "default", "default", default, MAX_STEP)]
     for tolerance in tolerances:
         options = Options(tolerance=tolerance)
-        bodies, _ = settled_bodies(shot.character, shot.animation, shot.meshes, options)
-        step, _ = chosen_step(shot.character, shot.animation, bodies, options)
+        settled = settled_bodies(character, animation, shot.meshes, options)
+        held = held_to_tolerance(character, animation, settled.bodies, options, settled.known)
+        bodies = held.bodies or settled.bodies
+        step, _ = chosen_step(character, animation, bodies, options)
         points.append(bench.measure(reference, "tolerance", f"{1e3 * tolerance:g} mm", bodies, step))
     return points
 

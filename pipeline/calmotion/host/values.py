@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from ..fem import ReducedBody
+    from ..retarget.motion_subspace import Known
     from ..shot import LeftOut, ModeTable, Track
     from ..shot.character import Array
 
@@ -125,11 +126,13 @@ class ReducedBodies:
         bodies: One for each body of the character.
         modes: One for each flexible body.
         error_m: How far a finer reduction moves a target in the shot [m]; None where that was not found out.
+        known: The shot as animated, simulated with these bodies; None where that was not done.
     """
 
     bodies: tuple[ReducedBody, ...]
     modes: tuple[ModeTable, ...]
     error_m: float | None = None
+    known: Known | None = None
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,6 +7,7 @@ frequencies, and a small shift makes the motions part in time; only the simulati
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
@@ -15,8 +16,9 @@ from ..dynamics.topology import span_tree
 from ..fem.reduced_body import ReducedBody
 from ..shot import Animation, Character, FEMeshes
 from .bodies import reduce_bodies
+from .motion_subspace import Known
 from .prepare import Options, excitations
-from .step_error import distance, simulate_at
+from .step_error import StepRun, distance, simulate_at
 from .time_grid import MAX_STEP
 from .to_tolerance import OF_SHAKE, intended_motion
 
@@ -24,20 +26,32 @@ SHARE = 0.4  # of the tolerance, that what is left out may take
 FINER, MOST = 0.1, 6  # each tolerance of the reduction over the last, and how many there are
 
 
+@dataclass(frozen=True, eq=False)
+class Settled:
+    """Reduced bodies that do for a shot.
+
+    Attributes:
+        bodies: One for each body of the character.
+        error_m: How far a target is from where the last coarser reduction had it [m]. That one would often do, but
+            where two reductions agree by chance the finer is the safer.
+        known: The shot as animated, simulated with these bodies.
+    """
+
+    bodies: tuple[ReducedBody, ...]
+    error_m: float
+    known: Known
+
+
 def settled_bodies(
     character: Character, animation: Animation, meshes: FEMeshes | None, options: Options,
     progress: Callable[[float, str], None] = lambda fraction, message: None, *, retargeted: bool = False,
-) -> tuple[list[ReducedBody], float]:  # fmt: skip
+) -> Settled:  # fmt: skip
     """Bodies whose reduction moves no target by more than the tolerance, in the shot as it is animated.
 
     Args:
         options: With a tolerance.
         retargeted: The shot's shake will be taken away: a twentieth of it may change as well, as what is left of it
             afterwards is known far better.
-
-    Returns:
-        The bodies, and how far a target is from where the last coarser reduction had it [m]. That one would often do,
-        but where two reductions agree by chance the finer is the safer.
 
     Raises:
         ShotError: A body cannot be reduced, or the shot not be simulated.
@@ -47,26 +61,27 @@ def settled_bodies(
     tree = span_tree(character)
     reduce = partial(reduce_bodies, character, tree, meshes, None, loads)
 
-    def places(bodies: Sequence[ReducedBody]) -> np.ndarray:
-        return simulate_at(character, animation, bodies, options, options.step or MAX_STEP).positions
+    def simulated(bodies: Sequence[ReducedBody]) -> StepRun:
+        return simulate_at(character, animation, bodies, options, options.step or MAX_STEP)
 
     tolerance = options.tolerance
     bodies, off = reduce(tolerance=tolerance), 0.0
-    found, allowed = places(bodies), SHARE * options.tolerance
+    found, allowed = simulated(bodies), SHARE * options.tolerance
     if retargeted:
-        allowed = max(allowed, OF_SHAKE * distance(found, intended_motion(character, animation, bodies, options)))
+        intended = intended_motion(character, animation, bodies, options)
+        allowed = max(allowed, OF_SHAKE * distance(found.positions, intended))
     for k in range(MOST):
         progress((k + 1) / (MOST + 1), f"a reduction to {1e3 * tolerance:.2g} mm")
         tolerance *= FINER
         finer = reduce(tolerance=tolerance)
         if _same(bodies, finer):
             continue
-        then = places(finer)
-        off = distance(then, found)
+        then = simulated(finer)
+        off = distance(then.positions, found.positions)
         bodies, found = finer, then
         if off <= allowed:
             break
-    return bodies, off
+    return Settled(tuple(bodies), off, Known(animation, found))
 
 
 def _same(one: Sequence[ReducedBody], other: Sequence[ReducedBody]) -> bool:

@@ -29,10 +29,13 @@ class StepRun:
     Attributes:
         step: [s].
         positions: [m], shape [f, K, 3]; infinite where the simulation failed.
+        elastic: Elastic coordinates of each body of the character at every step, shape [T, r]; empty for a motion that
+            is known at the frames alone.
     """
 
     step: float
     positions: Array
+    elastic: tuple[Array, ...] = ()
 
 
 def simulate_at(
@@ -52,7 +55,10 @@ def simulate_at(
         run = run_forward(model, workspace, angles, rates, grid.h, prepared.world, None, options.integrator, steady)
     except SimulationFailure as failure:
         raise failure_error(prepared, failure) from failure
-    return StepRun(grid.h, run.target_positions[grid.frames])
+    coordinates = run.trajectory.states.u
+    component = {body: k for k, body in enumerate(model.tree.body)}
+    elastic = (coordinates[:, component[b], : len(body.stiffness)] for b, body in enumerate(prepared.bodies))
+    return StepRun(grid.h, run.target_positions[grid.frames], tuple(elastic))
 
 
 def frames_of(result: Result, frame_times: Array) -> StepRun:

@@ -6,17 +6,19 @@ optimisation, where one more simulation costs next to nothing.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
-from functools import partial
+from functools import cache, partial
 from pathlib import Path
 
 from ..fem.reduced_body import ReducedBody
 from ..shot import Accuracy, Animation, Character, LeftOut, OptimizerStep, Result, Track
 from ..shot.character import Array
 from ..shot.needs import OFF
+from .bodies import mode_tables
 from .curves import sample_tracks
 from .idle_motors import ENOUGH
+from .motion_subspace import HeldBodies, Known, held_bodies
 from .optimize import optimize_shot
 from .prepare import Options, prepare
 from .run import Progress, meant_motion, simulate_shot
@@ -26,27 +28,61 @@ from .time_grid import MAX_STEP
 SHARE = 0.5  # of the tolerance, that the time step may take
 FIRST, LAST = 1.0 / 60.0, 1.0 / 30720.0  # steps that are tried [s]
 OF_SHAKE = 0.05  # of the input's own error: how well that need be known before it is taken away
+HELD = 0.05  # of the tolerance (and of how well the shake need be known), that holding bodies to directions may take
+FINDING = "finding the directions that the shot bends links in"
 MARGIN, MOST = 0.8, 3  # by which a step that was too large is made too small, and how often that is done
 Bodies = Sequence[ReducedBody] | None
 
 
 def simulate_to_tolerance(
     character: Character, animation: Animation, bodies: Bodies, options: Options, progress: Progress,
-    left_out_m: float | None = None,
+    left_out_m: float | None = None, known: Known | None = None,
 ) -> Result:  # fmt: skip
-    """As `simulate_shot`, with a time step that keeps the tolerance where one is asked for and no step is.
+    """As `simulate_shot`, with what keeps the tolerance where one is asked for: directions of bodies, and a time step.
 
     Args:
         left_out_m: Error of what the bodies do without where it is known better than their own estimates [m].
+        known: The shot, simulated with them; None: not known yet.
     """
-    if not _chooses(character, options):
+    if options.tolerance is None:
         return simulate_shot(character, animation, bodies, options, progress)
+    progress(0.0, FINDING)
+    held = held_to_tolerance(character, animation, bodies, options, known)
+    if not _chooses(character, options):
+        return _with_modes(simulate_shot(character, animation, held.bodies, options, progress), bodies)
     progress(0.0, "choosing the time step")
-    step, error = chosen_step(character, animation, bodies, options)
-    result = simulate_shot(character, animation, bodies, replace(options, step=step), progress)
+    step, error = chosen_step(character, animation, held.bodies, options)
+    result = simulate_shot(character, animation, held.bodies, replace(options, step=step), progress)
     left_out = _left_out(bodies) if left_out_m is None else left_out_m
-    accuracy = Accuracy(error, left_out, _mesh_error(bodies), options.tolerance)
-    return _with_step(replace(result, accuracy=accuracy), character, options)
+    accuracy = Accuracy(error, left_out + held.error_m, _mesh_error(bodies), options.tolerance)
+    return _with_step(_with_modes(replace(result, accuracy=accuracy), bodies), character, options)
+
+
+def held_to_tolerance(
+    character: Character, animation: Animation, bodies: Bodies, options: Options, known: Known | None,
+    shake: Callable[[StepRun], float] = lambda run: 0.0,
+) -> HeldBodies:  # fmt: skip
+    """The bodies in the directions that the shot needs, by its current curves.
+
+    Args:
+        known: The shot, simulated with the bodies, where that was done.
+        shake: How far a run is from what is meant, where that will be taken away [m].
+    """
+    least = HELD * character.retarget.allowed(options.tolerance)
+    step = _own_step(character, options)
+    return held_bodies(
+        character, animation, bodies, options, step, lambda item: max(least, HELD * OF_SHAKE * shake(item.run)), known
+    )
+
+
+def _own_step(character: Character, options: Options) -> float:
+    """The step of a simulation for which none is chosen [s]."""
+    return options.step or character.retarget.time_step or MAX_STEP
+
+
+def _with_modes(result: Result, bodies: Bodies) -> Result:
+    """The result with the frequencies of the bodies themselves, not of the directions that they were held to."""
+    return replace(result, modes=mode_tables(bodies or ()))
 
 
 def _with_step(result: Result, character: Character, options: Options) -> Result:
@@ -88,37 +124,45 @@ def chosen_step(character: Character, animation: Animation, bodies: Bodies, opti
 
 def optimize_to_tolerance(
     character: Character, animation: Animation, bodies: Bodies, options: Options, progress: Progress,
-    checkpoint: Path | None = None,
+    checkpoint: Path | None = None, known: Known | None = None,
 ) -> Result:  # fmt: skip
-    """As `optimize_shot`, likewise.
+    """As `optimize_shot`, likewise, and with directions of bodies always.
 
     The search begins with a step at which the input's shake is known well enough to be taken away. What is left of it
-    afterwards is known far better; where the tolerance asks for more, the search goes on with a finer step.
+    afterwards is known far better; where the tolerance asks for more, the search goes on with a finer step, and where
+    the links bend in other directions by now with these as well.
     """
-    run = partial(_searched, character, bodies=bodies, progress=progress, checkpoint=checkpoint)
-    if not _chooses(character, options):
-        found = run(animation, options=options)
-        return found if found.interrupted else _estimated(found, character, animation, bodies, options)
-    progress(0.0, "choosing the time step")
-    intended = intended_motion(character, animation, bodies, options)
+    input_shot = replace(animation, current=animation.tracks)
+    intended = cache(partial(intended_motion, character, animation, bodies, options))
 
-    def allowed(tried: StepRun) -> float:
-        return max(_allowed(options), OF_SHAKE * distance(tried.positions, intended))
+    def shake(run: StepRun) -> float:
+        return distance(run.positions, intended())
 
-    trial = partial(simulate_at, character, replace(animation, current=animation.tracks), bodies, options)
-    step, _ = largest_step(trial, FIRST, LAST, allowed)
+    progress(0.0, FINDING)
+    held = held_to_tolerance(character, input_shot, bodies, options, known, shake)
+    chooses = _chooses(character, options)
+    step = _own_step(character, options)
+    if chooses:
+        progress(0.0, "choosing the time step")
+        trial = partial(simulate_at, character, input_shot, held.bodies, options)
+        step, _ = largest_step(trial, FIRST, LAST, lambda run: max(_allowed(options), OF_SHAKE * shake(run)))
     result: Result | None = None
     for _ in range(MOST):
-        found = run(animation, options=replace(options, step=step))
-        result = found if result is None else _added(result, found)
+        own = held.bodies
+        of_step = replace(options, step=step) if chooses else options
+        found = _searched(character, animation, own, of_step, progress, checkpoint)
+        result = _with_modes(found if result is None else _added(result, found), bodies)
         if result.interrupted:
-            return result
-        result = _estimated(result, character, animation, bodies, options)
-        assert result.accuracy is not None
-        if result.accuracy.step_m <= _allowed(options) or step <= LAST:
             break
-        step = max(LAST, MARGIN * result.step_s * (_allowed(options) / result.accuracy.step_m) ** (1.0 / ORDER))
+        result = _estimated(result, character, animation, own, options)
+        assert result.accuracy is not None
         animation = replace(animation, current=found_tracks(result, animation))
+        fine = not chooses or result.accuracy.step_m <= _allowed(options) or step <= LAST
+        ended = found.iterations >= options.max_iterations  # by its limit: it is not worth more
+        if (ended or held.hold_for(animation, _own_step(character, options))) and fine:
+            break
+        if not fine:
+            step = max(LAST, MARGIN * result.step_s * (_allowed(options) / result.accuracy.step_m) ** (1.0 / ORDER))
     assert result is not None
     return result
 

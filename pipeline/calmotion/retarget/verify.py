@@ -10,12 +10,15 @@ from ..dynamics.topology import span_tree
 from ..fem.reduced_body import ReducedBody
 from ..shot import Animation, Character, FEMeshes, Result
 from .bodies import reduce_bodies
+from .motion_subspace import held_bodies
 from .prepare import Options, excitations
 from .run import Progress
 from .step_error import distance, frames_of, simulate_at
+from .time_grid import MAX_STEP
 from .to_tolerance import found_tracks
 
 STEP, TOLERANCE = 0.25, 0.1  # of those of the result
+HELD = 0.01  # of its tolerance, that holding the finer run's bodies to what the shot moves may take
 FINER, MOST = 0.1, 4  # a reduction that is no finer than the result's is tried again with this share of its tolerance
 
 
@@ -51,7 +54,9 @@ def verify(
             allowed *= FINER
             bodies = reduce(tolerance=allowed)
     progress(0.5, "simulating with a finer step")
-    fine = simulate_at(character, animation, bodies, options, STEP * result.step_s)
+    least = HELD * character.retarget.allowed(options.tolerance)
+    held = held_bodies(character, animation, bodies, options, MAX_STEP, lambda known: least)
+    fine = simulate_at(character, animation, held.bodies, options, STEP * result.step_s)
     own = frames_of(result, animation.frame_times)
     return distance(own.positions, fine.positions), fine.step, _coordinates(bodies or ())
 
