@@ -172,7 +172,8 @@ def _run_options(command: argparse.ArgumentParser) -> None:
         "--integrator",
         metavar="NAME",
         default=None,
-        help="bdf2 (default, the only one for optimize), newmark, generalized-alpha, rk4 or radau",
+        help="bdf2 (the only one for optimize), newmark, generalized-alpha, rk4 or radau (default: bdf2; "
+        "generalized-alpha where simulate is given a tolerance, as it needs half the steps)",
     )
     model.add_argument(
         "--pre-roll", metavar="TIME", type=_quantity("s"), help="time that eases into the motion (default: automatic)"

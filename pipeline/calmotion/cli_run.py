@@ -84,7 +84,7 @@ def run_shot(args: argparse.Namespace, command: str, output: Output) -> int:
         shaper=getattr(args, "shaper", None),
         motion=args.motion,
         verify=args.verify,
-        **({"integrator": args.integrator} if args.integrator else {}),
+        integrator=args.integrator,
     )
     _refuse_unreadable_motion(source, host)
     tell_failures(host, args.quiet)

@@ -4,6 +4,7 @@ import dataclasses
 
 import numpy as np
 import pytest
+from calmotion.errors import ShotError
 from calmotion.retarget import to_tolerance
 from calmotion.retarget.prepare import Options
 from calmotion.retarget.step_error import simulate_at
@@ -48,6 +49,26 @@ def test_a_step_or_no_tolerance_leaves_the_step_as_it_is(arm, animation, bodies)
     assert simulate_to_tolerance(slow, animation, bodies, Options(tolerance=1e-5), quiet).step_s == pytest.approx(
         1 / 120
     )
+
+
+def test_the_integrator_that_needs_fewest_steps_gives_way_where_it_fails(arm, animation, bodies, monkeypatch):
+    options = Options(tolerance=1e-3)
+    fast = simulate_to_tolerance(arm, animation, bodies, options, quiet)
+    asked = simulate_to_tolerance(arm, animation, bodies, dataclasses.replace(options, integrator="bdf2"), quiet)
+    assert fast.left_out[-1].why.endswith("by generalised-alpha") and asked.left_out[-1].why.endswith("by BDF2")
+    assert fast.step_s > 1.5 * asked.step_s
+    plain = to_tolerance.simulate_shot
+
+    def comes_apart(character, animation, bodies, options, progress):
+        if options.scheme != "bdf2":
+            raise ShotError("its joints come apart")
+        return plain(character, animation, bodies, options, progress)
+
+    monkeypatch.setattr(to_tolerance, "simulate_shot", comes_apart)
+    found = simulate_to_tolerance(arm, animation, bodies, options, quiet)
+    assert found.step_s == asked.step_s and found.left_out[-1].why == asked.left_out[-1].why
+    with pytest.raises(ShotError):
+        simulate_to_tolerance(arm, animation, bodies, dataclasses.replace(options, integrator="newmark"), quiet)
 
 
 @pytest.mark.parametrize("tolerance", [1e-3, 2e-5])

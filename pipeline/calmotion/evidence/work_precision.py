@@ -30,7 +30,8 @@ from ..retarget.prepare import Options, excitations
 from ..retarget.settled_bodies import settled_bodies
 from ..retarget.step_error import StepRun, distance, simulate_at
 from ..retarget.time_grid import MAX_STEP
-from ..retarget.to_tolerance import chosen_step, held_to_tolerance
+from ..retarget.to_tolerance import by_fast_scheme, chosen_step, held_to_tolerance
+from ..shot import Animation, Character
 from ..shot.character import Array
 from .shots import Unreduced, load_unreduced
 from .tables import write_rows
@@ -168,9 +169,15 @@ def chosen_points(bench: Bench, reference: Reference, tolerances: Sequence[float
         settled = settled_bodies(character, animation, shot.meshes, options)
         held = held_to_tolerance(character, animation, settled.bodies, options, settled.known)
         bodies = held.bodies or settled.bodies
-        step, _ = chosen_step(character, animation, bodies, options)
-        points.append(bench.measure(reference, "tolerance", f"{1e3 * tolerance:g} mm", bodies, step))
+        step, integrator = by_fast_scheme(options, partial(_step_and_scheme, character, animation, bodies))
+        points.append(bench.measure(reference, "tolerance", f"{1e3 * tolerance:g} mm", bodies, step, integrator))
     return points
+
+
+def _step_and_scheme(
+    character: Character, animation: Animation, bodies: Sequence[ReducedBody], options: Options
+) -> tuple[float, str]:
+    return chosen_step(character, animation, bodies, options)[0], options.scheme
 
 
 def element_points(bench: Bench, factors: Sequence[float] = ELEMENTS) -> list[Point]:

@@ -107,6 +107,8 @@ def strain_gram(rule: GradientRule, modes: Array, lame: float, mu: float) -> Arr
     Source: Barbic and James, Real-Time Subspace Integration for St. Venant-Kirchhoff Deformable Models, 2005 (the
     cubic polynomial), in the form of a Gram matrix.
     """
+    from scipy.linalg.blas import dsyrk
+
     r = modes.shape[2]
     first, second = np.triu_indices(r)
     size = r + len(first)
@@ -115,8 +117,9 @@ def strain_gram(rule: GradientRule, modes: Array, lame: float, mu: float) -> Arr
     points = rule.weights.shape[1]
     # strain fields of about 64 MB at a time
     chunk = max(1, 8_000_000 // (7 * points * size))
-    root_mu, root_lame = np.sqrt(2.0 * mu), np.sqrt(abs(lame))
-    scale = root_mu * np.array([1.0, 1.0, 1.0, np.sqrt(2.0), np.sqrt(2.0), np.sqrt(2.0)])
+    # the energy density 2 mu |E|^2 + lame tr(E)^2 as a sum of squares
+    root, bulk = np.sqrt(2.0 * mu), (np.sqrt(2.0 * mu + 3.0 * lame) - np.sqrt(2.0 * mu)) / 3.0
+    scale = root * np.array([1.0, 1.0, 1.0, np.sqrt(2.0), np.sqrt(2.0), np.sqrt(2.0)])
     rows, columns = np.array([0, 1, 2, 1, 0, 0]), np.array([0, 1, 2, 2, 2, 1])
     for start in range(0, count, chunk):
         part = slice(start, min(start + chunk, count))
@@ -138,11 +141,14 @@ def strain_gram(rule: GradientRule, modes: Array, lame: float, mu: float) -> Arr
                 fields[p : p + r - k, at] = pair
                 p += r - k
         fields *= weight.ravel()
-        trace = fields[:, :3].sum(axis=1)
+        trace = fields[:, :3].sum(axis=1, keepdims=True)
         fields *= scale[:, None]
-        A += fields.reshape(size, -1) @ (fields * sign).reshape(size, -1).T
-        A += np.sign(lame) * (root_lame * trace) @ (root_lame * trace * sign).T
-    return 0.5 * (A + A.T)
+        fields[:, :3] += bulk * trace
+        for own, factor in ((sign > 0.0, 1.0), (sign < 0.0, -1.0)):
+            if own.any():
+                of_points = np.ascontiguousarray(fields[:, :, own]).reshape(size, -1)
+                A += dsyrk(factor, of_points.T, trans=1)  # the upper triangle
+    return A + np.triu(A, 1).T
 
 
 def pair_index(r: int) -> Any:

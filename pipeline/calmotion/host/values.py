@@ -21,7 +21,7 @@ class Source:
         command: `inspect`, `simulate` or `optimize`.
         tolerance: Error at the targets that does not matter [m], or None for the shot's own.
         step: Time step [s], or None for automatic.
-        integrator: Name of the integrator.
+        integrator: Name of the integrator, or None for automatic.
         pre_roll: Length of the pre-roll [s], or None for automatic.
         shaper: Input shaper or filter through which `simulate` passes the motors' tracks first, or None.
         motion: File with a motion that replaces tracks of motors, or None.
@@ -32,7 +32,7 @@ class Source:
     command: str
     tolerance: float | None = None
     step: float | None = None
-    integrator: str = "bdf2"
+    integrator: str | None = None
     pre_roll: float | None = None
     shaper: str | None = None
     motion: str | None = None

@@ -84,13 +84,7 @@ def optimize_shot(
     Raises:
         ShotError: The shot cannot be processed.
     """
-    if options.integrator != "bdf2":
-        raise ShotError(
-            "derivatives are those of BDF2 alone",
-            attribute="--integrator",
-            found=options.integrator,
-            remedy="Leave it out, or use it with `calmotion simulate`.",
-        )
+    refuse_other_integrators(options)
     prepared = prepare(character, animation, bodies, options)
     model, grid = prepared.model, prepared.grid
     curves = sample_curves(animation.tracks, grid)
@@ -105,6 +99,17 @@ def optimize_shot(
         return _search(prepared, animation, posed, meant, options, progress, checkpoint)
     except SimulationFailure as failure:
         raise failure_error(prepared, failure) from failure
+
+
+def refuse_other_integrators(options: Options) -> None:
+    """Raise ShotError where a search is to be by another integrator than the one that is differentiated."""
+    if options.scheme != "bdf2":
+        raise ShotError(
+            "derivatives are those of BDF2 alone",
+            attribute="--integrator",
+            found=options.scheme,
+            remedy="Leave it out, or use it with `calmotion simulate`.",
+        )
 
 
 def _search(

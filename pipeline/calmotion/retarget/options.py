@@ -16,10 +16,15 @@ class Options:
     tolerance: float | None = None
     step: float | None = None
     pre_roll: float | None = None
-    integrator: str = "bdf2"
+    integrator: str | None = None
     knot_spacing: float | None = None
     smoothness: float | None = None
     max_iterations: int = 30
     adjoint: str = "discrete"
     ranges: str = "auto"
     motors: str = "auto"
+
+    @property
+    def scheme(self) -> str:
+        """The integrator of a simulation for which none is chosen."""
+        return self.integrator or "bdf2"

@@ -126,27 +126,27 @@ def _refuse_unsupported(character: Character, animation: Animation, options: Opt
                 found=f"{options.pre_roll:g} s",
                 remedy="Leave it out, or set calm:retarget:cyclic to false.",
             )
-        if options.integrator != "bdf2":
+        if options.scheme != "bdf2":
             raise ShotError(
                 "shots that loop are simulated by BDF2 alone",
                 path=character.path,
                 attribute="--integrator",
-                found=options.integrator,
+                found=options.scheme,
                 remedy="Leave it out, or set calm:retarget:cyclic to false.",
             )
-    if options.integrator not in INTEGRATORS:
+    if options.scheme not in INTEGRATORS:
         raise ShotError(
             "there is no such integrator",
             attribute="--integrator",
-            found=options.integrator,
+            found=options.scheme,
             remedy=f"Use one of {', '.join(INTEGRATORS)}.",
         )
-    if animation.moving and not follows_roots(options.integrator):
+    if animation.moving and not follows_roots(options.scheme):
         raise ShotError(
             "this integrator does not know of roots that move",
             path=character.joints[animation.moving[0].joint].path,
             attribute="--integrator",
-            found=options.integrator,
+            found=options.scheme,
             remedy=f"Use one of {', '.join(filter(follows_roots, INTEGRATORS))}.",
         )
 

@@ -77,12 +77,12 @@ def simulate_shot(
     try:
         reference = meant_motion(prepared, meant, meant_rates)
         progress(0.0, "compiling kernels, once")
-        run_forward(model, workspace, angles[:3], rates[:3], grid.h, world[:3], integrator=options.integrator)
+        run_forward(model, workspace, angles[:3], rates[:3], grid.h, world[:3], integrator=options.scheme)
         begin = time.perf_counter()
         steady = SteadyState(model, world, grid.h, workspace) if grid.cyclic else None
         run = run_forward(
             model, workspace, angles, rates, grid.h, world, lambda fraction: progress(fraction, "simulating"),
-            options.integrator, steady,
+            options.scheme, steady,
         )  # fmt: skip
         wall = time.perf_counter() - begin
     except SimulationFailure as failure:
@@ -127,6 +127,6 @@ def _refuse_open_joints(prepared: Prepared, gap: float, options: Options) -> Non
             f"its joints come apart by {1e3 * gap:.2g} mm in the simulation",
             path=character.path,
             attribute="--integrator",
-            found=f"{options.integrator} with steps of {1e3 * prepared.grid.h:.3g} ms",
+            found=f"{options.scheme} with steps of {1e3 * prepared.grid.h:.3g} ms",
             remedy="Use a smaller --step, or bdf2, which keeps them closed.",
         )

@@ -52,7 +52,7 @@ def simulate_at(
     angles, rates = sample_tracks(animation.current, grid)
     steady = SteadyState(model, prepared.world, grid.h, workspace) if grid.cyclic else None
     try:
-        run = run_forward(model, workspace, angles, rates, grid.h, prepared.world, None, options.integrator, steady)
+        run = run_forward(model, workspace, angles, rates, grid.h, prepared.world, None, options.scheme, steady)
     except SimulationFailure as failure:
         raise failure_error(prepared, failure) from failure
     coordinates = run.trajectory.states.u

@@ -15,7 +15,7 @@ from .prepare import Options, excitations
 from .run import Progress
 from .step_error import distance, frames_of, simulate_at
 from .time_grid import MAX_STEP
-from .to_tolerance import found_tracks
+from .to_tolerance import by_fast_scheme, found_tracks
 
 STEP, TOLERANCE = 0.25, 0.1  # of those of the result
 HELD = 0.01  # of its tolerance, that holding the finer run's bodies to what the shot moves may take
@@ -56,7 +56,8 @@ def verify(
     progress(0.5, "simulating with a finer step")
     least = HELD * character.retarget.allowed(options.tolerance)
     held = held_bodies(character, animation, bodies, options, MAX_STEP, lambda known: least)
-    fine = simulate_at(character, animation, held.bodies, options, STEP * result.step_s)
+    step = STEP * result.step_s
+    fine = by_fast_scheme(options, lambda options: simulate_at(character, animation, held.bodies, options, step))
     own = frames_of(result, animation.frame_times)
     return distance(own.positions, fine.positions), fine.step, _coordinates(bodies or ())
 
