@@ -1,9 +1,11 @@
 """Error against run time: every choice of the simulation, measured against a reference that is itself measured.
 
 `calmotion bench work-precision [SHOT ...] [--csv FILE] [--figures DIR]` simulates each shot as animated by many
-settings: step and integrator, reduction, elastic law, elements, and what `--tolerance` chooses. The error is the
-largest distance of any target, at any frame, to a reference with a far smaller step and far more coordinates; how far
-that is from its own limit is its error bar, below which nothing is told apart. Times are medians of the simulation.
+settings: step and integrator, reduction, directions that bodies are held to, elastic law, elements, and what
+`--tolerance` chooses. The error is the largest distance of any target, at any frame, to a reference with a far smaller
+step and far more coordinates; how far that is from its own limit is its error bar, below which nothing is told apart.
+Times are medians of the simulation. Each choice of a tolerance is compared with the fastest setting of all that keeps
+it.
 """
 
 from __future__ import annotations
@@ -33,6 +35,7 @@ from ..retarget.time_grid import MAX_STEP
 from ..retarget.to_tolerance import by_fast_scheme, chosen_step, held_to_tolerance
 from ..shot import Animation, Character
 from ..shot.character import Array
+from .pareto import over_fastest, print_over_fastest, setting_of
 from .shots import Unreduced, load_unreduced
 from .tables import write_rows
 from .timing import median_time
@@ -45,8 +48,10 @@ SAMPLES = tuple(f"samples/{name}/{name}.usda" for name in ("bartender", "dancer"
 STEPS = (1 / 60, 1 / 120, 1 / 240, 1 / 480, 1 / 960, 1 / 1920)
 FEW_STEPS = {"radau": (1 / 60, 1 / 120, 1 / 240)}  # of higher order, and dearer
 MODES = (1, 2, 4, 8, 16)
-TOLERANCES = (1e-2, 1e-3, 1e-4)
-BASE, FINEST = 1e-4, 1e-6  # reductions: of the runs that vary something else, and of the reference [m]
+TOLERANCES = (1e-2, 1e-3, 1e-4, 1e-5)
+BASE, FINEST = 1e-5, 1e-7  # reductions: of the runs that vary something else, and of the reference [m]
+LEVELS = (5e-4, 5e-6)  # what holding bodies to directions may change in the runs that vary step and integrator [m]
+DIRECTIONS = (1e-3, 1e-4, 1e-5, 1e-6)  # and in those that vary it
 REFERENCE_STEP = 1 / 3840
 ELEMENTS = (2.0, 1.4, 1.0, 0.7)  # edge lengths over those of the mesh that the shot gets
 REPEATS = 3
@@ -91,6 +96,7 @@ class Bench:
         self.shot, self.repeats = shot, repeats
         self.tree = span_tree(shot.character)
         self.loads = excitations(shot.character, shot.animation, shot.meshes, Options())
+        self._known: Known | None = None
 
     def bodies(self, tolerance: float, law: str | None = None, modes: int = -1) -> list[ReducedBody]:
         """The shot's bodies, reduced to a tolerance [m], or to as many modes."""
@@ -109,6 +115,12 @@ class Bench:
         """One simulation of the shot as animated."""
         options = Options(integrator=integrator)
         return simulate_at(self.shot.character, self.shot.animation, bodies, options, step)
+
+    def held(self, bodies: Sequence[ReducedBody], allowed: float) -> Sequence[ReducedBody]:
+        """Bodies of the reduction `BASE` held to directions, which may change this much [m]."""
+        shot = self.shot
+        self._known = self._known or Known(shot.animation, self.run(bodies, MAX_STEP))
+        return HeldBodies(shot.character, bodies, Options(), lambda item: allowed, [self._known]).bodies or bodies
 
     def reference(self, finest: float = FINEST) -> Reference:
         """The finest run, its step extrapolated to zero.
@@ -143,14 +155,20 @@ class Bench:
 
 
 def forward_points(bench: Bench, reference: Reference) -> list[Point]:
-    """Steps and integrators, modes, laws."""
+    """Steps and integrators, directions, modes, laws."""
     base = bench.bodies(BASE)
     points = [
-        bench.measure(reference, integrator, f"1/{1 / step:.0f} s", base, step, integrator)
+        bench.measure(reference, integrator, f"1/{1 / step:.0f} s", held, step, integrator)
+        for held in (bench.held(base, allowed) for allowed in LEVELS)
         for integrator in ("bdf2", "newmark", "generalized-alpha", "radau")
         for step in FEW_STEPS.get(integrator, STEPS)
     ]
     fine = 0.5 * MAX_STEP
+    for allowed in DIRECTIONS:
+        points.append(
+            bench.measure(reference, "directions", f"to {1e3 * allowed:g} mm", bench.held(base, allowed), fine)
+        )
+    points.append(bench.measure(reference, "directions", "all", base, fine))
     for count in MODES:
         points.append(bench.measure(reference, "modes", f"{count} modes", bench.bodies(BASE, modes=count), fine))
     for law in ("linear", "stvk", "neohookean"):
@@ -170,7 +188,7 @@ def chosen_points(bench: Bench, reference: Reference, tolerances: Sequence[float
         held = held_to_tolerance(character, animation, settled.bodies, options, settled.known)
         bodies = held.bodies or settled.bodies
         step, integrator = by_fast_scheme(options, partial(_step_and_scheme, character, animation, bodies))
-        points.append(bench.measure(reference, "tolerance", f"{1e3 * tolerance:g} mm", bodies, step, integrator))
+        points.append(bench.measure(reference, "tolerance", setting_of(tolerance), bodies, step, integrator))
     return points
 
 
@@ -244,6 +262,7 @@ def main(arguments: list[str] | None = None) -> int:
         points += own
         if not options.json:
             print_points(own, reference.bar_m)
+            print_over_fastest(own, TOLERANCES)
         if options.optimizer:
             from .gradients import errors, print_gradients
             from .optimizer import compare, print_tables
@@ -269,6 +288,12 @@ def main(arguments: list[str] | None = None) -> int:
     if options.json:
         rows = [asdict(point) for point in points]
         found = {"machine": machine(), "reference_error_m": bars, "points": rows, "figures": figures}
+        found["over_fastest"] = {
+            shot: {
+                t: ratio for t, (ratio, _) in over_fastest([p for p in points if p.shot == shot], TOLERANCES).items()
+            }
+            for shot in bars
+        }
         if options.optimizer:
             found |= {"gradients": [asdict(r) for r in gradients], "optimizers": [asdict(r) for r in converged]}
         print(json.dumps(found))

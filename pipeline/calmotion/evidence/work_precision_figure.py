@@ -9,26 +9,19 @@ import numpy as np
 
 from .drawing import plain, save
 from .integrator_figure import COLORS
+from .pareto import front
 
 if TYPE_CHECKING:
     from .work_precision import Point
 
 STYLES = {
     **{name: (color, "o-") for name, color in COLORS.items()},
+    "directions": ("#f0e442", "P--"),
     "modes": ("#56b4e9", "s--"),
     "law": ("#cc79a7", "^:"),
     "elements": ("#999999", "v--"),
 }
 SHORT = {"linear": "lin", "stvk": "StVK", "neohookean": "nH"}
-
-
-def front(points: Sequence[Point]) -> list[Point]:
-    """Those than which none is both faster and better, by run time."""
-    found: list[Point] = []
-    for point in sorted(points, key=lambda p: (p.wall_s, p.error_m)):
-        if np.isfinite(point.error_m) and (not found or point.error_m < found[-1].error_m):
-            found.append(point)
-    return found
 
 
 def draw(folder: str, points: Sequence[Point], bar: float) -> str:
@@ -53,9 +46,13 @@ def draw(folder: str, points: Sequence[Point], bar: float) -> str:
         if not own:
             continue
         label = "elements (against the finest mesh)" if series == "elements" else series
-        axes.loglog(
-            [p.wall_s for p in own], [1e3 * p.error_m for p in own], style, color=color, ms=4, lw=1, label=label
-        )
+        sizes = [0] if series not in COLORS else sorted({p.coordinates for p in own})
+        for size in sizes:  # a line for each number of coordinates
+            line = [p for p in own if p.coordinates == size] if size else own
+            axes.loglog(
+                [p.wall_s for p in line], [1e3 * p.error_m for p in line], style, color=color, ms=4, lw=1,
+                label=label if size == sizes[0] else None,
+            )  # fmt: skip
         if series == "law":
             for p in own:
                 axes.annotate(
