@@ -9,7 +9,7 @@ from typing import Any
 from calmotion.host import NotAsked, Operator, Property, RunContext
 from calmotion.host.values import OutputPaths, ReducedBodies, ShapedTracks, Source, SystemModes, Verification
 from calmotion.shot import Animation, Character, FEMeshes, Needs, Result
-from calmotion.shot.needs import AUTO, nothing_bends
+from calmotion.shot.needs import nothing_bends
 
 from .inputs import character_of, inputs, options_of, with_needs
 from .needs import AnalyseNeeds, PlanStep
@@ -177,15 +177,13 @@ class OptimizeShot(Operator):
         from calmotion.retarget.checkpoint import checkpoint_path
         from calmotion.retarget.to_tolerance import optimize_to_tolerance
 
-        values, needs = context.properties, context.get(Needs)
+        values = context.properties
         options = options_of(
             context,
             max_iterations=values.max_iterations,
             knot_spacing=values.knot_spacing if values.knot_spacing > 0.0 else None,
             smoothness=values.smoothness if values.smoothness >= 0.0 else None,
             adjoint=values.adjoint,
-            ranges=AUTO if needs is None else needs.choice("ranges"),
-            motors=AUTO if needs is None else needs.choice("motors"),
         )
         paths = context.get(OutputPaths)
         kept = checkpoint_path(paths.layer) if paths is not None and paths.layer else None

@@ -39,6 +39,15 @@ def with_needs(result: Result, context: RunContext) -> Result:
 
 
 def options_of(context: RunContext, **more: Any) -> Options:
+    """What the user asked for, with what is forced of it."""
+    needs = context.get(Needs)
+    if needs is not None:
+        more |= {kind: needs.choice(kind) for kind in ("directions", "motors", "ranges")}
+    return asked_options(context, **more)
+
+
+def asked_options(context: RunContext, **more: Any) -> Options:
+    """What the user asked for."""
     from calmotion.retarget.options import Options
 
     source = context.get(Source)

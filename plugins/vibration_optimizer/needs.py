@@ -10,7 +10,7 @@ from calmotion.host.values import OutputPaths, PlannedStep, ReducedBodies, Sourc
 from calmotion.shot import Animation, Character, Needs
 from calmotion.shot.needs import AUTO, KINDS, OFF, ON, nothing_bends
 
-from .inputs import inputs, options_of
+from .inputs import asked_options, inputs, options_of
 
 _FORCED = {
     "bodies": "Finite elements of all flexible bodies, or of none",
@@ -19,6 +19,7 @@ _FORCED = {
     "modes": "As many modes as if the tolerance were a thousandth, or only those that the motion excites",
     "elasticity": "Nonlinear elasticity of all flexible bodies, or linear",
     "motors": "All motors that may change, or only those that move a target, without looking back",
+    "directions": "All elastic coordinates of nonlinear bodies, or the fewest combinations that do for the shot",
     "ranges": "All of the shot, or only where a change promises to help, without looking back",
 }
 
@@ -44,7 +45,8 @@ class AnalyseNeeds(Operator):
         if paths is not None and paths.modes and forced["bodies"] == AUTO:
             forced["bodies"] = ON  # their mode shapes are asked for
         changes = source is None or source.command != "simulate"
-        return [analyse(context.get(Character), context.get(Animation), options_of(context), forced, changes)]
+        options = asked_options(context)
+        return [analyse(context.get(Character), context.get(Animation), options, forced, changes)]
 
 
 class PlanStep(Operator):

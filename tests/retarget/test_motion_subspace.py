@@ -99,3 +99,12 @@ def test_a_motion_that_is_known_is_not_simulated_again(nonlinear, animation, kno
     monkeypatch.setattr(motion_subspace, "known_motion", lambda *arguments: pytest.fail("simulated again"))
     again = dataclasses.replace(animation, current=tuple(animation.current))
     held_bodies(character, again, bodies, Options(), STEP, lambda item: ALLOWED, known)
+
+
+def test_either_can_be_forced(nonlinear, known):
+    character, bodies = nonlinear
+    kept = HeldBodies(character, bodies, Options(directions="on"), lambda item: 1.0, [known])
+    assert kept.bodies is bodies
+    fewest = HeldBodies(character, bodies, Options(directions="off"), lambda item: 0.0, [known])
+    assert count(fewest.bodies) == count(held(character, bodies, known, 1.0).bodies) != count(bodies)
+    assert fewest.error_m > 0.0 and fewest.hold_for(known.animation, STEP)

@@ -20,10 +20,9 @@ import numpy as np
 from ..dynamics.topology import span_tree
 from ..needs.analysis import analyse
 from ..retarget.bodies import reduce_bodies
-from ..retarget.optimize import optimize_shot
 from ..retarget.prepare import Options, excitations
-from ..retarget.run import simulate_shot
 from ..retarget.step_error import StepRun, distance, frames_of
+from ..retarget.to_tolerance import optimize_to_tolerance, simulate_to_tolerance
 from ..shot import Result
 from ..shot.needs import KINDS, ON
 from .fresh_cache import fresh_cache
@@ -94,14 +93,16 @@ def run(shot: NeedsShot, command: str, forced: Mapping[str, str], options: Optio
     begin = time.perf_counter()
     optimizes = command == "optimize"
     needs = analyse(shot.character, shot.animation, options, forced, optimizes)
-    options = replace(options, ranges=needs.choice("ranges"), motors=needs.choice("motors"))
+    options = replace(
+        options, ranges=needs.choice("ranges"), motors=needs.choice("motors"), directions=needs.choice("directions")
+    )
     character, bodies = needs.character, None
     if any(body.bends for body in character.bodies):
         loads = excitations(character, shot.animation, shot.meshes, options)
         # finite elements anew each time, as for a user who comes with a new character
         with fresh_cache():
             bodies = reduce_bodies(character, span_tree(character), shot.meshes, None, loads)
-    work: Callable[..., Result] = optimize_shot if optimizes else simulate_shot
+    work: Callable[..., Result] = optimize_to_tolerance if optimizes else simulate_to_tolerance
     result = work(character, shot.animation, bodies, options, lambda fraction, message: None)
     whole = time.perf_counter() - begin
     estimated = sum(row.estimated_error_m or 0.0 for row in (*needs.left_out, *result.left_out))
@@ -139,6 +140,7 @@ def pairs(repeats: int = REPEATS) -> list[partial[Pair]]:
         partial(pair, "turning", gantry(), "simulate", {"turning": ON}, repeats),
         partial(pair, "loops", clevis_arm(), "simulate", {"loops": ON}, repeats),
         partial(pair, "modes", firm_arm(), "simulate", {"modes": ON}, repeats),
+        partial(pair, "directions", plastic_arm(), "optimize", {"directions": ON}, repeats),
         partial(pair, "elasticity", firm_arm(), "simulate", {"elasticity": ON}, repeats),
         partial(pair, "motors", arm_with_head(6), "optimize", {"motors": ON}, repeats),
         partial(pair, "ranges", held_arm(), "optimize", {"ranges": ON}, repeats),

@@ -20,6 +20,7 @@ from ..fem.reduced_body import ReducedBody
 from ..fem.subspace import principal_subspace, within
 from ..shot import Animation, Character, LeftOut
 from ..shot.character import FlexibleSettings
+from ..shot.needs import OFF, ON
 from .prepare import Options
 from .step_error import StepRun, distance, run_or_none, simulate_at
 
@@ -38,7 +39,8 @@ class Known:
 class HeldBodies:
     """Bodies in the fewest directions in which all that is known of a shot happens to an allowed error.
 
-    Bodies whose coordinates are the user's choice keep them. Where fewer directions do not do all are kept.
+    Bodies whose coordinates are the user's choice keep them. Where fewer directions do not do, all are kept; what
+    `Options.directions` forces is done whatever the error.
 
     Args:
         character: The shot's.
@@ -58,7 +60,7 @@ class HeldBodies:
     ):  # fmt: skip
         self._character, self._complete, self._options = character, complete, options
         self._allowed, self._known = allowed, list(known)
-        self._chosen = _worth(character, complete)
+        self._chosen = _worth(character, complete, options)
         self.bodies, self.error_m = complete, 0.0
         if self._chosen:
             self._hold()
@@ -71,7 +73,8 @@ class HeldBodies:
             for b, coordinates in motion.items():
                 few[b] = within(few[b], principal_subspace(few[b], coordinates, missing))
             off = [self._off(few, item) for item in self._known]
-            if all(error <= self._allowed(item) for error, item in zip(off, self._known, strict=True)):
+            forced = self._options.directions == OFF and all(map(np.isfinite, off))
+            if forced or all(error <= self._allowed(item) for error, item in zip(off, self._known, strict=True)):
                 self.error_m = max(off)
                 self.bodies = _told(self._character, self._complete, few, self.error_m)
                 return
@@ -96,7 +99,7 @@ class HeldBodies:
             return True
         more = known_motion(self._character, animation, self._complete, self._options, step)
         off = self._off(self.bodies, more)
-        if off <= self._allowed(more):
+        if off <= self._allowed(more) or self._options.directions == OFF:
             self.error_m = off
             return True
         self._known.append(more)
@@ -117,16 +120,18 @@ def held_bodies(
     Raises:
         ShotError: The shot cannot be simulated.
     """
-    if not _worth(character, bodies):
+    if not _worth(character, bodies, options):
         return HeldBodies(character, bodies, options, allowed, ())
     if known is None or known.animation.current != animation.current:
         known = known_motion(character, animation, bodies, options, step)
     return HeldBodies(character, bodies, options, allowed, [known])
 
 
-def _worth(character: Character, bodies: Sequence[ReducedBody] | None) -> list[int]:
+def _worth(character: Character, bodies: Sequence[ReducedBody] | None, options: Options) -> list[int]:
     """Bodies that are nonlinear, and whose coordinates are the program's choice."""
-    found = []
+    found: list[int] = []
+    if options.directions == ON:
+        return found
     for b, body in enumerate(bodies or ()):
         own = character.bodies[b].flexible
         if own is None or body.elasticity is None:

@@ -10,7 +10,8 @@ class Options:
     """What the user overrides; None keeps the shot's own or the automatic choice. Lengths [m], times [s].
 
     `adjoint` is discrete or continuous; `ranges` is auto, on (the whole shot is searched) or off (see
-    `quiet_ranges`: without looking back); `motors` likewise (see `idle_motors`).
+    `quiet_ranges`: without looking back); `motors` likewise (see `idle_motors`); `directions` likewise (on: bodies keep
+    all coordinates; off: the fewest that are tried, whatever the error; see `motion_subspace`).
     """
 
     tolerance: float | None = None
@@ -23,6 +24,7 @@ class Options:
     adjoint: str = "discrete"
     ranges: str = "auto"
     motors: str = "auto"
+    directions: str = "auto"
 
     @property
     def scheme(self) -> str:

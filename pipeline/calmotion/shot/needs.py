@@ -9,7 +9,16 @@ from typing import Any
 from .character import Character
 from .result import LeftOut
 
-KINDS = ("bodies", "turning", "loops", "modes", "elasticity", "motors", "ranges")  # what can be forced on or off
+KINDS = (
+    "bodies",
+    "turning",
+    "loops",
+    "modes",
+    "directions",
+    "elasticity",
+    "motors",
+    "ranges",
+)  # what can be forced on or off
 AUTO, ON, OFF = "auto", "on", "off"
 
 
