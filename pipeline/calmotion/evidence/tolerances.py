@@ -114,6 +114,14 @@ class Tolerances:
         return result, sum(u.shape[1] for u in result.before.motion.elastic), more
 
 
+def told(row: Kept) -> str:
+    """One line of it."""
+    return (
+        f"{row.shot}, {1e3 * row.tolerance_m:g} mm: {1e3 * row.error_m:.2g} mm off, in {row.wall_s:.0f} s, "
+        f"{row.run_s:.1f} s of them the {'search' if row.command == 'optimize' else 'simulation'}"
+    )
+
+
 def print_rows(rows: Sequence[Kept]) -> None:
     """The table for a person."""
     from ..cli_tables import console_on, length, print_table
@@ -146,12 +154,15 @@ def main(arguments: list[str] | None = None) -> int:
     rows: list[Kept] = []
     for path in options.shots:
         shot = Tolerances(load_unreduced(path), FINER * min(options.tolerances))
-        own = [shot.kept(tolerance, "optimize" if options.optimize else "simulate") for tolerance in options.tolerances]
+        own = []
+        for tolerance in options.tolerances:
+            own.append(shot.kept(tolerance, "optimize" if options.optimize else "simulate"))
+            print(told(own[-1]), file=sys.stderr, flush=True)  # the next may take long
+            if options.csv:
+                write_rows(options.csv, Kept, rows + own)
         rows += own
         if not options.json:
             print_rows(own)
-    if options.csv:
-        write_rows(options.csv, Kept, rows)
     if options.json:
         print(json.dumps({"machine": machine(), "rows": [asdict(row) | {"kept": row.kept} for row in rows]}))
     return int(not all(row.kept for row in rows))
