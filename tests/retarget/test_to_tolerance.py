@@ -4,10 +4,13 @@ import dataclasses
 
 import numpy as np
 import pytest
+from calmotion.dynamics.topology import span_tree
 from calmotion.errors import ShotError
 from calmotion.retarget import to_tolerance
-from calmotion.retarget.prepare import Options
-from calmotion.retarget.step_error import simulate_at
+from calmotion.retarget.bodies import reduce_bodies, with_elasticity
+from calmotion.retarget.motion_subspace import HeldBodies, known_motion
+from calmotion.retarget.prepare import Options, excitations
+from calmotion.retarget.step_error import distance, frames_of, simulate_at
 from calmotion.retarget.to_tolerance import found_tracks, optimize_to_tolerance, simulate_to_tolerance
 from calmotion.retarget.verify import verify
 
@@ -116,3 +119,32 @@ def test_verifying_measures_the_distance_to_a_finer_run(arm, animation, meshes, 
     )
     wrong = dataclasses.replace(result, before=dataclasses.replace(result.before, motion=moved))
     assert verify(arm, animation, meshes, bodies, wrong, options, quiet)[0] == pytest.approx(0.02, abs=1.1 * error)
+
+
+def test_a_search_goes_on_where_links_bend_otherwise_than_they_are_held(arm, animation, meshes, monkeypatch):
+    character = with_elasticity(arm, "stvk")
+    loads = excitations(character, animation, meshes, Options())
+    bodies = reduce_bodies(character, span_tree(character), meshes, None, loads, 1e-3)
+    asked, parts = [], []
+    plain_hold, plain_search = HeldBodies.hold_for, to_tolerance.optimize_shot
+
+    def hold_for(self, animation, step):
+        asked.append(animation.current)
+        return plain_hold(self, animation, step) and len(asked) > 1
+
+    def search(character, animation, bodies, *more):
+        parts.append((animation.current, bodies))
+        return plain_search(character, animation, bodies, *more)
+
+    monkeypatch.setattr(HeldBodies, "hold_for", hold_for)
+    monkeypatch.setattr(to_tolerance, "optimize_shot", search)
+    result = optimize_to_tolerance(character, animation, bodies, Options(max_iterations=15), quiet)
+    assert len(asked) == len(parts) == 2
+    (begun, few), (gone_on, _) = parts
+    assert begun is animation.current and gone_on is asked[0] is not asked[1]
+    assert sum(len(body.stiffness) for body in few) < sum(len(body.stiffness) for body in bodies)
+    # the frequencies are those of the links, not of the directions that they were held to
+    assert [len(table.frequencies) for table in result.modes] == [len(body.stiffness) for body in bodies[:2]]
+    assert sum("elastic coordinates" in row.what for row in result.left_out) == 2
+    whole = known_motion(character, dataclasses.replace(animation, current=asked[1]), bodies, Options(), 1 / 480)
+    assert distance(whole.run.positions, frames_of(result, animation.frame_times).positions) < 1e-4

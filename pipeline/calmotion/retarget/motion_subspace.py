@@ -149,10 +149,7 @@ def known_motion(
 
 
 def _told(
-    character: Character,
-    bodies: Sequence[ReducedBody],
-    few: Sequence[ReducedBody],
-    error: float,
+    character: Character, bodies: Sequence[ReducedBody], few: Sequence[ReducedBody], error: float
 ) -> tuple[ReducedBody, ...]:
     """The bodies in fewer coordinates, each with what it does without; the error is of all of them together."""
     fewer = [b for b in range(len(bodies)) if len(few[b].stiffness) < len(bodies[b].stiffness)]

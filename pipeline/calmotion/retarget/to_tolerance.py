@@ -190,7 +190,7 @@ def optimize_to_tolerance(
         animation = replace(animation, current=found_tracks(result, animation))
         fine = not chooses or result.accuracy.step_m <= _allowed(options) or step <= LAST
         ended = found.iterations >= options.max_iterations  # by its limit: it is not worth more
-        if (ended or held.hold_for(animation, _own_step(character, options))) and fine:
+        if fine and (ended or held.hold_for(animation, _own_step(character, options))):
             break
         if not fine:
             step = max(LAST, MARGIN * result.step_s * (_allowed(options) / result.accuracy.step_m) ** (1.0 / ORDER))
