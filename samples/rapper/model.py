@@ -21,7 +21,7 @@ SHOULDER = (0.0, -0.235, 1.26)
 UPPER, FORE = 0.36, 0.33  # shoulder to elbow, elbow to wrist
 HUB = 0.036  # radius of the cases at shoulder and elbow; the links end where they begin
 CRANK = 0.095  # from the shoulder to the rods' hinge, and from the elbow to theirs
-SLIM = 0.0085  # half the thickness of the links
+SLIM = 0.0105  # half the thickness of the links
 LEAN = 155.0  # from the forearm to the lever, about y [deg]
 ROD_AT = 0.05  # of either rod beside the middle of the arm
 
