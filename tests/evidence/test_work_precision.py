@@ -23,7 +23,7 @@ def bench():
 def reference(bench):
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(work_precision, "REFERENCE_STEP", 1 / 1920)
-        return bench.reference()
+        return bench.reference(1e-6)
 
 
 @pytest.fixture(scope="module")
@@ -32,6 +32,9 @@ def points(bench, reference):
         patch.setattr(work_precision, "STEPS", (1 / 60, 1 / 120, 1 / 240, 1 / 480))
         patch.setattr(work_precision, "FEW_STEPS", {"radau": (1 / 60,)})
         patch.setattr(work_precision, "MODES", (2, 8))
+        patch.setattr(work_precision, "LEVELS", (5e-6,))
+        patch.setattr(work_precision, "DIRECTIONS", (1e-4,))
+        patch.setattr(work_precision, "BASE", 1e-4)
         return forward_points(bench, reference)
 
 

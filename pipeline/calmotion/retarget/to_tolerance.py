@@ -31,6 +31,8 @@ from .time_grid import MAX_STEP
 SHARE = 0.5  # of the tolerance, that the time step may take
 FIRST, LAST = 1.0 / 60.0, 1.0 / 30720.0  # steps that are tried [s]
 OF_SHAKE = 0.05  # of the input's own error: how well that need be known before it is taken away
+# Where no tolerance is asked for, a simulation of what was written has all coordinates, and is to tell the same errors.
+UNASKED = 0.002
 HELD = 0.05  # of the tolerance (and of how well the shake need be known), that holding bodies to directions may take
 FAST = "generalized-alpha"
 NAMES = {"bdf2": "BDF2", "newmark": "Newmark's method", "generalized-alpha": "generalised-alpha"}
@@ -96,10 +98,11 @@ def held_to_tolerance(
         known: The shot, simulated with the bodies, where that was done.
         shake: How far a run is from what is meant, where that will be taken away [m].
     """
-    least = HELD * character.retarget.allowed(options.tolerance)
+    share = UNASKED if options.tolerance is None else HELD
+    least = share * character.retarget.allowed(options.tolerance)
     step = _own_step(character, options)
     return held_bodies(
-        character, animation, bodies, options, step, lambda item: max(least, HELD * OF_SHAKE * shake(item.run)), known
+        character, animation, bodies, options, step, lambda item: max(least, share * OF_SHAKE * shake(item.run)), known
     )
 
 
