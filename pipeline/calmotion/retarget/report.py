@@ -29,12 +29,16 @@ def by_body(model: Model, values: Array, axis: int = 1) -> Array:
     return np.take(values, order, axis=axis)
 
 
+def elastic_by_body(model: Model, u: Array) -> tuple[Array, ...]:
+    """Elastic coordinates of each body of the character, shape [T, r], from those of the components, [T, B, r]."""
+    component = {body: k for k, body in enumerate(model.tree.body)}
+    return tuple(u[:, component[b], : model.system.elastic[component[b]]].copy() for b in range(len(component)))
+
+
 def _simulated_motion(model: Model, grid: TimeGrid, run: ForwardRun, motors: int, joints: int) -> Motion:
-    states, tree = run.trajectory.states, model.tree
-    component, shown = {body: k for k, body in enumerate(tree.body)}, _shown(grid)
-    elastic = tuple(
-        states.u[shown, component[b], : model.system.elastic[component[b]]].copy() for b in range(len(component))
-    )
+    states = run.trajectory.states
+    shown = _shown(grid)
+    elastic = elastic_by_body(model, states.u[shown])
     found = reactions(model.system, run.trajectory, run.joint_angles, run.joint_rates)
     values, efforts = np.zeros((len(states.c), motors)), np.zeros((len(states.c), motors))
     for k, motor in enumerate(model.motor):

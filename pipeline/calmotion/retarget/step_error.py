@@ -16,6 +16,7 @@ from ..shot.character import Array
 from .curves import sample_tracks
 from .forward import run_forward
 from .prepare import Options, failure_error, prepare
+from .report import elastic_by_body
 from .steady import SteadyState
 
 ORDER = 2  # of BDF2; the global error goes with this power of the step
@@ -55,10 +56,7 @@ def simulate_at(
         run = run_forward(model, workspace, angles, rates, grid.h, prepared.world, None, options.scheme, steady)
     except SimulationFailure as failure:
         raise failure_error(prepared, failure) from failure
-    coordinates = run.trajectory.states.u
-    component = {body: k for k, body in enumerate(model.tree.body)}
-    elastic = (coordinates[:, component[b], : len(body.stiffness)] for b, body in enumerate(prepared.bodies))
-    return StepRun(grid.h, run.target_positions[grid.frames], tuple(elastic))
+    return StepRun(grid.h, run.target_positions[grid.frames], elastic_by_body(model, run.trajectory.states.u))
 
 
 def frames_of(result: Result, frame_times: Array) -> StepRun:

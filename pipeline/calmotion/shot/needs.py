@@ -9,16 +9,8 @@ from typing import Any
 from .character import Character
 from .result import LeftOut
 
-KINDS = (
-    "bodies",
-    "turning",
-    "loops",
-    "modes",
-    "directions",
-    "elasticity",
-    "motors",
-    "ranges",
-)  # what can be forced on or off
+# What can be forced on or off.
+KINDS = ("bodies", "turning", "loops", "modes", "directions", "elasticity", "motors", "ranges")
 AUTO, ON, OFF = "auto", "on", "off"
 
 
