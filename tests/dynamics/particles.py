@@ -41,19 +41,26 @@ def moments(part: Particles):
 
 
 def nonlinear(system, laws, rng, stiffness=50.0) -> System:
-    """The system with random nonlinear elasticity: a law for each component, LINEAR keeps what it has."""
-    starts, arrays, size = [], [], 0
+    """The system with random nonlinear elasticity: a law for each component, LINEAR keeps what it has.
+
+    The quadratic strain of every second component sees a direction less than it has coordinates.
+    """
+    starts, arrays, points, size = [], [], [], 0
     lame = np.tile([0.3, 0.2], (len(laws), 1)) * stiffness
-    for law, r in zip(laws, system.elastic, strict=True):
-        data = np.zeros(0)
+    for k, (law, r) in enumerate(zip(laws, system.elastic, strict=True)):
+        data, count = np.zeros(0), 0
         if law == STVK:
-            pairs = r + r * (r + 1) // 2
-            fields = np.eye(pairs, pairs + 3) + 0.3 * rng.normal(size=(pairs, pairs + 3))
+            count = r - k % 2 if r > 1 else r
+            strains = r + count * (count + 1) // 2
+            fields = np.eye(strains, strains + 3) + 0.3 * rng.normal(size=(strains, strains + 3))
             data = stiffness * fields @ fields.T
+            if count < r:
+                data = np.concatenate([data.ravel(), rng.normal(size=count * r)])
         elif law == NEOHOOKEAN:
             gradients = 0.3 * rng.normal(size=(POINTS, 9 * r))
-            points = np.hstack([rng.uniform(0.5, 1.5, (POINTS, 1)), gradients])
-            data = np.concatenate([stiffness * np.eye(r).ravel(), points.ravel()])
+            weighted = np.hstack([rng.uniform(0.5, 1.5, (POINTS, 1)), gradients])
+            data, count = np.concatenate([stiffness * np.eye(r).ravel(), weighted.ravel()]), POINTS
+        points.append(count)
         starts.append(size)
         arrays.append(data.ravel())
         size += data.size
@@ -66,7 +73,7 @@ def nonlinear(system, laws, rng, stiffness=50.0) -> System:
         stiffness=system.stiffness * kept,
         retardation=np.where(law == LINEAR, 0.0, 0.02),
         lame=lame,
-        points=np.where(law == NEOHOOKEAN, POINTS, 0).astype(np.int32),
+        points=np.array(points, dtype=np.int32),
         data_start=np.array(starts, dtype=np.int64),
         data=np.concatenate(arrays),
     )

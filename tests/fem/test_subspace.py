@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 from boxes import box_tets, fe_mesh
-from calmotion.dynamics.elastic import stvk_forces
 from calmotion.dynamics.neohookean import neohookean_forces
 from calmotion.fem.interfaces import Anchor
 from calmotion.fem.reduce import reduce_body
 from calmotion.fem.reduced_body import Invariants, Marker, ReducedBody
 from calmotion.fem.subspace import principal_subspace, within
 from calmotion.shot import Body, FlexibleSettings, Frame
+from stvk_call import call_stvk
 
 IDENTITY = np.array([1.0, 0.0, 0.0, 0.0])
 
@@ -50,11 +50,10 @@ def flexible(law, material):
 def forces(body, u, v):
     """Elastic and viscous forces, and their derivatives."""
     r, law = len(u), body.elasticity
-    size = r + r * (r + 1) // 2
     res, P, K = np.zeros(6 + r), np.zeros((6 + r, 6 + r)), np.zeros((6 + r, 6 + r))
     if law.law == "stvk":
-        scratch = np.zeros(2 * size), np.zeros((r, size)), np.zeros(r)
-        stvk_forces(r, u, v, law.retardation, 0, law.data, True, *scratch, res, P, K)
+        p = r if law.seen is None else len(law.seen)
+        call_stvk(law.data.reshape(r + p * (p + 1) // 2, -1), u, v, law.retardation, True, res, P, K, law.seen)
     else:
         scratch = np.zeros((18, 18)), np.zeros((18, r))
         neohookean_forces(r, u, v, *law.lame, law.retardation, 0, law.points, law.data, True, *scratch, res, P, K)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 from calmotion.dynamics import inertia
-from calmotion.dynamics.elastic import strain_coordinates
 from calmotion.dynamics.reactions import reactions
 from calmotion.dynamics.so3 import matrix_of
 from calmotion.dynamics.system import LINEAR, STVK, System
@@ -35,10 +34,11 @@ def _strain_energy(system: System, b: int, u: np.ndarray) -> float:
     if system.law[b] == LINEAR:
         return 0.5 * float(system.stiffness[b, : len(u)] @ u**2)
     assert system.law[b] == STVK
-    size = len(u) + len(u) * (len(u) + 1) // 2
-    A = system.data[system.data_start[b] :][: size * size].reshape(size, size)
-    z = np.zeros(size)
-    strain_coordinates(len(u), u, np.zeros(len(u)), 0.0, z)
+    r, p, start = len(u), int(system.points[b]), system.data_start[b]
+    size = r + p * (p + 1) // 2
+    A = system.data[start:][: size * size].reshape(size, size)
+    w = u if p == r else system.data[start + size * size :][: p * r].reshape(p, r) @ u
+    z = np.concatenate([u, np.outer(w, w)[np.triu_indices(p)]])
     return 0.5 * float(z @ A @ z)
 
 

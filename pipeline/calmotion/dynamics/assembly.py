@@ -46,7 +46,9 @@ class Work(NamedTuple):
     wrench: Array
     strain: Array
     rows: Array
+    seen: Array
     row: Array
+    inner: Array
     point: Array
     force: Array
     along: Array
@@ -61,14 +63,16 @@ class Work(NamedTuple):
 def allocate_work(system: System) -> Work:
     """Scratch for one system."""
     r = system.size - 6
-    pairs = r + r * (r + 1) // 2 if len(system.stvk) else 0
+    seen = system.points[system.stvk]
+    p = int(seen.max(initial=0))
+    strains = int((system.elastic[system.stvk] + seen * (seen + 1) // 2).max(initial=0))
     points = 18 if len(system.neohookean) else 0
-    nonlinear = r if pairs or points else 0
     return Work(
         np.zeros((len(system.parent), 3, 3)), np.zeros(3), np.zeros((3, 3)), np.zeros((r, 3, 3)), np.zeros((3, 3)),
         np.zeros((3, 3)), np.zeros((3, 3)), np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(3), np.zeros((3, 3)),
-        np.zeros((3, 3)), np.zeros(3), np.zeros((2, JOINT_ROWS)), np.zeros(2 * pairs),
-        np.zeros((max(nonlinear, points), max(pairs, nonlinear))), np.zeros(nonlinear), np.zeros((points, points)),
+        np.zeros((3, 3)), np.zeros(3), np.zeros((2, JOINT_ROWS)), np.zeros(2 * strains),
+        np.zeros((max(p, points), max(strains, r if points else 0))), np.zeros((3, p)), np.zeros(p), np.zeros((p, r)),
+        np.zeros((points, points)),
         np.zeros(3), np.zeros(1), np.zeros(system.size), np.zeros((2, system.size)), np.zeros((system.size, 3)),
         np.zeros((int(system.moving.max(initial=-1)) + 1, WORLD_MARKER)), allocate_marker(system.size),
         allocate_marker(system.size),
@@ -127,8 +131,8 @@ def _straight_rows(system, b, u, V, Vd, tangent, w, blocks):
 def _add_stvk_forces(system, b, u, v, tangent, w, blocks):
     """Elastic rows of a body of this law; those of a linear one stand with its inertia."""
     stvk_forces(
-        system.elastic[b], u, v, system.retardation[b], system.data_start[b], system.data, tangent, w.strain, w.rows,
-        w.row, blocks.res[b], blocks.P[b], blocks.K[b],
+        system.elastic[b], system.points[b], u, v, system.retardation[b], system.data_start[b], system.data, tangent,
+        w.strain, w.rows, w.seen, w.row, w.inner, blocks.res[b], blocks.P[b], blocks.K[b],
     )  # fmt: skip
 
 

@@ -1,14 +1,15 @@
 """Elastic and viscous forces of a St. Venant-Kirchhoff body in reduced coordinates; compiled.
 
-With z(u) = (u_k; u_k u_l for k <= l) and A the Gram matrix of the strains that belong to it (`fem.elastic_forms`),
-the energy is z^T A z / 2. Kelvin-Voigt damping adds b C:E' to the stress C:E, hence, with J = dz/du,
+With w = W u the few directions that its quadratic strain sees (`fem.seen_directions`; all of u where W is none),
+z(u) = (u_k; w_k w_l for k <= l) and A the Gram matrix of the strains that belong to it (`fem.elastic_forms`), the
+energy is z^T A z / 2. Kelvin-Voigt damping adds b C:E' to the stress C:E, hence, with J = dz/du,
 
     force      f = J^T A (z + b z'),      z' = J v
     by v       b J^T A J
     by u       J^T A (J + b dz'/du) + d(J^T)/du A (z + b z')
 
 Both are exact: the force is a cubic polynomial, and a rigid turn of the body, of which z holds no strain, costs
-nothing.
+nothing. As pairs are bilinear, J + b dz'/du is J at u + b v.
 """
 
 from __future__ import annotations
@@ -17,54 +18,72 @@ from ..kernels import kernel
 
 
 @kernel
-def strain_coordinates(r, u, v, beta, z):
-    """z(u) + beta z'(u, v) into z, shape [r + r (r + 1) / 2]."""
-    p = r
+def _seen(r, p, at, W, u, w):
+    """w = W u, shape [p]; W starts at `at` of a flat array, and is none where p is r."""
+    for a in range(p):
+        if p == r:
+            w[a] = u[a]
+            continue
+        total = 0.0
+        for k in range(r):
+            total += W[at + a * r + k] * u[k]
+        w[a] = total
+
+
+@kernel
+def strain_coordinates(r, p, u, v, w, rate, beta, z):
+    """z + beta z' into z, shape [r + p (p + 1) / 2], of coordinates u, w and their rates v, rate."""
+    n = r
     for k in range(r):
         z[k] = u[k] + beta * v[k]
-        for l in range(k, r):
-            z[p] = u[k] * u[l] + beta * (u[k] * v[l] + v[k] * u[l])
-            p += 1
+    for k in range(p):
+        for l in range(k, p):
+            z[n] = w[k] * w[l] + beta * (w[k] * rate[l] + rate[k] * w[l])
+            n += 1
 
 
 @kernel
-def _pair_row(r, i, l):
+def _pair_row(r, p, i, l):
     """Row of A that belongs to the pair (i, l)."""
     k, n = min(i, l), max(i, l)
-    return r + k * r - (k * (k - 1)) // 2 + n - k
+    return r + k * p - (k * (k - 1)) // 2 + n - k
 
 
 @kernel
-def _project(r, u, at, A, size, Y):
-    """Y = J(u)^T A, shape [r, size]; A starts at `at` of a flat array."""
-    for i in range(r):
+def _project(r, p, w, at, A, size, Y):
+    """Y = J^T A, shape [p, size], with J the derivative of z by w; A starts at `at` of a flat array.
+
+    The part of single coordinates is in it where these are w.
+    """
+    for i in range(p):
         y = Y[i]
         first = A[at + i * size : at + (i + 1) * size]
+        single = 1.0 if p == r else 0.0
         for m in range(size):
-            y[m] = first[m]
-        # d(u_i u_l) = u_l du_i, and twice that where l is i; four rows at a time halve the traffic
+            y[m] = single * first[m]
+        # d(w_i w_l) = w_l dw_i, and twice that where l is i; four rows at a time halve the traffic
         l = 0
-        while l + 4 <= r:
-            s0, s1 = at + size * _pair_row(r, i, l), at + size * _pair_row(r, i, l + 1)
-            s2, s3 = at + size * _pair_row(r, i, l + 2), at + size * _pair_row(r, i, l + 3)
+        while l + 4 <= p:
+            s0, s1 = at + size * _pair_row(r, p, i, l), at + size * _pair_row(r, p, i, l + 1)
+            s2, s3 = at + size * _pair_row(r, p, i, l + 2), at + size * _pair_row(r, p, i, l + 3)
             a0, a1, a2, a3 = A[s0 : s0 + size], A[s1 : s1 + size], A[s2 : s2 + size], A[s3 : s3 + size]
-            u0, u1, u2, u3 = u[l], u[l + 1], u[l + 2], u[l + 3]
+            w0, w1, w2, w3 = w[l], w[l + 1], w[l + 2], w[l + 3]
             if l <= i < l + 4:
                 if i == l:
-                    u0 = 2.0 * u0
+                    w0 = 2.0 * w0
                 elif i == l + 1:
-                    u1 = 2.0 * u1
+                    w1 = 2.0 * w1
                 elif i == l + 2:
-                    u2 = 2.0 * u2
+                    w2 = 2.0 * w2
                 else:
-                    u3 = 2.0 * u3
+                    w3 = 2.0 * w3
             for m in range(size):
-                y[m] += u0 * a0[m] + u1 * a1[m] + u2 * a2[m] + u3 * a3[m]
+                y[m] += w0 * a0[m] + w1 * a1[m] + w2 * a2[m] + w3 * a3[m]
             l += 4
-        while l < r:
-            start = at + size * _pair_row(r, i, l)
+        while l < p:
+            start = at + size * _pair_row(r, p, i, l)
             last = A[start : start + size]
-            factor = 2.0 * u[l] if l == i else u[l]
+            factor = 2.0 * w[l] if l == i else w[l]
             for m in range(size):
                 y[m] += factor * last[m]
             l += 1
@@ -92,58 +111,107 @@ def _stress(size, at, A, z, stress):
 
 
 @kernel
-def _times_jacobian(r, i, Y, w, scale, row):
-    """row += scale * Y[i] J(w), shape [r]: the pairs of J(w) alone, without the part of single coordinates."""
-    p = r
-    for k in range(r):
-        for l in range(k, r):
-            y = scale * Y[i, p]
-            row[k] += y * w[l]
-            row[l] += y * w[k]
-            p += 1
+def _times_pairs(p, pairs, x, row):
+    """row = pairs^T J_w(x), shape [p]: what a row of A is worth in the directions, at w = x."""
+    for a in range(p):
+        row[a] = 0.0
+    n = 0
+    for k in range(p):
+        for l in range(k, p):
+            y = pairs[n]
+            row[k] += y * x[l]
+            row[l] += y * x[k]
+            n += 1
 
 
 @kernel
-def stvk_forces(r, u, v, beta, at, A, tangent, z, Y, row, res, P, K):
+def _add_carried(r, p, at, W, scale, row, out):
+    """out += scale row W, of what stands in the directions to what stands in the coordinates."""
+    if p == r:
+        for k in range(r):
+            out[k] += scale * row[k]
+        return
+    for a in range(p):
+        factor = scale * row[a]
+        start = at + a * r
+        line = W[start : start + r]
+        for k in range(r):
+            out[k] += factor * line[k]
+
+
+@kernel
+def _along(r, p, a, x, stress, Y, row):
+    """row = Y_pairs[a] J_w(x), and what the pairs of `stress` do as w turns; none where that is empty."""
+    _times_pairs(p, Y[a, r:], x, row)
+    if len(stress) == 0:
+        return
+    for l in range(p):
+        y = stress[_pair_row(r, p, a, l)]
+        row[l] += 2.0 * y if l == a else y
+
+
+@kernel
+def _add_tangent(r, p, x, stress, scale, at, A, size, Y, row, inner, out):
+    """out[6:, 6:] += scale (J(w)^T A J(x) + d(J^T)/du stress), the last none where `stress` is empty."""
+    if p == r:
+        for a in range(r):
+            _along(r, p, a, x, stress, Y, row)
+            own = out[6 + a, 6:]
+            for k in range(r):
+                own[k] += scale * (Y[a, k] + row[k])
+        return
+    W = at + size * size
+    # by the directions first: inner = Y_u + (Y_pairs J_w(x) + d(J_w^T)/dw stress) W
+    for a in range(p):
+        _along(r, p, a, x, stress, Y, row)
+        for k in range(r):
+            inner[a, k] = Y[a, k]
+        _add_carried(r, p, W, A, 1.0, row, inner[a])
+    for i in range(r):
+        start = at + i * size
+        line = A[start : start + size]
+        _times_pairs(p, line[r:], x, row)
+        own = out[6 + i, 6:]
+        for k in range(r):
+            own[k] += scale * line[k]
+        _add_carried(r, p, W, A, scale, row, own)
+        for a in range(p):
+            factor = scale * A[W + a * r + i]
+            for k in range(r):
+                own[k] += factor * inner[a, k]
+
+
+@kernel
+def stvk_forces(r, p, u, v, beta, at, A, tangent, z, Y, seen, row, inner, res, P, K):
     """Adds the forces to res[6:], and with `tangent` their derivatives by v and by u to P and K.
 
     Args:
+        r, p: Elastic coordinates, and directions that the quadratic strain sees.
         u, v: Elastic coordinates and their rates, shape [r].
         beta: Retardation time of Kelvin-Voigt damping [s].
-        at, A: Flat array of Gram matrices, and where this body's starts.
-        z, Y, row: Scratch, shapes [2 size], [r, size] and [r], with size = r + r (r + 1) / 2.
+        at, A: Flat array of Gram matrices, each with its W after it where p is below r, and where this body's starts.
+        z, Y, seen, row, inner: Scratch, shapes [2 size], [p, size], [3, p], [p] and [p, r], with
+            size = r + p (p + 1) / 2.
         res, P, K: Shapes [6 + r], [6 + r, 6 + r] twice.
     """
-    size = r + (r * (r + 1)) // 2
-    strain_coordinates(r, u, v, beta, z)
+    size = r + (p * (p + 1)) // 2
+    W = at + size * size
+    w, rate, x = seen[0], seen[1], seen[2]
+    _seen(r, p, W, A, u, w)
+    _seen(r, p, W, A, v, rate)
+    strain_coordinates(r, p, u, v, w, rate, beta, z)
     stress = z[size:]
     _stress(size, at, A, z, stress)
-    p = r
+    own = res[6:]
     for k in range(r):
-        res[6 + k] += stress[k]
-        for l in range(k, r):
-            res[6 + k] += stress[p] * u[l]
-            res[6 + l] += stress[p] * u[k]
-            p += 1
+        own[k] += stress[k]
+    _times_pairs(p, stress[r:], w, row)
+    _add_carried(r, p, W, A, 1.0, row, own)
     if not tangent:
         return
-    _project(r, u, at, A, size, Y)
-    for i in range(r):
-        for k in range(r):
-            row[k] = Y[i, k]
-        _times_jacobian(r, i, Y, u, 1.0, row)
-        for k in range(r):
-            K[6 + i, 6 + k] += row[k]
-            P[6 + i, 6 + k] += beta * row[k]
-        if beta != 0.0:
-            for k in range(r):
-                row[k] = 0.0
-            _times_jacobian(r, i, Y, v, beta, row)
-            for k in range(r):
-                K[6 + i, 6 + k] += row[k]
-    p = r
-    for k in range(r):
-        for l in range(k, r):
-            K[6 + k, 6 + l] += stress[p]
-            K[6 + l, 6 + k] += stress[p]
-            p += 1
+    _project(r, p, w, at, A, size, Y)
+    for a in range(p):
+        x[a] = w[a] + beta * rate[a]
+    _add_tangent(r, p, x, stress, 1.0, at, A, size, Y, row, inner, K)
+    if beta != 0.0:
+        _add_tangent(r, p, w, stress[:0], beta, at, A, size, Y, row, inner, P)

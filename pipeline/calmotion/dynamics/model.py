@@ -132,9 +132,14 @@ def _elastic_laws(bodies: Sequence[ReducedBody]) -> dict[str, Any]:
         if item is None:
             continue
         law[k] = {"stvk": STVK, "neohookean": NEOHOOKEAN}[item.law]
-        retardation[k], lame[k], points[k], start[k] = item.retardation, item.lame, item.points, size
-        arrays.append(item.data)
-        size += item.data.size
+        retardation[k], lame[k], start[k] = item.retardation, item.lame, size
+        points[k] = item.points
+        own = [item.data]
+        if item.law == "stvk":
+            points[k] = len(body.stiffness) if item.seen is None else len(item.seen)
+            own += [] if item.seen is None else [item.seen.ravel()]
+        arrays += own
+        size += sum(array.size for array in own)
     data = np.concatenate(arrays) if arrays else np.zeros(0)
     return {
         "law": law, "stvk": components(law == STVK), "neohookean": components(law == NEOHOOKEAN),

@@ -39,7 +39,7 @@ class System(NamedTuple):
         stvk, neohookean: Components of these laws.
         retardation: Kelvin-Voigt coefficient of nonlinear bodies [s], shape [B].
         lame: Lame's constants [Pa], shape [B, 2], where the law is NEOHOOKEAN.
-        points: Number of cubature points, shape [B].
+        points: Number of cubature points, or of directions that a STVK body's quadratic strain sees, shape [B].
         data_start, data: What `elastic` and `neohookean` read of each body, in one array, and where it starts.
         position, rotation, Phi, Psi: Joint markers, shapes [J, 2, 3], [J, 2, 3, 3], [J, 2, 3, R] twice.
         gravity: [m/s^2], shape [3].

@@ -33,6 +33,11 @@ class QuadraticMesh:
         """Nodes on the boundary, ascending."""
         return np.unique(self.surface)
 
+    @property
+    def volume(self) -> float:
+        """[m^3]."""
+        return float(self.basis.dx.sum())
+
 
 @dataclass(frozen=True, eq=False)
 class FEModel:

@@ -67,7 +67,7 @@ def choose_law(
     fields, motion = second_order.fields, second_order.motion
     modes = basis.modes[:, :, :count]
     omega_squared = basis.omega_squared[:count]
-    bend = _amplitudes(model, basis, excitation, count)
+    bend = amplitudes(model, basis, excitation, count)
     first, second = np.triu_indices(count)
     twice = np.where(first == second, 1.0, 2.0)
     pairs = twice * bend[first] * bend[second]
@@ -88,8 +88,7 @@ def choose_law(
             remedy="Check it, in the stage's units, and the masses that the body carries.",
         )
     linear_error = shortening + deflection * softening
-    volume = float(model.mass.sum()) / material.density
-    strain = float(np.sqrt(bend @ (omega_squared * bend) / (material.youngs_modulus * volume)))
+    strain = float(np.sqrt(bend @ (omega_squared * bend) / (material.youngs_modulus * model.mesh.volume)))
     stvk_error = deflection * strain**2
     found = f"it bends by about {_mm(deflection)}"
     if linear_error <= tolerance:
@@ -100,8 +99,8 @@ def choose_law(
     return LawChoice("neohookean", f"{because}; it is strained by {strain:.0%}", 0.0)
 
 
-def _amplitudes(model: FEModel, basis: Basis, excitation: Excitation, count: int) -> Array:
-    """How far the loads deflect the first modes at most, shape [count]."""
+def amplitudes(model: FEModel, basis: Basis, excitation: Excitation, count: int) -> Array:
+    """How far the loads deflect the first modes at most, each by itself, shape [count]."""
     work = work_of_loads(model, basis.modes[:, :, :count], basis.patch_motion[:, :, :count], excitation)
     return OVERSHOOT * work / basis.omega_squared[:count]
 
@@ -109,8 +108,8 @@ def _amplitudes(model: FEModel, basis: Basis, excitation: Excitation, count: int
 def deflection_of(model: FEModel, basis: Basis, excitation: Excitation) -> float:
     """How far the loads deflect a linear body at its interfaces, at most [m]."""
     count = min(_MODES, len(basis.omega_squared))
-    amplitudes = _amplitudes(model, basis, excitation, count)
-    return _reach(basis.modes[:, :, :count], basis.patch_motion[:, :, :count], amplitudes)
+    bend = amplitudes(model, basis, excitation, count)
+    return _reach(basis.modes[:, :, :count], basis.patch_motion[:, :, :count], bend)
 
 
 def work_of_loads(model: FEModel, fields: Array, motion: Array, excitation: Excitation) -> Array:

@@ -88,7 +88,19 @@ def lame_constants(youngs_modulus: float, poissons_ratio: float) -> tuple[float,
     return 2.0 * mu * poissons_ratio / (1.0 - 2.0 * poissons_ratio), mu
 
 
-def strain_gram(rule: GradientRule, modes: Array, lame: float, mu: float) -> Array:
+def gradient_gram(rule: GradientRule, modes: Array) -> Array:
+    """Inner products of the displacement gradients of modes, int G_k : G_l [m], shape [r, r].
+
+    Args:
+        rule: Of order 2, which integrates them exactly.
+        modes: Nodal displacements, shape [n, 3, r].
+    """
+    G = rule.gradients(modes) * np.sqrt(rule.weights)[:, :, None, None]
+    G = G.reshape(modes.shape[2], -1)
+    return G @ G.T
+
+
+def strain_gram(rule: GradientRule, modes: Array, lame: float, mu: float, directions: Array | None = None) -> Array:
     """Inner products of the Green strains that modes make, alone and in pairs.
 
     The Green strain of a displacement sum_k u_k phi_k is a combination of fields, one for each mode and one for each
@@ -100,9 +112,10 @@ def strain_gram(rule: GradientRule, modes: Array, lame: float, mu: float) -> Arr
         rule: Of order 4, which integrates the products of two quadratic strains exactly.
         modes: Nodal displacements, shape [n, 3, r].
         lame, mu: Lame's constants [Pa].
+        directions: Those whose pairs are made instead of all modes', in coordinates, shape [r, p] (`seen_directions`).
 
     Returns:
-        A, symmetric, shape [r + r (r + 1) / 2] squared; pairs ordered (0, 0), (0, 1), ..., (1, 1), ...
+        A, symmetric, shape [r + p (p + 1) / 2] squared; pairs ordered (0, 0), (0, 1), ..., (1, 1), ...
 
     Source: Barbic and James, Real-Time Subspace Integration for St. Venant-Kirchhoff Deformable Models, 2005 (the
     cubic polynomial), in the form of a Gram matrix.
@@ -110,8 +123,8 @@ def strain_gram(rule: GradientRule, modes: Array, lame: float, mu: float) -> Arr
     from scipy.linalg.blas import dsyrk
 
     r = modes.shape[2]
-    first, second = np.triu_indices(r)
-    size = r + len(first)
+    p = r if directions is None else directions.shape[1]
+    size = r + p * (p + 1) // 2
     A = np.zeros((size, size))
     count = len(rule.weights)
     points = rule.weights.shape[1]
@@ -128,18 +141,19 @@ def strain_gram(rule: GradientRule, modes: Array, lame: float, mu: float) -> Arr
         G = rule.gradients(modes, part)  # [r, e, q, 3, 3]
         n = weight.size
         G = G.reshape(r, n, 3, 3)
+        turns = G if directions is None else np.tensordot(directions.T, G, 1)
         fields = np.empty((size, 6, n))
         for at, (i, j) in enumerate(zip(rows, columns, strict=True)):
             fields[:r, at] = 0.5 * (G[:, :, i, j] + G[:, :, j, i])
-            left, right = np.ascontiguousarray(G[:, :, :, i]), np.ascontiguousarray(G[:, :, :, j])
-            p = r
-            for k in range(r):
+            left, right = np.ascontiguousarray(turns[:, :, :, i]), np.ascontiguousarray(turns[:, :, :, j])
+            row = r
+            for k in range(p):
                 # sym(G_k^T G_l), halved on the diagonal where the pair stands once
                 pair = np.einsum("nc,lnc->ln", left[k], right[k:]) + np.einsum("nc,lnc->ln", right[k], left[k:])
                 pair *= 0.5
                 pair[0] *= 0.5
-                fields[p : p + r - k, at] = pair
-                p += r - k
+                fields[row : row + p - k, at] = pair
+                row += p - k
         fields *= weight.ravel()
         trace = fields[:, :3].sum(axis=1, keepdims=True)
         fields *= scale[:, None]

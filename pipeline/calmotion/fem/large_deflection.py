@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
-from ..shot.character import DEFAULT_TOLERANCE, ElasticMaterial
+from ..shot.character import DEFAULT_TOLERANCE, Array, ElasticMaterial
 from .assembly import FEModel
 from .choose_law import work_of_loads
 from .craig_bampton import Basis
@@ -15,6 +16,7 @@ from .excitation_data import Excitation
 from .modal_derivatives import NEGLIGIBLE, Support, extended_basis
 from .patch_rotation import spring_rows, springs
 from .reduced_body import Elasticity
+from .seen_directions import first_order, seen_directions
 
 PAIRED_MODES = 16  # modes that may have derivatives
 _LEFT = 1e-3  # share of the derivatives' strain energy that may be missing, by the tolerance over the body's size
@@ -46,16 +48,33 @@ def large_deflection(
     extended = extended_basis(model, support, basis, PAIRED_MODES, material, law, negligible)
     lame = lame_constants(material.youngs_modulus, material.poissons_ratio)
     if law == "stvk":
-        gram = strain_gram(GradientRule(model.mesh, 4), extended.modes, *lame)
-        if extended.patch_squares is not None:
-            roots = springs(model.mesh.nodes, support.patches, support.centers, material.youngs_modulus)
-            rows = spring_rows(roots, extended.patch_squares, extended.patch_motion[:, 3:])
-            gram += rows.T @ rows
-        return extended, Elasticity(law, 0.0, gram.ravel(), 0, lame)
+        gram = partial(_gram, model, support, extended, material)
+        seen = None
+        if excitation is not None:
+            bends = first_order(model, extended, basis)[:, :PAIRED_MODES]
+            seen = seen_directions(
+                model, support, extended, basis, bends, gram(bends),
+                basis.excitation or excitation, material.youngs_modulus, tolerance,
+            )  # fmt: skip
+        if seen is None:
+            return extended, Elasticity(law, 0.0, gram(None).ravel(), 0, lame)
+        directions, part = seen
+        return extended, Elasticity(law, 0.0, gram(directions).ravel(), 0, lame, part)
     from .cubature import neohookean_cubature
 
     data, points = neohookean_cubature(model, extended, material)
     return extended, Elasticity(law, 0.0, data, points, lame)
+
+
+def _gram(model: FEModel, support: Support, basis: Basis, material: ElasticMaterial, directions: Array | None) -> Array:
+    """`strain_gram` of a basis, with the springs of its patches."""
+    lame = lame_constants(material.youngs_modulus, material.poissons_ratio)
+    gram = strain_gram(GradientRule(model.mesh, 4), basis.modes, *lame, directions)
+    if basis.patch_squares is not None:
+        roots = springs(model.mesh.nodes, support.patches, support.centers, material.youngs_modulus)
+        rows = spring_rows(roots, basis.patch_squares, basis.patch_motion[:, 3:], directions)
+        gram += rows.T @ rows
+    return gram
 
 
 def _by_deflection(model: FEModel, basis: Basis, excitation: Excitation) -> Basis:

@@ -100,16 +100,16 @@ def springs(nodes: Array, patches: Sequence[IntArray], centers: Sequence[Array],
     return roots
 
 
-def spring_rows(roots: Array, held: Array, rotation: Array) -> Array:
-    """Rows w with w z(u) the springs' extension, shape [6 p, r + r (r + 1) / 2]: w^T w is their Gram matrix.
+def spring_rows(roots: Array, held: Array, rotation: Array, directions: Array | None = None) -> Array:
+    """Rows w with w z(u) the springs' extension, shape [6 p, r + d (d + 1) / 2]: w^T w is their Gram matrix.
 
     Args:
         roots: As of `springs`.
         held: S of each mode, shape [p, 6, r].
         rotation: Rotation vector of each patch in each mode, shape [p, 3, r].
+        directions: As of `elastic_forms.strain_gram`, shape [r, d]; None: all coordinates.
     """
     p, r = len(rotation), rotation.shape[2]
-    first, second = np.triu_indices(r)
     H = np.zeros((p, r, 3, 3))  # gradient of the patch's displacement in each mode
     for m, (i, j) in enumerate(zip(_ROWS, _COLUMNS, strict=True)):
         H[:, :, i, j] = H[:, :, j, i] = held[:, m]
@@ -118,7 +118,9 @@ def spring_rows(roots: Array, held: Array, rotation: Array) -> Array:
     for i, (j, k) in enumerate(((1, 2), (2, 0), (0, 1))):
         H[:, :, k, j] += rotation[:, i]
         H[:, :, j, k] -= rotation[:, i]
-    product = np.einsum("pkij,pkil->pkjl", H[:, first], H[:, second])
+    turns = H if directions is None else np.einsum("pkij,kd->pdij", H, directions)
+    first, second = np.triu_indices(turns.shape[1])
+    product = np.einsum("pkij,pkil->pkjl", turns[:, first], turns[:, second])
     pairs = 0.5 * (product + np.swapaxes(product, 2, 3))
     pairs[:, first == second] *= 0.5  # u_k^2 stands once, u_k u_l for both orders
     entries = np.concatenate([strain, pairs], axis=1)[:, :, _ROWS, _COLUMNS]

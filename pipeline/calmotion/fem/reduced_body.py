@@ -68,6 +68,8 @@ class Elasticity:
             modes (9 x r).
         points: Number of cubature points.
         lame: Lame's constants (lambda, mu) [Pa].
+        seen: Of `stvk`: W, with W u the directions that the quadratic strain sees, shape [p, r] with p < r; None where
+            it sees all coordinates.
     """
 
     law: str
@@ -75,6 +77,7 @@ class Elasticity:
     data: Array
     points: int = 0
     lame: tuple[float, float] = (0.0, 0.0)
+    seen: Array | None = None
 
 
 @dataclass(frozen=True, eq=False)

@@ -71,9 +71,13 @@ def within(body: ReducedBody, T: Array) -> ReducedBody:
 def _law_within(law: Elasticity, T: Array) -> Elasticity:
     r, s = T.shape
     if law.law == "stvk":
-        L = _pairs_within(T)
+        turns = T if law.seen is None else law.seen @ T
+        kept = s < len(turns) or law.seen is None  # or fewer directions are seen still
+        pairs = _pairs_within(turns) if kept else np.eye(len(turns) * (len(turns) + 1) // 2)
+        L = np.zeros((r + len(pairs), s + pairs.shape[1]))
+        L[:r, :s], L[r:, s:] = T, pairs
         gram = np.asarray(law.data).reshape(len(L), len(L))
-        return replace(law, data=(L.T @ gram @ L).ravel())
+        return replace(law, data=(L.T @ gram @ L).ravel(), seen=None if kept else turns)
     correction, points = law.data[: r * r].reshape(r, r), law.data[r * r :].reshape(law.points, 1 + 9 * r)
     gradients = points[:, 1:].reshape(law.points, 9, r) @ T
     packed = np.hstack([points[:, :1], gradients.reshape(law.points, 9 * s)])
@@ -81,12 +85,10 @@ def _law_within(law: Elasticity, T: Array) -> Elasticity:
 
 
 def _pairs_within(T: Array) -> Array:
-    """z(T w) = L z(w) with z(u) = (u_k; u_k u_l for k <= l) of `elastic_forms.strain_gram`."""
+    """Pairs of T w (u_k u_l for k <= l, as of `elastic_forms.strain_gram`) from those of w."""
     r, s = T.shape
     (k, l), (a, b) = np.triu_indices(r), np.triu_indices(s)
-    L = np.zeros((r + len(k), s + len(a)))
-    L[:r, :s] = T
-    L[r:, s:] = T[k][:, a] * T[l][:, b]
+    L = T[k][:, a] * T[l][:, b]
     both = a != b
-    L[r:, s:][:, both] += T[k][:, b[both]] * T[l][:, a[both]]
+    L[:, both] += T[k][:, b[both]] * T[l][:, a[both]]
     return L
