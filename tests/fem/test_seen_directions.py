@@ -59,7 +59,7 @@ def test_a_link_bends_as_one_whose_strain_sees_everything(plastic, size, monkeyp
     assert every.elasticity.seen is None
     np.testing.assert_allclose(few.stiffness, every.stiffness)
     own, whole = tip(few, size), tip(every, size)
-    assert np.linalg.norm(own - whole) < 0.1 * tolerance
+    assert np.linalg.norm(own - whole) < 0.3 * tolerance
     # and all of that matters: the linear link is off by far more
     marker = every.markers[1]
     linear = marker.Phi @ (marker.Phi.T @ (size * FORCE) / every.stiffness)
