@@ -4,25 +4,27 @@ import numpy as np
 import pytest
 from calmotion.dynamics.topology import span_tree
 from calmotion.retarget.bodies import reduce_bodies
+from calmotion.retarget.fast_scheme import FAST
 from calmotion.retarget.prepare import Options, excitations
 from calmotion.retarget.settled_bodies import settled_bodies
 from calmotion.retarget.step_error import simulate_at
 
 STEP = 1 / 480
+BY = Options(integrator=FAST)
 
 
 @pytest.fixture(scope="module")
 def fine(arm, animation, meshes):
     loads = excitations(arm, animation, meshes, Options())
     bodies = reduce_bodies(arm, span_tree(arm), meshes, None, loads, 1e-6)
-    return bodies, simulate_at(arm, animation, bodies, Options(), STEP).positions
+    return bodies, simulate_at(arm, animation, bodies, BY, STEP).positions
 
 
 @pytest.mark.parametrize("tolerance", [1e-2, 1e-3, pytest.param(1e-4, marks=pytest.mark.long)])
 def test_the_motion_keeps_the_tolerance_against_a_far_finer_reduction(arm, animation, meshes, fine, tolerance):
     settled = settled_bodies(arm, animation, meshes, Options(tolerance=tolerance, step=STEP))
     bodies = settled.bodies
-    found = simulate_at(arm, animation, bodies, Options(), STEP).positions
+    found = simulate_at(arm, animation, bodies, BY, STEP).positions
     assert np.linalg.norm(found - fine[1], axis=2).max() < tolerance and settled.error_m <= 0.4 * tolerance
     np.testing.assert_array_equal(settled.known.run.positions, found)
     if tolerance > 5e-4:

@@ -27,12 +27,13 @@ from ..dynamics.topology import span_tree
 from ..errors import ShotError
 from ..fem.reduced_body import ReducedBody
 from ..retarget.bodies import reduce_bodies, with_elasticity
+from ..retarget.fast_scheme import by_fast_scheme
 from ..retarget.motion_subspace import HeldBodies, Known
 from ..retarget.prepare import Options, excitations
 from ..retarget.settled_bodies import settled_bodies
 from ..retarget.step_error import StepRun, distance, simulate_at
 from ..retarget.time_grid import MAX_STEP
-from ..retarget.to_tolerance import by_fast_scheme, chosen_step, held_to_tolerance
+from ..retarget.to_tolerance import chosen_step, held_to_tolerance
 from ..shot import Animation, Character
 from ..shot.character import Array
 from .pareto import over_fastest, print_over_fastest, setting_of

@@ -3,7 +3,7 @@
 Two things a linear body leaves out are estimated from the loads of the shot, with u_i = (load on mode i) / omega_i^2
 the quasi-static deflection and theta_ij the modal derivatives:
 
-- shortening: the tip is off by theta_ij u_i u_j / 2;
+- shortening: the tip, or a target beyond it, is off by theta_ij u_i u_j / 2;
 - stiffening (or softening): a load f works along theta_ij too, so that the stiffness changes by -f . theta_ij, and the
   deflection by that part of itself.
 
@@ -72,7 +72,8 @@ def choose_law(
     twice = np.where(first == second, 1.0, 2.0)
     pairs = twice * bend[first] * bend[second]
     deflection = _reach(modes, basis.patch_motion[:, :, :count], bend)
-    shortening = 0.5 * _reach(fields, motion, pairs)
+    moved = deflection_of(model, basis, excitation)
+    shortening = 0.5 * _reach(fields, motion, pairs, excitation.lever)
     change = np.zeros((count, count))
     change[first, second] = change[second, first] = work_of_loads(model, fields, motion, excitation)
     root = np.sqrt(omega_squared)
@@ -87,9 +88,9 @@ def choose_law(
             found=f"{material.youngs_modulus:.3g} Pa",
             remedy="Check it, in the stage's units, and the masses that the body carries.",
         )
-    linear_error = shortening + deflection * softening
+    linear_error = shortening + moved * softening
     strain = float(np.sqrt(bend @ (omega_squared * bend) / (material.youngs_modulus * model.mesh.volume)))
-    stvk_error = deflection * strain**2
+    stvk_error = moved * strain**2
     found = f"it bends by about {_mm(deflection)}"
     if linear_error <= tolerance:
         return LawChoice("linear", f"{found}, of which {_mm(linear_error)} is not linear", linear_error)
@@ -106,10 +107,10 @@ def amplitudes(model: FEModel, basis: Basis, excitation: Excitation, count: int)
 
 
 def deflection_of(model: FEModel, basis: Basis, excitation: Excitation) -> float:
-    """How far the loads deflect a linear body at its interfaces, at most [m]."""
+    """How far the loads of a linear body move its interfaces, or targets beyond them, at most [m]."""
     count = min(_MODES, len(basis.omega_squared))
     bend = amplitudes(model, basis, excitation, count)
-    return _reach(basis.modes[:, :, :count], basis.patch_motion[:, :, :count], bend)
+    return _reach(basis.modes[:, :, :count], basis.patch_motion[:, :, :count], bend, excitation.lever)
 
 
 def work_of_loads(model: FEModel, fields: Array, motion: Array, excitation: Excitation) -> Array:
@@ -137,10 +138,17 @@ def work_of_loads(model: FEModel, fields: Array, motion: Array, excitation: Exci
     return work
 
 
-def _reach(fields: Array, motion: Array, amplitudes: Array) -> float:
-    """Largest displacement of the interfaces, or of the whole body where it has none [m]."""
+def _reach(fields: Array, motion: Array, amplitudes: Array, lever: Array | None = None) -> float:
+    """Largest displacement of the interfaces, or of the whole body where it has none [m].
+
+    Args:
+        lever: Distance of a target beyond each interface, which its turn moves [m]; None: turns do not matter.
+    """
     if len(motion):
-        return float(np.linalg.norm(np.abs(motion[:, :3]) @ amplitudes, axis=1).max())
+        moved = np.linalg.norm(np.abs(motion[:, :3]) @ amplitudes, axis=1)
+        if lever is not None:
+            moved = moved + lever * np.linalg.norm(np.abs(motion[:, 3:]) @ amplitudes, axis=1)
+        return float(moved.max())
     return float(np.linalg.norm(np.abs(fields) @ amplitudes, axis=1).max())
 
 

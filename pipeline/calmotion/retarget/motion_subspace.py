@@ -21,6 +21,7 @@ from ..fem.subspace import principal_subspace, within
 from ..shot import Animation, Character, LeftOut
 from ..shot.character import FlexibleSettings
 from ..shot.needs import OFF, ON
+from .fast_scheme import by_fast_scheme
 from .prepare import Options
 from .step_error import StepRun, distance, run_or_none, simulate_at
 
@@ -81,8 +82,9 @@ class HeldBodies:
         self.bodies, self.error_m = self._complete, 0.0
 
     def _off(self, bodies: Sequence[ReducedBody] | None, known: Known) -> float:
-        """How far bodies are from a known simulation, by its own step, at any target and frame [m]."""
-        run = run_or_none(partial(simulate_at, self._character, known.animation, bodies, self._options), known.run.step)
+        """How far bodies are from a known simulation, by its own step and integrator, at any target and frame [m]."""
+        options = replace(self._options, integrator=known.run.integrator or self._options.integrator)
+        run = run_or_none(partial(simulate_at, self._character, known.animation, bodies, options), known.run.step)
         return np.inf if run is None else distance(run.positions, known.run.positions)
 
     def hold_for(self, animation: Animation, step: float) -> bool:
@@ -145,7 +147,10 @@ def known_motion(
     character: Character, animation: Animation, bodies: Sequence[ReducedBody] | None, options: Options, step: float
 ) -> Known:
     """The shot by its current curves, simulated with all coordinates; arguments as of `simulate_at`."""
-    return Known(animation, simulate_at(character, animation, bodies, options, step))
+    return Known(
+        animation,
+        by_fast_scheme(options, lambda options: simulate_at(character, animation, bodies, options, step)),
+    )  # fmt: skip
 
 
 def _told(

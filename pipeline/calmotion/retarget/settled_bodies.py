@@ -16,9 +16,9 @@ from ..dynamics.topology import span_tree
 from ..fem.reduced_body import ReducedBody
 from ..shot import Animation, Character, FEMeshes
 from .bodies import reduce_bodies
-from .motion_subspace import Known
+from .motion_subspace import Known, known_motion
 from .prepare import Options, excitations
-from .step_error import StepRun, distance, simulate_at
+from .step_error import StepRun, distance
 from .time_grid import MAX_STEP
 from .to_tolerance import OF_SHAKE, intended_motion
 
@@ -62,7 +62,7 @@ def settled_bodies(
     reduce = partial(reduce_bodies, character, tree, meshes, None, loads)
 
     def simulated(bodies: Sequence[ReducedBody]) -> StepRun:
-        return simulate_at(character, animation, bodies, options, options.step or MAX_STEP)
+        return known_motion(character, animation, bodies, options, options.step or MAX_STEP).run
 
     tolerance = options.tolerance
     bodies, off = reduce(tolerance=tolerance), 0.0

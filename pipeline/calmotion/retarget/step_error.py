@@ -32,11 +32,13 @@ class StepRun:
         positions: [m], shape [f, K, 3]; infinite where the simulation failed.
         elastic: Elastic coordinates of each body of the character at every step, shape [T, r]; empty for a motion that
             is known at the frames alone.
+        integrator: By which it was simulated; empty where that does not matter.
     """
 
     step: float
     positions: Array
     elastic: tuple[Array, ...] = ()
+    integrator: str = ""
 
 
 def simulate_at(
@@ -56,7 +58,8 @@ def simulate_at(
         run = run_forward(model, workspace, angles, rates, grid.h, prepared.world, None, options.scheme, steady)
     except SimulationFailure as failure:
         raise failure_error(prepared, failure) from failure
-    return StepRun(grid.h, run.target_positions[grid.frames], elastic_by_body(model, run.trajectory.states.u))
+    elastic = elastic_by_body(model, run.trajectory.states.u)
+    return StepRun(grid.h, run.target_positions[grid.frames], elastic, options.scheme)
 
 
 def frames_of(result: Result, frame_times: Array) -> StepRun:

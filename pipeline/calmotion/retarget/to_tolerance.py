@@ -10,16 +10,15 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import cache, partial
 from pathlib import Path
-from typing import TypeVar
 
 from ..dynamics.schemes import SCHEMES
-from ..errors import ShotError
 from ..fem.reduced_body import ReducedBody
 from ..shot import Accuracy, Animation, Character, LeftOut, OptimizerStep, Result, Track
 from ..shot.character import Array
 from ..shot.needs import OFF
 from .bodies import mode_tables
 from .curves import sample_tracks
+from .fast_scheme import by_fast_scheme
 from .idle_motors import ENOUGH
 from .motion_subspace import HeldBodies, Known, held_bodies
 from .optimize import optimize_shot, refuse_other_integrators
@@ -34,12 +33,10 @@ OF_SHAKE = 0.05  # of the input's own error: how well that need be known before 
 # Where no tolerance is asked for, a simulation of what was written has all coordinates, and is to tell the same errors.
 UNASKED = 0.002
 HELD = 0.05  # of the tolerance (and of how well the shake need be known), that holding bodies to directions may take
-FAST = "generalized-alpha"
 NAMES = {"bdf2": "BDF2", "newmark": "Newmark's method", "generalized-alpha": "generalised-alpha"}
 FINDING = "finding the directions that the shot bends links in"
 MARGIN, MOST = 0.8, 3  # by which a step that was too large is made too small, and how often that is done
 Bodies = Sequence[ReducedBody] | None
-Found = TypeVar("Found")
 
 
 def simulate_to_tolerance(
@@ -68,24 +65,6 @@ def simulate_to_tolerance(
         return _with_step(_with_modes(replace(result, accuracy=accuracy), bodies), character, options)
 
     return by_fast_scheme(options, simulated)
-
-
-def by_fast_scheme(options: Options, simulate: Callable[[Options], Found]) -> Found:
-    """What a simulation finds by the integrator that needs the fewest steps, or by the safest where that fails.
-
-    Generalised-alpha has a quarter of BDF2's error for the same step. It holds joints together in velocity alone, so
-    that they come apart where steps are coarse, and is not what searches differentiate.
-
-    Args:
-        options: With an integrator where one was asked for: it is then the only one.
-        simulate: By the options that it is given.
-    """
-    if options.integrator is None:
-        try:
-            return simulate(replace(options, integrator=FAST))
-        except ShotError:
-            pass
-    return simulate(options)
 
 
 def held_to_tolerance(

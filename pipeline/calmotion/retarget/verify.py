@@ -10,12 +10,13 @@ from ..dynamics.topology import span_tree
 from ..fem.reduced_body import ReducedBody
 from ..shot import Animation, Character, FEMeshes, Result
 from .bodies import reduce_bodies
+from .fast_scheme import by_fast_scheme
 from .motion_subspace import held_bodies
 from .prepare import Options, excitations
 from .run import Progress
 from .step_error import distance, frames_of, simulate_at
 from .time_grid import MAX_STEP
-from .to_tolerance import by_fast_scheme, found_tracks
+from .to_tolerance import found_tracks
 
 STEP, TOLERANCE = 0.25, 0.1  # of those of the result
 HELD = 0.01  # of its tolerance, that holding the finer run's bodies to what the shot moves may take
