@@ -59,3 +59,22 @@ def test_the_usual_basis_holds_all_but_a_thousandth_of_the_work_of_a_uniform_acc
     for group in (slice(0, 3), slice(3, 6)):
         assert (found <= exact * (1 + 1e-9))[group].all()
         assert (exact - found)[group].max() <= 2e-3 * exact[group].max()
+
+
+def test_a_body_in_balance_does_no_work_on_any_motion(held):
+    """The equilibrium by parts against the virtual work of the whole: every motion it may make is orthogonal."""
+    n = len(held.model.mesh.nodes)
+    rng = np.random.default_rng(6)
+    force, bent = rng.normal(size=(3 * n, 2)), np.zeros((3 * n, 2))
+    on_patch = (3 * held.patches[0][:, None] + np.arange(3)).ravel()
+    bent[on_patch] = 1e-6 * rng.normal(size=(len(on_patch), 2))
+    found, motion = held.balance(force, bent)
+    K = held.model.stiffness
+    left = force - K @ found
+    size = np.abs(force).sum()
+    assert np.abs(left[held.interior]).max() < 1e-9 * size
+    assert np.abs(held.constraint.T @ left).max() < 1e-9 * size
+    # on the patch it is what was imposed and a rigid motion, as told
+    np.testing.assert_allclose(
+        found[on_patch], (bent + held.constraint @ motion.reshape(-1, 2))[on_patch], atol=1e-12 * np.abs(found).max()
+    )

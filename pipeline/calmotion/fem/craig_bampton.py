@@ -42,6 +42,9 @@ class Basis:
         patch_squares: Second order of a rotation that each mode holds of each patch (see `patch_rotation`), shape
             [p, 6, r]; None where every patch moves as a rigid one.
         excitation: The loads that were looked at when modes were chosen by a tolerance: those of the shot, met askew.
+        first_order: Of a basis extended by modal derivatives, the modes that it extends in its coordinates, shape
+            [r, c].
+        second_order: And the derivatives of pairs of their first ones, shape [r, pairs].
     """
 
     modes: Array
@@ -51,13 +54,15 @@ class Basis:
     cut_error_m: float | None = None
     patch_squares: Array | None = None
     excitation: Excitation | None = None
+    first_order: Array | None = None
+    second_order: Array | None = None
 
 
 @one_blas_thread()
 def reduced_basis(
     model: FEModel, root: IntArray, patches: Sequence[IntArray], centers: Sequence[Array],
     settings: FlexibleSettings, *, excitation: Excitation | None = None, tolerance: float | None = None,
-    targets: Any = None,
+    targets: Any = None, fixed: FixedInterface | None = None,
 ) -> Basis:  # fmt: skip
     """The reduced basis of a body.
 
@@ -80,6 +85,7 @@ def reduced_basis(
         tolerance: Static displacement at the outputs that may be missing [m].
         targets: Function from nodal fields, shape [n, 3, r], to displacements of the body's targets, shape [k, 3, r];
             `embedding.embed(...).displacements` is one.
+        fixed: The body with every patch held, where that is known.
 
     Returns:
         The basis; it may be empty with an excitation that does not bend the body.
@@ -87,7 +93,7 @@ def reduced_basis(
     Raises:
         NotPositiveDefinite: The root patch does not hold the body.
     """
-    fixed = FixedInterface.of(model, root, patches, centers)
+    fixed = fixed or FixedInterface.of(model, root, patches, centers)
     places = None if excitation is None else _Places(fixed, excitation, targets)
     if places is not None and tolerance is not None and settings.mode_count < 0:
         return _chosen(fixed, places, settings, tolerance)

@@ -12,6 +12,7 @@ import numpy as np
 
 from ..shot.character import Array
 from .assembly import QuadraticMesh
+from .green_fields import green_fields
 
 
 class GradientRule:
@@ -126,42 +127,23 @@ def strain_gram(rule: GradientRule, modes: Array, lame: float, mu: float, direct
     p = r if directions is None else directions.shape[1]
     size = r + p * (p + 1) // 2
     A = np.zeros((size, size))
-    count = len(rule.weights)
-    points = rule.weights.shape[1]
+    count, points = rule.weights.shape
     # strain fields of about 64 MB at a time
     chunk = max(1, 8_000_000 // (7 * points * size))
     # the energy density 2 mu |E|^2 + lame tr(E)^2 as a sum of squares
-    root, bulk = np.sqrt(2.0 * mu), (np.sqrt(2.0 * mu + 3.0 * lame) - np.sqrt(2.0 * mu)) / 3.0
-    scale = root * np.array([1.0, 1.0, 1.0, np.sqrt(2.0), np.sqrt(2.0), np.sqrt(2.0)])
-    rows, columns = np.array([0, 1, 2, 1, 0, 0]), np.array([0, 1, 2, 2, 2, 1])
+    shear = np.sqrt(2.0 * mu)
+    bulk = (np.sqrt(2.0 * mu + 3.0 * lame) - shear) / 3.0
     for start in range(0, count, chunk):
         part = slice(start, min(start + chunk, count))
-        weight = np.sqrt(np.abs(rule.weights[part]))
-        sign = np.sign(rule.weights[part]).ravel()  # the rule has a negative weight at the centre
-        G = rule.gradients(modes, part)  # [r, e, q, 3, 3]
-        n = weight.size
-        G = G.reshape(r, n, 3, 3)
+        weights = rule.weights[part].ravel()
+        G = np.ascontiguousarray(rule.gradients(modes, part).reshape(r, -1, 9).transpose(0, 2, 1))
         turns = G if directions is None else np.tensordot(directions.T, G, 1)
-        fields = np.empty((size, 6, n))
-        for at, (i, j) in enumerate(zip(rows, columns, strict=True)):
-            fields[:r, at] = 0.5 * (G[:, :, i, j] + G[:, :, j, i])
-            left, right = np.ascontiguousarray(turns[:, :, :, i]), np.ascontiguousarray(turns[:, :, :, j])
-            row = r
-            for k in range(p):
-                # sym(G_k^T G_l), halved on the diagonal where the pair stands once
-                pair = np.einsum("nc,lnc->ln", left[k], right[k:]) + np.einsum("nc,lnc->ln", right[k], left[k:])
-                pair *= 0.5
-                pair[0] *= 0.5
-                fields[row : row + p - k, at] = pair
-                row += p - k
-        fields *= weight.ravel()
-        trace = fields[:, :3].sum(axis=1, keepdims=True)
-        fields *= scale[:, None]
-        fields[:, :3] += bulk * trace
-        for own, factor in ((sign > 0.0, 1.0), (sign < 0.0, -1.0)):
+        # the rule has a negative weight at the centre
+        for own, factor in ((weights > 0.0, 1.0), (weights < 0.0, -1.0)):
             if own.any():
-                of_points = np.ascontiguousarray(fields[:, :, own]).reshape(size, -1)
-                A += dsyrk(factor, of_points.T, trans=1)  # the upper triangle
+                fields = np.empty((size, 6, int(own.sum())))
+                green_fields(G[:, :, own], turns[:, :, own], np.sqrt(np.abs(weights[own])), shear, bulk, fields)
+                A += dsyrk(factor, fields.reshape(size, -1).T, trans=1)  # the upper triangle
     return A + np.triu(A, 1).T
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -47,6 +47,7 @@ class FixedInterface:
     mass: Any
     solver: SparseSolver
     constraint: Array
+    _normal: dict[float, tuple[Array, Array]] = field(default_factory=dict, init=False, repr=False)
 
     @classmethod
     def of(
@@ -101,11 +102,38 @@ class FixedInterface:
         Args:
             peaks: Of the twelve unit accelerations; those of peak zero are left out.
         """
-        below = (2.0 * 2.0 * np.pi * limit) ** 2
-        values, vectors = lowest_modes(
-            self.K, self.M, min(_MOST, len(self.interior)), solver=self.solver, below=below, most=_CANDIDATES
-        )
+        if limit not in self._normal:  # a body is asked again with other loads
+            below, least = (2.0 * 2.0 * np.pi * limit) ** 2, min(_MOST, len(self.interior))
+            self._normal[limit] = lowest_modes(self.K, self.M, least, solver=self.solver, below=below, most=_CANDIDATES)
+        values, vectors = self._normal[limit]
         return self._columns(vectors, self._residual(values, vectors, peaks, 0.0))
+
+    def balance(self, force: Array, bent: Array) -> tuple[Array, Array]:
+        """Where the body comes to rest under forces with displacements imposed on top of rigid motions of its patches.
+
+        Args:
+            force: Nodal [N], shape [3n, k].
+            bent: [m], shape [3n, k]; zero in the interior.
+
+        Returns:
+            Displacements, shape [3n, k], and the motion of each patch in them, shape [p, 6, k].
+        """
+        load = force - self.model.stiffness @ bent
+        result = bent.copy()
+        result[self.interior] += self.solver.solve(load[self.interior])
+        motion = np.zeros((0, load.shape[1]))
+        if self.constraint.shape[1]:
+            # what patches do and what the interior does are orthogonal in K, so that each follows by itself
+            motion = self._by_patches(self.constraint.T @ load)
+            result += self.constraint @ motion
+        return result, motion.reshape(len(self.patches), 6, load.shape[1])
+
+    def _by_patches(self, work: Array) -> Array:
+        """Motions of the patches under loads that do this work on unit ones, shape [6p, k]."""
+        K_r = self.constraint.T @ (self.model.stiffness @ self.constraint)
+        scale = 1.0 / np.sqrt(np.diag(K_r))
+        motion = np.linalg.solve(K_r * np.outer(scale, scale), scale[:, None] * work)
+        return np.asarray(scale[:, None] * motion)
 
     def _columns(self, normal: Array, residual: Array | None = None) -> Array:
         parts = [normal] if residual is None else [normal, residual]
@@ -133,10 +161,8 @@ class FixedInterface:
         work = np.einsum("ij,ij->j", inner, self.solver.solve(inner))
         if self.constraint.shape[1]:
             # constraint and fixed-interface displacements are orthogonal in K, so their shares of the work add
-            K_r = self.constraint.T @ (self.model.stiffness @ self.constraint)
-            scale = 1.0 / np.sqrt(np.diag(K_r))
-            load = scale[:, None] * (self.constraint.T @ loads)
-            work += np.einsum("ij,ij->j", load, np.linalg.solve(K_r * np.outer(scale, scale), load))
+            load = self.constraint.T @ loads
+            work += np.einsum("ij,ij->j", load, self._by_patches(load))
         return work
 
     def _work_weight(self) -> Array:

@@ -16,7 +16,7 @@ from .excitation_data import Excitation
 from .modal_derivatives import NEGLIGIBLE, Support, extended_basis
 from .patch_rotation import spring_rows, springs
 from .reduced_body import Elasticity
-from .seen_directions import first_order, seen_directions
+from .seen_directions import seen_directions
 
 PAIRED_MODES = 16  # modes that may have derivatives
 _LEFT = 1e-3  # share of the derivatives' strain energy that may be missing, by the tolerance over the body's size
@@ -51,11 +51,8 @@ def large_deflection(
         gram = partial(_gram, model, support, extended, material)
         seen = None
         if excitation is not None:
-            bends = first_order(model, extended, basis)[:, :PAIRED_MODES]
-            seen = seen_directions(
-                model, support, extended, basis, bends, gram(bends),
-                basis.excitation or excitation, material.youngs_modulus, tolerance,
-            )  # fmt: skip
+            loads = basis.excitation or excitation
+            seen = seen_directions(model, support, extended, basis, loads, material.youngs_modulus, tolerance)
         if seen is None:
             return extended, Elasticity(law, 0.0, gram(None).ravel(), 0, lame)
         directions, part = seen

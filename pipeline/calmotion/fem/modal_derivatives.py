@@ -12,16 +12,18 @@ James 2005 (the choice by amplitude).
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
 from ..shot.character import Array, ElasticMaterial, IntArray
 from .assembly import FEModel
-from .craig_bampton import Basis, mode_signs, rigid_patch
+from .blas_threads import one_blas_thread
+from .craig_bampton import Basis, mode_signs
 from .elastic_forms import GradientRule, lame_constants, second_order_force
-from .natural_modes import SparseSolver, vector_mass
+from .fixed_interface import FixedInterface
+from .natural_modes import vector_mass
 from .patch_rotation import STIFF, shape_changes, spring_rows, springs, square_fields, squares
 
 NEGLIGIBLE = 1e-3  # of the largest strain energy among the derivatives, in the square root
@@ -34,6 +36,18 @@ class Support:
     root: IntArray
     patches: Sequence[IntArray]
     centers: Sequence[Array]
+    _fixed: dict[FEModel, FixedInterface] = field(default_factory=dict, init=False, repr=False)
+
+    def fixed(self, model: FEModel) -> FixedInterface:
+        """The body with every patch held, factorised once.
+
+        Raises:
+            NotPositiveDefinite: The root patch does not hold the body.
+        """
+        if model not in self._fixed:
+            with one_blas_thread():
+                self._fixed[model] = FixedInterface.of(model, self.root, self.patches, self.centers)
+        return self._fixed[model]
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,7 +89,7 @@ def modal_derivatives(
     nodes = model.mesh.nodes
     n, p = len(nodes), len(support.patches)
     lame, mu = lame_constants(material.youngs_modulus, material.poissons_ratio)
-    rule = GradientRule(model.mesh, 4)  # three gradients multiplied: cubic
+    rule = GradientRule(model.mesh, 3)  # three gradients multiplied: cubic
     gradients = rule.gradients(np.ascontiguousarray(basis.modes[:, :, :count]))
     first, second = np.triu_indices(count)
     pairs = len(first)
@@ -93,45 +107,11 @@ def modal_derivatives(
     held = np.einsum("pms,pmq->sq", changes, squares(basis.patch_motion[:, 3:, :count]))
     for k, (patch, arm) in enumerate(zip(support.patches, arms, strict=True)):
         bent[patch] = square_fields(arm) @ changes[k] @ np.hstack([held, np.eye(at)])
-    flat, motion = _balance(model, support, force.reshape(3 * n, -1), bent.reshape(3 * n, -1))
+    flat, motion = support.fixed(model).balance(-force.reshape(3 * n, -1), bent.reshape(3 * n, -1))
     fields = flat.reshape(n, 3, -1)
     return Derivatives(
         fields[:, :, :pairs], motion[:, :, :pairs], changes, held, fields[:, :, pairs:], motion[:, :, pairs:]
     )
-
-
-def _balance(model: FEModel, support: Support, force: Array, bent: Array) -> tuple[Array, Array]:
-    """Displacements under -force with `bent` imposed on the patches on top of a free rigid motion."""
-    from scipy.sparse import coo_matrix, hstack
-
-    nodes, n = model.mesh.nodes, len(model.mesh.nodes)
-    free = np.ones(n, dtype=bool)
-    free[support.root] = False
-    for patch in support.patches:
-        free[patch] = False
-    interior = np.flatnonzero(np.repeat(free, 3))
-    unknown = [
-        coo_matrix(
-            (np.ones(len(interior)), (interior, np.arange(len(interior)))), shape=(3 * n, len(interior))
-        )
-    ]  # fmt: skip
-    # rotations in units of the patch's reach: the matrix stays well scaled
-    reach = []
-    for patch, center in zip(support.patches, support.centers, strict=True):
-        motion = rigid_patch(nodes[patch], center)
-        reach.append(float(np.linalg.norm(nodes[patch] - center, axis=1).max()))
-        motion[:, :, 3:] /= reach[-1]
-        rows = (3 * np.asarray(patch, dtype=np.int64)[:, None] + np.arange(3)).ravel()
-        values = motion.reshape(-1, 6)
-        row, column = np.repeat(rows, 6), np.tile(np.arange(6), len(rows))
-        unknown.append(coo_matrix((values.ravel(), (row, column)), shape=(3 * n, 6)))
-    B = hstack(unknown, format="csr")
-    K = (B.T @ model.stiffness @ B).tocsc()
-    x = SparseSolver(K).solve(-(B.T @ (force + model.stiffness @ bent)))
-    motion = x[len(interior) :].reshape(len(support.patches), 6, x.shape[1]).copy()
-    for k, length in enumerate(reach):
-        motion[k, 3:] /= length
-    return B @ x + bent, motion
 
 
 def extended_basis(
@@ -187,12 +167,14 @@ def extended_basis(
     omega_squared, U = _orthonormal(ritz.T @ (M @ ritz), ritz.T @ (K @ ritz) + added)
     result = ritz @ U
     sign = mode_signs(result)
-    U = U * sign
+    U, result = U * sign, result * sign
     return Basis(
-        np.ascontiguousarray((result * sign).reshape(n, 3, -1)),
+        np.ascontiguousarray(result.reshape(n, 3, -1)),
         omega_squared,
         np.ascontiguousarray(motion @ U),
         patch_squares=np.ascontiguousarray(shape @ U),
+        first_order=result.T @ (M @ modes),
+        second_order=result.T @ (M @ found.fields.reshape(3 * n, -1)),
     )
 
 

@@ -125,7 +125,7 @@ def linear_modes(
     basis = reduced_basis(
         model, support.root, support.patches, support.centers, settings, excitation=excitation,
         tolerance=settings.modes_share * tolerance if excitation is not None else None,
-        targets=_points(model.mesh, anchors).displacements,
+        targets=_points(model.mesh, anchors).displacements, fixed=support.fixed(model),
     )  # fmt: skip
     return LinearModes(model, support, moving, basis, excitation)
 

@@ -16,36 +16,26 @@ from .craig_bampton import Basis
 from .elastic_forms import GradientRule, gradient_gram
 from .excitation_data import Excitation
 from .modal_derivatives import Support
-from .natural_modes import vector_mass
 
 _LESS = 10.0  # what is left out moves targets by less than a hundredth of its bound (measured)
 _THIRD = 0.1  # of the tolerance: third order of a patch's turn that matters
 _FLAT = 1e-12  # of the largest
 
 
-def first_order(model: FEModel, basis: Basis, linear: Basis) -> Array:
-    """The modes of the linear basis in coordinates of the basis that extends it, shape [r, c]."""
-    M = vector_mass(model.mass)
-    modes = basis.modes.reshape(-1, basis.modes.shape[2])
-    return np.asarray(modes.T @ (M @ linear.modes.reshape(len(modes), -1)))
-
-
 def seen_directions(
-    model: FEModel, support: Support, basis: Basis, linear: Basis, bends: Array, gram: Array, excitation: Excitation,
-    youngs_modulus: float, tolerance: float,
+    model: FEModel, support: Support, basis: Basis, linear: Basis, excitation: Excitation, youngs_modulus: float,
+    tolerance: float,
 ) -> tuple[Array, Array] | None:  # fmt: skip
     """Directions whose pairs do for a body's quadratic strain.
 
-    The loads of the shot bend the linear modes by a_i, and these bring along -K^-1 f_ij a_i a_j, with f_ij the force
-    of a pair: principal directions of all that, by the gradients they make. What is left out moves an interface by no
+    The loads of the shot bend the linear modes by a_i, and these bring along their derivatives, theta_ij a_i a_j:
+    principal directions of all that, by the gradients they make. What is left out moves an interface by no
     more than its strain does in the softest way: far less in any real motion (measured: by a fortieth).
 
     Args:
         model, support: Full model and what holds it.
         basis: Extended by modal derivatives, r modes.
-        linear: The basis before, in the order of deflection.
-        bends: Its first d modes in coordinates of the extended one, shape [r, d].
-        gram: `strain_gram` (with springs) of the extended basis by the pairs of these.
+        linear: The basis before.
         excitation: Loads of the shot.
         youngs_modulus: [Pa].
         tolerance: Error that does not matter [m].
@@ -54,11 +44,11 @@ def seen_directions(
         Directions T, shape [r, p], and W with W u the part of u in them, shape [p, r]; None where all coordinates are
         as well.
     """
-    r, d = bends.shape
+    assert basis.first_order is not None and basis.second_order is not None
+    r, pairs = basis.second_order.shape
     bend = amplitudes(model, linear, excitation, len(linear.omega_squared))
-    first, second = np.triu_indices(d)
-    brought = -gram[:r, r:] / basis.omega_squared[:, None] * bend[first] * bend[second]
-    straight = first_order(model, basis, linear) * bend
+    first, second = np.triu_indices(int(np.sqrt(2 * pairs)))
+    straight, brought = basis.first_order * bend, basis.second_order * bend[first] * bend[second]
     L = np.linalg.cholesky(gradient_gram(GradientRule(model.mesh, 2), basis.modes))
     motion = L.T @ np.hstack([straight, brought])
     turns = np.linalg.qr(np.linalg.solve(L, _patch_rows(model, support, basis, straight, tolerance).T))[0]
