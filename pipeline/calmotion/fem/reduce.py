@@ -26,7 +26,7 @@ __all__ = ["Anchor", "LinearModes", "linear_modes", "reduce_body"]
 
 def reduce_body(
     mesh: FEMesh, body: Body, anchors: Sequence[Anchor], surfaces: Sequence[SurfaceMesh], root: int,
-    excitation: Excitation | None = None, tolerance: float = DEFAULT_TOLERANCE,
+    excitation: Excitation | None = None, tolerance: float = DEFAULT_TOLERANCE, full: FullBody | None = None,
 ) -> ReducedBody:  # fmt: skip
     """Reduces one flexible body.
 
@@ -42,6 +42,7 @@ def reduce_body(
         root: Index of the anchor of the parent-side joint; of kind `interface`.
         excitation: Loads on the body in this shot, for what is chosen automatically; None when nothing is known.
         tolerance: Error that does not matter [m].
+        full: `full_body` of the same, where it is known.
 
     Returns:
         The reduced body, damped as one that carries nothing; markers in the order of the anchors, skins in the order
@@ -52,7 +53,7 @@ def reduce_body(
 
     Source: Seed (11)-(20); formulation, section 1.
     """
-    linear = linear_modes(mesh, body, anchors, root, excitation, tolerance)
+    linear = linear_modes(mesh, body, anchors, root, excitation, tolerance, full)
     model, moving, basis, excitation = linear.model, linear.moving, linear.basis, linear.excitation
     left_out = _modes_left_out(basis, body, excitation)
     assert body.flexible is not None
@@ -81,29 +82,27 @@ def reduce_body(
 
 
 @dataclass(frozen=True, eq=False)
-class LinearModes:
-    """The full model of a body and its linear basis.
+class FullBody:
+    """A body before its reduction.
 
     Attributes:
         model: Full model.
         support: What holds the body.
         moving: Patches that move, in the order of the support's.
-        basis: Its modes.
-        excitation: The loads, by moving patch; None when they are not known.
     """
 
     model: FEModel
     support: Support
     moving: Sequence[Patch]
-    basis: Basis
-    excitation: Excitation | None
+
+    @property
+    def entries(self) -> int:
+        """Numbers in the factor that it keeps, most of its memory."""
+        return self.support.fixed(self.model).solver.entries
 
 
-def linear_modes(
-    mesh: FEMesh, body: Body, anchors: Sequence[Anchor], root: int, excitation: Excitation | None = None,
-    tolerance: float = DEFAULT_TOLERANCE,
-) -> LinearModes:  # fmt: skip
-    """The linear part of `reduce_body`, on the mesh; same arguments, same errors."""
+def full_body(mesh: FEMesh, body: Body, anchors: Sequence[Anchor], root: int) -> FullBody:
+    """The full model of a body and its interfaces; arguments and errors as of `reduce_body`."""
     settings = body.flexible
     if settings is None:
         raise ShotError("is not a flexible body", path=body.path, remedy="Apply CalmFlexibleBodyAPI")
@@ -118,10 +117,33 @@ def linear_modes(
         )  # fmt: skip
     moving = [patch for patch in patches if patch is not held]
     centers = [anchors[patch.anchors[0]].frame.position for patch in moving]
-    support = Support(held.nodes, [patch.nodes for patch in moving], centers)
+    return FullBody(model, Support(held.nodes, [patch.nodes for patch in moving], centers), moving)
+
+
+@dataclass(frozen=True, eq=False)
+class LinearModes(FullBody):
+    """The full model of a body and its linear basis.
+
+    Attributes:
+        basis: Its modes.
+        excitation: The loads, by moving patch; None when they are not known.
+    """
+
+    basis: Basis
+    excitation: Excitation | None
+
+
+def linear_modes(
+    mesh: FEMesh, body: Body, anchors: Sequence[Anchor], root: int, excitation: Excitation | None = None,
+    tolerance: float = DEFAULT_TOLERANCE, full: FullBody | None = None,
+) -> LinearModes:  # fmt: skip
+    """The linear part of `reduce_body`, on the mesh; same arguments, same errors."""
+    full = full or full_body(mesh, body, anchors, root)
+    model, support, moving, settings = full.model, full.support, full.moving, body.flexible
+    assert settings is not None
     if excitation is not None:
         positions = np.array([anchor.frame.position for anchor in anchors]).reshape(-1, 3)
-        excitation = patch_excitation(excitation, [patch.anchors for patch in moving], positions, centers)
+        excitation = patch_excitation(excitation, [patch.anchors for patch in moving], positions, support.centers)
     basis = reduced_basis(
         model, support.root, support.patches, support.centers, settings, excitation=excitation,
         tolerance=settings.modes_share * tolerance if excitation is not None else None,

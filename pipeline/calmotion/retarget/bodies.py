@@ -13,11 +13,14 @@ from ..dynamics.topology import Tree, span_tree
 from ..errors import ShotError
 from ..fem.excitation_data import Excitation
 from ..fem.reduced_body import ReducedBody
-from ..shot import Body, Character, FEMeshes, ModeTable, Skin
+from ..shot import Body, Character, FEMeshes, ModeTable, Skin, SurfaceMesh
+from ..shot.meshes import FEMesh
 
 if TYPE_CHECKING:
     from ..fem.interfaces import Anchor
-    from ..fem.reduce import LinearModes
+    from ..fem.reduce import FullBody, LinearModes
+
+_KEPT = 60_000_000  # numbers in factors of full models, half a gigabyte
 
 
 def reduce_bodies(
@@ -27,6 +30,7 @@ def reduce_bodies(
     progress: Callable[[float, str], None] | None = None,
     excitations: Sequence[Excitation | None] | None = None,
     tolerance: float | None = None,
+    full: dict[int, FullBody] | None = None,
 ) -> list[ReducedBody]:
     """Every body of a character as the dynamics needs it; finite elements are loaded only for flexible ones.
 
@@ -35,6 +39,7 @@ def reduce_bodies(
         progress: Called with a fraction and the body at hand.
         excitations: Loads on each body in the shot, for what is chosen automatically.
         tolerance: Error that does not matter [m]; None: the shot's own, or 1 mm.
+        full: Full models by body, for who reduces the same ones again; what is made and is not too large is added.
 
     Raises:
         ShotError: A flexible body without a mesh, or one that cannot be reduced.
@@ -56,7 +61,6 @@ def reduce_bodies(
                 path=body.path,
                 remedy="Enable the plugin that provides meshes, or remove CalmFlexibleBodyAPI.",
             )
-        from ..fem.reduce import reduce_body
         from ..fem.reduction_cache import cached_reduction
 
         frames = fem_anchors(character, body, anchors)
@@ -64,8 +68,27 @@ def reduce_bodies(
         # what has no bearing on the reduction does not make it another one
         body = replace(body, straight=False)
         parts = (mesh_of[index], body, frames, body.surfaces, anchors.root, excitation, allowed / flexible)
-        result.append(cached_reduction(parts, partial(reduce_body, *parts)))
+        result.append(cached_reduction(parts, partial(_reduced, full, index, parts)))
     return _damped(character, tree, result)
+
+
+def _reduced(
+    full: dict[int, FullBody] | None, index: int,
+    parts: tuple[FEMesh, Body, list[Anchor], Sequence[SurfaceMesh], int, Excitation | None, float],
+) -> ReducedBody:  # fmt: skip
+    """`reduce_body` of the parts, with the full model that is known, or will be."""
+    from ..fem.reduce import full_body, reduce_body
+
+    if full is None:
+        return reduce_body(*parts)
+    if index in full:
+        return reduce_body(*parts, full=full[index])
+    mesh, body, anchors, _, root, _, _ = parts
+    own = full_body(mesh, body, anchors, root)
+    found = reduce_body(*parts, full=own)
+    if own.entries + sum(item.entries for item in full.values()) <= _KEPT:
+        full[index] = own
+    return found
 
 
 def _damped(character: Character, tree: Tree, bodies: Sequence[ReducedBody]) -> list[ReducedBody]:

@@ -59,7 +59,7 @@ def settled_bodies(
     assert options.tolerance is not None
     loads = excitations(character, animation, meshes, options)
     tree = span_tree(character)
-    reduce = partial(reduce_bodies, character, tree, meshes, None, loads)
+    reduce = partial(reduce_bodies, character, tree, meshes, None, loads, full={})
 
     def simulated(bodies: Sequence[ReducedBody]) -> StepRun:
         return known_motion(character, animation, bodies, options, options.step or MAX_STEP).run
