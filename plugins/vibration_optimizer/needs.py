@@ -19,7 +19,7 @@ _FORCED = {
     "modes": "As many modes as if the tolerance were a thousandth, or only those that the motion excites",
     "elasticity": "Nonlinear elasticity of all flexible bodies, or linear",
     "motors": "All motors that may change, or only those that move a target, without looking back",
-    "directions": "All elastic coordinates of nonlinear bodies, or the fewest combinations that do for the shot",
+    "directions": "All elastic coordinates of nonlinear bodies and pairs of them, or the fewest that do for the shot",
     "ranges": "All of the shot, or only where a change promises to help, without looking back",
 }
 

@@ -4,12 +4,13 @@ import csv
 import json
 
 import pytest
-from calmotion.evidence import gradients, optimizer, shots, work_precision
+from calmotion.evidence import gradients, optimizer, shots, work_precision, work_precision_points
 from calmotion.evidence.beam_arm import beam_arm, quintic, shot_of
 from calmotion.evidence.gradients import GradientError
 from calmotion.evidence.optimizer import Convergence
 from calmotion.evidence.shots import Unreduced
-from calmotion.evidence.work_precision import Bench, chosen_points, distance, forward_points
+from calmotion.evidence.work_precision import Bench, distance
+from calmotion.evidence.work_precision_points import chosen_points, forward_points
 
 
 @pytest.fixture(scope="module")
@@ -29,12 +30,13 @@ def reference(bench):
 @pytest.fixture(scope="module")
 def points(bench, reference):
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(work_precision, "STEPS", (1 / 60, 1 / 120, 1 / 240, 1 / 480))
-        patch.setattr(work_precision, "FEW_STEPS", {"radau": (1 / 60,)})
-        patch.setattr(work_precision, "MODES", (2, 8))
-        patch.setattr(work_precision, "LEVELS", (5e-6,))
-        patch.setattr(work_precision, "DIRECTIONS", (1e-4,))
-        patch.setattr(work_precision, "BASE", 1e-4)
+        patch.setattr(work_precision_points, "STEPS", (1 / 60, 1 / 120, 1 / 240, 1 / 480))
+        patch.setattr(work_precision_points, "FEW_STEPS", {"radau": (1 / 60,)})
+        patch.setattr(work_precision_points, "MODES", (2, 8))
+        patch.setattr(work_precision_points, "LEVELS", (5e-6,))
+        patch.setattr(work_precision_points, "DIRECTIONS", (1e-4,))
+        patch.setattr(work_precision_points, "REDUCTIONS", (1e-2, 1e-4))
+        patch.setattr(work_precision_points, "BASE", 1e-4)
         return forward_points(bench, reference)
 
 
@@ -65,6 +67,13 @@ def test_more_modes_are_nearer(points):
     assert many.error_m <= few.error_m and many.coordinates > few.coordinates
 
 
+def test_finer_reductions_are_nearer_and_pairs_that_are_left_out_do_not_show(points):
+    coarse, fine = of(points, "reduction")
+    assert fine.error_m < coarse.error_m and fine.coordinates > coarse.coordinates
+    (every,) = of(points, "pairs")
+    assert every.coordinates == fine.coordinates and abs(every.error_m - fine.error_m) < 1e-5
+
+
 def test_what_is_chosen_keeps_its_tolerance(bench, reference):
     default, *chosen = chosen_points(bench, reference, (1e-2, 1e-3))
     assert default.series == "default" and default.step_s == pytest.approx(1 / 480)
@@ -76,8 +85,8 @@ def test_what_is_chosen_keeps_its_tolerance(bench, reference):
 def test_the_command_writes_a_table_a_picture_and_one_object(bench, reference, points, monkeypatch, capsys, tmp_path):
     monkeypatch.setattr(work_precision, "load_unreduced", lambda path: bench.shot)
     monkeypatch.setattr(Bench, "reference", lambda self: reference)
-    monkeypatch.setattr(work_precision, "forward_points", lambda bench, reference: points)
-    monkeypatch.setattr(work_precision, "chosen_points", lambda bench, reference: [])
+    monkeypatch.setattr(work_precision_points, "forward_points", lambda bench, reference: points)
+    monkeypatch.setattr(work_precision_points, "chosen_points", lambda bench, reference: [])
     table = tmp_path / "points.csv"
     assert work_precision.main(["arm.usda", "--json", "--csv", str(table), "--figures", str(tmp_path)]) == 0
     report = json.loads(capsys.readouterr().out)
@@ -100,8 +109,8 @@ def test_adjoints_and_optimisers_are_part_of_the_report_where_that_is_asked_for(
     found = Convergence("arm", "Gauss-Newton", 0.1, 1.0, 1.0, 30.0, 1.0, 9, 60, 1.2, 12.0)
     monkeypatch.setattr(work_precision, "load_unreduced", lambda path: bench.shot)
     monkeypatch.setattr(Bench, "reference", lambda self: reference)
-    monkeypatch.setattr(work_precision, "forward_points", lambda bench, reference: points)
-    monkeypatch.setattr(work_precision, "chosen_points", lambda bench, reference: [])
+    monkeypatch.setattr(work_precision_points, "forward_points", lambda bench, reference: points)
+    monkeypatch.setattr(work_precision_points, "chosen_points", lambda bench, reference: [])
     monkeypatch.setattr(shots, "load", lambda name: bench.shot)
     monkeypatch.setattr(gradients, "errors", lambda shot: rows)
     monkeypatch.setattr(optimizer, "compare", lambda shot, most: [found])

@@ -20,9 +20,9 @@ def loads(size):
     return Excitation(9.81 * np.ones(3), still, still, force, moment, 5.0, np.array([0.0, 0.3]))
 
 
-def link(material, tolerance, excitation):
+def link(material, tolerance, excitation, **more):
     points, tets = box_tets((12, 2, 2), (0.3, 0.03, 0.04), (0.0, -0.015, -0.02))
-    settings = FlexibleSettings(material, elasticity="stvk", mode_count=12)
+    settings = FlexibleSettings(material, elasticity="stvk", mode_count=12, **more)
     anchors = [Anchor(f"/C/{x}", Frame(np.array([x, 0.0, 0.0]), IDENTITY), "interface") for x in (0.0, 0.3)]
     body = Body("/C/Link", Frame(np.zeros(3), IDENTITY), None, flexible=settings)
     return reduce_body(fe_mesh(points, tets), body, anchors, (), 0, excitation, tolerance)
@@ -78,6 +78,19 @@ def test_turns_of_interfaces_are_seen_as_they_are(plastic):
     body = link(plastic, 1e-4, loads(30.0))
     Psi, W = body.markers[1].Psi, body.elasticity.seen
     assert np.linalg.lstsq(W.T, Psi.T, rcond=None)[1].sum() < 1e-18 * np.sum(Psi**2)
+
+
+def test_what_is_left_out_is_told(plastic):
+    body = link(plastic, 1e-4, loads(30.0))
+    p, r = body.elasticity.seen.shape
+    row = body.left_out[-1]
+    assert row.what == f"quadratic strain of {r - p} of {r} elastic coordinates of /C/Link"
+    assert 0.0 < row.estimated_error_m <= 1e-5
+
+
+def test_all_pairs_can_be_kept(plastic):
+    body = link(plastic, 1e-4, loads(30.0), pairs_share=0.0)
+    assert body.elasticity.seen is None and not any("quadratic" in row.what for row in body.left_out)
 
 
 def test_without_loads_everything_is_seen(plastic):

@@ -79,7 +79,7 @@ def test_everything_can_be_forced_off_and_on():
     assert not any(b.bends for b in off.character.bodies) and all(b.straight for b in off.character.bodies)
     assert on.character.bodies[0].bends and not any(b.straight for b in on.character.bodies)
     flexible = on.character.bodies[0].flexible
-    assert flexible.elasticity == "stvk" and flexible.modes_share < 1.0
+    assert flexible.elasticity == "stvk" and flexible.modes_share < 1.0 and flexible.pairs_share == 0.0
     assert off.character.bodies[0].flexible.elasticity == "linear"
     assert all(row.forced for row in (*_rows(on, "bodies"), *_rows(off, "bodies"), *_rows(on, "turning")))
     assert on.choice("ranges") == ON

@@ -19,24 +19,20 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import partial
 from itertools import pairwise
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..dynamics.topology import span_tree
 from ..errors import ShotError
 from ..fem.reduced_body import ReducedBody
-from ..retarget.bodies import reduce_bodies, with_elasticity
-from ..retarget.fast_scheme import by_fast_scheme
+from ..retarget.bodies import reduce_bodies
 from ..retarget.motion_subspace import HeldBodies, Known
 from ..retarget.prepare import Options, excitations
-from ..retarget.settled_bodies import settled_bodies
 from ..retarget.step_error import StepRun, distance, simulate_at
 from ..retarget.time_grid import MAX_STEP
-from ..retarget.to_tolerance import chosen_step, held_to_tolerance
-from ..shot import Animation, Character
 from ..shot.character import Array
-from .pareto import over_fastest, print_over_fastest, setting_of
+from .pareto import over_fastest, print_over_fastest
 from .shots import Unreduced, load_unreduced
 from .tables import write_rows
 from .timing import median_time
@@ -46,15 +42,9 @@ if TYPE_CHECKING:
     from .optimizer import Convergence
 
 SAMPLES = tuple(f"samples/{name}/{name}.usda" for name in ("bartender", "dancer", "rapper", "drummer", "boxer"))
-STEPS = (1 / 60, 1 / 120, 1 / 240, 1 / 480, 1 / 960, 1 / 1920)
-FEW_STEPS = {"radau": (1 / 60, 1 / 120, 1 / 240)}  # of higher order, and dearer
-MODES = (1, 2, 4, 8, 16)
 TOLERANCES = (1e-2, 1e-3, 1e-4, 1e-5)
 BASE, FINEST = 1e-5, 1e-7  # reductions: of the runs that vary something else, and of the reference [m]
-LEVELS = (5e-4, 5e-6)  # what holding bodies to directions may change in the runs that vary step and integrator [m]
-DIRECTIONS = (1e-3, 1e-4, 1e-5, 1e-6)  # and in those that vary it
 REFERENCE_STEP = 1 / 3840
-ELEMENTS = (2.0, 1.4, 1.0, 0.7)  # edge lengths over those of the mesh that the shot gets
 REPEATS = 3
 LBFGS = 200  # most evaluations of the quasi-Newton method
 
@@ -99,17 +89,15 @@ class Bench:
         self.loads = excitations(shot.character, shot.animation, shot.meshes, Options())
         self._known: Known | None = None
 
-    def bodies(self, tolerance: float, law: str | None = None, modes: int = -1) -> list[ReducedBody]:
-        """The shot's bodies, reduced to a tolerance [m], or to as many modes."""
-        character = self.shot.character if law is None else with_elasticity(self.shot.character, law)
-        if modes >= 0:
-            character = replace(
-                character,
-                bodies=tuple(
-                    b if b.flexible is None else replace(b, flexible=replace(b.flexible, mode_count=modes))
-                    for b in character.bodies
-                ),
-            )
+    def bodies(self, tolerance: float, **settings: Any) -> list[ReducedBody]:
+        """The shot's bodies, reduced to a tolerance [m] with some of their `FlexibleSettings` changed."""
+        character = replace(
+            self.shot.character,
+            bodies=tuple(
+                b if b.flexible is None else replace(b, flexible=replace(b.flexible, **settings))
+                for b in self.shot.character.bodies
+            ),
+        )
         return reduce_bodies(character, self.tree, self.shot.meshes, None, self.loads, tolerance)
 
     def run(self, bodies: Sequence[ReducedBody], step: float, integrator: str = "bdf2") -> StepRun:
@@ -155,62 +143,6 @@ class Bench:
         return named(median_time(lambda: self.run(bodies, step, integrator), self.repeats), error)
 
 
-def forward_points(bench: Bench, reference: Reference) -> list[Point]:
-    """Steps and integrators, directions, modes, laws."""
-    base = bench.bodies(BASE)
-    points = [
-        bench.measure(reference, integrator, f"1/{1 / step:.0f} s", held, step, integrator)
-        for held in (bench.held(base, allowed) for allowed in LEVELS)
-        for integrator in ("bdf2", "newmark", "generalized-alpha", "radau")
-        for step in FEW_STEPS.get(integrator, STEPS)
-    ]
-    fine = 0.5 * MAX_STEP
-    for allowed in DIRECTIONS:
-        points.append(
-            bench.measure(reference, "directions", f"to {1e3 * allowed:g} mm", bench.held(base, allowed), fine)
-        )
-    points.append(bench.measure(reference, "directions", "all", base, fine))
-    for count in MODES:
-        points.append(bench.measure(reference, "modes", f"{count} modes", bench.bodies(BASE, modes=count), fine))
-    for law in ("linear", "stvk", "neohookean"):
-        points.append(bench.measure(reference, "law", law, bench.bodies(BASE, law), fine))
-    return points
-
-
-def chosen_points(bench: Bench, reference: Reference, tolerances: Sequence[float] = TOLERANCES) -> list[Point]:
-    """What the program chooses: with no tolerance asked for, and for some."""
-    shot = bench.shot
-    character, animation = shot.character, shot.animation
-    default = bench.bodies(shot.character.retarget.allowed())
-    points = [bench.measure(reference, "default", "default", default, MAX_STEP)]
-    for tolerance in tolerances:
-        options = Options(tolerance=tolerance)
-        settled = settled_bodies(character, animation, shot.meshes, options)
-        held = held_to_tolerance(character, animation, settled.bodies, options, settled.known)
-        bodies = held.bodies or settled.bodies
-        step, integrator = by_fast_scheme(options, partial(_step_and_scheme, character, animation, bodies))
-        points.append(bench.measure(reference, "tolerance", setting_of(tolerance), bodies, step, integrator))
-    return points
-
-
-def _step_and_scheme(
-    character: Character, animation: Animation, bodies: Sequence[ReducedBody], options: Options
-) -> tuple[float, str]:
-    return chosen_step(character, animation, bodies, options)[0], options.scheme
-
-
-def element_points(bench: Bench, factors: Sequence[float] = ELEMENTS) -> list[Point]:
-    """Sizes of elements, against the smallest of them: a finer mesh is another body, with its own limit."""
-    benches = [Bench(load_unreduced(bench.shot.path, factor * bench.shot.edge), bench.repeats) for factor in factors]
-    fine = 0.5 * MAX_STEP
-    runs = [(other, other.bodies(BASE)) for other in benches]
-    finest = Reference(runs[-1][0].run(runs[-1][1], fine).positions, 0.0)
-    return [
-        other.measure(finest, "elements", f"{1e3 * factor * bench.shot.edge:.3g} mm", bodies, fine)
-        for factor, (other, bodies) in zip(factors[:-1], runs[:-1], strict=True)
-    ]
-
-
 def machine() -> dict[str, object]:
     """What the times were measured on."""
     return {
@@ -250,6 +182,8 @@ def main(arguments: list[str] | None = None) -> int:
     )
     parser.add_argument("--repeats", type=int, default=REPEATS, help="of which times are the median")
     options = parser.parse_args(arguments)
+    from .work_precision_points import chosen_points, element_points, forward_points
+
     points: list[Point] = []
     gradients: list[GradientError] = []
     converged: list[Convergence] = []

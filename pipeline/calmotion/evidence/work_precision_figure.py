@@ -16,6 +16,8 @@ if TYPE_CHECKING:
 
 STYLES = {
     **{name: (color, "o-") for name, color in COLORS.items()},
+    "reduction": ("0.35", "x--"),
+    "pairs": ("#882255", "p"),
     "directions": ("#f0e442", "P--"),
     "modes": ("#56b4e9", "s--"),
     "law": ("#cc79a7", "^:"),

@@ -7,7 +7,7 @@ from functools import partial
 
 import numpy as np
 
-from ..shot.character import DEFAULT_TOLERANCE, Array, ElasticMaterial
+from ..shot.character import DEFAULT_TOLERANCE, ElasticMaterial
 from .assembly import FEModel
 from .choose_law import work_of_loads
 from .craig_bampton import Basis
@@ -16,7 +16,7 @@ from .excitation_data import Excitation
 from .modal_derivatives import NEGLIGIBLE, Support, extended_basis
 from .patch_rotation import spring_rows, springs
 from .reduced_body import Elasticity
-from .seen_directions import seen_directions
+from .seen_directions import SeenDirections, seen_directions
 
 PAIRED_MODES = 16  # modes that may have derivatives
 _LEFT = 1e-3  # share of the derivatives' strain energy that may be missing, by the tolerance over the body's size
@@ -25,7 +25,7 @@ _FINEST = 1e-6  # below, what is missing is rounding
 
 def large_deflection(
     model: FEModel, support: Support, basis: Basis, material: ElasticMaterial, law: str,
-    excitation: Excitation | None = None, tolerance: float = DEFAULT_TOLERANCE,
+    excitation: Excitation | None = None, tolerance: float = DEFAULT_TOLERANCE, pairs_share: float = 1.0,
 ) -> tuple[Basis, Elasticity]:  # fmt: skip
     """A body's basis with modal derivatives, and its elastic law in it.
 
@@ -37,6 +37,7 @@ def large_deflection(
         law: `stvk` or `neohookean`.
         excitation: Its loads in this shot, by moving patch; None when they are not known.
         tolerance: Error that does not matter [m].
+        pairs_share: How much of it quadratic strains may take that are left out; 0 leaves none out.
 
     Returns:
         The extended basis, and the law without damping.
@@ -48,30 +49,31 @@ def large_deflection(
     extended = extended_basis(model, support, basis, PAIRED_MODES, material, law, negligible)
     lame = lame_constants(material.youngs_modulus, material.poissons_ratio)
     if law == "stvk":
-        gram = partial(_gram, model, support, extended, material)
-        seen = None
-        if excitation is not None:
-            loads = basis.excitation or excitation
-            seen = seen_directions(model, support, extended, basis, loads, material.youngs_modulus, tolerance)
-        if seen is None:
-            return extended, Elasticity(law, 0.0, gram(None).ravel(), 0, lame)
-        directions, part = seen
-        return extended, Elasticity(law, 0.0, gram(directions).ravel(), 0, lame, part)
+        law_of = partial(_stvk, model, support, extended, material)
+        if excitation is None or pairs_share <= 0.0:
+            return extended, law_of(None)
+        loads, allowed = basis.excitation or excitation, pairs_share * tolerance
+        seen = seen_directions(model, support, extended, basis, loads, material.youngs_modulus, allowed)
+        return extended, law_of(seen)
     from .cubature import neohookean_cubature
 
     data, points = neohookean_cubature(model, extended, material)
     return extended, Elasticity(law, 0.0, data, points, lame)
 
 
-def _gram(model: FEModel, support: Support, basis: Basis, material: ElasticMaterial, directions: Array | None) -> Array:
-    """`strain_gram` of a basis, with the springs of its patches."""
+def _stvk(
+    model: FEModel, support: Support, basis: Basis, material: ElasticMaterial, seen: SeenDirections | None
+) -> Elasticity:
+    """The law of a basis, with the springs of its patches; its quadratic strain sees some directions, or all."""
     lame = lame_constants(material.youngs_modulus, material.poissons_ratio)
+    directions = None if seen is None else seen.directions
     gram = strain_gram(GradientRule(model.mesh, 4), basis.modes, *lame, directions)
     if basis.patch_squares is not None:
         roots = springs(model.mesh.nodes, support.patches, support.centers, material.youngs_modulus)
         rows = spring_rows(roots, basis.patch_squares, basis.patch_motion[:, 3:], directions)
         gram += rows.T @ rows
-    return gram
+    law = Elasticity("stvk", 0.0, gram.ravel(), 0, lame)
+    return law if seen is None else replace(law, seen=seen.part, unseen_m=seen.error_m)
 
 
 def _by_deflection(model: FEModel, basis: Basis, excitation: Excitation) -> Basis:

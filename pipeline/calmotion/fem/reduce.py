@@ -19,7 +19,7 @@ from .excitation_data import Excitation, patch_excitation
 from .integrals import inertia_integrals
 from .interfaces import Anchor, Patch, interface_patches
 from .modal_derivatives import Support
-from .reduced_body import Marker, ReducedBody
+from .reduced_body import Elasticity, Marker, ReducedBody
 
 __all__ = ["Anchor", "LinearModes", "linear_modes", "reduce_body"]
 
@@ -64,7 +64,10 @@ def reduce_body(
     if law != "linear" and len(basis.omega_squared):
         from .large_deflection import large_deflection
 
-        basis, elasticity = large_deflection(model, linear.support, basis, material, law, excitation, tolerance)
+        basis, elasticity = large_deflection(
+            model, linear.support, basis, material, law, excitation, tolerance, body.flexible.pairs_share
+        )
+        left_out += _pairs_left_out(elasticity, body)
     r = len(basis.omega_squared)
     reduced = ReducedBody(
         invariants=inertia_integrals(model.mesh.nodes, model.mass, basis.modes),
@@ -201,6 +204,15 @@ def _modes_left_out(basis: Basis, body: Body, excitation: Excitation | None) -> 
             basis.cut_error_m,
         ),
     )
+
+
+def _pairs_left_out(law: Elasticity, body: Body) -> tuple[LeftOut, ...]:
+    """The coordinates whose quadratic strain a law does without, and what that costs."""
+    if law.seen is None:
+        return ()
+    p, r = law.seen.shape
+    what = f"quadratic strain of {r - p} of {r} elastic coordinates of {body.path}"
+    return (LeftOut(what, "the loads of this shot hardly turn the body in them", law.unseen_m),)
 
 
 def _markers(

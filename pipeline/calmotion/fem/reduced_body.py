@@ -70,6 +70,7 @@ class Elasticity:
         lame: Lame's constants (lambda, mu) [Pa].
         seen: Of `stvk`: W, with W u the directions that the quadratic strain sees, shape [p, r] with p < r; None where
             it sees all coordinates.
+        unseen_m: What that leaves out, estimated at the targets [m].
     """
 
     law: str
@@ -78,6 +79,7 @@ class Elasticity:
     points: int = 0
     lame: tuple[float, float] = (0.0, 0.0)
     seen: Array | None = None
+    unseen_m: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)

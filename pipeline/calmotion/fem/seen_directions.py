@@ -7,6 +7,8 @@ what the gradients have outside of them. To first order nothing is left out, and
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from ..shot.character import Array
@@ -17,20 +19,36 @@ from .elastic_forms import GradientRule, gradient_gram
 from .excitation_data import Excitation
 from .modal_derivatives import Support
 
-_LESS = 10.0  # what is left out moves targets by less than a hundredth of its bound (measured)
+_BOUND = 100.0  # what is left out moves targets by less than its bound over this (measured: by a five hundredth)
+_SHARE = 0.1  # of the tolerance, that it may take by that
 _THIRD = 0.1  # of the tolerance: third order of a patch's turn that matters
 _FLAT = 1e-12  # of the largest
+
+
+@dataclass(frozen=True, eq=False)
+class SeenDirections:
+    """Directions whose pairs do for a body's quadratic strain.
+
+    Attributes:
+        directions: T, shape [r, p].
+        part: W, with W u the part of u in them, shape [p, r].
+        error_m: What is left out, estimated at the targets [m].
+    """
+
+    directions: Array
+    part: Array
+    error_m: float
 
 
 def seen_directions(
     model: FEModel, support: Support, basis: Basis, linear: Basis, excitation: Excitation, youngs_modulus: float,
     tolerance: float,
-) -> tuple[Array, Array] | None:  # fmt: skip
-    """Directions whose pairs do for a body's quadratic strain.
+) -> SeenDirections | None:  # fmt: skip
+    """Directions for the loads of a shot.
 
-    The loads of the shot bend the linear modes by a_i, and these bring along their derivatives, theta_ij a_i a_j:
-    principal directions of all that, by the gradients they make. What is left out moves an interface by no
-    more than its strain does in the softest way: far less in any real motion (measured: by a fortieth).
+    They bend the linear modes by a_i, and these bring along their derivatives, theta_ij a_i a_j: principal directions
+    of all that, by the gradients they make. What is left out moves a target by no more than its strain does in the
+    softest way: in the motions of real shots by less than a hundredth of that.
 
     Args:
         model, support: Full model and what holds it.
@@ -41,8 +59,7 @@ def seen_directions(
         tolerance: Error that does not matter [m].
 
     Returns:
-        Directions T, shape [r, p], and W with W u the part of u in them, shape [p, r]; None where all coordinates are
-        as well.
+        The directions; None where they are no fewer than the coordinates.
     """
     assert basis.first_order is not None and basis.second_order is not None
     r, pairs = basis.second_order.shape
@@ -57,11 +74,12 @@ def seen_directions(
     turn = float(np.linalg.norm(L.T @ straight)) / np.sqrt(model.mesh.volume)
     softness = float(np.linalg.norm(_farthest(linear, excitation) / np.sqrt(linear.omega_squared)))
     error = softness * np.sqrt(youngs_modulus) * turn * missing
-    count = int(np.count_nonzero(error > _LESS * tolerance))
+    estimated = np.append(error / _BOUND, 0.0)
+    count = int(np.count_nonzero(estimated > _SHARE * tolerance))
     if count + turns.shape[1] >= r:
         return None
     kept = np.hstack([turns, directions[:, :count]])
-    return np.linalg.solve(L.T, kept), kept.T @ L.T
+    return SeenDirections(np.linalg.solve(L.T, kept), kept.T @ L.T, float(estimated[count]))
 
 
 def _patch_rows(model: FEModel, support: Support, basis: Basis, straight: Array, tolerance: float) -> Array:

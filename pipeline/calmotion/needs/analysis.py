@@ -64,11 +64,13 @@ def _choice(forced: Mapping[str, str], kind: str) -> str:
 
 
 def _asked(character: Character, forced: Mapping[str, str]) -> Character:
-    """The character with modes and elastic laws as they are forced."""
+    """The character with modes, their pairs and elastic laws as they are forced."""
 
     def settings(own: FlexibleSettings) -> FlexibleSettings:
         if "modes" in forced:
             own = replace(own, modes_share=FINE if forced["modes"] == ON else NONE)
+        if forced.get("directions") == ON:
+            own = replace(own, pairs_share=0.0)
         if "elasticity" in forced:
             own = replace(own, elasticity="stvk" if forced["elasticity"] == ON else "linear")
         return own

@@ -81,6 +81,8 @@ class FlexibleSettings:
         mesh_scale: Metres per unit of that file.
         elasticity: `auto`, `linear`, `stvk` or `neohookean`.
         modes_share: Of the tolerance, that modes which are left out may take when they are chosen automatically.
+        pairs_share: Of the tolerance, that quadratic strains of pairs of coordinates which are left out may take; 0
+            leaves none out.
     """
 
     material: ElasticMaterial
@@ -92,6 +94,7 @@ class FlexibleSettings:
     mesh_scale: float = 1.0
     elasticity: str = "auto"
     modes_share: float = 1.0
+    pairs_share: float = 1.0
 
 
 @dataclass(frozen=True, eq=False)
