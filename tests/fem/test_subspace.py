@@ -1,12 +1,14 @@
 """A body held to a subspace: every term of it is that of the whole body at u = T w."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from boxes import box_tets, fe_mesh
 from calmotion.dynamics.neohookean import neohookean_forces
 from calmotion.fem.interfaces import Anchor
 from calmotion.fem.reduce import reduce_body
-from calmotion.fem.reduced_body import Invariants, Marker, ReducedBody
+from calmotion.fem.reduced_body import Elasticity, Invariants, Marker, ReducedBody
 from calmotion.fem.subspace import principal_subspace, within
 from calmotion.shot import Body, FlexibleSettings, Frame
 from stvk_call import call_stvk
@@ -110,3 +112,17 @@ def test_a_body_at_rest_is_rigid(particles):
     body = of_particles(*particles)
     T = principal_subspace(body, np.zeros((7, 5)), 1e-3)
     assert T.shape == (5, 0) and len(within(body, T).stiffness) == 0
+
+
+@pytest.mark.parametrize("count", [2, 3, 4])
+def test_a_quadratic_strain_that_sees_part_of_a_body_sees_no_more_of_it_within_a_subspace(particles, rng, count):
+    fields = rng.normal(size=(5 + 6, 15))
+    law = Elasticity("stvk", 0.1, (fields @ fields.T).ravel(), seen=rng.normal(size=(3, 5)))
+    body = replace(of_particles(*particles), elasticity=law)
+    T = principal_subspace(body, rng.normal(size=(count, 5)), 1e-12)
+    held = within(body, T)
+    assert (held.elasticity.seen is None) == (count <= 3)
+    w, rate = rng.normal(size=count), rng.normal(size=count)
+    few, many = forces(held, w, rate), forces(body, T @ w, T @ rate)
+    for own, whole in zip(few, (T.T @ many[0], T.T @ many[1] @ T, T.T @ many[2] @ T), strict=True):
+        np.testing.assert_allclose(own, whole, rtol=1e-9, atol=1e-9 * np.abs(whole).max())

@@ -72,7 +72,7 @@ def _law_within(law: Elasticity, T: Array) -> Elasticity:
     r, s = T.shape
     if law.law == "stvk":
         turns = T if law.seen is None else law.seen @ T
-        kept = s < len(turns) or law.seen is None  # or fewer directions are seen still
+        kept = s <= len(turns) or law.seen is None  # or fewer directions are seen still
         pairs = _pairs_within(turns) if kept else np.eye(len(turns) * (len(turns) + 1) // 2)
         L = np.zeros((r + len(pairs), s + pairs.shape[1]))
         L[:r, :s], L[r:, s:] = T, pairs
