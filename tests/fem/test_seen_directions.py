@@ -85,7 +85,7 @@ def test_what_is_left_out_is_told(plastic):
     p, r = body.elasticity.seen.shape
     row = body.left_out[-1]
     assert row.what == f"quadratic strain of {r - p} of {r} elastic coordinates of /C/Link"
-    assert 0.0 < row.estimated_error_m <= 1e-5
+    assert 0.0 < row.estimated_error_m <= 2.5e-5
 
 
 def test_all_pairs_can_be_kept(plastic):

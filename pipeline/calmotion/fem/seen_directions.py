@@ -19,8 +19,8 @@ from .elastic_forms import GradientRule, gradient_gram
 from .excitation_data import Excitation
 from .modal_derivatives import Support
 
-_BOUND = 100.0  # what is left out moves targets by less than its bound over this (measured: by a five hundredth)
-_SHARE = 0.1  # of the tolerance, that it may take by that
+_BOUND = 20.0  # targets move by less than the bound over this (measured: by a twentieth to a thousandth of it)
+_SHARE = 0.25  # of the tolerance, that it may take by that
 _THIRD = 0.1  # of the tolerance: third order of a patch's turn that matters
 _FLAT = 1e-12  # of the largest
 
@@ -48,7 +48,7 @@ def seen_directions(
 
     They bend the linear modes by a_i, and these bring along their derivatives, theta_ij a_i a_j: principal directions
     of all that, by the gradients they make. What is left out moves a target by no more than its strain does in the
-    softest way: in the motions of real shots by less than a hundredth of that.
+    softest way: in the motions of shots by a twentieth of that at most.
 
     Args:
         model, support: Full model and what holds it.
