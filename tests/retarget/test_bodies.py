@@ -14,7 +14,7 @@ def reduced(arm, animation, meshes, tolerance, full=None):
         return reduce_bodies(arm, span_tree(arm), meshes, None, loads, tolerance, full)
 
 
-def test_full_models_that_are_known_change_nothing(arm, animation, meshes, monkeypatch):
+def test_full_models_that_are_known_change_nothing(arm, animation, meshes):
     full = {}
     first = reduced(arm, animation, meshes, 1e-3, full)
     assert sorted(full) == [mesh.body for mesh in meshes.meshes]

@@ -133,13 +133,12 @@ def _elastic_laws(bodies: Sequence[ReducedBody]) -> dict[str, Any]:
             continue
         law[k] = {"stvk": STVK, "neohookean": NEOHOOKEAN}[item.law]
         retardation[k], lame[k], start[k] = item.retardation, item.lame, size
-        points[k] = item.points
-        own = [item.data]
-        if item.law == "stvk":
-            points[k] = len(body.stiffness) if item.seen is None else len(item.seen)
-            own += [] if item.seen is None else [item.seen.ravel()]
-        arrays += own
-        size += sum(array.size for array in own)
+        points[k] = item.points if item.law == "neohookean" else len(body.stiffness)
+        data = item.data
+        if item.seen is not None:
+            points[k], data = len(item.seen), np.concatenate([data, item.seen.ravel()])
+        arrays.append(data)
+        size += data.size
     data = np.concatenate(arrays) if arrays else np.zeros(0)
     return {
         "law": law, "stvk": components(law == STVK), "neohookean": components(law == NEOHOOKEAN),

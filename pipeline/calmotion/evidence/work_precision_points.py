@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import partial
 
 from ..fem.reduced_body import ReducedBody
@@ -39,10 +40,14 @@ def forward_points(bench: Bench, reference: Reference) -> list[Point]:
         points.append(
             bench.measure(reference, "directions", f"to {1e3 * allowed:g} mm", bench.held(base, allowed), fine)
         )
-    points.append(bench.measure(reference, "directions", "all", base, fine))
+    every = bench.measure(reference, "directions", "all", base, fine)
+    points.append(every)
     for tolerance in REDUCTIONS:
-        bodies = base if tolerance == BASE else bench.bodies(tolerance)
-        points.append(bench.measure(reference, "reduction", f"to {1e3 * tolerance:g} mm", bodies, fine))
+        series, setting = "reduction", f"to {1e3 * tolerance:g} mm"
+        if tolerance == BASE:  # the same simulation
+            points.append(replace(every, series=series, setting=setting))
+        else:
+            points.append(bench.measure(reference, series, setting, bench.bodies(tolerance), fine))
     points.append(bench.measure(reference, "pairs", "all", bench.bodies(BASE, pairs_share=0.0), fine))
     for count in MODES:
         points.append(bench.measure(reference, "modes", f"{count} modes", bench.bodies(BASE, mode_count=count), fine))

@@ -72,7 +72,7 @@ def choose_law(
     twice = np.where(first == second, 1.0, 2.0)
     pairs = twice * bend[first] * bend[second]
     deflection = _reach(modes, basis.patch_motion[:, :, :count], bend)
-    moved = deflection_of(model, basis, excitation)
+    moved = _reach(modes, basis.patch_motion[:, :, :count], bend, excitation.lever)
     shortening = 0.5 * _reach(fields, motion, pairs, excitation.lever)
     change = np.zeros((count, count))
     change[first, second] = change[second, first] = work_of_loads(model, fields, motion, excitation)

@@ -87,9 +87,8 @@ def _patch_rows(model: FEModel, support: Support, basis: Basis, straight: Array,
 
     Turns of patches, and where the third order of a turn matters the shapes that these bring about.
     """
+    assert basis.patch_squares is not None
     rows = [basis.patch_motion[:, 3:].reshape(-1, len(basis.omega_squared))]
-    if basis.patch_squares is None:
-        return rows[0]
     for patch, center, motion, squares in zip(
         support.patches, support.centers, basis.patch_motion, basis.patch_squares, strict=True
     ):

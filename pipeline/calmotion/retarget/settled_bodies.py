@@ -18,7 +18,7 @@ from ..shot import Animation, Character, FEMeshes
 from .bodies import reduce_bodies
 from .motion_subspace import Known, known_motion
 from .prepare import Options, excitations
-from .step_error import StepRun, distance
+from .step_error import distance
 from .time_grid import MAX_STEP
 from .to_tolerance import OF_SHAKE, intended_motion
 
@@ -61,15 +61,15 @@ def settled_bodies(
     tree = span_tree(character)
     reduce = partial(reduce_bodies, character, tree, meshes, None, loads, full={})
 
-    def simulated(bodies: Sequence[ReducedBody]) -> StepRun:
-        return known_motion(character, animation, bodies, options, options.step or MAX_STEP).run
+    def simulated(bodies: Sequence[ReducedBody]) -> Known:
+        return known_motion(character, animation, bodies, options, options.step or MAX_STEP)
 
     tolerance = options.tolerance
     bodies, off = reduce(tolerance=tolerance), 0.0
     found, allowed = simulated(bodies), SHARE * options.tolerance
     if retargeted:
         intended = intended_motion(character, animation, bodies, options)
-        allowed = max(allowed, OF_SHAKE * distance(found.positions, intended))
+        allowed = max(allowed, OF_SHAKE * distance(found.run.positions, intended))
     for k in range(MOST):
         progress((k + 1) / (MOST + 1), f"a reduction to {1e3 * tolerance:.2g} mm")
         tolerance *= FINER
@@ -77,11 +77,11 @@ def settled_bodies(
         if _same(bodies, finer):
             continue
         then = simulated(finer)
-        off = distance(then.positions, found.positions)
+        off = distance(then.run.positions, found.run.positions)
         bodies, found = finer, then
         if off <= allowed:
             break
-    return Settled(tuple(bodies), off, Known(animation, found))
+    return Settled(tuple(bodies), off, found)
 
 
 def _same(one: Sequence[ReducedBody], other: Sequence[ReducedBody]) -> bool:
