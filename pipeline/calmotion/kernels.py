@@ -18,11 +18,14 @@ from typing import Any
 # run no slower. numba reads the level once, so it must be set before its first import; a user's own choice stays.
 os.environ.setdefault("NUMBA_OPT", "1")
 
+import numpy as np  # noqa: E402
 from numba import config, njit  # noqa: E402
 
 from .cache import cache_folder
 
 PACKAGE = Path(__file__).parent
+# Flags for the kernels that a kernel calls: numba compiles these anew for every literal True and False they are given.
+YES, NO = np.bool_(True), np.bool_(False)
 FUSED = {"contract"}  # a product and a sum in one rounding; nothing that would reorder or drop terms
 
 
@@ -32,7 +35,7 @@ def kernel_folder() -> Path:
     digest = hashlib.sha256()
     for path in sorted(PACKAGE.glob("*/*.py")):
         source = path.read_bytes()
-        if b"kernel\ndef " in source:
+        if b"kernel\ndef " in source or b"part\ndef " in source:
             digest.update(source)
     return cache_folder() / "kernels" / digest.hexdigest()[:16]
 
@@ -44,6 +47,15 @@ def kernel(function: Callable[..., Any]) -> Any:
     interpreter's lock.
     """
     return _compile(function, _nrt=False, no_cfunc_wrapper=True, nogil=True, fastmath=FUSED)
+
+
+def part(function: Callable[..., Any]) -> Any:
+    """A `kernel` that one other calls: compiled into that one, and by itself only where Python calls it.
+
+    Of a kernel that another calls numba makes machine code twice, by itself and in the other, and three times where
+    that is called in turn.
+    """
+    return _compile(function, _nrt=False, no_cfunc_wrapper=True, nogil=True, fastmath=FUSED, inline="always")
 
 
 def allocating_kernel(function: Callable[..., Any]) -> Any:

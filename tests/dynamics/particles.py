@@ -73,7 +73,7 @@ def nonlinear(system, laws, rng, stiffness=50.0) -> System:
         stiffness=system.stiffness * kept,
         retardation=np.where(law == LINEAR, 0.0, 0.02),
         lame=lame,
-        points=np.array(points, dtype=np.int32),
+        points=np.array(points, dtype=np.int64),
         data_start=np.array(starts, dtype=np.int64),
         data=np.concatenate(arrays),
     )
@@ -115,7 +115,7 @@ def particle_system(
                 Phi[j, k, :, : elastic[b]], Psi[j, k, :, : elastic[b]] = 0.3 * rng.normal(size=(2, 3, elastic[b]))
     system = System(
         parent=np.array(parents, dtype=np.int32),
-        elastic=np.array(elastic, dtype=np.int32),
+        elastic=np.array(elastic, dtype=np.int64),
         side=side,
         rows=np.array(rows, dtype=np.int32),
         sliding=np.isin(np.arange(joints), sliding).astype(np.int32),
@@ -137,7 +137,7 @@ def particle_system(
         neohookean=np.zeros(0, dtype=np.int32),
         retardation=np.zeros(count),
         lame=np.zeros((count, 2)),
-        points=np.zeros(count, dtype=np.int32),
+        points=np.zeros(count, dtype=np.int64),
         data_start=np.zeros(count, dtype=np.int64),
         data=np.zeros(0),
         position=rng.normal(size=(joints, 2, 3)) * 0.2,

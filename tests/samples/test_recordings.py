@@ -9,7 +9,11 @@ from test_samples import KINDS, path_of
 pytest.importorskip("rerun")
 
 
-@pytest.mark.parametrize("name", KINDS)
+# the boxer is the drummer's figure, animated as the bartender is
+LONG = {"boxer": pytest.mark.long}
+
+
+@pytest.mark.parametrize("name", [pytest.param(name, marks=LONG.get(name, ())) for name in KINDS])
 def test_the_recording_of_a_simulation_holds_what_the_table_holds(name, calmotion, tmp_path):
     files = tmp_path / "table.csv", tmp_path / "run.rrd"
     run = calmotion(

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..kernels import kernel
+from ..kernels import kernel, part
 from ..shot.character import Array
 from .constant_inertia import (
     straight_mass_matrix,
@@ -89,7 +89,7 @@ def _acceleration_less_gravity(system, b, Vd, w):
         w.a[i] = t
 
 
-@kernel
+@part
 def _turning_rows(system, b, u, V, Vd, tangent, w, blocks):
     """Inertia, linear elastic and gravity rows of a component that turns."""
     r = system.elastic[b]
@@ -111,7 +111,7 @@ def _turning_rows(system, b, u, V, Vd, tangent, w, blocks):
     )  # fmt: skip
 
 
-@kernel
+@part
 def _straight_rows(system, b, u, V, Vd, tangent, w, blocks):
     """The same of a component that never turns."""
     r = system.elastic[b]
@@ -127,7 +127,7 @@ def _straight_rows(system, b, u, V, Vd, tangent, w, blocks):
     straight_position_jacobian(r, system.M3[b], system.stiffness[b], w.a, Vd[b, 3:6], blocks.D[b], blocks.K[b])
 
 
-@kernel
+@part
 def _add_stvk_forces(system, b, u, v, tangent, w, blocks):
     """Elastic rows of a body of this law; those of a linear one stand with its inertia."""
     stvk_forces(
@@ -136,7 +136,7 @@ def _add_stvk_forces(system, b, u, v, tangent, w, blocks):
     )  # fmt: skip
 
 
-@kernel
+@part
 def _add_neohookean_forces(system, b, u, v, tangent, w, blocks):
     """The same of a Neo-Hookean body."""
     neohookean_forces(
@@ -145,7 +145,7 @@ def _add_neohookean_forces(system, b, u, v, tangent, w, blocks):
     )  # fmt: skip
 
 
-@kernel
+@part
 def _follow_positions(n, acceleration, Hv, D, P, K):
     """Tangents by what follows: accelerations follow velocities, into P, and these follow positions, into K."""
     beta = Hv[0, 0]
@@ -159,7 +159,7 @@ def _follow_positions(n, acceleration, Hv, D, P, K):
             K[i, k] += beta * P[i, k]
 
 
-@kernel
+@part
 def _joint_rows(system, scheme, joint, angle, rate, c, u, V, lam, Hv, tangent, w, blocks):
     """Constraint rows of a joint and the forces it transmits."""
     p = system.side[joint, 0]

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..kernels import kernel
+from ..kernels import NO, YES, part
 from .assembly import assemble
 from .elimination import factor
 from .least_multipliers import least_multipliers
@@ -24,7 +24,7 @@ VELOCITY_ROWS = Scheme(velocity=0.0, acceleration=0.0, gamma=1.0, alpha=0.0)
 POSITION_ROWS = Scheme(velocity=0.0, acceleration=0.0, gamma=0.0, alpha=1.0)
 
 
-@kernel
+@part
 def accelerations(system, state, angle, rate, acceleration, firmness, work, blocks, factors, scratch):
     """V' = (c'', alpha in body axes, u'') into scratch.Vd, shape [B, N], and multipliers into state.lam.
 
@@ -46,14 +46,14 @@ def accelerations(system, state, angle, rate, acceleration, firmness, work, bloc
             scratch.taken_lam[j, i] = 0.0
     if firmness > 0.0:
         assemble(
-            system, POSITION_ROWS, state.c, state.q, state.u, state.V, Vd, state.lam, angle, rate, Hv, False, work,
+            system, POSITION_ROWS, state.c, state.q, state.u, state.V, Vd, state.lam, angle, rate, Hv, NO, work,
             blocks,
         )  # fmt: skip
         for j in range(joints):
             for i in range(JOINT_ROWS):
                 scratch.taken_lam[j, i] = firmness * firmness * blocks.gap[j, i]
     assemble(
-        system, VELOCITY_ROWS, state.c, state.q, state.u, state.V, Vd, state.lam, angle, rate, Hv, True, work, blocks
+        system, VELOCITY_ROWS, state.c, state.q, state.u, state.V, Vd, state.lam, angle, rate, Hv, YES, work, blocks
     )
     # motion of the coordinates (R^T dc, dphi, du) by the velocities
     moving = scratch.taken

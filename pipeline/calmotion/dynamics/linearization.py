@@ -16,7 +16,7 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 
-from ..kernels import kernel
+from ..kernels import YES, kernel
 from ..shot.character import Array, IntArray
 from .assembly import assemble
 from .bdf2 import position_to_velocity, velocities
@@ -77,7 +77,7 @@ def _linearize(
         )  # fmt: skip
         kind = static if n == 0 else scheme
         assemble(
-            system, kind, now.c, now.q, now.u, now.V, Vd, now.lam, angles[n], rates[n], Hv[at], True, work, here
+            system, kind, now.c, now.q, now.u, now.V, Vd, now.lam, angles[n], rates[n], Hv[at], YES, work, here
         )  # fmt: skip
         bad = factor(system, here, lu[at], pivots[at], Z[at], block)
         if bad >= 0:

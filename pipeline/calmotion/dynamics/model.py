@@ -94,7 +94,7 @@ def compile_model(character: Character, tree: Tree, bodies: Sequence[ReducedBody
     mass, s, Z, M3, M4 = zeros(), zeros(3), zeros(3, 3), zeros(r_max, 3), zeros(r_max, 3, 3)
     S, axial, axial0 = zeros(r_max, r_max, 3, 3), zeros(r_max, r_max, 3), zeros(r_max, 3)
     stiffness, damping = zeros(r_max), zeros(r_max, r_max)
-    elastic = np.zeros(count, np.int32)
+    elastic = np.zeros(count, np.int64)
     for k, b in enumerate(tree.body):
         body = bodies[b]
         integrals = body.invariants
@@ -123,7 +123,7 @@ def compile_model(character: Character, tree: Tree, bodies: Sequence[ReducedBody
 def _elastic_laws(bodies: Sequence[ReducedBody]) -> dict[str, Any]:
     """What `System` says of elastic laws, bodies in the order of the components."""
     count = len(bodies)
-    law, points, start = np.full(count, LINEAR, np.int32), np.zeros(count, np.int32), np.zeros(count, np.int64)
+    law, points, start = np.full(count, LINEAR, np.int32), np.zeros(count, np.int64), np.zeros(count, np.int64)
     retardation, lame = np.zeros(count), np.zeros((count, 2))
     arrays: list[Array] = []
     size = 0

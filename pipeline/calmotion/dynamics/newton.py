@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..kernels import kernel
+from ..kernels import NO, YES, kernel, part
 from ..shot.character import Array
 from . import bdf2, newmark
 from .assembly import assemble
@@ -112,7 +112,7 @@ def worst_component(system, x):
     return worst
 
 
-@kernel
+@part
 def _predict(system, h, before, now, memory):
     """The new instant by Taylor's formula."""
     for b in range(len(system.parent)):
@@ -143,7 +143,7 @@ def _velocities(system, scheme, h, before2, before, now, scratch):
         newmark.velocities(system, scheme, h, now, before, scratch.memory, scratch.Vd)
 
 
-@kernel
+@part
 def _linearize(system, scheme, h, before, now, angle, rate, work, blocks, factors, scratch):
     """Residual, tangent and factors at a state; returns -1 or the component that is singular."""
     if scheme.family == BACKWARD_DIFFERENCE:
@@ -151,7 +151,7 @@ def _linearize(system, scheme, h, before, now, angle, rate, work, blocks, factor
     else:
         newmark.position_to_velocity(system, scheme, h, now, scratch.T, scratch.Hv)
     assemble(
-        system, scheme, now.c, now.q, now.u, now.V, scratch.Vd, now.lam, angle, rate, scratch.Hv, True, work, blocks
+        system, scheme, now.c, now.q, now.u, now.V, scratch.Vd, now.lam, angle, rate, scratch.Hv, YES, work, blocks
     )
     bad = factor(system, blocks, factors.lu, factors.pivots, factors.Z, scratch.block)
     if bad < 0 and len(system.rows) > len(system.parent):
@@ -192,7 +192,7 @@ def largest_entry(system, x):
     return largest
 
 
-@kernel
+@part
 def step(system, scheme, h, before2, before, now, angle, rate, predicted, work, blocks, factors, scratch):
     """One implicit step from two instants to the next.
 
@@ -221,7 +221,7 @@ def step(system, scheme, h, before2, before, now, angle, rate, predicted, work, 
                 return SINGULAR, factorisations, iteration + 1, bad
         else:
             assemble(
-                system, scheme, now.c, now.q, now.u, now.V, scratch.Vd, now.lam, angle, rate, scratch.Hv, False, work,
+                system, scheme, now.c, now.q, now.u, now.V, scratch.Vd, now.lam, angle, rate, scratch.Hv, NO, work,
                 blocks,
             )  # fmt: skip
         solve_correction(system, blocks, factors, scratch)
@@ -259,7 +259,7 @@ def step(system, scheme, h, before2, before, now, angle, rate, predicted, work, 
     return NOT_CONVERGED, factorisations, LIMIT, worst_component(system, x)
 
 
-@kernel
+@part
 def _finish(system, scheme, h, before2, before, now, scratch):
     """Velocities of the converged instant, what the next step remembers, and multipliers of least norm."""
     _velocities(system, scheme, h, before2, before, now, scratch)

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..kernels import kernel
+from ..kernels import kernel, part
 from ..shot.character import Array
 from .index1 import accelerations
 from .loops import copy_rows
@@ -57,7 +57,7 @@ def _place(system, start, share, h, slopes):
         turn(start.q[b], stage.turn[b], stage.q[b])
 
 
-@kernel
+@part
 def _slope(system, Vd, slopes):
     """Slopes at the stage's state."""
     stage, T = slopes.stage, slopes.T
@@ -73,7 +73,7 @@ def _slope(system, Vd, slopes):
             slopes.positions[b, 3 + i] = t
 
 
-@kernel
+@part
 def step(system, h, start, now, inputs, work, blocks, factors, scratch, slopes):
     """One step from `start` to `now`.
 

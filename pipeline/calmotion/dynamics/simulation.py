@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ..kernels import kernel
+from ..kernels import NO, kernel
 from ..shot.character import Array
 from . import bdf2, newton
 from .assembly import Work, allocate_work
@@ -106,7 +106,7 @@ def _advance(
         before2 = earlier if n == 1 else instant_of(states, n - 2)
         copy_rows(world[n], work.world)
         code, more, count, component = newton.step(
-            system, scheme, h, before2, before, instant_of(states, n), angles[n], rates[n], False, work, blocks,
+            system, scheme, h, before2, before, instant_of(states, n), angles[n], rates[n], NO, work, blocks,
             factors, scratch,
         )  # fmt: skip
         costs[n, 0] += count

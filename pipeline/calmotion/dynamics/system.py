@@ -10,9 +10,11 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..shot.character import Array, BoolArray, IntArray
 
+CountArray = NDArray[np.int64]  # as Python's own integers reach a kernel, which is then compiled for both at once
 JOINT_ROWS = 6
 BACKWARD_DIFFERENCE, NEWMARK = 0, 1  # families of time-stepping formulas
 LINEAR, STVK, NEOHOOKEAN = 0, 1, 2  # elastic laws; `finite_rotation` tells linear from nonlinear by zero
@@ -46,7 +48,7 @@ class System(NamedTuple):
     """
 
     parent: IntArray
-    elastic: IntArray
+    elastic: CountArray
     side: IntArray
     rows: IntArray
     sliding: IntArray
@@ -68,8 +70,8 @@ class System(NamedTuple):
     neohookean: IntArray
     retardation: Array
     lame: Array
-    points: IntArray
-    data_start: IntArray
+    points: CountArray
+    data_start: CountArray
     data: Array
     position: Array
     rotation: Array
