@@ -10,6 +10,7 @@ from calmotion.needs.analysis import SHARE, analyse
 from calmotion.retarget.bodies import reduce_bodies
 from calmotion.retarget.prepare import Options, excitations
 from calmotion.retarget.step_error import distance, simulate_at
+from calmotion.shot.character import with_settings
 from calmotion.shot.needs import KINDS, OFF, ON
 
 FAST = Options(step=1 / 120)
@@ -54,11 +55,9 @@ def test_a_tighter_tolerance_keeps_it():
 def test_what_the_shot_says_of_a_body_is_done():
     shot = steel_arm()
     for change in ({"mode_count": 4}, {"elasticity": "stvk"}):
-        bodies = tuple(
-            b if b.flexible is None else replace(b, flexible=replace(b.flexible, **change))
-            for b in shot.character.bodies
+        asked = replace(
+            shot, character=with_settings(shot.character, lambda own, change=change: replace(own, **change))
         )
-        asked = replace(shot, character=replace(shot.character, bodies=bodies))
         assert [b.bends for b in _analyse(asked).character.bodies] == [True, True, False]
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from calmotion.dynamics.topology import span_tree
 from calmotion.evidence.linkage_arm import linkage_arm, performance
-from calmotion.retarget.bodies import reduce_bodies
+from calmotion.retarget.bodies import reduce_bodies, with_elasticity
 from calmotion.retarget.prepare import Options, excitations
 from posed import looped, make_problem
 
@@ -21,11 +21,8 @@ def limited_motors(character, scale=1.0):
 
 def linkage(elasticity):
     character, meshes = linkage_arm(modes=-1 if elasticity == "auto" else 4)
-    bodies = [
-        dataclasses.replace(b, flexible=dataclasses.replace(b.flexible, elasticity=elasticity)) if b.flexible else b
-        for b in character.bodies
-    ]
-    character, animation = dataclasses.replace(character, bodies=tuple(bodies)), performance(0.8)
+    character = with_elasticity(character, elasticity)
+    animation = performance(0.8)
     loads = excitations(character, animation, meshes, Options())
     return character, reduce_bodies(character, span_tree(character), meshes, None, loads), animation
 

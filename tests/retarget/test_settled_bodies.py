@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from calmotion.dynamics.topology import span_tree
+from calmotion.retarget import settled_bodies as module
 from calmotion.retarget.bodies import reduce_bodies
 from calmotion.retarget.fast_scheme import FAST
 from calmotion.retarget.prepare import Options, excitations
@@ -49,3 +50,19 @@ def test_a_shake_that_will_be_taken_away_need_not_be_known_as_well(arm, animatio
 
     loose = count(1e-3, retargeted=True)
     assert count(1e-2) <= loose < count(1e-3)
+
+
+def test_fine_reductions_see_pairs_as_for_a_tenth_of_the_tolerance(arm, animation, meshes, monkeypatch):
+    levels = []
+
+    def spied(character, *arguments):
+        levels.append((arguments[4], [b.flexible.pairs_share for b in character.bodies if b.flexible is not None]))
+        return reduce_bodies(character, *arguments)
+
+    monkeypatch.setattr(module, "reduce_bodies", spied)
+    monkeypatch.setattr(module, "SHARE", 1e-3)  # goes on to finer ones
+    monkeypatch.setattr(module, "MOST", 3)
+    settled_bodies(arm, animation, meshes, Options(tolerance=1e-2, step=STEP))
+    assert [level for level, _ in levels] == pytest.approx([1e-2, 1e-3, 1e-4, 1e-5])
+    for (level, shares), seen in zip(levels, (1e-2, 1e-3, 1e-3, 1e-3), strict=True):
+        np.testing.assert_allclose([level * share for share in shares], seen)

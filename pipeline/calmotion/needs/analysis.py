@@ -14,6 +14,7 @@ from ..dynamics.topology import span_tree
 from ..naming import distinct_names
 from ..retarget.options import Options
 from ..shot import Animation, Character, FlexibleSettings, Need, Needs
+from ..shot.character import with_settings
 from ..shot.needs import AUTO, OFF, ON
 from .turning import Turning, turning_of
 
@@ -75,10 +76,7 @@ def _asked(character: Character, forced: Mapping[str, str]) -> Character:
             own = replace(own, elasticity="stvk" if forced["elasticity"] == ON else "linear")
         return own
 
-    bodies = tuple(
-        body if body.flexible is None else replace(body, flexible=settings(body.flexible)) for body in character.bodies
-    )
-    return replace(character, bodies=bodies)
+    return with_settings(character, settings)
 
 
 def _turning(found: list[Turning], choice: str, allowed: float) -> list[Turning]:

@@ -14,6 +14,7 @@ from ..errors import ShotError
 from ..fem.excitation_data import Excitation
 from ..fem.reduced_body import ReducedBody
 from ..shot import Body, Character, FEMeshes, ModeTable, Skin, SurfaceMesh
+from ..shot.character import with_settings
 from ..shot.meshes import FEMesh
 
 if TYPE_CHECKING:
@@ -137,11 +138,7 @@ def flexible_modes(
 
 def with_elasticity(character: Character, law: str) -> Character:
     """The character with one elastic law (see `FlexibleSettings`) for all flexible bodies."""
-    bodies = tuple(
-        body if body.flexible is None else replace(body, flexible=replace(body.flexible, elasticity=law))
-        for body in character.bodies
-    )
-    return replace(character, bodies=bodies)
+    return with_settings(character, lambda own: replace(own, elasticity=law))
 
 
 def mode_tables(bodies: Sequence[ReducedBody]) -> tuple[ModeTable, ...]:

@@ -7,14 +7,15 @@ frequencies, and a small shift makes the motions part in time; only the simulati
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from functools import partial
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..dynamics.topology import span_tree
 from ..fem.reduced_body import ReducedBody
 from ..shot import Animation, Character, FEMeshes
+from ..shot.character import with_settings
 from .bodies import reduce_bodies
 from .motion_subspace import Known, known_motion
 from .prepare import Options, excitations
@@ -22,7 +23,11 @@ from .step_error import distance
 from .time_grid import MAX_STEP
 from .to_tolerance import OF_SHAKE, intended_motion
 
+if TYPE_CHECKING:
+    from ..fem.reduce import FullBody
+
 SHARE = 0.4  # of the tolerance, that what is left out may take
+PAIRS = 0.1  # of the tolerance: a reduction finer than this sees pairs of coordinates as for this
 FINER, MOST = 0.1, 6  # each tolerance of the reduction over the last, and how many there are
 
 
@@ -56,24 +61,30 @@ def settled_bodies(
     Raises:
         ShotError: A body cannot be reduced, or the shot not be simulated.
     """
-    assert options.tolerance is not None
+    asked = options.tolerance
+    assert asked is not None
     loads = excitations(character, animation, meshes, options)
     tree = span_tree(character)
-    reduce = partial(reduce_bodies, character, tree, meshes, None, loads, full={})
+    full: dict[int, FullBody] = {}
+
+    def reduced(tolerance: float) -> list[ReducedBody]:
+        # what quadratic strain does not see has a bound of its own, and seeing all of it costs most of the time
+        share = max(1.0, PAIRS * asked / tolerance)
+        seeing = with_settings(character, lambda own: replace(own, pairs_share=share * own.pairs_share))
+        return reduce_bodies(seeing, tree, meshes, None, loads, tolerance, full)
 
     def simulated(bodies: Sequence[ReducedBody]) -> Known:
         return known_motion(character, animation, bodies, options, options.step or MAX_STEP)
 
-    tolerance = options.tolerance
-    bodies, off = reduce(tolerance=tolerance), 0.0
-    found, allowed = simulated(bodies), SHARE * options.tolerance
+    tolerance, bodies, off = asked, reduced(asked), 0.0
+    found, allowed = simulated(bodies), SHARE * asked
     if retargeted:
         intended = intended_motion(character, animation, bodies, options)
         allowed = max(allowed, OF_SHAKE * distance(found.run.positions, intended))
     for k in range(MOST):
         progress((k + 1) / (MOST + 1), f"a reduction to {1e3 * tolerance:.2g} mm")
         tolerance *= FINER
-        finer = reduce(tolerance=tolerance)
+        finer = reduced(tolerance)
         if _same(bodies, finer):
             continue
         then = simulated(finer)

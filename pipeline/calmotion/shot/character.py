@@ -6,7 +6,8 @@ Indices point into the character's tuples; body index -1 is the world.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -320,3 +321,11 @@ class Character:
     gravity: Array
     retarget: RetargetSettings = field(default_factory=RetargetSettings)
     notes: tuple[str, ...] = ()
+
+
+def with_settings(character: Character, change: Callable[[FlexibleSettings], FlexibleSettings]) -> Character:
+    """The character, with the settings of its flexible bodies changed."""
+    bodies = tuple(
+        body if body.flexible is None else replace(body, flexible=change(body.flexible)) for body in character.bodies
+    )
+    return replace(character, bodies=bodies)
