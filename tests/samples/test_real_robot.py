@@ -3,14 +3,19 @@
 import importlib.util
 import json
 
+from pxr import Usd
 
-def test_a_real_robot_with_arms_of_plastic_is_calmed(calmotion, repository, shared_data, tmp_path):
+
+def test_a_real_robot_with_soft_arms_is_calmed(calmotion, repository, shared_data, tmp_path):
     folder = repository / "samples" / "real"
     spec = importlib.util.spec_from_file_location("compose", folder / "compose.py")
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     shot = shared_data / "shots" / "g1_dual_arm_hands_chop.usda"
     composed = module.compose(folder / "g1_arms.usda", shot, tmp_path / "g1.usda")
+    stage = Usd.Stage.Open(str(composed))
+    assert stage.GetPrimAtPath("/g1_dual_arm/ABS").GetAttribute("physics:youngsModulus").Set(3e8)
+    stage.GetRootLayer().Save()
     done = calmotion(
         "optimize", composed, "-o", tmp_path / "calm.usda", "--json", "--step", "8.34ms",
         "--set", "retarget.optimize.max_iterations=4", "--set", "fe.mesh.element_size=15mm",
@@ -21,6 +26,6 @@ def test_a_real_robot_with_arms_of_plastic_is_calmed(calmotion, repository, shar
     assert report["pre_roll_s"] > 0.0, "the motion starts at speed"
     assert len(report["targets"]) == 2 and len(report["motors"]) == 14
     for target in report["targets"]:
-        assert target["max_error_before_m"] > 0.02
+        assert target["max_error_before_m"] > 0.03
         assert target["rms_error_after_m"] < 0.5 * target["rms_error_before_m"]
     assert (tmp_path / "calm.usda").is_file() and (tmp_path / "calm_root.usda").is_file()
