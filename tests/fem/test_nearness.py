@@ -44,3 +44,17 @@ def test_a_ray_finds_the_first_triangle_beyond_what_is_skipped():
     assert ray_length(origin, up, stack, 1.5) == pytest.approx(3.0)
     assert ray_length(origin, -up, stack, 0.0) == np.inf
     assert ray_length(np.array([0.7, 0.7, 0.0]), up, stack, 0.0) == np.inf
+
+
+def test_rays_meet_what_linear_equations_say():
+    rng = np.random.default_rng(4)
+    triangles, origins, directions = rng.normal(size=(60, 3, 3)), rng.normal(size=(100, 3)), rng.normal(size=(100, 3))
+    directions /= np.linalg.norm(directions, axis=1)[:, None]
+    # origin + t direction = a + u (b - a) + v (c - a)
+    A = np.zeros((100, 60, 3, 3))
+    A[..., 0], A[..., 1:] = -directions[:, None], np.swapaxes(triangles[:, 1:] - triangles[:, :1], 1, 2)
+    t, u, v = np.moveaxis(np.linalg.solve(A, (origins[:, None] - triangles[:, 0])[..., None])[..., 0], -1, 0)
+    expected = np.where((u >= 0.0) & (v >= 0.0) & (u + v <= 1.0) & (t > 0.1), t, np.inf).min(axis=1)
+    assert 10 < np.isfinite(expected).sum() < 95
+    found = [ray_length(o, d, triangles, 0.1) for o, d in zip(origins, directions, strict=True)]
+    np.testing.assert_allclose(found, expected, rtol=1e-9)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..kernels import kernel
 from ..shot.character import Array
 
 
@@ -50,21 +51,35 @@ def ray_length(origin: Array, direction: Array, triangles: Array, skip: float) -
         origin, direction: Shape [3].
         triangles: Corners [m], shape [k, 3, 3].
         skip: [m]; hits nearer than this are the surface that the ray starts on.
-
-    Source: Möller and Trumbore 1997, vectorised.
     """
-    a = triangles[:, 0]
-    e1, e2 = triangles[:, 1] - a, triangles[:, 2] - a
-    p = np.cross(direction, e2)
-    det = np.einsum("ij,ij->i", e1, p)
-    scale = np.linalg.norm(e1, axis=1) * np.linalg.norm(e2, axis=1)
-    good = np.abs(det) > 1e-12 * scale
-    inverse = 1.0 / np.where(good, det, 1.0)
-    s = origin - a
-    u = np.einsum("ij,ij->i", s, p) * inverse
-    q = np.cross(s, e1)
-    v = (q @ direction) * inverse
-    t = np.einsum("ij,ij->i", e2, q) * inverse
-    # a slight widening: a ray along an edge must not slip between its two triangles
-    hit = good & (u >= -1e-9) & (v >= -1e-9) & (u + v <= 1.0 + 1e-9) & (t > skip)
-    return float(t[hit].min()) if hit.any() else np.inf
+    return float(first_hit(*(np.ascontiguousarray(part) for part in (origin, direction, triangles)), float(skip)))
+
+
+@kernel
+def first_hit(origin, direction, triangles, skip):
+    """`ray_length`, of contiguous arrays.
+
+    Source: Möller and Trumbore 1997.
+    """
+    nearest = np.inf
+    d0, d1, d2 = direction[0], direction[1], direction[2]
+    for k in range(len(triangles)):
+        a, b, c = triangles[k, 0], triangles[k, 1], triangles[k, 2]
+        e0, e1, e2 = b[0] - a[0], b[1] - a[1], b[2] - a[2]
+        f0, f1, f2 = c[0] - a[0], c[1] - a[1], c[2] - a[2]
+        p0, p1, p2 = d1 * f2 - d2 * f1, d2 * f0 - d0 * f2, d0 * f1 - d1 * f0
+        det = e0 * p0 + e1 * p1 + e2 * p2
+        scale = np.sqrt((e0 * e0 + e1 * e1 + e2 * e2) * (f0 * f0 + f1 * f1 + f2 * f2))
+        if not abs(det) > 1e-12 * scale:
+            continue
+        s0, s1, s2 = origin[0] - a[0], origin[1] - a[1], origin[2] - a[2]
+        # a slight widening: a ray along an edge must not slip between its two triangles
+        u = (s0 * p0 + s1 * p1 + s2 * p2) / det
+        if u < -1e-9 or u > 1.0 + 1e-9:
+            continue
+        q0, q1, q2 = s1 * e2 - s2 * e1, s2 * e0 - s0 * e2, s0 * e1 - s1 * e0
+        v = (d0 * q0 + d1 * q1 + d2 * q2) / det
+        t = (f0 * q0 + f1 * q1 + f2 * q2) / det
+        if v >= -1e-9 and u + v <= 1.0 + 1e-9 and skip < t < nearest:
+            nearest = t
+    return nearest
