@@ -54,10 +54,15 @@ def test_the_command_tells_whether_they_are_kept(shot, rows, monkeypatch, capsys
         "--json",
         "--csv",
         str(tmp_path / "rows.csv"),
+        "--markdown",
+        str(tmp_path / "rows.md"),
     ]
     assert tolerances.main(arguments) == 0
     assert [row["kept"] for row in json.loads(capsys.readouterr().out)["rows"]] == [True, True]
     with open(tmp_path / "rows.csv", newline="") as file:
         assert [float(row["error_m"]) for row in csv.DictReader(file)] == [row.error_m for row in rows]
+    lines = (tmp_path / "rows.md").read_text().splitlines()
+    assert len(lines) == 4 and lines[0].startswith("| shot | tolerance | error |")
+    assert [line.split(" | ")[1] for line in lines[2:]] == ["10 mm", "1 mm"]
     found += [rows[0], dataclasses.replace(rows[1], error_m=2e-3)]
     assert tolerances.main(arguments) == 1

@@ -8,11 +8,10 @@ frequencies are relative to the mesh with the most nodes, which has an error of 
 from __future__ import annotations
 
 import argparse
-import csv
 import sys
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import astuple, dataclass, fields, replace
+from dataclasses import astuple, dataclass, replace
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -21,6 +20,7 @@ import numpy as np
 
 from ..errors import ShotError
 from .links import Link, read_links
+from .tables import markdown, write_rows
 
 SIZES = ("2", "1.4", "1", "0.7")
 
@@ -157,10 +157,7 @@ def table(rows: Sequence[Row]) -> str:
         "link", "size mm", "nodes", "mesh s", "reduce s", "f1 Hz", "f2 Hz", "f3 Hz", "error %", "estimate %",
         "volume %", "held",
     ]  # fmt: skip
-    lines = ["| " + " | ".join(heads) + " |", "| --- |" + " ---: |" * (len(heads) - 2) + " --- |"]
-    for row in rows:
-        lines.append("| " + " | ".join(_cell(value) for value in astuple(row)) + " |")
-    return "\n".join(lines) + "\n"
+    return markdown(heads, ([_cell(value) for value in astuple(row)] for row in rows), "---:")
 
 
 def _cell(value: object) -> str:
@@ -172,10 +169,7 @@ def _cell(value: object) -> str:
 def write(rows: Sequence[Row], path: str) -> None:
     """The rows as CSV or Markdown, by the suffix of the file."""
     if path.lower().endswith(".csv"):
-        with open(path, "w", newline="", encoding="utf-8") as file:
-            writer = csv.writer(file)
-            writer.writerow([field.name for field in fields(Row)])
-            writer.writerows(astuple(row) for row in rows)
+        write_rows(path, Row, rows)
     else:
         Path(path).write_text(table(rows), encoding="utf-8")
 

@@ -14,6 +14,7 @@ import sys
 import time
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
+from pathlib import Path
 
 from ..needs.analysis import analyse
 from ..retarget.prepare import Options
@@ -23,7 +24,7 @@ from ..retarget.to_tolerance import found_tracks, optimize_to_tolerance, simulat
 from ..shot import Result
 from .fresh_cache import fresh_cache
 from .shots import Unreduced, load_unreduced
-from .tables import write_rows
+from .tables import markdown, write_rows
 from .work_precision import FINEST, SAMPLES, Bench, Reference, machine
 
 TOLERANCES = (1e-2, 1e-3, 1e-4, 1e-5)
@@ -122,15 +123,17 @@ def told(row: Kept) -> str:
     )
 
 
-def print_rows(rows: Sequence[Kept]) -> None:
-    """The table for a person."""
-    from ..cli_tables import console_on, length, print_table
+HEADS = (
+    "shot", "tolerance", "error", "estimate", "reference to", "step", "coordinates", "run", "in all", "shake before",
+    "after",
+)  # fmt: skip
 
-    heads = [
-        "shot", "tolerance", "error", "estimate", "reference to", "step", "coordinates", "run", "in all",
-        "shake before", "after",
-    ]  # fmt: skip
-    cells = [
+
+def cells(rows: Sequence[Kept]) -> list[list[str]]:
+    """The table for a person, without its heads."""
+    from ..cli_tables import length
+
+    return [
         [
             row.shot, length(row.tolerance_m), length(row.error_m), length(row.estimated_m), length(row.reference_m),
             f"{1e3 * row.step_s:.3g} ms", str(row.coordinates), f"{row.run_s:.2f} s", f"{row.wall_s:.1f} s",
@@ -138,8 +141,14 @@ def print_rows(rows: Sequence[Kept]) -> None:
         ]
         for row in rows
     ]  # fmt: skip
+
+
+def print_rows(rows: Sequence[Kept]) -> None:
+    """The same on the screen."""
+    from ..cli_tables import console_on, print_table
+
     title = {"simulate": "Simulated", "optimize": "Optimised"}[rows[0].command]
-    print_table(console_on(sys.stdout), f"{title} to a tolerance, against a far finer simulation", heads, cells)
+    print_table(console_on(sys.stdout), f"{title} to a tolerance, against a far finer simulation", HEADS, cells(rows))
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -150,6 +159,7 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--optimize", action="store_true", help="retarget the shots, which takes far longer")
     parser.add_argument("--json", action="store_true", help="print one JSON object on stdout, and nothing else there")
     parser.add_argument("--csv", metavar="FILE", help="also write a table")
+    parser.add_argument("--markdown", metavar="FILE", help="also write the table as Markdown")
     options = parser.parse_args(arguments)
     rows: list[Kept] = []
     for path in options.shots:
@@ -161,6 +171,8 @@ def main(arguments: list[str] | None = None) -> int:
             if options.csv:
                 write_rows(options.csv, Kept, rows + own)
         rows += own
+        if options.markdown:
+            Path(options.markdown).write_text(markdown(HEADS, cells(rows)), encoding="utf-8")
         if not options.json:
             print_rows(own)
     if options.json:
