@@ -18,7 +18,6 @@ import sys
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import partial
-from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -44,7 +43,7 @@ if TYPE_CHECKING:
 SAMPLES = tuple(f"samples/{name}/{name}.usda" for name in ("bartender", "dancer", "rapper", "drummer", "boxer"))
 TOLERANCES = (1e-2, 1e-3, 1e-4, 1e-5)
 BASE, FINEST = 1e-5, 1e-7  # reductions: of the runs that vary something else, and of the reference [m]
-REFERENCE_STEP = 1 / 3840
+REFERENCE_STEP, SMALLEST_STEP = 1 / 3840, 1 / 30720  # of the reference: at most, and where it ends
 REPEATS = 3
 LBFGS = 200  # most evaluations of the quasi-Newton method
 
@@ -106,7 +105,7 @@ class Bench:
         return HeldBodies(shot.character, bodies, Options(), lambda item: allowed, [self._known]).bodies or bodies
 
     def reference(self, finest: float = FINEST) -> Reference:
-        """The finest run, its step extrapolated to zero.
+        """The finest run, its step extrapolated to zero, from steps as small as it takes.
 
         Its bar is what is left of the step's error, which falls by eight where that is halved, what ten times the
         tolerance of the reduction changes, what quadratic strain does not see, as estimated (to ten times the tolerance
@@ -120,12 +119,22 @@ class Bench:
         known = Known(shot.animation, self.run(bodies, MAX_STEP))
         other = self.run(self.bodies(10.0 * finest), MAX_STEP)
         held = HeldBodies(shot.character, bodies, Options(), lambda item: finest, [known])
-        runs = [self.run(held.bodies or bodies, factor * REFERENCE_STEP) for factor in (1.0, 2.0, 4.0)]
-        limits = [fine.positions + (fine.positions - coarse.positions) / 3.0 for fine, coarse in pairwise(runs)]
+        limit, left = self._limit(held.bodies or bodies, 10.0 * finest)
         unseen = sum(body.elasticity.unseen_m for body in bodies if body.elasticity is not None)
         reduced = distance(other.positions, known.run.positions) + unseen
-        bar = distance(limits[0], limits[1]) / 7.0 + reduced + held.error_m
-        return Reference(limits[0], bar)
+        return Reference(limit, left + reduced + held.error_m)
+
+    def _limit(self, bodies: Sequence[ReducedBody], allowed: float) -> tuple[Array, float]:
+        """Positions of the targets as the step goes to zero [m], and what is left of its error there [m]."""
+        step = 4.0 * REFERENCE_STEP
+        coarse, last, left = self.run(bodies, step).positions, None, np.inf
+        while last is None or step > REFERENCE_STEP or (left > allowed and step > SMALLEST_STEP):
+            step *= 0.5
+            fine = self.run(bodies, step).positions
+            limit = fine + (fine - coarse) / 3.0
+            left = np.inf if last is None else distance(limit, last) / 7.0
+            coarse, last = fine, limit
+        return last, left
 
     def measure(
         self, reference: Reference, series: str, setting: str, bodies: Sequence[ReducedBody], step: float,
