@@ -83,8 +83,19 @@ def pytest_configure(config):
     config.addinivalue_line("markers", "long: takes half a minute or more; run with -m long")
 
 
+# While one of two processes compiles the kernels, the other does what needs none: each begins with an eighth of all.
+COMPILING, WITHOUT_KERNELS = {"dynamics"}, {"host", "refusals", "rig", "shot", "usd"}
+WITH_KERNELS = {"test_equivalence.py", "test_length_motors_and_roots.py", "test_sources_end_to_end.py"}
+
+
+def _turn(item):
+    room, name = item.path.relative_to(REPOSITORY / "tests").parts[0], item.path.name
+    return 0 if room in COMPILING else 1 if room in WITHOUT_KERNELS and name not in WITH_KERNELS else 2
+
+
 def pytest_collection_modifyitems(config, items):
-    """Skip them otherwise."""
+    """Put tests in order, and skip the long ones unless they are asked for."""
+    items.sort(key=_turn)
     if "long" in (config.getoption("-m") or ""):
         return
     for item in items:
