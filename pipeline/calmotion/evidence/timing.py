@@ -8,11 +8,19 @@ from collections.abc import Callable
 import numpy as np
 
 
-def median_time(action: Callable[[], object], repeats: int = 5) -> float:
-    """Median time of an action [s]; the first call, which may compile or load, does not count."""
-    action()
-    times = []
-    for _ in range(repeats):
+def median_time(action: Callable[[], object], repeats: int = 5, *, warm: bool = False, enough: float = np.inf) -> float:
+    """Median time of an action [s]; the first call, which may compile or load, does not count.
+
+    Args:
+        action: What is timed.
+        repeats: How often at most.
+        warm: Whether it was called before.
+        enough: No more calls once they have taken this long together [s].
+    """
+    if not warm:
+        action()
+    times: list[float] = []
+    while len(times) < repeats and sum(times) < enough:
         begin = time.perf_counter()
         action()
         times.append(time.perf_counter() - begin)

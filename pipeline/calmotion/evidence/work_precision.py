@@ -45,6 +45,7 @@ TOLERANCES = (1e-2, 1e-3, 1e-4, 1e-5)
 BASE, FINEST = 1e-5, 1e-7  # reductions: of the runs that vary something else, and of the reference [m]
 REFERENCE_STEP, SMALLEST_STEP = 1 / 3840, 1 / 30720  # of the reference: at most, and where it ends
 REPEATS = 3
+ENOUGH_TIME = 10.0  # of runs that are timed [s]: a long one is timed once
 LBFGS = 200  # most evaluations of the quasi-Newton method
 
 
@@ -147,7 +148,8 @@ class Bench:
             error = distance(self.run(bodies, step, integrator).positions, reference.positions)
         except ShotError as failed:
             return named(float("nan"), float("nan"), str(failed))
-        return named(median_time(lambda: self.run(bodies, step, integrator), self.repeats), error)
+        took = median_time(lambda: self.run(bodies, step, integrator), self.repeats, warm=True, enough=ENOUGH_TIME)
+        return named(took, error)
 
 
 def machine() -> dict[str, object]:
