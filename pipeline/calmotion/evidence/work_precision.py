@@ -204,6 +204,8 @@ def main(arguments: list[str] | None = None) -> int:
         own += element_points(bench) if options.elements else []
         bars[bench.shot.name] = reference.bar_m
         points += own
+        if options.csv:
+            write_rows(options.csv, Point, points)  # the next shot may take long
         if not options.json:
             print_points(own, reference.bar_m)
             print_over_fastest(own, TOLERANCES)
@@ -219,8 +221,6 @@ def main(arguments: list[str] | None = None) -> int:
                 print_gradients(gradients, posed.name)
                 print_tables(converged, [], posed.name)
     figures: list[str] = []
-    if options.csv:
-        write_rows(options.csv, Point, points)
     if options.figures:
         from .work_precision_figure import draw
 
