@@ -154,7 +154,11 @@ class Bench:
         if took < ENOUGH_TIME:
             again = partial(self.run, bodies, step, integrator)
             took = median_time(again, self.repeats, warm=True, enough=ENOUGH_TIME)
-        return named(took, error)
+        point = named(took, error)
+        print(
+            f"{point.shot}, {series}, {setting}: {1e3 * error:.2g} mm off in {took:.3g} s", file=sys.stderr, flush=True
+        )
+        return point
 
 
 def machine() -> dict[str, object]:
