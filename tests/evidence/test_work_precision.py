@@ -37,6 +37,7 @@ def points(bench, reference):
         patch.setattr(work_precision_points, "DIRECTIONS", (1e-4,))
         patch.setattr(work_precision_points, "REDUCTIONS", (1e-2, 1e-4))
         patch.setattr(work_precision_points, "BASE", 1e-4)
+        patch.setattr(work_precision_points, "CUBATURE", 1e-4)
         return forward_points(bench, reference)
 
 
