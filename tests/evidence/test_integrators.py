@@ -20,7 +20,11 @@ SECOND = {"bdf2": (16, 32), "newmark": (16, 32), "generalized-alpha": (16, 32)}
 
 
 @pytest.mark.parametrize(
-    "scene, explicit", [(arm_scene, (16, 32)), (four_bar_scene, (32, 64))], ids=["flexible arm", "four-bar"]
+    "scene, explicit",
+    [
+        pytest.param(arm_scene, (16, 32), id="flexible arm", marks=pytest.mark.long),
+        pytest.param(four_bar_scene, (32, 64), id="four-bar"),
+    ],
 )
 def test_orders_are_those_of_the_methods(scene, explicit):
     rows = orders(scene(), {**SECOND, "rk4": explicit}, finest=16)

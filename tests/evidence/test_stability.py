@@ -11,7 +11,11 @@ TOO_SOFT = [f"1e{power} Pa" for power in (4, 5, 6, 7, 8)] + ["load a million arm
 TOO_FAST = ["half a turn in a frame, plastic", "100 rad/s, steps of 1/24 s"]
 
 
-@pytest.mark.parametrize("case", CASES, ids=lambda case: f"{case.group}, {case.name}")
+def _marked(case):
+    return pytest.param(case, id=f"{case.group}, {case.name}", marks=pytest.mark.long if case.group == "chain" else ())
+
+
+@pytest.mark.parametrize("case", [_marked(case) for case in CASES])
 def test_every_case_runs_or_is_refused_with_a_reason(case):
     outcome = run_case(case)
     assert outcome.outcome == (REFUSED if case.name in TOO_SOFT + TOO_FAST else RUNS), outcome

@@ -45,6 +45,7 @@ def of(points, series):
     return [point for point in points if point.series == series]
 
 
+@pytest.mark.long
 def test_the_bar_of_the_reference_holds_against_a_finer_one(bench, reference):
     finer = bench.run(bench.bodies(1e-7), 1 / 7680)
     assert distance(finer.positions, reference.positions) < 1.5 * reference.bar_m < 2e-4

@@ -9,8 +9,8 @@ from test_samples import KINDS, path_of
 pytest.importorskip("rerun")
 
 
-# bodies are animated in other tests, and the boxer is the drummer's figure, animated as the bartender is
-LONG = {"dancer": pytest.mark.long, "boxer": pytest.mark.long}
+# bodies and skeletons are animated in other tests, too
+LONG = dict.fromkeys(("dancer", "drummer", "boxer"), pytest.mark.long)
 
 
 @pytest.mark.parametrize("name", [pytest.param(name, marks=LONG.get(name, ())) for name in KINDS])

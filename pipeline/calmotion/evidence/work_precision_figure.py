@@ -35,7 +35,7 @@ def draw(folder: str, points: Sequence[Point], bar: float) -> str:
     """
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(8.0, 5.6), layout="constrained")
+    figure = Figure(figsize=(9.0, 5.6), layout="constrained")
     axes = figure.add_subplot()
     comparable = [p for p in points if p.series != "elements" and np.isfinite(p.error_m)]
     best = front(comparable)
@@ -69,11 +69,13 @@ def draw(folder: str, points: Sequence[Point], bar: float) -> str:
     for p in points:
         if p.series == "default":
             axes.loglog(p.wall_s, 1e3 * p.error_m, "*", color="black", ms=14, label="default")
-    axes.axhspan(axes.get_ylim()[0], 1e3 * bar, color="0.93", zorder=-1)
+    low = min(axes.get_ylim()[0], 0.5e3 * bar)
+    axes.axhspan(low, 1e3 * bar, color="0.93", zorder=-1)
+    axes.set_ylim(bottom=low)
     axes.annotate("error of the reference", (0.01, 1e3 * bar), xycoords=("axes fraction", "data"), fontsize=7, va="top")
     axes.set_xlabel("run time of the simulation [s]")
     axes.set_ylabel("largest error of any target [mm]")
     axes.set_title(f"{points[0].shot}, simulated as animated", loc="left", fontsize=10)
-    axes.legend(frameon=False, fontsize=8, loc="upper right")
+    figure.legend(frameon=False, fontsize=8, loc="outside right upper")  # over the points it would hide some
     plain([axes])
     return save(figure, folder, f"work_precision_{points[0].shot}")
