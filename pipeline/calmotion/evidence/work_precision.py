@@ -110,9 +110,9 @@ class Bench:
         """The finest run, its step extrapolated to zero, from steps as small as it takes.
 
         Its bar is what is left of the step's error, which falls by eight where that is halved, what ten times the
-        tolerance of the reduction changes, what quadratic strain does not see, as estimated (to ten times the tolerance
-        of the reduction, which they would cost much of the time), and what holding its bodies to the directions that
-        the shot needs does.
+        tolerance of the reduction changes, what quadratic strain does not see, as estimated (what a reduction to ten
+        times the tolerance would; to see more takes most of the time), and what holding its bodies to the directions
+        that the shot needs does.
 
         Args:
             finest: Tolerance of the reduction [m].
