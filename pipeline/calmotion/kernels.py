@@ -27,6 +27,7 @@ PACKAGE = Path(__file__).parent
 # Flags for the kernels that a kernel calls: numba compiles these anew for every literal True and False they are given.
 YES, NO = np.bool_(True), np.bool_(False)
 FUSED = {"contract"}  # a product and a sum in one rounding; nothing that would reorder or drop terms
+_WITHOUT_ARRAYS: dict[str, Any] = {"_nrt": False, "no_cfunc_wrapper": True, "nogil": True}  # of its own making
 
 
 @cache
@@ -46,7 +47,7 @@ def kernel(function: Callable[..., Any]) -> Any:
     It must not allocate: without reference counting it compiles in a fraction of the time. It runs without the
     interpreter's lock.
     """
-    return _compile(function, _nrt=False, no_cfunc_wrapper=True, nogil=True, fastmath=FUSED)
+    return _compile(function, **_WITHOUT_ARRAYS)
 
 
 def part(function: Callable[..., Any]) -> Any:
@@ -55,21 +56,21 @@ def part(function: Callable[..., Any]) -> Any:
     Of a kernel that another calls numba makes machine code twice, by itself and in the other, and three times where
     that is called in turn.
     """
-    return _compile(function, _nrt=False, no_cfunc_wrapper=True, nogil=True, fastmath=FUSED, inline="always")
+    return _compile(function, **_WITHOUT_ARRAYS, inline="always")
 
 
 def allocating_kernel(function: Callable[..., Any]) -> Any:
     """`kernel` for a function that makes arrays."""
-    return _compile(function, fastmath=FUSED)
+    return _compile(function)
 
 
 def _compile(function: Callable[..., Any], **options: Any) -> Any:
     if os.environ.get("NUMBA_CACHE_DIR"):
-        return njit(cache=True, **options)(function)
+        return njit(cache=True, fastmath=FUSED, **options)(function)
     # numba picks the folder when a function is decorated; other users of numba keep theirs
     before = config.CACHE_DIR
     config.CACHE_DIR = str(kernel_folder())
     try:
-        return njit(cache=True, **options)(function)
+        return njit(cache=True, fastmath=FUSED, **options)(function)
     finally:
         config.CACHE_DIR = before

@@ -128,15 +128,14 @@ class Bench:
 
     def _limit(self, bodies: Sequence[ReducedBody], allowed: float) -> tuple[Array, float]:
         """Positions of the targets as the step goes to zero [m], and what is left of its error there [m]."""
-        step = 4.0 * REFERENCE_STEP
-        coarse, last, left = self.run(bodies, step).positions, None, np.inf
-        while last is None or step > REFERENCE_STEP or (left > allowed and step > SMALLEST_STEP):
+        step, left = 4.0 * REFERENCE_STEP, np.inf
+        coarse = limit = self.run(bodies, step).positions
+        while step > REFERENCE_STEP or (left > allowed and step > SMALLEST_STEP):
             step *= 0.5
             fine = self.run(bodies, step).positions
-            limit = fine + (fine - coarse) / 3.0
-            left = np.inf if last is None else distance(limit, last) / 7.0
-            coarse, last = fine, limit
-        return last, left
+            last, limit = limit, fine + (fine - coarse) / 3.0
+            coarse, left = fine, distance(limit, last) / 7.0
+        return limit, left
 
     def measure(
         self, reference: Reference, series: str, setting: str, bodies: Sequence[ReducedBody], step: float,
