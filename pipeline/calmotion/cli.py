@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 BENCHMARKS = (
     "baselines", "gradients", "integrators", "meshing", "needs", "optimizer", "reading", "reduction", "scaling",
-    "stability", "tolerances", "work-precision",
+    "settling", "stability", "tolerances", "work-precision",
 )  # fmt: skip
 NEEDS = ("bodies", "turning", "loops", "modes", "directions", "elasticity", "motors", "ranges")  # those of `shot.needs`
 DONE, FAILED, WRONG_USAGE, INTERRUPTED = 0, 1, 2, 130

@@ -11,7 +11,7 @@ from calmotion.retarget.bodies import reduce_bodies, with_elasticity
 from calmotion.retarget.motion_subspace import HeldBodies
 from calmotion.retarget.prepare import Options, excitations
 from calmotion.retarget.step_error import distance, frames_of, simulate_at
-from calmotion.retarget.to_tolerance import found_tracks, optimize_to_tolerance, simulate_to_tolerance
+from calmotion.retarget.to_tolerance import WHOLE, found_tracks, optimize_to_tolerance, simulate_to_tolerance
 from calmotion.retarget.verify import verify
 
 FINE = 1 / 7680
@@ -42,6 +42,17 @@ def test_a_simulation_keeps_its_tolerance_by_a_step_no_smaller_than_it_must(arm,
         fine = simulate_at(arm, animation, bodies, Options(), FINE)
         assert np.linalg.norm(coarser.positions - fine.positions, axis=2).max() > 0.5 * tolerance
     assert steps[0] > steps[1] > steps[2]
+
+
+def test_the_step_takes_what_is_left_of_the_tolerance_and_half_of_it_in_any_case(arm, animation, bodies):
+    options = Options(tolerance=1e-3)
+    none, some, much = (
+        simulate_to_tolerance(arm, animation, bodies, options, quiet, left_out_m=left_out).accuracy
+        for left_out in (0.0, 2e-4, 8e-4)
+    )
+    assert 0.5e-3 < none.step_m <= 0.8e-3 and none.estimated_m <= 0.8e-3
+    assert 0.4e-3 < some.step_m <= 0.6e-3 < some.estimated_m <= 0.8e-3
+    assert 0.3e-3 < much.step_m <= 0.5e-3 < 0.8e-3 < much.estimated_m
 
 
 def test_a_step_or_no_tolerance_leaves_the_step_as_it_is(arm, animation, bodies):
@@ -78,7 +89,8 @@ def test_the_integrator_that_needs_fewest_steps_gives_way_where_it_fails(arm, an
 def test_an_optimisation_keeps_its_tolerance(arm, animation, bodies, tolerance):
     result = optimize_to_tolerance(arm, animation, bodies, Options(tolerance=tolerance), quiet)
     off = off_by(result, arm, animation, bodies)
-    assert off < tolerance and off < 1.5 * result.accuracy.step_m <= 0.75 * tolerance
+    assert off < 1.5 * result.accuracy.step_m and off < result.accuracy.asked_m == tolerance
+    assert result.accuracy.estimated_m <= WHOLE * tolerance
     assert result.objective_after < 0.1 * result.objective_before
     assert result.accuracy.left_out_m == sum(row.estimated_error_m or 0.0 for b in bodies for row in b.left_out)
 

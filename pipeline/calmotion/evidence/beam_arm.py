@@ -33,12 +33,12 @@ def _at(x: float, rotation: Array = IDENTITY) -> Frame:
     return Frame(np.array([x, 0.0, 0.0]), rotation)
 
 
-def beam_mesh(length: float, thickness: float, cells: int) -> tuple[Array, IntArray]:
-    """A square beam along x, two cells across; points [m], shape [n, 3], and tetrahedra."""
+def beam_mesh(length: float, thickness: float, cells: int, across: int = 2) -> tuple[Array, IntArray]:
+    """A square beam along x of so many cells along and across; points [m], shape [n, 3], and tetrahedra."""
     from skfem import MeshTet
 
-    across = np.linspace(-0.5, 0.5, 3) * thickness
-    mesh = MeshTet.init_tensor(np.linspace(0.0, length, cells + 1), across, across)
+    side = np.linspace(-0.5, 0.5, across + 1) * thickness
+    mesh = MeshTet.init_tensor(np.linspace(0.0, length, cells + 1), side, side)
     points = np.ascontiguousarray(mesh.p.T)
     return points, oriented_tets(points, mesh.t.T)[0]
 

@@ -136,7 +136,7 @@ def pairs(repeats: int = REPEATS) -> list[partial[Pair]]:
     finest, finer_steps = Options(knot_spacing=1.0 / 60.0), Options(step=1.0 / 3840.0)
     everything = dict.fromkeys(KINDS, ON)
     return [
-        partial(pair, "bodies", mixed_arm(), "simulate", {"bodies": ON}, repeats),
+        partial(pair, "bodies", mixed_arm(30, 8), "simulate", {"bodies": ON}, repeats),
         partial(pair, "turning", gantry(), "simulate", {"turning": ON}, repeats),
         partial(pair, "loops", clevis_arm(), "simulate", {"loops": ON}, repeats),
         partial(pair, "modes", firm_arm(), "simulate", {"modes": ON}, repeats),

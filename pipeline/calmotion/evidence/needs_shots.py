@@ -74,12 +74,12 @@ def steel_arm() -> NeedsShot:
     return NeedsShot("steel arm", _with_geometry(character, meshes), _swing(), meshes)
 
 
-def mixed_arm() -> NeedsShot:
-    """A plastic link, always of the same modes, on one of thick steel."""
+def mixed_arm(cells: int = 8, across: int = 2) -> NeedsShot:
+    """A plastic link, always of the same modes, on one of thick steel, whose mesh has so many cells."""
     character, meshes = beam_arm(2, length=0.3, thickness=0.014, payload=0.2, modes=8)
     settings = FlexibleSettings(ElasticMaterial("/Arm/Steel", 2.1e11, 0.3, 7800.0))
     bodies = (replace(character.bodies[0], flexible=settings), *character.bodies[1:])
-    thick = FEMesh(0, *beam_mesh(0.3, 0.08, 8), MeshQuality(0.0, 0.0, 0.0))
+    thick = FEMesh(0, *beam_mesh(0.3, 0.08, cells, across), MeshQuality(0.0, 0.0, 0.0))
     meshes = FEMeshes((thick, meshes.meshes[1]))
     return NeedsShot("steel and plastic", _with_geometry(replace(character, bodies=bodies), meshes), _swing(), meshes)
 

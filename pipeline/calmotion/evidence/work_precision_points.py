@@ -70,15 +70,16 @@ def chosen_points(bench: Bench, reference: Reference, tolerances: Sequence[float
         settled = settled_bodies(character, animation, shot.meshes, options)
         held = held_to_tolerance(character, animation, settled.bodies, options, settled.known)
         bodies = held.bodies or settled.bodies
-        step, integrator = by_fast_scheme(options, partial(_step_and_scheme, character, animation, bodies))
+        choice = partial(_step_and_scheme, character, animation, bodies, settled.error_m + held.error_m)
+        step, integrator = by_fast_scheme(options, choice)
         points.append(bench.measure(reference, "tolerance", setting_of(tolerance), bodies, step, integrator))
     return points
 
 
 def _step_and_scheme(
-    character: Character, animation: Animation, bodies: Sequence[ReducedBody], options: Options
+    character: Character, animation: Animation, bodies: Sequence[ReducedBody], left_out: float, options: Options
 ) -> tuple[float, str]:
-    return chosen_step(character, animation, bodies, options)[0], options.scheme
+    return chosen_step(character, animation, bodies, options, left_out)[0], options.scheme
 
 
 def element_points(bench: Bench, factors: Sequence[float] = ELEMENTS) -> list[Point]:

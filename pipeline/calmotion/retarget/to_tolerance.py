@@ -11,6 +11,8 @@ from dataclasses import replace
 from functools import cache, partial
 from pathlib import Path
 
+import numpy as np
+
 from ..dynamics.schemes import SCHEMES
 from ..fem.reduced_body import ReducedBody
 from ..shot import Accuracy, Animation, Character, LeftOut, OptimizerStep, Result, Track
@@ -27,12 +29,13 @@ from .run import Progress, meant_motion, simulate_shot
 from .step_error import ORDER, StepRun, distance, frames_of, largest_step, run_or_none, simulate_at, step_error
 from .time_grid import MAX_STEP
 
-SHARE = 0.5  # of the tolerance, that the time step may take
+SHARE = 0.5  # of the tolerance, that the time step may take in any case
+WHOLE = 0.8  # of the tolerance, that it may take together with what the bodies do without
 FIRST, LAST = 1.0 / 60.0, 1.0 / 30720.0  # steps that are tried [s]
 OF_SHAKE = 0.05  # of the input's own error: how well that need be known before it is taken away
 # Where no tolerance is asked for, a simulation of what was written has all coordinates, and is to tell the same errors.
 UNASKED = 0.002
-HELD = 0.05  # of the tolerance (and of how well the shake need be known), that holding bodies to directions may take
+HELD = 0.1  # of the tolerance (and of how well the shake need be known), that holding bodies to directions may take
 NAMES = {"bdf2": "BDF2", "newmark": "Newmark's method", "generalized-alpha": "generalised-alpha"}
 FINDING = "finding the directions that the shot bends links in"
 MARGIN, MOST = 0.8, 3  # by which a step that was too large is made too small, and how often that is done
@@ -59,7 +62,7 @@ def simulate_to_tolerance(
     left_out = (_left_out(bodies) if left_out_m is None else left_out_m) + held.error_m
 
     def simulated(options: Options) -> Result:
-        step, error = chosen_step(character, animation, held.bodies, options)
+        step, error = chosen_step(character, animation, held.bodies, options, left_out)
         result = simulate_shot(character, animation, held.bodies, replace(options, step=step), progress)
         accuracy = Accuracy(error, left_out, _mesh_error(bodies), options.tolerance)
         return _with_step(_with_modes(replace(result, accuracy=accuracy), bodies), character, options)
@@ -119,7 +122,10 @@ def planned_step(character: Character, animation: Animation, bodies: Bodies, opt
     """The step that a simulation of the shot as animated would take, and why, by simulating it."""
     if _chooses(character, options):
         return by_fast_scheme(
-            options, lambda options: step_row(character, options, *chosen_step(character, animation, bodies, options))
+            options,
+            lambda options: step_row(
+                character, options, *chosen_step(character, animation, bodies, options, _left_out(bodies))
+            ),
         )
     trial = partial(simulate_at, character, animation, bodies, options)
     fine = trial(options.step or character.retarget.time_step or MAX_STEP)
@@ -128,10 +134,16 @@ def planned_step(character: Character, animation: Animation, bodies: Bodies, opt
     return step_row(character, options, fine.step, error)
 
 
-def chosen_step(character: Character, animation: Animation, bodies: Bodies, options: Options) -> tuple[float, float]:
-    """The step of a simulation to a tolerance, and its estimated error [s], [m]; arguments as of `simulate_shot`."""
+def chosen_step(
+    character: Character, animation: Animation, bodies: Bodies, options: Options, left_out: float
+) -> tuple[float, float]:
+    """The step of a simulation to a tolerance, and its estimated error [s], [m]; arguments as of `simulate_shot`.
+
+    Args:
+        left_out: Error of what the bodies do without [m].
+    """
     trial = partial(simulate_at, character, animation, bodies, options)
-    return largest_step(trial, FIRST, LAST, lambda run: _allowed(options))
+    return largest_step(trial, FIRST, LAST, lambda run: _allowed(options, left_out))
 
 
 def optimize_to_tolerance(
@@ -158,7 +170,8 @@ def optimize_to_tolerance(
     if chooses:
         progress(0.0, "choosing the time step")
         trial = partial(simulate_at, character, input_shot, held.bodies, options)
-        step, _ = largest_step(trial, FIRST, LAST, lambda run: max(_allowed(options), OF_SHAKE * shake(run)))
+        enough = _allowed(options, _left_out(held.bodies))
+        step, _ = largest_step(trial, FIRST, LAST, lambda run: max(enough, OF_SHAKE * shake(run)))
     result: Result | None = None
     for _ in range(MOST):
         own = held.bodies
@@ -170,12 +183,13 @@ def optimize_to_tolerance(
         result = _estimated(result, character, animation, own, options)
         assert result.accuracy is not None
         animation = replace(animation, current=found_tracks(result, animation))
-        fine = not chooses or result.accuracy.step_m <= _allowed(options) or step <= LAST
+        allowed = _allowed(options, result.accuracy.left_out_m) if chooses else np.inf
+        fine = result.accuracy.step_m <= allowed or step <= LAST
         ended = found.iterations >= options.max_iterations  # by its limit: it is not worth more
         if fine and (ended or held.hold_for(animation, _own_step(character, options))):
             break
         if not fine:
-            step = max(LAST, MARGIN * result.step_s * (_allowed(options) / result.accuracy.step_m) ** (1.0 / ORDER))
+            step = max(LAST, MARGIN * result.step_s * (allowed / result.accuracy.step_m) ** (1.0 / ORDER))
     assert result is not None
     return result
 
@@ -202,9 +216,10 @@ def _chooses(character: Character, options: Options) -> bool:
     return options.scheme in SCHEMES and not character.retarget.cyclic
 
 
-def _allowed(options: Options) -> float:
+def _allowed(options: Options, left_out: float) -> float:
+    """Error that the time step may cause beside what the bodies do without [m]."""
     assert options.tolerance is not None
-    return SHARE * options.tolerance
+    return max(SHARE * options.tolerance, WHOLE * options.tolerance - left_out)
 
 
 def _left_out(bodies: Bodies) -> float:
