@@ -2,25 +2,19 @@
 
 from __future__ import annotations
 
-import importlib
 import re
-from pathlib import Path
 
 import numpy as np
 import pytest
 from calmotion.errors import ShotError
 from calmotion.fem.closed_surfaces import boundary_walks
 from calmotion.shot import SurfaceMesh
-from calmotion.testing import host_with
 from damaged_meshes import CORPUS
-
-PLUGIN = Path(__file__).resolve().parents[2] / "plugins" / "fe_mesher"
 
 
 @pytest.fixture(scope="module")
-def closed_solid():
-    name = host_with(PLUGIN).operators["fe.mesh"].__module__.rsplit(".", 1)[0]
-    return importlib.import_module(f"{name}.repair").closed_solid
+def closed_solid(package):
+    return package("repair").closed_solid
 
 
 def test_the_corpus_is_as_large_as_promised():

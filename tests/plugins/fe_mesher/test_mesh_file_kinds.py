@@ -2,25 +2,14 @@
 
 from __future__ import annotations
 
-import importlib
-from pathlib import Path
-
 import meshio
 import numpy as np
 import pytest
 from calmotion.errors import ShotError
 from calmotion.fem.tetrahedra import boundary_triangles, oriented_tets, surface_area, tet_volumes
 from calmotion.shot import Body, ElasticMaterial, FlexibleSettings, Frame, TetGeometry
-from calmotion.testing import host_with
 
-PLUGIN = Path(__file__).resolve().parents[2] / "plugins" / "fe_mesher"
 MATERIAL = ElasticMaterial("/Looks/Plastic", 1.8e9, 0.35, 1200.0)
-
-
-@pytest.fixture(scope="module")
-def package():
-    name = host_with(PLUGIN).operators["fe.mesh"].__module__.rsplit(".", 1)[0]
-    return lambda module: importlib.import_module(f"{name}.{module}")
 
 
 def mesh(package, file, scale=1.0):

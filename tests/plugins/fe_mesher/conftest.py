@@ -1,0 +1,27 @@
+"""The mesher as the host loads it, and a cache of its own for each test."""
+
+from __future__ import annotations
+
+import importlib
+
+import pytest
+from calmotion.testing import host_with
+from mesher_links import PLUGIN
+
+
+@pytest.fixture(scope="module")
+def host():
+    return host_with(PLUGIN)
+
+
+@pytest.fixture(scope="module")
+def package(host):
+    """Sub-modules of the plugin, as the host imports it."""
+    name = host.operators["fe.mesh"].__module__.rsplit(".", 1)[0]
+    return lambda module: importlib.import_module(f"{name}.{module}")
+
+
+@pytest.fixture(autouse=True)
+def own_cache(tmp_path, monkeypatch):
+    monkeypatch.setenv("CALMOTION_CACHE", str(tmp_path / "cache"))
+    return tmp_path / "cache" / "tetrahedra"

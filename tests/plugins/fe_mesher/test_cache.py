@@ -1,0 +1,51 @@
+"""Meshes that were made once are kept, and belong to exactly what they were made of."""
+
+import numpy as np
+import pytest
+from mesher_links import box, link, run, surface
+
+
+def test_a_mesh_is_made_once_and_then_read_from_the_cache(host, package, own_cache, monkeypatch):
+    body = link(surface(box()), element_size=0.02)
+    (first,) = run(host, body)
+    (kept,) = own_cache.iterdir()
+    monkeypatch.setattr(package("tetwild"), "_run", lambda *arguments: pytest.fail("meshed again"))
+    (again,) = run(host, body)
+    assert np.array_equal(first.points, again.points) and np.array_equal(first.tets, again.tets)
+    kept.write_bytes(b"torn")
+    monkeypatch.undo()
+    monkeypatch.setenv("CALMOTION_CACHE", str(own_cache.parent))
+    (third,) = run(host, body)
+    assert third.quality.volume == pytest.approx(first.quality.volume, rel=1e-3)
+    assert [path.suffix for path in own_cache.iterdir()] == [".npz"]
+
+
+def test_of_two_meshes_made_at_once_the_first_one_kept_serves_both(package, own_cache):
+    cache = package("cache")
+    first, second = np.zeros((4, 3)), np.ones((4, 3))
+    tets = np.arange(4)[None]
+    assert cache.store("key", points=first, tets=tets)[0] is first
+    assert np.array_equal(cache.store("key", points=second, tets=tets)[0], first)
+    next(own_cache.iterdir()).write_bytes(b"torn")
+    assert np.array_equal(cache.store("key", points=second, tets=tets)[0], second)
+    assert np.array_equal(cache.load("key")[0], second)
+    assert [path.name for path in own_cache.iterdir()] == ["key.npz"]
+
+
+def test_the_key_of_a_mesh_holds_everything_that_decides_it(package):
+    key = package("cache").cache_key
+    points, triangles = np.eye(3), np.array([[0, 1, 2]])
+    keys = [
+        key(points, triangles, {"size": 1.0}),
+        key(points + 1e-15, triangles, {"size": 1.0}),
+        key(points, triangles[:, ::-1], {"size": 1.0}),
+        key(points, triangles, {"size": 1.1}),
+    ]
+    assert len(set(keys)) == 4
+    assert keys[0] == key(points.copy(), triangles.astype(np.int64), {"size": 1.0})
+
+
+def test_a_cache_that_cannot_be_written_is_no_error(host, monkeypatch, tmp_path):
+    (tmp_path / "file").write_text("")
+    monkeypatch.setenv("CALMOTION_CACHE", str(tmp_path / "file"))
+    assert len(run(host, link(surface(box((0.05, 0.02, 0.02))), element_size=0.01))) == 1

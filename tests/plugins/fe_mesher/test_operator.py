@@ -1,0 +1,77 @@
+"""The operator: from the surfaces of a body to tetrahedra that fill them, in the size that was asked for."""
+
+import os
+import sys
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from calmotion.fem.tetrahedra import connected_parts, tet_volumes
+from calmotion.host import PluginError
+from calmotion.shot import Body, TetGeometry
+from calmotion.testing import check_plugin
+from mesher_links import PLUGIN, REST, box, link, links_of, run, surface
+
+
+def test_the_plugin_keeps_to_the_rules():
+    assert check_plugin(PLUGIN) == []
+
+
+def test_a_character_that_does_not_bend_is_left_out(host):
+    with pytest.raises(PluginError, match="nothing is flexible"):
+        run(host, Body("/Arm/link", REST, None, (surface(box()),)))
+
+
+def test_a_box_becomes_tetrahedra_that_fill_it(host):
+    rigid = Body("/Arm/base", REST, None)
+    (mesh,) = run(host, rigid, link(surface(box((0.3, 0.02, 0.02), at=(0.15, 0, 0))), element_size=0.011))
+    assert mesh.body == 1 and mesh.tets.dtype == np.int32
+    assert (tet_volumes(mesh.points, mesh.tets) > 0.0).all() and connected_parts(mesh.tets) == 1
+    assert mesh.quality.volume == pytest.approx(1.2e-4, rel=1e-3)
+    assert mesh.quality.volume_error < 1e-3 and mesh.quality.min_dihedral_deg > 5.0
+    assert 200 < len(mesh.tets) < 3000
+    assert np.allclose(mesh.points.min(axis=0), [0, -0.01, -0.01], atol=2e-4)
+    assert np.allclose(mesh.points.max(axis=0), [0.3, 0.01, 0.01], atol=2e-4)
+
+
+def test_smaller_elements_are_more_and_the_command_line_goes_before_the_shot(host):
+    body = link(surface(box((0.1, 0.02, 0.02))), element_size=0.02)
+    (coarse,) = run(host, body)
+    (fine,) = run(host, body, element_size="8mm")
+    assert len(fine.tets) > 2 * len(coarse.tets)
+
+
+def test_the_mesher_needs_no_viewer_library(host):
+    run(host, link(surface(box((0.05, 0.02, 0.02))), element_size=0.01))
+    assert not {"pyvista", "vtk", "vtkmodules"} & set(sys.modules)
+
+
+def test_authored_tetrahedra_are_taken_as_they_are_but_turned(host):
+    points = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 1, 1], [9, 9, 9]])
+    tets = TetGeometry("/Arm/link/tets", points, np.array([[0, 1, 2, 3], [1, 2, 3, 4][::-1]], dtype=np.int32))
+    volumes = tet_volumes(points, tets.tets)
+    (mesh,) = run(host, replace(link(surface(box())), tets=tets))
+    assert np.array_equal(mesh.points, points[:5])
+    assert mesh.quality.volume == pytest.approx(np.abs(volumes).sum()) and mesh.quality.volume_error == 0.0
+    assert any("points that no tetrahedron uses" in repair for repair in mesh.quality.repairs)
+    assert any("inverted" in repair for repair in mesh.quality.repairs) == bool((volumes < 0).any())
+
+
+def test_a_link_of_a_real_robot_is_meshed(host, shared_data):
+    (elbow,) = links_of(shared_data, "left_elbow_link")
+    (mesh,) = run(host, link(*elbow, element_size=0.012))
+    assert mesh.quality.volume_error < 0.01 and mesh.quality.min_dihedral_deg > 4.0
+    assert 800 < len(mesh.tets) < 6000
+
+
+def test_nothing_is_left_behind(host, own_cache, tmp_path, monkeypatch):
+    scratch = tmp_path / "scratch"
+    scratch.mkdir()
+    monkeypatch.setenv("TMPDIR", str(scratch))
+    monkeypatch.setattr("tempfile.tempdir", None)
+    work = tmp_path / "work"
+    work.mkdir()
+    monkeypatch.chdir(work)
+    run(host, link(surface(box((0.05, 0.02, 0.02))), element_size=0.01), cache=False)
+    assert os.listdir(work) == []
+    assert os.listdir(scratch) == [] and not own_cache.exists()
