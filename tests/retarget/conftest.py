@@ -62,14 +62,23 @@ def arm():
     return Character("/Arm", bodies, joints, motors, targets, np.array([0.0, 0.0, -9.81]))
 
 
-@pytest.fixture(scope="session")
-def animation():
-    """Two fast moves in 1.5 s at 24 frames a second, starting at rest."""
-    times = np.arange(37) / 24.0
+def at_rate(rate):
+    """Two fast moves in 1.5 s at so many frames a second, starting at rest."""
+    times = np.arange(round(1.5 * rate) + 1) / rate
     shoulder = -0.9 * ease(times, 0.25, 0.4) + 0.7 * ease(times, 0.8, 0.35)
     elbow = 0.6 * ease(times, 0.3, 0.4) - 0.8 * ease(times, 0.85, 0.3)
     tracks = (Track(times, shoulder), Track(times, elbow))
     return Animation(times, tracks, tracks)
+
+
+@pytest.fixture(scope="session")
+def moves():
+    return at_rate
+
+
+@pytest.fixture(scope="session")
+def animation():
+    return at_rate(24.0)
 
 
 @pytest.fixture(scope="session")

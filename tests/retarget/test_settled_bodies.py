@@ -1,5 +1,7 @@
 """A reduction that is fine enough for the simulation: against one far finer, and no finer than it must be."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 from calmotion.dynamics.topology import span_tree
@@ -8,7 +10,7 @@ from calmotion.retarget.bodies import reduce_bodies
 from calmotion.retarget.fast_scheme import FAST
 from calmotion.retarget.prepare import Options, excitations
 from calmotion.retarget.settled_bodies import settled_bodies
-from calmotion.retarget.step_error import simulate_at
+from calmotion.retarget.step_error import distance, simulate_at
 
 STEP = 1 / 480
 BY = Options(integrator=FAST)
@@ -66,3 +68,19 @@ def test_fine_reductions_see_pairs_as_for_a_tenth_of_the_tolerance(arm, animatio
     assert [level for level, _ in levels] == pytest.approx([1e-2, 1e-3, 1e-4, 1e-5])
     for (level, shares), seen in zip(levels, (1e-2, 1e-3, 1e-3, 1e-3), strict=True):
         np.testing.assert_allclose([level * share for share in shares], seen)
+
+
+def test_reductions_are_compared_by_one_integrator(arm, animation, meshes, monkeypatch):
+    known_motion, runs = module.known_motion, []
+
+    def gives_way_for_the_second(character, animation, bodies, options, step):
+        if len(runs) == 1:
+            options = dataclasses.replace(options, integrator="bdf2")
+        runs.append(known_motion(character, animation, bodies, options, step).run)
+        return module.Known(animation, runs[-1])
+
+    monkeypatch.setattr(module, "known_motion", gives_way_for_the_second)
+    monkeypatch.setattr(module, "SHARE", 1.0)  # the second will do
+    settled = settled_bodies(arm, animation, meshes, Options(tolerance=1e-2, step=STEP))
+    assert [run.integrator for run in runs] == [FAST, "bdf2", "bdf2", "bdf2"] and settled.known.run is runs[3]
+    assert settled.error_m == distance(runs[3].positions, runs[2].positions)

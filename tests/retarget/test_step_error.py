@@ -24,6 +24,15 @@ def test_the_largest_step_that_is_allowed_is_chosen(allowed):
     assert 0.85 * best < step <= best * (1.0 + 1e-9) and error == pytest.approx(3.0 * step**2, rel=1e-9)
 
 
+def test_steps_are_those_that_were_taken():
+    def of_frames(step):
+        return of_second_order(min(0.02, step))
+
+    assert largest_step(of_frames, 0.1, 1e-3, lambda run: 1.0) == (0.02, pytest.approx(3.0 * 0.02**2))
+    step, _ = largest_step(of_frames, 0.1, 1e-3, lambda run: 3.0 * 0.01**2)
+    assert 0.0085 < step <= 0.01
+
+
 def test_steps_that_fail_are_too_large_and_the_last_one_ends_the_search():
     def fragile(step):
         if step > 0.03:

@@ -11,7 +11,13 @@ from calmotion.retarget.bodies import reduce_bodies, with_elasticity
 from calmotion.retarget.motion_subspace import HeldBodies
 from calmotion.retarget.prepare import Options, excitations
 from calmotion.retarget.step_error import distance, frames_of, simulate_at
-from calmotion.retarget.to_tolerance import WHOLE, found_tracks, optimize_to_tolerance, simulate_to_tolerance
+from calmotion.retarget.to_tolerance import (
+    WHOLE,
+    found_tracks,
+    optimize_to_tolerance,
+    planned_step,
+    simulate_to_tolerance,
+)
 from calmotion.retarget.verify import verify
 
 FINE = 1 / 7680
@@ -53,6 +59,29 @@ def test_the_step_takes_what_is_left_of_the_tolerance_and_half_of_it_in_any_case
     assert 0.5e-3 < none.step_m <= 0.8e-3 and none.estimated_m <= 0.8e-3
     assert 0.4e-3 < some.step_m <= 0.6e-3 < some.estimated_m <= 0.8e-3
     assert 0.3e-3 < much.step_m <= 0.5e-3 < 0.8e-3 < much.estimated_m
+
+
+def test_frames_shorter_than_the_first_steps(arm, moves, bodies):
+    fast = moves(120.0)
+    result = simulate_to_tolerance(arm, fast, bodies, Options(tolerance=1e-2), quiet)
+    assert result.step_s <= 1 / 120 and off_by(result, arm, fast, bodies) < 1e-2
+
+
+def test_the_step_that_is_planned_is_the_one_that_is_taken(arm, animation, bodies, monkeypatch):
+    plain = to_tolerance.simulate_at
+
+    def fails(character, animation, bodies, options, step):
+        if options.scheme != "bdf2":
+            raise ShotError("diverges")
+        return plain(character, animation, bodies, options, step)
+
+    options = Options(tolerance=1e-3)
+    for gives_way in (False, True):
+        if gives_way:
+            monkeypatch.setattr(to_tolerance, "simulate_at", fails)
+        row = planned_step(arm, animation, bodies, options)
+        taken = simulate_to_tolerance(arm, animation, bodies, options, quiet)
+        assert row == taken.left_out[-1] and row.why.endswith("BDF2") == gives_way
 
 
 def test_a_step_or_no_tolerance_leaves_the_step_as_it_is(arm, animation, bodies):

@@ -21,6 +21,7 @@ import numpy as np
 
 from ..kernels import allocating_kernel, kernel
 from ..shot.character import Array
+from .held_statics import solve_statics_transposed
 from .linearization import Linearization
 from .loops import UNKNOWNS, solve_system_transposed
 from .sweeps import pull_on_motors, pull_on_velocities
@@ -116,9 +117,9 @@ def _start(system, data, pivots, mu_xi, g_angle, g_rate):
                 x[b, 3 + i] += R[0, b, k, i] * mu_xi[b, 3 + k]
         for i in range(6, 6 + system.elastic[b]):
             x[b, i] = mu_xi[b, i]
-    solve_system_transposed(
-        system, Lc[0], Lp[0], Hc[0], Hp[0], Nc[0], Jp[0], lu[0], pivots[0], Z[0], inverse[0], x, lam, X, tree, y, g,
-        block,
+    solve_statics_transposed(
+        system, D[0], Lc[0], Lp[0], Hc[0], Hp[0], Nc[0], Jp[0], lu[0], pivots[0], Z[0], inverse[0], x, lam, X, tree, y,
+        g, block, np.zeros((count, size)), np.zeros((joints, 6)),
     )  # fmt: skip
     pull_on_motors(system, x, lam, 1.0, by_angle[0], by_rate[0], on_parent[0], g_angle, g_rate)
 

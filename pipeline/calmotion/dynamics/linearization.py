@@ -22,6 +22,7 @@ from .assembly import assemble
 from .bdf2 import position_to_velocity, velocities
 from .elimination import factor
 from .failure import SimulationFailure
+from .held_statics import hold
 from .loops import UNKNOWNS, copy_rows, factor_loops
 from .reactions import reactions
 from .schemes import bdf2_scheme
@@ -79,6 +80,8 @@ def _linearize(
         assemble(
             system, kind, now.c, now.q, now.u, now.V, Vd, now.lam, angles[n], rates[n], Hv[at], YES, work, here
         )  # fmt: skip
+        if n == 0:
+            hold(system, here.D, here.K)
         bad = factor(system, here, lu[at], pivots[at], Z[at], block)
         if bad >= 0:
             return bad, n

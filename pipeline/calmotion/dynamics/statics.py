@@ -10,6 +10,7 @@ from ..shot.character import Array
 from .assembly import assemble
 from .elimination import factor
 from .failure import SimulationFailure
+from .held_statics import HOLD
 from .least_multipliers import least_multipliers
 from .loops import factor_loops, solve_system
 from .newton import correct, worst_component
@@ -106,7 +107,8 @@ def _iterate(
     x, lam, block, border, T = ws.scratch.x, ws.scratch.lam, ws.scratch.block, ws.scratch.border, ws.scratch.T
     count, loops = len(system.parent), len(system.rows) > len(system.parent)
     before = allocate_state(system)
-    previous = np.inf
+    previous, rest = np.inf, HOLD if loops else 0.0
+    inertia = max(inertia, rest)
     for iteration in range(limit):
         linearize(system, state, angle, ws)
         blocks, factors = ws.blocks, ws.factors
@@ -134,14 +136,14 @@ def _iterate(
         before.q[:] = state.q
         state.turn[:] = 0.0
         correct(system, before, state, ws.work.R, x, lam, 1.0, T)
-        if size < TOLERANCE and inertia == 0.0:
+        if size < TOLERANCE and inertia == rest:
             if loops:
                 least_multipliers(system, border, state.lam)
             return -1, iteration + 1
-        if inertia > 0.0:
+        if inertia > rest:
             # switched evolution relaxation: less inertia as the correction shrinks, none at the end
             inertia *= 0.5 if size <= previous else 1.5
             if inertia < 1e-6 or size < 1e-6:
-                inertia = 0.0
+                inertia = rest
         previous = size
     return worst_component(system, x), limit

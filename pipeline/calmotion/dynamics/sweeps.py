@@ -11,6 +11,7 @@ import numpy as np
 
 from ..kernels import allocating_kernel, kernel
 from ..shot.character import Array
+from .held_statics import solve_statics, solve_statics_transposed
 from .linearization import Linearization
 from .loops import UNKNOWNS, solve_system, solve_system_transposed
 from .sliders import has_row
@@ -166,10 +167,16 @@ def _tangent(system, h, turns, d_angle, d_rate, first, last, data, pivots, axes,
             if p >= 0 and system.sliding[j]:
                 for i in range(6 + system.elastic[p]):
                     x[p, i] -= on_parent[at, j, i] * d_angle[n, j]
-        solve_system(
-            system, Lc[at], Lp[at], Hc[at], Hp[at], Nc[at], Jp[at], lu[at], pivots[at], Z[at], inverse[at], x, lam, X,
-            tree, y, g, block,
-        )  # fmt: skip
+        if n > 0:
+            solve_system(
+                system, Lc[at], Lp[at], Hc[at], Hp[at], Nc[at], Jp[at], lu[at], pivots[at], Z[at], inverse[at], x, lam,
+                X, tree, y, g, block,
+            )  # fmt: skip
+        else:
+            solve_statics(
+                system, D[at], Lc[at], Lp[at], Hc[at], Hp[at], Nc[at], Jp[at], lu[at], pivots[at], Z[at], inverse[at],
+                x, lam, X, tree, y, g, block, hV, np.zeros((joints, 6)),
+            )  # fmt: skip
         if len(d_effort):
             for j in range(joints):
                 d_effort[n, j] = _effort_change(system, j, axes[n], lam_of[n], Jp[at], x, lam)
@@ -255,10 +262,16 @@ def _adjoint(
         if len(effort_bar):
             for j in range(joints):
                 _effort_pull(system, j, axes[n], lam_of[n], Jp[at], effort_bar[n, j], x, lam)
-        solve_system_transposed(
-            system, Lc[at], Lp[at], Hc[at], Hp[at], Nc[at], Jp[at], lu[at], pivots[at], Z[at], inverse[at], x, lam, X,
-            tree, y, g, block,
-        )  # fmt: skip
+        if n > 0:
+            solve_system_transposed(
+                system, Lc[at], Lp[at], Hc[at], Hp[at], Nc[at], Jp[at], lu[at], pivots[at], Z[at], inverse[at], x, lam,
+                X, tree, y, g, block,
+            )  # fmt: skip
+        else:
+            solve_statics_transposed(
+                system, D[at], Lc[at], Lp[at], Hc[at], Hp[at], Nc[at], Jp[at], lu[at], pivots[at], Z[at], inverse[at],
+                x, lam, X, tree, y, g, block, hV, np.zeros((joints, 6)),
+            )  # fmt: skip
         pull_on_motors(system, x, lam, 1.0, by_angle[at], by_rate[at], on_parent[at], g_angle[n], g_rate[n])
         if n == 0:
             continue

@@ -73,11 +73,11 @@ def settled_bodies(
         seeing = with_settings(character, lambda own: replace(own, pairs_share=share * own.pairs_share))
         return reduce_bodies(seeing, tree, meshes, None, loads, tolerance, full)
 
-    def simulated(bodies: Sequence[ReducedBody]) -> Known:
+    def simulated(bodies: Sequence[ReducedBody], options: Options) -> Known:
         return known_motion(character, animation, bodies, options, options.step or MAX_STEP)
 
     tolerance, bodies, off = asked, reduced(asked), 0.0
-    found, allowed = simulated(bodies), SHARE * asked
+    found, allowed = simulated(bodies, options), SHARE * asked
     if retargeted:
         intended = intended_motion(character, animation, bodies, options)
         allowed = max(allowed, OF_SHAKE * distance(found.run.positions, intended))
@@ -87,7 +87,10 @@ def settled_bodies(
         finer = reduced(tolerance)
         if _same(bodies, finer):
             continue
-        then = simulated(finer)
+        then = simulated(finer, options)
+        if then.run.integrator != found.run.integrator:  # it gave way for one of them, which differs by more
+            options = replace(options, integrator=options.scheme)
+            found, then = simulated(bodies, options), simulated(finer, options)
         off = distance(then.run.positions, found.run.positions)
         bodies, found = finer, then
         if off <= allowed:

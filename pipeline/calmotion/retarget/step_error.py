@@ -95,18 +95,23 @@ def largest_step(
     """
     step, coarse = first, run_or_none(run, first)
     while True:
-        fine = run_or_none(run, 0.5 * step)
-        if coarse is not None and fine is not None:
+        step *= 0.5
+        fine = run_or_none(run, step)
+        if fine is None:
+            if step <= last:
+                return step, np.inf
+        elif coarse is not None and coarse.step > fine.step:  # a frame may be shorter than both
             error, enough = step_error(coarse, fine), allowed(fine)
-            if 2.0**ORDER * error <= enough:
-                return step, 2.0**ORDER * error
+            by_coarse = (coarse.step / fine.step) ** ORDER * error
+            if by_coarse <= enough:
+                return coarse.step, by_coarse
             if error <= enough:
-                return _between(0.5 * step, error, enough)
-            if 0.5 * step <= last:
-                return 0.5 * step, error
-        elif 0.5 * step <= last:
-            return 0.5 * step, np.inf
-        step, coarse = 0.5 * step, fine
+                return _between(fine.step, error, enough)
+            if step <= last:
+                return fine.step, error
+        elif step <= last:
+            return fine.step, np.inf
+        coarse = fine
 
 
 def _between(step: float, error: float, enough: float) -> tuple[float, float]:

@@ -27,7 +27,7 @@ from .optimize import optimize_shot, refuse_other_integrators
 from .prepare import Options, prepare
 from .run import Progress, meant_motion, simulate_shot
 from .step_error import ORDER, StepRun, distance, frames_of, largest_step, run_or_none, simulate_at, step_error
-from .time_grid import MAX_STEP
+from .time_grid import MAX_STEP, make_grid
 
 SHARE = 0.5  # of the tolerance, that the time step may take in any case
 WHOLE = 0.8  # of the tolerance, that it may take together with what the bodies do without
@@ -139,11 +139,20 @@ def chosen_step(
 ) -> tuple[float, float]:
     """The step of a simulation to a tolerance, and its estimated error [s], [m]; arguments as of `simulate_shot`.
 
+    It divides a frame.
+
     Args:
         left_out: Error of what the bodies do without [m].
+
+    Raises:
+        ShotError: Not even the last step does.
     """
     trial = partial(simulate_at, character, animation, bodies, options)
-    return largest_step(trial, FIRST, LAST, lambda run: _allowed(options, left_out))
+    step, error = largest_step(trial, FIRST, LAST, lambda run: _allowed(options, left_out))
+    if not np.isfinite(error):
+        trial(step)
+    whole = make_grid(animation.frame_times, step, 0.0).h
+    return whole, (whole / step) ** ORDER * error
 
 
 def optimize_to_tolerance(
