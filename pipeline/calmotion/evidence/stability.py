@@ -22,6 +22,7 @@ from ..errors import ShotError
 from ..shot import Animation, Body, Character, FEMeshes, Frame, Joint, MassProperties
 from ..shot.character import Array
 from .beam_arm import IDENTITY, beam_arm, quintic, shot_of
+from .rigid_loops import push_rod, truss
 from .tables import write_rows
 
 if TYPE_CHECKING:
@@ -115,6 +116,10 @@ def _nearly_massless() -> tuple[tuple[Character, FEMeshes], Animation]:
     return (made, meshes), shot_of(SWING(0.5), 1.0, 2)
 
 
+def _rigid(character: Character) -> Scene:
+    return lambda: ((character, FEMeshes(())), shot_of(quintic(0.8, 0.5, 0.2), 1.0))
+
+
 def _cases() -> tuple[Case, ...]:
     found = [
         Case("Young's modulus", f"1e{power} Pa", _arm(youngs_modulus=10.0**power))
@@ -160,6 +165,16 @@ def _cases() -> tuple[Case, ...]:
             _wave, links=64, length=0.05, thickness=0.02, youngs_modulus=2.1e11, density=7800.0, cells=3
         )),
     ]  # fmt: skip
+    found += [
+        Case("loop", f"{name}, by {integrator}", _rigid(character), None, integrator)
+        for integrator in ("bdf2", "generalized-alpha")
+        for name, character in (
+            ("balanced push rod", push_rod()),
+            ("push rod in a horizontal plane", push_rod((0.0, -9.81, 0.0))),
+            ("push rod without gravity", push_rod((0.0, 0.0, 0.0))),
+            ("truss without freedom", truss()),
+        )
+    ]
     return tuple(found)
 
 
@@ -211,6 +226,8 @@ def judged(
         wrong = "the target flew away"
     elif simulation.max_joint_gap > allowed:
         wrong = f"a joint came apart by {simulation.max_joint_gap:.1e} m"
+    elif not any(len(body.stiffness) for body in bodies) and simulation.position_errors.max() > allowed:
+        wrong = "a rigid character does not do what it should"
     elif np.abs(np.linalg.norm(motion.rotations, axis=2) - 1.0).max() > NORM:
         wrong = "a quaternion lost its length"
     steps = len(motion.times)
