@@ -1,0 +1,29 @@
+"""Whatever is drawn and can be simulated keeps the tolerance that is asked for, by a step that follows from it."""
+
+from calmotion import ShotError
+from calmotion.dynamics.topology import span_tree
+from calmotion.retarget.bodies import reduce_bodies
+from calmotion.retarget.prepare import Options
+from calmotion.retarget.step_error import distance, frames_of, simulate_at
+from calmotion.retarget.to_tolerance import simulate_to_tolerance
+from hypothesis import assume, event, given
+from hypothesis import strategies as st
+from random_shots import linkages, shots
+
+TOLERANCE, FINE = 1e-3, 1 / 3840
+
+
+@given(st.one_of(shots(), linkages()))
+def test_the_tolerance_is_kept(shot):
+    character, animation = shot.character, shot.animation
+    bodies = reduce_bodies(character, span_tree(character), shot.meshes)
+    try:
+        options = Options(tolerance=TOLERANCE)
+        result = simulate_to_tolerance(character, animation, bodies, options, lambda fraction, message: None)
+        fine, finer = (simulate_at(character, animation, bodies, Options(), h).positions for h in (FINE, 0.5 * FINE))
+    except ShotError:
+        event("refused")
+        assume(False)
+    limit = finer + (finer - fine) / 3.0
+    assume(distance(limit, finer) < TOLERANCE)  # the limit is known
+    assert distance(frames_of(result, animation.frame_times).positions, limit) < TOLERANCE
