@@ -28,6 +28,7 @@ def test_simulations_keep_their_tolerance(shot):
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(work_precision, "REFERENCE_STEP", 1 / 1920)
         measured = Tolerances(shot)
+        measured.warm(1e-2, "simulate")
         found = [measured.kept(tolerance) for tolerance in (1e-2, 1e-3, 1e-4)]
     assert all(row.kept and row.reference_m < 0.1 * row.tolerance_m for row in found)
     assert found[2].step_s < found[0].step_s
@@ -44,6 +45,8 @@ def test_results_keep_their_tolerance(rows):
 def test_the_command_tells_whether_they_are_kept(shot, rows, monkeypatch, capsys, tmp_path):
     found = list(rows)
     monkeypatch.setattr(tolerances, "load_unreduced", lambda path: shot)
+    warmed = []
+    monkeypatch.setattr(Tolerances, "warm", lambda self, *arguments: warmed.append(arguments))
     monkeypatch.setattr(Tolerances, "kept", lambda self, tolerance, command: found.pop(0))
     arguments = [
         "arm.usda",
@@ -57,7 +60,7 @@ def test_the_command_tells_whether_they_are_kept(shot, rows, monkeypatch, capsys
         "--markdown",
         str(tmp_path / "rows.md"),
     ]
-    assert tolerances.main(arguments) == 0
+    assert tolerances.main(arguments) == 0 and warmed == [(0.01, "optimize")]
     assert [row["kept"] for row in json.loads(capsys.readouterr().out)["rows"]] == [True, True]
     with open(tmp_path / "rows.csv", newline="") as file:
         assert [float(row["error_m"]) for row in csv.DictReader(file)] == [row.error_m for row in rows]

@@ -77,6 +77,11 @@ class Tolerances:
         self.shot, self.finest = shot, finest
         self._reference: Reference | None = None
 
+    def warm(self, tolerance: float, command: str) -> None:
+        """Run once, so that what is timed afterwards neither compiles nor loads kernels."""
+        with fresh_cache():
+            self._run(Options(tolerance=tolerance), command)
+
     def kept(self, tolerance: float, command: str = "simulate") -> Kept:
         """Simulate or retarget the shot to a tolerance [m], and measure the result."""
         shot, animation = self.shot, self.shot.animation
@@ -164,9 +169,10 @@ def main(arguments: list[str] | None = None) -> int:
     rows: list[Kept] = []
     for path in options.shots:
         shot = Tolerances(load_unreduced(path), FINER * min(options.tolerances))
-        own = []
+        own, command = [], "optimize" if options.optimize else "simulate"
+        shot.warm(max(options.tolerances), command)
         for tolerance in options.tolerances:
-            own.append(shot.kept(tolerance, "optimize" if options.optimize else "simulate"))
+            own.append(shot.kept(tolerance, command))
             print(told(own[-1]), file=sys.stderr, flush=True)  # the next may take long
             if options.csv:
                 write_rows(options.csv, Kept, rows + own)
