@@ -231,16 +231,17 @@ def test_options_of_the_writer_are_its_properties(run):
     assert status == 2 and "usd.write.bake" in err
 
 
-def test_options_reach_the_plugins_in_si_units(run):
+@pytest.mark.parametrize("command", ["simulate", "inspect"])
+def test_options_reach_the_plugins_in_si_units(run, command):
     seen = []
 
-    def solve(context):
+    def read(context):
         seen.append(context.get(Source))
-        return (synthetic.result(False),)
+        return (synthetic.character(), synthetic.animation(), PROVENANCE)
 
-    run("simulate", "a.usda", "--step", "2ms", "--tolerance", "1mm", "--integrator", "radau", "--pre-roll", "0.5",
-        "--quiet", solve=solve)  # fmt: skip
-    assert seen == [Source("a.usda", "simulate", tolerance=0.001, step=0.002, integrator="radau", pre_roll=0.5)]
+    run(command, "a.usda", "--step", "2ms", "--tolerance", "1mm", "--integrator", "radau", "--pre-roll", "0.5",
+        "--quiet", read=read)  # fmt: skip
+    assert seen == [Source("a.usda", command, tolerance=0.001, step=0.002, integrator="radau", pre_roll=0.5)]
 
 
 def test_inspect_reports_bodies_motors_and_frequencies(run):

@@ -81,6 +81,7 @@ def _parser() -> argparse.ArgumentParser:
     for command in (simulate, optimize):
         _run_options(command)
     for command in (inspect, simulate, optimize):
+        _simulation_options(command)
         _needs_options(command)
     rig = _shot_command(commands, "rig", _rig, "make a robot of a skinned character: bodies, joints, motors, targets")
     rig.add_argument("-o", "--output", metavar="LAYER", required=True, help="USD layer to write; it opens the shot")
@@ -155,6 +156,14 @@ def _run_options(command: argparse.ArgumentParser) -> None:
         metavar="FILE",
         help="motion from beside the shot onto motors, such as a BVH file (--set bvh.read.map=...)",
     )
+    command.add_argument(
+        "--verify",
+        action="store_true",
+        help="measure the error of the result against a finer run: several times the time",
+    )
+
+
+def _simulation_options(command: argparse.ArgumentParser) -> None:
     model = command.add_argument_group("simulation")
     model.add_argument("--step", metavar="TIME", type=_quantity("s"), help="time step, in s or with a unit (2ms)")
     model.add_argument(
@@ -162,11 +171,6 @@ def _run_options(command: argparse.ArgumentParser) -> None:
         metavar="LENGTH",
         type=_quantity("m"),
         help="error at the targets that does not matter (1mm); the time step then follows from it",
-    )
-    model.add_argument(
-        "--verify",
-        action="store_true",
-        help="measure the error of the result against a finer run: several times the time",
     )
     model.add_argument(
         "--integrator",

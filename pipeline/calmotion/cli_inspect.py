@@ -36,10 +36,18 @@ def inspect_shot(args: argparse.Namespace, output: Output) -> int:
         wanted.append(ModeShapes)
     wanted += asked_for(host, args)
     tell_failures(host, args.quiet)
+    source = Source(
+        path=args.shot,
+        command="check" if args.strict else "inspect",
+        tolerance=args.tolerance,
+        step=args.step,
+        pre_roll=args.pre_roll,
+        integrator=args.integrator,
+    )
     optional = [Character, Animation, Provenance] if args.strict else [Needs, ReducedBodies, SystemModes, PlannedStep]
     with ProgressDisplay(args.quiet, args.progress) as display:
         run = host.run(
-            [Source(path=args.shot, command="check" if args.strict else "inspect"), OutputPaths(modes=args.modes)],
+            [source, OutputPaths(modes=args.modes)],
             wanted,
             optional=optional,
             settings=settings_of(args),

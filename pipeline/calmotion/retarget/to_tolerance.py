@@ -121,10 +121,12 @@ def step_row(character: Character, options: Options, step: float, error: float |
 def planned_step(character: Character, animation: Animation, bodies: Bodies, options: Options) -> LeftOut:
     """The step that a simulation of the shot as animated would take, and why, by simulating it."""
     if _chooses(character, options):
+        held = held_to_tolerance(character, animation, bodies, options, None)
+        left_out = _left_out(bodies) + held.error_m
         return by_fast_scheme(
             options,
             lambda options: step_row(
-                character, options, *chosen_step(character, animation, bodies, options, _left_out(bodies))
+                character, options, *chosen_step(character, animation, held.bodies, options, left_out)
             ),
         )
     trial = partial(simulate_at, character, animation, bodies, options)
