@@ -13,7 +13,7 @@ constraints no longer show.
 
 from __future__ import annotations
 
-from ..kernels import kernel, part
+from ..kernels import kernel
 from .loops import copy_rows, solve_system, solve_system_transposed
 
 HOLD = 1e-2  # [1/s^2]
@@ -31,7 +31,7 @@ def hold(system, D, K):
                 K[b, i, k] += HOLD * D[b, i, k]
 
 
-@part
+@kernel
 def _held(system, D, rx, rlam, x, lam, X):
     """(x, lam) <- (r + HOLD D x, rlam), by the scratch X."""
     for b in range(len(system.parent)):

@@ -143,7 +143,7 @@ def _iterate(
         if inertia > rest:
             # switched evolution relaxation: less inertia as the correction shrinks, none at the end
             inertia *= 0.5 if size <= previous else 1.5
-            if inertia < 1e-6 or size < 1e-6:
+            if inertia < max(1e-6, rest) or size < 1e-6:
                 inertia = rest
         previous = size
     return worst_component(system, x), limit
