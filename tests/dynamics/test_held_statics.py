@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 from arms import chain, compiled
 from calmotion.dynamics.elimination import factor
-from calmotion.dynamics.held_statics import hold, solve_statics, solve_statics_transposed
+from calmotion.dynamics.held_statics import hold, is_held, solve_statics, solve_statics_transposed
 from calmotion.dynamics.kinematics import rigid_state
 from calmotion.dynamics.loops import factor_loops
 from calmotion.dynamics.simulation import Workspace
 from calmotion.dynamics.statics import equilibrium, linearize
 from calmotion.dynamics.system import Blocks
-from calmotion.evidence.rigid_loops import push_rod
+from calmotion.evidence.neutral_hinges import push_rod, turning
 from dense import dense_matrix, join, split
 from scipy.spatial.transform import Rotation
 
@@ -48,7 +48,7 @@ def test_solutions_are_those_of_the_whole_matrix(made, transposed):
     A = dense_matrix(system, Blocks(*[part.copy() for part in blocks]))
     A = A.T if transposed else A  # free rows of joints are zero
     b = A @ np.random.default_rng(3).normal(size=len(A))  # that has a solution, though multipliers are redundant
-    hold(system, blocks.D, blocks.K)
+    hold(system, blocks.D, blocks.K, blocks.Nc)
     tree = (factors.lu, factors.pivots, factors.Z)
     shared = (blocks.Lc, blocks.Lp, blocks.Hc[len(system.parent) :], blocks.Hp, blocks.Nc, blocks.Jp, *tree)
     assert factor(system, blocks, *tree, block) == -1
@@ -65,8 +65,18 @@ def test_solutions_are_those_of_the_whole_matrix(made, transposed):
     np.testing.assert_allclose(found[motion], expected[motion], atol=1e-9 * np.abs(expected).max())
 
 
-def test_without_loops_nothing_is_held():
+@pytest.mark.parametrize("gravity", [(0, 0, -9.81), (0, -9.81, 0)], ids=["wheel", "door"])
+def test_what_nothing_holds_keeps_its_angle_and_goes_with_what_carries_it(gravity):
+    model = compiled(turning(gravity, 0.1 * (gravity[2] == 0)))
+    state, ws = resting(model)
+    for rotation in Rotation.from_quat(np.roll(state.q, -1, axis=1)).as_rotvec():
+        np.testing.assert_allclose(rotation, [0.0, 0.0, 0.4], atol=1e-10)
+    assert np.abs(ws.blocks.res).max() < 1e-10
+
+
+def test_what_motors_hold_needs_nothing():
     model = compiled(chain(2, driven=(0, 1)))
-    K, D = np.zeros((2, 6, 6)), np.ones((2, 6, 6))
-    hold(model.system, D, K)
-    assert not K.any()
+    K, D, Nc = np.zeros((2, 6, 6)), np.ones((2, 6, 6)), np.zeros((2, 6, 3))
+    hold(model.system, D, K, Nc)
+    assert not K.any() and not Nc.any() and not is_held(model.system)
+    assert is_held(compiled(chain(2, driven=(0,))).system)

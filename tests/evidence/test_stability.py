@@ -25,7 +25,11 @@ def test_every_case_runs_or_is_refused_with_a_reason(case):
         # where, what, and what to do about it
         assert outcome.why.startswith("/Arm/") and outcome.why.endswith(".") and len(outcome.why) > 100
     else:
-        assert outcome.steps > 10 and outcome.error_m < (1e-6 if case.group == "loop" else 2.0) and outcome.gap_m < 1e-6
+        assert (
+            outcome.steps > 10
+            and outcome.error_m < (1e-6 if case.group == "hinge without stiffness" else 2.0)
+            and outcome.gap_m < 1e-6
+        )
 
 
 def test_what_flies_away_or_is_no_number_has_failed(monkeypatch):

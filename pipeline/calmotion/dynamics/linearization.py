@@ -81,7 +81,7 @@ def _linearize(
             system, kind, now.c, now.q, now.u, now.V, Vd, now.lam, angles[n], rates[n], Hv[at], YES, work, here
         )  # fmt: skip
         if n == 0:
-            hold(system, here.D, here.K)
+            hold(system, here.D, here.K, here.Nc)
         bad = factor(system, here, lu[at], pivots[at], Z[at], block)
         if bad >= 0:
             return bad, n

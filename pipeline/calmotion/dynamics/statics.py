@@ -10,7 +10,7 @@ from ..shot.character import Array
 from .assembly import assemble
 from .elimination import factor
 from .failure import SimulationFailure
-from .held_statics import HOLD
+from .held_statics import hold
 from .least_multipliers import least_multipliers
 from .loops import factor_loops, solve_system
 from .newton import correct, worst_component
@@ -47,7 +47,7 @@ def equilibrium(system: System, start: State, angle: Array, ws: Workspace) -> tu
 
     Newton's method from the given pose. Where it does not converge at once gravity is brought up in parts; where joints
     move freely, or that fails too, the mass matrix over a growing pseudo time step squared is added, which follows the
-    damped fall into a stable equilibrium.
+    damped fall into a stable equilibrium. What nothing holds or moves, as a wheel, stays where it is.
 
     Returns:
         The state and the number of iterations.
@@ -107,12 +107,12 @@ def _iterate(
     x, lam, block, border, T = ws.scratch.x, ws.scratch.lam, ws.scratch.block, ws.scratch.border, ws.scratch.T
     count, loops = len(system.parent), len(system.rows) > len(system.parent)
     before = allocate_state(system)
-    previous, rest = np.inf, HOLD if loops else 0.0
-    inertia = max(inertia, rest)
+    previous = np.inf
     for iteration in range(limit):
         linearize(system, state, angle, ws)
         blocks, factors = ws.blocks, ws.factors
         blocks.K[:] += inertia * blocks.D
+        hold(system, blocks.D, blocks.K, blocks.Nc)
         component = factor(system, blocks, factors.lu, factors.pivots, factors.Z, block)
         if component >= 0:
             return component, iteration + 1
@@ -136,14 +136,14 @@ def _iterate(
         before.q[:] = state.q
         state.turn[:] = 0.0
         correct(system, before, state, ws.work.R, x, lam, 1.0, T)
-        if size < TOLERANCE and inertia == rest:
+        if size < TOLERANCE and inertia == 0.0:
             if loops:
                 least_multipliers(system, border, state.lam)
             return -1, iteration + 1
-        if inertia > rest:
+        if inertia > 0.0:
             # switched evolution relaxation: less inertia as the correction shrinks, none at the end
             inertia *= 0.5 if size <= previous else 1.5
-            if inertia < max(1e-6, rest) or size < 1e-6:
-                inertia = rest
+            if inertia < 1e-6 or size < 1e-6:
+                inertia = 0.0
         previous = size
     return worst_component(system, x), limit

@@ -22,7 +22,7 @@ from ..errors import ShotError
 from ..shot import Animation, Body, Character, FEMeshes, Frame, Joint, MassProperties
 from ..shot.character import Array
 from .beam_arm import IDENTITY, beam_arm, quintic, shot_of
-from .rigid_loops import push_rod, truss
+from .neutral_hinges import push_rod, truss, turning
 from .tables import write_rows
 
 if TYPE_CHECKING:
@@ -166,13 +166,16 @@ def _cases() -> tuple[Case, ...]:
         )),
     ]  # fmt: skip
     found += [
-        Case("loop", f"{name}, by {integrator}", _rigid(character), None, integrator)
+        Case("hinge without stiffness", f"{name}, by {integrator}", _rigid(character), None, integrator)
         for integrator in ("bdf2", "generalized-alpha")
         for name, character in (
             ("balanced push rod", push_rod()),
             ("push rod in a horizontal plane", push_rod((0.0, -9.81, 0.0))),
             ("push rod without gravity", push_rod((0.0, 0.0, 0.0))),
             ("truss without freedom", truss()),
+            ("wheel", turning()),
+            ("door", turning((0.0, -9.81, 0.0), 0.1)),
+            ("pendulum without gravity", turning((0.0, 0.0, 0.0), 0.1)),
         )
     ]
     return tuple(found)

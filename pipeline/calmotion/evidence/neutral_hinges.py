@@ -1,4 +1,4 @@
-"""Rigid characters whose passive hinges have no stiffness at rest: loops alone hold them."""
+"""Rigid characters whose passive hinges have no stiffness at rest: loops alone hold them, or nothing does."""
 
 from __future__ import annotations
 
@@ -63,4 +63,26 @@ def truss() -> Character:
     target = Target("/Truss/Left", 1, Frame(np.array([0.3, 0.0, 0.3]), IDENTITY))
     return Character(
         "/Truss", bodies, joints, (Motor(0, joints[0].path, _ANGLE),), (target,), np.array([0.0, 0.0, -9.81])
+    )
+
+
+def turning(gravity: Sequence[float] = (0.0, 0.0, -9.81), offset: float = 0.0) -> Character:
+    """An arm that a motor turns about z, with a wheel about y at its end.
+
+    Args:
+        gravity: [m/s^2]; along y the wheel is a door.
+        offset: Of the wheel's mass from its axis [m].
+    """
+    arm = MassProperties(_HEAVY, np.zeros(3), _SMALL)
+    wheel = MassProperties(_HEAVY, np.array([offset, 0.0, 0.0]), _SMALL)
+    origin, end = (0.0, 0.0, 0.0), (0.3, 0.0, 0.0)
+    bodies = (
+        Body("/Turn/Arm", Frame(np.zeros(3), IDENTITY), arm),
+        Body("/Turn/Wheel", Frame(np.array(end), IDENTITY), wheel),
+    )
+    at = Frame(np.zeros(3), IDENTITY)
+    joints = (Joint("/Turn/Motor", "revolute", WORLD, 0, at, at), _pin("/Turn/Axle", 0, 1, end, origin))
+    target = Target("/Turn/Wheel", 1, Frame(np.array([0.05, 0.0, 0.0]), IDENTITY))
+    return Character(
+        "/Turn", bodies, joints, (Motor(0, joints[0].path, _ANGLE),), (target,), np.array(gravity, dtype=float)
     )
