@@ -34,9 +34,9 @@ def forward_points(bench: Bench, reference: Reference) -> list[Point]:
     held = [bench.held(base, allowed) for allowed in LEVELS]
     points = [
         bench.measure(reference, integrator, f"1/{1 / step:.0f} s", bodies, step, integrator)
-        for bodies in held
+        for bodies, steps in zip(held, [*[STEPS] * (len(held) - 1), STEPS + FINER_STEPS], strict=True)
         for integrator in ("bdf2", "newmark", "generalized-alpha")
-        for step in (STEPS + FINER_STEPS if bodies is held[-1] else STEPS)
+        for step in steps
     ]
     points += [bench.measure(reference, "radau", f"1/{1 / h:.0f} s", held[0], h, "radau") for h in RADAU_STEPS]
     fine = 0.5 * MAX_STEP
