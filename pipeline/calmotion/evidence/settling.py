@@ -8,7 +8,6 @@ modes and their derivatives follows.
 
 from __future__ import annotations
 
-import argparse
 import json
 import sys
 import time
@@ -17,7 +16,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from ..retarget.step_error import distance
-from .tables import markdown, write_rows
+from .tables import markdown, table_parser, write_rows
 from .work_precision import FINEST, SAMPLES, Bench, machine
 
 TOLERANCES = (1e-3, 1e-4, 1e-5, 1e-6, FINEST)
@@ -75,13 +74,7 @@ def main(arguments: list[str] | None = None) -> int:
     """The command."""
     from .shots import load_unreduced
 
-    parser = argparse.ArgumentParser(prog="calmotion bench settling", description=__doc__)
-    parser.add_argument("shots", metavar="SHOT", nargs="*", default=list(SAMPLES), help="USD file (default: samples)")
-    parser.add_argument("--tolerances", metavar="METRES", nargs="+", type=float, default=list(TOLERANCES))
-    parser.add_argument("--json", action="store_true", help="print one JSON object on stdout, and nothing else there")
-    parser.add_argument("--csv", metavar="FILE", help="also write a table")
-    parser.add_argument("--markdown", metavar="FILE", help="also write the table as Markdown")
-    options = parser.parse_args(arguments)
+    options = table_parser("settling", __doc__, SAMPLES, TOLERANCES).parse_args(arguments)
     rows: list[Settling] = []
     for path in options.shots:
         for row in settling(Bench(load_unreduced(path)), options.tolerances):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import argparse
 import csv
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict, fields
@@ -20,3 +21,16 @@ def markdown(heads: Sequence[str], rows: Iterable[Sequence[str]], rule: str = "-
     """A Markdown table; `rule` aligns all columns but the first."""
     lines = [heads, ["---", *[rule] * (len(heads) - 1)], *rows]
     return "".join("| " + " | ".join(line) + " |\n" for line in lines)
+
+
+def table_parser(
+    name: str, description: str | None, shots: Sequence[str], tolerances: Sequence[float]
+) -> argparse.ArgumentParser:
+    """The arguments of a benchmark that takes shots to tolerances, and tells them as a table."""
+    parser = argparse.ArgumentParser(prog=f"calmotion bench {name}", description=description)
+    parser.add_argument("shots", metavar="SHOT", nargs="*", default=list(shots), help="USD file (default: samples)")
+    parser.add_argument("--tolerances", metavar="METRES", nargs="+", type=float, default=list(tolerances))
+    parser.add_argument("--json", action="store_true", help="print one JSON object on stdout, and nothing else there")
+    parser.add_argument("--csv", metavar="FILE", help="also write a table")
+    parser.add_argument("--markdown", metavar="FILE", help="also write the table as Markdown")
+    return parser

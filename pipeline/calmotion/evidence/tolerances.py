@@ -8,7 +8,6 @@ again. The error is the largest distance of any target, at any frame, between th
 
 from __future__ import annotations
 
-import argparse
 import json
 import sys
 import time
@@ -24,7 +23,7 @@ from ..retarget.to_tolerance import found_tracks, optimize_to_tolerance, simulat
 from ..shot import Result
 from .fresh_cache import fresh_cache
 from .shots import Unreduced, load_unreduced
-from .tables import markdown, write_rows
+from .tables import markdown, table_parser, write_rows
 from .work_precision import FINEST, SAMPLES, Bench, Reference, machine
 
 TOLERANCES = (1e-2, 1e-3, 1e-4, 1e-5)
@@ -158,13 +157,8 @@ def print_rows(rows: Sequence[Kept]) -> None:
 
 def main(arguments: list[str] | None = None) -> int:
     """The command: exit status 1 when a tolerance is not kept."""
-    parser = argparse.ArgumentParser(prog="calmotion bench tolerances", description=__doc__)
-    parser.add_argument("shots", metavar="SHOT", nargs="*", default=list(SAMPLES), help="USD file (default: samples)")
-    parser.add_argument("--tolerances", metavar="METRES", nargs="+", type=float, default=list(TOLERANCES))
+    parser = table_parser("tolerances", __doc__, SAMPLES, TOLERANCES)
     parser.add_argument("--optimize", action="store_true", help="retarget the shots, which takes far longer")
-    parser.add_argument("--json", action="store_true", help="print one JSON object on stdout, and nothing else there")
-    parser.add_argument("--csv", metavar="FILE", help="also write a table")
-    parser.add_argument("--markdown", metavar="FILE", help="also write the table as Markdown")
     options = parser.parse_args(arguments)
     rows: list[Kept] = []
     for path in options.shots:
