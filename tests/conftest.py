@@ -12,6 +12,7 @@ from pathlib import Path
 
 import pytest
 
+pytest_plugins = ["arm_fixtures", "finite_element_fixtures", "flexible_tree_fixture"]
 REPOSITORY = Path(__file__).resolve().parents[1]
 
 MANIFEST = {
@@ -84,7 +85,7 @@ def pytest_configure(config):
 
 
 # While one of two processes compiles the kernels, the other does what needs none: each begins with an eighth of all.
-COMPILING, WITHOUT_KERNELS = {"dynamics"}, {"host", "refusals", "rig", "shot", "usd"}
+COMPILING, WITHOUT_KERNELS = {"multibody"}, {"host", "refusals", "rigging", "views", "usd"}
 WITH_KERNELS = {"test_equivalence.py", "test_length_motors_and_roots.py", "test_sources_end_to_end.py"}
 
 

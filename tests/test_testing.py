@@ -1,7 +1,9 @@
 import numpy as np
 import pytest
 import synthetic
-from calmotion.host import CsvFile, OutputPaths, PluginError
+from calmotion.host import PluginError
+from calmotion.shot.outputs import CsvFile
+from calmotion.shot.run import OutputPaths
 from calmotion.testing import beam, check_plugin, host_with, run_operator, small_shot
 
 HEAD = """

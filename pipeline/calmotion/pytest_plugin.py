@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 import pytest
 
 if TYPE_CHECKING:
-    from .host import Host
-    from .shot import Animation, Character
+    from calmotion.host import Host
+    from calmotion.shot import Animation, Character
 
 
 @pytest.fixture
@@ -18,7 +18,7 @@ def calmotion_host() -> Callable[..., Host]:
     """Makes a host with the plugins of the folders it is given, and no others."""
 
     def make(*folders: str | Path) -> Host:
-        from .testing import host_with
+        from calmotion.testing import host_with
 
         return host_with(*folders)
 
@@ -28,7 +28,7 @@ def calmotion_host() -> Callable[..., Host]:
 @pytest.fixture
 def calmotion_shot() -> tuple[Character, Animation]:
     """A rigid arm with two motors that swings for a second."""
-    from .testing import small_shot
+    from calmotion.testing import small_shot
 
     return small_shot()
 
@@ -36,7 +36,7 @@ def calmotion_shot() -> tuple[Character, Animation]:
 @pytest.fixture
 def calmotion_flexible_shot() -> tuple[Character, Animation]:
     """The same with a forearm that bends."""
-    from .testing import small_shot
+    from calmotion.testing import small_shot
 
     return small_shot(flexible=True)
 

@@ -7,10 +7,10 @@ from pathlib import Path
 
 import numpy as np
 
-from .host import Host, Plugin, PluginError, PluginState, Settings
-from .host.discovery import Location
-from .host.manifest import FILE_NAME
-from .shot import (
+from calmotion.host import Host, Plugin, PluginError, PluginState, Settings
+from calmotion.host.discovery import Location
+from calmotion.host.manifest import FILE_NAME
+from calmotion.shot import (
     WORLD,
     Animation,
     Body,
@@ -26,7 +26,7 @@ from .shot import (
     TetGeometry,
     Track,
 )
-from .shot.character import Array, IntArray
+from calmotion.shot.character import Array, IntArray
 
 LENGTH, WIDTH, DENSITY = 0.4, 0.04, 1200.0
 

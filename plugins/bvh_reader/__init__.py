@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from calmotion.host import NotAsked, Operator, Property, RunContext, Source
+from calmotion.host import NotAsked, Operator, Property, RunContext
 from calmotion.shot import MotorTracks
+from calmotion.shot.run import Source
 
 
 class ReadMotion(Operator):

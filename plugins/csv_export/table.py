@@ -8,9 +8,9 @@ from pathlib import Path
 
 import numpy as np
 from calmotion.errors import ShotError
-from calmotion.files import write_whole
-from calmotion.retarget.commanded import commanded_values
 from calmotion.shot import Animation, Character, Motor, Provenance, Result
+from calmotion.shot.commanded import commanded_values
+from calmotion.support.files import write_whole
 
 
 def write_table(

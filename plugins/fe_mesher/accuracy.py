@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+from calmotion.accuracy.element_size import ACCURACY, MAX_NODES, Shape, smallest_size
 from calmotion.errors import ShotError
-from calmotion.fem.element_size import ACCURACY, MAX_NODES, Shape, smallest_size
 from calmotion.shot import Body, Character, Frame
 
 _COUNT = 3  # frequencies: those that a motion excites
@@ -47,8 +47,8 @@ def estimate(points: np.ndarray, tets: np.ndarray, body: Body, carrier: Frame | 
         body: With `flexible` settings.
         carrier: Where that is; None leaves the body free.
     """
-    from calmotion.fem.assembly import assemble
-    from calmotion.fem.discretization_error import frequency_errors
+    from calmotion.reduction.discretization_error import frequency_errors
+    from calmotion.reduction.elements.assembly import assemble
 
     assert body.flexible is not None
     model = assemble(points, tets, body.flexible.material)
@@ -102,7 +102,7 @@ def _weighed(errors: np.ndarray, frequencies: np.ndarray) -> float:
 
 
 def _held(mesh, body: Body, carrier: Frame | None) -> np.ndarray | None:
-    from calmotion.fem.interfaces import Anchor, interface_patches
+    from calmotion.reduction.interfaces.interface_patches import Anchor, interface_patches
 
     assert body.flexible is not None
     if carrier is None:

@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+from calmotion.accuracy.element_size import ACCURACY, MAX_NODES, Shape, element_size, envelope, shape_of
 from calmotion.errors import ShotError
-from calmotion.fem.element_size import ACCURACY, MAX_NODES, Shape, element_size, envelope, shape_of
-from calmotion.fem.tetrahedra import (
+from calmotion.geometry.tetrahedra import (
     connected_parts,
     measure_quality,
     oriented_tets,

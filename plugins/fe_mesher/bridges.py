@@ -48,7 +48,7 @@ def bridged(solids: Sequence[Part]) -> tuple[Part | None, float]:
 
 def _near(x: np.ndarray, facing: np.ndarray) -> list[tuple[int, float]]:
     """Triangles whose middle sees another solid within the gap, along their normal: number and distance."""
-    from calmotion.fem.nearness import ray_length
+    from calmotion.geometry.distances import ray_length
 
     low, high = facing.reshape(-1, 3).min(axis=0) - _GAP, facing.reshape(-1, 3).max(axis=0) + _GAP
     normal = np.cross(x[:, 1] - x[:, 0], x[:, 2] - x[:, 0])

@@ -10,7 +10,7 @@ import zipfile
 from pathlib import Path
 
 import numpy as np
-from calmotion.cache import cache_folder
+from calmotion.support.cache_folder import cache_folder
 
 FOLDER = "tetrahedra"
 

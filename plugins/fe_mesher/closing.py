@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from calmotion.errors import ShotError
-from calmotion.fem.closed_surfaces import boundary_walks, close
-from calmotion.fem.orientation import patch_boundaries, patches_of, signs_that_close
-from calmotion.fem.tetrahedra import surface_area, surface_volume
+from calmotion.geometry.closed_surfaces import boundary_walks, close
+from calmotion.geometry.orientation import patch_boundaries, patches_of, signs_that_close
+from calmotion.geometry.tetrahedra import surface_area, surface_volume
 
 from .junctions import split_at_junctions
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from calmotion.fem.orientation import directed_edges
+from calmotion.geometry.orientation import directed_edges
 
 _PASSES = 8  # a triangle may have to be split at each of its edges, and its parts again
 

@@ -7,7 +7,7 @@ from typing import Any
 
 from calmotion.host import Operator, Property, RunContext
 from calmotion.shot import Character, FEMeshes, Needs
-from calmotion.shot.needs import nothing_bends
+from calmotion.shot.model_choice import nothing_bends
 
 
 class TetrahedralizeFlexibleBodies(Operator):

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from calmotion.errors import ShotError
-from calmotion.fem.closed_surfaces import winding_number
+from calmotion.geometry.closed_surfaces import winding_number
 from calmotion.shot import SurfaceMesh
 
 from .bridges import bridged

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 from calmotion.errors import ShotError
-from calmotion.fem.tetrahedra import flat_tets
+from calmotion.geometry.tetrahedra import flat_tets
 
 from . import cache
 

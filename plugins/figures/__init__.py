@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from calmotion.host import Figures, Operator, OutputPaths, Property, RunContext, SystemModes
+from calmotion.host import Operator, Property, RunContext
 from calmotion.shot import Animation, Character, Result
+from calmotion.shot.outputs import Figures, SystemModes
+from calmotion.shot.run import OutputPaths
 
 
 class PlotFigures(Operator):

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from calmotion.shot import Character, Result, Simulation
 from calmotion.shot.measure import measure_of
-from calmotion.shot.playback import sample_motion
+from calmotion.views.playback import sample_motion
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from calmotion.naming import distinct_names
 from calmotion.shot import Animation, Character, Motion, Result, Simulation
 from calmotion.shot.character import Array
-from calmotion.shot.playback import sample_motion
-from calmotion.shot.viewpoint import choose_viewpoint
+from calmotion.support.naming import distinct_names
+from calmotion.views.playback import sample_motion
+from calmotion.views.viewpoint import choose_viewpoint
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from calmotion.shot import Character, Motion, Skin
 from calmotion.shot.character import Array, IntArray
-from calmotion.shot.playback import deformed_points, modes_of, rotation_matrices
-from calmotion.shot.shading import split_at_creases
-from calmotion.shot.viewpoint import Viewpoint
+from calmotion.views.playback import deformed_points, modes_of, rotation_matrices
+from calmotion.views.shading import split_at_creases
+from calmotion.views.viewpoint import Viewpoint
 from matplotlib.colors import to_rgb
 from numpy.typing import NDArray
 

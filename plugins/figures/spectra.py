@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from calmotion.host import SystemModes
 from calmotion.shot import Character, Result
-from calmotion.shot.spectrum import error_spectrum, highest_frequency
+from calmotion.shot.outputs import SystemModes
+from calmotion.views.spectrum import error_spectrum, highest_frequency
 from matplotlib.figure import Figure
 
 from .curves import WIDTH, runs_of, worst_targets

@@ -5,9 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from calmotion.host import ModeShapes, Operator, OutputPaths, Property, RunContext, Source
+from calmotion.host import Operator, Property, RunContext
 from calmotion.shot import Animation, Character, FEMeshes, Needs
-from calmotion.shot.needs import nothing_bends
+from calmotion.shot.model_choice import nothing_bends
+from calmotion.shot.outputs import ModeShapes
+from calmotion.shot.run import OutputPaths, Source
 
 
 class WriteModeShapes(Operator):
@@ -30,8 +32,8 @@ class WriteModeShapes(Operator):
         return nothing_bends(data) or asked
 
     def execute(self, context: RunContext) -> Sequence[object]:
-        from calmotion.retarget.bodies import flexible_modes
-        from calmotion.retarget.prepare import Options, excitations
+        from calmotion.simulation.bodies import flexible_modes
+        from calmotion.simulation.prepare import Options, excitations
 
         from .writing import write_modes
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
-    from calmotion.fem.assembly import QuadraticMesh
+    from calmotion.reduction.elements.assembly import QuadraticMesh
 
 COLUMNS = 4
 _WIDTH = 3.2  # of a panel [inch]

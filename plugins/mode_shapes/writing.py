@@ -9,15 +9,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from calmotion.errors import ShotError
-from calmotion.fem.damping import modal_damping
-from calmotion.fem.integrals import inertia_integrals
-from calmotion.naming import distinct_names
+from calmotion.reduction.damping import modal_damping
+from calmotion.reduction.inertia_integrals import inertia_integrals
 from calmotion.shot import Body
+from calmotion.support.naming import distinct_names
 
 from .picture import draw_modes
 
 if TYPE_CHECKING:
-    from calmotion.fem.reduce import LinearModes
+    from calmotion.reduction.reduce import LinearModes
 
 SHOWN = 0.1  # largest displacement of a mode in the files, of the body's size
 COLUMNS = ("body", "mode", "frequency_hz", "damping_ratio", "mass_x_kg", "mass_y_kg", "mass_z_kg", "mass_kg")

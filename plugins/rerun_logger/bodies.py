@@ -8,8 +8,8 @@ import numpy as np
 import rerun as rr
 from calmotion.shot import Character, Motion, Result, SurfaceMesh
 from calmotion.shot.character import Array
-from calmotion.shot.playback import carriers, deformed_points, modes_of, relative_poses
-from calmotion.shot.shading import split_at_creases
+from calmotion.views.playback import carriers, deformed_points, modes_of, relative_poses
+from calmotion.views.shading import split_at_creases
 from numpy.typing import NDArray
 
 from .deviation import deviation_colors

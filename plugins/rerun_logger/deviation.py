@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from calmotion.shot import Character, Motion, Result
 from calmotion.shot.character import Array
-from calmotion.shot.playback import deviations, modes_of
+from calmotion.views.playback import deviations, modes_of
 from numpy.typing import NDArray
 
 from .layout import INPUT, STYLES

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import rerun.blueprint as rrb
 from calmotion.shot import Animation, Character, Motor, Result
 from calmotion.shot.measure import measure_of
-from calmotion.shot.playback import sample_motion
-from calmotion.shot.viewpoint import choose_viewpoint
+from calmotion.views.playback import sample_motion
+from calmotion.views.viewpoint import choose_viewpoint
 
 INPUT, OPTIMIZED, REFERENCE = "input", "optimized", "reference"
 TIME = "time"  # the timeline of the shot

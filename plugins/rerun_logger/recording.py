@@ -13,13 +13,14 @@ from pathlib import Path
 import numpy as np
 import rerun as rr
 from calmotion.errors import ShotError
-from calmotion.host import OperatorResult, SystemModes
-from calmotion.naming import distinct_names
+from calmotion.host import OperatorResult
 from calmotion.shot import Animation, Character, Motion, Result, Simulation
 from calmotion.shot.character import Array
 from calmotion.shot.measure import measure_of
-from calmotion.shot.playback import sample_motion
-from calmotion.shot.spectrum import error_spectrum, highest_frequency
+from calmotion.shot.outputs import SystemModes
+from calmotion.support.naming import distinct_names
+from calmotion.views.playback import sample_motion
+from calmotion.views.spectrum import error_spectrum, highest_frequency
 
 from .bodies import log_bodies
 from .deviation import largest_deviation

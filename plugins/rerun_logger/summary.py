@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from calmotion.host import OperatorResult, SystemModes
-from calmotion.naming import distinct_names
+from calmotion.host import OperatorResult
 from calmotion.shot import Character, Result, Simulation
+from calmotion.shot.outputs import SystemModes
+from calmotion.support.naming import distinct_names
 
 HEAD = "| target | largest before | largest after | rms before | rms after |\n|---|---:|---:|---:|---:|"
 

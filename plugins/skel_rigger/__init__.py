@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from calmotion.host import NotAsked, Operator, OutputPaths, Property, Rig, RunContext, Source
-from calmotion.rig.materials import MATERIALS
+from calmotion.host import NotAsked, Operator, Property, RunContext
+from calmotion.rigging.materials import MATERIALS
+from calmotion.shot.outputs import Rig
+from calmotion.shot.run import OutputPaths, Source
 
 
 class RigSkeleton(Operator):

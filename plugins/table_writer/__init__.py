@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from calmotion.host import CsvFile, Host, Operator, OutputPaths, RunContext
+from calmotion.host import Host, Operator, RunContext
 from calmotion.shot import Character, Result
+from calmotion.shot.outputs import CsvFile
+from calmotion.shot.run import OutputPaths
 
 
 class WriteTable(Operator):

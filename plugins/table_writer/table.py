@@ -8,9 +8,9 @@ from collections.abc import Mapping
 
 import numpy as np
 from calmotion.errors import ShotError
-from calmotion.files import write_whole
 from calmotion.shot import Character, Result
 from calmotion.shot.character import Array
+from calmotion.support.files import write_whole
 
 
 def columns(character: Character, result: Result) -> dict[str, Array]:

@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from calmotion.host import Operator, OutputPaths, RunContext, Source
+from calmotion.host import Operator, RunContext
 from calmotion.shot import Animation, Character, Findings, MotorTracks, Provenance
+from calmotion.shot.run import OutputPaths, Source
 
 
 class ReadShot(Operator):

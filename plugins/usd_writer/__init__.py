@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from calmotion.host import Operator, OutputPaths, Property, RunContext, WrittenLayer
+from calmotion.host import Operator, Property, RunContext
 from calmotion.shot import Animation, Character, Provenance, Result
+from calmotion.shot.outputs import WrittenLayer
+from calmotion.shot.run import OutputPaths
 
 
 class WriteResult(Operator):

@@ -6,10 +6,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
+from calmotion.accuracy.reduced_bodies import ReducedBodies
 from calmotion.host import NotAsked, Operator, Property, RunContext
-from calmotion.host.values import OutputPaths, ReducedBodies, ShapedTracks, Source, SystemModes, Verification
 from calmotion.shot import Animation, Character, FEMeshes, Needs, Result
-from calmotion.shot.needs import nothing_bends
+from calmotion.shot.model_choice import nothing_bends
+from calmotion.shot.outputs import ShapedTracks, SystemModes, Verification
+from calmotion.shot.run import OutputPaths, Source
 
 from .inputs import character_of, inputs, options_of, with_needs
 from .needs import AnalyseNeeds, PlanStep
@@ -43,9 +45,9 @@ class ReduceFlexibleBodies(Operator):
         return nothing_bends(data)
 
     def execute(self, context: RunContext) -> Sequence[object]:
-        from calmotion.dynamics.topology import span_tree
-        from calmotion.retarget.bodies import mode_tables, reduce_bodies, with_elasticity
-        from calmotion.retarget.prepare import excitations
+        from calmotion.multibody.model.topology import span_tree
+        from calmotion.simulation.bodies import mode_tables, reduce_bodies, with_elasticity
+        from calmotion.simulation.prepare import excitations
 
         character, meshes, animation = character_of(context), context.get(FEMeshes), context.get(Animation)
         if context.properties.elasticity != "shot":
@@ -55,7 +57,7 @@ class ReduceFlexibleBodies(Operator):
             context.progress(0.0, "compiling kernels, once")
             options = options_of(context)
             if source.command != "inspect" and source.tolerance is not None:
-                from calmotion.retarget.settled_bodies import settled_bodies
+                from calmotion.accuracy.converged_reduction import settled_bodies
 
                 search = source.command == "optimize"
                 settled = settled_bodies(character, animation, meshes, options, context.progress, retargeted=search)
@@ -84,7 +86,7 @@ class FindSystemModes(Operator):
         return nothing_bends(data)
 
     def execute(self, context: RunContext) -> Sequence[object]:
-        from calmotion.retarget.prepare import first_pose_modes
+        from calmotion.simulation.prepare import first_pose_modes
 
         context.progress(0.0, "compiling kernels, once")
         return [SystemModes(*first_pose_modes(*inputs(context)))]
@@ -108,7 +110,7 @@ class ShapeTracks(Operator):
         return NotAsked("no --shaper was asked for") if source is None or not source.shaper else None
 
     def execute(self, context: RunContext) -> Sequence[object]:
-        from calmotion.retarget.run import shape_tracks
+        from calmotion.simulation.simulate import shape_tracks
 
         kind, cutoff = context.get(Source).shaper or "", context.properties.cutoff
         return [ShapedTracks(shape_tracks(*inputs(context), options_of(context), kind, cutoff))]
@@ -128,7 +130,7 @@ class SimulateShot(Operator):
         return _wrong_command(data, "simulate")
 
     def execute(self, context: RunContext) -> Sequence[object]:
-        from calmotion.retarget.to_tolerance import simulate_to_tolerance
+        from calmotion.accuracy.simulate_to_tolerance import simulate_to_tolerance
 
         character, animation, bodies = inputs(context)
         shaped = context.get(ShapedTracks)
@@ -174,8 +176,8 @@ class OptimizeShot(Operator):
         return _wrong_command(data, "optimize")
 
     def execute(self, context: RunContext) -> Sequence[object]:
-        from calmotion.retarget.checkpoint import checkpoint_path
-        from calmotion.retarget.to_tolerance import optimize_to_tolerance
+        from calmotion.retargeting.checkpoint import checkpoint_path
+        from calmotion.retargeting.to_tolerance import optimize_to_tolerance
 
         values = context.properties
         options = options_of(
@@ -212,7 +214,7 @@ class VerifyResult(Operator):
         return NotAsked("no --verify was asked for") if source is None or not source.verify else None
 
     def execute(self, context: RunContext) -> Sequence[object]:
-        from calmotion.retarget.verify import verify
+        from calmotion.accuracy.verify import verify
 
         animation, shaped = context.get(Animation), context.get(ShapedTracks)
         if shaped is not None:

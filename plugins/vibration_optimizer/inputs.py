@@ -6,12 +6,13 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
+from calmotion.accuracy.reduced_bodies import ReducedBodies
 from calmotion.host import RunContext
-from calmotion.host.values import ReducedBodies, Source
 from calmotion.shot import Animation, Character, Needs, Result
+from calmotion.shot.run import Source
 
 if TYPE_CHECKING:
-    from calmotion.retarget.options import Options
+    from calmotion.simulation.settings import Options
 
 
 def inputs(context: RunContext) -> tuple[Character, Animation, Sequence[Any] | None]:
@@ -48,7 +49,7 @@ def options_of(context: RunContext, **more: Any) -> Options:
 
 def asked_options(context: RunContext, **more: Any) -> Options:
     """What the user asked for."""
-    from calmotion.retarget.options import Options
+    from calmotion.simulation.settings import Options
 
     source = context.get(Source)
     if source is None:

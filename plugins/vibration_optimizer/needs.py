@@ -5,10 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from calmotion.accuracy.reduced_bodies import ReducedBodies
 from calmotion.host import NotAsked, Operator, Property, RunContext
-from calmotion.host.values import OutputPaths, PlannedStep, ReducedBodies, Source
 from calmotion.shot import Animation, Character, Needs
-from calmotion.shot.needs import AUTO, KINDS, OFF, ON, nothing_bends
+from calmotion.shot.model_choice import AUTO, KINDS, OFF, ON, nothing_bends
+from calmotion.shot.outputs import PlannedStep
+from calmotion.shot.run import OutputPaths, Source
 
 from .inputs import asked_options, inputs, options_of
 
@@ -38,7 +40,7 @@ class AnalyseNeeds(Operator):
     )
 
     def execute(self, context: RunContext) -> Sequence[object]:
-        from calmotion.needs.analysis import analyse
+        from calmotion.accuracy.simplification.analysis import analyse
 
         source, paths = context.get(Source), context.get(OutputPaths)
         forced = {kind: getattr(context.properties, kind) for kind in KINDS}
@@ -71,7 +73,7 @@ class PlanStep(Operator):
         return None if free else f"{reason}, and motors alone decide where it is"
 
     def execute(self, context: RunContext) -> Sequence[object]:
-        from calmotion.retarget.to_tolerance import planned_step
+        from calmotion.accuracy.simulate_to_tolerance import planned_step
 
         context.progress(0.0, "simulating the shot as animated")
         return [PlannedStep(planned_step(*inputs(context), options_of(context)))]

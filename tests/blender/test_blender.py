@@ -61,7 +61,7 @@ def test_the_licence_is_kept_apart(repository):
 
 
 def test_materials_are_those_of_the_rigger():
-    from calmotion.rig.materials import MATERIALS
+    from calmotion.rigging.materials import MATERIALS
 
     (node,) = [n for n in ast.parse((EXTENSION / "settings.py").read_text()).body if isinstance(n, ast.Assign)]
     assert set(ast.literal_eval(node.value)) == set(MATERIALS)
@@ -142,14 +142,14 @@ def test_cancelling_stops_the_program(pipeline, tmp_path):
 
 
 def test_the_real_program_tells_its_progress(pipeline, repository, tmp_path, monkeypatch):
-    sys.path.insert(0, str(HERE.parent / "usd"))
+    sys.path.insert(0, str(HERE.parent / "helpers" / "usd"))
     import small_shots
 
     shot = small_shots.write_arm(tmp_path / "robot.usda", small_shots.make_flexible)
     (tmp_path / "shot.usda").write_text(shot.read_text())
     monkeypatch.setenv("PYTHONPATH", str(repository / "pipeline"))
     program = [sys.executable, "-c", f"import sys; sys.path.insert(0, {str(repository / 'pipeline')!r}); "
-               "from calmotion.cli import main; sys.exit(main())"]  # fmt: skip
+               "from calmotion.cli.main import main; sys.exit(main())"]  # fmt: skip
     (_, optimize) = job(pipeline, program, tmp_path).commands
     run = pipeline.PipelineRun(pipeline.Job((optimize,), tmp_path / "calm_root.usda")).start()
     seen = set()

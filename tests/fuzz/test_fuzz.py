@@ -22,7 +22,7 @@ from calmotion.usd.reading import read_shot
 from calmotion.usd.validation import validate_shot
 
 HERE = Path(__file__).resolve().parent
-sys.path[:0] = [str(HERE), str(HERE.parent / "usd")]
+sys.path.insert(0, str(HERE.parent / "helpers" / "usd"))
 
 import mutations  # noqa: E402
 import posed_shots  # noqa: E402

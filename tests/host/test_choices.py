@@ -32,8 +32,9 @@ def test_a_disabled_plugin_is_not_imported_and_its_operators_are_not_there(envir
 
 
 def test_what_is_missing_for_a_disabled_plugin_is_said(environment):
-    from calmotion.host import PlanError, Source
+    from calmotion.host import PlanError
     from calmotion.shot import Character
+    from calmotion.shot.run import Source
 
     choose("usd_reader", False, environment)
     with pytest.raises(PlanError) as refused:

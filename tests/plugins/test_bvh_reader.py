@@ -3,19 +3,15 @@
 from __future__ import annotations
 
 import json
-import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
-from calmotion.errors import ShotError
-from calmotion.host import SettingError, Source
-from calmotion.shot import MotorTracks
-from calmotion.testing import host_with, run_operator
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "usd"))
-
 import small_shots as shots  # noqa: E402
+from calmotion.errors import ShotError
+from calmotion.host import SettingError
+from calmotion.shot import MotorTracks
+from calmotion.shot.run import Source
+from calmotion.testing import host_with, run_operator
 
 HEAD = """HIERARCHY
 ROOT Hips

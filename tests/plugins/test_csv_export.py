@@ -9,9 +9,9 @@ import os
 import numpy as np
 import pytest
 from calmotion.errors import ShotError
-from calmotion.retarget.prepare import Options
-from calmotion.retarget.run import simulate_shot
 from calmotion.shot import InputLayer, MotorCurve, Provenance
+from calmotion.simulation.prepare import Options
+from calmotion.simulation.simulate import simulate_shot
 from calmotion.testing import host_with, run_operator, small_shot
 
 PROVENANCE = Provenance("shots/arm.usda", (InputLayer("arm.usda", "0"),), 1.0, 1.0, "Z", 24.0, 24.0, 0.0, 24.0, "Arm")

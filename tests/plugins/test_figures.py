@@ -10,10 +10,12 @@ import numpy as np
 import pytest
 import synthetic
 from calmotion.errors import ShotError
-from calmotion.host import OutputPaths, PluginError, SystemModes
-from calmotion.shot.spectrum import error_spectrum
-from calmotion.shot.viewpoint import choose_viewpoint
+from calmotion.host import PluginError
+from calmotion.shot.outputs import SystemModes
+from calmotion.shot.run import OutputPaths
 from calmotion.testing import check_plugin, host_with, run_operator
+from calmotion.views.spectrum import error_spectrum
+from calmotion.views.viewpoint import choose_viewpoint
 
 matplotlib = pytest.importorskip("matplotlib")
 PLUGIN = Path(__file__).resolve().parents[2] / "plugins" / "figures"

@@ -7,7 +7,8 @@ import csv
 import meshio
 import numpy as np
 import pytest
-from calmotion.host import ModeShapes, OutputPaths, Source
+from calmotion.shot.outputs import ModeShapes
+from calmotion.shot.run import OutputPaths, Source
 from calmotion.testing import host_with, small_shot
 
 

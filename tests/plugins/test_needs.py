@@ -3,12 +3,14 @@
 from argparse import Namespace
 
 import pytest
-from calmotion.cli import NEEDS
-from calmotion.cli_run import settings_of
-from calmotion.evidence.needs_shots import clevis_arm, mixed_arm, steel_arm
-from calmotion.host import NotAsked, OutputPaths, PlannedStep, Source
+from calmotion.benchmarks.scenes.simplification_shots import clevis_arm, mixed_arm, steel_arm
+from calmotion.cli.main import NEEDS
+from calmotion.cli.run import settings_of
+from calmotion.host import NotAsked
 from calmotion.shot import Character, FEMeshes, Needs, Result
-from calmotion.shot.needs import KINDS, OFF, ON
+from calmotion.shot.model_choice import KINDS, OFF, ON
+from calmotion.shot.outputs import PlannedStep
+from calmotion.shot.run import OutputPaths, Source
 from calmotion.testing import host_with, run_operator, small_shot
 
 

@@ -12,10 +12,12 @@ import numpy as np
 import pytest
 import synthetic
 from calmotion.errors import ShotError
-from calmotion.host import OutputPaths, PluginError, Recording, SystemModes
-from calmotion.shot.playback import sample_motion, world_points
-from calmotion.shot.spectrum import error_spectrum
+from calmotion.host import PluginError
+from calmotion.shot.outputs import Recording, SystemModes
+from calmotion.shot.run import OutputPaths
 from calmotion.testing import check_plugin, host_with, run_operator
+from calmotion.views.playback import sample_motion, world_points
+from calmotion.views.spectrum import error_spectrum
 from recordings import read_recording
 
 pytest.importorskip("rerun")
@@ -236,11 +238,11 @@ def test_writing_a_recording_leaves_no_trace_in_the_home_folder(tmp_path):
     home = tmp_path / "home"
     home.mkdir()
     code = (
-        "import sys; sys.path[:0] = sys.argv[1:3]\n"
+        "import sys; sys.path[:0] = sys.argv[1:4]\n"
         "import test_rerun_logger as t, synthetic\n"
-        "t.write(sys.argv[3], synthetic.result())\n"
+        "t.write(sys.argv[4], synthetic.result())\n"
     )
-    folders = [str(ROOT / "pipeline"), str(Path(__file__).parent)]
+    folders = [str(ROOT / "pipeline"), str(Path(__file__).parent), str(ROOT / "tests" / "helpers" / "plugins")]
     environment = {key: value for key, value in os.environ.items() if not key.startswith("XDG_")} | {"HOME": str(home)}
     subprocess.run(
         [sys.executable, "-c", code, *folders, str(tmp_path / "out.rrd")], env=environment, check=True, timeout=120

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 import synthetic
 from calmotion.errors import ShotError
-from calmotion.host import OutputPaths
+from calmotion.shot.run import OutputPaths
 from calmotion.testing import host_with, run_operator
 
 

@@ -1,6 +1,8 @@
 import small_shots as shots
-from calmotion.host import Host, OutputPaths, Source, WrittenLayer
+from calmotion.host import Host
 from calmotion.shot import Animation, Character, Provenance, Result
+from calmotion.shot.outputs import WrittenLayer
+from calmotion.shot.run import OutputPaths, Source
 from calmotion.testing import host_with
 
 

@@ -3,8 +3,11 @@ import dataclasses
 import numpy as np
 import pytest
 from calmotion import ShotError
-from calmotion.host import NotAsked, OutputPaths, ReducedBodies, ShapedTracks, Source, SystemModes, Verification
+from calmotion.accuracy.reduced_bodies import ReducedBodies
+from calmotion.host import NotAsked
 from calmotion.shot import Character, Result
+from calmotion.shot.outputs import ShapedTracks, SystemModes, Verification
+from calmotion.shot.run import OutputPaths, Source
 from calmotion.testing import host_with, run_operator, small_shot
 
 

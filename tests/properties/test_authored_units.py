@@ -10,12 +10,12 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from calmotion.dynamics.topology import span_tree
-from calmotion.evidence.beam_arm import beam_mesh
-from calmotion.retarget.bodies import reduce_bodies
-from calmotion.retarget.prepare import Options
-from calmotion.retarget.run import simulate_shot
+from calmotion.benchmarks.scenes.beam_arm import beam_mesh
+from calmotion.multibody.model.topology import span_tree
 from calmotion.shot import FEMesh, FEMeshes, MeshQuality
+from calmotion.simulation.bodies import reduce_bodies
+from calmotion.simulation.prepare import Options
+from calmotion.simulation.simulate import simulate_shot
 from calmotion.usd import schemas
 from calmotion.usd.reading import read_shot
 from hypothesis import given

@@ -6,15 +6,15 @@ energy that moves about in the shot.
 
 import numpy as np
 from calmotion import ShotError
-from calmotion.dynamics.failure import SimulationFailure
-from calmotion.dynamics.integrators import integrate
-from calmotion.dynamics.kinematics import rigid_state
-from calmotion.dynamics.simulation import Workspace
-from calmotion.dynamics.topology import span_tree
-from calmotion.retarget.bodies import reduce_bodies
-from calmotion.retarget.curves import sample_tracks
-from calmotion.retarget.forward import run_forward
-from calmotion.retarget.prepare import Options, prepare
+from calmotion.multibody.analysis.kinematics import rigid_state
+from calmotion.multibody.failure import SimulationFailure
+from calmotion.multibody.integrators.integrate import integrate
+from calmotion.multibody.integrators.workspace import Workspace
+from calmotion.multibody.model.topology import span_tree
+from calmotion.simulation.bodies import reduce_bodies
+from calmotion.simulation.forward import run_forward
+from calmotion.simulation.inputs.curves import sample_tracks
+from calmotion.simulation.prepare import Options, prepare
 from energies import energy, work
 from hypothesis import assume, given
 from hypothesis import strategies as st

@@ -1,11 +1,11 @@
 """Whatever is drawn and can be simulated keeps the tolerance that is asked for, by a step that follows from it."""
 
 from calmotion import ShotError
-from calmotion.dynamics.topology import span_tree
-from calmotion.retarget.bodies import reduce_bodies
-from calmotion.retarget.prepare import Options
-from calmotion.retarget.step_error import distance, frames_of, simulate_at
-from calmotion.retarget.to_tolerance import simulate_to_tolerance
+from calmotion.accuracy.simulate_to_tolerance import simulate_to_tolerance
+from calmotion.accuracy.step_error import distance, frames_of, simulate_at
+from calmotion.multibody.model.topology import span_tree
+from calmotion.simulation.bodies import reduce_bodies
+from calmotion.simulation.prepare import Options
 from hypothesis import assume, event, given
 from hypothesis import strategies as st
 from random_shots import linkages, shots

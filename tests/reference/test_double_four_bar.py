@@ -2,9 +2,10 @@
 
 import numpy as np
 import pytest
-from calmotion.dynamics.dead_centres import dead_centres
-from calmotion.dynamics.kinematics import rigid_state, target_frames
-from calmotion.dynamics.simulation import Workspace, simulate
+from calmotion.multibody.analysis.dead_centres import dead_centres
+from calmotion.multibody.analysis.kinematics import rigid_state, target_frames
+from calmotion.multibody.integrators.simulation import simulate
+from calmotion.multibody.integrators.workspace import Workspace
 from calmotion.shot import WORLD
 from mechanisms import mechanism
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from calmotion.fem import assemble, frequencies
-from calmotion.fem.natural_modes import vector_mass
-from calmotion.fem.tetrahedra import oriented_tets
+from calmotion.geometry.tetrahedra import oriented_tets
+from calmotion.reduction.basis.natural_modes import frequencies, vector_mass
+from calmotion.reduction.elements.assembly import assemble
 from calmotion.shot import ElasticMaterial
 
 STEEL = ElasticMaterial("/block", 2e11, 0.3, 2900.0)

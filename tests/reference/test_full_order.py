@@ -87,9 +87,9 @@ def test_a_tip_load_bends_it_as_far(law):
     tip = (arm.full.statics(arm.root, loads) - arm.full.nodes)[arm.tip]
     assert tip[2] > 0.2
     reduced = arm.reduced(law)
-    from calmotion.dynamics.kinematics import rigid_state, target_frames
-    from calmotion.dynamics.simulation import Workspace
-    from calmotion.dynamics.statics import equilibrium
+    from calmotion.multibody.analysis.kinematics import rigid_state, target_frames
+    from calmotion.multibody.integrators.workspace import Workspace
+    from calmotion.multibody.statics.equilibrium import equilibrium
 
     # the load as the weight of the payload, whose own inertia does not matter at rest; the arm weighs nothing
     system = reduced.model.system

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 from boxes import box_tets
-from calmotion.fem import assemble, frequencies
-from calmotion.fem.natural_modes import SparseSolver, vector_mass
+from calmotion.reduction.basis.natural_modes import SparseSolver, frequencies, vector_mass
+from calmotion.reduction.elements.assembly import assemble
 from calmotion.shot import ElasticMaterial
 
 SIDE, THICKNESS = 1.0, 0.02

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from calmotion.dynamics.failure import SimulationFailure
+from calmotion.multibody.failure import SimulationFailure
 from calmotion.shot import ElasticMaterial
 from turning_beam import TurningBeam
 

@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 from arms import chain, compiled
-from calmotion.dynamics.kinematics import rigid_state
-from calmotion.dynamics.simulation import Workspace, simulate
+from calmotion.multibody.analysis.kinematics import rigid_state
+from calmotion.multibody.integrators.simulation import simulate
+from calmotion.multibody.integrators.workspace import Workspace
 from mechanisms import mechanism
 
 H = 1.0 / 480.0

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 from broken_shots import CASES, too_many_samples
-from calmotion import cli
+from calmotion.cli import main as cli
 
 
 def state(folder: Path) -> dict[str, str]:
@@ -69,7 +69,7 @@ def test_ten_million_samples_are_refused_in_time(capfd, tmp_path):
 
 WRITING = """
 import resource, sys
-from calmotion import cli
+from calmotion.cli import main as cli
 resource.setrlimit(resource.RLIMIT_FSIZE, ({limit}, {limit}))
 sys.exit(cli.main(["simulate", "shot.usda", "-o", "moved.usda", "--json", "--quiet", "--step", "20ms"]))
 """

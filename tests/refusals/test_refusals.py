@@ -5,16 +5,12 @@ from __future__ import annotations
 import hashlib
 import json
 import math
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
-from pxr import Sdf, Usd, Vt
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "usd"))
-
 import small_shots as shots  # noqa: E402
+from pxr import Sdf, Usd, Vt
 
 
 def no_joints(stage: Usd.Stage) -> None:

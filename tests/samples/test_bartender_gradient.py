@@ -2,14 +2,16 @@
 
 import numpy as np
 import pytest
-from calmotion.host import ReducedBodies, Source, open_host
-from calmotion.retarget.curves import sample_curves
-from calmotion.retarget.objective import Objective
-from calmotion.retarget.offset_basis import make_basis
-from calmotion.retarget.prepare import Options, prepare
-from calmotion.retarget.problem import RetargetProblem
-from calmotion.retarget.reference import rigid_motion
+from calmotion.accuracy.reduced_bodies import ReducedBodies
+from calmotion.host import open_host
+from calmotion.retargeting.problem.offset_basis import make_basis
+from calmotion.retargeting.problem.problem import RetargetProblem
 from calmotion.shot import Animation, Character
+from calmotion.shot.run import Source
+from calmotion.simulation.inputs.curves import sample_curves
+from calmotion.simulation.intended_motion import rigid_motion
+from calmotion.simulation.prepare import Options, prepare
+from calmotion.simulation.target_errors import Objective
 
 
 @pytest.fixture(scope="module")

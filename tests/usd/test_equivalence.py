@@ -6,8 +6,8 @@ import dataclasses
 
 import numpy as np
 import pytest
-from calmotion.retarget.prepare import Options
-from calmotion.retarget.run import simulate_shot
+from calmotion.simulation.prepare import Options
+from calmotion.simulation.simulate import simulate_shot
 from calmotion.usd.reading import read_shot
 from calmotion.usd.writing import write_result
 from performing import result_with

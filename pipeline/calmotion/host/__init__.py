@@ -1,35 +1,16 @@
 """The host of plugins: it finds and registers them, orders their operators by data, and runs what is needed."""
 
-from .errors import HostError, PlanError, PluginError, SettingError
-from .manifest import Manifest, read_manifest
-from .operators import NotAsked, Operator, Record, RunContext
-from .plan import Plan
-from .properties import Property, PropertyValues, nearest
-from .registry import Host, Plugin, PluginState, open_host
-from .run import OperatorResult, Outcome, Run
-from .settings import Settings, merge, read_assignment, read_settings_file
-from .units import parse_quantity
-from .values import (
-    CsvFile,
-    Figures,
-    ModeShapes,
-    OutputPaths,
-    PlannedStep,
-    Recording,
-    ReducedBodies,
-    Rig,
-    RiggedJoint,
-    ShapedTracks,
-    Source,
-    SystemModes,
-    Verification,
-    WrittenLayer,
-)
+from calmotion.host.errors import HostError, PlanError, PluginError, SettingError
+from calmotion.host.manifest import Manifest, read_manifest
+from calmotion.host.operators import NotAsked, Operator, Record, RunContext
+from calmotion.host.plan import Plan
+from calmotion.host.properties import Property, PropertyValues, nearest
+from calmotion.host.registry import Host, Plugin, PluginState, open_host
+from calmotion.host.run import OperatorResult, Outcome, Run
+from calmotion.host.settings import Settings, merge, read_assignment, read_settings_file
+from calmotion.host.units import parse_quantity
 
 __all__ = [
-    "CsvFile",
-    "Figures",
-    "ModeShapes",
     "Host",
     "HostError",
     "Manifest",
@@ -37,8 +18,6 @@ __all__ = [
     "Operator",
     "OperatorResult",
     "Outcome",
-    "OutputPaths",
-    "PlannedStep",
     "Plan",
     "PlanError",
     "Plugin",
@@ -47,19 +26,10 @@ __all__ = [
     "Property",
     "PropertyValues",
     "Record",
-    "Recording",
-    "ReducedBodies",
-    "Rig",
-    "RiggedJoint",
-    "ShapedTracks",
     "Run",
     "RunContext",
     "SettingError",
     "Settings",
-    "Source",
-    "SystemModes",
-    "Verification",
-    "WrittenLayer",
     "merge",
     "nearest",
     "open_host",

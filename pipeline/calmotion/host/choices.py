@@ -8,8 +8,8 @@ import tomllib
 from collections.abc import Mapping
 from pathlib import Path
 
-from ..files import write_whole
-from .errors import SettingError
+from calmotion.host.errors import SettingError
+from calmotion.support.files import write_whole
 
 FOLDER_VARIABLE = "CALMOTION_CONFIG"
 FILE_NAME = "plugins.toml"

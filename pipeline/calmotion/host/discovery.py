@@ -7,8 +7,8 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from .errors import SettingError
-from .manifest import FILE_NAME
+from calmotion.host.errors import SettingError
+from calmotion.host.manifest import FILE_NAME
 
 ENTRY_POINT_GROUP = "calmotion.plugins"
 FOLDERS_VARIABLE = "CALMOTION_PLUGINS"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ..errors import ShotError
+from calmotion.errors import ShotError
 
 
 class HostError(ShotError):

@@ -7,7 +7,7 @@ import threading
 from collections.abc import Callable
 from typing import TypeVar
 
-from .errors import PluginError
+from calmotion.host.errors import PluginError
 
 T = TypeVar("T")
 _TICK = 0.1  # between two looks, so that an interrupt is noticed [s]

@@ -8,8 +8,8 @@ import sys
 import zlib
 from types import ModuleType
 
-from .discovery import Location
-from .errors import PluginError
+from calmotion.host.discovery import Location
+from calmotion.host.errors import PluginError
 
 
 def import_plugin(plugin_id: str, location: Location) -> ModuleType:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from .errors import PluginError
+from calmotion.host.errors import PluginError
 
 FILE_NAME = "plugin.toml"
 _TEXTS = ("id", "version", "name", "tagline", "maintainer", "license", "calmotion")

@@ -8,8 +8,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, ClassVar, TypeVar
 
-from .errors import PluginError
-from .properties import Property, PropertyValues
+from calmotion.host.errors import PluginError
+from calmotion.host.properties import Property, PropertyValues
 
 T = TypeVar("T")
 LEVELS = ("info", "warning")

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from graphlib import CycleError, TopologicalSorter
 
-from .errors import PlanError
-from .operators import Operator
+from calmotion.host.errors import PlanError
+from calmotion.host.operators import Operator
 
 Operators = Sequence[type[Operator]]
 

@@ -6,8 +6,8 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from .errors import PluginError, SettingError
-from .units import is_unit, parse_quantity
+from calmotion.host.errors import PluginError, SettingError
+from calmotion.host.units import is_unit, parse_quantity
 
 _BOOLEANS = {"true": True, "yes": True, "on": True, "1": True, "false": False, "no": False, "off": False, "0": False}
 

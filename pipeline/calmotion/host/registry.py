@@ -10,17 +10,17 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from .. import __version__
-from .choices import disabled_plugins
-from .discovery import Location, discover
-from .errors import PluginError, SettingError
-from .loading import import_plugin
-from .manifest import Manifest, check_requirements, read_manifest
-from .operators import TIMEOUT, Operator, check_operator
-from .plan import Plan, make_plan
-from .properties import PropertyValues, nearest, values_of
-from .run import Run
-from .settings import Settings
+from calmotion import __version__
+from calmotion.host.choices import disabled_plugins
+from calmotion.host.discovery import Location, discover
+from calmotion.host.errors import PluginError, SettingError
+from calmotion.host.loading import import_plugin
+from calmotion.host.manifest import Manifest, check_requirements, read_manifest
+from calmotion.host.operators import TIMEOUT, Operator, check_operator
+from calmotion.host.plan import Plan, make_plan
+from calmotion.host.properties import PropertyValues, nearest, values_of
+from calmotion.host.run import Run
+from calmotion.host.settings import Settings
 
 
 class PluginState(StrEnum):

@@ -9,14 +9,14 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from .errors import PluginError
-from .limited import call_within
-from .operators import TIMEOUT, NotAsked, Operator, Record, RunContext
-from .plan import Plan
-from .properties import PropertyValues
+from calmotion.host.errors import PluginError
+from calmotion.host.limited import call_within
+from calmotion.host.operators import TIMEOUT, NotAsked, Operator, Record, RunContext
+from calmotion.host.plan import Plan
+from calmotion.host.properties import PropertyValues
 
 if TYPE_CHECKING:
-    from ..shot import LeftOut
+    from calmotion.shot import LeftOut
 
 T = TypeVar("T")
 Progress = Callable[[str, float, str], None]
@@ -177,7 +177,7 @@ class Run:
     def left_out(self) -> tuple[LeftOut, ...]:
         """What the polls left out, for the report; not an operator whose values another one made, or that nobody asked
         for."""
-        from ..shot import LeftOut
+        from calmotion.shot import LeftOut
 
         made = {cls.idname: all(kind in self.data for kind in cls.provides) for cls in self.plan.operators}
         return tuple(

@@ -6,7 +6,7 @@ import tomllib
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 
-from .errors import SettingError
+from calmotion.host.errors import SettingError
 
 Settings = dict[str, dict[str, object]]
 """Operator idname -> property name -> string or typed value, not yet checked against the declarations."""

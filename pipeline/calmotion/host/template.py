@@ -5,8 +5,8 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from .. import __version__
-from .errors import PluginError
+from calmotion import __version__
+from calmotion.host.errors import PluginError
 
 _FILES = {
     "pyproject.toml": """\

@@ -6,7 +6,7 @@ import math
 import re
 from decimal import Decimal
 
-from .errors import SettingError
+from calmotion.host.errors import SettingError
 
 # Unit -> (base unit, size in base units). Decimals, so that `5mm` is exactly the float 0.005.
 _UNITS = {

@@ -1,7 +1,7 @@
 """What a shot is, as plain data in SI units: read by plugins, solved by the engine, written by plugins."""
 
-from .animation import Animation, FreeTrack, MotorTracks, MovingFrame, Track, WeightTrack
-from .character import (
+from calmotion.shot.animation import Animation, FreeTrack, MotorTracks, MovingFrame, Track, WeightTrack
+from calmotion.shot.character import (
     WORLD,
     Body,
     Character,
@@ -18,11 +18,11 @@ from .character import (
     Target,
     TetGeometry,
 )
-from .finding import Finding, Findings
-from .meshes import FEMesh, FEMeshes, MeshQuality
-from .needs import Need, Needs
-from .provenance import InputLayer, Provenance
-from .result import (
+from calmotion.shot.finding import Finding, Findings
+from calmotion.shot.meshes import FEMesh, FEMeshes, MeshQuality
+from calmotion.shot.model_choice import Need, Needs
+from calmotion.shot.provenance import InputLayer, Provenance
+from calmotion.shot.result import (
     Accuracy,
     LeftOut,
     LimitUse,

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from .character import Array, BoolArray
+from calmotion.shot.character import Array, BoolArray
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .character import Motor
+from calmotion.shot.character import Motor
 
 
 class Measure(NamedTuple):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from .character import Array, IntArray
+from calmotion.shot.character import Array, IntArray
 
 
 @dataclass(frozen=True, eq=False)

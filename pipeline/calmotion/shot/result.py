@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from .character import Array
+from calmotion.shot.character import Array
 
 
 @dataclass(frozen=True, eq=False)

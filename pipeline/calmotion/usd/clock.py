@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..errors import ShotError
-from ..shot.character import Array
+from calmotion.errors import ShotError
+from calmotion.shot.character import Array
 
 MOST_FRAMES = 10_000_000  # a day at 120 frames a second
 SHORTEST = 1e-6  # [s]

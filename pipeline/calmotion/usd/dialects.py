@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from ..errors import ShotError
+from calmotion.errors import ShotError
 
 USD, SI = "usd", "si"  # degrees and stage units, or radians and stage units as MuJoCo has them
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..shot.character import Array, IntArray
+from calmotion.shot.character import Array, IntArray
 
 
 def vector(value) -> Array:

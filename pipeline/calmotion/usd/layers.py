@@ -6,8 +6,8 @@ import os
 import tempfile
 from collections.abc import Callable, Iterable
 
-from ..errors import ShotError
-from ..files import make_public
+from calmotion.errors import ShotError
+from calmotion.support.files import make_public
 
 EXTENSIONS = (".usda", ".usdc", ".usd")
 

@@ -8,9 +8,9 @@ import re
 from contextlib import contextmanager
 from pathlib import Path
 
-from ..errors import ShotError, raise_all
-from ..shot import InputLayer
-from . import schemas
+from calmotion.errors import ShotError, raise_all
+from calmotion.shot import InputLayer
+from calmotion.usd import schemas
 
 METADATA_KEY = "calmotion"
 CURVES, MOTION, ROOT, RIG = "curves", "motion", "root", "rig"  # roles of layers that we write

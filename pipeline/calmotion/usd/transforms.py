@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..errors import ShotError
-from ..shot.character import Array, Frame
+from calmotion.errors import ShotError
+from calmotion.shot.character import Array, Frame
 
 _HUGE = 1e30
 _SHEAR_TOLERANCE = 1e-4  # xforms are often authored in single precision

@@ -62,7 +62,7 @@ def units_of(stage) -> StageUnits:
 
     from pxr import UsdGeom, UsdPhysics
 
-    from ..errors import ShotError
+    from calmotion.errors import ShotError
 
     units = StageUnits(UsdGeom.GetStageMetersPerUnit(stage), UsdPhysics.GetStageKilogramsPerUnit(stage))
     for name, found in (("metersPerUnit", units.meters), ("kilogramsPerUnit", units.kilograms)):

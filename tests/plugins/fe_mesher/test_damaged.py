@@ -7,7 +7,7 @@ import re
 import numpy as np
 import pytest
 from calmotion.errors import ShotError
-from calmotion.fem.closed_surfaces import boundary_walks
+from calmotion.geometry.closed_surfaces import boundary_walks
 from calmotion.shot import SurfaceMesh
 from damaged_meshes import CORPUS
 

@@ -6,7 +6,7 @@ import meshio
 import numpy as np
 import pytest
 from calmotion.errors import ShotError
-from calmotion.fem.tetrahedra import boundary_triangles, oriented_tets, surface_area, tet_volumes
+from calmotion.geometry.tetrahedra import boundary_triangles, oriented_tets, surface_area, tet_volumes
 from calmotion.shot import Body, ElasticMaterial, FlexibleSettings, Frame, TetGeometry
 
 MATERIAL = ElasticMaterial("/Looks/Plastic", 1.8e9, 0.35, 1200.0)
@@ -67,7 +67,7 @@ def test_volume_elements_are_cut_into_tetrahedra_that_meet_face_to_face(package,
 
 def tets10(bulge=0.0):
     points, cells = bricks()
-    from calmotion.fem.assembly import quadratic_mesh
+    from calmotion.reduction.elements.assembly import quadratic_mesh
     from skfem import MeshHex
 
     cut = MeshHex(points.T, cells[:, [0, 4, 3, 1, 7, 5, 2, 6]].T).to_meshtet()

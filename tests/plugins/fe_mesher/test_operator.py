@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from calmotion.fem.tetrahedra import connected_parts, tet_volumes
+from calmotion.geometry.tetrahedra import connected_parts, tet_volumes
 from calmotion.host import PluginError
 from calmotion.shot import Body, TetGeometry
 from calmotion.testing import check_plugin

@@ -130,7 +130,7 @@ def test_links_in_several_colours_and_with_gaps_of_a_tenth_of_a_millimetre_are_c
 ):
     """KUKA iiwa: orange and grey are open meshes of their own; the flange misses the link by 0.1 mm."""
     pytest.importorskip("pxr")
-    from calmotion.evidence.links import read_links
+    from calmotion.benchmarks.scenes.links import read_links
 
     file = shared_data / "converted" / "kuka_iiwa_14" / "iiwa14.usda"
     if not file.is_file():

@@ -34,7 +34,7 @@ def test_samples_are_at_least_as_dense_as_asked_for_and_hold_the_frames(rate, pa
 
 
 def test_between_frames_a_curve_is_what_its_frames_are_read_back_as():
-    from calmotion.retarget.curves import interpolate
+    from calmotion.shot.curves import interpolate
 
     times = sample_times(FRAMES, 240.0)
     read_back = interpolate(Track(FRAMES, CURVE.frame_values), 0.5)

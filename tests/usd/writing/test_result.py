@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import small_shots as shots
 from calmotion import ShotError
-from calmotion.retarget.run import Options, simulate_shot
+from calmotion.simulation.simulate import Options, simulate_shot
 from calmotion.usd.reading import read_shot
 from calmotion.usd.writing import WriteOptions, write_result
 from performing import curves_of, performed, tracks_of

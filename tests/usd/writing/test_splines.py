@@ -4,11 +4,11 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from calmotion.retarget.curves import curve_of
 from calmotion.shot import Animation, MotorCurve, Track
+from calmotion.shot.curves import curve_of
 from calmotion.usd.clock import Clock
 from calmotion.usd.reading.context import Reading
-from calmotion.usd.reading.tracks import read_track
+from calmotion.usd.reading.motors.tracks import read_track
 from calmotion.usd.units import StageUnits
 from calmotion.usd.writing.splines import author_splines, hermite
 from pxr import Sdf, Usd

@@ -8,19 +8,28 @@ from typing import Any
 
 import numpy as np
 
-from ...errors import ShotError, raise_all
-from ...shot import Body, Character, Joint, RetargetSettings
-from ..clock import Clock
-from ..transforms import Pose
-from . import mass, motors, scene, targets, topology
-from .context import Reading, grouped, is_rigid_body, prims_of
-from .flexible import flexible_settings
-from .interfaces import interfaces_of
-from .joints import JointPrim, body_index, joint_prims, joint_to_world, read_joint, refuse_unsupported
-from .posed_motors import posed_joints
-from .roots import on_moving_prim
-from .shapes import shapes_of, tets_of
-from .stillness import refuse_moving
+from calmotion.errors import ShotError, raise_all
+from calmotion.shot import Body, Character, Joint, RetargetSettings
+from calmotion.usd.clock import Clock
+from calmotion.usd.reading import scene, targets, topology
+from calmotion.usd.reading.bodies import mass
+from calmotion.usd.reading.bodies.flexible import flexible_settings
+from calmotion.usd.reading.bodies.interfaces import interfaces_of
+from calmotion.usd.reading.bodies.shapes import shapes_of, tets_of
+from calmotion.usd.reading.context import Reading, grouped, is_rigid_body, prims_of
+from calmotion.usd.reading.joints import (
+    JointPrim,
+    body_index,
+    joint_prims,
+    joint_to_world,
+    read_joint,
+    refuse_unsupported,
+)
+from calmotion.usd.reading.motors import driven_motors as motors
+from calmotion.usd.reading.motors.posed_motors import posed_joints
+from calmotion.usd.reading.roots import on_moving_prim
+from calmotion.usd.reading.stillness import refuse_moving
+from calmotion.usd.transforms import Pose
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,11 +7,11 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any, TypeVar
 
-from ...errors import ShotError
-from ..gf import matrix
-from ..schemas import is_applied
-from ..transforms import Pose, pose_from_matrix, refuse_infinite
-from ..units import StageUnits
+from calmotion.errors import ShotError
+from calmotion.usd.gf import matrix
+from calmotion.usd.schemas import is_applied
+from calmotion.usd.transforms import Pose, pose_from_matrix, refuse_infinite
+from calmotion.usd.units import StageUnits
 
 T = TypeVar("T")
 R = TypeVar("R")

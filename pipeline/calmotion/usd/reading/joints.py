@@ -7,12 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from ...errors import ShotError
-from ...shot import WORLD, Frame
-from ...shot.character import Array
-from .. import gf
-from ..transforms import Pose, axis_rotation, quaternion_from_rotation, rotation_from_quaternion
-from .context import Reading, prims_of
+from calmotion.errors import ShotError
+from calmotion.shot import WORLD, Frame
+from calmotion.shot.character import Array
+from calmotion.usd import gf
+from calmotion.usd.reading.context import Reading, prims_of
+from calmotion.usd.transforms import Pose, axis_rotation, quaternion_from_rotation, rotation_from_quaternion
 
 _KINDS = {
     "PhysicsRevoluteJoint": "revolute", "PhysicsPrismaticJoint": "prismatic", "PhysicsFixedJoint": "fixed",

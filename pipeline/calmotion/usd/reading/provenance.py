@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from ...shot import Provenance
-from .. import stages
-from ..clock import Clock
-from ..units import units_of
+from calmotion.shot import Provenance
+from calmotion.usd import stages
+from calmotion.usd.clock import Clock
+from calmotion.usd.units import units_of
 
 
 def provenance_of(path: str, stage, clock: Clock, earlier: tuple[str, ...] = ()) -> Provenance:

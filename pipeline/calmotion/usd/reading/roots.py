@@ -6,15 +6,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...shot import Frame, MovingFrame
-from ..clock import Clock
-from ..transforms import Pose
-from .context import Reading
-from .joints import JointPrim, read_joint
-from .stillness import carriers, codes_of, moves
+from calmotion.shot import Frame, MovingFrame
+from calmotion.usd.clock import Clock
+from calmotion.usd.reading.context import Reading
+from calmotion.usd.reading.joints import JointPrim, read_joint
+from calmotion.usd.reading.stillness import carriers, codes_of, moves
+from calmotion.usd.transforms import Pose
 
 if TYPE_CHECKING:
-    from .character import Skeleton
+    from calmotion.usd.reading.character import Skeleton
 
 
 def world_side_prim(reading: Reading, joint: JointPrim):

@@ -6,12 +6,12 @@ import math
 
 import numpy as np
 
-from ...errors import ShotError
-from ...shot import RetargetSettings
-from ...shot.character import Array
-from .. import gf, schemas
-from ..units import EARTH_GRAVITY
-from .context import Reading, prims_of
+from calmotion.errors import ShotError
+from calmotion.shot import RetargetSettings
+from calmotion.shot.character import Array
+from calmotion.usd import gf, schemas
+from calmotion.usd.reading.context import Reading, prims_of
+from calmotion.usd.units import EARTH_GRAVITY
 
 _SCHEMA = "CalmRetargetAPI"
 

@@ -8,25 +8,34 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...errors import raise_all
-from ...shot import Animation, Character, MotorTracks, MovingFrame, Provenance, Track
-from .. import stages
-from ..clock import Clock, clock_of, still_clock
-from ..units import units_of
-from .character import Skeleton, build_character, read_skeleton
-from .context import Reading, is_rigid_body, prims_of
-from .free_ranges import free_tracks
-from .given_tracks import given_joints, given_track
-from .joints import joint_prims
-from .motors import ATTRIBUTE, BODIES, DRIVE, GIVEN, HELD, LENGTH_ATTRIBUTE, Drive, to_si
-from .posed_motors import joint_motions, pose_codes, posed_track
-from .provenance import provenance_of
-from .roots import moving_frames
-from .skeletal_motors import HingeStack, hinge_stacks, performed_on, skeletal_tracks
-from .stillness import carriers, codes_of
-from .targets import weight_tracks
-from .tracks import read_track, sample_codes
-from .well_formed import broken_transforms, wrong_types
+from calmotion.errors import raise_all
+from calmotion.shot import Animation, Character, MotorTracks, MovingFrame, Provenance, Track
+from calmotion.usd import stages
+from calmotion.usd.clock import Clock, clock_of, still_clock
+from calmotion.usd.reading.character import Skeleton, build_character, read_skeleton
+from calmotion.usd.reading.context import Reading, is_rigid_body, prims_of
+from calmotion.usd.reading.joints import joint_prims
+from calmotion.usd.reading.motors.driven_motors import (
+    ATTRIBUTE,
+    BODIES,
+    DRIVE,
+    GIVEN,
+    HELD,
+    LENGTH_ATTRIBUTE,
+    Drive,
+    to_si,
+)
+from calmotion.usd.reading.motors.free_ranges import free_tracks
+from calmotion.usd.reading.motors.given_tracks import given_joints, given_track
+from calmotion.usd.reading.motors.posed_motors import joint_motions, pose_codes, posed_track
+from calmotion.usd.reading.motors.skeletal_motors import HingeStack, hinge_stacks, performed_on, skeletal_tracks
+from calmotion.usd.reading.motors.tracks import read_track, sample_codes
+from calmotion.usd.reading.provenance import provenance_of
+from calmotion.usd.reading.roots import moving_frames
+from calmotion.usd.reading.stillness import carriers, codes_of
+from calmotion.usd.reading.targets import weight_tracks
+from calmotion.usd.reading.well_formed import broken_transforms, wrong_types
+from calmotion.usd.units import units_of
 
 
 def read_shot(

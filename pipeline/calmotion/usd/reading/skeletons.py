@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from ...errors import ShotError
-from ...shot.character import Array
-from .. import gf
-from ..transforms import pose_from_matrix
-from .context import prims_of
+from calmotion.errors import ShotError
+from calmotion.shot.character import Array
+from calmotion.usd import gf
+from calmotion.usd.reading.context import prims_of
+from calmotion.usd.transforms import pose_from_matrix
 
 
 @dataclass(frozen=True, eq=False)

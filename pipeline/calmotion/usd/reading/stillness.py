@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...errors import ShotError
-from ..gf import matrix
-from .context import Reading
+from calmotion.errors import ShotError
+from calmotion.usd.gf import matrix
+from calmotion.usd.reading.context import Reading
 
 _TOLERANCE = 1e-6  # relative to the size of the transform: what single precision leaves
 

@@ -8,12 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from ...errors import ShotError
-from ...shot import Body, Frame, Joint, Target, WeightTrack
-from .. import schemas
-from ..clock import Clock
-from ..transforms import Pose, pose_from_matrix, quaternion_from_rotation
-from .context import Reading, is_rigid_body, prims_of
+from calmotion.errors import ShotError
+from calmotion.shot import Body, Frame, Joint, Target, WeightTrack
+from calmotion.usd import schemas
+from calmotion.usd.clock import Clock
+from calmotion.usd.reading.context import Reading, is_rigid_body, prims_of
+from calmotion.usd.transforms import Pose, pose_from_matrix, quaternion_from_rotation
 
 _SCHEMA = "CalmTargetAPI"
 WEIGHTS = ("calm:target:positionWeight", "calm:target:rotationWeight")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import deque
 
-from .joints import JointPrim
+from calmotion.usd.reading.joints import JointPrim
 
 
 def components(bodies: list[str], joints: list[JointPrim]) -> list[list[str]]:

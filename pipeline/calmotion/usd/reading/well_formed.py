@@ -5,9 +5,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from ...errors import ShotError
-from ..schemas import NAMES
-from .context import prims_of
+from calmotion.errors import ShotError
+from calmotion.usd.reading.context import prims_of
+from calmotion.usd.schemas import NAMES
 
 _PHYSICS = ("PhysicsMassAPI", "PhysicsRigidBodyAPI", "PhysicsCollisionAPI", "PhysicsMaterialAPI")
 _DRIVE, _DRIVES = "PhysicsDriveAPI", ("angular", "linear")

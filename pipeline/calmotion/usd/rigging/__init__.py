@@ -1,5 +1,5 @@
 """From a skinned UsdSkel character without physics to a layer with bodies, joints, motors and targets."""
 
-from .rig import RigOptions, rig_shot
+from calmotion.usd.rigging.rig import RigOptions, rig_shot
 
 __all__ = ["RigOptions", "rig_shot"]

@@ -7,18 +7,18 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ...rig.links import Link, tip_of
-from ...rig.materials import Material
-from ...shot import MassProperties, Provenance
-from ...shot.character import Array, IntArray
-from .. import gf
-from ..reading.moments import surface_moments
-from ..reading.skeletons import BoundSkeleton
-from ..stages import RIG
-from ..transforms import Pose, pose_from_matrix, quaternion_from_rotation
-from ..units import units_of
-from ..writing.metadata import author_origin, author_stage_metadata
-from ..writing.root import relative_asset
+from calmotion.rigging.links import Link, tip_of
+from calmotion.rigging.materials import Material
+from calmotion.shot import MassProperties, Provenance
+from calmotion.shot.character import Array, IntArray
+from calmotion.usd import gf
+from calmotion.usd.reading.bodies.moments import surface_moments
+from calmotion.usd.reading.skeletons import BoundSkeleton
+from calmotion.usd.stages import RIG
+from calmotion.usd.transforms import Pose, pose_from_matrix, quaternion_from_rotation
+from calmotion.usd.units import units_of
+from calmotion.usd.writing.metadata import author_origin, author_stage_metadata
+from calmotion.usd.writing.root import relative_asset
 
 _STILL = 1e-6  # of a matrix, over its size: a root that moves less stands
 _SERVO = 0.1  # radius of gyration of a servo, over the size of the link that it turns

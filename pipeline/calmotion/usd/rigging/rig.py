@@ -7,21 +7,21 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...errors import ShotError
-from ...host.values import Rig, RiggedJoint
-from ...rig.links import Link, make_links, targets_of
-from ...rig.materials import MATERIALS
-from ...shot.character import Array
-from .. import stages
-from ..clock import Clock
-from ..layers import refuse_input_as_output, write_layer
-from ..reading.context import is_rigid_body, prims_of
-from ..reading.provenance import provenance_of
-from ..reading.shot import read_shot, shot_clock
-from ..reading.skeletons import BoundSkeleton, bound_skeletons
-from ..transforms import pose_from_matrix
-from .layer import RobotLayer
-from .skins import read_skin
+from calmotion.errors import ShotError
+from calmotion.rigging.links import Link, make_links, targets_of
+from calmotion.rigging.materials import MATERIALS
+from calmotion.shot.character import Array
+from calmotion.shot.outputs import Rig, RiggedJoint
+from calmotion.usd import stages
+from calmotion.usd.clock import Clock
+from calmotion.usd.layers import refuse_input_as_output, write_layer
+from calmotion.usd.reading.context import is_rigid_body, prims_of
+from calmotion.usd.reading.provenance import provenance_of
+from calmotion.usd.reading.shot import read_shot, shot_clock
+from calmotion.usd.reading.skeletons import BoundSkeleton, bound_skeletons
+from calmotion.usd.rigging.layer import RobotLayer
+from calmotion.usd.rigging.skins import read_skin
+from calmotion.usd.transforms import pose_from_matrix
 
 
 @dataclass(frozen=True)

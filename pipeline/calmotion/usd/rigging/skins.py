@@ -6,12 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...errors import ShotError
-from ...shot.character import Array, IntArray
-from .. import gf
-from ..reading.context import prims_of
-from ..reading.shapes import mesh_geometry
-from ..reading.skeletons import BoundSkeleton
+from calmotion.errors import ShotError
+from calmotion.shot.character import Array, IntArray
+from calmotion.usd import gf
+from calmotion.usd.reading.bodies.shapes import mesh_geometry
+from calmotion.usd.reading.context import prims_of
+from calmotion.usd.reading.skeletons import BoundSkeleton
 
 
 @dataclass(frozen=True, eq=False)

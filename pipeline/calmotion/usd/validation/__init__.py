@@ -4,6 +4,6 @@ Ours are registered in USD's validation framework as well, so that any tool that
 runs them.
 """
 
-from .run import register_validators, validate_shot
+from calmotion.usd.validation.run import register_validators, validate_shot
 
 __all__ = ["register_validators", "validate_shot"]

@@ -7,11 +7,11 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ...errors import ShotError, each
-from ...shot.finding import ERROR, WARNING, Finding
-from .. import schemas
-from ..reading.context import is_rigid_body, prims_of
-from ..reading.shot import StageReading, read_stage
+from calmotion.errors import ShotError, each
+from calmotion.shot.finding import ERROR, WARNING, Finding
+from calmotion.usd import schemas
+from calmotion.usd.reading.context import is_rigid_body, prims_of
+from calmotion.usd.reading.shot import StageReading, read_stage
 
 READABLE, SCHEMAS, PLACES, LIMITS = "ShotIsReadable", "SchemasAreKnown", "SchemasFit", "AnimationKeepsLimits"
 _NAMESPACE = "calm:"

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from typing import Any
 
-from ...errors import ShotError, each
-from ...shot.finding import ERROR, WARNING, Finding, Findings
-from .. import stages
-from .rules import READABLE, RULES, finding_of
+from calmotion.errors import ShotError, each
+from calmotion.shot.finding import ERROR, WARNING, Finding, Findings
+from calmotion.usd import stages
+from calmotion.usd.validation.rules import READABLE, RULES, finding_of
 
 _PLUGIN = "calmotion"
 

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...shot import Character, Skin
-from ...shot.character import Array
-from .. import gf
-from ..clock import Clock
-from ..transforms import Pose, pose_from_matrix, rotation_from_quaternion
-from .curves import attribute_spec
-from .motions import BakedMotion
+from calmotion.shot import Character, Skin
+from calmotion.shot.character import Array
+from calmotion.usd import gf
+from calmotion.usd.clock import Clock
+from calmotion.usd.transforms import Pose, pose_from_matrix, rotation_from_quaternion
+from calmotion.usd.writing.curves import attribute_spec
+from calmotion.usd.writing.motions import BakedMotion
 
 _EQUAL = 1e-6  # of matrices, over the size of their entries: what single precision leaves
 _OP = "xformOp:transform:calmotion"  # a name of our own: never the type of an op that the shot has

@@ -6,10 +6,10 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from ...shot import Animation, Character, Motor, MotorCurve
-from ...shot.character import Array
-from ..clock import Clock
-from ..schemas import is_applied
+from calmotion.shot import Animation, Character, Motor, MotorCurve
+from calmotion.shot.character import Array
+from calmotion.usd.clock import Clock
+from calmotion.usd.schemas import is_applied
 
 
 def sample_times(frame_times: Array, samples_per_second: float | None) -> Array:
@@ -31,7 +31,7 @@ def curve_values(animation: Animation, curve: MotorCurve, times: Array, cyclic: 
     """A motor's curve [rad or m] at times within the shot."""
     if times is animation.frame_times:
         return curve.frame_values
-    from ...retarget.commanded import optimized_curve
+    from calmotion.shot.commanded import optimized_curve
 
     return optimized_curve(animation, curve, cyclic)(times, 0)
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from ... import __version__
-from ...shot import Character, Provenance, Result, Simulation
-from .. import gf
-from ..stages import METADATA_KEY
+from calmotion import __version__
+from calmotion.shot import Character, Provenance, Result, Simulation
+from calmotion.usd import gf
+from calmotion.usd.stages import METADATA_KEY
 
 
 def author_stage_metadata(layer, provenance: Provenance) -> None:

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...shot import Motion
-from ...shot.character import Array
+from calmotion.shot import Motion
+from calmotion.shot.character import Array
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,16 +6,16 @@ import os
 from dataclasses import dataclass
 from typing import Any
 
-from ...errors import ShotError
-from ...shot import Animation, Character, MotorCurve, Provenance, Result
-from .. import stages
-from ..clock import Clock
-from ..layers import refuse_input_as_output, write_layer
-from . import bake, metadata, motions
-from .curves import author_curves, ensure_drives, sample_times
-from .root import keeps_earlier_curves, root_path, write_root
-from .skeletal import author_skeletons
-from .splines import author_splines
+from calmotion.errors import ShotError
+from calmotion.shot import Animation, Character, MotorCurve, Provenance, Result
+from calmotion.usd import stages
+from calmotion.usd.clock import Clock
+from calmotion.usd.layers import refuse_input_as_output, write_layer
+from calmotion.usd.writing import bake, metadata, motions
+from calmotion.usd.writing.curves import author_curves, ensure_drives, sample_times
+from calmotion.usd.writing.root import keeps_earlier_curves, root_path, write_root
+from calmotion.usd.writing.skeletal import author_skeletons
+from calmotion.usd.writing.splines import author_splines
 
 BAKES = ("none", "motors", "simulated")
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-from ...errors import ShotError
-from ...shot import Provenance
-from .. import stages
-from ..layers import write_layer
-from .metadata import author_origin, author_stage_metadata
+from calmotion.errors import ShotError
+from calmotion.shot import Provenance
+from calmotion.usd import stages
+from calmotion.usd.layers import write_layer
+from calmotion.usd.writing.metadata import author_origin, author_stage_metadata
 
 
 def root_path(layer: str) -> str:

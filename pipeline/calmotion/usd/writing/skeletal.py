@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...retarget.curves import curve_of
-from ...shot import Animation, Character, MotorCurve
-from ...shot.character import Array
-from .. import gf
-from ..clock import Clock
-from ..reading.character import read_skeleton
-from ..reading.context import Reading
-from ..reading.skeletal_motors import HingeStack, hinge_stacks
-from ..transforms import pose_from_matrix, quaternion_from_rotation
-from ..units import units_of
-from .curves import attribute_spec, curve_values
+from calmotion.shot import Animation, Character, MotorCurve
+from calmotion.shot.character import Array
+from calmotion.shot.curves import curve_of
+from calmotion.usd import gf
+from calmotion.usd.clock import Clock
+from calmotion.usd.reading.character import read_skeleton
+from calmotion.usd.reading.context import Reading
+from calmotion.usd.reading.motors.skeletal_motors import HingeStack, hinge_stacks
+from calmotion.usd.transforms import pose_from_matrix, quaternion_from_rotation
+from calmotion.usd.units import units_of
+from calmotion.usd.writing.curves import attribute_spec, curve_values
 
 
 def author_skeletons(

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...shot import Animation, Character, MotorCurve
-from ...shot.character import Array
-from ..clock import Clock
-from .curves import attribute_spec
+from calmotion.shot import Animation, Character, MotorCurve
+from calmotion.shot.character import Array
+from calmotion.usd.clock import Clock
+from calmotion.usd.writing.curves import attribute_spec
 
 SAME = 1e-9  # times that are closer are one [s]
 
@@ -18,7 +18,7 @@ def hermite(animation: Animation, curve: MotorCurve, cyclic: bool) -> tuple[Arra
 
     Knots are where the animation has samples and where the offset has knots; between them both are cubics.
     """
-    from ...retarget.commanded import optimized_curve
+    from calmotion.shot.commanded import optimized_curve
 
     track, end = animation.tracks[curve.motor], float(animation.frame_times[-1])
     whole = optimized_curve(animation, curve, cyclic)

@@ -1,0 +1,1 @@
+"""An upper bound of the deflection of a flexible body, before it is meshed."""

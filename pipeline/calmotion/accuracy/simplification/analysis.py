@@ -1,0 +1,108 @@
+"""What a shot needs, from its geometry and one simulation of the rigid robot: before meshes and finite elements."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from functools import partial
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from calmotion.accuracy.simplification.rotating_bodies import Turning, turning_of
+from calmotion.multibody.failure import SimulationFailure
+from calmotion.multibody.model.topology import span_tree
+from calmotion.shot import Animation, Character, FlexibleSettings, Need, Needs
+from calmotion.shot.character import with_settings
+from calmotion.shot.model_choice import AUTO, OFF, ON
+from calmotion.simulation.settings import Options
+from calmotion.support.naming import distinct_names
+
+if TYPE_CHECKING:
+    from calmotion.accuracy.deflection_bound.bound import Stiffness
+
+SHARE = 0.2  # of the tolerance, that bodies taken as rigid may take together, and those taken as not turning
+FINE, NONE = 1e-3, np.inf  # shares of the tolerance for modes that are left out, where modes are forced on and off
+
+
+def analyse(
+    character: Character, animation: Animation, options: Options, forced: Mapping[str, str], changes: bool
+) -> Needs:
+    """Decide what a shot needs.
+
+    Args:
+        options: With the tolerance.
+        forced: Kinds of `shot.needs.KINDS` that are forced `on` or `off`.
+        changes: Whether motors' curves are to be changed.
+
+    Returns:
+        The decisions, and the character marked with them. A shot whose rigid robot cannot follow its tracks keeps
+        everything: the flexible one will say why.
+    """
+    forced = {kind: choice for kind, choice in forced.items() if choice != AUTO}
+    choice = partial(_choice, forced)
+    if len(animation.frame_times) < 2:
+        return Needs(_asked(character, forced), (), forced)
+    tree = span_tree(character)
+    allowed = SHARE * character.retarget.allowed(options.tolerance)
+    rows: list[Need] = [Need("loops", "closed loops", False, "no joint closes one")]
+    stiffness: Mapping[int, Stiffness] = {}
+    if tree.loops or any(body.flexible for body in character.bodies):
+        # what simulates the rigid robot takes a while to load, and a rigid shot without loops does not need it
+        from calmotion.accuracy.simplification.by_rigid_run import decide
+
+        try:
+            character, rows, stiffness = decide(character, animation, options, tree, choice, allowed, changes)
+        except SimulationFailure:
+            return Needs(_asked(character, forced), (), forced)
+    found = _turning(turning_of(character, animation, tree, stiffness, changes), choice("turning"), allowed)
+    character, more = _straight(character, found, "turning" in forced)
+    return Needs(_asked(character, forced), (*rows, *more), forced)
+
+
+def _choice(forced: Mapping[str, str], kind: str) -> str:
+    return forced.get(kind, AUTO)
+
+
+def _asked(character: Character, forced: Mapping[str, str]) -> Character:
+    """The character with modes, their pairs and elastic laws as they are forced."""
+
+    def settings(own: FlexibleSettings) -> FlexibleSettings:
+        if "modes" in forced:
+            own = replace(own, modes_share=FINE if forced["modes"] == ON else NONE)
+        if forced.get("directions") == ON:
+            own = replace(own, pairs_share=0.0)
+        if "elasticity" in forced:
+            own = replace(own, elasticity="stvk" if forced["elasticity"] == ON else "linear")
+        return own
+
+    return with_settings(character, settings)
+
+
+def _turning(found: list[Turning], choice: str, allowed: float) -> list[Turning]:
+    """What is decided of what was found."""
+    if choice == ON:
+        return [replace(item, turns=True, why="forced on") for item in found]
+    if choice == OFF:
+        return [replace(item, turns=False, why="forced off") for item in found]
+    return [
+        replace(item, turns=True, why="what carries it bends too far")
+        if (item.error_m or 0.0) > allowed / len(found)
+        else item
+        for item in found
+    ]
+
+
+def _straight(character: Character, found: list[Turning], forced: bool) -> tuple[Character, list[Need]]:
+    """The character with its bodies marked, and a row for each reason."""
+    bodies = tuple(replace(b, straight=not t.turns) for b, t in zip(character.bodies, found, strict=True))
+    names = distinct_names([body.path for body in bodies])
+    groups: dict[tuple[bool, str], list[int]] = {}
+    for k, item in enumerate(found):
+        groups.setdefault((item.turns, item.why), []).append(k)
+    rows = []
+    for (turns, why), members in groups.items():
+        errors = [error for k in members if (error := found[k].error_m) is not None]
+        what = "turning of " + ", ".join(names[bodies[k].path] for k in members)
+        rows.append(Need("turning", what, turns, why, sum(errors) if errors else None, forced))
+    return replace(character, bodies=bodies), rows

@@ -1,0 +1,199 @@
+"""Simulate or retarget a shot to a tolerance: the time step follows from the error that it causes at the targets.
+
+Where no tolerance is asked for, the step is that of `time_grid.make_grid`; its error is estimated all the same after an
+optimisation, where one more simulation costs next to nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+
+from calmotion.accuracy.integrator_choice import by_fast_scheme
+from calmotion.accuracy.pod_subspace import HeldBodies, Known, held_bodies
+from calmotion.accuracy.step_error import (
+    ORDER,
+    StepRun,
+    largest_step,
+    run_or_none,
+    simulate_at,
+    step_error,
+)
+from calmotion.multibody.integrators.schemes import SCHEMES
+from calmotion.reduction.reduced_body import ReducedBody
+from calmotion.shot import Accuracy, Animation, Character, LeftOut, Result, Track
+from calmotion.shot.character import Array
+from calmotion.simulation.bodies import mode_tables
+from calmotion.simulation.inputs.curves import sample_tracks
+from calmotion.simulation.inputs.time_grid import MAX_STEP, make_grid
+from calmotion.simulation.prepare import Options, prepare
+from calmotion.simulation.simulate import Progress, meant_motion, simulate_shot
+
+SHARE = 0.5  # of the tolerance, that the time step may take in any case
+WHOLE = 0.8  # of the tolerance, that it may take together with what the bodies do without
+FIRST, LAST = 1.0 / 60.0, 1.0 / 30720.0  # steps that are tried [s]
+OF_SHAKE = 0.05  # of the input's own error: how well that need be known before it is taken away
+# Where no tolerance is asked for, a simulation of what was written has all coordinates, and is to tell the same errors.
+UNASKED = 0.002
+HELD = 0.1  # of the tolerance (and of how well the shake need be known), that holding bodies to directions may take
+NAMES = {"bdf2": "BDF2", "newmark": "Newmark's method", "generalized-alpha": "generalised-alpha"}
+FINDING = "finding the directions that the shot bends links in"
+Bodies = Sequence[ReducedBody] | None
+
+
+def simulate_to_tolerance(
+    character: Character, animation: Animation, bodies: Bodies, options: Options, progress: Progress,
+    left_out_m: float | None = None, known: Known | None = None,
+) -> Result:  # fmt: skip
+    """As `simulate_shot`, with what keeps the tolerance where one is asked for: directions of bodies, and a time step.
+
+    Args:
+        left_out_m: Error of what the bodies do without where it is known better than their own estimates [m].
+        known: The shot, simulated with them; None: not known yet.
+    """
+    if options.tolerance is None:
+        return simulate_shot(character, animation, bodies, options, progress)
+    progress(0.0, FINDING)
+    held = held_to_tolerance(character, animation, bodies, options, known)
+    if not chooses_step(character, options):
+        return with_modes(simulate_shot(character, animation, held.bodies, options, progress), bodies)
+    progress(0.0, "choosing the time step")
+    left_out = (omitted_error(bodies) if left_out_m is None else left_out_m) + held.error_m
+
+    def simulated(options: Options) -> Result:
+        step, error = chosen_step(character, animation, held.bodies, options, left_out)
+        result = simulate_shot(character, animation, held.bodies, replace(options, step=step), progress)
+        accuracy = Accuracy(error, left_out, mesh_error(bodies), options.tolerance)
+        return with_step(with_modes(replace(result, accuracy=accuracy), bodies), character, options)
+
+    return by_fast_scheme(options, simulated)
+
+
+def held_to_tolerance(
+    character: Character, animation: Animation, bodies: Bodies, options: Options, known: Known | None,
+    shake: Callable[[StepRun], float] = lambda run: 0.0,
+) -> HeldBodies:  # fmt: skip
+    """The bodies in the directions that the shot needs, by its current curves.
+
+    Args:
+        known: The shot, simulated with the bodies, where that was done.
+        shake: How far a run is from what is meant, where that will be taken away [m].
+    """
+    share = UNASKED if options.tolerance is None else HELD
+    least = share * character.retarget.allowed(options.tolerance)
+    step = own_step(character, options)
+    return held_bodies(
+        character, animation, bodies, options, step, lambda item: max(least, share * OF_SHAKE * shake(item.run)), known
+    )
+
+
+def own_step(character: Character, options: Options) -> float:
+    """The step of a simulation for which none is chosen [s]."""
+    return options.step or character.retarget.time_step or MAX_STEP
+
+
+def with_modes(result: Result, bodies: Bodies) -> Result:
+    """The result with the frequencies of the bodies themselves, not of the directions that they were held to."""
+    return replace(result, modes=mode_tables(bodies or ()))
+
+
+def with_step(result: Result, character: Character, options: Options) -> Result:
+    """The result with its time step among what was left out: finer ones, and what they would change."""
+    assert result.accuracy is not None
+    row = step_row(character, options, result.step_s, result.accuracy.step_m)
+    return replace(result, left_out=(*result.left_out, row))
+
+
+def step_row(character: Character, options: Options, step: float, error: float | None) -> LeftOut:
+    """Why steps [s] are no shorter, and their error at the targets [m]."""
+    if options.step is not None:
+        why = "the step was asked for"
+    elif character.retarget.time_step is not None:
+        why = "calm:retarget:timeStep says so"
+    elif chooses_step(character, options):
+        why = f"they keep the tolerance of {1e3 * (options.tolerance or 0.0):g} mm by {NAMES[options.scheme]}"
+    else:
+        why = "at 1/480 s motions of 10 Hz are simulated to better than a percent"
+    return LeftOut(f"time steps shorter than {1e3 * step:.3g} ms", why, error)
+
+
+def planned_step(character: Character, animation: Animation, bodies: Bodies, options: Options) -> LeftOut:
+    """The step that a simulation of the shot as animated would take, and why, by simulating it."""
+    if chooses_step(character, options):
+        held = held_to_tolerance(character, animation, bodies, options, None)
+        left_out = omitted_error(bodies) + held.error_m
+        return by_fast_scheme(
+            options,
+            lambda options: step_row(
+                character, options, *chosen_step(character, animation, held.bodies, options, left_out)
+            ),
+        )
+    trial = partial(simulate_at, character, animation, bodies, options)
+    fine = trial(options.step or character.retarget.time_step or MAX_STEP)
+    coarse = run_or_none(trial, 2.0 * fine.step)
+    error = None if coarse is None or coarse.step < 1.5 * fine.step else step_error(coarse, fine)
+    return step_row(character, options, fine.step, error)
+
+
+def chosen_step(
+    character: Character, animation: Animation, bodies: Bodies, options: Options, left_out: float
+) -> tuple[float, float]:
+    """The step of a simulation to a tolerance, and its estimated error [s], [m]; arguments as of `simulate_shot`.
+
+    It divides a frame.
+
+    Args:
+        left_out: Error of what the bodies do without [m].
+
+    Raises:
+        ShotError: Not even the last step does.
+    """
+    trial = partial(simulate_at, character, animation, bodies, options)
+    step, error = largest_step(trial, FIRST, LAST, lambda run: allowed_step_error(options, left_out))
+    if not np.isfinite(error):
+        trial(step)
+    whole = make_grid(animation.frame_times, step, 0.0).h
+    return whole, (whole / step) ** ORDER * error
+
+
+def chooses_step(character: Character, options: Options) -> bool:
+    """Whether the step is to follow from the tolerance."""
+    if options.tolerance is None or options.step is not None or character.retarget.time_step is not None:
+        return False
+    return options.scheme in SCHEMES and not character.retarget.cyclic
+
+
+def allowed_step_error(options: Options, left_out: float) -> float:
+    """Error that the time step may cause beside what the bodies do without [m]."""
+    assert options.tolerance is not None
+    return max(SHARE * options.tolerance, WHOLE * options.tolerance - left_out)
+
+
+def omitted_error(bodies: Bodies) -> float:
+    """Estimated error of what the bodies do without [m]; along a chain it adds up."""
+    return sum(row.estimated_error_m or 0.0 for body in bodies or () for row in body.left_out)
+
+
+def mesh_error(bodies: Bodies) -> float | None:
+    """That of their meshes [m]; None where nothing is flexible, or one of them is not known."""
+    errors = [body.mesh_error_m for body in bodies or () if len(body.stiffness)]
+    known = [error for error in errors if error is not None]
+    return sum(known) if errors and len(known) == len(errors) else None
+
+
+def intended_motion(character: Character, animation: Animation, bodies: Bodies, options: Options) -> Array:
+    """Where the targets are meant to be at the frames [m], shape [f, K, 3]."""
+    prepared = prepare(character, animation, bodies, replace(options, step=FIRST))
+    meant = meant_motion(prepared, *sample_tracks(animation.tracks, prepared.grid))
+    return meant.reference.positions[prepared.grid.frames]
+
+
+def found_tracks(result: Result, animation: Animation) -> tuple[Track, ...]:
+    """The curves that were found: samples at the frames hold them exactly."""
+    return tuple(
+        Track(animation.frame_times, curve.frame_values) if curve.changed else track
+        for curve, track in zip(result.curves, animation.tracks, strict=True)
+    )

@@ -1,0 +1,130 @@
+"""The error of the time step at the targets, from two simulations of the same curves by different steps."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from calmotion.errors import ShotError
+from calmotion.multibody.failure import SimulationFailure
+from calmotion.multibody.integrators.workspace import Workspace
+from calmotion.reduction.reduced_body import ReducedBody
+from calmotion.shot import Animation, Character, Result
+from calmotion.shot.character import Array
+from calmotion.simulation.cyclic import SteadyState
+from calmotion.simulation.forward import run_forward
+from calmotion.simulation.inputs.curves import sample_tracks
+from calmotion.simulation.prepare import Options, failure_error, prepare
+from calmotion.simulation.report import elastic_by_body
+
+ORDER = 2  # of BDF2; the global error goes with this power of the step
+MARGIN, WORTH = 0.9, 1.1  # of a step between two that were tried; how much longer it must be than the shorter of them
+
+
+@dataclass(frozen=True, eq=False)
+class StepRun:
+    """Where one simulation has the targets at the shot's frames.
+
+    Attributes:
+        step: [s].
+        positions: [m], shape [f, K, 3]; infinite where the simulation failed.
+        elastic: Elastic coordinates of each body of the character at every step, shape [T, r]; empty for a motion that
+            is known at the frames alone.
+        integrator: By which it was simulated; empty where that does not matter.
+    """
+
+    step: float
+    positions: Array
+    elastic: tuple[Array, ...] = ()
+    integrator: str = ""
+
+
+def simulate_at(
+    character: Character, animation: Animation, bodies: Sequence[ReducedBody] | None, options: Options, step: float
+) -> StepRun:
+    """One simulation of an animation's current curves; other arguments as of `simulate_shot`.
+
+    Raises:
+        ShotError: The shot cannot be simulated by this step.
+    """
+    prepared = prepare(character, animation, bodies, replace(options, step=step))
+    model, grid = prepared.model, prepared.grid
+    workspace = Workspace.for_system(model.system)
+    angles, rates = sample_tracks(animation.current, grid)
+    steady = SteadyState(model, prepared.world, grid.h, workspace) if grid.cyclic else None
+    try:
+        run = run_forward(model, workspace, angles, rates, grid.h, prepared.world, None, options.scheme, steady)
+    except SimulationFailure as failure:
+        raise failure_error(prepared, failure) from failure
+    elastic = elastic_by_body(model, run.trajectory.states.u)
+    return StepRun(grid.h, run.target_positions[grid.frames], elastic, options.scheme)
+
+
+def frames_of(result: Result, frame_times: Array) -> StepRun:
+    """The motion of a result that counts, at the frames [s]."""
+    motion = (result.after or result.before).motion
+    # times are sums of steps, so a frame may come out a rounding later
+    return StepRun(result.step_s, motion.target_positions[np.searchsorted(motion.times, frame_times - 1e-9)])
+
+
+def distance(one: Array, other: Array) -> float:
+    """Largest distance of any target at any frame [m], between places of shape [f, K, 3]."""
+    return float(np.max(np.linalg.norm(one - other, axis=2), initial=0.0))
+
+
+def step_error(coarse: StepRun, fine: StepRun) -> float:
+    """Error of the finer of two runs at any target [m], by Richardson's extrapolation."""
+    ratio = (coarse.step / fine.step) ** ORDER - 1.0
+    return distance(coarse.positions, fine.positions) / ratio
+
+
+def largest_step(
+    run: Callable[[float], StepRun], first: float, last: float, allowed: Callable[[StepRun], float]
+) -> tuple[float, float]:
+    """The largest step whose error is allowed: by halving the first, and then between two of these by the order.
+
+    Args:
+        run: Simulates by a step [s]; may raise ShotError where that is too large.
+        first, last: Steps to begin and to end with [s].
+        allowed: Error at the targets [m] that may be, from the finest run so far.
+
+    Returns:
+        The step [s] and its estimated error [m]; where not even the last is fine enough, that and its error.
+    """
+    step, coarse = first, run_or_none(run, first)
+    while True:
+        step *= 0.5
+        fine = run_or_none(run, step)
+        if fine is None:
+            if step <= last:
+                return step, np.inf
+        elif coarse is not None and coarse.step > fine.step:  # a frame may be shorter than both
+            error, enough = step_error(coarse, fine), allowed(fine)
+            by_coarse = (coarse.step / fine.step) ** ORDER * error
+            if by_coarse <= enough:
+                return coarse.step, by_coarse
+            if error <= enough:
+                return _between(fine.step, error, enough)
+            if step <= last:
+                return fine.step, error
+        elif step <= last:
+            return fine.step, np.inf
+        coarse = fine
+
+
+def _between(step: float, error: float, enough: float) -> tuple[float, float]:
+    """A step [s] up to twice as long as one whose error is allowed, and its error."""
+    longer = MARGIN * np.sqrt(enough / error) if error > 0.0 else 2.0
+    if longer <= WORTH:
+        return step, error
+    return longer * step, longer**ORDER * error
+
+
+def run_or_none(run: Callable[[float], StepRun], step: float) -> StepRun | None:
+    """The run by a step, None where that fails."""
+    try:
+        return run(step)
+    except ShotError:
+        return None

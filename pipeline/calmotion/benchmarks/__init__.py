@@ -1,0 +1,1 @@
+"""Measurements behind `calmotion bench`; nothing imports this room but the command itself."""

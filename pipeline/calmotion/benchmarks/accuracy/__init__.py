@@ -1,0 +1,1 @@
+"""Error against run time, tolerances, convergence of the reduction, value of simplifications."""

@@ -1,0 +1,185 @@
+"""Whether `--tolerance` is kept: shots simulated or retargeted to it, each measured against a finer simulation.
+
+`calmotion bench tolerances [SHOT ...] [--csv FILE]` simulates each shot as animated to each tolerance, with all that
+the program leaves out and chooses for it, and measures the result against a simulation with everything kept, a far
+smaller step and far more coordinates. With `--optimize` it retargets each shot, and simulates the curves that it finds
+again. The error is the largest distance of any target, at any frame, between the two.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+import time
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+
+from calmotion.accuracy.converged_reduction import settled_bodies
+from calmotion.accuracy.simplification.analysis import analyse
+from calmotion.accuracy.simulate_to_tolerance import found_tracks, simulate_to_tolerance
+from calmotion.accuracy.step_error import distance, frames_of
+from calmotion.benchmarks.accuracy.work_precision import FINEST, SAMPLES, Bench, Reference, machine
+from calmotion.benchmarks.common.fresh_cache import fresh_cache
+from calmotion.benchmarks.common.shots import Unreduced, load_unreduced
+from calmotion.benchmarks.common.tables import markdown, table_parser, write_rows
+from calmotion.retargeting.to_tolerance import optimize_to_tolerance
+from calmotion.shot import Result
+from calmotion.simulation.prepare import Options
+
+TOLERANCES = (1e-2, 1e-3, 1e-4, 1e-5)
+FINER = 1e-2  # tolerance of the reference's reduction over the tightest that is measured
+
+
+@dataclass(frozen=True)
+class Kept:
+    """One shot to one tolerance.
+
+    Attributes:
+        shot, command: Name; `simulate` or `optimize`.
+        tolerance_m: Asked for [m].
+        error_m, reference_m: Measured, and how far the reference may be from its limit [m].
+        estimated_m: What the program estimates [m].
+        step_s, coordinates: What it chose.
+        wall_s: Analysis, reduction, choices and the run, the mesh at hand [s].
+        run_s: The simulation or the search alone [s].
+        shake_before_m, shake_after_m: Largest error of the input and of the result against what was meant [m].
+    """
+
+    shot: str
+    command: str
+    tolerance_m: float
+    error_m: float
+    reference_m: float
+    estimated_m: float
+    step_s: float
+    coordinates: int
+    wall_s: float
+    run_s: float
+    shake_before_m: float
+    shake_after_m: float
+
+    @property
+    def kept(self) -> bool:
+        """Whether the error is within the tolerance."""
+        return self.error_m <= self.tolerance_m
+
+
+class Tolerances:
+    """One shot to several tolerances; the reference of its input is made once.
+
+    Args:
+        shot: The shot.
+        finest: Tolerance of the reference's reduction [m], far below those that are measured.
+    """
+
+    def __init__(self, shot: Unreduced, finest: float = FINEST):
+        self.shot, self.finest = shot, finest
+        self._reference: Reference | None = None
+
+    def warm(self, tolerance: float, command: str) -> None:
+        """Run once, so that what is timed afterwards neither compiles nor loads kernels."""
+        with fresh_cache():
+            self._run(Options(tolerance=tolerance), command)
+
+    def kept(self, tolerance: float, command: str = "simulate") -> Kept:
+        """Simulate or retarget the shot to a tolerance [m], and measure the result."""
+        shot, animation = self.shot, self.shot.animation
+        begin = time.perf_counter()
+        with fresh_cache():
+            result, coordinates, more = self._run(Options(tolerance=tolerance), command)
+        wall = time.perf_counter() - begin
+        assert result.accuracy is not None
+        if result.after is None:
+            self._reference = self._reference or Bench(shot).reference(self.finest)
+            reference = self._reference
+        else:
+            found = replace(animation, current=found_tracks(result, animation))
+            reference = Bench(replace(shot, animation=found)).reference(self.finest)
+        runs = (result.before, result.after or result.before)
+        return Kept(
+            shot.name, command, tolerance,
+            distance(frames_of(result, animation.frame_times).positions, reference.positions), reference.bar_m,
+            result.accuracy.estimated_m + more, result.step_s, coordinates, wall, result.wall_s,
+            *(float(run.position_errors[run.motion.judged].max()) for run in runs),
+        )  # fmt: skip
+
+    def _run(self, options: Options, command: str) -> tuple[Result, int, float]:
+        """The result, its elastic coordinates, and what the analysis of needs estimates to leave out [m]."""
+        shot, animation = self.shot, self.shot.animation
+        needs = analyse(shot.character, animation, options, {}, command == "optimize")
+        character, more = needs.character, sum(row.estimated_error_m or 0.0 for row in needs.left_out)
+        quiet = lambda fraction, message: None  # noqa: E731  (a callback, twice)
+        search = command == "optimize"
+        settled = settled_bodies(character, animation, shot.meshes, options, retargeted=search)
+        bodies, known = settled.bodies, settled.known
+        if search:
+            result = optimize_to_tolerance(character, animation, bodies, options, quiet, known=known)
+        else:
+            result = simulate_to_tolerance(character, animation, bodies, options, quiet, settled.error_m, known)
+        return result, sum(u.shape[1] for u in result.before.motion.elastic), more
+
+
+def told(row: Kept) -> str:
+    """One line of it."""
+    return (
+        f"{row.shot}, {1e3 * row.tolerance_m:g} mm: {1e3 * row.error_m:.2g} mm off, in {row.wall_s:.0f} s, "
+        f"{row.run_s:.1f} s of them the {'search' if row.command == 'optimize' else 'simulation'}"
+    )
+
+
+HEADS = (
+    "shot", "tolerance", "error", "estimate", "reference to", "step", "coordinates", "run", "in all", "shake before",
+    "after",
+)  # fmt: skip
+
+
+def cells(rows: Sequence[Kept]) -> list[list[str]]:
+    """The table for a person, without its heads."""
+    from calmotion.cli.tables import length
+
+    return [
+        [
+            row.shot, length(row.tolerance_m), length(row.error_m), length(row.estimated_m), length(row.reference_m),
+            f"{1e3 * row.step_s:.3g} ms", str(row.coordinates), f"{row.run_s:.2f} s", f"{row.wall_s:.1f} s",
+            length(row.shake_before_m), length(row.shake_after_m) if row.command == "optimize" else "-",
+        ]
+        for row in rows
+    ]  # fmt: skip
+
+
+def print_rows(rows: Sequence[Kept]) -> None:
+    """The same on the screen."""
+    from calmotion.cli.tables import console_on, print_table
+
+    title = {"simulate": "Simulated", "optimize": "Optimised"}[rows[0].command]
+    print_table(console_on(sys.stdout), f"{title} to a tolerance, against a far finer simulation", HEADS, cells(rows))
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """The command: exit status 1 when a tolerance is not kept."""
+    parser = table_parser("tolerances", __doc__, SAMPLES, TOLERANCES)
+    parser.add_argument("--optimize", action="store_true", help="retarget the shots, which takes far longer")
+    options = parser.parse_args(arguments)
+    rows: list[Kept] = []
+    for path in options.shots:
+        shot = Tolerances(load_unreduced(path), FINER * min(options.tolerances))
+        own, command = [], "optimize" if options.optimize else "simulate"
+        shot.warm(max(options.tolerances), command)
+        for tolerance in options.tolerances:
+            own.append(shot.kept(tolerance, command))
+            print(told(own[-1]), file=sys.stderr, flush=True)  # the next may take long
+            if options.csv:
+                write_rows(options.csv, Kept, rows + own)
+        rows += own
+        if options.markdown:
+            Path(options.markdown).write_text(markdown(HEADS, cells(rows)), encoding="utf-8")
+        if not options.json:
+            print_rows(own)
+    if options.json:
+        print(json.dumps({"machine": machine(), "rows": [asdict(row) | {"kept": row.kept} for row in rows]}))
+    return int(not all(row.kept for row in rows))
+
+
+if __name__ == "__main__":
+    sys.exit(main())

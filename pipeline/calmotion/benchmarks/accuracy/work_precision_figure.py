@@ -1,0 +1,81 @@
+"""The figure of `work_precision`: error against run time, the Pareto front, and what the program chooses."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from calmotion.benchmarks.accuracy.pareto import front
+from calmotion.benchmarks.common.drawing import plain, save
+from calmotion.benchmarks.integrators.integrator_figure import COLORS
+
+if TYPE_CHECKING:
+    from calmotion.benchmarks.accuracy.work_precision import Point
+
+STYLES = {
+    **{name: (color, "o-") for name, color in COLORS.items()},
+    "reduction": ("0.35", "x--"),
+    "pairs": ("#882255", "p"),
+    "directions": ("#f0e442", "P--"),
+    "modes": ("#56b4e9", "s--"),
+    "law": ("#cc79a7", "^:"),
+    "elements": ("#999999", "v--"),
+}
+SHORT = {"linear": "lin", "stvk": "StVK", "neohookean": "nH"}
+
+
+def draw(folder: str, points: Sequence[Point], bar: float) -> str:
+    """Draw one shot to `<folder>/work_precision_<shot>.png` and return the path.
+
+    Args:
+        points: All of one shot.
+        bar: Error of the reference [m].
+    """
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(9.0, 5.6), layout="constrained")
+    axes = figure.add_subplot()
+    comparable = [p for p in points if p.series != "elements" and np.isfinite(p.error_m)]
+    best = front(comparable)
+    axes.step(
+        [p.wall_s for p in best], [1e3 * p.error_m for p in best], where="post", color="0.8", lw=5, zorder=0,
+        label="Pareto front",
+    )  # fmt: skip
+    for series, (color, style) in STYLES.items():
+        own = [p for p in points if p.series == series and np.isfinite(p.error_m)]
+        if not own:
+            continue
+        label = "elements (against the finest mesh)" if series == "elements" else series
+        sizes = [0] if series not in COLORS else sorted({p.coordinates for p in own})
+        for size in sizes:  # a line for each number of coordinates
+            line = [p for p in own if p.coordinates == size] if size else own
+            axes.loglog(
+                [p.wall_s for p in line], [1e3 * p.error_m for p in line], style, color=color, ms=4, lw=1,
+                label=label if size == sizes[0] else None,
+            )  # fmt: skip
+        if series == "law":
+            for p in own:
+                axes.annotate(
+                    SHORT[p.setting], (p.wall_s, 1e3 * p.error_m), (4, 4), textcoords="offset points", fontsize=7
+                )
+    chosen = [p for p in points if p.series == "tolerance"]
+    axes.loglog(
+        [p.wall_s for p in chosen], [1e3 * p.error_m for p in chosen], "D", color="black", ms=6, label="--tolerance"
+    )
+    for p in chosen:
+        axes.annotate(p.setting, (p.wall_s, 1e3 * p.error_m), (6, -10), textcoords="offset points", fontsize=8)
+    for p in points:
+        if p.series == "default":
+            axes.loglog(p.wall_s, 1e3 * p.error_m, "*", color="black", ms=14, label="default")
+    low = min(axes.get_ylim()[0], 0.5e3 * bar)
+    axes.axhspan(low, 1e3 * bar, color="0.93", zorder=-1)
+    axes.set_ylim(bottom=low)
+    axes.annotate("error of the reference", (0.01, 1e3 * bar), xycoords=("axes fraction", "data"), fontsize=7, va="top")
+    axes.set_xlabel("run time of the simulation [s]")
+    axes.set_ylabel("largest error of any target [mm]")
+    axes.set_title(f"{points[0].shot}, simulated as animated", loc="left", fontsize=10)
+    figure.legend(frameon=False, fontsize=8, loc="outside right upper")  # over the points it would hide some
+    plain([axes])
+    return save(figure, folder, f"work_precision_{points[0].shot}")

@@ -1,0 +1,95 @@
+"""The settings whose error and run time `calmotion bench work-precision` compares."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import partial
+
+from calmotion.accuracy.converged_reduction import settled_bodies
+from calmotion.accuracy.integrator_choice import by_fast_scheme
+from calmotion.accuracy.simulate_to_tolerance import chosen_step, held_to_tolerance
+from calmotion.benchmarks.accuracy.pareto import setting_of
+from calmotion.benchmarks.accuracy.work_precision import BASE, TOLERANCES, Bench, Point, Reference
+from calmotion.benchmarks.common.shots import load_unreduced
+from calmotion.reduction.reduced_body import ReducedBody
+from calmotion.shot import Animation, Character
+from calmotion.simulation.inputs.time_grid import MAX_STEP
+from calmotion.simulation.prepare import Options
+
+STEPS = (1 / 60, 1 / 120, 1 / 240, 1 / 480, 1 / 960, 1 / 1920)
+FINER_STEPS = (1 / 3840, 1 / 7680)  # too, where directions are fine enough: the tightest tolerances ask for them
+RADAU_STEPS = (1 / 60, 1 / 120)  # of higher order, far dearer, and not compiled: few, with the fewest coordinates
+MODES = (1, 2, 4, 8, 16)
+LEVELS = (5e-4, 5e-6)  # what holding bodies to directions may change in the runs that vary step and integrator [m]
+DIRECTIONS = (1e-3, 1e-4, 1e-5, 1e-6)  # and in those that vary it
+CUBATURE = 1e-3  # the reduction of Neo-Hookean bodies: their cubature takes minutes for finer ones [m]
+REDUCTIONS = (1e-2, 1e-3, 1e-4, BASE, 1e-6)
+ELEMENTS = (2.0, 1.4, 1.0, 0.7)  # edge lengths over those of the mesh that the shot gets
+
+
+def forward_points(bench: Bench, reference: Reference) -> list[Point]:
+    """Steps and integrators, reductions, pairs, directions, modes, laws."""
+    base = bench.bodies(BASE)
+    held = [bench.held(base, allowed) for allowed in LEVELS]
+    points = [
+        bench.measure(reference, integrator, f"1/{1 / step:.0f} s", bodies, step, integrator)
+        for bodies, steps in zip(held, [*[STEPS] * (len(held) - 1), STEPS + FINER_STEPS], strict=True)
+        for integrator in ("bdf2", "newmark", "generalized-alpha")
+        for step in steps
+    ]
+    points += [bench.measure(reference, "radau", f"1/{1 / h:.0f} s", held[0], h, "radau") for h in RADAU_STEPS]
+    fine = 0.5 * MAX_STEP
+    for allowed in DIRECTIONS:
+        points.append(
+            bench.measure(reference, "directions", f"to {1e3 * allowed:g} mm", bench.held(base, allowed), fine)
+        )
+    every = bench.measure(reference, "directions", "all", base, fine)
+    points.append(every)
+    for tolerance in REDUCTIONS:
+        series, setting = "reduction", f"to {1e3 * tolerance:g} mm"
+        if tolerance == BASE:  # the same simulation
+            points.append(replace(every, series=series, setting=setting))
+        else:
+            points.append(bench.measure(reference, series, setting, bench.bodies(tolerance), fine))
+    points.append(bench.measure(reference, "pairs", "all", bench.bodies(BASE, pairs_share=0.0), fine))
+    for count in MODES:
+        points.append(bench.measure(reference, "modes", f"{count} modes", bench.bodies(BASE, mode_count=count), fine))
+    for law, tolerance in (("linear", BASE), ("stvk", BASE), ("neohookean", CUBATURE)):
+        points.append(bench.measure(reference, "law", law, bench.bodies(tolerance, elasticity=law), fine))
+    return points
+
+
+def chosen_points(bench: Bench, reference: Reference, tolerances: Sequence[float] = TOLERANCES) -> list[Point]:
+    """What the program chooses: with no tolerance asked for, and for some."""
+    shot = bench.shot
+    character, animation = shot.character, shot.animation
+    default = bench.bodies(shot.character.retarget.allowed())
+    points = [bench.measure(reference, "default", "default", default, MAX_STEP)]
+    for tolerance in tolerances:
+        options = Options(tolerance=tolerance)
+        settled = settled_bodies(character, animation, shot.meshes, options)
+        held = held_to_tolerance(character, animation, settled.bodies, options, settled.known)
+        bodies = held.bodies or settled.bodies
+        choice = partial(_step_and_scheme, character, animation, bodies, settled.error_m + held.error_m)
+        step, integrator = by_fast_scheme(options, choice)
+        points.append(bench.measure(reference, "tolerance", setting_of(tolerance), bodies, step, integrator))
+    return points
+
+
+def _step_and_scheme(
+    character: Character, animation: Animation, bodies: Sequence[ReducedBody], left_out: float, options: Options
+) -> tuple[float, str]:
+    return chosen_step(character, animation, bodies, options, left_out)[0], options.scheme
+
+
+def element_points(bench: Bench, factors: Sequence[float] = ELEMENTS) -> list[Point]:
+    """Sizes of elements, against the smallest of them: a finer mesh is another body, with its own limit."""
+    benches = [Bench(load_unreduced(bench.shot.path, factor * bench.shot.edge), bench.repeats) for factor in factors]
+    fine = 0.5 * MAX_STEP
+    runs = [(other, other.bodies(BASE)) for other in benches]
+    finest = Reference(runs[-1][0].run(runs[-1][1], fine).positions, 0.0)
+    return [
+        other.measure(finest, "elements", f"{1e3 * factor * bench.shot.edge:.3g} mm", bodies, fine)
+        for factor, (other, bodies) in zip(factors[:-1], runs[:-1], strict=True)
+    ]

@@ -1,0 +1,1 @@
+"""What benchmarks share: shots, tables, timing, figures."""

@@ -1,0 +1,1 @@
+"""Comparison and stability of integrators, accuracy of gradients."""

@@ -1,0 +1,136 @@
+"""What practitioners do otherwise, on the same shot: input shapers and a low-pass filter beside the optimised curves.
+
+`calmotion bench baselines [SHOT ...]` simulates each shot as animated, through ZV and ZVD shapers for its lowest mode
+and for its lowest two, through a low-pass filter, and optimised. Errors are those of the worst target against the
+animation as it is timed and, since shapers delay the motion, against the animation delayed by as much as suits each
+method best.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from dataclasses import asdict, dataclass
+
+import numpy as np
+
+from calmotion.benchmarks.common.shots import MADE, BenchShot, load
+from calmotion.benchmarks.optimizer.optimizer import make_problem
+from calmotion.retargeting.problem.problem import RetargetProblem
+from calmotion.retargeting.solver.damping_homotopy import approach
+from calmotion.retargeting.solver.gauss_newton import minimize
+from calmotion.shot.character import Array
+from calmotion.simulation.inputs.curves import Curves
+from calmotion.simulation.inputs.shapers import SHAPERS, delay, shaped
+from calmotion.simulation.prepare import Options, modes_of, prepare
+from calmotion.simulation.simulator import Simulator
+
+LONGEST_DELAY = 0.6  # that is tried [s]
+
+
+@dataclass(frozen=True)
+class Row:
+    """One way to make one shot calmer.
+
+    Attributes:
+        shot, method: Names.
+        delay_s: Mean delay of its impulses [s].
+        largest_mm, rms_mm: Error of the worst target against the animation as timed [mm].
+        best_delay_s, delayed_largest_mm: The delay of the animation that suits it best, and the error against that.
+        change_deg: Largest change of a motor's curve [deg], of length motors [mm].
+    """
+
+    shot: str
+    method: str
+    delay_s: float
+    largest_mm: float
+    rms_mm: float
+    best_delay_s: float
+    delayed_largest_mm: float
+    change_deg: float
+
+
+def compare(shot: BenchShot) -> list[Row]:
+    """All methods on one shot."""
+    prepared = prepare(shot.character, shot.animation, shot.bodies, Options())
+    problem = make_problem(shot, prepared, 0.05)
+    frequencies, damping = modes_of(prepared, shot.animation)
+    simulator = Simulator(prepared.model, prepared.grid.h, prepared.world, prepared.grid.cyclic)
+    rows = []
+    for kind in ("as animated", *SHAPERS):
+        curves, late = problem.curves, 0.0
+        if kind in SHAPERS:
+            curves = shaped(problem.curves, prepared.grid, kind, frequencies, damping)
+            late = delay(kind, frequencies, damping)
+        run = simulator.run(curves.angles, curves.rates)
+        rows.append(_row(shot, kind.replace("2", ", two modes"), late, problem, curves, run.target_positions))
+    zero, free = np.zeros(problem.size), np.zeros(problem.size, bool)
+    problem.value(zero)
+    found = minimize(problem, approach(problem, zero, free, float(frequencies[0])), free, 5e-6)
+    problem.value(found.x)
+    rows.append(_row(shot, "optimised", 0.0, problem, problem.changed_curves, problem.run.target_positions))
+    return rows
+
+
+def _row(
+    shot: BenchShot, method: str, late: float, problem: RetargetProblem, curves: Curves, positions: Array
+) -> Row:  # fmt: skip
+    grid, meant = problem.grid, problem.objective.reference.positions
+    judged = np.flatnonzero(grid.judged)
+
+    def errors(shift: int) -> Array:
+        return np.linalg.norm(positions[judged] - meant[np.maximum(judged - shift, 0)], axis=2)
+
+    shifts = range(0, int(LONGEST_DELAY / grid.h), max(1, int(0.002 / grid.h)))
+    best = min(shifts, key=lambda shift: float(errors(shift).max()))
+    now = errors(0)
+    change = np.abs(curves.angles - problem.curves.angles)[judged].max()
+    return Row(
+        shot.name, method, late, 1e3 * float(now.max()), 1e3 * float(np.sqrt(np.mean(now**2, axis=0)).max()),
+        best * grid.h, 1e3 * float(errors(best).max()), float(np.degrees(change)),
+    )  # fmt: skip
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """The command."""
+    parser = argparse.ArgumentParser(prog="calmotion bench baselines", description=__doc__)
+    parser.add_argument("shots", metavar="SHOT", nargs="*", default=["arm", "linkage"], help=f"USD file, or {MADE}")
+    parser.add_argument("--json", action="store_true", help="print one JSON object on stdout, and nothing else there")
+    options = parser.parse_args(arguments)
+    found: list[Row] = []
+    for name in options.shots:
+        shot = load(name)
+        found += compare(shot)
+        if not options.json:
+            print_table_of(found, shot.name)
+    if options.json:
+        print(json.dumps([asdict(row) for row in found]))
+    return 0
+
+
+def print_table_of(rows: list[Row], name: str) -> None:
+    """The table of one shot for a person."""
+    from calmotion.cli.tables import console_on, print_table
+
+    heads = [
+        "method",
+        "delay",
+        "largest error",
+        "rms error",
+        "least error, animation delayed",
+        "by",
+        "curves change by",
+    ]
+    shown = [
+        [
+            row.method, f"{1e3 * row.delay_s:.0f} ms", f"{row.largest_mm:.2f} mm", f"{row.rms_mm:.2f} mm",
+            f"{row.delayed_largest_mm:.2f} mm", f"{1e3 * row.best_delay_s:.0f} ms", f"{row.change_deg:.1f}°",
+        ]
+        for row in rows if row.shot == name
+    ]  # fmt: skip
+    print_table(console_on(sys.stdout), name, heads, shown)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

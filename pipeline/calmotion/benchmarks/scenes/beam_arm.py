@@ -1,0 +1,98 @@
+"""Arms of prismatic beams made in code, for benchmarks: no shot, no mesher, the same numbers everywhere."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from calmotion.geometry.tetrahedra import oriented_tets
+from calmotion.shot import (
+    Animation,
+    Body,
+    Character,
+    ElasticMaterial,
+    FEMesh,
+    FEMeshes,
+    FlexibleSettings,
+    Frame,
+    Joint,
+    MassProperties,
+    MeshQuality,
+    Motor,
+    Target,
+    Track,
+)
+from calmotion.shot.character import Array, IntArray
+
+IDENTITY = np.array([1.0, 0.0, 0.0, 0.0])
+LIFTS = np.array([np.sqrt(0.5), np.sqrt(0.5), 0.0, 0.0])  # joint axis z along -y: a positive angle lifts the arm
+
+
+def _at(x: float, rotation: Array = IDENTITY) -> Frame:
+    return Frame(np.array([x, 0.0, 0.0]), rotation)
+
+
+def beam_mesh(length: float, thickness: float, cells: int, across: int = 2) -> tuple[Array, IntArray]:
+    """A square beam along x of so many cells along and across; points [m], shape [n, 3], and tetrahedra."""
+    from skfem import MeshTet
+
+    side = np.linspace(-0.5, 0.5, across + 1) * thickness
+    mesh = MeshTet.init_tensor(np.linspace(0.0, length, cells + 1), side, side)
+    points = np.ascontiguousarray(mesh.p.T)
+    return points, oriented_tets(points, mesh.t.T)[0]
+
+
+def beam_arm(
+    links: int = 1, length: float = 0.6, thickness: float = 0.02, youngs_modulus: float = 1.8e9,
+    density: float = 1200.0, payload: float = 0.2, damping: float = 0.01, gravity: float = 9.81,
+    elasticity: str = "auto", modes: int = -1, cells: int = 12,
+) -> tuple[Character, FEMeshes]:  # fmt: skip
+    """An arm along x of flexible links, each on a motor that lifts it, with a rigid load welded to the end.
+
+    The defaults are those of a slender plastic arm: 0.6 m, 20 mm square, with 0.2 kg at its end it swings at 5.6 Hz.
+
+    Args:
+        links: Number of links, each `length` [m] long.
+        length, thickness: [m].
+        youngs_modulus, density: [Pa], [kg/m^3]; Poisson's ratio is 0.35.
+        payload: [kg].
+        damping: Ratio of critical.
+        gravity: Down the z axis [m/s^2].
+        elasticity, modes: See `FlexibleSettings`.
+        cells: Elements along a link.
+    """
+    material = ElasticMaterial("/Arm/Plastic", youngs_modulus, 0.35, density, damping)
+    settings = FlexibleSettings(material, mode_count=modes, elasticity=elasticity)
+    bodies = [Body(f"/Arm/Link{k}", _at(k * length), None, flexible=settings) for k in range(links)]
+    # a cube, as heavy as the load, of an edge of two thicknesses
+    inertia = payload * (2.0 * thickness) ** 2 / 6.0 * np.eye(3)
+    bodies.append(Body("/Arm/Load", _at(links * length), MassProperties(payload, np.zeros(3), inertia)))
+    joints = [
+        Joint(f"/Arm/Joint{k}", "revolute", k - 1, k, _at(length if k else 0.0, LIFTS), _at(0.0, LIFTS))
+        for k in range(links)
+    ]
+    joints.append(Joint("/Arm/Weld", "fixed", links - 1, links, _at(length), _at(0.0)))
+    motors = tuple(Motor(k, joints[k].path, "drive:angular:physics:targetPosition") for k in range(links))
+    target = Target("/Arm/Load", links, _at(0.0))
+    points, tets = beam_mesh(length, thickness, cells)
+    meshes = FEMeshes(tuple(FEMesh(k, points, tets, MeshQuality(0.0, 0.0, 0.0)) for k in range(links)))
+    down = np.array([0.0, 0.0, -gravity])
+    return Character("/Arm", tuple(bodies), tuple(joints), motors, (target,), down), meshes
+
+
+def quintic(turn: float, seconds: float, start: float = 0.0) -> Callable[[Array], Array]:
+    """A move from rest to rest: its angle [rad] over time [s]."""
+
+    def angle(t: Array) -> Array:
+        s = np.clip((np.asarray(t) - start) / seconds, 0.0, 1.0)
+        return turn * s**3 * (10.0 - 15.0 * s + 6.0 * s * s)
+
+    return angle
+
+
+def shot_of(angle: Callable[[Array], Array], seconds: float, motors: int = 1, rate: float = 24.0) -> Animation:
+    """A shot of so many seconds at `rate` frames a second in which every motor follows the same curve."""
+    times = np.arange(round(seconds * rate) + 1) / rate
+    tracks = tuple(Track(times, angle(times)) for _ in range(motors))
+    return Animation(times, tracks, tracks)

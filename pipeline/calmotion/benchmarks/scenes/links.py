@@ -1,0 +1,94 @@
+"""Links of robots as bodies to be meshed, from any USD file with rigid bodies: no animation or motors are needed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from calmotion.errors import ShotError
+from calmotion.shot import Body, ElasticMaterial, FlexibleSettings, Frame
+
+# of polyamide as printed links are; relative errors of frequencies do not depend on its stiffness and density
+POLYAMIDE = ElasticMaterial("", 1.8e9, 0.35, 1200.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Link:
+    """A link of a robot.
+
+    Attributes:
+        name: Of its prim.
+        body: With surfaces or tetrahedra, and flexible settings.
+        carrier: Where the joint towards the world takes hold of it, body frame; None without one.
+    """
+
+    name: str
+    body: Body
+    carrier: Frame | None
+
+
+def read_links(source: str) -> list[Link]:
+    """The links that `FILE` or `FILE:PRIM` names; a prim by its path or its name, all rigid bodies without one.
+
+    A material that is bound to the prim is not looked at: all links are of the same one.
+
+    Raises:
+        ShotError: The file cannot be read, or has no such prim.
+    """
+    from calmotion.usd import stages
+    from calmotion.usd.reading.bodies.shapes import shapes_of, tets_of
+    from calmotion.usd.reading.context import Reading, is_rigid_body, prims_of
+    from calmotion.usd.units import units_of
+
+    file, wanted = _split(source)
+    stage = stages.open_stage(file)
+    with stages.quiet():
+        reading = Reading(stage, units_of(stage), float(stage.GetStartTimeCode()))
+        prims = [prim for prim in prims_of(stage) if is_rigid_body(prim)]
+        if wanted:
+            by_path = stage.GetPrimAtPath(wanted) if wanted.startswith("/") else None
+            named = [prim for prim in [*prims, *prims_of(stage)] if prim.GetName() == wanted]
+            prims = [by_path] if by_path else named[:1]
+        if not prims:
+            raise ShotError(
+                "has no such link", path=file, found=wanted or "no prim with PhysicsRigidBodyAPI",
+                remedy="Name a prim of the file, as in robot.usda:left_elbow_link",
+            )  # fmt: skip
+        carriers = _carriers(reading, stage)
+        links = []
+        for prim in prims:
+            pose = reading.pose(prim)
+            body = Body(
+                path=str(prim.GetPath()),
+                rest=pose.frame(reading.units.length(1.0)),
+                mass=None,
+                surfaces=tuple(shape.surface for shape in shapes_of(reading, prim, pose)),
+                tets=tets_of(reading, prim, pose),
+                flexible=FlexibleSettings(POLYAMIDE, mode_count=12),
+            )
+            links.append(Link(prim.GetName(), body, carriers.get(body.path)))
+    return links
+
+
+def _split(source: str) -> tuple[str, str]:
+    """File and prim; a drive letter is no prim."""
+    file, colon, prim = source.rpartition(":")
+    return (file, prim) if colon and len(file) > 1 else (source, "")
+
+
+def _carriers(reading, stage) -> dict[str, Frame]:
+    """The frame of the first joint that has a body as its second one."""
+    from calmotion.usd.reading.context import is_rigid_body, prims_of
+    from calmotion.usd.reading.joints import joint_prims, read_joint
+
+    poses = {str(prim.GetPath()): reading.pose(prim) for prim in prims_of(stage) if is_rigid_body(prim)}
+    found: dict[str, Frame] = {}
+    for prim in joint_prims(stage):
+        try:
+            joint = read_joint(reading, prim, poses)
+        except ShotError:
+            continue  # what is wrong with a joint does not matter to the mesh of another link
+        if joint is not None and joint.body1 and np.isfinite(joint.frame1.position).all():
+            found.setdefault(joint.body1, joint.frame1)
+    return found

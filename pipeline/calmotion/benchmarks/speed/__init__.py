@@ -1,0 +1,1 @@
+"""Run time against problem size: scaling, reduction, meshing, reading."""

@@ -1,0 +1,1 @@
+"""The command line: one file a command. Importing the package alone loads nothing."""

@@ -1,0 +1,192 @@
+"""`calmotion inspect`: what is in the shot, and what would be left out and why."""
+
+from __future__ import annotations
+
+import argparse
+import dataclasses
+from collections.abc import Sequence
+from typing import Any, TextIO
+
+import numpy as np
+
+from calmotion import __version__
+from calmotion.accuracy.reduced_bodies import ReducedBodies
+from calmotion.cli.output import Output, Problem
+from calmotion.cli.progress import ProgressDisplay
+from calmotion.cli.report import left_out_row, operator_row
+from calmotion.cli.run import (
+    FAILED,
+    INTERRUPTED,
+    asked_for,
+    carry_out,
+    conclude,
+    problems_of,
+    settings_of,
+    tell_failures,
+)
+from calmotion.errors import ShotError
+from calmotion.host import HostError, Run, open_host
+from calmotion.shot import Animation, Body, Character, Findings, LeftOut, ModeTable, Motor, Needs, Provenance, Track
+from calmotion.shot.measure import measure_of
+from calmotion.shot.outputs import ModeShapes, PlannedStep, SystemModes
+from calmotion.shot.run import OutputPaths, Source
+
+SHOWN_MODES = 10
+
+
+def inspect_shot(args: argparse.Namespace, output: Output) -> int:
+    """Read a shot and print what is in it; the exit status.
+
+    Raises:
+        ShotError: When nothing could be read.
+        SettingError: When an option or setting does not fit.
+    """
+    host = open_host(args.plugins)
+    # a gate is asked before the costly work, so it does none
+    wanted: list[type] = [Findings] if args.strict else [Character, Animation, Provenance]
+    if args.modes:
+        wanted.append(ModeShapes)
+    wanted += asked_for(host, args)
+    tell_failures(host, args.quiet)
+    source = Source(
+        path=args.shot,
+        command="check" if args.strict else "inspect",
+        tolerance=args.tolerance,
+        step=args.step,
+        pre_roll=args.pre_roll,
+        integrator=args.integrator,
+    )
+    optional = [Character, Animation, Provenance] if args.strict else [Needs, ReducedBodies, SystemModes, PlannedStep]
+    with ProgressDisplay(args.quiet, args.progress) as display:
+        run = host.run(
+            [source, OutputPaths(modes=args.modes)],
+            wanted,
+            optional=optional,
+            settings=settings_of(args),
+            progress=display,
+        )
+        interrupted = carry_out(run, display)
+    problems = [Problem(ShotError("interrupted"))] if interrupted else problems_of(run, wanted)
+    findings = run.get(Findings)
+    if findings is not None:
+        # what the reader refuses is among the findings, with the rest
+        problems = [problem for problem in problems if isinstance(problem.error, HostError)]
+    report = inspect_report(run) if all(run.get(kind) for kind in (Character, Animation, Provenance)) else {}
+    if findings is not None:
+        report |= {"shot": args.shot, "findings": [dataclasses.asdict(finding) for finding in findings.items]}
+    status = conclude(report, problems, output, None if args.quiet and not args.strict else _print)
+    if interrupted:
+        return INTERRUPTED
+    return FAILED if findings is not None and findings.items else status
+
+
+def inspect_report(run: Run) -> dict[str, Any]:
+    """The object of `inspect --json`; SI units and radians, as the names of the keys say."""
+    character, animation, provenance = run.data[Character], run.data[Animation], run.data[Provenance]
+    reduced, modes, needs = run.get(ReducedBodies), run.get(SystemModes), run.get(Needs)
+    tables = {table.body: table for table in reduced.modes} if reduced else {}
+    names = [body.path for body in character.bodies]
+    bends = [body.bends for body in (needs.character if needs else character).bodies]
+    return {
+        "command": "inspect",
+        "version": __version__,
+        "shot": provenance.shot,
+        "layers": [{"path": layer.path, "sha256": layer.sha256} for layer in provenance.layers],
+        "earlier_layers": list(provenance.earlier_layers),
+        "units": {
+            "meters_per_unit": provenance.meters_per_unit,
+            "kilograms_per_unit": provenance.kilograms_per_unit,
+            "up_axis": provenance.up_axis,
+            "time_codes_per_second": provenance.time_codes_per_second,
+            "frames_per_second": provenance.frames_per_second,
+        },
+        "frames": len(animation.frame_times),
+        "duration_s": float(animation.frame_times[-1]),
+        "character": character.path,
+        "gravity_m_s2": character.gravity,
+        "bodies": [_body(body, tables.get(index), bends[index]) for index, body in enumerate(character.bodies)],
+        "joints": [
+            {
+                "path": joint.path,
+                "kind": joint.kind,
+                "body0": names[joint.body0] if joint.body0 >= 0 else "",
+                "body1": names[joint.body1] if joint.body1 >= 0 else "",
+                "lower_rad": joint.lower,
+                "upper_rad": joint.upper,
+            }
+            for joint in character.joints
+        ],
+        "motors": [
+            _motor(motor, track, character) for motor, track in zip(character.motors, animation.tracks, strict=True)
+        ],
+        "targets": [
+            {
+                "path": target.path,
+                "body": names[target.body],
+                "position_weight": target.position_weight,
+                "rotation_weight": target.rotation_weight,
+            }
+            for target in character.targets
+        ],
+        "system_frequencies_hz": modes.frequencies[:SHOWN_MODES].tolist() if modes else [],
+        "system_damping_ratios": modes.damping[:SHOWN_MODES].tolist() if modes else [],
+        "mode_shapes": list(shapes.paths) if (shapes := run.get(ModeShapes)) else [],
+        "notes": list(character.notes),
+        "needs": [dataclasses.asdict(row) for row in needs.rows] if needs else [],
+        "left_out": [left_out_row(row) for row in (*run.left_out(), *_without(needs, reduced, run.get(PlannedStep)))],
+        "operators": [operator_row(row) for row in run.results],
+    }
+
+
+def _without(needs: Needs | None, reduced: ReducedBodies | None, step: PlannedStep | None) -> Sequence[LeftOut]:
+    """What the shot and its flexible bodies do without."""
+    rows = list(needs.left_out) if needs else []
+    rows += [row for body in reduced.bodies for row in body.left_out] if reduced else []
+    return [*rows, step.row] if step else rows
+
+
+def _body(body: Body, table: ModeTable | None, bends: bool) -> dict[str, Any]:
+    report: dict[str, Any] = {
+        "path": body.path,
+        "kind": "flexible" if body.flexible else "rigid",
+        "simulated": "flexible" if bends else "rigid",
+        # The mesh's mass is the one that is simulated, so it beats the one of the shot.
+        "mass_kg": table.mass if table else body.mass.mass if body.mass else None,
+    }
+    if body.flexible:
+        material = body.flexible.material
+        report |= {
+            "material": material.path,
+            "youngs_modulus_pa": material.youngs_modulus,
+            "poissons_ratio": material.poissons_ratio,
+            "density_kg_m3": material.density,
+        }
+    if table:
+        report |= {"frequencies_hz": table.frequencies, "nodes": table.nodes, "elements": table.elements}
+    return report
+
+
+def _motor(motor: Motor, track: Track, character: Character) -> dict[str, Any]:
+    joint = character.joints[motor.joint]
+    unit = measure_of(motor).si
+    speeds = np.abs(np.diff(track.values) / np.diff(track.times))
+    return {
+        "path": motor.path,
+        "attribute": motor.attribute,
+        "optimize": motor.optimize,
+        "samples": len(track.times),
+        f"min_{unit}": float(track.values.min()),
+        f"max_{unit}": float(track.values.max()),
+        f"lower_{unit}": joint.lower,
+        f"upper_{unit}": joint.upper,
+        f"peak_velocity_{unit}_s": float(speeds.max(initial=0.0)),
+        f"max_velocity_{unit}_s": motor.max_velocity,
+        f"max_acceleration_{unit}_s2": motor.max_acceleration,
+        "max_force_n" if motor.linear else "max_torque_n_m": motor.max_torque,
+    }
+
+
+def _print(report: dict[str, Any], stream: TextIO) -> None:
+    from calmotion.cli.inspect_tables import print_inspection
+
+    print_inspection(report, stream)

@@ -1,0 +1,109 @@
+"""The report of `calmotion inspect` as tables for a person."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any, TextIO
+
+from calmotion.cli.tables import angle, console_on, length, print_left_out, print_table
+from calmotion.shot.finding import ERROR, WARNING
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+
+def print_inspection(report: dict[str, Any], stream: TextIO) -> None:
+    """Print what is in a shot, and what a check found."""
+    console = console_on(stream)
+    (_print_findings if "findings" in report else _print_contents)(console, report)
+
+
+def _print_findings(console: Console, report: dict[str, Any]) -> None:
+    for finding in report["findings"]:
+        place = ".".join(filter(None, (finding["path"], finding["attribute"])))
+        console.print(f"{finding['level']}: {place}", markup=False, highlight=False, soft_wrap=True)
+        for label in ("problem", "found", "remedy", "rule"):
+            if finding[label]:
+                console.print(f"  {label}: {finding[label]}", markup=False, highlight=False, soft_wrap=True)
+    levels = [finding["level"] for finding in report["findings"]]
+    counts = ", ".join(f"{levels.count(level)} {level}s" for level in (ERROR, WARNING))
+    console.print(f"{report['shot']}: {counts if levels else 'nothing was found'}", markup=False, soft_wrap=True)
+
+
+def _print_contents(console: Console, report: dict[str, Any]) -> None:
+    units = report["units"]
+    console.print(
+        f"{report['shot']}: {report['character']}, {report['frames']} frames, {report['duration_s']:.4g} s",
+        markup=False,
+        soft_wrap=True,
+    )
+    gravity = ", ".join(f"{component:.4g}" for component in report["gravity_m_s2"])
+    console.print(
+        f"units: {units['meters_per_unit']:g} m, {units['kilograms_per_unit']:g} kg, {units['up_axis']} up, "
+        f"{units['time_codes_per_second']:g} time codes and {units['frames_per_second']:g} frames a second; "
+        f"gravity ({gravity}) m/s²"
+    )
+    for layer in report["earlier_layers"]:
+        console.print(f"carries an optimised layer: {layer}", soft_wrap=True)
+    bodies = [_body_row(body) for body in report["bodies"]]
+    print_table(console, "Bodies", ["body", "kind", "mass", "elements", "frequencies"], bodies, texts=2)
+    print_table(
+        console,
+        "Joints",
+        ["joint", "kind", "body 0", "body 1"],
+        [[j["path"], j["kind"], j["body0"] or "world", j["body1"] or "world"] for j in report["joints"]],
+        texts=4,
+    )
+    print_table(
+        console,
+        "Motors",
+        ["motor", "track", "limits", "peak speed", "speed limit", "effort limit", "optimised"],
+        [_motor_row(motor) for motor in report["motors"]],
+    )
+    print_table(
+        console,
+        "Targets",
+        ["target", "body", "position weight", "rotation weight"],
+        [[t["path"], t["body"], f"{t['position_weight']:g}", f"{t['rotation_weight']:g}"] for t in report["targets"]],
+        texts=2,
+    )
+    if report["system_frequencies_hz"]:
+        modes = zip(report["system_frequencies_hz"], report["system_damping_ratios"], strict=True)
+        shown = ", ".join(f"{frequency:.4g} Hz ({ratio:.2g})" for frequency, ratio in modes)
+        console.print(f"modes of the whole character in its first pose, and their damping ratios: {shown}, ...")
+    print_left_out(console, report["left_out"])
+    if report["mode_shapes"]:
+        console.print(f"mode shapes: {', '.join(report['mode_shapes'])}", soft_wrap=True)
+    for note in report["notes"]:
+        console.print(f"note: {note}")
+
+
+def _body_row(body: dict[str, Any]) -> list[str]:
+    frequencies = [f"{value:.4g}" for value in body.get("frequencies_hz", ())]
+    shown = ", ".join(frequencies[:6]) + (", ..." if len(frequencies) > 6 else "")
+    return [
+        body["path"],
+        body["kind"] if body["kind"] == body["simulated"] else f"{body['kind']}, here {body['simulated']}",
+        "-" if body["mass_kg"] is None else f"{body['mass_kg']:.4g} kg",
+        str(body.get("elements", "-")),
+        f"{shown} Hz" if shown else "-",
+    ]
+
+
+def _motor_row(motor: dict[str, Any]) -> list[str]:
+    linear = "min_m" in motor
+    shown, unit = (length, "m") if linear else (angle, "rad")
+    effort, newtons = (motor["max_force_n"], "N") if linear else (motor["max_torque_n_m"], "N m")
+    return [
+        motor["path"],
+        f"{shown(motor[f'min_{unit}'])} .. {shown(motor[f'max_{unit}'])}",
+        f"{shown(motor[f'lower_{unit}'])} .. {shown(motor[f'upper_{unit}'])}",
+        f"{shown(motor[f'peak_velocity_{unit}_s'])}/s",
+        _limit(motor[f"max_velocity_{unit}_s"], f"{shown(motor[f'max_velocity_{unit}_s'])}/s"),
+        _limit(effort, f"{effort:.4g} {newtons}"),
+        "yes" if motor["optimize"] else "no",
+    ]
+
+
+def _limit(value: float, text: str) -> str:
+    return text if math.isfinite(value) else "-"

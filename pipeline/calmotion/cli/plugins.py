@@ -1,0 +1,149 @@
+"""`calmotion plugins list`, `check`, `enable`, `disable` and `new`."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+from calmotion.cli.output import Output
+from calmotion.host import Operator, Plugin, Property, SettingError, nearest, open_host
+
+
+def list_plugins(args: argparse.Namespace, output: Output) -> int:
+    """Print every plugin with its state, operators and properties; the exit status is 0 also when some failed."""
+    plugins = open_host(args.plugins).plugins
+    if output.json:
+        output.object({"plugins": [_plugin(plugin) for plugin in plugins]})
+        return 0
+    for plugin in plugins:
+        _print_plugin(plugin, output, args.verbose)
+    if not plugins:
+        print("no plugin was found", file=output.stream)
+    return 0
+
+
+def _plugin(plugin: Plugin) -> dict[str, Any]:
+    manifest = plugin.manifest
+    return {
+        "id": plugin.id,
+        "version": manifest.version if manifest else None,
+        "name": manifest.name if manifest else None,
+        "tagline": manifest.tagline if manifest else None,
+        "license": manifest.license if manifest else None,
+        "tags": manifest.tags if manifest else [],
+        "folder": str(plugin.location.folder),
+        "origin": plugin.location.origin,
+        "state": str(plugin.state),
+        "error": str(plugin.error) if plugin.error else None,
+        "traceback": plugin.traceback or None,
+        "operators": [_operator(cls) for cls in plugin.operators],
+    }
+
+
+def _operator(cls: type[Operator]) -> dict[str, Any]:
+    return {
+        "idname": cls.idname,
+        "label": cls.label,
+        "requires": [kind.__name__ for kind in cls.requires],
+        "uses": [kind.__name__ for kind in cls.uses],
+        "provides": [kind.__name__ for kind in cls.provides],
+        "properties": [
+            {
+                "name": f"{cls.idname}.{declared.name}",
+                "type": declared.kind.__name__,
+                "default": declared.default,
+                "unit": declared.unit,
+                "minimum": declared.minimum,
+                "maximum": declared.maximum,
+                "choices": declared.choices,
+                "description": declared.description,
+            }
+            for declared in cls.properties
+        ],
+    }
+
+
+def _print_plugin(plugin: Plugin, output: Output, verbose: bool) -> None:
+    def tell(line: str) -> None:
+        print(line, file=output.stream)
+
+    manifest = plugin.manifest
+    version = f" {manifest.version}" if manifest else ""
+    tell(f"{plugin.id}{version}: {plugin.state} ({plugin.location.origin})")
+    if manifest:
+        tell(f"    {manifest.tagline}")
+    if plugin.error:
+        tell(f"    {type(plugin.error).__name__}: {plugin.error}")
+        if verbose:
+            tell("".join(f"    | {line}\n" for line in plugin.traceback.splitlines()).rstrip())
+    for cls in plugin.operators:
+        inputs = ", ".join([k.__name__ for k in cls.requires] + [f"[{k.__name__}]" for k in cls.uses])
+        tell(f"    {cls.idname}  {cls.label}: {inputs} -> {', '.join(k.__name__ for k in cls.provides)}")
+        for declared in cls.properties:
+            tell(f"        {cls.idname}.{declared.name} = {_default(declared)}  {declared.description}")
+
+
+def _default(declared: Property) -> str:
+    limits = "|".join(declared.choices) or declared.range_text()
+    text = f"{declared.default!r}" + (f" {declared.unit}" if declared.unit else "")
+    return f"{text} ({limits})" if limits else text
+
+
+def check_plugins(args: argparse.Namespace, output: Output) -> int:
+    """Check the plugin in a folder; exit status 1 when it breaks a rule."""
+    from calmotion.testing import check_plugin
+
+    problems = check_plugin(Path(args.folder))
+    if output.json:
+        output.object({"folder": args.folder, "problems": problems})
+    else:
+        for problem in problems:
+            print(f"{args.folder}: {problem}", file=output.stream)
+        if not problems:
+            print(f"{args.folder}: keeps to the rules", file=output.stream)
+    return 1 if problems else 0
+
+
+def choose_plugin(args: argparse.Namespace, output: Output) -> int:
+    """Enable or disable a plugin for all later runs.
+
+    Raises:
+        SettingError: There is no plugin of this id, or the choice cannot be kept.
+    """
+    from calmotion.host.choices import choose, disabled_plugins
+
+    if args.id not in disabled_plugins():
+        known = [plugin.id for plugin in open_host(args.plugins).plugins]
+        if args.id not in known:
+            raise SettingError(
+                "there is no such plugin",
+                path="ID",
+                found=args.id,
+                remedy=f"{nearest(args.id, known)}The plugins are {', '.join(known)}.",
+            )
+    file = choose(args.id, args.enabled)
+    state = "enabled" if args.enabled else "disabled"
+    if output.json:
+        output.object({"id": args.id, "state": state, "file": str(file)})
+    else:
+        print(f"{args.id} is {state} (kept in {file})", file=output.stream)
+    return 0
+
+
+def new_plugin(args: argparse.Namespace, output: Output) -> int:
+    """Begin a plugin.
+
+    Raises:
+        PluginError: The name is none for a plugin, or the folder is there already.
+    """
+    from calmotion.host.template import write_template
+
+    folder = write_template(args.name, Path(args.folder))
+    if output.json:
+        output.object({"id": args.name, "folder": str(folder)})
+        return 0
+    print(f"made {folder}; next:", file=output.stream)
+    for line in (f"pip install -e {folder}", f"pytest {folder}", f"calmotion plugins check {folder / args.name}"):
+        print(f"    {line}", file=output.stream)
+    return 0

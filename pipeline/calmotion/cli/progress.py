@@ -1,0 +1,67 @@
+"""Progress of a run on stderr: bars on a terminal, one line an operator in a log, lines for a program where it asks.
+
+A program that runs calmotion reads lines `progress<tab>stage<tab>fraction<tab>message`.
+"""
+
+from __future__ import annotations
+
+import sys
+from types import TracebackType
+from typing import TYPE_CHECKING, Any
+
+from calmotion.host import OperatorResult, Outcome
+
+if TYPE_CHECKING:
+    from rich.progress import Progress, TaskID
+
+
+class ProgressDisplay:
+    """Shows stages as they come; use as a context, call as the host's progress callback."""
+
+    def __init__(self, quiet: bool, machine: bool = False):
+        self._quiet, self._machine = quiet, machine
+        self._bars: Progress | None = None
+        self._tasks: dict[str, TaskID] = {}
+
+    def __enter__(self) -> ProgressDisplay:
+        if not self._quiet and not self._machine and sys.stderr.isatty():
+            from rich.console import Console
+            from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+
+            columns: list[Any] = [SpinnerColumn(), TextColumn("{task.description}"), BarColumn(bar_width=24)]
+            columns += [TimeElapsedColumn(), TextColumn("{task.fields[message]}", style="dim")]
+            self._bars = Progress(*columns, console=Console(stderr=True))
+            self._bars.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if self._bars:
+            self._bars.stop()
+
+    def __call__(self, stage: str, fraction: float, message: str) -> None:
+        """Show how far a stage is, 0..1."""
+        if self._machine:
+            line = "\t".join(("progress", stage, f"{fraction:.4f}", message)).replace("\n", " ")
+            print(line, file=sys.stderr, flush=True)
+        if self._bars is None:
+            return
+        if stage not in self._tasks:
+            self._tasks[stage] = self._bars.add_task(stage, total=1.0, message=message)
+        self._bars.update(self._tasks[stage], completed=fraction, message=message)
+
+    def done(self, result: OperatorResult) -> None:
+        """Show what became of an operator, and what it reported."""
+        if self._quiet:
+            return
+        if self._bars is None and result.outcome in (Outcome.DONE, Outcome.FAILED):
+            self._tell(f"{result.label}: {result.outcome} in {result.duration:.2f} s")
+        for record in result.records:
+            self._tell(f"{'warning' if record.level == 'warning' else 'note'}: {record.text}")
+
+    def _tell(self, line: str) -> None:
+        if self._bars:
+            self._bars.console.print(line, markup=False, highlight=False)
+        else:
+            print(line, file=sys.stderr, flush=True)

@@ -1,0 +1,186 @@
+"""What a run reports: the object of `--json`, from the values of `calmotion.shot`."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calmotion import __version__
+from calmotion.host import OperatorResult, Run
+from calmotion.shot import Character, LeftOut, LimitUse, Result, Simulation
+from calmotion.shot.character import Array
+from calmotion.shot.measure import measure_of
+from calmotion.shot.outputs import CsvFile, Figures, Recording, Verification, WrittenLayer
+from calmotion.support.memory import peak_memory
+
+LIMIT_KEPT = 1e-6  # relative excess that is rounding
+
+
+def judged_steps(simulation: Simulation) -> NDArray[np.bool_]:
+    """Which steps count, shape [T]: those of the shot, not of the pre-roll."""
+    # Times are sums of steps, so the first frame may come out a rounding before 0.
+    return simulation.motion.times >= -1e-9
+
+
+def error_norms(errors: Array, judged: NDArray[np.bool_]) -> tuple[Array, Array]:
+    """Largest and root-mean-square error of each target over the judged steps.
+
+    Args:
+        errors: [m] or [rad], shape [T, K].
+        judged: Shape [T].
+
+    Returns:
+        Two arrays of shape [K], in the unit of `errors`.
+    """
+    counted = errors[judged]
+    return np.max(counted, axis=0, initial=0.0), np.sqrt(np.mean(counted**2, axis=0))
+
+
+def target_errors(character: Character, simulation: Simulation, suffix: str) -> list[dict[str, Any]]:
+    """The errors of each target, with keys as in the contract: `max_error<suffix>_m` and so on."""
+    judged = judged_steps(simulation)
+    position = error_norms(simulation.position_errors, judged)
+    rotation = error_norms(simulation.rotation_errors, judged)
+    return [
+        {
+            "path": target.path,
+            f"max_error{suffix}_m": float(position[0][k]),
+            f"rms_error{suffix}_m": float(position[1][k]),
+            f"max_rotation_error{suffix}_rad": float(rotation[0][k]),
+            f"rms_rotation_error{suffix}_rad": float(rotation[1][k]),
+            f"sag{suffix}_m": float(simulation.sag[k]) if len(simulation.sag) else None,
+            f"seam{suffix}_m": float(simulation.seam[k]) if len(simulation.seam) else None,
+        }
+        for k, target in enumerate(character.targets)
+    ]
+
+
+def left_out_row(row: LeftOut) -> dict[str, Any]:
+    """One row of `left_out`."""
+    return {"what": row.what, "why": row.why, "estimated_error_m": row.estimated_error_m}
+
+
+def limit_row(character: Character, limit: LimitUse) -> dict[str, Any]:
+    """One row of `limits`."""
+    motor = character.motors[limit.motor]
+    return {
+        "path": motor.path,
+        "quantity": limit.quantity,
+        "unit": measure_of(motor).unit_of(limit.quantity),
+        "limit": limit.limit,
+        "before": limit.before,
+        "after": limit.after,
+        "time_s": limit.time_s,
+        "shown": [measure_of(motor).shown(limit.quantity, v) for v in (limit.limit, limit.before, limit.after)],
+        "exceeded": limit.excess > LIMIT_KEPT,
+        "cost_m": limit.cost_m,
+    }
+
+
+def operator_row(result: OperatorResult) -> dict[str, Any]:
+    """What became of an operator."""
+    return {
+        "operator": result.idname,
+        "plugin": result.plugin,
+        "outcome": str(result.outcome),
+        "reason": result.reason,
+        "duration_s": result.duration,
+        "reports": [{"level": record.level, "text": record.text} for record in result.records],
+    }
+
+
+def run_report(run: Run, character: Character, result: Result, command: str, total_wall_s: float) -> dict[str, Any]:
+    """Everything about a finished `simulate` or `optimize`."""
+    final = result.after or result.before
+    report: dict[str, Any] = {"command": command, "version": __version__}
+    report |= _optimized(character, result) if result.after else _simulated(character, result)
+    report |= {
+        "wall_s": result.wall_s,
+        "total_wall_s": total_wall_s,
+        "peak_memory_gb": peak if math.isfinite(peak := peak_memory()) else None,
+        "steps": len(final.motion.times),
+        "step_s": result.step_s,
+        "pre_roll_s": result.pre_roll_s,
+        "dof": result.dof,
+        "modes": sum(elastic.shape[1] for elastic in final.motion.elastic),
+        "parameters": result.parameters,
+        "newton_iterations": final.newton_iterations,
+        "limits": [limit_row(character, limit) for limit in result.limits],
+        "max_joint_gap_m": final.max_joint_gap,
+        "refined_steps": final.refined_steps,
+        "loop_growth": final.growth,
+        "dead_centres_s": final.dead_centres.tolist(),
+        **_accuracy(run, result),
+        "frequencies_hz": {character.bodies[table.body].path: table.frequencies for table in result.modes},
+    }
+    layer, recording, table, figures = run.get(WrittenLayer), run.get(Recording), run.get(CsvFile), run.get(Figures)
+    report |= {
+        "layer": layer.layer if layer else None,
+        "root_layer": layer.root if layer else None,
+        "rrd": recording.path if recording else None,
+        "csv": table.path if table else None,
+        "figures": figures.paths if figures else [],
+        "left_out": [left_out_row(row) for row in (*run.left_out(), *result.left_out)],
+        "notes": list(character.notes),
+        "operators": [operator_row(row) for row in run.results],
+    }
+    return report
+
+
+def _accuracy(run: Run, result: Result) -> dict[str, Any]:
+    """How far the targets are from where a finer simulation has them: estimated, and measured with `--verify`."""
+    accuracy, verified = result.accuracy, run.get(Verification)
+    return {
+        "tolerance_m": accuracy.asked_m if accuracy else None,
+        "estimated_error_m": accuracy.estimated_m if accuracy else None,
+        "estimated_step_error_m": accuracy.step_m if accuracy else None,
+        "estimated_mesh_error_m": accuracy.mesh_m if accuracy else None,
+        "verified_error_m": verified.error_m if verified else None,
+        "verified_step_s": verified.step_s if verified else None,
+        "verified_modes": verified.modes if verified else None,
+    }
+
+
+def _simulated(character: Character, result: Result) -> dict[str, Any]:
+    targets = target_errors(character, result.before, "")
+    return {"targets": targets, **_overall(targets, ""), "objective": result.objective_before}
+
+
+def _optimized(character: Character, result: Result) -> dict[str, Any]:
+    assert result.after is not None and result.objective_after is not None
+    before = target_errors(character, result.before, "_before")
+    after = target_errors(character, result.after, "_after")
+    return {
+        "targets": [one | other for one, other in zip(before, after, strict=True)],
+        **_overall(before, "_before"),
+        **_overall(after, "_after"),
+        "objective_before": result.objective_before,
+        "objective_after": result.objective_after,
+        "forward_simulations": result.forward_simulations,
+        "stopped": result.stopped,
+        "interrupted": result.interrupted,
+        "expected_further_gain_m": result.expected_gain_m,
+        "gradients": result.gradients,
+        "linearized_sweeps": result.linearized_sweeps,
+        "iterations": result.iterations,
+        # The last forward simulation: everything is compiled and warm by then.
+        "simulate_wall_s": result.after.wall_s,
+        "motors": [
+            {
+                "path": character.motors[curve.motor].path,
+                "changed": curve.changed,
+                f"max_offset_{measure_of(character.motors[curve.motor]).si}": curve.max_offset,
+            }
+            for curve in result.curves
+        ],
+    }
+
+
+def _overall(targets: list[dict[str, Any]], suffix: str) -> dict[str, float]:
+    """The worst target, and the root mean square over all of them."""
+    worst = max((row[f"max_error{suffix}_m"] for row in targets), default=0.0)
+    square = sum(row[f"rms_error{suffix}_m"] ** 2 for row in targets) / max(len(targets), 1)
+    return {f"max_error{suffix}_m": worst, f"rms_error{suffix}_m": square**0.5}

@@ -1,0 +1,160 @@
+"""Reports as tables for a person."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any, TextIO
+
+from rich.console import Console
+from rich.table import Table
+
+from calmotion.support.naming import distinct_names
+
+_FAR = 2.0  # times the tolerance: an estimate beyond says that it is not kept
+
+
+def length(meters: float | None) -> str:
+    """A length or error as text in mm; `-` when it is not known."""
+    return "-" if meters is None or not math.isfinite(meters) else f"{1000.0 * meters:.4g} mm"
+
+
+def angle(radians: float | None) -> str:
+    """An angle as text in degrees; `-` when there is none."""
+    return "-" if radians is None or not math.isfinite(radians) else f"{math.degrees(radians):.4g}°"
+
+
+LONG = 60  # characters of a prim path beyond which a table shows names
+
+
+def name_paths(paths: Sequence[str]) -> dict[str, str]:
+    """Prim paths as they are when all are short, else by names that tell them apart."""
+    if max(map(len, paths), default=0) <= LONG:
+        return {path: path for path in paths}
+    return distinct_names(paths)
+
+
+def print_table(
+    console: Console, title: str, columns: Sequence[str], rows: Sequence[Sequence[str]], texts: int = 1
+) -> None:
+    """Print a table whose first `texts` columns are text and whose others are numbers; nothing without rows."""
+    if not rows:
+        return
+    table = Table(title=title, title_justify="left", title_style="bold")
+    for index, column in enumerate(columns):
+        # Prim paths stand alone on their line rather than being cut: a reader copies them.
+        table.add_column(column, justify="left" if index < texts else "right", overflow="fold")
+    names = name_paths([cell for row in rows for cell in row[:texts] if cell.startswith("/")])
+    for row in rows:
+        table.add_row(*(names.get(cell, cell) for cell in row))
+    console.print(table)
+    if any(name != path for path, name in names.items()):
+        console.print("(names are the ends of prim paths; --json has the paths)")
+
+
+def console_on(stream: TextIO) -> Console:
+    """A console on a stream; wide in a file, where nothing needs to be folded."""
+    return Console(file=stream, highlight=False, markup=False, width=None if stream.isatty() else 200)
+
+
+def print_left_out(console: Console, rows: Sequence[dict[str, Any]]) -> None:
+    """What was left out and why."""
+    for row in rows:
+        error = row["estimated_error_m"]
+        cost = "" if error is None else f" (error about {length(error)})"
+        console.print(f"left out: {row['what']}: {row['why']}{cost}")
+
+
+def print_limits(console: Console, limits: Sequence[dict[str, Any]], optimized: bool) -> None:
+    """Limits of motors that are exceeded, or that keep the targets from their motion."""
+    rows = []
+    for row in limits:
+        if not row["exceeded"] and row["cost_m"] is None:
+            continue
+        limit, before, after = row["shown"]
+        verdict = "exceeded" if row["exceeded"] else f"costs {length(row['cost_m'])} rms"
+        values = [limit, before, after] if optimized else [limit, after]
+        rows.append([row["path"], row["quantity"], *values, f"{row['time_s']:.3f} s", verdict])
+    heads = ["limit", "before", "after"] if optimized else ["limit", "reached"]
+    print_table(console, "Limits of motors that matter", ["motor", "quantity", *heads, "at", ""], rows, texts=2)
+
+
+def print_accuracy(console: Console, report: dict[str, Any]) -> None:
+    """How far the simulation itself may be off."""
+    if report["estimated_error_m"] is not None:
+        error, step = length(report["estimated_error_m"]), length(report["estimated_step_error_m"])
+        mesh = report["estimated_mesh_error_m"]
+        more = "the finite-element mesh not counted" if mesh is None else f"the finite elements to {length(mesh)}"
+        console.print(f"simulated to about {error} at the targets ({step} of it the time step), {more}")
+    if report["verified_error_m"] is not None:
+        console.print(
+            f"verified: a run with steps of {1000 * report['verified_step_s']:.4g} ms and {report['verified_modes']} "
+            f"elastic coordinates has the targets within {length(report['verified_error_m'])}"
+        )
+    asked, measured, estimated = report["tolerance_m"], report["verified_error_m"], report["estimated_error_m"] or 0.0
+    # estimates add up bounds, so only one far above the tolerance tells something
+    if asked is not None and (estimated > _FAR * asked if measured is None else measured > asked):
+        console.print(
+            f"the tolerance of {length(asked)} is not kept: where links bend far, or near to buckling, small errors "
+            "grow; a stiffer robot or a slower motion can be simulated more closely"
+        )
+
+
+def print_run(report: dict[str, Any], stream: TextIO) -> None:
+    """The report of `simulate` or `optimize`."""
+    console = console_on(stream)
+    optimized = "objective_after" in report
+    suffixes = ["_before", "_after"] if optimized else [""]
+    heads = [f"{kind}{' ' + s[1:] if s else ''}" for kind in ("max", "rms") for s in suffixes]
+    for title, unit, shown in (("Position", "m", length), ("Rotation", "rad", angle)):
+        name = "error" if unit == "m" else "rotation_error"
+        keys = [f"{kind}_{name}{suffix}_{unit}" for kind in ("max", "rms") for suffix in suffixes]
+        rows = [[target["path"], *(shown(target[key]) for key in keys)] for target in report["targets"]]
+        print_table(console, f"{title} error of the targets", ["target", *heads], rows)
+    if optimized:
+        console.print(
+            f"objective {report['objective_before']:.6g} -> {report['objective_after']:.6g} in {report['iterations']} "
+            f"iterations, {report['forward_simulations']} simulations, {report['linearized_sweeps']} linearized "
+            f"sweeps, {report['wall_s']:.2f} s"
+        )
+        if report["stopped"] not in ("converged", ""):
+            gain = report["expected_further_gain_m"]
+            more = "" if gain is None else f", {length(gain)} less error expected of one more iteration"
+            console.print(f"stopped: {report['stopped']}{more}")
+        kept = [motor["path"] for motor in report["motors"] if not motor["changed"]]
+        if kept:
+            console.print(f"motors that did not change: {', '.join(kept)}")
+    print_limits(console, report["limits"], optimized)
+    sag = max((target[f"sag{suffixes[-1]}_m"] or 0.0 for target in report["targets"]), default=0.0)
+    if sag > 1e-6:
+        console.print(f"at rest, before the motion, the targets are off by up to {length(sag)}")
+    seams = [target[f"seam{suffixes[-1]}_m"] for target in report["targets"]]
+    if seams and seams[0] is not None:
+        console.print(f"where the loop begins again the targets are {length(max(seams))} from where they began")
+        if report["loop_growth"] > 1.0:
+            console.print(
+                f"the robot would not stay in this loop: a disturbance grows {report['loop_growth']:.3g}-fold from one "
+                "to the next"
+            )
+    if report["dead_centres_s"]:
+        times = [f"{time:.3f}" for time in report["dead_centres_s"]]
+        more = f" and {len(times) - 5} times more" if len(times) > 5 else ""
+        console.print(
+            f"closed loops pass a dead centre, where they could go two ways, at {', '.join(times[:5])} s{more}"
+        )
+    if report["refined_steps"]:
+        console.print(f"{report['refined_steps']} steps were only reached by smaller ones: try a smaller --step")
+    console.print(
+        f"{report['steps']} steps of {1000 * report['step_s']:.4g} ms, {report['dof']} coordinates, "
+        f"{report['modes']} of them elastic; {report['total_wall_s']:.1f} s in all"
+        + (f", {report['peak_memory_gb']:.2f} GB" if report["peak_memory_gb"] else "")
+    )
+    print_accuracy(console, report)
+    print_left_out(console, report["left_out"])
+    for note in report["notes"]:
+        console.print(f"note: {note}")
+    for name in ("layer", "root_layer", "rrd", "csv"):
+        if report[name]:
+            console.print(f"wrote {report[name]}", soft_wrap=True)
+    for figure in report["figures"]:
+        console.print(f"wrote {figure}", soft_wrap=True)

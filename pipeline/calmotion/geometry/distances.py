@@ -1,0 +1,85 @@
+"""Distances between points and triangles: closest points and rays."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from calmotion.shot.character import Array
+from calmotion.support.compilation import kernel
+
+
+def closest_on_triangles(point: Array, triangles: Array) -> Array:
+    """Closest point of each triangle to one point.
+
+    Args:
+        point: [m], shape [3].
+        triangles: Corners [m], shape [k, 3, 3].
+
+    Returns:
+        [m], shape [k, 3].
+
+    Source: Ericson, Real-Time Collision Detection, 5.1.5 (regions of the triangle's plane), vectorised.
+    """
+    a, b, c = triangles[:, 0], triangles[:, 1], triangles[:, 2]
+    candidates = np.stack([_closest_on_segments(point, p, q) for p, q in ((a, b), (b, c), (c, a))], axis=1)
+    nearest = np.linalg.norm(candidates - point, axis=-1).argmin(axis=1)
+    closest = candidates[np.arange(len(a)), nearest]
+    # the foot of the perpendicular, where it falls inside the triangle, is nearer than any edge
+    n = np.cross(b - a, c - a)
+    area2 = np.einsum("ij,ij->i", n, n)
+    good = area2 > 0.0
+    safe = np.where(good, area2, 1.0)
+    foot = point - n * (np.einsum("ij,ij->i", point - a, n) / safe)[:, None]
+    v = np.einsum("ij,ij->i", np.cross(foot - a, c - a), n) / safe
+    w = np.einsum("ij,ij->i", np.cross(b - a, foot - a), n) / safe
+    inside = good & (v >= 0.0) & (w >= 0.0) & (v + w <= 1.0)
+    closest[inside] = foot[inside]
+    return closest
+
+
+def _closest_on_segments(point: Array, a: Array, b: Array) -> Array:
+    d = b - a
+    length2 = np.maximum(np.einsum("ij,ij->i", d, d), np.finfo(float).tiny)
+    t = np.clip(np.einsum("ij,ij->i", point - a, d) / length2, 0.0, 1.0)
+    return a + t[:, None] * d
+
+
+def ray_length(origin: Array, direction: Array, triangles: Array, skip: float) -> float:
+    """Distance along a unit direction to the first triangle that is farther than `skip`; infinite without one.
+
+    Args:
+        origin, direction: Shape [3].
+        triangles: Corners [m], shape [k, 3, 3].
+        skip: [m]; hits nearer than this are the surface that the ray starts on.
+    """
+    return float(first_hit(*(np.ascontiguousarray(part) for part in (origin, direction, triangles)), float(skip)))
+
+
+@kernel
+def first_hit(origin, direction, triangles, skip):
+    """`ray_length`, of contiguous arrays.
+
+    Source: Möller and Trumbore 1997.
+    """
+    nearest = np.inf
+    d0, d1, d2 = direction[0], direction[1], direction[2]
+    for k in range(len(triangles)):
+        a, b, c = triangles[k, 0], triangles[k, 1], triangles[k, 2]
+        e0, e1, e2 = b[0] - a[0], b[1] - a[1], b[2] - a[2]
+        f0, f1, f2 = c[0] - a[0], c[1] - a[1], c[2] - a[2]
+        p0, p1, p2 = d1 * f2 - d2 * f1, d2 * f0 - d0 * f2, d0 * f1 - d1 * f0
+        det = e0 * p0 + e1 * p1 + e2 * p2
+        scale = np.sqrt((e0 * e0 + e1 * e1 + e2 * e2) * (f0 * f0 + f1 * f1 + f2 * f2))
+        if not abs(det) > 1e-12 * scale:
+            continue
+        s0, s1, s2 = origin[0] - a[0], origin[1] - a[1], origin[2] - a[2]
+        # a slight widening: a ray along an edge must not slip between its two triangles
+        u = (s0 * p0 + s1 * p1 + s2 * p2) / det
+        if u < -1e-9 or u > 1.0 + 1e-9:
+            continue
+        q0, q1, q2 = s1 * e2 - s2 * e1, s2 * e0 - s0 * e2, s0 * e1 - s1 * e0
+        v = (d0 * q0 + d1 * q1 + d2 * q2) / det
+        t = (f0 * q0 + f1 * q1 + f2 * q2) / det
+        if v >= -1e-9 and u + v <= 1.0 + 1e-9 and skip < t < nearest:
+            nearest = t
+    return nearest

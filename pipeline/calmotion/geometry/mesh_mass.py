@@ -1,0 +1,33 @@
+"""Mass of a body filled with linear tetrahedra."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from calmotion.geometry.tetrahedra import tet_volumes
+from calmotion.shot.character import Array, IntArray, MassProperties
+
+
+def mass_of_tets(points: Array, tets: IntArray, density: float, mass: float | None = None) -> MassProperties:
+    """Mass properties of homogeneous tetrahedra, exact.
+
+    Args:
+        points: [m], shape [n, 3].
+        tets: Shape [m, 4], either way round.
+        density: [kg/m^3].
+        mass: Total mass [kg] that the density is scaled to; None keeps it.
+
+    Source: int x x^T over a tetrahedron is V (sum x_i x_i^T + (sum x_i)(sum x_i)^T) / 20.
+    """
+    volume = np.abs(tet_volumes(points, tets))
+    if mass is not None:
+        density = mass / float(volume.sum())
+    weight = density * volume
+    total = float(weight.sum())
+    corners = points[tets]
+    center = weight @ corners.mean(axis=1) / total
+    arms = corners - center
+    sums = arms.sum(axis=1)
+    second = np.einsum("e,eki,ekj->ij", weight, arms, arms) + np.einsum("e,ei,ej->ij", weight, sums, sums)
+    second /= 20.0
+    return MassProperties(total, center, np.trace(second) * np.eye(3) - second)

@@ -1,0 +1,163 @@
+"""Linear tetrahedra: volumes, orientation, dihedral angles, boundary."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calmotion.errors import ShotError
+from calmotion.shot.character import Array, BoolArray, IntArray
+from calmotion.shot.meshes import MeshQuality
+
+Indices = NDArray[np.integer[Any]]  # of any width, inside the engine
+
+_FACES = np.array([[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]])  # face i is opposite corner i, outward
+
+
+def tet_volumes(points: Array, tets: IntArray) -> Array:
+    """Signed volumes [m^3], shape [m]; positive when corner 3 is on the right-hand side of 0, 1, 2."""
+    x = points[tets]
+    return np.einsum("ij,ij->i", np.cross(x[:, 1] - x[:, 0], x[:, 2] - x[:, 0]), x[:, 3] - x[:, 0]) / 6.0
+
+
+def face_normals(points: Array, tets: IntArray) -> Array:
+    """Outward unit normals of the four faces, face i opposite corner i, shape [m, 4, 3] (positive volumes)."""
+    x = points[tets]
+    a, b, c = (x[:, _FACES[:, k]] for k in range(3))
+    n = np.cross(b - a, c - a)
+    return n / np.maximum(np.linalg.norm(n, axis=-1, keepdims=True), np.finfo(float).tiny)
+
+
+def boundary_triangles(tets: IntArray) -> IntArray:
+    """Triangles that belong to one tetrahedron only, outward, shape [k, 3] (positive volumes)."""
+    faces = tets[:, _FACES].reshape(-1, 3)
+    _, first, count = np.unique(np.sort(faces, axis=1), axis=0, return_index=True, return_counts=True)
+    return np.ascontiguousarray(faces[np.sort(first[count == 1])])
+
+
+def min_dihedral_deg(points: Array, tets: IntArray) -> float:
+    """Smallest dihedral angle of a mesh with positive volumes [deg]."""
+    n = face_normals(points, tets)
+    i, j = np.triu_indices(4, 1)
+    cosine = np.clip(-np.einsum("mek,mek->me", n[:, i], n[:, j]), -1.0, 1.0)
+    return float(np.degrees(np.arccos(cosine.max())))
+
+
+def surface_volume(points: Array, triangles: Indices) -> float:
+    """Volume enclosed by a closed, consistently outward surface [m^3] (divergence theorem)."""
+    # about the centroid, so that a surface far from the origin loses no digits
+    x = (points - points.mean(axis=0))[triangles]
+    return float(np.einsum("ij,ij->", np.cross(x[:, 0], x[:, 1]), x[:, 2]) / 6.0)
+
+
+def surface_area(points: Array, triangles: Indices) -> float:
+    """Area of a triangulated surface [m^2]."""
+    x = points[triangles]
+    return float(0.5 * np.linalg.norm(np.cross(x[:, 1] - x[:, 0], x[:, 2] - x[:, 0]), axis=1).sum())
+
+
+def flat_tets(points: Array, tets: IntArray) -> BoolArray:
+    """Which tetrahedra have no volume, but for rounding; points of shape [n, 3], tetrahedra [m, 4]."""
+    x = points[tets]
+    edge = np.linalg.norm(x[:, [1, 2, 3, 2, 3, 3]] - x[:, [0, 0, 0, 1, 1, 2]], axis=-1).max(axis=1)
+    return np.abs(tet_volumes(points, tets)) <= 1e-9 * edge**3
+
+
+def oriented_tets(points: Array, tets: IntArray, path: str = "") -> tuple[IntArray, int]:
+    """The tetrahedra with corners swapped where that makes a volume positive.
+
+    Args:
+        points: [m], shape [n, 3].
+        tets: Shape [m, 4].
+        path: Prim path or file for the error.
+
+    Returns:
+        The tetrahedra, int32, shape [m, 4], and how many were turned.
+
+    Raises:
+        ShotError: No tetrahedra, an index out of range, a point that is not finite, or a flat element.
+    """
+    tets = np.array(tets, dtype=np.int32).reshape(-1, 4)
+    remedy = "Author a TetMesh with valid elements, or remove it so that a closed Mesh is tetrahedralised"
+    if len(tets) == 0:
+        raise ShotError("has no tetrahedra", path=path, found=0, remedy=remedy)
+    if tets.min() < 0 or tets.max() >= len(points):
+        raise ShotError(
+            "a tetrahedron names a point that does not exist",
+            path=path, attribute="tetVertexIndices", found=int(tets.max()), remedy=remedy,
+        )  # fmt: skip
+    if not np.isfinite(points[tets]).all():
+        raise ShotError("a point is not finite", path=path, attribute="points", remedy=remedy)
+    volumes, flat = tet_volumes(points, tets), flat_tets(points, tets)
+    if flat.any():
+        element = int(np.flatnonzero(flat)[0])
+        raise ShotError(
+            "a tetrahedron has no volume",
+            path=path, found=f"element {element}, {volumes[element]:.3g} m^3", remedy=remedy,
+        )  # fmt: skip
+    turned = volumes < 0.0
+    tets[turned] = tets[turned][:, [0, 2, 1, 3]]
+    return tets, int(turned.sum())
+
+
+def without_unused_points(points: Array, tets: IntArray) -> tuple[Array, IntArray]:
+    """Points that some tetrahedron uses, in their order, and the tetrahedra renumbered."""
+    used, inverse = np.unique(tets, return_inverse=True)
+    return np.ascontiguousarray(points[used]), inverse.reshape(tets.shape).astype(np.int32)
+
+
+def welded_tets(points: Array, tets: IntArray, tolerance: float) -> tuple[Array, IntArray, int]:
+    """Tetrahedra whose points in one place are one point.
+
+    Args:
+        points: [m], shape [n, 3], every one used.
+        tets: Shape [m, 4].
+        tolerance: Largest distance of points in one place, as a part of the bounding box's diagonal.
+
+    Returns:
+        Points, tetrahedra, and how many points went into others.
+    """
+    from scipy.sparse import coo_matrix
+    from scipy.sparse.csgraph import connected_components
+    from scipy.spatial import cKDTree
+
+    reach = tolerance * float(np.linalg.norm(np.ptp(points, axis=0)))
+    pairs = cKDTree(points).query_pairs(reach, output_type="ndarray")
+    n = len(points)
+    graph = coo_matrix((np.ones(len(pairs)), pairs.T.reshape(2, -1)), shape=(n, n))
+    count, label = connected_components(graph, directed=False)
+    first = np.full(count, n)
+    np.minimum.at(first, label, np.arange(n))
+    return np.ascontiguousarray(points[first]), label[tets].astype(np.int32), n - int(count)
+
+
+def connected_parts(tets: IntArray) -> int:
+    """Number of parts that share no point; 1 for a body that holds together."""
+    from scipy.sparse import coo_matrix
+    from scipy.sparse.csgraph import connected_components
+
+    number = np.unique(tets, return_inverse=True)[1].reshape(-1, 4)
+    n = int(number.max()) + 1
+    rows, columns = np.repeat(number[:, 0], 3), number[:, 1:].ravel()
+    graph = coo_matrix((np.ones(len(rows)), (rows, columns)), shape=(n, n))
+    return int(connected_components(graph, directed=False)[0])
+
+
+def measure_quality(
+    points: Array, tets: IntArray, *, surface_volume: float | None = None, repairs: tuple[str, ...] = ()
+) -> MeshQuality:
+    """Smallest dihedral angle and volume of a mesh with positive volumes.
+
+    Args:
+        points: [m], shape [n, 3].
+        tets: Shape [m, 4].
+        surface_volume: Volume of the surface it was made from [m^3]; None where there was none.
+        repairs: What was repaired before.
+    """
+    volume = float(tet_volumes(points, tets).sum())
+    error = 0.0 if surface_volume is None else abs(volume - surface_volume) / surface_volume
+    return MeshQuality(
+        min_dihedral_deg=min_dihedral_deg(points, tets), volume=volume, volume_error=error, repairs=tuple(repairs)
+    )

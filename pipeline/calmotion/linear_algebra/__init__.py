@@ -1,0 +1,1 @@
+"""Sparse Cholesky factorisation by nested dissection and multifrontal elimination, and block Lanczos."""

@@ -1,0 +1,122 @@
+"""Lowest eigenpairs by a block Lanczos method on the inverse, with every vector kept orthogonal to all before.
+
+A block of vectors costs little more than one of them: the factors are read once for all. And a block finds all modes
+of one frequency (both bending pairs of a square link), where a single vector sees one of them.
+
+Source: Golub and Underwood, The Block Lanczos Method for Computing Eigenvalues, 1977; Grimes, Lewis and Simon, A
+Shifted Block Lanczos Algorithm, SIAM Journal on Matrix Analysis and Applications 15(1), 1994.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from calmotion.linear_algebra.blas_threads import one_blas_thread
+from calmotion.linear_algebra.sparse_solver import SparseSolver
+from calmotion.shot.character import Array
+
+_WIDTH = 8
+_CONVERGED = 1e-10  # of the eigenvalue of the inverse: error of a mode; that of its frequency is its square
+_ROUNDING = 2e-15  # of the largest eigenvalue of the inverse: no residual is smaller than that
+_DEPENDENT = 1e-13
+_MOST_STEPS = 200
+
+
+def lowest_by_lanczos(
+    K: Any, M: Any, count: int, shift: float, solver: SparseSolver, below: float | None, most: int
+) -> tuple[Array, Array]:
+    """Lowest eigenpairs of K x = value M x.
+
+    Args:
+        K, M: Sparse symmetric, shape [n, n], M positive definite.
+        count: How many; with `below` the fewest.
+        shift: Of the solver.
+        solver: Of K + shift M.
+        below: Every eigenvalue up to this one is found, and one above it.
+        most: But no more than this many.
+
+    Returns:
+        Values, ascending, shape [count or more], and M-orthonormal vectors, shape [n, count or more].
+
+    Raises:
+        ArithmeticError: They do not converge.
+    """
+    with one_blas_thread():
+        return _lanczos(K, M, count, shift, solver, below, most)
+
+
+def _lanczos(
+    K: Any, M: Any, count: int, shift: float, solver: SparseSolver, below: float | None, most: int
+) -> tuple[Array, Array]:
+    n = K.shape[0]
+    width = min(_WIDTH, max(2, count // 2), n)
+    # fixed, so that a run repeats to the last bit
+    start = np.random.default_rng(20190712).standard_normal((n, width))
+    blocks: list[Array] = []
+    block, _ = _normalized(solver.solve(M @ start), M, blocks, None)
+    H = np.zeros((0, 0))
+    for _ in range(_MOST_STEPS):
+        blocks.append(block)
+        last = block.shape[1]
+        block = solver.solve(M @ block)
+        column = _inner(blocks, M @ block)
+        corner = column[-last:]
+        H = np.block([[H, column[:-last]], [column[:-last].T, 0.5 * (corner + corner.T)]])
+        block, rest = _normalized(block, M, blocks, column)
+        values, vectors = np.linalg.eigh(H)
+        values, vectors = values[::-1], vectors[:, ::-1]
+        error = np.linalg.norm(rest @ vectors[-last:], axis=0)
+        wanted = count
+        if below is not None:
+            wanted = min(max(count, int(np.count_nonzero(values * (below + shift) >= 1.0)) + 1), most)
+        done = error[:wanted] <= _CONVERGED * values[:wanted] + _ROUNDING * values[0]
+        if (len(H) >= wanted and done.all()) or block.shape[1] == 0 or len(H) == n:
+            return _refined(K, M, _combined(blocks, vectors[:, :wanted]))
+        block = block[:, : n - len(H)]
+    raise ArithmeticError(f"{count} modes do not converge in {_MOST_STEPS} steps")
+
+
+def _inner(blocks: list[Array], vectors: Array) -> Array:
+    """Products of all columns of the blocks with vectors."""
+    return np.vstack([block.T @ vectors for block in blocks])
+
+
+def _combined(blocks: list[Array], share: Array) -> Array:
+    """The blocks side by side, times `share`."""
+    result, at = np.zeros((len(blocks[0]), share.shape[1])), 0
+    for block in blocks:
+        result += block @ share[at : at + block.shape[1]]
+        at += block.shape[1]
+    return result
+
+
+def _normalized(W: Array, M: Any, blocks: list[Array], inner: Array | None) -> tuple[Array, Array]:
+    """M-orthonormal columns that span W beyond the blocks, and the factor R with W = blocks (...) + columns R.
+
+    Args:
+        inner: Products of the blocks with M W; None when there are no blocks.
+    """
+    R = np.eye(W.shape[1])
+    largest = np.sqrt(np.einsum("ij,ij->j", W, M @ W).max(initial=0.0)) if inner is None else np.abs(inner).max()
+    for turn in range(2):  # twice is enough
+        if inner is not None:
+            W = W - _combined(blocks, _inner(blocks, M @ W) if turn else inner)
+        MW = M @ W
+        gram = W.T @ MW
+        values, vectors = np.linalg.eigh(0.5 * (gram + gram.T))
+        keep = values > (_DEPENDENT * largest) ** 2
+        root = np.sqrt(values[keep])
+        W = W @ (vectors[:, keep] / root)
+        R = (root[:, None] * vectors[:, keep].T) @ R
+        largest = 1.0
+    return W, R
+
+
+def _refined(K: Any, M: Any, modes: Array) -> tuple[Array, Array]:
+    """The eigenproblem in the span of the modes: values that are accurate to the square of the modes' error."""
+    from scipy.linalg import eigh
+
+    values, U = eigh(modes.T @ (K @ modes), modes.T @ (M @ modes))
+    return values, modes @ U

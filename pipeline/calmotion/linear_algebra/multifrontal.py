@@ -1,0 +1,186 @@
+"""Sparse Cholesky factors as a tree of dense blocks, by BLAS and LAPACK on all cores.
+
+Eliminating a piece of the nested dissection touches the piece and its border, the nodes of pieces above it that
+elimination has connected it with. Their matrix (the front) gets the entries of the matrix and what the pieces below
+left on it (their Schur complements). Everything is dense there, so the work runs at the speed of matrix products.
+
+Source: Duff and Reid, The Multifrontal Solution of Indefinite Sparse Symmetric Linear Equations, ACM Transactions on
+Mathematical Software 9(3), 1983; Liu, The Multifrontal Method for Sparse Matrix Solution, SIAM Review 34(1), 1992.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from calmotion.linear_algebra.blas_threads import one_blas_thread
+from calmotion.linear_algebra.nested_dissection import Dissection
+from calmotion.shot.character import Array
+from calmotion.support.compilation import kernel
+
+
+class NotPositiveDefinite(ArithmeticError):
+    """A matrix has no Cholesky factors: a body that is not held, or numbers that are not finite."""
+
+
+@kernel
+def _add_triangle(target: Array, update: Array, first: int, at: Array) -> None:
+    """target[at[i], at[j]] += update[first + i, first + j] for i >= j."""
+    for j in range(len(at)):
+        for i in range(j, len(at)):
+            target[at[i], at[j]] += update[first + i, first + j]
+
+
+@kernel
+def _add_block(target: Array, update: Array, split: int, at: Array) -> None:
+    """target[at[i], at[j]] += update[i, j] for j < split <= i."""
+    for j in range(split):
+        for i in range(split, len(at)):
+            target[at[i], at[j]] += update[i, j]
+
+
+class _Complements:
+    """Schur complements that wait for the piece above, each from the end of its own elimination until then.
+
+    Children come before parents and no piece comes between: those of pieces at even depth are a stack, and those at
+    odd depth are another one, so that a complement never lies where one that it is made of lies.
+    """
+
+    def __init__(self, parent: Any, outer: Any):
+        self._outer = outer
+        self._below: list[list[int]] = [[] for _ in parent]
+        depth = np.zeros(len(parent), dtype=np.int64)
+        for k in range(len(parent) - 1, -1, -1):
+            if parent[k] >= 0:
+                self._below[parent[k]].insert(0, k)
+                depth[k] = depth[parent[k]] + 1
+        self._odd = depth % 2
+        top, most = [0, 0], [0, 0]
+        for k, odd in enumerate(self._odd):
+            top[odd] += int(outer[k]) ** 2
+            most[odd] = max(most[odd], top[odd])
+            top[1 - odd] -= sum(int(outer[j]) ** 2 for j in self._below[k])
+        self._stacks = [np.empty(size) for size in most]
+        self._top = [0, 0]
+
+    def below(self, k: int) -> list[int]:
+        """The pieces right below a piece, last first."""
+        return self._below[k][::-1]
+
+    def push(self, k: int) -> Array:
+        """Room for the complement of a piece, zero, shape [outer, outer]."""
+        odd, m = self._odd[k], int(self._outer[k])
+        self._top[odd] += m * m
+        room = self._stacks[odd][self._top[odd] - m * m : self._top[odd]].reshape((m, m), order="F")
+        room[...] = 0.0
+        return room
+
+    def pop(self, k: int) -> Array:
+        """The complement that was pushed last at this depth, valid until the next push."""
+        odd, m = self._odd[k], int(self._outer[k])
+        self._top[odd] -= m * m
+        return self._stacks[odd][self._top[odd] : self._top[odd] + m * m].reshape((m, m), order="F")
+
+
+class MultifrontalCholesky:
+    """Factors L L^T of a permuted symmetric positive definite matrix.
+
+    Args:
+        matrix: Sparse, shape [n, n]; its lower triangle is read.
+        graph: Sparse CSR pattern of its blocks, shape [n / block, n / block].
+        dissection: Of the graph.
+        block: Degrees of freedom of a node of the graph.
+
+    Raises:
+        NotPositiveDefinite: It is not.
+    """
+
+    def __init__(self, matrix: Any, graph: Any, dissection: Dissection, block: int):
+        order = dissection.order
+        self._order = (block * order[:, None] + np.arange(block)).ravel()
+        self._start = block * dissection.start
+        self._borders = [_expand(b, block) for b in _borders(graph[order][:, order].tocsr(), dissection)]
+        own = np.diff(self._start)
+        outer = np.array([len(border) for border in self._borders], dtype=np.int64)
+        # one array for everything: the system then maps large pages, and no page twice
+        offset = np.concatenate([[0], np.cumsum(own * (own + outer))])
+        self.entries = int(offset[-1])
+        self._factors = np.zeros(self.entries)
+        self._diagonal, self._below = [], []
+        for at, k, m in zip(offset[:-1], own, outer, strict=True):
+            self._diagonal.append(self._factors[at : at + k * k].reshape((k, k), order="F"))
+            self._below.append(self._factors[at + k * k : at + k * (k + m)].reshape((m, k), order="F"))
+        with one_blas_thread():
+            self._factor(matrix.tocsr()[self._order][:, self._order].tocsc(), dissection.parent, outer)
+
+    def _factor(self, A: Any, parent: Any, outer: Any) -> None:
+        from scipy.linalg.blas import dsyrk, dtrsm
+        from scipy.linalg.lapack import dpotrf
+
+        complements = _Complements(parent, outer)
+        place = np.zeros(A.shape[0], dtype=np.int64)
+        for k, border in enumerate(self._borders):
+            s, e = int(self._start[k]), int(self._start[k + 1])
+            F11, F21 = self._diagonal[k], self._below[k]
+            place[s:e] = np.arange(e - s)
+            place[border] = np.arange(len(border))
+            entries = slice(A.indptr[s], A.indptr[e])
+            row, value = A.indices[entries], A.data[entries]
+            column = np.repeat(np.arange(e - s), np.diff(A.indptr[s : e + 1]))
+            inside, below = (row >= s) & (row < e), row >= e
+            F11[place[row[inside]], column[inside]] = value[inside]
+            F21[place[row[below]], column[below]] = value[below]
+            F22 = complements.push(k)
+            for piece in complements.below(k):
+                rows, update = self._borders[piece], complements.pop(piece)
+                split = int(np.searchsorted(rows, e))
+                at = place[rows]
+                _add_triangle(F11, update, 0, at[:split])
+                _add_block(F21, update, split, at)
+                _add_triangle(F22, update, split, at[split:])
+            # the results take the place of the arguments: all are contiguous in the order of Fortran
+            _, info = dpotrf(F11, lower=1, clean=1, overwrite_a=1)
+            # OpenBLAS lets numbers pass that are none
+            if info != 0 or not np.isfinite(F11.diagonal()).all():
+                raise NotPositiveDefinite("the matrix is not positive definite")
+            if len(border):
+                dtrsm(1.0, F11, F21, side=1, lower=1, trans_a=1, overwrite_b=1)
+                dsyrk(-1.0, F21, beta=1.0, c=F22, lower=1, overwrite_c=1)
+
+    def solve(self, b: Array) -> Array:
+        """x with matrix @ x = b, b of shape [n, k]."""
+        from scipy.linalg.blas import dtrsm
+
+        x = np.ascontiguousarray(b[self._order], dtype=float)
+        pieces = list(zip(self._start[:-1], self._start[1:], self._borders, self._diagonal, self._below, strict=True))
+        for s, e, border, L11, L21 in pieces:
+            x[s:e] = dtrsm(1.0, L11, x[s:e].T, side=1, lower=1, trans_a=1).T
+            if len(border):
+                x[border] -= L21 @ x[s:e]
+        for s, e, border, L11, L21 in reversed(pieces):
+            if len(border):
+                x[s:e] -= L21.T @ x[border]
+            x[s:e] = dtrsm(1.0, L11, x[s:e].T, side=1, lower=1).T
+        out = np.empty_like(x)
+        out[self._order] = x
+        return out
+
+
+def _borders(graph: Any, dissection: Dissection) -> list[Any]:
+    """For each piece the later nodes that elimination connects it with, ascending; graph in order of elimination."""
+    borders: list[Any] = []
+    from_below: list[list[Any]] = [[] for _ in dissection.parent]
+    for k, above in enumerate(dissection.parent):
+        s, e = dissection.start[k], dissection.start[k + 1]
+        near = np.unique(np.concatenate([graph.indices[graph.indptr[s] : graph.indptr[e]], *from_below[k]]))
+        border = near[near >= e]
+        borders.append(border)
+        from_below[k] = []
+        if above >= 0:
+            from_below[above].append(border)
+    return borders
+
+
+def _expand(nodes: Any, block: int) -> Any:
+    return (block * np.asarray(nodes, dtype=np.int64)[:, None] + np.arange(block)).ravel()

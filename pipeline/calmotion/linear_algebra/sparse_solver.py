@@ -1,0 +1,47 @@
+"""Direct solution of the sparse systems of elasticity."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from calmotion.linear_algebra.blas_threads import one_blas_thread
+from calmotion.linear_algebra.multifrontal import MultifrontalCholesky
+from calmotion.linear_algebra.nested_dissection import dissect
+from calmotion.shot.character import Array
+
+
+class SparseSolver:
+    """A factorised symmetric positive definite matrix: `solve(b)` for b of shape [n] or [n, k].
+
+    Args:
+        matrix: Sparse, shape [n, n]. Where n is a multiple of three its degrees of freedom are taken to be the
+            vectors of nodes.
+        points: Of the nodes, shape [n / 3, 3]; they cost nothing and make a better order of elimination.
+
+    Raises:
+        NotPositiveDefinite: It is not.
+    """
+
+    def __init__(self, matrix: Any, points: Array | None = None):
+        from scipy.sparse import csr_matrix
+
+        matrix = matrix.tocsr()
+        n = matrix.shape[0]
+        block = 3 if n % 3 == 0 else 1
+        row = np.repeat(np.arange(n), np.diff(matrix.indptr)) // block
+        graph = csr_matrix(
+            (np.ones(matrix.nnz, dtype=np.int8), (row, matrix.indices // block)), shape=(n // block, n // block)
+        )
+        self._factors = MultifrontalCholesky(matrix, graph, dissect(graph, points), block)
+
+    @property
+    def entries(self) -> int:
+        """Numbers that the factor keeps."""
+        return self._factors.entries
+
+    def solve(self, b: Array) -> Array:
+        """x with matrix @ x = b."""
+        with one_blas_thread():
+            return self._factors.solve(b.reshape(len(b), -1)).reshape(b.shape)

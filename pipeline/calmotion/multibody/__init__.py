@@ -1,0 +1,1 @@
+"""The differential-algebraic system of rigid and reduced flexible bodies, its integrators and derivatives."""

@@ -1,0 +1,1 @@
+"""Kinematics, natural modes, reactions, dead centres, deflections, motor response."""

@@ -1,0 +1,147 @@
+"""Rigid kinematics: poses and target motions of the undeformed character from joint angles."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from calmotion.multibody.kernels.markers import allocate_marker, marker_jacobian, marker_values
+from calmotion.multibody.kernels.moving_frames import rooted
+from calmotion.multibody.kernels.so3 import matrix_of, quaternion_of
+from calmotion.multibody.model.model import Model
+from calmotion.multibody.model.system import State, System, allocate_state
+from calmotion.shot.character import Array, IntArray
+from calmotion.support.compilation import allocating_kernel
+
+
+@allocating_kernel
+def _rigid_poses(system, values, world, c, q, R):
+    """Poses of all components for joint angles and lengths, shape [T, B]; R is scratch, shape [B, 3, 3]."""
+    A, near, x = np.zeros((3, 3)), np.zeros((3, 3)), np.zeros(3)
+    for n in range(values.shape[0]):
+        for b in range(len(system.parent)):
+            p = system.parent[b]
+            moving = system.moving[b]
+            length = values[n, b] if system.sliding[b] else 0.0
+            angle = 0.0 if system.sliding[b] else values[n, b]
+            cs, sn = np.cos(angle), np.sin(angle)
+            far = system.rotation[b, 1]
+            for i in range(3):
+                x[i] = world[n, moving, i] if moving >= 0 else system.position[b, 0, i]
+                for k in range(3):
+                    near[i, k] = world[n, moving, 9 + 3 * i + k] if moving >= 0 else system.rotation[b, 0, i, k]
+            # R_b = R_p R_i R_z(angle) R_j^T
+            for i in range(3):
+                x[i] += near[i, 2] * length
+                y0 = near[i, 0] * cs + near[i, 1] * sn
+                y1 = near[i, 1] * cs - near[i, 0] * sn
+                for k in range(3):
+                    A[i, k] = y0 * far[k, 0] + y1 * far[k, 1] + near[i, 2] * far[k, 2]
+            for i in range(3):
+                t = x[i]
+                if p >= 0:
+                    t = c[n, p, i] + R[p, i, 0] * x[0] + R[p, i, 1] * x[1] + R[p, i, 2] * x[2]
+                for k in range(3):
+                    if p >= 0:
+                        R[b, i, k] = R[p, i, 0] * A[0, k] + R[p, i, 1] * A[1, k] + R[p, i, 2] * A[2, k]
+                    else:
+                        R[b, i, k] = A[i, k]
+                for k in range(3):
+                    t -= R[b, i, k] * system.position[b, 1, k]
+                c[n, b, i] = t
+            quaternion_of(R[b], q[n, b])
+
+
+def system_poses(system: System, joint_angles: Array, world: Array | None = None) -> tuple[Array, Array]:
+    """`rigid_poses` of a system alone."""
+    total, count = len(joint_angles), len(system.parent)
+    c, q = np.zeros((total, count, 3)), np.zeros((total, count, 4))
+    _rigid_poses(system, joint_angles, rooted(world, total), c, q, np.zeros((count, 3, 3)))
+    return c, q
+
+
+def rigid_poses(model: Model, joint_angles: Array, world: Array | None = None) -> tuple[Array, Array]:
+    """Poses of the undeformed character.
+
+    Args:
+        joint_angles: Angles [rad] (or lengths [m]) of the components' joints, shape [T, B] or, with those of loops
+            behind, [T, J]; free joints included.
+        world: Moving markers of the world, shape [T, W, 18]; needed where the system has any.
+
+    Returns:
+        Origins [m], shape [T, B, 3], and unit quaternions, shape [T, B, 4], world.
+    """
+    return system_poses(model.system, joint_angles, world)
+
+
+def rigid_state(model: Model, joint_angles: Array, world: Array | None = None) -> State:
+    """A state at rest in the rigid pose of joint angles (or lengths) of shape [B] or [J]; `world` of shape [W, 18]."""
+    state = allocate_state(model.system)
+    c, q = rigid_poses(model, joint_angles[None], None if world is None else world[None])
+    state.c[:], state.q[:] = c[0], q[0]
+    return state
+
+
+@allocating_kernel
+def _target_frames(targets, elastic, law, c, q, u, m, R, positions, quaternions):
+    component, position, rotation, Phi, Psi = targets
+    V = np.zeros(6 + u.shape[2])
+    for n in range(c.shape[0]):
+        for k in range(len(component)):
+            b = component[k]
+            matrix_of(q[n, b], R)
+            marker_values(elastic[b], law[b], position[k], rotation[k], Phi[k], Psi[k], c[n, b], R, u[n, b], V, m)
+            for i in range(3):
+                positions[n, k, i] = m.p[i]
+            quaternion_of(m.R, quaternions[n, k])
+
+
+def target_arrays(model: Model) -> tuple[IntArray, Array, Array, Array, Array]:
+    """The target markers as the tuple that the kernels take."""
+    t = model.targets
+    return (t.component, t.position, t.rotation, t.Phi, t.Psi)
+
+
+def target_frames(model: Model, c: Array, q: Array, u: Array) -> tuple[Array, Array]:
+    """Motion of the targets: positions [m], shape [T, K, 3], and quaternions, shape [T, K, 4], world."""
+    count = len(model.targets.component)
+    positions, quaternions = np.zeros((len(c), count, 3)), np.zeros((len(c), count, 4))
+    _target_frames(
+        target_arrays(model), model.system.elastic, model.system.law, c, q, u, allocate_marker(model.system.size),
+        np.zeros((3, 3)), positions, quaternions,
+    )  # fmt: skip
+    return positions, quaternions
+
+
+@allocating_kernel
+def _target_jacobians(targets, elastic, law, c, q, u, m, R, J):
+    component, position, rotation, Phi, Psi = targets
+    V = np.zeros(6 + u.shape[2])
+    for n in range(c.shape[0]):
+        for k in range(len(component)):
+            b = component[k]
+            r = elastic[b]
+            matrix_of(q[n, b], R)
+            marker_values(r, law[b], position[k], rotation[k], Phi[k], Psi[k], c[n, b], R, u[n, b], V, m)
+            marker_jacobian(r, rotation[k], Phi[k], Psi[k], m)
+            for a in range(6 + r):
+                for i in range(3):
+                    J[n, k, i, a] = R[i, 0] * m.Jp[0, a] + R[i, 1] * m.Jp[1, a] + R[i, 2] * m.Jp[2, a]
+                    J[n, k, 3 + i, a] = m.Jf[i, a]
+
+
+def target_jacobians(model: Model, c: Array, q: Array, u: Array) -> Array:
+    """Derivative of the targets' frames by their component's coordinates (R^T dc, dphi, du), shape [T, K, 6, N]:
+    rows 0-2 the position in world axes, rows 3-5 the turning in the target's own axes."""
+    J = np.zeros((len(c), len(model.targets.component), 6, model.system.size))
+    _target_jacobians(
+        target_arrays(model),
+        model.system.elastic,
+        model.system.law,
+        c,
+        q,
+        u,
+        allocate_marker(model.system.size),
+        np.zeros((3, 3)),
+        J,
+    )
+    return J

@@ -1,0 +1,111 @@
+"""Natural modes of the whole character, joints held by their motors."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.linalg import cholesky, eigh, null_space, solve_triangular, svd
+
+from calmotion.multibody.analysis.kinematics import rigid_state
+from calmotion.multibody.integrators.workspace import Workspace
+from calmotion.multibody.kernels.sliders import LENGTH, slides_freely
+from calmotion.multibody.model.model import Model
+from calmotion.multibody.model.system import State, System
+from calmotion.multibody.statics.equilibrium import equilibrium, linearize
+from calmotion.shot.character import Array
+
+
+def system_modes(model: Model, joint_angles: Array, world: Array | None = None) -> tuple[Array, Array]:
+    """Undamped natural frequencies [Hz], ascending, and damping ratios of their modes, about the equilibrium at joint
+    angles of shape [B], moving roots held at `world`, shape [W, 18].
+
+    Motions that the joints forbid are projected out; free joints count as motions. A negative stiffness (an
+    unstable pose) gives a frequency of zero, and a ratio of zero. Modes couple through the damping; ratios are those
+    of each mode by itself.
+
+    Raises:
+        SimulationFailure: No equilibrium was found.
+    """
+    system, workspace = model.system, Workspace.for_system(model.system)
+    if world is not None:
+        workspace.work.world[:] = world
+    state, _ = equilibrium(system, rigid_state(model, joint_angles, world), joint_angles, workspace)
+    omega, shapes, C = _natural_modes(system, state, joint_angles, workspace)
+    damping = np.einsum("ik,ij,jk->k", shapes, C, shapes)
+    return omega / (2.0 * np.pi), np.where(omega > 0.0, damping / np.maximum(2.0 * omega, 1e-300), 0.0)
+
+
+def elastic_modes(model: Model) -> tuple[Array, list[Array]]:
+    """Natural modes of the undeformed character in the pose in which the shot was authored, without gravity.
+
+    From the singular values of a root of the stiffness: squares of frequencies would be known only to a rounding of
+    the largest, which leaves nothing of slow modes, and a frequency to motions of free joints that have none.
+
+    Returns:
+        Angular frequencies [rad/s], ascending, shape [n]; and for each component its elastic coordinates in the modes,
+        shape [r, n]. The modes have mass one; those of frequency zero, up to rounding, deform nothing.
+    """
+    system = model.system._replace(gravity=np.zeros(3))
+    angles = model.rest_angles
+    K, M, _, allowed = _matrices(system, rigid_state(model, angles), angles, Workspace.for_system(system))
+    ends = np.cumsum(6 + system.elastic)
+    parts = [slice(end - r, end) for end, r in zip(ends, system.elastic, strict=True)]
+    size = allowed.shape[1]
+    if not size:
+        return np.zeros(0), [np.zeros((int(r), 0)) for r in system.elastic]
+    unit = solve_triangular(cholesky(allowed.T @ M @ allowed, lower=True), allowed.T, lower=True).T
+    _, roots, turned = svd(np.concatenate([_root(K[own, own]) @ unit[own] for own in parts]))
+    omega = np.zeros(size)
+    omega[: len(roots)] = roots
+    shapes = unit @ turned.T
+    return omega[::-1], [shapes[own, ::-1] for own in parts]
+
+
+def _root(K: Array) -> Array:
+    """A matrix whose square (transposed times itself) is a stiffness, shape [r, r]."""
+    values, vectors = eigh(K) if len(K) else (np.zeros(0), K)
+    return np.sqrt(np.maximum(values, 0.0))[:, None] * vectors.T
+
+
+def _natural_modes(
+    system: System, state: State, joint_angles: Array, workspace: Workspace
+) -> tuple[Array, Array, Array]:
+    """Angular frequencies [rad/s], modes of mass one, shape [N, n], and damping, shape [N, N], in all coordinates."""
+    K, M, C, allowed = _matrices(system, state, joint_angles, workspace)
+    if not allowed.shape[1]:
+        return np.zeros(0), allowed, C
+    stiffness = allowed.T @ K @ allowed
+    # symmetric up to what the moments' axes leave, which vanishes on allowed motions
+    values, shapes = eigh(0.5 * (stiffness + stiffness.T), allowed.T @ M @ allowed)
+    return np.sqrt(np.maximum(values, 0.0)), allowed @ shapes, C
+
+
+def _matrices(
+    system: System, state: State, joint_angles: Array, workspace: Workspace
+) -> tuple[Array, Array, Array, Array]:
+    """Stiffness, mass and damping in all coordinates, shape [N, N], and the motions that joints allow, [N, n]."""
+    linearize(system, state, joint_angles, workspace)
+    blocks = workspace.blocks
+    offset = np.concatenate([[0], np.cumsum(6 + system.elastic)])
+    total = int(offset[-1])
+    (K, M, C), H = np.zeros((3, total, total)), np.zeros((6 * len(system.rows), total))
+    for b, r in enumerate(system.elastic):
+        own = slice(offset[b], offset[b] + 6 + r)
+        K[own, own] = blocks.K[b, : 6 + r, : 6 + r]
+        M[own, own] = blocks.D[b, : 6 + r, : 6 + r]
+        C[own, own] = blocks.P[b, : 6 + r, : 6 + r]
+    for joint, (p, b) in enumerate(system.side):
+        n = int(6 + system.elastic[b])
+        own, rows = slice(offset[b], offset[b] + n), slice(6 * joint, 6 * joint + 6)
+        H[rows, own] = blocks.Hc[joint, :, :n]
+        free = slides_freely(system, joint)
+        if p >= 0:
+            m = int(6 + system.elastic[p])
+            parent = slice(offset[p], offset[p] + m)
+            K[own, parent] += blocks.Nc[joint, :n] @ blocks.Jp[joint, :, :m]
+            H[rows, parent] = blocks.Hp[joint, :, :m]
+            if free:
+                # the parent's rows by the length, which follows the coordinates of both
+                K[parent] -= np.outer(blocks.Lp[joint, :m, LENGTH], H[6 * joint + LENGTH])
+        if free:
+            H[6 * joint + LENGTH] = 0.0
+    return K, M, C, null_space(H)

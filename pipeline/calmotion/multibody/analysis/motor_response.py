@@ -1,0 +1,82 @@
+"""How the rigid robot follows its motors at once: the motions of bodies and the efforts that each motor causes."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from calmotion.multibody.failure import SimulationFailure
+from calmotion.multibody.integrators.workspace import Workspace
+from calmotion.multibody.linear_solver.closed_chains import factor_loops, solve_system
+from calmotion.multibody.linear_solver.elimination import factor
+from calmotion.multibody.model.model import Model
+from calmotion.multibody.model.system import System, allocate_state
+from calmotion.multibody.statics.equilibrium import linearize
+from calmotion.shot.character import Array, IntArray
+
+
+def motor_responses(
+    rigid: Model, c: Array, q: Array, joint_angles: Array, motors: IntArray, world: Array
+) -> tuple[Array, Array]:
+    """The rigid robot's response to each motor, the others held; loops and free joints included.
+
+    With the mass matrix in place of a stiffness, what a motor's angle imposes on the joints gives the derivatives of
+    the poses by it (where motors determine them; free joints follow by inertia), and the multipliers are the efforts
+    that a unit acceleration takes: the columns of the mass matrix in the motors' angles.
+
+    It uses what statics has compiled already, one instant at a time.
+
+    Args:
+        rigid: The rigid model.
+        c, q: Its poses, shapes [T, B, 3], [T, B, 4].
+        joint_angles: Of its joints, shape [T, J].
+        motors: Which motors, shape [m].
+        world: Moving markers, shape [T, W, 18].
+
+    Returns:
+        (R^T dc, dphi) of each component by each motor [m/rad], [rad/rad], shape [T, B, 6, m]; efforts of all motors
+        by the acceleration of each of these [kg m^2], shape [T, M, m].
+
+    Raises:
+        SimulationFailure: A pose in which the system is singular.
+    """
+    system = rigid.system._replace(gravity=np.zeros(3))
+    count, joints = len(system.parent), len(system.rows)
+    turned = rigid.joint_angles(np.eye(int(max(rigid.motor)) + 1)[motors])
+    ws, state = Workspace.for_system(system), allocate_state(system)
+    blocks, factors, scratch = ws.blocks, ws.factors, ws.scratch
+    x, lam, border, closing = scratch.x, scratch.lam, scratch.border, blocks.Hc[count:]
+    tree = (factors.lu, factors.pivots, factors.Z)
+    motions = np.zeros((len(c), count, system.size, len(motors)))
+    efforts = np.zeros((len(c), len(motors), joints))
+    for n in range(len(c)):
+        state.c[:], state.q[:], ws.work.world[:] = c[n], q[n], world[n]
+        linearize(system, state, joint_angles[n], ws)
+        blocks.K[:] = blocks.D
+        bad = factor(system, blocks, *tree, scratch.block)
+        if bad >= 0:
+            raise SimulationFailure(float(n), bad, "singular")
+        if joints > count:
+            factor_loops(
+                system, blocks.Lc, blocks.Lp, closing, blocks.Hp, blocks.Nc, blocks.Jp, *tree, border, scratch.block
+            )  # fmt: skip
+        for m, imposed in enumerate(turned):
+            x[:] = 0.0
+            lam[:] = -blocks.by_angle * imposed[:, None]
+            solve_system(
+                system, blocks.Lc, blocks.Lp, closing, blocks.Hp, blocks.Nc, blocks.Jp, *tree, border.inverse, x, lam,
+                border.X, border.lam, border.y, border.x, scratch.block,
+            )  # fmt: skip
+            motions[n, :, :, m] = x
+            efforts[n, m] = _along_axes(system, ws.work.R, lam)
+    by_motor = np.stack([rigid.motor_values(efforts[:, m]) for m in range(len(motors))], axis=2)
+    return motions, by_motor
+
+
+def _along_axes(system: System, R: Array, lam: Array) -> Array:
+    """Efforts of joints that are driven, from multipliers of shape [J, 6]; of sliders by the undeformed axis."""
+    found = lam[:, 5].copy()
+    for j in np.flatnonzero(system.sliding):
+        parent = system.side[j, 0]
+        axis = system.rotation[j, 0, :, 2]
+        found[j] = (axis if parent < 0 else R[parent] @ axis) @ lam[j, :3]
+    return found

@@ -1,0 +1,81 @@
+"""Forces and moments that joints transmit, and efforts of motors, from the multipliers of a simulation."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from calmotion.multibody.integrators.trajectory import Trajectory
+from calmotion.multibody.kernels.assembly import Work, allocate_work
+from calmotion.multibody.kernels.joints import joint_kinematics
+from calmotion.multibody.kernels.sliders import slides_freely
+from calmotion.multibody.kernels.so3 import matrix_of
+from calmotion.multibody.linear_solver.closed_chains import copy_rows
+from calmotion.multibody.model.system import System
+from calmotion.shot.character import Array
+from calmotion.support.compilation import allocating_kernel
+
+
+class Reactions(NamedTuple):
+    """What each joint does to the component on its side 1, at that side's frame, world axes.
+
+    Attributes:
+        forces: [N], shape [T, J, 3].
+        moments: [N m], shape [T, J, 3].
+        efforts: Along the joint's axis, as its value grows: moments [N m], or forces [N] of a slider, shape [T, J].
+        axes: Of the frame on the joint's side 0, as columns, world, shape [T, J, 3, 3].
+    """
+
+    forces: Array
+    moments: Array
+    efforts: Array
+    axes: Array
+
+
+@allocating_kernel
+def _reactions(system, states, angles, rates, world, work, forces, moments, efforts, frames):
+    for n in range(len(angles)):
+        copy_rows(world[n], work.world)
+        for b in range(len(system.parent)):
+            matrix_of(states.q[n, b], work.R[b])
+        for joint in range(len(system.rows)):
+            joint_kinematics(
+                system, joint, angles[n, joint], rates[n, joint], states.c[n], states.u[n], states.V[n], work
+            )
+            lam, axes = states.lam[n, joint], work.i.R
+            for i in range(3):
+                m = 0.0
+                f = 0.0
+                for k in range(3):
+                    m += axes[i, k] * lam[3 + k]
+                    f += axes[i, k] * lam[k]
+                moments[n, joint, i] = m
+                forces[n, joint, i] = f if slides_freely(system, joint) else lam[i]
+            source = forces if system.sliding[joint] else moments
+            t = 0.0
+            for i in range(3):
+                t += axes[i, 2] * source[n, joint, i]
+            efforts[n, joint] = t
+            for i in range(3):
+                for k in range(3):
+                    frames[n, joint, i, k] = axes[i, k]
+
+
+def reactions(system: System, trajectory: Trajectory, angles: Array, rates: Array) -> Reactions:
+    """Reactions of all joints at all instants.
+
+    Where constraints are redundant (a planar mechanism of hinges) loads between them are not determined by rigid-body
+    mechanics: the multipliers are those of least norm.
+
+    Args:
+        angles, rates: The joint angles (or lengths) and rates that were simulated, shape [T, J].
+    """
+    total, joints = len(angles), len(system.rows)
+    work: Work = allocate_work(system)
+    found = Reactions(
+        np.zeros((total, joints, 3)), np.zeros((total, joints, 3)), np.zeros((total, joints)),
+        np.zeros((total, joints, 3, 3)),
+    )  # fmt: skip
+    _reactions(system, trajectory.states, angles, rates, trajectory.world, work, *found)
+    return found

@@ -1,0 +1,52 @@
+"""How the rigid robot's targets and motor efforts respond to its motors."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from calmotion.multibody.analysis.kinematics import target_jacobians
+from calmotion.multibody.analysis.motor_response import motor_responses
+from calmotion.multibody.model.model import Model
+from calmotion.shot.character import Array, IntArray
+
+
+@dataclass(frozen=True, eq=False)
+class RigidResponse:
+    """How the rigid robot's targets and efforts follow its motors, at some instants of a motion.
+
+    Attributes:
+        targets: Targets' frames by motor angles, shape [T, K, 6, m]: position in world axes [m/rad], turning in the
+            target's own axes.
+        inertia: Efforts of all motors by motor accelerations [kg m^2], shape [T, M, m].
+    """
+
+    targets: Array
+    inertia: Array
+
+    @classmethod
+    def along(
+        cls, rigid: Model, c: Array, q: Array, joint_angles: Array, motors: IntArray, world: Array, stride: int = 1
+    ) -> RigidResponse:
+        """The response along a motion; computed at every `stride`-th instant and held in between, which is enough to
+        precondition with.
+
+        Args:
+            rigid: The rigid model.
+            c, q: Its poses, shapes [T, B, 3], [T, B, 4].
+            joint_angles: Of its joints, shape [T, J].
+            motors: Those that may change, m of them.
+            world: Moving markers, shape [T, W, 18].
+        """
+        few = slice(None, None, stride)
+        c, q = np.ascontiguousarray(c[few]), np.ascontiguousarray(q[few])
+        motions, inertia = motor_responses(rigid, c, q, joint_angles[few].copy(), motors, world[few].copy())
+        J = target_jacobians(rigid, c, q, np.zeros(c.shape[:2] + (0,)))
+        targets = np.einsum("nkia,nkam->nkim", J, motions[:, rigid.targets.component])
+        held = np.minimum(np.arange(len(joint_angles)) // stride, len(c) - 1)
+        return cls(targets[held], inertia[held])
+
+    def coupled(self, coupling: Array) -> RigidResponse:
+        """The response to motors that move others with them; `coupling` of shape [m, leaders]."""
+        return RigidResponse(self.targets @ coupling, self.inertia @ coupling)

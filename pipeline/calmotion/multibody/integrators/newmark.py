@@ -1,0 +1,54 @@
+"""Newmark's formulas and the generalised-alpha method on the rotation group; compiled.
+
+With a the method's own acceleration and D the change of position over the step (c_n - c_{n-1}, the rotation vector
+theta_n in body axes, u_n - u_{n-1}):
+
+    a_n = (D - h V_{n-1}) / (beta h^2) - (1/(2 beta) - 1) a_{n-1}
+    V_n = V_{n-1} + h ((1 - gamma) a_{n-1} + gamma a_n)
+    (1 - alpha_f) V'_n + alpha_f V'_{n-1} = (1 - alpha_m) a_n + alpha_m a_{n-1}
+
+where V' is what the equations of motion see. alpha_m = alpha_f = 0 is Newmark's method. Source: Chung, Hulbert, A time
+integration algorithm for structural dynamics, 1993; Bruels, Cardona, On the use of Lie group time integrators in
+multibody dynamics, 2010.
+"""
+
+from __future__ import annotations
+
+from calmotion.multibody.kernels.so3 import inverse_right_jacobian
+from calmotion.support.compilation import kernel
+
+
+@kernel
+def velocities(system, scheme, h, now, before, memory, Vd):
+    """Velocities (into now.V) and accelerations (into Vd, shape [B, N]) of instant n.
+
+    Args:
+        memory: V' and a of the instant before, and room for a of this one, shape [3, B, N].
+    """
+    beta, gamma = scheme.newmark_beta, scheme.newmark_gamma
+    rest = 1.0 / (1.0 - scheme.alpha_f)
+    for b in range(len(system.parent)):
+        for i in range(6 + system.elastic[b]):
+            if i < 3:
+                D = now.c[b, i] - before.c[b, i]
+            elif i < 6:
+                D = now.turn[b, i - 3]
+            else:
+                D = now.u[b, i - 6] - before.u[b, i - 6]
+            old = memory[1, b, i]
+            a = (D - h * before.V[b, i]) / (beta * h * h) - (0.5 / beta - 1.0) * old
+            now.V[b, i] = before.V[b, i] + h * ((1.0 - gamma) * old + gamma * a)
+            Vd[b, i] = rest * ((1.0 - scheme.alpha_m) * a + scheme.alpha_m * old - scheme.alpha_f * memory[0, b, i])
+            memory[2, b, i] = a
+
+
+@kernel
+def position_to_velocity(system, scheme, h, now, T, Hv):
+    """How the velocity of instant n follows its position, into Hv, shape [B, 4, 4]; see `assemble`."""
+    rate = scheme.newmark_gamma / (scheme.newmark_beta * h)
+    for b in range(len(system.parent)):
+        Hv[b, 0, 0] = rate
+        inverse_right_jacobian(now.turn[b], T)
+        for i in range(3):
+            for k in range(3):
+                Hv[b, 1 + i, 1 + k] = rate * T[i, k]

@@ -1,0 +1,144 @@
+"""The classical Runge-Kutta method of fourth order on the index-1 form; compiled.
+
+For comparison: it is explicit, so that stiff bodies need steps far below what their motion asks for.
+
+A step integrates (c, theta, u, V), theta being the rotation vector from the step's start, theta' = J_r^-1(theta) omega
+(H. Munthe-Kaas, Runge-Kutta methods on Lie groups, 1998).
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from calmotion.multibody.kernels.so3 import inverse_right_jacobian, turn
+from calmotion.multibody.linear_solver.closed_chains import copy_rows
+from calmotion.multibody.linear_solver.index1 import accelerations
+from calmotion.multibody.model.system import State, System, allocate_state
+from calmotion.shot.character import Array
+from calmotion.support.compilation import kernel, part
+
+STAGES = np.array([0.0, 0.5, 1.0])  # where in a step it looks at the motors
+FIRMNESS = 10.0  # Baumgarte's coefficient [1/s]; one that grew with 1/h would take the method's order from it
+
+
+class Slopes(NamedTuple):
+    """Scratch of a step: a stage's state, slopes of positions and velocities, and their weighted sums, shape [B, N]."""
+
+    stage: State
+    positions: Array
+    velocities: Array
+    moved: Array
+    gained: Array
+    T: Array
+
+
+def allocate_slopes(system: System) -> Slopes:
+    """Scratch for one system."""
+    shape = (len(system.parent), system.size)
+    return Slopes(
+        allocate_state(system), np.zeros(shape), np.zeros(shape), np.zeros(shape), np.zeros(shape), np.zeros((3, 3))
+    )
+
+
+@kernel
+def _place(system, start, share, h, slopes):
+    """The state share * h along the slopes."""
+    stage = slopes.stage
+    for b in range(len(system.parent)):
+        for i in range(3):
+            stage.c[b, i] = start.c[b, i] + share * h * slopes.positions[b, i]
+            stage.turn[b, i] = share * h * slopes.positions[b, 3 + i]
+        for i in range(system.elastic[b]):
+            stage.u[b, i] = start.u[b, i] + share * h * slopes.positions[b, 6 + i]
+        for i in range(6 + system.elastic[b]):
+            stage.V[b, i] = start.V[b, i] + share * h * slopes.velocities[b, i]
+        turn(start.q[b], stage.turn[b], stage.q[b])
+
+
+@part
+def _slope(system, Vd, slopes):
+    """Slopes at the stage's state."""
+    stage, T = slopes.stage, slopes.T
+    for b in range(len(system.parent)):
+        inverse_right_jacobian(stage.turn[b], T)
+        for i in range(6 + system.elastic[b]):
+            slopes.positions[b, i] = stage.V[b, i]
+            slopes.velocities[b, i] = Vd[b, i]
+        for i in range(3):
+            t = 0.0
+            for k in range(3):
+                t += T[i, k] * stage.V[b, 3 + k]
+            slopes.positions[b, 3 + i] = t
+
+
+@part
+def step(system, h, start, now, inputs, work, blocks, factors, scratch, slopes):
+    """One step from `start` to `now`.
+
+    Args:
+        inputs: Angle, rate and acceleration of each joint's motor at start, middle and end, shape [3, 3, J].
+
+    Returns:
+        -1, or the component whose equations are singular or not finite.
+    """
+    count = len(system.parent)
+    slopes.moved[:] = 0.0
+    slopes.gained[:] = 0.0
+    slopes.positions[:] = 0.0
+    slopes.velocities[:] = 0.0
+    for stage in range(4):
+        _place(system, start, 0.0 if stage == 0 else (1.0 if stage == 3 else 0.5), h, slopes)
+        at = 0 if stage == 0 else (2 if stage == 3 else 1)
+        bad = accelerations(
+            system, slopes.stage, inputs[at, 0], inputs[at, 1], inputs[at, 2], FIRMNESS, work, blocks, factors,
+            scratch,
+        )  # fmt: skip
+        if bad >= 0:
+            return bad
+        if stage == 0:
+            copy_rows(slopes.stage.lam, start.lam)
+        _slope(system, scratch.Vd, slopes)
+        weight = 1.0 / 3.0 if stage in (1, 2) else 1.0 / 6.0
+        for b in range(count):
+            for i in range(6 + system.elastic[b]):
+                slopes.moved[b, i] += weight * slopes.positions[b, i]
+                slopes.gained[b, i] += weight * slopes.velocities[b, i]
+    copy_rows(slopes.moved, slopes.positions)
+    copy_rows(slopes.gained, slopes.velocities)
+    _place(system, start, 1.0, h, slopes)
+    copy_rows(slopes.stage.c, now.c)
+    copy_rows(slopes.stage.q, now.q)
+    copy_rows(slopes.stage.u, now.u)
+    copy_rows(slopes.stage.turn, now.turn)
+    copy_rows(slopes.stage.V, now.V)
+    copy_rows(slopes.stage.lam, now.lam)
+    return -1
+
+
+@kernel
+def advance(system, h, states, inputs, work, blocks, factors, scratch, slopes, limit):
+    """Steps 1.. of a trajectory from its first instant.
+
+    Args:
+        states: Arrays of `State` with a leading time axis; the first is given.
+        inputs: Shape [T - 1, 3, 3, J], see `step`.
+        limit: Velocity [m/s, rad/s] beyond which the motion has blown up.
+
+    Returns:
+        The instant and the component where it went wrong, or the number of instants and -1.
+    """
+    for n in range(1, len(states.c)):
+        start = State(
+            states.c[n - 1], states.q[n - 1], states.u[n - 1], states.turn[n - 1], states.V[n - 1], states.lam[n - 1]
+        )
+        now = State(states.c[n], states.q[n], states.u[n], states.turn[n], states.V[n], states.lam[n])
+        bad = step(system, h, start, now, inputs[n - 1], work, blocks, factors, scratch, slopes)
+        if bad >= 0:
+            return n, bad
+        for b in range(len(system.parent)):
+            for i in range(6 + system.elastic[b]):
+                if not (abs(now.V[b, i]) < limit):
+                    return n, b
+    return len(states.c), -1

@@ -1,0 +1,1 @@
+"""Compiled kernels: rotations, markers, joint rows, inertia, elastic forces, assembly."""

@@ -1,0 +1,1 @@
+"""The compiled model: topology, joints and bodies as flat arrays."""

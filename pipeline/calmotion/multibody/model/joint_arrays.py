@@ -1,0 +1,126 @@
+"""The joints of a character as flat arrays: those of the tree, by component, then those that close loops."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from calmotion.multibody.kernels.so3 import matrix_of
+from calmotion.multibody.model.topology import Tree
+from calmotion.reduction.reduced_body import Marker, ReducedBody
+from calmotion.shot.character import WORLD, Array, Character, Frame, IntArray
+
+_ROWS = {"fixed": 6, "revolute": 5, "spherical": 3, "prismatic": 5}  # constraint rows of a joint without a motor
+
+
+@dataclass(frozen=True, eq=False)
+class BodyAnchors:
+    """The frames of a body that joints and targets use, in this order; `root` is the joint to its parent."""
+
+    joints: tuple[int, ...]
+    targets: tuple[int, ...]
+    frames: tuple[Frame, ...]
+    root: int
+
+
+def body_anchors(character: Character, tree: Tree) -> list[BodyAnchors]:
+    """For each body, which frames its reduction must provide markers for."""
+    carrier = dict(zip(tree.body, tree.joint, strict=True))
+    result = []
+    for index in range(len(character.bodies)):
+        joints = [k for k, joint in enumerate(character.joints) if index in (joint.body0, joint.body1)]
+        targets = [k for k, target in enumerate(character.targets) if target.body == index]
+        frames = [_side(character, k, index) for k in joints] + [character.targets[k].frame for k in targets]
+        result.append(BodyAnchors(tuple(joints), tuple(targets), tuple(frames), joints.index(carrier[index])))
+    return result
+
+
+def _side(character: Character, joint: int, body: int) -> Frame:
+    item = character.joints[joint]
+    return item.frame0 if item.body0 == body else item.frame1
+
+
+def rotation_matrix(quaternion: Array) -> Array:
+    """Rotation matrix of a quaternion (w, x, y, z)."""
+    out = np.zeros((3, 3))
+    matrix_of(np.asarray(quaternion, dtype=float), out)
+    return out
+
+
+@dataclass(frozen=True, eq=False)
+class JointArrays:
+    """What `System` and `Model` say of the joints."""
+
+    arrays: dict[str, Any]
+    motor: IntArray
+    sign: Array
+    rest: Array
+
+
+def joint_arrays(
+    character: Character, tree: Tree, bodies: Sequence[ReducedBody], anchors: list[BodyAnchors], r_max: int,
+    moving: Sequence[int] = (),
+) -> JointArrays:  # fmt: skip
+    """Joints of the tree, by component, then those that close loops.
+
+    Args:
+        moving: Joints whose world-side frame moves as it is told, in the order of `assembly.Work.world`.
+    """
+    component_of = {WORLD: -1} | {b: k for k, b in enumerate(tree.body)}
+    order = [*tree.joint, *tree.loops]
+    count = len(order)
+    side, rows = np.zeros((count, 2), np.int32), np.zeros(count, np.int32)
+    sliding, motor, sign = np.zeros(count, np.int32), np.full(count, -1, np.int32), np.ones(count)
+    moved = np.full(count, -1, np.int32)
+    position, rotation = np.zeros((count, 2, 3)), np.zeros((count, 2, 3, 3))
+    Phi, Psi = np.zeros((count, 2, 3, r_max)), np.zeros((count, 2, 3, r_max))
+    rest = np.zeros(count)
+    motor_of = {item.joint: k for k, item in enumerate(character.motors)}
+    for k, joint in enumerate(order):
+        item = character.joints[joint]
+        # a loop's joint, too, has the world on its first side or nowhere
+        flipped = tree.flipped[k] if k < len(tree.body) else item.body1 == WORLD
+        ends = [(item.body0, item.frame0), (item.body1, item.frame1)]
+        if flipped:
+            ends.reverse()
+        bodies_of = [body for body, _ in ends]
+        for own, (body, frame) in enumerate(ends):
+            side[k, own] = component_of[body]
+            none = np.zeros((3, 0))
+            marker = Marker(frame.position, frame.rotation, none, none)
+            if body != WORLD:
+                marker = bodies[body].markers[anchors[body].joints.index(joint)]
+            r = marker.Phi.shape[1]
+            position[k, own], rotation[k, own] = marker.position, rotation_matrix(marker.rotation)
+            Phi[k, own, :, :r], Psi[k, own, :, :r] = marker.Phi, marker.Psi
+        if item.kind == "spherical":
+            # a ball has no axes of its own: those of its second side are laid so that the authored pose is zero
+            turns = [np.eye(3) if b == WORLD else rotation_matrix(character.bodies[b].rest.rotation) for b in bodies_of]
+            rotation[k, 1] = turns[1].T @ turns[0] @ rotation[k, 0]
+        sign[k] = -1.0 if flipped else 1.0
+        motor[k] = motor_of.get(joint, -1)
+        sliding[k] = item.kind == "prismatic"
+        moved[k] = moving.index(joint) if joint in moving else -1
+        rows[k] = _ROWS[item.kind] if motor[k] < 0 else 6
+        rest[k] = _rest_value(character, bodies_of, position[k], rotation[k], item.kind == "prismatic")
+    arrays = {
+        "side": side, "rows": rows, "sliding": sliding, "moving": moved, "position": position, "rotation": rotation,
+        "Phi": Phi, "Psi": Psi,
+    }  # fmt: skip
+    return JointArrays(arrays, motor, sign, rest)
+
+
+def _rest_value(character: Character, ends: Sequence[int], position: Array, rotation: Array, sliding: bool) -> float:
+    """Angle (or length) of a joint in the pose in which the shot was authored; parent's side first."""
+    frames = []
+    for body, x, R in zip(ends, position, rotation, strict=True):
+        rest = None if body == WORLD else character.bodies[body].rest
+        turn = np.eye(3) if rest is None else rotation_matrix(rest.rotation)
+        frames.append((turn @ x + (np.zeros(3) if rest is None else rest.position), turn @ R))
+    if sliding:
+        return float((frames[1][0] - frames[0][0]) @ frames[0][1][:, 2])
+    Q = frames[0][1].T @ frames[1][1]
+    return float(np.arctan2(Q[1, 0] - Q[0, 1], Q[0, 0] + Q[1, 1]))

@@ -1,0 +1,235 @@
+"""From a character and its reduced bodies to the compiled system, its motors and its targets."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from calmotion.multibody.model.joint_arrays import BodyAnchors, body_anchors, joint_arrays, rotation_matrix
+from calmotion.multibody.model.system import LINEAR, NEOHOOKEAN, STVK, System, components
+from calmotion.multibody.model.topology import Tree, span_tree
+from calmotion.reduction.reduced_body import Marker, ReducedBody, rigid_invariants
+from calmotion.shot.character import Array, Body, BoolArray, Character, IntArray
+
+
+@dataclass(frozen=True, eq=False)
+class Targets:
+    """Target markers, one row each (K targets): component, marker (see `fem.Marker`), weights."""
+
+    component: IntArray
+    position: Array
+    rotation: Array
+    Phi: Array
+    Psi: Array
+    position_weight: Array
+    rotation_weight: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Model:
+    """A character compiled for simulation.
+
+    Attributes:
+        system: The flat arrays.
+        tree: Order of the components.
+        motor: Motor that drives each joint, -1 for none, shape [J]: the joints of the tree, by component, then
+            those that close loops.
+        sign: +1, or -1 where the joint's angle runs against the tree, shape [J].
+        targets: The target markers.
+        rest_angles: Angle [rad] (or length [m]) of each joint in the pose the shot was authored in, shape [J].
+    """
+
+    system: System
+    tree: Tree
+    motor: IntArray
+    sign: Array
+    targets: Targets
+    rest_angles: Array
+
+    def joint_angles(self, motor_values: Array) -> Array:
+        """Angles (or lengths) of the joints, shape [..., J], from values of the motors, shape [..., M]."""
+        out = np.zeros(motor_values.shape[:-1] + (len(self.motor),))
+        driven = self.motor >= 0
+        out[..., driven] = motor_values[..., self.motor[driven]] * self.sign[driven]
+        return out
+
+    def motor_values(self, joint_values: Array) -> Array:
+        """The transpose of `joint_angles`: shape [..., J] to [..., M]."""
+        out = np.zeros(joint_values.shape[:-1] + (int(self.motor.max(initial=-1)) + 1,))
+        for joint, motor in enumerate(self.motor):
+            if motor >= 0:
+                out[..., motor] += self.sign[joint] * joint_values[..., joint]
+        return out
+
+    @property
+    def dof(self) -> int:
+        """Position coordinates of all components."""
+        return int(np.sum(6 + self.system.elastic))
+
+
+def rigid_body(body: Body, anchors: BodyAnchors) -> ReducedBody:
+    """A rigid body with its markers."""
+    assert body.mass is not None
+    none = np.zeros((3, 0))
+    markers = tuple(Marker(frame.position, frame.rotation, none, none) for frame in anchors.frames)
+    return ReducedBody(rigid_invariants(body.mass), np.zeros(0), np.zeros((0, 0)), markers)
+
+
+def compile_model(character: Character, tree: Tree, bodies: Sequence[ReducedBody], moving: Sequence[int] = ()) -> Model:
+    """Compile a character whose bodies are given reduced, with the markers of `body_anchors`.
+
+    Args:
+        moving: Joints to the world whose frame there moves as it is told (moving roots).
+    """
+    anchors = body_anchors(character, tree)
+    count = len(tree.body)
+    r_max = max((len(body.stiffness) for body in bodies), default=0)
+
+    def zeros(*shape: int) -> Array:
+        return np.zeros((count,) + shape)
+
+    mass, s, Z, M3, M4 = zeros(), zeros(3), zeros(3, 3), zeros(r_max, 3), zeros(r_max, 3, 3)
+    S, axial, axial0 = zeros(r_max, r_max, 3, 3), zeros(r_max, r_max, 3), zeros(r_max, 3)
+    stiffness, damping = zeros(r_max), zeros(r_max, r_max)
+    elastic = np.zeros(count, np.int64)
+    for k, b in enumerate(tree.body):
+        body = bodies[b]
+        integrals = body.invariants
+        r = elastic[k] = len(body.stiffness)
+        mass[k], s[k], Z[k] = integrals.mass, integrals.s, integrals.Z
+        M3[k, :r], M4[k, :r], S[k, :r, :r] = integrals.M3, integrals.M4, integrals.S
+        for i in range(3):
+            j, m = (i + 1) % 3, (i + 2) % 3
+            axial[k, :r, :r, i] = integrals.S[:, :, j, m] - integrals.S[:, :, m, j]
+            axial0[k, :r, i] = integrals.M4[:, j, m] - integrals.M4[:, m, j]
+        damping[k, :r, :r] = body.damping
+        if body.elasticity is None:
+            stiffness[k, :r] = body.stiffness
+    joints = joint_arrays(character, tree, bodies, anchors, r_max, moving)
+    straight = np.array([character.bodies[b].straight for b in tree.body], bool)
+    system = System(
+        parent=np.array(tree.parent, np.int32), elastic=elastic, mass=mass, s=s, Z=Z, M3=M3, M4=M4, S=S, axial=axial,
+        axial0=axial0, turning=components(~straight), straight=components(straight), stiffness=stiffness,
+        damping=damping, gravity=np.asarray(character.gravity, dtype=float),
+        **_elastic_laws([bodies[b] for b in tree.body]), **joints.arrays,
+    )  # fmt: skip
+    targets = _targets(character, tree, bodies, anchors, r_max)
+    return Model(system, tree, joints.motor, joints.sign, targets, joints.rest)
+
+
+def _elastic_laws(bodies: Sequence[ReducedBody]) -> dict[str, Any]:
+    """What `System` says of elastic laws, bodies in the order of the components."""
+    count = len(bodies)
+    law, points, start = np.full(count, LINEAR, np.int32), np.zeros(count, np.int64), np.zeros(count, np.int64)
+    retardation, lame = np.zeros(count), np.zeros((count, 2))
+    arrays: list[Array] = []
+    size = 0
+    for k, body in enumerate(bodies):
+        item = body.elasticity
+        if item is None:
+            continue
+        law[k] = {"stvk": STVK, "neohookean": NEOHOOKEAN}[item.law]
+        retardation[k], lame[k], start[k] = item.retardation, item.lame, size
+        points[k] = item.points if item.law == "neohookean" else len(body.stiffness)
+        data = item.data
+        if item.seen is not None:
+            points[k], data = len(item.seen), np.concatenate([data, item.seen.ravel()])
+        arrays.append(data)
+        size += data.size
+    data = np.concatenate(arrays) if arrays else np.zeros(0)
+    return {
+        "law": law, "stvk": components(law == STVK), "neohookean": components(law == NEOHOOKEAN),
+        "retardation": retardation, "lame": lame, "points": points, "data_start": start, "data": data,
+    }  # fmt: skip
+
+
+def _targets(
+    character: Character, tree: Tree, bodies: Sequence[ReducedBody], anchors: list[BodyAnchors], r_max: int
+) -> Targets:
+    count = len(character.targets)
+    component_of = {b: k for k, b in enumerate(tree.body)}
+    Phi, Psi = np.zeros((count, 3, r_max)), np.zeros((count, 3, r_max))
+    position, rotation = np.zeros((count, 3)), np.zeros((count, 3, 3))
+    for k, target in enumerate(character.targets):
+        own = anchors[target.body]
+        marker = bodies[target.body].markers[len(own.joints) + own.targets.index(k)]
+        r = marker.Phi.shape[1]
+        position[k], rotation[k] = marker.position, rotation_matrix(marker.rotation)
+        Phi[k, :, :r], Psi[k, :, :r] = marker.Phi, marker.Psi
+    return Targets(
+        component=np.array([component_of[target.body] for target in character.targets], np.int32),
+        position=position,
+        rotation=rotation,
+        Phi=Phi,
+        Psi=Psi,
+        position_weight=np.array([target.position_weight for target in character.targets]),
+        rotation_weight=np.array([target.rotation_weight for target in character.targets]),
+    )
+
+
+def rigid_model(model: Model) -> Model:
+    """The same character with every body rigid."""
+    system = model.system
+    none = 0
+    rigid = system._replace(
+        elastic=np.zeros_like(system.elastic),
+        M3=np.ascontiguousarray(system.M3[:, :none]),
+        M4=np.ascontiguousarray(system.M4[:, :none]),
+        S=np.ascontiguousarray(system.S[:, :none, :none]),
+        axial=np.ascontiguousarray(system.axial[:, :none, :none]),
+        axial0=np.ascontiguousarray(system.axial0[:, :none]),
+        stiffness=np.ascontiguousarray(system.stiffness[:, :none]),
+        damping=np.ascontiguousarray(system.damping[:, :none, :none]),
+        law=np.full_like(system.law, LINEAR),
+        stvk=system.stvk[:none],
+        neohookean=system.neohookean[:none],
+        data=np.zeros(0),
+        Phi=np.ascontiguousarray(system.Phi[..., :none]),
+        Psi=np.ascontiguousarray(system.Psi[..., :none]),
+    )
+    t = model.targets
+    targets = Targets(
+        t.component, t.position, t.rotation, np.ascontiguousarray(t.Phi[..., :none]),
+        np.ascontiguousarray(t.Psi[..., :none]), t.position_weight, t.rotation_weight,
+    )  # fmt: skip
+    return Model(rigid, model.tree, model.motor, model.sign, targets, model.rest_angles)
+
+
+def moves_freely(model: Model) -> BoolArray:
+    """Which joints no motor holds."""
+    rows = model.system.rows
+    return (rows > 0) & (rows < 6)
+
+
+def start_angles(model: Model, joint_angles: Array) -> Array:
+    """Angles of all joints for the first pose: motors from their tracks, free joints as the shot was authored."""
+    free = moves_freely(model)
+    return np.where(free, model.rest_angles, joint_angles)
+
+
+def with_damping(model: Model, ratio: float, frequency: float) -> Model:
+    """A model with more damping: Kelvin-Voigt's, which grows with the frequency.
+
+    Args:
+        ratio: Of critical, at the given frequency.
+        frequency: [Hz], not zero.
+    """
+    system, retardation = model.system, ratio / (np.pi * frequency)
+    added = retardation * system.stiffness[:, :, None] * np.eye(system.stiffness.shape[1])
+    more = system._replace(damping=system.damping + added, retardation=system.retardation + retardation)
+    return replace(model, system=more)
+
+
+__all__ = [
+    "BodyAnchors",
+    "Model",
+    "Targets",
+    "body_anchors",
+    "compile_model",
+    "rigid_body",
+    "rigid_model",
+    "span_tree",
+]

@@ -1,0 +1,227 @@
+"""The compiled multibody system: flat arrays that the kernels read, one row a component, parents before children.
+
+Each component hangs by one joint from its parent (-1: the world): component b by joint b. Further joints, from
+number B on, close loops. Arrays are padded to the largest number of elastic coordinates. Side 0 of a joint is on the
+parent, side 1 on the component; a loop's joint may have the world on side 0, never on side 1.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calmotion.shot.character import Array, BoolArray, IntArray
+
+CountArray = NDArray[np.int64]  # as Python's own integers reach a kernel, which is then compiled for both at once
+JOINT_ROWS = 6
+BACKWARD_DIFFERENCE, NEWMARK = 0, 1  # families of time-stepping formulas
+LINEAR, STVK, NEOHOOKEAN = 0, 1, 2  # elastic laws; `finite_rotation` tells linear from nonlinear by zero
+
+
+class System(NamedTuple):
+    """Constants of the system (B components, J >= B joints, at most R elastic coordinates, N = 6 + R).
+
+    Attributes:
+        parent: Parent of each component, shape [B], -1 for the world.
+        elastic: Number of elastic coordinates, shape [B].
+        side: Components on the two sides of each joint, shape [J, 2].
+        rows: Number of constraint rows of each joint: 6 (weld, motor), 5 (free hinge or slider), 3 (ball) or 0
+            (floating), shape [J].
+        sliding: Whether a joint has a length along its axis instead of an angle, shape [J].
+        moving: Row of `assembly.Work.world` that moves the world-side marker of a joint, -1 for none, shape [J].
+        mass, s, Z, M3, M4, S: Inertia integrals, see `fem.Invariants`.
+        axial: axial(S[j, k]) = int rho phi_j x phi_k, shape [B, R, R, 3].
+        axial0: axial(M4[j]) = int rho X x phi_j, shape [B, R, 3].
+        turning, straight: Components with the inertia of `inertia`, and those with that of `constant_inertia`.
+        stiffness: Diagonal, shape [B, R]; zero for a nonlinear body.
+        damping: Symmetric, shape [B, R, R]; of a nonlinear body, what goes by mass.
+        law: Elastic law: LINEAR, STVK, NEOHOOKEAN, shape [B].
+        stvk, neohookean: Components of these laws.
+        retardation: Kelvin-Voigt coefficient of nonlinear bodies [s], shape [B].
+        lame: Lame's constants [Pa], shape [B, 2], where the law is NEOHOOKEAN.
+        points: Number of cubature points, or of directions that a STVK body's quadratic strain sees, shape [B].
+        data_start, data: What `elastic` and `neohookean` read of each body, in one array, and where it starts.
+        position, rotation, Phi, Psi: Joint markers, shapes [J, 2, 3], [J, 2, 3, 3], [J, 2, 3, R] twice.
+        gravity: [m/s^2], shape [3].
+    """
+
+    parent: IntArray
+    elastic: CountArray
+    side: IntArray
+    rows: IntArray
+    sliding: IntArray
+    moving: IntArray
+    mass: Array
+    s: Array
+    Z: Array
+    M3: Array
+    M4: Array
+    S: Array
+    axial: Array
+    axial0: Array
+    turning: IntArray
+    straight: IntArray
+    stiffness: Array
+    damping: Array
+    law: IntArray
+    stvk: IntArray
+    neohookean: IntArray
+    retardation: Array
+    lame: Array
+    points: CountArray
+    data_start: CountArray
+    data: Array
+    position: Array
+    rotation: Array
+    Phi: Array
+    Psi: Array
+    gravity: Array
+
+    @property
+    def size(self) -> int:
+        """Position coordinates of the largest component, N = 6 + R."""
+        return 6 + self.M3.shape[1]
+
+
+class Scheme(NamedTuple):
+    """How a step turns positions into velocities and accelerations.
+
+    Attributes:
+        velocity: d(velocity)/d(position) [1/s]; 0 for statics.
+        acceleration: d(acceleration)/d(velocity) [1/s]; 0 for statics.
+        gamma: Weight of the constraint at velocity level: 1, or 0 for statics.
+        alpha: Baumgarte coefficient [1/s]; 1 for statics. Seed (31).
+        family: BACKWARD_DIFFERENCE, or NEWMARK with the coefficients that follow.
+        newmark_beta, newmark_gamma: Of Newmark's formulas.
+        alpha_m, alpha_f: Share of the previous instant in the inertia and in the forces (generalised-alpha).
+    """
+
+    velocity: float
+    acceleration: float
+    gamma: float
+    alpha: float
+    family: int = BACKWARD_DIFFERENCE
+    newmark_beta: float = 0.25
+    newmark_gamma: float = 0.5
+    alpha_m: float = 0.0
+    alpha_f: float = 0.0
+
+
+class State(NamedTuple):
+    """State of one instant, all components.
+
+    Attributes:
+        c: Origins [m], shape [B, 3], world.
+        q: Unit quaternions (w, x, y, z), shape [B, 4].
+        u: Elastic coordinates, shape [B, R].
+        turn: Rotation vector from the previous instant to this one, body axes [rad], shape [B, 3].
+        V: Velocities (w in world axes, omega in body axes, v), shape [B, N].
+        lam: Joint multipliers (force on the component at the joint in world axes [N], moment in the parent-side
+            joint frame [N m]), shape [J, 6]. On a free slider the force, too, is in the parent-side joint frame.
+    """
+
+    c: Array
+    q: Array
+    u: Array
+    turn: Array
+    V: Array
+    lam: Array
+
+
+class Blocks(NamedTuple):
+    """The linearised equations of one instant, component by component (see `assembly.assemble`).
+
+    Unknowns of a component are (R^T dc, dphi, du) in body axes and its joint's multipliers. What concerns a joint
+    has one entry for each of the J joints; "component" and "parent" are then its sides 1 and 0.
+
+    Attributes:
+        K: Tangent of its own rows, shape [B, N, N].
+        P: By its velocity, dV-dot included, shape [B, N, N].
+        D: By its acceleration (its mass matrix), shape [B, N, N].
+        Lc, Lp: By the joint's multipliers: the component's rows, its parent's rows, shape [J, N, 6].
+        Hc, Hp: The joint's constraint rows, by the component and by its parent, shape [J, 6, N]. A free slider has
+            its length in place of a multiplier and the definition of it in place of a row, see `sliders`.
+        Nc: The component's rows by the turning of the parent-side marker, shape [J, N, 3].
+        Jp: Turning of the parent-side marker by the parent's coordinates, shape [J, 3, N].
+        by_angle, by_rate: The joint's rows by the motor's angle (or length) and rate, shape [J, 6].
+        on_parent: The parent's rows by the motor's length, shape [J, N]; zero where it is an angle.
+        res: Residual of its rows, shape [B, N].
+        gap: Residual of the joint's constraint rows, shape [J, 6].
+    """
+
+    K: Array
+    P: Array
+    D: Array
+    Lc: Array
+    Lp: Array
+    Hc: Array
+    Hp: Array
+    Nc: Array
+    Jp: Array
+    by_angle: Array
+    by_rate: Array
+    on_parent: Array
+    res: Array
+    gap: Array
+
+
+class Factors(NamedTuple):
+    """The eliminated step matrix: `lu`, `pivots` of each component with its joint, and `Z`, the transposed
+    solutions for its multipliers, shapes [B, N + 6, N + 6], [B, N + 6], [B, N + 6, 6]; in the order of
+    `elimination.place`."""
+
+    lu: Array
+    pivots: IntArray
+    Z: Array
+
+
+def components(chosen: BoolArray) -> IntArray:
+    """Numbers of the components that are chosen by an array of shape [B]."""
+    return np.flatnonzero(chosen).astype(np.int32)
+
+
+def allocate_state(system: System) -> State:
+    """A state at the origin, at rest."""
+    count, size = len(system.parent), system.size
+    q = np.zeros((count, 4))
+    q[:, 0] = 1.0
+    return State(
+        c=np.zeros((count, 3)),
+        q=q,
+        u=np.zeros((count, size - 6)),
+        turn=np.zeros((count, 3)),
+        V=np.zeros((count, size)),
+        lam=np.zeros((len(system.rows), JOINT_ROWS)),
+    )
+
+
+def allocate_blocks(system: System, instants: int | None = None) -> Blocks:
+    """Zeroed blocks, for one instant or with a leading axis of that many instants."""
+    count, size = len(system.parent), system.size
+    lead = () if instants is None else (instants,)
+
+    joints = len(system.rows)
+
+    def zeros(*shape: int) -> Array:
+        return np.zeros(lead + shape)
+
+    square, wide, tall = (count, size, size), (joints, JOINT_ROWS, size), (joints, size, JOINT_ROWS)
+    row = (joints, JOINT_ROWS)
+    return Blocks(
+        zeros(*square), zeros(*square), zeros(*square), zeros(*tall), zeros(*tall), zeros(*wide), zeros(*wide),
+        zeros(joints, size, 3), zeros(joints, 3, size), zeros(*row), zeros(*row), zeros(joints, size),
+        zeros(count, size), zeros(*row),
+    )  # fmt: skip
+
+
+def allocate_factors(system: System, instants: int | None = None) -> Factors:
+    """Zeroed factors, for one instant or with a leading axis of that many instants."""
+    count, size = len(system.parent), system.size + JOINT_ROWS
+    lead = () if instants is None else (instants,)
+    return Factors(
+        np.zeros(lead + (count, size, size)),
+        np.zeros(lead + (count, size), dtype=np.int32),
+        np.zeros(lead + (count, size, JOINT_ROWS)),
+    )

@@ -1,0 +1,119 @@
+"""The tree of a character's bodies and joints, seen from the world."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from calmotion.errors import ShotError
+from calmotion.shot.character import WORLD, Character, IntArray
+
+
+@dataclass(frozen=True)
+class Tree:
+    """Components in an order in which parents come before children; component k is body `body[k]`.
+
+    Attributes:
+        body: Body index of each component.
+        parent: Parent component of each, -1 for the world.
+        joint: Joint that carries each component.
+        flipped: Whether the component is `body0` of that joint, so that its angle runs backwards.
+        loops: Joints that are not in the tree: each closes a loop; without those that are redundant.
+    """
+
+    body: tuple[int, ...]
+    parent: tuple[int, ...]
+    joint: tuple[int, ...]
+    flipped: tuple[bool, ...]
+    loops: tuple[int, ...] = ()
+
+
+def span_tree(character: Character) -> Tree:
+    """Order the bodies of a character from the world outwards.
+
+    Where joints close a loop, one of them is left out of the tree: the one that constrains least, so that motors and
+    welds stay in it.
+
+    Raises:
+        ShotError: A body that no chain of joints connects to the world.
+    """
+    inside, loops = _spanning(character)
+    touching: dict[int, list[int]] = {}
+    for index in inside:
+        joint = character.joints[index]
+        touching.setdefault(joint.body0, []).append(index)
+        touching.setdefault(joint.body1, []).append(index)
+    body: list[int] = []
+    parent: list[int] = []
+    joint_of: list[int] = []
+    flipped: list[bool] = []
+    component_of = {WORLD: -1}
+    queue = [WORLD]
+    for current in queue:
+        for index in touching.get(current, ()):
+            joint = character.joints[index]
+            other = joint.body1 if joint.body0 == current else joint.body0
+            if other in component_of:
+                continue  # the way we came
+            component_of[other] = len(body)
+            body.append(other)
+            parent.append(component_of[current])
+            joint_of.append(index)
+            flipped.append(joint.body0 == other)
+            queue.append(other)
+    for index, item in enumerate(character.bodies):
+        if index not in component_of:
+            raise ShotError(
+                "no chain of joints connects this body to the world",
+                path=item.path,
+                remedy="Add a joint to its neighbour, or a PhysicsFixedJoint with an empty body0.",
+            )
+    needed = tuple(index for index in loops if not character.joints[index].redundant)
+    return Tree(tuple(body), tuple(parent), tuple(joint_of), tuple(flipped), needed)
+
+
+def loop_members(parent: Sequence[int] | IntArray, ends: Sequence[int] | IntArray) -> set[int]:
+    """Components of the loop that a joint between two of them closes.
+
+    Args:
+        parent: Of each component, -1 for the world.
+        ends: The two components, -1 for the world.
+    """
+    paths = []
+    for end in ends:
+        path, b = set(), int(end)
+        while b >= 0:
+            path.add(b)
+            b = int(parent[b])
+        paths.append(path)
+    return paths[0] ^ paths[1]
+
+
+def _spanning(character: Character) -> tuple[list[int], list[int]]:
+    """Joints of a spanning tree, and those that close loops (Kruskal's algorithm, firmest joints first)."""
+    driven = {motor.joint for motor in character.motors}
+
+    def looseness(index: int) -> tuple[int, int]:
+        joint = character.joints[index]
+        # a free slider has no stiffness of its own at rest, which a tree must have
+        kind = 0 if index in driven else {"fixed": 1, "revolute": 2, "spherical": 3, "prismatic": 4}[joint.kind]
+        return (5 if joint.closes_loop else kind), index
+
+    group = {index: index for index in range(WORLD, len(character.bodies))}
+
+    def leader(item: int) -> int:
+        while group[item] != item:
+            group[item] = group[group[item]]
+            item = group[item]
+        return item
+
+    inside, loops = [], []
+    for index in sorted(range(len(character.joints)), key=looseness):
+        joint = character.joints[index]
+        one, other = leader(joint.body0), leader(joint.body1)
+        if one == other:
+            loops.append(index)
+        else:
+            group[one] = other
+            inside.append(index)
+    return sorted(inside), sorted(loops)

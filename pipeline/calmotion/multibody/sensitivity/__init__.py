@@ -1,0 +1,1 @@
+"""Linearisation, tangent (JVP), discrete adjoint (VJP), periodic motion, continuous adjoint."""

@@ -1,0 +1,83 @@
+"""Natural frequencies and modes of the full model."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from calmotion.geometry.tetrahedra import Indices
+from calmotion.linear_algebra.block_lanczos import lowest_by_lanczos
+from calmotion.linear_algebra.sparse_solver import SparseSolver
+from calmotion.reduction.elements.assembly import FEModel
+from calmotion.shot.character import Array
+
+__all__ = ["SparseSolver", "frequencies", "lowest_modes", "vector_mass"]
+
+_DENSE = 60  # degrees of freedom up to which a dense solver is as quick
+
+
+def vector_mass(mass: Any) -> Any:
+    """m (x) E, sparse CSR, shape [3n, 3n], from the scalar mass matrix m, shape [n, n]."""
+    from scipy.sparse import identity, kron
+
+    return kron(mass, identity(3), format="csr")
+
+
+def lowest_modes(
+    K: Any, M: Any, count: int, *, shift: float = 0.0, solver: SparseSolver | None = None, below: float | None = None,
+    most: int | None = None,
+) -> tuple[Array, Array]:  # fmt: skip
+    """Lowest eigenpairs of K x = omega^2 M x.
+
+    Args:
+        K, M: Sparse symmetric, shape [n, n]; K + shift M positive definite.
+        count: How many, at most n; the fewest with `below`.
+        shift: [1/s^2], positive where K alone is singular.
+        solver: Of K + shift M, when it is there already.
+        below: All up to this omega^2 [1/s^2] are wanted, and one above.
+        most: But no more than this many.
+
+    Returns:
+        omega^2 [1/s^2], ascending, shape [count] (or more), and M-orthonormal modes, shape [n, count] (or more).
+
+    Raises:
+        NotPositiveDefinite: K + shift M is not.
+    """
+    from scipy.linalg import eigh
+
+    n = K.shape[0]
+    most = n if most is None else min(most, n)
+    count = min(count, most)
+    if count == 0 and below is None:
+        return np.zeros(0), np.zeros((n, 0))
+    if n <= _DENSE or 3 * count >= n:
+        values, vectors = eigh(K.toarray(), M.toarray())
+        if below is not None:
+            count = min(max(count, int(np.count_nonzero(values <= below)) + 1), most)
+        return values[:count], vectors[:, :count]
+    solver = solver or SparseSolver(K + shift * M if shift else K)
+    return lowest_by_lanczos(K, M, max(count, 1), shift, solver, below, most)
+
+
+def frequencies(model: FEModel, count: int, clamped: Indices | None = None) -> Array:
+    """Lowest natural frequencies of the full model [Hz], shape [count].
+
+    Args:
+        model: Its matrices.
+        count: How many; for a free body the six rigid ones (zero) come first.
+        clamped: Nodes that are held, or None for a free body.
+    """
+    n = len(model.mesh.nodes)
+    free = np.ones(n, dtype=bool)
+    shift = 0.0
+    M = vector_mass(model.mass)
+    if clamped is None or len(clamped) == 0:
+        # far below the first elastic frequency, far above rounding of the rigid ones
+        shift = 1e-4 * float(model.stiffness.diagonal().sum() / M.diagonal().sum())
+    else:
+        free[clamped] = False
+    dofs = np.flatnonzero(np.repeat(free, 3))
+    K, M = model.stiffness[dofs][:, dofs], M[dofs][:, dofs]
+    values, _ = lowest_modes(K, M, count, shift=shift)
+    return np.sqrt(np.maximum(values, 0.0)) / (2.0 * np.pi)

@@ -1,0 +1,155 @@
+"""Second-order internal forces of hyperelastic materials on the full mesh, and the strain fields of modes.
+
+With displacement gradient G of the body (F = E + G), the first Piola-Kirchhoff stress of a material expands about
+the undeformed state as P = C:sym(G) + P''[G, G]/2 + ..., where P''[A, B] is symmetric in A and B.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from calmotion.reduction.elements.assembly import QuadraticMesh
+from calmotion.reduction.elements.green_strain_fields import green_fields
+from calmotion.shot.character import Array
+
+
+class GradientRule:
+    """Displacement gradients at the quadrature points of every element.
+
+    Args:
+        mesh: Of the body, m elements.
+        order: Polynomial degree that the rule integrates exactly, 2 or 4.
+
+    Attributes:
+        weights: Quadrature weights times volume [m^3], shape [m, q].
+    """
+
+    def __init__(self, mesh: QuadraticMesh, order: int):
+        from skfem import Basis, ElementTetP2
+
+        basis = Basis(mesh.basis.mesh, ElementTetP2(), intorder=order)
+        self._shape = np.stack([np.asarray(field[0].grad) for field in basis.basis])  # [10, 3, m, q]
+        self._tets = mesh.tets
+        self._nodes = len(mesh.nodes)
+        self.weights: Array = np.ascontiguousarray(basis.dx)
+
+    def gradients(self, modes: Array, elements: slice = slice(None)) -> Array:
+        """G_ij = d(displacement i)/dX_j of nodal fields of shape [n, 3, r]; shape [r, m, q, 3, 3]."""
+        local = modes[self._tets[elements]]  # [m, 10, 3, r]
+        return np.einsum("eair,ajeq->reqij", local, self._shape[:, :, elements], optimize=True)
+
+    def nodal_forces(self, stress: Array) -> Array:
+        """int P : grad N, shape [n, 3], of a stress field P of shape [m, q, 3, 3] [Pa]."""
+        local = np.einsum("eqij,ajeq,eq->eai", stress, self._shape, self.weights, optimize=True)
+        out = np.zeros((self._nodes, 3))
+        np.add.at(out, self._tets, local)
+        return out
+
+
+def linear_stress(G: Array, lame: float, mu: float) -> Array:
+    """C : sym(G) [Pa], shape of G [..., 3, 3]."""
+    trace = np.trace(G, axis1=-2, axis2=-1)[..., None, None]
+    return mu * (G + np.swapaxes(G, -1, -2)) + lame * trace * np.eye(3)
+
+
+def second_order_stress(A: Array, B: Array, lame: float, mu: float, material: str) -> Array:
+    """P''[A, B] [Pa] of two displacement gradients, shapes [..., 3, 3].
+
+    Args:
+        material: `stvk` (St. Venant-Kirchhoff) or `neohookean`.
+
+    Source: the second derivative of S = C:E, P = F S with E = sym(G) + G^T G/2, or of
+    P = mu (F - F^-T) + lame ln(J) F^-T, at F = E.
+    """
+    At, Bt = np.swapaxes(A, -1, -2), np.swapaxes(B, -1, -2)
+    if material == "stvk":
+        return linear_stress(At @ B, lame, mu) + A @ linear_stress(B, lame, mu) + B @ linear_stress(A, lame, mu)
+    trace_a = np.trace(A, axis1=-2, axis2=-1)[..., None, None]
+    trace_b = np.trace(B, axis1=-2, axis2=-1)[..., None, None]
+    product = np.einsum("...ij,...ji->...", A, B)[..., None, None]
+    return -mu * (At @ Bt + Bt @ At) - lame * (trace_a * Bt + trace_b * At + product * np.eye(3))
+
+
+def second_order_force(
+    rule: GradientRule, A: Array, B: Array, lame: float, mu: float, material: str
+) -> Array:  # fmt: skip
+    """Second derivative of the internal force in the directions of two fields [N], shape [n, 3].
+
+    Args:
+        A, B: Gradients of the fields at the rule's points, shape [m, q, 3, 3].
+    """
+    return rule.nodal_forces(second_order_stress(A, B, lame, mu, material))
+
+
+def lame_constants(youngs_modulus: float, poissons_ratio: float) -> tuple[float, float]:
+    """Lame's constants (lambda, mu) [Pa]."""
+    mu = 0.5 * youngs_modulus / (1.0 + poissons_ratio)
+    return 2.0 * mu * poissons_ratio / (1.0 - 2.0 * poissons_ratio), mu
+
+
+def gradient_gram(rule: GradientRule, modes: Array) -> Array:
+    """Inner products of the displacement gradients of modes, int G_k : G_l [m], shape [r, r].
+
+    Args:
+        rule: Of order 2, which integrates them exactly.
+        modes: Nodal displacements, shape [n, 3, r].
+    """
+    G = rule.gradients(modes) * np.sqrt(rule.weights)[:, :, None, None]
+    G = G.reshape(modes.shape[2], -1)
+    return G @ G.T
+
+
+def strain_gram(rule: GradientRule, modes: Array, lame: float, mu: float, directions: Array | None = None) -> Array:
+    """Inner products of the Green strains that modes make, alone and in pairs.
+
+    The Green strain of a displacement sum_k u_k phi_k is a combination of fields, one for each mode and one for each
+    pair of modes, with the coefficients z(u) = (u_k; u_k u_l for k <= l). Hence the energy of a St. Venant-Kirchhoff
+    body is exactly z^T A z / 2 with A_ab = int E_a : C : E_b: the force is a cubic polynomial whose coefficients
+    are in A. It is a Gram matrix, so the energy is never negative.
+
+    Args:
+        rule: Of order 4, which integrates the products of two quadratic strains exactly.
+        modes: Nodal displacements, shape [n, 3, r].
+        lame, mu: Lame's constants [Pa].
+        directions: Those whose pairs are made instead of all modes', in coordinates, shape [r, p] (`seen_directions`).
+
+    Returns:
+        A, symmetric, shape [r + p (p + 1) / 2] squared; pairs ordered (0, 0), (0, 1), ..., (1, 1), ...
+
+    Source: Barbic and James, Real-Time Subspace Integration for St. Venant-Kirchhoff Deformable Models, 2005 (the
+    cubic polynomial), in the form of a Gram matrix.
+    """
+    from scipy.linalg.blas import dsyrk
+
+    r = modes.shape[2]
+    p = r if directions is None else directions.shape[1]
+    size = r + p * (p + 1) // 2
+    A = np.zeros((size, size))
+    count, points = rule.weights.shape
+    # strain fields of about 64 MB at a time
+    chunk = max(1, 8_000_000 // (7 * points * size))
+    # the energy density 2 mu |E|^2 + lame tr(E)^2 as a sum of squares
+    shear = np.sqrt(2.0 * mu)
+    bulk = (np.sqrt(2.0 * mu + 3.0 * lame) - shear) / 3.0
+    for start in range(0, count, chunk):
+        part = slice(start, min(start + chunk, count))
+        weights = rule.weights[part].ravel()
+        G = np.ascontiguousarray(rule.gradients(modes, part).reshape(r, -1, 9).transpose(0, 2, 1))
+        turns = G if directions is None else np.tensordot(directions.T, G, 1)
+        # the rule has a negative weight at the centre
+        for own, factor in ((weights > 0.0, 1.0), (weights < 0.0, -1.0)):
+            if own.any():
+                fields = np.empty((size, 6, int(own.sum())))
+                green_fields(G[:, :, own], turns[:, :, own], np.sqrt(np.abs(weights[own])), shear, bulk, fields)
+                A += dsyrk(factor, fields.reshape(size, -1).T, trans=1)  # the upper triangle
+    return A + np.triu(A, 1).T
+
+
+def pair_index(r: int) -> Any:
+    """Position of each pair of modes in z(u), shape [r, r], symmetric."""
+    first, second = np.triu_indices(r)
+    index = np.zeros((r, r), dtype=np.int64)
+    index[first, second] = index[second, first] = r + np.arange(len(first))
+    return index

@@ -1,0 +1,138 @@
+"""Displacement and small rotation of arbitrary points of a body from its nodal displacements."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from calmotion.geometry.tetrahedra import Indices, face_normals, tet_volumes
+from calmotion.reduction.elements.assembly import QuadraticMesh
+from calmotion.shot.character import Array, IntArray
+
+_CANDIDATES = 24
+_ALL_PAIRS = 2_000_000  # up to this many pairs of point and element every pair is looked at
+_EDGES = ((0, 1), (1, 2), (0, 2), (0, 3), (1, 3), (2, 3))  # of the midpoints, nodes 4..9 of ElementTetP2
+
+
+def shape_functions(bary: Array) -> Array:
+    """Quadratic shape functions from barycentric coordinates, shape [k, 4] -> [k, 10]."""
+    corners = bary * (2.0 * bary - 1.0)
+    edges = np.stack([4.0 * bary[:, i] * bary[:, j] for i, j in _EDGES], axis=1)
+    return np.hstack([corners, edges])
+
+
+def shape_gradients(bary: Array, gradients: Array) -> Array:
+    """Gradients [1/m] of the shape functions from those of the barycentric coordinates [k, 4, 3] -> [k, 10, 3]."""
+    corners = (4.0 * bary - 1.0)[:, :, None] * gradients
+    edges = [4.0 * (bary[:, i, None] * gradients[:, j] + bary[:, j, None] * gradients[:, i]) for i, j in _EDGES]
+    return np.concatenate([corners, np.stack(edges, axis=1)], axis=1)
+
+
+@dataclass(frozen=True, eq=False)
+class Embedding:
+    """Points tied to elements of a mesh.
+
+    A point inside its element follows the quadratic field. A point outside follows the nearest place of the nearest
+    element (clamped barycentric coordinates) as if on a rigid arm, so a rigid motion is exact everywhere.
+
+    Attributes:
+        nodes: Nodes of each point's element, shape [k, 10].
+        values: Shape functions, shape [k, 10].
+        gradients: Their gradients [1/m], shape [k, 10, 3].
+        arms: From the place in the element to the point [m], shape [k, 3]; zero inside.
+    """
+
+    nodes: IntArray
+    values: Array
+    gradients: Array
+    arms: Array
+
+    def displacements(self, modes: Array) -> Array:
+        """Displacement of the points for nodal displacements `modes`, shape [n, 3, r] -> [k, 3, r]."""
+        moved = np.einsum("ka,kair->kir", self.values, modes[self.nodes], optimize=True)
+        outside = np.flatnonzero(np.abs(self.arms).max(axis=1, initial=0.0) > 0.0)
+        if len(outside):
+            turned = self._curl(modes, outside)
+            moved[outside] += np.cross(turned, self.arms[outside][:, :, None], axis=1)
+        return moved
+
+    def rotations(self, modes: Array) -> Array:
+        """Small rotation (half the curl) at the points [rad per unit], shape [n, 3, r] -> [k, 3, r], body axes."""
+        return self._curl(modes, np.arange(len(self.nodes)))
+
+    def _curl(self, modes: Array, rows: Indices) -> Array:
+        # gradient[k, j, i, r] = d_j u_i
+        gradient = np.einsum("kaj,kair->kjir", self.gradients[rows], modes[self.nodes[rows]], optimize=True)
+        return 0.5 * np.stack([gradient[:, (i + 1) % 3, (i + 2) % 3] - gradient[:, (i + 2) % 3, (i + 1) % 3]
+                               for i in range(3)], axis=1)  # fmt: skip
+
+
+def embed(mesh: QuadraticMesh, points: Array) -> Embedding:
+    """Ties points to the mesh.
+
+    Args:
+        mesh: Of the body.
+        points: [m], shape [k, 3], body frame; anywhere.
+    """
+    tets = mesh.tets[:, :4]
+    x = mesh.nodes[tets]
+    edges = np.stack([x[:, 1] - x[:, 0], x[:, 2] - x[:, 0], x[:, 3] - x[:, 0]], axis=1)
+    inverse = np.linalg.inv(edges)  # columns are the gradients of barycentric coordinates 1..3
+    gradients = np.concatenate([-inverse.sum(axis=2, keepdims=True), inverse], axis=2).transpose(0, 2, 1)
+    # outward whatever the order of the corners
+    normals = face_normals(mesh.nodes, tets) * np.sign(tet_volumes(mesh.nodes, tets))[:, None, None]
+    offsets = np.einsum("efk,efk->ef", normals, x[:, [1, 0, 0, 0]])
+    element = _nearest_elements(mesh, x.mean(axis=1), normals, offsets, points)
+    local = np.einsum("kij,kj->ki", gradients[element][:, 1:], points - x[element, 0])
+    bary = np.concatenate([1.0 - local.sum(axis=1, keepdims=True), local], axis=1)
+    inside = bary.min(axis=1) >= -1e-9
+    clamped = np.where(inside[:, None], bary, np.maximum(bary, 0.0))
+    clamped /= clamped.sum(axis=1, keepdims=True)
+    place = np.einsum("kc,kci->ki", clamped, x[element])
+    arms = np.where(inside[:, None], 0.0, points - place)
+    nodes = mesh.tets[element]
+    return Embedding(
+        nodes=nodes,
+        values=shape_functions(clamped),
+        gradients=shape_gradients(clamped, gradients[element]),
+        arms=arms,
+    )
+
+
+def _nearest_elements(mesh: QuadraticMesh, centers: Array, normals: Array, offsets: Array, points: Array) -> Indices:
+    """The element that holds each point, or the one whose face planes it exceeds least."""
+    from scipy.spatial import cKDTree
+
+    element = np.empty(len(points), dtype=np.int64)
+    if len(points) * len(centers) <= _ALL_PAIRS:
+        rows = max(1, 200_000 // len(centers))
+        for start in range(0, len(points), rows):
+            part = points[start : start + rows]
+            excess = np.full((len(part), len(centers)), -np.inf)
+            for face in range(4):
+                excess = np.maximum(excess, part @ normals[:, face].T - offsets[:, face])
+            element[start : start + rows] = excess.argmin(axis=1)
+        return element
+    near_center = cKDTree(centers).query(points, k=min(_CANDIDATES, len(centers)))[1].reshape(len(points), -1)
+    # beside a large element, many small ones are nearer by their centres: those around the nearest node too
+    of_node = _elements_of_nodes(mesh)
+    near_node = of_node[cKDTree(mesh.nodes).query(points)[1]]
+    candidates = np.hstack([near_center, near_node])
+    for start in range(0, len(points), 4096):
+        part, chosen = points[start : start + 4096], candidates[start : start + 4096]
+        excess = (np.einsum("kcfi,ki->kcf", normals[chosen], part, optimize=True) - offsets[chosen]).max(axis=2)
+        element[start : start + 4096] = chosen[np.arange(len(part)), excess.argmin(axis=1)]
+    return element
+
+
+def _elements_of_nodes(mesh: QuadraticMesh) -> Indices:
+    """Up to 32 elements of each node, shape [n, 32]; filled up by repeating the first."""
+    node = mesh.tets.ravel()
+    element = np.repeat(np.arange(len(mesh.tets)), mesh.tets.shape[1])
+    order = np.argsort(node, kind="stable")
+    node, element = node[order], element[order]
+    first = np.searchsorted(node, np.arange(len(mesh.nodes)))
+    count = np.searchsorted(node, np.arange(len(mesh.nodes)), side="right") - first
+    slot = np.arange(32)[None, :]
+    return element[first[:, None] + np.where(slot < count[:, None], slot, 0)]

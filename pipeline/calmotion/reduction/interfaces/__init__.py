@@ -1,0 +1,1 @@
+"""Interface patches: the parts of a surface that joints hold, and how they move."""

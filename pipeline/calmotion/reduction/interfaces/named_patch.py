@@ -1,0 +1,50 @@
+"""The patch of a mesh that a named part of the body's surface becomes."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from calmotion.geometry.distances import closest_on_triangles
+from calmotion.reduction.elements.assembly import QuadraticMesh
+from calmotion.shot.character import Array, IntArray
+
+_REACH = 5e-3  # of the body's size: a tetrahedraliser may leave the surface by so much
+_FACING = 0.5  # cosine between the normals; keeps the other side of a thin wall out
+
+
+def named_patch(mesh: QuadraticMesh, triangles: Array) -> IntArray:
+    """Surface nodes that lie on given triangles and look the same way, ascending.
+
+    The mesh need not share points or edges with the triangles. On a mesh that is coarser than they are wide the
+    patch may come out empty.
+
+    Args:
+        mesh: Of the body.
+        triangles: Corners [m], shape [k, 3, 3], body frame, outward.
+    """
+    reach = _REACH * float(np.linalg.norm(np.ptp(mesh.nodes, axis=0)))
+    normals = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+    size = np.linalg.norm(normals, axis=1, keepdims=True)
+    normals = normals / np.maximum(size, np.finfo(float).tiny)
+    own = _node_normals(mesh)
+    surface = mesh.surface_nodes
+    x = mesh.nodes[surface]
+    low, high = triangles.min(axis=(0, 1)) - reach, triangles.max(axis=(0, 1)) + reach
+    near = surface[np.all((x >= low) & (x <= high), axis=1)]
+    found = []
+    for node in near:
+        gaps = np.linalg.norm(closest_on_triangles(mesh.nodes[node], triangles) - mesh.nodes[node], axis=1)
+        touched = gaps <= reach
+        if np.any(touched & (normals @ own[node] > _FACING)):
+            found.append(node)
+    return np.array(found, dtype=np.int32)
+
+
+def _node_normals(mesh: QuadraticMesh) -> Array:
+    """Outward unit normals at the surface nodes, the mean by area of the triangles around, shape [n, 3]."""
+    corners = mesh.nodes[mesh.surface[:, :3]]
+    area = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    out = np.zeros_like(mesh.nodes)
+    for column in range(mesh.surface.shape[1]):
+        np.add.at(out, mesh.surface[:, column], area)
+    return out / np.maximum(np.linalg.norm(out, axis=1, keepdims=True), np.finfo(float).tiny)

@@ -1,0 +1,1 @@
+"""Choice of the elastic law of a body, and the reduced energies of nonlinear ones."""

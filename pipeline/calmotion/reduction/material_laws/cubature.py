@@ -1,0 +1,173 @@
+"""A few weighted points that integrate the forces of a Neo-Hookean body in its reduced coordinates.
+
+Source: An, Kim, James, Optimizing Cubature for Efficient Integration of Subspace Deformations, 2008: points are
+added greedily, weights follow by non-negative least squares over training poses. Two things differ: the part of the
+force that is linear in the coordinates is kept exactly (a constant matrix), so that the points have to integrate
+the rest alone; and the poses are equilibria under random loads, since a random sum of modes stretches a link as no
+load would.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from calmotion.errors import ShotError
+from calmotion.reduction.basis.craig_bampton import Basis
+from calmotion.reduction.elements.assembly import FEModel
+from calmotion.reduction.elements.elastic_forms import GradientRule, lame_constants, strain_gram
+from calmotion.reduction.material_laws.reduced_poses import equilibrium_poses
+from calmotion.shot.character import Array, ElasticMaterial
+
+# Of the force over the training poses, each coordinate measured by its stiffness. It looks small, but a link in
+# bending is the small difference of large stretches: 1e-3 leaves 5% in its deflection, this 0.1%.
+ERROR = 2e-5
+POSES = 24
+_BATCH = 4  # points added between two solutions for the weights
+_MOST = 600
+LEAST_VOLUME = 0.2  # volume ratio below which the logarithm of the law is continued as a parabola
+_CANDIDATES = 10_000  # points that are looked at, a random choice on large meshes
+
+
+def neohookean_cubature(model: FEModel, basis: Basis, material: ElasticMaterial) -> tuple[Array, int]:
+    """The data of `Elasticity` of a Neo-Hookean body, and the number of its points.
+
+    Args:
+        model: Full model.
+        basis: Modes, modal derivatives included.
+        material: Elastic constants.
+
+    Raises:
+        ShotError: No set of points meets `ERROR`.
+    """
+    lame, mu = lame_constants(material.youngs_modulus, material.poissons_ratio)
+    gram = strain_gram(GradientRule(model.mesh, 4), basis.modes, lame, mu)
+    poses = equilibrium_poses(gram, basis, POSES, float(np.linalg.norm(np.ptp(model.mesh.nodes, axis=0))))
+    candidates, columns, target = _training(GradientRule(model.mesh, 2), basis, poses, lame, mu)
+    chosen, weights, error = greedy_cubature(columns, target, ERROR, _MOST)
+    if error > 10.0 * ERROR:
+        raise ShotError(
+            "no cubature of the Neo-Hookean energy was found", path=material.path,
+            attribute="calm:flexible:elasticity", found=f"error {error:.2%} with {len(chosen)} points",
+            remedy="Use stvk, which needs none, or a coarser mesh",
+        )  # fmt: skip
+    C = linear_tangent(lame, mu)
+    points = candidates[chosen]
+    correction = np.diag(basis.omega_squared) - np.einsum("c,cmi,mn,cnj->ij", weights, points, C, points, optimize=True)
+    correction = 0.5 * (correction + correction.T)
+    packed = np.hstack([weights[:, None], points.reshape(len(chosen), -1)])
+    return np.concatenate([correction.ravel(), packed.ravel()]), len(chosen)
+
+
+def _training(rule: GradientRule, basis: Basis, poses: Array, lame: float, mu: float) -> tuple[Array, Array, Array]:
+    """Gradients of the candidate points [c, 9, r], the rows to be met by each of them, and by the whole body."""
+    r = len(basis.omega_squared)
+    elements, points = rule.weights.shape
+    total = elements * points
+    taken = np.arange(total)
+    if total > _CANDIDATES:
+        taken = np.sort(np.random.default_rng(2008).choice(total, _CANDIDATES, replace=False))
+    chunk = max(1, _CANDIDATES // points)
+    parts, columns = [], []
+    forces = np.zeros(len(poses) * r)
+    stiffness = np.zeros(r * (r + 1) // 2)
+    for start in range(0, elements, chunk):
+        part = slice(start, min(start + chunk, elements))
+        G = np.ascontiguousarray(rule.gradients(basis.modes, part).reshape(r, -1, 9).transpose(1, 2, 0))
+        volume = rule.weights[part].ravel()
+        own, K = _forces(G, poses, basis.omega_squared, lame, mu), _stiffness(G, basis.omega_squared, lame, mu)
+        forces += own @ volume
+        stiffness += K @ volume
+        inside = taken[(taken >= start * points) & (taken < part.stop * points)] - start * points
+        parts.append(G[inside])
+        columns.append(np.vstack([own[:, inside], K[:, inside]]))
+    # each pose counts alike, whatever work it takes
+    size = np.linalg.norm(forces.reshape(len(poses), r), axis=1)
+    scale = np.concatenate([np.repeat(1.0 / size, r), np.ones(len(stiffness))])
+    columns_all = np.hstack(columns)
+    columns_all *= scale[:, None]
+    return np.concatenate(parts), columns_all, np.concatenate([forces, stiffness]) * scale
+
+
+def linear_tangent(lame: float, mu: float) -> Array:
+    """dP/dF at F = E [Pa], shape [9, 9], row by row."""
+    E = np.eye(3)
+    C = lame * np.einsum("ij,kl->ijkl", E, E)
+    C += mu * (np.einsum("ik,jl->ijkl", E, E) + np.einsum("il,jk->ijkl", E, E))
+    return C.reshape(9, 9)
+
+
+def _forces(G: Array, poses: Array, omega_squared: Array, lame: float, mu: float) -> Array:
+    """Reduced force per volume at each point, each coordinate's by its stiffness, shape [poses * r, points]."""
+    out = np.empty((len(poses), G.shape[2], len(G)))
+    scaled = G / np.sqrt(omega_squared)
+    for k, u in enumerate(poses):
+        F = (G @ u).reshape(-1, 3, 3) + np.eye(3)
+        out[k] = np.einsum("cm,cmi->ic", neohookean_stress(F, lame, mu).reshape(-1, 9), scaled)
+    return out.reshape(-1, len(G))
+
+
+def _stiffness(G: Array, omega_squared: Array, lame: float, mu: float) -> Array:
+    """Reduced stiffness per volume about the undeformed state at each point, shape [r (r + 1) / 2, points]."""
+    scaled = G / np.sqrt(omega_squared)
+    first, second = np.triu_indices(len(omega_squared))
+    stress = np.einsum("mn,cni->cmi", linear_tangent(lame, mu), scaled)
+    return np.einsum("cmp,cmp->pc", scaled[:, :, first], stress[:, :, second], optimize=True)
+
+
+def neohookean_stress(F: Array, lame: float, mu: float) -> Array:
+    """P = mu F + (lame L - mu) L' cof F [Pa] of deformation gradients, shape [..., 3, 3].
+
+    L = ln J, continued below `LEAST_VOLUME` as its parabola, as `dynamics.neohookean` does.
+    """
+    rows = np.moveaxis(F, -2, 0)
+    cofactor = np.stack([np.cross(rows[(i + 1) % 3], rows[(i + 2) % 3]) for i in range(3)], axis=-2)
+    J = np.einsum("...i,...i->...", rows[0], cofactor[..., 0, :])[..., None, None]
+    x = (J - LEAST_VOLUME) / LEAST_VOLUME
+    flat = J < LEAST_VOLUME
+    held = np.where(flat, LEAST_VOLUME, J)
+    L = np.log(held) + np.where(flat, x - 0.5 * x * x, 0.0)
+    slope = np.where(flat, (1.0 - x) / LEAST_VOLUME, 1.0 / held)
+    return mu * F + (lame * L - mu) * slope * cofactor
+
+
+def greedy_cubature(columns: Array, target: Array, error: float, most: int) -> tuple[Array, Array, float]:
+    """Few columns and non-negative weights with columns @ weights near the target.
+
+    Args:
+        columns: Shape [rows, candidates].
+        target: Shape [rows].
+        error: Of the target, at which to stop.
+        most: Columns at most.
+
+    Returns:
+        Indices of the columns, their weights, and the error reached, relative to the target.
+    """
+    from scipy.optimize import lsq_linear, nnls
+
+    norm = np.linalg.norm(columns, axis=0)
+    norm[norm == 0.0] = np.inf
+    chosen: list[int] = []
+    weights = np.zeros(0)
+    residual = target
+    size = float(np.linalg.norm(target))
+    if size == 0.0:
+        return np.zeros(0, dtype=np.int64), weights, 0.0
+    while len(chosen) < most:
+        score = (columns.T @ residual) / norm
+        score[chosen] = -np.inf
+        best = np.argsort(-score)[: min(_BATCH, most - len(chosen))]
+        best = best[score[best] > 0.0]
+        if not len(best):
+            break
+        chosen.extend(best.tolist())
+        try:
+            weights, _ = nnls(columns[:, chosen], target)
+        except RuntimeError:  # it gives up on nearly parallel columns
+            weights = lsq_linear(columns[:, chosen], target, (0.0, np.inf), "bvls").x
+        used = weights > 0.0
+        chosen = [c for c, keep in zip(chosen, used, strict=True) if keep]
+        weights = weights[used]
+        residual = target - columns[:, chosen] @ weights
+        if np.linalg.norm(residual) <= error * size:
+            break
+    return np.array(chosen, dtype=np.int64), weights, float(np.linalg.norm(residual)) / size

@@ -1,0 +1,93 @@
+"""The reduced elastic law of a body of large deflection: its basis and its energy."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+
+from calmotion.reduction.basis.craig_bampton import Basis
+from calmotion.reduction.basis.modal_derivatives import NEGLIGIBLE, Support, extended_basis
+from calmotion.reduction.basis.quadratic_strain_subspace import SeenDirections, seen_directions
+from calmotion.reduction.elements.assembly import FEModel
+from calmotion.reduction.elements.elastic_forms import GradientRule, lame_constants, strain_gram
+from calmotion.reduction.interfaces.patch_rotation import spring_rows, springs
+from calmotion.reduction.load_envelope import Excitation
+from calmotion.reduction.material_laws.choice import work_of_loads
+from calmotion.reduction.reduced_body import Elasticity
+from calmotion.shot.character import DEFAULT_TOLERANCE, ElasticMaterial
+
+PAIRED_MODES = 16  # modes that may have derivatives
+_LEFT = 1e-3  # share of the derivatives' strain energy that may be missing, by the tolerance over the body's size
+_FINEST = 1e-6  # below, what is missing is rounding
+
+
+def large_deflection(
+    model: FEModel, support: Support, basis: Basis, material: ElasticMaterial, law: str,
+    excitation: Excitation | None = None, tolerance: float = DEFAULT_TOLERANCE, pairs_share: float = 1.0,
+) -> tuple[Basis, Elasticity]:  # fmt: skip
+    """A body's basis with modal derivatives, and its elastic law in it.
+
+    Args:
+        model: Full model.
+        support: What holds the body.
+        basis: Its linear modes.
+        material: Elastic constants.
+        law: `stvk` or `neohookean`.
+        excitation: Its loads in this shot, by moving patch; None when they are not known.
+        tolerance: Error that does not matter [m].
+        pairs_share: How much of it quadratic strains may take that are left out; 0 leaves none out.
+
+    Returns:
+        The extended basis, and the law without damping.
+    """
+    if excitation is not None:
+        basis = _by_deflection(model, basis, basis.excitation or excitation)
+    size = float(np.ptp(model.mesh.nodes, axis=0).max())
+    negligible = float(np.clip(np.sqrt(_LEFT * tolerance / size), _FINEST, NEGLIGIBLE))
+    extended = extended_basis(model, support, basis, PAIRED_MODES, material, law, negligible)
+    lame = lame_constants(material.youngs_modulus, material.poissons_ratio)
+    if law == "stvk":
+        law_of = partial(_stvk, model, support, extended, material)
+        if excitation is None or pairs_share <= 0.0:
+            return extended, law_of(None)
+        loads, allowed = basis.excitation or excitation, pairs_share * tolerance
+        seen = seen_directions(model, support, extended, basis, loads, material.youngs_modulus, allowed)
+        return extended, law_of(seen)
+    from calmotion.reduction.material_laws.cubature import neohookean_cubature
+
+    data, points = neohookean_cubature(model, extended, material)
+    return extended, Elasticity(law, 0.0, data, points, lame)
+
+
+def _stvk(
+    model: FEModel, support: Support, basis: Basis, material: ElasticMaterial, seen: SeenDirections | None
+) -> Elasticity:
+    """The law of a basis, with the springs of its patches; its quadratic strain sees some directions, or all."""
+    lame = lame_constants(material.youngs_modulus, material.poissons_ratio)
+    directions = None if seen is None else seen.directions
+    gram = strain_gram(GradientRule(model.mesh, 4), basis.modes, *lame, directions)
+    if basis.patch_squares is not None:
+        roots = springs(model.mesh.nodes, support.patches, support.centers, material.youngs_modulus)
+        rows = spring_rows(roots, basis.patch_squares, basis.patch_motion[:, 3:], directions)
+        gram += rows.T @ rows
+    law = Elasticity("stvk", 0.0, gram.ravel(), 0, lame)
+    return law if seen is None else replace(law, seen=seen.part, unseen_m=seen.error_m)
+
+
+def _by_deflection(model: FEModel, basis: Basis, excitation: Excitation) -> Basis:
+    """The basis in the order of how far the shot's loads deflect its modes.
+
+    By frequency, the vectors that stand for the static response to a load come last, though a link may bend in them
+    as far as in the first; without its derivatives a mode stretches the link as it bends, and hardly takes part.
+    """
+    reach = np.abs(basis.modes).max(axis=(0, 1))
+    deflection = reach * work_of_loads(model, basis.modes, basis.patch_motion, excitation) / basis.omega_squared
+    order = np.argsort(-deflection, kind="stable")
+    return replace(
+        basis,
+        modes=basis.modes[:, :, order],
+        omega_squared=basis.omega_squared[order],
+        patch_motion=basis.patch_motion[:, :, order],
+    )

@@ -1,0 +1,1 @@
+"""The optimiser: motor offsets that remove the vibration."""

@@ -1,0 +1,115 @@
+"""Where a search stands, on disk: written whole or not at all, and read back only for the same problem."""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import json
+import os
+import zipfile
+from dataclasses import astuple, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from calmotion import __version__
+from calmotion.retargeting.problem.limits import LimitTerms
+from calmotion.retargeting.problem.problem import RetargetProblem
+from calmotion.retargeting.solver.gauss_newton import Iterate, Search
+from calmotion.retargeting.solver.recycling import Recycled
+from calmotion.shot.character import BoolArray, IntArray
+
+_OF_LIMITS = ("rho", "left", "reached", "stalled", "on")
+
+
+def checkpoint_path(layer: str) -> Path:
+    """The file beside a layer in which its optimisation keeps where it stands."""
+    path = Path(layer)
+    return path.with_name(f".{path.name}.checkpoint.npz")
+
+
+def problem_key(problem: RetargetProblem, fixed: BoolArray, settings: object) -> str:
+    """Hash of everything that a search follows from."""
+    digest = hashlib.sha256(f"{__version__} {settings!r}".encode())
+    basis, curves, objective = problem.basis, problem.curves, problem.objective
+    reference = objective.reference
+    arrays: list[Any] = [np.asarray(part) for part in problem.model.system]
+    arrays += [curves.angles, curves.rates, curves.accelerations]
+    arrays += [basis.values.data, basis.knots, problem.coupling, fixed]
+    arrays += [objective.weights, reference.positions, reference.rotations]
+    if problem.world is not None:
+        arrays.append(problem.world)
+    if problem.limits is not None:
+        for bound in problem.limits.bounds.values():
+            arrays += [bound.lower, bound.upper]
+    for array in arrays:
+        digest.update(str((array.shape, array.dtype)).encode())
+        digest.update(np.ascontiguousarray(array).tobytes())
+    return digest.hexdigest()
+
+
+@dataclass(frozen=True, eq=False)
+class Checkpoint:
+    """Keeps the search of one problem in one file; None keeps nothing.
+
+    Attributes:
+        path: The file.
+        key: Of the problem.
+    """
+
+    path: Path | None
+    key: str
+
+    def save(self, search: Search, limits: LimitTerms | None, breaks: IntArray) -> None:
+        """Replace what the file holds. A folder that cannot be written is passed over: the run itself goes on."""
+        if self.path is None:
+            return
+        values: dict[str, Any] = {
+            "x": search.x, "breaks": breaks, "p": search.recycled.p, "Hp": search.recycled.Hp,
+            "history": np.array([astuple(iterate) for iterate in search.history], float),
+        }  # fmt: skip
+        state: dict[str, object] = {
+            "key": self.key, "radius": search.radius, "evaluations": search.evaluations, "gradients": search.gradients,
+            "products": search.products, "reason": search.reason,
+        }  # fmt: skip
+        if limits is not None:
+            state |= {name: getattr(limits, name) for name in _OF_LIMITS}
+            values |= {f"limit {name}": y for name, y in limits.multipliers.items()}
+        values["state"] = np.frombuffer(json.dumps(state).encode(), np.uint8)
+        # one name for what is not whole yet: what a killed process leaves is written over
+        partial = self.path.with_name(self.path.name + ".part")
+        try:
+            with open(partial, "wb") as file:
+                np.savez(file, **values)  # type: ignore[arg-type]
+                file.flush()
+                os.fsync(file.fileno())
+            os.replace(partial, self.path)
+        except OSError:
+            with contextlib.suppress(OSError):
+                partial.unlink(missing_ok=True)
+
+    def load(self, limits: LimitTerms | None) -> tuple[Search, IntArray] | None:
+        """The search that was kept and the frames that carry knots in it, its multipliers put into the limits; None
+        where there is none of this problem."""
+        if self.path is None:
+            return None
+        try:
+            with np.load(self.path, allow_pickle=False) as file:
+                values = {name: file[name] for name in file.files}
+            state = json.loads(values["state"].tobytes())
+            if state["key"] != self.key:
+                return None
+            rows = values["history"].tolist()
+            history = tuple(Iterate(row[0], row[1], row[2], int(row[3]), int(row[4])) for row in rows)
+            search = Search(
+                values["x"], state["radius"], Recycled(values["p"], values["Hp"]), history, state["evaluations"],
+                state["gradients"], state["products"], state["reason"],
+            )  # fmt: skip
+            if limits is not None:
+                limits.multipliers = {name: values[f"limit {name}"] for name in limits.bounds}
+                for name in _OF_LIMITS:
+                    setattr(limits, name, state[name])
+        except (OSError, ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile):
+            return None
+        return search, values["breaks"]

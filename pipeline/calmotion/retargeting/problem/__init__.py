@@ -1,0 +1,1 @@
+"""The retargeting problem: offset splines, objective, limits."""

@@ -1,0 +1,148 @@
+"""Cubic B-splines of what is added to the motor curves."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.interpolate import BSpline
+from scipy.sparse import csr_matrix, diags
+
+from calmotion.shot.character import Array, IntArray
+from calmotion.simulation.inputs.time_grid import TimeGrid, over_grid
+
+DEGREE = 3
+
+
+@dataclass(frozen=True, eq=False)
+class OffsetBasis:
+    """Cubic B-splines of the offsets, the same for all motors.
+
+    Attributes:
+        breaks: Frames that carry a knot, shape [n].
+        knots: Their times [s], shape [n].
+        values, rates, accelerations: Basis and its derivatives at the grid's instants, sparse, shape [T, P].
+        at_frames: Basis at the frames, sparse, shape [f, P].
+        bend: Second derivatives at the two Gauss points of each interval between knots, shape [2 (n - 1), P].
+        bending: Gram matrix of the second derivatives, pre-roll included, shape [P, P] [1/s^3].
+        closeness: Gram matrix of the functions themselves, pre-roll included, shape [P, P] [s].
+        support: First and last time at which each basis function acts [s], shape [P, 2]; the pre-roll counts as 0.
+            In a loop it may begin before 0: it then also acts at the end.
+        wraps: Whether the last functions are neighbours of the first.
+        kept_ends: Whether the offset vanishes at the first and last frame.
+    """
+
+    breaks: IntArray
+    knots: Array
+    values: csr_matrix
+    rates: csr_matrix
+    accelerations: csr_matrix
+    at_frames: csr_matrix
+    bend: csr_matrix
+    bending: csr_matrix
+    closeness: csr_matrix
+    support: Array
+    wraps: bool
+    kept_ends: bool
+
+    @property
+    def count(self) -> int:
+        """Number of coefficients of one motor."""
+        return self.values.shape[1]
+
+
+def knot_frames(grid: TimeGrid) -> IntArray:
+    """Frames that may carry an inner knot; never the second or the last but one, so that samples at the frames with
+    not-a-knot ends hold the spline exactly. In a loop, whose interpolant has none of these, all may."""
+    margin, last = 1 if grid.cyclic else 2, len(grid.frame_times) - 1
+    return np.arange(margin, last - margin + 1, dtype=np.int32)
+
+
+def uniform_breaks(grid: TimeGrid, spacing: float) -> IntArray:
+    """Frames about `spacing` [s] apart, the first and the last among them."""
+    last, allowed = len(grid.frame_times) - 1, knot_frames(grid)
+    stride = max(1, round(spacing / float(grid.frame_times[1] - grid.frame_times[0])))
+    inner = allowed[allowed % stride == 0]
+    return np.array([0, *inner, last], np.int32)
+
+
+def make_basis(grid: TimeGrid, spacing: float, kept_ends: bool) -> OffsetBasis:
+    """`basis_on` knots about `spacing` [s] apart."""
+    return basis_on(grid, uniform_breaks(grid, spacing), kept_ends)
+
+
+def basis_on(grid: TimeGrid, breaks: IntArray, kept_ends: bool) -> OffsetBasis:
+    """Basis of the offsets on a grid.
+
+    Args:
+        breaks: Frames that carry a knot, ascending, the first and the last among them.
+        kept_ends: Whether the offset vanishes, with its slope, at the first and last frame.
+
+    Slope and curvature are zero at the end, so that no motor is thrown in the last frames, where nothing that
+    follows is judged; and at the start unless there is a pre-roll, since the system then starts at rest. Offsets of a
+    shot that loops are periodic, or, kept at the seam, have no curvature there.
+    """
+    knots = grid.frame_times[breaks]
+    wraps = grid.cyclic and not kept_ends and len(knots) > 4
+    splines, merge, support = (_periodic if wraps else _open)(knots)
+    if not wraps:
+        merge = _ends(merge, kept_ends, grid)
+        columns = [np.flatnonzero(merge[:, k]) for k in range(merge.shape[1])]
+        support = np.array([[support[rows, 0].min(), support[rows, 1].max()] for rows in columns]).reshape(-1, 2)
+
+    def sample(times: Array, order: int) -> Array:
+        inside = np.mod(times, grid.end) if grid.cyclic else np.clip(times, knots[0], knots[-1])
+        return np.asarray(splines(inside, nu=order) @ merge)
+
+    values, rates, accelerations = over_grid(grid, sample)
+    # two Gauss points integrate the squared second derivative of a cubic exactly
+    width = np.diff(knots)[:, None]
+    points = (0.5 * (knots[:-1] + knots[1:])[:, None] + 0.5 * width * np.array([-1, 1]) / math.sqrt(3)).ravel()
+    bend = csr_matrix(sample(points, 2))
+    bending = bend.T @ diags(np.repeat(0.5 * width.ravel(), 2)) @ bend
+    stored = csr_matrix(values)
+    near = stored[grid.judged] if grid.cyclic else stored
+    if not grid.cyclic and grid.pre_steps:
+        before = csr_matrix(accelerations[: grid.pre_steps])
+        bending = bending + grid.h * (before.T @ before)
+    return OffsetBasis(
+        breaks, knots, stored, csr_matrix(rates), csr_matrix(accelerations), stored[grid.frames], bend,
+        csr_matrix(bending),
+        grid.h * (near.T @ near), support, wraps, kept_ends,
+    )  # fmt: skip
+
+
+def _open(knots: Array) -> tuple[BSpline, Array, Array]:
+    """B-splines between the first and the last knot, the identity, and where each acts."""
+    padded = np.concatenate([np.repeat(knots[0], DEGREE), knots, np.repeat(knots[-1], DEGREE)])
+    count = len(padded) - DEGREE - 1
+    support = np.stack([padded[:count], padded[DEGREE + 1 :]], axis=1)
+    return BSpline(padded, np.eye(count), DEGREE), np.eye(count), support
+
+
+def _periodic(knots: Array) -> tuple[BSpline, Array, Array]:
+    """The same over a loop: functions that leave it at the end come in again at the start."""
+    length, inner = knots[-1] - knots[0], len(knots) - 1
+    padded = np.concatenate([knots[inner - DEGREE : -1] - length, knots, knots[1 : DEGREE + 1] + length])
+    count = inner + DEGREE
+    support = np.stack([padded[:inner], padded[DEGREE + 1 : inner + DEGREE + 1]], axis=1)
+    return BSpline(padded, np.eye(count), DEGREE), np.eye(inner)[np.arange(count) % inner], support
+
+
+def _ends(merge: Array, kept_ends: bool, grid: TimeGrid) -> Array:
+    """Which combinations of open B-splines keep what is to be kept at the ends, as columns."""
+    count = len(merge)
+    if kept_ends:
+        order = 3 if grid.cyclic else 2
+        return merge[:, order:-order]
+    if count <= 4 or grid.cyclic:
+        # too short for anything but a constant
+        return np.ones((count, 1))
+    # three equal coefficients at an end: zero slope and curvature there
+    merge = merge[:, :-2]
+    merge[-2:, -1] = 1.0
+    if grid.pre_steps == 0:
+        merge = merge[:, 2:]
+        merge[:2, 0] = 1.0
+    return merge

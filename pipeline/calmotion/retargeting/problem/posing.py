@@ -1,0 +1,107 @@
+"""The retargeting problem that a shot poses: what may change, what is wanted, what must be kept."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from calmotion.errors import ShotError
+from calmotion.retargeting.problem.adaptive_knots import breaks_for, first_breaks, fitted
+from calmotion.retargeting.problem.limits import LimitTerms
+from calmotion.retargeting.problem.offset_basis import OffsetBasis, basis_on, uniform_breaks
+from calmotion.retargeting.problem.problem import RetargetProblem
+from calmotion.shot import Animation
+from calmotion.shot.character import Array, BoolArray, IntArray
+from calmotion.simulation.inputs.curves import Curves, sample_tracks
+from calmotion.simulation.inputs.gearing import coupling_of, leaders
+from calmotion.simulation.intended_motion import MeantMotion
+from calmotion.simulation.motor_limits import motor_bounds
+from calmotion.simulation.prepare import Options, Prepared
+from calmotion.simulation.target_errors import Objective
+
+SMOOTHNESS = 1e-10
+CLOSENESS = 1e-4  # an offset of 0.1 rad weighs as much as an error of 1 mm [m^2/rad^2]
+
+
+def pose(
+    prepared: Prepared, animation: Animation, curves: Curves, meant: MeantMotion, options: Options
+) -> tuple[RetargetProblem, Array, bool]:
+    """The problem that a shot poses, where its search begins, and whether its knots are to follow the motion.
+
+    Args:
+        curves: The animator's.
+        meant: What the targets should do.
+
+    Raises:
+        ShotError: Nothing may change, or options contradict each other.
+    """
+    character, grid, settings = prepared.character, prepared.grid, prepared.character.retarget
+    motors = leaders(character)
+    coupling = coupling_of(character, motors)
+    kept_ends, offsets = settings.endpoints == "kept", carried_offsets(prepared, animation, motors)
+    spacing = options.knot_spacing or settings.knot_spacing
+    if spacing:
+        breaks = uniform_breaks(grid, spacing)
+    else:
+        breaks = breaks_for(grid, kept_ends, offsets) if np.any(offsets) else first_breaks(grid)
+    basis = basis_on(grid, breaks, kept_ends)
+    if not basis.count:
+        raise ShotError(
+            "the shot is too short to change anything between its kept end poses",
+            path=character.path,
+            attribute="calm:retarget:endpoints",
+            found=settings.endpoints,
+            remedy="Set it to free, or lengthen the shot to five frames or more.",
+        )
+    fixed = locked_coefficients(animation, basis, motors, grid.end)
+    if not len(motors) or np.all(fixed):
+        raise ShotError(
+            "every motor is locked, so there is nothing to optimise",
+            path=character.path,
+            attribute="calm:motor:optimize",
+            remedy="Set it to true on the motors that may change.",
+        )
+    bounds = motor_bounds(character, np.any(coupling, axis=1))
+    continuous = options.adjoint == "continuous"
+    if continuous and ("effort" in bounds or grid.cyclic):
+        raise ShotError(
+            f"the continuous adjoint {'plays a shot once' if grid.cyclic else 'cannot keep limits of effort'}",
+            path=character.path,
+            attribute="retarget.optimize.adjoint",
+            found=options.adjoint,
+            remedy="Use the discrete one.",
+        )
+    smoothness = next(v for v in (options.smoothness, settings.smoothness, SMOOTHNESS) if v is not None)
+    problem = RetargetProblem(
+        prepared.model, grid, curves, Objective.over(prepared.model, meant.reference, grid, animation.weights), basis,
+        motors, smoothness, CLOSENESS, prepared.world,
+        LimitTerms(bounds, grid.judged, grid.h, 1.0) if bounds else None, continuous, coupling,
+    )  # fmt: skip
+    start = fitted(basis, offsets).ravel() if np.any(offsets) else np.zeros(problem.size)
+    return problem, np.where(fixed, 0.0, start), not spacing
+
+
+def carried_offsets(prepared: Prepared, animation: Animation, motors: IntArray) -> Array:
+    """The offsets that the shot already carries, shape [T, m]; zero when it carries none."""
+    if animation.current is animation.tracks:
+        return np.zeros((len(prepared.grid.times), len(motors)))
+    meant, _ = sample_tracks([animation.tracks[k] for k in motors], prepared.grid)
+    current, _ = sample_tracks([animation.current[k] for k in motors], prepared.grid)
+    return current - meant
+
+
+def locked_coefficients(animation: Animation, basis: OffsetBasis, motors: IntArray, end: float) -> BoolArray:
+    """Coefficients that would change a curve where the shot locks it, ordered by basis function, then motor.
+
+    Args:
+        end: Last frame of the shot [s].
+    """
+    fixed = np.zeros((basis.count, len(motors)), bool)
+    first, last = basis.support.T
+    column = {int(motor): k for k, motor in enumerate(motors)}
+    for track in animation.free:
+        if track.motor in column:
+            for start, stop in track.locked(end):
+                # functions of a loop that begin before it also act at its end
+                for late in (0.0, end) if basis.wraps else (0.0,):
+                    fixed[(first + late < stop) & (last + late > start), column[track.motor]] = True
+    return fixed.ravel()

@@ -1,0 +1,60 @@
+"""What a search left out, and what that costs: ranges, knots, motors."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from calmotion.retargeting.problem.problem import RetargetProblem
+from calmotion.retargeting.simplification.idle_motors import idle_motors
+from calmotion.retargeting.simplification.inactive_intervals import QuietRange, quiet_rows
+from calmotion.shot import Character, LeftOut, MotorCurve
+from calmotion.simulation.settings import Options
+
+FINER = 0.01  # of the tolerance: what finer knots must promise
+PRUNED = 0.02  # of the tolerance: what offsets that are dropped may cost together
+
+
+def search_rows(
+    problem: RetargetProblem, character: Character, curves: Sequence[MotorCurve], quiet: Sequence[QuietRange],
+    options: Options, idle_gain_m: float | None,
+) -> list[LeftOut]:  # fmt: skip
+    """The rows of a search that ended.
+
+    Args:
+        problem: On the knots of its end.
+        curves: Of all motors.
+        quiet: Ranges that were left out.
+        options: With what was asked for.
+        idle_gain_m: What idle motors promise [m]; None where there are none.
+    """
+    tolerance = character.retarget.allowed(options.tolerance)
+    idle = idle_motors(character)
+    rows = [*quiet_rows(quiet), _knots_row(problem, character, options)]
+    rows += [
+        LeftOut("optimisation of " + character.motors[k].path, "it moves no target; this is what it could help", gain)
+        for k, gain in zip(idle, [idle_gain_m, *[None] * len(idle)], strict=False)
+    ]
+    rows += [
+        LeftOut(
+            "changes of " + character.motors[curve.motor].path,
+            f"they would gain less than {PRUNED:.0%} of the tolerance",
+            PRUNED * tolerance,
+        )
+        for curve in curves
+        if not curve.changed and curve.motor in problem.motors
+    ]
+    return rows
+
+
+def _knots_row(problem: RetargetProblem, character: Character, options: Options) -> LeftOut:
+    """Why knots are no closer than they are."""
+    closest = float(np.diff(problem.basis.knots).min())
+    what = f"knots closer than {1e3 * closest:.3g} ms"
+    if options.knot_spacing:
+        return LeftOut(what, "retarget.optimize.knot_spacing says so")
+    if character.retarget.knot_spacing:
+        return LeftOut(what, "calm:retarget:knotSpacing says so")
+    tolerance = character.retarget.allowed(options.tolerance)
+    return LeftOut(what, f"finer ones promise less than {FINER:.0%} of the tolerance", FINER * tolerance)

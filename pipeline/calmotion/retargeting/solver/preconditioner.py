@@ -1,0 +1,127 @@
+"""The Gauss-Newton matrix of the rigid robot, banded in time: a preconditioner for that of the flexible one."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.linalg import cho_solve_banded, cholesky_banded
+from scipy.sparse import csr_matrix
+
+from calmotion.multibody.analysis.rigid_response import RigidResponse
+from calmotion.retargeting.problem.offset_basis import DEGREE, OffsetBasis
+from calmotion.shot.character import Array, BoolArray, IntArray
+
+
+class BandedGram:
+    """Sums of `sum_n b_n b_n^T (x) W_n` over rows b_n of spline matrices, unknowns ordered by basis function, then
+    motor; block-banded, since at any time only DEGREE + 1 functions act.
+
+    Functions that go round in a loop are put in the order first, last, second, last but one ... so that neighbours
+    stay near each other across the seam.
+    """
+
+    def __init__(self, count: int, motors: int, wraps: bool = False):
+        """
+        Args:
+            count: Number of basis functions.
+            motors: Unknowns of each.
+            wraps: Whether they go round in a loop.
+        """
+        functions = np.arange(count)
+        folded = np.where(2 * functions < count, 2 * functions, 2 * (count - functions) - 1)
+        self._place = folded if wraps else functions
+        self._blocks = np.zeros((2 * DEGREE + 1 if wraps else DEGREE + 1, count, motors, motors))
+
+    @property
+    def order(self) -> IntArray:
+        """Which unknown stands at each place of the bands, shape [P * m]."""
+        motors = self._blocks.shape[2]
+        return np.asarray((motors * np.argsort(self._place)[:, None] + np.arange(motors)).ravel(), np.int32)
+
+    def add(self, basis: csr_matrix, metric: Array) -> None:
+        """Add the rows of a matrix of shape [T, P], the metric of shape [T, M, M], symmetric."""
+        functions, weights = _rows(basis)
+        places = self._place[functions]
+        for i in range(DEGREE + 1):
+            for j in range(DEGREE + 1):
+                product, apart = weights[:, i] * weights[:, j], places[:, j] - places[:, i]
+                used = np.flatnonzero((product != 0.0) & (apart >= 0))
+                np.add.at(
+                    self._blocks, (apart[used], places[used, i]), product[used, None, None] * metric[used]
+                )  # fmt: skip
+
+    def add_matrix(self, matrix: csr_matrix) -> None:
+        """Add a banded matrix of shape [P, P] for every motor."""
+        entries = matrix.tocoo()
+        place, apart = self._place[entries.row], self._place[entries.col] - self._place[entries.row]
+        used = (apart >= 0) & (entries.data != 0.0)
+        eye = np.eye(self._blocks.shape[2])
+        np.add.at(self._blocks, (apart[used], place[used]), entries.data[used, None, None] * eye)
+
+    def banded(self) -> Array:
+        """The lower bands as `scipy.linalg.cholesky_banded` takes them."""
+        bands, count, motors, _ = self._blocks.shape
+        banded = np.zeros((bands * motors, count * motors))
+        for d in range(bands):
+            for a in range(motors):
+                for b in range(motors):
+                    if d * motors + b - a >= 0:
+                        banded[d * motors + b - a, a::motors] = self._blocks[d, :, a, b]
+        return banded
+
+
+def _rows(basis: csr_matrix) -> tuple[IntArray, Array]:
+    """Functions that act in each row, DEGREE + 1 of them, and their values; what is missing has value 0."""
+    shape = basis.shape[0], DEGREE + 1
+    functions, weights = np.zeros(shape, np.int32), np.zeros(shape)
+    row = np.repeat(np.arange(shape[0]), np.diff(basis.indptr))
+    rank = np.arange(basis.nnz) - basis.indptr[row]
+    functions[row, rank], weights[row, rank] = basis.indices, basis.data
+    return functions, weights
+
+
+class RigidPreconditioner:
+    """Banded Cholesky factor of `B^T (J^T W J) B + penalty` and of what limits add to it."""
+
+    def __init__(self, response: RigidResponse, weights: Array, basis: OffsetBasis, penalty: csr_matrix):
+        """
+        Args:
+            response: Of the rigid robot.
+            weights: Square roots of the residuals' weights, shape [T, K, 6].
+            basis: Offset basis.
+            penalty: Matrix of the regulariser for one motor, shape [P, P].
+        """
+        weighted = response.targets * weights[..., None]
+        self._shape = basis.count, weighted.shape[3], basis.wraps
+        gram = BandedGram(*self._shape)
+        self._order = gram.order
+        gram.add(basis.values, np.einsum("nkia,nkib->nab", weighted, weighted))
+        gram.add_matrix(penalty)
+        self._banded = gram.banded()
+        self._scale = float(np.max(self._banded[0]))
+
+    def factor(self, fixed: BoolArray, more: list[tuple[csr_matrix, Array]] | None = None) -> None:
+        """Factorise with the unknowns where `fixed` (shape [P * M], bool) is true left out.
+
+        Args:
+            more: Spline matrices and metrics of further terms, as `BandedGram.add` takes them.
+        """
+        banded = self._banded.copy()
+        if more:
+            gram = BandedGram(*self._shape)
+            for basis, metric in more:
+                gram.add(basis, metric)
+            banded += gram.banded()
+        fixed = fixed[self._order]
+        for d in range(1, len(banded)):
+            banded[d, : banded.shape[1] - d] *= ~fixed[d:]
+        banded[:, fixed] = 0.0
+        # directions that no target sees get a floor, so that the factor exists
+        banded[0] += max(1e-9 * self._scale, 1e-12 * float(np.max(banded[0])))
+        banded[0, fixed] = 1.0
+        self._factor = cholesky_banded(banded, lower=True)
+
+    def solve(self, x: Array) -> Array:
+        """The factor's inverse applied to a vector of shape [P * M]."""
+        solved = np.empty_like(x)
+        solved[self._order] = cho_solve_banded((self._factor, True), x[self._order])
+        return solved

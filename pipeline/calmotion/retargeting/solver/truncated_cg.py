@@ -1,0 +1,106 @@
+"""Conjugate gradients for the model of a trust region, with the whole way kept: a smaller region costs no product."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from calmotion.shot.character import Array
+
+_LEFT = 1.5  # r P^-1 r times this bounds the decrease that is left
+
+
+@dataclass(frozen=True, eq=False)
+class Path:
+    """Iterates of conjugate gradients on g s + s H s / 2 from s = 0, and where a trust region ends.
+
+    Attributes:
+        steps, curved: s and H s, shape [k + 1, n], the first zero.
+        lengths: Norms of the steps in the preconditioner's metric, increasing, shape [k + 1].
+        p, Hp: Directions and their products, shape [k, n].
+        gradient: g.
+    """
+
+    steps: Array
+    curved: Array
+    lengths: Array
+    p: Array
+    Hp: Array
+    gradient: Array
+
+    @property
+    def length(self) -> float:
+        """Length of the whole way."""
+        return float(self.lengths[-1])
+
+    def within(self, radius: float) -> tuple[Array, float, float]:
+        """The step that reaches a radius, or the last one; the decrease that the model predicts, and its length."""
+        k = int(np.searchsorted(self.lengths, radius))
+        if k >= len(self.lengths):
+            step, curved, length = self.steps[-1], self.curved[-1], self.length
+        else:
+            # between two iterates lengths are nearly linear, and the region's size is a choice anyway
+            span = self.lengths[k] - self.lengths[k - 1]
+            t = (radius - self.lengths[k - 1]) / span
+            step = (1 - t) * self.steps[k - 1] + t * self.steps[k]
+            curved = (1 - t) * self.curved[k - 1] + t * self.curved[k]
+            length = radius
+        return step, -float(self.gradient @ step + 0.5 * step @ curved), length
+
+
+def conjugate_gradients(
+    product: Callable[[Array], Array], gradient: Array, inverse: Callable[[Array], Array], radius: float,
+    share: float, enough: float, limit: int,
+) -> Path:  # fmt: skip
+    """Minimise g s + s H s / 2 by preconditioned conjugate gradients (Steihaug 1983).
+
+    With r the residual and P the preconditioner, r P^-1 r / 2 is the decrease that is left where P is H; it was never
+    found to be less than a third of what is left, so it says when to end: where too little is left to matter. The
+    decrease of a step says nothing, it stalls on stiff directions first.
+
+    Args:
+        product: H times a vector.
+        gradient: g, shape [n].
+        inverse: The preconditioner.
+        radius: Of the trust region, in the preconditioner's metric.
+        share: Ends where less than this share of the decrease so far is left.
+        enough: Ends where a decrease of less than this is left.
+        limit: Most products.
+    """
+    n = len(gradient)
+    steps, curved, lengths = [np.zeros(n)], [np.zeros(n)], [0.0]
+    directions: list[Array] = []
+    products: list[Array] = []
+    r = gradient.copy()
+    z = inverse(r)
+    p, rz = -z, float(r @ z)
+    decrease = 0.0
+    ss, sp, pp = 0.0, 0.0, rz  # products of step and direction in the preconditioner's metric
+    while len(directions) < limit and _LEFT * rz > max(enough, share * decrease):
+        Hp = product(p)
+        curvature = float(p @ Hp)
+        if not curvature > 0.0:
+            break
+        directions.append(p)
+        products.append(Hp)
+        a = rz / curvature
+        steps.append(steps[-1] + a * p)
+        curved.append(curved[-1] + a * Hp)
+        ss += 2.0 * a * sp + a * a * pp
+        lengths.append(max(np.sqrt(max(ss, 0.0)), np.nextafter(lengths[-1], np.inf)))
+        decrease += 0.5 * a * rz
+        if lengths[-1] >= radius:
+            break
+        r = r + a * Hp
+        z = inverse(r)
+        new = float(r @ z)
+        b = new / rz
+        p, rz = b * p - z, new
+        sp, pp = b * (sp + a * pp), new + b * b * pp
+    shape = (len(directions), n)
+    return Path(
+        np.array(steps), np.array(curved), np.array(lengths), np.reshape(directions, shape),
+        np.reshape(products, shape), gradient,
+    )  # fmt: skip

@@ -1,0 +1,43 @@
+"""Bodies cut from a skin: each triangle goes to the joint that moves it most, and the cuts are closed."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from calmotion.geometry.closed_surfaces import close
+from calmotion.geometry.tetrahedra import surface_volume
+from calmotion.shot.character import Array, IntArray
+
+_FLAT = 1e-7  # volume over the whole skin's, below which a piece is no body
+
+
+def cut_skin(points: Array, triangles: IntArray, weights: Array) -> dict[int, tuple[Array, IntArray]]:
+    """Cut a skin into closed pieces.
+
+    Args:
+        points: Shape [n, 3]; points at one place count as one.
+        triangles: Shape [m, 3].
+        weights: How much each joint moves each point, shape [n, j].
+
+    Returns:
+        Points and outward triangles of the piece of each joint that has one with a volume.
+    """
+    places, same = np.unique(np.round(points, 9), axis=0, return_inverse=True)
+    same = same.reshape(-1)
+    merged = np.zeros((len(places), weights.shape[1]))
+    np.add.at(merged, same, weights)
+    faces = same[triangles]
+    whole = (faces[:, 0] != faces[:, 1]) & (faces[:, 1] != faces[:, 2]) & (faces[:, 2] != faces[:, 0])
+    faces = faces[whole]
+    owners = np.argmax(merged[faces].sum(axis=1), axis=1)
+    pieces = {}
+    for joint in np.unique(owners):
+        used, own = np.unique(faces[owners == joint], return_inverse=True)
+        closure = close(places[used], own.reshape(-1, 3))
+        piece = closure.points, closure.triangles.astype(np.int32)
+        volume = surface_volume(*piece)
+        if volume < 0.0:
+            piece = piece[0], piece[1][:, ::-1].copy()
+        pieces[int(joint)] = (*piece, abs(volume))
+    least = _FLAT * sum(volume for *_, volume in pieces.values())
+    return {joint: (x, t) for joint, (x, t, volume) in pieces.items() if volume > least}

@@ -1,0 +1,78 @@
+"""What a shot needs of all that could be simulated, decided before anything heavy is loaded or computed."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from calmotion.shot.character import Character
+from calmotion.shot.result import LeftOut
+
+# What can be forced on or off.
+KINDS = ("bodies", "turning", "loops", "modes", "directions", "elasticity", "motors", "ranges")
+AUTO, ON, OFF = "auto", "on", "off"
+
+
+@dataclass(frozen=True)
+class Need:
+    """One thing that a shot may need.
+
+    Attributes:
+        kind: One of `KINDS`, or `step` and `knots`, which have options of their own.
+        what: The thing, in the user's words.
+        needed: Whether it is there.
+        why: The reason.
+        estimated_error_m: What leaving it out costs at the targets, or would cost [m]; None: nothing, or not known.
+        forced: Whether the user chose.
+    """
+
+    kind: str
+    what: str
+    needed: bool
+    why: str
+    estimated_error_m: float | None = None
+    forced: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class Needs:
+    """What a shot needs.
+
+    Attributes:
+        character: The shot's character, marked with what is left out of it.
+        rows: Every decision.
+        forced: Kinds that the user forced, `on` or `off`.
+    """
+
+    character: Character
+    rows: tuple[Need, ...] = ()
+    forced: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def left_out(self) -> tuple[LeftOut, ...]:
+        """What is left out, for the report."""
+        return self.left_out_but()
+
+    def left_out_but(self, *kinds: str) -> tuple[LeftOut, ...]:
+        """The same without some kinds."""
+        rows = (row for row in self.rows if not row.needed and row.kind not in kinds)
+        return tuple(LeftOut(row.what, row.why, row.estimated_error_m) for row in rows)
+
+    def choice(self, kind: str) -> str:
+        """`auto`, `on` or `off`."""
+        return self.forced.get(kind, AUTO)
+
+
+def nothing_bends(data: Mapping[type, Any]) -> str | None:
+    """The reason why a step for flexible bodies is not needed, None where it is.
+
+    Args:
+        data: What is known of the run, by type.
+    """
+    character, needs = data.get(Character), data.get(Needs)
+    if character is not None and not any(body.flexible for body in character.bodies):
+        return "nothing is flexible: no body has CalmFlexibleBodyAPI"
+    if needs is not None and not any(body.bends for body in needs.character.bodies):
+        return "nothing bends noticeably in this shot"
+    return None

@@ -1,0 +1,120 @@
+"""Values that travel between the command line, the host and plugins, beside those of `calmotion.shot`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from calmotion.shot import LeftOut, Track
+    from calmotion.shot.character import Array
+
+
+@dataclass(frozen=True)
+class WrittenLayer:
+    """Paths of the layer of overs and of the root layer that opens it with the shot."""
+
+    layer: str
+    root: str
+
+
+@dataclass(frozen=True)
+class RiggedJoint:
+    """What became of one joint of a skeleton: the body that turns with it, the joints that turn that, and the angle
+    [rad] that they leave of the animation."""
+
+    joint: str
+    body: str
+    motors: tuple[str, ...]
+    off: float
+
+
+@dataclass(frozen=True)
+class Rig:
+    """A robot that was made of a skinned character.
+
+    Attributes:
+        layer: Path of the layer, which opens with the shot beneath it.
+        robot: Prim path of the robot.
+        joints: What turns, each with its motors.
+        bodies: Number of bodies, servos included.
+        mass: Of all of them [kg].
+        targets: Prim paths.
+    """
+
+    layer: str
+    robot: str
+    joints: tuple[RiggedJoint, ...]
+    bodies: int
+    mass: float
+    targets: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Recording:
+    """Path of a rerun recording."""
+
+    path: str
+
+
+@dataclass(frozen=True)
+class CsvFile:
+    """Path of a table."""
+
+    path: str
+
+
+@dataclass(frozen=True)
+class Figures:
+    """Paths of the figures."""
+
+    paths: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class ModeShapes:
+    """Paths of the files that show the modes of the flexible bodies."""
+
+    paths: tuple[str, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class ShapedTracks:
+    """The motors' tracks after an input shaper or a filter, in the motors' order."""
+
+    tracks: tuple[Track, ...]
+
+
+@dataclass(frozen=True)
+class Verification:
+    """A run compared with a finer one of the same curves.
+
+    Attributes:
+        error_m: Largest distance of any target, at any frame, to where the finer run has it [m].
+        step_s: Step of the finer run [s].
+        modes: Its elastic coordinates.
+    """
+
+    error_m: float
+    step_s: float
+    modes: int
+
+
+@dataclass(frozen=True, eq=False)
+class PlannedStep:
+    """The time step that a simulation of the shot would take: what it leaves out."""
+
+    row: LeftOut
+
+
+@dataclass(frozen=True, eq=False)
+class SystemModes:
+    """Natural modes of the whole character in its first pose, motors held.
+
+    Attributes:
+        frequencies: [Hz], ascending.
+        damping: Their ratios of critical.
+    """
+
+    frequencies: Array
+    damping: Array

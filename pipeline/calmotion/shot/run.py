@@ -1,0 +1,47 @@
+"""What the user asked for."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    pass
+
+
+@dataclass(frozen=True)
+class Source:
+    """What the user asked for.
+
+    Attributes:
+        path: The shot.
+        command: `inspect`, `simulate` or `optimize`.
+        tolerance: Error at the targets that does not matter [m], or None for the shot's own.
+        step: Time step [s], or None for automatic.
+        integrator: Name of the integrator, or None for automatic.
+        pre_roll: Length of the pre-roll [s], or None for automatic.
+        shaper: Input shaper or filter through which `simulate` passes the motors' tracks first, or None.
+        motion: File with a motion that replaces tracks of motors, or None.
+        verify: Whether the result is to be compared with a finer run.
+    """
+
+    path: str
+    command: str
+    tolerance: float | None = None
+    step: float | None = None
+    integrator: str | None = None
+    pre_roll: float | None = None
+    shaper: str | None = None
+    motion: str | None = None
+    verify: bool = False
+
+
+@dataclass(frozen=True)
+class OutputPaths:
+    """Where the results go; None: not asked for."""
+
+    layer: str | None = None
+    rrd: str | None = None
+    csv: str | None = None
+    figures: str | None = None
+    modes: str | None = None

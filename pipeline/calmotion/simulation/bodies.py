@@ -1,0 +1,155 @@
+"""From a character and its finite-element meshes to reduced bodies, skins and frequencies."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+from functools import partial
+from typing import TYPE_CHECKING
+
+from calmotion.errors import ShotError
+from calmotion.multibody.model.joint_arrays import BodyAnchors
+from calmotion.multibody.model.model import body_anchors, compile_model, rigid_body
+from calmotion.multibody.model.topology import Tree, span_tree
+from calmotion.reduction.load_envelope import Excitation
+from calmotion.reduction.reduced_body import ReducedBody
+from calmotion.shot import Body, Character, FEMeshes, ModeTable, Skin, SurfaceMesh
+from calmotion.shot.character import with_settings
+from calmotion.shot.meshes import FEMesh
+
+if TYPE_CHECKING:
+    from calmotion.reduction.interfaces.interface_patches import Anchor
+    from calmotion.reduction.reduce import FullBody, LinearModes
+
+_KEPT = 60_000_000  # numbers in factors of full models, half a gigabyte
+
+
+def reduce_bodies(
+    character: Character,
+    tree: Tree,
+    meshes: FEMeshes | None,
+    progress: Callable[[float, str], None] | None = None,
+    excitations: Sequence[Excitation | None] | None = None,
+    tolerance: float | None = None,
+    full: dict[int, FullBody] | None = None,
+) -> list[ReducedBody]:
+    """Every body of a character as the dynamics needs it; finite elements are loaded only for flexible ones.
+
+    Args:
+        character, tree, meshes: What to reduce.
+        progress: Called with a fraction and the body at hand.
+        excitations: Loads on each body in the shot, for what is chosen automatically.
+        tolerance: Error that does not matter [m]; None: the shot's own, or 1 mm.
+        full: Full models by body, for who reduces the same ones again; what is made and is not too large is added.
+
+    Raises:
+        ShotError: A flexible body without a mesh, or one that cannot be reduced.
+    """
+    mesh_of = {} if meshes is None else {mesh.body: mesh for mesh in meshes.meshes}
+    allowed = character.retarget.allowed(tolerance)
+    # what bodies along a chain leave out adds up
+    flexible = sum(body.bends for body in character.bodies)
+    result = []
+    for index, (body, anchors) in enumerate(zip(character.bodies, body_anchors(character, tree), strict=True)):
+        if progress is not None:
+            progress(index / len(character.bodies), body.path)
+        if not body.bends:
+            result.append(rigid_body(body, anchors))
+            continue
+        if index not in mesh_of:
+            raise ShotError(
+                "this flexible body has no finite-element mesh",
+                path=body.path,
+                remedy="Enable the plugin that provides meshes, or remove CalmFlexibleBodyAPI.",
+            )
+        from calmotion.reduction.cache import cached_reduction
+
+        frames = fem_anchors(character, body, anchors)
+        excitation = None if excitations is None else excitations[index]
+        # what has no bearing on the reduction does not make it another one
+        body = replace(body, straight=False)
+        parts = (mesh_of[index], body, frames, body.surfaces, anchors.root, excitation, allowed / flexible)
+        result.append(cached_reduction(parts, partial(_reduced, full, index, parts)))
+    return _damped(character, tree, result)
+
+
+def _reduced(
+    full: dict[int, FullBody] | None, index: int,
+    parts: tuple[FEMesh, Body, list[Anchor], Sequence[SurfaceMesh], int, Excitation | None, float],
+) -> ReducedBody:  # fmt: skip
+    """`reduce_body` of the parts, with the full model that is known, or will be."""
+    from calmotion.reduction.reduce import full_body, reduce_body
+
+    if full is None:
+        return reduce_body(*parts)
+    if index in full:
+        return reduce_body(*parts, full=full[index])
+    mesh, body, anchors, _, root, _, _ = parts
+    own = full_body(mesh, body, anchors, root)
+    found = reduce_body(*parts, full=own)
+    if own.entries + sum(item.entries for item in full.values()) <= _KEPT:
+        full[index] = own
+    return found
+
+
+def _damped(character: Character, tree: Tree, bodies: Sequence[ReducedBody]) -> list[ReducedBody]:
+    """The bodies, damped so that the character's modes have the ratios of their materials."""
+    materials = {k: b.flexible.material for k, b in enumerate(character.bodies) if b.flexible is not None and b.bends}
+    if all(material.rayleigh is not None for material in materials.values()):
+        return list(bodies)  # these do not know of modes
+    from calmotion.multibody.analysis.modes import elastic_modes
+    from calmotion.reduction.damping import damped
+
+    omega, shapes = elastic_modes(compile_model(character, tree, bodies))
+    result = list(bodies)
+    for b, shape in zip(tree.body, shapes, strict=True):
+        if b in materials:
+            result[b] = damped(bodies[b], materials[b], omega, shape)
+    return result
+
+
+def fem_anchors(character: Character, body: Body, anchors: BodyAnchors) -> list[Anchor]:
+    """The anchors of a flexible body as finite elements take them."""
+    from calmotion.reduction.interfaces.interface_patches import Anchor
+
+    joints, targets = character.joints, character.targets
+    paths = [joints[k].path for k in anchors.joints] + [targets[k].path for k in anchors.targets]
+    kinds = ["interface"] * len(anchors.joints) + ["point"] * len(anchors.targets)
+    held = {surface.joint: surface for surface in body.interfaces}
+    named = [held.get(path) for path in paths]
+    return [Anchor(*item) for item in zip(paths, anchors.frames, kinds, named, strict=True)]
+
+
+def flexible_modes(
+    character: Character, meshes: FEMeshes, excitations: Sequence[Excitation | None] | None, tolerance: float | None
+) -> Iterator[tuple[Body, LinearModes]]:
+    """Every flexible body with its linear modes on the mesh; arguments as of `reduce_bodies`."""
+    from calmotion.reduction.reduce import linear_modes
+
+    tree = span_tree(character)
+    anchors = body_anchors(character, tree)
+    allowed = character.retarget.allowed(tolerance)
+    for mesh in meshes.meshes:
+        body, own = character.bodies[mesh.body], anchors[mesh.body]
+        excitation = None if excitations is None else excitations[mesh.body]
+        frames = fem_anchors(character, body, own)
+        yield body, linear_modes(mesh, body, frames, own.root, excitation, allowed / len(meshes.meshes))
+
+
+def with_elasticity(character: Character, law: str) -> Character:
+    """The character with one elastic law (see `FlexibleSettings`) for all flexible bodies."""
+    return with_settings(character, lambda own: replace(own, elasticity=law))
+
+
+def mode_tables(bodies: Sequence[ReducedBody]) -> tuple[ModeTable, ...]:
+    """Frequencies of the flexible bodies."""
+    return tuple(
+        ModeTable(index, body.frequencies, body.nodes, body.elements, body.invariants.mass)
+        for index, body in enumerate(bodies)
+        if len(body.stiffness)
+    )
+
+
+def skins(bodies: Sequence[ReducedBody]) -> tuple[Skin | None, ...]:
+    """How the elastic coordinates move each body's surfaces."""
+    return tuple(Skin(body.skin) if len(body.stiffness) else None for body in bodies)

@@ -1,0 +1,1 @@
+"""Inputs of a simulation: time grid, motor curves, moving roots, gears, input shapers."""

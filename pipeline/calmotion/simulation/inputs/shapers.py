@@ -1,0 +1,75 @@
+"""What practitioners do instead: input shapers and low-pass filters on the motors' tracks.
+
+A shaper convolves every track with a few impulses, timed so that a mode of known frequency and damping cancels its own
+vibration (N. C. Singer, W. P. Seering, Preshaping command inputs to reduce system vibration, 1990): ZV with two, ZVD,
+which also forgives an error of the frequency, with three. It delays the motion and knows nothing of the targets.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+from calmotion.errors import ShotError
+from calmotion.shot.character import Array
+from calmotion.simulation.inputs.curves import Curves
+from calmotion.simulation.inputs.time_grid import TimeGrid
+
+SHAPERS = ("zv", "zvd", "zv2", "zvd2", "lowpass")
+CUTOFF = 0.5  # of the low-pass filter, over the lowest frequency, where nobody says
+
+
+def impulses(kind: str, frequencies: Array, damping: Array) -> tuple[Array, Array]:
+    """Times [s] and amplitudes, of sum one, of a shaper.
+
+    Args:
+        kind: `zv` or `zvd` for the lowest mode, `zv2` or `zvd2` for the lowest two.
+        frequencies: Undamped, of the modes [Hz], ascending.
+        damping: Their ratios of critical.
+    """
+    times, amplitudes = np.zeros(1), np.ones(1)
+    count = 2 if kind.endswith("2") else 1
+    for frequency, ratio in zip(frequencies[:count], damping[:count], strict=True):
+        K = np.exp(-np.pi * ratio / np.sqrt(1.0 - ratio**2))
+        own = np.array([1.0, 2.0 * K, K * K]) if "d" in kind else np.array([1.0, K])
+        half = 0.5 / (frequency * np.sqrt(1.0 - ratio**2))
+        times = (times[:, None] + half * np.arange(len(own))).ravel()
+        amplitudes = (amplitudes[:, None] * own / own.sum()).ravel()
+    return times, amplitudes
+
+
+def delay(kind: str, frequencies: Array, damping: Array) -> float:
+    """Mean delay of a shaper [s]; none of a filter that runs both ways."""
+    if kind == "lowpass":
+        return 0.0
+    times, amplitudes = impulses(kind, frequencies, damping)
+    return float(times @ amplitudes)
+
+
+def shaped(
+    curves: Curves, grid: TimeGrid, kind: str, frequencies: Array, damping: Array, cutoff: float = CUTOFF
+) -> Curves:
+    """Curves through a shaper; before their first instant they rest.
+
+    Raises:
+        ShotError: There is no such shaper, or no frequency to shape for.
+    """
+    if kind not in SHAPERS or not len(frequencies):
+        raise ShotError(
+            "there is no such shaper" if len(frequencies) else "a rigid robot has no frequency to shape for",
+            attribute="--shaper",
+            found=kind,
+            remedy=f"Use one of {', '.join(SHAPERS)}." if len(frequencies) else "Leave it out.",
+        )
+    times = grid.times
+    if kind == "lowpass":
+        from scipy.signal import butter, sosfiltfilt
+
+        sections = butter(2, cutoff * frequencies[0], fs=1.0 / grid.h, output="sos")
+        angles = sosfiltfilt(sections, curves.angles, axis=0, padtype="constant", padlen=min(len(times) - 1, 4000))
+    else:
+        source, angles = CubicSpline(times, curves.angles), np.zeros_like(curves.angles)
+        for late, amplitude in zip(*impulses(kind, frequencies, damping), strict=True):
+            angles += amplitude * source(np.maximum(times - late, times[0]))
+    spline = CubicSpline(times, angles)
+    return Curves(angles, spline(times, 1), spline(times, 2))

@@ -1,0 +1,79 @@
+"""What the targets should do: the animation on a rigid robot, or with the sag of each pose."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from calmotion.multibody.analysis.kinematics import rigid_poses, target_frames
+from calmotion.multibody.integrators.workspace import Workspace
+from calmotion.multibody.model.model import Model, moves_freely, rigid_model
+from calmotion.multibody.model.system import State, allocate_state
+from calmotion.multibody.statics.equilibrium import equilibrium
+from calmotion.shot.character import Array, BoolArray
+from calmotion.simulation.simulator import Simulator
+from calmotion.simulation.target_errors import Reference
+
+
+@dataclass(frozen=True, eq=False)
+class MeantMotion:
+    """The motion that is meant: body poses (by component) and targets, shapes [T, B, ...], [T, K, ...]."""
+
+    c: Array
+    q: Array
+    target_positions: Array
+    target_rotations: Array
+
+    @property
+    def reference(self) -> Reference:
+        """The targets alone."""
+        return Reference(self.target_positions, self.target_rotations)
+
+
+def rigid_motion(
+    model: Model, angles: Array, rates: Array, h: float, world: Array | None = None, cyclic: bool = False
+) -> MeantMotion:
+    """The animation on a rigid robot: kinematics alone, or a rigid simulation where joints move freely."""
+    rigid = rigid_model(model)
+    if np.any(moves_freely(rigid)):
+        run = Simulator(rigid, h, world, cyclic).run(angles, rates)
+        states = run.trajectory.states
+        return MeantMotion(states.c, states.q, run.target_positions, run.target_rotations)
+    c, q = rigid_poses(rigid, model.joint_angles(angles), world)
+    positions, rotations = target_frames(rigid, c, q, np.zeros(c.shape[:2] + (0,)))
+    return MeantMotion(c, q, positions, rotations)
+
+
+def static_motion(
+    model: Model, rigid: MeantMotion, angles: Array, judged: BoolArray, world: Array | None = None
+) -> MeantMotion:
+    """The animation with the sag of each pose: the flexible robot in static equilibrium at every judged instant.
+
+    Args:
+        model: The flexible character.
+        rigid: Its rigid motion, kept where nothing is judged.
+        angles: Of the motors, shape [T, M].
+        judged: Shape [T].
+        world: Moving roots, at rest in each pose.
+
+    Raises:
+        SimulationFailure: A pose without static equilibrium.
+    """
+    ws, joint_angles = Workspace.for_system(model.system), model.joint_angles(angles)
+    meant = MeantMotion(
+        rigid.c.copy(), rigid.q.copy(), rigid.target_positions.copy(), rigid.target_rotations.copy()
+    )  # fmt: skip
+    state: State | None = None
+    for n in np.flatnonzero(judged):
+        if state is None:
+            state = allocate_state(model.system)
+            state.c[:], state.q[:] = rigid.c[n], rigid.q[n]
+        if world is not None and world.shape[1]:
+            ws.work.world[:] = world[n]
+            ws.work.world[:, 3:9] = 0.0
+        state, _ = equilibrium(model.system, state, joint_angles[n], ws)
+        meant.c[n], meant.q[n] = state.c, state.q
+        positions, rotations = target_frames(model, state.c[None], state.q[None], state.u[None])
+        meant.target_positions[n], meant.target_rotations[n] = positions[0], rotations[0]
+    return meant

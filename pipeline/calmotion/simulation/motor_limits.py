@@ -1,0 +1,97 @@
+"""Limits of the motors, and how far a motion exceeds them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from calmotion.shot.character import Array, BoolArray, Character
+
+QUANTITIES = ("position", "velocity", "acceleration", "effort")
+
+
+@dataclass(frozen=True, eq=False)
+class Bounds:
+    """Bounds of one quantity of all motors, shape [M] each; infinite where there are none.
+
+    Attributes:
+        lower, upper: [rad], [rad/s], [rad/s^2] or [N m] (m and N of a length motor).
+        scale: What an excess is measured by.
+    """
+
+    lower: Array
+    upper: Array
+    scale: Array
+
+
+def motor_bounds(character: Character, movable: BoolArray | None = None) -> dict[str, Bounds]:
+    """Bounds by the name of their quantity; only quantities of which some motor has one.
+
+    Args:
+        movable: Motors whose curve may change, shape [M]; of the others only the effort is bounded, since nothing
+            else of them can be changed. None: all motors, with all their limits.
+    """
+    joints = [character.joints[motor.joint] for motor in character.motors]
+    found: dict[str, Bounds] = {}
+
+    def add(name: str, lower: Array, upper: Array) -> None:
+        if movable is not None and name != "effort":
+            lower, upper = np.where(movable, lower, -np.inf), np.where(movable, upper, np.inf)
+        finite = np.isfinite(np.stack([lower, upper]))
+        size = np.max(np.where(finite, np.abs(np.stack([lower, upper])), 0.0), axis=0)
+        if np.any(finite):
+            found[name] = Bounds(lower, upper, np.where(size > 0.0, size, 1.0))
+
+    add("position", np.array([j.lower for j in joints], float), np.array([j.upper for j in joints], float))
+    for name, values in (
+        ("velocity", [m.max_velocity for m in character.motors]),
+        ("acceleration", [m.max_acceleration for m in character.motors]),
+        ("effort", [m.max_torque for m in character.motors]),
+    ):
+        upper = np.array(values, float)
+        add(name, -upper, upper)
+    return found
+
+
+@dataclass(frozen=True, eq=False)
+class Excess:
+    """How far a motor goes within one of its limits.
+
+    Attributes:
+        motor: Its index.
+        quantity: One of `QUANTITIES`.
+        limit: The limit [rad], [rad/s], [rad/s^2] or [N m].
+        value: The value that comes closest to it, or exceeds it most.
+        instant: When.
+        excess: (value - limit) / scale: positive where the limit is exceeded.
+    """
+
+    motor: int
+    quantity: str
+    limit: float
+    value: float
+    instant: int
+    excess: float
+
+
+def excesses(bounds: dict[str, Bounds], values: dict[str, Array], judged: BoolArray) -> list[Excess]:
+    """For each limit of each motor, where it comes closest.
+
+    Args:
+        values: Of each quantity, shape [T, M].
+        judged: Which instants count, shape [T].
+    """
+    found = []
+    instants = np.flatnonzero(judged)
+    for name, bound in bounds.items():
+        for motor in range(len(bound.scale)):
+            v = values[name][instants, motor]
+            ends = ((bound.upper[motor], 1.0), (bound.lower[motor], -1.0))
+            sides = [(limit, sign * (v - limit)) for limit, sign in ends if np.isfinite(limit)]
+            if sides:
+                limit, beyond = max(sides, key=lambda side: float(np.max(side[1])))
+                n = int(np.argmax(beyond))
+                share = float(beyond[n] / bound.scale[motor])
+                found.append(Excess(motor, name, float(limit), float(v[n]), int(instants[n]), share))
+    return found

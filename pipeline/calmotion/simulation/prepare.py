@@ -1,0 +1,216 @@
+"""A shot made ready for simulation: options, the compiled model, the time grid, and errors in the user's words."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from calmotion.errors import ShotError
+from calmotion.multibody.analysis.deflection import most_bent
+from calmotion.multibody.analysis.modes import system_modes
+from calmotion.multibody.failure import SimulationFailure
+from calmotion.multibody.integrators.integrate import INTEGRATORS, follows_roots
+from calmotion.multibody.model.model import Model, compile_model
+from calmotion.multibody.model.topology import span_tree
+from calmotion.reduction.load_envelope import Excitation
+from calmotion.reduction.reduced_body import ReducedBody
+from calmotion.shot import Animation, Character, FEMeshes
+from calmotion.shot.character import Array
+from calmotion.simulation.bodies import reduce_bodies
+from calmotion.simulation.cyclic import refuse_open_loops
+from calmotion.simulation.inputs.curves import needed_pre_roll, sample_tracks
+from calmotion.simulation.inputs.roots import root_tracks, sample_roots
+from calmotion.simulation.inputs.time_grid import TimeGrid, make_grid
+from calmotion.simulation.settings import Options
+
+__all__ = ["Options", "Prepared", "prepare"]
+
+
+@dataclass(frozen=True, eq=False)
+class Prepared:
+    """A shot compiled for simulation; `world` holds its moving roots, see `roots.sample_roots`."""
+
+    character: Character
+    bodies: Sequence[ReducedBody]
+    model: Model
+    grid: TimeGrid
+    world: Array
+
+
+def prepare(
+    character: Character, animation: Animation, bodies: Sequence[ReducedBody] | None, options: Options
+) -> Prepared:
+    """Compile the system and the time grid.
+
+    Raises:
+        ShotError: Something the shot asks for is not supported.
+    """
+    _refuse_unsupported(character, animation, options)
+    if len(animation.frame_times) < 2:
+        raise ShotError(
+            "a shot of one frame has no motion",
+            path=character.path,
+            attribute="endTimeCode",
+            remedy="Author startTimeCode and endTimeCode of the stage, at least a frame apart.",
+        )
+    tree = span_tree(character)
+    if bodies is None:
+        bodies = reduce_bodies(character, tree, None)
+    model = compile_model(character, tree, bodies, [frame.joint for frame in animation.moving])
+    grid = grid_of(character, animation, options)
+    return Prepared(character, bodies, model, grid, sample_roots(animation.moving, grid))
+
+
+def grid_of(character: Character, animation: Animation, options: Options) -> TimeGrid:
+    """The time grid of a shot, with its pre-roll."""
+    pre_roll = options.pre_roll
+    if pre_roll is None:
+        pre_roll = max(
+            needed_pre_roll(tracks, animation.frame_times)
+            for tracks in (animation.tracks, root_tracks(animation.moving))
+        )
+    step = options.step if options.step is not None else character.retarget.time_step
+    return make_grid(animation.frame_times, step, pre_roll, character.retarget.cyclic)
+
+
+def excitations(
+    character: Character, animation: Animation, meshes: FEMeshes | None, options: Options
+) -> tuple[Excitation, ...] | None:
+    """What the shot does to each body, for what the reduction chooses; None where a rigid robot cannot follow it."""
+    if len(animation.frame_times) < 2:
+        return None
+    from calmotion.simulation.rigid_run import shot_excitation
+
+    try:
+        grid, tree = grid_of(character, animation, options), span_tree(character)
+        return shot_excitation(character, animation, grid, tree, meshes)
+    except SimulationFailure:
+        return None  # the flexible robot will say so, with the place
+
+
+def first_pose_modes(
+    character: Character, animation: Animation, bodies: Sequence[ReducedBody] | None
+) -> tuple[Array, Array]:
+    """Natural frequencies of the whole character in its first pose, motors held [Hz], ascending, and damping ratios.
+
+    Raises:
+        ShotError: It has no static equilibrium there.
+    """
+    return modes_of(prepare(character, animation, bodies, Options(pre_roll=0.0)), animation)
+
+
+def modes_of(prepared: Prepared, animation: Animation) -> tuple[Array, Array]:
+    """The same of a shot that is prepared."""
+    angles, _ = sample_tracks(animation.tracks, prepared.grid)
+    try:
+        return system_modes(prepared.model, prepared.model.joint_angles(angles[0]), prepared.world[0])
+    except SimulationFailure as failure:
+        raise failure_error(prepared, failure) from failure
+
+
+def lowest_frequency(prepared: Prepared, animation: Animation) -> float:
+    """The lowest of them [Hz]; 0 where there is none."""
+    return float(next(iter(modes_of(prepared, animation)[0]), 0.0))
+
+
+def _refuse_unsupported(character: Character, animation: Animation, options: Options) -> None:
+    if character.retarget.cyclic:
+        refuse_open_loops(character, animation)
+        if options.pre_roll:
+            raise ShotError(
+                "a shot that loops has no beginning to ease into",
+                path=character.path,
+                attribute="--pre-roll",
+                found=f"{options.pre_roll:g} s",
+                remedy="Leave it out, or set calm:retarget:cyclic to false.",
+            )
+        if options.scheme != "bdf2":
+            raise ShotError(
+                "shots that loop are simulated by BDF2 alone",
+                path=character.path,
+                attribute="--integrator",
+                found=options.scheme,
+                remedy="Leave it out, or set calm:retarget:cyclic to false.",
+            )
+    if options.scheme not in INTEGRATORS:
+        raise ShotError(
+            "there is no such integrator",
+            attribute="--integrator",
+            found=options.scheme,
+            remedy=f"Use one of {', '.join(INTEGRATORS)}.",
+        )
+    if animation.moving and not follows_roots(options.scheme):
+        raise ShotError(
+            "this integrator does not know of roots that move",
+            path=character.joints[animation.moving[0].joint].path,
+            attribute="--integrator",
+            found=options.scheme,
+            remedy=f"Use one of {', '.join(filter(follows_roots, INTEGRATORS))}.",
+        )
+
+
+def refuse_half_turns(prepared: Prepared, angles: Array) -> None:
+    """Motors must not turn by half a turn within a step: nothing could tell which way they went.
+
+    Args:
+        angles: Of the motors, shape [T, M].
+
+    Raises:
+        ShotError: One does.
+    """
+    character, grid = prepared.character, prepared.grid
+    for k, motor in enumerate(character.motors):
+        if character.joints[motor.joint].kind != "revolute" or len(angles) < 2:
+            continue
+        turns = np.abs(np.diff(angles[:, k]))
+        n = int(np.argmax(turns))
+        if not turns[n] < np.pi:
+            raise ShotError(
+                f"this motor turns by {np.degrees(turns[n]):.0f} degrees within one step of {1e3 * grid.h:.3g} ms",
+                path=motor.path,
+                attribute=motor.attribute,
+                found=f"at {grid.times[n]:.3f} s",
+                remedy="Use a smaller --step, or slow it down there.",
+            )
+
+
+def failure_error(prepared: Prepared, failure: SimulationFailure) -> ShotError:
+    """A failed step in the user's words: which body, which joint, when."""
+    tree, character, system = prepared.model.tree, prepared.character, prepared.model.system
+    if failure.reason == "does not settle":
+        return ShotError(
+            "no motion of the robot was found that repeats itself, loop after loop",
+            path=character.path,
+            attribute="calm:retarget:cyclic",
+            found=True,
+            remedy="Raise calm:damping:ratio, slow the loop down where it shakes most, or set calm:retarget:cyclic to "
+            "false.",
+        )
+    when = failure.time_s + prepared.grid.times[0]
+    what = f"{_REASONS[failure.reason]} at {when:.3f} s"
+    bend = None if failure.state is None else most_bent(system, failure.state)
+    if bend is not None and bend.share > _FAR:
+        under = "just before" if failure.share == 1.0 else f"under {failure.share:.0%} of gravity"
+        return ShotError(
+            f"the simulation {what}: {under} this body bends by {1e3 * bend.distance:.3g} mm, "
+            f"{bend.share:.0%} of its length, which its modes cannot follow much further",
+            path=character.bodies[tree.body[bend.component]].path,
+            remedy="Check physics:youngsModulus (in the stage's units), the loads and the speed of the motion.",
+        )
+    joint = character.joints[tree.joint[failure.component]]
+    return ShotError(
+        f"the simulation {what}, first at the joint {joint.path}",
+        path=character.bodies[tree.body[failure.component]].path,
+        remedy="Try a smaller --step; check the masses, the material and the motion of this joint there.",
+    )
+
+
+_FAR = 0.25  # deflection over length that explains a failure
+_REASONS = {
+    "singular": "meets a singular system",
+    "diverged": "diverges",
+    "refined": "can only go on with smaller steps",
+    "no static equilibrium": "finds no static equilibrium",
+}

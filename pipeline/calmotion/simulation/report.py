@@ -1,0 +1,139 @@
+"""Runs of the engine as the values that plugins write: motions by body, simulations with errors, what was left out."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from calmotion.multibody.analysis.dead_centres import dead_centres
+from calmotion.multibody.analysis.reactions import reactions
+from calmotion.multibody.failure import SimulationFailure
+from calmotion.multibody.model.model import Model
+from calmotion.shot import LeftOut, LimitUse, Motion, Simulation
+from calmotion.shot.character import Array
+from calmotion.simulation.forward import ForwardRun
+from calmotion.simulation.inputs.curves import Curves
+from calmotion.simulation.inputs.time_grid import TimeGrid
+from calmotion.simulation.intended_motion import MeantMotion, rigid_motion
+from calmotion.simulation.motor_limits import Excess
+from calmotion.simulation.prepare import Prepared
+from calmotion.simulation.target_errors import Reference, rotation_errors
+from calmotion.support.naming import distinct_names
+
+
+def by_body(model: Model, values: Array, axis: int = 1) -> Array:
+    """Reorder an axis of components to the character's bodies."""
+    order = np.empty(len(model.tree.body), int)
+    order[list(model.tree.body)] = np.arange(len(order))
+    return np.take(values, order, axis=axis)
+
+
+def elastic_by_body(model: Model, u: Array) -> tuple[Array, ...]:
+    """Elastic coordinates of each body of the character, shape [T, r], from those of the components, [T, B, r]."""
+    component = {body: k for k, body in enumerate(model.tree.body)}
+    return tuple(u[:, component[b], : model.system.elastic[component[b]]].copy() for b in range(len(component)))
+
+
+def _simulated_motion(model: Model, grid: TimeGrid, run: ForwardRun, motors: int, joints: int) -> Motion:
+    states = run.trajectory.states
+    shown = _shown(grid)
+    elastic = elastic_by_body(model, states.u[shown])
+    found = reactions(model.system, run.trajectory, run.joint_angles, run.joint_rates)
+    values, efforts = np.zeros((len(states.c), motors)), np.zeros((len(states.c), motors))
+    for k, motor in enumerate(model.motor):
+        if motor >= 0:
+            values[:, motor] = run.joint_angles[:, k] * model.sign[k]
+            efforts[:, motor] = found.efforts[:, k] * model.sign[k]
+    forces, moments = (_by_joint(model, joints, part[shown]) for part in (found.forces, found.moments))
+    return Motion(
+        grid.times[shown], by_body(model, states.c[shown]), by_body(model, states.q[shown]), elastic, values[shown],
+        efforts[shown], run.target_positions[shown], run.target_rotations[shown], forces, moments,
+    )  # fmt: skip
+
+
+def _by_joint(model: Model, joints: int, values: Array) -> Array:
+    """From the system's joints and sides to the character's, shape [T, J, 3]; a joint that is left out carries none."""
+    out = np.zeros((len(values), joints, 3))
+    out[:, [*model.tree.joint, *model.tree.loops]] = model.sign[:, None] * values
+    return out
+
+
+def _shown(grid: TimeGrid) -> slice:
+    """Instants that the user gets: all, but of a shot that loops not the one before it."""
+    return slice(1 if grid.cyclic else 0, None)
+
+
+def reference_motion(model: Model, grid: TimeGrid, rigid: MeantMotion, angles: Array) -> Motion:
+    """The motion that was meant; it has no efforts."""
+    shown = _shown(grid)
+    times, angles = grid.times[shown], angles[shown]
+    return Motion(
+        times, by_body(model, rigid.c[shown]), by_body(model, rigid.q[shown]),
+        tuple(np.zeros((len(times), 0)) for _ in model.tree.body), angles, np.full_like(angles, np.nan),
+        rigid.target_positions[shown], rigid.target_rotations[shown],
+    )  # fmt: skip
+
+
+def performed_motion(prepared: Prepared, curves: Curves) -> Motion | None:
+    """A rigid robot performing curves; None where a linkage cannot follow them."""
+    model, grid = prepared.model, prepared.grid
+    try:
+        rigid = rigid_motion(model, curves.angles, curves.rates, grid.h, prepared.world, grid.cyclic)
+    except SimulationFailure:
+        return None
+    return reference_motion(model, grid, rigid, curves.angles)
+
+
+def simulation_of(prepared: Prepared, run: ForwardRun, reference: Reference) -> Simulation:
+    """A forward run as a value for the user, measured against the reference."""
+    model, grid, character = prepared.model, prepared.grid, prepared.character
+    turned, _ = rotation_errors(reference.rotations, run.target_rotations)
+    off = run.target_positions - reference.positions
+    errors, shown = np.linalg.norm(off, axis=2), _shown(grid)
+    return Simulation(
+        motion=_simulated_motion(model, grid, run, len(character.motors), len(character.joints)),
+        position_errors=errors[shown],
+        rotation_errors=np.linalg.norm(turned, axis=2)[shown],
+        newton_iterations=run.trajectory.newton_iterations,
+        max_joint_gap=run.trajectory.max_joint_gap,
+        wall_s=run.trajectory.wall_s,
+        sag=np.zeros(0) if grid.cyclic else errors[0].copy(),
+        refined_steps=len(run.trajectory.refined),
+        dead_centres=grid.times[dead_centres(run.trajectory.margins)],
+        growth=run.growth,
+        seam=np.linalg.norm(off[-1] - off[shown][0], axis=1) if grid.cyclic else np.zeros(0),
+    )
+
+
+def left_out_rows(prepared: Prepared) -> list[LeftOut]:
+    """What a run of this shot leaves out."""
+    character, grid = prepared.character, prepared.grid
+    rigid = [body.path for body in character.bodies if body.flexible is None]
+    names = ", ".join(distinct_names(rigid).values())
+    rows = [LeftOut("finite elements of " + names, "rigid: no CalmFlexibleBodyAPI")] if rigid else []
+    rows += [row for body in prepared.bodies for row in body.left_out]
+    if not grid.pre_roll:
+        rows.append(LeftOut("pre-roll", "the shot loops" if grid.cyclic else "the shot starts at rest"))
+    locked = [motor.path for motor in character.motors if not motor.optimize]
+    rows += [LeftOut("optimisation of " + path, "calm:motor:optimize is false") for path in locked]
+    return rows
+
+
+def limit_uses(
+    before: Sequence[Excess], after: Sequence[Excess], grid: TimeGrid,
+    costs: Mapping[tuple[int, str], float] | None = None,
+) -> tuple[LimitUse, ...]:  # fmt: skip
+    """The limits of the motors as values for the user.
+
+    Args:
+        before, after: Of the input and of the result, in the same order.
+        costs: Of limits that bind, by motor and quantity [m].
+    """
+    return tuple(
+        LimitUse(
+            item.motor, item.quantity, item.limit, first.value, item.value, float(grid.times[item.instant]),
+            item.excess, (costs or {}).get((item.motor, item.quantity)),
+        )
+        for first, item in zip(before, after, strict=True)
+    )  # fmt: skip

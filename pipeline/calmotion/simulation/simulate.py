@@ -1,0 +1,132 @@
+"""Simulate a shot as animated."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from calmotion.errors import ShotError
+from calmotion.multibody.failure import SimulationFailure
+from calmotion.multibody.integrators.workspace import Workspace
+from calmotion.reduction.reduced_body import ReducedBody
+from calmotion.shot import Animation, Character, Result, Track
+from calmotion.shot.character import Array
+from calmotion.simulation.bodies import mode_tables, skins
+from calmotion.simulation.cyclic import SteadyState
+from calmotion.simulation.forward import limited_values, run_forward
+from calmotion.simulation.inputs.curves import sample_curves, sample_tracks
+from calmotion.simulation.inputs.shapers import shaped
+from calmotion.simulation.intended_motion import MeantMotion, rigid_motion, static_motion
+from calmotion.simulation.motor_limits import excesses, motor_bounds
+from calmotion.simulation.prepare import Options, Prepared, failure_error, modes_of, prepare, refuse_half_turns
+from calmotion.simulation.report import left_out_rows, limit_uses, performed_motion, reference_motion, simulation_of
+from calmotion.simulation.target_errors import Objective
+
+Progress = Callable[[float, str], None]
+CLOSED = 0.1  # of the error that does not matter: joints that come apart by less are closed
+
+
+def meant_motion(prepared: Prepared, angles: Array, rates: Array) -> MeantMotion:
+    """What the targets should do, as `calm:retarget:reference` says.
+
+    Args:
+        angles, rates: The animator's, shape [T, M].
+    """
+    rigid = rigid_motion(prepared.model, angles, rates, prepared.grid.h, prepared.world, prepared.grid.cyclic)
+    if prepared.character.retarget.reference == "rigid":
+        return rigid
+    return static_motion(prepared.model, rigid, angles, prepared.grid.times >= 0.0, prepared.world)
+
+
+def shape_tracks(
+    character: Character, animation: Animation, bodies: Sequence[ReducedBody] | None, options: Options, kind: str,
+    cutoff: float,
+) -> tuple[Track, ...]:  # fmt: skip
+    """The shot's tracks through an input shaper or a filter, sampled at the steps of its simulation.
+
+    Args:
+        kind: One of `shapers.SHAPERS`.
+        cutoff: Of the low-pass filter, over the lowest frequency.
+
+    Raises:
+        ShotError: There is no such shaper, or nothing to shape for.
+    """
+    prepared = prepare(character, animation, bodies, options)
+    grid, curves = prepared.grid, sample_curves(animation.current, prepared.grid)
+    found = shaped(curves, grid, kind, *modes_of(prepared, animation), cutoff)
+    return tuple(Track(grid.times, column) for column in found.angles.T)
+
+
+def simulate_shot(
+    character: Character,
+    animation: Animation,
+    bodies: Sequence[ReducedBody] | None,
+    options: Options,
+    progress: Progress,
+) -> Result:
+    """Simulate the shot as animated, and measure it against the rigid motion of the animator's intent."""
+    prepared = prepare(character, animation, bodies, options)
+    model, grid, world = prepared.model, prepared.grid, prepared.world
+    workspace = Workspace.for_system(model.system)
+    curves = sample_curves(animation.current, grid)
+    angles, rates = curves.angles, curves.rates
+    meant, meant_rates = sample_tracks(animation.tracks, grid)
+    refuse_half_turns(prepared, angles)
+    try:
+        reference = meant_motion(prepared, meant, meant_rates)
+        progress(0.0, "compiling kernels, once")
+        run_forward(model, workspace, angles[:3], rates[:3], grid.h, world[:3], integrator=options.scheme)
+        begin = time.perf_counter()
+        steady = SteadyState(model, world, grid.h, workspace) if grid.cyclic else None
+        run = run_forward(
+            model, workspace, angles, rates, grid.h, world, lambda fraction: progress(fraction, "simulating"),
+            options.scheme, steady,
+        )  # fmt: skip
+        wall = time.perf_counter() - begin
+    except SimulationFailure as failure:
+        raise failure_error(prepared, failure) from failure
+    _refuse_open_joints(prepared, run.trajectory.max_joint_gap, options)
+    objective = Objective.over(model, reference.reference, grid, animation.weights)
+    bounds = motor_bounds(character)
+    used = excesses(bounds, limited_values(model, bounds, curves, run), grid.judged)
+    residuals, _ = objective.residuals(run.target_positions, run.target_rotations)
+    intent = reference_motion(model, grid, reference, meant)
+    as_meant = animation.current is animation.tracks and character.retarget.reference == "rigid"
+    return Result(
+        reference=intent,
+        before=simulation_of(prepared, run, reference.reference),
+        after=None,
+        skins=skins(prepared.bodies),
+        modes=mode_tables(prepared.bodies),
+        curves=(),
+        steps=(),
+        objective_before=0.5 * float(np.sum(residuals**2)),
+        objective_after=None,
+        gradients=0,
+        linearized_sweeps=0,
+        forward_simulations=1,
+        iterations=0,
+        parameters=0,
+        wall_s=wall,
+        step_s=grid.h,
+        pre_roll_s=grid.pre_roll,
+        dof=model.dof,
+        left_out=tuple(left_out_rows(prepared)),
+        limits=limit_uses(used, used, grid),
+        performed=intent if as_meant else performed_motion(prepared, curves),
+    )
+
+
+def _refuse_open_joints(prepared: Prepared, gap: float, options: Options) -> None:
+    """BDF2 keeps joints closed; the others hold them together in velocity, and drift where steps are coarse."""
+    character = prepared.character
+    if gap > CLOSED * character.retarget.allowed(options.tolerance):
+        raise ShotError(
+            f"its joints come apart by {1e3 * gap:.2g} mm in the simulation",
+            path=character.path,
+            attribute="--integrator",
+            found=f"{options.scheme} with steps of {1e3 * prepared.grid.h:.3g} ms",
+            remedy="Use a smaller --step, or bdf2, which keeps them closed.",
+        )

@@ -1,0 +1,148 @@
+"""The motions of a robot for motor curves, from rest or in a loop, and their derivatives."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from calmotion.multibody.analysis.kinematics import target_frames
+from calmotion.multibody.integrators.simulation import simulate_from
+from calmotion.multibody.integrators.workspace import Workspace
+from calmotion.multibody.model.model import Model
+from calmotion.multibody.sensitivity.continuous_adjoint import continuous_adjoint
+from calmotion.multibody.sensitivity.linearization import Linearization, linearize
+from calmotion.multibody.sensitivity.periodic import Monodromy, periodic_adjoint, periodic_tangent
+from calmotion.multibody.sensitivity.sweeps import adjoint, tangent
+from calmotion.shot.character import Array
+from calmotion.simulation.cyclic import SteadyState
+from calmotion.simulation.forward import ForwardRun, run_forward
+
+
+def compile_kernels(
+    model: Model, workspace: Workspace, angles: Array, rates: Array, h: float, world: Array | None = None
+) -> None:
+    """Run every kernel once on three instants, so that compiling them is not counted as simulating."""
+    run = run_forward(model, workspace, angles[:3], rates[:3], h, None if world is None else world[:3])
+    lin = linearize(model.system, run.trajectory, run.joint_angles, run.joint_rates, workspace)
+    adjoint(lin, *tangent(lin, run.joint_angles, run.joint_rates, efforts=True))
+
+
+class Simulator:
+    """One robot over one time grid.
+
+    Args:
+        model: The robot.
+        h: Step [s].
+        world: Moving roots, shape [T, W, 18].
+        cyclic: Whether the shot loops.
+    """
+
+    def __init__(self, model: Model, h: float, world: Array | None, cyclic: bool):
+        self.model, self.h, self.world = model, h, world
+        self._workspace = Workspace.for_system(model.system)
+        self._steady = SteadyState(model, world, h, self._workspace) if cyclic else None
+        self._linearization: Linearization | None = None
+        self._for_continuous: Linearization | None = None
+        self._monodromy: Monodromy | None = None
+        self._first: int | None = None
+        self._known: ForwardRun | None = None  # the last motion, where simulations go on from it
+
+    def hold(self, first: int) -> None:
+        """From now on motor curves stay as they are before an instant.
+
+        Simulations then go on from the first instant at which they differ from the one before, and derivatives by what
+        acts before the instant are not worked out: they are zero. Loops have no beginning that could stay.
+        """
+        if self._steady is None:
+            self._first = first
+
+    def forget(self) -> None:
+        """The next motion is simulated from its start, also where its beginning is known."""
+        self._known = None
+
+    def of(self, model: Model) -> Simulator:
+        """The same of another model of the same character; its loops begin near those of this one."""
+        other = Simulator(model, self.h, self.world, False)
+        if self._steady is not None:
+            other._steady = self._steady.for_model(model)
+        other._first = self._first
+        return other
+
+    def run(self, angles: Array, rates: Array) -> ForwardRun:
+        """Simulate motor curves of shape [T, M].
+
+        Raises:
+            SimulationFailure: They cannot be simulated.
+        """
+        known = self._known
+        if known is None:
+            run = run_forward(self.model, self._workspace, angles, rates, self.h, self.world, steady=self._steady)
+        else:
+            run = self._gone_on(known, angles, rates)
+        if self._first is not None:
+            self._known = run
+        return run
+
+    def _gone_on(self, known: ForwardRun, angles: Array, rates: Array) -> ForwardRun:
+        """The motion that goes on from a known one; that one itself where nothing is different."""
+        joint_angles, joint_rates = self.model.joint_angles(angles), self.model.joint_angles(rates)
+        same = np.all(joint_angles == known.joint_angles, axis=1) & np.all(joint_rates == known.joint_rates, axis=1)
+        if np.all(same):
+            return known
+        first = int(np.argmin(same))
+        if first < 2 or first - 1 in known.trajectory.refined:
+            return run_forward(self.model, self._workspace, angles, rates, self.h, self.world)
+        trajectory = simulate_from(
+            self.model.system, known.trajectory, first, joint_angles, joint_rates, self._workspace
+        )  # fmt: skip
+        states = trajectory.states
+        positions, rotations = target_frames(self.model, states.c[first:], states.q[first:], states.u[first:])
+        return ForwardRun(
+            trajectory, joint_angles, joint_rates, np.concatenate([known.target_positions[:first], positions]),
+            np.concatenate([known.target_rotations[:first], rotations]),
+        )  # fmt: skip
+
+    def linearize(self, run: ForwardRun) -> None:
+        """Linearise about a run, for `tangent` and `adjoint`."""
+        begin = 2 if self._steady is not None else self._first or 0
+        previous, self._linearization = self._linearization, None  # whose memory is used again, also where this fails
+        if previous is not None and self._known is run and previous.is_of(run.trajectory, begin):
+            self._linearization = previous
+            return
+        self._linearization = self._linearized(run, previous, begin)
+        if self._steady is not None:
+            self._monodromy = self._steady.known = Monodromy.of(self._linearization)
+
+    def _linearized(
+        self, run: ForwardRun, previous: Linearization | None, begin: int, continuous: bool = False
+    ) -> Linearization:
+        return linearize(
+            self.model.system, run.trajectory, run.joint_angles, run.joint_rates, self._workspace, previous,
+            continuous=continuous, begin=begin,
+        )  # fmt: skip
+
+    def tangent(self, values: Array, rates: Array, efforts: bool) -> tuple[Array, Array]:
+        """Change of the components' coordinates, shape [T, B, N], and where wanted of the motors' efforts, [T, M], with
+        the motors' values and rates, shape [T, M]."""
+        assert self._linearization is not None
+        given = self.model.joint_angles(values), self.model.joint_angles(rates), efforts
+        if self._monodromy is None:
+            motion, effort = tangent(self._linearization, *given)
+        else:
+            motion, effort = periodic_tangent(self._linearization, self._monodromy, *given)
+        return motion, self.model.motor_values(effort)
+
+    def adjoint(self, gradient: Array, effort: Array | None) -> tuple[Array, Array]:
+        """The transpose of `tangent`: derivatives by the motors' values and rates, shape [T, M] each."""
+        assert self._linearization is not None
+        given = gradient, None if effort is None else self.model.joint_angles(effort)
+        if self._monodromy is None:
+            found = adjoint(self._linearization, *given)
+        else:
+            found = periodic_adjoint(self._linearization, self._monodromy, *given)
+        return self.model.motor_values(found[0]), self.model.motor_values(found[1])
+
+    def continuous_adjoint(self, run: ForwardRun, gradient: Array) -> tuple[Array, Array]:
+        """The same by the continuous adjoint, with a linearisation of its own, of a shot that plays once."""
+        self._for_continuous = self._linearized(run, self._for_continuous, 0, continuous=True)
+        found = continuous_adjoint(self._for_continuous, gradient)
+        return self.model.motor_values(found[0]), self.model.motor_values(found[1])

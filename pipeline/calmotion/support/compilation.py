@@ -1,0 +1,76 @@
+"""Compiled kernels, cached on disk under a key of all their sources.
+
+numba's own cache looks at one file at a time, so a kernel compiled into its caller would go stale when only the
+kernel's file changes. The folder is named by a hash of every kernel source instead, and lies in the user's cache,
+so that an installation that cannot be written to caches as well.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+# Compiling is most of a first run. At level 1 it takes two thirds of the time, and the kernels, whose loops are short,
+# run no slower. numba reads the level once, so it must be set before its first import; a user's own choice stays.
+os.environ.setdefault("NUMBA_OPT", "1")
+
+import numpy as np  # noqa: E402
+from numba import config, njit  # noqa: E402
+
+from calmotion.support.cache_folder import cache_folder
+
+PACKAGE = Path(__file__).parents[1]
+# Flags for the kernels that a kernel calls: numba compiles these anew for every literal True and False they are given.
+YES, NO = np.bool_(True), np.bool_(False)
+FUSED = {"contract"}  # a product and a sum in one rounding; nothing that would reorder or drop terms
+_WITHOUT_ARRAYS: dict[str, Any] = {"_nrt": False, "no_cfunc_wrapper": True, "nogil": True}  # of its own making
+
+
+@cache
+def kernel_folder() -> Path:
+    """Folder of the compiled kernels of exactly these sources."""
+    digest = hashlib.sha256()
+    for path in sorted(PACKAGE.rglob("*.py")):
+        source = path.read_bytes()
+        if b"kernel\ndef " in source or b"part\ndef " in source:
+            digest.update(source)
+    return cache_folder() / "kernels" / digest.hexdigest()[:16]
+
+
+def kernel(function: Callable[..., Any]) -> Any:
+    """Compile a function with numba when it is first called, and keep the result on disk.
+
+    It must not allocate: without reference counting it compiles in a fraction of the time. It runs without the
+    interpreter's lock.
+    """
+    return _compile(function, **_WITHOUT_ARRAYS)
+
+
+def part(function: Callable[..., Any]) -> Any:
+    """A `kernel` that one other calls: compiled into that one, and by itself only where Python calls it.
+
+    Of a kernel that another calls numba makes machine code twice, by itself and in the other, and three times where
+    that is called in turn.
+    """
+    return _compile(function, **_WITHOUT_ARRAYS, inline="always")
+
+
+def allocating_kernel(function: Callable[..., Any]) -> Any:
+    """`kernel` for a function that makes arrays."""
+    return _compile(function)
+
+
+def _compile(function: Callable[..., Any], **options: Any) -> Any:
+    if os.environ.get("NUMBA_CACHE_DIR"):
+        return njit(cache=True, fastmath=FUSED, **options)(function)
+    # numba picks the folder when a function is decorated; other users of numba keep theirs
+    before = config.CACHE_DIR
+    config.CACHE_DIR = str(kernel_folder())
+    try:
+        return njit(cache=True, fastmath=FUSED, **options)(function)
+    finally:
+        config.CACHE_DIR = before

@@ -1,0 +1,1 @@
+"""Bodies: mass, shapes, materials, interfaces, flexible settings."""

@@ -1,0 +1,103 @@
+"""Which bodies bend, and how they are to be meshed and reduced."""
+
+from __future__ import annotations
+
+import math
+import os
+
+import numpy as np
+
+from calmotion.errors import ShotError
+from calmotion.shot import FlexibleSettings
+from calmotion.usd import schemas
+from calmotion.usd.reading.bodies.materials import elastic_material
+from calmotion.usd.reading.context import Reading
+from calmotion.usd.transforms import Pose
+
+_SCHEMA = "CalmFlexibleBodyAPI"
+_ELASTICITY = ("auto", "linear", "stvk", "neohookean")
+
+
+def flexible_settings(reading: Reading, prim, pose: Pose) -> FlexibleSettings | None:
+    """The settings of a flexible body, or None for a rigid one.
+
+    Raises:
+        ShotError: A value out of range, a mesh file that is missing, no elastic material.
+    """
+    if not schemas.is_applied(prim, _SCHEMA):
+        if any(a.GetName().startswith("calm:flexible:") for a in prim.GetAuthoredAttributes()):
+            reading.note(f"{prim.GetPath()}: it has calm:flexible attributes but not {_SCHEMA}, so it stays rigid")
+        return None
+    if not schemas.value(prim, _SCHEMA, "calm:flexible:enabled"):
+        return None
+    elasticity = str(schemas.value(prim, _SCHEMA, "calm:flexible:elasticity"))
+    if elasticity not in _ELASTICITY:
+        raise ShotError(
+            "names an elasticity model that does not exist",
+            path=prim.GetPath(),
+            attribute="calm:flexible:elasticity",
+            found=elasticity,
+            remedy=f"Use one of {', '.join(_ELASTICITY)}",
+        )
+    mesh_file = _mesh_file(prim)
+    return FlexibleSettings(
+        material=elastic_material(reading, prim),
+        mode_count=int(_automatic(prim, "calm:flexible:modeCount")),
+        max_frequency=_automatic(prim, "calm:flexible:maxFrequency"),
+        element_size=_length(reading, prim, "calm:flexible:elementSize"),
+        interface_radius=_length(reading, prim, "calm:flexible:interfaceRadius"),
+        mesh_file=mesh_file,
+        mesh_scale=_mesh_scale(reading, prim, pose) if mesh_file else 1.0,
+        elasticity=elasticity,
+    )
+
+
+def _automatic(prim, name: str) -> float:
+    """A positive value, or -1 for automatic."""
+    value = schemas.value(prim, _SCHEMA, name)
+    if value == -1:
+        return -1.0
+    if not (math.isfinite(value) and value > 0):
+        raise ShotError(
+            "must be positive, or -1 for automatic",
+            path=prim.GetPath(),
+            attribute=name,
+            found=value,
+            remedy="Correct the value, or remove the attribute",
+        )
+    return float(value)
+
+
+def _length(reading: Reading, prim, name: str) -> float:
+    value = _automatic(prim, name)
+    return value if value == -1.0 else reading.units.length(value)
+
+
+def _mesh_file(prim) -> str:
+    """The external mesh, resolved against the layer that names it; empty when there is none."""
+    name = "calm:flexible:meshFile"
+    asset = schemas.value(prim, _SCHEMA, name)
+    if asset is None or not asset.path:
+        return ""
+    if asset.resolvedPath and os.path.exists(asset.resolvedPath):
+        return str(asset.resolvedPath)
+    raise ShotError(
+        "names a mesh file that is missing",
+        path=prim.GetPath(),
+        attribute=name,
+        found=f"@{asset.path}@",
+        remedy="Put the file there, or correct or remove the attribute",
+    )
+
+
+def _mesh_scale(reading: Reading, prim, pose: Pose) -> float:
+    """Metres per unit of an external mesh, which is in the body's own axes."""
+    if not np.allclose(pose.scale, pose.scale[0], rtol=1e-5) or pose.scale[0] < 0.0:
+        raise ShotError(
+            "an external mesh needs a body without a mirrored scale or one that differs by axis",
+            path=prim.GetPath(),
+            attribute="calm:flexible:meshFile",
+            found=pose.scale.tolist(),
+            remedy="Freeze the scale of the body, or put the mesh into the shot",
+        )
+    return float(reading.units.length(pose.scale[0]))

@@ -1,0 +1,214 @@
+"""Mass, centre and inertia of a body with the precedence and the "not authored" conventions of UsdPhysics."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from calmotion.errors import ShotError
+from calmotion.shot import MassProperties
+from calmotion.shot.character import Array
+from calmotion.usd import gf
+from calmotion.usd.reading.bodies.moments import Moments, sum_of, surface_moments
+from calmotion.usd.reading.bodies.shapes import Shape
+from calmotion.usd.reading.context import Reading
+from calmotion.usd.schemas import is_applied
+from calmotion.usd.transforms import Pose, rotation_from_quaternion
+
+_DEFAULT_DENSITY = 1000.0  # kg/m^3: what UsdPhysics assumes for a collider without any density
+
+
+def mass_of(reading: Reading, prim, pose: Pose, shapes: list[Shape]) -> MassProperties | None:
+    """The mass properties of a body.
+
+    A mass on the body overrides everything below it. Otherwise each of its colliders (where it has none, each of
+    its visible solids) gives a mass: its own, or its volume times its own density, the body's, the material's, and
+    for a collider at last 1000 kg/m^3. Centre and inertia follow from the geometry, and what is authored of
+    them on the body overrides that.
+
+    Args:
+        reading: The stage.
+        prim: The body's prim.
+        pose: Its pose, stage units.
+        shapes: Its geometry.
+
+    Returns:
+        SI, body frame; None where nothing in the shot gives the body a mass.
+
+    Raises:
+        ShotError: A mass, density or inertia that is authored and not positive, or not finite.
+    """
+    units = reading.units
+    mass = _authored(prim, "physics:mass", "mass", zero_means_unauthored=False)
+    center, tensor = _center(prim), _inertia(prim)
+    if tensor is not None:
+        _note_impossible(reading, prim, tensor)
+    if mass is not None and center is not None and tensor is not None:
+        return MassProperties(units.mass(mass), units.length(pose.scale * center), units.inertia(tensor))
+    solid = _from_geometry(reading, prim, shapes, body_mass=None if mass is None else units.mass(mass))
+    if solid is None:
+        return None
+    return MassProperties(
+        solid.mass,
+        solid.center if center is None else units.length(pose.scale * center),
+        solid.inertia if tensor is None else units.inertia(tensor),
+    )
+
+
+def has_authored_mass(prim) -> bool:
+    """Whether a positive mass is authored on the body itself; refuses one that is not positive."""
+    return _authored(prim, "physics:mass", "mass", zero_means_unauthored=False) is not None
+
+
+def _authored(prim, name: str, what: str, *, zero_means_unauthored: bool = True) -> float | None:
+    """A mass or density: None where not authored."""
+    attribute = prim.GetAttribute(name)
+    if not attribute or not attribute.HasAuthoredValue():
+        return None
+    value = attribute.Get()
+    if value is None or (value == 0.0 and zero_means_unauthored):
+        return None
+    if not (np.isfinite(value) and value > 0.0):
+        raise ShotError(
+            f"the {what} must be positive",
+            path=prim.GetPath(),
+            attribute=name,
+            found=value,
+            remedy=f"Author a positive {what}, or remove the attribute so that it follows from geometry and density",
+        )
+    return float(value)
+
+
+def _center(prim) -> Array | None:
+    attribute = prim.GetAttribute("physics:centerOfMass")
+    value = attribute.Get() if attribute and attribute.HasAuthoredValue() else None
+    if value is None:
+        return None
+    found = gf.vector(value)
+    if np.all(np.isneginf(found)):
+        return None
+    if not np.all(np.isfinite(found)):
+        raise ShotError(
+            "the centre of mass is not finite",
+            path=prim.GetPath(),
+            attribute="physics:centerOfMass",
+            found=value,
+            remedy="Correct it, or remove the attribute so that it follows from the geometry",
+        )
+    return found
+
+
+def _inertia(prim) -> Array | None:
+    """The authored inertia tensor, body axes, stage units, shape [3, 3]."""
+    attribute = prim.GetAttribute("physics:diagonalInertia")
+    value = attribute.Get() if attribute and attribute.HasAuthoredValue() else None
+    if value is None:
+        return None
+    diagonal = gf.vector(value)
+    if np.all(diagonal == 0.0):
+        return None
+    if not (np.all(np.isfinite(diagonal)) and np.all(diagonal > 0.0)):
+        raise ShotError(
+            "every principal moment of inertia must be positive",
+            path=prim.GetPath(),
+            attribute="physics:diagonalInertia",
+            found=value,
+            remedy="Correct it, or remove the attribute so that it follows from the geometry",
+        )
+    axes = prim.GetAttribute("physics:principalAxes")
+    turn = axes.Get() if axes and axes.HasAuthoredValue() else None
+    quaternion = np.array([1.0, 0.0, 0.0, 0.0]) if turn is None else gf.quaternion(turn)
+    if not np.all(np.isfinite(quaternion)):
+        raise ShotError(
+            "the principal axes are not finite",
+            path=prim.GetPath(),
+            attribute="physics:principalAxes",
+            found=turn,
+            remedy="Correct them, or remove the attribute",
+        )
+    if np.linalg.norm(quaternion) < 1e-6:  # (0, 0, 0, 0) means: not authored
+        return np.diag(diagonal)
+    rotation = rotation_from_quaternion(quaternion)
+    return rotation @ np.diag(diagonal) @ rotation.T
+
+
+def _note_impossible(reading: Reading, prim, tensor: Array) -> None:
+    a, b, c = np.sort(np.linalg.eigvalsh(tensor))
+    if c > (a + b) * (1.0 + 1e-3):
+        reading.note(
+            f"{prim.GetPath()}: no real body has this physics:diagonalInertia (its largest value exceeds the sum of "
+            "the other two); it is used as it is"
+        )
+
+
+def _from_geometry(reading: Reading, prim, shapes: list[Shape], body_mass: float | None) -> MassProperties | None:
+    """What geometry and densities say, scaled to the authored mass of the body where there is one."""
+    colliders = [s for s in shapes if s.collider]
+    solids = colliders or [s for s in shapes if s.surface.visible]
+    density = _authored(prim, "physics:density", "density")
+    parts: list[MassProperties] = []
+    for shape in solids:
+        own = shape.prim != prim  # a body may itself be its only geometry
+        part_density = _authored(shape.prim, "physics:density", "density") if own else None
+        part_density = part_density or density or _material_density(shape.prim)
+        part_mass = _authored(shape.prim, "physics:mass", "mass") if own else None
+        si = None if part_density is None else reading.units.density(part_density)
+        if si is None and (colliders or body_mass is not None or part_mass is not None):
+            si = _DEFAULT_DENSITY
+            if body_mass is None and part_mass is None:
+                reading.note(
+                    f"{shape.surface.path}: neither a mass nor a density is authored; 1000 kg/m^3 is assumed, as "
+                    "UsdPhysics does"
+                )
+        if si is None:
+            continue
+        moments = shape.moments or _hull_moments(reading, shape)
+        part = moments.mass_properties(si)
+        if part.mass <= 0.0:
+            continue
+        if part_mass is not None:
+            factor = reading.units.mass(part_mass) / part.mass
+            part = MassProperties(part.mass * factor, part.center, part.inertia * factor)
+        parts.append(part)
+    if parts:
+        whole = sum_of(parts)
+        if body_mass is None:
+            return whole
+        factor = body_mass / whole.mass
+        return MassProperties(body_mass, whole.center, whole.inertia * factor)
+    if body_mass is None:
+        return None
+    # A mass without geometry: a ball of the density of water, unless an inertia is authored.
+    radius2 = (3.0 * body_mass / (4.0 * np.pi * _DEFAULT_DENSITY)) ** (2.0 / 3.0)
+    if _inertia(prim) is None:
+        reading.note(
+            f"{prim.GetPath()}: it has a mass but neither inertia nor geometry; the inertia of a ball of 1000 kg/m^3 "
+            "is used"
+        )
+    return MassProperties(body_mass, np.zeros(3), 0.4 * body_mass * radius2 * np.eye(3))
+
+
+def _hull_moments(reading: Reading, shape: Shape) -> Moments:
+    """Moments of the convex hull of an open surface."""
+    from scipy.spatial import ConvexHull, QhullError
+
+    points = shape.surface.points
+    try:
+        hull = ConvexHull(points)
+    except QhullError:  # flat or too few points
+        return Moments(0.0, np.zeros(3), np.zeros((3, 3)))
+    reading.note(f"{shape.surface.path}: the surface is open; its mass follows from its convex hull")
+    triangles = hull.simplices.astype(np.int32)
+    a, b, c = (points[triangles[:, k]] for k in range(3))
+    inward = np.einsum("na,na->n", np.cross(b - a, c - a), a - points.mean(axis=0)) < 0.0
+    triangles[inward] = triangles[inward][:, ::-1]
+    return surface_moments(points, triangles)
+
+
+def _material_density(prim) -> float | None:
+    """The density of the physics material bound to a prim, the weakest opinion."""
+    from pxr import UsdShade
+
+    material, _ = UsdShade.MaterialBindingAPI(prim).ComputeBoundMaterial("physics")
+    if not material or not is_applied(material.GetPrim(), "PhysicsMaterialAPI"):
+        return None
+    return _authored(material.GetPrim(), "physics:density", "density")

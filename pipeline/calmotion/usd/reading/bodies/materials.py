@@ -1,0 +1,87 @@
+"""The elastic material of a flexible body."""
+
+from __future__ import annotations
+
+import math
+
+from calmotion.errors import ShotError
+from calmotion.shot import ElasticMaterial
+from calmotion.usd import schemas
+from calmotion.usd.dialects import number_of
+from calmotion.usd.reading.context import Reading, is_rigid_body, prims_below
+
+_SCHEMA = "PhysicsVolumeDeformableMaterialAPI"  # of the AOUSD proposal; usd-core does not define it
+_REMEDY = (
+    f"Bind a Material for the purpose `physics` (material:binding:physics) with {_SCHEMA} and its attributes "
+    "physics:youngsModulus, physics:poissonsRatio and physics:density, or remove CalmFlexibleBodyAPI"
+)
+
+
+def elastic_material(reading: Reading, body_prim) -> ElasticMaterial:
+    """The material bound for physics to a body, else to geometry below it.
+
+    Raises:
+        ShotError: There is none, or a value of it that no elastic solid has.
+    """
+    from pxr import UsdShade
+
+    bound = None
+    for prim in prims_below(body_prim, is_rigid_body):
+        found, _ = UsdShade.MaterialBindingAPI(prim).ComputeBoundMaterial("physics")
+        if not found:
+            continue
+        bound = bound or found.GetPrim()
+        if schemas.is_applied(found.GetPrim(), _SCHEMA) or found.GetPrim().GetAttribute("physics:youngsModulus"):
+            return _material(reading, found.GetPrim())
+    raise ShotError(
+        "a flexible body without an elastic material",
+        path=body_prim.GetPath(),
+        attribute="material:binding:physics",
+        found=f"{bound.GetPath()}, which is not elastic" if bound else None,
+        remedy=_REMEDY,
+    )
+
+
+def _material(reading: Reading, prim) -> ElasticMaterial:
+    units = reading.units
+    modulus = _number(prim, "physics:youngsModulus", lambda x: x > 0.0, "must be positive")
+    ratio = _number(prim, "physics:poissonsRatio", lambda x: -1.0 < x < 0.5, "must lie between -1 and 0.5, exclusively")
+    density = _number(prim, "physics:density", lambda x: x > 0.0, "must be positive")
+    damping = float(schemas.value(prim, "CalmDampingAPI", "calm:damping:ratio"))
+    if not 0.0 <= damping < 1.0:
+        raise ShotError(
+            "must lie between 0 and 1 (critical damping)",
+            path=prim.GetPath(),
+            attribute="calm:damping:ratio",
+            found=damping,
+            remedy="Author a fraction of critical damping, such as 0.01",
+        )
+    rayleigh = [_rayleigh(prim, name) for name in ("calm:damping:rayleighMass", "calm:damping:rayleighStiffness")]
+    return ElasticMaterial(
+        path=str(prim.GetPath()),
+        youngs_modulus=units.pressure(modulus),
+        poissons_ratio=ratio,
+        density=units.density(density),
+        damping_ratio=damping,
+        rayleigh=None if rayleigh == [None, None] else (rayleigh[0] or 0.0, rayleigh[1] or 0.0),
+    )
+
+
+def _number(prim, name: str, allowed, problem: str) -> float:
+    value = number_of(prim, name)
+    if value is None:
+        raise ShotError("is not authored", path=prim.GetPath(), attribute=name, remedy=_REMEDY)
+    if not (math.isfinite(value) and allowed(value)):
+        raise ShotError(problem, path=prim.GetPath(), attribute=name, found=value, remedy="Correct the value")
+    return value
+
+
+def _rayleigh(prim, name: str) -> float | None:
+    value = schemas.value(prim, "CalmDampingAPI", name)
+    if value is None:
+        return None
+    if not (math.isfinite(value) and value >= 0.0):
+        raise ShotError(
+            "must not be negative", path=prim.GetPath(), attribute=name, found=value, remedy="Correct the value"
+        )
+    return float(value)

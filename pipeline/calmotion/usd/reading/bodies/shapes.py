@@ -1,0 +1,235 @@
+"""The geometry of a body: triangulated surfaces in its frame, tetrahedra, and the solids for its mass."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from calmotion.errors import ShotError
+from calmotion.shot import SurfaceMesh, TetGeometry
+from calmotion.shot.character import Array, IntArray
+from calmotion.usd import gf
+from calmotion.usd.reading.bodies import primitives
+from calmotion.usd.reading.bodies.moments import Moments, is_closed, surface_moments
+from calmotion.usd.reading.bodies.polygons import triangulate
+from calmotion.usd.reading.context import Reading, is_rigid_body, prims_below
+from calmotion.usd.schemas import is_applied
+from calmotion.usd.transforms import Pose
+
+
+@dataclass(frozen=True, eq=False)
+class Shape:
+    """One geometric prim of a body.
+
+    Attributes:
+        prim: The Usd.Prim.
+        surface: Its surface, in the body's frame, m.
+        moments: Moments of its solid, in the body's frame, m; None for an open surface.
+        collider: Whether it collides.
+    """
+
+    prim: Any
+    surface: SurfaceMesh
+    moments: Moments | None
+    collider: bool
+
+
+def shapes_of(reading: Reading, body_prim, pose: Pose) -> list[Shape]:
+    """The geometry below a body, up to bodies nested in it.
+
+    Args:
+        reading: The stage.
+        body_prim: The body's prim.
+        pose: Its pose, stage units.
+
+    Raises:
+        ShotError: Geometry that is not finite or whose faces do not fit its points.
+    """
+    shapes: list[Shape] = []
+    purposes = _shown_purposes(body_prim)
+    for prim in prims_below(body_prim, _is_elsewhere):
+        if prim.GetTypeName() == "PointInstancer":
+            _pass_over(reading, prim, body_prim)
+        kind = str(prim.GetTypeName())
+        if kind == "Mesh":
+            points, triangles = mesh_geometry(prim, reading.start)
+            moments = None
+        elif kind in primitives.TYPES:
+            points, triangles, moments = primitives.solid(prim, reading.start)
+        else:
+            continue
+        if len(triangles) == 0:
+            continue
+        linear, offset = to_body(reading, prim, pose)
+        placed = points @ linear.T + offset
+        if np.linalg.det(linear) < 0.0:
+            triangles = triangles[:, ::-1].copy()
+        if moments is not None:
+            moments = moments.mapped(linear, offset)
+        elif is_closed(triangles, placed):
+            moments = surface_moments(placed, triangles)
+        writable = kind == "Mesh" and not prim.IsInstanceProxy()
+        surface = SurfaceMesh(
+            path=str(prim.GetPath()),
+            points=placed,
+            triangles=triangles,
+            color=_color(prim, reading.start),
+            visible=_is_visible(prim, reading.start, purposes) and not _is_copy(placed, triangles, shapes),
+            displaced=len(placed) if writable else 0,
+        )
+        collider = is_applied(prim, "PhysicsCollisionAPI")
+        collider = collider and prim.GetAttribute("physics:collisionEnabled").Get() is not False
+        shapes.append(Shape(prim, surface, moments, collider))
+    return shapes
+
+
+def tets_of(reading: Reading, body_prim, pose: Pose) -> TetGeometry | None:
+    """The tetrahedra authored below a body, or None.
+
+    Raises:
+        ShotError: Several TetMesh prims, or one whose tetrahedra do not fit its points.
+    """
+    found = [p for p in prims_below(body_prim, _is_elsewhere) if p.GetTypeName() == "TetMesh"]
+    if not found:
+        return None
+    if len(found) > 1:
+        raise ShotError(
+            "a body has one TetMesh",
+            path=body_prim.GetPath(),
+            found=", ".join(str(p.GetPath()) for p in found),
+            remedy="Merge them into one, or keep one of them",
+        )
+    prim = found[0]
+    points = finite_points(prim, reading.start)
+    tets = gf.indices(prim.GetAttribute("tetVertexIndices").Get(reading.start), 4)
+    if len(tets) == 0 or len(points) == 0:
+        raise ShotError(
+            "has no tetrahedra",
+            path=prim.GetPath(),
+            attribute="tetVertexIndices",
+            remedy="Author them, or remove the prim",
+        )
+    _check_indices(prim, "tetVertexIndices", tets, len(points))
+    linear, offset = to_body(reading, prim, pose)
+    mirrored = np.linalg.det(linear) < 0.0
+    if mirrored != (prim.GetAttribute("orientation").Get() == "leftHanded"):
+        tets = tets[:, [1, 0, 2, 3]].copy()
+    return TetGeometry(str(prim.GetPath()), points @ linear.T + offset, tets)
+
+
+def _is_elsewhere(prim) -> bool:
+    """Whether what is below a prim is no geometry of the body above it: another body, or patterns of instances."""
+    return is_rigid_body(prim) or prim.GetParent().GetTypeName() == "PointInstancer"
+
+
+def _pass_over(reading: Reading, prim, body_prim) -> None:
+    """Point instances are not read: refused where a body is to be meshed, a note where they are only looks."""
+    flexible = is_applied(body_prim, "CalmFlexibleBodyAPI")
+    if flexible and body_prim.GetAttribute("calm:flexible:enabled").Get() is not False:
+        raise ShotError(
+            "holds point instances, which are not read as geometry of a flexible body",
+            path=prim.GetPath(),
+            found="PointInstancer",
+            remedy="Make them Mesh prims or instanceable references, or move them out of the body",
+        )
+    reading.note(f"{prim.GetPath()}: point instances are not read; the body is treated without them")
+
+
+def to_body(reading: Reading, prim, pose: Pose) -> tuple[Array, Array]:
+    """Linear part [3, 3] and offset [3] from a prim's own axes, stage units, to the body's frame, m."""
+    world = reading.world_matrix(prim)
+    scale = reading.units.length(1.0)
+    return scale * pose.rotation.T @ world[:3, :3], scale * pose.rotation.T @ (world[:3, 3] - pose.position)
+
+
+def finite_points(prim, time: float) -> Array:
+    """The points of a Mesh or TetMesh, its own axes and stage units, shape [n, 3].
+
+    Raises:
+        ShotError: They are not finite.
+    """
+    points = gf.points(prim.GetAttribute("points").Get(time))
+    if not np.all(np.isfinite(points)):
+        raise ShotError("its points are not finite", path=prim.GetPath(), attribute="points", remedy="Correct them")
+    return points
+
+
+def _check_indices(prim, name: str, found: IntArray, count: int) -> None:
+    if len(found) and (int(found.min()) < 0 or int(found.max()) >= count):
+        raise ShotError(
+            f"refers to points that do not exist (it has {count})",
+            path=prim.GetPath(),
+            attribute=name,
+            found=int(found.min()) if found.min() < 0 else int(found.max()),
+            remedy="Correct the indices",
+        )
+
+
+def mesh_geometry(prim, time: float) -> tuple[Array, IntArray]:
+    """Points and right-handed triangles of a Mesh, its polygons cut up, its holes left out."""
+    points = finite_points(prim, time)
+    counts = gf.indices(prim.GetAttribute("faceVertexCounts").Get(time))
+    corners = gf.indices(prim.GetAttribute("faceVertexIndices").Get(time))
+    if int(counts.min(initial=0)) < 0 or int(counts.sum()) != len(corners):
+        raise ShotError(
+            "the faces use another number of corners than there are",
+            path=prim.GetPath(),
+            attribute="faceVertexCounts",
+            found=f"{int(counts.sum())} and {len(corners)}",
+            remedy="Correct faceVertexCounts or faceVertexIndices",
+        )
+    _check_indices(prim, "faceVertexIndices", corners, len(points))
+    keep = np.ones(len(counts), dtype=bool)
+    holes = gf.indices(prim.GetAttribute("holeIndices").Get(time))
+    keep[holes[(holes >= 0) & (holes < len(counts))]] = False
+    triangles = triangulate(points, counts, corners, keep)
+    if prim.GetAttribute("orientation").Get() == "leftHanded":
+        triangles = triangles[:, ::-1].copy()
+    return points, triangles
+
+
+def _shown_purposes(body_prim) -> set[str]:
+    """Purposes of the geometry by which a body is shown: guides and proxies where it has nothing else."""
+    from pxr import UsdGeom
+
+    geometry = [p for p in prims_below(body_prim, _is_elsewhere) if p.IsA(UsdGeom.Gprim)]
+    found = {str(UsdGeom.Imageable(prim).ComputePurpose()) for prim in geometry}
+    return found - {"guide", "proxy"} or found
+
+
+def _is_visible(prim, time: float, purposes: set[str]) -> bool:
+    from pxr import UsdGeom
+
+    image = UsdGeom.Imageable(prim)
+    return str(image.ComputePurpose()) in purposes and image.ComputeVisibility(time) != UsdGeom.Tokens.invisible
+
+
+def _is_copy(points: Array, triangles: IntArray, earlier: list[Shape]) -> bool:
+    """Whether a visible surface with the same points is there already, as converters make for collisions."""
+    size = float(np.max(np.ptp(points, axis=0)))
+    for shape in earlier:
+        other = shape.surface
+        if other.visible and other.points.shape == points.shape and len(other.triangles) == len(triangles):
+            if np.allclose(other.points, points, rtol=0.0, atol=1e-6 * size):
+                return True
+    return False
+
+
+def _color(prim, time: float) -> tuple[float, float, float] | None:
+    """The display colour, else the diffuse colour of a preview surface; linear RGB."""
+    from pxr import UsdGeom, UsdShade
+
+    primvar = UsdGeom.PrimvarsAPI(prim).FindPrimvarWithInheritance("displayColor")
+    if primvar and primvar.HasValue() and str(primvar.GetTypeName()).endswith("3f[]"):
+        values = gf.points(primvar.Get(time))
+        if len(values):
+            return tuple(float(x) for x in values[0])  # type: ignore[return-value]
+    material, _ = UsdShade.MaterialBindingAPI(prim).ComputeBoundMaterial()
+    if material:
+        shader, _, _ = material.ComputeSurfaceSource()
+        color = shader.GetInput("diffuseColor").Get() if shader and shader.GetInput("diffuseColor") else None
+        if color is not None:
+            return tuple(float(x) for x in color)  # type: ignore[return-value]
+    return None

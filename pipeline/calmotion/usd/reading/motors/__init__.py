@@ -1,0 +1,1 @@
+"""Motor tracks: from drives, body transforms, skeletons and files; gears and limits."""

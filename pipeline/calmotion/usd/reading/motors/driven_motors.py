@@ -1,0 +1,277 @@
+"""Motors: which joints are driven, and where the track of each is."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from calmotion.errors import ShotError
+from calmotion.shot import Follows, Motor
+from calmotion.usd import schemas
+from calmotion.usd.dialects import number_of
+from calmotion.usd.reading.context import Reading, prims_of
+from calmotion.usd.reading.joints import JointPrim, refuse_unsupported
+from calmotion.usd.reading.motors.free_ranges import may_change
+from calmotion.usd.reading.motors.gearing import Gear, read_gear, resolve
+from calmotion.usd.reading.motors.motor_limits import effort_limit, own_limit, velocity_limit
+from calmotion.usd.reading.motors.tracks import sample_codes
+from calmotion.usd.units import StageUnits
+
+ATTRIBUTE = "drive:angular:physics:targetPosition"
+LENGTH_ATTRIBUTE = "drive:linear:physics:targetPosition"
+SKEL_JOINT = "calm:motor:skelJoint"
+DRIVE, BODIES, SKELETON, HELD, GEARED, GIVEN = "drive", "bodies", "skeleton", "held", "geared", "given"
+_SCHEMA = "CalmMotorAPI"
+_DRIVES = {"revolute": "angular", "prismatic": "linear"}
+_UNITS = {"angular": "degrees", "linear": "units of length"}
+_WRITTEN_AS = {BODIES: "xformOpOrder", SKELETON: SKEL_JOINT}
+
+
+def target_attribute(kind: str) -> str:
+    """Name of the attribute with the track of a joint of a kind."""
+    return LENGTH_ATTRIBUTE if kind == "prismatic" else ATTRIBUTE
+
+
+def to_si(kind: str, units: StageUnits) -> float:
+    """Radians or metres in the unit of that attribute."""
+    return float(units.length(1.0) if kind == "prismatic" else np.deg2rad(1.0))
+
+
+def _remedy(kind: str) -> str:
+    drive = _DRIVES[kind]
+    return (
+        f"Apply PhysicsDriveAPI:{drive} and author time samples of {target_attribute(kind)}, in {_UNITS[drive]}, or "
+        "animate the transforms of the bodies that it joins, or remove what makes the joint a motor"
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class Drive:
+    """A joint that is driven.
+
+    Attributes:
+        joint: The joint.
+        source: Where its track is: `DRIVE` (samples or a spline of the target position), `BODIES` (transforms of the
+            bodies), `SKELETON` (a joint of a UsdSkel animation), `HELD` (nowhere: it holds a value), `GEARED` (another
+            motor's), `GIVEN` (beside the shot).
+        held: The value that it holds [rad or m]; None: that of the pose in which the bodies stand.
+        skel_joint: The joint of the skeleton.
+        gear: How it follows another motor.
+    """
+
+    joint: JointPrim
+    source: str
+    held: float | None = None
+    skel_joint: str = ""
+    gear: Gear | None = None
+
+    def attribute(self, stage) -> Any:
+        """The target position of its drive, on a stage; invalid where the joint has no drive."""
+        return stage.GetPrimAtPath(self.joint.path).GetAttribute(target_attribute(self.joint.kind))
+
+
+def actuated_joints(stage) -> dict[str, str]:
+    """Joints that an actuator of a MuJoCo conversion drives, itself or by a tendon, with the actuator's path (usd-core
+    does not know these types)."""
+    found = {}
+    for prim in prims_of(stage):
+        if prim.GetTypeName() != "MjcActuator":
+            continue
+        relationship = prim.GetRelationship("mjc:target")
+        for target in relationship.GetTargets() if relationship else []:
+            named = stage.GetPrimAtPath(target)
+            path = named.GetRelationship("mjc:path") if named else None
+            for joint in path.GetTargets() if path else [target]:
+                found[str(joint)] = str(prim.GetPath())
+    return found
+
+
+def read_drives(
+    reading: Reading, joints: list[JointPrim], root: str, posed: Sequence[str], given: Sequence[str], still: bool
+) -> list[Drive]:
+    """The driven joints.
+
+    A revolute joint with an angular drive, or a prismatic one with a linear drive, is a motor, and one that an actuator
+    of a MuJoCo conversion names. A drive without any target position and without stiffness pulls nowhere, and its joint
+    moves freely.
+
+    Args:
+        joints: The joints of the character.
+        root: Path of the character, for the message.
+        posed: Joints whose bodies the shot moves relative to each other, by their transforms; where there are any, the
+            motors that hold still are read from the bodies as well.
+        given: Joints whose tracks are given beside the shot.
+        still: Whether a character that is not animated at all may be read.
+
+    Raises:
+        ShotError: No motors; none that is animated; a motor inside an instance, where nothing can be written.
+    """
+    kinds = {joint.path: joint.kind for joint in joints}
+    actuated, drives, gears = actuated_joints(reading.stage), {}, {}
+    for joint in joints:
+        with reading.going_on():
+            if joint.prim is None or joint.kind not in _DRIVES:
+                _refuse_wrong_motor(joint)
+                continue
+            gear = read_gear(joint, kinds, reading.units)
+            if gear is not None:
+                gears[joint.path] = gear
+            drive = _drive(joint, actuated, reading, posed, given, still or gear is not None)
+            if drive is not None:
+                drives[joint.path] = drive
+    with reading.going_on():
+        _engage(drives, resolve(gears), {joint.path: joint for joint in joints}, reading)
+    found = [drives[joint.path] for joint in joints if joint.path in drives]
+    if reading.problems:
+        return found
+    if not found:
+        for joint in joints:
+            refuse_unsupported(joint)
+        raise ShotError(
+            "no motors: none of its joints is driven",
+            path=root,
+            remedy="Apply PhysicsDriveAPI:angular to the revolute joints that motors drive, and author time samples "
+            f"of {ATTRIBUTE}, in degrees",
+        )
+    if not still and all(drive.source in (HELD, GEARED) for drive in found):
+        raise ShotError(
+            "a motor without animation, and no other motor is animated either",
+            path=found[0].joint.path,
+            attribute=target_attribute(found[0].joint.kind),
+            remedy=_remedy(found[0].joint.kind),
+        )
+    _refuse_rivals(found, reading)
+    for drive in found:
+        if drive.joint.prim.IsInstanceProxy():
+            reading.problems.append(
+                ShotError(
+                    "the motor is inside an instance, where its curve cannot be written",
+                    path=drive.joint.path,
+                    attribute=target_attribute(drive.joint.kind),
+                    remedy="Set instanceable = false on the instance above it",
+                )
+            )
+    return found
+
+
+def _refuse_rivals(drives: Sequence[Drive], reading: Reading) -> None:
+    """Two motors between the same bodies cannot both have their way."""
+    first: dict[frozenset[str], Drive] = {}
+    for drive in drives:
+        pair = frozenset((drive.joint.body0, drive.joint.body1))
+        rival = first.setdefault(pair, drive)
+        if rival is not drive:
+            reading.problems.append(
+                ShotError(
+                    "two motors are between the same two bodies, and cannot both have their way",
+                    path=drive.joint.path,
+                    attribute=target_attribute(drive.joint.kind),
+                    found=rival.joint.path,
+                    remedy="Remove one of the joints, or the drive of one of them",
+                )
+            )
+
+
+def _engage(drives: dict[str, Drive], gears: dict[str, Gear], joints: dict[str, JointPrim], reading: Reading) -> None:
+    """Make motors of the joints that are geared to motors."""
+    for path, gear in gears.items():
+        if gear.leader not in drives:
+            raise ShotError(
+                "the joint is geared to one that no motor drives",
+                path=path,
+                found=gear.leader,
+                remedy="Make that one a motor, or remove the gear and close a loop of bodies and joints instead",
+            )
+        if path in drives and drives[path].source not in (HELD, GEARED):
+            reading.note(f"{path}: it is geared to {gear.leader}, so its own animation is not used")
+        drives[path] = Drive(joints[path], GEARED, gear=gear)
+
+
+def read_motor(drive: Drive, index: int, motors: dict[str, int], reading: Reading) -> Motor:
+    """The motor of a drive, limits in SI.
+
+    Args:
+        drive: The drive.
+        index: Of its joint.
+        motors: Index of each motor, by the path of its joint.
+
+    Raises:
+        ShotError: A limit that is not positive.
+    """
+    prim, kind, linear = drive.joint.prim, _DRIVES[drive.joint.kind], drive.joint.kind == "prismatic"
+    from_stage = reading.units.length if linear else np.deg2rad
+    gear = drive.gear
+    return Motor(
+        joint=index,
+        path=drive.joint.path,
+        attribute=_WRITTEN_AS.get(drive.source, target_attribute(drive.joint.kind)),
+        source=drive.source if drive.source in _WRITTEN_AS else DRIVE,
+        optimize=may_change(prim),
+        max_velocity=velocity_limit(drive.joint, kind, reading.units, reading.notes),
+        max_acceleration=float(from_stage(own_limit(prim, "calm:motor:maxAcceleration"))),
+        max_torque=effort_limit(drive.joint, kind, reading.units, reading.notes),
+        linear=linear,
+        follows=None if gear is None else Follows(motors[gear.leader], gear.ratio, gear.offset),
+    )
+
+
+def _drive(
+    joint: JointPrim, actuated: dict[str, str], reading: Reading, posed: Sequence[str], given: Sequence[str],
+    still: bool,
+) -> Drive | None:  # fmt: skip
+    prim, name = joint.prim, target_attribute(joint.kind)
+    drive, unit = _DRIVES[joint.kind], _UNITS[_DRIVES[joint.kind]]
+    has_drive, ours = schemas.is_applied(prim, f"PhysicsDriveAPI:{drive}"), schemas.is_applied(prim, _SCHEMA)
+    if joint.path in given:
+        return Drive(joint, GIVEN)
+    attribute = prim.GetAttribute(name)
+    if has_drive and attribute and len(sample_codes(attribute)):
+        return Drive(joint, DRIVE)
+    if attribute and len(sample_codes(attribute)):
+        raise ShotError(
+            "the target position is animated, but the joint has no drive",
+            path=joint.path,
+            attribute=name,
+            remedy=f"Apply PhysicsDriveAPI:{drive} to the joint",
+        )
+    skel_joint = str(schemas.value(prim, _SCHEMA, SKEL_JOINT) or "") if ours else ""
+    if not (has_drive or ours or joint.path in actuated):
+        return None
+    if joint.path in posed:
+        return Drive(joint, BODIES)
+    if skel_joint:
+        return Drive(joint, SKELETON, skel_joint=skel_joint)
+    if posed:
+        return Drive(joint, BODIES)
+    if ours and not still:
+        raise ShotError("a motor without animation", path=joint.path, attribute=name, remedy=_remedy(joint.kind))
+    held = number_of(prim, name) if has_drive else None
+    if held is not None:
+        if not math.isfinite(held):
+            raise ShotError("is not finite", path=joint.path, attribute=name, found=held, remedy="Correct the value")
+        reading.note(f"{joint.path}: its drive is not animated and holds {held:g} {unit}")
+        return Drive(joint, HELD, held=held * to_si(joint.kind, reading.units))
+    if ours or joint.path in actuated:
+        what = "an actuator drives it" if joint.path in actuated else "it is a motor"
+        reading.note(f"{joint.path}: {what}, nothing animates it, and it holds the pose of its bodies")
+        return Drive(joint, HELD)
+    stiffness = prim.GetAttribute(f"drive:{drive}:physics:stiffness").Get()
+    if stiffness:
+        reading.note(f"{joint.path}: its drive has a stiffness but no target position and holds 0 {unit}")
+        return Drive(joint, HELD, held=0.0)
+    reading.note(f"{joint.path}: its drive has neither a target position nor a stiffness, so the joint moves freely")
+    return None
+
+
+def _refuse_wrong_motor(joint: JointPrim) -> None:
+    if joint.prim is not None and schemas.is_applied(joint.prim, _SCHEMA):
+        raise ShotError(
+            f"a {joint.kind} joint cannot be a motor",
+            path=joint.path,
+            found=joint.prim.GetTypeName(),
+            remedy="Remove CalmMotorAPI, or make it a PhysicsRevoluteJoint or PhysicsPrismaticJoint",
+        )

@@ -1,0 +1,104 @@
+"""Joints that are geared to others: mimic joints of several dialects."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from calmotion.errors import ShotError
+from calmotion.usd.dialects import GEARS, SI, GearSpelling, number_of
+from calmotion.usd.reading.joints import JointPrim
+from calmotion.usd.units import StageUnits
+
+
+@dataclass(frozen=True)
+class Gear:
+    """value = offset + ratio * value of the leader.
+
+    Attributes:
+        leader: Path of the joint that leads.
+        ratio: [-], or between metres and radians.
+        offset: [rad or m].
+    """
+
+    leader: str
+    ratio: float
+    offset: float
+
+
+def read_gear(joint: JointPrim, kinds: dict[str, str], units: StageUnits) -> Gear | None:
+    """The gear of a joint; None where it has none.
+
+    Args:
+        joint: The joint.
+        kinds: Kind of every joint, by path.
+        units: Of the stage.
+
+    Raises:
+        ShotError: It is geared to itself, to something that is no joint with one angle or length, or by a ratio that
+            is not finite.
+    """
+    for spelling in GEARS if joint.prim is not None else ():
+        relationship = joint.prim.GetRelationship(spelling.leader)
+        targets = relationship.GetForwardedTargets() if relationship else []
+        switch = joint.prim.GetAttribute(spelling.enabled) if spelling.enabled else None
+        if not targets or (switch and switch.Get() is False):
+            continue
+        leader = str(targets[0])
+        if len(targets) > 1 or leader == joint.path or kinds.get(leader) not in ("revolute", "prismatic"):
+            raise ShotError(
+                "a geared joint follows one other joint, revolute or prismatic",
+                path=joint.path,
+                attribute=spelling.leader,
+                found=", ".join(str(t) for t in targets),
+                remedy="Name that joint, or remove the relationship",
+            )
+        return _gear(joint, spelling, leader, kinds[leader], units)
+    return None
+
+
+def _gear(joint: JointPrim, spelling: GearSpelling, leader: str, leader_kind: str, units: StageUnits) -> Gear:
+    ratio = _number(joint.prim, spelling.ratio, spelling.default_ratio)
+    offset = _number(joint.prim, spelling.offset, 0.0)
+    own, its = (_to_si(kind, spelling, units) for kind in (joint.kind, leader_kind))
+    return Gear(leader, spelling.sign * ratio * own / its, spelling.sign * offset * own)
+
+
+def _to_si(kind: str, spelling: GearSpelling, units: StageUnits) -> float:
+    if kind == "prismatic":
+        return units.length(1.0)
+    return 1.0 if spelling.angles == SI else float(np.deg2rad(1.0))
+
+
+def _number(prim, name: str, fallback: float) -> float:
+    value = number_of(prim, name)
+    value = fallback if value is None else value
+    if not math.isfinite(value):
+        raise ShotError("is not finite", path=prim.GetPath(), attribute=name, found=value, remedy="Correct the value")
+    return value
+
+
+def resolve(gears: dict[str, Gear]) -> dict[str, Gear]:
+    """Gears whose leaders follow nobody: chains multiplied out.
+
+    Raises:
+        ShotError: Joints that are geared to each other in a circle.
+    """
+    found = {}
+    for path, gear in gears.items():
+        seen = [path]
+        while gear.leader in gears:
+            if gear.leader in seen:
+                raise ShotError(
+                    "joints are geared to each other in a circle",
+                    path=path,
+                    found=" -> ".join([*seen, gear.leader]),
+                    remedy="Let one of them lead",
+                )
+            seen.append(gear.leader)
+            above = gears[gear.leader]
+            gear = Gear(above.leader, gear.ratio * above.ratio, gear.offset + gear.ratio * above.offset)
+        found[path] = gear
+    return found

@@ -1,0 +1,38 @@
+"""Motors' tracks that are given beside the shot, by the names or paths of joints."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from calmotion.errors import ShotError
+from calmotion.shot import MotorTracks, Track
+from calmotion.usd.reading.joints import JointPrim, joint_prims
+
+
+def given_joints(stage, given: MotorTracks | None) -> tuple[str, ...]:
+    """Paths of the joints that are named.
+
+    Raises:
+        ShotError: A name that no joint, or more than one, has.
+    """
+    if given is None:
+        return ()
+    paths = [str(prim.GetPath()) for prim in joint_prims(stage)]
+    found = []
+    for name in given.values:
+        named = [path for path in paths if path == name] or [path for path in paths if path.split("/")[-1] == name]
+        if len(named) != 1:
+            raise ShotError(
+                "several joints have this name" if named else "no joint has this name",
+                path=given.origin,
+                found=name,
+                remedy=f"Use the path of a joint, such as {(named or paths or ['/Robot/joint'])[0]}",
+            )
+        found += named
+    return tuple(found)
+
+
+def given_track(given: MotorTracks, joint: JointPrim) -> Track:
+    """The track of a joint that is named."""
+    name = joint.path if joint.path in given.values else joint.path.split("/")[-1]
+    return Track(np.asarray(given.times, dtype=np.float64), np.asarray(given.values[name], dtype=np.float64))

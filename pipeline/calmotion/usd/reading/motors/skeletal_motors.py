@@ -1,0 +1,192 @@
+"""Motors' tracks out of a UsdSkel animation.
+
+A motor names a joint of a skeleton. The bodies as authored stand where the skeleton is at rest, or as at the first
+frame (`calm:motor:skelPose`), and turn with it: with L(t) the joint's rotation in its parent's axes, the product
+D = L(t) L(there)^T turns the robot's body about axes fixed in the body before it. One motor takes the part of D about
+its axis; two or three that name the same joint, one carrying the next, take a product of rotations about theirs
+(`rig.hinge_rows`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from calmotion.errors import ShotError
+from calmotion.rigging.hinge_rows import follow
+from calmotion.shot import Track
+from calmotion.shot.character import Array
+from calmotion.usd import schemas
+from calmotion.usd.clock import Clock
+from calmotion.usd.reading.context import Reading
+from calmotion.usd.reading.motors.driven_motors import SKEL_JOINT, SKELETON, Drive
+from calmotion.usd.reading.motors.posed_motors import OFF_ANCHOR, OFF_AXIS, joint_motions
+from calmotion.usd.reading.skeletons import BoundSkeleton, bound_skeletons, skeleton_with
+from calmotion.usd.transforms import pose_from_matrix, rotation_from_quaternion
+
+SKEL_POSE = "calm:motor:skelPose"
+MOST = 3  # motors that one joint of a skeleton takes
+
+
+@dataclass(frozen=True, eq=False)
+class HingeStack:
+    """The motors that perform one joint of a skeleton.
+
+    Attributes:
+        skeleton, joint: Which one.
+        drives: The motors, from the body that carries them outwards.
+        reference: Rotation of the joint in its parent's axes where the bodies stand, shape [3, 3].
+        axes: Their axes in the axes of the joint's parent there, shape [m, 3].
+        start: Their angles there [rad], shape [m].
+    """
+
+    skeleton: BoundSkeleton
+    joint: int
+    drives: tuple[Drive, ...]
+    reference: Array
+    axes: Array
+    start: Array
+
+    def turned(self, angles: Array) -> Array:
+        """D at angles of the motors [rad], shape [n, m] to [n, 3, 3]."""
+        from scipy.spatial.transform import Rotation
+
+        turn = Rotation.identity(len(angles))
+        for k, axis in enumerate(self.axes):
+            turn = turn * Rotation.from_rotvec((angles[:, k] - self.start[k])[:, None] * axis)
+        return turn.as_matrix()
+
+
+def hinge_stacks(reading: Reading, drives: Sequence[Drive]) -> list[HingeStack]:
+    """The joints of skeletons that motors perform.
+
+    Args:
+        reading: The stage at the frame at which the bodies stand at rest.
+        drives: The motors of the character; those of other sources are passed over.
+
+    Raises:
+        ShotError: A joint that no skeleton has, or that more than three motors, or sliding ones, name.
+    """
+    wanted: dict[str, list[Drive]] = {}
+    for drive in drives:
+        if drive.source == SKELETON:
+            wanted.setdefault(drive.skel_joint, []).append(drive)
+    if not wanted:
+        return []
+    skeletons, found = bound_skeletons(reading.stage), []
+    for token, stack in wanted.items():
+        with reading.going_on():
+            first = stack[0].joint
+            skeleton, joint = skeleton_with(skeletons, token, first.path, SKEL_JOINT)
+            if len(stack) > MOST or any(drive.joint.kind != "revolute" for drive in stack):
+                raise ShotError(
+                    "a joint of a skeleton is performed by one, two or three revolute joints",
+                    path=first.path,
+                    attribute=SKEL_JOINT,
+                    found=f"{token} on {', '.join(drive.joint.path for drive in stack)}",
+                    remedy="Name another joint of the skeleton, or remove the attribute from what is too many",
+                )
+            found.append(_stack(reading, skeleton, joint, _outwards(stack)))
+    return found
+
+
+def performed_on(stacks: Sequence[HingeStack], stage) -> list[HingeStack]:
+    """The same motors on the skeletons of another stage, a result of ours: where the bodies stand, and so the pose
+    that angles count from, is that of the stage without our layers."""
+    skeletons = {skeleton.prim.GetPath(): skeleton for skeleton in bound_skeletons(stage)} if stacks else {}
+    return [replace(stack, skeleton=skeletons[stack.skeleton.prim.GetPath()]) for stack in stacks]
+
+
+def _outwards(stack: list[Drive]) -> tuple[Drive, ...]:
+    """Motors in the order in which they carry each other."""
+    carried = {drive.joint.body0: drive for drive in stack}
+    first = [d for d in stack if d.joint.body0 not in {other.joint.body1 for other in stack}]
+    order = [first[0]] if first else []
+    while order and order[-1].joint.body1 in carried and len(order) < len(stack):
+        order.append(carried[order[-1].joint.body1])
+    if len(order) != len(stack):
+        raise ShotError(
+            "the motors of one joint of a skeleton must carry each other",
+            path=stack[0].joint.path,
+            attribute=SKEL_JOINT,
+            found=", ".join(drive.joint.path for drive in stack),
+            remedy="Put them one after the other, each on the body that the one before turns",
+        )
+    return tuple(order)
+
+
+def _stack(reading: Reading, skeleton: BoundSkeleton, joint: int, drives: tuple[Drive, ...]) -> HingeStack:
+    place, above, path = skeleton.placement(reading.start), skeleton.parent(joint), str(skeleton.prim.GetPath())
+    standing = skeleton.rest if _stands_at_rest(drives) else skeleton.locals_at(reading.start)
+    parent = place if above < 0 else place @ skeleton.in_skeleton(standing)[above]
+    turn, reference = (pose_from_matrix(m, path).rotation for m in (parent, standing[joint]))
+    axes = [turn.T @ _axis(reading, drive) for drive in drives]
+    motions = joint_motions(reading, [d.joint for d in drives], np.array([reading.start]))
+    return HingeStack(skeleton, joint, drives, reference, np.array(axes), np.array([m.values[0] for m in motions]))
+
+
+def _stands_at_rest(drives: tuple[Drive, ...]) -> bool:
+    """Whether the bodies stand where the skeleton is at rest."""
+    poses = {str(schemas.value(drive.joint.prim, "CalmMotorAPI", SKEL_POSE)) for drive in drives}
+    if len(poses) > 1 or not poses <= {"rest", "start"}:
+        raise ShotError(
+            "the bodies of one joint stand in one pose of the skeleton, rest or start",
+            path=drives[0].joint.path,
+            attribute=SKEL_POSE,
+            found=", ".join(sorted(poses)),
+            remedy="Correct the values",
+        )
+    return poses == {"rest"}
+
+
+def _axis(reading: Reading, drive: Drive) -> Array:
+    """A motor's axis in the world, where the bodies stand."""
+    joint = drive.joint
+    axis = rotation_from_quaternion(joint.frame1.rotation)[:, 2]
+    return reading.pose(reading.stage.GetPrimAtPath(joint.body1)).rotation @ axis
+
+
+def skeletal_tracks(stack: HingeStack, clock: Clock, reading: Reading) -> dict[str, Track]:
+    """Tracks of the motors of a stack, by the path of their joint; a doubt where they cannot follow the skeleton."""
+    codes = clock.merged(stack.skeleton.codes())
+    D = stack.skeleton.local_rotations(stack.joint, codes) @ stack.reference.T
+    angles, off = follow(stack.axes, D)
+    _doubt_stretch(stack, codes, reading)
+    worst = int(np.argmax(off))
+    if off[worst] > OFF_AXIS:
+        names = ", ".join(drive.joint.path for drive in stack.drives)
+        reading.doubt(
+            ShotError(
+                f"{stack.skeleton.joints[stack.joint]} of {stack.skeleton.prim.GetPath()} is animated off the axes of "
+                "its motors, which the robot will not do",
+                path=names,
+                attribute=SKEL_JOINT,
+                found=f"{np.degrees(off[worst]):.3g} degrees at time code {codes[worst]:g}",
+                remedy="Animate the skeleton as the hinges let it move, or add a motor",
+            )
+        )
+    return {
+        drive.joint.path: Track(clock.seconds(codes), start + column)
+        for drive, start, column in zip(stack.drives, stack.start, angles.T, strict=True)
+    }
+
+
+def _doubt_stretch(stack: HingeStack, codes: Array, reading: Reading) -> None:
+    """A doubt where the animation moves a joint of the skeleton away from the one above it."""
+    places = np.array([stack.skeleton.locals_at(float(code))[stack.joint, :3, 3] for code in codes])
+    scale = np.linalg.det(stack.skeleton.placement(reading.start)[:3, :3]) ** (1.0 / 3.0)
+    moved = reading.units.length(scale * np.linalg.norm(places - places[0], axis=1))
+    worst = int(np.argmax(moved))
+    if moved[worst] > OFF_ANCHOR:
+        reading.doubt(
+            ShotError(
+                f"{stack.skeleton.joints[stack.joint]} of {stack.skeleton.prim.GetPath()} is moved away from the joint "
+                "above it, which the robot will not do",
+                path=stack.drives[0].joint.path,
+                attribute=SKEL_JOINT,
+                found=f"{1e3 * moved[worst]:.3g} mm at time code {codes[worst]:g}",
+                remedy="Animate rotations alone",
+            )
+        )

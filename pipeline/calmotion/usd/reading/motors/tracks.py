@@ -1,0 +1,81 @@
+"""The samples of a drive as a track in seconds, and radians or metres."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from calmotion.errors import ShotError
+from calmotion.shot import Track
+from calmotion.shot.character import Array
+from calmotion.usd.clock import Clock
+from calmotion.usd.reading.context import Reading
+from calmotion.usd.reading.motors.splines import read_spline, value_at
+
+MOST = 1_000_000  # samples of one motor
+_CLOSE = 1e-4  # samples closer than this share of a frame are at one time
+
+
+def sample_codes(attribute) -> Array:
+    """Time codes of the samples of an attribute; the knots of its spline where it has no samples."""
+    codes = attribute.GetTimeSamples()
+    if not codes and attribute.HasSpline():
+        codes = list(attribute.GetSpline().GetKnots().keys())
+    return np.array(codes, dtype=np.float64)
+
+
+def read_track(attribute, clock: Clock, reading: Reading, to_si: float) -> Track:
+    """The track of a motor.
+
+    Samples are taken where they are, also outside the shot. Where they begin after the first frame or end
+    before the last, USD holds the value, so frames with that value are added. For splines see `read_spline`. A
+    constant gives two equal samples.
+
+    Args:
+        attribute: The drive's target position, degrees or stage length.
+        clock: The clock of the shot.
+        reading: Notes and doubts for the user are kept in it.
+        to_si: Radians, or metres, in its unit.
+
+    Raises:
+        ShotError: A sample that is blocked, not a number or not finite, or too many of them.
+    """
+    path, notes = attribute.GetPath(), reading.notes
+    frames = clock.time_codes(clock.frame_times())
+    _refuse_too_many(attribute)
+    codes = np.array(attribute.GetTimeSamples(), dtype=np.float64)
+    if len(codes) == 0 and attribute.HasSpline():
+        return read_spline(attribute, clock, reading, to_si)
+    if len(codes) == 0:
+        codes = frames[[0, -1]]
+    codes = _apart(codes, clock, path, notes)
+    values = np.array([value_at(attribute, code) for code in codes])
+    held = (frames < codes[0] - 1e-9, frames > codes[-1] + 1e-9)
+    if len(attribute.GetTimeSamples()) > 0 and (held[0].any() or held[1].any()):
+        notes.append(f"{path}: its samples do not span the shot; the first and last value are held, as USD does")
+    codes = np.concatenate([frames[held[0]], codes, frames[held[1]]])
+    values = np.concatenate([np.full(held[0].sum(), values[0]), values, np.full(held[1].sum(), values[-1])])
+    return Track(clock.seconds(codes), to_si * values)
+
+
+def _refuse_too_many(attribute) -> None:
+    count = attribute.GetNumTimeSamples()
+    if count > MOST:
+        raise ShotError(
+            f"has more samples than can be meant (at most {MOST})",
+            path=attribute.GetPrimPath(),
+            attribute=attribute.GetName(),
+            found=count,
+            remedy="Sample it at the rate of the frames, or of the motor controller",
+        )
+
+
+def _apart(codes: Array, clock: Clock, path, notes: list[str]) -> Array:
+    """Time codes without those that another follows at once: nothing smooth goes through two values there."""
+    least = _CLOSE * clock.time_codes_per_second / clock.frames_per_second
+    follows = np.append(np.diff(codes) < least, False)
+    if follows.any():
+        notes.append(
+            f"{path}: of samples at nearly the same time the last counts ({int(follows.sum())} left out, the first at "
+            f"time code {codes[follows][0]:.9g})"
+        )
+    return codes[~follows]

@@ -1,0 +1,1 @@
+"""What pictures and recordings share: playback of a computed motion, viewpoint, shading, spectrum."""

@@ -1,0 +1,161 @@
+"""A computed motion as pictures need it: at any times, and as the points of the surfaces it carries."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from calmotion.shot.character import Array, Body
+from calmotion.shot.result import Motion, Skin
+
+
+def sample_motion(motion: Motion, times: Array) -> Motion:
+    """The motion at other times, linear between steps, held before the first and after the last.
+
+    The steps of a simulation are far shorter than the frames of a shot, so linear is enough to look at.
+
+    Args:
+        motion: T steps.
+        times: [s] after the first frame of the shot, shape [f].
+
+    Returns:
+        The same motion with f rows; rotations are unit quaternions.
+    """
+    times = np.asarray(times, dtype=float)
+    if len(motion.times) == 1:
+        low, high, weight = np.zeros(len(times), int), np.zeros(len(times), int), np.zeros(len(times))
+    else:
+        low = np.clip(np.searchsorted(motion.times, times, side="right") - 1, 0, len(motion.times) - 2)
+        high = low + 1
+        weight = np.clip((times - motion.times[low]) / (motion.times[high] - motion.times[low]), 0.0, 1.0)
+
+    def blend(values: Array) -> Array:
+        share = weight.reshape(-1, *([1] * (values.ndim - 1)))
+        return (1.0 - share) * values[low] + share * values[high]
+
+    def blend_rotations(values: Array) -> Array:
+        first, second = values[low], values[high]
+        # q and -q are the same rotation: take the nearer of the two.
+        second = np.where(np.sum(first * second, axis=-1, keepdims=True) < 0.0, -second, second)
+        share = weight.reshape(-1, *([1] * (values.ndim - 1)))
+        mixed = (1.0 - share) * first + share * second
+        return mixed / np.linalg.norm(mixed, axis=-1, keepdims=True)
+
+    return Motion(
+        times=times,
+        positions=blend(motion.positions),
+        rotations=blend_rotations(motion.rotations),
+        elastic=tuple(blend(u) for u in motion.elastic),
+        motor_values=blend(motion.motor_values),
+        motor_efforts=blend(motion.motor_efforts),
+        target_positions=blend(motion.target_positions),
+        target_rotations=blend_rotations(motion.target_rotations),
+        joint_forces=None if motion.joint_forces is None else blend(motion.joint_forces),
+        joint_moments=None if motion.joint_moments is None else blend(motion.joint_moments),
+    )
+
+
+def deformed_points(points: Array, modes: Array | None, elastic: Array) -> Array:
+    """Points of a surface in body axes for each row of elastic coordinates.
+
+    Args:
+        points: Undeformed [m], shape [n, 3].
+        modes: Displacement of the points [m per unit], shape [n, 3, r], or None for a rigid body.
+        elastic: Elastic coordinates, shape [f, r]; r = 0 for a motion in which the body does not deform.
+
+    Returns:
+        [m], shape [f, n, 3]; [1, n, 3] when nothing deforms.
+    """
+    if modes is None or elastic.shape[1] == 0:
+        return points[None]
+    return points[None] + np.einsum("nik,fk->fni", modes, elastic)
+
+
+def modes_of(skin: Skin | None, surface: int) -> Array | None:
+    """Modes of one surface of a body, or None where it does not deform."""
+    if skin is None or surface >= len(skin.modes) or skin.modes[surface].shape[2] == 0:
+        return None
+    return skin.modes[surface]
+
+
+def rotation_matrices(quaternions: Array) -> Array:
+    """Unit quaternions (w, x, y, z), shape [..., 4], as matrices, shape [..., 3, 3]."""
+    w, x, y, z = np.moveaxis(quaternions, -1, 0)
+    rows = [
+        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+    ]
+    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+
+
+def carriers(bodies: Sequence[Body]) -> list[int]:
+    """For each body the one whose prim is its nearest ancestor, -1 for none: what its prim is placed in."""
+    index = {body.path: k for k, body in enumerate(bodies)}
+    found = []
+    for body in bodies:
+        path = body.path
+        while path and path not in index or path == body.path:
+            path = path.rpartition("/")[0]
+        found.append(index.get(path, -1))
+    return found
+
+
+def relative_poses(motion: Motion, body: int, carrier: int) -> tuple[Array, Array]:
+    """Pose of a body in another's frame, or in the world for -1.
+
+    Returns:
+        Positions [m], shape [f, 3], and unit quaternions (w, x, y, z), shape [f, 4].
+    """
+    positions, rotations = motion.positions[:, body], motion.rotations[:, body]
+    if carrier < 0:
+        return positions, rotations
+    turned = rotation_matrices(motion.rotations[:, carrier])
+    offset = positions - motion.positions[:, carrier]
+    w, v = motion.rotations[:, carrier, :1], -motion.rotations[:, carrier, 1:]
+    real = w * rotations[:, :1] - np.sum(v * rotations[:, 1:], axis=1, keepdims=True)
+    imaginary = w * rotations[:, 1:] + rotations[:, :1] * v + np.cross(v, rotations[:, 1:])
+    return np.einsum("fji,fj->fi", turned, offset), np.concatenate([real, imaginary], axis=1)
+
+
+def deviations(surface: Array, modes: Array | None, body: int, motion: Motion, reference: Motion) -> Array:
+    """How far each point of a surface is from where it was meant to be.
+
+    Args:
+        surface: Undeformed points, body axes [m], shape [n, 3].
+        modes: Displacement of the points [m per unit], shape [n, 3, r], or None for a rigid body.
+        body: Index of the body.
+        motion: f rows.
+        reference: f rows at the same times.
+
+    Returns:
+        Distances [m], shape [f, n].
+    """
+    places = []
+    for moved in (motion, reference):
+        points = deformed_points(surface, modes, moved.elastic[body])
+        turned = np.einsum("fij,fnj->fni", rotation_matrices(moved.rotations[:, body]), points)
+        places.append(turned + moved.positions[:, body, None])
+    return np.linalg.norm(places[0] - places[1], axis=2)
+
+
+def world_points(body: Body, index: int, skin: Skin | None, motion: Motion, row: int) -> list[Array]:
+    """World positions of the points of each surface of a body at one row of a motion.
+
+    Args:
+        body: The body.
+        index: Its index in the character.
+        skin: Its skin, or None.
+        motion: The motion.
+        row: Row of the motion.
+
+    Returns:
+        For each surface [m], shape [n_s, 3].
+    """
+    turn = rotation_matrices(motion.rotations[row, index])
+    elastic = motion.elastic[index][row : row + 1]
+    return [
+        deformed_points(surface.points, modes_of(skin, s), elastic)[0] @ turn.T + motion.positions[row, index]
+        for s, surface in enumerate(body.surfaces)
+    ]

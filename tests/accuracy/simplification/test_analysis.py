@@ -1,0 +1,133 @@
+"""What is decided, on shots each of which has something that it does not need; each decision against a run without."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from calmotion.accuracy.simplification.analysis import SHARE, analyse
+from calmotion.accuracy.step_error import distance, simulate_at
+from calmotion.benchmarks.scenes.simplification_shots import (
+    arm_with_head,
+    clevis_arm,
+    gantry,
+    mixed_arm,
+    plastic_arm,
+    steel_arm,
+)
+from calmotion.multibody.model.topology import span_tree
+from calmotion.shot.character import with_settings
+from calmotion.shot.model_choice import KINDS, OFF, ON
+from calmotion.simulation.bodies import reduce_bodies
+from calmotion.simulation.prepare import Options, excitations
+
+FAST = Options(step=1 / 120)
+
+
+def _analyse(shot, forced=None, changes=False, options=FAST):
+    return analyse(shot.character, shot.animation, options, forced or {}, changes)
+
+
+def _simulated(shot, character):
+    bodies = None
+    if any(body.bends for body in character.bodies):
+        loads = excitations(character, shot.animation, shot.meshes, FAST)
+        bodies = reduce_bodies(character, span_tree(character), shot.meshes, None, loads)
+    return simulate_at(character, shot.animation, bodies, FAST, 1 / 240).positions
+
+
+def _rows(needs, kind):
+    return [row for row in needs.rows if row.kind == kind]
+
+
+def test_thick_steel_is_rigid_and_its_estimate_holds():
+    shot = steel_arm()
+    needs = _analyse(shot)
+    assert not any(body.bends for body in needs.character.bodies)
+    estimates = [row.estimated_error_m for row in _rows(needs, "bodies")]
+    assert len(needs.left_out) >= 2 and all("bends by at most" in row.why for row in _rows(needs, "bodies"))
+    error = distance(_simulated(shot, needs.character), _simulated(shot, _analyse(shot, {"bodies": ON}).character))
+    assert 0.0 < error < sum(estimates) < SHARE * 1e-3
+
+
+def test_only_what_hardly_bends_is_rigid():
+    needs = _analyse(mixed_arm())
+    assert [body.bends for body in needs.character.bodies] == [False, True, False]
+    assert needs.character.bodies[0].mass.mass == pytest.approx(7800 * 0.3 * 0.08**2)
+
+
+def test_a_tighter_tolerance_keeps_it():
+    assert _analyse(mixed_arm(), options=replace(FAST, tolerance=1e-7)).character.bodies[0].bends
+
+
+def test_what_the_shot_says_of_a_body_is_done():
+    shot = steel_arm()
+    for change in ({"mode_count": 4}, {"elasticity": "stvk"}):
+        asked = replace(
+            shot, character=with_settings(shot.character, lambda own, change=change: replace(own, **change))
+        )
+        assert [b.bends for b in _analyse(asked).character.bodies] == [True, True, False]
+
+
+def test_without_geometry_finite_elements_decide():
+    shot = steel_arm()
+    bodies = tuple(replace(body, tets=None) for body in shot.character.bodies)
+    bare = replace(shot, character=replace(shot.character, bodies=bodies))
+    needs = _analyse(bare)
+    assert needs.character.bodies[0].bends
+    assert "only finite elements" in _rows(needs, "bodies")[0].why
+    forced = _analyse(bare, {"bodies": OFF})
+    assert forced.character.bodies[0].bends and "mesh" in _rows(forced, "bodies")[0].why
+
+
+def test_everything_can_be_forced_off_and_on():
+    shot = plastic_arm()
+    off, on = _analyse(shot, dict.fromkeys(KINDS, OFF)), _analyse(shot, dict.fromkeys(KINDS, ON))
+    assert not any(b.bends for b in off.character.bodies) and all(b.straight for b in off.character.bodies)
+    assert on.character.bodies[0].bends and not any(b.straight for b in on.character.bodies)
+    flexible = on.character.bodies[0].flexible
+    assert flexible.elasticity == "stvk" and flexible.modes_share < 1.0 and flexible.pairs_share == 0.0
+    assert off.character.bodies[0].flexible.elasticity == "linear"
+    assert all(row.forced for row in (*_rows(on, "bodies"), *_rows(off, "bodies"), *_rows(on, "turning")))
+    assert on.choice("ranges") == ON
+
+
+def test_the_second_pins_of_a_clevis_are_left_out_and_the_motion_stays():
+    shot = clevis_arm(2)
+    needs = _analyse(shot)
+    assert [j.redundant for j in needs.character.joints] == [False, True, False, True, False, False]
+    full = _analyse(shot, {"loops": ON}).character
+    assert not any(j.redundant for j in full.joints)
+    assert distance(_simulated(shot, needs.character), _simulated(shot, full)) < 1e-9
+
+
+def test_loops_of_bodies_that_bend_are_kept():
+    shot = clevis_arm(2)
+    bodies = list(shot.character.bodies)
+    bodies[0] = replace(bodies[0], flexible=bodies[2].flexible)  # which is not meshed: the analysis asks before that
+    kept = _analyse(replace(shot, character=replace(shot.character, bodies=tuple(bodies))))
+    assert [j.redundant for j in kept.character.joints][:4] == [False, False, False, True]
+
+
+def test_nothing_on_a_gantry_turns_as_far_as_that_can_be_told():
+    shot = gantry(1)
+    needs = _analyse(shot)
+    straight = [body.straight for body in needs.character.bodies]
+    assert straight[:2] == [True, True]
+    full = _analyse(shot, {"turning": ON}).character
+    assert distance(_simulated(shot, needs.character), _simulated(shot, full)) < 1e-10
+
+
+def test_motors_that_move_no_target_are_idle_in_an_optimisation_alone():
+    shot = arm_with_head()
+    assert [m.idle for m in _analyse(shot, changes=True).character.motors] == [False, False, True, True]
+    assert not any(m.idle for m in _analyse(shot).character.motors)
+    assert not any(m.idle for m in _analyse(shot, {"motors": ON}, True).character.motors)
+    locked = tuple(replace(m, optimize=k > 1) for k, m in enumerate(shot.character.motors))
+    only = replace(shot, character=replace(shot.character, motors=locked))
+    assert not any(m.idle for m in _analyse(only, changes=True).character.motors)
+
+
+def test_a_still_of_one_frame_needs_no_decision():
+    shot = plastic_arm()
+    still = replace(shot, animation=replace(shot.animation, frame_times=np.zeros(1)))
+    assert _analyse(still).rows == ()

@@ -1,0 +1,60 @@
+"""Loops: redundant rows by Gruebler's count, and joints that hold nothing."""
+
+from dataclasses import replace
+
+import pytest
+from calmotion.accuracy.simplification.redundant_constraints import Closures, closures_of
+from calmotion.benchmarks.scenes.linkage_arm import linkage_arm, performance
+from calmotion.benchmarks.scenes.simplification_shots import NeedsShot, clevis_arm, plastic_arm
+from calmotion.multibody.model.topology import span_tree
+from calmotion.shot import Motor
+from calmotion.simulation.prepare import Options, grid_of
+from calmotion.simulation.rigid_run import rigid_bodies, rigid_run
+
+
+def _of(shot):
+    tree = span_tree(shot.character)
+    grid = grid_of(shot.character, shot.animation, Options(step=1 / 60))
+    model, run = rigid_run(
+        shot.character, shot.animation, grid, tree, rigid_bodies(shot.character, tree, shot.meshes)
+    )  # fmt: skip
+    return closures_of(model, run), tree
+
+
+def test_no_loops():
+    assert _of(plastic_arm())[0] == Closures()
+
+
+def test_a_planar_four_bar_has_three_redundant_rows_and_needs_its_joint():
+    character, meshes = linkage_arm()
+    found, tree = _of(NeedsShot("linkage", character, performance(), meshes))
+    assert found.joints == (len(tree.body),)
+    assert found.redundant_rows == 3
+    assert found.redundant == ()
+
+
+@pytest.mark.parametrize("links", [1, 3])
+def test_the_second_pin_of_a_clevis_holds_nothing(links):
+    shot = clevis_arm(links)
+    found, tree = _of(shot)
+    assert found.redundant_rows == 5 * links
+    assert found.redundant == found.joints
+    names = [shot.character.joints[tree.loops[k - len(tree.body)]].path for k in found.redundant]
+    assert all("Right" in name for name in names) and len(names) == links
+
+
+def test_nor_does_a_ball_on_the_axis_of_a_hinge():
+    shot = clevis_arm(1)
+    joints = list(shot.character.joints)
+    joints[1] = replace(joints[1], kind="spherical")
+    found, _ = _of(replace(shot, character=replace(shot.character, joints=tuple(joints))))
+    assert found.redundant_rows == 3 and found.redundant == found.joints
+
+
+def test_a_motor_on_a_second_pin_is_kept_for_its_effort():
+    shot = clevis_arm(1)
+    motors = (*shot.character.motors, Motor(1, shot.character.joints[1].path, shot.character.motors[0].attribute))
+    tracks = shot.animation.tracks * 2
+    animation = replace(shot.animation, tracks=tracks, current=tracks)
+    found, _ = _of(replace(shot, character=replace(shot.character, motors=motors), animation=animation))
+    assert found.redundant_rows == 6 and found.redundant == ()

@@ -1,0 +1,85 @@
+"""What never turns hangs by welds, sliders and motors that keep their angle."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from calmotion.accuracy.deflection_bound.bound import Stiffness
+from calmotion.accuracy.simplification.rotating_bodies import turning_of
+from calmotion.benchmarks.scenes.simplification_shots import arm_with_head, gantry, plastic_arm
+from calmotion.multibody.model.topology import span_tree
+from calmotion.shot import MovingFrame, Track
+
+NAN = float("nan")
+
+
+def _found(shot, stiffness=None, changes=True):
+    tree = span_tree(shot.character)
+    return turning_of(shot.character, shot.animation, tree, stiffness or {}, changes)
+
+
+def _stiff(displacement, rotation):
+    return Stiffness(displacement, rotation)
+
+
+def test_a_carriage_and_what_is_welded_to_it_never_turn_and_that_costs_nothing():
+    shot = gantry(2)
+    found = _found(shot)
+    by_name = dict(zip([b.path.split("/")[-1] for b in shot.character.bodies], found, strict=True))
+    for name in ("Carriage", "Mast0", "Mast1"):
+        assert not by_name[name].turns and by_name[name].error_m is None
+    # nothing says how far the masts bend, and with them their loads turn
+    assert by_name["Load0"].turns and "bends" in by_name["Load0"].why
+
+
+def test_what_a_bending_body_carries_turns_by_as_much_as_that_bends():
+    shot = gantry(1)
+    found = _found(shot, {1: _stiff(2e-3, 0.01)})
+    assert not found[2].turns
+    assert found[2].error_m == pytest.approx(0.01 * 2e-3)
+
+
+def test_motors_that_move_or_may_be_changed_turn_bodies():
+    shot = plastic_arm()
+    assert all(item.turns for item in _found(shot))
+    held = tuple(Track(t.times, np.full_like(t.values, 0.3)) for t in shot.animation.tracks)
+    still = replace(shot, animation=replace(shot.animation, tracks=held, current=held))
+    assert all("may turn" in item.why or "carried" in item.why for item in _found(still))
+    simulated = _found(still, changes=False)
+    assert not simulated[0].turns and simulated[1].turns  # the second hangs from what bends
+
+
+def test_locked_and_idle_motors_do_not():
+    shot = plastic_arm()
+    held = tuple(Track(t.times, np.zeros_like(t.values)) for t in shot.animation.tracks)
+    for change in ({"optimize": False}, {"idle": True}):
+        motors = tuple(replace(m, **change) for m in shot.character.motors)
+        still = replace(
+            shot, character=replace(shot.character, motors=motors),
+            animation=replace(shot.animation, tracks=held, current=held),
+        )  # fmt: skip
+        assert not _found(still)[0].turns
+
+
+def test_only_the_optimised_curve_moves():
+    shot = plastic_arm()
+    held = tuple(Track(t.times, np.zeros_like(t.values)) for t in shot.animation.tracks)
+    shown = replace(shot, animation=replace(shot.animation, tracks=held))  # `current` still swings
+    assert _found(shown, changes=False)[0].turns
+
+
+def test_roots_that_turn():
+    shot = gantry(1)
+    times = np.array([0.0, 1.0])
+    still = np.tile([1.0, 0.0, 0.0, 0.0], (2, 1))
+    for rotations, turns in ((still, False), (np.array([[1.0, 0, 0, 0], [0.9, 0.0, 0.0, 0.436]]), True)):
+        frame = MovingFrame(0, times, np.zeros((2, 3)), rotations)
+        moved = replace(shot, animation=replace(shot.animation, moving=(frame,)))
+        assert _found(moved)[0].turns == turns
+
+
+def test_free_joints_turn_what_hangs_from_them():
+    shot = arm_with_head()
+    motors = shot.character.motors[:-1]
+    free = replace(shot, character=replace(shot.character, motors=motors))
+    assert "freely" in _found(free)[-1].why

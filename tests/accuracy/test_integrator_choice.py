@@ -1,0 +1,37 @@
+"""Which integrator simulates, and what happens where it cannot."""
+
+import pytest
+from calmotion.accuracy.integrator_choice import FAST, by_fast_scheme
+from calmotion.errors import ShotError
+from calmotion.simulation.prepare import Options
+
+
+class Simulation:
+    """Tells by what it was asked to run, and fails for some of it."""
+
+    def __init__(self, *failing):
+        self.failing, self.asked = failing, []
+
+    def __call__(self, options):
+        self.asked.append(options.scheme)
+        if options.scheme in self.failing:
+            raise ShotError("joints come apart")
+        return options.scheme
+
+
+def test_the_fast_one_is_taken_where_it_does():
+    run = Simulation()
+    assert by_fast_scheme(Options(), run) == FAST and run.asked == [FAST]
+
+
+def test_the_safe_one_follows_where_it_fails():
+    run = Simulation(FAST)
+    assert by_fast_scheme(Options(), run) == "bdf2" and run.asked == [FAST, "bdf2"]
+
+
+@pytest.mark.parametrize("asked", ["bdf2", "newmark", FAST])
+def test_one_that_was_asked_for_is_the_only_one(asked):
+    run = Simulation(asked)
+    with pytest.raises(ShotError, match="apart"):
+        by_fast_scheme(Options(integrator=asked), run)
+    assert run.asked == [asked]

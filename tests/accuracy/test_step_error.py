@@ -1,0 +1,55 @@
+"""The error of a step, from two of them: on a motion that is known, and on the arm against a far finer one."""
+
+import numpy as np
+import pytest
+from calmotion.accuracy.step_error import StepRun, largest_step, simulate_at, step_error
+from calmotion.errors import ShotError
+from calmotion.simulation.prepare import Options
+
+
+def of_second_order(step):
+    """A target that is off by 3 step^2 in x."""
+    return StepRun(step, np.array([[[1.0 + 3.0 * step**2, 2.0, 0.0]]]))
+
+
+@pytest.mark.parametrize("ratio", [2.0, 1.5])
+def test_the_error_of_a_method_of_second_order_is_found(ratio):
+    assert step_error(of_second_order(0.1 * ratio), of_second_order(0.1)) == pytest.approx(0.03, rel=1e-9)
+
+
+@pytest.mark.parametrize("allowed", [1.0, 0.02, 0.0076, 0.0075, 0.0074, 1e-4])
+def test_the_largest_step_that_is_allowed_is_chosen(allowed):
+    step, error = largest_step(of_second_order, 0.1, 1e-3, lambda run: allowed)
+    best = min(0.1, np.sqrt(allowed / 3.0))
+    assert 0.85 * best < step <= best * (1.0 + 1e-9) and error == pytest.approx(3.0 * step**2, rel=1e-9)
+
+
+def test_steps_are_those_that_were_taken():
+    def of_frames(step):
+        return of_second_order(min(0.02, step))
+
+    assert largest_step(of_frames, 0.1, 1e-3, lambda run: 1.0) == (0.02, pytest.approx(3.0 * 0.02**2))
+    step, _ = largest_step(of_frames, 0.1, 1e-3, lambda run: 3.0 * 0.01**2)
+    assert 0.0085 < step <= 0.01
+
+
+def test_steps_that_fail_are_too_large_and_the_last_one_ends_the_search():
+    def fragile(step):
+        if step > 0.03:
+            raise ShotError("diverges")
+        return of_second_order(step)
+
+    assert largest_step(fragile, 0.1, 1e-3, lambda run: 1.0)[0] == 0.025
+    step, error = largest_step(of_second_order, 0.1, 0.025, lambda run: 0.0)
+    assert step == 0.025 and error == pytest.approx(3.0 * 0.025**2, rel=1e-9)
+
+    def never(step):
+        raise ShotError("diverges")
+
+    assert largest_step(never, 0.1, 0.025, lambda run: 1.0) == (0.025, np.inf)
+
+
+def test_the_estimate_is_near_the_error_against_a_far_finer_step(arm, animation, bodies):
+    runs = {h: simulate_at(arm, animation, bodies, Options(), h) for h in (1 / 480, 1 / 960, 1 / 7680)}
+    error = np.linalg.norm(runs[1 / 960].positions - runs[1 / 7680].positions, axis=2).max()
+    assert step_error(runs[1 / 480], runs[1 / 960]) == pytest.approx(error, rel=0.2)

@@ -1,0 +1,71 @@
+"""Tolerances of the optimisation, measured: they are kept, and one that is not is told."""
+
+import csv
+import dataclasses
+import json
+
+import pytest
+from calmotion.benchmarks.accuracy import tolerances, work_precision
+from calmotion.benchmarks.accuracy.tolerances import Tolerances
+from calmotion.benchmarks.common.shots import Unreduced
+from calmotion.benchmarks.scenes.beam_arm import beam_arm, quintic, shot_of
+
+
+@pytest.fixture(scope="module")
+def shot():
+    character, meshes = beam_arm(payload=0.1, damping=0.02)
+    return Unreduced("arm", "arm.usda", character, shot_of(quintic(0.8, 0.35, 0.1), 0.75), meshes, 0.05)
+
+
+@pytest.fixture(scope="module")
+def rows(shot):
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(work_precision, "REFERENCE_STEP", 1 / 1920)
+        return [Tolerances(shot).kept(tolerance, "optimize") for tolerance in (1e-2, 1e-3)]
+
+
+def test_simulations_keep_their_tolerance(shot):
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(work_precision, "REFERENCE_STEP", 1 / 1920)
+        measured = Tolerances(shot)
+        measured.warm(1e-2, "simulate")
+        found = [measured.kept(tolerance) for tolerance in (1e-2, 1e-3, 1e-4)]
+    assert all(row.kept and row.reference_m < 0.1 * row.tolerance_m for row in found)
+    assert found[2].step_s < found[0].step_s
+    assert found[0].shake_after_m == found[0].shake_before_m
+
+
+def test_results_keep_their_tolerance(rows):
+    for row, tolerance in zip(rows, (1e-2, 1e-3), strict=True):
+        assert row.kept and row.error_m <= row.tolerance_m == tolerance
+        assert row.shake_after_m < 0.2 * row.shake_before_m
+    assert rows[1].coordinates >= rows[0].coordinates
+
+
+def test_the_command_tells_whether_they_are_kept(shot, rows, monkeypatch, capsys, tmp_path):
+    found = list(rows)
+    monkeypatch.setattr(tolerances, "load_unreduced", lambda path: shot)
+    warmed = []
+    monkeypatch.setattr(Tolerances, "warm", lambda self, *arguments: warmed.append(arguments))
+    monkeypatch.setattr(Tolerances, "kept", lambda self, tolerance, command: found.pop(0))
+    arguments = [
+        "arm.usda",
+        "--tolerances",
+        "0.01",
+        "0.001",
+        "--optimize",
+        "--json",
+        "--csv",
+        str(tmp_path / "rows.csv"),
+        "--markdown",
+        str(tmp_path / "rows.md"),
+    ]
+    assert tolerances.main(arguments) == 0 and warmed == [(0.01, "optimize")]
+    assert [row["kept"] for row in json.loads(capsys.readouterr().out)["rows"]] == [True, True]
+    with open(tmp_path / "rows.csv", newline="") as file:
+        assert [float(row["error_m"]) for row in csv.DictReader(file)] == [row.error_m for row in rows]
+    lines = (tmp_path / "rows.md").read_text().splitlines()
+    assert len(lines) == 4 and lines[0].startswith("| shot | tolerance | error |")
+    assert [line.split(" | ")[1] for line in lines[2:]] == ["10 mm", "1 mm"]
+    found += [rows[0], dataclasses.replace(rows[1], error_m=2e-3)]
+    assert tolerances.main(arguments) == 1

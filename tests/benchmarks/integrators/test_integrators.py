@@ -1,0 +1,74 @@
+"""The comparison of integrators: orders, the stiff scene of the seed, and the damping of BDF2."""
+
+import json
+
+import pytest
+from calmotion.benchmarks.integrators import integrators
+from calmotion.benchmarks.integrators.integrators import (
+    WORKING_STEP,
+    Measured,
+    arm_scene,
+    damping,
+    four_bar_scene,
+    order_of,
+    orders,
+    stiff_scene,
+)
+from calmotion.multibody.failure import SimulationFailure
+
+SECOND = {"bdf2": (16, 32), "newmark": (16, 32), "generalized-alpha": (16, 32)}
+
+
+@pytest.mark.parametrize(
+    "scene, explicit",
+    [
+        pytest.param(arm_scene, (16, 32), id="flexible arm", marks=pytest.mark.long),
+        pytest.param(four_bar_scene, (32, 64), id="four-bar"),
+    ],
+)
+def test_orders_are_those_of_the_methods(scene, explicit):
+    rows = orders(scene(), {**SECOND, "rk4": explicit}, finest=16)
+    for integrator in SECOND:
+        assert order_of(rows, integrator) == pytest.approx(2.0, abs=0.1), rows
+        assert order_of(rows, integrator, "velocity_error") > 1.7, rows
+    assert order_of(rows, "rk4") > 3.5, rows
+    finest = {row.integrator: row.position_error for row in rows}
+    assert finest["rk4"] < 0.01 * finest["newmark"] < 0.01 * finest["bdf2"]
+
+
+def test_the_order_is_the_slope_of_the_errors():
+    rows = [Measured("a", h, 3.0 * h**4, 2.0 * h**2, 1.0) for h in (0.1, 0.05, 0.025)]
+    assert order_of(rows, "a") == pytest.approx(4.0) and order_of(rows, "a", "velocity_error") == pytest.approx(2.0)
+
+
+def test_only_bdf2_takes_thin_steel_links_through_a_fast_motion():
+    """Seed, section 3: RK4 at once with steps thousands of times smaller, Newmark later, BDF2 not at all."""
+    scene = stiff_scene()
+    run = scene.run(WORKING_STEP, "bdf2")
+    assert run.trajectory.refined == () and run.trajectory.max_joint_gap < 1e-6
+    with pytest.raises(SimulationFailure) as newmark:
+        scene.run(WORKING_STEP, "newmark")
+    assert 0.1 < newmark.value.time_s < 2.0
+    with pytest.raises(SimulationFailure) as explicit:
+        scene.run(WORKING_STEP / 4000, "rk4", 0.1)
+    assert explicit.value.time_s < WORKING_STEP
+
+
+def test_bdf2_damps_a_vibration_as_its_root_says():
+    for count, measured, expected in damping((20, 40, 80)):
+        assert measured == pytest.approx(expected, rel=0.12), count
+
+
+def test_the_command_prints_one_object_and_draws(capsys, monkeypatch, tmp_path):
+    monkeypatch.setattr(integrators, "orders", lambda scene: orders(scene, {"bdf2": (4, 8)}, finest=1))
+    monkeypatch.setattr(integrators, "fates", integrators_fates)
+    assert integrators.main(["--json", "--figures", str(tmp_path)]) == 0
+    report = json.loads(capsys.readouterr().out)
+    assert set(report) == {"orders", "stiff", "bdf2_damping", "figures"} and len(report["orders"]) == 2
+    assert (tmp_path / "integrators.png").read_bytes()[:4] == b"\x89PNG"
+
+
+def integrators_fates(scene):
+    run = scene.run(WORKING_STEP, "bdf2", 0.1)
+    height = integrators._height(run, WORKING_STEP)
+    return [integrators.Fate("bdf2", WORKING_STEP, "runs to the end", 0.1, 0.0)], {"bdf2": height}

@@ -1,0 +1,71 @@
+"""Stiff and extreme cases run to the end or are refused with a reason, and the command says so."""
+
+import dataclasses
+import json
+
+import pytest
+from calmotion.benchmarks.integrators import stability
+from calmotion.benchmarks.integrators.stability import CASES, FAILED, REFUSED, RUNS, Case, run_case
+from calmotion.simulation import simulate as run
+
+# what no set of reduced coordinates about a straight arm can follow
+TOO_SOFT = [f"1e{power} Pa" for power in (4, 5, 6, 7, 8)] + ["load a million arms", "1:500, plastic"]
+TOO_FAST = ["half a turn in a frame, plastic", "100 rad/s, steps of 1/24 s"]
+
+
+def _marked(case):
+    return pytest.param(case, id=f"{case.group}, {case.name}", marks=pytest.mark.long if case.group == "chain" else ())
+
+
+@pytest.mark.parametrize("case", [_marked(case) for case in CASES])
+def test_every_case_runs_or_is_refused_with_a_reason(case):
+    outcome = run_case(case)
+    assert outcome.outcome == (REFUSED if case.name in TOO_SOFT + TOO_FAST else RUNS), outcome
+    if outcome.outcome == REFUSED:
+        # where, what, and what to do about it
+        assert outcome.why.startswith("/Arm/") and outcome.why.endswith(".") and len(outcome.why) > 100
+    else:
+        assert (
+            outcome.steps > 10
+            and outcome.error_m < (1e-6 if case.group == "hinge without stiffness" else 2.0)
+            and outcome.gap_m < 1e-6
+        )
+
+
+def test_what_flies_away_or_is_no_number_has_failed(monkeypatch):
+    (weightless,) = (case for case in CASES if (case.group, case.name) == ("gravity", "none"))
+    monkeypatch.setattr(stability, "REACH", 0.5)
+    assert run_case(Case("a", "b", weightless.scene)).outcome == FAILED
+    monkeypatch.setattr(stability, "GAP", -1.0)
+    monkeypatch.setattr(stability, "REACH", 5.0)
+    assert "came apart" in run_case(Case("a", "b", weightless.scene)).why
+
+    def broken():
+        raise ZeroDivisionError("no")
+
+    with pytest.raises(ZeroDivisionError):
+        run_case(Case("a", "b", broken))
+
+
+def test_a_rigid_character_that_jumps_to_another_pose_has_failed(monkeypatch):
+    """As the truss did, whose tip was below its feet from the second step on."""
+    plain = run.simulate_shot
+
+    def jumping(*arguments):
+        result = plain(*arguments)
+        before = dataclasses.replace(result.before, position_errors=result.before.position_errors + 0.6)
+        return dataclasses.replace(result, before=before)
+
+    monkeypatch.setattr(run, "simulate_shot", jumping)
+    (case,) = (case for case in CASES if case.name == "truss without freedom, by bdf2")
+    outcome = run_case(case)
+    assert outcome.outcome == FAILED and "does not do what it should" in outcome.why
+
+
+def test_the_command_prints_one_object_and_fails_with_its_cases(capsys, monkeypatch):
+    assert stability.main(["--json", "--only", "load a millionth"]) == 0
+    (row,) = json.loads(capsys.readouterr().out)["cases"]
+    assert row["outcome"] == RUNS and row["group"] == "mass ratio" and row["steps"] == 961
+    monkeypatch.setattr(stability, "GAP", -1.0)
+    assert stability.main(["--only", "load a millionth"]) == 1
+    assert "came apart" in capsys.readouterr().out

@@ -1,0 +1,56 @@
+"""The table of time and error against element size, on a link small enough to be meshed in seconds."""
+
+from __future__ import annotations
+
+import csv
+
+import numpy as np
+import pytest
+from calmotion.benchmarks.scenes.links import read_links
+from calmotion.benchmarks.speed import meshing
+from calmotion.errors import ShotError
+from small_shots import ELBOW, FORE, LENGTH, UPPER, WIDTH, write_arm
+
+
+@pytest.fixture(scope="module")
+def shot(tmp_path_factory):
+    return write_arm(tmp_path_factory.mktemp("arm") / "arm.usda")
+
+
+def test_links_are_named_by_path_or_name_or_taken_all(shot):
+    assert [link.body.path for link in read_links(f"{shot}:fore")] == [FORE]
+    assert [link.body.path for link in read_links(f"{shot}:{UPPER}")] == [UPPER]
+    (fore,) = read_links(f"{shot}:fore")
+    assert fore.body.flexible is not None and len(fore.body.surfaces) == 1
+    assert fore.carrier is not None and fore.carrier.position == pytest.approx([0.0, 0.0, 0.0]), ELBOW
+    assert {link.name for link in read_links(str(shot))} >= {"upper", "fore"}
+    with pytest.raises(ShotError, match="no such link"):
+        read_links(f"{shot}:foot")
+
+
+def test_the_table_shows_errors_that_fall_towards_the_finest_mesh(shot, tmp_path, capsys):
+    file = tmp_path / "table.csv"
+    assert meshing.main([f"{shot}:fore", "--sizes", "40mm", "16mm", "-o", str(file)]) == 0
+    with open(file, newline="") as text:
+        coarse, fine = csv.DictReader(text)
+    assert [float(row["size"]) for row in (coarse, fine)] == pytest.approx([40.0, 16.0])
+    assert coarse["held"] == fine["held"] == "joint"
+    assert int(coarse["nodes"]) < int(fine["nodes"])
+    # a clamped beam: f1 = 3.516 / (2 pi) sqrt(E I / (rho A L^4))
+    beam = 3.516 / (2.0 * np.pi) * np.sqrt(1.8e9 * WIDTH**2 / 12.0 / 1200.0) / LENGTH**2
+    assert float(fine["f1"]) == pytest.approx(beam, rel=0.03)
+    assert float(coarse["error"]) > 0.0 and np.isnan(float(fine["error"]))
+    assert float(coarse["estimate"]) > float(fine["estimate"]) > 0.0
+    assert all(float(fine[name]) > 0.0 for name in ("mesh_time", "reduce_time"))
+    lines = capsys.readouterr().out.splitlines()
+    assert len(lines) == 4 and lines[2].startswith("| fore | 40 |") and "| - |" in lines[3]
+
+
+def test_what_cannot_be_meshed_is_told_and_the_rest_goes_on(shot, tmp_path, capsys):
+    assert meshing.main([f"{shot}:foot", "--sizes", "1"]) == 1
+    assert "no such link" in capsys.readouterr().err
+
+
+def test_sizes_are_multiples_of_the_automatic_one_or_lengths():
+    assert meshing._length("1.4", 0.01) == pytest.approx(0.014)
+    assert meshing._length("8mm", 0.01) == pytest.approx(0.008)

@@ -1,0 +1,61 @@
+"""The scaling benchmark: its numbers on small sizes, and what it says without Exudyn. Nothing here is about seconds."""
+
+import json
+
+import numpy as np
+import pytest
+from calmotion.benchmarks.scenes import exudyn_arm
+from calmotion.benchmarks.scenes.exudyn_arm import Run, time_at
+from calmotion.benchmarks.speed import scaling
+from calmotion.benchmarks.speed.scaling import Growth, against_splu, branches, links, motion, prepared
+from calmotion.multibody.analysis.kinematics import rigid_state
+from calmotion.multibody.integrators.simulation import simulate
+from calmotion.multibody.integrators.workspace import Workspace
+
+
+def test_the_exponent_is_the_slope_of_logarithms():
+    values = (4, 8, 32)
+    assert Growth("a", values, tuple(2e-6 * v**1.3 for v in values)).exponent == pytest.approx(1.3)
+
+
+def test_the_chain_is_a_chain_that_moves():
+    model = prepared(*links(5, 4))
+    assert list(model.system.parent) == [-1, 0, 1, 2, 3, 4] and list(model.system.elastic) == [4] * 5 + [0]
+    angles, rates = motion(model, 20)
+    ws = Workspace.for_system(model.system)
+    trajectory = simulate(model.system, rigid_state(model, angles[0]), angles, rates, scaling.STEP, ws)
+    assert trajectory.max_joint_gap < 1e-8 and np.abs(trajectory.states.u).max() > 1e-9
+
+
+def test_the_tree_has_fourteen_bodies_of_ten_modes_and_splu_agrees():
+    model = prepared(*branches())
+    assert list(model.system.elastic) == [10] * 14 and np.bincount(model.system.parent + 1).max() == 4
+    sparse = against_splu(3)
+    assert sparse.unknowns == 14 * 16 + 14 * 6 and sparse.difference < 1e-8 and sparse.splu_s > 0.0
+
+
+def test_run_times_are_compared_at_equal_error():
+    runs = [Run("a", n, 1.0 / n**2, 1e-3 * n) for n in (10, 20, 40)] + [
+        Run("b", n, 4.0 / n**2, 1e-4 * n) for n in (10, 40)
+    ]
+    assert time_at(runs, "a", 1e-4) == pytest.approx(0.1) and time_at(runs, "b", 1e-4) == pytest.approx(0.02)
+
+
+def test_our_arm_is_of_second_order_in_time():
+    code = exudyn_arm.Ours("bdf2")
+    exact, _ = code.run(3840)
+    errors = [np.abs(code.run(steps)[0] - exact).max() for steps in (240, 480)]
+    assert 1.7 < np.log2(errors[0] / errors[1]) < 2.3
+
+
+def test_without_exudyn_the_command_says_so_and_goes_on(capsys, monkeypatch, tmp_path):
+    monkeypatch.setattr(exudyn_arm, "installed", lambda: False)
+    monkeypatch.setattr(scaling, "growths", lambda *sizes: [Growth("bodies", (4, 8), (1e-4, 2e-4))])
+    assert scaling.main(["--figures", str(tmp_path)]) == 0
+    out = capsys.readouterr().out
+    assert "install the extra `bench`" in out and "exponent 1.00" in out
+    assert (tmp_path / "scaling.png").read_bytes()[:4] == b"\x89PNG"
+    assert scaling.main(["--json", "--quick"]) == 0
+    report = json.loads(capsys.readouterr().out)
+    assert set(report) == {"growth", "sparse", "exudyn", "times_faster_than_exudyn", "figures"}
+    assert report["sparse"]["times_faster"] > 1.0 and report["exudyn"] == []

@@ -1,0 +1,50 @@
+import io
+
+from calmotion.cli.tables import console_on, name_paths, print_accuracy
+
+
+def test_short_paths_stay_whole():
+    assert name_paths(["/A/b", "/A/c"]) == {"/A/b": "/A/b", "/A/c": "/A/c"}
+
+
+def test_long_paths_are_named_by_as_few_last_names_as_tell_them_apart():
+    deep = "/Robot/" + "link/" * 20
+    names = name_paths([deep + "left/hand", deep + "right/hand", deep + "head"])
+    assert sorted(names.values()) == ["head", "left/hand", "right/hand"]
+
+
+def test_the_accuracy_is_told_where_it_is_known():
+    names = ("tolerance_m", "estimated_error_m", "estimated_step_error_m", "estimated_mesh_error_m", "verified_error_m")
+    none = dict.fromkeys(names)
+    told = none | {"estimated_error_m": 3e-4, "estimated_step_error_m": 1e-4, "verified_error_m": 2e-4}
+    with_mesh = told | {"estimated_mesh_error_m": 5e-4, "verified_error_m": None}
+    for report, expected in (
+        (none, ""),
+        (
+            with_mesh,
+            "simulated to about 0.3 mm at the targets (0.1 mm of it the time step), the finite elements to 0.5 mm\n",
+        ),
+        (
+            told | {"verified_step_s": 5e-4, "verified_modes": 44},
+            "simulated to about 0.3 mm at the targets (0.1 mm of it the time step), "
+            "the finite-element mesh not counted\n"
+            "verified: a run with steps of 0.5 ms and 44 elastic coordinates has the targets within 0.2 mm\n",
+        ),
+    ):
+        stream = io.StringIO()
+        print_accuracy(console_on(stream), report)
+        assert stream.getvalue() == expected
+
+
+def test_a_tolerance_that_is_not_kept_is_told():
+    report = {"tolerance_m": 1e-4, "estimated_step_error_m": 1e-5, "estimated_mesh_error_m": None}
+    report |= {"verified_step_s": 5e-4, "verified_modes": 44}
+    for estimated, verified, told in (
+        (1.5e-4, None, False),
+        (3e-4, None, True),
+        (3e-4, 9e-5, False),
+        (5e-5, 2e-4, True),
+    ):
+        stream = io.StringIO()
+        print_accuracy(console_on(stream), report | {"estimated_error_m": estimated, "verified_error_m": verified})
+        assert ("the tolerance of 0.1 mm is not kept" in stream.getvalue()) == told

@@ -1,0 +1,38 @@
+"""Boxes of tetrahedra, and quadrature that is not the one under test."""
+
+from __future__ import annotations
+
+import numpy as np
+from calmotion.geometry.tetrahedra import measure_quality, oriented_tets
+from calmotion.shot import FEMesh
+
+
+def box_tets(counts, size, origin=(0.0, 0.0, 0.0)):
+    """Points [n, 3] and tetrahedra [m, 4] of a box cut into bricks of six tetrahedra each."""
+    from skfem import MeshTet
+
+    mesh = MeshTet.init_tensor(*(o + np.linspace(0.0, s, n + 1) for n, s, o in zip(counts, size, origin, strict=True)))
+    points = np.ascontiguousarray(mesh.p.T)
+    return points, oriented_tets(points, mesh.t.T)[0]
+
+
+def conical_quadrature(points, tets, order=4):
+    """Gauss points of a collapsed cube on every element: barycentric [q, 4], weights [m, q] (volume included).
+
+    Exact for degree 2 `order` - 3 and more; built from one-dimensional rules alone, so that it shares nothing with
+    the tables of the element library.
+    """
+    x, w = np.polynomial.legendre.leggauss(order)
+    x, w = 0.5 * (x + 1.0), 0.5 * w
+    a, b, c = (g.ravel() for g in np.meshgrid(x, x, x, indexing="ij"))
+    wa, wb, wc = (g.ravel() for g in np.meshgrid(w, w, w, indexing="ij"))
+    r, s, t = a, b * (1.0 - a), c * (1.0 - a) * (1.0 - b)
+    weight = wa * wb * wc * (1.0 - a) ** 2 * (1.0 - b)
+    bary = np.stack([1.0 - r - s - t, r, s, t], axis=1)
+    e = points[tets]
+    jacobian = np.einsum("ij,ij->i", np.cross(e[:, 1] - e[:, 0], e[:, 2] - e[:, 0]), e[:, 3] - e[:, 0])
+    return bary, jacobian[:, None] * weight
+
+
+def fe_mesh(points, tets):
+    return FEMesh(0, points, tets, measure_quality(points, tets))

@@ -1,0 +1,443 @@
+"""Shots that are broken on purpose, each in one way: `python tests/refusals/broken_shots.py FOLDER` writes them all.
+
+Most are the arm of `small_shots` with an edit; the others are files that are damaged afterwards. Each ends in an error
+that names its place, or, where it says so, in a repair that is told.
+"""
+
+from __future__ import annotations
+
+import math
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import small_shots as shots  # noqa: E402
+from pxr import Gf, Sdf, Usd, UsdGeom, UsdPhysics, Vt  # noqa: E402
+from small_shots import BASE, ELBOW, FORE, HAND, PLASTIC, SHOULDER, TARGET_POSITION, UPPER, set_float  # noqa: E402
+
+Edit = Callable[[Usd.Stage], None]
+SKIN = f"{FORE}/skin"
+
+
+@dataclass(frozen=True)
+class Case:
+    """One broken shot.
+
+    Attributes:
+        make: Writes it into a folder; its file.
+        place: What the error's place must hold; prim path, attribute or file.
+        repaired: What a note must hold, where the shot is processed all the same; empty where it is refused.
+    """
+
+    make: Callable[[Path], Path]
+    place: tuple[str, ...] = ()
+    repaired: str = ""
+
+
+def edited(edit: Edit, *place: str, repaired: str = "") -> Case:
+    """The arm with an edit."""
+    return Case(lambda folder: shots.write_arm(folder / "shot.usda", edit), place, repaired)
+
+
+def of_text(change: Callable[[str], str], *place: str, repaired: str = "", name: str = "shot.usda") -> Case:
+    """The arm with its text changed."""
+
+    def make(folder: Path) -> Path:
+        text = shots.write_arm(folder / "shot.usda").read_text()
+        (folder / "shot.usda").unlink()
+        (folder / name).write_text(change(text))
+        return folder / name
+
+    return Case(make, place, repaired)
+
+
+def of_bytes(content: bytes, name: str, *place: str) -> Case:
+    """A file of one's own."""
+
+    def make(folder: Path) -> Path:
+        (folder / name).write_bytes(content)
+        return folder / name
+
+    return Case(make, place or (name,))
+
+
+def of_layer(change: Callable[[Sdf.Layer], None], *place: str, more: dict[str, str] | None = None) -> Case:
+    """The arm with its layer changed, and other files beside it."""
+
+    def make(folder: Path) -> Path:
+        shot = shots.write_arm(folder / "shot.usda")
+        for name, text in (more or {}).items():
+            (folder / name).write_text(text)
+        layer = Sdf.Layer.OpenAsAnonymous(str(shot))
+        change(layer)
+        layer.Export(str(shot))
+        return shot
+
+    return Case(make, place)
+
+
+def sample(path: str, value: object, code: float = 3.0) -> Edit:
+    return lambda stage: stage.GetPrimAtPath(path).GetAttribute(TARGET_POSITION).Set(value, code)
+
+
+def number(path: str, name: str, value: float) -> Edit:
+    return lambda stage: set_float(stage, path, name, value)
+
+
+def vector(path: str, name: str, *value: float) -> Edit:
+    return lambda stage: stage.GetPrimAtPath(path).GetAttribute(name).Set(Gf.Vec3f(*value))
+
+
+def attribute(path: str, name: str, kind: str, value: object) -> Edit:
+    """An attribute authored anew, with whatever type."""
+
+    def edit(stage: Usd.Stage) -> None:
+        prim = stage.GetPrimAtPath(path)
+        prim.RemoveProperty(name)
+        spec = Sdf.AttributeSpec(stage.GetRootLayer().GetPrimAtPath(path), name, getattr(Sdf.ValueTypeNames, kind))
+        spec.default = value
+
+    return edit
+
+
+def targets(path: str, name: str, *paths: str) -> Edit:
+    return lambda stage: stage.GetPrimAtPath(path).GetRelationship(name).SetTargets(list(paths))
+
+
+def transform(path: str, matrix: Gf.Matrix4d) -> Edit:
+    def edit(stage: Usd.Stage) -> None:
+        xform = UsdGeom.Xformable(stage.GetPrimAtPath(path))
+        xform.ClearXformOpOrder()
+        xform.AddTransformOp().Set(matrix)
+
+    return edit
+
+
+def applied(path: str, *schemas: str) -> Edit:
+    def edit(stage: Usd.Stage) -> None:
+        for schema in schemas:
+            stage.GetPrimAtPath(path).AddAppliedSchema(schema)
+
+    return edit
+
+
+def both(*edits: Edit) -> Edit:
+    def edit(stage: Usd.Stage) -> None:
+        for one in edits:
+            one(stage)
+
+    return edit
+
+
+def material(**values: float) -> Edit:
+    return lambda stage: shots.make_flexible(stage, FORE, **values)
+
+
+def flexible(edit: Edit) -> Edit:
+    return both(lambda stage: shots.make_flexible(stage), edit)
+
+
+def target(**weights: float) -> Edit:
+    return lambda stage: shots.make_target(stage, HAND, **weights)
+
+
+def retarget(name: str, kind: str, value: object) -> Edit:
+    return both(applied("/Arm", "CalmRetargetAPI"), attribute("/Arm", f"calm:retarget:{name}", kind, value))
+
+
+def unanimated(stage: Usd.Stage) -> None:
+    for path in (SHOULDER, ELBOW):
+        stage.GetPrimAtPath(path).GetAttribute(TARGET_POSITION).Clear()
+        stage.GetPrimAtPath(path).AddAppliedSchema("CalmMotorAPI")
+
+
+def undriven(stage: Usd.Stage) -> None:
+    for path in (SHOULDER, ELBOW):
+        stage.GetPrimAtPath(path).RemoveAppliedSchema("PhysicsDriveAPI:angular")
+        stage.GetPrimAtPath(path).GetAttribute(TARGET_POSITION).Clear()
+
+
+def no_bodies(stage: Usd.Stage) -> None:
+    for path in (BASE, UPPER, FORE):
+        stage.GetPrimAtPath(path).RemoveAppliedSchema("PhysicsRigidBodyAPI")
+
+
+def massless(stage: Usd.Stage) -> None:
+    for name in ("physics:mass", "physics:diagonalInertia", "physics:centerOfMass"):
+        stage.GetPrimAtPath(BASE).GetAttribute(name).Clear()
+
+
+def second_motor(stage: Usd.Stage) -> None:
+    """A second motor between the same bodies, on the same axis, that wants something else."""
+    layer = stage.GetRootLayer()
+    Sdf.CopySpec(layer, ELBOW, layer, "/Arm/joints/elbow_again")
+    attr = stage.GetPrimAtPath("/Arm/joints/elbow_again").GetAttribute(TARGET_POSITION)
+    for frame in range(shots.FRAMES + 1):
+        attr.Set(float(-30.0 * frame), frame)
+
+
+def moving_root(stage: Usd.Stage) -> None:
+    op = UsdGeom.Xformable(stage.GetPrimAtPath(BASE)).GetOrderedXformOps()[0]
+    for frame in range(shots.FRAMES + 1):
+        op.Set(Gf.Vec3d(0, 0.01 * frame, 1), frame)
+
+
+def gear(leader: str) -> Edit:
+    return lambda stage: stage.GetPrimAtPath(ELBOW).CreateRelationship("newton:mimicJoint").SetTargets([leader])
+
+
+def gears_in_a_circle(stage: Usd.Stage) -> None:
+    for one, other in ((SHOULDER, ELBOW), (ELBOW, SHOULDER)):
+        stage.GetPrimAtPath(one).CreateRelationship("newton:mimicJoint").SetTargets([other])
+
+
+def skel_joint(stage: Usd.Stage) -> None:
+    unanimated(stage)
+    stage.GetPrimAtPath(ELBOW).CreateAttribute("calm:motor:skelJoint", Sdf.ValueTypeNames.Token).Set("hips/arm")
+
+
+def mesh(name: str, value: object) -> Edit:
+    return flexible(lambda stage: stage.GetPrimAtPath(SKIN).GetAttribute(name).Set(value))
+
+
+def open_mesh(stage: Usd.Stage) -> None:
+    counts, indices = (stage.GetPrimAtPath(SKIN).GetAttribute(f"faceVertex{n}") for n in ("Counts", "Indices"))
+    counts.Set(counts.Get()[:3])
+    indices.Set(indices.Get()[:12])
+
+
+def mesh_file(path: str) -> Edit:
+    return flexible(attribute(FORE, "calm:flexible:meshFile", "Asset", Sdf.AssetPath(path)))
+
+
+def tet_mesh(points: list, tets: list) -> Edit:
+    def edit(stage: Usd.Stage) -> None:
+        tet = UsdGeom.TetMesh.Define(stage, f"{FORE}/tets")
+        tet.CreatePointsAttr(points)
+        tet.CreateTetVertexIndicesAttr([Gf.Vec4i(*t) for t in tets])
+
+    return flexible(edit)
+
+
+def a_foreign_joint(stage: Usd.Stage) -> None:
+    layer = stage.GetRootLayer()
+    layer.GetPrimAtPath(ELBOW).typeName = "PhysicsDistanceJoint"
+
+
+def stage_metadata(name: str, value: float) -> Edit:
+    return lambda stage: stage.GetRootLayer().pseudoRoot.SetInfo(name, value)
+
+
+def times(start: float, end: float) -> Edit:
+    def edit(stage: Usd.Stage) -> None:
+        stage.SetStartTimeCode(start)
+        stage.SetEndTimeCode(end)
+
+    return edit
+
+
+def one_sample(stage: Usd.Stage) -> None:
+    for path in (SHOULDER, ELBOW):
+        stage.GetPrimAtPath(path).GetAttribute(TARGET_POSITION).Clear()
+        stage.GetPrimAtPath(path).GetAttribute(TARGET_POSITION).Set(1.0, 3.0)
+    for name in ("startTimeCode", "endTimeCode"):
+        stage.GetRootLayer().pseudoRoot.ClearInfo(name)
+
+
+def half_turns(stage: Usd.Stage) -> None:
+    for frame in range(shots.FRAMES + 1):
+        stage.GetPrimAtPath(SHOULDER).GetAttribute(TARGET_POSITION).Set(float(9e7 * (frame % 2)), frame)
+
+
+def close_samples(stage: Usd.Stage) -> None:
+    attr = stage.GetPrimAtPath(SHOULDER).GetAttribute(TARGET_POSITION)
+    attr.Set(float(attr.Get(12.0)) + 1e-4, 12.0 + 1e-10)
+
+
+def too_many_samples(count: int) -> Case:
+    def make(folder: Path) -> Path:
+        layer = Sdf.Layer.FindOrOpen(str(shots.write_arm(folder / "arm.usda")))
+        shot = Sdf.Layer.CreateNew(str(folder / "shot.usdc"))
+        shot.TransferContent(layer)
+        path = f"{SHOULDER}.{TARGET_POSITION}"
+        with Sdf.ChangeBlock():
+            for code in np.linspace(0.0, 24.0, count):
+                shot.SetTimeSample(path, float(code), 1.0)
+        shot.Save()
+        del shot
+        (folder / "arm.usda").unlink()
+        return folder / "shot.usdc"
+
+    return Case(make, (SHOULDER, TARGET_POSITION))
+
+
+def unicode_names(text: str) -> str:
+    return (
+        text.replace('"Arm"', '"机械臂"')
+        .replace("/Arm", "/机械臂")
+        .replace("upper", "плечо")
+        .replace("fore", "avant_bras_é")
+    )
+
+
+NAN, INF = math.nan, math.inf
+SHEAR = Gf.Matrix4d(1, 0.5, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0.4, 0, 1, 1)
+SQUARE = [Gf.Vec3f(*p) for p in ((0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1))]
+
+CASES: dict[str, Case] = {
+    # files
+    "a file that is not USD": of_bytes(b"BVH is not USD", "shot.usda"),
+    "an empty file": of_bytes(b"", "shot.usda"),
+    "a binary file of noise": of_bytes(bytes(range(256)) * 8, "shot.usdc"),
+    "a binary header and nothing else": of_bytes(b"PXR-USDC" + bytes(80), "shot.usdc"),
+    "a package that is no archive": of_bytes(b"PK\x03\x04 and then nothing", "shot.usdz"),
+    "text that stops in the middle": of_text(lambda text: text[: len(text) // 2], "shot.usda"),
+    "a brace too many": of_text(lambda text: text + "}\n", "shot.usda"),
+    # composition
+    "a missing sublayer": of_layer(lambda layer: layer.subLayerPaths.append("./gone.usda"), "gone.usda"),
+    "a missing reference": of_layer(
+        lambda layer: layer.GetPrimAtPath(FORE).referenceList.Prepend(Sdf.Reference("./gone.usda")), FORE
+    ),
+    "a missing payload": of_layer(
+        lambda layer: layer.GetPrimAtPath(FORE).payloadList.Prepend(Sdf.Payload("./gone.usda")), FORE, "payload"
+    ),
+    "a reference to a prim that is not there": of_layer(
+        lambda layer: layer.GetPrimAtPath(FORE).referenceList.Prepend(Sdf.Reference("./other.usda", "/Gone")),
+        FORE, more={"other.usda": '#usda 1.0\ndef "There" {}\n'},
+    ),
+    "a reference out of the folder": of_layer(
+        lambda layer: layer.GetPrimAtPath(FORE).referenceList.Prepend(Sdf.Reference("../../../../../../etc/passwd")),
+        FORE,
+    ),
+    "a prim that references itself": of_layer(
+        lambda layer: layer.GetPrimAtPath(FORE).referenceList.Prepend(Sdf.Reference("", "/Arm")), "/Arm"
+    ),
+    "files that reference each other": of_layer(
+        lambda layer: layer.GetPrimAtPath(FORE).referenceList.Prepend(Sdf.Reference("./other.usda", "/Arm")),
+        "/Arm",
+        more={"other.usda": '#usda 1.0\ndef "Arm" (references = @./shot.usda@</Arm>) {}\n'},
+    ),
+    "a layer that is its own sublayer": of_layer(lambda layer: layer.subLayerPaths.append("./shot.usda"), "shot.usda"),
+    # the stage
+    "no length of a unit": edited(stage_metadata("metersPerUnit", 0.0), "metersPerUnit"),
+    "a length of a unit that is no number": edited(stage_metadata("metersPerUnit", NAN), "metersPerUnit"),
+    "a negative mass of a unit": edited(stage_metadata("kilogramsPerUnit", -1.0), "kilogramsPerUnit"),
+    "no time codes in a second": edited(lambda stage: stage.SetTimeCodesPerSecond(0.0), "timeCodesPerSecond"),
+    "an end before the start": edited(times(10.0, 3.0), "endTimeCode"),
+    "one sample and no range": edited(one_sample, "endTimeCode"),
+    "gravity that is no number": edited(
+        both(lambda s: UsdPhysics.Scene.Define(s, "/Arm/scene").CreateGravityMagnitudeAttr(NAN)), "/Arm/scene"
+    ),
+    # bodies
+    "no bodies": edited(no_bodies, "shot.usda"),
+    "a body without mass": edited(massless, BASE, "physics:mass"),
+    "a mass of zero and nothing else": edited(both(massless, number(BASE, "physics:mass", 0.0)), BASE, "physics:mass"),
+    "a negative mass": edited(number(FORE, "physics:mass", -1.0), FORE, "physics:mass"),
+    "a mass that is no number": edited(number(FORE, "physics:mass", NAN), FORE, "physics:mass"),
+    "an infinite mass": edited(number(FORE, "physics:mass", INF), FORE, "physics:mass"),
+    "a mass of a wrong type": edited(attribute(FORE, "physics:mass", "String", "heavy"), FORE, "physics:mass"),
+    "a negative inertia": edited(vector(FORE, "physics:diagonalInertia", -1, 1, 1), FORE, "physics:diagonalInertia"),
+    "an inertia that is no number": edited(vector(FORE, "physics:diagonalInertia", NAN, 1, 1), FORE, "Inertia"),
+    "a transform that is no number": edited(transform(FORE, Gf.Matrix4d(NAN)), FORE),
+    "an infinite transform": edited(transform(FORE, Gf.Matrix4d(1).SetTranslate(Gf.Vec3d(INF, 0, 0))), FORE),
+    "a scale of zero": edited(transform(FORE, Gf.Matrix4d(0).SetScale(Gf.Vec3d(1, 0, 1))), FORE),
+    "a transform that shears": edited(transform(FORE, SHEAR), FORE),
+    "a root that is held and moves": edited(moving_root, BASE),
+    # joints
+    "no joints": edited(lambda stage: stage.RemovePrim("/Arm/joints"), "/Arm"),
+    "a joint between a body and itself": edited(targets(ELBOW, "physics:body0", FORE), ELBOW, "physics:body"),
+    "a joint to a prim that is not there": edited(targets(ELBOW, "physics:body0", "/Arm/gone"), ELBOW, "physics:body0"),
+    "a joint end on two bodies": edited(targets(ELBOW, "physics:body0", UPPER, BASE), ELBOW, "physics:body0"),
+    "a joint to an attribute": edited(targets(ELBOW, "physics:body0", f"{UPPER}.physics:mass"), ELBOW, "physics:body0"),
+    "an axis that is none": edited(attribute(ELBOW, "physics:axis", "Token", "W"), ELBOW, "physics:axis"),
+    "an axis of a wrong type": edited(attribute(ELBOW, "physics:axis", "Float", 1.0), ELBOW, "physics:axis"),
+    "a rotation of length zero": edited(
+        lambda stage: stage.GetPrimAtPath(ELBOW).GetAttribute("physics:localRot0").Set(Gf.Quatf(0)),
+        ELBOW, "physics:localRot0",
+    ),
+    "a position that is no number": edited(vector(ELBOW, "physics:localPos0", NAN, 0, 0), ELBOW, "physics:localPos0"),
+    "a position of a wrong type": edited(attribute(ELBOW, "physics:localPos0", "String", "here"), ELBOW, "localPos0"),
+    "a limit that is no number": edited(number(ELBOW, "physics:lowerLimit", NAN), ELBOW, "physics:lowerLimit"),
+    "a joint of a kind that is not supported": edited(a_foreign_joint, ELBOW),
+    "two motors on one hinge": edited(second_motor, "elbow"),
+    # motors
+    "no motors": edited(undriven, "/Arm"),
+    "motors without animation": edited(unanimated, SHOULDER, TARGET_POSITION),
+    "a fixed joint as a motor": edited(applied("/Arm/joints/stand", "CalmMotorAPI"), "/Arm/joints/stand"),
+    "an animation without a drive": edited(
+        lambda s: s.GetPrimAtPath(ELBOW).RemoveAppliedSchema("PhysicsDriveAPI:angular"), ELBOW, TARGET_POSITION
+    ),
+    "a sample that is no number": edited(sample(SHOULDER, NAN), SHOULDER, TARGET_POSITION),
+    "an infinite sample": edited(sample(SHOULDER, INF), SHOULDER, TARGET_POSITION),
+    "a sample that is blocked": edited(sample(SHOULDER, Sdf.ValueBlock()), SHOULDER, TARGET_POSITION),
+    "a track of a wrong type": edited(attribute(SHOULDER, TARGET_POSITION, "String", "up"), SHOULDER, TARGET_POSITION),
+    "half turns between frames": edited(half_turns, SHOULDER, TARGET_POSITION),
+    "more samples than anybody means": too_many_samples(1_100_000),
+    "a negative limit of effort": edited(number(ELBOW, "drive:angular:physics:maxForce", -1.0), ELBOW, "maxForce"),
+    "a limit of speed of zero": edited(
+        both(applied(ELBOW, "CalmMotorAPI"), number(ELBOW, "calm:motor:maxVelocity", 0.0)), ELBOW, "maxVelocity"
+    ),
+    "a gear to itself": edited(gear(ELBOW), ELBOW, "newton:mimicJoint"),
+    "a gear to nothing": edited(gear("/Arm/joints/gone"), ELBOW, "newton:mimicJoint"),
+    "gears in a circle": edited(gears_in_a_circle, "/Arm/joints"),
+    "a joint of a skeleton that is not there": edited(skel_joint, ELBOW, "calm:motor:skelJoint"),
+    # targets and settings
+    "a target on no body": edited(applied("/Arm", "CalmTargetAPI"), "/Arm"),
+    "a target without weight": edited(target(positionWeight=0.0), HAND, "calm:target:positionWeight"),
+    "a negative weight": edited(target(positionWeight=-1.0), HAND, "calm:target:positionWeight"),
+    "a weight that is no number": edited(target(rotationWeight=NAN), HAND, "calm:target:rotationWeight"),
+    "a negative tolerance": edited(retarget("tolerance", "Float", -5.0), "/Arm", "calm:retarget:tolerance"),
+    "a step that is no number": edited(retarget("timeStep", "Float", NAN), "/Arm", "calm:retarget:timeStep"),
+    "a reference that is none": edited(retarget("reference", "Token", "soft"), "/Arm", "calm:retarget:reference"),
+    "a loop that does not close": edited(
+        both(retarget("cyclic", "Bool", True), sample(SHOULDER, 90.0, 24.0)), SHOULDER
+    ),
+    # flexible bodies
+    "no elastic material": edited(applied(FORE, "CalmFlexibleBodyAPI"), FORE, "material:binding:physics"),
+    "a negative stiffness": edited(material(youngsModulus=-1.0), PLASTIC, "physics:youngsModulus"),
+    "a stiffness of zero": edited(material(youngsModulus=0.0), PLASTIC, "physics:youngsModulus"),
+    "an incompressible material": edited(material(poissonsRatio=0.5), PLASTIC, "physics:poissonsRatio"),
+    "a density of zero": edited(material(density=0.0), PLASTIC, "physics:density"),
+    "damping beyond critical": edited(
+        flexible(both(applied(PLASTIC, "CalmDampingAPI"), number(PLASTIC, "calm:damping:ratio", 1.5))), PLASTIC
+    ),
+    "an elasticity that is none": edited(
+        flexible(attribute(FORE, "calm:flexible:elasticity", "Token", "rubbery")), FORE, "calm:flexible:elasticity"
+    ),
+    "an open mesh": edited(flexible(open_mesh), SKIN),
+    "points that are no numbers": edited(mesh("points", Vt.Vec3fArray([Gf.Vec3f(NAN)] * 8)), SKIN, "points"),
+    "corners that are not there": edited(mesh("faceVertexIndices", Vt.IntArray([99] * 24)), SKIN, "faceVertexIndices"),
+    "negative corners": edited(mesh("faceVertexIndices", Vt.IntArray([-1] * 24)), SKIN, "faceVertexIndices"),
+    "faces of another number of corners": edited(
+        mesh("faceVertexCounts", Vt.IntArray([3] * 6)), SKIN, "faceVertexCounts"
+    ),
+    "a mesh without points": edited(mesh("points", Vt.Vec3fArray()), SKIN),
+    "tetrahedra of points that are not there": edited(tet_mesh(SQUARE, [(0, 1, 2, 9)]), f"{FORE}/tets"),
+    "no tetrahedra": edited(tet_mesh(SQUARE, []), f"{FORE}/tets", "tetVertexIndices"),
+    "a flat tetrahedron": edited(tet_mesh([*SQUARE[:3], Gf.Vec3f(1, 1, 0)], [(0, 1, 2, 3)]), f"{FORE}/tets"),
+    "a mesh file that is missing": edited(mesh_file("./gone.msh"), FORE, "calm:flexible:meshFile"),
+    "a mesh file out of the folder": edited(mesh_file("../../../../../../etc/passwd"), FORE, "calm:flexible:meshFile"),
+    # what can be repaired
+    "names in other scripts": of_text(unicode_names, repaired="机械臂"),
+    "samples at nearly the same time": edited(close_samples, repaired=SHOULDER),
+    "a body that nothing holds": edited(
+        lambda s: s.GetPrimAtPath("/Arm/joints/stand").GetAttribute("physics:jointEnabled").Set(False), repaired=BASE
+    ),
+    "limits the wrong way round": edited(
+        both(number(ELBOW, "physics:lowerLimit", 90.0), number(ELBOW, "physics:upperLimit", -90.0)), repaired=""
+    ),
+}  # fmt: skip
+
+
+def write_all(folder: Path) -> None:
+    """Write every case into a folder of its name."""
+    for name, case in CASES.items():
+        own = folder / name.replace(" ", "_")
+        own.mkdir(parents=True, exist_ok=True)
+        print(case.make(own))
+
+
+if __name__ == "__main__":
+    write_all(Path(sys.argv[1]))

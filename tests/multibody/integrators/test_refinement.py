@@ -1,0 +1,84 @@
+"""Steps that only smaller ones reach."""
+
+import numpy as np
+import pytest
+from arms import chain, compiled
+from calmotion.multibody.analysis.kinematics import rigid_state
+from calmotion.multibody.failure import SimulationFailure
+from calmotion.multibody.integrators import newton, refinement
+from calmotion.multibody.integrators.simulation import simulate
+from calmotion.multibody.integrators.workspace import Workspace
+from calmotion.multibody.sensitivity.linearization import linearize
+
+
+def driven(model, turn, h=1.0 / 24.0, steps=12):
+    """A two-link arm whose first motor jumps by a turn [rad] from one instant to the next, while the other moves on."""
+    angles, rates = np.zeros((steps, 2)), np.zeros((steps, 2))
+    angles[steps // 2 :, 0] = turn
+    angles[:, 1], rates[:, 1] = 0.3 * np.linspace(0.0, 1.0, steps) ** 2, 0.6 * np.linspace(0.0, 1.0, steps) / (11 * h)
+    ws = Workspace.for_system(model.system)
+    return simulate(model.system, rigid_state(model, angles[0]), angles, rates, h, ws), angles, rates, ws
+
+
+def test_the_end_of_smaller_steps_is_a_guess_for_the_step_itself(monkeypatch):
+    """Made to fail once, the step is found again, and its equations hold as if nothing had happened."""
+    model = compiled(chain(2, driven=(0, 1), length=0.3))
+    expected, angles, rates, ws = driven(model, 0.4)
+    failed = []
+
+    class Failing:
+        CONVERGED, SINGULAR = newton.CONVERGED, newton.SINGULAR
+
+    from calmotion.multibody.integrators import simulation
+
+    advance = simulation._advance
+
+    def once(system, scheme, h, first, last, *more):
+        if first <= 5 < last and not failed:
+            code = advance(system, scheme, h, first, 5, *more)
+            failed.append(5)
+            return (newton.NOT_CONVERGED, 5, 0, *code[3:])
+        return advance(system, scheme, h, first, last, *more)
+
+    monkeypatch.setattr(simulation, "_advance", once)
+    found, *_ = driven(model, 0.4)
+    assert failed and found.refined == ()
+    for part in ("c", "q", "turn", "V", "lam"):
+        one, other = getattr(found.states, part), getattr(expected.states, part)
+        assert np.abs(one - other).max() < 1e-8 * max(1.0, np.abs(other).max()), part
+    linearize(model.system, found, angles, rates, ws)
+
+
+def test_where_smaller_steps_stand_in_there_is_no_gradient(monkeypatch):
+    model = compiled(chain(2, driven=(0, 1), length=0.3))
+    expected, angles, rates, ws = driven(model, 0.4)
+    from calmotion.multibody.integrators import simulation
+
+    refined = refinement.refined_step
+    advance, failed = simulation._advance, []
+
+    def once(system, scheme, h, first, last, *more):
+        if first <= 5 < last and not failed:
+            code = advance(system, scheme, h, first, 5, *more)
+            failed.append(5)
+            return (newton.NOT_CONVERGED, 5, 0, *code[3:])
+        return advance(system, scheme, h, first, last, *more)
+
+    monkeypatch.setattr(simulation, "_advance", once)
+    monkeypatch.setattr(simulation, "refined_step", lambda *arguments: refined(*arguments) and False)
+    found, *_ = driven(model, 0.4)
+    assert found.refined == (5,)
+    with pytest.raises(SimulationFailure, match="refined"):
+        linearize(model.system, found, angles, rates, ws)
+
+
+def test_a_jump_of_half_a_turn_is_taken_or_refused_but_never_not_a_number():
+    model = compiled(chain(2, driven=(0, 1), length=0.3))
+    for turn in (np.pi, 0.9 * np.pi, 3.0):
+        try:
+            trajectory, *_ = driven(model, turn)
+        except SimulationFailure as failure:
+            assert failure.time_s == pytest.approx(0.25) and failure.reason in ("diverged", "singular")
+            continue
+        assert all(np.all(np.isfinite(part)) for part in trajectory.states)
+        assert trajectory.max_joint_gap < 1e-3

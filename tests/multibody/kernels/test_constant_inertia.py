@@ -1,0 +1,132 @@
+"""Bodies that never turn: their rows against sums over particles, and against those of bodies that may turn."""
+
+import numpy as np
+import pytest
+from calmotion.multibody.analysis.kinematics import rigid_state, target_frames
+from calmotion.multibody.analysis.reactions import reactions
+from calmotion.multibody.integrators.simulation import simulate
+from calmotion.multibody.integrators.workspace import Workspace
+from calmotion.multibody.kernels import constant_inertia
+from calmotion.multibody.model.model import rigid_model
+from gantries import ASIDE, STILL, UP, drive, gantry
+from particles import particle_system
+from test_inertia import by_particles
+
+ALL = ("Bridge", "Trolley", "Beam0", "Beam1", "Tool")
+
+
+def component(r):
+    rng = np.random.default_rng(0)
+    system, parts = particle_system(rng, [-1], [r])
+    u, v, vd = (rng.normal(size=r) * scale for scale in (0.3, 1.0, 2.0))
+    a, al = rng.normal(size=(2, 3))
+    return system, parts[0], (a, al, u, v, vd)
+
+
+def residual(system, state):
+    a, al, u, v, vd = state
+    s, res = np.zeros(3), np.zeros(6 + len(u))
+    constant_inertia.straight_residual(
+        len(u), system.mass[0], system.s[0], system.Z[0], system.M3[0], system.axial0[0], system.stiffness[0],
+        system.damping[0], a, al, u, v, vd, s, res,
+    )  # fmt: skip
+    return res, s
+
+
+def mass_matrix(system, s):
+    r = system.size - 6
+    D = np.zeros((6 + r, 6 + r))
+    constant_inertia.straight_mass_matrix(r, system.mass[0], s, system.Z[0], system.M3[0], system.axial0[0], D)
+    return D
+
+
+@pytest.mark.parametrize("r", [0, 1, 6])
+def test_rows_are_the_work_of_the_particles_where_nothing_turns_or_nothing_is_deformed(r):
+    system, part, (a, al, u, v, vd) = component(r)
+    still = np.zeros(3)
+    undeformed = (a, al, 0.0 * u, v, vd)
+    expected = by_particles(system, part, (a, still, al, 0.0 * u, v, vd))
+    assert np.abs(residual(system, undeformed)[0] - expected).max() < 1e-12 * np.abs(expected).max()
+    # deformed: all but what the acceleration of the deformation does to the moment
+    expected = by_particles(system, part, (a, still, still, u, v, vd))
+    found = residual(system, (a, still, u, v, vd))[0]
+    expected[3:6] -= np.einsum("l,k,lki->i", u, vd, system.axial[0])
+    assert np.abs(found - expected).max() < 1e-12 * np.abs(expected).max()
+
+
+@pytest.mark.parametrize("r", [0, 5])
+def test_mass_matrix_is_symmetric_and_gives_the_acceleration_terms(r):
+    system, _, (a, al, u, v, vd) = component(r)
+    found, s = residual(system, (a, al, u, v, vd))
+    D = mass_matrix(system, s)
+    change = found - residual(system, (0.0 * a, 0.0 * al, u, v, 0.0 * vd))[0]
+    assert np.abs(D - D.T).max() < 1e-15
+    assert np.abs(D @ np.concatenate([a, al, vd]) - change).max() < 1e-12 * np.abs(change).max()
+
+
+@pytest.mark.parametrize("r", [0, 1, 6])
+def test_jacobians_match_central_differences(r):
+    system, _, (a, al, u, v, vd) = component(r)
+    n, e = 6 + r, 1e-3
+    D = mass_matrix(system, residual(system, (a, al, u, v, vd))[1])
+    P, K = np.zeros((n, n)), np.zeros((n, n))
+    constant_inertia.straight_velocity_jacobian(r, system.damping[0], P)
+    constant_inertia.straight_position_jacobian(r, system.M3[0], system.stiffness[0], a, al, D, K)
+
+    def change(da=0.0, du=0.0, dv=0.0):
+        ends = [residual(system, (a + k * da, al, u + k * du, v + k * dv, vd))[0] for k in (e, -e)]
+        return (ends[0] - ends[1]) / (2 * e)
+
+    for k in range(3):
+        assert np.abs(change(da=np.cross(a, np.eye(3)[k])) - K[:, 3 + k]).max() < 1e-10
+    for k in range(r):
+        assert np.abs(change(du=np.eye(r)[k]) - K[:, 6 + k]).max() < 1e-10
+        assert np.abs(change(dv=np.eye(r)[k]) - P[:, 6 + k]).max() < 1e-10
+    assert not P[:, :6].any() and not K[:, :3].any()
+
+
+def run(model, reach, steps=150):
+    """The motion, where the tool is, shape [T, 3], and the motors' efforts, shape [T, 2]."""
+    times = 0.004 * np.arange(steps + 1)
+    angles, rates = (model.joint_angles(values) for values in drive(times, reach))
+    found = simulate(
+        model.system, rigid_state(model, angles[0]), angles, rates, 0.004, Workspace.for_system(model.system)
+    )
+    tool = target_frames(model, found.states.c, found.states.q, found.states.u)[0][:, 0]
+    return found.states, tool, reactions(model.system, found, angles, rates).efforts[:, :2]
+
+
+def test_nothing_is_lost_where_the_frames_cannot_turn():
+    """A beam on rigid slides; what hangs on it turns with its tip, and is told so."""
+    exact, told = (run(gantry([STILL], straight), 0.2) for straight in ((), ALL[:3]))
+    bent = np.abs(exact[0].u).max(axis=(0, 1))
+    assert np.abs(exact[0].q[:, -1] - exact[0].q[0, 0]).max() > 1e-3, "the tool does turn"
+    assert np.abs(told[0].u - exact[0].u).max() < 1e-12 * bent.max()
+    assert np.abs(told[1] - exact[1]).max() < 1e-12 * np.abs(exact[1]).max()
+    assert np.abs(told[2] - exact[2]).max() < 1e-10 * np.abs(exact[2]).max()
+
+
+@pytest.mark.parametrize("beams", [[UP, ASIDE], [STILL, STILL]], ids=["mast and boom", "boom"])
+def test_what_is_lost_on_carriers_that_bend_is_of_second_order(beams):
+    """A beam on the end of another one: its frame turns with the deflection. All loads grow together."""
+    lost = []
+    for part in (1.0, 0.5, 0.25):
+        exact, told = (run(gantry(beams, straight, 9.81 * part), 0.2 * part) for straight in ((), ALL))
+        lost.append([np.abs(found - expected).max() for found, expected in zip(told[1:], exact[1:], strict=True)])
+    orders = np.log2(np.array(lost[:-1]) / lost[1:])
+    assert np.all(orders > 1.9), (orders, lost)
+    assert lost[0][0] < 1e-3, "[m], of a deflection of 0.2 m"
+
+
+def test_a_body_that_turns_moves_otherwise_when_it_is_told_that_it_does_not():
+    exact, told = (run(gantry([STILL], straight, hinged=True), 1.0)[0] for straight in ((), ALL))
+    assert np.abs(told.u - exact.u).max() > 0.01 * np.abs(exact.u).max()
+
+
+def test_the_list_of_bodies_that_never_turn_survives_making_them_rigid():
+    model = gantry([STILL], ALL[:3])
+    for system in (model.system, rigid_model(model).system):
+        assert list(system.straight) == [0, 1, 2] and list(system.turning) == [3]
+        assert not len(system.stvk) and not len(system.neohookean)
+    states = run(rigid_model(model), 0.2)[0]
+    assert not states.u.size and np.abs(states.q[:, :, 1:]).max() < 1e-15

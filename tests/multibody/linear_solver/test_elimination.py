@@ -1,0 +1,86 @@
+"""Elimination along the tree against dense linear algebra."""
+
+import numpy as np
+import pytest
+from calmotion.multibody.kernels.assembly import allocate_work, assemble
+from calmotion.multibody.linear_solver import closed_chains as loops
+from calmotion.multibody.linear_solver import elimination
+from calmotion.multibody.linear_solver.closed_chains import allocate_border
+from calmotion.multibody.model.system import Blocks, Scheme, allocate_blocks, allocate_factors
+from dense import constrains, dense_matrix, join, multipliers, split
+from particles import random_state
+from test_assembly import TREES, put_world, tree
+
+
+def eliminated(name):
+    system = tree(name, 2)
+    state = random_state(np.random.default_rng(2), system)
+    Hv = np.zeros((len(system.parent), 4, 4))
+    Hv[:, 0, 0] = 50.0
+    Hv[:, 1:, 1:] = 50.0 * np.eye(3)
+    blocks = allocate_blocks(system)
+    zero, vector = np.zeros((len(system.parent), system.size)), np.zeros(len(system.rows))
+    work = allocate_work(system)
+    put_world(work, np.random.default_rng(4))
+    state.lam[~constrains(system)] = 0.0
+    assemble(
+        system,
+        Scheme(50.0, 50.0, 1.0, 100.0),
+        state.c,
+        state.q,
+        state.u,
+        state.V,
+        zero,
+        state.lam,
+        vector,
+        vector,
+        Hv,
+        True,
+        work,
+        blocks,
+    )
+    A = dense_matrix(system, Blocks(*[part.copy() for part in blocks]))
+    for joint, constrained in enumerate(constrains(system)):
+        for k in np.flatnonzero(~constrained) + multipliers(system, joint).start:
+            A[k, k] = 1.0
+    factors = allocate_factors(system)
+    assert elimination.factor(system, blocks, factors.lu, factors.pivots, factors.Z, np.zeros(system.size)) == -1
+    return system, blocks, factors, A
+
+
+@pytest.mark.parametrize("name", TREES)
+@pytest.mark.parametrize("transposed", [False, True], ids=["plain", "transposed"])
+def test_solution_is_that_of_the_dense_matrix(name, transposed):
+    system, blocks, factors, A = eliminated(name)
+    b = np.random.default_rng(3).normal(size=len(A))
+    x, lam = split(system, b)
+    border = allocate_border(system)
+    shared = (blocks.Lc, blocks.Lp, blocks.Hc[len(system.parent) :], blocks.Hp, blocks.Nc, blocks.Jp)
+    block = np.zeros(system.size + 6)
+    loops.factor_loops(system, *shared, factors.lu, factors.pivots, factors.Z, border, block)
+    solve = loops.solve_system_transposed if transposed else loops.solve_system
+    solve(
+        system, *shared, factors.lu, factors.pivots, factors.Z, border.inverse, x, lam, border.X, border.lam, border.y,
+        border.x, block,
+    )  # fmt: skip
+    M = A.T if transposed else A
+    found = join(system, x, lam)
+    assert np.abs(M @ found - b).max() < 1e-12 * (np.abs(M) @ np.abs(found)).max()
+    assert np.allclose(found, np.linalg.solve(M, b), rtol=1e-7, atol=1e-9)
+
+
+def test_singular_component_is_named():
+    system, blocks, factors, _ = eliminated("flexible chain")
+    blocks.K[1] = 0.0
+    blocks.Lc[1] = 0.0
+    assert elimination.factor(system, blocks, factors.lu, factors.pivots, factors.Z, np.zeros(system.size)) == 1
+
+
+def test_dense_factors_solve_a_matrix_that_needs_pivoting():
+    A = np.array([[0.0, 2.0, 1.0], [1.0, 0.0, 0.0], [3.0, 1.0, 0.0]])
+    lu, piv, b = A.copy(), np.zeros(3, np.int32), np.array([1.0, 2.0, 3.0])
+    assert elimination.lu_factor(3, lu, piv)
+    x, y = b.copy(), b.copy()
+    elimination.lu_solve(3, lu, piv, x)
+    elimination.lu_solve_transposed(3, lu, piv, y)
+    assert np.abs(A @ x - b).max() < 1e-14 and np.abs(A.T @ y - b).max() < 1e-14

@@ -1,0 +1,56 @@
+"""Eigenpairs of the full model."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from calmotion.reduction.basis.natural_modes import SparseSolver, frequencies, lowest_modes, vector_mass
+from calmotion.reduction.elements.assembly import assemble
+
+
+@pytest.fixture(scope="module")
+def model(helpers, steel):
+    return assemble(*helpers.box((8, 1, 2), (0.4, 0.02, 0.04)), steel)
+
+
+def held(model):
+    return np.flatnonzero(model.mesh.nodes[:, 0] < 1e-9)
+
+
+def reduced_matrices(model):
+    dofs = np.setdiff1d(np.arange(3 * len(model.mesh.nodes)), (3 * held(model)[:, None] + np.arange(3)).ravel())
+    return model.stiffness[dofs][:, dofs], vector_mass(model.mass)[dofs][:, dofs]
+
+
+def test_the_sparse_modes_are_those_of_the_dense_solver(model):
+    from scipy.linalg import eigh
+
+    K, M = reduced_matrices(model)
+    values, vectors = lowest_modes(K, M, 8)
+    dense = eigh(K.toarray(), M.toarray(), eigvals_only=True, subset_by_index=(0, 7))
+    assert np.allclose(values, dense, rtol=1e-6)  # the dense solver loses digits to the highest modes
+    assert np.abs(vectors.T @ (M @ vectors) - np.eye(8)).max() < 1e-9
+
+
+def test_the_same_modes_come_back_to_the_last_bit(model):
+    K, M = reduced_matrices(model)
+    first, second = lowest_modes(K, M, 5), lowest_modes(K, M, 5)
+    assert np.array_equal(first[0], second[0]) and np.array_equal(first[1], second[1])
+
+
+def test_a_free_body_has_six_rigid_modes_and_no_more(model):
+    f = frequencies(model, 8)
+    assert f[:6].max() < 1e-3 * f[6]
+    assert f[6] > 100.0
+
+
+def test_more_modes_than_there_are_is_all_of_them(helpers, steel):
+    tiny = assemble(*helpers.box((1, 1, 1), (0.1, 0.1, 0.1)), steel)
+    clamped = held(tiny)
+    assert len(frequencies(tiny, 1000, clamped)) == 3 * (len(tiny.mesh.nodes) - len(clamped))
+
+
+def test_the_solver_solves_many_right_hand_sides(model):
+    K, _ = reduced_matrices(model)
+    b = np.random.default_rng(0).standard_normal((K.shape[0], 3))
+    assert np.abs(K @ SparseSolver(K).solve(b) - b).max() < 1e-8

@@ -1,0 +1,93 @@
+"""Points tied to a mesh."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from calmotion.reduction.elements import embedding
+from calmotion.reduction.elements.assembly import quadratic_mesh
+
+
+@pytest.fixture(scope="module")
+def mesh(helpers):
+    points, tets = helpers.box((4, 3, 2), (0.4, 0.3, 0.2), origin=(-0.1, 0.2, 0))
+    moved = points + 0.01 * np.random.default_rng(2).standard_normal(points.shape)
+    return quadratic_mesh(moved, tets)
+
+
+def inside(mesh, count=300, seed=3):
+    rng = np.random.default_rng(seed)
+    tets = mesh.tets[rng.integers(len(mesh.tets), size=count), :4]
+    return np.einsum("kc,kci->ki", rng.dirichlet(np.ones(4), count), mesh.nodes[tets])
+
+
+def quadratic(x):
+    """A field that quadratic elements hold exactly, and half its curl."""
+    X, Y, Z = x.T
+    u = np.stack([X * Y + Z**2, X**2 - 3 * Y * Z, X * Z + 2 * Y**2 - X], axis=1)
+    curl = np.stack([4 * Y + 3 * Y, 2 * Z - (Z - 1), 2 * X - X], axis=1)
+    return u[:, :, None], 0.5 * curl[:, :, None]
+
+
+def test_a_quadratic_field_and_its_rotation_are_exact_inside(mesh):
+    points = inside(mesh)
+    tied = embedding.embed(mesh, points)
+    u, rotation = quadratic(points)
+    modes = quadratic(mesh.nodes)[0]
+    assert np.abs(tied.displacements(modes) - u).max() < 1e-12
+    assert np.abs(tied.rotations(modes) - rotation).max() < 1e-11
+    assert np.abs(tied.arms).max() == 0.0
+
+
+def test_nodes_get_their_own_displacement(mesh):
+    modes = np.random.default_rng(0).standard_normal((len(mesh.nodes), 3, 2))
+    assert np.abs(embedding.embed(mesh, mesh.nodes).displacements(modes) - modes).max() < 1e-12
+
+
+def test_a_rigid_motion_is_exact_everywhere_also_far_outside(mesh):
+    points = np.random.default_rng(1).uniform(-2, 2, (400, 3))
+    axis, shift = np.array([0.3, -0.2, 0.5]), np.array([1.0, 2.0, 3.0])
+    modes = (np.cross(axis, mesh.nodes) + shift)[:, :, None]
+    tied = embedding.embed(mesh, points)
+    assert np.abs(tied.displacements(modes)[:, :, 0] - (np.cross(axis, points) + shift)).max() < 1e-11
+    assert np.abs(tied.rotations(modes)[:, :, 0] - axis).max() < 1e-11
+
+
+def test_points_just_outside_move_like_the_surface_beside_them(mesh):
+    surface = mesh.nodes[mesh.surface[:, :3]].mean(axis=1)
+    a, b, c = (mesh.nodes[mesh.surface[:, k]] for k in range(3))
+    normal = np.cross(b - a, c - a)
+    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    modes = quadratic(mesh.nodes)[0]
+    on = embedding.embed(mesh, surface - 1e-6 * normal).displacements(modes)
+    off = embedding.embed(mesh, surface + 1e-6 * normal).displacements(modes)
+    assert np.abs(on - off).max() < 1e-4
+
+
+def test_many_points_find_the_same_elements_as_a_few(mesh, monkeypatch):
+    points = np.vstack([inside(mesh, 500, seed=5), np.random.default_rng(4).uniform(-0.3, 0.7, (200, 3))])
+    modes = quadratic(mesh.nodes)[0]
+    every = embedding.embed(mesh, points)
+    monkeypatch.setattr(embedding, "_ALL_PAIRS", 0)
+    monkeypatch.setattr(embedding, "_CANDIDATES", 4)
+    few = embedding.embed(mesh, points)
+    assert np.abs((every.displacements(modes) - few.displacements(modes))[:500]).max() < 1e-12
+    # outside, neighbours may tie; both must be beside the point
+    reach = np.abs(np.linalg.norm(every.arms, axis=1) - np.linalg.norm(few.arms, axis=1))
+    assert np.median(reach) < 1e-12
+
+
+def test_no_points_are_no_problem(mesh):
+    tied = embedding.embed(mesh, np.zeros((0, 3)))
+    assert tied.displacements(np.zeros((len(mesh.nodes), 3, 2))).shape == (0, 3, 2)
+
+
+def test_shape_functions_sum_to_one_and_their_gradients_match_differences(mesh):
+    bary = np.random.default_rng(6).dirichlet(np.ones(4), 20)
+    assert np.allclose(embedding.shape_functions(bary).sum(axis=1), 1.0, atol=1e-14)
+    gradients = np.random.default_rng(7).standard_normal((20, 4, 3))
+    step = 1e-6
+    for axis in range(3):
+        difference = embedding.shape_functions(bary + step * gradients[:, :, axis])
+        difference = (difference - embedding.shape_functions(bary - step * gradients[:, :, axis])) / (2 * step)
+        assert np.abs(embedding.shape_gradients(bary, gradients)[:, :, axis] - difference).max() < 1e-8

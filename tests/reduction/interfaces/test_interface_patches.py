@@ -1,0 +1,81 @@
+"""Patches of the surface that joints hold."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from calmotion.errors import ShotError
+from calmotion.reduction.elements.assembly import quadratic_mesh
+from calmotion.reduction.interfaces.interface_patches import Anchor, interface_patches, spans_a_plane
+
+
+@pytest.fixture(scope="module")
+def beam(helpers):
+    return quadratic_mesh(*helpers.box((20, 2, 2), (0.6, 0.02, 0.02), origin=(0, -0.01, -0.01)))
+
+
+@pytest.fixture
+def anchor(helpers):
+    return lambda name, *position, kind="interface": Anchor(name, helpers.frame(*position), kind)
+
+
+def test_a_given_radius_takes_the_surface_within_it(beam, anchor):
+    """By area, so that a patch does not grow or shrink by an element as the mesh happens to lie."""
+    center = np.array([0.3, 0.0, 0.01])
+    (patch,) = interface_patches(beam, [anchor("/j", *center)], 0.025, "/b")
+    distance = np.linalg.norm(beam.nodes - center, axis=1)
+    surface = np.isin(np.arange(len(beam.nodes)), beam.surface_nodes)
+    inside = np.flatnonzero(surface & (distance <= 0.025))
+    assert np.isin(patch.nodes, beam.surface_nodes).all()
+    assert len(np.setxor1d(patch.nodes, inside)) <= 0.1 * len(inside)
+    assert distance[patch.nodes].max() < 0.03
+    # nearest first: none is left out that is nearer than one that is in
+    out = np.setdiff1d(np.flatnonzero(surface), patch.nodes)
+    assert distance[out].min() >= distance[patch.nodes].max() - 1e-12
+
+
+def test_patches_never_share_a_node_and_anchors_at_one_place_share_a_patch(beam, anchor):
+    anchors = [
+        anchor("/a", 0.28, 0, 0.01), anchor("/t", 0.1, 0, 0, kind="point"),
+        anchor("/b", 0.32, 0, 0.01), anchor("/c", 0.28, 0, 0.01),
+    ]  # fmt: skip
+    first, second = interface_patches(beam, anchors, 0.05, "/b")
+    assert first.anchors == (0, 3) and second.anchors == (2,)
+    assert not np.intersect1d(first.nodes, second.nodes).size
+    assert (beam.nodes[first.nodes, 0] <= 0.3 + 1e-12).all() and (beam.nodes[second.nodes, 0] >= 0.3 - 1e-12).all()
+
+
+def test_a_radius_finer_than_the_mesh_takes_the_triangle_that_is_touched(beam, anchor):
+    (patch,) = interface_patches(beam, [anchor("/j", 0.312, 0.003, 0.01)], 1e-3, "/b")
+    assert len(patch.nodes) == 6 and spans_a_plane(beam.nodes[patch.nodes])
+
+
+def test_an_anchor_off_the_body_is_refused_with_its_distance(beam, anchor):
+    with pytest.raises(ShotError) as caught:
+        interface_patches(beam, [anchor("/Arm/elbow", 0.3, 0.0, 0.11)], 0.02, "/Arm/link")
+    assert caught.value.path == "/Arm/link" and caught.value.attribute == "calm:flexible:interfaceRadius"
+    assert "/Arm/elbow" in str(caught.value) and "0.1 m away" in str(caught.value)
+    assert len(interface_patches(beam, [anchor("/Arm/elbow", 0.3, 0.0, 0.11)], 0.12, "/Arm/link")) == 1
+
+
+def test_the_automatic_radius_does_not_reach_for_an_anchor_in_the_air(beam, anchor):
+    with pytest.raises(ShotError, match="0.09 m away"):
+        interface_patches(beam, [anchor("/j", 0.3, 0.0, 0.1)], -1.0, "/b")
+
+
+def test_the_axis_of_a_bore_is_held_by_a_band_of_its_wall(helpers, anchor):
+    points, tets = helpers.box((8, 8, 2), (0.1, 0.1, 0.02), origin=(-0.05, -0.05, -0.01))
+    center = points[tets].mean(axis=1)
+    tets = tets[np.abs(center[:, :2]).max(axis=1) > 0.025]
+    used = np.unique(tets)
+    ring = quadratic_mesh(points[used], np.searchsorted(used, tets).astype(np.int32))
+    (patch,) = interface_patches(ring, [anchor("/j", 0, 0, 0)], -1.0, "/b")
+    assert np.abs(ring.nodes[patch.nodes][:, :2]).max() < 0.049
+    for direction in ((1, 0), (-1, 0), (0, 1), (0, -1)):
+        assert (ring.nodes[patch.nodes][:, :2] @ direction).max() >= 0.025 - 1e-12
+
+
+def test_points_on_a_line_span_no_plane():
+    line = np.outer(np.arange(4.0), [1, 2, 3])
+    assert not spans_a_plane(line) and not spans_a_plane(line[:2])
+    assert spans_a_plane(np.vstack([line, [[1.0, 0, 0], [0, 4, 0]]]))

@@ -1,0 +1,69 @@
+"""Patches from named surfaces."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from boxes import box_tets
+from calmotion.errors import ShotError
+from calmotion.reduction.elements.assembly import quadratic_mesh
+from calmotion.reduction.interfaces.interface_patches import Anchor, interface_patches
+from calmotion.reduction.interfaces.named_patch import named_patch
+from calmotion.shot import Frame, InterfaceSurface
+
+IDENTITY = np.array([1.0, 0.0, 0.0, 0.0])
+
+
+def square(x0, x1, y0, y1, z, up=True):
+    """Two triangles of a horizontal rectangle."""
+    a, b, c, d = np.array([[x0, y0, z], [x1, y0, z], [x1, y1, z], [x0, y1, z]], dtype=float)
+    triangles = np.array([[a, b, c], [a, c, d]])
+    return triangles if up else triangles[:, ::-1]
+
+
+@pytest.fixture(scope="module")
+def plate():
+    return quadratic_mesh(*box_tets((10, 10, 1), (0.2, 0.2, 0.001)))
+
+
+def anchor(path, position, triangles=None):
+    surface = None if triangles is None else InterfaceSurface(f"{path}/part", path, triangles)
+    return Anchor(path, Frame(np.asarray(position, dtype=float), IDENTITY), "interface", surface)
+
+
+def test_nodes_on_the_surface_and_on_its_side_of_a_thin_wall(plate):
+    nodes = named_patch(plate, square(0.0, 0.1, 0.0, 0.2, 0.001))
+    x = plate.nodes[nodes]
+    # 11 x 21 nodes of the upper side, those on the rim of the plate included
+    assert len(nodes) == 11 * 21 and np.allclose(x[:, 2], 0.001) and x[:, 0].max() < 0.1 + 1e-9
+    assert np.allclose(plate.nodes[named_patch(plate, square(0.0, 0.1, 0.0, 0.2, 0.0, up=False))][:, 2], 0.0)
+
+
+def test_a_surface_a_little_off_the_mesh_is_found(plate):
+    assert len(named_patch(plate, square(0.0, 0.1, 0.0, 0.2, 0.0015))) == 11 * 21
+    assert len(named_patch(plate, square(0.0, 0.1, 0.0, 0.2, 0.004))) == 0
+
+
+def test_named_patches_come_first_and_the_others_get_the_rest(plate):
+    a = anchor("/J/a", (0.0, 0.1, 0.0), square(0.0, 0.04, 0.0, 0.2, 0.001))
+    b = anchor("/J/b", (0.06, 0.1, 0.001))
+    first, second = interface_patches(plate, [a, b], 0.05, "/Plate")
+    assert len(first.nodes) == 5 * 21 and first.anchors == (0,)
+    assert not np.intersect1d(first.nodes, second.nodes).size and len(second.nodes)
+
+
+def test_two_names_at_one_place_stay_two(plate):
+    a = anchor("/J/a", (0.1, 0.1, 0.0), square(0.0, 0.04, 0.0, 0.2, 0.001))
+    b = anchor("/J/b", (0.1, 0.1, 0.0), square(0.16, 0.2, 0.0, 0.2, 0.001))
+    assert len(interface_patches(plate, [a, b], -1.0, "/Plate")) == 2
+
+
+def test_too_small_and_overlapping_ones_are_refused(plate):
+    tiny = anchor("/J/a", (0.1, 0.1, 0.0), square(0.103, 0.107, 0.103, 0.107, 0.001))
+    with pytest.raises(ShotError, match="too small") as caught:
+        interface_patches(plate, [tiny], -1.0, "/Plate")
+    assert caught.value.path == "/J/a/part"
+    one = anchor("/J/a", (0.0, 0.1, 0.0), square(0.0, 0.1, 0.0, 0.2, 0.001))
+    other = anchor("/J/b", (0.2, 0.1, 0.0), square(0.08, 0.2, 0.0, 0.2, 0.001))
+    with pytest.raises(ShotError, match="overlaps"):
+        interface_patches(plate, [one, other], -1.0, "/Plate")

@@ -1,0 +1,103 @@
+"""Patches that turn without changing their shape."""
+
+import numpy as np
+import pytest
+from boxes import box_tets
+from calmotion.reduction.basis.craig_bampton import reduced_basis
+from calmotion.reduction.basis.fixed_interface import FixedInterface
+from calmotion.reduction.basis.modal_derivatives import Support, extended_basis
+from calmotion.reduction.elements.assembly import assemble
+from calmotion.reduction.interfaces import patch_rotation
+from calmotion.reduction.interfaces.patch_rotation import shape_changes, spring_rows, springs, square_fields, squares
+from calmotion.shot import FlexibleSettings
+from scipy.spatial.transform import Rotation
+
+ENTRIES = ((0, 1, 2, 1, 0, 0), (0, 1, 2, 2, 2, 1))
+
+
+def test_squares_are_the_second_order_of_a_rotation():
+    rng = np.random.default_rng(0)
+    arms, turn = rng.normal(size=(5, 3)), 1e-3 * rng.normal(size=3)
+    second = Rotation.from_rotvec(turn).apply(arms) - arms - np.cross(turn, arms)
+    expected = 0.5 * square_fields(arms) @ squares(turn[None, :, None])[0, :, 0]
+    assert np.allclose(second, expected, rtol=0, atol=2e-3 * np.abs(second).max())
+
+
+def test_squares_of_pairs_are_symmetric_products():
+    rng = np.random.default_rng(1)
+    rotation = rng.normal(size=(2, 3, 3))
+    pairs = squares(rotation)
+    assert pairs.shape == (2, 6, 6)
+    product = 0.5 * (np.outer(rotation[1, :, 0], rotation[1, :, 2]) + np.outer(rotation[1, :, 2], rotation[1, :, 0]))
+    assert np.allclose(pairs[1, :, 2], product[ENTRIES])
+
+
+def test_springs_resist_what_the_nodes_move():
+    rng = np.random.default_rng(2)
+    nodes, center = 0.01 * rng.normal(size=(12, 3)), np.array([0.0, 0.01, 0.0])
+    patch = np.array([1, 4, 5, 7, 9, 10])
+    root = springs(nodes, [patch], [center], 2e9)[0]
+    strain = rng.normal(size=(3, 3))
+    strain += strain.T
+    arms = nodes[patch] - center
+    squared = np.sum(arms**2, axis=1)
+    products = np.einsum("ai,ij,bj->ab", arms, strain, arms)  # X^T E Y of all pairs of points
+    expected = patch_rotation.STIFF * 2e9 * squared.max() ** 1.5 * np.sum(products**2) / squared.sum() ** 2
+    assert np.sum((root @ strain[ENTRIES]) ** 2) == pytest.approx(expected, rel=1e-10)
+
+
+def test_all_six_entries_change_the_shape_of_a_body_and_three_that_of_a_plane():
+    arms = np.random.default_rng(4).normal(size=(9, 3))
+    assert shape_changes(arms).shape == (6, 6)
+    arms[:, 0] = 0.0
+    found = shape_changes(arms)
+    assert found.shape == (6, 3)
+    # the entries 02 and 01 turn a plane across the first axis as a whole, and 00 does what 11 and 22 do
+    assert np.allclose(found[4:], 0.0, atol=1e-12)
+    assert shape_changes(np.zeros((1, 3))).shape == (6, 0)
+
+
+def test_springs_are_stretched_by_the_green_strain_of_a_patch():
+    rng = np.random.default_rng(3)
+    roots, held, rotation, u = (rng.normal(size=shape) for shape in ((2, 6, 6), (2, 6, 4), (2, 3, 4), 4))
+    first, second = np.triu_indices(4)
+    z = np.concatenate([u, u[first] * u[second]])
+    expected = []
+    for root, S, turn in zip(roots, held @ u, rotation @ u, strict=True):
+        F = np.eye(3) + square_fields(np.eye(3)).swapaxes(0, 1) @ S + np.cross(turn, np.eye(3)).T
+        expected.append(root @ (0.5 * (F.T @ F - np.eye(3)))[ENTRIES])
+    assert np.allclose(spring_rows(roots, held, rotation) @ z, np.concatenate(expected), rtol=1e-12)
+
+
+def test_springs_let_a_patch_turn_by_any_angle():
+    """In coordinates of sin(a) n and of the second order, as `dynamics.finite_rotation` has them."""
+    turn = Rotation.from_rotvec([0.5, -0.3, 0.7]).as_matrix()
+    axial = 0.5 * np.array([turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]])
+    even = 0.5 * (turn + turn.T) - np.eye(3)
+    S = (even - 0.5 * np.trace(even) * np.eye(3))[ENTRIES]
+    rows = spring_rows(np.eye(6)[None], np.eye(6, 9)[None], np.eye(3, 9, 6)[None])
+    u = np.concatenate([S, axial])
+    first, second = np.triu_indices(9)
+    assert np.abs(rows @ np.concatenate([u, u[first] * u[second]])).max() < 1e-14
+
+
+@pytest.mark.parametrize(("stiff", "softer"), [(patch_rotation.STIFF, 0.0), (0.0, 1e-4)])
+def test_a_link_is_not_softer_for_the_derivatives_of_its_modes(plastic, monkeypatch, stiff, softer):
+    """A reduction is never softer than the mesh with rigid patches, unless the patches lose their shape."""
+    monkeypatch.setattr(patch_rotation, "STIFF", stiff)
+    points, tets = box_tets((6, 3, 3), (0.12, 0.04, 0.04), (0.0, -0.02, -0.02))
+    model = assemble(points, tets, plastic)
+    x, tip = model.mesh.nodes[:, 0], np.array([0.12, 0.0, 0.0])
+    support = Support(np.flatnonzero(x < 1e-9), [np.flatnonzero(x > 0.12 - 1e-9)], [tip])
+    settings = FlexibleSettings(plastic, mode_count=10)
+    basis = reduced_basis(model, support.root, support.patches, support.centers, settings)
+    longer = extended_basis(model, support, basis, 6, plastic, "stvk")
+    response = (longer.patch_motion[0] / longer.omega_squared) @ longer.patch_motion[0].T
+    constraint = FixedInterface.of(model, support.root, support.patches, support.centers).constraint
+    exact = np.linalg.inv(constraint.T @ (model.stiffness @ constraint))
+    scale = np.sqrt(np.diag(exact))
+    excess = np.linalg.eigvalsh((response - exact) / np.outer(scale, scale)).max()
+    if softer:
+        assert excess > softer
+    else:
+        assert excess < 1e-6

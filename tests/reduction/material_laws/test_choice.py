@@ -1,0 +1,86 @@
+"""The law that is chosen, against what the laws make of an arm that is swung (evidence, 8)."""
+
+import numpy as np
+import pytest
+from boxes import box_tets
+from calmotion.reduction.basis.craig_bampton import reduced_basis
+from calmotion.reduction.basis.modal_derivatives import Support
+from calmotion.reduction.elements.assembly import assemble
+from calmotion.reduction.load_envelope import Excitation
+from calmotion.reduction.material_laws.choice import choose_law, deflection_of, work_of_loads
+from calmotion.shot import ElasticMaterial, FlexibleSettings
+
+LENGTH, PAYLOAD = 0.6, 0.2
+
+
+def arm(youngs_modulus):
+    material = ElasticMaterial("/Looks/Plastic", youngs_modulus, 0.35, 1200.0)
+    points, tets = box_tets((15, 1, 1), (LENGTH, 0.02, 0.02), (0.0, -0.01, -0.01))
+    model = assemble(points, tets, material)
+    x = model.mesh.nodes[:, 0]
+    support = Support(np.flatnonzero(x < 1e-9), [np.flatnonzero(x > LENGTH - 1e-9)], [np.array([LENGTH, 0.0, 0.0])])
+    settings = FlexibleSettings(material, mode_count=6)
+    basis = reduced_basis(model, support.root, support.patches, support.centers, settings)
+    return model, support, basis, material
+
+
+def swing(speed):
+    """Peak loads of a swing through 90 degrees in half a second over `speed`, the payload's included."""
+    spin, turn = 5.89 * speed, 36.3 * speed**2
+    force = PAYLOAD * LENGTH * np.array([[spin**2, 0.0, turn]])
+    return Excitation(
+        np.zeros(3), np.array([0.0, turn, 0.0]), np.array([0.0, spin, 0.0]), force, np.zeros((1, 3)), 5.0 * speed
+    )
+
+
+def test_a_slow_swing_is_linear_and_a_fast_one_is_not():
+    body = arm(1.8e9)
+    slow, fast = choose_law(*body, swing(0.2), 1e-3), choose_law(*body, swing(1.0), 1e-3)
+    assert slow.law == "linear" and slow.error_m < 1e-3
+    assert fast.law == "stvk" and "mm" in fast.reason
+    # 31 mm bend and 0.95 mm of shortening, as published; loads at their peaks together make it more, not less
+    assert 1e-3 < choose_law(*body, swing(1.0), 1.0).error_m < 30e-3
+    # the same swing with a tolerance that allows it
+    assert choose_law(*body, swing(1.0), 1.0).law == "linear"
+
+
+def test_rubber_needs_the_material_law():
+    assert choose_law(*arm(5e6), swing(1.0), 1e-3).law == "neohookean"
+
+
+def test_at_rest_everything_is_linear():
+    still = Excitation(np.zeros(3), np.zeros(3), np.zeros(3), np.zeros((1, 3)), np.zeros((1, 3)))
+    choice = choose_law(*arm(1e6), still, 1e-6)
+    assert choice.law == "linear" and choice.error_m == 0.0
+
+
+def test_a_deflection_is_bounded_by_twice_that_of_a_beam_at_rest_and_a_little_more():
+    model, _, basis, _ = arm(1.8e9)
+    none = np.zeros(3)
+    loads = Excitation(none, none, none, np.array([[0.0, 0.0, 2.0]]), np.zeros((1, 3)))
+    at_rest = 2.0 * LENGTH**3 / (3.0 * 1.8e9 * 0.02**4 / 12.0)
+    assert 2.0 * at_rest < deflection_of(model, basis, loads) < 3.0 * at_rest
+
+
+def test_the_work_of_loads_is_that_of_their_sum_at_worst():
+    model, _, basis, _ = arm(1.8e9)
+    rng = np.random.default_rng(0)
+    loads = Excitation(
+        *(rng.uniform(0.0, 2.0, 3) for _ in range(3)), *(rng.uniform(0.0, 2.0, (1, 3)) for _ in range(2))
+    )
+    bound = work_of_loads(model, basis.modes, basis.patch_motion, loads)
+    X = model.mesh.nodes
+    largest = np.zeros(len(bound))
+    for _ in range(200):
+        a, turn, w, force, moment = (
+            value * rng.choice([-1.0, 1.0], value.shape)
+            for value in (
+                loads.acceleration, loads.angular_acceleration, loads.angular_velocity, loads.force, loads.moment
+            )
+        )  # fmt: skip
+        field = a + np.cross(turn, X) + np.cross(w, np.cross(w, X))
+        work = np.einsum("nak,na->k", basis.modes, model.mass @ field)
+        work += np.einsum("pa,pak->k", np.concatenate([force, moment], axis=1), basis.patch_motion)
+        largest = np.maximum(largest, np.abs(work))
+    assert (largest <= bound * (1 + 1e-12)).all()
+    assert largest == pytest.approx(bound, rel=0.35)

@@ -1,0 +1,41 @@
+"""The reduced law of a body of large deflection."""
+
+import numpy as np
+import pytest
+from boxes import box_tets, fe_mesh
+from calmotion.reduction.interfaces.interface_patches import Anchor
+from calmotion.reduction.reduce import reduce_body
+from calmotion.shot import Body, FlexibleSettings, Frame
+
+IDENTITY = np.array([1.0, 0.0, 0.0, 0.0])
+
+
+def arm(law, material):
+    points, tets = box_tets((12, 1, 1), (0.6, 0.02, 0.02), (0.0, -0.01, -0.01))
+    body = Body(
+        "/C/Arm", Frame(np.zeros(3), IDENTITY), None, flexible=FlexibleSettings(material, mode_count=6, elasticity=law)
+    )
+    anchors = [
+        Anchor("/C/J", Frame(np.zeros(3), IDENTITY), "interface"),
+        Anchor("/C/W", Frame(np.array([0.6, 0.0, 0.0]), IDENTITY), "interface"),
+    ]
+    return reduce_body(fe_mesh(points, tets), body, anchors, (), 0)
+
+
+def test_a_linear_body_has_no_law(plastic):
+    assert arm("linear", plastic).elasticity is None
+
+
+@pytest.mark.parametrize("law", ["stvk", "neohookean"])
+def test_a_nonlinear_body_has_more_modes_and_damping_of_its_own(plastic, law):
+    linear, body = arm("linear", plastic), arm(law, plastic)
+    assert body.elasticity is not None and body.elasticity.law == law
+    assert len(body.stiffness) > len(linear.stiffness) == 6
+    assert np.allclose(body.frequencies[:4], linear.frequencies[:4], rtol=1e-3)
+    assert body.elasticity.retardation > 0.0
+    r = len(body.stiffness)
+    if law == "stvk":
+        gram = body.elasticity.data.reshape(r + r * (r + 1) // 2, -1)
+        assert np.allclose(np.diag(gram)[:r], body.stiffness, rtol=1e-6)
+    else:
+        assert body.elasticity.data.size == r * r + body.elasticity.points * (1 + 9 * r)

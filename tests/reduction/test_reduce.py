@@ -1,0 +1,122 @@
+"""From a mesh to the reduced body."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from calmotion.errors import ShotError
+from calmotion.reduction.interfaces.interface_patches import Anchor
+from calmotion.reduction.load_envelope import Excitation
+from calmotion.reduction.reduce import reduce_body
+from calmotion.reduction.reduced_body import rigid_invariants
+from calmotion.shot import Body, FlexibleSettings, MassProperties, SurfaceMesh
+
+SIZE = (0.6, 0.02, 0.02)
+
+
+@pytest.fixture(scope="module")
+def mesh(helpers):
+    return helpers.mesh(*helpers.box((20, 2, 2), SIZE, origin=(0, -0.01, -0.01)))
+
+
+@pytest.fixture
+def body(helpers, plastic):
+    return Body("/Arm/link", helpers.frame(0, 0, 0), None, flexible=FlexibleSettings(plastic))
+
+
+@pytest.fixture
+def anchors(helpers):
+    return [
+        Anchor("/Arm/hand", helpers.frame(0.6, 0.0, 0.0), "interface"),
+        Anchor("/Arm/shoulder", helpers.frame(0.0, 0.0, 0.0), "interface"),
+        Anchor("/Arm/target", helpers.frame(0.6, 0.0, 0.0), "point"),
+        Anchor("/Arm/beyond", helpers.frame(0.65, 0.0, 0.0), "point"),
+    ]
+
+
+def test_the_root_stands_still_and_the_tip_moves_with_its_patch(mesh, body, anchors):
+    reduced = reduce_body(mesh, body, anchors, [], 1)
+    hand, shoulder, target, beyond = reduced.markers
+    r = len(reduced.stiffness)
+    assert r == 10 and np.abs(shoulder.Phi).max() == 0.0 and np.abs(shoulder.Psi).max() == 0.0
+    assert np.array_equal(hand.position, [0.6, 0.0, 0.0])
+    # the target lies in the middle of the rigid patch, so it does what the patch does
+    assert np.abs(target.Phi - hand.Phi).max() < 1e-10 * np.abs(hand.Phi).max()
+    arm = np.cross(beyond_rotation := beyond.Psi, np.array([0.05, 0, 0])[:, None], axis=0)
+    assert np.abs(beyond.Phi - (target.Phi + arm)).max() < 1e-10 * np.abs(hand.Phi).max()
+    assert np.abs(beyond_rotation - target.Psi).max() < 1e-10 * np.abs(target.Psi).max()
+
+
+def test_either_end_can_be_the_root(mesh, body, anchors):
+    one, other = reduce_body(mesh, body, anchors, [], 0), reduce_body(mesh, body, anchors, [], 1)
+    assert np.allclose(one.frequencies[:4], other.frequencies[:4], rtol=1e-3)
+    assert np.abs(one.markers[0].Phi).max() == 0.0 and np.abs(one.markers[1].Phi).max() > 0.0
+
+
+def test_the_invariants_are_those_of_the_solid(mesh, body, anchors, plastic):
+    reduced = reduce_body(mesh, body, anchors, [], 1)
+    m = plastic.density * np.prod(SIZE)
+    a2, b2, c2 = np.square(SIZE)
+    inertia = m / 12.0 * np.diag([b2 + c2, a2 + c2, a2 + b2])
+    rigid = rigid_invariants(MassProperties(m, np.array([0.3, 0, 0]), inertia))
+    inv = reduced.invariants
+    assert inv.mass == pytest.approx(m, rel=1e-12)
+    assert np.allclose(inv.s, rigid.s, atol=1e-12 * m) and np.allclose(inv.Z, rigid.Z, atol=1e-12 * m)
+    assert np.abs(inv.M - np.eye(len(reduced.stiffness))).max() < 1e-10
+
+
+def test_an_authored_mass_is_kept(mesh, body, anchors):
+    heavy = replace(body, mass=MassProperties(5.0, np.zeros(3), np.eye(3)))
+    light, reduced = reduce_body(mesh, body, anchors, [], 1), reduce_body(mesh, heavy, anchors, [], 1)
+    assert reduced.invariants.mass == pytest.approx(5.0, rel=1e-12)
+    ratio = np.sqrt(light.invariants.mass / 5.0)
+    assert np.allclose(reduced.frequencies, light.frequencies * ratio, rtol=1e-6)
+
+
+def test_a_skin_moves_with_the_body(mesh, body, anchors):
+    points = np.array([[0.0, 0.005, 0.005], [0.6, 0.0, 0.0], [0.3, 0.0, 0.0101]])
+    surface = SurfaceMesh("/Arm/link/skin", points, np.array([[0, 1, 2]], dtype=np.int32))
+    reduced = reduce_body(mesh, body, anchors, [surface], 1)
+    (skin,) = reduced.skin
+    assert skin.shape == (3, 3, len(reduced.stiffness))
+    assert np.abs(skin[0]).max() < 1e-12
+    assert np.abs(skin[1] - reduced.markers[2].Phi).max() < 1e-10
+    assert np.abs(skin[2]).max() > 1e-3
+
+
+def test_the_same_body_reduces_to_the_same_numbers(mesh, body, anchors):
+    one, two = reduce_body(mesh, body, anchors, [], 1), reduce_body(mesh, body, anchors, [], 1)
+    assert np.array_equal(one.stiffness, two.stiffness)
+    assert np.array_equal(one.invariants.S, two.invariants.S)
+    assert np.array_equal(one.markers[0].Phi, two.markers[0].Phi)
+
+
+@pytest.mark.parametrize(
+    ("field", "value"), [("youngs_modulus", 0.0), ("poissons_ratio", 0.5), ("density", -1.0), ("density", np.nan)]
+)
+def test_a_material_that_is_none_is_refused(mesh, body, anchors, field, value):
+    bad = replace(body, flexible=replace(body.flexible, material=replace(body.flexible.material, **{field: value})))
+    with pytest.raises(ShotError) as caught:
+        reduce_body(mesh, bad, anchors, [], 1)
+    assert caught.value.path == "/Looks/Plastic"
+
+
+def test_a_body_that_nothing_carries_is_refused(mesh, body, anchors):
+    with pytest.raises(ShotError, match="needs a joint that carries it"):
+        reduce_body(mesh, body, anchors, [], 2)
+
+
+def test_what_a_mesh_is_off_by_is_a_part_of_the_deflection(mesh, body, anchors):
+    none = np.zeros(3)
+    force = np.zeros((2, 3))
+    force[0, 2] = 2.0
+    loads = Excitation(none, none, none, force, np.zeros((2, 3)))
+    judged = replace(mesh, quality=replace(mesh.quality, frequency_error=0.01))
+    error = reduce_body(judged, body, anchors, [], 1, loads).mesh_error_m
+    # two percent of the stiffness, of twice the deflection at rest
+    at_rest = 2.0 * 0.6**3 / (3.0 * 1.8e9 * 0.02**4 / 12.0)
+    assert 0.04 * at_rest < error < 0.06 * at_rest
+    assert reduce_body(mesh, body, anchors, [], 1, loads).mesh_error_m is None
+    assert reduce_body(judged, body, anchors, [], 1).mesh_error_m is None

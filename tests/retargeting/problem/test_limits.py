@@ -1,0 +1,141 @@
+"""Limits of motors: their terms against differences, and each kind where it binds, kept to the last digit."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+from calmotion.retargeting.optimize import optimize_shot
+from calmotion.retargeting.problem.limits import MARGIN, LimitTerms
+from calmotion.simulation.motor_limits import motor_bounds
+from calmotion.simulation.prepare import Options
+
+OPTIONS = Options(step=1 / 240)
+UNIT = {"velocity": "max_velocity", "acceleration": "max_acceleration", "effort": "max_torque"}
+
+
+def quiet(fraction, message):
+    pass
+
+
+def with_limits(arm, **limits):
+    """The arm with limits by name, one value for each motor."""
+    motors = tuple(
+        dataclasses.replace(motor, **{name: float(values[k]) for name, values in limits.items()})
+        for k, motor in enumerate(arm.motors)
+    )
+    return dataclasses.replace(arm, motors=motors)
+
+
+@pytest.fixture(scope="module")
+def free(arm, animation, bodies):
+    """The optimum without limits, and the largest value of each quantity of each motor in it."""
+    wide = with_limits(arm, max_velocity=[1e6] * 2, max_acceleration=[1e6] * 2, max_torque=[1e6] * 2)
+    result = optimize_shot(wide, animation, bodies, OPTIONS, quiet)
+    return result, {
+        name: [abs(use.after) for use in result.limits if use.quantity == name] for name in ("position", *UNIT)
+    }
+
+
+@pytest.mark.parametrize("quantity", list(UNIT))
+@pytest.mark.parametrize("share", [0.95, 0.85])
+def test_limits_that_bind_are_kept_and_cost_no_more_than_they_must(arm, animation, bodies, free, quantity, share):
+    without, largest = free
+    character = with_limits(arm, **{UNIT[quantity]: share * np.array(largest[quantity])})
+    result = optimize_shot(character, animation, bodies, OPTIONS, quiet)
+    uses = [use for use in result.limits if use.quantity == quantity]
+    assert len(uses) == 2
+    for use in uses:
+        assert use.excess <= 1e-6 and abs(use.after) <= abs(use.limit) * (1 + 1e-6)
+    assert max(abs(use.after / use.limit) for use in uses) > 0.999, "the limits should bind"
+    assert 0.99 * without.objective_after < result.objective_after < 0.2 * result.objective_before
+    if quantity != "effort" and result.objective_after > 1.01 * without.objective_after:
+        assert max(use.cost_m or 0.0 for use in uses) > 0.0
+    # the values that the user gets are those that were limited
+    motion = result.after.motion
+    if quantity == "effort":
+        assert np.all(np.abs(motion.motor_efforts).max(axis=0) <= share * np.array(largest[quantity]) * (1 + 1e-6))
+
+
+def test_ranges_that_the_animation_leaves_are_kept(arm, animation, bodies):
+    at_frames = np.array([track.values for track in animation.tracks])
+    limits = [(float(v.min()) + 0.01, float(v.max()) - 0.01) for v in at_frames]
+    joints = tuple(
+        dataclasses.replace(joint, lower=limits[k][0], upper=limits[k][1]) if k < 2 else joint
+        for k, joint in enumerate(arm.joints)
+    )
+    result = optimize_shot(dataclasses.replace(arm, joints=joints), animation, bodies, OPTIONS, quiet)
+    values = result.after.motion.motor_values
+    for k, (low, high) in enumerate(limits):
+        assert values[:, k].min() >= low and values[:, k].max() <= high
+    assert max(use.cost_m or 0.0 for use in result.limits) > 1e-4
+    assert result.objective_after < 0.5 * result.objective_before
+
+
+def test_all_limits_together(arm, animation, bodies, free):
+    _, largest = free
+    limits = {name: 0.9 * np.array(largest[quantity]) for quantity, name in UNIT.items()}
+    result = optimize_shot(with_limits(arm, **limits), animation, bodies, OPTIONS, quiet)
+    assert all(use.excess <= 1e-6 for use in result.limits)
+    assert result.objective_after < 0.2 * result.objective_before
+
+
+def test_a_limit_that_nothing_can_keep_is_told_as_exceeded(arm, animation, bodies, free):
+    """The shoulder cannot even hold the arm."""
+    result = optimize_shot(
+        with_limits(arm, max_torque=[np.inf, 0.05]), animation, bodies, dataclasses.replace(OPTIONS, max_iterations=6),
+        quiet,
+    )  # fmt: skip
+    (use,) = [use for use in result.limits if use.quantity == "effort"]
+    assert use.motor == 1 and use.excess > 0.01 and abs(use.after) > 0.05
+
+
+def test_locked_motors_are_limited_in_effort_alone(arm):
+    arm = with_limits(arm, max_velocity=[1.0, 2.0], max_torque=[3.0, 4.0])
+    bounds = motor_bounds(arm, np.array([False, True]))
+    assert np.array_equal(np.isfinite(bounds["velocity"].upper), [False, True])
+    assert np.array_equal(bounds["effort"].upper, [3.0, 4.0]) and np.array_equal(bounds["effort"].lower, [-3.0, -4.0])
+    assert np.array_equal(np.isfinite(bounds["position"].upper), [False, True]) and "acceleration" not in bounds
+
+
+@pytest.fixture
+def terms(arm):
+    arm = with_limits(arm, max_velocity=[1.0, 2.0])
+    limits = LimitTerms(motor_bounds(arm), np.arange(9) > 1, 0.1, 7.0, on=True)
+    rng = np.random.default_rng(0)
+    for name in limits.multipliers:
+        limits.multipliers[name] = np.maximum(0.0, rng.normal(size=(2, 9, 2)))
+    return limits, {name: 2.0 * rng.normal(size=(9, 2)) for name in limits.bounds}
+
+
+def test_terms_have_the_derivatives_that_they_say(terms):
+    limits, values = terms
+    d = {name: np.random.default_rng(1).normal(size=v.shape) for name, v in values.items()}
+    e = 1e-6
+
+    def moved(t):
+        return {name: v + t * d[name] for name, v in values.items()}
+
+    slope = sum(np.sum(limits.gradient(name, v) * d[name]) for name, v in values.items())
+    assert slope == pytest.approx((limits.value(moved(e)) - limits.value(moved(-e))) / (2 * e), rel=1e-6)
+    curvature = sum(np.sum(limits.curvature(name, v) * d[name] ** 2) for name, v in values.items())
+    second = (limits.value(moved(1e-4)) - 2 * limits.value(values) + limits.value(moved(-1e-4))) / 1e-8
+    assert curvature == pytest.approx(second, rel=1e-3)
+    assert np.all(limits.gradient("velocity", values["velocity"])[:2] == 0.0), "nothing counts before the shot"
+
+
+def test_multipliers_grow_where_limits_are_exceeded_and_off_terms_are_nothing(terms):
+    limits, values = terms
+    before = {name: y.copy() for name, y in limits.multipliers.items()}
+    over = (values["velocity"] - limits.bounds["velocity"].upper) > 0.0
+    over[:2] = False
+    assert limits.update(values)
+    assert np.all(limits.multipliers["velocity"][0][over] > before["velocity"][0][over])
+    off = LimitTerms(limits.bounds, limits.judged, 0.1, 7.0)
+    assert off.value(values) == 0.0 and not np.any(off.curvature("velocity", values["velocity"]))
+    kept = {name: 0.0 * v for name, v in values.items()}
+    assert off.kept(kept) and not off.tighten(kept) and not off.on
+    assert off.tighten(values) and off.on
+    edge = {
+        name: np.broadcast_to((1 - 0.5 * MARGIN) * limits.bounds[name].upper, v.shape) for name, v in values.items()
+    }
+    assert off.kept(edge)

@@ -1,0 +1,65 @@
+"""What idle motors promise, against a search with them; and searches that take them in after all."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from calmotion.accuracy.simplification.analysis import analyse
+from calmotion.benchmarks.scenes.simplification_shots import arm_with_head
+from calmotion.multibody.model.topology import span_tree
+from calmotion.retargeting import to_tolerance
+from calmotion.retargeting.optimize import optimize_shot
+from calmotion.retargeting.simplification.idle_motors import idle_motors
+from calmotion.retargeting.to_tolerance import optimize_to_tolerance
+from calmotion.shot.model_choice import ON
+from calmotion.simulation.bodies import reduce_bodies
+from calmotion.simulation.prepare import Options, excitations
+
+FAST = Options(step=1 / 240)
+
+
+def quiet(fraction, message):
+    pass
+
+
+@pytest.fixture(scope="module")
+def shot():
+    return arm_with_head()
+
+
+@pytest.fixture(scope="module")
+def bodies(shot):
+    loads = excitations(shot.character, shot.animation, shot.meshes, FAST)
+    return reduce_bodies(shot.character, span_tree(shot.character), shot.meshes, None, loads)
+
+
+def _marked(shot, forced=None):
+    return analyse(shot.character, shot.animation, FAST, forced or {}, True).character
+
+
+@pytest.fixture(scope="module")
+def lean(shot, bodies):
+    return optimize_shot(_marked(shot), shot.animation, bodies, FAST, quiet)
+
+
+def test_a_head_stays_as_it_is_and_costs_little(shot, bodies, lean):
+    assert list(idle_motors(_marked(shot))) == [2, 3]
+    every = optimize_shot(_marked(shot, {"motors": ON}), shot.animation, bodies, FAST, quiet)
+    assert [curve.changed for curve in lean.curves] == [True, True, False, False]
+    assert lean.parameters < every.parameters and every.idle_gain_m is None
+    unit = np.sqrt(2.0 * lean.objective_after / np.mean(lean.after.position_errors[lean.after.motion.judged] ** 2))
+    lost = (np.sqrt(2.0 * lean.objective_after) - np.sqrt(2.0 * every.objective_after)) / unit
+    assert 0.0 <= lean.idle_gain_m < 1e-3
+    assert lost < max(5.0 * lean.idle_gain_m, 2e-5)
+    rows = {row.what: row for row in lean.left_out}
+    assert rows["optimisation of /Arm/Nod"].estimated_error_m == lean.idle_gain_m
+    assert "optimisation of /Arm/Shake" in rows and "changes of /Arm/Nod" not in rows
+
+
+def test_where_they_promise_much_the_search_goes_on_with_them(shot, bodies, monkeypatch):
+    monkeypatch.setattr(to_tolerance, "ENOUGH", -1.0)
+    result = optimize_to_tolerance(_marked(shot), shot.animation, bodies, FAST, quiet)
+    assert result.idle_gain_m is None
+    assert not any("Nod" in row.what and "moves no target" in row.why for row in result.left_out)
+    kept = optimize_to_tolerance(_marked(shot), shot.animation, bodies, replace(FAST, motors="off"), quiet)
+    assert kept.idle_gain_m is not None and kept.parameters < result.parameters

@@ -1,0 +1,121 @@
+"""Searches that are cut off go on as if nothing had happened, and files of other problems are not taken."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+from calmotion.retargeting import optimize
+from calmotion.retargeting.checkpoint import checkpoint_path
+from calmotion.retargeting.optimize import optimize_shot
+from calmotion.retargeting.problem import adaptive_knots
+from calmotion.retargeting.problem.problem import RetargetProblem
+from calmotion.simulation.prepare import Options
+from posed import jerking
+
+OPTIONS = Options(step=1 / 240)
+
+
+def quiet(fraction, message):
+    pass
+
+
+@pytest.fixture(scope="module")
+def limited(arm):
+    """The arm with limits that bind, so that the search has all its parts."""
+    motors = tuple(dataclasses.replace(motor, max_velocity=3.2) for motor in arm.motors)
+    return dataclasses.replace(arm, motors=motors)
+
+
+@pytest.fixture(scope="module")
+def whole(limited, animation, bodies):
+    return optimize_shot(limited, animation, bodies, OPTIONS, quiet)
+
+
+class Killed(Exception):
+    pass
+
+
+def stopping(monkeypatch, evaluations, error):
+    """Make the problem raise at its n-th evaluation."""
+    calls, value = [0], RetargetProblem.value
+
+    def counted(self, x):
+        calls[0] += 1
+        if calls[0] == evaluations:
+            raise error
+        return value(self, x)
+
+    monkeypatch.setattr(RetargetProblem, "value", counted)
+
+
+@pytest.mark.parametrize("evaluations", [1, 3, 4, 5, 7, 8])
+def test_a_killed_search_ends_at_the_same_result(
+    limited, animation, bodies, whole, tmp_path, monkeypatch, evaluations
+):  # fmt: skip
+    path = tmp_path / "kept.npz"
+    with monkeypatch.context() as patch:
+        stopping(patch, evaluations, Killed())
+        with pytest.raises(Killed):
+            optimize_shot(limited, animation, bodies, OPTIONS, quiet, path)
+    assert path.exists() == (evaluations > 3)
+    again = optimize_shot(limited, animation, bodies, OPTIONS, quiet, path)
+    assert again.objective_after == pytest.approx(whole.objective_after, rel=1e-9)
+    for one, other in zip(again.curves, whole.curves, strict=True):
+        assert np.abs(one.frame_values - other.frame_values).max() < 1e-9
+    assert [p.name for p in tmp_path.iterdir()] == ["kept.npz"], "no part of a file is left"
+
+
+@pytest.mark.parametrize("evaluations", [5, 7, 9])
+def test_a_search_that_was_killed_on_finer_knots_goes_on_with_them(
+    arm, bodies, tmp_path, monkeypatch, evaluations
+):  # fmt: skip
+    monkeypatch.setattr(adaptive_knots, "FIRST", 0.1)
+    path = tmp_path / "kept.npz"
+    direct = optimize_shot(arm, jerking(), bodies, OPTIONS, quiet)
+    with monkeypatch.context() as patch:
+        stopping(patch, evaluations, Killed())
+        with pytest.raises(Killed):
+            optimize_shot(arm, jerking(), bodies, OPTIONS, quiet, path)
+    again = optimize_shot(arm, jerking(), bodies, OPTIONS, quiet, path)
+    assert again.parameters == direct.parameters
+    assert again.objective_after == pytest.approx(direct.objective_after, rel=1e-9)
+    for one, other in zip(again.curves, direct.curves, strict=True):
+        assert np.abs(one.frame_values - other.frame_values).max() < 1e-9
+        assert np.array_equal(one.knots, other.knots)
+
+
+def test_an_interrupt_keeps_the_best_so_far(limited, animation, bodies, whole, tmp_path, monkeypatch):
+    path = tmp_path / "kept.npz"
+    with monkeypatch.context() as patch:
+        stopping(patch, 4, KeyboardInterrupt())
+        early = optimize_shot(limited, animation, bodies, OPTIONS, quiet, path)
+    assert early.interrupted and early.stopped == "interrupted" and not whole.interrupted
+    assert early.objective_before > early.objective_after
+    assert any(curve.changed for curve in early.curves)
+    late = optimize_shot(limited, animation, bodies, OPTIONS, quiet, path)
+    assert late.objective_after == pytest.approx(whole.objective_after, rel=1e-9) and not late.interrupted
+
+
+def test_what_another_problem_left_is_not_used(limited, animation, bodies, tmp_path, monkeypatch):
+    path = tmp_path / "kept.npz"
+    optimize_shot(limited, animation, bodies, OPTIONS, quiet, path)
+    started = []
+    find = optimize.minimize
+
+    def watched(problem, search, *arguments, **options):
+        started.append(len(search.history))
+        return find(problem, search, *arguments, **options)
+
+    monkeypatch.setattr(optimize, "minimize", watched)
+    other = dataclasses.replace(limited, gravity=0.9 * limited.gravity)
+    optimize_shot(other, animation, bodies, OPTIONS, quiet, path)
+    assert started[0] == 0
+    path.write_bytes(b"torn")
+    started.clear()
+    optimize_shot(limited, animation, bodies, OPTIONS, quiet, path)
+    assert started[0] == 0
+
+
+def test_the_file_lies_hidden_beside_the_layer():
+    path = checkpoint_path("/shots/arm_calm.usda")
+    assert path.parent.name == "shots" and path.name.startswith(".") and "arm_calm.usda" in path.name

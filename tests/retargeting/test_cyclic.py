@@ -1,0 +1,124 @@
+"""Shots that loop: judged in a steady state, optimised over it, without a jump at the seam."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+from calmotion import ShotError
+from calmotion.multibody.model.topology import span_tree
+from calmotion.retargeting.optimize import optimize_shot
+from calmotion.shot import Animation, FreeTrack, Track
+from calmotion.simulation.bodies import reduce_bodies
+from calmotion.simulation.prepare import Options
+from calmotion.simulation.simulate import simulate_shot
+
+OPTIONS = Options(step=1 / 240)
+FRAMES = np.arange(37) / 24.0
+
+
+def quiet(fraction, message):
+    pass
+
+
+@pytest.fixture(scope="module")
+def looping(arm):
+    return dataclasses.replace(arm, retarget=dataclasses.replace(arm.retarget, cyclic=True))
+
+
+@pytest.fixture(scope="module")
+def dance():
+    """A loop of a second and a half that is nowhere at rest."""
+    w = 2.0 * np.pi / FRAMES[-1]
+    tracks = (Track(FRAMES, 0.5 * np.sin(w * FRAMES)), Track(FRAMES, 0.4 * np.cos(2.0 * w * FRAMES + 0.5)))
+    return Animation(FRAMES, tracks, tracks)
+
+
+@pytest.fixture(scope="module")
+def result(looping, dance, bodies):
+    return optimize_shot(looping, dance, bodies, OPTIONS, quiet)
+
+
+def test_a_loop_is_calm_and_closes(result):
+    before, after = (s.position_errors[:, 1].max() for s in (result.before, result.after))
+    assert before > 0.01 and after < 0.15 * before
+    assert result.objective_after < 0.1 * result.objective_before and result.stopped == "converged"
+    assert result.before.seam.max() < 1e-8 and result.after.seam.max() < 1e-8
+    # the instant before the loop is no part of the result
+    assert result.after.motion.times[0] == 0.0 and len(result.after.motion.times) == 361
+    assert np.abs(result.after.position_errors[0] - result.after.position_errors[-1]).max() < 1e-8
+    assert result.pre_roll_s == 0.0 and not len(result.after.sag)
+    for curve in result.curves:
+        assert curve.changed and curve.frame_values[0] == pytest.approx(curve.frame_values[-1], abs=1e-12)
+
+
+def test_written_curves_simulated_again_give_the_reported_errors(result, looping, dance, bodies):
+    tracks = tuple(Track(FRAMES, curve.frame_values) for curve in result.curves)
+    again = simulate_shot(looping, Animation(FRAMES, dance.tracks, tracks), bodies, OPTIONS, quiet)
+    assert np.abs(again.before.position_errors - result.after.position_errors).max() < 1e-8
+
+
+def test_it_is_what_a_well_damped_robot_comes_to_in_many_loops(looping, dance, meshes):
+    """Simulated from rest, eight loops long, as one shot that plays once."""
+    plastic = dataclasses.replace(looping.bodies[0].flexible.material, damping_ratio=0.9)
+    flexible = dataclasses.replace(looping.bodies[0].flexible, material=plastic)
+    damped = tuple(dataclasses.replace(body, flexible=flexible) if body.flexible else body for body in looping.bodies)
+    character = dataclasses.replace(looping, bodies=damped)
+    bodies = reduce_bodies(character, span_tree(character), meshes)
+    found = simulate_shot(character, dance, bodies, OPTIONS, quiet)
+    loops, frames = 8, len(FRAMES) - 1
+    times = np.arange(loops * frames + 1) / 24.0
+    tracks = tuple(
+        Track(times, np.append(np.tile(track.values[:-1], loops), track.values[-1])) for track in dance.tracks
+    )
+    once = dataclasses.replace(character, retarget=dataclasses.replace(character.retarget, cyclic=False))
+    long = simulate_shot(once, Animation(times, tracks, tracks), bodies, OPTIONS, quiet)
+    # the last loop but one: the interpolant of the last ends differently
+    last = long.before.motion.target_positions[-721:-360]
+    assert np.abs(last - found.before.motion.target_positions).max() < 1e-5
+    assert np.abs(long.before.motion.target_positions[240:601] - found.before.motion.target_positions).max() > 1e-4
+
+
+def test_what_a_loop_cannot_do_is_refused(looping, dance, bodies):
+    with pytest.raises(ShotError, match="BDF2 alone") as error:
+        simulate_shot(looping, dance, bodies, dataclasses.replace(OPTIONS, integrator="newmark"), quiet)
+    assert error.value.attribute == "--integrator"
+    with pytest.raises(ShotError, match="ease into") as error:
+        simulate_shot(looping, dance, bodies, dataclasses.replace(OPTIONS, pre_roll=0.5), quiet)
+    assert error.value.attribute == "--pre-roll"
+
+
+def test_a_range_locked_at_the_seam_is_locked_on_both_sides_of_it(looping, dance, bodies):
+    locks = (FreeTrack(0, np.array([0.0, 0.1]), np.array([False, True])),)
+    found = optimize_shot(looping, dataclasses.replace(dance, free=locks), bodies, OPTIONS, quiet)
+    values, meant = found.curves[0].frame_values, dance.tracks[0].values
+    assert np.abs((values - meant)[[0, 1, 2, -1]]).max() < 1e-12 and np.abs(values - meant).max() > 1e-4
+
+
+def test_a_loop_that_does_not_close_is_refused(looping, dance, bodies):
+    values = dance.tracks[1].values + np.linspace(0.0, 0.05, len(FRAMES))
+    tracks = (dance.tracks[0], Track(FRAMES, values))
+    with pytest.raises(ShotError, match="not its first again") as error:
+        simulate_shot(looping, Animation(FRAMES, tracks, tracks), bodies, OPTIONS, quiet)
+    assert error.value.path == "/Arm/Elbow" and "2.86 degrees" in str(error.value) and error.value.remedy
+
+
+def test_whole_turns_of_a_loop_are_no_jump(looping, dance, bodies):
+    """A shoulder that goes round and round; a shot that plays it once starts in motion."""
+    w = 2.0 * np.pi / FRAMES[-1]
+    tracks = (Track(FRAMES, w * FRAMES), dance.tracks[1])
+    joints = (dataclasses.replace(looping.joints[0], lower=-np.inf, upper=np.inf), *looping.joints[1:])
+    turning = dataclasses.replace(looping, joints=joints)
+    found = simulate_shot(turning, Animation(FRAMES, tracks, tracks), bodies, OPTIONS, quiet)
+    assert found.before.seam.max() < 1e-3
+    # the forearm feels the same pull all the way: its tip is off by the centrifugal stretch and the sway alone
+    assert 1e-3 < found.before.position_errors[:, 1].max() < 0.2
+
+
+def test_a_loop_that_is_not_found_says_what_to_do(looping, dance, bodies, monkeypatch):
+    from calmotion.multibody.sensitivity import periodic
+
+    monkeypatch.setattr(periodic, "LIMIT", 1)
+    for job in (simulate_shot, optimize_shot):
+        with pytest.raises(ShotError, match="repeats itself") as error:
+            job(looping, dance, bodies, OPTIONS, quiet)
+        assert error.value.attribute == "calm:retarget:cyclic" and "calm:damping:ratio" in error.value.remedy

@@ -1,0 +1,64 @@
+"""An arm with a closed loop that shakes by a quarter of a metre, calmed: through damped problems to the real one."""
+
+import numpy as np
+import pytest
+from calmotion.benchmarks.common.shots import load
+from calmotion.benchmarks.optimizer.optimizer import make_problem
+from calmotion.retargeting.optimize import optimize_shot
+from calmotion.retargeting.solver.damping_homotopy import FAR, approach
+from calmotion.retargeting.solver.gauss_newton import Search, minimize
+from calmotion.simulation.prepare import Options, modes_of, prepare
+
+OPTIONS = Options(step=1 / 120)
+
+
+def quiet(fraction, message):
+    pass
+
+
+@pytest.fixture(scope="module")
+def shot():
+    return load("soft-linkage")
+
+
+def largest(simulation):
+    return simulation.position_errors[simulation.motion.times >= -1e-9].max(axis=0)
+
+
+@pytest.fixture(scope="module")
+def result(shot):
+    return optimize_shot(shot.character, shot.animation, shot.bodies, OPTIONS, quiet)
+
+
+def test_the_hand_that_was_off_by_a_quarter_of_a_metre_follows_to_a_few_millimetres(result):
+    before, after = largest(result.before), largest(result.after)
+    assert before[1] > 0.2
+    assert after[1] < 0.01 and after[1] < before[1] / 35.0
+    assert max(result.before.max_joint_gap, result.after.max_joint_gap) < 1e-6
+    assert result.stopped == "converged"
+
+
+def test_the_way_through_damped_problems_is_shorter(shot):
+    prepared = prepare(shot.character, shot.animation, shot.bodies, OPTIONS)
+    problem = make_problem(shot, prepared, 0.05)
+    zero, free = np.zeros(problem.size), np.zeros(problem.size, bool)
+    problem.value(zero)
+    assert problem.error > FAR * problem.lever()
+    start = approach(problem, zero, free, float(modes_of(prepared, shot.animation)[0][0]))
+    near = problem.value(start.x)
+    # as much work as the approach took, spent on the problem itself; a product is a fifth of a simulation
+    direct = minimize(problem, Search.start(zero), free, 1e-6, max_iterations=8)
+    spent = start.evaluations + 0.2 * start.products
+    reached = [i.value for i in direct.history if i.evaluations + 0.2 * i.products <= spent]
+    assert len(reached) < len(direct.history) and near < 0.5 * min(reached)
+
+
+def test_a_problem_with_more_damping_differs_in_nothing_else(shot):
+    prepared = prepare(shot.character, shot.animation, shot.bodies, OPTIONS)
+    problem = make_problem(shot, prepared, 0.2)
+    x = np.zeros(problem.size)
+    value = problem.value(x)
+    more = problem.damped(0.2, 10.0 / np.pi)
+    assert more.value(x) < 0.7 * value, "it shakes less"
+    assert problem.damped(0.0, 3.0).value(x) == pytest.approx(value, rel=1e-12)
+    assert problem.value(x) == pytest.approx(value, rel=1e-12), "the problem itself stays as it was"

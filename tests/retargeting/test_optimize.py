@@ -1,0 +1,136 @@
+"""The two jobs on a small arm: tenfold calmer, reproducible, within limits, honest about what it does not do."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+from calmotion import ShotError
+from calmotion.retargeting.optimize import optimize_shot
+from calmotion.shot import Animation, FreeTrack, Track, WeightTrack
+from calmotion.simulation.prepare import Options
+from calmotion.simulation.simulate import simulate_shot
+
+OPTIONS = Options(step=1 / 240)
+
+
+def quiet(fraction, message):
+    assert 0.0 <= fraction <= 1.0 and message
+
+
+@pytest.fixture(scope="module")
+def result(arm, animation, bodies):
+    return optimize_shot(arm, animation, bodies, OPTIONS, quiet)
+
+
+def judged(simulation):
+    return simulation.position_errors[simulation.motion.times >= 0.0].max(axis=0)
+
+
+def test_error_at_the_payload_falls_at_least_tenfold(result):
+    before, after = judged(result.before), judged(result.after)
+    assert before[1] > 0.01, "the input should shake visibly"
+    assert after[1] < 0.1 * before[1]
+    assert result.objective_after < 0.03 * result.objective_before
+    values = [step.objective for step in result.steps]
+    assert all(b < a for a, b in zip(values, values[1:], strict=False))
+
+
+def test_written_curves_simulated_again_give_the_reported_errors(result, arm, animation, bodies):
+    tracks = tuple(Track(animation.frame_times, curve.frame_values) for curve in result.curves)
+    again = simulate_shot(arm, Animation(animation.frame_times, animation.tracks, tracks), bodies, OPTIONS, quiet)
+    assert np.abs(again.before.position_errors - result.after.position_errors).max() < 1e-9
+    assert np.abs(again.before.rotation_errors - result.after.rotation_errors).max() < 1e-8
+
+
+def test_optimising_the_result_again_finds_nothing_left(result, arm, animation, bodies):
+    tracks = tuple(Track(animation.frame_times, curve.frame_values) for curve in result.curves)
+    again = optimize_shot(arm, Animation(animation.frame_times, animation.tracks, tracks), bodies, OPTIONS, quiet)
+    assert again.iterations <= 2
+    assert again.objective_after <= result.objective_after * (1 + 1e-6)
+
+
+def test_the_continuous_adjoint_leads_to_the_same_curves(result, arm, animation, bodies):
+    found = optimize_shot(arm, animation, bodies, dataclasses.replace(OPTIONS, adjoint="continuous"), quiet)
+    assert found.objective_after < 1.02 * result.objective_after
+    offsets = [a.frame_values - b.frame_values for a, b in zip(found.curves, result.curves, strict=True)]
+    assert 0.0 < np.abs(offsets).max() < 0.05 * max(curve.max_offset for curve in result.curves)
+    motors = tuple(dataclasses.replace(motor, max_torque=50.0) for motor in arm.motors)
+    with pytest.raises(ShotError, match="efforts?") as error:
+        optimize_shot(
+            dataclasses.replace(arm, motors=motors), animation, bodies,
+            dataclasses.replace(OPTIONS, adjoint="continuous"), quiet,
+        )  # fmt: skip
+    assert error.value.attribute == "retarget.optimize.adjoint" and "discrete" in error.value.remedy
+
+
+def test_joints_stay_closed(result):
+    assert max(result.before.max_joint_gap, result.after.max_joint_gap) < 1e-6
+
+
+def test_locked_motors_keep_their_curves(arm, animation, bodies):
+    motors = (dataclasses.replace(arm.motors[0], optimize=False), arm.motors[1])
+    result = optimize_shot(dataclasses.replace(arm, motors=motors), animation, bodies, OPTIONS, quiet)
+    assert not result.curves[0].changed and result.curves[1].changed
+    assert np.array_equal(result.after.motion.motor_values[:, 0], result.before.motion.motor_values[:, 0])
+    assert any("/Arm/Shoulder" in row.what for row in result.left_out)
+
+
+def test_a_range_in_which_a_motor_is_locked_keeps_its_curve(arm, animation, bodies):
+    lock = FreeTrack(0, np.array([0.0, 0.5, 1.0]), np.array([True, False, True]))
+    result = optimize_shot(arm, dataclasses.replace(animation, free=(lock,)), bodies, OPTIONS, quiet)
+    before, after = result.before.motion, result.after.motion
+    inside = (after.times >= 0.5) & (after.times <= 1.0)
+    assert np.array_equal(after.motor_values[inside, 0], before.motor_values[inside, 0])
+    assert np.abs(after.motor_values[~inside, 0] - before.motor_values[~inside, 0]).max() > 1e-4
+    assert judged(result.after)[1] < judged(result.before)[1]
+    with pytest.raises(ShotError, match="every motor is locked"):
+        locks = tuple(FreeTrack(k, np.array([0.0]), np.array([False])) for k in range(2))
+        optimize_shot(arm, dataclasses.replace(animation, free=locks), bodies, OPTIONS, quiet)
+
+
+def test_where_nothing_is_gained_the_curves_stay_exactly_as_they_were(arm, animation, bodies):
+    """Nothing is judged in the second half."""
+    weights = tuple(
+        WeightTrack(target, rotation, np.array([0.7, 0.75]), np.array([value, 0.0]))
+        for target, rotation, value in ((0, False, 1.0), (1, False, 1.0), (1, True, 0.05))
+    )
+    result = optimize_shot(arm, dataclasses.replace(animation, weights=weights), bodies, OPTIONS, quiet)
+    late = animation.frame_times > 1.1
+    for curve, track in zip(result.curves, animation.tracks, strict=True):
+        assert curve.changed and np.array_equal(curve.frame_values[late], track.values[late])
+    first = (result.after.motion.times >= 0.0) & (result.after.motion.times < 0.7)
+    before, after = (s.position_errors[first, 1].max() for s in (result.before, result.after))
+    assert after < 0.1 * before
+
+
+def test_a_static_reference_keeps_the_sag_and_removes_the_shake(arm, animation, bodies, result):
+    character = dataclasses.replace(arm, retarget=dataclasses.replace(arm.retarget, reference="static"))
+    found = optimize_shot(character, animation, bodies, OPTIONS, quiet)
+    assert found.before.position_errors[0].max() < 1e-9, "at rest there is nothing to correct"
+    sag = result.before.position_errors[0, 1]
+    assert sag > 1e-3
+    assert judged(found.after)[1] < 0.1 * judged(found.before)[1]
+    # the first pose is the animator's, sag and all
+    shift = found.after.motion.target_positions[0, 1] - result.reference.target_positions[0, 1]
+    assert np.linalg.norm(shift) == pytest.approx(sag, rel=0.2)
+
+
+def test_kept_ends_keep_the_first_and_last_pose(arm, animation, bodies):
+    character = dataclasses.replace(arm, retarget=dataclasses.replace(arm.retarget, endpoints="kept"))
+    result = optimize_shot(character, animation, bodies, OPTIONS, quiet)
+    for curve, track in zip(result.curves, animation.tracks, strict=True):
+        assert curve.frame_values[0] == track.values[0] and curve.frame_values[-1] == track.values[-1]
+    # the sag of the first pose cannot be removed then
+    assert judged(result.after)[1] >= 0.999 * result.before.position_errors[0, 1]
+
+
+def test_a_rigid_character_needs_no_change(arm, animation):
+    from calmotion.shot import MassProperties
+
+    mass = MassProperties(0.17, np.array([0.16, 0.0, 0.0]), 1e-3 * np.eye(3))
+    rigid = dataclasses.replace(
+        arm, bodies=tuple(dataclasses.replace(b, flexible=None, mass=b.mass or mass) for b in arm.bodies)
+    )
+    result = simulate_shot(rigid, animation, None, OPTIONS, quiet)
+    assert judged(result.before).max() < 1e-4
+    assert any("finite elements" in row.what for row in result.left_out)

@@ -1,0 +1,78 @@
+"""Input shapers against what defines them: a mode of their frequency keeps no vibration."""
+
+import numpy as np
+import pytest
+from calmotion import ShotError
+from calmotion.shot import Track
+from calmotion.simulation.inputs.curves import sample_curves
+from calmotion.simulation.inputs.shapers import delay, impulses, shaped
+from calmotion.simulation.inputs.time_grid import make_grid
+from scipy.signal import lsim
+
+FRAMES = np.arange(73) / 24.0
+FREQUENCIES, DAMPING = np.array([3.0, 5.0]), 0.02
+RATIOS = np.full(2, DAMPING)
+
+
+def left_over(times, amplitudes, frequency):
+    """Amplitude of a mode after impulses, over that after a single one at the last of them (Singer and Seering)."""
+    w = 2 * np.pi * frequency
+    rotating = amplitudes * np.exp((DAMPING + 1j * np.sqrt(1 - DAMPING**2)) * w * (times - times[-1]))
+    return abs(rotating.sum())
+
+
+@pytest.mark.parametrize(("kind", "modes"), [("zv", 1), ("zvd", 1), ("zv2", 2), ("zvd2", 2)])
+def test_a_shaper_cancels_its_modes(kind, modes):
+    times, amplitudes = impulses(kind, FREQUENCIES, RATIOS)
+    assert amplitudes.sum() == pytest.approx(1.0) and np.all(amplitudes > 0.0)
+    for frequency in FREQUENCIES[:modes]:
+        assert left_over(times, amplitudes, frequency) < 1e-12
+    assert left_over(times, amplitudes, 1.7 * FREQUENCIES[-1]) > 1e-2
+    assert delay(kind, FREQUENCIES, RATIOS) == pytest.approx(times @ amplitudes)
+
+
+def test_zvd_forgives_an_error_of_the_frequency_that_zv_does_not():
+    zv, zvd = (left_over(*impulses(kind, FREQUENCIES, RATIOS), 1.05 * FREQUENCIES[0]) for kind in ("zv", "zvd"))
+    assert zvd < 0.15 * zv
+
+
+@pytest.fixture
+def parts():
+    grid = make_grid(FRAMES, 1 / 480, 0.0)
+    step = np.clip((FRAMES - 0.3) / 0.35, 0.0, 1.0)
+    return sample_curves([Track(FRAMES, step**2 * (3 - 2 * step))], grid), grid
+
+
+def vibration(curves, grid, frequency):
+    """Largest swing of a mode, excited by the motor's acceleration, in the last second."""
+    w = 2 * np.pi * frequency
+    response = lsim(([-1.0], [1.0, 2 * DAMPING * w, w * w]), curves.accelerations[:, 0], grid.times)[1]
+    return np.abs(response[grid.times > 2.0]).max()
+
+
+def test_shaped_curves_arrive_later_and_leave_the_mode_at_rest(parts):
+    curves, grid = parts
+    found = shaped(curves, grid, "zvd", FREQUENCIES, RATIOS)
+    assert vibration(found, grid, FREQUENCIES[0]) < 0.02 * vibration(curves, grid, FREQUENCIES[0])
+    assert found.angles[-1, 0] == pytest.approx(curves.angles[-1, 0])
+    middle = [np.interp(0.5, c.angles[:, 0], grid.times) for c in (curves, found)]
+    assert middle[1] - middle[0] == pytest.approx(delay("zvd", FREQUENCIES, RATIOS), rel=0.1)
+    rates = np.gradient(found.angles[:, 0], grid.h)
+    assert np.abs(rates - found.rates[:, 0]).max() < 0.02 * np.abs(rates).max()
+
+
+def test_a_low_pass_filter_takes_the_mode_out_of_the_motion_without_delay(parts):
+    curves, grid = parts
+    found = shaped(curves, grid, "lowpass", FREQUENCIES, RATIOS)
+    assert vibration(found, grid, FREQUENCIES[0]) < 0.5 * vibration(curves, grid, FREQUENCIES[0])
+    middle = [np.interp(0.5, c.angles[:, 0], grid.times) for c in (curves, found)]
+    assert abs(middle[1] - middle[0]) < 0.02 and delay("lowpass", FREQUENCIES, RATIOS) == 0.0
+    lower = shaped(curves, grid, "lowpass", FREQUENCIES, RATIOS, 0.2)
+    assert vibration(lower, grid, FREQUENCIES[0]) < vibration(found, grid, FREQUENCIES[0])
+
+
+def test_what_cannot_be_shaped_is_refused(parts):
+    for kind, frequencies in (("zvx", FREQUENCIES), ("zv", np.zeros(0))):
+        with pytest.raises(ShotError) as error:
+            shaped(*parts, kind, frequencies, RATIOS)
+        assert error.value.remedy and error.value.found == kind

@@ -1,0 +1,120 @@
+"""One robot over one grid: tangent and adjoint of motor curves are transposes, once and in a loop."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+from calmotion.benchmarks.scenes.linkage_arm import linkage_arm, performance
+from calmotion.multibody.failure import SimulationFailure
+from calmotion.multibody.model.topology import span_tree
+from calmotion.simulation.bodies import reduce_bodies
+from calmotion.simulation.inputs.curves import sample_curves
+from calmotion.simulation.prepare import Options, prepare
+from calmotion.simulation.simulator import Simulator
+from posed import looped, make_problem
+
+
+@pytest.mark.parametrize("cyclic", [False, True])
+def test_derivatives_by_motors_are_transposes(arm, animation, bodies, cyclic):
+    character, animation = looped(arm, animation) if cyclic else (arm, animation)
+    prepared = prepare(character, animation, bodies, Options(step=1 / 240))
+    grid, curves = prepared.grid, sample_curves(animation.tracks, prepared.grid)
+    simulator = Simulator(prepared.model, grid.h, prepared.world, cyclic)
+    run = simulator.run(curves.angles, curves.rates)
+    simulator.linearize(run)
+    rng = np.random.default_rng(0)
+    gradient = rng.normal(size=run.trajectory.states.V.shape)
+    effort = rng.normal(size=curves.angles.shape)
+    values, rates = rng.normal(size=(2, *curves.angles.shape))
+    for part in (gradient, effort, values, rates):
+        part[: 2 if cyclic else 0] = 0.0  # the two instants of the loop before
+    motion, efforts = simulator.tangent(values, rates, True)
+    by_value, by_rate = simulator.adjoint(gradient, effort)
+    forward = np.sum(motion * gradient) + np.sum(efforts * effort)
+    backward = np.sum(by_value * values) + np.sum(by_rate * rates)
+    assert abs(forward - backward) < 1e-10 * np.linalg.norm(efforts) * np.linalg.norm(effort)
+    growth = simulator.run(curves.angles, curves.rates).growth
+    assert (growth > 0.0) == cyclic and growth < 1.0
+
+
+def test_another_robot_s_loops_begin_near_those_of_this_one(arm, animation, bodies):
+    from calmotion.multibody.model.model import with_damping
+
+    character, animation = looped(arm, animation)
+    prepared = prepare(character, animation, bodies, Options(step=1 / 240))
+    curves = sample_curves(animation.tracks, prepared.grid)
+    simulator = Simulator(prepared.model, prepared.grid.h, prepared.world, True)
+    one = simulator.run(curves.angles, curves.rates)
+    other = simulator.of(with_damping(prepared.model, 0.05, 4.0)).run(curves.angles, curves.rates)
+    again = simulator.run(curves.angles, curves.rates)
+    assert np.abs(one.target_positions - again.target_positions).max() < 1e-10
+    assert 1e-4 < np.abs(one.target_positions - other.target_positions).max()
+
+
+def with_a_held_beginning(make, until):
+    """Two equal problems, which of their coefficients act before a time, and random values of the others."""
+    problem, other = make(), make()
+    fixed = np.repeat(problem.basis.support[:, 0] < until, len(problem.motors))
+    x = np.where(fixed, 0.0, 0.01 * np.random.default_rng(0).normal(size=problem.size))
+    return problem, other, fixed, x
+
+
+@pytest.mark.parametrize("kind", ["arm", "pre-roll", "linkage"])
+def test_where_a_beginning_is_held_all_is_as_it_would_be_otherwise(arm, bodies, animation, kind):
+    if kind == "linkage":
+        character, meshes = linkage_arm(modes=4)
+        parts = character, reduce_bodies(character, span_tree(character), meshes), performance(0.8)
+    else:
+        parts = arm, bodies, animation
+    motors = tuple(dataclasses.replace(m, max_velocity=1.0, max_torque=2.0) for m in parts[0].motors)
+    parts = dataclasses.replace(parts[0], motors=motors), *parts[1:]
+    problem, other, fixed, x = with_a_held_beginning(
+        lambda: make_problem(*parts, 0.25 if kind == "pre-roll" else 0.0, limited=True), 0.35
+    )
+    # the first simulation is known, and the one of another point near by
+    first = int(np.searchsorted(problem.grid.times, 0.4 - 1e-9))
+    problem.hold(first)
+    problem.value(np.zeros(problem.size))
+    problem.value(0.5 * x)
+    assert problem.value(x) == other.value(x)
+    found, expected = problem.run.trajectory, other.run.trajectory
+    for part in ("c", "q", "u", "turn", "V", "lam"):
+        assert np.array_equal(getattr(found.states, part), getattr(expected.states, part)), part
+    assert found.newton_iterations == expected.newton_iterations and found.max_joint_gap == expected.max_joint_gap
+    assert np.array_equal(found.margins, expected.margins)
+    assert np.array_equal(problem.run.target_rotations, other.run.target_rotations)
+    assert np.array_equal(problem.limited["effort"], other.limited["effort"])
+    one, two = problem.linearize(), other.linearize()
+    assert np.abs(one - two)[~fixed].max() < 1e-12 * np.abs(two).max()
+    if not problem.grid.pre_steps:
+        assert not np.any(one[: len(problem.motors)] == two[: len(problem.motors)]), "what is held is not worked out"
+    d = np.where(fixed, 0.0, np.random.default_rng(1).normal(size=len(x)))
+    one, two = problem.product(d), other.product(d)
+    assert np.abs(one - two)[~fixed].max() < 1e-12 * np.abs(two).max()
+
+
+def test_a_motion_that_is_known_is_simulated_again_only_where_that_is_asked_for(arm, bodies, animation):
+    prepared = prepare(arm, animation, bodies, Options(step=1 / 240))
+    grid, curves = prepared.grid, sample_curves(animation.tracks, prepared.grid)
+    simulator = Simulator(prepared.model, grid.h, prepared.world, False)
+    given = curves.angles, curves.rates
+    assert simulator.run(*given) is not simulator.run(*given), "measurements of time are those of simulations"
+    simulator.hold(10)
+    run = simulator.run(*given)
+    assert simulator.run(*given) is run
+    # a curve that fails leaves what is known as it is
+    jump = curves.angles.copy()
+    jump[60:] = np.nan
+    with pytest.raises(SimulationFailure):
+        simulator.run(jump, curves.rates)
+    assert simulator.run(*given) is run
+    # what is held less is linearised anew
+    simulator.linearize(run)
+    gradient = np.random.default_rng(0).normal(size=run.trajectory.states.V.shape)
+    late, _ = simulator.adjoint(gradient, None)
+    simulator.hold(0)
+    simulator.linearize(run)
+    whole, _ = simulator.adjoint(gradient, None)
+    assert np.array_equal(late[10:], whole[10:]) and not np.any(late[:10]) and np.all(whole[:10])
+    simulator.forget()
+    assert simulator.run(*given) is not run

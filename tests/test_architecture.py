@@ -1,0 +1,114 @@
+"""The rooms of the package: imports go down the floors and never up, and no circle of modules (docs/architecture.md).
+
+All imports count: those inside functions, and those for type checkers.
+"""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterator
+from graphlib import CycleError, TopologicalSorter
+from pathlib import Path
+
+import pytest
+
+PACKAGE = Path(__file__).resolve().parents[1] / "pipeline" / "calmotion"
+PLUGINS = PACKAGE.parents[1] / "plugins"
+
+# From the lowest floor to the highest; rooms of one floor do not know each other.
+FLOORS = (
+    ("errors", "version"),
+    ("support",),
+    ("shot",),
+    ("geometry", "linear_algebra", "views"),
+    ("reduction", "rigging"),
+    ("multibody", "usd"),
+    ("simulation",),
+    ("accuracy",),
+    ("retargeting",),
+    ("host",),
+    ("workflow", "testing"),
+    ("cli", "pytest_plugin"),
+    ("benchmarks", "__main__"),
+)
+FLOOR = {room: floor for floor, rooms in enumerate(FLOORS) for room in rooms}
+MODULES_OF_A_FOLDER = 14
+LINES_OF_A_MODULE = 350
+
+
+def name_of(path: Path) -> str:
+    """The module of a file."""
+    parts = path.relative_to(PACKAGE.parent).with_suffix("").parts
+    return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
+
+
+MODULES = {name_of(path): path for path in sorted(PACKAGE.rglob("*.py"))}
+
+
+def imports_of(module: str) -> Iterator[str]:
+    """The modules of the package that a module imports, anywhere in its source."""
+    path = MODULES[module]
+    package = module.split(".") if path.name == "__init__.py" else module.split(".")[:-1]
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names if alias.name in MODULES)
+        elif isinstance(node, ast.ImportFrom):
+            base = package[: len(package) - node.level + 1] if node.level else []
+            source = ".".join([*base, *([node.module] if node.module else [])])
+            for alias in node.names:
+                full = f"{source}.{alias.name}"
+                if full in MODULES or source in MODULES:
+                    yield full if full in MODULES else source
+
+
+IMPORTS = {module: {name for name in imports_of(module) if name != module} for module in MODULES}
+
+
+def room_of(module: str) -> str:
+    """The room that a module lies in; the package itself offers the interface and the version."""
+    parts = module.split(".")
+    return parts[1] if len(parts) > 1 else ""
+
+
+def test_every_room_stands_on_a_floor():
+    rooms = {room_of(module) for module in MODULES} - {""}
+    assert rooms <= set(FLOOR), f"name the floor of {rooms - set(FLOOR)}"
+
+
+@pytest.mark.parametrize("room", sorted(FLOOR))
+def test_imports_never_go_up(room):
+    up = [
+        f"{module} imports {other}"
+        for module, others in IMPORTS.items()
+        for other in sorted(others)
+        if room_of(module) == room and room_of(other) not in ("", room) and FLOOR[room_of(other)] >= FLOOR[room]
+    ]
+    assert not up
+
+
+def test_no_circle_of_modules():
+    try:
+        TopologicalSorter(IMPORTS).prepare()
+    except CycleError as circle:
+        pytest.fail(" -> ".join(circle.args[1]))
+
+
+def test_the_engine_imports_neither_usd_nor_rerun():
+    found = [
+        f"{module} imports {name}"
+        for module, path in MODULES.items()
+        if room_of(module) != "usd"
+        for node in ast.walk(ast.parse(path.read_text()))
+        for name in ([a.name for a in node.names] if isinstance(node, ast.Import) else [getattr(node, "module", None)])
+        if isinstance(node, ast.Import | ast.ImportFrom) and name and name.split(".")[0] in ("pxr", "rerun")
+    ]
+    assert not found
+
+
+def test_folders_and_modules_stay_small():
+    folders = {path.parent for root in (PACKAGE, PLUGINS) for path in root.rglob("*.py")}
+    crowded = {str(f): n for f in folders if (n := len(list(f.glob("*.py")))) > MODULES_OF_A_FOLDER}
+    assert not crowded
+    sources = [path for root in (PACKAGE, PLUGINS) for path in root.rglob("*.py")]
+    long = {str(path): n for path in sources if (n := len(path.read_text().splitlines())) > LINES_OF_A_MODULE}
+    assert not long

@@ -1,0 +1,34 @@
+"""The viewpoint sees what moves, from the side it moves on."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+import synthetic
+from calmotion.views.viewpoint import choose_viewpoint
+
+
+def test_the_sphere_holds_every_target_but_not_the_hidden_guide():
+    result = synthetic.result()
+    motion = result.before.motion
+    view = choose_viewpoint(synthetic.character(), result.skins, motion)
+    assert np.linalg.norm(motion.target_positions[:, 0] - view.center, axis=1).max() <= view.radius
+    assert view.radius < 0.6
+
+
+def test_it_looks_from_the_side_of_the_targets_and_from_above():
+    result = synthetic.result()
+    view = choose_viewpoint(synthetic.character(), result.skins, result.before.motion)
+    assert view.toward_eye @ result.reference.target_positions[:, 0].mean(axis=0) > 0.0
+    assert view.toward_eye @ view.up == pytest.approx(np.sin(np.radians(17.0)))
+    assert np.linalg.norm(view.toward_eye) == pytest.approx(1.0)
+
+
+def test_without_gravity_or_targets_there_is_still_a_view():
+    result = synthetic.result()
+    motion = dataclasses.replace(result.reference, target_positions=np.zeros((len(result.reference.times), 0, 3)))
+    character = dataclasses.replace(synthetic.character(), gravity=np.zeros(3), targets=())
+    view = choose_viewpoint(character, result.skins, motion)
+    assert np.all(np.isfinite(view.toward_eye)) and np.linalg.norm(view.toward_eye) == pytest.approx(1.0)
