@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from calmotion.host import Operator, Property, RunContext
-from calmotion.shot import Character, FEMeshes, Needs
+from calmotion.shot import Character, FEMeshes, ModelChoices
 from calmotion.shot.model_choice import nothing_bends
 
 
@@ -16,7 +16,7 @@ class TetrahedralizeFlexibleBodies(Operator):
     idname = "fe.mesh"
     label = "Tetrahedralise flexible bodies"
     requires = (Character,)
-    uses = (Needs,)
+    uses = (ModelChoices,)
     provides = (FEMeshes,)
     properties = (
         Property(
@@ -49,7 +49,7 @@ class TetrahedralizeFlexibleBodies(Operator):
         from .accuracy import carrier_of
         from .body_mesh import MeshOptions, mesh_body
 
-        needs = context.get(Needs)
+        needs = context.get(ModelChoices)
         character = context.get(Character) if needs is None else needs.character
         options = MeshOptions(
             element_size=context.properties.element_size,

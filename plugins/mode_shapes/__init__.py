@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from calmotion.host import Operator, Property, RunContext
-from calmotion.shot import Animation, Character, FEMeshes, Needs
+from calmotion.shot import Animation, Character, FEMeshes, ModelChoices
 from calmotion.shot.model_choice import nothing_bends
 from calmotion.shot.outputs import ModeShapes
 from calmotion.shot.run import OutputPaths, Source
@@ -18,7 +18,7 @@ class WriteModeShapes(Operator):
     idname = "modes.write"
     label = "Write the mode shapes"
     requires = (Character, FEMeshes, OutputPaths)
-    uses = (Animation, Source, Needs)
+    uses = (Animation, Source, ModelChoices)
     provides = (ModeShapes,)
     properties = (
         Property("dpi", int, 150, minimum=30, maximum=600, description="Resolution of the pictures, dots an inch."),
@@ -33,15 +33,15 @@ class WriteModeShapes(Operator):
 
     def execute(self, context: RunContext) -> Sequence[object]:
         from calmotion.simulation.bodies import flexible_modes
-        from calmotion.simulation.prepare import Options, excitations
+        from calmotion.simulation.prepare import Options, load_envelopes
 
         from .writing import write_modes
 
-        meshes, animation, needs = context.get(FEMeshes), context.get(Animation), context.get(Needs)
+        meshes, animation, needs = context.get(FEMeshes), context.get(Animation), context.get(ModelChoices)
         character = context.get(Character) if needs is None else needs.character
         source = context.get(Source)
         options = Options() if source is None else Options(tolerance=source.tolerance, step=source.step)
-        loads = None if animation is None else excitations(character, animation, meshes, options)
+        loads = None if animation is None else load_envelopes(character, animation, meshes, options)
         written = write_modes(
             context.get(OutputPaths).modes or "",
             flexible_modes(character, meshes, loads, options.tolerance),

@@ -8,7 +8,7 @@ from typing import Any
 
 from calmotion.accuracy.reduced_bodies import ReducedBodies
 from calmotion.host import NotAsked, Operator, Property, RunContext
-from calmotion.shot import Animation, Character, FEMeshes, Needs, Result
+from calmotion.shot import Animation, Character, FEMeshes, ModelChoices, Result
 from calmotion.shot.model_choice import nothing_bends
 from calmotion.shot.outputs import ShapedTracks, SystemModes, Verification
 from calmotion.shot.run import OutputPaths, Source
@@ -28,7 +28,7 @@ class ReduceFlexibleBodies(Operator):
     idname = "fem.reduce"
     label = "Reduce flexible bodies"
     requires = (Character,)
-    uses = (FEMeshes, Animation, Source, Needs)
+    uses = (FEMeshes, Animation, Source, ModelChoices)
     provides = (ReducedBodies,)
     properties = (
         Property(
@@ -47,7 +47,7 @@ class ReduceFlexibleBodies(Operator):
     def execute(self, context: RunContext) -> Sequence[object]:
         from calmotion.multibody.model.topology import span_tree
         from calmotion.simulation.bodies import mode_tables, reduce_bodies, with_elasticity
-        from calmotion.simulation.prepare import excitations
+        from calmotion.simulation.prepare import load_envelopes
 
         character, meshes, animation = character_of(context), context.get(FEMeshes), context.get(Animation)
         if context.properties.elasticity != "shot":
@@ -57,13 +57,15 @@ class ReduceFlexibleBodies(Operator):
             context.progress(0.0, "compiling kernels, once")
             options = options_of(context)
             if source.command != "inspect" and source.tolerance is not None:
-                from calmotion.accuracy.converged_reduction import settled_bodies
+                from calmotion.accuracy.converged_reduction import converged_reduction
 
                 search = source.command == "optimize"
-                settled = settled_bodies(character, animation, meshes, options, context.progress, retargeted=search)
+                settled = converged_reduction(
+                    character, animation, meshes, options, context.progress, retargeted=search
+                )
                 error = None if search else settled.error_m
                 return [ReducedBodies(settled.bodies, mode_tables(settled.bodies), error, settled.known)]
-            loads, tolerance = excitations(character, animation, meshes, options), options.tolerance
+            loads, tolerance = load_envelopes(character, animation, meshes, options), options.tolerance
         bodies = reduce_bodies(character, span_tree(character), meshes, context.progress, loads, tolerance)
         return [ReducedBodies(tuple(bodies), mode_tables(bodies))]
 
@@ -74,7 +76,7 @@ class FindSystemModes(Operator):
     idname = "dynamics.modes"
     label = "Find the frequencies of the character"
     requires = (Character, Animation)
-    uses = (ReducedBodies, Source, OutputPaths, Needs)
+    uses = (ReducedBodies, Source, OutputPaths, ModelChoices)
     provides = (SystemModes,)
 
     @classmethod
@@ -98,7 +100,7 @@ class ShapeTracks(Operator):
     idname = "retarget.shape"
     label = "Shape the motors' tracks"
     requires = (Character, Animation, Source)
-    uses = (ReducedBodies, Needs)
+    uses = (ReducedBodies, ModelChoices)
     provides = (ShapedTracks,)
     properties = (
         Property("cutoff", float, 0.5, minimum=0.01, description="Of the low-pass filter, over the lowest frequency"),
@@ -122,7 +124,7 @@ class SimulateShot(Operator):
     idname = "retarget.simulate"
     label = "Simulate the shot"
     requires = (Character, Animation, Source)
-    uses = (ReducedBodies, ShapedTracks, Needs)
+    uses = (ReducedBodies, ShapedTracks, ModelChoices)
     provides = (Result,)
 
     @classmethod
@@ -150,7 +152,7 @@ class OptimizeShot(Operator):
     idname = "retarget.optimize"
     label = "Optimise the motor curves"
     requires = (Character, Animation, Source)
-    uses = (ReducedBodies, OutputPaths, Needs)
+    uses = (ReducedBodies, OutputPaths, ModelChoices)
     provides = (Result,)
     properties = (
         Property("max_iterations", int, 30, minimum=1, description="Most Gauss-Newton iterations"),
@@ -205,7 +207,7 @@ class VerifyResult(Operator):
     idname = "retarget.verify"
     label = "Compare with a finer run"
     requires = (Character, Animation, Source, Result)
-    uses = (FEMeshes, ReducedBodies, ShapedTracks, Needs)
+    uses = (FEMeshes, ReducedBodies, ShapedTracks, ModelChoices)
     provides = (Verification,)
 
     @classmethod

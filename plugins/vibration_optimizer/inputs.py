@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from calmotion.accuracy.reduced_bodies import ReducedBodies
 from calmotion.host import RunContext
-from calmotion.shot import Animation, Character, Needs, Result
+from calmotion.shot import Animation, Character, ModelChoices, Result
 from calmotion.shot.run import Source
 
 if TYPE_CHECKING:
@@ -22,13 +22,13 @@ def inputs(context: RunContext) -> tuple[Character, Animation, Sequence[Any] | N
 
 def character_of(context: RunContext) -> Character:
     """The character, marked with what the shot does not need of it."""
-    needs = context.get(Needs)
+    needs = context.get(ModelChoices)
     return context.get(Character) if needs is None else needs.character
 
 
 def with_needs(result: Result, context: RunContext) -> Result:
     """The result, with what the shot does not need among what is left out."""
-    needs, accuracy = context.get(Needs), result.accuracy
+    needs, accuracy = context.get(ModelChoices), result.accuracy
     if needs is None:
         return result
     if accuracy is not None:
@@ -41,7 +41,7 @@ def with_needs(result: Result, context: RunContext) -> Result:
 
 def options_of(context: RunContext, **more: Any) -> Options:
     """What the user asked for, with what is forced of it."""
-    needs = context.get(Needs)
+    needs = context.get(ModelChoices)
     if needs is not None:
         more |= {kind: needs.choice(kind) for kind in ("directions", "motors", "ranges")}
     return asked_options(context, **more)

@@ -7,7 +7,7 @@ from typing import Any
 
 from calmotion.accuracy.reduced_bodies import ReducedBodies
 from calmotion.host import NotAsked, Operator, Property, RunContext
-from calmotion.shot import Animation, Character, Needs
+from calmotion.shot import Animation, Character, ModelChoices
 from calmotion.shot.model_choice import AUTO, KINDS, OFF, ON, nothing_bends
 from calmotion.shot.outputs import PlannedStep
 from calmotion.shot.run import OutputPaths, Source
@@ -33,7 +33,7 @@ class AnalyseNeeds(Operator):
     label = "Find out what the shot needs"
     requires = (Character, Animation)
     uses = (Source, OutputPaths)
-    provides = (Needs,)
+    provides = (ModelChoices,)
     properties = tuple(
         Property(kind, str, AUTO, choices=(AUTO, ON, OFF), description=f"{_FORCED[kind]}; auto: by the tolerance")
         for kind in KINDS
@@ -57,7 +57,7 @@ class PlanStep(Operator):
     idname = "needs.step"
     label = "Find out which time step the shot needs"
     requires = (Character, Animation)
-    uses = (ReducedBodies, Needs, Source)
+    uses = (ReducedBodies, ModelChoices, Source)
     provides = (PlannedStep,)
 
     @classmethod

@@ -5,12 +5,12 @@ import dataclasses
 import numpy as np
 import pytest
 from calmotion.accuracy.integrator_choice import FAST
-from calmotion.accuracy.pod_subspace import HeldBodies, held_bodies, known_motion
+from calmotion.accuracy.pod_subspace import ProjectedBodies, project_to_subspace, reference_run
 from calmotion.accuracy.step_error import distance, simulate_at
 from calmotion.multibody.model.topology import span_tree
 from calmotion.shot import Track
 from calmotion.simulation.bodies import reduce_bodies, with_elasticity
-from calmotion.simulation.prepare import Options, excitations
+from calmotion.simulation.prepare import Options, load_envelopes
 
 STEP, ALLOWED = 1 / 240, 2e-5
 
@@ -18,13 +18,13 @@ STEP, ALLOWED = 1 / 240, 2e-5
 @pytest.fixture(scope="module")
 def nonlinear(arm, animation, meshes):
     character = with_elasticity(arm, "stvk")
-    loads = excitations(character, animation, meshes, Options())
+    loads = load_envelopes(character, animation, meshes, Options())
     return character, reduce_bodies(character, span_tree(character), meshes, None, loads, 1e-4)
 
 
 @pytest.fixture(scope="module")
 def known(nonlinear, animation):
-    return known_motion(nonlinear[0], animation, nonlinear[1], Options(), STEP)
+    return reference_run(nonlinear[0], animation, nonlinear[1], Options(), STEP)
 
 
 def count(bodies):
@@ -32,7 +32,7 @@ def count(bodies):
 
 
 def held(character, bodies, known, allowed=ALLOWED):
-    return HeldBodies(character, bodies, Options(), lambda item: allowed, [known])
+    return ProjectedBodies(character, bodies, Options(), lambda item: allowed, [known])
 
 
 def off(character, animation, one, other, step):
@@ -73,7 +73,7 @@ def test_bodies_learn_from_curves_that_bend_them_otherwise(nonlinear, animation)
     still = Track(animation.frame_times, np.zeros(len(animation.frame_times)))
     swing, lift = ((animation.tracks[0], still), (still, animation.tracks[1]))
     swung, lifted = (dataclasses.replace(animation, current=tracks) for tracks in (swing, lift))
-    found = held(character, bodies, known_motion(character, swung, bodies, Options(), STEP))
+    found = held(character, bodies, reference_run(character, swung, bodies, Options(), STEP))
     assert found.hold_for(swung, STEP)
     first = found.bodies
     assert off(character, lifted, bodies, first, STEP) > ALLOWED and not found.hold_for(lifted, STEP)
@@ -84,8 +84,8 @@ def test_bodies_learn_from_curves_that_bend_them_otherwise(nonlinear, animation)
 
 
 def test_linear_bodies_and_those_of_the_users_choice_keep_theirs(arm, nonlinear, bodies, animation, known):
-    assert held_bodies(arm, animation, bodies, Options(), STEP, lambda item: 1.0).bodies is bodies
-    assert held_bodies(arm, animation, None, Options(), STEP, lambda item: 1.0).bodies is None
+    assert project_to_subspace(arm, animation, bodies, Options(), STEP, lambda item: 1.0).bodies is bodies
+    assert project_to_subspace(arm, animation, None, Options(), STEP, lambda item: 1.0).bodies is None
     character, reduced = nonlinear
     for own in ({"mode_count": 6}, {"max_frequency": 500.0}, {"modes_share": 1e-3}):
         settings = dataclasses.replace(character.bodies[0].flexible, **own)
@@ -99,15 +99,15 @@ def test_a_motion_that_is_known_is_not_simulated_again(nonlinear, animation, kno
     from calmotion.accuracy import pod_subspace as motion_subspace
 
     character, bodies = nonlinear
-    monkeypatch.setattr(motion_subspace, "known_motion", lambda *arguments: pytest.fail("simulated again"))
+    monkeypatch.setattr(motion_subspace, "reference_run", lambda *arguments: pytest.fail("simulated again"))
     again = dataclasses.replace(animation, current=tuple(animation.current))
-    held_bodies(character, again, bodies, Options(), STEP, lambda item: ALLOWED, known)
+    project_to_subspace(character, again, bodies, Options(), STEP, lambda item: ALLOWED, known)
 
 
 def test_either_can_be_forced(nonlinear, known):
     character, bodies = nonlinear
-    kept = HeldBodies(character, bodies, Options(directions="on"), lambda item: 1.0, [known])
+    kept = ProjectedBodies(character, bodies, Options(directions="on"), lambda item: 1.0, [known])
     assert kept.bodies is bodies
-    fewest = HeldBodies(character, bodies, Options(directions="off"), lambda item: 0.0, [known])
+    fewest = ProjectedBodies(character, bodies, Options(directions="off"), lambda item: 0.0, [known])
     assert count(fewest.bodies) == count(held(character, bodies, known, 1.0).bodies) != count(bodies)
     assert fewest.error_m > 0.0 and fewest.hold_for(known.animation, STEP)

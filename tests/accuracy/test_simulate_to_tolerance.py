@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 from calmotion.accuracy import simulate_to_tolerance as to_tolerance
-from calmotion.accuracy.pod_subspace import HeldBodies
+from calmotion.accuracy.pod_subspace import ProjectedBodies
 from calmotion.accuracy.simulate_to_tolerance import WHOLE, found_tracks, planned_step, simulate_to_tolerance
 from calmotion.accuracy.step_error import distance, frames_of, simulate_at
 from calmotion.accuracy.verify import verify
@@ -14,7 +14,7 @@ from calmotion.multibody.model.topology import span_tree
 from calmotion.retargeting import to_tolerance as retarget
 from calmotion.retargeting.to_tolerance import optimize_to_tolerance
 from calmotion.simulation.bodies import reduce_bodies, with_elasticity
-from calmotion.simulation.prepare import Options, excitations
+from calmotion.simulation.prepare import Options, load_envelopes
 
 FINE = 1 / 7680
 
@@ -161,10 +161,10 @@ def test_verifying_measures_the_distance_to_a_finer_run(arm, animation, meshes, 
 
 def test_a_search_goes_on_where_links_bend_otherwise_than_they_are_held(arm, animation, meshes, monkeypatch):
     character = with_elasticity(arm, "stvk")
-    loads = excitations(character, animation, meshes, Options())
+    loads = load_envelopes(character, animation, meshes, Options())
     bodies = reduce_bodies(character, span_tree(character), meshes, None, loads, 1e-3)
     asked, parts = [], []
-    plain_hold, plain_search = HeldBodies.hold_for, retarget.optimize_shot
+    plain_hold, plain_search = ProjectedBodies.hold_for, retarget.optimize_shot
 
     def hold_for(self, animation, step):
         asked.append(animation.current)
@@ -174,7 +174,7 @@ def test_a_search_goes_on_where_links_bend_otherwise_than_they_are_held(arm, ani
         parts.append((animation.current, bodies))
         return plain_search(character, animation, bodies, *more)
 
-    monkeypatch.setattr(HeldBodies, "hold_for", hold_for)
+    monkeypatch.setattr(ProjectedBodies, "hold_for", hold_for)
     monkeypatch.setattr(retarget, "optimize_shot", search)
     result = optimize_to_tolerance(character, animation, bodies, Options(max_iterations=15), quiet)
     assert len(asked) == len(parts) == 2

@@ -7,7 +7,7 @@ from calmotion.benchmarks.scenes.simplification_shots import clevis_arm, mixed_a
 from calmotion.cli.main import NEEDS
 from calmotion.cli.run import settings_of
 from calmotion.host import NotAsked
-from calmotion.shot import Character, FEMeshes, Needs, Result
+from calmotion.shot import Character, FEMeshes, ModelChoices, Result
 from calmotion.shot.model_choice import KINDS, OFF, ON
 from calmotion.shot.outputs import PlannedStep
 from calmotion.shot.run import OutputPaths, Source
@@ -78,7 +78,7 @@ def test_forces_of_a_joint_that_is_left_out_are_zero_and_the_others_carry_them(h
 
 def test_an_inspection_plans_the_step_where_one_matters(host):
     shot = mixed_arm()
-    run = host.run([shot.character, shot.animation, _source("inspect")], [Needs, PlannedStep]).finish()
+    run = host.run([shot.character, shot.animation, _source("inspect")], [ModelChoices, PlannedStep]).finish()
     row = run.get(PlannedStep).row
     assert row.what == "time steps shorter than 8.33 ms" and row.why == "the step was asked for"
     assert 0.0 < row.estimated_error_m < 0.1

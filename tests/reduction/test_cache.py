@@ -12,7 +12,7 @@ import pytest
 from calmotion.reduction import cache as reduction_cache
 from calmotion.reduction.cache import cache_key, cached_reduction
 from calmotion.reduction.reduced_body import Elasticity, Invariants, Marker, ReducedBody
-from calmotion.shot import ElasticMaterial, FlexibleSettings, LeftOut
+from calmotion.shot import ElasticMaterial, FlexibleSettings, Simplification
 
 
 @pytest.fixture(autouse=True)
@@ -32,7 +32,7 @@ def a_body(seed=0, nonlinear=True):
     )
     elasticity = Elasticity("neohookean", 1e-5, rng.normal(size=40), 3, (1e9, 1 / 3)) if nonlinear else None
     skin = (np.asfortranarray(rng.normal(size=(7, 3, 2))), np.zeros((0, 3, 2)))
-    left_out = (LeftOut("modes", "too fast", 1e-5),)
+    left_out = (Simplification("modes", "too fast", 1e-5),)
     return ReducedBody(invariants, rng.random(2), rng.random(2), markers, skin, 123, 45, elasticity, left_out)
 
 

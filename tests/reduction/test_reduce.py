@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from calmotion.errors import ShotError
 from calmotion.reduction.interfaces.interface_patches import Anchor
-from calmotion.reduction.load_envelope import Excitation
+from calmotion.reduction.load_envelope import LoadEnvelope
 from calmotion.reduction.reduce import reduce_body
 from calmotion.reduction.reduced_body import rigid_invariants
 from calmotion.shot import Body, FlexibleSettings, MassProperties, SurfaceMesh
@@ -112,7 +112,7 @@ def test_what_a_mesh_is_off_by_is_a_part_of_the_deflection(mesh, body, anchors):
     none = np.zeros(3)
     force = np.zeros((2, 3))
     force[0, 2] = 2.0
-    loads = Excitation(none, none, none, force, np.zeros((2, 3)))
+    loads = LoadEnvelope(none, none, none, force, np.zeros((2, 3)))
     judged = replace(mesh, quality=replace(mesh.quality, frequency_error=0.01))
     error = reduce_body(judged, body, anchors, [], 1, loads).mesh_error_m
     # two percent of the stiffness, of twice the deflection at rest

@@ -5,7 +5,7 @@ import pytest
 from calmotion.benchmarks.common.shots import load
 from calmotion.benchmarks.optimizer.optimizer import make_problem
 from calmotion.retargeting.optimize import optimize_shot
-from calmotion.retargeting.solver.damping_homotopy import FAR, approach
+from calmotion.retargeting.solver.damping_homotopy import FAR, damping_homotopy
 from calmotion.retargeting.solver.gauss_newton import Search, minimize
 from calmotion.simulation.prepare import Options, modes_of, prepare
 
@@ -44,7 +44,7 @@ def test_the_way_through_damped_problems_is_shorter(shot):
     zero, free = np.zeros(problem.size), np.zeros(problem.size, bool)
     problem.value(zero)
     assert problem.error > FAR * problem.lever()
-    start = approach(problem, zero, free, float(modes_of(prepared, shot.animation)[0][0]))
+    start = damping_homotopy(problem, zero, free, float(modes_of(prepared, shot.animation)[0][0]))
     near = problem.value(start.x)
     # as much work as the approach took, spent on the problem itself; a product is a fifth of a simulation
     direct = minimize(problem, Search.start(zero), free, 1e-6, max_iterations=8)

@@ -27,7 +27,7 @@ AXES = {
     "one": np.array([[0.0, 0.6, 0.8]]),
     "two": np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0]]),
     "three": np.eye(3),
-    "three askew": np.array([[1.0, 0.0, 0.0], [0.6, 0.8, 0.0], [0.0, 0.6, 0.8]]),
+    "three oblique": np.array([[1.0, 0.0, 0.0], [0.6, 0.8, 0.0], [0.0, 0.6, 0.8]]),
 }
 
 
@@ -67,9 +67,9 @@ def test_a_joint_that_turns_about_one_axis_needs_one():
     assert np.allclose(row.axes, axis) and np.allclose(row.angles, waves(1)) and row.off.max() < 1e-7
 
 
-@pytest.mark.parametrize("askew", [0.0, 0.3])
-def test_a_universal_joint_needs_two_also_askew(askew):
-    axes = np.array([[0.0, 0.0, 1.0], [0.0, np.cos(askew), np.sin(askew)]])
+@pytest.mark.parametrize("oblique", [0.0, 0.3])
+def test_a_universal_joint_needs_two_also_where_oblique(oblique):
+    axes = np.array([[0.0, 0.0, 1.0], [0.0, np.cos(oblique), np.sin(oblique)]])
     row = hinges_for(turns(axes, waves(2) * [1.0, 0.5]), np.radians(0.5))
     assert len(row.axes) == 2 and row.off.max() < np.radians(0.5)
 

@@ -5,11 +5,11 @@ from calmotion.benchmarks.common.fresh_cache import fresh_cache
 from calmotion.multibody.model.topology import span_tree
 from calmotion.simulation import bodies as module
 from calmotion.simulation.bodies import reduce_bodies
-from calmotion.simulation.prepare import Options, excitations
+from calmotion.simulation.prepare import Options, load_envelopes
 
 
 def reduced(arm, animation, meshes, tolerance, full=None):
-    loads = excitations(arm, animation, meshes, Options())
+    loads = load_envelopes(arm, animation, meshes, Options())
     with fresh_cache():
         return reduce_bodies(arm, span_tree(arm), meshes, None, loads, tolerance, full)
 

@@ -1,4 +1,4 @@
-"""Excitation of the bodies of simple robots against mechanics done by hand."""
+"""LoadEnvelope of the bodies of simple robots against mechanics done by hand."""
 
 import dataclasses
 
@@ -20,7 +20,7 @@ from calmotion.shot import (
     Track,
 )
 from calmotion.simulation.inputs.time_grid import make_grid
-from calmotion.simulation.rigid_run import highest_frequency, rigid_bodies, shot_excitation
+from calmotion.simulation.rigid_run import highest_frequency, rigid_bodies, shot_load_envelopes
 
 IDENTITY = np.array([1.0, 0.0, 0.0, 0.0])
 LENGTH, MASS, AMPLITUDE, FREQUENCY = 0.5, 2.0, 0.3, 3.0
@@ -59,7 +59,7 @@ def oscillation():
     s = np.clip(times / 2.5, 0.0, 1.0)
     fade = s**3 * (10.0 - 15.0 * s + 6.0 * s * s)
     track = Track(times, AMPLITUDE * fade * np.sin(2 * np.pi * FREQUENCY * times))
-    return shot_excitation(
+    return shot_load_envelopes(
         character, animation(times, [track]), make_grid(times, 1 / 960, 0.0), span_tree(character), None
     )
 
@@ -110,7 +110,7 @@ def test_a_robot_at_rest_feels_its_weight_and_nothing_else():
     character = turntable()
     times = np.arange(25) / 24.0
     tracks = [Track(times, np.full(25, 0.4))]
-    link, load = shot_excitation(
+    link, load = shot_load_envelopes(
         character, animation(times, tracks), make_grid(times, None, 0.0), span_tree(character), None
     )
     for body in (link, load):

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from calmotion.accuracy.pod_subspace import Known, known_motion
-from calmotion.accuracy.simulate_to_tolerance import OF_SHAKE, intended_motion
+from calmotion.accuracy.pod_subspace import ReferenceRun, reference_run
+from calmotion.accuracy.simulate_to_tolerance import OF_SHAKE, intended_positions
 from calmotion.accuracy.step_error import distance
 from calmotion.multibody.model.topology import span_tree
 from calmotion.reduction.reduced_body import ReducedBody
@@ -21,7 +21,7 @@ from calmotion.shot import Animation, Character, FEMeshes
 from calmotion.shot.character import with_settings
 from calmotion.simulation.bodies import reduce_bodies
 from calmotion.simulation.inputs.time_grid import MAX_STEP
-from calmotion.simulation.prepare import Options, excitations
+from calmotion.simulation.prepare import Options, load_envelopes
 
 if TYPE_CHECKING:
     from calmotion.reduction.reduce import FullBody
@@ -32,7 +32,7 @@ FINER, MOST = 0.1, 6  # each tolerance of the reduction over the last, and how m
 
 
 @dataclass(frozen=True, eq=False)
-class Settled:
+class ConvergedReduction:
     """Reduced bodies that do for a shot.
 
     Attributes:
@@ -44,13 +44,13 @@ class Settled:
 
     bodies: tuple[ReducedBody, ...]
     error_m: float
-    known: Known
+    known: ReferenceRun
 
 
-def settled_bodies(
+def converged_reduction(
     character: Character, animation: Animation, meshes: FEMeshes | None, options: Options,
     progress: Callable[[float, str], None] = lambda fraction, message: None, *, retargeted: bool = False,
-) -> Settled:  # fmt: skip
+) -> ConvergedReduction:  # fmt: skip
     """Bodies whose reduction moves no target by more than the tolerance, in the shot as it is animated.
 
     Args:
@@ -63,7 +63,7 @@ def settled_bodies(
     """
     asked = options.tolerance
     assert asked is not None
-    loads = excitations(character, animation, meshes, options)
+    loads = load_envelopes(character, animation, meshes, options)
     tree = span_tree(character)
     full: dict[int, FullBody] = {}
 
@@ -73,13 +73,13 @@ def settled_bodies(
         seeing = with_settings(character, lambda own: replace(own, pairs_share=share * own.pairs_share))
         return reduce_bodies(seeing, tree, meshes, None, loads, tolerance, full)
 
-    def simulated(bodies: Sequence[ReducedBody], options: Options) -> Known:
-        return known_motion(character, animation, bodies, options, options.step or MAX_STEP)
+    def simulated(bodies: Sequence[ReducedBody], options: Options) -> ReferenceRun:
+        return reference_run(character, animation, bodies, options, options.step or MAX_STEP)
 
     tolerance, bodies, off = asked, reduced(asked), 0.0
     found, allowed = simulated(bodies, options), SHARE * asked
     if retargeted:
-        intended = intended_motion(character, animation, bodies, options)
+        intended = intended_positions(character, animation, bodies, options)
         allowed = max(allowed, OF_SHAKE * distance(found.run.positions, intended))
     for k in range(MOST):
         progress((k + 1) / (MOST + 1), f"a reduction to {1e3 * tolerance:.2g} mm")
@@ -95,7 +95,7 @@ def settled_bodies(
         bodies, found = finer, then
         if off <= allowed:
             break
-    return Settled(tuple(bodies), off, found)
+    return ConvergedReduction(tuple(bodies), off, found)
 
 
 def _same(one: Sequence[ReducedBody], other: Sequence[ReducedBody]) -> bool:

@@ -20,7 +20,7 @@ from calmotion.accuracy.integrator_choice import by_fast_scheme
 from calmotion.accuracy.step_error import StepRun, distance, run_or_none, simulate_at
 from calmotion.reduction.reduced_body import ReducedBody
 from calmotion.reduction.subspace import principal_subspace, within
-from calmotion.shot import Animation, Character, LeftOut
+from calmotion.shot import Animation, Character, Simplification
 from calmotion.shot.character import FlexibleSettings
 from calmotion.shot.model_choice import OFF, ON
 from calmotion.simulation.prepare import Options
@@ -30,14 +30,14 @@ MISSING = tuple(10.0 ** (-0.5 * k) for k in range(4, 13))
 
 
 @dataclass(frozen=True, eq=False)
-class Known:
+class ReferenceRun:
     """A simulation with all coordinates: the shot, with its curves, and what came of them."""
 
     animation: Animation
     run: StepRun
 
 
-class HeldBodies:
+class ProjectedBodies:
     """Bodies in the fewest directions in which all that is known of a shot happens to an allowed error.
 
     Bodies whose coordinates are the user's choice keep them. Where fewer directions do not do, all are kept; what
@@ -57,7 +57,7 @@ class HeldBodies:
 
     def __init__(
         self, character: Character, complete: Sequence[ReducedBody] | None, options: Options,
-        allowed: Callable[[Known], float], known: Sequence[Known],
+        allowed: Callable[[ReferenceRun], float], known: Sequence[ReferenceRun],
     ):  # fmt: skip
         self._character, self._complete, self._options = character, complete, options
         self._allowed, self._known = allowed, list(known)
@@ -81,7 +81,7 @@ class HeldBodies:
                 return
         self.bodies, self.error_m = self._complete, 0.0
 
-    def _off(self, bodies: Sequence[ReducedBody] | None, known: Known) -> float:
+    def _off(self, bodies: Sequence[ReducedBody] | None, known: ReferenceRun) -> float:
         """How far bodies are from a known simulation, by its own step and integrator, at any target and frame [m]."""
         options = replace(self._options, integrator=known.run.integrator or self._options.integrator)
         run = run_or_none(partial(simulate_at, self._character, known.animation, bodies, options), known.run.step)
@@ -99,7 +99,7 @@ class HeldBodies:
         """
         if self._complete is None or self.bodies is self._complete:
             return True
-        more = known_motion(self._character, animation, self._complete, self._options, step)
+        more = reference_run(self._character, animation, self._complete, self._options, step)
         off = self._off(self.bodies, more)
         if off <= self._allowed(more) or self._options.directions == OFF:
             self.error_m = off
@@ -109,11 +109,11 @@ class HeldBodies:
         return False
 
 
-def held_bodies(
+def project_to_subspace(
     character: Character, animation: Animation, bodies: Sequence[ReducedBody] | None, options: Options, step: float,
-    allowed: Callable[[Known], float], known: Known | None = None,
-) -> HeldBodies:  # fmt: skip
-    """Bodies held to what a shot does, by its current curves; other arguments as of `HeldBodies`.
+    allowed: Callable[[ReferenceRun], float], known: ReferenceRun | None = None,
+) -> ProjectedBodies:  # fmt: skip
+    """Bodies held to what a shot does, by its current curves; other arguments as of `ProjectedBodies`.
 
     Args:
         step: Of the simulation with all coordinates [s].
@@ -123,10 +123,10 @@ def held_bodies(
         ShotError: The shot cannot be simulated.
     """
     if not _worth(character, bodies, options):
-        return HeldBodies(character, bodies, options, allowed, ())
+        return ProjectedBodies(character, bodies, options, allowed, ())
     if known is None or known.animation.current != animation.current:
-        known = known_motion(character, animation, bodies, options, step)
-    return HeldBodies(character, bodies, options, allowed, [known])
+        known = reference_run(character, animation, bodies, options, step)
+    return ProjectedBodies(character, bodies, options, allowed, [known])
 
 
 def _worth(character: Character, bodies: Sequence[ReducedBody] | None, options: Options) -> list[int]:
@@ -143,11 +143,11 @@ def _worth(character: Character, bodies: Sequence[ReducedBody] | None, options: 
     return found
 
 
-def known_motion(
+def reference_run(
     character: Character, animation: Animation, bodies: Sequence[ReducedBody] | None, options: Options, step: float
-) -> Known:
+) -> ReferenceRun:
     """The shot by its current curves, simulated with all coordinates; arguments as of `simulate_at`."""
-    return Known(
+    return ReferenceRun(
         animation,
         by_fast_scheme(options, lambda options: simulate_at(character, animation, bodies, options, step)),
     )  # fmt: skip
@@ -162,6 +162,6 @@ def _told(
     for b in fewer:
         count, left = len(bodies[b].stiffness), len(few[b].stiffness)
         what = f"{count - left} of {count} elastic coordinates of {character.bodies[b].path}"
-        row = LeftOut(what, "the shot does not move them", error / len(fewer))
+        row = Simplification(what, "the shot does not move them", error / len(fewer))
         told[b] = replace(few[b], left_out=(*few[b].left_out, row))
     return tuple(told)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from calmotion.accuracy.pod_subspace import Known
+    from calmotion.accuracy.pod_subspace import ReferenceRun
     from calmotion.reduction.reduced_body import ReducedBody
     from calmotion.shot import ModeTable
 
@@ -25,4 +25,4 @@ class ReducedBodies:
     bodies: tuple[ReducedBody, ...]
     modes: tuple[ModeTable, ...]
     error_m: float | None = None
-    known: Known | None = None
+    known: ReferenceRun | None = None

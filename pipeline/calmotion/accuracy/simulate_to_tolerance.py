@@ -13,7 +13,7 @@ from functools import partial
 import numpy as np
 
 from calmotion.accuracy.integrator_choice import by_fast_scheme
-from calmotion.accuracy.pod_subspace import HeldBodies, Known, held_bodies
+from calmotion.accuracy.pod_subspace import ProjectedBodies, ReferenceRun, project_to_subspace
 from calmotion.accuracy.step_error import (
     ORDER,
     StepRun,
@@ -24,13 +24,13 @@ from calmotion.accuracy.step_error import (
 )
 from calmotion.multibody.integrators.schemes import SCHEMES
 from calmotion.reduction.reduced_body import ReducedBody
-from calmotion.shot import Accuracy, Animation, Character, LeftOut, Result, Track
+from calmotion.shot import Accuracy, Animation, Character, Result, Simplification, Track
 from calmotion.shot.character import Array
 from calmotion.simulation.bodies import mode_tables
 from calmotion.simulation.inputs.curves import sample_tracks
 from calmotion.simulation.inputs.time_grid import MAX_STEP, make_grid
 from calmotion.simulation.prepare import Options, prepare
-from calmotion.simulation.simulate import Progress, meant_motion, simulate_shot
+from calmotion.simulation.simulate import Progress, intended_motion, simulate_shot
 
 SHARE = 0.5  # of the tolerance, that the time step may take in any case
 WHOLE = 0.8  # of the tolerance, that it may take together with what the bodies do without
@@ -46,7 +46,7 @@ Bodies = Sequence[ReducedBody] | None
 
 def simulate_to_tolerance(
     character: Character, animation: Animation, bodies: Bodies, options: Options, progress: Progress,
-    left_out_m: float | None = None, known: Known | None = None,
+    left_out_m: float | None = None, known: ReferenceRun | None = None,
 ) -> Result:  # fmt: skip
     """As `simulate_shot`, with what keeps the tolerance where one is asked for: directions of bodies, and a time step.
 
@@ -57,7 +57,7 @@ def simulate_to_tolerance(
     if options.tolerance is None:
         return simulate_shot(character, animation, bodies, options, progress)
     progress(0.0, FINDING)
-    held = held_to_tolerance(character, animation, bodies, options, known)
+    held = project_to_tolerance(character, animation, bodies, options, known)
     if not chooses_step(character, options):
         return with_modes(simulate_shot(character, animation, held.bodies, options, progress), bodies)
     progress(0.0, "choosing the time step")
@@ -72,10 +72,10 @@ def simulate_to_tolerance(
     return by_fast_scheme(options, simulated)
 
 
-def held_to_tolerance(
-    character: Character, animation: Animation, bodies: Bodies, options: Options, known: Known | None,
+def project_to_tolerance(
+    character: Character, animation: Animation, bodies: Bodies, options: Options, known: ReferenceRun | None,
     shake: Callable[[StepRun], float] = lambda run: 0.0,
-) -> HeldBodies:  # fmt: skip
+) -> ProjectedBodies:  # fmt: skip
     """The bodies in the directions that the shot needs, by its current curves.
 
     Args:
@@ -85,7 +85,7 @@ def held_to_tolerance(
     share = UNASKED if options.tolerance is None else HELD
     least = share * character.retarget.allowed(options.tolerance)
     step = own_step(character, options)
-    return held_bodies(
+    return project_to_subspace(
         character, animation, bodies, options, step, lambda item: max(least, share * OF_SHAKE * shake(item.run)), known
     )
 
@@ -107,7 +107,7 @@ def with_step(result: Result, character: Character, options: Options) -> Result:
     return replace(result, left_out=(*result.left_out, row))
 
 
-def step_row(character: Character, options: Options, step: float, error: float | None) -> LeftOut:
+def step_row(character: Character, options: Options, step: float, error: float | None) -> Simplification:
     """Why steps [s] are no shorter, and their error at the targets [m]."""
     if options.step is not None:
         why = "the step was asked for"
@@ -117,13 +117,13 @@ def step_row(character: Character, options: Options, step: float, error: float |
         why = f"they keep the tolerance of {1e3 * (options.tolerance or 0.0):g} mm by {NAMES[options.scheme]}"
     else:
         why = "at 1/480 s motions of 10 Hz are simulated to better than a percent"
-    return LeftOut(f"time steps shorter than {1e3 * step:.3g} ms", why, error)
+    return Simplification(f"time steps shorter than {1e3 * step:.3g} ms", why, error)
 
 
-def planned_step(character: Character, animation: Animation, bodies: Bodies, options: Options) -> LeftOut:
+def planned_step(character: Character, animation: Animation, bodies: Bodies, options: Options) -> Simplification:
     """The step that a simulation of the shot as animated would take, and why, by simulating it."""
     if chooses_step(character, options):
-        held = held_to_tolerance(character, animation, bodies, options, None)
+        held = project_to_tolerance(character, animation, bodies, options, None)
         left_out = omitted_error(bodies) + held.error_m
         return by_fast_scheme(
             options,
@@ -184,10 +184,10 @@ def mesh_error(bodies: Bodies) -> float | None:
     return sum(known) if errors and len(known) == len(errors) else None
 
 
-def intended_motion(character: Character, animation: Animation, bodies: Bodies, options: Options) -> Array:
+def intended_positions(character: Character, animation: Animation, bodies: Bodies, options: Options) -> Array:
     """Where the targets are meant to be at the frames [m], shape [f, K, 3]."""
     prepared = prepare(character, animation, bodies, replace(options, step=FIRST))
-    meant = meant_motion(prepared, *sample_tracks(animation.tracks, prepared.grid))
+    meant = intended_motion(prepared, *sample_tracks(animation.tracks, prepared.grid))
     return meant.reference.positions[prepared.grid.frames]
 
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 from functools import partial
 
 from calmotion.accuracy.integrator_choice import by_fast_scheme
-from calmotion.accuracy.pod_subspace import held_bodies
+from calmotion.accuracy.pod_subspace import project_to_subspace
 from calmotion.accuracy.simulate_to_tolerance import found_tracks
 from calmotion.accuracy.step_error import distance, frames_of, simulate_at
 from calmotion.multibody.model.topology import span_tree
@@ -15,7 +15,7 @@ from calmotion.reduction.reduced_body import ReducedBody
 from calmotion.shot import Animation, Character, FEMeshes, Result
 from calmotion.simulation.bodies import reduce_bodies
 from calmotion.simulation.inputs.time_grid import MAX_STEP
-from calmotion.simulation.prepare import Options, excitations
+from calmotion.simulation.prepare import Options, load_envelopes
 from calmotion.simulation.simulate import Progress
 
 STEP, TOLERANCE = 0.25, 0.1  # of those of the result
@@ -46,7 +46,7 @@ def verify(
     bodies = None
     if reduced is not None and any(body.bends for body in character.bodies):
         allowed = TOLERANCE * character.retarget.allowed(options.tolerance)
-        loads = excitations(character, animation, meshes, options)
+        loads = load_envelopes(character, animation, meshes, options)
         reduce = partial(reduce_bodies, character, span_tree(character), meshes, progress, loads)
         bodies = reduce(tolerance=allowed)
         for _ in range(MOST):
@@ -56,7 +56,7 @@ def verify(
             bodies = reduce(tolerance=allowed)
     progress(0.5, "simulating with a finer step")
     least = HELD * character.retarget.allowed(options.tolerance)
-    held = held_bodies(character, animation, bodies, options, MAX_STEP, lambda known: least)
+    held = project_to_subspace(character, animation, bodies, options, MAX_STEP, lambda known: least)
     step = STEP * result.step_s
     fine = by_fast_scheme(options, lambda options: simulate_at(character, animation, held.bodies, options, step))
     own = frames_of(result, animation.frame_times)

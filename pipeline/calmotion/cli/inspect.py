@@ -26,7 +26,18 @@ from calmotion.cli.run import (
 )
 from calmotion.errors import ShotError
 from calmotion.host import HostError, Run, open_host
-from calmotion.shot import Animation, Body, Character, Findings, LeftOut, ModeTable, Motor, Needs, Provenance, Track
+from calmotion.shot import (
+    Animation,
+    Body,
+    Character,
+    Findings,
+    ModelChoices,
+    ModeTable,
+    Motor,
+    Provenance,
+    Simplification,
+    Track,
+)
 from calmotion.shot.measure import measure_of
 from calmotion.shot.outputs import ModeShapes, PlannedStep, SystemModes
 from calmotion.shot.run import OutputPaths, Source
@@ -56,7 +67,9 @@ def inspect_shot(args: argparse.Namespace, output: Output) -> int:
         pre_roll=args.pre_roll,
         integrator=args.integrator,
     )
-    optional = [Character, Animation, Provenance] if args.strict else [Needs, ReducedBodies, SystemModes, PlannedStep]
+    optional = (
+        [Character, Animation, Provenance] if args.strict else [ModelChoices, ReducedBodies, SystemModes, PlannedStep]
+    )
     with ProgressDisplay(args.quiet, args.progress) as display:
         run = host.run(
             [source, OutputPaths(modes=args.modes)],
@@ -83,7 +96,7 @@ def inspect_shot(args: argparse.Namespace, output: Output) -> int:
 def inspect_report(run: Run) -> dict[str, Any]:
     """The object of `inspect --json`; SI units and radians, as the names of the keys say."""
     character, animation, provenance = run.data[Character], run.data[Animation], run.data[Provenance]
-    reduced, modes, needs = run.get(ReducedBodies), run.get(SystemModes), run.get(Needs)
+    reduced, modes, needs = run.get(ReducedBodies), run.get(SystemModes), run.get(ModelChoices)
     tables = {table.body: table for table in reduced.modes} if reduced else {}
     names = [body.path for body in character.bodies]
     bends = [body.bends for body in (needs.character if needs else character).bodies]
@@ -138,7 +151,9 @@ def inspect_report(run: Run) -> dict[str, Any]:
     }
 
 
-def _without(needs: Needs | None, reduced: ReducedBodies | None, step: PlannedStep | None) -> Sequence[LeftOut]:
+def _without(
+    needs: ModelChoices | None, reduced: ReducedBodies | None, step: PlannedStep | None
+) -> Sequence[Simplification]:
     """What the shot and its flexible bodies do without."""
     rows = list(needs.left_out) if needs else []
     rows += [row for body in reduced.bodies for row in body.left_out] if reduced else []

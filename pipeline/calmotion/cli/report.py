@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from calmotion import __version__
 from calmotion.host import OperatorResult, Run
-from calmotion.shot import Character, LeftOut, LimitUse, Result, Simulation
+from calmotion.shot import Character, LimitUse, Result, Simplification, Simulation
 from calmotion.shot.character import Array
 from calmotion.shot.measure import measure_of
 from calmotion.shot.outputs import CsvFile, Figures, Recording, Verification, WrittenLayer
@@ -58,7 +58,7 @@ def target_errors(character: Character, simulation: Simulation, suffix: str) -> 
     ]
 
 
-def left_out_row(row: LeftOut) -> dict[str, Any]:
+def left_out_row(row: Simplification) -> dict[str, Any]:
     """One row of `left_out`."""
     return {"what": row.what, "why": row.why, "estimated_error_m": row.estimated_error_m}
 

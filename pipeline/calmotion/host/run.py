@@ -16,7 +16,7 @@ from calmotion.host.plan import Plan
 from calmotion.host.properties import PropertyValues
 
 if TYPE_CHECKING:
-    from calmotion.shot import LeftOut
+    from calmotion.shot import Simplification
 
 T = TypeVar("T")
 Progress = Callable[[str, float, str], None]
@@ -174,14 +174,14 @@ class Run:
         except Exception:
             return False  # it fails by itself when its turn comes
 
-    def left_out(self) -> tuple[LeftOut, ...]:
+    def left_out(self) -> tuple[Simplification, ...]:
         """What the polls left out, for the report; not an operator whose values another one made, or that nobody asked
         for."""
-        from calmotion.shot import LeftOut
+        from calmotion.shot import Simplification
 
         made = {cls.idname: all(kind in self.data for kind in cls.provides) for cls in self.plan.operators}
         return tuple(
-            LeftOut(result.label, result.reason)
+            Simplification(result.label, result.reason)
             for result in self.results
             if result.outcome == Outcome.LEFT_OUT
             and not made[result.idname]

@@ -22,7 +22,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from calmotion.reduction.reduced_body import Elasticity, Invariants, Marker, ReducedBody
-from calmotion.shot.result import LeftOut
+from calmotion.shot.result import Simplification
 from calmotion.support.cache_folder import cache_folder
 
 T = TypeVar("T")
@@ -34,7 +34,7 @@ _ABANDONED = 3600.0  # a temporary file of that age [s] was left by a process th
 
 # What a file may hold besides arrays, numbers, strings, None and tuples of them; a file names its types, and only
 # these are ever made from one.
-TYPES: dict[str, type] = {item.__name__: item for item in (Elasticity, Invariants, LeftOut, Marker, ReducedBody)}
+TYPES: dict[str, type] = {item.__name__: item for item in (Elasticity, Invariants, Simplification, Marker, ReducedBody)}
 
 
 def cached_reduction(key_parts: object, compute: Callable[[], T]) -> T:

@@ -11,14 +11,14 @@ from calmotion.shot.character import Array
 
 
 @dataclass(frozen=True, eq=False)
-class Excitation:
+class LoadEnvelope:
     """Largest loads on a body over a shot, taken from a rigid simulation; absolute values, body axes.
 
     Attributes:
         acceleration: Of the frame's origin, less gravity [m/s^2], shape [3]; a body at rest has its weight here.
         angular_acceleration: [rad/s^2], shape [3].
         angular_velocity: [rad/s], shape [3].
-        force: On each interface, by the body beyond it [N], shape [j, 3]; `patch_excitation` makes it one row for
+        force: On each interface, by the body beyond it [N], shape [j, 3]; `patch_load_envelope` makes it one row for
             each moving patch.
         moment: Likewise, about the interface's anchor [N m], shape [j, 3].
         frequency: Highest frequency at which the motion pushes noticeably [Hz]; 0 when it is not known.
@@ -43,8 +43,8 @@ class Excitation:
         return np.zeros(len(self.force)) if self.reach is None else self.reach
 
 
-def askew(excitation: Excitation, angle: float, size: float) -> Excitation:
-    """The excitation of a body that has turned by an angle in any direction as it bends, and so meets its loads askew.
+def load_direction_envelope(load_envelope: LoadEnvelope, angle: float, size: float) -> LoadEnvelope:
+    """The loads on a body that deflection has rotated by an angle about any axis.
 
     A rigid robot that swings in a plane never twists a link; one that bends does, as the load beyond it moves aside.
 
@@ -57,24 +57,24 @@ def askew(excitation: Excitation, angle: float, size: float) -> Excitation:
     def every_way(load: Array) -> Array:
         return np.maximum(np.abs(load), share * np.linalg.norm(load, axis=-1, keepdims=True))
 
-    lever = share * size * np.linalg.norm(excitation.force, axis=-1, keepdims=True)
+    lever = share * size * np.linalg.norm(load_envelope.force, axis=-1, keepdims=True)
     return replace(
-        excitation,
-        acceleration=every_way(excitation.acceleration),
-        angular_acceleration=every_way(excitation.angular_acceleration),
-        angular_velocity=every_way(excitation.angular_velocity),
-        force=every_way(excitation.force),
-        moment=np.maximum(every_way(excitation.moment), lever),
+        load_envelope,
+        acceleration=every_way(load_envelope.acceleration),
+        angular_acceleration=every_way(load_envelope.angular_acceleration),
+        angular_velocity=every_way(load_envelope.angular_velocity),
+        force=every_way(load_envelope.force),
+        moment=np.maximum(every_way(load_envelope.moment), lever),
     )
 
 
-def patch_excitation(
-    excitation: Excitation, anchors: Sequence[Sequence[int]], positions: Array, centers: Sequence[Array]
-) -> Excitation:
-    """The excitation with one row for each moving patch instead of one for each interface.
+def patch_load_envelope(
+    load_envelope: LoadEnvelope, anchors: Sequence[Sequence[int]], positions: Array, centers: Sequence[Array]
+) -> LoadEnvelope:
+    """The load_envelope with one row for each moving patch instead of one for each interface.
 
     Args:
-        excitation: Of a body with j interfaces.
+        load_envelope: Of a body with j interfaces.
         anchors: For each of the p patches the interfaces that it carries.
         positions: Anchors of the interfaces, body frame [m], shape [j, 3] (more rows are ignored).
         centers: Point of each patch that its wrench is about [m], shape [3].
@@ -86,9 +86,9 @@ def patch_excitation(
     force, moment, reach = np.zeros((count, 3)), np.zeros((count, 3)), np.zeros(count)
     for k, (group, center) in enumerate(zip(anchors, centers, strict=True)):
         for i in group:
-            arm, f = np.abs(positions[i] - center), excitation.force[i]
+            arm, f = np.abs(positions[i] - center), load_envelope.force[i]
             lever = np.roll(arm, -1) * np.roll(f, -2) + np.roll(arm, -2) * np.roll(f, -1)
             force[k] += f
-            moment[k] += excitation.moment[i] + lever
-            reach[k] = max(reach[k], float(excitation.lever[i]))
-    return replace(excitation, force=force, moment=moment, reach=reach)
+            moment[k] += load_envelope.moment[i] + lever
+            reach[k] = max(reach[k], float(load_envelope.lever[i]))
+    return replace(load_envelope, force=force, moment=moment, reach=reach)

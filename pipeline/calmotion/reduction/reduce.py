@@ -15,18 +15,18 @@ from calmotion.reduction.elements.assembly import FEModel, QuadraticMesh, assemb
 from calmotion.reduction.elements.embedding import Embedding, embed
 from calmotion.reduction.inertia_integrals import inertia_integrals
 from calmotion.reduction.interfaces.interface_patches import Anchor, Patch, interface_patches
-from calmotion.reduction.load_envelope import Excitation, patch_excitation
+from calmotion.reduction.load_envelope import LoadEnvelope, patch_load_envelope
 from calmotion.reduction.reduced_body import Elasticity, Marker, ReducedBody
 from calmotion.shot.character import DEFAULT_TOLERANCE, Body, ElasticMaterial, SurfaceMesh
 from calmotion.shot.meshes import FEMesh
-from calmotion.shot.result import LeftOut
+from calmotion.shot.result import Simplification
 
 __all__ = ["Anchor", "LinearModes", "linear_modes", "reduce_body"]
 
 
 def reduce_body(
     mesh: FEMesh, body: Body, anchors: Sequence[Anchor], surfaces: Sequence[SurfaceMesh], root: int,
-    excitation: Excitation | None = None, tolerance: float = DEFAULT_TOLERANCE, full: FullBody | None = None,
+    load_envelope: LoadEnvelope | None = None, tolerance: float = DEFAULT_TOLERANCE, full: FullBody | None = None,
 ) -> ReducedBody:  # fmt: skip
     """Reduces one flexible body.
 
@@ -40,7 +40,7 @@ def reduce_body(
         anchors: Where joints attach and targets are, body frame.
         surfaces: To be skinned, body frame.
         root: Index of the anchor of the parent-side joint; of kind `interface`.
-        excitation: Loads on the body in this shot, for what is chosen automatically; None when nothing is known.
+        load_envelope: Loads on the body in this shot, for what is chosen automatically; None when nothing is known.
         tolerance: Error that does not matter [m].
         full: `full_body` of the same, where it is known.
 
@@ -53,19 +53,19 @@ def reduce_body(
 
     Source: Seed (11)-(20); formulation, section 1.
     """
-    linear = linear_modes(mesh, body, anchors, root, excitation, tolerance, full)
-    model, moving, basis, excitation = linear.model, linear.moving, linear.basis, linear.excitation
-    left_out = _modes_left_out(basis, body, excitation)
+    linear = linear_modes(mesh, body, anchors, root, load_envelope, tolerance, full)
+    model, moving, basis, load_envelope = linear.model, linear.moving, linear.basis, linear.load_envelope
+    left_out = _modes_left_out(basis, body, load_envelope)
     assert body.flexible is not None
     material = body.flexible.material
     elasticity = None
-    law, without = _law(model, linear.support, basis, body, excitation, tolerance)
+    law, without = _law(model, linear.support, basis, body, load_envelope, tolerance)
     left_out += without
     if law != "linear" and len(basis.omega_squared):
         from calmotion.reduction.material_laws.large_deflection import large_deflection
 
         basis, elasticity = large_deflection(
-            model, linear.support, basis, material, law, excitation, tolerance, body.flexible.pairs_share
+            model, linear.support, basis, material, law, load_envelope, tolerance, body.flexible.pairs_share
         )
         left_out += _pairs_left_out(elasticity, body)
     r = len(basis.omega_squared)
@@ -129,61 +129,63 @@ class LinearModes(FullBody):
 
     Attributes:
         basis: Its modes.
-        excitation: The loads, by moving patch; None when they are not known.
+        load_envelope: The loads, by moving patch; None when they are not known.
     """
 
     basis: Basis
-    excitation: Excitation | None
+    load_envelope: LoadEnvelope | None
 
 
 def linear_modes(
-    mesh: FEMesh, body: Body, anchors: Sequence[Anchor], root: int, excitation: Excitation | None = None,
+    mesh: FEMesh, body: Body, anchors: Sequence[Anchor], root: int, load_envelope: LoadEnvelope | None = None,
     tolerance: float = DEFAULT_TOLERANCE, full: FullBody | None = None,
 ) -> LinearModes:  # fmt: skip
     """The linear part of `reduce_body`, on the mesh; same arguments, same errors."""
     full = full or full_body(mesh, body, anchors, root)
     model, support, moving, settings = full.model, full.support, full.moving, body.flexible
     assert settings is not None
-    if excitation is not None:
+    if load_envelope is not None:
         positions = np.array([anchor.frame.position for anchor in anchors]).reshape(-1, 3)
-        excitation = patch_excitation(excitation, [patch.anchors for patch in moving], positions, support.centers)
+        load_envelope = patch_load_envelope(
+            load_envelope, [patch.anchors for patch in moving], positions, support.centers
+        )
     basis = reduced_basis(
-        model, support.root, support.patches, support.centers, settings, excitation=excitation,
-        tolerance=settings.modes_share * tolerance if excitation is not None else None,
+        model, support.root, support.patches, support.centers, settings, load_envelope=load_envelope,
+        tolerance=settings.modes_share * tolerance if load_envelope is not None else None,
         targets=_points(model.mesh, anchors).displacements, fixed=support.fixed(model),
     )  # fmt: skip
-    return LinearModes(model, support, moving, basis, excitation)
+    return LinearModes(model, support, moving, basis, load_envelope)
 
 
 def _law(
-    model: FEModel, support: Support, basis: Basis, body: Body, excitation: Excitation | None, tolerance: float
-) -> tuple[str, tuple[LeftOut, ...]]:
+    model: FEModel, support: Support, basis: Basis, body: Body, load_envelope: LoadEnvelope | None, tolerance: float
+) -> tuple[str, tuple[Simplification, ...]]:
     """The elastic law of a body, and what it leaves out."""
     settings = body.flexible
     assert settings is not None
     law, what = settings.elasticity, f"nonlinear elasticity of {body.path}"
     if law != "auto":
-        return law, (LeftOut(what, "calm:flexible:elasticity is linear"),) if law == "linear" else ()
-    if excitation is None:
-        return "linear", (LeftOut(what, "no motion tells how far it bends"),)
+        return law, (Simplification(what, "calm:flexible:elasticity is linear"),) if law == "linear" else ()
+    if load_envelope is None:
+        return "linear", (Simplification(what, "no motion tells how far it bends"),)
     from calmotion.reduction.material_laws.choice import choose_law
 
-    choice = choose_law(model, support, basis, settings.material, excitation, tolerance, body.path)
+    choice = choose_law(model, support, basis, settings.material, load_envelope, tolerance, body.path)
     if choice.law == "neohookean":
         return choice.law, ()
     if choice.law == "stvk":
         what = f"nonlinear material of {body.path}"
-    return choice.law, (LeftOut(what, choice.reason, choice.error_m),)
+    return choice.law, (Simplification(what, choice.reason, choice.error_m),)
 
 
 def _mesh_error(mesh: FEMesh, linear: LinearModes) -> float | None:
     """What elements that are too stiff take from the deflection [m]: stiffness goes by the square of a frequency."""
     error = mesh.quality.frequency_error
-    if error is None or linear.excitation is None:
+    if error is None or linear.load_envelope is None:
         return None
     from calmotion.reduction.material_laws.choice import deflection_of
 
-    return 2.0 * error * deflection_of(linear.model, linear.basis, linear.excitation)
+    return 2.0 * error * deflection_of(linear.model, linear.basis, linear.load_envelope)
 
 
 def _points(mesh: QuadraticMesh, anchors: Sequence[Anchor]) -> Embedding:
@@ -192,13 +194,13 @@ def _points(mesh: QuadraticMesh, anchors: Sequence[Anchor]) -> Embedding:
     return embed(mesh, np.array(places).reshape(-1, 3))
 
 
-def _modes_left_out(basis: Basis, body: Body, excitation: Excitation | None) -> tuple[LeftOut, ...]:
+def _modes_left_out(basis: Basis, body: Body, load_envelope: LoadEnvelope | None) -> tuple[Simplification, ...]:
     """The modes that the basis does without, and what that costs."""
-    if excitation is None or basis.cut_error_m is None:
+    if load_envelope is None or basis.cut_error_m is None:
         return ()
     kept = len(basis.omega_squared)
     return (
-        LeftOut(
+        Simplification(
             f"all but {kept} linear modes of {body.path}",
             "the motion of this shot hardly moves them",
             basis.cut_error_m,
@@ -206,13 +208,13 @@ def _modes_left_out(basis: Basis, body: Body, excitation: Excitation | None) -> 
     )
 
 
-def _pairs_left_out(law: Elasticity, body: Body) -> tuple[LeftOut, ...]:
+def _pairs_left_out(law: Elasticity, body: Body) -> tuple[Simplification, ...]:
     """The coordinates whose quadratic strain a law does without, and what that costs."""
     if law.seen is None:
         return ()
     p, r = law.seen.shape
     what = f"quadratic strain of {r - p} of {r} elastic coordinates of {body.path}"
-    return (LeftOut(what, "the loads of this shot hardly turn the body in them", law.unseen_m),)
+    return (Simplification(what, "the loads of this shot hardly turn the body in them", law.unseen_m),)
 
 
 def _markers(

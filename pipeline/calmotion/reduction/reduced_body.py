@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from calmotion.shot.character import Array, MassProperties
-from calmotion.shot.result import LeftOut
+from calmotion.shot.result import Simplification
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,7 +107,7 @@ class ReducedBody:
     nodes: int = 0
     elements: int = 0
     elasticity: Elasticity | None = None
-    left_out: tuple[LeftOut, ...] = ()
+    left_out: tuple[Simplification, ...] = ()
     mesh_error_m: float | None = None
 
     @property

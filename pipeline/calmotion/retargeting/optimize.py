@@ -20,10 +20,15 @@ from calmotion.retargeting.problem.offset_basis import OffsetBasis, basis_on
 from calmotion.retargeting.problem.posing import locked_coefficients, pose
 from calmotion.retargeting.problem.problem import RetargetProblem
 from calmotion.retargeting.simplification.idle_motors import idle_gain, idle_motors
-from calmotion.retargeting.simplification.inactive_intervals import first_change, left_out_on, quiet_ranges, with_gains
+from calmotion.retargeting.simplification.inactive_intervals import (
+    first_change,
+    inactive_intervals,
+    left_out_on,
+    with_gains,
+)
 from calmotion.retargeting.simplification.pruning import UNCHANGED, block_energies, worthless
 from calmotion.retargeting.simplification.report_rows import FINER, PRUNED, search_rows
-from calmotion.retargeting.solver.damping_homotopy import approach
+from calmotion.retargeting.solver.damping_homotopy import damping_homotopy
 from calmotion.retargeting.solver.gauss_newton import Search, minimize
 from calmotion.retargeting.solver.recycling import Recycled
 from calmotion.shot import Animation, Character, MotorCurve, OptimizerStep, Result
@@ -32,11 +37,11 @@ from calmotion.shot.model_choice import OFF
 from calmotion.simulation.bodies import mode_tables, skins
 from calmotion.simulation.forward import limited_values
 from calmotion.simulation.inputs.curves import sample_curves
-from calmotion.simulation.intended_motion import MeantMotion
+from calmotion.simulation.intended_motion import IntendedMotion
 from calmotion.simulation.motor_limits import Excess, excesses, motor_bounds
 from calmotion.simulation.prepare import Options, Prepared, failure_error, lowest_frequency, prepare, refuse_half_turns
 from calmotion.simulation.report import left_out_rows, limit_uses, performed_motion, reference_motion, simulation_of
-from calmotion.simulation.simulate import Progress, meant_motion
+from calmotion.simulation.simulate import Progress, intended_motion
 from calmotion.simulation.simulator import compile_kernels
 
 WORTH = 0.005  # of the tolerance: what an iteration must be expected to gain
@@ -90,7 +95,7 @@ def optimize_shot(
     curves = sample_curves(animation.tracks, grid)
     refuse_half_turns(prepared, curves.angles)
     try:
-        meant = meant_motion(prepared, curves.angles, curves.rates)
+        meant = intended_motion(prepared, curves.angles, curves.rates)
         posed = pose(prepared, animation, curves, meant, options)
         progress(0.0, "compiling kernels, once")
         compile_kernels(
@@ -113,7 +118,7 @@ def refuse_other_integrators(options: Options) -> None:
 
 
 def _search(
-    prepared: Prepared, animation: Animation, posed: tuple[RetargetProblem, Array, bool], meant: MeantMotion,
+    prepared: Prepared, animation: Animation, posed: tuple[RetargetProblem, Array, bool], meant: IntendedMotion,
     options: Options, progress: Progress, checkpoint: Path | None,
 ) -> Result:  # fmt: skip
     character, grid, model = prepared.character, prepared.grid, prepared.model
@@ -140,7 +145,7 @@ def _search(
         problem.limits.rho = FIRST_PENALTY * max(before_value, problem.worth(1e-3 * tolerance)) / grid.end
     kept = Checkpoint(checkpoint, problem_key(problem, locked_on(problem.basis), (options, tolerance)))
     frequency = lowest_frequency(prepared, animation)
-    quiet = quiet_ranges(problem, start, frequency, tolerance, options.ranges)
+    quiet = inactive_intervals(problem, start, frequency, tolerance, options.ranges)
     resumed = kept.load(problem.limits)
     search, interrupted, idle = Search.start(np.where(fixed_on(problem.basis), 0.0, start)), False, None
     if resumed is not None:
@@ -159,7 +164,7 @@ def _search(
 
     try:
         if resumed is None and not np.any(start):
-            search = approach(problem, start, fixed, frequency)
+            search = damping_homotopy(problem, start, fixed, frequency)
         while True:
             if not search.reason:
                 search = minimize(

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from calmotion.accuracy.pod_subspace import Known
+from calmotion.accuracy.pod_subspace import ReferenceRun
 from calmotion.accuracy.simulate_to_tolerance import (
     FINDING,
     FIRST,
@@ -18,11 +18,11 @@ from calmotion.accuracy.simulate_to_tolerance import (
     allowed_step_error,
     chooses_step,
     found_tracks,
-    held_to_tolerance,
-    intended_motion,
+    intended_positions,
     mesh_error,
     omitted_error,
     own_step,
+    project_to_tolerance,
     with_modes,
     with_step,
 )
@@ -48,7 +48,7 @@ MARGIN, MOST = 0.8, 3  # by which a step that was too large is made too small, a
 
 def optimize_to_tolerance(
     character: Character, animation: Animation, bodies: Bodies, options: Options, progress: Progress,
-    checkpoint: Path | None = None, known: Known | None = None,
+    checkpoint: Path | None = None, known: ReferenceRun | None = None,
 ) -> Result:  # fmt: skip
     """As `optimize_shot`, likewise, and with directions of bodies always.
 
@@ -58,13 +58,13 @@ def optimize_to_tolerance(
     """
     refuse_other_integrators(options)
     input_shot = replace(animation, current=animation.tracks)
-    intended = cache(partial(intended_motion, character, animation, bodies, options))
+    intended = cache(partial(intended_positions, character, animation, bodies, options))
 
     def shake(run: StepRun) -> float:
         return distance(run.positions, intended())
 
     progress(0.0, FINDING)
-    held = held_to_tolerance(character, input_shot, bodies, options, known, shake)
+    held = project_to_tolerance(character, input_shot, bodies, options, known, shake)
     chooses = chooses_step(character, options)
     step = own_step(character, options)
     if chooses:

@@ -20,17 +20,17 @@ from calmotion.shot.character import (
 )
 from calmotion.shot.finding import Finding, Findings
 from calmotion.shot.meshes import FEMesh, FEMeshes, MeshQuality
-from calmotion.shot.model_choice import Need, Needs
+from calmotion.shot.model_choice import ModelChoice, ModelChoices
 from calmotion.shot.provenance import InputLayer, Provenance
 from calmotion.shot.result import (
     Accuracy,
-    LeftOut,
     LimitUse,
     ModeTable,
     Motion,
     MotorCurve,
     OptimizerStep,
     Result,
+    Simplification,
     Simulation,
     Skin,
 )
@@ -53,7 +53,7 @@ __all__ = [
     "InputLayer",
     "InterfaceSurface",
     "Joint",
-    "LeftOut",
+    "Simplification",
     "LimitUse",
     "MassProperties",
     "MeshQuality",
@@ -63,8 +63,8 @@ __all__ = [
     "MotorCurve",
     "MotorTracks",
     "MovingFrame",
-    "Need",
-    "Needs",
+    "ModelChoice",
+    "ModelChoices",
     "OptimizerStep",
     "Provenance",
     "Result",

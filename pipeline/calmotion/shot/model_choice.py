@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from calmotion.shot.character import Character
-from calmotion.shot.result import LeftOut
+from calmotion.shot.result import Simplification
 
 # What can be forced on or off.
 KINDS = ("bodies", "turning", "loops", "modes", "directions", "elasticity", "motors", "ranges")
@@ -15,7 +15,7 @@ AUTO, ON, OFF = "auto", "on", "off"
 
 
 @dataclass(frozen=True)
-class Need:
+class ModelChoice:
     """One thing that a shot may need.
 
     Attributes:
@@ -36,7 +36,7 @@ class Need:
 
 
 @dataclass(frozen=True, eq=False)
-class Needs:
+class ModelChoices:
     """What a shot needs.
 
     Attributes:
@@ -46,18 +46,18 @@ class Needs:
     """
 
     character: Character
-    rows: tuple[Need, ...] = ()
+    rows: tuple[ModelChoice, ...] = ()
     forced: Mapping[str, str] = field(default_factory=dict)
 
     @property
-    def left_out(self) -> tuple[LeftOut, ...]:
+    def left_out(self) -> tuple[Simplification, ...]:
         """What is left out, for the report."""
         return self.left_out_but()
 
-    def left_out_but(self, *kinds: str) -> tuple[LeftOut, ...]:
+    def left_out_but(self, *kinds: str) -> tuple[Simplification, ...]:
         """The same without some kinds."""
         rows = (row for row in self.rows if not row.needed and row.kind not in kinds)
-        return tuple(LeftOut(row.what, row.why, row.estimated_error_m) for row in rows)
+        return tuple(Simplification(row.what, row.why, row.estimated_error_m) for row in rows)
 
     def choice(self, kind: str) -> str:
         """`auto`, `on` or `off`."""
@@ -70,7 +70,7 @@ def nothing_bends(data: Mapping[type, Any]) -> str | None:
     Args:
         data: What is known of the run, by type.
     """
-    character, needs = data.get(Character), data.get(Needs)
+    character, needs = data.get(Character), data.get(ModelChoices)
     if character is not None and not any(body.flexible for body in character.bodies):
         return "nothing is flexible: no body has CalmFlexibleBodyAPI"
     if needs is not None and not any(body.bends for body in needs.character.bodies):

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from calmotion.shot import LeftOut, Track
+    from calmotion.shot import Simplification, Track
     from calmotion.shot.character import Array
 
 
@@ -104,7 +104,7 @@ class Verification:
 class PlannedStep:
     """The time step that a simulation of the shot would take: what it leaves out."""
 
-    row: LeftOut
+    row: Simplification
 
 
 @dataclass(frozen=True, eq=False)

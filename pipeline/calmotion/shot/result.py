@@ -105,7 +105,7 @@ class MotorCurve:
 
 
 @dataclass(frozen=True, eq=False)
-class LeftOut:
+class Simplification:
     """Something the run left out: what, why, and the error this costs at the targets (None: none, exact)."""
 
     what: str
@@ -228,7 +228,7 @@ class Result:
     step_s: float
     pre_roll_s: float
     dof: int
-    left_out: tuple[LeftOut, ...] = ()
+    left_out: tuple[Simplification, ...] = ()
     limits: tuple[LimitUse, ...] = ()
     stopped: str = ""
     expected_gain_m: float | None = None

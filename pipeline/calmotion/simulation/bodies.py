@@ -11,7 +11,7 @@ from calmotion.errors import ShotError
 from calmotion.multibody.model.joint_arrays import BodyAnchors
 from calmotion.multibody.model.model import body_anchors, compile_model, rigid_body
 from calmotion.multibody.model.topology import Tree, span_tree
-from calmotion.reduction.load_envelope import Excitation
+from calmotion.reduction.load_envelope import LoadEnvelope
 from calmotion.reduction.reduced_body import ReducedBody
 from calmotion.shot import Body, Character, FEMeshes, ModeTable, Skin, SurfaceMesh
 from calmotion.shot.character import with_settings
@@ -29,7 +29,7 @@ def reduce_bodies(
     tree: Tree,
     meshes: FEMeshes | None,
     progress: Callable[[float, str], None] | None = None,
-    excitations: Sequence[Excitation | None] | None = None,
+    load_envelopes: Sequence[LoadEnvelope | None] | None = None,
     tolerance: float | None = None,
     full: dict[int, FullBody] | None = None,
 ) -> list[ReducedBody]:
@@ -38,7 +38,7 @@ def reduce_bodies(
     Args:
         character, tree, meshes: What to reduce.
         progress: Called with a fraction and the body at hand.
-        excitations: Loads on each body in the shot, for what is chosen automatically.
+        load_envelopes: Loads on each body in the shot, for what is chosen automatically.
         tolerance: Error that does not matter [m]; None: the shot's own, or 1 mm.
         full: Full models by body, for who reduces the same ones again; what is made and is not too large is added.
 
@@ -65,17 +65,17 @@ def reduce_bodies(
         from calmotion.reduction.cache import cached_reduction
 
         frames = fem_anchors(character, body, anchors)
-        excitation = None if excitations is None else excitations[index]
+        load_envelope = None if load_envelopes is None else load_envelopes[index]
         # what has no bearing on the reduction does not make it another one
         body = replace(body, straight=False)
-        parts = (mesh_of[index], body, frames, body.surfaces, anchors.root, excitation, allowed / flexible)
+        parts = (mesh_of[index], body, frames, body.surfaces, anchors.root, load_envelope, allowed / flexible)
         result.append(cached_reduction(parts, partial(_reduced, full, index, parts)))
     return _damped(character, tree, result)
 
 
 def _reduced(
     full: dict[int, FullBody] | None, index: int,
-    parts: tuple[FEMesh, Body, list[Anchor], Sequence[SurfaceMesh], int, Excitation | None, float],
+    parts: tuple[FEMesh, Body, list[Anchor], Sequence[SurfaceMesh], int, LoadEnvelope | None, float],
 ) -> ReducedBody:  # fmt: skip
     """`reduce_body` of the parts, with the full model that is known, or will be."""
     from calmotion.reduction.reduce import full_body, reduce_body
@@ -121,7 +121,10 @@ def fem_anchors(character: Character, body: Body, anchors: BodyAnchors) -> list[
 
 
 def flexible_modes(
-    character: Character, meshes: FEMeshes, excitations: Sequence[Excitation | None] | None, tolerance: float | None
+    character: Character,
+    meshes: FEMeshes,
+    load_envelopes: Sequence[LoadEnvelope | None] | None,
+    tolerance: float | None,
 ) -> Iterator[tuple[Body, LinearModes]]:
     """Every flexible body with its linear modes on the mesh; arguments as of `reduce_bodies`."""
     from calmotion.reduction.reduce import linear_modes
@@ -131,9 +134,9 @@ def flexible_modes(
     allowed = character.retarget.allowed(tolerance)
     for mesh in meshes.meshes:
         body, own = character.bodies[mesh.body], anchors[mesh.body]
-        excitation = None if excitations is None else excitations[mesh.body]
+        load_envelope = None if load_envelopes is None else load_envelopes[mesh.body]
         frames = fem_anchors(character, body, own)
-        yield body, linear_modes(mesh, body, frames, own.root, excitation, allowed / len(meshes.meshes))
+        yield body, linear_modes(mesh, body, frames, own.root, load_envelope, allowed / len(meshes.meshes))
 
 
 def with_elasticity(character: Character, law: str) -> Character:

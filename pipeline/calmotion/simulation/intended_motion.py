@@ -17,7 +17,7 @@ from calmotion.simulation.target_errors import Reference
 
 
 @dataclass(frozen=True, eq=False)
-class MeantMotion:
+class IntendedMotion:
     """The motion that is meant: body poses (by component) and targets, shapes [T, B, ...], [T, K, ...]."""
 
     c: Array
@@ -33,21 +33,21 @@ class MeantMotion:
 
 def rigid_motion(
     model: Model, angles: Array, rates: Array, h: float, world: Array | None = None, cyclic: bool = False
-) -> MeantMotion:
+) -> IntendedMotion:
     """The animation on a rigid robot: kinematics alone, or a rigid simulation where joints move freely."""
     rigid = rigid_model(model)
     if np.any(moves_freely(rigid)):
         run = Simulator(rigid, h, world, cyclic).run(angles, rates)
         states = run.trajectory.states
-        return MeantMotion(states.c, states.q, run.target_positions, run.target_rotations)
+        return IntendedMotion(states.c, states.q, run.target_positions, run.target_rotations)
     c, q = rigid_poses(rigid, model.joint_angles(angles), world)
     positions, rotations = target_frames(rigid, c, q, np.zeros(c.shape[:2] + (0,)))
-    return MeantMotion(c, q, positions, rotations)
+    return IntendedMotion(c, q, positions, rotations)
 
 
 def static_motion(
-    model: Model, rigid: MeantMotion, angles: Array, judged: BoolArray, world: Array | None = None
-) -> MeantMotion:
+    model: Model, rigid: IntendedMotion, angles: Array, judged: BoolArray, world: Array | None = None
+) -> IntendedMotion:
     """The animation with the sag of each pose: the flexible robot in static equilibrium at every judged instant.
 
     Args:
@@ -61,7 +61,7 @@ def static_motion(
         SimulationFailure: A pose without static equilibrium.
     """
     ws, joint_angles = Workspace.for_system(model.system), model.joint_angles(angles)
-    meant = MeantMotion(
+    meant = IntendedMotion(
         rigid.c.copy(), rigid.q.copy(), rigid.target_positions.copy(), rigid.target_rotations.copy()
     )  # fmt: skip
     state: State | None = None

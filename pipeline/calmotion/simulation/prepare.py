@@ -14,7 +14,7 @@ from calmotion.multibody.failure import SimulationFailure
 from calmotion.multibody.integrators.integrate import INTEGRATORS, follows_roots
 from calmotion.multibody.model.model import Model, compile_model
 from calmotion.multibody.model.topology import span_tree
-from calmotion.reduction.load_envelope import Excitation
+from calmotion.reduction.load_envelope import LoadEnvelope
 from calmotion.reduction.reduced_body import ReducedBody
 from calmotion.shot import Animation, Character, FEMeshes
 from calmotion.shot.character import Array
@@ -75,17 +75,17 @@ def grid_of(character: Character, animation: Animation, options: Options) -> Tim
     return make_grid(animation.frame_times, step, pre_roll, character.retarget.cyclic)
 
 
-def excitations(
+def load_envelopes(
     character: Character, animation: Animation, meshes: FEMeshes | None, options: Options
-) -> tuple[Excitation, ...] | None:
+) -> tuple[LoadEnvelope, ...] | None:
     """What the shot does to each body, for what the reduction chooses; None where a rigid robot cannot follow it."""
     if len(animation.frame_times) < 2:
         return None
-    from calmotion.simulation.rigid_run import shot_excitation
+    from calmotion.simulation.rigid_run import shot_load_envelopes
 
     try:
         grid, tree = grid_of(character, animation, options), span_tree(character)
-        return shot_excitation(character, animation, grid, tree, meshes)
+        return shot_load_envelopes(character, animation, grid, tree, meshes)
     except SimulationFailure:
         return None  # the flexible robot will say so, with the place
 

@@ -10,12 +10,12 @@ from calmotion.multibody.analysis.dead_centres import dead_centres
 from calmotion.multibody.analysis.reactions import reactions
 from calmotion.multibody.failure import SimulationFailure
 from calmotion.multibody.model.model import Model
-from calmotion.shot import LeftOut, LimitUse, Motion, Simulation
+from calmotion.shot import LimitUse, Motion, Simplification, Simulation
 from calmotion.shot.character import Array
 from calmotion.simulation.forward import ForwardRun
 from calmotion.simulation.inputs.curves import Curves
 from calmotion.simulation.inputs.time_grid import TimeGrid
-from calmotion.simulation.intended_motion import MeantMotion, rigid_motion
+from calmotion.simulation.intended_motion import IntendedMotion, rigid_motion
 from calmotion.simulation.motor_limits import Excess
 from calmotion.simulation.prepare import Prepared
 from calmotion.simulation.target_errors import Reference, rotation_errors
@@ -64,7 +64,7 @@ def _shown(grid: TimeGrid) -> slice:
     return slice(1 if grid.cyclic else 0, None)
 
 
-def reference_motion(model: Model, grid: TimeGrid, rigid: MeantMotion, angles: Array) -> Motion:
+def reference_motion(model: Model, grid: TimeGrid, rigid: IntendedMotion, angles: Array) -> Motion:
     """The motion that was meant; it has no efforts."""
     shown = _shown(grid)
     times, angles = grid.times[shown], angles[shown]
@@ -106,17 +106,17 @@ def simulation_of(prepared: Prepared, run: ForwardRun, reference: Reference) -> 
     )
 
 
-def left_out_rows(prepared: Prepared) -> list[LeftOut]:
+def left_out_rows(prepared: Prepared) -> list[Simplification]:
     """What a run of this shot leaves out."""
     character, grid = prepared.character, prepared.grid
     rigid = [body.path for body in character.bodies if body.flexible is None]
     names = ", ".join(distinct_names(rigid).values())
-    rows = [LeftOut("finite elements of " + names, "rigid: no CalmFlexibleBodyAPI")] if rigid else []
+    rows = [Simplification("finite elements of " + names, "rigid: no CalmFlexibleBodyAPI")] if rigid else []
     rows += [row for body in prepared.bodies for row in body.left_out]
     if not grid.pre_roll:
-        rows.append(LeftOut("pre-roll", "the shot loops" if grid.cyclic else "the shot starts at rest"))
+        rows.append(Simplification("pre-roll", "the shot loops" if grid.cyclic else "the shot starts at rest"))
     locked = [motor.path for motor in character.motors if not motor.optimize]
-    rows += [LeftOut("optimisation of " + path, "calm:motor:optimize is false") for path in locked]
+    rows += [Simplification("optimisation of " + path, "calm:motor:optimize is false") for path in locked]
     return rows
 
 

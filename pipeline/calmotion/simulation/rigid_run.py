@@ -12,7 +12,7 @@ from calmotion.multibody.analysis.reactions import reactions
 from calmotion.multibody.integrators.workspace import Workspace
 from calmotion.multibody.model.model import Model, body_anchors, compile_model, rigid_body
 from calmotion.multibody.model.topology import Tree, loop_members
-from calmotion.reduction.load_envelope import Excitation
+from calmotion.reduction.load_envelope import LoadEnvelope
 from calmotion.reduction.reduced_body import ReducedBody
 from calmotion.shot import Animation, Character, FEMeshes
 from calmotion.shot.character import Array
@@ -25,10 +25,10 @@ _POWER_LEFT = 1e-3  # of a signal's power may lie above the highest frequency th
 _NOTHING = 1e-9  # of gravity, or of it over a metre: an acceleration that is rounding
 
 
-def shot_excitation(
+def shot_load_envelopes(
     character: Character, animation: Animation, grid: TimeGrid, tree: Tree, meshes: FEMeshes | None
-) -> tuple[Excitation, ...]:
-    """Excitation of every body of a shot.
+) -> tuple[LoadEnvelope, ...]:
+    """LoadEnvelope of every body of a shot.
 
     Args:
         character: The bodies; flexible ones count with the mass of their mesh.
@@ -73,8 +73,8 @@ def rigid_bodies(character: Character, tree: Tree, meshes: FEMeshes | None) -> l
     return result
 
 
-def excitation_of(character: Character, model: Model, run: ForwardRun, h: float) -> tuple[Excitation, ...]:
-    """Excitation of every body in a simulation of the rigid robot with step h [s]; see `shot_excitation`."""
+def excitation_of(character: Character, model: Model, run: ForwardRun, h: float) -> tuple[LoadEnvelope, ...]:
+    """LoadEnvelope of every body in a simulation of the rigid robot with step h [s]; see `shot_load_envelopes`."""
     system, tree, states = model.system, model.tree, run.trajectory.states
     R = _matrices(states.q)
     omega = states.V[:, :, 3:6]
@@ -105,7 +105,7 @@ def excitation_of(character: Character, model: Model, run: ForwardRun, h: float)
                 far[row] = max(far[row], float(np.linalg.norm(ends[0] - ends[1])))
         center = acceleration[:, b] + _carried_center(system.s[b] / system.mass[b], R[:, b], omega[:, b], angular[:, b])
         result.append(
-            Excitation(
+            LoadEnvelope(
                 _peak(felt[:, b]), _peak(angular[:, b]), _peak(omega[:, b]), peaks[:, :3], peaks[:, 3:],
                 max(highest_frequency(center, h), highest_frequency(angular[:, b], h)), far, b in closed,
             )

@@ -18,7 +18,7 @@ from calmotion.simulation.cyclic import SteadyState
 from calmotion.simulation.forward import limited_values, run_forward
 from calmotion.simulation.inputs.curves import sample_curves, sample_tracks
 from calmotion.simulation.inputs.shapers import shaped
-from calmotion.simulation.intended_motion import MeantMotion, rigid_motion, static_motion
+from calmotion.simulation.intended_motion import IntendedMotion, rigid_motion, static_motion
 from calmotion.simulation.motor_limits import excesses, motor_bounds
 from calmotion.simulation.prepare import Options, Prepared, failure_error, modes_of, prepare, refuse_half_turns
 from calmotion.simulation.report import left_out_rows, limit_uses, performed_motion, reference_motion, simulation_of
@@ -28,7 +28,7 @@ Progress = Callable[[float, str], None]
 CLOSED = 0.1  # of the error that does not matter: joints that come apart by less are closed
 
 
-def meant_motion(prepared: Prepared, angles: Array, rates: Array) -> MeantMotion:
+def intended_motion(prepared: Prepared, angles: Array, rates: Array) -> IntendedMotion:
     """What the targets should do, as `calm:retarget:reference` says.
 
     Args:
@@ -75,7 +75,7 @@ def simulate_shot(
     meant, meant_rates = sample_tracks(animation.tracks, grid)
     refuse_half_turns(prepared, angles)
     try:
-        reference = meant_motion(prepared, meant, meant_rates)
+        reference = intended_motion(prepared, meant, meant_rates)
         progress(0.0, "compiling kernels, once")
         run_forward(model, workspace, angles[:3], rates[:3], grid.h, world[:3], integrator=options.scheme)
         begin = time.perf_counter()

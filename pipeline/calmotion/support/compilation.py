@@ -36,7 +36,7 @@ def kernel_folder() -> Path:
     digest = hashlib.sha256()
     for path in sorted(PACKAGE.rglob("*.py")):
         source = path.read_bytes()
-        if b"kernel\ndef " in source or b"part\ndef " in source:
+        if b"kernel\ndef " in source or b"inlined_kernel\ndef " in source:
             digest.update(source)
     return cache_folder() / "kernels" / digest.hexdigest()[:16]
 
@@ -50,7 +50,7 @@ def kernel(function: Callable[..., Any]) -> Any:
     return _compile(function, **_WITHOUT_ARRAYS)
 
 
-def part(function: Callable[..., Any]) -> Any:
+def inlined_kernel(function: Callable[..., Any]) -> Any:
     """A `kernel` that one other calls: compiled into that one, and by itself only where Python calls it.
 
     Of a kernel that another calls numba makes machine code twice, by itself and in the other, and three times where

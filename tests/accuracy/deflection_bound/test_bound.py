@@ -11,7 +11,7 @@ from calmotion.multibody.model.joint_arrays import BodyAnchors
 from calmotion.reduction.basis.static_loads import OVERSHOOT, peak_loads, unit_accelerations
 from calmotion.reduction.elements.embedding import embed
 from calmotion.reduction.interfaces.interface_patches import Anchor
-from calmotion.reduction.load_envelope import Excitation
+from calmotion.reduction.load_envelope import LoadEnvelope
 from calmotion.reduction.reduce import linear_modes
 from solids import PLASTIC, STEEL, body_of, box, frame, inside_out, joined, rotated, tube
 
@@ -69,20 +69,20 @@ def loads(rng, joints, root=0, size=1.0):
     """Peaks of a lively motion with a payload of some newtons beyond each joint."""
     force, moment = rng.uniform(0, 20, (joints, 3)), rng.uniform(0, 1, (joints, 3))
     force[root] = moment[root] = 0.0
-    return Excitation(
+    return LoadEnvelope(
         *(size * rng.uniform(0, scale, 3) for scale in (15.0, 40.0, 6.0)), size * force, size * moment, 3.0,
         rng.uniform(0, 0.5, joints),
     )  # fmt: skip
 
 
-def finite_elements(solid, anchors, excitation, material=PLASTIC):
+def finite_elements(solid, anchors, load_envelope, material=PLASTIC):
     """Largest displacement [m] and turn [rad] at the anchors that static loads make, as if all peaks met."""
     points, tets = solid
     body = body_of(surface_of(solid), material=material, elasticity="linear")
     count = len(anchors.joints)
     kinds = ["interface"] * count + ["point"] * (len(anchors.frames) - count)
     places = [Anchor(f"/A{k}", item, kind) for k, (item, kind) in enumerate(zip(anchors.frames, kinds, strict=True))]
-    linear = linear_modes(fe_mesh(points, tets), body, places, anchors.root, excitation, 1e-12)
+    linear = linear_modes(fe_mesh(points, tets), body, places, anchors.root, load_envelope, 1e-12)
     model, basis = linear.model, linear.basis
     assert basis.cut_error_m <= 1e-9
     nodes = model.mesh.nodes
@@ -90,9 +90,9 @@ def finite_elements(solid, anchors, excitation, material=PLASTIC):
     weight = (model.mass @ unit_accelerations(nodes).reshape(n, 36)).reshape(3 * n, 12)
     motion = basis.patch_motion
     work = np.hstack([basis.modes.reshape(3 * n, r).T @ weight, motion.reshape(-1, r).T])
-    responses = work / basis.omega_squared[:, None] * peak_loads(linear.excitation)
+    responses = work / basis.omega_squared[:, None] * peak_loads(linear.load_envelope)
     tied = embed(model.mesh, np.array([a.frame.position for a in places if a.kind == "point"]).reshape(-1, 3))
-    lever = linear.excitation.lever
+    lever = linear.load_envelope.lever
     found = []
     for k, patch in enumerate(motion):
         u, turn = np.abs(patch[:3] @ responses).sum(axis=1), np.abs(patch[3:] @ responses).sum(axis=1)
@@ -105,9 +105,9 @@ def finite_elements(solid, anchors, excitation, material=PLASTIC):
 def ratios(solid, places, joints, seed=0, root=0, **parts):
     """Estimates over what finite elements say, of displacement and turn; `parts` replaces loads."""
     anchors = anchors_of(places, joints, root)
-    excitation = replace(loads(np.random.default_rng(seed), joints, root), **parts)
-    found = static_reach(body_of(surface_of(solid)), anchors, excitation)
-    return np.array([found.displacement_m, found.rotation]) / finite_elements(solid, anchors, excitation)
+    load_envelope = replace(loads(np.random.default_rng(seed), joints, root), **parts)
+    found = static_reach(body_of(surface_of(solid)), anchors, load_envelope)
+    return np.array([found.displacement_m, found.rotation]) / finite_elements(solid, anchors, load_envelope)
 
 
 def plain(surface=None, **settings):
@@ -193,30 +193,30 @@ def test_awkward_bodies_bend_less_than_said(solid, places):
 
 def test_a_body_that_carries_nothing_bends_as_far_as_its_far_end():
     solid, far = bar(), (0.3, 0.015, 0.015)
-    excitation = loads(np.random.default_rng(0), 1)
-    alone = static_reach(body_of(surface_of(solid)), anchors_of(ENDS[:1], 1), excitation)
-    assert alone.displacement_m > OVERSHOOT * finite_elements(solid, anchors_of([ENDS[0], far], 1), excitation)[0]
+    load_envelope = loads(np.random.default_rng(0), 1)
+    alone = static_reach(body_of(surface_of(solid)), anchors_of(ENDS[:1], 1), load_envelope)
+    assert alone.displacement_m > OVERSHOOT * finite_elements(solid, anchors_of([ENDS[0], far], 1), load_envelope)[0]
 
 
 def test_a_stiffer_material_bends_less_and_a_longer_reach_farther():
     soft, steel = plain(), plain(material=STEEL)
     assert 0.0 < steel.displacement_m < 0.1 * soft.displacement_m
     body, anchors = body_of(box((0.3, 0.03, 0.03), (0.0, -0.015, -0.015))), anchors_of(ENDS, 2)
-    excitation = loads(np.random.default_rng(0), 2)
-    near, far = (static_reach(body, anchors, replace(excitation, reach=np.array([0.0, r]))) for r in (0.0, 1.0))
+    load_envelope = loads(np.random.default_rng(0), 2)
+    near, far = (static_reach(body, anchors, replace(load_envelope, reach=np.array([0.0, r]))) for r in (0.0, 1.0))
     assert far.displacement_m == pytest.approx(near.displacement_m + far.rotation) and far.rotation == near.rotation
 
 
 def test_at_rest_nothing_bends():
-    still = Excitation(*np.zeros((3, 3)), *np.zeros((2, 2, 3)))
+    still = LoadEnvelope(*np.zeros((3, 3)), *np.zeros((2, 2, 3)))
     body = body_of(box((0.3, 0.03, 0.03), (0.0, -0.015, -0.015)))
     assert static_reach(body, anchors_of(ENDS, 2), still) == Stiffness(0.0, 0.0)
 
 
 def test_anchors_at_the_root_do_not_move():
     body = body_of(box((0.3, 0.03, 0.03), (0.0, -0.015, -0.015)))
-    excitation = loads(np.random.default_rng(0), 2)
-    found = [static_reach(body, anchors_of(places, 2), excitation) for places in (ENDS, [*ENDS, ENDS[0]])]
+    load_envelope = loads(np.random.default_rng(0), 2)
+    found = [static_reach(body, anchors_of(places, 2), load_envelope) for places in (ENDS, [*ENDS, ENDS[0]])]
     assert found[0] == found[1]
 
 
@@ -240,18 +240,18 @@ def test_what_a_beam_does_not_tell_is_not_told():
 
 def test_bodies_of_closed_loops_are_not_told():
     body = body_of(box((0.3, 0.03, 0.03), (0.0, -0.015, -0.015)))
-    excitation = replace(loads(np.random.default_rng(0), 2), closed=True)
-    assert static_reach(body, anchors_of(ENDS, 2), excitation) is None
+    load_envelope = replace(loads(np.random.default_rng(0), 2), closed=True)
+    assert static_reach(body, anchors_of(ENDS, 2), load_envelope) is None
 
 
 def test_it_does_not_depend_on_where_the_body_frame_is_turned():
     turn = rotated(np.array([1.0, 0.0, 0.0]), np.pi / 2)  # peaks are along axes: only quarter turns keep them
     points, triangles = box((0.3, 0.02, 0.03), (0.0, -0.01, -0.015))
-    excitation = loads(np.random.default_rng(0), 2)
-    turned = Excitation(*(abs(value @ turn.T) for value in _vectors(excitation)), 3.0, excitation.reach)
+    load_envelope = loads(np.random.default_rng(0), 2)
+    turned = LoadEnvelope(*(abs(value @ turn.T) for value in _vectors(load_envelope)), 3.0, load_envelope.reach)
     found = [
         static_reach(body_of((p, triangles)), anchors_of(ENDS, 2), e)
-        for p, e in ((points, excitation), (points @ turn.T, turned))
+        for p, e in ((points, load_envelope), (points @ turn.T, turned))
     ]
     assert found[0].displacement_m == pytest.approx(found[1].displacement_m, rel=1e-6)
 

@@ -18,7 +18,7 @@ from calmotion.multibody.model.topology import span_tree
 from calmotion.shot.character import with_settings
 from calmotion.shot.model_choice import KINDS, OFF, ON
 from calmotion.simulation.bodies import reduce_bodies
-from calmotion.simulation.prepare import Options, excitations
+from calmotion.simulation.prepare import Options, load_envelopes
 
 FAST = Options(step=1 / 120)
 
@@ -30,7 +30,7 @@ def _analyse(shot, forced=None, changes=False, options=FAST):
 def _simulated(shot, character):
     bodies = None
     if any(body.bends for body in character.bodies):
-        loads = excitations(character, shot.animation, shot.meshes, FAST)
+        loads = load_envelopes(character, shot.animation, shot.meshes, FAST)
         bodies = reduce_bodies(character, span_tree(character), shot.meshes, None, loads)
     return simulate_at(character, shot.animation, bodies, FAST, 1 / 240).positions
 

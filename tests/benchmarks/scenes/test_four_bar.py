@@ -10,7 +10,7 @@ from calmotion.simulation.bodies import reduce_bodies
 from calmotion.simulation.forward import run_forward
 from calmotion.simulation.inputs.curves import sample_tracks
 from calmotion.simulation.intended_motion import rigid_motion
-from calmotion.simulation.prepare import Options, excitations, prepare
+from calmotion.simulation.prepare import Options, load_envelopes, prepare
 
 
 def test_its_corners_are_as_far_apart_as_its_bars_are_long():
@@ -23,7 +23,7 @@ def deflected(modes):
     """Largest deflection of the coupler's middle and that at rest [m], and the largest multiplier [N, N m]."""
     character, meshes = four_bar(modes=modes)
     animation = shot_of(quintic(2.0 * np.pi, 1.0, 0.25), 1.25)
-    known = excitations(character, animation, meshes, Options()) if modes < 0 else None
+    known = load_envelopes(character, animation, meshes, Options()) if modes < 0 else None
     bodies = reduce_bodies(character, span_tree(character), meshes, None, known)
     prepared = prepare(character, animation, bodies, Options())
     angles, rates = sample_tracks(animation.tracks, prepared.grid)

@@ -15,7 +15,6 @@ from calmotion.shot import (
     FlexibleSettings,
     Frame,
     Joint,
-    LeftOut,
     MassProperties,
     ModeTable,
     Motion,
@@ -23,6 +22,7 @@ from calmotion.shot import (
     MotorCurve,
     OptimizerStep,
     Result,
+    Simplification,
     Simulation,
     Skin,
     SurfaceMesh,
@@ -177,5 +177,5 @@ def result(optimized=True):
         step_s=STEP,
         pre_roll_s=PRE_ROLL,
         dof=19,
-        left_out=(LeftOut("modes above 40 Hz", "the motion does not excite them", 2e-5),),
+        left_out=(Simplification("modes above 40 Hz", "the motion does not excite them", 2e-5),),
     )

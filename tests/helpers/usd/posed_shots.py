@@ -80,7 +80,7 @@ def skeletal(stage, sparse: bool = False, turn=angles, off_axis: float = 0.0) ->
     root.AddRotateXOp().Set(-90.0)  # a y-up skeleton in a z-up shot
     skeleton = UsdSkel.Skeleton.Define(stage, SKELETON)
     joints = [ROOT, ARM, FOREARM]
-    # at rest the joints' axes lie askew
+    # at rest the joints' axes lie oblique
     rests = [
         Gf.Matrix4d().SetRotate(Gf.Rotation(Gf.Vec3d(1, 2, 3).GetNormalized(), 40.0)),
         Gf.Matrix4d().SetRotate(Gf.Rotation(Gf.Vec3d(0, 1, 1).GetNormalized(), -70.0))

@@ -1,4 +1,4 @@
-"""The basis that a known excitation needs, against static solutions of the unreduced body."""
+"""The basis that a known load_envelope needs, against static solutions of the unreduced body."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from calmotion.reduction.basis.fixed_interface import FixedInterface, ritz_modes
 from calmotion.reduction.basis.natural_modes import SparseSolver, frequencies, vector_mass
 from calmotion.reduction.elements.assembly import assemble
 from calmotion.reduction.elements.embedding import embed
-from calmotion.reduction.load_envelope import Excitation
+from calmotion.reduction.load_envelope import LoadEnvelope
 from calmotion.shot import FlexibleSettings
 from scipy.sparse import bmat, csr_matrix, identity
 
@@ -21,7 +21,7 @@ TARGETS = np.array([[0.31, 0.002, 0.001], [0.6, 0.01, 0.015]])
 
 
 def an_excitation(scale=1.0, frequency=0.0):
-    return Excitation(
+    return LoadEnvelope(
         acceleration=scale * np.array([4.0, 6.0, 15.0]),
         angular_acceleration=scale * np.array([20.0, 40.0, 30.0]),
         angular_velocity=np.sqrt(scale) * np.array([1.0, 3.0, 2.0]),
@@ -85,31 +85,33 @@ def body(helpers, plastic):
     return Body(model, FlexibleSettings(plastic))
 
 
-def peaks_of(excitation, rng):
+def peaks_of(load_envelope, rng):
     """A load within the peaks: all of them at once, with random signs."""
 
     def sign(peak):
         return rng.choice([-1.0, 1.0], size=3) * peak
 
     accelerations = (
-        sign(excitation.acceleration), sign(excitation.angular_acceleration), sign(excitation.angular_velocity),
+        sign(load_envelope.acceleration),
+        sign(load_envelope.angular_acceleration),
+        sign(load_envelope.angular_velocity),
     )  # fmt: skip
-    return accelerations, np.concatenate([sign(excitation.force[0]), sign(excitation.moment[0])])
+    return accelerations, np.concatenate([sign(load_envelope.force[0]), sign(load_envelope.moment[0])])
 
 
 @pytest.mark.parametrize("tolerance", [1e-2, 1e-3, 1e-4, 1e-6])
 def test_what_is_cut_is_never_more_than_said_and_not_much_less(body, tolerance):
-    excitation = an_excitation()
-    basis = body.basis(excitation=excitation, tolerance=tolerance)
+    load_envelope = an_excitation()
+    basis = body.basis(load_envelope=load_envelope, tolerance=tolerance)
     rng = np.random.default_rng(3)
-    errors = [body.error(basis, body.force(*peaks_of(excitation, rng))) for _ in range(200)]
+    errors = [body.error(basis, body.force(*peaks_of(load_envelope, rng))) for _ in range(200)]
     assert max(errors) <= basis.cut_error_m * (1 + 1e-6) + 1e-12
     assert max(errors) >= 0.3 * basis.cut_error_m - 1e-12
     assert basis.cut_error_m <= tolerance
 
 
 def test_the_error_of_one_load_alone_is_predicted_exactly(body):
-    nothing = Excitation(*(np.zeros(3),) * 3, np.zeros((1, 3)), np.zeros((1, 3)), reach=np.array([REACH]))
+    nothing = LoadEnvelope(*(np.zeros(3),) * 3, np.zeros((1, 3)), np.zeros((1, 3)), reach=np.array([REACH]))
     settings = replace(body.settings, mode_count=3)
     loads = {
         "acceleration": np.array([0.0, 0.0, 9.81]),
@@ -119,31 +121,31 @@ def test_the_error_of_one_load_alone_is_predicted_exactly(body):
         "moment": np.array([[0.3, 0.0, 0.0]]),
     }
     for name, value in loads.items():
-        excitation = replace(nothing, **{name: value})
-        basis = body.basis(settings, excitation=excitation)
-        accelerations = excitation.acceleration, excitation.angular_acceleration, excitation.angular_velocity
-        force = body.force(accelerations, np.concatenate([excitation.force[0], excitation.moment[0]]))
+        load_envelope = replace(nothing, **{name: value})
+        basis = body.basis(settings, load_envelope=load_envelope)
+        accelerations = load_envelope.acceleration, load_envelope.angular_acceleration, load_envelope.angular_velocity
+        force = body.force(accelerations, np.concatenate([load_envelope.force[0], load_envelope.moment[0]]))
         assert len(basis.omega_squared) == 3
         assert body.error(basis, force) == pytest.approx(basis.cut_error_m, rel=1e-5, abs=1e-12), name
 
 
 def test_a_smaller_tolerance_needs_more_modes(body):
     counts = [
-        len(body.basis(excitation=an_excitation(), tolerance=tolerance).omega_squared)
+        len(body.basis(load_envelope=an_excitation(), tolerance=tolerance).omega_squared)
         for tolerance in (1.0, 1e-2, 1e-4, 1e-6, 0.0)
     ]
     assert counts[0] == 0 and (np.diff(counts) >= 0).all() and counts[2] > counts[1]
 
 
 def test_a_gentler_shot_needs_fewer_modes(body):
-    gentle, rough = (body.basis(excitation=an_excitation(scale), tolerance=1e-3) for scale in (0.1, 10.0))
+    gentle, rough = (body.basis(load_envelope=an_excitation(scale), tolerance=1e-3) for scale in (0.1, 10.0))
     assert len(gentle.omega_squared) < len(rough.omega_squared)
 
 
 def test_modes_in_the_excited_band_are_kept_whatever_their_deflection(body):
     full = frequencies(body.model, 8, body.root)
-    excitation = an_excitation(1e-6, frequency=0.5 * float(full[4] + full[5]) / 2.0)
-    basis = body.basis(excitation=excitation, tolerance=1e-3)
+    load_envelope = an_excitation(1e-6, frequency=0.5 * float(full[4] + full[5]) / 2.0)
+    basis = body.basis(load_envelope=load_envelope, tolerance=1e-3)
     f = np.sqrt(basis.omega_squared) / (2 * np.pi)
     assert len(f) == 5 and basis.residual == 0
     assert np.allclose(f, full[:5], rtol=1e-4)
@@ -152,7 +154,7 @@ def test_modes_in_the_excited_band_are_kept_whatever_their_deflection(body):
 def test_a_highest_frequency_is_met_by_residual_vectors_instead_of_modes(body):
     full = frequencies(body.model, 8, body.root)
     settings = replace(body.settings, max_frequency=float(0.5 * (full[3] + full[4])))
-    basis = body.basis(settings, excitation=an_excitation(1e-3), tolerance=1e-7)
+    basis = body.basis(settings, load_envelope=an_excitation(1e-3), tolerance=1e-7)
     f = np.sqrt(basis.omega_squared) / (2 * np.pi)
     assert np.allclose(f[:4], full[:4], rtol=1e-4) and basis.residual > 0 and len(f) == 4 + basis.residual
     assert basis.cut_error_m <= 1e-7
@@ -166,11 +168,11 @@ def test_with_all_residual_vectors_static_deflection_is_that_of_the_full_model(
     if not slender:
         model = assemble(*helpers.box((8, 2, 2), (0.6, 0.1, 0.12), origin=(0, -0.05, -0.06)), plastic)
         body = Body(model, body.settings)
-    excitation = an_excitation()
-    basis = body.basis(excitation=excitation, tolerance=0.0)
+    load_envelope = an_excitation()
+    basis = body.basis(load_envelope=load_envelope, tolerance=0.0)
     rng = np.random.default_rng(5)
     for _ in range(3):
-        force = body.force(*peaks_of(excitation, rng))
+        force = body.force(*peaks_of(load_envelope, rng))
         (u, motion), (v, moved) = body.full(force), body.reduced(basis, force)
         assert np.abs(u - v).max() < accuracy * np.abs(u).max()
         for part in (slice(0, 3), slice(3, 6)):
@@ -178,7 +180,7 @@ def test_with_all_residual_vectors_static_deflection_is_that_of_the_full_model(
 
 
 def test_a_basis_by_tolerance_is_orthonormal_and_its_patch_rigid(body):
-    basis = body.basis(replace(body.settings, max_frequency=20.0), excitation=an_excitation(), tolerance=1e-5)
+    basis = body.basis(replace(body.settings, max_frequency=20.0), load_envelope=an_excitation(), tolerance=1e-5)
     U = basis.modes.reshape(-1, len(basis.omega_squared))
     assert basis.residual > 0
     assert np.abs(U.T @ (vector_mass(body.model.mass) @ U) - np.eye(U.shape[1])).max() < 1e-9
@@ -211,9 +213,9 @@ def test_residual_vectors_hold_all_but_a_thousandth_of_the_work_and_lower_freque
 
 def test_a_body_that_carries_nothing_is_judged_by_its_surface(body):
     none = np.zeros((0, 3))
-    excitation = Excitation(np.array([0.0, 0.0, 9.81]), np.zeros(3), np.zeros(3), none, none)
+    load_envelope = LoadEnvelope(np.array([0.0, 0.0, 9.81]), np.zeros(3), np.zeros(3), none, none)
     basis = reduced_basis(
-        body.model, body.root, [], [], body.settings, excitation=excitation, tolerance=1e-5, targets=None
+        body.model, body.root, [], [], body.settings, load_envelope=load_envelope, tolerance=1e-5, targets=None
     )
     n = len(body.model.mesh.nodes)
     dofs = np.setdiff1d(np.arange(3 * n), (3 * body.root[:, None] + np.arange(3)).ravel())
@@ -223,15 +225,15 @@ def test_a_body_that_carries_nothing_is_judged_by_its_surface(body):
     U = basis.modes.reshape(3 * n, -1)
     v = U @ ((U[dofs].T @ load) / basis.omega_squared)
     missing = np.linalg.norm((u - v).reshape(n, 3), axis=1).max()
-    # a bent body meets its loads a little askew as well
+    # a bent body meets its loads from other directions as well
     assert missing <= basis.cut_error_m <= 1.1 * missing and missing <= 1e-5
     assert 0 < len(basis.omega_squared) < 6
 
 
 def test_modes_far_above_a_known_excitation_are_replaced_by_fewer_vectors(body):
     """Nothing slower is said of the first: all of its modes may ring."""
-    unknown = body.basis(excitation=an_excitation(), tolerance=1e-5)
-    slow = body.basis(excitation=an_excitation(frequency=2.0), tolerance=1e-5)
+    unknown = body.basis(load_envelope=an_excitation(), tolerance=1e-5)
+    slow = body.basis(load_envelope=an_excitation(frequency=2.0), tolerance=1e-5)
     assert len(slow.omega_squared) < len(unknown.omega_squared) and slow.residual > unknown.residual
     assert slow.cut_error_m <= 1e-5
     # the first two bending modes still ring: a load at 2 Hz makes them deflect a tenth further than at rest

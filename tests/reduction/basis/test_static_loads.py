@@ -2,11 +2,11 @@
 
 import numpy as np
 from calmotion.reduction.basis.static_loads import peak_loads, unit_accelerations
-from calmotion.reduction.load_envelope import Excitation, askew, patch_excitation
+from calmotion.reduction.load_envelope import LoadEnvelope, load_direction_envelope, patch_load_envelope
 
 
 def an_excitation(rng, rows=2):
-    return Excitation(*rng.random((3, 3)), rng.random((rows, 3)), rng.random((rows, 3)), 7.0, rng.random(rows))
+    return LoadEnvelope(*rng.random((3, 3)), rng.random((rows, 3)), rng.random((rows, 3)), 7.0, rng.random(rows))
 
 
 def test_unit_accelerations_make_up_the_acceleration_of_any_rigid_motion():
@@ -32,7 +32,7 @@ def test_wrenches_of_a_patch_bound_those_of_its_interfaces_together():
     rng = np.random.default_rng(2)
     item, positions = an_excitation(rng, 3), rng.normal(size=(3, 3))
     center = positions[1]
-    patches = patch_excitation(item, [(1, 2), (0,)], positions, [center, positions[0]])
+    patches = patch_load_envelope(item, [(1, 2), (0,)], positions, [center, positions[0]])
     assert np.allclose(patches.force[1], item.force[0]) and np.allclose(patches.moment[1], item.moment[0])
     assert np.allclose(patches.reach, [item.reach[1:].max(), item.reach[0]]) and patches.frequency == 7.0
     largest = np.zeros(6)
@@ -46,17 +46,17 @@ def test_wrenches_of_a_patch_bound_those_of_its_interfaces_together():
 
 
 def test_turns_do_not_matter_without_a_reach():
-    item = Excitation(*np.ones((3, 3)), np.ones((2, 3)), np.ones((2, 3)))
+    item = LoadEnvelope(*np.ones((3, 3)), np.ones((2, 3)), np.ones((2, 3)))
     assert np.array_equal(item.lever, np.zeros(2))
 
 
 def test_a_body_that_has_turned_meets_a_part_of_every_load_from_every_side():
     force, moment = np.array([[3.0, 4.0, 0.0]]), np.array([[0.0, 0.0, 2.0]])
-    item = Excitation(np.array([0.0, 9.81, 0.0]), np.zeros(3), np.array([0.0, 5.0, 0.0]), force, moment)
-    found = askew(item, 0.1, 0.2)
+    item = LoadEnvelope(np.array([0.0, 9.81, 0.0]), np.zeros(3), np.array([0.0, 5.0, 0.0]), force, moment)
+    found = load_direction_envelope(item, 0.1, 0.2)
     assert np.allclose(found.acceleration, [0.981, 9.81, 0.981]) and np.allclose(found.angular_velocity, [0.5, 5, 0.5])
     assert np.allclose(found.force, [[3.0, 4.0, 0.5]])
     # the force has moved aside by 0.1 of 0.2 m; a tenth of the moment is more
     assert np.allclose(found.moment, [[0.2, 0.2, 2.0]])
-    assert np.allclose(askew(item, 7.0, 0.2).force, 5.0)  # no more than all of it
-    assert np.array_equal(askew(item, 0.0, 0.2).force, force)
+    assert np.allclose(load_direction_envelope(item, 7.0, 0.2).force, 5.0)  # no more than all of it
+    assert np.array_equal(load_direction_envelope(item, 0.0, 0.2).force, force)

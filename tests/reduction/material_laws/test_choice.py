@@ -6,7 +6,7 @@ from boxes import box_tets
 from calmotion.reduction.basis.craig_bampton import reduced_basis
 from calmotion.reduction.basis.modal_derivatives import Support
 from calmotion.reduction.elements.assembly import assemble
-from calmotion.reduction.load_envelope import Excitation
+from calmotion.reduction.load_envelope import LoadEnvelope
 from calmotion.reduction.material_laws.choice import choose_law, deflection_of, work_of_loads
 from calmotion.shot import ElasticMaterial, FlexibleSettings
 
@@ -28,7 +28,7 @@ def swing(speed):
     """Peak loads of a swing through 90 degrees in half a second over `speed`, the payload's included."""
     spin, turn = 5.89 * speed, 36.3 * speed**2
     force = PAYLOAD * LENGTH * np.array([[spin**2, 0.0, turn]])
-    return Excitation(
+    return LoadEnvelope(
         np.zeros(3), np.array([0.0, turn, 0.0]), np.array([0.0, spin, 0.0]), force, np.zeros((1, 3)), 5.0 * speed
     )
 
@@ -49,7 +49,7 @@ def test_rubber_needs_the_material_law():
 
 
 def test_at_rest_everything_is_linear():
-    still = Excitation(np.zeros(3), np.zeros(3), np.zeros(3), np.zeros((1, 3)), np.zeros((1, 3)))
+    still = LoadEnvelope(np.zeros(3), np.zeros(3), np.zeros(3), np.zeros((1, 3)), np.zeros((1, 3)))
     choice = choose_law(*arm(1e6), still, 1e-6)
     assert choice.law == "linear" and choice.error_m == 0.0
 
@@ -57,7 +57,7 @@ def test_at_rest_everything_is_linear():
 def test_a_deflection_is_bounded_by_twice_that_of_a_beam_at_rest_and_a_little_more():
     model, _, basis, _ = arm(1.8e9)
     none = np.zeros(3)
-    loads = Excitation(none, none, none, np.array([[0.0, 0.0, 2.0]]), np.zeros((1, 3)))
+    loads = LoadEnvelope(none, none, none, np.array([[0.0, 0.0, 2.0]]), np.zeros((1, 3)))
     at_rest = 2.0 * LENGTH**3 / (3.0 * 1.8e9 * 0.02**4 / 12.0)
     assert 2.0 * at_rest < deflection_of(model, basis, loads) < 3.0 * at_rest
 
@@ -65,7 +65,7 @@ def test_a_deflection_is_bounded_by_twice_that_of_a_beam_at_rest_and_a_little_mo
 def test_the_work_of_loads_is_that_of_their_sum_at_worst():
     model, _, basis, _ = arm(1.8e9)
     rng = np.random.default_rng(0)
-    loads = Excitation(
+    loads = LoadEnvelope(
         *(rng.uniform(0.0, 2.0, 3) for _ in range(3)), *(rng.uniform(0.0, 2.0, (1, 3)) for _ in range(2))
     )
     bound = work_of_loads(model, basis.modes, basis.patch_motion, loads)

@@ -7,7 +7,7 @@ import pytest
 from calmotion.benchmarks.scenes.linkage_arm import linkage_arm, performance
 from calmotion.multibody.model.topology import span_tree
 from calmotion.simulation.bodies import reduce_bodies, with_elasticity
-from calmotion.simulation.prepare import Options, excitations
+from calmotion.simulation.prepare import Options, load_envelopes
 from posed import looped, make_problem
 
 
@@ -23,7 +23,7 @@ def linkage(elasticity):
     character, meshes = linkage_arm(modes=-1 if elasticity == "auto" else 4)
     character = with_elasticity(character, elasticity)
     animation = performance(0.8)
-    loads = excitations(character, animation, meshes, Options())
+    loads = load_envelopes(character, animation, meshes, Options())
     return character, reduce_bodies(character, span_tree(character), meshes, None, loads), animation
 
 
@@ -93,7 +93,7 @@ def test_product_is_symmetric_and_follows_the_change_of_the_residuals(linearized
     Ha, Hb = problem.product(a), problem.product(b)
     # the terms of either sum cancel in part
     assert abs(a @ Hb - b @ Ha) < 5e-11 * (np.abs(a) @ np.abs(Hb))
-    residuals, values = problem.push_forward(a)
+    residuals, values = problem.jvp(a)
     change = np.sum(residuals**2) + a @ problem.bend(a)
     if problem.limits is not None:
         weights = {name: problem.limits.curvature(name, v) for name, v in problem.limited.items()}
@@ -109,7 +109,7 @@ def test_model_is_the_merit_to_second_order(linearized):
     from calmotion.retargeting.solver.limited_step import ModelPoint
 
     d = np.random.default_rng(3).normal(size=len(x))
-    residuals, values = problem.push_forward(d)
+    residuals, values = problem.jvp(d)
     way = ModelPoint(d, residuals, values)
     start = ModelPoint(0.0 * d, problem.residuals, dict(problem.limited))
     assert problem.model_value(start) == pytest.approx(problem.merit(), rel=1e-12)
@@ -128,7 +128,7 @@ def test_static_start_follows_the_curves(arm, bodies, animation):
     problem.linearize()
     d = np.zeros(problem.size)
     d[1] = 1.0  # elbow
-    change, _ = problem.push_forward(d)
+    change, _ = problem.jvp(d)
     assert np.abs(change[0, 1]).max() > 1e-3
 
 

@@ -13,7 +13,7 @@ from calmotion.retargeting.simplification.idle_motors import idle_motors
 from calmotion.retargeting.to_tolerance import optimize_to_tolerance
 from calmotion.shot.model_choice import ON
 from calmotion.simulation.bodies import reduce_bodies
-from calmotion.simulation.prepare import Options, excitations
+from calmotion.simulation.prepare import Options, load_envelopes
 
 FAST = Options(step=1 / 240)
 
@@ -29,7 +29,7 @@ def shot():
 
 @pytest.fixture(scope="module")
 def bodies(shot):
-    loads = excitations(shot.character, shot.animation, shot.meshes, FAST)
+    loads = load_envelopes(shot.character, shot.animation, shot.meshes, FAST)
     return reduce_bodies(shot.character, span_tree(shot.character), shot.meshes, None, loads)
 
 

@@ -9,7 +9,12 @@ from calmotion.retargeting.optimize import MISSED, optimize_shot
 from calmotion.retargeting.problem import adaptive_knots
 from calmotion.retargeting.problem.offset_basis import basis_on
 from calmotion.retargeting.problem.problem import RetargetProblem
-from calmotion.retargeting.simplification.inactive_intervals import QuietRange, first_change, left_out_on, quiet_ranges
+from calmotion.retargeting.simplification.inactive_intervals import (
+    InactiveInterval,
+    first_change,
+    inactive_intervals,
+    left_out_on,
+)
 from calmotion.shot import Animation, FreeTrack, Track
 from calmotion.simulation.prepare import Options
 from calmotion.simulation.simulator import Simulator
@@ -103,7 +108,7 @@ def test_where_the_beginning_is_off_nothing_is_left_out_and_nothing_is_different
         assert result.after.position_errors[0, 1] < 0.5 * result.before.position_errors[0, 1]
     with monkeypatch.context() as patch:
         patch.setattr(RetargetProblem, "hold", lambda self, first: None)
-        patch.setattr(optimize, "quiet_ranges", lambda *a: ())
+        patch.setattr(optimize, "inactive_intervals", lambda *a: ())
         plain = optimize_shot(arm, animation, bodies, OPTIONS, quiet)
     for one, other in zip(result.curves, plain.curves, strict=True):
         assert np.array_equal(one.frame_values, other.frame_values)
@@ -128,8 +133,8 @@ def test_what_is_left_out_stays_so_on_finer_knots(arm, bodies, monkeypatch):
 
 
 def test_a_range_that_would_have_gained_something_is_searched_after_all(arm, bodies, everywhere, monkeypatch):
-    too_much = (QuietRange(0.0, HELD + 0.45, 0.0),)
-    monkeypatch.setattr(optimize, "quiet_ranges", lambda *a: too_much)
+    too_much = (InactiveInterval(0.0, HELD + 0.45, 0.0),)
+    monkeypatch.setattr(optimize, "inactive_intervals", lambda *a: too_much)
     result = optimize_shot(still(arm), pausing(), bodies, OPTIONS, quiet)
     assert not rows_of(result) and result.stopped == "converged"
     assert abs(root_mean_square(result) - root_mean_square(everywhere)) < 0.02 * arm.retarget.allowed(None)
@@ -147,7 +152,7 @@ def test_ranges_keep_away_from_errors_limits_and_changes(arm, bodies):
         problem = make_problem(character, bodies, animation or pausing(after=3.0), static=True, limited=True)
         problem.value(np.zeros(problem.size))
         start = np.zeros(problem.size) if start is None else start(problem)
-        return quiet_ranges(problem, start, 5.0, 1e-3, ranges)
+        return inactive_intervals(problem, start, 5.0, 1e-3, ranges)
 
     first, *more = found(arm)
     assert first.start == 0.0 and HELD - 0.6 < first.stop < HELD - 0.2 and 0.0 <= first.gain < 2e-6
@@ -171,10 +176,10 @@ def test_a_shot_that_is_quiet_throughout_and_one_without_vibration(arm, bodies):
     tracks = (Track(times, 0.2 + 0.0 * times), Track(times, 0.0 * times))
     problem = make_problem(arm, bodies, Animation(times, tracks, tracks), static=True)
     problem.value(np.zeros(problem.size))
-    assert quiet_ranges(problem, np.zeros(problem.size), 5.0, 1e-3) == (), "a search of it ends at once"
+    assert inactive_intervals(problem, np.zeros(problem.size), 5.0, 1e-3) == (), "a search of it ends at once"
     problem = make_problem(arm, bodies, pausing(), static=True)
     problem.value(np.zeros(problem.size))
-    assert quiet_ranges(problem, np.zeros(problem.size), 0.0, 1e-3) == ()
+    assert inactive_intervals(problem, np.zeros(problem.size), 0.0, 1e-3) == ()
 
 
 def test_nothing_acts_before_the_first_change_on_finer_knots_either(arm, bodies):
@@ -182,7 +187,7 @@ def test_nothing_acts_before_the_first_change_on_finer_knots_either(arm, bodies)
     grid, basis = problem.grid, basis_on(problem.grid, np.arange(0, 73, 6), False)
 
     def fixed_on(until):
-        return lambda some: left_out_on(some, (QuietRange(0.0, until, 0.0),), 2)
+        return lambda some: left_out_on(some, (InactiveInterval(0.0, until, 0.0),), 2)
 
     assert first_change(grid, basis, lambda some: np.zeros(2 * some.count, bool)) == 0
     for until in (0.1, 0.5, 0.6, 0.75):

@@ -12,7 +12,7 @@ from calmotion.shot import Follows, Track
 from calmotion.simulation.inputs.curves import sample_curves
 from calmotion.simulation.inputs.gearing import coupling_of, leaders
 from calmotion.simulation.prepare import Options, prepare
-from calmotion.simulation.simulate import meant_motion
+from calmotion.simulation.simulate import intended_motion
 
 RATIO = -0.6
 
@@ -34,7 +34,7 @@ def problem_of(character, animation, bodies):
     options = Options(step=1 / 240, pre_roll=0.0)
     prepared = prepare(character, animation, bodies, options)
     curves = sample_curves(animation.tracks, prepared.grid)
-    return pose(prepared, animation, curves, meant_motion(prepared, curves.angles, curves.rates), options)[0]
+    return pose(prepared, animation, curves, intended_motion(prepared, curves.angles, curves.rates), options)[0]
 
 
 def test_followers_have_no_unknowns(geared):

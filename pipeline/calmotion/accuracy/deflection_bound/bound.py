@@ -18,7 +18,7 @@ from calmotion.accuracy.deflection_bound.interface_radius import grip_radius
 from calmotion.accuracy.element_size import THIN, wall_thickness
 from calmotion.geometry.solid import Solid, solid_of
 from calmotion.reduction.basis.static_loads import ACCELERATIONS, OVERSHOOT, peak_loads, unit_accelerations
-from calmotion.reduction.load_envelope import Excitation
+from calmotion.reduction.load_envelope import LoadEnvelope
 from calmotion.shot.character import Array, Body, ElasticMaterial
 
 if TYPE_CHECKING:
@@ -35,7 +35,7 @@ class Stiffness:
 
     Attributes:
         displacement_m: Largest displacement that its bending causes: of an anchor, and by the turn there of what is at
-            the excitation's reach beyond it [m].
+            the load_envelope's reach beyond it [m].
         rotation: Largest turn of an anchor [rad].
     """
 
@@ -43,19 +43,19 @@ class Stiffness:
     rotation: float
 
 
-def static_reach(body: Body, anchors: BodyAnchors, excitation: Excitation) -> Stiffness | None:
+def static_reach(body: Body, anchors: BodyAnchors, load_envelope: LoadEnvelope) -> Stiffness | None:
     """How far a body can at most bend under the loads of a shot.
 
     Args:
         body: With `flexible` settings.
         anchors: The frames of its joints, then of its targets; `root` is clamped.
-        excitation: Its loads, one row for each joint of `anchors`.
+        load_envelope: Its loads, one row for each joint of `anchors`.
 
     Returns:
         None where a beam does not tell: a body of a closed loop, whose loads a rigid robot does not tell, or of no
         physical material; and see `solid_of`, `beam_between` and `grip_radius`.
     """
-    if excitation.closed or body.flexible is None or not _is_physical(body.flexible.material):
+    if load_envelope.closed or body.flexible is None or not _is_physical(body.flexible.material):
         return None
     solid, material = solid_of(body), body.flexible.material
     if solid is None:
@@ -77,14 +77,14 @@ def static_reach(body: Body, anchors: BodyAnchors, excitation: Excitation) -> St
         grip = _grip(solid, body, places[:count], k) if k < count else 0.0
         if beam is None or grip is None:
             return None
-        loads = _Loads.of(beam, places[:count], anchors.root, excitation)
+        loads = _Loads.of(beam, places[:count], anchors.root, load_envelope)
         u, turn = _bent(beam, loads, material, places[k], held)
         if k < count:
             here = np.linalg.norm(places[:count] - places[k], axis=1) <= _SHORTEST  # these share what they hold
-            wrench = [np.abs(peaks[here]).sum(axis=0) for peaks in (excitation.force, excitation.moment)]
+            wrench = [np.abs(peaks[here]).sum(axis=0) for peaks in (load_envelope.force, load_envelope.moment)]
             v, more = _given(beam, wrench, material, places[k], grip)
             u, turn = u + v, turn + more
-        lever = float(excitation.lever[k]) if k < count else 0.0
+        lever = float(load_envelope.lever[k]) if k < count else 0.0
         size = float(np.linalg.norm(turn))
         found.append((float(np.linalg.norm(u)) + lever * size, size))
     largest = SAFETY * OVERSHOOT * np.max(found, axis=0)
@@ -100,17 +100,17 @@ class _Loads:
     moment: Array
 
     @staticmethod
-    def of(beam: Beam, places: Array, root: int, excitation: Excitation) -> _Loads:
-        peaks = peak_loads(excitation)[:ACCELERATIONS]
+    def of(beam: Beam, places: Array, root: int, load_envelope: LoadEnvelope) -> _Loads:
+        peaks = peak_loads(load_envelope)[:ACCELERATIONS]
         force = beam.mass[:, None] * (np.abs(unit_accelerations(beam.center)) @ peaks)
-        omega = excitation.angular_velocity
-        twist = float(np.linalg.norm(excitation.angular_acceleration) + omega @ omega)
+        omega = load_envelope.angular_velocity
+        twist = float(np.linalg.norm(load_envelope.angular_acceleration) + omega @ omega)
         moment = np.repeat((beam.mass * beam.spread * twist)[:, None], 3, axis=1)
         others = np.arange(len(places)) != root
         return _Loads(
             np.vstack([beam.center, places[others]]),
-            np.vstack([force, np.abs(excitation.force[others])]),
-            np.vstack([moment, np.abs(excitation.moment[others])]),
+            np.vstack([force, np.abs(load_envelope.force[others])]),
+            np.vstack([moment, np.abs(load_envelope.moment[others])]),
         )
 
     def about(self, points: Array, hanging: Array) -> tuple[Array, Array]:

@@ -12,7 +12,7 @@ import numpy as np
 from calmotion.accuracy.simplification.rotating_bodies import Turning, turning_of
 from calmotion.multibody.failure import SimulationFailure
 from calmotion.multibody.model.topology import span_tree
-from calmotion.shot import Animation, Character, FlexibleSettings, Need, Needs
+from calmotion.shot import Animation, Character, FlexibleSettings, ModelChoice, ModelChoices
 from calmotion.shot.character import with_settings
 from calmotion.shot.model_choice import AUTO, OFF, ON
 from calmotion.simulation.settings import Options
@@ -27,7 +27,7 @@ FINE, NONE = 1e-3, np.inf  # shares of the tolerance for modes that are left out
 
 def analyse(
     character: Character, animation: Animation, options: Options, forced: Mapping[str, str], changes: bool
-) -> Needs:
+) -> ModelChoices:
     """Decide what a shot needs.
 
     Args:
@@ -42,10 +42,10 @@ def analyse(
     forced = {kind: choice for kind, choice in forced.items() if choice != AUTO}
     choice = partial(_choice, forced)
     if len(animation.frame_times) < 2:
-        return Needs(_asked(character, forced), (), forced)
+        return ModelChoices(_asked(character, forced), (), forced)
     tree = span_tree(character)
     allowed = SHARE * character.retarget.allowed(options.tolerance)
-    rows: list[Need] = [Need("loops", "closed loops", False, "no joint closes one")]
+    rows: list[ModelChoice] = [ModelChoice("loops", "closed loops", False, "no joint closes one")]
     stiffness: Mapping[int, Stiffness] = {}
     if tree.loops or any(body.flexible for body in character.bodies):
         # what simulates the rigid robot takes a while to load, and a rigid shot without loops does not need it
@@ -54,10 +54,10 @@ def analyse(
         try:
             character, rows, stiffness = decide(character, animation, options, tree, choice, allowed, changes)
         except SimulationFailure:
-            return Needs(_asked(character, forced), (), forced)
+            return ModelChoices(_asked(character, forced), (), forced)
     found = _turning(turning_of(character, animation, tree, stiffness, changes), choice("turning"), allowed)
     character, more = _straight(character, found, "turning" in forced)
-    return Needs(_asked(character, forced), (*rows, *more), forced)
+    return ModelChoices(_asked(character, forced), (*rows, *more), forced)
 
 
 def _choice(forced: Mapping[str, str], kind: str) -> str:
@@ -93,7 +93,7 @@ def _turning(found: list[Turning], choice: str, allowed: float) -> list[Turning]
     ]
 
 
-def _straight(character: Character, found: list[Turning], forced: bool) -> tuple[Character, list[Need]]:
+def _straight(character: Character, found: list[Turning], forced: bool) -> tuple[Character, list[ModelChoice]]:
     """The character with its bodies marked, and a row for each reason."""
     bodies = tuple(replace(b, straight=not t.turns) for b, t in zip(character.bodies, found, strict=True))
     names = distinct_names([body.path for body in bodies])
@@ -104,5 +104,5 @@ def _straight(character: Character, found: list[Turning], forced: bool) -> tuple
     for (turns, why), members in groups.items():
         errors = [error for k in members if (error := found[k].error_m) is not None]
         what = "turning of " + ", ".join(names[bodies[k].path] for k in members)
-        rows.append(Need("turning", what, turns, why, sum(errors) if errors else None, forced))
+        rows.append(ModelChoice("turning", what, turns, why, sum(errors) if errors else None, forced))
     return replace(character, bodies=bodies), rows

@@ -14,8 +14,8 @@ from calmotion.geometry.solid import solid_of
 from calmotion.multibody.model.joint_arrays import BodyAnchors
 from calmotion.multibody.model.model import Model, body_anchors, rigid_body
 from calmotion.multibody.model.topology import Tree, loop_members
-from calmotion.reduction.load_envelope import Excitation
-from calmotion.shot import Animation, Body, Character, MassProperties, Need
+from calmotion.reduction.load_envelope import LoadEnvelope
+from calmotion.shot import Animation, Body, Character, MassProperties, ModelChoice
 from calmotion.shot.model_choice import AUTO, OFF, ON
 from calmotion.simulation.forward import ForwardRun
 from calmotion.simulation.inputs.gearing import leaders
@@ -29,7 +29,7 @@ STEP = 1.0 / 100.0  # of the rigid robot's simulation [s]: loads are those of th
 def decide(
     character: Character, animation: Animation, options: Options, tree: Tree, choice: Callable[[str], str],
     allowed: float, changes: bool,
-) -> tuple[Character, list[Need], dict[int, Stiffness]]:  # fmt: skip
+) -> tuple[Character, list[ModelChoice], dict[int, Stiffness]]:  # fmt: skip
     """Decide which bodies bend, which loops are needed and which motors move targets.
 
     Args:
@@ -80,7 +80,9 @@ def _guessed_mass(body: Body) -> MassProperties:
     return MassProperties(mass, 0.5 * (corners.min(axis=0) + corners.max(axis=0)), np.diag(across))
 
 
-def _stiffness(character: Character, anchors: list[BodyAnchors], loads: tuple[Excitation, ...]) -> dict[int, Stiffness]:
+def _stiffness(
+    character: Character, anchors: list[BodyAnchors], loads: tuple[LoadEnvelope, ...]
+) -> dict[int, Stiffness]:
     """How far flexible bodies bend, where that can be told."""
     found = {
         k: static_reach(body, own, load)
@@ -93,7 +95,7 @@ def _stiffness(character: Character, anchors: list[BodyAnchors], loads: tuple[Ex
 def _bodies(
     character: Character, stiffness: Mapping[int, Stiffness], masses: Mapping[int, MassProperties], allowed: float,
     choice: str,
-) -> tuple[Character, list[Need]]:  # fmt: skip
+) -> tuple[Character, list[ModelChoice]]:  # fmt: skip
     """Flexible bodies that are simulated as rigid."""
     bodies, rows, spent = list(character.bodies), [], 0.0
     flexible = [k for k, body in enumerate(bodies) if body.flexible is not None]
@@ -115,11 +117,11 @@ def _bodies(
         if stiff:
             bodies[k] = replace(body, stiff=True, mass=masses[k])
             spent += error or 0.0
-        rows.append(Need("bodies", f"finite elements of {body.path}", not stiff, why, error, is_forced))
+        rows.append(ModelChoice("bodies", f"finite elements of {body.path}", not stiff, why, error, is_forced))
     return replace(character, bodies=tuple(bodies)), rows
 
 
-def _motors(character: Character, model: Model, run: ForwardRun, choice: str) -> tuple[Character, list[Need]]:
+def _motors(character: Character, model: Model, run: ForwardRun, choice: str) -> tuple[Character, list[ModelChoice]]:
     """Motors that move no target."""
     own = leaders(character)
     reach = influence(character, model, run, own) if len(own) else np.zeros(0)
@@ -130,18 +132,20 @@ def _motors(character: Character, model: Model, run: ForwardRun, choice: str) ->
         if far <= NOTHING:
             motors[k] = replace(motors[k], idle=True)
             rows.append(
-                Need("motors", f"optimisation of {motors[k].path}", False, "it moves no target", None, choice == OFF)
+                ModelChoice(
+                    "motors", f"optimisation of {motors[k].path}", False, "it moves no target", None, choice == OFF
+                )
             )
     return replace(character, motors=tuple(motors)), rows
 
 
 def _loops(
     character: Character, tree: Tree, model: Model, run: ForwardRun, choice: str
-) -> tuple[Character, list[Need]]:
+) -> tuple[Character, list[ModelChoice]]:
     """Closed loops, and joints that could be left out of them."""
     found = closures_of(model, run)
     if not found.joints:
-        return character, [Need("loops", "closed loops", False, "no joint closes one")]
+        return character, [ModelChoice("loops", "closed loops", False, "no joint closes one")]
     joints, rows = list(character.joints), []
     order = [*tree.joint, *tree.loops]
     for k in found.joints:
@@ -151,11 +155,11 @@ def _loops(
         if k in found.redundant and choice != ON and (choice == OFF or not bends):
             joints[order[k]] = replace(item, redundant=True)
             why = "other joints hold all that it holds; its force is shown as zero"
-            rows.append(Need("loops", f"the joint {item.path}", False, why, None, choice == OFF))
+            rows.append(ModelChoice("loops", f"the joint {item.path}", False, why, None, choice == OFF))
         else:
-            rows.append(Need("loops", f"the joint {item.path}", True, "it closes a loop", None, choice != AUTO))
+            rows.append(ModelChoice("loops", f"the joint {item.path}", True, "it closes a loop", None, choice != AUTO))
     left = [k for k in found.joints if not joints[order[k]].redundant]
     if found.redundant_rows and left:
         why = f"{found.redundant_rows} rows of all joints follow from others, and are met by forces of least norm"
-        rows.append(Need("loops", "redundant constraints", True, why))
+        rows.append(ModelChoice("loops", "redundant constraints", True, why))
     return replace(character, joints=tuple(joints)), rows

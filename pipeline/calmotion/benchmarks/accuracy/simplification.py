@@ -39,7 +39,7 @@ from calmotion.retargeting.to_tolerance import optimize_to_tolerance
 from calmotion.shot import Result
 from calmotion.shot.model_choice import KINDS, ON
 from calmotion.simulation.bodies import reduce_bodies
-from calmotion.simulation.prepare import Options, excitations
+from calmotion.simulation.prepare import Options, load_envelopes
 
 REPEATS = 3
 
@@ -99,7 +99,7 @@ def run(shot: NeedsShot, command: str, forced: Mapping[str, str], options: Optio
     )
     character, bodies = needs.character, None
     if any(body.bends for body in character.bodies):
-        loads = excitations(character, shot.animation, shot.meshes, options)
+        loads = load_envelopes(character, shot.animation, shot.meshes, options)
         # finite elements anew each time, as for a user who comes with a new character
         with fresh_cache():
             bodies = reduce_bodies(character, span_tree(character), shot.meshes, None, loads)

@@ -15,7 +15,7 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
-from calmotion.accuracy.converged_reduction import settled_bodies
+from calmotion.accuracy.converged_reduction import converged_reduction
 from calmotion.accuracy.simplification.analysis import analyse
 from calmotion.accuracy.simulate_to_tolerance import found_tracks, simulate_to_tolerance
 from calmotion.accuracy.step_error import distance, frames_of
@@ -111,7 +111,7 @@ class Tolerances:
         character, more = needs.character, sum(row.estimated_error_m or 0.0 for row in needs.left_out)
         quiet = lambda fraction, message: None  # noqa: E731  (a callback, twice)
         search = command == "optimize"
-        settled = settled_bodies(character, animation, shot.meshes, options, retargeted=search)
+        settled = converged_reduction(character, animation, shot.meshes, options, retargeted=search)
         bodies, known = settled.bodies, settled.known
         if search:
             result = optimize_to_tolerance(character, animation, bodies, options, quiet, known=known)

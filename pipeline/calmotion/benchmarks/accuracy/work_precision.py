@@ -23,7 +23,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from calmotion.accuracy.pod_subspace import HeldBodies, Known
+from calmotion.accuracy.pod_subspace import ProjectedBodies, ReferenceRun
 from calmotion.accuracy.step_error import StepRun, distance, simulate_at
 from calmotion.benchmarks.accuracy.pareto import over_fastest, print_over_fastest
 from calmotion.benchmarks.common.shots import Unreduced, load_unreduced
@@ -35,7 +35,7 @@ from calmotion.reduction.reduced_body import ReducedBody
 from calmotion.shot.character import Array, with_settings
 from calmotion.simulation.bodies import reduce_bodies
 from calmotion.simulation.inputs.time_grid import MAX_STEP
-from calmotion.simulation.prepare import Options, excitations
+from calmotion.simulation.prepare import Options, load_envelopes
 
 if TYPE_CHECKING:
     from calmotion.benchmarks.integrators.gradients import GradientError
@@ -87,8 +87,8 @@ class Bench:
     def __init__(self, shot: Unreduced, repeats: int = REPEATS):
         self.shot, self.repeats = shot, repeats
         self.tree = span_tree(shot.character)
-        self.loads = excitations(shot.character, shot.animation, shot.meshes, Options())
-        self._known: Known | None = None
+        self.loads = load_envelopes(shot.character, shot.animation, shot.meshes, Options())
+        self._known: ReferenceRun | None = None
 
     def bodies(self, tolerance: float, **settings: Any) -> list[ReducedBody]:
         """The shot's bodies, reduced to a tolerance [m] with some of their `FlexibleSettings` changed."""
@@ -103,8 +103,8 @@ class Bench:
     def held(self, bodies: Sequence[ReducedBody], allowed: float) -> Sequence[ReducedBody]:
         """Bodies of the reduction `BASE` held to directions, which may change this much [m]."""
         shot = self.shot
-        self._known = self._known or Known(shot.animation, self.run(bodies, MAX_STEP))
-        return HeldBodies(shot.character, bodies, Options(), lambda item: allowed, [self._known]).bodies or bodies
+        self._known = self._known or ReferenceRun(shot.animation, self.run(bodies, MAX_STEP))
+        return ProjectedBodies(shot.character, bodies, Options(), lambda item: allowed, [self._known]).bodies or bodies
 
     def reference(self, finest: float = FINEST) -> Reference:
         """The finest run, its step extrapolated to zero, from steps as small as it takes.
@@ -118,9 +118,9 @@ class Bench:
             finest: Tolerance of the reduction [m].
         """
         shot, bodies = self.shot, self.bodies(finest, pairs_share=10.0)
-        known = Known(shot.animation, self.run(bodies, MAX_STEP))
+        known = ReferenceRun(shot.animation, self.run(bodies, MAX_STEP))
         other = self.run(self.bodies(10.0 * finest), MAX_STEP)
-        held = HeldBodies(shot.character, bodies, Options(), lambda item: finest, [known])
+        held = ProjectedBodies(shot.character, bodies, Options(), lambda item: finest, [known])
         limit, left = self._limit(held.bodies or bodies, 10.0 * finest)
         unseen = sum(body.elasticity.unseen_m for body in bodies if body.elasticity is not None)
         reduced = distance(other.positions, known.run.positions) + unseen

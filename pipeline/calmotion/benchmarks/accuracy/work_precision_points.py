@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 
-from calmotion.accuracy.converged_reduction import settled_bodies
+from calmotion.accuracy.converged_reduction import converged_reduction
 from calmotion.accuracy.integrator_choice import by_fast_scheme
-from calmotion.accuracy.simulate_to_tolerance import chosen_step, held_to_tolerance
+from calmotion.accuracy.simulate_to_tolerance import chosen_step, project_to_tolerance
 from calmotion.benchmarks.accuracy.pareto import setting_of
 from calmotion.benchmarks.accuracy.work_precision import BASE, TOLERANCES, Bench, Point, Reference
 from calmotion.benchmarks.common.shots import load_unreduced
@@ -68,8 +68,8 @@ def chosen_points(bench: Bench, reference: Reference, tolerances: Sequence[float
     points = [bench.measure(reference, "default", "default", default, MAX_STEP)]
     for tolerance in tolerances:
         options = Options(tolerance=tolerance)
-        settled = settled_bodies(character, animation, shot.meshes, options)
-        held = held_to_tolerance(character, animation, settled.bodies, options, settled.known)
+        settled = converged_reduction(character, animation, shot.meshes, options)
+        held = project_to_tolerance(character, animation, settled.bodies, options, settled.known)
         bodies = held.bodies or settled.bodies
         choice = partial(_step_and_scheme, character, animation, bodies, settled.error_m + held.error_m)
         step, integrator = by_fast_scheme(options, choice)

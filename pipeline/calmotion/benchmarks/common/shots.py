@@ -11,10 +11,10 @@ import numpy as np
 from calmotion.errors import ShotError
 from calmotion.multibody.model.topology import span_tree
 from calmotion.reduction.reduced_body import ReducedBody
-from calmotion.shot import Animation, Character, FEMeshes, Needs
+from calmotion.shot import Animation, Character, FEMeshes, ModelChoices
 from calmotion.shot.model_choice import ON
 from calmotion.simulation.bodies import reduce_bodies
-from calmotion.simulation.prepare import Options, excitations
+from calmotion.simulation.prepare import Options, load_envelopes
 
 MADE = {
     "linkage": "an arm with a four-bar, made in code",
@@ -88,7 +88,7 @@ def load(name: str) -> BenchShot:
     """
     if name in MADE:
         character, animation, meshes = _made(name)
-        loads = excitations(character, animation, meshes, Options())
+        loads = load_envelopes(character, animation, meshes, Options())
         return BenchShot(
             name, character, animation, reduce_bodies(character, span_tree(character), meshes, None, loads)
         )
@@ -96,11 +96,13 @@ def load(name: str) -> BenchShot:
     from calmotion.host import open_host
     from calmotion.shot.run import Source
 
-    run = open_host([]).run([Source(path=name, command="optimize")], [Character, Animation, Needs, ReducedBodies])
+    run = open_host([]).run(
+        [Source(path=name, command="optimize")], [Character, Animation, ModelChoices, ReducedBodies]
+    )
     for result in run:
         if result.error is not None:
             raise result.error
-    needs, animation_found, reduced = run.get(Needs), run.get(Animation), run.get(ReducedBodies)
+    needs, animation_found, reduced = run.get(ModelChoices), run.get(Animation), run.get(ReducedBodies)
     if needs is None or animation_found is None or reduced is None:
         raise ShotError("has nothing flexible to retarget", path=name)
     return BenchShot(Path(name).stem, needs.character, animation_found, reduced.bodies)

@@ -188,13 +188,13 @@ def run_case(case: Case) -> Outcome:
     """Run one case as `calmotion simulate` would."""
     from calmotion.multibody.model.topology import span_tree
     from calmotion.simulation.bodies import reduce_bodies
-    from calmotion.simulation.prepare import Options, excitations
+    from calmotion.simulation.prepare import Options, load_envelopes
 
     (character, meshes), animation = case.scene()
     options = Options(step=case.step, integrator=case.integrator)
     try:
         tree = span_tree(character)
-        bodies = reduce_bodies(character, tree, meshes, None, excitations(character, animation, meshes, options))
+        bodies = reduce_bodies(character, tree, meshes, None, load_envelopes(character, animation, meshes, options))
     except ShotError as error:
         return Outcome(case.group, case.name, REFUSED, str(error))
     return judged(case.group, case.name, character, animation, bodies, options)

@@ -18,7 +18,7 @@ import numpy as np
 from calmotion.benchmarks.common.shots import MADE, BenchShot, load
 from calmotion.benchmarks.optimizer.optimizer import make_problem
 from calmotion.retargeting.problem.problem import RetargetProblem
-from calmotion.retargeting.solver.damping_homotopy import approach
+from calmotion.retargeting.solver.damping_homotopy import damping_homotopy
 from calmotion.retargeting.solver.gauss_newton import minimize
 from calmotion.shot.character import Array
 from calmotion.simulation.inputs.curves import Curves
@@ -67,7 +67,7 @@ def compare(shot: BenchShot) -> list[Row]:
         rows.append(_row(shot, kind.replace("2", ", two modes"), late, problem, curves, run.target_positions))
     zero, free = np.zeros(problem.size), np.zeros(problem.size, bool)
     problem.value(zero)
-    found = minimize(problem, approach(problem, zero, free, float(frequencies[0])), free, 5e-6)
+    found = minimize(problem, damping_homotopy(problem, zero, free, float(frequencies[0])), free, 5e-6)
     problem.value(found.x)
     rows.append(_row(shot, "optimised", 0.0, problem, problem.changed_curves, problem.run.target_positions))
     return rows

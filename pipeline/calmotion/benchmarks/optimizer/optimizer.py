@@ -22,7 +22,7 @@ from calmotion.benchmarks.common.timing import median_time
 from calmotion.retargeting.problem.offset_basis import OffsetBasis, make_basis
 from calmotion.retargeting.problem.posing import CLOSENESS, SMOOTHNESS
 from calmotion.retargeting.problem.problem import RetargetProblem
-from calmotion.retargeting.solver.damping_homotopy import approach
+from calmotion.retargeting.solver.damping_homotopy import damping_homotopy
 from calmotion.retargeting.solver.gauss_newton import Search, minimize
 from calmotion.shot.character import Array
 from calmotion.simulation.inputs.curves import sample_curves
@@ -94,7 +94,7 @@ def _reference(shot: BenchShot, prepared: Prepared, zero: Array) -> Search:
     """A solution well beyond what is compared."""
     problem, free = make_problem(shot, prepared, 0.05), np.zeros(len(zero), bool)
     problem.value(zero)
-    start = approach(problem, zero, free, lowest_frequency(prepared, shot.animation))
+    start = damping_homotopy(problem, zero, free, lowest_frequency(prepared, shot.animation))
     return minimize(problem, start, free, GAIN, 60, 200)
 
 
@@ -131,7 +131,7 @@ def compare(shot: BenchShot, lbfgs: int) -> list[Convergence]:
         trace.append((time.perf_counter() - begin, fresh.merit()))
 
     fresh.value(zero)
-    start = approach(fresh, zero, free, lowest_frequency(prepared, shot.animation))
+    start = damping_homotopy(fresh, zero, free, lowest_frequency(prepared, shot.animation))
     found = minimize(fresh, start, free, 5e-6, on_iterate=on_iterate)
     rows = [row("Gauss-Newton", trace, found.x, found.evaluations, found.products)]
 

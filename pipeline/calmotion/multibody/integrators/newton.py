@@ -27,7 +27,7 @@ from calmotion.multibody.linear_solver.elimination import factor
 from calmotion.multibody.linear_solver.least_multipliers import least_multipliers
 from calmotion.multibody.model.system import BACKWARD_DIFFERENCE, JOINT_ROWS, State, System, allocate_state
 from calmotion.shot.character import Array
-from calmotion.support.compilation import NO, YES, kernel, part
+from calmotion.support.compilation import NO, YES, inlined_kernel, kernel
 
 CONVERGED, SINGULAR, NOT_CONVERGED = 0, 1, 2
 LIMIT = 40
@@ -118,7 +118,7 @@ def worst_component(system, x):
     return worst
 
 
-@part
+@inlined_kernel
 def _predict(system, h, before, now, memory):
     """The new instant by Taylor's formula."""
     for b in range(len(system.parent)):
@@ -149,7 +149,7 @@ def _velocities(system, scheme, h, before2, before, now, scratch):
         newmark.velocities(system, scheme, h, now, before, scratch.memory, scratch.Vd)
 
 
-@part
+@inlined_kernel
 def _linearize(system, scheme, h, before, now, angle, rate, work, blocks, factors, scratch):
     """Residual, tangent and factors at a state; returns -1 or the component that is singular."""
     if scheme.family == BACKWARD_DIFFERENCE:
@@ -198,7 +198,7 @@ def largest_entry(system, x):
     return largest
 
 
-@part
+@inlined_kernel
 def step(system, scheme, h, before2, before, now, angle, rate, predicted, work, blocks, factors, scratch):
     """One implicit step from two instants to the next.
 
@@ -265,7 +265,7 @@ def step(system, scheme, h, before2, before, now, angle, rate, predicted, work, 
     return NOT_CONVERGED, factorisations, LIMIT, worst_component(system, x)
 
 
-@part
+@inlined_kernel
 def _finish(system, scheme, h, before2, before, now, scratch):
     """Velocities of the converged instant, what the next step remembers, and multipliers of least norm."""
     _velocities(system, scheme, h, before2, before, now, scratch)

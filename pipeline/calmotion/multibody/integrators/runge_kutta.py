@@ -17,7 +17,7 @@ from calmotion.multibody.linear_solver.closed_chains import copy_rows
 from calmotion.multibody.linear_solver.index1 import accelerations
 from calmotion.multibody.model.system import State, System, allocate_state
 from calmotion.shot.character import Array
-from calmotion.support.compilation import kernel, part
+from calmotion.support.compilation import inlined_kernel, kernel
 
 STAGES = np.array([0.0, 0.5, 1.0])  # where in a step it looks at the motors
 FIRMNESS = 10.0  # Baumgarte's coefficient [1/s]; one that grew with 1/h would take the method's order from it
@@ -57,7 +57,7 @@ def _place(system, start, share, h, slopes):
         turn(start.q[b], stage.turn[b], stage.q[b])
 
 
-@part
+@inlined_kernel
 def _slope(system, Vd, slopes):
     """Slopes at the stage's state."""
     stage, T = slopes.stage, slopes.T
@@ -73,7 +73,7 @@ def _slope(system, Vd, slopes):
             slopes.positions[b, 3 + i] = t
 
 
-@part
+@inlined_kernel
 def step(system, h, start, now, inputs, work, blocks, factors, scratch, slopes):
     """One step from `start` to `now`.
 

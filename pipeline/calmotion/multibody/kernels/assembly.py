@@ -39,7 +39,7 @@ from calmotion.multibody.kernels.so3 import matrix_of
 from calmotion.multibody.kernels.stvk import stvk_forces
 from calmotion.multibody.model.system import JOINT_ROWS, System
 from calmotion.shot.character import Array
-from calmotion.support.compilation import kernel, part
+from calmotion.support.compilation import inlined_kernel, kernel
 
 
 class Work(NamedTuple):
@@ -107,7 +107,7 @@ def _acceleration_less_gravity(system, b, Vd, w):
         w.a[i] = t
 
 
-@part
+@inlined_kernel
 def _turning_rows(system, b, u, V, Vd, tangent, w, blocks):
     """Inertia, linear elastic and gravity rows of a component that turns."""
     r = system.elastic[b]
@@ -129,7 +129,7 @@ def _turning_rows(system, b, u, V, Vd, tangent, w, blocks):
     )  # fmt: skip
 
 
-@part
+@inlined_kernel
 def _straight_rows(system, b, u, V, Vd, tangent, w, blocks):
     """The same of a component that never turns."""
     r = system.elastic[b]
@@ -145,7 +145,7 @@ def _straight_rows(system, b, u, V, Vd, tangent, w, blocks):
     straight_position_jacobian(r, system.M3[b], system.stiffness[b], w.a, Vd[b, 3:6], blocks.D[b], blocks.K[b])
 
 
-@part
+@inlined_kernel
 def _add_stvk_forces(system, b, u, v, tangent, w, blocks):
     """Elastic rows of a body of this law; those of a linear one stand with its inertia."""
     stvk_forces(
@@ -154,7 +154,7 @@ def _add_stvk_forces(system, b, u, v, tangent, w, blocks):
     )  # fmt: skip
 
 
-@part
+@inlined_kernel
 def _add_neohookean_forces(system, b, u, v, tangent, w, blocks):
     """The same of a Neo-Hookean body."""
     neohookean_forces(
@@ -163,7 +163,7 @@ def _add_neohookean_forces(system, b, u, v, tangent, w, blocks):
     )  # fmt: skip
 
 
-@part
+@inlined_kernel
 def _follow_positions(n, acceleration, Hv, D, P, K):
     """Tangents by what follows: accelerations follow velocities, into P, and these follow positions, into K."""
     beta = Hv[0, 0]
@@ -177,7 +177,7 @@ def _follow_positions(n, acceleration, Hv, D, P, K):
             K[i, k] += beta * P[i, k]
 
 
-@part
+@inlined_kernel
 def _joint_rows(system, scheme, joint, angle, rate, c, u, V, lam, Hv, tangent, w, blocks):
     """Constraint rows of a joint and the forces it transmits."""
     p = system.side[joint, 0]

@@ -30,7 +30,7 @@ from calmotion.multibody.kernels.sliders import (
     slide_velocity_jacobian,
     slides_freely,
 )
-from calmotion.support.compilation import kernel, part
+from calmotion.support.compilation import inlined_kernel, kernel
 
 
 @kernel
@@ -102,7 +102,7 @@ def _turned_back(Q, angle, E):
         E[i, 2] = Q[i, 2]
 
 
-@part
+@inlined_kernel
 def constraint_residual(system, joint, angle, rate, scheme, w, gap):
     """Residual of a joint's rows; leaves omega_j - theta' z in w.x, E in w.E, and the unused part of a free slider's
     first three rows, that along its axis, in w.along[0]."""
@@ -193,7 +193,7 @@ def add_skew(A, x, sign, out):
         out[i, 2] += sign * (A[i, 0] * x[1] - A[i, 1] * x[0])
 
 
-@part
+@inlined_kernel
 def joint_tangent(system, joint, value, rate, scheme, Hv, V, w, blocks):
     """All blocks of a joint; needs `joint_kinematics`, `constraint_residual` and the markers' Jacobians first."""
     p = system.side[joint, 0]
@@ -288,7 +288,7 @@ def joint_tangent(system, joint, value, rate, scheme, Hv, V, w, blocks):
                 blocks.Hp[joint, i, a] = 0.0
 
 
-@part
+@inlined_kernel
 def _free_slider(system, joint, w, blocks):
     """Blocks of a free slider from those of a driven one at its length."""
     p = system.side[joint, 0]

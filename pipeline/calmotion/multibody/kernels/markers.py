@@ -200,7 +200,7 @@ def marker_velocity_jacobian(r, kind, rotation, Phi, Psi, V, m):
 @kernel
 def add_wrench_stiffness(r, kind, rotation, Phi, Psi, f, t, sign, m, K):
     """K += sign * d(generalised force)/d(R^T dc, dphi, du) for a force f fixed in the world and a moment t fixed
-    in marker axes. Needs `marker_values` first.
+    in marker axes. ModelChoices `marker_values` first.
 
     Args:
         f: R^T f, body axes, shape [3].

@@ -1,8 +1,9 @@
 """Elastic and viscous forces of a St. Venant-Kirchhoff body in reduced coordinates; compiled.
 
-With w = W u the few directions that its quadratic strain sees (`fem.seen_directions`; all of u where W is none),
-z(u) = (u_k; w_k w_l for k <= l) and A the Gram matrix of the strains that belong to it (`fem.elastic_forms`), the
-energy is z^T A z / 2. Kelvin-Voigt damping adds b C:E' to the stress C:E, hence, with J = dz/du,
+With w = W u the few directions that its quadratic strain sees (all of u where W is none),
+z(u) = (u_k; w_k w_l for k <= l) and A the Gram matrix of the strains that belong to it
+(`reduction.elements.elastic_forms`), the energy is z^T A z / 2. Kelvin-Voigt damping adds b C:E' to the stress C:E,
+hence, with J = dz/du,
 
     force      f = J^T A (z + b z'),      z' = J v
     by v       b J^T A J

@@ -18,13 +18,13 @@ from calmotion.multibody.linear_solver.closed_chains import copy_rows, factor_lo
 from calmotion.multibody.linear_solver.elimination import factor
 from calmotion.multibody.linear_solver.least_multipliers import least_multipliers
 from calmotion.multibody.model.system import JOINT_ROWS, Scheme
-from calmotion.support.compilation import NO, YES, part
+from calmotion.support.compilation import NO, YES, inlined_kernel
 
 VELOCITY_ROWS = Scheme(velocity=0.0, acceleration=0.0, gamma=1.0, alpha=0.0)
 POSITION_ROWS = Scheme(velocity=0.0, acceleration=0.0, gamma=0.0, alpha=1.0)
 
 
-@part
+@inlined_kernel
 def accelerations(system, state, angle, rate, acceleration, firmness, work, blocks, factors, scratch):
     """V' = (c'', alpha in body axes, u'') into scratch.Vd, shape [B, N], and multipliers into state.lam.
 

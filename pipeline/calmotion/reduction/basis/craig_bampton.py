@@ -23,7 +23,7 @@ from calmotion.reduction.basis.residual_flexibility import (
 from calmotion.reduction.basis.static_loads import ACCELERATIONS, peak_loads, unit_accelerations
 from calmotion.reduction.elements.assembly import FEModel
 from calmotion.reduction.interfaces.rigid_patch import rigid_patch
-from calmotion.reduction.load_envelope import Excitation, askew
+from calmotion.reduction.load_envelope import LoadEnvelope, load_direction_envelope
 from calmotion.shot.character import Array, FlexibleSettings, IntArray
 
 __all__ = ["Basis", "mode_signs", "reduced_basis", "rigid_patch"]
@@ -46,7 +46,7 @@ class Basis:
             excites the body.
         patch_squares: Second order of a rotation that each mode holds of each patch (see `patch_rotation`), shape
             [p, 6, r]; None where every patch moves as a rigid one.
-        excitation: The loads that were looked at when modes were chosen by a tolerance: those of the shot, met askew.
+        load_envelope: The loads by which modes were chosen for a tolerance: those of the shot, in any direction.
         first_order: Of a basis extended by modal derivatives, the modes that it extends in its coordinates, shape
             [r, c].
         second_order: And the derivatives of pairs of their first ones, shape [r, pairs].
@@ -58,7 +58,7 @@ class Basis:
     residual: int = 0
     cut_error_m: float | None = None
     patch_squares: Array | None = None
-    excitation: Excitation | None = None
+    load_envelope: LoadEnvelope | None = None
     first_order: Array | None = None
     second_order: Array | None = None
 
@@ -66,19 +66,19 @@ class Basis:
 @one_blas_thread()
 def reduced_basis(
     model: FEModel, root: IntArray, patches: Sequence[IntArray], centers: Sequence[Array],
-    settings: FlexibleSettings, *, excitation: Excitation | None = None, tolerance: float | None = None,
+    settings: FlexibleSettings, *, load_envelope: LoadEnvelope | None = None, tolerance: float | None = None,
     targets: Any = None, fixed: FixedInterface | None = None,
 ) -> Basis:  # fmt: skip
     """The reduced basis of a body.
 
     With `mode_count` the lowest modes of constraint modes and fixed-interface modes, exactly as many. With an
-    excitation and a tolerance the modes up to `max_frequency`, or else those in the excited band and those whose own
+    load_envelope and a tolerance the modes up to `max_frequency`, or else those in the excited band and those whose own
     motion, beyond following their load, moves the outputs by more than the tolerance; and residual vectors until all
     that is missing of the static displacement is below it.
     With neither all constraint modes, fixed-interface modes up to `max_frequency` or as a shot usually needs, and the
     residual vectors that hold more than 0.1% of the work of a uniform (angular) acceleration.
 
-    The outputs are the translation of each moving patch, its rotation times the excitation's reach, and the targets.
+    The outputs are the translation of each moving patch, its rotation times the load_envelope's reach, and the targets.
 
     Args:
         model: Full model, n nodes.
@@ -86,20 +86,20 @@ def reduced_basis(
         patches: Nodes of the p patches that move as rigid ones, disjoint from each other and from the root.
         centers: Anchor of each [m], shape [3].
         settings: `mode_count` and `max_frequency`; negative is automatic.
-        excitation: Peaks over the shot, one row of forces for each patch; None when they are not known.
+        load_envelope: Peaks over the shot, one row of forces for each patch; None when they are not known.
         tolerance: Static displacement at the outputs that may be missing [m].
         targets: Function from nodal fields, shape [n, 3, r], to displacements of the body's targets, shape [k, 3, r];
             `embedding.embed(...).displacements` is one.
         fixed: The body with every patch held, where that is known.
 
     Returns:
-        The basis; it may be empty with an excitation that does not bend the body.
+        The basis; it may be empty with an load_envelope that does not bend the body.
 
     Raises:
         NotPositiveDefinite: The root patch does not hold the body.
     """
     fixed = fixed or FixedInterface.of(model, root, patches, centers)
-    places = None if excitation is None else _Places(fixed, excitation, targets)
+    places = None if load_envelope is None else _Places(fixed, load_envelope, targets)
     if places is not None and tolerance is not None and settings.mode_count < 0:
         return _chosen(fixed, places, settings, tolerance)
     if settings.mode_count >= 0:
@@ -132,7 +132,7 @@ class _Places:
     """
 
     fixed: FixedInterface
-    excitation: Excitation
+    load_envelope: LoadEnvelope
     targets: Any
 
     def static_model(self, omega_squared: Array, modes: Array, patch_motion: Array) -> StaticModel:
@@ -144,34 +144,37 @@ class _Places:
         # a wrench does work on the motion of its patch alone
         loads = np.hstack([inertia, patch_motion.reshape(-1, r).T])
         nodal = modes.reshape(n, 3, r)
-        outputs = [patch_motion[:, :3], self.excitation.lever[:, None, None] * patch_motion[:, 3:]]
+        outputs = [patch_motion[:, :3], self.load_envelope.lever[:, None, None] * patch_motion[:, 3:]]
         if self.targets is not None:
             outputs.append(self.targets(nodal))
         if sum(map(len, outputs)) == 0:
             surface = mesh.surface_nodes
             outputs.append(nodal[surface[:: max(1, len(surface) // _OUTPUTS)]])
-        return StaticModel(omega_squared, loads * peak_loads(self.excitation), np.concatenate(outputs))
+        return StaticModel(omega_squared, loads * peak_loads(self.load_envelope), np.concatenate(outputs))
 
 
 def _chosen(fixed: FixedInterface, places: _Places, settings: FlexibleSettings, tolerance: float) -> Basis:
     """As many of all candidates as the tolerance needs."""
-    limit = frequency_limit(settings, _BAND * places.excitation.frequency)
+    limit = frequency_limit(settings, _BAND * places.load_envelope.frequency)
     columns, U, static = _candidates(fixed, places, limit)
     size = float(np.linalg.norm(np.ptp(fixed.model.mesh.nodes, axis=0)))
-    places = replace(places, excitation=askew(places.excitation, largest_displacement(static.response) / size, size))
+    places = replace(
+        places,
+        load_envelope=load_direction_envelope(places.load_envelope, largest_displacement(static.response) / size, size),
+    )
     columns, U, static = _candidates(fixed, places, limit)
     kept = static.omega_squared <= (2.0 * np.pi * limit) ** 2
     if settings.max_frequency < 0.0:
         kept |= displacement_alone(static) * _lag(static.omega_squared, limit) > tolerance
     combination, residual, error = needed_coordinates(static, kept, tolerance)
-    if places.excitation.closed and combination.shape[1]:
+    if places.load_envelope.closed and combination.shape[1]:
         # A loop locks whatever motion of an interface its bodies have no coordinate for, and with it all that is
         # coupled to that motion even slightly.
         giving = _giving_way(static, tolerance)
         combination, residual, _ = needed_coordinates(giving, kept, tolerance)
     omega_squared = np.einsum("ij,i,ij->j", combination, static.omega_squared, combination)
     basis = _basis(fixed, columns, omega_squared, U @ combination, int(residual.sum()))
-    return replace(basis, cut_error_m=error, excitation=places.excitation)
+    return replace(basis, cut_error_m=error, load_envelope=places.load_envelope)
 
 
 def _giving_way(static: StaticModel, tolerance: float) -> StaticModel:
@@ -186,7 +189,7 @@ def _lag(omega_squared: Array, limit: float) -> Array:
     """How much modes move beyond following a load of at most a frequency [Hz], as a share of following it.
 
     A mode above the limit answers 1 / (1 - r^2) times as far as at rest, r the ratio of the frequencies. Where
-    nothing is known of the excitation all of a mode's motion counts as its own.
+    nothing is known of the load_envelope all of a mode's motion counts as its own.
     """
     if limit <= 0.0:
         return np.ones_like(omega_squared)
@@ -205,7 +208,7 @@ def _with_error(basis: Basis, places: _Places, limit: float) -> Basis:
 def _candidates(fixed: FixedInterface, places: _Places, limit: float) -> tuple[Array, Array, StaticModel]:
     """Columns, their combinations, and the static behaviour of more modes than are needed up to a frequency [Hz];
     with all residual vectors, so that static responses are those of the full model."""
-    columns = fixed.all_needed(limit, peak_loads(places.excitation)[:ACCELERATIONS])
+    columns = fixed.all_needed(limit, peak_loads(places.load_envelope)[:ACCELERATIONS])
     omega_squared, U = ritz_modes(fixed.model, columns)
     motion = U[: 6 * len(fixed.patches)].reshape(len(fixed.patches), 6, U.shape[1])
     return columns, U, places.static_model(omega_squared, columns @ U, motion)

@@ -15,7 +15,7 @@ from calmotion.reduction.basis.craig_bampton import Basis
 from calmotion.reduction.basis.modal_derivatives import Support
 from calmotion.reduction.elements.assembly import FEModel
 from calmotion.reduction.elements.elastic_forms import GradientRule, gradient_gram
-from calmotion.reduction.load_envelope import Excitation
+from calmotion.reduction.load_envelope import LoadEnvelope
 from calmotion.reduction.material_laws.choice import amplitudes
 from calmotion.shot.character import Array
 
@@ -26,7 +26,7 @@ _FLAT = 1e-12  # of the largest
 
 
 @dataclass(frozen=True, eq=False)
-class SeenDirections:
+class QuadraticStrainSubspace:
     """Directions whose pairs do for a body's quadratic strain.
 
     Attributes:
@@ -40,10 +40,10 @@ class SeenDirections:
     error_m: float
 
 
-def seen_directions(
-    model: FEModel, support: Support, basis: Basis, linear: Basis, excitation: Excitation, youngs_modulus: float,
+def quadratic_strain_subspace(
+    model: FEModel, support: Support, basis: Basis, linear: Basis, load_envelope: LoadEnvelope, youngs_modulus: float,
     tolerance: float,
-) -> SeenDirections | None:  # fmt: skip
+) -> QuadraticStrainSubspace | None:  # fmt: skip
     """Directions for the loads of a shot.
 
     They bend the linear modes by a_i, and these bring along their derivatives, theta_ij a_i a_j: principal directions
@@ -54,7 +54,7 @@ def seen_directions(
         model, support: Full model and what holds it.
         basis: Extended by modal derivatives, r modes.
         linear: The basis before.
-        excitation: Loads of the shot.
+        load_envelope: Loads of the shot.
         youngs_modulus: [Pa].
         tolerance: Error that does not matter [m].
 
@@ -63,7 +63,7 @@ def seen_directions(
     """
     assert basis.first_order is not None and basis.second_order is not None
     r, pairs = basis.second_order.shape
-    bend = amplitudes(model, linear, excitation, len(linear.omega_squared))
+    bend = amplitudes(model, linear, load_envelope, len(linear.omega_squared))
     first, second = np.triu_indices(int(np.sqrt(2 * pairs)))
     straight, brought = basis.first_order * bend, basis.second_order * bend[first] * bend[second]
     L = np.linalg.cholesky(gradient_gram(GradientRule(model.mesh, 2), basis.modes))
@@ -72,14 +72,14 @@ def seen_directions(
     directions, size, _ = np.linalg.svd(motion - turns @ (turns.T @ motion), full_matrices=False)
     missing = np.sqrt(np.cumsum(size[::-1] ** 2)[::-1])  # without the direction and those after it
     turn = float(np.linalg.norm(L.T @ straight)) / np.sqrt(model.mesh.volume)
-    softness = float(np.linalg.norm(_farthest(linear, excitation) / np.sqrt(linear.omega_squared)))
+    softness = float(np.linalg.norm(_farthest(linear, load_envelope) / np.sqrt(linear.omega_squared)))
     error = softness * np.sqrt(youngs_modulus) * turn * missing
     estimated = np.append(error / _BOUND, 0.0)
     count = int(np.count_nonzero(estimated > _SHARE * tolerance))
     if count + turns.shape[1] >= r:
         return None
     kept = np.hstack([turns, directions[:, :count]])
-    return SeenDirections(np.linalg.solve(L.T, kept), kept.T @ L.T, float(estimated[count]))
+    return QuadraticStrainSubspace(np.linalg.solve(L.T, kept), kept.T @ L.T, float(estimated[count]))
 
 
 def _patch_rows(model: FEModel, support: Support, basis: Basis, straight: Array, tolerance: float) -> Array:
@@ -100,9 +100,9 @@ def _patch_rows(model: FEModel, support: Support, basis: Basis, straight: Array,
     return np.vstack(rows)
 
 
-def _farthest(basis: Basis, excitation: Excitation) -> Array:
+def _farthest(basis: Basis, load_envelope: LoadEnvelope) -> Array:
     """How far each mode moves an interface, or a target beyond it by its turn, shape [c]."""
     if not len(basis.patch_motion):
         return np.asarray(np.linalg.norm(basis.modes, axis=1).max(axis=0))
     moved, turned = (np.linalg.norm(part, axis=1) for part in np.split(basis.patch_motion, 2, axis=1))
-    return np.asarray((moved + excitation.lever[:, None] * turned).max(axis=0))
+    return np.asarray((moved + load_envelope.lever[:, None] * turned).max(axis=0))

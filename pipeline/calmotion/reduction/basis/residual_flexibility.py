@@ -1,6 +1,6 @@
 """What the modes that are left out would still do under slow loads, kept in a few vectors (static correction).
 
-A mode far above the excitation follows its load without delay. All such modes together follow as the static response
+A mode far above the load_envelope follows its load without delay. All such modes together follow as the static response
 does less the part of the modes that are kept; one vector for each load holds it exactly, however many modes it stands
 for.
 

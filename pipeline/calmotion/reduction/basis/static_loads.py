@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from calmotion.reduction.load_envelope import Excitation
+from calmotion.reduction.load_envelope import LoadEnvelope
 from calmotion.shot.character import Array
 
 ACCELERATIONS = 12  # leading entries of `peak_loads`, before those of wrenches
@@ -36,10 +36,10 @@ def unit_accelerations(nodes: Array) -> Array:
     return fields
 
 
-def peak_loads(excitation: Excitation) -> Array:
+def peak_loads(load_envelope: LoadEnvelope) -> Array:
     """Peaks of the twelve unit accelerations, then of the six wrench components of each patch, shape [12 + 6 p]."""
-    omega = np.abs(excitation.angular_velocity)
+    omega = np.abs(load_envelope.angular_velocity)
     products = [omega[i] * omega[j] for i, j in _PAIRS]
-    wrenches = np.hstack([excitation.force, excitation.moment]).ravel()
-    accelerations = np.concatenate([excitation.acceleration, excitation.angular_acceleration, products])
+    wrenches = np.hstack([load_envelope.force, load_envelope.moment]).ravel()
+    accelerations = np.concatenate([load_envelope.acceleration, load_envelope.angular_acceleration, products])
     return np.abs(np.concatenate([accelerations, wrenches]))

@@ -113,7 +113,7 @@ def strain_gram(rule: GradientRule, modes: Array, lame: float, mu: float, direct
         rule: Of order 4, which integrates the products of two quadratic strains exactly.
         modes: Nodal displacements, shape [n, 3, r].
         lame, mu: Lame's constants [Pa].
-        directions: Those whose pairs are made instead of all modes', in coordinates, shape [r, p] (`seen_directions`).
+        directions: Those whose pairs are made instead of all modes', in coordinates, shape [r, p].
 
     Returns:
         A, symmetric, shape [r + p (p + 1) / 2] squared; pairs ordered (0, 0), (0, 1), ..., (1, 1), ...

@@ -22,7 +22,7 @@ from calmotion.reduction.basis.craig_bampton import Basis
 from calmotion.reduction.basis.modal_derivatives import Support, modal_derivatives
 from calmotion.reduction.basis.static_loads import OVERSHOOT
 from calmotion.reduction.elements.assembly import FEModel
-from calmotion.reduction.load_envelope import Excitation
+from calmotion.reduction.load_envelope import LoadEnvelope
 from calmotion.shot.character import Array, ElasticMaterial
 
 _MODES = 4  # the lowest carry nearly all of a deflection
@@ -46,14 +46,14 @@ class LawChoice:
 
 
 def choose_law(
-    model: FEModel, support: Support, basis: Basis, material: ElasticMaterial, excitation: Excitation,
+    model: FEModel, support: Support, basis: Basis, material: ElasticMaterial, load_envelope: LoadEnvelope,
     tolerance: float, path: str = "",
 ) -> LawChoice:  # fmt: skip
     """The cheapest law whose estimated error is within the tolerance [m].
 
     Args:
         model, support, basis, material: The body; see `modal_derivatives`.
-        excitation: Its loads in this shot.
+        load_envelope: Its loads in this shot.
         tolerance: [m].
         path: Prim path of the body, for errors.
 
@@ -67,15 +67,15 @@ def choose_law(
     fields, motion = second_order.fields, second_order.motion
     modes = basis.modes[:, :, :count]
     omega_squared = basis.omega_squared[:count]
-    bend = amplitudes(model, basis, excitation, count)
+    bend = amplitudes(model, basis, load_envelope, count)
     first, second = np.triu_indices(count)
     twice = np.where(first == second, 1.0, 2.0)
     pairs = twice * bend[first] * bend[second]
     deflection = _reach(modes, basis.patch_motion[:, :, :count], bend)
-    moved = _reach(modes, basis.patch_motion[:, :, :count], bend, excitation.lever)
-    shortening = 0.5 * _reach(fields, motion, pairs, excitation.lever)
+    moved = _reach(modes, basis.patch_motion[:, :, :count], bend, load_envelope.lever)
+    shortening = 0.5 * _reach(fields, motion, pairs, load_envelope.lever)
     change = np.zeros((count, count))
-    change[first, second] = change[second, first] = work_of_loads(model, fields, motion, excitation)
+    change[first, second] = change[second, first] = work_of_loads(model, fields, motion, load_envelope)
     root = np.sqrt(omega_squared)
     softening = float(np.linalg.norm(change / np.outer(root, root), 2))
     size = float(np.ptp(model.mesh.nodes, axis=0).max())
@@ -100,20 +100,20 @@ def choose_law(
     return LawChoice("neohookean", f"{because}; it is strained by {strain:.0%}", 0.0)
 
 
-def amplitudes(model: FEModel, basis: Basis, excitation: Excitation, count: int) -> Array:
+def amplitudes(model: FEModel, basis: Basis, load_envelope: LoadEnvelope, count: int) -> Array:
     """How far the loads deflect the first modes at most, each by itself, shape [count]."""
-    work = work_of_loads(model, basis.modes[:, :, :count], basis.patch_motion[:, :, :count], excitation)
+    work = work_of_loads(model, basis.modes[:, :, :count], basis.patch_motion[:, :, :count], load_envelope)
     return OVERSHOOT * work / basis.omega_squared[:count]
 
 
-def deflection_of(model: FEModel, basis: Basis, excitation: Excitation) -> float:
+def deflection_of(model: FEModel, basis: Basis, load_envelope: LoadEnvelope) -> float:
     """How far the loads of a linear body move its interfaces, or targets beyond them, at most [m]."""
     count = min(_MODES, len(basis.omega_squared))
-    bend = amplitudes(model, basis, excitation, count)
-    return _reach(basis.modes[:, :, :count], basis.patch_motion[:, :, :count], bend, excitation.lever)
+    bend = amplitudes(model, basis, load_envelope, count)
+    return _reach(basis.modes[:, :, :count], basis.patch_motion[:, :, :count], bend, load_envelope.lever)
 
 
-def work_of_loads(model: FEModel, fields: Array, motion: Array, excitation: Excitation) -> Array:
+def work_of_loads(model: FEModel, fields: Array, motion: Array, load_envelope: LoadEnvelope) -> Array:
     """Most work that the loads do on displacement fields, shape [k], however they fall together.
 
     Args:
@@ -125,15 +125,15 @@ def work_of_loads(model: FEModel, fields: Array, motion: Array, excitation: Exci
     straight = np.abs(weighted.sum(axis=0))  # [3, k]
     moments = np.einsum("na,nbk->abk", X, weighted)  # int rho X_a phi_b
     turning = np.abs([moments[1, 2] - moments[2, 1], moments[2, 0] - moments[0, 2], moments[0, 1] - moments[1, 0]])
-    w = excitation.angular_velocity
+    w = load_envelope.angular_velocity
     # |omega x (omega x X)| . phi, term by term
     centrifugal = np.zeros(fields.shape[2])
     for a in range(3):
         for b in range(3):
             size = w[a] * w[b] if a != b else float(w @ w - w[a] * w[a])
             centrifugal += size * np.abs(moments[a, b])
-    work = excitation.acceleration @ straight + excitation.angular_acceleration @ turning + centrifugal
-    for force, moment, patch in zip(excitation.force, excitation.moment, np.abs(motion), strict=True):
+    work = load_envelope.acceleration @ straight + load_envelope.angular_acceleration @ turning + centrifugal
+    for force, moment, patch in zip(load_envelope.force, load_envelope.moment, np.abs(motion), strict=True):
         work += force @ patch[:3] + moment @ patch[3:]
     return work
 

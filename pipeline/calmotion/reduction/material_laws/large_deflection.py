@@ -9,11 +9,11 @@ import numpy as np
 
 from calmotion.reduction.basis.craig_bampton import Basis
 from calmotion.reduction.basis.modal_derivatives import NEGLIGIBLE, Support, extended_basis
-from calmotion.reduction.basis.quadratic_strain_subspace import SeenDirections, seen_directions
+from calmotion.reduction.basis.quadratic_strain_subspace import QuadraticStrainSubspace, quadratic_strain_subspace
 from calmotion.reduction.elements.assembly import FEModel
 from calmotion.reduction.elements.elastic_forms import GradientRule, lame_constants, strain_gram
 from calmotion.reduction.interfaces.patch_rotation import spring_rows, springs
-from calmotion.reduction.load_envelope import Excitation
+from calmotion.reduction.load_envelope import LoadEnvelope
 from calmotion.reduction.material_laws.choice import work_of_loads
 from calmotion.reduction.reduced_body import Elasticity
 from calmotion.shot.character import DEFAULT_TOLERANCE, ElasticMaterial
@@ -25,7 +25,7 @@ _FINEST = 1e-6  # below, what is missing is rounding
 
 def large_deflection(
     model: FEModel, support: Support, basis: Basis, material: ElasticMaterial, law: str,
-    excitation: Excitation | None = None, tolerance: float = DEFAULT_TOLERANCE, pairs_share: float = 1.0,
+    load_envelope: LoadEnvelope | None = None, tolerance: float = DEFAULT_TOLERANCE, pairs_share: float = 1.0,
 ) -> tuple[Basis, Elasticity]:  # fmt: skip
     """A body's basis with modal derivatives, and its elastic law in it.
 
@@ -35,25 +35,25 @@ def large_deflection(
         basis: Its linear modes.
         material: Elastic constants.
         law: `stvk` or `neohookean`.
-        excitation: Its loads in this shot, by moving patch; None when they are not known.
+        load_envelope: Its loads in this shot, by moving patch; None when they are not known.
         tolerance: Error that does not matter [m].
         pairs_share: How much of it quadratic strains may take that are left out; 0 leaves none out.
 
     Returns:
         The extended basis, and the law without damping.
     """
-    if excitation is not None:
-        basis = _by_deflection(model, basis, basis.excitation or excitation)
+    if load_envelope is not None:
+        basis = _by_deflection(model, basis, basis.load_envelope or load_envelope)
     size = float(np.ptp(model.mesh.nodes, axis=0).max())
     negligible = float(np.clip(np.sqrt(_LEFT * tolerance / size), _FINEST, NEGLIGIBLE))
     extended = extended_basis(model, support, basis, PAIRED_MODES, material, law, negligible)
     lame = lame_constants(material.youngs_modulus, material.poissons_ratio)
     if law == "stvk":
         law_of = partial(_stvk, model, support, extended, material)
-        if excitation is None or pairs_share <= 0.0:
+        if load_envelope is None or pairs_share <= 0.0:
             return extended, law_of(None)
-        loads, allowed = basis.excitation or excitation, pairs_share * tolerance
-        seen = seen_directions(model, support, extended, basis, loads, material.youngs_modulus, allowed)
+        loads, allowed = basis.load_envelope or load_envelope, pairs_share * tolerance
+        seen = quadratic_strain_subspace(model, support, extended, basis, loads, material.youngs_modulus, allowed)
         return extended, law_of(seen)
     from calmotion.reduction.material_laws.cubature import neohookean_cubature
 
@@ -62,7 +62,7 @@ def large_deflection(
 
 
 def _stvk(
-    model: FEModel, support: Support, basis: Basis, material: ElasticMaterial, seen: SeenDirections | None
+    model: FEModel, support: Support, basis: Basis, material: ElasticMaterial, seen: QuadraticStrainSubspace | None
 ) -> Elasticity:
     """The law of a basis, with the springs of its patches; its quadratic strain sees some directions, or all."""
     lame = lame_constants(material.youngs_modulus, material.poissons_ratio)
@@ -76,14 +76,14 @@ def _stvk(
     return law if seen is None else replace(law, seen=seen.part, unseen_m=seen.error_m)
 
 
-def _by_deflection(model: FEModel, basis: Basis, excitation: Excitation) -> Basis:
+def _by_deflection(model: FEModel, basis: Basis, load_envelope: LoadEnvelope) -> Basis:
     """The basis in the order of how far the shot's loads deflect its modes.
 
     By frequency, the vectors that stand for the static response to a load come last, though a link may bend in them
     as far as in the first; without its derivatives a mode stretches the link as it bends, and hardly takes part.
     """
     reach = np.abs(basis.modes).max(axis=(0, 1))
-    deflection = reach * work_of_loads(model, basis.modes, basis.patch_motion, excitation) / basis.omega_squared
+    deflection = reach * work_of_loads(model, basis.modes, basis.patch_motion, load_envelope) / basis.omega_squared
     order = np.argsort(-deflection, kind="stable")
     return replace(
         basis,

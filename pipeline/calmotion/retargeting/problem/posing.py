@@ -13,7 +13,7 @@ from calmotion.shot import Animation
 from calmotion.shot.character import Array, BoolArray, IntArray
 from calmotion.simulation.inputs.curves import Curves, sample_tracks
 from calmotion.simulation.inputs.gearing import coupling_of, leaders
-from calmotion.simulation.intended_motion import MeantMotion
+from calmotion.simulation.intended_motion import IntendedMotion
 from calmotion.simulation.motor_limits import motor_bounds
 from calmotion.simulation.prepare import Options, Prepared
 from calmotion.simulation.target_errors import Objective
@@ -23,7 +23,7 @@ CLOSENESS = 1e-4  # an offset of 0.1 rad weighs as much as an error of 1 mm [m^2
 
 
 def pose(
-    prepared: Prepared, animation: Animation, curves: Curves, meant: MeantMotion, options: Options
+    prepared: Prepared, animation: Animation, curves: Curves, meant: IntendedMotion, options: Options
 ) -> tuple[RetargetProblem, Array, bool]:
     """The problem that a shot poses, where its search begins, and whether its knots are to follow the motion.
 

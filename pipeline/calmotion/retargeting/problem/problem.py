@@ -217,7 +217,7 @@ class RetargetProblem:
         """Gradient of the merit where it was linearised; the limits may have changed since."""
         if self._continuous:
             return self.continuous_gradient()
-        return self.pull_back(self._residuals, self._limit_pulls()) + self.bend(self._x)
+        return self.vjp(self._residuals, self._limit_pulls()) + self.bend(self._x)
 
     def continuous_gradient(self) -> Array:
         """The same by the continuous adjoint, with a linearisation of its own; limits of effort are beyond it."""
@@ -230,8 +230,8 @@ class RetargetProblem:
         limits = self._acting
         return {} if limits is None else {name: limits.gradient(name, v) for name, v in self.limited.items()}
 
-    def pull_back(self, residuals: Array, limited: dict[str, Array]) -> Array:
-        """The transpose of `push_forward`: weighted residuals and limited quantities to the unknowns."""
+    def vjp(self, residuals: Array, limited: dict[str, Array]) -> Array:
+        """The transpose of `jvp`: weighted residuals and limited quantities to the unknowns."""
         pulls = self._simulator.adjoint(self.objective.scatter(self._jacobian, residuals), limited.get("effort"))
         return self._to_unknowns(*pulls, limited)
 
@@ -243,7 +243,7 @@ class RetargetProblem:
                 pulled += self._gather(spline, limited[name])
         return pulled
 
-    def push_forward(self, direction: Array) -> tuple[Array, dict[str, Array]]:
+    def jvp(self, direction: Array) -> tuple[Array, dict[str, Array]]:
         """Change of the weighted residuals along a direction, shape [T, K, 6], and of the limited quantities."""
         bounds = {} if self._acting is None else self._acting.bounds
         motion, effort = self._simulator.tangent(*self.offsets(direction), "effort" in bounds)
@@ -254,10 +254,10 @@ class RetargetProblem:
 
     def product(self, direction: Array) -> Array:
         """Gauss-Newton matrix times a direction: one tangent and one adjoint sweep."""
-        residuals, changes = self.push_forward(direction)
+        residuals, changes = self.jvp(direction)
         if self.limits is not None:
             changes = {name: self.limits.curvature(name, self.limited[name]) * v for name, v in changes.items()}
-        return self.pull_back(residuals, changes) + self.bend(direction)
+        return self.vjp(residuals, changes) + self.bend(direction)
 
     def model_objective(self, point: ModelPoint) -> float:
         """The objective in the model about the point that was linearised."""
@@ -273,7 +273,7 @@ class RetargetProblem:
         """Its gradient."""
         assert self.limits is not None
         pulls = {name: self.limits.gradient(name, v) for name, v in point.values.items()}
-        return self.pull_back(point.residuals, pulls) + self.bend(self._x + point.step)
+        return self.vjp(point.residuals, pulls) + self.bend(self._x + point.step)
 
     def model_slope(self, point: ModelPoint, way: ModelPoint) -> float:
         """Its slope along a direction."""

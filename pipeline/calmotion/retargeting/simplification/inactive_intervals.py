@@ -24,7 +24,7 @@ from calmotion.retargeting.problem.offset_basis import OffsetBasis, basis_on
 from calmotion.retargeting.problem.problem import RetargetProblem
 from calmotion.retargeting.simplification.pruning import UNCHANGED
 from calmotion.retargeting.solver.gauss_newton import Search
-from calmotion.shot import LeftOut
+from calmotion.shot import Simplification
 from calmotion.shot.character import Array, BoolArray
 from calmotion.simulation.inputs.time_grid import TimeGrid
 
@@ -35,7 +35,7 @@ FixedOn = Callable[[OffsetBasis], BoolArray]
 
 
 @dataclass(frozen=True)
-class QuietRange:
+class InactiveInterval:
     """A range of a shot in which no motor is to change.
 
     Attributes:
@@ -49,9 +49,9 @@ class QuietRange:
     gain: float
 
 
-def quiet_ranges(
+def inactive_intervals(
     problem: RetargetProblem, start: Array, frequency: float, tolerance: float, ranges: str = "auto"
-) -> tuple[QuietRange, ...]:
+) -> tuple[InactiveInterval, ...]:
     """The ranges that a search may leave out; none in a shot that loops, or that is quiet throughout.
 
     Args:
@@ -79,7 +79,7 @@ def quiet_ranges(
         return ()
     value = problem.objective_value()
     return tuple(
-        QuietRange(a, b, problem.gain(float(promised[_acting(basis, a, b)].sum()), value))
+        InactiveInterval(a, b, problem.gain(float(promised[_acting(basis, a, b)].sum()), value))
         for a, b in _gaps(intervals, grid.end)
         if b - a >= SHORTEST
     )
@@ -110,7 +110,7 @@ def _acting(basis: OffsetBasis, start: float, stop: float) -> BoolArray:
     return (first < stop) & (last > start)
 
 
-def left_out_on(basis: OffsetBasis, ranges: Sequence[QuietRange], motors: int) -> BoolArray:
+def left_out_on(basis: OffsetBasis, ranges: Sequence[InactiveInterval], motors: int) -> BoolArray:
     """Coefficients that would change a motor's curve in any of the ranges, shape [P * m]."""
     found = np.zeros(basis.count, bool)
     for item in ranges:
@@ -138,8 +138,8 @@ def first_change(grid: TimeGrid, basis: OffsetBasis, fixed_on: FixedOn) -> int:
 
 
 def with_gains(
-    problem: RetargetProblem, search: Search, ranges: Sequence[QuietRange], locked_on: FixedOn
-) -> tuple[tuple[QuietRange, ...], Search]:
+    problem: RetargetProblem, search: Search, ranges: Sequence[InactiveInterval], locked_on: FixedOn
+) -> tuple[tuple[InactiveInterval, ...], Search]:
     """The ranges with what changes in them would gain after a search, by one step of the linearised robot; the search
     counts the work. Leaves the problem with nothing held but what is locked.
 
@@ -164,10 +164,10 @@ def with_gains(
     return tuple(found), counted
 
 
-def quiet_rows(ranges: Sequence[QuietRange]) -> list[LeftOut]:
+def quiet_rows(ranges: Sequence[InactiveInterval]) -> list[Simplification]:
     """What the user is told of them."""
     return [
-        LeftOut(
+        Simplification(
             f"changes of the motion from {_seconds(math.ceil(100 * item.start))} to {_seconds(int(100 * item.stop))}",
             "they would gain next to nothing there",
             item.gain,

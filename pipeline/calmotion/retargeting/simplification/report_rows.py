@@ -8,8 +8,8 @@ import numpy as np
 
 from calmotion.retargeting.problem.problem import RetargetProblem
 from calmotion.retargeting.simplification.idle_motors import idle_motors
-from calmotion.retargeting.simplification.inactive_intervals import QuietRange, quiet_rows
-from calmotion.shot import Character, LeftOut, MotorCurve
+from calmotion.retargeting.simplification.inactive_intervals import InactiveInterval, quiet_rows
+from calmotion.shot import Character, MotorCurve, Simplification
 from calmotion.simulation.settings import Options
 
 FINER = 0.01  # of the tolerance: what finer knots must promise
@@ -17,9 +17,9 @@ PRUNED = 0.02  # of the tolerance: what offsets that are dropped may cost togeth
 
 
 def search_rows(
-    problem: RetargetProblem, character: Character, curves: Sequence[MotorCurve], quiet: Sequence[QuietRange],
+    problem: RetargetProblem, character: Character, curves: Sequence[MotorCurve], quiet: Sequence[InactiveInterval],
     options: Options, idle_gain_m: float | None,
-) -> list[LeftOut]:  # fmt: skip
+) -> list[Simplification]:  # fmt: skip
     """The rows of a search that ended.
 
     Args:
@@ -33,11 +33,13 @@ def search_rows(
     idle = idle_motors(character)
     rows = [*quiet_rows(quiet), _knots_row(problem, character, options)]
     rows += [
-        LeftOut("optimisation of " + character.motors[k].path, "it moves no target; this is what it could help", gain)
+        Simplification(
+            "optimisation of " + character.motors[k].path, "it moves no target; this is what it could help", gain
+        )
         for k, gain in zip(idle, [idle_gain_m, *[None] * len(idle)], strict=False)
     ]
     rows += [
-        LeftOut(
+        Simplification(
             "changes of " + character.motors[curve.motor].path,
             f"they would gain less than {PRUNED:.0%} of the tolerance",
             PRUNED * tolerance,
@@ -48,13 +50,13 @@ def search_rows(
     return rows
 
 
-def _knots_row(problem: RetargetProblem, character: Character, options: Options) -> LeftOut:
+def _knots_row(problem: RetargetProblem, character: Character, options: Options) -> Simplification:
     """Why knots are no closer than they are."""
     closest = float(np.diff(problem.basis.knots).min())
     what = f"knots closer than {1e3 * closest:.3g} ms"
     if options.knot_spacing:
-        return LeftOut(what, "retarget.optimize.knot_spacing says so")
+        return Simplification(what, "retarget.optimize.knot_spacing says so")
     if character.retarget.knot_spacing:
-        return LeftOut(what, "calm:retarget:knotSpacing says so")
+        return Simplification(what, "calm:retarget:knotSpacing says so")
     tolerance = character.retarget.allowed(options.tolerance)
-    return LeftOut(what, f"finer ones promise less than {FINER:.0%} of the tolerance", FINER * tolerance)
+    return Simplification(what, f"finer ones promise less than {FINER:.0%} of the tolerance", FINER * tolerance)

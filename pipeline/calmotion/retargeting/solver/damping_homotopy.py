@@ -20,7 +20,7 @@ GAIN = 1e-3  # that ends a stage, over the error at its start
 STEPS = 5  # of a stage at most
 
 
-def approach(problem: RetargetProblem, start: Array, fixed: BoolArray, frequency: float) -> Search:
+def damping_homotopy(problem: RetargetProblem, start: Array, fixed: BoolArray, frequency: float) -> Search:
     """A search that begins at the given point, or near the optimum where that is far.
 
     Args:

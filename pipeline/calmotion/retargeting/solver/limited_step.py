@@ -109,10 +109,10 @@ def _newton_direction(
     carried: list[tuple[Array, Values]] = []
 
     def product(d: Array) -> Array:
-        residuals, values = problem.push_forward(d)
+        residuals, values = problem.jvp(d)
         carried.append((residuals, values))
         weighted = {name: weights[name] * v for name, v in values.items()}
-        return np.where(fixed, 0.0, problem.pull_back(residuals, weighted) + problem.bend(d))
+        return np.where(fixed, 0.0, problem.vjp(residuals, weighted) + problem.bend(d))
 
     inverse = problem.precondition(fixed, here.values)
     path = conjugate_gradients(product, gradient, inverse, np.inf, share, enough, max_products)
