@@ -10,8 +10,8 @@ class Options:
     """What the user overrides; None keeps the shot's own or the automatic choice. Lengths [m], times [s].
 
     `adjoint` is discrete or continuous; `ranges` is auto, on (the whole shot is searched) or off (see
-    `inactive_intervals`: without looking back); `motors` likewise (see `idle_motors`); `directions` likewise (on: bodies
-    keep all coordinates; off: the fewest that are tried, whatever the error; see `pod_subspace`).
+    `inactive_intervals`: without looking back); `motors` likewise (see `idle_motors`); `directions` likewise (on:
+    bodies keep all coordinates; off: the fewest that are tried, whatever the error; see `pod_subspace`).
     """
 
     tolerance: float | None = None
