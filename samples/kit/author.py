@@ -98,7 +98,7 @@ def create(prim: Usd.Prim, name: str, value: float) -> None:
 def author_part(stage: Usd.Stage, path: str, part: Part, looks: Mapping[str, Look], scope: str) -> UsdGeom.Mesh:
     """A mesh with its display color and its look."""
     mesh = UsdGeom.Mesh.Define(stage, path)
-    points = np.round(part.shape.points * per_metre(stage), DIGITS).astype(np.float32)
+    points = (np.round(part.shape.points * per_metre(stage), DIGITS) + 0.0).astype(np.float32)
     mesh.CreatePointsAttr(Vt.Vec3fArray.FromNumpy(points))
     mesh.CreateFaceVertexCountsAttr([len(face) for face in part.shape.faces])
     mesh.CreateFaceVertexIndicesAttr([index for face in part.shape.faces for index in face])
@@ -132,7 +132,7 @@ def author_body(
         mass, center, inertia = mass_properties(body)
         api = UsdPhysics.MassAPI.Apply(prim)
         api.CreateMassAttr(mass)
-        api.CreateCenterOfMassAttr(Gf.Vec3f(*np.round(center * scale, DIGITS).tolist()))
+        api.CreateCenterOfMassAttr(Gf.Vec3f(*(np.round(center * scale, DIGITS) + 0.0).tolist()))
         api.CreateDiagonalInertiaAttr(Gf.Vec3f(*(float(f"{value * scale**2:.4g}") for value in inertia)))
         api.CreatePrincipalAxesAttr(Gf.Quatf(1.0))  # USD's validators want both or neither
     for target in body.targets:

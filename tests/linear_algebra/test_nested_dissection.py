@@ -99,3 +99,13 @@ def test_fill_is_far_less_than_without_and_close_to_that_of_minimum_degree(with_
     ).L.nnz
     assert fill(graph, cut) < 0.8 * plain
     assert fill(graph, cut) < 1.5 * degree
+
+
+@pytest.mark.parametrize("counts", [(24, 24), (9, 9, 9)])
+def test_the_order_does_not_depend_on_rounding(counts):
+    """The principal axes of a square or a cube are any: the last digits of the points must not choose them."""
+    graph, points = grid_graph(*counts)
+    order = dissect(graph, points).order
+    for seed in range(3):
+        noise = 1e-14 * np.random.default_rng(seed).normal(size=points.shape)
+        assert np.array_equal(dissect(graph, points + noise).order, order)

@@ -42,6 +42,21 @@ def test_written_curves_simulated_again_give_the_reported_errors(result, arm, an
     assert np.abs(again.before.rotation_errors - result.after.rotation_errors).max() < 1e-8
 
 
+def test_the_largest_offset_is_that_of_the_shot_without_the_pre_roll(arm, animation, bodies):
+    """The shot starts in the middle of a move, and its pre-roll asks for the largest change."""
+    first = len(animation.frame_times) // 3
+    times = animation.frame_times[first:] - animation.frame_times[first]
+    tracks = tuple(Track(times, track.values[first:]) for track in animation.tracks)
+    moving = Animation(times, tracks, tracks)
+    result = optimize_shot(arm, moving, bodies, dataclasses.replace(OPTIONS, max_iterations=2), quiet)
+    assert result.pre_roll_s > 0.0 and result.performed is not None
+    motion = result.performed
+    for curve in result.curves:
+        frames = np.abs(curve.frame_values - tracks[curve.motor].values).max()
+        assert frames <= curve.max_offset * (1 + 1e-9) and curve.max_offset < 1.2 * frames
+    assert motion.times[0] < 0.0
+
+
 def test_optimising_the_result_again_finds_nothing_left(result, arm, animation, bodies):
     tracks = tuple(Track(animation.frame_times, curve.frame_values) for curve in result.curves)
     again = optimize_shot(arm, Animation(animation.frame_times, animation.tracks, tracks), bodies, OPTIONS, quiet)

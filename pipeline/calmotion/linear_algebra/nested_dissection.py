@@ -19,6 +19,7 @@ from calmotion.shot.character import Array
 _LEAF = 48  # nodes of a piece that is not worth cutting
 _LANDMARKS = 4
 _SMALLEST_SIDE = 0.3  # of the nodes; thinner cuts may lie anywhere else
+_EQUAL = 1e-9  # lengths of axes, over the longest, and heights, over the largest, that differ by less are equal
 _DENSE = 0.5  # a separator that holds this share of its piece is none
 
 
@@ -60,7 +61,7 @@ def dissect(graph: Any, points: Array | None = None) -> Dissection:
         nodes, part, where, above = stack.pop()
         if len(nodes) == 0:
             continue
-        cut = None if len(nodes) <= _LEAF else _cut(part, _places(part) if where is None else where)
+        cut = None if len(nodes) <= _LEAF else _cut(part, _levels(part) if where is None else _heights(where))
         if cut is None:
             pieces.append(nodes)
             parent.append(above)
@@ -82,40 +83,69 @@ def dissect(graph: Any, points: Array | None = None) -> Dissection:
     )
 
 
-def _places(graph: Any) -> Array:
-    """Distances to a few nodes that are far from each other, shape [n, landmarks]."""
+def _levels(graph: Any) -> Array:
+    """Distances in the graph to a few nodes that are far from each other, and their differences: the three that vary
+    most, shape [n, 3].
+
+    They are whole numbers, so that the cuts do not depend on rounding.
+    """
     from scipy.sparse.csgraph import dijkstra
 
     n = graph.shape[0]
-    place = np.zeros((n, _LANDMARKS))
+    distances = np.zeros((n, _LANDMARKS))
     landmark = int(dijkstra(graph, unweighted=True, indices=0, directed=False).argmax())
     nearest = np.full(n, np.inf)
     for k in range(_LANDMARKS):
         distance = dijkstra(graph, unweighted=True, indices=landmark, directed=False)
-        # parts that hang together with nothing else lie beyond everything
-        place[:, k] = np.where(np.isinf(distance), n, distance)
-        nearest = np.minimum(nearest, place[:, k])
+        # components that are not connected to the landmark lie beyond all others
+        distances[:, k] = np.where(np.isinf(distance), n, distance)
+        nearest = np.minimum(nearest, distances[:, k])
         landmark = int(nearest.argmax())
-    return place
+    first, second = np.triu_indices(_LANDMARKS, 1)
+    levels = np.concatenate([distances, distances[:, first] - distances[:, second]], axis=1)
+    spread = n * np.sum(levels**2, axis=0) - np.sum(levels, axis=0) ** 2
+    return levels[:, np.argsort(-spread, kind="stable")[:3]]
 
 
-def _cut(graph: Any, place: Array) -> tuple[Any, Any, Any] | None:
-    """Separator and both sides (indices) of a graph, by the best plane across one of its principal axes.
+def _heights(points: Array) -> Array:
+    """Coordinates of points along their principal axes, the longest first, shape [n, d].
 
-    A plane has the nodes of rank below c on its left. Those of them with a neighbour at c or beyond separate; how
+    Where axes are equally long any basis of their plane is principal; the one closest to the coordinate axes is taken.
+    Coordinates are rounded, so that points that rounding alone tells apart are at one height.
+    """
+    centered = points - points.mean(axis=0)
+    lengths, axes = np.linalg.eigh(centered.T @ centered)
+    group = np.cumsum(np.concatenate([[0], np.diff(lengths) > _EQUAL * max(lengths[-1], 1e-300)]))
+    for index in range(group[-1] + 1):
+        columns = np.flatnonzero(group == index)
+        span = axes[:, columns]
+        near = np.sort(np.argsort(-np.sum(span**2, axis=1).round(6), kind="stable")[: len(columns)])
+        axes[:, columns] = np.linalg.qr(span @ span[near].T)[0]
+    large = np.abs(axes) > 0.9 * np.max(np.abs(axes), axis=0)
+    axes = axes * np.sign(axes[np.argmax(large, axis=0), np.arange(axes.shape[1])])
+    heights = centered @ axes[:, ::-1]
+    unit = _EQUAL * max(float(np.max(np.abs(heights), initial=0.0)), 1e-300)
+    return np.asarray(np.round(heights / unit))
+
+
+def _cut(graph: Any, heights: Array) -> tuple[Any, Any, Any] | None:
+    """Separator and both sides (indices) of a graph, by the best level of one of several heights.
+
+    A cut at c has the nodes of rank below c on its left. Those of them with a neighbour at c or beyond separate; how
     many there are for every c at once is a running sum.
+
+    Args:
+        heights: Of the nodes along several directions, shape [n, directions].
     """
     n = graph.shape[0]
-    centered = place - place.mean(axis=0)
-    _, axes = np.linalg.eigh(centered.T @ centered)
     row = np.repeat(np.arange(n), np.diff(graph.indptr))
     low, high = max(1, int(_SMALLEST_SIDE * n)), min(n - 1, int((1.0 - _SMALLEST_SIDE) * n))
     balance = 1.0 + np.abs(np.arange(low, high + 1) / n - 0.5)
     best: tuple[float, Any, Any] | None = None
-    for axis in axes.T[::-1][:3]:
+    for height in heights.T[:3]:
         for sign in (1.0, -1.0):
             rank = np.empty(n, dtype=np.int64)
-            rank[np.argsort(sign * (centered @ axis), kind="stable")] = np.arange(n)
+            rank[np.argsort(sign * height, kind="stable")] = np.arange(n)
             reach = rank.copy()
             np.maximum.at(reach, row, rank[graph.indices])
             # a node of rank p that reaches to m separates for p < c <= m

@@ -55,10 +55,11 @@ def _curves(problem: RetargetProblem, motors: int, x: Array) -> tuple[tuple[Moto
     coefficients = x.reshape(basis.count, len(problem.motors)).copy()
     coefficients[:, np.max(np.abs(basis.values @ coefficients), axis=0) <= UNCHANGED] = 0.0
     by_motor = coefficients @ problem.coupling.T
-    largest = np.max(np.abs(basis.values @ by_motor), axis=0)
+    offsets = np.abs(basis.values @ by_motor)
+    changes, largest = np.any(offsets > 0.0, axis=0), np.max(offsets[grid.judged], axis=0)
     curves = []
     for motor in range(motors):
-        values, own, changed = problem.curves.angles[grid.frames, motor], by_motor[:, motor], bool(largest[motor] > 0.0)
+        values, own, changed = problem.curves.angles[grid.frames, motor], by_motor[:, motor], bool(changes[motor])
         if changed:
             values = values + basis.at_frames @ own
         knots = useful_knots(basis, own) if changed else basis.knots[[0, -1]]

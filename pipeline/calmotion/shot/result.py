@@ -94,7 +94,7 @@ class MotorCurve:
         changed: False when the offset is exactly zero; such a motor is not written.
         knots: Knots of the offset's cubic spline [s], shape [n]; frames of the shot.
         frame_values: The optimised curve at the shot's frames [rad or m], shape [f].
-        max_offset: Largest change [rad or m].
+        max_offset: Largest change during the shot, without the pre-roll [rad or m].
     """
 
     motor: int
