@@ -163,6 +163,10 @@ def _closed(piece: Part, path: str, repairs: list[str]) -> Part:
     if len(closure.areas) == 0:
         return Part(piece.points, triangles)
     area = surface_area(piece.points, triangles)
+    if area == 0.0:
+        raise ShotError(
+            "has only triangles without area", path=path, found=f"{len(triangles)} triangles", remedy=REMEDY
+        )
     closed = Part(closure.points, closure.triangles)
     # a single triangle that is missing can be told in one way only, however large it is
     doubtful = closure.areas[closure.sides > 3]

@@ -6,6 +6,7 @@ import dataclasses
 import sys
 from pathlib import Path
 
+import matplotlib.image
 import numpy as np
 import pytest
 import synthetic
@@ -17,7 +18,6 @@ from calmotion.testing import check_plugin, host_with, run_operator
 from calmotion.views.spectrum import error_spectrum
 from calmotion.views.viewpoint import choose_viewpoint
 
-matplotlib = pytest.importorskip("matplotlib")
 PLUGIN = Path(__file__).resolve().parents[2] / "plugins" / "figures"
 
 

@@ -20,8 +20,6 @@ from calmotion.views.playback import sample_motion, world_points
 from calmotion.views.spectrum import error_spectrum
 from recordings import read_recording
 
-pytest.importorskip("rerun")
-
 ROOT = Path(__file__).resolve().parents[2]
 PLUGIN = ROOT / "plugins" / "rerun_logger"
 

@@ -6,9 +6,6 @@ import pytest
 from sample_recordings import check_recording
 from test_samples import KINDS, path_of
 
-pytest.importorskip("rerun")
-
-
 # bodies and skeletons are animated in other tests, too
 LONG = dict.fromkeys(("dancer", "drummer", "boxer"), pytest.mark.long)
 

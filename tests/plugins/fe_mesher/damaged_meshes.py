@@ -128,6 +128,11 @@ def zero_area_triangles():
     return points, np.vstack([triangles, [[n, n + 1, n + 2], [n, n + 3, n + 4]]])
 
 
+def only_zero_area():
+    """Two triangles on one line."""
+    return np.outer([0.0, 0.1, 0.3, 0.7], [1.0, 0.0, 0.0]), np.array([[0, 1, 2], [1, 2, 3]])
+
+
 def slivers():
     """A box whose sides are cut into strips a thousand times as long as wide."""
     points, triangles = box()
@@ -302,6 +307,7 @@ CORPUS: dict[str, Damaged] = {
     "an infinite point in a face": Damaged(bad_point(np.inf, True), None, "not finite"),
     "a NaN point in no face": Damaged(bad_point(np.nan, False), CAPSULE, "not finite"),
     "zero-area triangles": Damaged(zero_area_triangles, CAPSULE, "dropped"),
+    "only zero-area triangles": Damaged(only_zero_area, None, "without area"),
     "slivers 1:1000": Damaged(slivers, BOX),
     "T-junctions": Damaged(t_junctions, BOX, "", 1e-6),
     "a partition inside": Damaged(partition, BOX, "sheets"),

@@ -43,7 +43,6 @@ def solid(package, *surfaces):
 
 def links_of(shared_data, *names):
     """Surfaces of links of a real robot, in their body frames, as the reader gives them."""
-    pytest.importorskip("pxr")
     from calmotion.usd import schemas
 
     schemas.register()  # before USD is used, as it reads schemas once in a process

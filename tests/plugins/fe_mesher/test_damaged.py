@@ -22,6 +22,7 @@ def test_the_corpus_is_as_large_as_promised():
     assert sum(case.volume is None for case in CORPUS.values()) >= 8
 
 
+@pytest.mark.filterwarnings("error::RuntimeWarning")
 @pytest.mark.parametrize("name", CORPUS)
 def test_a_damaged_mesh_is_repaired_or_refused(closed_solid, name):
     case = CORPUS[name]

@@ -129,7 +129,6 @@ def test_links_in_several_colours_and_with_gaps_of_a_tenth_of_a_millimetre_are_c
     package, shared_data, name, volume
 ):
     """KUKA iiwa: orange and grey are open meshes of their own; the flange misses the link by 0.1 mm."""
-    pytest.importorskip("pxr")
     from calmotion.benchmarks.scenes.links import read_links
 
     file = shared_data / "converted" / "kuka_iiwa_14" / "iiwa14.usda"
