@@ -5,6 +5,8 @@ import pytest
 from calmotion.benchmarks.scenes.beam_arm import beam_arm, shot_of
 from calmotion.benchmarks.scenes.linkage_arm import linkage_arm, performance
 from calmotion.multibody.analysis.motor_response import motor_responses
+from calmotion.multibody.analysis.rigid_response import RigidResponse
+from calmotion.multibody.failure import SimulationFailure
 from calmotion.multibody.kernels.markers import WORLD_MARKER
 from calmotion.multibody.model.model import rigid_model
 from calmotion.multibody.model.topology import span_tree
@@ -35,8 +37,9 @@ def case(request):
 def response(rigid, angles, h):
     motion = rigid_motion(rigid, angles, np.zeros_like(angles), h)
     world = np.zeros((len(angles), 0, WORLD_MARKER))
+    times = h * np.arange(len(angles))
     motors = np.arange(angles.shape[1], dtype=np.int32)
-    return motion, motor_responses(rigid, motion.c, motion.q, rigid.joint_angles(angles), motors, world)
+    return motion, motor_responses(rigid, motion.c, motion.q, rigid.joint_angles(angles), motors, world, times)
 
 
 def test_motions_are_the_derivatives_of_the_poses(case):
@@ -65,3 +68,16 @@ def test_efforts_of_unit_accelerations_are_the_mass_matrix(case):
         expected += np.einsum("nia,ij,njb->nab", x, M, x)
     assert np.abs(inertia - np.swapaxes(inertia, 1, 2)).max() < 1e-9 * np.abs(inertia).max()
     assert np.abs(inertia - expected).max() < 1e-9 * np.abs(expected).max()
+
+
+def test_a_singular_pose_is_reported_at_its_time(case):
+    rigid, angles, h = case
+    motion = rigid_motion(rigid, angles, np.zeros_like(angles), h)
+    singular, q = 6, motion.q.copy()
+    q[singular] = np.nan
+    motors, world = np.arange(angles.shape[1], dtype=np.int32), np.zeros((len(angles), 0, WORLD_MARKER))
+    joint_angles, times = rigid.joint_angles(angles), h * np.arange(len(angles))
+    with pytest.raises(SimulationFailure) as failure:
+        RigidResponse.along(rigid, motion.c, q, joint_angles, motors, world, times, stride=3)
+    assert failure.value.time_s == times[singular]
+    assert failure.value.reason == "singular"

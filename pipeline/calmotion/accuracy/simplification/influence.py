@@ -31,7 +31,13 @@ def influence(character: Character, rigid: Model, run: ForwardRun, motors: IntAr
     coupling = coupling_of(character, motors)
     moved = np.flatnonzero(np.any(coupling, axis=1)).astype(np.int32)
     response = RigidResponse.along(
-        rigid, states.c[at], states.q[at], run.joint_angles[at], moved, run.trajectory.world[at]
+        rigid,
+        states.c[at],
+        states.q[at],
+        run.joint_angles[at],
+        moved,
+        run.trajectory.world[at],
+        at * run.trajectory.h,
     )
     found = response.coupled(coupling[moved]).targets
     positions, rotations = rigid.targets.position_weight, rigid.targets.rotation_weight

@@ -15,7 +15,7 @@ from calmotion.shot.character import Array, IntArray
 
 
 def motor_responses(
-    rigid: Model, c: Array, q: Array, joint_angles: Array, motors: IntArray, world: Array
+    rigid: Model, c: Array, q: Array, joint_angles: Array, motors: IntArray, world: Array, times: Array
 ) -> tuple[Array, Array]:
     """The rigid robot's response to each motor, the others held; loops and free joints included.
 
@@ -31,6 +31,7 @@ def motor_responses(
         joint_angles: Of its joints, shape [T, J].
         motors: Which motors, shape [m].
         world: Moving markers, shape [T, W, 18].
+        times: Of the poses, from the start of the simulation [s], shape [T].
 
     Returns:
         (R^T dc, dphi) of each component by each motor [m/rad], [rad/rad], shape [T, B, 6, m]; efforts of all motors
@@ -54,7 +55,7 @@ def motor_responses(
         blocks.K[:] = blocks.D
         bad = factor(system, blocks, *tree, scratch.block)
         if bad >= 0:
-            raise SimulationFailure(float(n), bad, "singular")
+            raise SimulationFailure(float(times[n]), bad, "singular")
         if joints > count:
             factor_loops(
                 system, blocks.Lc, blocks.Lp, closing, blocks.Hp, blocks.Nc, blocks.Jp, *tree, border, scratch.block

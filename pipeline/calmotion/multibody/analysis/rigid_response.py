@@ -27,8 +27,9 @@ class RigidResponse:
 
     @classmethod
     def along(
-        cls, rigid: Model, c: Array, q: Array, joint_angles: Array, motors: IntArray, world: Array, stride: int = 1
-    ) -> RigidResponse:
+        cls, rigid: Model, c: Array, q: Array, joint_angles: Array, motors: IntArray, world: Array, times: Array,
+        stride: int = 1,
+    ) -> RigidResponse:  # fmt: skip
         """The response along a motion; computed at every `stride`-th instant and held in between, which is enough to
         precondition with.
 
@@ -38,10 +39,15 @@ class RigidResponse:
             joint_angles: Of its joints, shape [T, J].
             motors: Those that may change, m of them.
             world: Moving markers, shape [T, W, 18].
+            times: Of the poses, from the start of the simulation [s], shape [T].
+            stride: Distance of the instants at which it is computed.
+
+        Raises:
+            SimulationFailure: A pose in which the system is singular.
         """
         few = slice(None, None, stride)
         c, q = np.ascontiguousarray(c[few]), np.ascontiguousarray(q[few])
-        motions, inertia = motor_responses(rigid, c, q, joint_angles[few].copy(), motors, world[few].copy())
+        motions, inertia = motor_responses(rigid, c, q, joint_angles[few].copy(), motors, world[few].copy(), times[few])
         J = target_jacobians(rigid, c, q, np.zeros(c.shape[:2] + (0,)))
         targets = np.einsum("nkia,nkam->nkim", J, motions[:, rigid.targets.component])
         held = np.minimum(np.arange(len(joint_angles)) // stride, len(c) - 1)
