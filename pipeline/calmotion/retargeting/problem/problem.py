@@ -327,7 +327,7 @@ class RetargetProblem:
         motion = rigid_motion(rigid, self.curves.angles, self.curves.rates, self.grid.h, self.world, self.grid.cyclic)
         angles = self.model.joint_angles(self.curves.angles)
         world, moved = rooted(self.world, len(motion.c)), np.flatnonzero(np.any(self.coupling, axis=1)).astype(np.int32)
-        times = self.grid.h * np.arange(len(angles))
+        times = self.grid.h * np.arange(len(angles), dtype=np.float64)
         response = RigidResponse.along(rigid, motion.c, motion.q, angles, moved, world, times, _STRIDE)
         return response.coupled(self.coupling[moved])
 
