@@ -1,6 +1,72 @@
-"""Calmotion: vibration-minimising motion retargeting for robotic characters."""
+"""Calmotion: vibration-minimising motion retargeting for robotic characters.
+
+    import calmotion as cm
+
+    shot = cm.open_shot("bartender.usda")
+    result = cm.optimize(shot, tolerance="1mm")
+    result.write("calm.usda")
+
+Each name is imported when it is first used.
+"""
+
+from typing import TYPE_CHECKING, Any
 
 from calmotion.errors import ShotError
+from calmotion.version import __version__
 
-__version__ = "0.1.0"
-__all__ = ["ShotError", "__version__"]
+if TYPE_CHECKING:
+    from calmotion.host.errors import SettingError
+    from calmotion.shot.run import OutputPaths
+    from calmotion.workflow.commands import inspect, optimize, rig, simulate, verify
+    from calmotion.workflow.inspection import Inspection
+    from calmotion.workflow.problems import Cancelled, RunError
+    from calmotion.workflow.results import MotorMotion, OptimizationResult, RobotMotion, SimulationResult, TargetMotion
+    from calmotion.workflow.run import Progress
+    from calmotion.workflow.shot import Shot, open_shot
+
+__all__ = [
+    "Cancelled",
+    "Inspection",
+    "MotorMotion",
+    "OptimizationResult",
+    "OutputPaths",
+    "Progress",
+    "RobotMotion",
+    "RunError",
+    "SettingError",
+    "Shot",
+    "ShotError",
+    "SimulationResult",
+    "TargetMotion",
+    "__version__",
+    "inspect",
+    "open_shot",
+    "optimize",
+    "rig",
+    "simulate",
+    "verify",
+]
+
+_HOMES = {
+    "host.errors": ("SettingError",),
+    "shot.run": ("OutputPaths",),
+    "workflow.commands": ("inspect", "optimize", "rig", "simulate", "verify"),
+    "workflow.inspection": ("Inspection",),
+    "workflow.problems": ("Cancelled", "RunError"),
+    "workflow.results": ("MotorMotion", "OptimizationResult", "RobotMotion", "SimulationResult", "TargetMotion"),
+    "workflow.run": ("Progress",),
+    "workflow.shot": ("Shot", "open_shot"),
+}
+
+
+def __getattr__(name: str) -> Any:
+    for module, names in _HOMES.items():
+        if name in names:
+            from importlib import import_module
+
+            return getattr(import_module(f"calmotion.{module}"), name)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

@@ -24,7 +24,9 @@ class WriteTable(Operator):
         return None if data[OutputPaths].csv else "no table was asked for"
 
     def execute(self, context: RunContext) -> Sequence[object]:
-        from .table import columns, write_table
+        from calmotion.shot.table import columns
+
+        from .table import write_table
 
         path = context.get(OutputPaths).csv
         assert path is not None  # poll

@@ -7,8 +7,7 @@ import os
 import subprocess
 import sys
 
-import calmotion.cli.inspect
-import calmotion.cli.run
+import calmotion.workflow.shot
 import numpy as np
 import pytest
 import synthetic
@@ -62,8 +61,7 @@ def run(repository, monkeypatch, capfd, tmp_path):
     monkeypatch.chdir(tmp_path)
 
     def command(*arguments, **changes):
-        for module in (calmotion.cli.run, calmotion.cli.inspect):
-            monkeypatch.setattr(module, "open_host", lambda folders: fake_host(repository, **changes))
+        monkeypatch.setattr(calmotion.workflow.shot, "open_host", lambda folders: fake_host(repository, **changes))
         status = main([str(argument) for argument in arguments])
         captured = capfd.readouterr()
         return status, captured.out, captured.err
@@ -334,6 +332,6 @@ def test_a_host_without_a_reader_names_the_plugins_that_failed(make_plugin, run,
 
     host = Host()
     host.add(Location(make_plugin("reader", "", version="one"), "test"))
-    monkeypatch.setattr(calmotion.cli.run, "open_host", lambda folders: host)
+    monkeypatch.setattr(calmotion.workflow.shot, "open_host", lambda folders: host)
     with pytest.raises(ShotError, match="reader .*is not a version"):
         list(host.run([Source("a.usda", "inspect")], [Character]))

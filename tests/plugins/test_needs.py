@@ -1,14 +1,10 @@
 """The analysis of needs in the pipeline: what it leaves out is not run, and everything can be forced."""
 
-from argparse import Namespace
-
 import pytest
 from calmotion.benchmarks.scenes.simplification_shots import clevis_arm, mixed_arm, steel_arm
-from calmotion.cli.main import NEEDS
-from calmotion.cli.run import settings_of
 from calmotion.host import NotAsked
 from calmotion.shot import Character, FEMeshes, ModelChoices, Result
-from calmotion.shot.model_choice import KINDS, OFF, ON
+from calmotion.shot.model_choice import ON
 from calmotion.shot.outputs import PlannedStep
 from calmotion.shot.run import OutputPaths, Source
 from calmotion.testing import host_with, run_operator, small_shot
@@ -86,18 +82,6 @@ def test_an_inspection_plans_the_step_where_one_matters(host):
     character, _ = small_shot()
     assert "motors alone" in poll({Character: character, Source: _source("inspect")})
     assert isinstance(poll({Source: _source("simulate")}), NotAsked)
-
-
-def test_keep_and_leave_out_become_settings():
-    args = Namespace(settings=None, set=[], keep=["modes"], leave_out=["all"])
-    assert settings_of(args) == {"needs.analyse": dict.fromkeys(KINDS, OFF) | {"modes": ON}}
-    stronger = Namespace(settings=None, set=["needs.analyse.modes=auto"], keep=["modes"], leave_out=[])
-    assert settings_of(stronger) == {"needs.analyse": {"modes": "auto"}}
-    assert settings_of(Namespace(settings=None, set=[])) == {}
-
-
-def test_the_command_line_knows_every_kind():
-    assert NEEDS == KINDS
 
 
 def test_kinds_that_are_none_are_wrong_usage(calmotion):

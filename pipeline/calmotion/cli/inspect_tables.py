@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import TYPE_CHECKING, Any, TextIO
 
 from calmotion.cli.tables import angle, console_on, length, print_left_out, print_table
@@ -94,16 +93,13 @@ def _motor_row(motor: dict[str, Any]) -> list[str]:
     linear = "min_m" in motor
     shown, unit = (length, "m") if linear else (angle, "rad")
     effort, newtons = (motor["max_force_n"], "N") if linear else (motor["max_torque_n_m"], "N m")
+    speed = motor[f"max_velocity_{unit}_s"]  # None where there is no limit
     return [
         motor["path"],
         f"{shown(motor[f'min_{unit}'])} .. {shown(motor[f'max_{unit}'])}",
         f"{shown(motor[f'lower_{unit}'])} .. {shown(motor[f'upper_{unit}'])}",
         f"{shown(motor[f'peak_velocity_{unit}_s'])}/s",
-        _limit(motor[f"max_velocity_{unit}_s"], f"{shown(motor[f'max_velocity_{unit}_s'])}/s"),
-        _limit(effort, f"{effort:.4g} {newtons}"),
+        "-" if speed is None else f"{shown(speed)}/s",
+        "-" if effort is None else f"{effort:.4g} {newtons}",
         "yes" if motor["optimize"] else "no",
     ]
-
-
-def _limit(value: float, text: str) -> str:
-    return text if math.isfinite(value) else "-"

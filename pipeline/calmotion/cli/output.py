@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import json
-import math
 import os
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any, TextIO
 
 from calmotion.errors import ShotError, each
+from calmotion.host import Host
+from calmotion.workflow.plain import plain
+from calmotion.workflow.problems import Problem, RunError
+
+FAILED, INTERRUPTED = 1, 130
 
 
 @dataclass(frozen=True)
@@ -24,40 +28,6 @@ class Output:
     def object(self, fields: Mapping[str, Any]) -> None:
         """Print the one JSON object of this command."""
         print(json.dumps(plain(fields), indent=2, allow_nan=False), file=self.stream, flush=True)
-
-
-@dataclass(frozen=True)
-class Problem:
-    """An error, and the operator and plugin it came from; `traceback` only where their author needs it."""
-
-    error: ShotError
-    operator: str = ""
-    plugin: str = ""
-    traceback: str = ""
-
-    def as_dict(self) -> dict[str, str]:
-        """The fields, for `--json`."""
-        owner = {"operator": self.operator, "plugin": self.plugin, "traceback": self.traceback}
-        return self.error.as_dict() | {key: value for key, value in owner.items() if value}
-
-    def tell(self) -> None:
-        """Print it on stderr."""
-        if self.traceback:
-            print(self.traceback, end="", file=sys.stderr)
-        tell_error(self.error)
-
-
-def plain(value: Any) -> Any:
-    """`value` as JSON can hold it: NumPy as Python, and null for what is not a finite number."""
-    if isinstance(value, Mapping):
-        return {str(key): plain(item) for key, item in value.items()}
-    if hasattr(value, "tolist"):
-        return plain(value.tolist())
-    if isinstance(value, (list, tuple)):
-        return [plain(item) for item in value]
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    return value
 
 
 @contextmanager
@@ -99,12 +69,40 @@ def _descriptor(stream: TextIO) -> int | None:
 
 def print_error(error: ShotError, output: Output) -> None:
     """Print an error: as the JSON object, or on stderr in lines for a person."""
-    single = each(error)
+    conclude({}, error.problems if isinstance(error, RunError) else [Problem(one) for one in each(error)], output)
+
+
+def conclude(
+    report: Mapping[str, Any],
+    problems: Sequence[Problem],
+    output: Output,
+    show: Callable[[dict[str, Any], TextIO], None] | None = None,
+) -> None:
+    """Print the report and the problems.
+
+    Args:
+        report: What was computed; empty when nothing was.
+        problems: What went wrong.
+        output: Where the report is printed.
+        show: Prints the report for a person; None prints nothing.
+    """
     if output.json:
-        output.object({"error": single[0].as_dict(), "errors": [one.as_dict() for one in single]})
-    else:
-        for one in single:
-            tell_error(one)
+        errors = [problem.as_dict() for problem in problems]
+        output.object({**report, **({"error": errors[0], "errors": errors} if errors else {})})
+        return
+    if report and show:
+        show(dict(report), output.stream)
+    for problem in problems:
+        if problem.traceback:
+            print(problem.traceback, end="", file=sys.stderr)
+        tell_error(problem.error)
+
+
+def tell_failed_plugins(host: Host) -> None:
+    """Tell of plugins that could not be loaded, each with its own traceback; the run goes on without them."""
+    for plugin in host.failures():
+        print(plugin.traceback, end="", file=sys.stderr)
+        print(f"warning: the plugin {plugin.id} is not used: {plugin.error}", file=sys.stderr, flush=True)
 
 
 def tell_error(error: ShotError) -> None:

@@ -1,6 +1,6 @@
 """Progress of a run on stderr: bars on a terminal, one line an operator in a log, lines for a program where it asks.
 
-A program that runs calmotion reads lines `progress<tab>stage<tab>fraction<tab>message`.
+A program that runs calmotion reads lines `progress<tab>stage<tab>fraction<tab>message` (`--progress`).
 """
 
 from __future__ import annotations
@@ -10,13 +10,14 @@ from types import TracebackType
 from typing import TYPE_CHECKING, Any
 
 from calmotion.host import OperatorResult, Outcome
+from calmotion.workflow.run import Progress as Stage
 
 if TYPE_CHECKING:
     from rich.progress import Progress, TaskID
 
 
 class ProgressDisplay:
-    """Shows stages as they come; use as a context, call as the host's progress callback."""
+    """Shows stages as they come; use as a context, call as the workflow's progress callback."""
 
     def __init__(self, quiet: bool, machine: bool = False):
         self._quiet, self._machine = quiet, machine
@@ -40,8 +41,9 @@ class ProgressDisplay:
         if self._bars:
             self._bars.stop()
 
-    def __call__(self, stage: str, fraction: float, message: str) -> None:
-        """Show how far a stage is, 0..1."""
+    def __call__(self, state: Stage) -> None:
+        """Show how far a stage is."""
+        stage, fraction, message = state.stage, state.fraction, state.message
         if self._machine:
             line = "\t".join(("progress", stage, f"{fraction:.4f}", message)).replace("\n", " ")
             print(line, file=sys.stderr, flush=True)

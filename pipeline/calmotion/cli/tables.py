@@ -130,12 +130,11 @@ def print_run(report: dict[str, Any], stream: TextIO) -> None:
         console.print(f"at rest, before the motion, the targets are off by up to {length(sag)}")
     seams = [target[f"seam{suffixes[-1]}_m"] for target in report["targets"]]
     if seams and seams[0] is not None:
-        console.print(f"where the loop begins again the targets are {length(max(seams))} from where they began")
-        if report["loop_growth"] > 1.0:
-            console.print(
-                f"the robot would not stay in this loop: a disturbance grows {report['loop_growth']:.3g}-fold from one "
-                "to the next"
-            )
+        console.print(f"at the end of a cycle the targets are {length(max(seams))} from where they began")
+        growth = report["loop_growth"]
+        if growth is None or growth > 1.0:
+            factor = "without bound" if growth is None else f"by a factor of {growth:.3g}"
+            console.print(f"the cyclic motion is unstable: a disturbance grows {factor} in each cycle")
     if report["dead_centres_s"]:
         times = [f"{time:.3f}" for time in report["dead_centres_s"]]
         more = f" and {len(times) - 5} times more" if len(times) > 5 else ""

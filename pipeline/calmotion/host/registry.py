@@ -10,7 +10,6 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from calmotion import __version__
 from calmotion.host.choices import disabled_plugins
 from calmotion.host.discovery import Location, discover
 from calmotion.host.errors import PluginError, SettingError
@@ -21,6 +20,7 @@ from calmotion.host.plan import Plan, make_plan
 from calmotion.host.properties import PropertyValues, nearest, values_of
 from calmotion.host.run import Run
 from calmotion.host.settings import Settings
+from calmotion.version import __version__
 
 
 class PluginState(StrEnum):

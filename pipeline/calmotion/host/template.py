@@ -5,8 +5,8 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from calmotion import __version__
 from calmotion.host.errors import PluginError
+from calmotion.version import __version__
 
 _FILES = {
     "pyproject.toml": """\

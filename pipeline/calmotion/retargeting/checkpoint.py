@@ -13,12 +13,12 @@ from typing import Any
 
 import numpy as np
 
-from calmotion import __version__
 from calmotion.retargeting.problem.limits import LimitTerms
 from calmotion.retargeting.problem.problem import RetargetProblem
 from calmotion.retargeting.solver.gauss_newton import Iterate, Search
 from calmotion.retargeting.solver.recycling import Recycled
 from calmotion.shot.character import BoolArray, IntArray
+from calmotion.version import __version__
 
 _OF_LIMITS = ("rho", "left", "reached", "stalled", "on")
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from calmotion import __version__
 from calmotion.shot import Character, Provenance, Result, Simulation
 from calmotion.usd import gf
 from calmotion.usd.stages import METADATA_KEY
+from calmotion.version import __version__
 
 
 def author_stage_metadata(layer, provenance: Provenance) -> None:

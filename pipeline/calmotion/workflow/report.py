@@ -8,13 +8,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from calmotion import __version__
 from calmotion.host import OperatorResult, Run
 from calmotion.shot import Character, LimitUse, Result, Simplification, Simulation
 from calmotion.shot.character import Array
 from calmotion.shot.measure import measure_of
-from calmotion.shot.outputs import CsvFile, Figures, Recording, Verification, WrittenLayer
+from calmotion.shot.outputs import CsvFile, Figures, Recording, Rig, Verification, WrittenLayer
 from calmotion.support.memory import peak_memory
+from calmotion.version import __version__
 
 LIMIT_KEPT = 1e-6  # relative excess that is rounding
 
@@ -184,3 +184,21 @@ def _overall(targets: list[dict[str, Any]], suffix: str) -> dict[str, float]:
     worst = max((row[f"max_error{suffix}_m"] for row in targets), default=0.0)
     square = sum(row[f"rms_error{suffix}_m"] ** 2 for row in targets) / max(len(targets), 1)
     return {f"max_error{suffix}_m": worst, f"rms_error{suffix}_m": square**0.5}
+
+
+def rig_report(made: Rig) -> dict[str, Any]:
+    """The object of `rig --json`."""
+    return {
+        "command": "rig",
+        "version": __version__,
+        "layer": made.layer,
+        "robot": made.robot,
+        "bodies": made.bodies,
+        "mass_kg": made.mass,
+        "motors": sum(len(joint.motors) for joint in made.joints),
+        "max_angle_error_rad": max((joint.off for joint in made.joints), default=0.0),
+        "joints": [
+            {"joint": j.joint, "body": j.body, "motors": j.motors, "angle_error_rad": j.off} for j in made.joints
+        ],
+        "targets": made.targets,
+    }

@@ -1,31 +1,15 @@
-"""`calmotion inspect`: what is in the shot, and what would be left out and why."""
+"""What is in a shot: the object of `inspect --json`, from the values of a run."""
 
 from __future__ import annotations
 
-import argparse
 import dataclasses
 from collections.abc import Sequence
-from typing import Any, TextIO
+from typing import Any
 
 import numpy as np
 
-from calmotion import __version__
 from calmotion.accuracy.reduced_bodies import ReducedBodies
-from calmotion.cli.output import Output, Problem
-from calmotion.cli.progress import ProgressDisplay
-from calmotion.cli.report import left_out_row, operator_row
-from calmotion.cli.run import (
-    FAILED,
-    INTERRUPTED,
-    asked_for,
-    carry_out,
-    conclude,
-    problems_of,
-    settings_of,
-    tell_failures,
-)
-from calmotion.errors import ShotError
-from calmotion.host import HostError, Run, open_host
+from calmotion.host import HostError, Run
 from calmotion.shot import (
     Animation,
     Body,
@@ -40,57 +24,58 @@ from calmotion.shot import (
 )
 from calmotion.shot.measure import measure_of
 from calmotion.shot.outputs import ModeShapes, PlannedStep, SystemModes
-from calmotion.shot.run import OutputPaths, Source
+from calmotion.version import __version__
+from calmotion.workflow.problems import Problem
+from calmotion.workflow.report import left_out_row, operator_row
+from calmotion.workflow.run import Outcome
 
 SHOWN_MODES = 10
+_CONTENTS: tuple[type, ...] = (Character, Animation, Provenance)
 
 
-def inspect_shot(args: argparse.Namespace, output: Output) -> int:
-    """Read a shot and print what is in it; the exit status.
+def wanted_of(strict: bool, modes: bool) -> tuple[tuple[type, ...], tuple[type, ...]]:
+    """What an inspection needs, and what it makes where it can.
 
-    Raises:
-        ShotError: When nothing could be read.
-        SettingError: When an option or setting does not fit.
+    Args:
+        strict: Whether the shot is only checked, without costly work.
+        modes: Whether mode shapes are asked for.
     """
-    host = open_host(args.plugins)
-    # a gate is asked before the costly work, so it does none
-    wanted: list[type] = [Findings] if args.strict else [Character, Animation, Provenance]
-    if args.modes:
-        wanted.append(ModeShapes)
-    wanted += asked_for(host, args)
-    tell_failures(host, args.quiet)
-    source = Source(
-        path=args.shot,
-        command="check" if args.strict else "inspect",
-        tolerance=args.tolerance,
-        step=args.step,
-        pre_roll=args.pre_roll,
-        integrator=args.integrator,
-    )
-    optional = (
-        [Character, Animation, Provenance] if args.strict else [ModelChoices, ReducedBodies, SystemModes, PlannedStep]
-    )
-    with ProgressDisplay(args.quiet, args.progress) as display:
-        run = host.run(
-            [source, OutputPaths(modes=args.modes)],
-            wanted,
-            optional=optional,
-            settings=settings_of(args),
-            progress=display,
-        )
-        interrupted = carry_out(run, display)
-    problems = [Problem(ShotError("interrupted"))] if interrupted else problems_of(run, wanted)
-    findings = run.get(Findings)
-    if findings is not None:
-        # what the reader refuses is among the findings, with the rest
-        problems = [problem for problem in problems if isinstance(problem.error, HostError)]
-    report = inspect_report(run) if all(run.get(kind) for kind in (Character, Animation, Provenance)) else {}
-    if findings is not None:
-        report |= {"shot": args.shot, "findings": [dataclasses.asdict(finding) for finding in findings.items]}
-    status = conclude(report, problems, output, None if args.quiet and not args.strict else _print)
-    if interrupted:
-        return INTERRUPTED
-    return FAILED if findings is not None and findings.items else status
+    wanted: tuple[type, ...] = (Findings,) if strict else _CONTENTS
+    optional = _CONTENTS if strict else (ModelChoices, ReducedBodies, SystemModes, PlannedStep)
+    return (*wanted, *((ModeShapes,) if modes else ())), optional
+
+
+class Inspection:
+    """An inspected shot.
+
+    Attributes:
+        problems: What went wrong.
+        interrupted: Whether the user interrupted it.
+    """
+
+    def __init__(self, outcome: Outcome):
+        self._run, self._path = outcome.run, outcome.shot.path
+        self.interrupted = outcome.interrupted
+        self.problems: tuple[Problem, ...] = outcome.problems
+        if self.findings is not None:
+            # what the reader refuses is among the findings, with the rest
+            self.problems = tuple(problem for problem in self.problems if isinstance(problem.error, HostError))
+
+    @property
+    def findings(self) -> Findings | None:
+        """What a strict inspection found; None without `strict`."""
+        return self._run.get(Findings)
+
+    def report(self) -> dict[str, Any]:
+        """The object that `--json` prints; empty where the shot could not be read."""
+        from calmotion.workflow.plain import plain
+
+        report = inspect_report(self._run) if all(self._run.get(kind) for kind in _CONTENTS) else {}
+        if self.findings is not None:
+            rows = [dataclasses.asdict(finding) for finding in self.findings.items]
+            report |= {"shot": self._path, "findings": rows}
+        made: dict[str, Any] = plain(report)
+        return made
 
 
 def inspect_report(run: Run) -> dict[str, Any]:
@@ -199,9 +184,3 @@ def _motor(motor: Motor, track: Track, character: Character) -> dict[str, Any]:
         f"max_acceleration_{unit}_s2": motor.max_acceleration,
         "max_force_n" if motor.linear else "max_torque_n_m": motor.max_torque,
     }
-
-
-def _print(report: dict[str, Any], stream: TextIO) -> None:
-    from calmotion.cli.inspect_tables import print_inspection
-
-    print_inspection(report, stream)

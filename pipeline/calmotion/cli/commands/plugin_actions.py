@@ -1,4 +1,4 @@
-"""`calmotion plugins list`, `check`, `enable`, `disable` and `new`."""
+"""What `calmotion plugins list`, `check`, `enable`, `disable` and `new` do."""
 
 from __future__ import annotations
 

@@ -1,0 +1,58 @@
+"""`calmotion inspect`: what is in the shot, and how its model is simplified."""
+
+from __future__ import annotations
+
+import argparse
+from typing import TYPE_CHECKING
+
+from calmotion.cli.options import Commands, assignments, file_argument, opened_shot, shot_command, simulation_options
+
+if TYPE_CHECKING:
+    from calmotion.cli.output import Output
+
+
+def add_to(commands: Commands) -> None:
+    """Add the command."""
+    command = shot_command(commands, "inspect", _run, "show what is in the shot, and which simplifications it allows")
+    file_argument(
+        command, "--modes", metavar="DIR",
+        help="folder for the mode shapes of the flexible bodies (.vtu, .png) and their table",
+    )  # fmt: skip
+    command.add_argument(
+        "--strict",
+        action="store_true",
+        help="check the shot before publishing: run every cheap check and USD's validators, list all findings, and end "
+        "with status 1 if there are any",
+    )
+    simulation_options(command, "bdf2, newmark, generalized-alpha, rk4 or radau (default: automatic)")
+
+
+def _run(args: argparse.Namespace, output: Output) -> int:
+    from calmotion.cli.inspect_tables import print_inspection
+    from calmotion.cli.output import FAILED, INTERRUPTED, conclude
+    from calmotion.cli.progress import ProgressDisplay
+    from calmotion.workflow.commands import inspect
+
+    shot = opened_shot(args)
+    with ProgressDisplay(args.quiet, args.progress) as display:
+        inspection = inspect(
+            shot,
+            tolerance=args.tolerance,
+            step=args.step,
+            integrator=args.integrator,
+            pre_roll=args.pre_roll,
+            keep=args.keep,
+            leave_out=args.leave_out,
+            strict=args.strict,
+            modes=args.modes,
+            operators=args.run,
+            settings=assignments(args),
+            progress=display,
+            on_operator=display.done,
+        )
+    findings = inspection.findings
+    show = None if args.quiet and not args.strict else print_inspection
+    conclude(inspection.report(), inspection.problems, output, show)
+    if inspection.interrupted:
+        return INTERRUPTED
+    return FAILED if inspection.problems or (findings is not None and findings.items) else 0

@@ -1,0 +1,62 @@
+"""`calmotion rig`: a robot out of a skinned character."""
+
+from __future__ import annotations
+
+import argparse
+from typing import TYPE_CHECKING, Any, TextIO
+
+from calmotion.cli.options import Commands, assignments, file_argument, opened_shot, shot_command
+
+if TYPE_CHECKING:
+    from calmotion.cli.output import Output
+
+
+def add_to(commands: Commands) -> None:
+    """Add the command."""
+    command = shot_command(
+        commands, "rig", _run, "make a robot of a skinned character: bodies, joints, motors, targets"
+    )
+    file_argument(
+        command, "-o", "--output", metavar="LAYER", required=True, help="USD layer to write; it opens the shot"
+    )
+
+
+def _run(args: argparse.Namespace, output: Output) -> int:
+    from calmotion.cli.output import conclude
+    from calmotion.cli.progress import ProgressDisplay
+    from calmotion.workflow.commands import rig
+    from calmotion.workflow.report import rig_report
+
+    shot = opened_shot(args)
+    with ProgressDisplay(args.quiet, args.progress) as display:
+        made = rig(
+            shot, args.output, operators=args.run, settings=assignments(args), progress=display,
+            on_operator=display.done,
+        )  # fmt: skip
+    conclude(rig_report(made), (), output, None if args.quiet else _print)
+    return 0
+
+
+def _print(report: dict[str, Any], stream: TextIO) -> None:
+    from calmotion.cli.tables import angle, console_on, print_table
+
+    console = console_on(stream)
+    rows = [
+        [j["joint"].split("/")[-1], j["body"], str(len(j["motors"])), angle(j["angle_error_rad"])]
+        for j in report["joints"]
+    ]
+    print_table(console, "Joints that turn", ["joint", "body", "hinges", "residual angle"], rows, texts=2)
+    console.print(
+        f"{report['robot']}: {report['bodies']} bodies, {report['motors']} motors, {report['mass_kg']:.4g} kg; "
+        f"largest residual angle {angle(report['max_angle_error_rad'])}",
+        markup=False,
+        soft_wrap=True,
+    )
+    for target in report["targets"]:
+        console.print(f"target: {target}", markup=False, soft_wrap=True)
+    console.print(
+        f"{report['layer']} opens as a shot; to make links flexible, apply CalmFlexibleBodyAPI or run again with "
+        "--set rig.skeleton.flexible=all",
+        markup=False,
+        soft_wrap=True,
+    )

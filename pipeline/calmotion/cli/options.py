@@ -1,0 +1,161 @@
+"""Options that several commands share."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable
+from typing import TYPE_CHECKING, TypeAlias
+
+if TYPE_CHECKING:
+    from calmotion.cli.output import Output
+    from calmotion.workflow.shot import Shot
+
+Commands: TypeAlias = "argparse._SubParsersAction[argparse.ArgumentParser]"
+Command: TypeAlias = "Callable[[argparse.Namespace, Output], int]"
+# Those of `calmotion.shot.model_choice`, written out since `--help` does not import the engine; a test compares them.
+KINDS = ("bodies", "turning", "loops", "modes", "directions", "elasticity", "motors", "ranges")
+
+
+def shot_command(commands: Commands, name: str, function: Command, text: str) -> argparse.ArgumentParser:
+    """Add a command on a shot, with the options that all of them have.
+
+    Args:
+        commands: Where it is added.
+        name: Of the command.
+        function: What it calls.
+        text: What it does, for the help.
+    """
+    command = commands.add_parser(name, help=text, description=text[0].upper() + text[1:] + ".")
+    command.set_defaults(command=function)
+    file_argument(command, "shot", metavar="SHOT", help="USD file of the shot")
+    command.add_argument("--json", action="store_true", help="print one JSON object on stdout, and nothing else there")
+    command.add_argument("--quiet", action="store_true", help="print nothing but errors (and the object of --json)")
+    command.add_argument("--progress", action="store_true", help="print machine-readable progress to stderr")
+    plugin_option(command)
+    command.add_argument(
+        "--run",
+        metavar="OPERATOR",
+        action="append",
+        default=[],
+        help="run this operator of a plugin as well, such as curves.export; may be repeated",
+    )
+    file_argument(command, "--settings", metavar="FILE", help="TOML file with a table for each operator")
+    command.add_argument(
+        "--set",
+        metavar="NAME=VALUE",
+        action="append",
+        default=[],
+        help="set a property of an operator, such as fe.mesh.element_size=5mm; see `calmotion plugins list`",
+    )
+    return command
+
+
+def file_argument(command: argparse.ArgumentParser | argparse._ArgumentGroup, *names: str, **options: object) -> None:
+    """Add an argument that names a file or a folder, which shells complete as such."""
+    argument = command.add_argument(*names, **options)  # type: ignore[arg-type]
+    argument.complete = {"bash": "_shtab_compgen_files", "zsh": "_files", "tcsh": "f"}  # type: ignore[attr-defined]
+
+
+def plugin_option(command: argparse.ArgumentParser) -> None:
+    """Add `--plugins`."""
+    file_argument(
+        command, "--plugins", metavar="DIR", action="append", default=[],
+        help="folder with more plugins; may be repeated",
+    )  # fmt: skip
+
+
+def run_options(command: argparse.ArgumentParser) -> None:
+    """Add the options of `simulate` and `optimize`: outputs, motion, verification."""
+    outputs = command.add_argument_group("outputs")
+    outputs.add_argument(
+        "--bake",
+        nargs="?",
+        const="motors",
+        choices=("motors", "simulated"),
+        help="write body transforms as well: of a rigid robot with the new curves, or of the predicted motion",
+    )
+    outputs.add_argument(
+        "--samples-per-second", metavar="HZ", help="write denser samples than the frames, for linear interpolation"
+    )
+    outputs.add_argument(
+        "--splines",
+        action="store_true",
+        help="write motor curves as splines with the optimiser's knots, not as samples",
+    )
+    file_argument(outputs, "--csv", metavar="FILE", help="write a table of targets and motors, one row for each step")
+    file_argument(outputs, "--rrd", metavar="FILE", help="write a recording for the rerun viewer")
+    file_argument(outputs, "--figures", metavar="DIR", help="draw figures into this folder")
+    file_argument(
+        command, "--motion", metavar="FILE",
+        help="file with a motion for the motors, such as a BVH file (with --set bvh.read.map=...)",
+    )  # fmt: skip
+    command.add_argument(
+        "--verify",
+        action="store_true",
+        help="measure the error of the result against a finer simulation (takes several times as long)",
+    )
+
+
+def simulation_options(command: argparse.ArgumentParser, integrators: str) -> None:
+    """Add the options of the simulation and of the simplification of the model."""
+    model = command.add_argument_group("simulation")
+    model.add_argument("--step", metavar="TIME", type=_quantity("s"), help="time step, in s or with a unit (2ms)")
+    model.add_argument(
+        "--tolerance",
+        metavar="LENGTH",
+        type=_quantity("m"),
+        help="acceptable error at the targets (1mm); time step, modes and simplifications follow from it",
+    )
+    model.add_argument("--integrator", metavar="NAME", default=None, help=integrators)
+    model.add_argument(
+        "--pre-roll", metavar="TIME", type=_quantity("s"), help="time that eases into the motion (default: automatic)"
+    )
+    group = command.add_argument_group("model simplification (by default it follows from the tolerance)")
+    for flag, text in (("--keep", "do not simplify"), ("--leave-out", "always simplify")):
+        group.add_argument(
+            flag, metavar="KIND", action="append", default=[], choices=("all", *KINDS),
+            help=f"{text} {', '.join(KINDS[:-1])}, {KINDS[-1]} or all; may be repeated",
+        )  # fmt: skip
+
+
+def opened_shot(args: argparse.Namespace) -> Shot:
+    """The shot that the arguments name, not yet read; plugins that could not be loaded are told on stderr.
+
+    Raises:
+        SettingError: A folder holds no plugin, or the settings cannot be read.
+    """
+    from calmotion.cli.output import tell_failed_plugins
+    from calmotion.workflow.shot import Shot
+
+    shot = Shot(args.shot, getattr(args, "motion", None), args.plugins, args.settings)
+    if not args.quiet:
+        tell_failed_plugins(shot.host)
+    return shot
+
+
+def assignments(args: argparse.Namespace) -> dict[str, dict[str, object]]:
+    """The settings of `--set`, and those that have options of their own.
+
+    Raises:
+        SettingError: An assignment cannot be read.
+    """
+    from calmotion.host import merge, read_assignment
+
+    names = {"bake": None, "samples_per_second": None, "splines": False}
+    writer = {name: value for name, empty in names.items() if (value := getattr(args, name, empty)) != empty}
+    return merge([*(read_assignment(text) for text in args.set), *([{"usd.write": writer}] if writer else [])])
+
+
+def _quantity(unit: str) -> Callable[[str], float]:
+    def read(text: str) -> float:
+        from calmotion.host import SettingError, parse_quantity
+
+        try:
+            value = parse_quantity(text, unit)
+        except SettingError as error:
+            raise argparse.ArgumentTypeError(str(error)) from None
+        if not 0.0 <= value < float("inf"):
+            raise argparse.ArgumentTypeError(f"{text} is out of range; it must be finite and not negative")
+        return value
+
+    return read

@@ -1,0 +1,248 @@
+"""The commands as functions: simulate, optimise, verify, inspect, rig."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Sequence
+
+from calmotion.host import OperatorResult, Settings, merge, parse_quantity
+from calmotion.shot.model_choice import KINDS, OFF, ON
+from calmotion.shot.outputs import Rig, Verification
+from calmotion.shot.result import Result
+from calmotion.shot.run import OutputPaths, Source
+from calmotion.workflow.inspection import Inspection, wanted_of
+from calmotion.workflow.results import OptimizationResult, SimulationResult
+from calmotion.workflow.run import Hooks, Progress, carry_out
+from calmotion.workflow.shot import Given, Path, Shot, read_settings
+
+ProgressCallback = Callable[[Progress], None]
+OperatorCallback = Callable[[OperatorResult], None]
+
+
+# parameters: one for each option of the command, all but the shot by keyword
+def simulate(
+    shot: Shot | Path,
+    *,
+    tolerance: float | str | None = None,
+    step: float | str | None = None,
+    integrator: str | None = None,
+    pre_roll: float | str | None = None,
+    shaper: str | None = None,
+    keep: Sequence[str] = (),
+    leave_out: Sequence[str] = (),
+    verify: bool = False,
+    outputs: OutputPaths | None = None,
+    operators: Sequence[str] = (),
+    settings: Given = None,
+    progress: ProgressCallback | None = None,
+    on_operator: OperatorCallback | None = None,
+    cancel: Callable[[], bool] | None = None,
+) -> SimulationResult:
+    """Simulate a shot as animated.
+
+    Args:
+        shot: The shot, or its USD file.
+        tolerance: Acceptable error at the targets, [m] or text with a unit (`"1mm"`); None: the shot's own.
+        step: Time step, [s] or text with a unit; None: from the tolerance.
+        integrator: `bdf2`, `newmark`, `generalized-alpha`, `rk4` or `radau`; None: automatic.
+        pre_roll: Time that eases into the motion, [s] or text with a unit; None: automatic.
+        shaper: Input shaper (`zv`, `zvd`, `zv2`, `zvd2`) or `lowpass` filter for the motors' tracks, to compare with.
+        keep, leave_out: Kinds of simplification that are forbidden or forced (`bodies`, `turning`, `loops`, `modes`,
+            `directions`, `elasticity`, `motors`, `ranges`, or `all`); the others follow from the tolerance.
+        verify: Measure the error against a finer run as well.
+        outputs: Files to write in the same run; the result's methods write them later as well.
+        operators: Idnames of operators of plugins to run as well.
+        settings: Settings of operators, stronger than those of the shot.
+        progress: Called with a `Progress`.
+        on_operator: Called after each operator with its outcome, duration and notes.
+        cancel: Called often; the run stops when it returns True.
+
+    Raises:
+        ShotError: The shot cannot be processed; a `RunError` names the operators and plugins that failed.
+        SettingError: An argument does not fit.
+        Cancelled: `cancel` stopped the run.
+    """
+    source = _source(tolerance, step, integrator, pre_roll, shaper=shaper, verify=verify)
+    return SimulationResult(
+        carry_out(
+            _opened(shot), "simulate", wanted=_wanted(verify), operators=operators, source=source, outputs=outputs,
+            settings=merge([_forced(keep, leave_out), read_settings(settings)]),
+            hooks=Hooks(progress, on_operator, cancel),
+        )
+    )  # fmt: skip
+
+
+# parameters: one for each option of the command, all but the shot by keyword
+def optimize(
+    shot: Shot | Path,
+    *,
+    tolerance: float | str | None = None,
+    step: float | str | None = None,
+    pre_roll: float | str | None = None,
+    integrator: str | None = None,
+    adjoint: str | None = None,
+    keep: Sequence[str] = (),
+    leave_out: Sequence[str] = (),
+    verify: bool = False,
+    outputs: OutputPaths | None = None,
+    operators: Sequence[str] = (),
+    settings: Given = None,
+    progress: ProgressCallback | None = None,
+    on_operator: OperatorCallback | None = None,
+    cancel: Callable[[], bool] | None = None,
+) -> OptimizationResult:
+    """Find motor curves with which the flexible robot performs the intended motion.
+
+    An interrupted or cancelled run that has curves already returns the best of them (`interrupted` is True). With
+    `outputs.layer` a checkpoint is kept beside the layer, and the same call goes on from it.
+
+    Args:
+        shot: The shot, or its USD file.
+        tolerance: Acceptable error at the targets, [m] or text with a unit (`"1mm"`); None: the shot's own.
+        step: Time step, [s] or text with a unit; None: from the tolerance.
+        integrator: `bdf2`, the only one for the optimiser.
+        pre_roll: Time that eases into the motion, [s] or text with a unit; None: automatic.
+        adjoint: `discrete` (None; exact gradients) or `continuous` (to compare with).
+        keep, leave_out: Kinds of simplification that are forbidden or forced (`bodies`, `turning`, `loops`, `modes`,
+            `directions`, `elasticity`, `motors`, `ranges`, or `all`); the others follow from the tolerance.
+        verify: Measure the error against a finer run as well.
+        outputs: Files to write in the same run; the result's methods write them later as well.
+        operators: Idnames of operators of plugins to run as well.
+        settings: Settings of operators, stronger than those of the shot.
+        progress: Called with a `Progress`.
+        on_operator: Called after each operator with its outcome, duration and notes.
+        cancel: Called often; the run stops when it returns True.
+
+    Raises:
+        ShotError: The shot cannot be processed; a `RunError` names the operators and plugins that failed.
+        SettingError: An argument does not fit.
+        Cancelled: `cancel` stopped the run before it had curves.
+    """
+    source = _source(tolerance, step, integrator, pre_roll, verify=verify)
+    chosen: Settings = {"retarget.optimize": {"adjoint": adjoint}} if adjoint is not None else {}
+    outcome = carry_out(
+        _opened(shot), "optimize", wanted=_wanted(verify), operators=operators, source=source, outputs=outputs,
+        settings=merge([_forced(keep, leave_out), chosen, read_settings(settings)]),
+        hooks=Hooks(progress, on_operator, cancel),
+    )  # fmt: skip
+    result = OptimizationResult(outcome)
+    if outputs is not None and outputs.layer and not outcome.problems and not result.interrupted:
+        from calmotion.retargeting.checkpoint import checkpoint_path
+
+        checkpoint_path(outputs.layer).unlink(missing_ok=True)
+    return result
+
+
+def verify(result: SimulationResult) -> Verification:
+    """Measure the error of a result against a finer run of the same curves: takes several times as long.
+
+    Raises:
+        RunError: The finer run failed.
+    """
+    return result.verify()
+
+
+def inspect(
+    shot: Shot | Path,
+    *,
+    tolerance: float | str | None = None,
+    step: float | str | None = None,
+    integrator: str | None = None,
+    pre_roll: float | str | None = None,
+    keep: Sequence[str] = (),
+    leave_out: Sequence[str] = (),
+    strict: bool = False,
+    modes: Path | None = None,
+    operators: Sequence[str] = (),
+    settings: Given = None,
+    progress: ProgressCallback | None = None,
+    on_operator: OperatorCallback | None = None,
+) -> Inspection:
+    """What is in a shot, its natural frequencies, and how its model is simplified and why.
+
+    Args:
+        shot: The shot, or its USD file.
+        tolerance, step, integrator, pre_roll, keep, leave_out, operators, settings, progress, on_operator: As of
+            `simulate`.
+        strict: Check the shot instead, with USD's validators as well, and list all findings; nothing costly runs.
+        modes: Folder for the mode shapes of the flexible bodies.
+
+    Raises:
+        SettingError: An argument does not fit.
+    """
+    kinds, optional = wanted_of(strict, modes is not None)
+    return Inspection(
+        carry_out(
+            _opened(shot), "check" if strict else "inspect", wanted=kinds, optional=optional, operators=operators,
+            source=_source(tolerance, step, integrator, pre_roll), known=(),
+            outputs=OutputPaths(modes=None if modes is None else os.fspath(modes)),
+            settings=merge([_forced(keep, leave_out), read_settings(settings)]), hooks=Hooks(progress, on_operator),
+        )
+    )  # fmt: skip
+
+
+def rig(
+    shot: Shot | Path,
+    layer: Path,
+    *,
+    operators: Sequence[str] = (),
+    settings: Given = None,
+    progress: ProgressCallback | None = None,
+    on_operator: OperatorCallback | None = None,
+) -> Rig:
+    """Make a robot of a skinned character: bodies, joints, motors and targets.
+
+    Args:
+        shot: USD file of a UsdSkel character.
+        layer: USD layer to write; it opens the shot.
+        operators, settings, progress, on_operator: As of `simulate`; see the properties of `rig.skeleton`.
+
+    Raises:
+        ShotError: The character cannot be rigged.
+        SettingError: A setting does not fit.
+    """
+    outputs = OutputPaths(layer=os.fspath(layer))
+    outcome = carry_out(
+        _opened(shot), "rig", wanted=(Rig,), operators=operators, known=(), outputs=outputs,
+        settings=read_settings(settings), hooks=Hooks(progress, on_operator),
+    )  # fmt: skip
+    return outcome.require(Rig)
+
+
+def _opened(shot: Shot | Path) -> Shot:
+    return shot if isinstance(shot, Shot) else Shot(shot)
+
+
+def _wanted(verify: bool) -> tuple[type, ...]:
+    from calmotion.shot import Character
+
+    return (Character, Result, *((Verification,) if verify else ()))
+
+
+def _source(
+    tolerance: float | str | None, step: float | str | None, integrator: str | None, pre_roll: float | str | None,
+    shaper: str | None = None, verify: bool = False,
+) -> Source:  # fmt: skip
+    """What the user asked for, in SI units."""
+    return Source(
+        path="",
+        command="",
+        tolerance=_quantity(tolerance, "m"),
+        step=_quantity(step, "s"),
+        integrator=integrator,
+        pre_roll=_quantity(pre_roll, "s"),
+        shaper=shaper,
+        verify=verify,
+    )
+
+
+def _quantity(value: float | str | None, unit: str) -> float | None:
+    return parse_quantity(value, unit) if isinstance(value, str) else value
+
+
+def _forced(keep: Sequence[str], leave_out: Sequence[str]) -> Settings:
+    """Settings of the analysis for what is forced on or off; what is kept wins."""
+    forced: dict[str, object] = {}
+    for given, choice in ((leave_out, OFF), (keep, ON)):
+        forced |= {kind: choice for name in given for kind in (KINDS if name == "all" else (name,))}
+    return {"needs.analyse": forced} if forced else {}

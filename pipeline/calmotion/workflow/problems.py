@@ -1,0 +1,73 @@
+"""What went wrong in a run: the errors, the operators that raised them, and how they reach the caller."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from calmotion.errors import ShotError, ShotErrors, each
+from calmotion.host import HostError, OperatorResult, Run
+
+
+@dataclass(frozen=True)
+class Problem:
+    """An error of a run.
+
+    Attributes:
+        error: The error.
+        operator, plugin: Where it was raised; empty when it concerns the whole run.
+        traceback: Text of the traceback, only where the plugin's author needs it.
+    """
+
+    error: ShotError
+    operator: str = ""
+    plugin: str = ""
+    traceback: str = ""
+
+    def as_dict(self) -> dict[str, str]:
+        """The fields, as `--json` prints them."""
+        owner = {"operator": self.operator, "plugin": self.plugin, "traceback": self.traceback}
+        return self.error.as_dict() | {key: value for key, value in owner.items() if value}
+
+
+class RunError(ShotErrors):
+    """A run that made no result.
+
+    Attributes:
+        problems: Every problem, with the operator and the plugin that it came from.
+    """
+
+    def __init__(self, problems: Sequence[Problem]):
+        self.problems = tuple(problems)
+        super().__init__([problem.error for problem in problems])
+
+
+class Cancelled(Exception):
+    """The caller's `cancel` stopped a run before it had a result."""
+
+
+def problems_of(run: Run, wanted: Sequence[type]) -> list[Problem]:
+    """The errors of operators that raised; without any, the wanted values that no operator made, with the reasons."""
+    problems = [problem for result in run.failures() for problem in _problems(result)]
+    if problems:
+        return problems
+    for kind in wanted:
+        if run.get(kind) is None:
+            makers = {cls.idname for cls in run.plan.operators if kind in cls.provides}
+            reasons = "; ".join(f"{row.idname}: {row.reason}" for row in run.results if row.idname in makers)
+            problems.append(Problem(HostError(f"there is no {kind.__name__}", found=reasons or None)))
+    return problems
+
+
+def _problems(result: OperatorResult) -> list[Problem]:
+    error = result.error
+    # A ShotError is the user's to solve; anything else is the plugin's, and its author needs the traceback.
+    if isinstance(error, ShotError):
+        return [Problem(one, result.idname, result.plugin) for one in each(error)]
+    raised = HostError(
+        f"the operator {result.idname} of the plugin {result.plugin} raised {type(error).__name__}",
+        found=str(error) or None,
+        remedy="Report this to the plugin's maintainer, with the traceback.",
+    )
+    raised.__cause__ = error
+    return [Problem(raised, result.idname, result.plugin, result.traceback)]

@@ -1,0 +1,276 @@
+"""One run of the plugins on a shot: what is wanted, where files go, progress, interruption."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, TypeVar
+
+from calmotion.errors import ShotError
+from calmotion.host import Host, OperatorResult, Run, SettingError, Settings, merge, nearest
+from calmotion.shot.outputs import CsvFile, Figures, Recording, WrittenLayer
+from calmotion.shot.run import OutputPaths, Source
+from calmotion.workflow.problems import Cancelled, Problem, RunError, problems_of
+from calmotion.workflow.shot import Shot
+
+T = TypeVar("T")
+_FILES = (
+    (WrittenLayer, "-o", "layer"), (CsvFile, "--csv", "csv"), (Recording, "--rrd", "rrd"),
+    (Figures, "--figures", "figures"),
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Progress:
+    """How far a run is.
+
+    Attributes:
+        stage: Label of the operator that runs.
+        fraction: How far it is, 0..1.
+        message: What it does now, or empty.
+        time_left_s: Estimate of what this operator still takes [s], from its pace so far; None before it has one.
+    """
+
+    stage: str
+    fraction: float
+    message: str
+    time_left_s: float | None = None
+
+
+@dataclass(frozen=True)
+class Hooks:
+    """What a caller wants to hear of a run, and how it stops one.
+
+    Attributes:
+        progress: Called often with a `Progress`.
+        on_operator: Called after each operator with its outcome, duration and notes.
+        cancel: Called as often as `progress`; the run stops when it returns True.
+    """
+
+    progress: Callable[[Progress], None] | None = None
+    on_operator: Callable[[OperatorResult], None] | None = None
+    cancel: Callable[[], bool] | None = None
+
+
+class _Stop(KeyboardInterrupt):
+    """The caller's `cancel`, in the form in which the optimiser keeps its best curves."""
+
+
+@dataclass(frozen=True, eq=False)
+class Outcome:
+    """What became of a run.
+
+    Attributes:
+        shot: The shot.
+        run: The host's run: every value by its type, and what became of each operator.
+        problems: What went wrong.
+        interrupted: Whether the user interrupted it, or the caller cancelled it.
+        cancelled: Whether the caller did.
+        total_wall_s: Time of all of it [s].
+    """
+
+    shot: Shot
+    run: Run
+    problems: tuple[Problem, ...]
+    interrupted: bool
+    cancelled: bool
+    total_wall_s: float
+
+    def require(self, kind: type[T]) -> T:
+        """The value of a type.
+
+        Raises:
+            RunError: The run did not make it.
+            Cancelled: The caller stopped the run before.
+            KeyboardInterrupt: The user interrupted the run before.
+        """
+        value = self.run.get(kind)
+        if value is not None:
+            return value
+        if self.cancelled:
+            raise Cancelled(f"{self.shot.path}: cancelled before there was a result")
+        if self.interrupted:
+            raise KeyboardInterrupt
+        raise RunError(self.problems)
+
+
+def carry_out(
+    shot: Shot,
+    command: str,
+    *,
+    wanted: Sequence[type] = (),
+    optional: Sequence[type] = (),
+    operators: Sequence[str] = (),
+    source: Source | None = None,
+    outputs: OutputPaths | None = None,
+    known: Sequence[object] | None = None,
+    settings: Settings | None = None,
+    hooks: Hooks | None = None,
+) -> Outcome:
+    """Run the operators that are needed for what is wanted.
+
+    Args:
+        shot: The shot; what a run reads of it is kept there.
+        command: `inspect`, `check`, `simulate`, `optimize` or `rig`.
+        wanted: Types that must come out.
+        optional: Types that are made where an operator can.
+        operators: Idnames of operators to run as well.
+        source: What the user asked for of the simulation; path, command and motion are filled in.
+        outputs: Files to write.
+        known: Values that exist already; the shot's when None.
+        settings: Settings of operators, stronger than the shot's.
+        hooks: Progress, notes, cancelling.
+
+    Raises:
+        SettingError: A setting, an operator's name or an output does not fit.
+        PlanError: The operators cannot make what is wanted.
+    """
+    start, host, hooks = time.perf_counter(), shot.host, hooks or Hooks()
+    source = replace(source or Source("", ""), path=shot.path, command=command, motion=shot.motion)
+    outputs = outputs or OutputPaths()
+    known = shot.known if known is None else known
+    writes = command in ("simulate", "optimize")
+    kinds = [*wanted, *(_files_asked_for(host, outputs) if writes else ()), *_made_by(host, operators)]
+    _refuse_unreadable_motion(source, host)
+    run = host.run(
+        [*known, source, outputs], kinds, optional=optional, settings=merge([shot.settings, settings or {}]),
+        progress=_listener(hooks),
+    )  # fmt: skip
+    if writes:
+        _prepare_folders(shot.path, outputs)
+    interrupted = cancelled = False
+    try:
+        for result in run:
+            if hooks.on_operator:
+                hooks.on_operator(result)
+    except _Stop:
+        interrupted = cancelled = True
+    except KeyboardInterrupt:
+        interrupted = True
+    if writes:  # other commands also accept a shot in which nothing moves
+        shot.keep(run.data)
+    problems = [Problem(ShotError("interrupted"))] if interrupted else problems_of(run, kinds)
+    return Outcome(shot, run, tuple(problems), interrupted, cancelled, time.perf_counter() - start)
+
+
+def _listener(hooks: Hooks) -> Callable[[str, float, str], None]:
+    """The host's progress callback that asks `cancel` and estimates the time left."""
+    began: dict[str, float] = {}
+
+    def listen(stage: str, fraction: float, message: str) -> None:
+        if hooks.cancel and hooks.cancel():
+            raise _Stop
+        now = time.perf_counter()
+        elapsed = now - began.setdefault(stage, now)
+        left = elapsed * (1.0 - fraction) / fraction if fraction > 0.0 and elapsed > 0.0 else None
+        if hooks.progress:
+            hooks.progress(Progress(stage, fraction, message, left))
+
+    return listen
+
+
+def _made_by(host: Host, operators: Sequence[str]) -> list[type]:
+    """The types that the named operators make.
+
+    Raises:
+        SettingError: There is no such operator.
+    """
+    kinds: list[type] = []
+    for idname in operators:
+        if idname not in host.operators:
+            known = ", ".join(host.operators)
+            raise SettingError(
+                "there is no such operator",
+                path="--run",
+                found=idname,
+                remedy=f"{nearest(idname, host.operators)}The operators are {known}",
+            )
+        kinds += host.operators[idname].provides
+    return kinds
+
+
+def _refuse_unreadable_motion(source: Source, host: Host) -> None:
+    """Refuse a motion that no plugin reads, before anything costly.
+
+    Raises:
+        SettingError: None does.
+    """
+    from calmotion.shot import MotorTracks
+
+    readers = host.providers(MotorTracks)
+    if source.motion is not None and all(cls.poll({Source: source}) is not None for cls in readers):
+        raise SettingError(
+            "no plugin reads this motion",
+            path="--motion",
+            found=source.motion,
+            remedy="Name a .bvh file, or a plugin that provides MotorTracks with --plugins",
+        )
+
+
+def _files_asked_for(host: Host, outputs: OutputPaths) -> list[type]:
+    """The types that the asked-for files are made as.
+
+    Raises:
+        SettingError: No plugin writes one of them.
+    """
+    kinds: list[type] = []
+    for kind, option, name in _FILES:
+        path = getattr(outputs, name)
+        if path is None:
+            continue
+        if not host.providers(kind):
+            failed = "; ".join(f"{plugin.id}: {plugin.error}" for plugin in host.failures())
+            raise SettingError(
+                "no plugin is there that writes this",
+                path=option,
+                found=path,
+                remedy=f"Plugins that failed: {failed}" if failed else f"Install one that provides {kind.__name__}.",
+            )
+        kinds.append(kind)
+    return kinds
+
+
+def _prepare_folders(shot: str, outputs: OutputPaths) -> None:
+    """Make the folders of the outputs, so that a path that cannot be written is refused before the long work.
+
+    Raises:
+        SettingError: A folder cannot be made, or an output is the shot itself.
+    """
+    for _, option, name in _FILES:
+        path: str | None = getattr(outputs, name)
+        if path is None:
+            continue
+        if os.path.realpath(path) == os.path.realpath(shot):
+            raise SettingError("this is the shot, which is never written to", path=option, found=path)
+        try:
+            (Path(path) if name == "figures" else Path(path).parent).mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise SettingError(
+                "the folder cannot be made", path=option, found=f"{path}: {error.strerror}", remedy="Choose another."
+            ) from error
+
+
+def again(outcome: Outcome, wanted: type[T], *values: object, settings: Settings | None = None) -> T:
+    """One more value from what a run has made.
+
+    Args:
+        outcome: The run.
+        wanted: Type of the value; it is made anew, also where the run had made one.
+        values: Given instead of the run's values of the same types.
+        settings: Settings of operators, stronger than the shot's.
+
+    Raises:
+        RunError: No operator made it.
+        SettingError: A setting does not fit.
+    """
+    host, given = outcome.shot.host, {kind: value for kind, value in outcome.run.data.items() if kind is not wanted}
+    given |= {type(value): value for value in values}
+    data: list[Any] = list(given.values())
+    run = host.run(data, [wanted], settings=merge([outcome.shot.settings, settings or {}])).finish()
+    made = run.get(wanted)
+    if made is None:
+        raise RunError(problems_of(run, [wanted]))
+    return made

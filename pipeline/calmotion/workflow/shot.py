@@ -1,0 +1,140 @@
+"""An opened shot: its file, the plugins that read it, and what they read."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Mapping, Sequence
+from functools import cached_property
+from typing import TypeVar
+
+from calmotion.host import Host, Settings, merge, open_host, read_assignment, read_settings_file
+from calmotion.shot import Animation, Character, Provenance
+from calmotion.shot.run import OutputPaths, Source
+from calmotion.workflow.problems import RunError, problems_of
+
+T = TypeVar("T")
+_READ: tuple[type, ...] = (Character, Animation, Provenance)
+Path = str | os.PathLike[str]
+Given = Mapping[str, object] | Path | None
+"""Settings of operators: `{"fe.mesh.element_size": "5mm"}`, `{"fe.mesh": {"element_size": 0.005}}`, or a TOML file."""
+
+
+class Shot:
+    """A shot of a character in USD.
+
+    Read when something of it is first asked for; `open_shot` reads at once.
+
+    Args:
+        path: USD file.
+        motion: File with a motion that replaces the tracks of motors, such as a BVH file.
+        plugins: Folders with more plugins.
+        settings: Settings of operators for every run of this shot.
+
+    Raises:
+        SettingError: A folder holds no plugin, or the settings cannot be read.
+    """
+
+    def __init__(self, path: Path, motion: Path | None = None, plugins: Iterable[Path] = (), settings: Given = None):
+        self.path = os.fspath(path)
+        self.motion = None if motion is None else os.fspath(motion)
+        self.settings = read_settings(settings)
+        self.host: Host = open_host([os.fspath(folder) for folder in plugins])
+        self._read: dict[type, object] = {}
+
+    def __repr__(self) -> str:
+        return f"Shot({self.path!r})"
+
+    @property
+    def known(self) -> tuple[object, ...]:
+        """The values that were read of it so far; empty before."""
+        return tuple(self._read.values())
+
+    def keep(self, data: Mapping[type, object]) -> None:
+        """Keep what a run has read of it, so that the next one need not."""
+        self._read |= {kind: data[kind] for kind in _READ if kind in data}
+
+    def read(self) -> Shot:
+        """Read the file, if that has not happened; returns itself.
+
+        Raises:
+            ShotError: The shot cannot be processed; it names every problem that was found (`errors` of a `ShotErrors`).
+        """
+        if not self._read:
+            given = (Source(self.path, "simulate", motion=self.motion), OutputPaths())
+            run = self.host.run(given, _READ, settings=self.settings).finish()
+            if any(run.get(kind) is None for kind in _READ):
+                raise RunError(problems_of(run, _READ))
+            self.keep(run.data)
+        return self
+
+    def _value(self, kind: type[T]) -> T:
+        value = self.read()._read[kind]
+        assert isinstance(value, kind)
+        return value
+
+    @cached_property
+    def character(self) -> Character:
+        """Bodies, joints, motors and targets, SI units."""
+        return self._value(Character)
+
+    @cached_property
+    def animation(self) -> Animation:
+        """The tracks of the motors, SI units, times in seconds after the first frame."""
+        return self._value(Animation)
+
+    @cached_property
+    def provenance(self) -> Provenance:
+        """Layers of the shot with their hashes, and units of its stage."""
+        return self._value(Provenance)
+
+    @property
+    def targets(self) -> tuple[str, ...]:
+        """Prim paths of the targets."""
+        return tuple(target.path for target in self.character.targets)
+
+    @property
+    def motors(self) -> tuple[str, ...]:
+        """Prim paths of the motors' joints."""
+        return tuple(motor.path for motor in self.character.motors)
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What the reader noticed, as sentences."""
+        return tuple(self.character.notes)
+
+
+def open_shot(path: Path, *, motion: Path | None = None, plugins: Sequence[Path] = (), settings: Given = None) -> Shot:
+    """Read and check a shot.
+
+    Args:
+        path: USD file.
+        motion: File with a motion that replaces the tracks of motors, such as a BVH file.
+        plugins: Folders with more plugins.
+        settings: Settings of operators for every run of this shot: `{"fe.mesh.element_size": "5mm"}`, a mapping for
+            each operator, or a TOML file.
+
+    Raises:
+        ShotError: The shot cannot be processed; every problem is named with prim path, attribute and remedy.
+        SettingError: A folder holds no plugin, or a setting does not fit.
+    """
+    return Shot(path, motion, plugins, settings).read()
+
+
+def read_settings(given: Given) -> Settings:
+    """Settings in any of their forms, as a table for each operator.
+
+    Raises:
+        SettingError: A file cannot be read, or a name is not `<operator>.<property>`.
+    """
+    if given is None:
+        return {}
+    if not isinstance(given, Mapping):
+        return read_settings_file(os.fspath(given))
+    tables: list[Settings] = []
+    for name, value in given.items():
+        if isinstance(value, Mapping):
+            tables.append({name: dict(value)})
+            continue
+        ((operator, properties),) = read_assignment(f"{name}=").items()
+        tables.append({operator: dict.fromkeys(properties, value)})
+    return merge(tables)

@@ -1,0 +1,185 @@
+"""The Python interface on a small robot in USD: arrays by prim path, report, files, cancelling."""
+
+from __future__ import annotations
+
+import csv
+import json
+import threading
+
+import calmotion as cm
+import numpy as np
+import pytest
+from calmotion.shot.model_choice import KINDS, OFF, ON
+from calmotion.workflow.commands import _forced
+
+SHOT = """#usda 1.0
+(
+    defaultPrim = "Robot"
+    endTimeCode = 24
+    kilogramsPerUnit = 1
+    metersPerUnit = 1
+    startTimeCode = 0
+    timeCodesPerSecond = 24
+    upAxis = "Z"
+)
+def Xform "Robot" (prepend apiSchemas = ["PhysicsArticulationRootAPI"])
+{
+    def Cube "Link" (prepend apiSchemas = ["PhysicsRigidBodyAPI", "PhysicsMassAPI"])
+    {
+        float physics:mass = 2
+        double size = 0.2
+        def Xform "Tip" (prepend apiSchemas = ["CalmTargetAPI"])
+        {
+            double3 xformOp:translate = (0.1, 0, 0)
+            uniform token[] xformOpOrder = ["xformOp:translate"]
+        }
+    }
+    def PhysicsRevoluteJoint "Hinge" (prepend apiSchemas = ["PhysicsDriveAPI:angular"])
+    {
+        uniform token physics:axis = "Z"
+        rel physics:body1 = </Robot/Link>
+        float drive:angular:physics:targetPosition.timeSamples = { 0: 0, 6: 10, 12: 30, 18: 20, 24: 0 }
+    }
+}
+"""
+TIP, HINGE = "/Robot/Link/Tip", "/Robot/Hinge"
+
+
+@pytest.fixture
+def shot_file(tmp_path):
+    path = tmp_path / "shot.usda"
+    path.write_text(SHOT)
+    return path
+
+
+@pytest.fixture
+def simulated(shot_file):
+    return cm.simulate(cm.open_shot(shot_file), step="4ms")
+
+
+def test_an_opened_shot_tells_what_is_in_it(shot_file):
+    shot = cm.open_shot(shot_file)
+    assert shot.targets == (TIP,) and shot.motors == (HINGE,)
+    assert shot.animation.frame_times[-1] == pytest.approx(1.0)
+    assert shot.provenance.shot == str(shot_file)
+
+
+def test_a_shot_that_cannot_be_read_raises_with_the_place(tmp_path):
+    (tmp_path / "no.usda").write_text(SHOT.replace('"PhysicsDriveAPI:angular"', ""))
+    with pytest.raises(cm.ShotError) as raised:
+        cm.open_shot(tmp_path / "no.usda")
+    assert raised.value.problem and raised.value.problems[0].operator == "usd.read"
+    with pytest.raises(cm.ShotError, match="missing.usda"):
+        cm.open_shot(tmp_path / "missing.usda")
+
+
+def test_results_are_arrays_by_prim_path(simulated):
+    tip, hinge = simulated.targets[TIP], simulated.motors[HINGE]
+    steps = len(simulated.times)
+    assert simulated.times[0] == pytest.approx(0.0, abs=1e-9) and simulated.times[-1] == pytest.approx(1.0)
+    assert tip.position.shape == (steps, 3) and tip.orientation.shape == (steps, 4) and tip.error.shape == (steps,)
+    assert np.interp(0.5, simulated.times, hinge.input) == pytest.approx(np.radians(30), rel=1e-6)
+    # the tip goes round the hinge with the motor
+    np.testing.assert_allclose(np.arctan2(tip.position[:, 1], tip.position[:, 0]), hinge.output, atol=1e-9)
+    np.testing.assert_allclose(np.linalg.norm(tip.position - tip.intended_position, axis=1), tip.error, atol=1e-12)
+    assert simulated.max_error == tip.max_error and simulated.rms_error == pytest.approx(tip.rms_error)
+
+
+def test_the_report_is_the_object_of_the_command_line(shot_file, simulated, calmotion):
+    printed = json.loads(calmotion("simulate", shot_file, "--step", "4ms", "--json").stdout)
+    report = simulated.report()
+    assert json.loads(json.dumps(report, allow_nan=False)) == report
+    assert set(report) == set(printed)
+    for key in ("targets", "steps", "step_s", "dof", "command", "version", "max_error_m"):
+        assert report[key] == printed[key]
+
+
+def test_an_opened_shot_is_not_read_again(shot_file):
+    shot = cm.open_shot(shot_file)
+    ran = []
+    cm.simulate(shot, step=0.004, on_operator=ran.append)
+    assert "usd.read" not in [operator.idname for operator in ran]
+    assert "retarget.simulate" in [operator.idname for operator in ran]
+    ran.clear()
+    cm.simulate(shot_file, step=0.004, on_operator=ran.append)
+    assert "usd.read" in [operator.idname for operator in ran]
+
+
+def test_files_are_made_of_a_result(simulated, tmp_path):
+    table = simulated.write_table(tmp_path / "table.csv")
+    with open(table, newline="") as stream:
+        rows = list(csv.reader(stream))
+    assert rows[0] == list(simulated.columns()) and len(rows) == len(simulated.times) + 1
+    curves = simulated.export(tmp_path / "curves.csv", rate=50.0)
+    with open(curves) as stream:
+        lines = [line for line in stream if not line.startswith("#")]
+    assert len(lines) == 1 + 51
+    written = simulated.write(tmp_path / "layer.usda", bake="motors")
+    assert (tmp_path / "layer.usda").is_file() and cm.open_shot(written.root).targets == (TIP,)
+
+
+def test_a_layer_of_the_shot_is_never_written(simulated, shot_file):
+    before = shot_file.read_bytes()
+    with pytest.raises(cm.ShotError):
+        simulated.write(shot_file)
+    with pytest.raises(cm.SettingError):
+        cm.simulate(shot_file, outputs=cm.OutputPaths(layer=str(shot_file)))
+    assert shot_file.read_bytes() == before
+
+
+def test_the_table_has_the_columns_by_name(simulated):
+    table = simulated.table()
+    np.testing.assert_array_equal(np.asarray(table[f"{TIP}.error"]), simulated.targets[TIP].error)
+    np.testing.assert_array_equal(np.asarray(table["time_s"]), simulated.times)
+
+
+def test_optimize_has_the_motion_before_and_after(shot_file):
+    result = cm.optimize(shot_file, step="8ms")
+    assert isinstance(result, cm.OptimizationResult) and result.stopped
+    assert result.before.targets[TIP].position.shape == result.targets[TIP].position.shape
+    assert result.rms_error <= result.before.targets[TIP].rms_error + 1e-12
+    assert result.report()["command"] == "optimize"
+
+
+def test_a_result_can_be_verified(simulated):
+    verification = cm.verify(simulated)
+    assert verification.step_s < simulated.report()["step_s"] and verification.error_m >= 0.0
+
+
+def test_progress_tells_stage_fraction_and_time_left(shot_file):
+    seen = []
+    cm.simulate(shot_file, step="4ms", progress=seen.append)
+    assert {state.stage for state in seen} >= {"Read the shot", "Simulate the shot"}
+    assert all(0.0 <= state.fraction <= 1.0 for state in seen)
+    assert all(state.time_left_s is None or state.time_left_s >= 0.0 for state in seen)
+
+
+def test_a_cancelled_run_raises(shot_file):
+    stop = threading.Event()
+
+    def progress(state):
+        if state.stage == "Simulate the shot":
+            stop.set()
+
+    with pytest.raises(cm.Cancelled, match="shot.usda"):
+        cm.simulate(shot_file, step="4ms", progress=progress, cancel=stop.is_set)
+
+
+def test_an_inspection_reports_what_is_there(shot_file):
+    report = cm.inspect(shot_file).report()
+    assert report["motors"][0]["path"] == HINGE and report["targets"][0]["path"] == TIP
+    checked = cm.inspect(shot_file, strict=True)
+    assert checked.findings is not None and checked.report()["findings"] == []
+
+
+@pytest.mark.parametrize(
+    ("given", "problem"), [({"tolerance": "1kg"}, "1kg"), ({"settings": {"no.such.thing": 1}}, "no.such")]
+)
+def test_wrong_arguments_are_setting_errors(shot_file, given, problem):
+    with pytest.raises(cm.SettingError, match=problem):
+        cm.simulate(shot_file, **given)
+
+
+def test_keep_wins_over_leave_out():
+    assert _forced([], []) == {}
+    assert _forced(["modes"], ["all"]) == {"needs.analyse": dict.fromkeys(KINDS, OFF) | {"modes": ON}}
