@@ -10,7 +10,7 @@ import numpy as np
 from calmotion.errors import ShotError
 from calmotion.shot import Animation, Character, Motor, Provenance, Result
 from calmotion.shot.commanded import commanded_values
-from calmotion.support.files import write_whole
+from calmotion.support.files import write_text
 
 
 def write_table(
@@ -68,7 +68,7 @@ def _limits(motor: Motor, character: Character, angle: str) -> str:
 
 def _write(target: str, text: str) -> None:
     try:
-        write_whole(target, text)
+        write_text(target, text)
     except OSError as error:
         raise ShotError(
             "the curves cannot be written",

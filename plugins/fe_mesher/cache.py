@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import contextlib
 import hashlib
-import os
-import tempfile
 import zipfile
-from pathlib import Path
 
 import numpy as np
 from calmotion.support.cache_folder import cache_folder
+from calmotion.support.files import remove_abandoned, replaced
 
 FOLDER = "tetrahedra"
 
@@ -37,33 +35,19 @@ def load(key: str, names: tuple[str, ...] = ("points", "tets")) -> tuple[np.ndar
 def store(key: str, **arrays: np.ndarray) -> tuple[np.ndarray, ...]:
     """Keep arrays; a reader sees all of them or nothing. A folder that cannot be written is passed over.
 
-    The tetrahedraliser makes another mesh each time, so where two processes made one, both go on with that which
-    was there first: simulations of the same shot then agree.
+    The tetrahedraliser makes another mesh each time. Where two processes make one, both go on with the one that is
+    stored first: simulations of the same shot then agree.
 
     Returns:
-        What is kept under the key from now on.
+        The arrays that are kept under the key from now on.
     """
-    folder, own = cache_folder() / FOLDER, tuple(arrays.values())
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        handle, name = tempfile.mkstemp(dir=folder, suffix=".part")
-    except OSError:
-        return own
-    path = folder / f"{key}.npz"
-    try:
-        with os.fdopen(handle, "wb") as file:
-            np.savez(file, **arrays)  # type: ignore[arg-type]
-        try:
-            os.link(name, path)
-        except FileExistsError:
-            other = load(key, tuple(arrays))
-            if other is not None:
-                return other
-            os.replace(name, path)
-    except OSError:
-        # a file system without links: the last one wins
-        with contextlib.suppress(OSError):
-            os.replace(name, path)
-    finally:
-        Path(name).unlink(missing_ok=True)
-    return own
+    path, names = cache_folder() / FOLDER / f"{key}.npz", tuple(arrays)
+    with contextlib.suppress(OSError):
+        for keep_existing in (True, False):  # a second time over a damaged file
+            with replaced(path, keep_existing) as temporary:
+                np.savez(temporary, **arrays)  # type: ignore[arg-type]
+            remove_abandoned(path.parent)
+            stored = load(key, names)
+            if stored is not None:
+                return stored
+    return tuple(arrays.values())

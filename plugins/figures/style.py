@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 
+from calmotion.support.files import replaced
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
@@ -36,13 +36,9 @@ def tidy(axes: Axes, label: str, title: str = "") -> None:
 
 
 def save(figure: Figure, path: Path, dpi: int) -> str:
-    """Write the figure, whole or not at all; the same figure always gives the same bytes."""
-    partial = path.with_name(f".{path.stem}.{os.getpid()}.partial.png")
-    try:
-        figure.savefig(partial, dpi=dpi, metadata={"Software": None})
-        os.replace(partial, path)
-    finally:
-        partial.unlink(missing_ok=True)
+    """Write the figure atomically; the same figure always gives the same bytes."""
+    with replaced(path) as temporary:
+        figure.savefig(temporary, dpi=dpi, metadata={"Software": None})
     return str(path)
 
 

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
+from calmotion.support.files import replaced
 
 if TYPE_CHECKING:
     from calmotion.reduction.elements.assembly import QuadraticMesh
@@ -73,7 +74,8 @@ def draw_modes(
         ax.set_title(f"mode {k + 1}: {frequencies[k]:.4g} Hz", fontsize=9)
         ax.set_xlim(shown[:, 0].min(), shown[:, 0].max())
         ax.set_ylim(shown[:, 1].min(), shown[:, 1].max())
-    figure.savefig(path, dpi=dpi)
+    with replaced(path) as temporary:
+        figure.savefig(temporary, dpi=dpi)
 
 
 def view(nodes: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

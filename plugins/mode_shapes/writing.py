@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import io
 from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -12,6 +13,7 @@ from calmotion.errors import ShotError
 from calmotion.reduction.damping import modal_damping
 from calmotion.reduction.inertia_integrals import inertia_integrals
 from calmotion.shot import Body
+from calmotion.support.files import replaced, write_text
 from calmotion.support.naming import distinct_names
 
 from .picture import draw_modes
@@ -70,10 +72,9 @@ def write_modes(
                 written.append(str(picture))
             rows += table_rows(body, linear, frequencies)
         table = target / "modes.csv"
-        with open(table, "w", newline="", encoding="utf-8") as file:
-            writer = csv.writer(file)
-            writer.writerow(COLUMNS)
-            writer.writerows(rows)
+        text = io.StringIO(newline="")
+        csv.writer(text).writerows([COLUMNS, *rows])
+        write_text(table, text.getvalue())
         written.append(str(table))
     except OSError as error:
         raise ShotError(
@@ -96,7 +97,8 @@ def write_vtu(path: Path, linear: LinearModes, shapes: np.ndarray) -> None:
 
     mesh = linear.model.mesh
     fields = {f"mode_{k + 1:02d}": np.ascontiguousarray(shapes[:, :, k]) for k in range(shapes.shape[2])}
-    meshio.Mesh(mesh.nodes, [("tetra10", mesh.tets)], point_data=fields).write(path)
+    with replaced(path) as temporary:
+        meshio.Mesh(mesh.nodes, [("tetra10", mesh.tets)], point_data=fields).write(temporary)
 
 
 def table_rows(body: Body, linear: LinearModes, frequencies: np.ndarray) -> list[tuple]:

@@ -5,8 +5,6 @@ Only rerun's viewer binds sockets or reports on its use. It is never started her
 
 from __future__ import annotations
 
-import contextlib
-import os
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
@@ -18,6 +16,7 @@ from calmotion.shot import Animation, Character, Motion, Result, Simulation
 from calmotion.shot.character import Array
 from calmotion.shot.measure import measure_of
 from calmotion.shot.outputs import SystemModes
+from calmotion.support.files import replaced
 from calmotion.support.naming import distinct_names
 from calmotion.views.playback import sample_motion
 from calmotion.views.spectrum import error_spectrum, highest_frequency
@@ -42,7 +41,7 @@ def write_recording(
     operators: Sequence[OperatorResult] = (),
     system: SystemModes | None = None,
 ) -> None:
-    """Write a .rrd file, whole or not at all.
+    """Write a .rrd file atomically.
 
     In 3D the motion is sampled at the shot's frames; curves keep the simulation's steps, thinned to
     `samples_per_plot`. What lies before the first frame (the pre-roll) is not recorded.
@@ -61,32 +60,26 @@ def write_recording(
         ShotError: When the file cannot be written.
     """
     target = Path(path)
-    partial = target.with_name(f".{target.stem}.{os.getpid()}.partial.rrd")
     recording = rr.RecordingStream("calmotion", recording_id=f"{target.stem}{character.path}")
+    motions = {INPUT: result.before.motion, REFERENCE: result.reference}
+    if result.after is not None:
+        motions[OPTIMIZED] = result.after.motion
+    at_frames = {root: sample_motion(motion, animation.frame_times) for root, motion in motions.items()}
+    scale = largest_deviation(character, result, at_frames[INPUT], at_frames[REFERENCE])
     try:
-        target.parent.mkdir(parents=True, exist_ok=True)
-        motions = {INPUT: result.before.motion, REFERENCE: result.reference}
-        if result.after is not None:
-            motions[OPTIMIZED] = result.after.motion
-        at_frames = {root: sample_motion(motion, animation.frame_times) for root, motion in motions.items()}
-        scale = largest_deviation(character, result, at_frames[INPUT], at_frames[REFERENCE])
-        recording.save(str(partial), default_blueprint=make_blueprint(character, animation, result, scale))
-        summary = rr.TextDocument(describe(character, result, operators, system), media_type="text/markdown")
-        recording.log("summary", summary, static=True)
-        log_all(recording, character, at_frames, result, scale, samples_per_plot, progress)
-        recording.flush()
-        recording.disconnect()
-        with partial.open("rb+") as file:
-            os.fsync(file.fileno())
-        os.replace(partial, target)
+        with replaced(target) as temporary:
+            recording.save(str(temporary), default_blueprint=make_blueprint(character, animation, result, scale))
+            summary = rr.TextDocument(describe(character, result, operators, system), media_type="text/markdown")
+            recording.log("summary", summary, static=True)
+            log_all(recording, character, at_frames, result, scale, samples_per_plot, progress)
+            recording.flush()
+            recording.disconnect()
     except OSError as error:
         raise ShotError(
             f"the recording cannot be written: {error}", path=path, remedy="Choose another --rrd."
         ) from error
     finally:
         recording.disconnect()
-        with contextlib.suppress(OSError):
-            partial.unlink()
 
 
 def log_all(

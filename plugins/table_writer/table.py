@@ -9,7 +9,7 @@ from collections.abc import Mapping
 import numpy as np
 from calmotion.errors import ShotError
 from calmotion.shot.character import Array
-from calmotion.support.files import write_whole
+from calmotion.support.files import write_text
 
 
 def write_table(path: str, table: Mapping[str, Array]) -> None:
@@ -23,7 +23,7 @@ def write_table(path: str, table: Mapping[str, Array]) -> None:
     writer.writerow(table)
     writer.writerows([f"{value:.12g}" for value in row] for row in np.column_stack(list(table.values())))
     try:
-        write_whole(path, text.getvalue())
+        write_text(path, text.getvalue())
     except OSError as error:
         raise ShotError(
             "the table cannot be written", path=path, found=error.strerror, remedy="Choose another file for --csv."

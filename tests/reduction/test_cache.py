@@ -176,7 +176,7 @@ def test_the_oldest_go_when_the_limit_is_passed(folder, monkeypatch):
         size = path.stat().st_size
         os.utime(path, (1e9 + k, 1e9 + k))
     cached_reduction(0, never)  # used: it is now the newest
-    old = folder / "left.part"
+    old = folder / ".calmotion-left.npz"
     old.write_text("")
     os.utime(old, (1e9, 1e9))
     monkeypatch.setattr(reduction_cache, "LIMIT", int(3.5 * size))
@@ -227,4 +227,4 @@ def test_several_processes_at_once_never_see_half_a_file(folder, repository):
     for (out, err), code in results:
         assert code == 0, err
         assert int(out) < 40
-    assert not list(folder.glob("*.part"))
+    assert not list(folder.glob(".calmotion-*"))

@@ -1,32 +1,102 @@
-"""Files that are written whole or not at all."""
+"""Files are replaced atomically."""
+
+from __future__ import annotations
 
 import os
 import stat
 
 import pytest
-from calmotion.support.files import write_whole
+from calmotion.support.files import PREFIX, remove_abandoned, replaced, write_text
+
+
+def names(folder):
+    return sorted(path.name for path in folder.iterdir())
 
 
 def test_a_file_is_replaced_as_a_whole_and_is_as_public_as_others(tmp_path):
     file = tmp_path / "deep" / "table.csv"
-    write_whole(file, "old")
-    write_whole(file, "new é\n")
-    assert file.read_text(encoding="utf-8") == "new é\n" and [p.name for p in file.parent.iterdir()] == ["table.csv"]
+    write_text(file, "old")
+    write_text(file, "new é\r\n\n")
+    assert file.read_bytes() == "new é\r\n\n".encode() and names(file.parent) == ["table.csv"]
     mask = os.umask(0)
     os.umask(mask)
     assert stat.S_IMODE(file.stat().st_mode) == 0o666 & ~mask
 
 
-def test_what_cannot_be_written_leaves_the_old_file_and_nothing_else(tmp_path, monkeypatch):
+def test_the_temporary_file_has_another_name_each_time_and_belongs_to_its_owner_alone(tmp_path):
+    seen = []
+    for _ in range(3):
+        with replaced(tmp_path / "layer.usda") as temporary:
+            seen.append(temporary)
+            assert temporary.name.startswith(PREFIX) and temporary.suffix == ".usda" and temporary.parent == tmp_path
+            assert stat.S_IMODE(temporary.stat().st_mode) == 0o600 and temporary.stat().st_size == 0
+    assert len(set(seen)) == 3 and names(tmp_path) == ["layer.usda"]
+
+
+def test_a_symbolic_link_is_replaced_and_what_it_names_is_not_touched(tmp_path, monkeypatch):
+    precious = tmp_path / "precious"
+    precious.write_text("precious")
+    (tmp_path / "table.csv").symlink_to(precious)
+    write_text(tmp_path / "table.csv", "new")
+    assert not (tmp_path / "table.csv").is_symlink() and (tmp_path / "table.csv").read_text() == "new"
+    assert precious.read_text() == "precious"
+    # a link that waits under the name of the temporary file is passed over
+    candidates = iter(["guessed", "another"])
+    monkeypatch.setattr("tempfile._get_candidate_names", lambda: candidates)
+    (tmp_path / f"{PREFIX}guessed.csv").symlink_to(precious)
+    with replaced(tmp_path / "other.csv") as temporary:
+        assert temporary.name == f"{PREFIX}another.csv"
+        temporary.write_text("new")
+    assert precious.read_text() == "precious" and (tmp_path / "other.csv").read_text() == "new"
+
+
+def test_a_link_that_takes_the_place_of_the_temporary_file_is_not_followed(tmp_path):
+    precious = tmp_path / "precious"
+    precious.write_text("precious")
+    mode = precious.stat().st_mode
+    with pytest.raises(OSError), replaced(tmp_path / "table.csv") as temporary:
+        temporary.unlink()
+        temporary.symlink_to(precious)
+    assert names(tmp_path) == ["precious"]
+    assert precious.read_text() == "precious" and precious.stat().st_mode == mode
+
+
+def test_an_existing_file_can_be_kept(tmp_path):
+    file = tmp_path / "mesh.npz"
+    for text in ("first", "second"):
+        with replaced(file, keep_existing=True) as temporary:
+            temporary.write_text(text)
+        assert file.read_text() == "first" and names(tmp_path) == ["mesh.npz"]
+
+
+def test_an_existing_file_is_kept_where_there_are_no_hard_links(tmp_path, monkeypatch):
+    monkeypatch.setattr(os, "link", lambda *paths: (_ for _ in ()).throw(PermissionError("no links here")))
+    test_an_existing_file_can_be_kept(tmp_path)
+
+
+def test_a_failure_leaves_the_old_file_and_nothing_else(tmp_path, monkeypatch):
     file = tmp_path / "table.csv"
-    write_whole(file, "old")
+    write_text(file, "old")
+    with pytest.raises(KeyboardInterrupt), replaced(file) as temporary:
+        temporary.write_text("half")
+        raise KeyboardInterrupt
+    assert file.read_text() == "old" and names(tmp_path) == ["table.csv"]
     monkeypatch.setattr(os, "fsync", lambda descriptor: (_ for _ in ()).throw(OSError("the disk is full")))
     with pytest.raises(OSError, match="full"):
-        write_whole(file, "new")
-    assert file.read_text() == "old" and [path.name for path in tmp_path.iterdir()] == ["table.csv"]
+        write_text(file, "new")
+    assert file.read_text() == "old" and names(tmp_path) == ["table.csv"]
 
 
 def test_a_file_where_a_folder_should_be_is_an_error(tmp_path):
     (tmp_path / "taken").write_text("")
     with pytest.raises(OSError):
-        write_whole(tmp_path / "taken" / "table.csv", "new")
+        write_text(tmp_path / "taken" / "table.csv", "new")
+
+
+def test_old_temporary_files_are_removed_and_new_ones_are_not(tmp_path):
+    for name, age in ((f"{PREFIX}old.npz", 7200.0), (f"{PREFIX}new.npz", 60.0), ("old.npz", 7200.0)):
+        (tmp_path / name).write_text("")
+        then = (tmp_path / name).stat().st_mtime - age
+        os.utime(tmp_path / name, (then, then))
+    remove_abandoned(tmp_path)
+    assert names(tmp_path) == [f"{PREFIX}new.npz", "old.npz"]

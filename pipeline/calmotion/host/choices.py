@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from calmotion.host.errors import SettingError
-from calmotion.support.files import write_whole
+from calmotion.support.files import write_text
 
 FOLDER_VARIABLE = "CALMOTION_CONFIG"
 FILE_NAME = "plugins.toml"
@@ -65,7 +65,7 @@ def choose(plugin_id: str, enabled: bool, environment: Mapping[str, str] | None 
     names = ", ".join(f'"{name}"' for name in sorted(kept))
     head = "# Plugins that are not loaded; `calmotion plugins enable ID` takes one off the list.\n"
     try:
-        write_whole(file, f"{head}disabled = [{names}]\n")
+        write_text(file, f"{head}disabled = [{names}]\n")
     except OSError as error:
         raise SettingError(
             "the choice of plugins cannot be kept",

@@ -1,17 +1,16 @@
 """Reduced bodies kept in the user's cache folder, by the hash of everything that they follow from.
 
-A file is an `.npz` without pickled objects: the arrays of a value, and its structure as JSON. It is written beside
-its place and moved there in one step, so that a reader sees all of it or nothing, and two writers do not mix. What
-cannot be read, for whatever reason, is computed and written again.
+A file is an `.npz` without pickled objects: the arrays of a value, and its structure as JSON. It is replaced
+atomically: a reader sees all of it or nothing, and two writers do not mix. What cannot be read, for whatever reason,
+is computed and written again.
 """
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import json
 import os
-import tempfile
-import time
 from collections.abc import Callable
 from dataclasses import fields, is_dataclass
 from functools import cache
@@ -24,13 +23,13 @@ import numpy as np
 from calmotion.reduction.reduced_body import Elasticity, Invariants, Marker, ReducedBody
 from calmotion.shot.result import Simplification
 from calmotion.support.cache_folder import cache_folder
+from calmotion.support.files import PREFIX, remove_abandoned, replaced
 
 T = TypeVar("T")
 
 FOLDER = "reduced"
 FORMAT = 1  # to be raised when files of the same content are to be read in another way
 LIMIT = 2 * 1024**3  # bytes that are kept
-_ABANDONED = 3600.0  # a temporary file of that age [s] was left by a process that is gone
 
 # What a file may hold besides arrays, numbers, strings, None and tuples of them; a file names its types, and only
 # these are ever made from one.
@@ -127,22 +126,10 @@ def _store(path: Path, key: str, value: Any) -> None:
     arrays: list[Any] = []
     structure = json.dumps({"key": key, "value": _encode(value, arrays)}).encode()
     named = {f"a{k}": array for k, array in enumerate(arrays)}
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        handle, name = tempfile.mkstemp(dir=path.parent, suffix=".part")
-    except OSError:
-        return
-    try:
-        with os.fdopen(handle, "wb") as file:
-            np.savez(file, structure=np.frombuffer(structure, dtype=np.uint8), **named)
-            file.flush()
-            os.fsync(file.fileno())
-        os.replace(name, path)
+    with contextlib.suppress(OSError):
+        with replaced(path) as temporary:
+            np.savez(temporary, structure=np.frombuffer(structure, dtype=np.uint8), **named)
         _prune(path.parent, LIMIT)
-    except OSError:
-        pass
-    finally:
-        Path(name).unlink(missing_ok=True)
 
 
 def _encode(value: Any, arrays: list[Any]) -> Any:
@@ -190,15 +177,14 @@ def _mark_used(path: Path) -> None:
 
 def _prune(folder: Path, limit: int) -> None:
     """Remove the files that were not used for longest until the rest is within the limit [bytes]; the newest stays."""
+    remove_abandoned(folder)
     files = []
     for path in folder.iterdir():
         try:
             state = path.stat()
-            if path.suffix == ".part" and time.time() - state.st_mtime > _ABANDONED:
-                path.unlink()
         except OSError:
             continue  # removed by another process
-        if path.suffix == ".npz":
+        if path.suffix == ".npz" and not path.name.startswith(PREFIX):
             files.append((state.st_mtime_ns, state.st_size, path))
     files.sort(key=lambda entry: entry[0], reverse=True)
     total = 0

@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import hashlib
 import json
-import os
 import zipfile
 from dataclasses import astuple, dataclass
 from pathlib import Path
@@ -18,6 +17,7 @@ from calmotion.retargeting.problem.problem import RetargetProblem
 from calmotion.retargeting.solver.gauss_newton import Iterate, Search
 from calmotion.retargeting.solver.recycling import Recycled
 from calmotion.shot.character import BoolArray, IntArray
+from calmotion.support.files import replaced
 from calmotion.version import __version__
 
 _OF_LIMITS = ("rho", "left", "reached", "stalled", "on")
@@ -77,17 +77,8 @@ class Checkpoint:
             state |= {name: getattr(limits, name) for name in _OF_LIMITS}
             values |= {f"limit {name}": y for name, y in limits.multipliers.items()}
         values["state"] = np.frombuffer(json.dumps(state).encode(), np.uint8)
-        # one name for what is not whole yet: what a killed process leaves is written over
-        partial = self.path.with_name(self.path.name + ".part")
-        try:
-            with open(partial, "wb") as file:
-                np.savez(file, **values)  # type: ignore[arg-type]
-                file.flush()
-                os.fsync(file.fileno())
-            os.replace(partial, self.path)
-        except OSError:
-            with contextlib.suppress(OSError):
-                partial.unlink(missing_ok=True)
+        with contextlib.suppress(OSError), replaced(self.path) as temporary:
+            np.savez(temporary, **values)  # type: ignore[arg-type]
 
     def load(self, limits: LimitTerms | None) -> tuple[Search, IntArray] | None:
         """The search that was kept and the frames that carry knots in it, its multipliers put into the limits; None

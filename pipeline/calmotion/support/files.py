@@ -1,35 +1,94 @@
-"""Writing files whole or not at all."""
+"""Atomic replacement of files: a reader sees the old file or the new one, never half of one."""
 
 from __future__ import annotations
 
+import contextlib
 import os
 import tempfile
+import time
+from collections.abc import Iterator
 from pathlib import Path
 
+PREFIX = ".calmotion-"  # of the names of temporary files
+_ABANDONED = 3600.0  # a temporary file of that age [s] was left by a process that was killed
 
-def write_whole(path: str | Path, text: str) -> None:
-    """Write a text so that an interrupted run leaves the old file or the new one; folders above it are made.
+
+@contextlib.contextmanager
+def replaced(path: str | Path, keep_existing: bool = False) -> Iterator[Path]:
+    """A temporary file that replaces `path` when the block ends without an exception.
+
+    The file is created exclusively, under a random name that starts with `PREFIX` and has the suffix of `path`, in the
+    folder of `path`, and no symbolic link is followed. Its content is flushed to the disk before it is renamed. An
+    exception in the block removes it. Missing folders above `path` are created. The new file has the permissions of
+    any new file.
+
+    Args:
+        path: The file to replace; a symbolic link is replaced itself.
+        keep_existing: Keep a file that is already at `path`, and drop the new one.
+
+    Yields:
+        The path of the temporary file, which is empty.
 
     Raises:
-        OSError: It cannot be written; nothing is left then.
+        OSError: The file cannot be written; what was at `path` is still there.
     """
     target = Path(path)
     target.parent.mkdir(parents=True, exist_ok=True)
-    handle, temporary = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}.", suffix=".tmp")
+    handle, name = tempfile.mkstemp(dir=target.parent, prefix=PREFIX, suffix=target.suffix)
+    os.close(handle)
+    temporary = Path(name)
     try:
-        with os.fdopen(handle, "w", encoding="utf-8", newline="") as file:
-            file.write(text)
-            file.flush()
-            os.fsync(file.fileno())
-        make_public(temporary)
-        os.replace(temporary, target)
-    except BaseException:
-        os.unlink(temporary)
-        raise
+        yield temporary
+        _flush(temporary)
+        _make_public(temporary)
+        if keep_existing:
+            _move_unless_present(temporary, target)
+        else:
+            os.replace(temporary, target)
+    finally:
+        temporary.unlink(missing_ok=True)
+    with contextlib.suppress(OSError):  # the file is in its place; some file systems cannot flush a folder
+        _flush(target.parent)
 
 
-def make_public(path: str) -> None:
-    """Give a file of mkstemp, which only its owner reads, the permissions of any other new file."""
+def write_text(path: str | Path, text: str) -> None:
+    """Write a text as UTF-8 without changing its line ends, see `replaced`.
+
+    Raises:
+        OSError: The file cannot be written; what was at `path` is still there.
+    """
+    with replaced(path) as temporary:
+        temporary.write_text(text, encoding="utf-8", newline="")
+
+
+def remove_abandoned(folder: Path) -> None:
+    """Remove the temporary files that killed processes left in a folder more than an hour ago."""
+    for path in folder.glob(f"{PREFIX}*"):
+        with contextlib.suppress(OSError):  # another process removed it
+            if time.time() - path.lstat().st_mtime > _ABANDONED:
+                path.unlink()
+
+
+def _move_unless_present(temporary: Path, target: Path) -> None:
+    try:
+        os.link(temporary, target)
+    except FileExistsError:
+        return
+    except OSError:  # a file system without hard links
+        if not os.path.lexists(target):
+            os.replace(temporary, target)
+
+
+def _flush(path: Path) -> None:
+    descriptor = os.open(path, os.O_RDONLY | getattr(os, "O_NOFOLLOW", 0))
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
+
+
+def _make_public(path: Path) -> None:
+    """Replace the permissions that mkstemp gives, owner only, by those of any new file."""
     mask = os.umask(0)
     os.umask(mask)
     os.chmod(path, 0o666 & ~mask)

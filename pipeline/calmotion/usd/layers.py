@@ -1,13 +1,12 @@
-"""Writing a layer so that an interrupted run leaves the old file or the new one, never half of one."""
+"""Atomic writing of USD layers."""
 
 from __future__ import annotations
 
 import os
-import tempfile
 from collections.abc import Callable, Iterable
 
 from calmotion.errors import ShotError
-from calmotion.support.files import make_public
+from calmotion.support.files import replaced
 
 EXTENSIONS = (".usda", ".usdc", ".usd")
 
@@ -39,7 +38,7 @@ def refuse_input_as_output(output: str, inputs: Iterable[str]) -> None:
 def write_layer(layer, output: str, validate: Callable[[str], None]) -> None:
     """Write an anonymous layer to a file, atomically.
 
-    It is exported beside its destination, flushed to disk, reopened and validated, and then renamed over it.
+    It is exported to a temporary file, opened again and validated before it replaces `output`, see `replaced`.
 
     Args:
         layer: The Sdf.Layer; its content is written in the format that the extension of `output` names.
@@ -51,23 +50,13 @@ def write_layer(layer, output: str, validate: Callable[[str], None]) -> None:
     """
     from pxr import Sdf, Tf
 
-    folder = os.path.dirname(os.path.abspath(output))
-    suffix = os.path.splitext(output)[1]
-    temporary = None
     try:
-        os.makedirs(folder, exist_ok=True)
-        handle, temporary = tempfile.mkstemp(suffix=suffix, prefix=".calmotion-", dir=folder)
-        os.close(handle)
-        if not layer.Export(temporary):
-            raise OSError("USD could not write it")
-        _flush(temporary)
-        if Sdf.Layer.OpenAsAnonymous(temporary) is None:
-            raise OSError("what was written cannot be opened again")
-        validate(temporary)
-        make_public(temporary)
-        os.replace(temporary, output)
-        temporary = None
-        _flush(folder)
+        with replaced(output) as temporary:
+            if not layer.Export(str(temporary)):
+                raise OSError("USD could not write it")
+            if Sdf.Layer.OpenAsAnonymous(str(temporary)) is None:
+                raise OSError("what was written cannot be opened again")
+            validate(str(temporary))
     except (OSError, Tf.ErrorException) as error:
         raise ShotError(
             "the layer cannot be written",
@@ -75,17 +64,6 @@ def write_layer(layer, output: str, validate: Callable[[str], None]) -> None:
             found=str(error).strip(),
             remedy="Check the folder, its permissions and the space on the disk",
         ) from error
-    finally:
-        if temporary is not None and os.path.exists(temporary):
-            os.unlink(temporary)
     opened = Sdf.Layer.Find(output)
     if opened is not None:
         opened.Reload(True)
-
-
-def _flush(path: str) -> None:
-    descriptor = os.open(path, os.O_RDONLY)
-    try:
-        os.fsync(descriptor)
-    finally:
-        os.close(descriptor)
