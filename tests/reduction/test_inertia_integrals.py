@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from boxes import quadratic_shapes
 from calmotion.reduction.elements.assembly import assemble
-from calmotion.reduction.elements.embedding import shape_functions
 from calmotion.reduction.inertia_integrals import inertia_integrals
 
 RELATIVE = 1e-12
@@ -38,7 +38,7 @@ class Case:
         self.Phi = rng.standard_normal((len(self.nodes), 3, modes))
         self.inv = inertia_integrals(self.nodes, self.model.mass, self.Phi)
         bary, weights = helpers.quadrature(points, tets, order=5)
-        N = shape_functions(bary)
+        N = quadratic_shapes(bary)
         elements = self.model.mesh.tets
         self.rho = material.density * weights.ravel()
         self.X = np.einsum("qa,eai->eqi", N, self.nodes[elements]).reshape(-1, 3)

@@ -34,5 +34,11 @@ def conical_quadrature(points, tets, order=4):
     return bary, jacobian[:, None] * weight
 
 
+def quadratic_shapes(bary):
+    """The ten shape functions at barycentric coordinates, [q, 4] -> [q, 10], written out for comparison."""
+    first, second = np.array([(0, 1), (1, 2), (0, 2), (0, 3), (1, 3), (2, 3)]).T
+    return np.hstack([bary * (2.0 * bary - 1.0), 4.0 * bary[:, first] * bary[:, second]])
+
+
 def fe_mesh(points, tets):
     return FEMesh(0, points, tets, measure_quality(points, tets))

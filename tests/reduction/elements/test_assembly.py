@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from boxes import quadratic_shapes
 from calmotion.geometry.tetrahedra import surface_area
 from calmotion.reduction.elements.assembly import assemble, quadratic_mesh
-from calmotion.reduction.elements.embedding import shape_functions
 
 
 @pytest.fixture(scope="module")
@@ -40,7 +40,7 @@ def test_surface_triangles_carry_their_own_midpoints(block):
 def test_the_mass_matrix_equals_independent_quadrature(block, helpers, steel):
     points, tets, model = block
     bary, weights = helpers.quadrature(points, tets, order=5)
-    N = shape_functions(bary)
+    N = quadratic_shapes(bary)
     n = len(model.mesh.nodes)
     expected = np.zeros((n, n))
     for element, w in zip(model.mesh.tets, weights, strict=True):

@@ -80,14 +80,3 @@ def test_many_points_find_the_same_elements_as_a_few(mesh, monkeypatch):
 def test_no_points_are_no_problem(mesh):
     tied = embedding.embed(mesh, np.zeros((0, 3)))
     assert tied.displacements(np.zeros((len(mesh.nodes), 3, 2))).shape == (0, 3, 2)
-
-
-def test_shape_functions_sum_to_one_and_their_gradients_match_differences(mesh):
-    bary = np.random.default_rng(6).dirichlet(np.ones(4), 20)
-    assert np.allclose(embedding.shape_functions(bary).sum(axis=1), 1.0, atol=1e-14)
-    gradients = np.random.default_rng(7).standard_normal((20, 4, 3))
-    step = 1e-6
-    for axis in range(3):
-        difference = embedding.shape_functions(bary + step * gradients[:, :, axis])
-        difference = (difference - embedding.shape_functions(bary - step * gradients[:, :, axis])) / (2 * step)
-        assert np.abs(embedding.shape_gradients(bary, gradients)[:, :, axis] - difference).max() < 1e-8

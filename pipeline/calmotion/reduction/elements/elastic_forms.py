@@ -23,6 +23,7 @@ class GradientRule:
         order: Polynomial degree that the rule integrates exactly, 2 or 4.
 
     Attributes:
+        points: Quadrature points in the reference tetrahedron, shape [3, q].
         weights: Quadrature weights times volume [m^3], shape [m, q].
     """
 
@@ -33,6 +34,7 @@ class GradientRule:
         self._shape = np.stack([np.asarray(field[0].grad) for field in basis.basis])  # [10, 3, m, q]
         self._tets = mesh.tets
         self._nodes = len(mesh.nodes)
+        self.points: Array = basis.X
         self.weights: Array = np.ascontiguousarray(basis.dx)
 
     def gradients(self, modes: Array, elements: slice = slice(None)) -> Array:

@@ -12,21 +12,6 @@ from calmotion.shot.character import Array, IntArray
 
 _CANDIDATES = 24
 _ALL_PAIRS = 2_000_000  # up to this many pairs of point and element every pair is looked at
-_EDGES = ((0, 1), (1, 2), (0, 2), (0, 3), (1, 3), (2, 3))  # of the midpoints, nodes 4..9 of ElementTetP2
-
-
-def shape_functions(bary: Array) -> Array:
-    """Quadratic shape functions from barycentric coordinates, shape [k, 4] -> [k, 10]."""
-    corners = bary * (2.0 * bary - 1.0)
-    edges = np.stack([4.0 * bary[:, i] * bary[:, j] for i, j in _EDGES], axis=1)
-    return np.hstack([corners, edges])
-
-
-def shape_gradients(bary: Array, gradients: Array) -> Array:
-    """Gradients [1/m] of the shape functions from those of the barycentric coordinates [k, 4, 3] -> [k, 10, 3]."""
-    corners = (4.0 * bary - 1.0)[:, :, None] * gradients
-    edges = [4.0 * (bary[:, i, None] * gradients[:, j] + bary[:, j, None] * gradients[:, i]) for i, j in _EDGES]
-    return np.concatenate([corners, np.stack(edges, axis=1)], axis=1)
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,28 +60,26 @@ def embed(mesh: QuadraticMesh, points: Array) -> Embedding:
         mesh: Of the body.
         points: [m], shape [k, 3], body frame; anywhere.
     """
+    from skfem import ElementTetP2
+
+    shape, mapping = ElementTetP2(), mesh.basis.mapping
     tets = mesh.tets[:, :4]
     x = mesh.nodes[tets]
-    edges = np.stack([x[:, 1] - x[:, 0], x[:, 2] - x[:, 0], x[:, 3] - x[:, 0]], axis=1)
-    inverse = np.linalg.inv(edges)  # columns are the gradients of barycentric coordinates 1..3
-    gradients = np.concatenate([-inverse.sum(axis=2, keepdims=True), inverse], axis=2).transpose(0, 2, 1)
     # outward whatever the order of the corners
     normals = face_normals(mesh.nodes, tets) * np.sign(tet_volumes(mesh.nodes, tets))[:, None, None]
     offsets = np.einsum("efk,efk->ef", normals, x[:, [1, 0, 0, 0]])
     element = _nearest_elements(mesh, x.mean(axis=1), normals, offsets, points)
-    local = np.einsum("kij,kj->ki", gradients[element][:, 1:], points - x[element, 0])
-    bary = np.concatenate([1.0 - local.sum(axis=1, keepdims=True), local], axis=1)
-    inside = bary.min(axis=1) >= -1e-9
-    clamped = np.where(inside[:, None], bary, np.maximum(bary, 0.0))
-    clamped /= clamped.sum(axis=1, keepdims=True)
-    place = np.einsum("kc,kci->ki", clamped, x[element])
-    arms = np.where(inside[:, None], 0.0, points - place)
-    nodes = mesh.tets[element]
+    local = mapping.invF(points.T[:, :, None], tind=element)[:, :, 0]
+    bary = np.vstack([1.0 - local.sum(axis=0), local])
+    inside = bary.min(axis=0) >= -1e-9
+    clamped = np.where(inside, bary, np.maximum(bary, 0.0))
+    local = (clamped[1:] / clamped.sum(axis=0))[:, :, None]
+    fields = [shape.gbasis(mapping, local, a, tind=element)[0] for a in range(10)]
     return Embedding(
-        nodes=nodes,
-        values=shape_functions(clamped),
-        gradients=shape_gradients(clamped, gradients[element]),
-        arms=arms,
+        nodes=mesh.tets[element],
+        values=np.stack([np.asarray(field)[:, 0] for field in fields], axis=1),
+        gradients=np.stack([field.grad[:, :, 0].T for field in fields], axis=1),
+        arms=np.where(inside[:, None], 0.0, points - mapping.F(local, tind=element)[:, :, 0].T),
     )
 
 
