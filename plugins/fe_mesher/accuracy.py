@@ -102,13 +102,13 @@ def _weighed(errors: np.ndarray, frequencies: np.ndarray) -> float:
 
 
 def _held(mesh, body: Body, carrier: Frame | None) -> np.ndarray | None:
-    from calmotion.reduction.interfaces.interface_patches import Anchor, interface_patches
+    from calmotion.reduction.interfaces.interface_patches import AttachmentFrame, interface_patches
 
     assert body.flexible is not None
     if carrier is None:
         return None
     try:
-        anchor = Anchor(body.path, carrier, "interface")
+        anchor = AttachmentFrame(body.path, carrier, "interface")
         return interface_patches(mesh, [anchor], body.flexible.interface_radius, body.path)[0].nodes
     except ShotError:
         return None  # the reduction, which knows the joint, refuses it

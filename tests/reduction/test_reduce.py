@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from calmotion.errors import ShotError
-from calmotion.reduction.interfaces.interface_patches import Anchor
+from calmotion.reduction.interfaces.interface_patches import AttachmentFrame
 from calmotion.reduction.load_envelope import LoadEnvelope
 from calmotion.reduction.reduce import reduce_body
 from calmotion.reduction.reduced_body import rigid_invariants
@@ -29,10 +29,10 @@ def body(helpers, plastic):
 @pytest.fixture
 def anchors(helpers):
     return [
-        Anchor("/Arm/hand", helpers.frame(0.6, 0.0, 0.0), "interface"),
-        Anchor("/Arm/shoulder", helpers.frame(0.0, 0.0, 0.0), "interface"),
-        Anchor("/Arm/target", helpers.frame(0.6, 0.0, 0.0), "point"),
-        Anchor("/Arm/beyond", helpers.frame(0.65, 0.0, 0.0), "point"),
+        AttachmentFrame("/Arm/hand", helpers.frame(0.6, 0.0, 0.0), "interface"),
+        AttachmentFrame("/Arm/shoulder", helpers.frame(0.0, 0.0, 0.0), "interface"),
+        AttachmentFrame("/Arm/target", helpers.frame(0.6, 0.0, 0.0), "point"),
+        AttachmentFrame("/Arm/beyond", helpers.frame(0.65, 0.0, 0.0), "point"),
     ]
 
 
@@ -104,7 +104,7 @@ def test_a_material_that_is_none_is_refused(mesh, body, anchors, field, value):
 
 
 def test_a_body_that_nothing_carries_is_refused(mesh, body, anchors):
-    with pytest.raises(ShotError, match="needs a joint that carries it"):
+    with pytest.raises(ShotError, match="no joint connects this flexible body"):
         reduce_body(mesh, body, anchors, [], 2)
 
 

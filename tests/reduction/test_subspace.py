@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from boxes import box_tets, fe_mesh
 from calmotion.multibody.kernels.neohookean import neohookean_forces
-from calmotion.reduction.interfaces.interface_patches import Anchor
+from calmotion.reduction.interfaces.interface_patches import AttachmentFrame
 from calmotion.reduction.reduce import reduce_body
 from calmotion.reduction.reduced_body import Elasticity, Invariants, Marker, ReducedBody
-from calmotion.reduction.subspace import principal_subspace, within
+from calmotion.reduction.subspace import principal_subspace, projected_body
 from calmotion.shot import Body, FlexibleSettings, Frame
 from stvk_call import call_stvk
 
@@ -44,7 +44,7 @@ def rng():
 def flexible(law, material):
     points, tets = box_tets((12, 1, 1), (0.6, 0.02, 0.02), (0.0, -0.01, -0.01))
     settings = FlexibleSettings(material, mode_count=6, elasticity=law)
-    anchors = [Anchor(f"/C/{x}", Frame(np.array([x, 0.0, 0.0]), IDENTITY), "interface") for x in (0.0, 0.6)]
+    anchors = [AttachmentFrame(f"/C/{x}", Frame(np.array([x, 0.0, 0.0]), IDENTITY), "interface") for x in (0.0, 0.6)]
     body = Body("/C/Arm", Frame(np.zeros(3), IDENTITY), None, flexible=settings)
     return reduce_body(fe_mesh(points, tets), body, anchors, (), 0)
 
@@ -54,8 +54,10 @@ def forces(body, u, v):
     r, law = len(u), body.elasticity
     res, P, K = np.zeros(6 + r), np.zeros((6 + r, 6 + r)), np.zeros((6 + r, 6 + r))
     if law.law == "stvk":
-        p = r if law.seen is None else len(law.seen)
-        call_stvk(law.data.reshape(r + p * (p + 1) // 2, -1), u, v, law.retardation, True, res, P, K, law.seen)
+        p = r if law.strain_projection is None else len(law.strain_projection)
+        call_stvk(
+            law.data.reshape(r + p * (p + 1) // 2, -1), u, v, law.retardation, True, res, P, K, law.strain_projection
+        )
     else:
         scratch = np.zeros((18, 18)), np.zeros((18, r))
         neohookean_forces(r, u, v, *law.lame, law.retardation, 0, law.points, law.data, True, *scratch, res, P, K)
@@ -67,7 +69,7 @@ def test_the_integrals_are_those_of_the_combined_modes(particles, rng):
     body = of_particles(*particles)
     T = principal_subspace(body, rng.normal(size=(3, 5)), 1e-9)
     assert T.shape == (5, 3)
-    held, direct = within(body, T), of_particles(weight, X, phi @ T, stiffness, damping)
+    held, direct = projected_body(body, T), of_particles(weight, X, phi @ T, stiffness, damping)
     for name in ("mass", "s", "Z", "M", "M3", "M4", "S"):
         np.testing.assert_allclose(getattr(held.invariants, name), getattr(direct.invariants, name), atol=1e-13)
     np.testing.assert_allclose(held.invariants.M, np.eye(3), atol=1e-13)
@@ -84,7 +86,7 @@ def test_forces_are_those_of_the_whole_body_along_the_subspace(law, plastic, rng
     r = len(body.stiffness)
     amplitudes = 0.02 * body.stiffness[0] / body.stiffness
     T = principal_subspace(body, amplitudes * rng.normal(size=(4, r)), 1e-9)
-    held = within(body, T)
+    held = projected_body(body, T)
     w, rate = 1e-3 * rng.normal(size=4), 0.1 * rng.normal(size=4)
     few, many = forces(held, w, rate), forces(body, T @ w, T @ rate)
     for own, whole in zip(few, (T.T @ many[0], T.T @ many[1] @ T, T.T @ many[2] @ T), strict=True):
@@ -111,17 +113,17 @@ def test_a_subspace_holds_its_motion_but_for_what_may_be_missing(particles, rng)
 def test_a_body_at_rest_is_rigid(particles):
     body = of_particles(*particles)
     T = principal_subspace(body, np.zeros((7, 5)), 1e-3)
-    assert T.shape == (5, 0) and len(within(body, T).stiffness) == 0
+    assert T.shape == (5, 0) and len(projected_body(body, T).stiffness) == 0
 
 
 @pytest.mark.parametrize("count", [2, 3, 4])
 def test_a_quadratic_strain_that_sees_part_of_a_body_sees_no_more_of_it_within_a_subspace(particles, rng, count):
     fields = rng.normal(size=(5 + 6, 15))
-    law = Elasticity("stvk", 0.1, (fields @ fields.T).ravel(), seen=rng.normal(size=(3, 5)))
+    law = Elasticity("stvk", 0.1, (fields @ fields.T).ravel(), strain_projection=rng.normal(size=(3, 5)))
     body = replace(of_particles(*particles), elasticity=law)
     T = principal_subspace(body, rng.normal(size=(count, 5)), 1e-12)
-    held = within(body, T)
-    assert (held.elasticity.seen is None) == (count <= 3)
+    held = projected_body(body, T)
+    assert (held.elasticity.strain_projection is None) == (count <= 3)
     w, rate = rng.normal(size=count), rng.normal(size=count)
     few, many = forces(held, w, rate), forces(body, T @ w, T @ rate)
     for own, whole in zip(few, (T.T @ many[0], T.T @ many[1] @ T, T.T @ many[2] @ T), strict=True):

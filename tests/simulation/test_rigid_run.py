@@ -88,7 +88,7 @@ def test_force_and_moment_of_the_load_on_its_carrier(oscillation):
 
 
 def test_reach_is_the_distance_to_the_target_beyond(oscillation):
-    assert oscillation[0].reach == pytest.approx([0.0, 0.25], abs=1e-6)
+    assert oscillation[0].target_distance == pytest.approx([0.0, 0.25], abs=1e-6)
 
 
 def test_the_highest_frequency_is_that_of_the_motion(oscillation):

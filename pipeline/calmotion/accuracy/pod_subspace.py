@@ -19,7 +19,7 @@ import numpy as np
 from calmotion.accuracy.integrator_choice import by_fast_scheme
 from calmotion.accuracy.step_error import StepRun, distance, run_or_none, simulate_at
 from calmotion.reduction.reduced_body import ReducedBody
-from calmotion.reduction.subspace import principal_subspace, within
+from calmotion.reduction.subspace import principal_subspace, projected_body
 from calmotion.shot import Animation, Character, Simplification
 from calmotion.shot.character import FlexibleSettings
 from calmotion.shot.model_choice import OFF, ON
@@ -72,7 +72,7 @@ class ProjectedBodies:
         for missing in MISSING:
             few = list(self._complete)
             for b, coordinates in motion.items():
-                few[b] = within(few[b], principal_subspace(few[b], coordinates, missing))
+                few[b] = projected_body(few[b], principal_subspace(few[b], coordinates, missing))
             off = [self._off(few, item) for item in self._known]
             forced = self._options.directions == OFF and all(map(np.isfinite, off))
             if forced or all(error <= self._allowed(item) for error, item in zip(off, self._known, strict=True)):

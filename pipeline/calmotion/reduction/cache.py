@@ -1,8 +1,8 @@
-"""Reduced bodies kept in the user's cache folder, by the hash of everything that they follow from.
+"""Cache of reduced bodies in the cache folder of the user, by the hash of all inputs.
 
 A file is an `.npz` without pickled objects: the arrays of a value, and its structure as JSON. It is replaced
-atomically: a reader sees all of it or nothing, and two writers do not mix. What cannot be read, for whatever reason,
-is computed and written again.
+atomically: a reader sees a whole file or none, also with several writers. A file that cannot be read is computed and
+written again.
 """
 
 from __future__ import annotations
@@ -28,34 +28,33 @@ from calmotion.support.files import PREFIX, remove_abandoned, replaced
 T = TypeVar("T")
 
 FOLDER = "reduced"
-FORMAT = 1  # to be raised when files of the same content are to be read in another way
-LIMIT = 2 * 1024**3  # bytes that are kept
+FORMAT = 1  # to increment when the meaning of the content of a file changes
+LIMIT = 2 * 1024**3  # size of the cache in bytes
 
-# What a file may hold besides arrays, numbers, strings, None and tuples of them; a file names its types, and only
-# these are ever made from one.
-TYPES: dict[str, type] = {item.__name__: item for item in (Elasticity, Invariants, Simplification, Marker, ReducedBody)}
+# A file names the types of its values. Only these are constructed, besides arrays, numbers, strings, None and tuples.
+TYPES: dict[str, type] = {kind.__name__: kind for kind in (Elasticity, Invariants, Simplification, Marker, ReducedBody)}
 
 
 def cached_reduction(key_parts: object, compute: Callable[[], T]) -> T:
-    """The value of `compute()`, from the cache when it is there.
+    """The value of `compute()`, from the cache where it is stored.
 
     Args:
-        key_parts: Everything that the value follows from besides the sources of this package: arrays, numbers,
-            strings, None, and tuples, lists, dicts or dataclasses of them.
-        compute: Makes the value, of the same sort, its dataclasses from `TYPES`.
+        key_parts: All inputs of the value besides the sources of this package: arrays, numbers, strings, None, and
+            tuples, lists, dicts or dataclasses of them.
+        compute: Computes the value, of the same kinds, with dataclasses from `TYPES`.
 
     Returns:
-        What `compute()` returns; lists come back as tuples, arrays to the last bit.
+        The value of `compute()`; lists are returned as tuples, arrays bit for bit.
 
     Raises:
-        TypeError: A part of the key or of the value is of another sort.
+        TypeError: A part of the key or of the value has another type.
     """
     key = cache_key(key_parts)
     path = cache_folder() / FOLDER / f"{key}.npz"
     try:
         value = _load(path, key)
     except Exception:
-        # a torn file can fail in any way: in the archive, the arrays, the structure, or where a type has changed
+        # a damaged file can cause any error: in the archive, the arrays, the structure, or a type that has changed
         pass
     else:
         _mark_used(path)
@@ -66,7 +65,7 @@ def cached_reduction(key_parts: object, compute: Callable[[], T]) -> T:
 
 
 def cache_key(parts: object) -> str:
-    """Hash of values, and of the sources that make reduced bodies from them; hexadecimal."""
+    """Hash of values and of the sources of this package; hexadecimal."""
     digest = hashlib.sha256()
     digest.update(f"{FORMAT} {_sources()}".encode())
     _feed(digest, parts)
@@ -85,7 +84,7 @@ def _sources() -> str:
 
 
 def _feed(digest: Any, value: Any) -> None:
-    """Add a value to a hash, its type and size first, so that different values never look alike."""
+    """Add a value to a hash, its type and size first, so that different values have different hashes."""
     if isinstance(value, np.ndarray):
         if value.dtype.hasobject:
             raise TypeError("an array of objects cannot be part of a key")
@@ -98,8 +97,8 @@ def _feed(digest: Any, value: Any) -> None:
             _feed(digest, getattr(value, field.name))
     elif isinstance(value, (tuple, list)):
         digest.update(f"tuple {len(value)} ".encode())
-        for item in value:
-            _feed(digest, item)
+        for element in value:
+            _feed(digest, element)
     elif isinstance(value, dict):
         digest.update(f"dict {len(value)} ".encode())
         for name in sorted(value):
@@ -117,12 +116,12 @@ def _load(path: Path, key: str) -> Any:
     with open(path, "rb") as file, np.load(file, allow_pickle=False) as archive:
         head = json.loads(bytes(archive["structure"]))
         if head["key"] != key:
-            raise ValueError("this file was made for something else")
+            raise ValueError("this file has another key")
         return _decode(head["value"], archive)
 
 
 def _store(path: Path, key: str, value: Any) -> None:
-    """Keep a value. A folder that cannot be written to is passed over: the cache is a convenience."""
+    """Store a value. A folder that cannot be written is ignored: the cache is optional."""
     arrays: list[Any] = []
     structure = json.dumps({"key": key, "value": _encode(value, arrays)}).encode()
     named = {f"a{k}": array for k, array in enumerate(arrays)}
@@ -133,42 +132,43 @@ def _store(path: Path, key: str, value: Any) -> None:
 
 
 def _encode(value: Any, arrays: list[Any]) -> Any:
-    """A value as JSON; its arrays are appended to a list and stand in it by their number."""
+    """A value as JSON; its arrays are appended to a list and represented by their index."""
     if isinstance(value, np.ndarray):
         if value.dtype.hasobject:
-            raise TypeError("an array of objects cannot be kept")
+            raise TypeError("an array of objects cannot be stored")
         arrays.append(value)
         return {"array": len(arrays) - 1}
     if is_dataclass(value) and not isinstance(value, type):
         name = type(value).__name__
         if TYPES.get(name) is not type(value):
-            raise TypeError(f"{name} is not in reduction_cache.TYPES")
+            raise TypeError(f"{name} is not in reduction.cache.TYPES")
         return {"type": name, "fields": {f.name: _encode(getattr(value, f.name), arrays) for f in fields(value)}}
     if isinstance(value, (tuple, list)):
-        return {"tuple": [_encode(item, arrays) for item in value]}
+        return {"tuple": [_encode(element, arrays) for element in value]}
     if isinstance(value, np.generic):
         value = value.item()
     if value is None or isinstance(value, (bool, int, float, str)):
         return {"plain": value}
-    raise TypeError(f"a {type(value).__name__} cannot be kept")
+    raise TypeError(f"a {type(value).__name__} cannot be stored")
 
 
-def _decode(item: Any, archive: Any) -> Any:
-    if "array" in item:
-        return archive[f"a{item['array']}"]
-    if "type" in item:
-        made = TYPES[item["type"]]
-        values = {name: _decode(value, archive) for name, value in item["fields"].items()}
-        if set(values) != {field.name for field in fields(made)}:
-            raise ValueError("this file is of another version")
-        return made(**values)
-    if "tuple" in item:
-        return tuple(_decode(part, archive) for part in item["tuple"])
-    return item["plain"]
+def _decode(node: Any, archive: Any) -> Any:
+    """The value of a node of the JSON structure."""
+    if "array" in node:
+        return archive[f"a{node['array']}"]
+    if "type" in node:
+        kind = TYPES[node["type"]]
+        values = {name: _decode(value, archive) for name, value in node["fields"].items()}
+        if set(values) != {field.name for field in fields(kind)}:
+            raise ValueError("this file has another version")
+        return kind(**values)
+    if "tuple" in node:
+        return tuple(_decode(part, archive) for part in node["tuple"])
+    return node["plain"]
 
 
 def _mark_used(path: Path) -> None:
-    """Make a file the last to be removed."""
+    """Make a file the newest one, which is removed last."""
     try:
         os.utime(path)
     except OSError:
@@ -176,14 +176,14 @@ def _mark_used(path: Path) -> None:
 
 
 def _prune(folder: Path, limit: int) -> None:
-    """Remove the files that were not used for longest until the rest is within the limit [bytes]; the newest stays."""
+    """Remove the least recently used files until the rest is within the limit [bytes]; the newest stays."""
     remove_abandoned(folder)
     files = []
     for path in folder.iterdir():
         try:
             state = path.stat()
         except OSError:
-            continue  # removed by another process
+            continue  # another process has removed it
         if path.suffix == ".npz" and not path.name.startswith(PREFIX):
             files.append((state.st_mtime_ns, state.st_size, path))
     files.sort(key=lambda entry: entry[0], reverse=True)

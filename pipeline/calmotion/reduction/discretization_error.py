@@ -1,4 +1,4 @@
-"""What a mesh costs in accuracy: the error of its frequencies, estimated from that mesh alone by recovered strains."""
+"""Discretisation error of a mesh: the error of its frequencies, estimated by recovered strains."""
 
 from __future__ import annotations
 
@@ -10,24 +10,25 @@ from calmotion.reduction.elements.assembly import FEModel, QuadraticMesh
 from calmotion.reduction.elements.elastic_forms import GradientRule
 from calmotion.shot.character import Array, ElasticMaterial
 
-_PATCH = 30  # elements; fewer around a corner, and the neighbours' elements join
+_PATCH = 30  # least number of elements around a corner for a fit; else those of its neighbours are added
 
 
 def frequency_errors(
     model: FEModel, material: ElasticMaterial, count: int = 3, clamped: Indices | None = None
 ) -> tuple[Array, Array]:
-    """Lowest elastic frequencies of a mesh, and how much too high the mesh makes each of them, as estimated.
+    """Lowest elastic frequencies of a mesh, and the estimated relative error of each.
 
     Args:
         model: Its matrices.
-        material: That they were assembled with.
-        count: Number of frequencies; the six of a free body that are zero come on top.
-        clamped: Nodes that are held; None for a free body, which has no singular edge of a clamp.
+        material: Material of the matrices.
+        count: Number of elastic frequencies; the six rigid modes of a free body are not counted.
+        clamped: Clamped nodes; None for a free body, which has no singularity at the edge of a clamp.
 
     Returns:
         Frequencies [Hz] and relative errors, both of shape [count].
 
-    A Rayleigh quotient is too high by the energy of the error: (omega_h^2 - omega^2) / omega^2 = |u - u_h|^2 / |u_h|^2.
+    The relative error of a Rayleigh quotient is the energy of the error:
+    (omega_h^2 - omega^2) / omega^2 = |u - u_h|^2 / |u_h|^2.
     Source: Zienkiewicz and Zhu 1992 (superconvergent patch recovery); Strang and Fix 1973, 6.3, for the eigenvalue.
     """
     n = len(model.mesh.nodes)
@@ -104,7 +105,7 @@ def _recovered(mesh: QuadraticMesh, points: Array, samples: Array) -> Array:
         d = (at[near] - mesh.nodes[node]).reshape(-1, 3)
         d /= np.abs(d).max()
         P = np.column_stack([np.ones(len(d)), d, d * d, d[:, 0] * d[:, 1], d[:, 1] * d[:, 2], d[:, 0] * d[:, 2]])
-        # a patch one element thick may not tell all coefficients apart: the smallest fit is taken then
+        # elements in one layer may not determine all coefficients: then the solution of least norm
         fitted[node] = np.linalg.lstsq(P, flat[near].reshape(len(d), -1), rcond=1e-6)[0][0]
     first, second = mesh.basis.mesh.edges
     fitted[mesh.basis.edge_dofs[0]] = 0.5 * (fitted[first] + fitted[second])

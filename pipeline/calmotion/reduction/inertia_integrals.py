@@ -1,6 +1,6 @@
 """Inertia integrals of a component from nodal fields and the scalar mass matrix.
 
-Every one of them is int rho A B^T = A^T m B for nodal fields A, B of shape [n, 3].
+Each integral is int rho A B^T = A^T m B for nodal fields A, B of shape [n, 3].
 """
 
 from __future__ import annotations

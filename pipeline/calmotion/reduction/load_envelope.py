@@ -1,4 +1,4 @@
-"""What shakes a body in a shot, as far as a rigid robot tells."""
+"""Load envelopes: the largest loads on a body over a shot, from a simulation of the rigid robot."""
 
 from __future__ import annotations
 
@@ -12,20 +12,21 @@ from calmotion.shot.character import Array
 
 @dataclass(frozen=True, eq=False)
 class LoadEnvelope:
-    """Largest loads on a body over a shot, taken from a rigid simulation; absolute values, body axes.
+    """Largest absolute values of the loads on a body over a shot, body axes, from a simulation of the rigid robot.
 
     Attributes:
-        acceleration: Of the frame's origin, less gravity [m/s^2], shape [3]; a body at rest has its weight here.
+        acceleration: Of the origin of the body frame, minus gravity [m/s^2], shape [3]; gravity alone at rest.
         angular_acceleration: [rad/s^2], shape [3].
         angular_velocity: [rad/s], shape [3].
-        force: On each interface, by the body beyond it [N], shape [j, 3]; `patch_load_envelope` makes it one row for
-            each moving patch.
-        moment: Likewise, about the interface's anchor [N m], shape [j, 3].
-        frequency: Highest frequency at which the motion pushes noticeably [Hz]; 0 when it is not known.
-        reach: Longest distance from each interface to a target beyond it [m], shape [j]: a small turn of the
-            interface moves that target by the angle times this. None: turns do not matter.
-        closed: Whether the body is part of a closed loop. Its other members may then hold its interfaces against any
-            motion, so that it must be able to give way in all of them: a rigid robot does not tell these loads.
+        force: On each interface, by the next body [N], shape [j, 3]; after `patch_load_envelope` one row for each
+            moving patch.
+        moment: Likewise, about the attachment frame [N m], shape [j, 3].
+        frequency: Highest frequency with noticeable power in the motion [Hz]; 0 when it is not known.
+        target_distance: Largest distance from each interface to a target beyond it [m], shape [j]; None: rotations of
+            the interfaces do not matter.
+        closed_chain: Whether the body is part of a closed chain. The other bodies of the chain may constrain any motion
+            of its interfaces. The simulation of the rigid robot does not give these loads, so the body needs a
+            coordinate for each motion of its interfaces.
     """
 
     acceleration: Array
@@ -34,61 +35,64 @@ class LoadEnvelope:
     force: Array
     moment: Array
     frequency: float = 0.0
-    reach: Array | None = None
-    closed: bool = False
+    target_distance: Array | None = None
+    closed_chain: bool = False
 
     @property
-    def lever(self) -> Array:
-        """`reach`, zero where turns do not matter."""
-        return np.zeros(len(self.force)) if self.reach is None else self.reach
+    def lever_arm(self) -> Array:
+        """Displacement of the farthest target by a unit rotation of each interface [m], shape [j]; zero where rotations
+        do not matter."""
+        return np.zeros(len(self.force)) if self.target_distance is None else self.target_distance
 
 
 def load_direction_envelope(load_envelope: LoadEnvelope, angle: float, size: float) -> LoadEnvelope:
-    """The loads on a body that deflection has rotated by an angle about any axis.
+    """The envelope over all directions that the loads may take when deflections rotate the robot by up to an angle.
 
-    A rigid robot that swings in a plane never twists a link; one that bends does, as the load beyond it moves aside.
+    A rigid robot that swings in a plane does not twist its links. A flexible one does, because deflections move the
+    loads out of the plane.
 
     Args:
-        angle: [rad].
-        size: Of the body, for the moments of forces [m].
+        load_envelope: Of the rigid robot.
+        angle: Largest rotation about any axis [rad].
+        size: Of the body, the lever arm of forces [m].
     """
     share = min(angle, 1.0)
 
-    def every_way(load: Array) -> Array:
+    def in_all_directions(load: Array) -> Array:
         return np.maximum(np.abs(load), share * np.linalg.norm(load, axis=-1, keepdims=True))
 
-    lever = share * size * np.linalg.norm(load_envelope.force, axis=-1, keepdims=True)
+    moment_of_force = share * size * np.linalg.norm(load_envelope.force, axis=-1, keepdims=True)
     return replace(
         load_envelope,
-        acceleration=every_way(load_envelope.acceleration),
-        angular_acceleration=every_way(load_envelope.angular_acceleration),
-        angular_velocity=every_way(load_envelope.angular_velocity),
-        force=every_way(load_envelope.force),
-        moment=np.maximum(every_way(load_envelope.moment), lever),
+        acceleration=in_all_directions(load_envelope.acceleration),
+        angular_acceleration=in_all_directions(load_envelope.angular_acceleration),
+        angular_velocity=in_all_directions(load_envelope.angular_velocity),
+        force=in_all_directions(load_envelope.force),
+        moment=np.maximum(in_all_directions(load_envelope.moment), moment_of_force),
     )
 
 
 def patch_load_envelope(
-    load_envelope: LoadEnvelope, anchors: Sequence[Sequence[int]], positions: Array, centers: Sequence[Array]
+    load_envelope: LoadEnvelope, attachments: Sequence[Sequence[int]], positions: Array, centers: Sequence[Array]
 ) -> LoadEnvelope:
-    """The load_envelope with one row for each moving patch instead of one for each interface.
+    """The load envelope with one row for each moving patch instead of one for each interface.
 
     Args:
         load_envelope: Of a body with j interfaces.
-        anchors: For each of the p patches the interfaces that it carries.
-        positions: Anchors of the interfaces, body frame [m], shape [j, 3] (more rows are ignored).
+        attachments: For each of the p patches the indices of its interfaces.
+        positions: Origins of the attachment frames, body frame [m], shape [j, 3] (more rows are ignored).
         centers: Point of each patch that its wrench is about [m], shape [3].
 
     Returns:
-        Forces add, as if all peaks met; so do moments, with those of the forces about the patch's center.
+        Sums of the forces, as if all peaks coincided, and of the moments about the center of the patch.
     """
-    count = len(anchors)
-    force, moment, reach = np.zeros((count, 3)), np.zeros((count, 3)), np.zeros(count)
-    for k, (group, center) in enumerate(zip(anchors, centers, strict=True)):
+    count = len(attachments)
+    force, moment, target_distance = np.zeros((count, 3)), np.zeros((count, 3)), np.zeros(count)
+    for k, (group, center) in enumerate(zip(attachments, centers, strict=True)):
         for i in group:
             arm, f = np.abs(positions[i] - center), load_envelope.force[i]
-            lever = np.roll(arm, -1) * np.roll(f, -2) + np.roll(arm, -2) * np.roll(f, -1)
+            moment_of_force = np.roll(arm, -1) * np.roll(f, -2) + np.roll(arm, -2) * np.roll(f, -1)
             force[k] += f
-            moment[k] += load_envelope.moment[i] + lever
-            reach[k] = max(reach[k], float(load_envelope.lever[i]))
-    return replace(load_envelope, force=force, moment=moment, reach=reach)
+            moment[k] += load_envelope.moment[i] + moment_of_force
+            target_distance[k] = max(target_distance[k], float(load_envelope.lever_arm[i]))
+    return replace(load_envelope, force=force, moment=moment, target_distance=target_distance)

@@ -1,4 +1,4 @@
-"""A reduced flexible body, as the dynamics needs it; a rigid body is the case of no elastic coordinate."""
+"""Reduced flexible bodies as multibody dynamics takes them; a rigid body has no elastic coordinates."""
 
 from __future__ import annotations
 
@@ -39,9 +39,9 @@ class Invariants:
 class Marker:
     """A frame on a body at which joints attach or targets are measured.
 
-    With elastic coordinates u the marker is at `position + Phi u` (body frame), and turned by the rotation
-    vector `Psi u` (body axes) before `rotation`; on a body of large deflection `Psi u` is the axis of the turn times
-    the sine of its angle (`dynamics.finite_rotation`).
+    With elastic coordinates u the marker is at `position + Phi u` (body frame), and rotated by the rotation vector
+    `Psi u` (body axes) before `rotation`. On a body of large deflection `Psi u` is the axis of the rotation times the
+    sine of its angle (`multibody.kernels.finite_rotation`).
 
     Attributes:
         position: [m], shape [3], body frame, undeformed.
@@ -58,7 +58,7 @@ class Marker:
 
 @dataclass(frozen=True, eq=False)
 class Elasticity:
-    """The elastic law of a body of large deflection, as the dynamics reads it.
+    """The elastic law of a body of large deflection.
 
     Attributes:
         law: `stvk` or `neohookean`.
@@ -68,9 +68,9 @@ class Elasticity:
             modes (9 x r).
         points: Number of cubature points.
         lame: Lame's constants (lambda, mu) [Pa].
-        seen: Of `stvk`: W, with W u the directions that the quadratic strain sees, shape [p, r] with p < r; None where
-            it sees all coordinates.
-        unseen_m: What that leaves out, estimated at the targets [m].
+        strain_projection: Of `stvk`: projection W onto the subspace of the quadratic strain, W u its coordinates, shape
+            [p, r] with p < r; None where the subspace has all r coordinates.
+        strain_error_m: Estimated error of this subspace at the targets [m].
     """
 
     law: str
@@ -78,8 +78,8 @@ class Elasticity:
     data: Array
     points: int = 0
     lame: tuple[float, float] = (0.0, 0.0)
-    seen: Array | None = None
-    unseen_m: float = 0.0
+    strain_projection: Array | None = None
+    strain_error_m: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,14 +89,13 @@ class ReducedBody:
     Attributes:
         invariants: Inertia integrals.
         stiffness: Diagonal of the reduced stiffness about the undeformed state, omega_j^2 [1/s^2], shape [r].
-        damping: Reduced damping [1/s], symmetric, shape [r, r]; with `elasticity`, its part by mass.
-        markers: One for each anchor that was asked for, in that order.
-        skin: One array for each surface that was asked for: displacement of its points, shape [n, 3, r].
+        damping: Reduced damping [1/s], symmetric, shape [r, r]; with `elasticity`, the part proportional to the mass.
+        markers: One for each attachment frame, in their order.
+        skin: One array for each skinned surface: displacement of its points by each mode, shape [n, 3, r].
         nodes, elements: Size of the finite-element mesh; 0 for a rigid body.
         elasticity: None for a linear body.
-        left_out: What this body does without, and what that costs.
-        mesh_error_m: What its finite-element mesh is estimated to be off by in the shot [m]; None where that is not
-            known.
+        left_out: Simplifications of the model of this body, with their estimated errors.
+        mesh_error_m: Estimated error of its finite-element mesh in the shot [m]; None where it is not known.
     """
 
     invariants: Invariants

@@ -18,7 +18,7 @@ from calmotion.shot.character import with_settings
 from calmotion.shot.meshes import FEMesh
 
 if TYPE_CHECKING:
-    from calmotion.reduction.interfaces.interface_patches import Anchor
+    from calmotion.reduction.interfaces.interface_patches import AttachmentFrame
     from calmotion.reduction.reduce import FullBody, LinearModes
 
 _KEPT = 60_000_000  # numbers in factors of full models, half a gigabyte
@@ -75,7 +75,7 @@ def reduce_bodies(
 
 def _reduced(
     full: dict[int, FullBody] | None, index: int,
-    parts: tuple[FEMesh, Body, list[Anchor], Sequence[SurfaceMesh], int, LoadEnvelope | None, float],
+    parts: tuple[FEMesh, Body, list[AttachmentFrame], Sequence[SurfaceMesh], int, LoadEnvelope | None, float],
 ) -> ReducedBody:  # fmt: skip
     """`reduce_body` of the parts, with the full model that is known, or will be."""
     from calmotion.reduction.reduce import full_body, reduce_body
@@ -108,16 +108,16 @@ def _damped(character: Character, tree: Tree, bodies: Sequence[ReducedBody]) -> 
     return result
 
 
-def fem_anchors(character: Character, body: Body, anchors: BodyAnchors) -> list[Anchor]:
+def fem_anchors(character: Character, body: Body, anchors: BodyAnchors) -> list[AttachmentFrame]:
     """The anchors of a flexible body as finite elements take them."""
-    from calmotion.reduction.interfaces.interface_patches import Anchor
+    from calmotion.reduction.interfaces.interface_patches import AttachmentFrame
 
     joints, targets = character.joints, character.targets
     paths = [joints[k].path for k in anchors.joints] + [targets[k].path for k in anchors.targets]
     kinds = ["interface"] * len(anchors.joints) + ["point"] * len(anchors.targets)
     held = {surface.joint: surface for surface in body.interfaces}
     named = [held.get(path) for path in paths]
-    return [Anchor(*item) for item in zip(paths, anchors.frames, kinds, named, strict=True)]
+    return [AttachmentFrame(*item) for item in zip(paths, anchors.frames, kinds, named, strict=True)]
 
 
 def flexible_modes(

@@ -10,7 +10,7 @@ from calmotion.geometry.tetrahedra import boundary_triangles, oriented_tets
 from calmotion.multibody.model.joint_arrays import BodyAnchors
 from calmotion.reduction.basis.static_loads import OVERSHOOT, peak_loads, unit_accelerations
 from calmotion.reduction.elements.embedding import embed
-from calmotion.reduction.interfaces.interface_patches import Anchor
+from calmotion.reduction.interfaces.interface_patches import AttachmentFrame
 from calmotion.reduction.load_envelope import LoadEnvelope
 from calmotion.reduction.reduce import linear_modes
 from solids import PLASTIC, STEEL, body_of, box, frame, inside_out, joined, rotated, tube
@@ -81,7 +81,9 @@ def finite_elements(solid, anchors, load_envelope, material=PLASTIC):
     body = body_of(surface_of(solid), material=material, elasticity="linear")
     count = len(anchors.joints)
     kinds = ["interface"] * count + ["point"] * (len(anchors.frames) - count)
-    places = [Anchor(f"/A{k}", item, kind) for k, (item, kind) in enumerate(zip(anchors.frames, kinds, strict=True))]
+    places = [
+        AttachmentFrame(f"/A{k}", item, kind) for k, (item, kind) in enumerate(zip(anchors.frames, kinds, strict=True))
+    ]
     linear = linear_modes(fe_mesh(points, tets), body, places, anchors.root, load_envelope, 1e-12)
     model, basis = linear.model, linear.basis
     assert basis.cut_error_m <= 1e-9
@@ -92,7 +94,7 @@ def finite_elements(solid, anchors, load_envelope, material=PLASTIC):
     work = np.hstack([basis.modes.reshape(3 * n, r).T @ weight, motion.reshape(-1, r).T])
     responses = work / basis.omega_squared[:, None] * peak_loads(linear.load_envelope)
     tied = embed(model.mesh, np.array([a.frame.position for a in places if a.kind == "point"]).reshape(-1, 3))
-    lever = linear.load_envelope.lever
+    lever = linear.load_envelope.lever_arm
     found = []
     for k, patch in enumerate(motion):
         u, turn = np.abs(patch[:3] @ responses).sum(axis=1), np.abs(patch[3:] @ responses).sum(axis=1)
@@ -203,7 +205,9 @@ def test_a_stiffer_material_bends_less_and_a_longer_reach_farther():
     assert 0.0 < steel.displacement_m < 0.1 * soft.displacement_m
     body, anchors = body_of(box((0.3, 0.03, 0.03), (0.0, -0.015, -0.015))), anchors_of(ENDS, 2)
     load_envelope = loads(np.random.default_rng(0), 2)
-    near, far = (static_reach(body, anchors, replace(load_envelope, reach=np.array([0.0, r]))) for r in (0.0, 1.0))
+    near, far = (
+        static_reach(body, anchors, replace(load_envelope, target_distance=np.array([0.0, r]))) for r in (0.0, 1.0)
+    )
     assert far.displacement_m == pytest.approx(near.displacement_m + far.rotation) and far.rotation == near.rotation
 
 
@@ -240,7 +244,7 @@ def test_what_a_beam_does_not_tell_is_not_told():
 
 def test_bodies_of_closed_loops_are_not_told():
     body = body_of(box((0.3, 0.03, 0.03), (0.0, -0.015, -0.015)))
-    load_envelope = replace(loads(np.random.default_rng(0), 2), closed=True)
+    load_envelope = replace(loads(np.random.default_rng(0), 2), closed_chain=True)
     assert static_reach(body, anchors_of(ENDS, 2), load_envelope) is None
 
 
@@ -248,7 +252,9 @@ def test_it_does_not_depend_on_where_the_body_frame_is_turned():
     turn = rotated(np.array([1.0, 0.0, 0.0]), np.pi / 2)  # peaks are along axes: only quarter turns keep them
     points, triangles = box((0.3, 0.02, 0.03), (0.0, -0.01, -0.015))
     load_envelope = loads(np.random.default_rng(0), 2)
-    turned = LoadEnvelope(*(abs(value @ turn.T) for value in _vectors(load_envelope)), 3.0, load_envelope.reach)
+    turned = LoadEnvelope(
+        *(abs(value @ turn.T) for value in _vectors(load_envelope)), 3.0, load_envelope.target_distance
+    )
     found = [
         static_reach(body_of((p, triangles)), anchors_of(ENDS, 2), e)
         for p, e in ((points, load_envelope), (points @ turn.T, turned))

@@ -10,7 +10,7 @@ from calmotion.multibody.integrators.simulation import simulate
 from calmotion.multibody.integrators.workspace import Workspace
 from calmotion.multibody.model.model import body_anchors, compile_model, rigid_body
 from calmotion.multibody.model.topology import span_tree
-from calmotion.reduction.interfaces.interface_patches import Anchor
+from calmotion.reduction.interfaces.interface_patches import AttachmentFrame
 from calmotion.reduction.reduce import reduce_body
 from calmotion.shot import Body, Character, FlexibleSettings, Joint, MassProperties, Motor, Target
 
@@ -47,7 +47,7 @@ class TurningBeam:
         points, tets = box_tets(cells, (length, thickness, thickness), (0.0, -thickness / 2, -thickness / 2))
         own = anchors[0]
         kinds = ["interface"] * len(own.joints) + ["point"] * len(own.targets)
-        named = [Anchor(f"/C/{k}", f, kind) for k, (f, kind) in enumerate(zip(own.frames, kinds, strict=True))]
+        named = [AttachmentFrame(f"/C/{k}", f, kind) for k, (f, kind) in enumerate(zip(own.frames, kinds, strict=True))]
         self.body = reduce_body(fe_mesh(points, tets), bodies[0], named, (), own.root)
         reduced = [self.body] + [rigid_body(body, a) for body, a in zip(bodies[1:], anchors[1:], strict=True)]
         self.model = compile_model(self.character, tree, reduced)

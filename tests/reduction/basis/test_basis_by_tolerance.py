@@ -27,7 +27,7 @@ def an_excitation(scale=1.0, frequency=0.0):
         angular_velocity=np.sqrt(scale) * np.array([1.0, 3.0, 2.0]),
         force=scale * np.array([[5.0, 8.0, 12.0]]),
         moment=scale * np.array([[0.1, 0.3, 0.2]]),
-        reach=np.array([REACH]),
+        target_distance=np.array([REACH]),
         frequency=frequency,
     )
 
@@ -111,7 +111,7 @@ def test_what_is_cut_is_never_more_than_said_and_not_much_less(body, tolerance):
 
 
 def test_the_error_of_one_load_alone_is_predicted_exactly(body):
-    nothing = LoadEnvelope(*(np.zeros(3),) * 3, np.zeros((1, 3)), np.zeros((1, 3)), reach=np.array([REACH]))
+    nothing = LoadEnvelope(*(np.zeros(3),) * 3, np.zeros((1, 3)), np.zeros((1, 3)), target_distance=np.array([REACH]))
     settings = replace(body.settings, mode_count=3)
     loads = {
         "acceleration": np.array([0.0, 0.0, 9.81]),

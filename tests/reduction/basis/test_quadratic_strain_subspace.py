@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from boxes import box_tets, fe_mesh
-from calmotion.reduction.interfaces.interface_patches import Anchor
+from calmotion.reduction.interfaces.interface_patches import AttachmentFrame
 from calmotion.reduction.load_envelope import LoadEnvelope
 from calmotion.reduction.material_laws.reduced_poses import equilibrium
 from calmotion.reduction.reduce import reduce_body
@@ -23,7 +23,7 @@ def loads(size):
 def link(material, tolerance, load_envelope, **more):
     points, tets = box_tets((12, 2, 2), (0.3, 0.03, 0.04), (0.0, -0.015, -0.02))
     settings = FlexibleSettings(material, elasticity="stvk", mode_count=12, **more)
-    anchors = [Anchor(f"/C/{x}", Frame(np.array([x, 0.0, 0.0]), IDENTITY), "interface") for x in (0.0, 0.3)]
+    anchors = [AttachmentFrame(f"/C/{x}", Frame(np.array([x, 0.0, 0.0]), IDENTITY), "interface") for x in (0.0, 0.3)]
     body = Body("/C/Link", Frame(np.zeros(3), IDENTITY), None, flexible=settings)
     return reduce_body(fe_mesh(points, tets), body, anchors, (), 0, load_envelope, tolerance)
 
@@ -31,7 +31,7 @@ def link(material, tolerance, load_envelope, **more):
 def whole_gram(body):
     """Gram matrix of all pairs of coordinates, as a body that sees some directions has them."""
     law, r = body.elasticity, len(body.stiffness)
-    W = np.eye(r) if law.seen is None else law.seen
+    W = np.eye(r) if law.strain_projection is None else law.strain_projection
     p = len(W)
     first, second = np.triu_indices(p)
     k, l = np.triu_indices(r)
@@ -52,13 +52,13 @@ def tip(body, size):
 def test_a_link_bends_as_one_whose_strain_sees_everything(plastic, size, monkeypatch):
     tolerance = 1e-5
     few = link(plastic, tolerance, loads(size))
-    seen = few.elasticity.seen
+    seen = few.elasticity.strain_projection
     assert seen is not None and 3 <= len(seen) < len(few.stiffness)
     monkeypatch.setattr(
         "calmotion.reduction.material_laws.large_deflection.quadratic_strain_subspace", lambda *arguments: None
     )
     every = link(plastic, tolerance, loads(size))
-    assert every.elasticity.seen is None
+    assert every.elasticity.strain_projection is None
     np.testing.assert_allclose(few.stiffness, every.stiffness)
     own, whole = tip(few, size), tip(every, size)
     assert np.linalg.norm(own - whole) < 0.3 * tolerance
@@ -72,28 +72,28 @@ def test_a_tighter_tolerance_sees_more(plastic):
     counts = []
     for tolerance in (1e-3, 1e-5, 1e-7):
         law = link(plastic, tolerance, loads(30.0)).elasticity
-        counts.append(10**6 if law.seen is None else len(law.seen))
+        counts.append(10**6 if law.strain_projection is None else len(law.strain_projection))
     assert counts == sorted(counts) and counts[0] < counts[-1]
 
 
 def test_turns_of_interfaces_are_seen_as_they_are(plastic):
     body = link(plastic, 1e-4, loads(30.0))
-    Psi, W = body.markers[1].Psi, body.elasticity.seen
+    Psi, W = body.markers[1].Psi, body.elasticity.strain_projection
     assert np.linalg.lstsq(W.T, Psi.T, rcond=None)[1].sum() < 1e-18 * np.sum(Psi**2)
 
 
 def test_what_is_left_out_is_told(plastic):
     body = link(plastic, 1e-4, loads(30.0))
-    p, r = body.elasticity.seen.shape
+    p, r = body.elasticity.strain_projection.shape
     row = body.left_out[-1]
-    assert row.what == f"quadratic strain of {r - p} of {r} elastic coordinates of /C/Link"
+    assert row.what == f"quadratic strain in {r - p} of {r} elastic coordinates of /C/Link"
     assert 0.0 < row.estimated_error_m <= 2.5e-5
 
 
 def test_all_pairs_can_be_kept(plastic):
     body = link(plastic, 1e-4, loads(30.0), pairs_share=0.0)
-    assert body.elasticity.seen is None and not any("quadratic" in row.what for row in body.left_out)
+    assert body.elasticity.strain_projection is None and not any("quadratic" in row.what for row in body.left_out)
 
 
 def test_without_loads_everything_is_seen(plastic):
-    assert link(plastic, 1e-4, None).elasticity.seen is None
+    assert link(plastic, 1e-4, None).elasticity.strain_projection is None

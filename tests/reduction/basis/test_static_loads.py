@@ -34,7 +34,10 @@ def test_wrenches_of_a_patch_bound_those_of_its_interfaces_together():
     center = positions[1]
     patches = patch_load_envelope(item, [(1, 2), (0,)], positions, [center, positions[0]])
     assert np.allclose(patches.force[1], item.force[0]) and np.allclose(patches.moment[1], item.moment[0])
-    assert np.allclose(patches.reach, [item.reach[1:].max(), item.reach[0]]) and patches.frequency == 7.0
+    assert (
+        np.allclose(patches.target_distance, [item.target_distance[1:].max(), item.target_distance[0]])
+        and patches.frequency == 7.0
+    )
     largest = np.zeros(6)
     for _ in range(4000):
         wrench = np.zeros(6)
@@ -47,7 +50,7 @@ def test_wrenches_of_a_patch_bound_those_of_its_interfaces_together():
 
 def test_turns_do_not_matter_without_a_reach():
     item = LoadEnvelope(*np.ones((3, 3)), np.ones((2, 3)), np.ones((2, 3)))
-    assert np.array_equal(item.lever, np.zeros(2))
+    assert np.array_equal(item.lever_arm, np.zeros(2))
 
 
 def test_a_body_that_has_turned_meets_a_part_of_every_load_from_every_side():

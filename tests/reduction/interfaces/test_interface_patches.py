@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from calmotion.errors import ShotError
 from calmotion.reduction.elements.assembly import quadratic_mesh
-from calmotion.reduction.interfaces.interface_patches import Anchor, interface_patches, spans_a_plane
+from calmotion.reduction.interfaces.interface_patches import AttachmentFrame, interface_patches, spans_a_plane
 
 
 @pytest.fixture(scope="module")
@@ -16,7 +16,7 @@ def beam(helpers):
 
 @pytest.fixture
 def anchor(helpers):
-    return lambda name, *position, kind="interface": Anchor(name, helpers.frame(*position), kind)
+    return lambda name, *position, kind="interface": AttachmentFrame(name, helpers.frame(*position), kind)
 
 
 def test_a_given_radius_takes_the_surface_within_it(beam, anchor):
@@ -40,7 +40,7 @@ def test_patches_never_share_a_node_and_anchors_at_one_place_share_a_patch(beam,
         anchor("/b", 0.32, 0, 0.01), anchor("/c", 0.28, 0, 0.01),
     ]  # fmt: skip
     first, second = interface_patches(beam, anchors, 0.05, "/b")
-    assert first.anchors == (0, 3) and second.anchors == (2,)
+    assert first.attachments == (0, 3) and second.attachments == (2,)
     assert not np.intersect1d(first.nodes, second.nodes).size
     assert (beam.nodes[first.nodes, 0] <= 0.3 + 1e-12).all() and (beam.nodes[second.nodes, 0] >= 0.3 - 1e-12).all()
 

@@ -7,7 +7,7 @@ import pytest
 from boxes import box_tets
 from calmotion.errors import ShotError
 from calmotion.reduction.elements.assembly import quadratic_mesh
-from calmotion.reduction.interfaces.interface_patches import Anchor, interface_patches
+from calmotion.reduction.interfaces.interface_patches import AttachmentFrame, interface_patches
 from calmotion.reduction.interfaces.named_patch import named_patch
 from calmotion.shot import Frame, InterfaceSurface
 
@@ -28,7 +28,7 @@ def plate():
 
 def anchor(path, position, triangles=None):
     surface = None if triangles is None else InterfaceSurface(f"{path}/part", path, triangles)
-    return Anchor(path, Frame(np.asarray(position, dtype=float), IDENTITY), "interface", surface)
+    return AttachmentFrame(path, Frame(np.asarray(position, dtype=float), IDENTITY), "interface", surface)
 
 
 def test_nodes_on_the_surface_and_on_its_side_of_a_thin_wall(plate):
@@ -48,7 +48,7 @@ def test_named_patches_come_first_and_the_others_get_the_rest(plate):
     a = anchor("/J/a", (0.0, 0.1, 0.0), square(0.0, 0.04, 0.0, 0.2, 0.001))
     b = anchor("/J/b", (0.06, 0.1, 0.001))
     first, second = interface_patches(plate, [a, b], 0.05, "/Plate")
-    assert len(first.nodes) == 5 * 21 and first.anchors == (0,)
+    assert len(first.nodes) == 5 * 21 and first.attachments == (0,)
     assert not np.intersect1d(first.nodes, second.nodes).size and len(second.nodes)
 
 

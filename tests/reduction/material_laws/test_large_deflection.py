@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from boxes import box_tets, fe_mesh
-from calmotion.reduction.interfaces.interface_patches import Anchor
+from calmotion.reduction.interfaces.interface_patches import AttachmentFrame
 from calmotion.reduction.reduce import reduce_body
 from calmotion.shot import Body, FlexibleSettings, Frame
 
@@ -16,8 +16,8 @@ def arm(law, material):
         "/C/Arm", Frame(np.zeros(3), IDENTITY), None, flexible=FlexibleSettings(material, mode_count=6, elasticity=law)
     )
     anchors = [
-        Anchor("/C/J", Frame(np.zeros(3), IDENTITY), "interface"),
-        Anchor("/C/W", Frame(np.array([0.6, 0.0, 0.0]), IDENTITY), "interface"),
+        AttachmentFrame("/C/J", Frame(np.zeros(3), IDENTITY), "interface"),
+        AttachmentFrame("/C/W", Frame(np.array([0.6, 0.0, 0.0]), IDENTITY), "interface"),
     ]
     return reduce_body(fe_mesh(points, tets), body, anchors, (), 0)
 

@@ -55,7 +55,7 @@ def static_reach(body: Body, anchors: BodyAnchors, load_envelope: LoadEnvelope) 
         None where a beam does not tell: a body of a closed loop, whose loads a rigid robot does not tell, or of no
         physical material; and see `solid_of`, `beam_between` and `grip_radius`.
     """
-    if load_envelope.closed or body.flexible is None or not _is_physical(body.flexible.material):
+    if load_envelope.closed_chain or body.flexible is None or not _is_physical(body.flexible.material):
         return None
     solid, material = solid_of(body), body.flexible.material
     if solid is None:
@@ -84,7 +84,7 @@ def static_reach(body: Body, anchors: BodyAnchors, load_envelope: LoadEnvelope) 
             wrench = [np.abs(peaks[here]).sum(axis=0) for peaks in (load_envelope.force, load_envelope.moment)]
             v, more = _given(beam, wrench, material, places[k], grip)
             u, turn = u + v, turn + more
-        lever = float(load_envelope.lever[k]) if k < count else 0.0
+        lever = float(load_envelope.lever_arm[k]) if k < count else 0.0
         size = float(np.linalg.norm(turn))
         found.append((float(np.linalg.norm(u)) + lever * size, size))
     largest = SAFETY * OVERSHOOT * np.max(found, axis=0)

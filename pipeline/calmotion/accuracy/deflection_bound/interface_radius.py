@@ -23,7 +23,7 @@ def grip_radius(points: Array, triangles: Indices, body: Body, center: Array, ro
         points: Of the solid [m], shape [n, 3].
         triangles: Shape [m, 3], outward.
         body: With `flexible` settings.
-        center: Anchor of the joint [m], shape [3], body frame.
+        center: AttachmentFrame of the joint [m], shape [3], body frame.
         room: Distance to the next joint's [m].
 
     Returns:

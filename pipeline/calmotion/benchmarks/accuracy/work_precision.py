@@ -122,7 +122,7 @@ class Bench:
         other = self.run(self.bodies(10.0 * finest), MAX_STEP)
         held = ProjectedBodies(shot.character, bodies, Options(), lambda item: finest, [known])
         limit, left = self._limit(held.bodies or bodies, 10.0 * finest)
-        unseen = sum(body.elasticity.unseen_m for body in bodies if body.elasticity is not None)
+        unseen = sum(body.elasticity.strain_error_m for body in bodies if body.elasticity is not None)
         reduced = distance(other.positions, known.run.positions) + unseen
         return Reference(limit, left + reduced + held.error_m)
 

@@ -89,7 +89,7 @@ def study(link: Link, sizes: Sequence[str], time_limit: float, say: Callable[[st
 def _row(link: Link, size: float, mesh: Any, mesh_time: float) -> Row:
     from calmotion.reduction.discretization_error import frequency_errors
     from calmotion.reduction.elements.assembly import assemble
-    from calmotion.reduction.interfaces.interface_patches import Anchor, interface_patches
+    from calmotion.reduction.interfaces.interface_patches import AttachmentFrame, interface_patches
     from calmotion.reduction.reduce import reduce_body
 
     settings = link.body.flexible
@@ -97,7 +97,7 @@ def _row(link: Link, size: float, mesh: Any, mesh_time: float) -> Row:
     model = assemble(mesh.points, mesh.tets, settings.material)
     held, reduce_time = None, float("nan")
     if link.carrier is not None:
-        anchor = Anchor(link.body.path, link.carrier, "interface")
+        anchor = AttachmentFrame(link.body.path, link.carrier, "interface")
         try:
             held = interface_patches(model.mesh, [anchor], settings.interface_radius, link.body.path)[0].nodes
             start = time.perf_counter()

@@ -135,8 +135,8 @@ def _elastic_laws(bodies: Sequence[ReducedBody]) -> dict[str, Any]:
         retardation[k], lame[k], start[k] = item.retardation, item.lame, size
         points[k] = item.points if item.law == "neohookean" else len(body.stiffness)
         data = item.data
-        if item.seen is not None:
-            points[k], data = len(item.seen), np.concatenate([data, item.seen.ravel()])
+        if item.strain_projection is not None:
+            points[k], data = len(item.strain_projection), np.concatenate([data, item.strain_projection.ravel()])
         arrays.append(data)
         size += data.size
     data = np.concatenate(arrays) if arrays else np.zeros(0)

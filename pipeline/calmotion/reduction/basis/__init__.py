@@ -1,1 +1,1 @@
-"""The reduced basis: Craig-Bampton modes, residual vectors, modal derivatives, quadratic-strain subspace."""
+"""Reduced bases: Craig-Bampton modes, residual vectors, modal derivatives, quadratic-strain subspace."""

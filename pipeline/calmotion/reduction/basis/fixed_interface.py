@@ -1,4 +1,4 @@
-"""A body with every patch held: its constraint modes, normal modes and residual vectors."""
+"""A body with all interfaces fixed: its constraint modes, normal modes and residual vectors."""
 
 from __future__ import annotations
 
@@ -17,17 +17,17 @@ from calmotion.reduction.elements.assembly import FEModel
 from calmotion.reduction.interfaces.rigid_patch import rigid_patch
 from calmotion.shot.character import Array, FlexibleSettings, IntArray
 
-_DEPENDENT = 1e-12  # share of unit mass that a combination of unit columns has where it is rounding
-_FEWEST = 4  # fixed-interface modes that are always kept: two bending pairs, or bending and twist of a plate
-_MOST = 8  # and at most, when they are chosen automatically
-_CANDIDATES = 64  # at most, when the shot says what is needed
-_FREQUENCY_RATIO = 3.0
-_COMPLIANCE_LEFT = 1e-3
+_DEPENDENT = 1e-12  # mass of a combination of columns of unit mass below which they are linearly dependent
+_FEWEST = 4  # least number of fixed-interface modes: two bending pairs, or bending and twist of a plate
+_MOST = 8  # largest number when it is chosen automatically
+_CANDIDATES = 64  # largest number when the loads are known
+_FREQUENCY_RATIO = 3.0  # of the highest mode to the first
+_COMPLIANCE_LEFT = 1e-3  # of the work of uniform accelerations that may be missing
 
 
 @dataclass(frozen=True, eq=False)
 class FixedInterface:
-    """A body with every patch held.
+    """A body with all interfaces fixed.
 
     Attributes:
         model: Full model, n nodes.
@@ -53,7 +53,7 @@ class FixedInterface:
     def of(
         cls, model: FEModel, root: IntArray, patches: Sequence[IntArray], centers: Sequence[Array]
     ) -> FixedInterface:
-        """Factorises the interior and solves for the constraint modes; arguments as of `reduced_basis`."""
+        """Factorise the interior and solve for the constraint modes; arguments as of `reduced_basis`."""
         nodes = model.mesh.nodes
         n = len(nodes)
         free = np.ones(n, dtype=bool)
@@ -69,21 +69,21 @@ class FixedInterface:
             constraint[patch, :, 6 * k : 6 * k + 6] = rigid_patch(nodes[patch], center)
         flat = constraint.reshape(3 * n, -1)
         if len(patches):
-            # static response of the interior to a motion of the patches; the interior rows of `flat` are zero before
+            # static response of the interior to a motion of the patches; the interior rows of `flat` were zero
             flat[interior] = -solver.solve((model.stiffness @ flat)[interior])
         return cls(model, patches, interior, K, M, mass, solver, flat)
 
     def lowest(self, count: int) -> Array:
-        """Constraint modes and enough normal modes for `count` good ones of the body, shape [3n, 6p + k]."""
-        # as many as are kept: constraint modes alone would make the lowest frequencies too high
+        """Constraint modes and enough normal modes for `count` accurate modes of the body, shape [3n, 6p + k]."""
+        # as many as modes are kept: with constraint modes alone the lowest frequencies would be too high
         count = min(max(count, _FEWEST), len(self.interior))
         return self._columns(lowest_modes(self.K, self.M, count, solver=self.solver)[1])
 
     def usual(self, settings: FlexibleSettings) -> tuple[Array, int]:
-        """Constraint modes, normal modes and residual vectors of a body of which nobody says what excites it.
+        """Constraint modes, normal modes and residual vectors of a body whose loads are not known.
 
         Returns:
-            Columns, shape [3n, 6p + k], and how many of them, the last ones, are residual vectors.
+            Columns, shape [3n, 6p + k], and the number of residual vectors, which are the last columns.
         """
         if settings.max_frequency >= 0.0:
             limit = (2.0 * np.pi * settings.max_frequency) ** 2
@@ -100,36 +100,36 @@ class FixedInterface:
         """Constraint modes, normal modes up to twice a frequency [Hz], and all residual vectors of the accelerations.
 
         Args:
-            peaks: Of the twelve unit accelerations; those of peak zero are left out.
+            peaks: Of the twelve unit accelerations, shape [12]; those of peak zero are omitted.
         """
-        if limit not in self._normal:  # a body is asked again with other loads
+        if limit not in self._normal:  # kept for other loads on the same body
             below, least = (2.0 * 2.0 * np.pi * limit) ** 2, min(_MOST, len(self.interior))
             self._normal[limit] = lowest_modes(self.K, self.M, least, solver=self.solver, below=below, most=_CANDIDATES)
         values, vectors = self._normal[limit]
         return self._columns(vectors, self._residual(values, vectors, peaks, 0.0))
 
-    def balance(self, force: Array, bent: Array) -> tuple[Array, Array]:
-        """Where the body comes to rest under forces with displacements imposed on top of rigid motions of its patches.
+    def balance(self, force: Array, imposed: Array) -> tuple[Array, Array]:
+        """Static equilibrium under forces, with displacements imposed on the patches besides their rigid motions.
 
         Args:
             force: Nodal [N], shape [3n, k].
-            bent: [m], shape [3n, k]; zero in the interior.
+            imposed: [m], shape [3n, k]; zero in the interior.
 
         Returns:
             Displacements, shape [3n, k], and the motion of each patch in them, shape [p, 6, k].
         """
-        load = force - self.model.stiffness @ bent
-        result = bent.copy()
+        load = force - self.model.stiffness @ imposed
+        result = imposed.copy()
         result[self.interior] += self.solver.solve(load[self.interior])
         motion = np.zeros((0, load.shape[1]))
         if self.constraint.shape[1]:
-            # what patches do and what the interior does are orthogonal in K, so that each follows by itself
+            # constraint modes and displacements of the interior are orthogonal in K, so each is solved separately
             motion = self._by_patches(self.constraint.T @ load)
             result += self.constraint @ motion
         return result, motion.reshape(len(self.patches), 6, load.shape[1])
 
     def _by_patches(self, work: Array) -> Array:
-        """Motions of the patches under loads that do this work on unit ones, shape [6p, k]."""
+        """Motions of the patches under generalised loads, both of shape [6p, k]."""
         K_r = self.constraint.T @ (self.model.stiffness @ self.constraint)
         scale = 1.0 / np.sqrt(np.diag(K_r))
         motion = np.linalg.solve(K_r * np.outer(scale, scale), scale[:, None] * work)
@@ -166,34 +166,33 @@ class FixedInterface:
         return work
 
     def _work_weight(self) -> Array:
-        """Accelerations that do at most unit work on the body, the linear ones alike and the angular ones alike."""
+        """Accelerations that do at most unit work on the body, with one factor for linear and one for angular ones."""
         work = self._work(self._weight(UNIFORM))
         return np.repeat(1.0 / np.sqrt([work[:3].max(), work[3:].max()]), 3)
 
     def _automatic_count(self, values: Array, vectors: Array) -> int:
-        """How many normal modes a shot needs when nobody says.
+        """Number of normal modes when the loads are not known.
 
-        Motors excite a body up to a few times its first frequency, hence all modes below three times that; and its
-        own weight, and an acceleration of its base, must bend it by the right amount, hence as many as hold all but
-        0.1% of the work that a uniform acceleration does on the body. Both are usually met by four; more than eight
-        are never taken, since every mode costs a row and a column of each step's system; what they miss is left to
-        residual vectors.
+        Motors excite a body up to a few times its first frequency: all modes up to three times that are needed. The
+        deflection by the weight of the body and by accelerations of its base must be accurate: the modes must cover
+        all but 0.1% of the work of a uniform acceleration. Four modes usually suffice. At most eight are taken, because
+        each mode adds a row and a column to the linear system of a time step; residual vectors cover the rest.
         """
         weight = self._weight(3)
         first = values[0]
         if self.constraint.shape[1]:
             first = min(first, ritz_modes(self.model, self.constraint)[0][0])
         inner = weight[self.interior]
-        left = np.einsum("ij,ij->j", inner, self.solver.solve(inner))
-        held = np.cumsum((vectors.T @ inner) ** 2 / values[:, None], axis=0)
-        enough = np.flatnonzero((left - held).max(axis=1) <= _COMPLIANCE_LEFT * self._work(weight).max())
+        total = np.einsum("ij,ij->j", inner, self.solver.solve(inner))
+        covered = np.cumsum((vectors.T @ inner) ** 2 / values[:, None], axis=0)
+        enough = np.flatnonzero((total - covered).max(axis=1) <= _COMPLIANCE_LEFT * self._work(weight).max())
         below = int(np.count_nonzero(values <= _FREQUENCY_RATIO**2 * first))
         count = max(below, _FEWEST, int(enough[0]) + 1 if len(enough) else len(values))
         return min(count, len(values))
 
 
 def frequency_limit(settings: FlexibleSettings, excited: float) -> float:
-    """Up to which frequency modes are kept [Hz]: as the settings say, else as the body is excited."""
+    """Highest frequency of the modes that are kept [Hz]: that of the settings, else the highest excited one."""
     return settings.max_frequency if settings.max_frequency >= 0.0 else excited
 
 
@@ -202,7 +201,7 @@ def ritz_modes(model: FEModel, columns: Array) -> tuple[Array, Array]:
 
     Returns:
         omega^2 [1/s^2] ascending, shape [m], and combinations that are orthonormal in mass, shape [r, m]; m < r where
-        columns depend on each other but for rounding.
+        columns are linearly dependent.
     """
     from scipy.linalg import eigh
 
@@ -214,8 +213,8 @@ def ritz_modes(model: FEModel, columns: Array) -> tuple[Array, Array]:
     scale = 1.0 / np.sqrt(np.diag(M_r))
     K_r = columns.T @ (model.stiffness @ columns)
     size, directions = eigh(M_r * np.outer(scale, scale))
-    own = size > _DEPENDENT * size[-1]
-    free = scale[:, None] * (directions[:, own] / np.sqrt(size[own]))
+    independent = size > _DEPENDENT * size[-1]
+    free = scale[:, None] * (directions[:, independent] / np.sqrt(size[independent]))
     omega_squared, U = eigh(free.T @ K_r @ free)
     return omega_squared, free @ U
 
@@ -225,6 +224,6 @@ def mode_signs(modes: Array) -> Array:
     if modes.shape[1] == 0:
         return np.zeros(0)
     size = np.abs(modes)
-    # "nearly": symmetric modes have entries equal but for rounding, and rounding must not choose between them
+    # "nearly": entries of symmetric modes differ by rounding only, and rounding must not decide the sign
     first = (size >= (1.0 - 1e-6) * size.max(axis=0)).argmax(axis=0)
     return np.where(modes[first, np.arange(modes.shape[1])] < 0.0, -1.0, 1.0)

@@ -1,8 +1,8 @@
-"""How modes change as a body deflects: the part of a basis without which a nonlinear body is far too stiff.
+"""Modal derivatives: the change of modes with the deflection, without which a nonlinear body is far too stiff.
 
-A bending mode alone stretches a link, since its points move on straight lines. The (static) modal derivative of two
-modes is the second-order displacement that keeps the body in balance while both grow: with it, the link bends at
-its length, and an axial force stiffens it.
+A bending mode alone stretches a link, because its points move on straight lines. The static modal derivative of two
+modes is the second-order displacement that keeps the body in equilibrium while both grow: with it the link bends
+without stretching, and an axial force stiffens it.
 
 Source: Idelsohn and Cardona, A reduction method for nonlinear structural dynamic analysis, 1985; Wu and Tiso,
 Nonlinear model order reduction for flexible multibody dynamics: a modal derivatives approach, 2016; Barbic and
@@ -33,12 +33,12 @@ from calmotion.reduction.interfaces.patch_rotation import (
 )
 from calmotion.shot.character import Array, ElasticMaterial, IntArray
 
-NEGLIGIBLE = 1e-3  # of the largest strain energy among the derivatives, in the square root
+NEGLIGIBLE = 1e-3  # square root of the negligible share of the largest strain energy among the derivatives
 
 
 @dataclass(frozen=True, eq=False)
 class Support:
-    """What holds a body: the clamped nodes, and patches that move as rigid ones about their centers."""
+    """Supports of a body: the nodes of the clamped root patch, and the rigid moving patches with their centers."""
 
     root: IntArray
     patches: Sequence[IntArray]
@@ -46,10 +46,10 @@ class Support:
     _fixed: dict[FEModel, FixedInterface] = field(default_factory=dict, init=False, repr=False)
 
     def fixed(self, model: FEModel) -> FixedInterface:
-        """The body with every patch held, factorised once.
+        """The body with all interfaces fixed, factorised once.
 
         Raises:
-            NotPositiveDefinite: The root patch does not hold the body.
+            NotPositiveDefinite: The root patch does not constrain all rigid motions of the body.
         """
         if model not in self._fixed:
             with one_blas_thread():
@@ -64,17 +64,17 @@ class Derivatives:
     Attributes:
         fields: theta_ij with x = sum phi_i u_i + sum_ij theta_ij u_i u_j / 2 to second order, i <= j, shape
             [n, 3, c (c + 1) / 2].
-        motion: Of each patch in them (translation, rotation vector), shape [p, 6, c (c + 1) / 2].
-        changes: Shapes that patches may take as they turn, see `patch_rotation`, orthonormal, shape [p, 6, s].
-        held: What the fields hold of them, shape [s, c (c + 1) / 2].
-        shapes: Response of the body to each change alone, shape [n, 3, s].
-        shape_motion: Of each patch in it, shape [p, 6, s].
+        motion: Motion of each patch in the fields (translation, rotation vector), shape [p, 6, c (c + 1) / 2].
+        changes: Changes of shape of rotating patches, see `patch_rotation`, orthonormal, shape [p, 6, s].
+        change_sizes: Size of each change in the fields, shape [s, c (c + 1) / 2].
+        shapes: Response of the body to each change, shape [n, 3, s].
+        shape_motion: Motion of each patch in this response, shape [p, 6, s].
     """
 
     fields: Array
     motion: Array
     changes: Array
-    held: Array
+    change_sizes: Array
     shapes: Array
     shape_motion: Array
 
@@ -86,38 +86,38 @@ def modal_derivatives(
 
     Args:
         model: Full model, n nodes.
-        support: Its root patch is held; each of the other p turns by a finite rotation about its center, whose second
-            order is imposed, and is otherwise free to move as a rigid one.
+        support: Its root patch is clamped. The second order of the finite rotation of each of the other p patches is
+            imposed; otherwise they are free to move as rigid bodies.
         basis: Mass-orthonormal modes.
-        count: How many of its modes are paired, c.
+        count: Number c of modes that are paired.
         material: Elastic constants.
         law: `stvk` or `neohookean`.
     """
     nodes = model.mesh.nodes
     n, p = len(nodes), len(support.patches)
     lame, mu = lame_constants(material.youngs_modulus, material.poissons_ratio)
-    rule = GradientRule(model.mesh, 3)  # three gradients multiplied: cubic
+    rule = GradientRule(model.mesh, 3)  # products of three gradients are cubic
     gradients = rule.gradients(np.ascontiguousarray(basis.modes[:, :, :count]))
     first, second = np.triu_indices(count)
     pairs = len(first)
     arms = [nodes[patch] - center for patch, center in zip(support.patches, support.centers, strict=True)]
-    own = [shape_changes(arm) for arm in arms]
-    changes = np.zeros((p, 6, sum(change.shape[1] for change in own)))
+    patch_changes = [shape_changes(arm) for arm in arms]
+    changes = np.zeros((p, 6, sum(change.shape[1] for change in patch_changes)))
     at = 0
-    for k, change in enumerate(own):
+    for k, change in enumerate(patch_changes):
         changes[k, :, at : at + change.shape[1]] = change
         at += change.shape[1]
     force = np.zeros((n, 3, pairs + at))
-    bent = np.zeros((n, 3, pairs + at))
+    imposed = np.zeros((n, 3, pairs + at))
     for k, (i, j) in enumerate(zip(first, second, strict=True)):
         force[:, :, k] = second_order_force(rule, gradients[i], gradients[j], lame, mu, law)
-    held = np.einsum("pms,pmq->sq", changes, squares(basis.patch_motion[:, 3:, :count]))
+    change_sizes = np.einsum("pms,pmq->sq", changes, squares(basis.patch_motion[:, 3:, :count]))
     for k, (patch, arm) in enumerate(zip(support.patches, arms, strict=True)):
-        bent[patch] = square_fields(arm) @ changes[k] @ np.hstack([held, np.eye(at)])
-    flat, motion = support.fixed(model).balance(-force.reshape(3 * n, -1), bent.reshape(3 * n, -1))
+        imposed[patch] = square_fields(arm) @ changes[k] @ np.hstack([change_sizes, np.eye(at)])
+    flat, motion = support.fixed(model).balance(-force.reshape(3 * n, -1), imposed.reshape(3 * n, -1))
     fields = flat.reshape(n, 3, -1)
     return Derivatives(
-        fields[:, :, :pairs], motion[:, :, :pairs], changes, held, fields[:, :, pairs:], motion[:, :, pairs:]
+        fields[:, :, :pairs], motion[:, :, :pairs], changes, change_sizes, fields[:, :, pairs:], motion[:, :, pairs:]
     )
 
 
@@ -125,49 +125,50 @@ def extended_basis(
     model: FEModel, support: Support, basis: Basis, count: int, material: ElasticMaterial, law: str,
     negligible: float = NEGLIGIBLE,
 ) -> Basis:  # fmt: skip
-    """A basis and the modal derivatives of its first modes, mass-orthonormal again.
+    """A basis and the modal derivatives of its first modes, made mass-orthonormal.
 
-    Derivatives are weighed by how far their modes deflect under one and the same load (as 1/omega^2); directions of
-    negligible strain energy at that weight are dropped. The shapes of turning patches are coordinates by themselves,
-    held to the turns by springs (see `patch_rotation`).
+    A derivative is weighted by the deflections of its modes under the same load (by 1/omega^2); directions whose strain
+    energy is negligible with these weights are dropped. The changes of shape of rotating patches are coordinates of
+    their own, which penalty springs couple to the rotations (see `patch_rotation`).
 
     Args:
-        count: How many of the first modes are paired.
-        negligible: Share of the largest strain energy among the derivatives, in the square root.
+        model, support, basis, material, law: As of `modal_derivatives`.
+        count: Number of the first modes that are paired.
+        negligible: Square root of the negligible share of the largest strain energy among the derivatives.
 
     Returns:
-        The basis: its stiffness, with that of the springs, is diagonal and its lowest modes are (nearly) those given.
+        The basis: its stiffness, with that of the springs, is diagonal; its lowest modes are nearly those of `basis`.
     """
     count = min(count, len(basis.omega_squared))
     if count == 0:
         return basis
-    found = modal_derivatives(model, support, basis, count, material, law)
+    derivatives = modal_derivatives(model, support, basis, count, material, law)
     n, p = len(model.mesh.nodes), len(support.patches)
     amplitude = basis.omega_squared[0] / basis.omega_squared[:count]
     first, second = np.triu_indices(count)
     weight = amplitude[first] * amplitude[second]
-    held = found.held * weight
-    shapes, shape_motion = found.shapes.reshape(3 * n, -1), found.shape_motion
-    # the derivatives with patches of fixed shape, and the shapes
-    extra = found.fields.reshape(3 * n, -1) * weight - shapes @ held
-    moved = found.motion * weight - shape_motion @ held
+    change_sizes = derivatives.change_sizes * weight
+    shapes, shape_motion = derivatives.shapes.reshape(3 * n, -1), derivatives.shape_motion
+    # the derivatives without changes of shape, and the responses to these changes
+    extra = derivatives.fields.reshape(3 * n, -1) * weight - shapes @ change_sizes
+    moved = derivatives.motion * weight - shape_motion @ change_sizes
     M, K = vector_mass(model.mass), model.stiffness
     modes = basis.modes.reshape(3 * n, -1)
-    for _ in range(2):  # twice is enough
-        extra, moved = _less(modes, basis.patch_motion, M, extra, moved)
-        shapes, shape_motion = _less(modes, basis.patch_motion, M, shapes, shape_motion)
+    for _ in range(2):  # the second pass removes the rounding of the first
+        extra, moved = _without_modes(modes, basis.patch_motion, M, extra, moved)
+        shapes, shape_motion = _without_modes(modes, basis.patch_motion, M, shapes, shape_motion)
     energy, directions = np.linalg.eigh(extra.T @ (K @ extra))
     dropped = negligible**2 * max(float(energy[-1]), np.finfo(float).tiny)
     keep = directions[:, energy > dropped]
     extra, moved = extra @ keep, moved @ keep
-    # of the shapes those that turns of the patches bring about; the springs would resist with one that is missing
+    # the changes of shape that rotations of the patches cause; a missing one would make the springs resist the rotation
     root = _root(shapes.T @ (K @ shapes))
-    strain, strength, _ = np.linalg.svd(root @ held, full_matrices=False)
+    strain, strength, _ = np.linalg.svd(root @ change_sizes, full_matrices=False)
     taken = np.linalg.pinv(root) @ strain[:, STIFF * strength**2 > dropped]
     ritz = np.hstack([modes, extra, shapes @ taken])
     motion = np.concatenate([basis.patch_motion, moved, shape_motion @ taken], axis=2)
     none = np.zeros((p, 6, modes.shape[1] + extra.shape[1]))
-    shape = np.concatenate([none, found.changes @ taken], axis=2)
+    shape = np.concatenate([none, derivatives.changes @ taken], axis=2)
     roots = springs(model.mesh.nodes, support.patches, support.centers, material.youngs_modulus)
     extension = spring_rows(roots, shape, np.zeros((p, 3, ritz.shape[1])))[:, : ritz.shape[1]]
     added = extension.T @ extension if law == "stvk" else 0.0
@@ -181,12 +182,12 @@ def extended_basis(
         np.ascontiguousarray(motion @ U),
         patch_squares=np.ascontiguousarray(shape @ U),
         first_order=result.T @ (M @ modes),
-        second_order=result.T @ (M @ found.fields.reshape(3 * n, -1)),
+        second_order=result.T @ (M @ derivatives.fields.reshape(3 * n, -1)),
     )
 
 
-def _less(modes: Array, patch_motion: Array, M: Any, fields: Array, motion: Array) -> tuple[Array, Array]:
-    """Fields and their patches' motion without what they have of the modes."""
+def _without_modes(modes: Array, patch_motion: Array, M: Any, fields: Array, motion: Array) -> tuple[Array, Array]:
+    """Fields and the motion of their patches, made mass-orthogonal to the modes."""
     share = modes.T @ (M @ fields)
     return fields - modes @ share, motion - patch_motion @ share
 
@@ -198,11 +199,11 @@ def _root(K: Array) -> Array:
 
 
 def _orthonormal(M: Array, K: Array) -> tuple[Array, Array]:
-    """Eigenvalues and mass-orthonormal eigenvectors of K and M, of which columns may be nearly parallel."""
+    """Eigenvalues and mass-orthonormal eigenvectors of K and M of columns that may be nearly parallel."""
     from scipy.linalg import eigh
 
     scale = 1.0 / np.sqrt(np.diag(M))
-    # nearly parallel directions would be blown up by the normalisation
+    # the normalisation would amplify the rounding of nearly parallel directions
     values, vectors = np.linalg.eigh(M * np.outer(scale, scale))
     T = scale[:, None] * (vectors[:, values > 1e-10] / np.sqrt(values[values > 1e-10]))
     K = T.T @ K @ T

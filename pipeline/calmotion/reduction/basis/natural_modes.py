@@ -14,7 +14,7 @@ from calmotion.shot.character import Array
 
 __all__ = ["SparseSolver", "frequencies", "lowest_modes", "vector_mass"]
 
-_DENSE = 60  # degrees of freedom up to which a dense solver is as quick
+_DENSE = 60  # degrees of freedom up to which a dense solver is as fast
 
 
 def vector_mass(mass: Any) -> Any:
@@ -32,11 +32,11 @@ def lowest_modes(
 
     Args:
         K, M: Sparse symmetric, shape [n, n]; K + shift M positive definite.
-        count: How many, at most n; the fewest with `below`.
+        count: Number of pairs, at most n; with `below` the least number.
         shift: [1/s^2], positive where K alone is singular.
-        solver: Of K + shift M, when it is there already.
-        below: All up to this omega^2 [1/s^2] are wanted, and one above.
-        most: But no more than this many.
+        solver: Of K + shift M, where it is known.
+        below: All pairs up to this omega^2 [1/s^2] are computed, and one above.
+        most: Largest number of pairs.
 
     Returns:
         omega^2 [1/s^2], ascending, shape [count] (or more), and M-orthonormal modes, shape [n, count] (or more).
@@ -65,15 +65,15 @@ def frequencies(model: FEModel, count: int, clamped: Indices | None = None) -> A
 
     Args:
         model: Its matrices.
-        count: How many; for a free body the six rigid ones (zero) come first.
-        clamped: Nodes that are held, or None for a free body.
+        count: Number of frequencies; for a free body the six rigid ones (zero) come first.
+        clamped: Clamped nodes, or None for a free body.
     """
     n = len(model.mesh.nodes)
     free = np.ones(n, dtype=bool)
     shift = 0.0
     M = vector_mass(model.mass)
     if clamped is None or len(clamped) == 0:
-        # far below the first elastic frequency, far above rounding of the rigid ones
+        # far below the first elastic frequency, far above the rounding of the rigid ones
         shift = 1e-4 * float(model.stiffness.diagonal().sum() / M.diagonal().sum())
     else:
         free[clamped] = False

@@ -1,4 +1,4 @@
-"""The loads that bend a body slowly: its own inertia in an accelerated frame, and wrenches on its interfaces."""
+"""Static loads of a body: inertial forces in an accelerated frame, and wrenches on its interfaces."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from calmotion.reduction.load_envelope import LoadEnvelope
 from calmotion.shot.character import Array
 
 ACCELERATIONS = 12  # leading entries of `peak_loads`, before those of wrenches
-OVERSHOOT = 2.0  # of a sudden load, against the deflection it holds at rest
-UNIFORM = 6  # of the unit accelerations the first six are those of a frame that starts from rest
+OVERSHOOT = 2.0  # deflection by a sudden load over the static one
+UNIFORM = 6  # the first six unit accelerations are those of a frame that starts from rest
 _PAIRS = ((0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1))
 
 

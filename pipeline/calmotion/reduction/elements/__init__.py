@@ -1,1 +1,1 @@
-"""Quadratic tetrahedra: assembly, embedding of points, strains, forces of second order."""
+"""Quadratic tetrahedra: assembly, embedding of points, strains, second-order forces."""

@@ -113,7 +113,7 @@ def assemble_stiffness(mesh: QuadraticMesh, youngs_modulus: float, poissons_rati
                     blocks[:, c, c] += mu * summed
     indptr = np.searchsorted(keys, n * np.arange(n + 1))
     matrix = bsr_matrix((blocks, keys % n, indptr), shape=(3 * n, 3 * n)).tocsr()
-    return 0.5 * (matrix + matrix.T)  # symmetric to the last bit, whatever the order of summation
+    return 0.5 * (matrix + matrix.T)  # exactly symmetric, whatever the order of summation
 
 
 def assemble(points: Array, tets: IntArray, material: ElasticMaterial, mass: float | None = None) -> FEModel:

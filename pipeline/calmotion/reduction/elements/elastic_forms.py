@@ -20,7 +20,7 @@ class GradientRule:
 
     Args:
         mesh: Of the body, m elements.
-        order: Polynomial degree that the rule integrates exactly, 2 or 4.
+        order: Polynomial degree that the rule integrates exactly.
 
     Attributes:
         points: Quadrature points in the reference tetrahedron, shape [3, q].
@@ -104,7 +104,7 @@ def gradient_gram(rule: GradientRule, modes: Array) -> Array:
 
 
 def strain_gram(rule: GradientRule, modes: Array, lame: float, mu: float, directions: Array | None = None) -> Array:
-    """Inner products of the Green strains that modes make, alone and in pairs.
+    """Inner products of the Green strains of modes and of pairs of modes.
 
     The Green strain of a displacement sum_k u_k phi_k is a combination of fields, one for each mode and one for each
     pair of modes, with the coefficients z(u) = (u_k; u_k u_l for k <= l). Hence the energy of a St. Venant-Kirchhoff
@@ -115,7 +115,7 @@ def strain_gram(rule: GradientRule, modes: Array, lame: float, mu: float, direct
         rule: Of order 4, which integrates the products of two quadratic strains exactly.
         modes: Nodal displacements, shape [n, 3, r].
         lame, mu: Lame's constants [Pa].
-        directions: Those whose pairs are made instead of all modes', in coordinates, shape [r, p].
+        directions: Basis of the subspace of the quadratic strain, shape [r, p]; None: all coordinates.
 
     Returns:
         A, symmetric, shape [r + p (p + 1) / 2] squared; pairs ordered (0, 0), (0, 1), ..., (1, 1), ...
@@ -136,15 +136,17 @@ def strain_gram(rule: GradientRule, modes: Array, lame: float, mu: float, direct
     shear = np.sqrt(2.0 * mu)
     bulk = (np.sqrt(2.0 * mu + 3.0 * lame) - shear) / 3.0
     for start in range(0, count, chunk):
-        part = slice(start, min(start + chunk, count))
-        weights = rule.weights[part].ravel()
-        G = np.ascontiguousarray(rule.gradients(modes, part).reshape(r, -1, 9).transpose(0, 2, 1))
-        turns = G if directions is None else np.tensordot(directions.T, G, 1)
+        elements = slice(start, min(start + chunk, count))
+        weights = rule.weights[elements].ravel()
+        G = np.ascontiguousarray(rule.gradients(modes, elements).reshape(r, -1, 9).transpose(0, 2, 1))
+        H = G if directions is None else np.tensordot(directions.T, G, 1)
         # the rule has a negative weight at the centre
-        for own, factor in ((weights > 0.0, 1.0), (weights < 0.0, -1.0)):
-            if own.any():
-                fields = np.empty((size, 6, int(own.sum())))
-                green_fields(G[:, :, own], turns[:, :, own], np.sqrt(np.abs(weights[own])), shear, bulk, fields)
+        for selected, factor in ((weights > 0.0, 1.0), (weights < 0.0, -1.0)):
+            if selected.any():
+                fields = np.empty((size, 6, int(selected.sum())))
+                green_fields(
+                    G[:, :, selected], H[:, :, selected], np.sqrt(np.abs(weights[selected])), shear, bulk, fields
+                )
                 A += dsyrk(factor, fields.reshape(size, -1).T, trans=1)  # the upper triangle
     return A + np.triu(A, 1).T
 

@@ -1,4 +1,4 @@
-"""Displacement and small rotation of arbitrary points of a body from its nodal displacements."""
+"""Displacement and small rotation of arbitrary points of a body by its nodal displacements."""
 
 from __future__ import annotations
 
@@ -10,22 +10,22 @@ from calmotion.geometry.tetrahedra import Indices, face_normals, tet_volumes
 from calmotion.reduction.elements.assembly import QuadraticMesh
 from calmotion.shot.character import Array, IntArray
 
-_CANDIDATES = 24
-_ALL_PAIRS = 2_000_000  # up to this many pairs of point and element every pair is looked at
+_CANDIDATES = 24  # nearest elements of a point, by their centers
+_ALL_PAIRS = 2_000_000  # largest number of pairs of point and element for an exhaustive search
 
 
 @dataclass(frozen=True, eq=False)
 class Embedding:
-    """Points tied to elements of a mesh.
+    """Points embedded in elements of a mesh.
 
-    A point inside its element follows the quadratic field. A point outside follows the nearest place of the nearest
-    element (clamped barycentric coordinates) as if on a rigid arm, so a rigid motion is exact everywhere.
+    A point inside its element moves with the quadratic field. A point outside moves as if connected by a rigid arm to
+    the nearest point of the nearest element (clamped barycentric coordinates), so rigid motions are exact everywhere.
 
     Attributes:
         nodes: Nodes of each point's element, shape [k, 10].
         values: Shape functions, shape [k, 10].
         gradients: Their gradients [1/m], shape [k, 10, 3].
-        arms: From the place in the element to the point [m], shape [k, 3]; zero inside.
+        arms: From the nearest point of the element to the point [m], shape [k, 3]; zero inside.
     """
 
     nodes: IntArray
@@ -38,8 +38,8 @@ class Embedding:
         moved = np.einsum("ka,kair->kir", self.values, modes[self.nodes], optimize=True)
         outside = np.flatnonzero(np.abs(self.arms).max(axis=1, initial=0.0) > 0.0)
         if len(outside):
-            turned = self._curl(modes, outside)
-            moved[outside] += np.cross(turned, self.arms[outside][:, :, None], axis=1)
+            rotation = self._curl(modes, outside)
+            moved[outside] += np.cross(rotation, self.arms[outside][:, :, None], axis=1)
         return moved
 
     def rotations(self, modes: Array) -> Array:
@@ -54,18 +54,18 @@ class Embedding:
 
 
 def embed(mesh: QuadraticMesh, points: Array) -> Embedding:
-    """Ties points to the mesh.
+    """Embed points in a mesh.
 
     Args:
         mesh: Of the body.
-        points: [m], shape [k, 3], body frame; anywhere.
+        points: [m], shape [k, 3], body frame; inside or outside.
     """
     from skfem import ElementTetP2
 
     shape, mapping = ElementTetP2(), mesh.basis.mapping
     tets = mesh.tets[:, :4]
     x = mesh.nodes[tets]
-    # outward whatever the order of the corners
+    # outward for either orientation of the corners
     normals = face_normals(mesh.nodes, tets) * np.sign(tet_volumes(mesh.nodes, tets))[:, None, None]
     offsets = np.einsum("efk,efk->ef", normals, x[:, [1, 0, 0, 0]])
     element = _nearest_elements(mesh, x.mean(axis=1), normals, offsets, points)
@@ -84,7 +84,7 @@ def embed(mesh: QuadraticMesh, points: Array) -> Embedding:
 
 
 def _nearest_elements(mesh: QuadraticMesh, centers: Array, normals: Array, offsets: Array, points: Array) -> Indices:
-    """The element that holds each point, or the one whose face planes it exceeds least."""
+    """The element that contains each point, or the one whose face planes it exceeds least."""
     from scipy.spatial import cKDTree
 
     element = np.empty(len(points), dtype=np.int64)
@@ -98,7 +98,7 @@ def _nearest_elements(mesh: QuadraticMesh, centers: Array, normals: Array, offse
             element[start : start + rows] = excess.argmin(axis=1)
         return element
     near_center = cKDTree(centers).query(points, k=min(_CANDIDATES, len(centers)))[1].reshape(len(points), -1)
-    # beside a large element, many small ones are nearer by their centres: those around the nearest node too
+    # the centers of many small elements may be nearer than that of the right large one: add those at the nearest node
     of_node = _elements_of_nodes(mesh)
     near_node = of_node[cKDTree(mesh.nodes).query(points)[1]]
     candidates = np.hstack([near_center, near_node])
@@ -110,7 +110,7 @@ def _nearest_elements(mesh: QuadraticMesh, centers: Array, normals: Array, offse
 
 
 def _elements_of_nodes(mesh: QuadraticMesh) -> Indices:
-    """Up to 32 elements of each node, shape [n, 32]; filled up by repeating the first."""
+    """Up to 32 elements of each node, shape [n, 32]; filled with the first."""
     node = mesh.tets.ravel()
     element = np.repeat(np.arange(len(mesh.tets)), mesh.tets.shape[1])
     order = np.argsort(node, kind="stable")

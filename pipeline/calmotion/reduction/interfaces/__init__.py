@@ -1,1 +1,1 @@
-"""Interface patches: the parts of a surface that joints hold, and how they move."""
+"""Interface patches: the parts of a surface to which joints are attached, and their motion."""

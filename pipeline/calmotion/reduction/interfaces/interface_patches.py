@@ -1,4 +1,4 @@
-"""Where joints take hold of a flexible body: patches of its surface that move as rigid ones."""
+"""Interface patches of a flexible body: parts of its surface to which joints are attached, and which stay rigid."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ _SPREAD = 0.2  # second largest over largest extent below which a patch is a lin
 
 
 @dataclass(frozen=True, eq=False)
-class Anchor:
-    """A place on a body that the dynamics asks for.
+class AttachmentFrame:
+    """A frame on a body to which a joint is attached, or at which a target is measured.
 
     Attributes:
         path: Prim path of the joint or target, for errors.
         frame: Its frame in the body frame, undeformed.
-        kind: `interface` (a joint: a patch of the surface moves rigidly with it) or `point` (a target).
-        surface: The part of the surface that the shot says it holds, or None.
+        kind: `interface` (a joint: an interface patch moves rigidly with the frame) or `point` (a target).
+        surface: The part of the surface that the shot names as interface of the joint, or None.
     """
 
     path: str
@@ -36,132 +36,141 @@ class Anchor:
 
 
 @dataclass(frozen=True, eq=False)
-class Patch:
-    """A rigid patch: surface nodes, ascending, and the indices of the anchors that it carries (same position)."""
+class InterfacePatch:
+    """A part of the surface that moves as a rigid body.
+
+    Attributes:
+        nodes: Surface nodes, ascending.
+        attachments: Indices of the attachment frames that it carries, all at one position.
+        radius: Largest distance of its nodes from them, or the radius that it was made with [m].
+    """
 
     nodes: IntArray
-    anchors: tuple[int, ...]
+    attachments: tuple[int, ...]
     radius: float
 
 
-def interface_patches(mesh: QuadraticMesh, anchors: Sequence[Anchor], radius: float, body: str) -> list[Patch]:
-    """The rigid patches of a body, in the order of the anchors that first name them.
+def interface_patches(
+    mesh: QuadraticMesh, attachments: Sequence[AttachmentFrame], radius: float, body: str
+) -> list[InterfacePatch]:
+    """The interface patches of a body, in the order of their first attachment frames.
 
-    Anchors of kind `interface` at one position share a patch, unless they name their surfaces. Nodes on a named
-    surface belong to it alone; any other within reach of two patches goes to the nearer anchor.
+    Attachment frames of kind `interface` at one position share a patch, unless they name their surfaces. A node on a
+    named surface belongs to the patch of that surface; a node that two patches could take belongs to the patch of the
+    nearer attachment frame.
 
     Args:
         mesh: Of the body.
-        anchors: All anchors; those of kind `point` are passed over.
-        radius: [m], or negative: chosen for each anchor (`automatic_radius`).
+        attachments: All attachment frames; those of kind `point` are ignored.
+        radius: Radius of the patches [m]; negative: chosen for each attachment frame (`automatic_radius`).
         body: Prim path of the body, for errors.
 
     Raises:
-        ShotError: An anchor touches no surface, or its patch cannot carry a moment, or two named ones overlap.
+        ShotError: An attachment frame touches no surface, its patch carries no moment, or two named patches overlap.
     """
     size = float(np.linalg.norm(np.ptp(mesh.nodes, axis=0)))
     groups: list[list[int]] = []
-    for index, anchor in enumerate(anchors):
-        if anchor.kind != "interface":
+    for index, attachment in enumerate(attachments):
+        if attachment.kind != "interface":
             continue
-        at = anchor.frame.position
+        at = attachment.frame.position
         for group in groups:
             if (
-                anchor.surface is None
-                and anchors[group[0]].surface is None
-                and np.linalg.norm(anchors[group[0]].frame.position - at) < 1e-6 * size
+                attachment.surface is None
+                and attachments[group[0]].surface is None
+                and np.linalg.norm(attachments[group[0]].frame.position - at) < 1e-6 * size
             ):
                 group.append(index)
                 break
         else:
             groups.append([index])
-    centers = np.array([anchors[group[0]].frame.position for group in groups]).reshape(-1, 3)
+    centers = np.array([attachments[group[0]].frame.position for group in groups]).reshape(-1, 3)
     triangles = mesh.nodes[mesh.surface[:, :3]]
     surface = mesh.surface_nodes
     distance = np.linalg.norm(mesh.nodes[surface][None] - centers[:, None], axis=-1)
     nearest = distance.argmin(axis=0)
-    named = _named_patches(mesh, anchors, groups, body)
+    named = _named_patches(mesh, attachments, groups, body)
     taken = np.isin(surface, np.concatenate([np.zeros(0, np.int32), *named.values()]))
     patches = []
     for k, group in enumerate(groups):
         if k in named:
             extent = float(np.linalg.norm(mesh.nodes[named[k]] - centers[k], axis=1).max())
-            patches.append(Patch(nodes=named[k], anchors=tuple(group), radius=extent))
+            patches.append(InterfacePatch(nodes=named[k], attachments=tuple(group), radius=extent))
             continue
-        own = surface[(nearest == k) & ~taken]
+        candidates = surface[(nearest == k) & ~taken]
         others = np.delete(centers, k, axis=0)
         room = float(np.linalg.norm(others - centers[k], axis=1).min()) if len(others) else np.inf
-        patches.append(_patch(mesh, triangles, own, anchors, group, radius, room, size, body))
+        patches.append(_patch(mesh, triangles, candidates, attachments, group, radius, room, size, body))
     return patches
 
 
 def _named_patches(
-    mesh: QuadraticMesh, anchors: Sequence[Anchor], groups: list[list[int]], body: str
+    mesh: QuadraticMesh, attachments: Sequence[AttachmentFrame], groups: list[list[int]], body: str
 ) -> dict[int, IntArray]:
     """Nodes of the patches whose surface the shot names, by group."""
-    found: dict[int, IntArray] = {}
+    patches: dict[int, IntArray] = {}
     for k, group in enumerate(groups):
-        surface = anchors[group[0]].surface
+        surface = attachments[group[0]].surface
         if surface is None:
             continue
         nodes = named_patch(mesh, surface.triangles)
         if not spans_a_plane(mesh.nodes[nodes]):
             raise ShotError(
-                f"this interface of {anchors[group[0]].path} is too small to hold a joint",
+                f"this interface of {attachments[group[0]].path} is too small to carry a joint",
                 path=surface.path, attribute="indices", found=f"{len(nodes)} nodes of the mesh of {body} on it",
                 remedy="Add faces to it, or author a smaller calm:flexible:elementSize",
             )  # fmt: skip
-        for other, taken in found.items():
+        for other, taken in patches.items():
             if np.intersect1d(nodes, taken).size:
                 raise ShotError(
-                    f"this interface overlaps that of {anchors[groups[other][0]].path}",
+                    f"this interface overlaps that of {attachments[groups[other][0]].path}",
                     path=surface.path, attribute="indices", remedy="Leave a face between the two, or join them by one",
                 )  # fmt: skip
-        found[k] = nodes
-    return found
+        patches[k] = nodes
+    return patches
 
 
 def _patch(
-    mesh: QuadraticMesh, triangles: Array, own: IntArray, anchors: Sequence[Anchor], group: list[int],
-    radius: float, room: float, size: float, body: str,
-) -> Patch:  # fmt: skip
-    center, path = anchors[group[0]].frame.position, anchors[group[0]].path
+    mesh: QuadraticMesh, triangles: Array, candidates: IntArray, attachments: Sequence[AttachmentFrame],
+    group: list[int], radius: float, room: float, size: float, body: str,
+) -> InterfacePatch:  # fmt: skip
+    center, path = attachments[group[0]].frame.position, attachments[group[0]].path
     closest = closest_on_triangles(center, triangles)
     gaps = np.linalg.norm(closest - center, axis=1)
     gap = float(gaps.min())
     automatic = radius < 0.0
     if automatic:
-        reach = 0.5 * size if _inside_hull(mesh, center, 0.05 * size) else 0.0
+        largest_gap = 0.5 * size if _inside_hull(mesh, center, 0.05 * size) else 0.0
         radius = automatic_radius(center, triangles, closest, gaps, room)
     else:
-        reach = radius
-    if gap > reach:
+        largest_gap = radius
+    if gap > largest_gap:
         raise ShotError(
-            f"the anchor of {path} touches no surface of this flexible body: it is {gap:.4g} m away",
+            f"the attachment frame of {path} is {gap:.4g} m away from the surface of this flexible body",
             path=body, attribute="calm:flexible:interfaceRadius",
-            found=f"anchor at {np.array2string(center, precision=4)} m, radius {radius:.4g} m",
-            remedy="Move the joint's frame onto the body, or author an interfaceRadius larger than that distance",
+            found=f"frame at {np.array2string(center, precision=4)} m, radius {radius:.4g} m",
+            remedy="Move the frame of the joint onto the body, or author an interfaceRadius larger than this distance",
         )  # fmt: skip
     if automatic:
-        face = np.intersect1d(end_face(mesh, center, triangles, closest, gaps, room), own)
+        face = np.intersect1d(end_face(mesh, center, triangles, closest, gaps, room), candidates)
         if spans_a_plane(mesh.nodes[face]):
             extent = float(np.linalg.norm(mesh.nodes[face] - center, axis=1).max())
-            return Patch(nodes=face.astype(np.int32), anchors=tuple(group), radius=extent)
-    nodes = nodes_of_area(mesh, own, center, radius)
+            return InterfacePatch(nodes=face.astype(np.int32), attachments=tuple(group), radius=extent)
+    nodes = nodes_of_area(mesh, candidates, center, radius)
     if not spans_a_plane(mesh.nodes[nodes]):
-        # a mesh coarser than the radius: the surface triangle that is touched is the least that holds a moment
-        touched = np.intersect1d(mesh.surface[gaps <= gap + 1e-9 * size].ravel(), own)
+        # elements larger than the radius: the nearest surface triangle is the smallest patch that carries a moment
+        touched = np.intersect1d(mesh.surface[gaps <= gap + 1e-9 * size].ravel(), candidates)
         nodes = np.union1d(nodes, touched)
     while automatic and not spans_a_plane(mesh.nodes[nodes]) and radius < min(0.5 * size, room):
         radius *= _GROWTH
-        nodes = nodes_of_area(mesh, own, center, radius)
+        nodes = nodes_of_area(mesh, candidates, center, radius)
     if not spans_a_plane(mesh.nodes[nodes]):
         raise ShotError(
-            f"the surface near the anchor of {path} is too small to hold a joint",
+            f"the surface near the attachment frame of {path} is too small to carry a joint",
             path=body, attribute="calm:flexible:interfaceRadius", found=f"{len(nodes)} nodes within {radius:.4g} m",
             remedy="Author a larger interfaceRadius or a smaller elementSize, or move the joints apart",
         )  # fmt: skip
-    return Patch(nodes=nodes.astype(np.int32), anchors=tuple(group), radius=radius)
+    return InterfacePatch(nodes=nodes.astype(np.int32), attachments=tuple(group), radius=radius)
 
 
 def spans_a_plane(points: Array) -> bool:

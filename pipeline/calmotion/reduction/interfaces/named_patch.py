@@ -1,4 +1,4 @@
-"""The patch of a mesh that a named part of the body's surface becomes."""
+"""The interface patch on a part of the surface that the shot names."""
 
 from __future__ import annotations
 
@@ -8,40 +8,40 @@ from calmotion.geometry.distances import closest_on_triangles
 from calmotion.reduction.elements.assembly import QuadraticMesh
 from calmotion.shot.character import Array, IntArray
 
-_REACH = 5e-3  # of the body's size: a tetrahedraliser may leave the surface by so much
-_FACING = 0.5  # cosine between the normals; keeps the other side of a thin wall out
+_DISTANCE = 5e-3  # of the body's size: distance that a tetrahedraliser may keep from the surface
+_FACING = 0.5  # least cosine between the normals; excludes the other side of a thin wall
 
 
 def named_patch(mesh: QuadraticMesh, triangles: Array) -> IntArray:
-    """Surface nodes that lie on given triangles and look the same way, ascending.
+    """Surface nodes that lie on given triangles and face the same direction, ascending.
 
-    The mesh need not share points or edges with the triangles. On a mesh that is coarser than they are wide the
-    patch may come out empty.
+    The mesh need not share points or edges with the triangles. Where its elements are larger than the named part, the
+    patch may be empty.
 
     Args:
         mesh: Of the body.
         triangles: Corners [m], shape [k, 3, 3], body frame, outward.
     """
-    reach = _REACH * float(np.linalg.norm(np.ptp(mesh.nodes, axis=0)))
+    distance = _DISTANCE * float(np.linalg.norm(np.ptp(mesh.nodes, axis=0)))
     normals = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
     size = np.linalg.norm(normals, axis=1, keepdims=True)
     normals = normals / np.maximum(size, np.finfo(float).tiny)
-    own = _node_normals(mesh)
+    node_normals = _node_normals(mesh)
     surface = mesh.surface_nodes
     x = mesh.nodes[surface]
-    low, high = triangles.min(axis=(0, 1)) - reach, triangles.max(axis=(0, 1)) + reach
+    low, high = triangles.min(axis=(0, 1)) - distance, triangles.max(axis=(0, 1)) + distance
     near = surface[np.all((x >= low) & (x <= high), axis=1)]
-    found = []
+    nodes = []
     for node in near:
         gaps = np.linalg.norm(closest_on_triangles(mesh.nodes[node], triangles) - mesh.nodes[node], axis=1)
-        touched = gaps <= reach
-        if np.any(touched & (normals @ own[node] > _FACING)):
-            found.append(node)
-    return np.array(found, dtype=np.int32)
+        touched = gaps <= distance
+        if np.any(touched & (normals @ node_normals[node] > _FACING)):
+            nodes.append(node)
+    return np.array(nodes, dtype=np.int32)
 
 
 def _node_normals(mesh: QuadraticMesh) -> Array:
-    """Outward unit normals at the surface nodes, the mean by area of the triangles around, shape [n, 3]."""
+    """Outward unit normals at the surface nodes, the area-weighted mean of the triangles around, shape [n, 3]."""
     corners = mesh.nodes[mesh.surface[:, :3]]
     area = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     out = np.zeros_like(mesh.nodes)

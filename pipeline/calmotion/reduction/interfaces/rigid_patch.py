@@ -1,4 +1,4 @@
-"""How the nodes of a patch move with it."""
+"""Rigid motions of the nodes of an interface patch."""
 
 from __future__ import annotations
 

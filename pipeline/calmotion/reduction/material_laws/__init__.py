@@ -1,1 +1,1 @@
-"""Choice of the elastic law of a body, and the reduced energies of nonlinear ones."""
+"""Choice of the elastic law of a body, and the reduced energies of nonlinear laws."""

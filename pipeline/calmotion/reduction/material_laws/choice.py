@@ -1,14 +1,14 @@
-"""Which elastic law a body needs: the cheapest whose error stays below the tolerance, and why.
+"""Choice of the elastic law of a body: the cheapest one whose estimated error is within the tolerance.
 
-Two things a linear body leaves out are estimated from the loads of the shot, with u_i = (load on mode i) / omega_i^2
-the quasi-static deflection and theta_ij the modal derivatives:
+Two errors of a linear body are estimated from the loads of the shot, with u_i = (load on mode i) / omega_i^2 the
+quasi-static deflection and theta_ij the modal derivatives:
 
-- shortening: the tip, or a target beyond it, is off by theta_ij u_i u_j / 2;
-- stiffening (or softening): a load f works along theta_ij too, so that the stiffness changes by -f . theta_ij, and the
-  deflection by that part of itself.
+- shortening: the displacement of the tip, or of a target beyond it, is wrong by theta_ij u_i u_j / 2;
+- stiffening or softening: a load f also does work on theta_ij, so the stiffness changes by -f . theta_ij, and the
+  deflection by this share of itself.
 
-St. Venant-Kirchhoff leaves out that the material itself is not linear, by a part of the order of the strain; in
-bending, one side is strained as the other is not, and what is left is of the order of its square.
+St. Venant-Kirchhoff omits the nonlinearity of the material, a relative error of the order of the strain. In bending,
+the errors of the two sides cancel, and the rest is of the order of the square of the strain.
 """
 
 from __future__ import annotations
@@ -25,9 +25,9 @@ from calmotion.reduction.elements.assembly import FEModel
 from calmotion.reduction.load_envelope import LoadEnvelope
 from calmotion.shot.character import Array, ElasticMaterial
 
-_MODES = 4  # the lowest carry nearly all of a deflection
-_LARGE_STRAIN = 0.1  # below, the loads' bound says more about the bound than about the material
-_HOPELESS = 100.0  # times its own size: no real body bends so far, and modes about the straight one do not
+_MODES = 4  # the lowest modes, which make nearly all of a deflection
+_LARGE_STRAIN = 0.1  # below, the bound of the loads is too pessimistic to require a nonlinear material
+_UNPHYSICAL = 100.0  # deflection over the size of the body, beyond any real one
 
 
 @dataclass(frozen=True)
@@ -36,8 +36,8 @@ class LawChoice:
 
     Attributes:
         law: `linear`, `stvk` or `neohookean`.
-        reason: In the user's words.
-        error_m: What it is estimated to leave out at the body's interfaces [m].
+        reason: For the user.
+        error_m: Estimated error of the law at the interfaces of the body [m].
     """
 
     law: str
@@ -58,7 +58,7 @@ def choose_law(
         path: Prim path of the body, for errors.
 
     Raises:
-        ShotError: The body is so soft that no law helps.
+        ShotError: The body is too soft for any of the laws.
     """
     count = min(_MODES, len(basis.omega_squared))
     if count == 0:
@@ -67,64 +67,65 @@ def choose_law(
     fields, motion = second_order.fields, second_order.motion
     modes = basis.modes[:, :, :count]
     omega_squared = basis.omega_squared[:count]
-    bend = amplitudes(model, basis, load_envelope, count)
+    deflections = amplitudes(model, basis, load_envelope, count)
     first, second = np.triu_indices(count)
     twice = np.where(first == second, 1.0, 2.0)
-    pairs = twice * bend[first] * bend[second]
-    deflection = _reach(modes, basis.patch_motion[:, :, :count], bend)
-    moved = _reach(modes, basis.patch_motion[:, :, :count], bend, load_envelope.lever)
-    shortening = 0.5 * _reach(fields, motion, pairs, load_envelope.lever)
+    pairs = twice * deflections[first] * deflections[second]
+    deflection = _largest_displacement(modes, basis.patch_motion[:, :, :count], deflections)
+    moved = _largest_displacement(modes, basis.patch_motion[:, :, :count], deflections, load_envelope.lever_arm)
+    shortening = 0.5 * _largest_displacement(fields, motion, pairs, load_envelope.lever_arm)
     change = np.zeros((count, count))
     change[first, second] = change[second, first] = work_of_loads(model, fields, motion, load_envelope)
     root = np.sqrt(omega_squared)
     softening = float(np.linalg.norm(change / np.outer(root, root), 2))
     size = float(np.ptp(model.mesh.nodes, axis=0).max())
-    if deflection > _HOPELESS * size:
+    if deflection > _UNPHYSICAL * size:
         raise ShotError(
-            f"this body is too soft for this shot: as a linear body it would bend by {deflection / size:.3g} times "
-            "its size",
+            f"this body is too soft for this shot: the deflection of a linear body would be {deflection / size:.3g} "
+            "times its size",
             path=path,
             attribute="physics:youngsModulus",
             found=f"{material.youngs_modulus:.3g} Pa",
-            remedy="Check it, in the stage's units, and the masses that the body carries.",
+            remedy="Check it, in units of the stage, and the masses that the body carries.",
         )
     linear_error = shortening + moved * softening
-    strain = float(np.sqrt(bend @ (omega_squared * bend) / (material.youngs_modulus * model.mesh.volume)))
+    strain = float(np.sqrt(deflections @ (omega_squared * deflections) / (material.youngs_modulus * model.mesh.volume)))
     stvk_error = moved * strain**2
-    found = f"it bends by about {_mm(deflection)}"
+    reason = f"its deflection is about {_mm(deflection)}, of which {_mm(linear_error)} is nonlinear"
     if linear_error <= tolerance:
-        return LawChoice("linear", f"{found}, of which {_mm(linear_error)} is not linear", linear_error)
-    because = f"{found}, of which {_mm(linear_error)} is not linear"
+        return LawChoice("linear", reason, linear_error)
     if stvk_error <= tolerance or strain <= _LARGE_STRAIN:
-        return LawChoice("stvk", f"{because}; it is strained by {strain:.1%}", stvk_error)
-    return LawChoice("neohookean", f"{because}; it is strained by {strain:.0%}", 0.0)
+        return LawChoice("stvk", f"{reason}; its strain is {strain:.1%}", stvk_error)
+    return LawChoice("neohookean", f"{reason}; its strain is {strain:.0%}", 0.0)
 
 
 def amplitudes(model: FEModel, basis: Basis, load_envelope: LoadEnvelope, count: int) -> Array:
-    """How far the loads deflect the first modes at most, each by itself, shape [count]."""
+    """Bound of the deflection of each of the first modes by the loads, shape [count]."""
     work = work_of_loads(model, basis.modes[:, :, :count], basis.patch_motion[:, :, :count], load_envelope)
     return OVERSHOOT * work / basis.omega_squared[:count]
 
 
 def deflection_of(model: FEModel, basis: Basis, load_envelope: LoadEnvelope) -> float:
-    """How far the loads of a linear body move its interfaces, or targets beyond them, at most [m]."""
+    """Bound of the displacement of the interfaces of a linear body, or of targets beyond them, by the loads [m]."""
     count = min(_MODES, len(basis.omega_squared))
-    bend = amplitudes(model, basis, load_envelope, count)
-    return _reach(basis.modes[:, :, :count], basis.patch_motion[:, :, :count], bend, load_envelope.lever)
+    deflections = amplitudes(model, basis, load_envelope, count)
+    return _largest_displacement(
+        basis.modes[:, :, :count], basis.patch_motion[:, :, :count], deflections, load_envelope.lever_arm
+    )
 
 
 def work_of_loads(model: FEModel, fields: Array, motion: Array, load_envelope: LoadEnvelope) -> Array:
-    """Most work that the loads do on displacement fields, shape [k], however they fall together.
+    """Bound of the work of the loads on displacement fields, for any combination of their signs, shape [k].
 
     Args:
         fields: Nodal displacements, shape [n, 3, k].
-        motion: What they do to the moving interfaces (translation, rotation vector), shape [p, 6, k].
+        motion: Motion of the moving interfaces in them (translation, rotation vector), shape [p, 6, k].
     """
     X = model.mesh.nodes
     weighted = (model.mass @ fields.reshape(len(X), -1)).reshape(fields.shape)  # int rho phi, by nodes
-    straight = np.abs(weighted.sum(axis=0))  # [3, k]
+    linear = np.abs(weighted.sum(axis=0))  # [3, k]
     moments = np.einsum("na,nbk->abk", X, weighted)  # int rho X_a phi_b
-    turning = np.abs([moments[1, 2] - moments[2, 1], moments[2, 0] - moments[0, 2], moments[0, 1] - moments[1, 0]])
+    angular = np.abs([moments[1, 2] - moments[2, 1], moments[2, 0] - moments[0, 2], moments[0, 1] - moments[1, 0]])
     w = load_envelope.angular_velocity
     # |omega x (omega x X)| . phi, term by term
     centrifugal = np.zeros(fields.shape[2])
@@ -132,22 +133,22 @@ def work_of_loads(model: FEModel, fields: Array, motion: Array, load_envelope: L
         for b in range(3):
             size = w[a] * w[b] if a != b else float(w @ w - w[a] * w[a])
             centrifugal += size * np.abs(moments[a, b])
-    work = load_envelope.acceleration @ straight + load_envelope.angular_acceleration @ turning + centrifugal
+    work = load_envelope.acceleration @ linear + load_envelope.angular_acceleration @ angular + centrifugal
     for force, moment, patch in zip(load_envelope.force, load_envelope.moment, np.abs(motion), strict=True):
         work += force @ patch[:3] + moment @ patch[3:]
     return work
 
 
-def _reach(fields: Array, motion: Array, amplitudes: Array, lever: Array | None = None) -> float:
+def _largest_displacement(fields: Array, motion: Array, amplitudes: Array, lever_arm: Array | None = None) -> float:
     """Largest displacement of the interfaces, or of the whole body where it has none [m].
 
     Args:
-        lever: Distance of a target beyond each interface, which its turn moves [m]; None: turns do not matter.
+        lever_arm: Displacement of a target by a unit rotation of each interface [m]; None: that of the interfaces only.
     """
     if len(motion):
         moved = np.linalg.norm(np.abs(motion[:, :3]) @ amplitudes, axis=1)
-        if lever is not None:
-            moved = moved + lever * np.linalg.norm(np.abs(motion[:, 3:]) @ amplitudes, axis=1)
+        if lever_arm is not None:
+            moved = moved + lever_arm * np.linalg.norm(np.abs(motion[:, 3:]) @ amplitudes, axis=1)
         return float(moved.max())
     return float(np.linalg.norm(np.abs(fields) @ amplitudes, axis=1).max())
 

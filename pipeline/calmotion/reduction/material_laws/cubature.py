@@ -1,10 +1,9 @@
-"""A few weighted points that integrate the forces of a Neo-Hookean body in its reduced coordinates.
+"""Cubature of the forces of a Neo-Hookean body in reduced coordinates: few weighted points.
 
 Source: An, Kim, James, Optimizing Cubature for Efficient Integration of Subspace Deformations, 2008: points are
-added greedily, weights follow by non-negative least squares over training poses. Two things differ: the part of the
-force that is linear in the coordinates is kept exactly (a constant matrix), so that the points have to integrate
-the rest alone; and the poses are equilibria under random loads, since a random sum of modes stretches a link as no
-load would.
+added greedily, weights follow by non-negative least squares over training poses. Two things differ. The part of the
+force that is linear in the coordinates is exact (a constant matrix), so the points integrate the nonlinear part only.
+The poses are equilibria under random loads, because a random sum of modes stretches a link more than any load does.
 """
 
 from __future__ import annotations
@@ -18,14 +17,14 @@ from calmotion.reduction.elements.elastic_forms import GradientRule, lame_consta
 from calmotion.reduction.material_laws.reduced_poses import equilibrium_poses
 from calmotion.shot.character import Array, ElasticMaterial
 
-# Of the force over the training poses, each coordinate measured by its stiffness. It looks small, but a link in
-# bending is the small difference of large stretches: 1e-3 leaves 5% in its deflection, this 0.1%.
+# Relative error of the forces over the training poses, each coordinate scaled by its stiffness. Bending forces are
+# small differences of large stretch forces: 1e-3 gives an error of 5% in the deflection of a link, this value 0.1%.
 ERROR = 2e-5
 POSES = 24
 _BATCH = 4  # points added between two solutions for the weights
 _MOST = 600
 LEAST_VOLUME = 0.2  # volume ratio below which the logarithm of the law is continued as a parabola
-_CANDIDATES = 10_000  # points that are looked at, a random choice on large meshes
+_CANDIDATES = 10_000  # candidate points, a random choice on large meshes
 
 
 def neohookean_cubature(model: FEModel, basis: Basis, material: ElasticMaterial) -> tuple[Array, int]:
@@ -46,9 +45,9 @@ def neohookean_cubature(model: FEModel, basis: Basis, material: ElasticMaterial)
     chosen, weights, error = greedy_cubature(columns, target, ERROR, _MOST)
     if error > 10.0 * ERROR:
         raise ShotError(
-            "no cubature of the Neo-Hookean energy was found", path=material.path,
+            "no cubature of the Neo-Hookean energy is accurate enough", path=material.path,
             attribute="calm:flexible:elasticity", found=f"error {error:.2%} with {len(chosen)} points",
-            remedy="Use stvk, which needs none, or a coarser mesh",
+            remedy="Use stvk, which needs no cubature, or a coarser mesh",
         )  # fmt: skip
     C = linear_tangent(lame, mu)
     points = candidates[chosen]
@@ -59,7 +58,7 @@ def neohookean_cubature(model: FEModel, basis: Basis, material: ElasticMaterial)
 
 
 def _training(rule: GradientRule, basis: Basis, poses: Array, lame: float, mu: float) -> tuple[Array, Array, Array]:
-    """Gradients of the candidate points [c, 9, r], the rows to be met by each of them, and by the whole body."""
+    """Gradients at the candidate points [c, 9, r], the training rows of each of them, and those of the whole body."""
     r = len(basis.omega_squared)
     elements, points = rule.weights.shape
     total = elements * points
@@ -74,13 +73,13 @@ def _training(rule: GradientRule, basis: Basis, poses: Array, lame: float, mu: f
         part = slice(start, min(start + chunk, elements))
         G = np.ascontiguousarray(rule.gradients(basis.modes, part).reshape(r, -1, 9).transpose(1, 2, 0))
         volume = rule.weights[part].ravel()
-        own, K = _forces(G, poses, basis.omega_squared, lame, mu), _stiffness(G, basis.omega_squared, lame, mu)
-        forces += own @ volume
+        force, K = _forces(G, poses, basis.omega_squared, lame, mu), _stiffness(G, basis.omega_squared, lame, mu)
+        forces += force @ volume
         stiffness += K @ volume
         inside = taken[(taken >= start * points) & (taken < part.stop * points)] - start * points
         parts.append(G[inside])
-        columns.append(np.vstack([own[:, inside], K[:, inside]]))
-    # each pose counts alike, whatever work it takes
+        columns.append(np.vstack([force[:, inside], K[:, inside]]))
+    # all poses have the same weight, whatever their forces
     size = np.linalg.norm(forces.reshape(len(poses), r), axis=1)
     scale = np.concatenate([np.repeat(1.0 / size, r), np.ones(len(stiffness))])
     columns_all = np.hstack(columns)
@@ -97,7 +96,7 @@ def linear_tangent(lame: float, mu: float) -> Array:
 
 
 def _forces(G: Array, poses: Array, omega_squared: Array, lame: float, mu: float) -> Array:
-    """Reduced force per volume at each point, each coordinate's by its stiffness, shape [poses * r, points]."""
+    """Reduced force per volume at each point, scaled by the stiffness of each coordinate, shape [poses * r, points]."""
     out = np.empty((len(poses), G.shape[2], len(G)))
     scaled = G / np.sqrt(omega_squared)
     for k, u in enumerate(poses):
@@ -117,27 +116,27 @@ def _stiffness(G: Array, omega_squared: Array, lame: float, mu: float) -> Array:
 def neohookean_stress(F: Array, lame: float, mu: float) -> Array:
     """P = mu F + (lame L - mu) L' cof F [Pa] of deformation gradients, shape [..., 3, 3].
 
-    L = ln J, continued below `LEAST_VOLUME` as its parabola, as `dynamics.neohookean` does.
+    L = ln J, continued below `LEAST_VOLUME` as its parabola, as in `multibody.kernels.neohookean`.
     """
     rows = np.moveaxis(F, -2, 0)
     cofactor = np.stack([np.cross(rows[(i + 1) % 3], rows[(i + 2) % 3]) for i in range(3)], axis=-2)
     J = np.einsum("...i,...i->...", rows[0], cofactor[..., 0, :])[..., None, None]
     x = (J - LEAST_VOLUME) / LEAST_VOLUME
     flat = J < LEAST_VOLUME
-    held = np.where(flat, LEAST_VOLUME, J)
-    L = np.log(held) + np.where(flat, x - 0.5 * x * x, 0.0)
-    slope = np.where(flat, (1.0 - x) / LEAST_VOLUME, 1.0 / held)
+    bounded = np.where(flat, LEAST_VOLUME, J)
+    L = np.log(bounded) + np.where(flat, x - 0.5 * x * x, 0.0)
+    slope = np.where(flat, (1.0 - x) / LEAST_VOLUME, 1.0 / bounded)
     return mu * F + (lame * L - mu) * slope * cofactor
 
 
 def greedy_cubature(columns: Array, target: Array, error: float, most: int) -> tuple[Array, Array, float]:
-    """Few columns and non-negative weights with columns @ weights near the target.
+    """Few columns and non-negative weights such that columns @ weights approximates the target.
 
     Args:
         columns: Shape [rows, candidates].
         target: Shape [rows].
-        error: Of the target, at which to stop.
-        most: Columns at most.
+        error: Error at which to stop, relative to the target.
+        most: Largest number of columns.
 
     Returns:
         Indices of the columns, their weights, and the error reached, relative to the target.
@@ -162,7 +161,7 @@ def greedy_cubature(columns: Array, target: Array, error: float, most: int) -> t
         chosen.extend(best.tolist())
         try:
             weights, _ = nnls(columns[:, chosen], target)
-        except RuntimeError:  # it gives up on nearly parallel columns
+        except RuntimeError:  # it does not converge for nearly parallel columns
             weights = lsq_linear(columns[:, chosen], target, (0.0, np.inf), "bvls").x
         used = weights > 0.0
         chosen = [c for c, keep in zip(chosen, used, strict=True) if keep]

@@ -18,26 +18,26 @@ from calmotion.reduction.material_laws.choice import work_of_loads
 from calmotion.reduction.reduced_body import Elasticity
 from calmotion.shot.character import DEFAULT_TOLERANCE, ElasticMaterial
 
-PAIRED_MODES = 16  # modes that may have derivatives
-_LEFT = 1e-3  # share of the derivatives' strain energy that may be missing, by the tolerance over the body's size
-_FINEST = 1e-6  # below, what is missing is rounding
+PAIRED_MODES = 16  # largest number of modes with derivatives
+_NEGLIGIBLE_ENERGY = 1e-3  # share of the derivatives' strain energy, times the tolerance over the body's size
+_FINEST = 1e-6  # rounding
 
 
 def large_deflection(
     model: FEModel, support: Support, basis: Basis, material: ElasticMaterial, law: str,
     load_envelope: LoadEnvelope | None = None, tolerance: float = DEFAULT_TOLERANCE, pairs_share: float = 1.0,
 ) -> tuple[Basis, Elasticity]:  # fmt: skip
-    """A body's basis with modal derivatives, and its elastic law in it.
+    """The basis of a body with modal derivatives, and the elastic law in this basis.
 
     Args:
         model: Full model.
-        support: What holds the body.
+        support: Its root patch and moving patches.
         basis: Its linear modes.
         material: Elastic constants.
         law: `stvk` or `neohookean`.
-        load_envelope: Its loads in this shot, by moving patch; None when they are not known.
-        tolerance: Error that does not matter [m].
-        pairs_share: How much of it quadratic strains may take that are left out; 0 leaves none out.
+        load_envelope: Its loads in this shot, one row for each moving patch; None when they are not known.
+        tolerance: Acceptable error [m].
+        pairs_share: Share of the tolerance for the subspace of the quadratic strain; 0 keeps all coordinates.
 
     Returns:
         The extended basis, and the law without damping.
@@ -45,7 +45,7 @@ def large_deflection(
     if load_envelope is not None:
         basis = _by_deflection(model, basis, basis.load_envelope or load_envelope)
     size = float(np.ptp(model.mesh.nodes, axis=0).max())
-    negligible = float(np.clip(np.sqrt(_LEFT * tolerance / size), _FINEST, NEGLIGIBLE))
+    negligible = float(np.clip(np.sqrt(_NEGLIGIBLE_ENERGY * tolerance / size), _FINEST, NEGLIGIBLE))
     extended = extended_basis(model, support, basis, PAIRED_MODES, material, law, negligible)
     lame = lame_constants(material.youngs_modulus, material.poissons_ratio)
     if law == "stvk":
@@ -53,8 +53,8 @@ def large_deflection(
         if load_envelope is None or pairs_share <= 0.0:
             return extended, law_of(None)
         loads, allowed = basis.load_envelope or load_envelope, pairs_share * tolerance
-        seen = quadratic_strain_subspace(model, support, extended, basis, loads, material.youngs_modulus, allowed)
-        return extended, law_of(seen)
+        subspace = quadratic_strain_subspace(model, support, extended, basis, loads, material.youngs_modulus, allowed)
+        return extended, law_of(subspace)
     from calmotion.reduction.material_laws.cubature import neohookean_cubature
 
     data, points = neohookean_cubature(model, extended, material)
@@ -62,28 +62,30 @@ def large_deflection(
 
 
 def _stvk(
-    model: FEModel, support: Support, basis: Basis, material: ElasticMaterial, seen: QuadraticStrainSubspace | None
+    model: FEModel, support: Support, basis: Basis, material: ElasticMaterial, subspace: QuadraticStrainSubspace | None
 ) -> Elasticity:
-    """The law of a basis, with the springs of its patches; its quadratic strain sees some directions, or all."""
+    """The law in a basis, with the penalty springs of its patches; quadratic strain in a subspace, or in all of it."""
     lame = lame_constants(material.youngs_modulus, material.poissons_ratio)
-    directions = None if seen is None else seen.directions
+    directions = None if subspace is None else subspace.basis
     gram = strain_gram(GradientRule(model.mesh, 4), basis.modes, *lame, directions)
     if basis.patch_squares is not None:
         roots = springs(model.mesh.nodes, support.patches, support.centers, material.youngs_modulus)
         rows = spring_rows(roots, basis.patch_squares, basis.patch_motion[:, 3:], directions)
         gram += rows.T @ rows
     law = Elasticity("stvk", 0.0, gram.ravel(), 0, lame)
-    return law if seen is None else replace(law, seen=seen.part, unseen_m=seen.error_m)
+    if subspace is None:
+        return law
+    return replace(law, strain_projection=subspace.projection, strain_error_m=subspace.error_m)
 
 
 def _by_deflection(model: FEModel, basis: Basis, load_envelope: LoadEnvelope) -> Basis:
-    """The basis in the order of how far the shot's loads deflect its modes.
+    """The basis, ordered by the deflection of its modes under the loads of the shot.
 
-    By frequency, the vectors that stand for the static response to a load come last, though a link may bend in them
-    as far as in the first; without its derivatives a mode stretches the link as it bends, and hardly takes part.
+    In the order of frequencies, residual vectors come last, although a link may deflect in them as far as in the first
+    mode. A mode without derivatives stretches the link as it bends, so its deflection would be too small.
     """
-    reach = np.abs(basis.modes).max(axis=(0, 1))
-    deflection = reach * work_of_loads(model, basis.modes, basis.patch_motion, load_envelope) / basis.omega_squared
+    largest = np.abs(basis.modes).max(axis=(0, 1))
+    deflection = largest * work_of_loads(model, basis.modes, basis.patch_motion, load_envelope) / basis.omega_squared
     order = np.argsort(-deflection, kind="stable")
     return replace(
         basis,

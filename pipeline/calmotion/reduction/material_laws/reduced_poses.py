@@ -1,4 +1,4 @@
-"""Poses that a body takes under loads, in reduced coordinates."""
+"""Equilibrium poses of a body under loads, in reduced coordinates."""
 
 from __future__ import annotations
 
@@ -7,15 +7,15 @@ import numpy as np
 from calmotion.reduction.basis.craig_bampton import Basis
 from calmotion.shot.character import Array
 
-_REACH = 0.25  # largest deflection of the poses, of the body's size
-_VIBRATION = 0.05  # amplitude of what is added to them
-_MODES = 8  # the load is a random sum of the forces that bend the lowest ones
+_LARGEST = 0.25  # largest deflection of the poses, of the body's size
+_VIBRATION = 0.05  # amplitude of the random displacement that is added
+_MODES = 8  # the loads are random sums of the forces that deflect the lowest modes
 
 
 def stvk_force(gram: Array, u: Array) -> tuple[Array, Array]:
     """Force and stiffness of a St. Venant-Kirchhoff body in reduced coordinates, shapes [r] and [r, r].
 
-    The readable counterpart of `dynamics.elastic`: with z = (u, pairs) and J = dz/du, the force is J^T A z.
+    The reference of `multibody.kernels.stvk`: with z = (u, pairs) and J = dz/du, the force is J^T A z.
     """
     r = len(u)
     first, second = np.triu_indices(r)
@@ -33,9 +33,9 @@ def stvk_force(gram: Array, u: Array) -> tuple[Array, Array]:
 
 
 def equilibrium(gram: Array, load: Array, start: Array, steps: int = 1, tolerance: float = 1e-9) -> Array:
-    """Where a St. Venant-Kirchhoff body comes to rest under a load in its reduced coordinates, shape [r].
+    """Static equilibrium of a St. Venant-Kirchhoff body under a load, in reduced coordinates, shape [r].
 
-    Newton's method with the load raised in steps; the residual may rise first, as stretch gives way to bending.
+    Newton's method with load stepping; the residual may grow at first, while the stretch relaxes into bending.
     """
     u = start.copy()
     size = max(float(np.abs(load).max()), np.finfo(float).tiny)
@@ -52,21 +52,21 @@ def equilibrium(gram: Array, load: Array, start: Array, steps: int = 1, toleranc
 
 
 def equilibrium_poses(gram: Array, basis: Basis, count: int, size: float) -> Array:
-    """Poses under random loads on the lowest modes, from small to `_REACH` of the body, shape [count, r]."""
+    """Poses under random loads on the lowest modes, deflections up to `_LARGEST` of the body, shape [count, r]."""
     rng = np.random.default_rng(2008)
     r = len(basis.omega_squared)
     few = min(_MODES, r)
     poses = np.zeros((count, r))
     widest = np.abs(basis.modes).max(axis=(0, 1))
     for k in range(count):
-        # softer modes give way more under the same kind of load
+        # softer modes deflect further under similar loads
         direction = rng.normal(size=few) * basis.omega_squared[0] / basis.omega_squared[:few] / widest[:few]
-        reach = float(np.abs(basis.modes[:, :, :few] @ direction).max())
-        amplitude = _REACH * size * (k + 1) / count
+        largest = float(np.abs(basis.modes[:, :, :few] @ direction).max())
+        amplitude = _LARGEST * size * (k + 1) / count
         load = np.zeros(r)
-        load[:few] = basis.omega_squared[:few] * direction * amplitude / reach
+        load[:few] = basis.omega_squared[:few] * direction * amplitude / largest
         poses[k] = equilibrium(gram, load, np.zeros(r), steps=4, tolerance=1e-4)
-        # and some vibration about it, in all coordinates alike
+        # and vibration of equal energy in all coordinates
         energy = 0.5 * load @ poses[k]
         poses[k] += _VIBRATION * np.sqrt(energy / basis.omega_squared) * rng.normal(size=r)
     return poses
