@@ -22,7 +22,7 @@ def test_the_guide_names_what_there_is(calmotion):
     from calmotion.host import Operator, RunContext
 
     text = GUIDE.read_text()
-    for name in ("idname", "label", "requires", "uses", "provides", "properties", "timeout", "poll", "execute"):
+    for name in ("idname", "label", "requires", "uses", "provides", "properties", "poll", "execute"):
         assert f"`{name}" in text and hasattr(Operator, name)
     for name in ("get", "progress", "report"):
         assert f"context.{name}(" in text and hasattr(RunContext, name)

@@ -124,6 +124,41 @@ def test_two_operators_that_both_want_to_make_a_value_are_refused_and_named():
     assert "smithy.melt" in str(run.failures()[0].error) and "smithy.again" in str(run.failures()[0].error)
 
 
+def test_rivals_are_refused_before_any_costly_operator_runs():
+    executed = []
+
+    def dig(context):
+        executed.append("dig")
+        return (Ore(),)
+
+    def willing(data):
+        return None if Coal in data else "there is no coal"
+
+    again = operator("smithy.again", requires=[Ore], provides=[Iron], poll=willing)
+    costly = operator("mine.dig", provides=[Ore], execute=dig)
+    run = host_of(costly, MELT, again).run([Coal()], [Iron]).finish()
+    assert executed == [] and run.results[0].outcome is Outcome.BLOCKED
+    assert "more than one operator makes Iron" in run.results[0].reason
+
+
+def test_what_rivals_do_not_need_is_done_all_the_same():
+    again = operator("smithy.again", requires=[Ore], provides=[Iron])
+    alloy = operator("smithy.alloy", requires=[Iron], provides=[Steel])
+    burn = operator("wood.burn", requires=[Ore], provides=[Coal])
+    run = host_of(DIG, MELT, again, alloy, burn).run([], [Steel, Coal]).finish()
+    assert run.get(Coal) is not None and run.get(Steel) is None
+    assert outcomes(run)["smithy.melt"] is outcomes(run)["smithy.again"] is Outcome.FAILED
+
+
+def test_an_answer_that_may_change_is_no_rivalry_yet():
+    """The poll asks for coal, which is made later and makes it decline."""
+    late = operator("smithy.late", requires=[Ore], uses=[Coal], provides=[Iron],
+                    poll=lambda data: "there is coal" if data.get(Coal) else None)  # fmt: skip
+    burn = operator("wood.burn", provides=[Coal])
+    run = host_of(DIG, burn, MELT, late).run([], [Iron, Coal]).finish()
+    assert run.get(Iron) is not None and outcomes(run)["smithy.late"] is Outcome.LEFT_OUT
+
+
 def test_a_poll_that_raises_or_answers_nonsense_is_a_failure():
     for answer in (lambda data: data["nothing"], lambda data: True):
         run = host_of(operator("mine.dig", provides=[Ore], poll=answer)).run([], [Ore]).finish()

@@ -4,13 +4,13 @@ import dataclasses
 
 import numpy as np
 import pytest
-from calmotion.retargeting import optimize
-from calmotion.retargeting.checkpoint import checkpoint_path
+from calmotion.retargeting import checkpoint, search
+from calmotion.retargeting.checkpoint import checkpoint_path, problem_key
 from calmotion.retargeting.optimize import optimize_shot
 from calmotion.retargeting.problem import adaptive_knots
 from calmotion.retargeting.problem.problem import RetargetProblem
 from calmotion.simulation.prepare import Options
-from posed import jerking
+from posed import jerking, make_problem
 
 OPTIONS = Options(step=1 / 240)
 
@@ -100,13 +100,13 @@ def test_what_another_problem_left_is_not_used(limited, animation, bodies, tmp_p
     path = tmp_path / "kept.npz"
     optimize_shot(limited, animation, bodies, OPTIONS, quiet, path)
     started = []
-    find = optimize.minimize
+    find = search.minimize
 
-    def watched(problem, search, *arguments, **options):
-        started.append(len(search.history))
-        return find(problem, search, *arguments, **options)
+    def watched(problem, begin, *arguments, **options):
+        started.append(len(begin.history))
+        return find(problem, begin, *arguments, **options)
 
-    monkeypatch.setattr(optimize, "minimize", watched)
+    monkeypatch.setattr(search, "minimize", watched)
     other = dataclasses.replace(limited, gravity=0.9 * limited.gravity)
     optimize_shot(other, animation, bodies, OPTIONS, quiet, path)
     assert started[0] == 0
@@ -114,6 +114,17 @@ def test_what_another_problem_left_is_not_used(limited, animation, bodies, tmp_p
     started.clear()
     optimize_shot(limited, animation, bodies, OPTIONS, quiet, path)
     assert started[0] == 0
+
+
+def test_the_key_tells_regularisation_and_code_apart(arm, animation, bodies, monkeypatch):
+    def key(smoothness):
+        problem = make_problem(arm, bodies, animation, smoothness=smoothness)
+        return problem_key(problem, np.zeros(problem.size, bool), OPTIONS)
+
+    assert key(1e-6) == key(1e-6) != key(2e-6)
+    before = key(1e-6)
+    monkeypatch.setattr(checkpoint, "source_digest", lambda *rooms: "another version of the engine")
+    assert key(1e-6) != before
 
 
 def test_the_file_lies_hidden_beside_the_layer():

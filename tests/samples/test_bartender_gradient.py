@@ -5,6 +5,7 @@ import pytest
 from calmotion.accuracy.reduced_bodies import ReducedBodies
 from calmotion.host import open_host
 from calmotion.retargeting.problem.offset_basis import make_basis
+from calmotion.retargeting.problem.offset_space import OffsetSpace
 from calmotion.retargeting.problem.problem import RetargetProblem
 from calmotion.shot import Animation, Character
 from calmotion.shot.run import Source
@@ -26,7 +27,8 @@ def problem(repository):
     objective = Objective.over(prepared.model, rigid.reference, prepared.grid)
     basis = make_basis(prepared.grid, 0.2, False)
     motors = np.arange(len(character.motors), dtype=np.int32)
-    return RetargetProblem(prepared.model, prepared.grid, curves, objective, basis, motors, 1e-8, 1e-4)
+    space = OffsetSpace.uncoupled(basis, motors, len(motors), 1e-8, 1e-4)
+    return RetargetProblem(prepared.model, prepared.grid, curves, objective, space)
 
 
 def test_gradient_matches_central_differences_of_the_whole_simulation(problem):

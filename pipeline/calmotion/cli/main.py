@@ -55,6 +55,7 @@ def build_parser() -> argparse.ArgumentParser:
     commands = parser.add_subparsers(title="commands", required=True, metavar="COMMAND")
     for command in (inspect, simulate, optimize, rig, bench, plugins, completion):
         command.add_to(commands)
+    parser.set_defaults(parser=parser)  # for `completion`
     return parser
 
 

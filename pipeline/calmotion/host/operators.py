@@ -13,9 +13,6 @@ from calmotion.host.properties import Property, PropertyValues
 
 T = TypeVar("T")
 LEVELS = ("info", "warning")
-TIMEOUT = Property(
-    "timeout", float, -1.0, unit="s", minimum=1e-3, description="Longest time that it may take; -1: its own limit"
-)
 
 
 @dataclass(frozen=True)
@@ -87,8 +84,6 @@ class Operator:
         uses: Types that are made first where some operator provides them and its poll says yes.
         provides: Types that it makes.
         properties: What can be set.
-        timeout: Longest time that it may take [s]; None for any. Users can set it for every operator, as
-            `<idname>.timeout`.
     """
 
     idname: ClassVar[str] = ""
@@ -97,7 +92,6 @@ class Operator:
     uses: ClassVar[tuple[type, ...]] = ()
     provides: ClassVar[tuple[type, ...]] = ()
     properties: ClassVar[tuple[Property, ...]] = ()
-    timeout: ClassVar[float | None] = None
 
     @classmethod
     def poll(cls, data: Mapping[type, Any]) -> str | None:
@@ -140,10 +134,6 @@ def check_operator(cls: object) -> None:
         refuse("a type stands in two of requires, uses and provides", ", ".join(sorted(k.__name__ for k in both)))
     if not (isinstance(cls.properties, tuple) and all(isinstance(p, Property) for p in cls.properties)):
         refuse("properties must be a tuple of Property", repr(cls.properties))
-    if any(p.name == TIMEOUT.name for p in cls.properties):
-        refuse(f"{TIMEOUT.name} is a property of every operator", remedy="Give the property another name.")
-    if not (cls.timeout is None or (isinstance(cls.timeout, (int, float)) and cls.timeout > 0.0)):
-        refuse("timeout must be a positive number of seconds, or None", repr(cls.timeout))
     if len({p.name for p in cls.properties}) != len(cls.properties):
         refuse("two properties have the same name", ", ".join(p.name for p in cls.properties))
     for declared in cls.properties:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from graphlib import CycleError, TopologicalSorter
 
@@ -25,6 +25,28 @@ class Plan:
     operators: tuple[type[Operator], ...]
     wanted: tuple[type, ...]
     optional: tuple[type, ...]
+
+    @property
+    def contested(self) -> bool:
+        """Whether several operators make values of the same type."""
+        kinds = [kind for cls in self.operators for kind in cls.provides]
+        return len(set(kinds)) < len(kinds)
+
+    def useful(self, lost: Collection[type], known: Collection[type]) -> set[type[Operator]]:
+        """The operators that are still needed where some types cannot be made.
+
+        Args:
+            lost: Types that cannot be made.
+            known: Types whose values are there.
+        """
+        gone, have, able = set(lost), set(known), []
+        for cls in self.operators:
+            if gone.intersection((*cls.requires, *cls.uses, *cls.provides)):
+                gone.update(cls.provides)
+            elif have.issuperset(cls.requires):
+                able.append(cls)
+                have.update(cls.provides)
+        return set(_closure(able, [*known], [*self.wanted, *self.optional]))
 
 
 def make_plan(

@@ -11,11 +11,10 @@ from types import ModuleType
 from typing import Any
 
 from calmotion.host.choices import disabled_plugins
-from calmotion.host.discovery import Location, discover
+from calmotion.host.discovery import Location, discover, import_plugin
 from calmotion.host.errors import PluginError, SettingError
-from calmotion.host.loading import import_plugin
 from calmotion.host.manifest import Manifest, check_requirements, read_manifest
-from calmotion.host.operators import TIMEOUT, Operator, check_operator
+from calmotion.host.operators import Operator, check_operator
 from calmotion.host.plan import Plan, make_plan
 from calmotion.host.properties import PropertyValues, nearest, values_of
 from calmotion.host.run import Run
@@ -209,9 +208,7 @@ class Host:
                     path=idname,
                     remedy=f"{nearest(idname, operators)}The operators with properties are: {known}.",
                 )
-        return {
-            name: values_of((*cls.properties, TIMEOUT), settings.get(name, {}), name) for name, cls in operators.items()
-        }
+        return {name: values_of(cls.properties, settings.get(name, {}), name) for name, cls in operators.items()}
 
     def plan(self, given: Iterable[type], wanted: Iterable[type], optional: Iterable[type] = ()) -> Plan:
         """Which operators run, in which order; see `plan.make_plan`."""

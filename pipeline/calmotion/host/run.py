@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import time
 import traceback
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from calmotion.host.errors import PluginError
-from calmotion.host.limited import call_within
-from calmotion.host.operators import TIMEOUT, NotAsked, Operator, Record, RunContext
+from calmotion.host.operators import NotAsked, Operator, Record, RunContext
 from calmotion.host.plan import Plan
+from calmotion.host.polling import find_rivals, poll
 from calmotion.host.properties import PropertyValues
 
 if TYPE_CHECKING:
@@ -84,6 +84,8 @@ class Run:
         self.data: dict[type, Any] = dict(data)
         self.results: list[OperatorResult] = []
         self._failed: set[type] = set()
+        self._made: dict[type, type[Operator]] = {}
+        self._refused: dict[type, tuple[type[Operator], ...]] = {}
         self._properties = properties
         self._owners = owners
         self._progress = progress or (lambda stage, fraction, message: None)
@@ -93,7 +95,9 @@ class Run:
         return self.data.get(kind)
 
     def __iter__(self) -> Iterator[OperatorResult]:
-        for cls in self.plan.operators:
+        for index, cls in enumerate(self.plan.operators):
+            if self.plan.contested:  # rivals are refused before any work that only they would use
+                self._refused |= find_rivals(self.plan.operators[index:], self.data, self._made)
             result = self._step(cls)
             self.results.append(result)
             yield result
@@ -105,6 +109,9 @@ class Run:
         return self
 
     def _step(self, cls: type[Operator]) -> OperatorResult:
+        rivals = [kind for kind in cls.provides if cls in self._refused.get(kind, ())]
+        if rivals:
+            return self._failure(cls, self._rivalry(rivals[0], self._refused[rivals[0]]))
         # A used value may be absent because nobody needs it, but not because making it failed.
         failed = [kind for kind in cls.requires + cls.uses if kind not in self.data and kind in self._failed]
         missing = failed or [kind for kind in cls.requires if kind not in self.data]
@@ -112,6 +119,10 @@ class Run:
             self._failed |= set(cls.provides if failed else ())
             names = ", ".join(kind.__name__ for kind in missing)
             return self._result(cls, Outcome.BLOCKED, reason=f"there is no {names}")
+        if self._refused and cls not in self.plan.useful(self._refused, self.data):
+            self._failed |= set(cls.provides)
+            names = ", ".join(kind.__name__ for kind in self._refused)
+            return self._result(cls, Outcome.BLOCKED, reason=f"more than one operator makes {names}")
         start = time.perf_counter()
         context = RunContext(
             cls,
@@ -121,58 +132,52 @@ class Run:
             results=tuple(self.results),
         )
         try:
-            reason = _poll(cls, self.data)
+            reason = poll(cls, self.data)
             if reason is not None:
                 return self._result(cls, Outcome.LEFT_OUT, reason=reason)
-            self._refuse_rivals(cls)
+            for kind in cls.provides:
+                if kind in self.data:
+                    made = (self._made[kind],) if kind in self._made else ()
+                    raise self._rivalry(kind, (*made, cls))
             self._progress(cls.label, 0.0, "")
-            values = _checked(cls, self._execute(cls, context))
+            values = _checked(cls, cls().execute(context))
             self._progress(cls.label, 1.0, "")
         except (Exception, SystemExit) as error:  # a plugin does not end the host
-            self._failed |= set(cls.provides)
-            return self._result(
-                cls,
-                Outcome.FAILED,
-                reason=str(error) or type(error).__name__,
-                error=error,
-                traceback="".join(traceback.format_exception(error)),
-                duration=time.perf_counter() - start,
-                records=tuple(context.records),
-                progress=context.fraction,
-            )
+            return self._failure(cls, error, time.perf_counter() - start, context)
         self.data.update(values)
+        self._made |= dict.fromkeys(values, cls)
         duration = time.perf_counter() - start
         return self._result(cls, Outcome.DONE, duration=duration, records=tuple(context.records), progress=1.0)
-
-    def _execute(self, cls: type[Operator], context: RunContext) -> object:
-        asked = context.properties[TIMEOUT.name]
-        limit = asked if asked > 0.0 else cls.timeout
-        if limit is None:
-            return cls().execute(context)
-        return call_within(limit, lambda: cls().execute(context), cls.idname)
 
     def _result(self, cls: type[Operator], outcome: Outcome, **fields: Any) -> OperatorResult:
         return OperatorResult(cls.idname, cls.label, self._owners[cls.idname], outcome, **fields)
 
-    def _refuse_rivals(self, cls: type[Operator]) -> None:
-        """Two operators that both want to make the same value: a choice that is the user's, not ours."""
-        for kind in cls.provides:
-            others = [other for other in self.plan.operators if other is not cls and kind in other.provides]
-            rivals = [other for other in others if kind in self.data or self._is_willing(other)]
-            if rivals:
-                raise PluginError(
-                    f"more than one operator makes {kind.__name__}",
-                    found=", ".join(f"{one.idname} of the plugin {self._owners[one.idname]}" for one in [cls, *rivals]),
-                    remedy="Leave one of the plugins out.",
-                )
+    def _failure(
+        self,
+        cls: type[Operator],
+        error: Exception | SystemExit,
+        duration: float = 0.0,
+        context: RunContext | None = None,
+    ) -> OperatorResult:
+        self._failed |= set(cls.provides)
+        return self._result(
+            cls,
+            Outcome.FAILED,
+            reason=str(error) or type(error).__name__,
+            error=error,
+            traceback="".join(traceback.format_exception(error)),
+            duration=duration,
+            records=tuple(context.records) if context else (),
+            progress=context.fraction if context else 0.0,
+        )
 
-    def _is_willing(self, cls: type[Operator]) -> bool:
-        if any(kind not in self.data for kind in cls.requires):
-            return False
-        try:
-            return _poll(cls, self.data) is None
-        except Exception:
-            return False  # it fails by itself when its turn comes
+    def _rivalry(self, kind: type, rivals: Sequence[type[Operator]]) -> PluginError:
+        """The error about operators that would make the same value: the choice is the user's."""
+        return PluginError(
+            f"more than one operator makes {kind.__name__}",
+            found=", ".join(f"{one.idname} of the plugin {self._owners[one.idname]}" for one in rivals),
+            remedy="Disable one of the plugins.",
+        )
 
     def left_out(self) -> tuple[Simplification, ...]:
         """What the polls left out, for the report; not an operator whose values another one made, or that nobody asked
@@ -191,15 +196,6 @@ class Run:
     def failures(self) -> list[OperatorResult]:
         """The operators that raised."""
         return [result for result in self.results if result.outcome == Outcome.FAILED]
-
-
-def _poll(cls: type[Operator], data: Mapping[type, Any]) -> str | None:
-    reason = cls.poll(dict(data))
-    if reason is not None and not (isinstance(reason, str) and reason.strip()):
-        raise PluginError(
-            f"poll of {cls.idname} must return None or a reason", found=repr(reason), remedy="Return a text."
-        )
-    return reason
 
 
 def _checked(cls: type[Operator], values: object) -> dict[type, object]:

@@ -82,7 +82,6 @@ class ReportSpeeds(Operator):
     properties = (
         Property("share", float, 0.9, minimum=0.0, maximum=1.0, description="Share of a speed limit to warn from"),
     )
-    timeout = 60.0
 
     @classmethod
     def poll(cls, data: Mapping[type, Any]) -> str | None:

@@ -18,8 +18,10 @@ from calmotion.retargeting.solver.gauss_newton import Iterate, Search
 from calmotion.retargeting.solver.recycling import Recycled
 from calmotion.shot.character import BoolArray, IntArray
 from calmotion.support.files import replaced
-from calmotion.version import __version__
+from calmotion.support.sources import source_digest
 
+# Another version of the engine would not go on from where this one stood.
+_ROOMS = ("linear_algebra", "multibody", "retargeting", "simulation", "support")
 _OF_LIMITS = ("rho", "left", "reached", "stalled", "on")
 
 
@@ -30,20 +32,20 @@ def checkpoint_path(layer: str) -> Path:
 
 
 def problem_key(problem: RetargetProblem, fixed: BoolArray, settings: object) -> str:
-    """Hash of everything that a search follows from."""
-    digest = hashlib.sha256(f"{__version__} {settings!r}".encode())
-    basis, curves, objective = problem.basis, problem.curves, problem.objective
+    """Hash of everything that a search follows from, the sources of the engine included."""
+    digest = hashlib.sha256(f"{source_digest(*_ROOMS)} {settings!r}".encode())
+    space, curves, objective = problem.space, problem.curves, problem.objective
     reference = objective.reference
     arrays: list[Any] = [np.asarray(part) for part in problem.model.system]
     arrays += [curves.angles, curves.rates, curves.accelerations]
-    arrays += [basis.values.data, basis.knots, problem.coupling, fixed]
+    arrays += [space.basis.values.data, space.basis.knots, space.coupling, fixed, space.smoothness, space.closeness]
     arrays += [objective.weights, reference.positions, reference.rotations]
     if problem.world is not None:
         arrays.append(problem.world)
     if problem.limits is not None:
         for bound in problem.limits.bounds.values():
             arrays += [bound.lower, bound.upper]
-    for array in arrays:
+    for array in map(np.asarray, arrays):
         digest.update(str((array.shape, array.dtype)).encode())
         digest.update(np.ascontiguousarray(array).tobytes())
     return digest.hexdigest()

@@ -1,14 +1,16 @@
 """Compiled kernels, cached on disk under a key of all their sources.
 
 numba's own cache looks at one file at a time, so a kernel compiled into its caller would go stale when only the
-kernel's file changes. The folder is named by a hash of every kernel source instead, and lies in the user's cache,
-so that an installation that cannot be written to caches as well.
+kernel's file changes, or a constant that it imports. The folder is named by a hash of everything that is compiled in
+instead, and lies in the user's cache, so that an installation that cannot be written to caches as well.
 """
 
 from __future__ import annotations
 
 import hashlib
 import os
+import re
+import sys
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
@@ -18,27 +20,42 @@ from typing import Any
 # run no slower. numba reads the level once, so it must be set before its first import; a user's own choice stays.
 os.environ.setdefault("NUMBA_OPT", "1")
 
+import llvmlite  # noqa: E402
+import numba  # noqa: E402
 import numpy as np  # noqa: E402
 from numba import config, njit  # noqa: E402
 
 from calmotion.support.cache_folder import cache_folder
+from calmotion.support.sources import digest_of, with_imports
 
 PACKAGE = Path(__file__).parents[1]
 # Flags for the kernels that a kernel calls: numba compiles these anew for every literal True and False they are given.
 YES, NO = np.bool_(True), np.bool_(False)
 FUSED = {"contract"}  # a product and a sum in one rounding; nothing that would reorder or drop terms
+_KERNEL = re.compile(rb"kernel\ndef ")
 _WITHOUT_ARRAYS: dict[str, Any] = {"_nrt": False, "no_cfunc_wrapper": True, "nogil": True}  # of its own making
 
 
 @cache
 def kernel_folder() -> Path:
-    """Folder of the compiled kernels of exactly these sources."""
-    digest = hashlib.sha256()
-    for path in sorted(PACKAGE.rglob("*.py")):
-        source = path.read_bytes()
-        if b"kernel\ndef " in source or b"inlined_kernel\ndef " in source:
-            digest.update(source)
-    return cache_folder() / "kernels" / digest.hexdigest()[:16]
+    """Folder of the compiled kernels of exactly these sources, options and versions."""
+    return cache_folder() / "kernels" / kernel_key(PACKAGE)[:16]
+
+
+def kernel_key(package: Path) -> str:
+    """Hash of all that ends up in machine code.
+
+    That is the sources of all kernels, of the modules that these import, since constants are compiled in, and of this
+    module with its options; the optimisation level; and the versions of numba, llvmlite and Python. numba itself tells
+    processors apart.
+
+    Args:
+        package: The folder of the package.
+    """
+    kernels = [path for path in package.rglob("*.py") if _KERNEL.search(path.read_bytes())]
+    sources = with_imports([*kernels, package / "support" / "compilation.py"], package.parent)
+    level = f"numba {numba.__version__} llvmlite {llvmlite.__version__} python {sys.version_info[:3]} opt {config.OPT}"
+    return hashlib.sha256(f"{level} {digest_of(sources)}".encode()).hexdigest()
 
 
 def kernel(function: Callable[..., Any]) -> Any:

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from calmotion.benchmarks.accuracy.pareto import front, over_fastest, print_over_fastest
-from calmotion.benchmarks.accuracy.work_precision import Point
+from calmotion.benchmarks.accuracy.reference_bench import Point
 
 
 def test_the_front_has_what_nothing_beats():

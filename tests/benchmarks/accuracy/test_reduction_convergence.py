@@ -5,7 +5,7 @@ import json
 
 import pytest
 from calmotion.benchmarks.accuracy import reduction_convergence as settling
-from calmotion.benchmarks.accuracy.work_precision import Bench
+from calmotion.benchmarks.accuracy.reference_bench import Bench
 from calmotion.benchmarks.common import shots
 from calmotion.benchmarks.common.shots import Unreduced
 from calmotion.benchmarks.scenes.beam_arm import beam_arm, quintic, shot_of

@@ -5,7 +5,7 @@ import dataclasses
 import json
 
 import pytest
-from calmotion.benchmarks.accuracy import tolerances, work_precision
+from calmotion.benchmarks.accuracy import reference_bench, tolerances
 from calmotion.benchmarks.accuracy.tolerances import Tolerances
 from calmotion.benchmarks.common.shots import Unreduced
 from calmotion.benchmarks.scenes.beam_arm import beam_arm, quintic, shot_of
@@ -20,13 +20,13 @@ def shot():
 @pytest.fixture(scope="module")
 def rows(shot):
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(work_precision, "REFERENCE_STEP", 1 / 1920)
+        patch.setattr(reference_bench, "REFERENCE_STEP", 1 / 1920)
         return [Tolerances(shot).kept(tolerance, "optimize") for tolerance in (1e-2, 1e-3)]
 
 
 def test_simulations_keep_their_tolerance(shot):
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(work_precision, "REFERENCE_STEP", 1 / 1920)
+        patch.setattr(reference_bench, "REFERENCE_STEP", 1 / 1920)
         measured = Tolerances(shot)
         measured.warm(1e-2, "simulate")
         found = [measured.kept(tolerance) for tolerance in (1e-2, 1e-3, 1e-4)]

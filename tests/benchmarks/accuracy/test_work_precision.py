@@ -4,13 +4,14 @@ import csv
 import json
 
 import pytest
-from calmotion.benchmarks.accuracy import work_precision, work_precision_points
-from calmotion.benchmarks.accuracy.work_precision import Bench, distance
+from calmotion.accuracy.step_error import distance
+from calmotion.benchmarks.accuracy import reference_bench, work_precision, work_precision_points
+from calmotion.benchmarks.accuracy.reference_bench import Bench
 from calmotion.benchmarks.accuracy.work_precision_points import chosen_points, forward_points
 from calmotion.benchmarks.common import shots
 from calmotion.benchmarks.common.shots import Unreduced
-from calmotion.benchmarks.integrators import gradients
-from calmotion.benchmarks.integrators.gradients import GradientError
+from calmotion.benchmarks.integrators import gradient_error
+from calmotion.benchmarks.integrators.gradient_error import GradientError
 from calmotion.benchmarks.optimizer import optimizer
 from calmotion.benchmarks.optimizer.optimizer import Convergence
 from calmotion.benchmarks.scenes.beam_arm import beam_arm, quintic, shot_of
@@ -26,7 +27,7 @@ def bench():
 @pytest.fixture(scope="module")
 def reference(bench):
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(work_precision, "REFERENCE_STEP", 1 / 1920)
+        patch.setattr(reference_bench, "REFERENCE_STEP", 1 / 1920)
         return bench.reference(1e-6)
 
 
@@ -118,7 +119,7 @@ def test_adjoints_and_optimisers_are_part_of_the_report_where_that_is_asked_for(
     monkeypatch.setattr(work_precision_points, "forward_points", lambda bench, reference: points)
     monkeypatch.setattr(work_precision_points, "chosen_points", lambda bench, reference: [])
     monkeypatch.setattr(shots, "load", lambda name: bench.shot)
-    monkeypatch.setattr(gradients, "errors", lambda shot: rows)
+    monkeypatch.setattr(gradient_error, "errors", lambda shot: rows)
     monkeypatch.setattr(optimizer, "compare", lambda shot, most: [found])
     assert work_precision.main(["arm.usda", "--optimizer", "--json", "--figures", str(tmp_path)]) == 0
     report = json.loads(capsys.readouterr().out)

@@ -4,9 +4,11 @@ import json
 
 import pytest
 from calmotion.benchmarks.integrators import integrators
-from calmotion.benchmarks.integrators.integrators import (
+from calmotion.benchmarks.integrators.integrator_errors import (
     WORKING_STEP,
+    Fate,
     Measured,
+    _height,
     arm_scene,
     damping,
     four_bar_scene,
@@ -70,5 +72,5 @@ def test_the_command_prints_one_object_and_draws(capsys, monkeypatch, tmp_path):
 
 def integrators_fates(scene):
     run = scene.run(WORKING_STEP, "bdf2", 0.1)
-    height = integrators._height(run, WORKING_STEP)
-    return [integrators.Fate("bdf2", WORKING_STEP, "runs to the end", 0.1, 0.0)], {"bdf2": height}
+    height = _height(run, WORKING_STEP)
+    return [Fate("bdf2", WORKING_STEP, "runs to the end", 0.1, 0.0)], {"bdf2": height}

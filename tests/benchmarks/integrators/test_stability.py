@@ -4,8 +4,8 @@ import dataclasses
 import json
 
 import pytest
-from calmotion.benchmarks.integrators import stability
-from calmotion.benchmarks.integrators.stability import CASES, FAILED, REFUSED, RUNS, Case, run_case
+from calmotion.benchmarks.integrators import outcomes, stability
+from calmotion.benchmarks.integrators.outcomes import CASES, FAILED, REFUSED, RUNS, Case, run_case
 from calmotion.simulation import simulate as run
 
 # what no set of reduced coordinates about a straight arm can follow
@@ -34,10 +34,10 @@ def test_every_case_runs_or_is_refused_with_a_reason(case):
 
 def test_what_flies_away_or_is_no_number_has_failed(monkeypatch):
     (weightless,) = (case for case in CASES if (case.group, case.name) == ("gravity", "none"))
-    monkeypatch.setattr(stability, "REACH", 0.5)
+    monkeypatch.setattr(outcomes, "REACH", 0.5)
     assert run_case(Case("a", "b", weightless.scene)).outcome == FAILED
-    monkeypatch.setattr(stability, "GAP", -1.0)
-    monkeypatch.setattr(stability, "REACH", 5.0)
+    monkeypatch.setattr(outcomes, "GAP", -1.0)
+    monkeypatch.setattr(outcomes, "REACH", 5.0)
     assert "came apart" in run_case(Case("a", "b", weightless.scene)).why
 
     def broken():
@@ -66,6 +66,6 @@ def test_the_command_prints_one_object_and_fails_with_its_cases(capsys, monkeypa
     assert stability.main(["--json", "--only", "load a millionth"]) == 0
     (row,) = json.loads(capsys.readouterr().out)["cases"]
     assert row["outcome"] == RUNS and row["group"] == "mass ratio" and row["steps"] == 961
-    monkeypatch.setattr(stability, "GAP", -1.0)
+    monkeypatch.setattr(outcomes, "GAP", -1.0)
     assert stability.main(["--only", "load a millionth"]) == 1
     assert "came apart" in capsys.readouterr().out

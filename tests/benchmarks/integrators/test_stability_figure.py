@@ -1,6 +1,6 @@
 """Pictures of the maps of stability."""
 
-from calmotion.benchmarks.integrators.stability import FAILED, REFUSED, RUNS
+from calmotion.benchmarks.integrators.outcomes import FAILED, REFUSED, RUNS
 from calmotion.benchmarks.integrators.stability_figure import COLORS, draw_map
 from calmotion.benchmarks.integrators.stability_map import Cell
 

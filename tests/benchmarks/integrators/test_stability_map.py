@@ -6,8 +6,8 @@ import time
 
 import pytest
 from calmotion.benchmarks.common.tables import write_rows
-from calmotion.benchmarks.integrators import stability, stability_map
-from calmotion.benchmarks.integrators.stability import FAILED, REFUSED, RUNS
+from calmotion.benchmarks.integrators import outcomes, stability, stability_map
+from calmotion.benchmarks.integrators.outcomes import FAILED, REFUSED, RUNS
 from calmotion.benchmarks.integrators.stability_map import MAPS, STEPS, Cell, all_cells, cells_of, largest_steps, within
 from calmotion.multibody.integrators.integrate import INTEGRATORS
 
@@ -71,7 +71,7 @@ def test_the_command_writes_cells_table_and_pictures(capsys, monkeypatch, tmp_pa
     assert refused["outcome"] == REFUSED and refused["why"].startswith("/Arm/") and refused["error_m"] is None
     assert report["cases"] == [] and report["figures"] == [str(pictures / "stability_load.png")]
     assert [row["integrator"] for row in csv.DictReader(table.open())] == ["bdf2", "rk4"]
-    monkeypatch.setattr(stability, "REACH", 0.1)
+    monkeypatch.setattr(outcomes, "REACH", 0.1)
     assert stability.main(["--only", "map load"]) == 1
     out = capsys.readouterr().out
     assert "the target flew away" in out and "1 cells fail" in out and "Largest stable step" in out

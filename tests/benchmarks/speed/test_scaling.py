@@ -7,7 +7,8 @@ import pytest
 from calmotion.benchmarks.scenes import exudyn_arm
 from calmotion.benchmarks.scenes.exudyn_arm import Run, time_at
 from calmotion.benchmarks.speed import scaling
-from calmotion.benchmarks.speed.scaling import Growth, against_splu, branches, links, motion, prepared
+from calmotion.benchmarks.speed.growth import STEP, Growth, branches, links, motion, prepared
+from calmotion.benchmarks.speed.scaling import against_splu
 from calmotion.multibody.analysis.kinematics import rigid_state
 from calmotion.multibody.integrators.simulation import simulate
 from calmotion.multibody.integrators.workspace import Workspace
@@ -23,7 +24,7 @@ def test_the_chain_is_a_chain_that_moves():
     assert list(model.system.parent) == [-1, 0, 1, 2, 3, 4] and list(model.system.elastic) == [4] * 5 + [0]
     angles, rates = motion(model, 20)
     ws = Workspace.for_system(model.system)
-    trajectory = simulate(model.system, rigid_state(model, angles[0]), angles, rates, scaling.STEP, ws)
+    trajectory = simulate(model.system, rigid_state(model, angles[0]), angles, rates, STEP, ws)
     assert trajectory.max_joint_gap < 1e-8 and np.abs(trajectory.states.u).max() > 1e-9
 
 

@@ -5,6 +5,7 @@ import dataclasses
 import numpy as np
 from calmotion.retargeting.problem.limits import LimitTerms
 from calmotion.retargeting.problem.offset_basis import make_basis
+from calmotion.retargeting.problem.offset_space import OffsetSpace
 from calmotion.retargeting.problem.problem import RetargetProblem
 from calmotion.shot import Animation, Track
 from calmotion.simulation.inputs.curves import sample_curves
@@ -27,7 +28,8 @@ def make_problem(character, bodies, animation, pre_roll=0.0, kept=False, limited
     basis = make_basis(grid, 0.1, kept)
     limits = LimitTerms(motor_bounds(character), grid.judged, grid.h, 3.0, on=True) if limited else None
     motors = np.arange(len(character.motors), dtype=np.int32)
-    return RetargetProblem(model, grid, curves, objective, basis, motors, smoothness, 1e-4, None, limits)
+    space = OffsetSpace.uncoupled(basis, motors, len(motors), smoothness, 1e-4)
+    return RetargetProblem(model, grid, curves, objective, space, None, limits)
 
 
 def jerking(at=0.6):

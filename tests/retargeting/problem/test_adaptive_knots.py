@@ -95,12 +95,12 @@ def test_knots_are_wanted_where_something_is_to_be_gained(arm, bodies):
     def free(basis):
         return np.zeros(basis.count * 2, bool)
 
-    x = minimize(problem, Search.start(np.zeros(problem.size)), free(problem.basis), 1e-6).x
+    x = minimize(problem, Search.start(np.zeros(problem.size)), free(problem.space.basis), 1e-6).x
     problem.value(x)
     problem.linearize()
     breaks = wanted_breaks(problem, x, free, 1e-6)
-    new = np.setdiff1d(breaks, problem.basis.breaks) / 120.0
-    assert len(new) >= 4 and len(breaks) < len(halved(problem.grid, problem.basis.breaks))
+    new = np.setdiff1d(breaks, problem.space.basis.breaks) / 120.0
+    assert len(new) >= 4 and len(breaks) < len(halved(problem.grid, problem.space.basis.breaks))
     assert new.max() < 0.75
     assert wanted_breaks(problem, x, free, 1.0) is None, "nothing gains a metre"
 

@@ -94,7 +94,7 @@ def test_product_is_symmetric_and_follows_the_change_of_the_residuals(linearized
     # the terms of either sum cancel in part
     assert abs(a @ Hb - b @ Ha) < 5e-11 * (np.abs(a) @ np.abs(Hb))
     residuals, values = problem.jvp(a)
-    change = np.sum(residuals**2) + a @ problem.bend(a)
+    change = np.sum(residuals**2) + a @ problem.penalty_gradient(a)
     if problem.limits is not None:
         weights = {name: problem.limits.curvature(name, v) for name, v in problem.limited.items()}
         assert all(np.any(w) for w in weights.values()), "every limit should act somewhere"

@@ -4,11 +4,12 @@ import dataclasses
 
 import numpy as np
 import pytest
-from calmotion.retargeting import optimize
-from calmotion.retargeting.optimize import MISSED, optimize_shot
+from calmotion.retargeting import search
+from calmotion.retargeting.optimize import optimize_shot
 from calmotion.retargeting.problem import adaptive_knots
 from calmotion.retargeting.problem.offset_basis import basis_on
 from calmotion.retargeting.problem.problem import RetargetProblem
+from calmotion.retargeting.search import MISSED
 from calmotion.retargeting.simplification.inactive_intervals import (
     InactiveInterval,
     first_change,
@@ -108,7 +109,7 @@ def test_where_the_beginning_is_off_nothing_is_left_out_and_nothing_is_different
         assert result.after.position_errors[0, 1] < 0.5 * result.before.position_errors[0, 1]
     with monkeypatch.context() as patch:
         patch.setattr(RetargetProblem, "hold", lambda self, first: None)
-        patch.setattr(optimize, "inactive_intervals", lambda *a: ())
+        patch.setattr(search, "inactive_intervals", lambda *a: ())
         plain = optimize_shot(arm, animation, bodies, OPTIONS, quiet)
     for one, other in zip(result.curves, plain.curves, strict=True):
         assert np.array_equal(one.frame_values, other.frame_values)
@@ -134,13 +135,13 @@ def test_what_is_left_out_stays_so_on_finer_knots(arm, bodies, monkeypatch):
 
 def test_a_range_that_would_have_gained_something_is_searched_after_all(arm, bodies, everywhere, monkeypatch):
     too_much = (InactiveInterval(0.0, HELD + 0.45, 0.0),)
-    monkeypatch.setattr(optimize, "inactive_intervals", lambda *a: too_much)
+    monkeypatch.setattr(search, "inactive_intervals", lambda *a: too_much)
     result = optimize_shot(still(arm), pausing(), bodies, OPTIONS, quiet)
     assert not rows_of(result) and result.stopped == "converged"
     assert abs(root_mean_square(result) - root_mean_square(everywhere)) < 0.02 * arm.retarget.allowed(None)
     assert result.gradients > everywhere.gradients
     # as it would stay without that
-    monkeypatch.setattr(optimize, "MISSED", 1e9)
+    monkeypatch.setattr(search, "MISSED", 1e9)
     worse = optimize_shot(still(arm), pausing(), bodies, OPTIONS, quiet)
     (row,) = rows_of(worse)
     lost = root_mean_square(worse) - root_mean_square(result)
@@ -160,7 +161,7 @@ def test_ranges_keep_away_from_errors_limits_and_changes(arm, bodies):
     assert found(arm, ranges="on") == ()
 
     def early(problem):
-        return np.repeat(1e-3 * (problem.basis.support[:, 1] < 0.5), 2)
+        return np.repeat(1e-3 * (problem.space.basis.support[:, 1] < 0.5), 2)
 
     changed, *_ = found(arm, early)
     assert 0.3 < changed.start < 0.8 and changed.stop == first.stop

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
-    from calmotion.benchmarks.accuracy.work_precision import Point
+    from calmotion.benchmarks.accuracy.reference_bench import Point
 
 
 def front(points: Sequence[Point]) -> list[Point]:

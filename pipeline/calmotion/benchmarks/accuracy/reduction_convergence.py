@@ -16,7 +16,8 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from calmotion.accuracy.step_error import distance
-from calmotion.benchmarks.accuracy.work_precision import FINEST, SAMPLES, Bench, machine
+from calmotion.benchmarks.accuracy.reference_bench import FINEST, Bench
+from calmotion.benchmarks.accuracy.work_precision import SAMPLES, machine
 from calmotion.benchmarks.common.tables import markdown, table_parser, write_rows
 
 TOLERANCES = (1e-3, 1e-4, 1e-5, 1e-6, FINEST)

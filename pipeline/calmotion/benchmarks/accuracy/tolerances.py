@@ -19,7 +19,8 @@ from calmotion.accuracy.converged_reduction import converged_reduction
 from calmotion.accuracy.simplification.analysis import analyse
 from calmotion.accuracy.simulate_to_tolerance import found_tracks, simulate_to_tolerance
 from calmotion.accuracy.step_error import distance, frames_of
-from calmotion.benchmarks.accuracy.work_precision import FINEST, SAMPLES, Bench, Reference, machine
+from calmotion.benchmarks.accuracy.reference_bench import FINEST, Bench, Reference
+from calmotion.benchmarks.accuracy.work_precision import SAMPLES, machine
 from calmotion.benchmarks.common.fresh_cache import fresh_cache
 from calmotion.benchmarks.common.shots import Unreduced, load_unreduced
 from calmotion.benchmarks.common.tables import markdown, table_parser, write_rows

@@ -12,7 +12,7 @@ from calmotion.benchmarks.common.drawing import plain, save
 from calmotion.benchmarks.integrators.integrator_figure import COLORS
 
 if TYPE_CHECKING:
-    from calmotion.benchmarks.accuracy.work_precision import Point
+    from calmotion.benchmarks.accuracy.reference_bench import Point
 
 STYLES = {
     **{name: (color, "o-") for name, color in COLORS.items()},

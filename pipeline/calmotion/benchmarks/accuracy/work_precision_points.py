@@ -10,7 +10,7 @@ from calmotion.accuracy.converged_reduction import converged_reduction
 from calmotion.accuracy.integrator_choice import by_fast_scheme
 from calmotion.accuracy.simulate_to_tolerance import chosen_step, project_to_tolerance
 from calmotion.benchmarks.accuracy.pareto import setting_of
-from calmotion.benchmarks.accuracy.work_precision import BASE, TOLERANCES, Bench, Point, Reference
+from calmotion.benchmarks.accuracy.reference_bench import BASE, TOLERANCES, Bench, Point, Reference
 from calmotion.benchmarks.common.shots import load_unreduced
 from calmotion.reduction.reduced_body import ReducedBody
 from calmotion.shot import Animation, Character

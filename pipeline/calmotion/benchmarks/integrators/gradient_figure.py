@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from calmotion.benchmarks.common.drawing import mark_measured, plain, save
 
 if TYPE_CHECKING:
-    from calmotion.benchmarks.integrators.gradients import GradientError
+    from calmotion.benchmarks.integrators.gradient_error import GradientError
 
 COLORS = {"discrete": "#0072b2", "continuous": "#d55e00"}
 

@@ -8,7 +8,7 @@ from calmotion.benchmarks.common.drawing import plain, save
 from calmotion.shot.character import Array
 
 if TYPE_CHECKING:
-    from calmotion.benchmarks.integrators.integrators import Measured
+    from calmotion.benchmarks.integrators.integrator_errors import Measured
 
 COLORS = {
     "bdf2": "#0072b2", "newmark": "#d55e00", "generalized-alpha": "#e69f00", "rk4": "#999999", "radau": "#009e73",

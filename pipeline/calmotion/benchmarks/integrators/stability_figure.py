@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from calmotion.benchmarks.common.drawing import save
-from calmotion.benchmarks.integrators.stability import FAILED, REFUSED, RUNS
+from calmotion.benchmarks.integrators.outcomes import FAILED, REFUSED, RUNS
 from calmotion.benchmarks.integrators.stability_map import BEGINNING, BRIEFLY, Cell, largest_steps, step_name
 
 # told apart by people who do not see red and green apart, and by their lightness

@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from calmotion.benchmarks.integrators.stability import FAILED, REFUSED, RUNS, judged
+from calmotion.benchmarks.integrators.outcomes import FAILED, REFUSED, RUNS, judged
 from calmotion.benchmarks.scenes.beam_arm import beam_arm, quintic, shot_of
 
 IMPLICIT = (1 / 24, 1 / 48, 1 / 120, 1 / 240, 1 / 480, 1 / 2400)

@@ -20,6 +20,7 @@ from scipy.optimize import minimize as quasi_newton
 from calmotion.benchmarks.common.shots import MADE, BenchShot, load
 from calmotion.benchmarks.common.timing import median_time
 from calmotion.retargeting.problem.offset_basis import OffsetBasis, make_basis
+from calmotion.retargeting.problem.offset_space import OffsetSpace
 from calmotion.retargeting.problem.posing import CLOSENESS, SMOOTHNESS
 from calmotion.retargeting.problem.problem import RetargetProblem
 from calmotion.retargeting.solver.damping_homotopy import damping_homotopy
@@ -82,7 +83,8 @@ def make_problem(shot: BenchShot, prepared: Prepared, spacing: float) -> Retarge
     objective = Objective.over(model, meant.reference, grid, shot.animation.weights)
     basis: OffsetBasis = make_basis(grid, spacing, False)
     motors = np.array([k for k, motor in enumerate(shot.character.motors) if motor.optimize], dtype=np.int32)
-    return RetargetProblem(model, grid, curves, objective, basis, motors, SMOOTHNESS, CLOSENESS, world)
+    space = OffsetSpace.uncoupled(basis, motors, len(shot.character.motors), SMOOTHNESS, CLOSENESS)
+    return RetargetProblem(model, grid, curves, objective, space, world)
 
 
 def _largest(problem: RetargetProblem) -> float:

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from calmotion.benchmarks.integrators.integrators import Scene
+from calmotion.benchmarks.integrators.integrator_errors import Scene
 from calmotion.benchmarks.scenes.beam_arm import beam_arm, beam_mesh, quintic, shot_of
 from calmotion.reduction.elements.assembly import FEModel, assemble
 from calmotion.shot import ElasticMaterial

@@ -9,7 +9,7 @@ from calmotion.benchmarks.common.drawing import mark_measured, plain, save
 
 if TYPE_CHECKING:
     from calmotion.benchmarks.scenes.exudyn_arm import Run
-    from calmotion.benchmarks.speed.scaling import Growth
+    from calmotion.benchmarks.speed.growth import Growth
 
 BLUE, COLORS = "#0072b2", {"exudyn": "#d55e00", "ours, bdf2": "#0072b2", "ours, generalized-alpha": "#e69f00"}
 

@@ -27,7 +27,5 @@ def add_to(commands: Commands) -> None:
 def _run(args: argparse.Namespace, output: Output) -> int:
     import shtab
 
-    from calmotion.cli.main import build_parser
-
-    print(shtab.complete(build_parser(), args.shell), file=output.stream)
+    print(shtab.complete(args.parser, args.shell), file=output.stream)
     return 0

@@ -30,8 +30,10 @@ from calmotion.multibody.statics.equilibrium import STATIC
 from calmotion.multibody.statics.regularized_statics import hold
 from calmotion.shot.character import Array, IntArray
 from calmotion.support.compilation import YES, kernel
+from calmotion.support.memory import available_memory
 
-MEMORY = 4e9  # [bytes]
+MEMORY = 4e9  # most that a linearisation takes [bytes]
+SHARE = 0.5  # of the memory that is free
 _FEW = 64  # instants that are not worth another thread
 
 
@@ -107,7 +109,7 @@ def linearize(
     rates: Array,
     workspace: Workspace,
     previous: Linearization | None = None,
-    memory: float = MEMORY,
+    memory: float | None = None,
     continuous: bool = False,
     begin: int = 0,
 ) -> Linearization:
@@ -116,7 +118,7 @@ def linearize(
     Args:
         angles, rates: The joint angles (or lengths) and rates it was simulated with, shape [T, J].
         previous: A linearisation of the same size whose memory is used again (it becomes invalid).
-        memory: Most that blocks and factors may take [bytes].
+        memory: Most that blocks and factors may take [bytes]; None: what the machine has to spare.
         continuous: For `continuous_adjoint`: a step's velocities follow its positions by 3/2h alone.
         begin: First instant whose equations count: 0, the static start, 2 where two instants were given, or one before
             which nothing changes; derivatives by what acts before it are then zero.
@@ -129,7 +131,8 @@ def linearize(
         raise ValueError("sweeps are those of BDF2")
     if trajectory.refined:
         raise SimulationFailure(trajectory.refined[0] * trajectory.h, 0, "refined")
-    size = max(2, min(len(angles) - begin, int(memory / bytes_of_an_instant(system))))
+    held = 0 if previous is None else len(previous.pivots) * bytes_of_an_instant(system)
+    size = window_size(system, len(angles) - begin, spare_memory(held) if memory is None else memory)
     if previous is not None and len(previous.pivots) == size:
         data, pivots = previous.data, previous.pivots
     else:
@@ -152,6 +155,20 @@ def _shapes(system: System) -> list[tuple[int, ...]]:
         (joints, m, size), (joints, size, 3), (joints, 3, size), (joints, m), (joints, m), (joints, size),
         (count, size + m, size + m), (count, size + m, m), (border, border), (count, 3, 3), (count, 4, 4),
     ]  # fmt: skip
+
+
+def spare_memory(held: float = 0.0) -> float:
+    """What a linearisation may take [bytes]: a share of the memory that is free, at most `MEMORY`.
+
+    Args:
+        held: Of it, what an earlier linearisation has that is used again [bytes].
+    """
+    return min(MEMORY, SHARE * (available_memory() + held))
+
+
+def window_size(system: System, instants: int, memory: float) -> int:
+    """Number of instants whose blocks and factors fit into some memory [bytes], at least two."""
+    return max(2, min(instants, int(min(memory, MEMORY) / bytes_of_an_instant(system))))
 
 
 def bytes_of_an_instant(system: System) -> int:

@@ -49,20 +49,20 @@ def wanted_breaks(
         fixed_on: Function from a basis to which of its coefficients stay as they are.
         gain: Fall of the root-mean-square error that finer knots must promise [m].
     """
-    grid, basis = problem.grid, problem.basis
+    grid, basis = problem.grid, problem.space.basis
     breaks = halved(grid, basis.breaks)
     if len(breaks) == len(basis.breaks):
         return None
     finer = basis_on(grid, breaks, basis.kept_ends)
-    fine = problem.on_basis(finer, carried(basis, finer, x, len(problem.motors)))
-    fixed = fixed_on(fine.basis)
+    fine = problem.on_basis(finer, carried(basis, finer, x, len(problem.space.motors)))
+    fixed = fixed_on(fine.space.basis)
     gradient = np.where(fixed, 0.0, fine.gradient())
     promised = 0.5 * gradient * fine.precondition(fixed)(gradient)
-    by_function = promised.reshape(fine.basis.count, -1).sum(axis=1)
+    by_function = promised.reshape(fine.space.basis.count, -1).sum(axis=1)
     total = float(by_function.sum())
     if not total > 0.0 or problem.gain(total, problem.objective_value()) < gain:
         return None
-    wanted = halved(grid, basis.breaks, _paying(grid, basis, fine.basis, np.maximum(by_function, 0.0)))
+    wanted = halved(grid, basis.breaks, _paying(grid, basis, fine.space.basis, np.maximum(by_function, 0.0)))
     return wanted if len(wanted) > len(basis.breaks) else None
 
 

@@ -8,6 +8,7 @@ from calmotion.errors import ShotError
 from calmotion.retargeting.problem.adaptive_knots import breaks_for, first_breaks, fitted
 from calmotion.retargeting.problem.limits import LimitTerms
 from calmotion.retargeting.problem.offset_basis import OffsetBasis, basis_on, uniform_breaks
+from calmotion.retargeting.problem.offset_space import OffsetSpace
 from calmotion.retargeting.problem.problem import RetargetProblem
 from calmotion.shot import Animation
 from calmotion.shot.character import Array, BoolArray, IntArray
@@ -72,9 +73,9 @@ def pose(
         )
     smoothness = next(v for v in (options.smoothness, settings.smoothness, SMOOTHNESS) if v is not None)
     problem = RetargetProblem(
-        prepared.model, grid, curves, Objective.over(prepared.model, meant.reference, grid, animation.weights), basis,
-        motors, smoothness, CLOSENESS, prepared.world,
-        LimitTerms(bounds, grid.judged, grid.h, 1.0) if bounds else None, continuous, coupling,
+        prepared.model, grid, curves, Objective.over(prepared.model, meant.reference, grid, animation.weights),
+        OffsetSpace(basis, motors, coupling, smoothness, CLOSENESS), prepared.world,
+        LimitTerms(bounds, grid.judged, grid.h, 1.0) if bounds else None, continuous,
     )  # fmt: skip
     start = fitted(basis, offsets).ravel() if np.any(offsets) else np.zeros(problem.size)
     return problem, np.where(fixed, 0.0, start), not spacing

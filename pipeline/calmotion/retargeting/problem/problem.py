@@ -4,23 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from copy import copy
+from dataclasses import replace
 
 import numpy as np
-from scipy.sparse import csr_matrix
 
 from calmotion.multibody.analysis.rigid_response import RigidResponse
 from calmotion.multibody.failure import SimulationFailure
-from calmotion.multibody.kernels.moving_frames import rooted
-from calmotion.multibody.model.model import Model, rigid_model, with_damping
+from calmotion.multibody.model.model import Model, with_damping
 from calmotion.retargeting.problem.limits import LimitTerms
 from calmotion.retargeting.problem.offset_basis import OffsetBasis
+from calmotion.retargeting.problem.offset_space import OffsetSpace
+from calmotion.retargeting.problem.rigid_approximation import limit_metrics, rigid_gradient, rigid_response
 from calmotion.retargeting.solver.limited_step import LimitedStep, ModelPoint, limited_step
 from calmotion.retargeting.solver.preconditioner import RigidPreconditioner
 from calmotion.shot.character import Array, BoolArray, IntArray
 from calmotion.simulation.forward import ForwardRun, limited_values
 from calmotion.simulation.inputs.curves import Curves
 from calmotion.simulation.inputs.time_grid import TimeGrid
-from calmotion.simulation.intended_motion import rigid_motion
 from calmotion.simulation.simulator import Simulator
 from calmotion.simulation.target_errors import Objective
 
@@ -33,25 +33,18 @@ class RetargetProblem:
         grid: Its time grid.
         curves: The animator's curves.
         objective: Errors at the targets.
-        basis: Offset splines.
-        motors: Motors that may change, m of them.
-        smoothness: Weight of int |offset''|^2 / 2 for each motor.
-        closeness: Weight of int |offset|^2 / 2 for each motor.
+        space: The unknowns: splines, motors that may change, regularisation.
         world: Moving roots.
         limits: Limits of the motors; None where there are none.
         continuous: Whether gradients are those of the continuous adjoint, which are not exact.
-        coupling: By how much each motor changes with each of `motors`, shape [M, m]; None: they alone, as they do.
     """
 
     def __init__(
-        self, model: Model, grid: TimeGrid, curves: Curves, objective: Objective, basis: OffsetBasis,
-        motors: IntArray, smoothness: float, closeness: float, world: Array | None = None,
-        limits: LimitTerms | None = None, continuous: bool = False, coupling: Array | None = None,
+        self, model: Model, grid: TimeGrid, curves: Curves, objective: Objective, space: OffsetSpace,
+        world: Array | None = None, limits: LimitTerms | None = None, continuous: bool = False,
     ):  # fmt: skip
-        self.grid, self.objective = grid, objective
-        self.curves, self.motors, self.world, self.limits = curves, motors, world, limits
-        self.coupling = np.eye(curves.angles.shape[1])[:, motors] if coupling is None else coupling
-        self._smoothness, self._closeness = smoothness, closeness
+        self.grid, self.objective, self.space = grid, objective, space
+        self.curves, self.world, self.limits = curves, world, limits
         self._simulator = Simulator(model, grid.h, world, grid.cyclic)
         self._run: ForwardRun | None = None
         self.failure: SimulationFailure | None = None  # of the last point that could not be simulated
@@ -59,17 +52,10 @@ class RetargetProblem:
         self._residuals = self._inverse = self._jacobian = np.zeros(0)
         self._limited: dict[str, Array] | None = None
         self._x = self._linearized_x = np.zeros(0)
-        self._preconditioner: RigidPreconditioner | None
+        self._preconditioner: RigidPreconditioner | None = None
         self._response: RigidResponse | None = None
-        self._use(basis)
         # objective of an error of one metre everywhere
         self._unit = max(float(np.sum(objective.weights**2)) / max(1, 3 * len(model.targets.component)), 1e-300)
-
-    def _use(self, basis: OffsetBasis) -> None:
-        self.basis = basis
-        self._penalty = self._smoothness * basis.bending + self._closeness * basis.closeness
-        self._splines = {"position": basis.values, "velocity": basis.rates, "acceleration": basis.accelerations}
-        self._preconditioner = None
 
     def on_basis(self, basis: OffsetBasis, x: Array) -> RetargetProblem:
         """The same problem, evaluated and linearised where this one was, over other splines.
@@ -78,7 +64,7 @@ class RetargetProblem:
             x: The same point in coefficients of the new basis.
         """
         other = copy(self)
-        other._use(basis)
+        other.space, other._preconditioner = self.space.on_basis(basis), None
         other._x = x
         other._linearized_x = np.zeros(0)
         return other
@@ -87,18 +73,18 @@ class RetargetProblem:
         """The same problem without limits, linearised where this one was, over offsets of other motors, now zero.
 
         Args:
-            motors, coupling: As of `RetargetProblem`.
+            motors, coupling: As of `OffsetSpace`.
         """
         other = copy(self)
-        other.motors, other.coupling, other.limits, other._response = motors, coupling, None, None
-        other._use(self.basis)
-        other._x = np.zeros(other.size)
+        other.space = replace(self.space, motors=motors, coupling=coupling)
+        other.limits, other._response, other._preconditioner = None, None, None
+        other._x = np.zeros(other.space.size)
         return other
 
     @property
     def size(self) -> int:
         """Number of unknowns."""
-        return self.basis.count * len(self.motors)
+        return self.space.size
 
     @property
     def model(self) -> Model:
@@ -147,27 +133,9 @@ class RetargetProblem:
         """The next point is simulated from the start of the shot."""
         self._simulator.forget()
 
-    def offsets(self, x: Array) -> tuple[Array, Array]:
-        """Offsets and their rates for all motors, shape [T, M]."""
-        return self._spread(self.basis.values, x), self._spread(self.basis.rates, x)
-
-    def _spread(self, spline: csr_matrix, x: Array) -> Array:
-        """Rows of a spline matrix times the coefficients, for all motors, shape [T, M]."""
-        coefficients = x.reshape(self.basis.count, len(self.motors))
-        return np.asarray(spline @ (coefficients @ self.coupling.T))
-
-    def _gather(self, spline: csr_matrix, by_motor: Array) -> Array:
-        """The transpose of `_spread`."""
-        return np.asarray(spline.T @ (by_motor @ self.coupling)).ravel()
-
-    def bend(self, x: Array) -> Array:
-        """Matrix of the regulariser times x."""
-        coefficients = x.reshape(self.basis.count, len(self.motors))
-        return (self._penalty @ coefficients).ravel()
-
     def value(self, x: Array) -> float:
         """The objective and what limits add to it; infinite where the simulation fails."""
-        values, rates = self.offsets(x)
+        values, rates = self.space.offsets(x)
         angles, rates = self.curves.angles + values, self.curves.rates + rates
         try:
             self._run = self._simulator.run(angles, rates)
@@ -189,14 +157,11 @@ class RetargetProblem:
     @property
     def changed_curves(self) -> Curves:
         """The motors' curves at the point evaluated last."""
-        splines = (self.basis.values, self.basis.rates, self.basis.accelerations)
-        values, rates, accelerations = (self._spread(spline, self._x) for spline in splines)
-        mine = self.curves
-        return Curves(mine.angles + values, mine.rates + rates, mine.accelerations + accelerations)
+        return self.space.changed(self.curves, self._x)
 
     def objective_value(self) -> float:
         """The objective at the point evaluated last, without what limits add to it."""
-        return 0.5 * float(np.sum(self._residuals**2)) + 0.5 * float(self._x @ self.bend(self._x))
+        return 0.5 * float(np.sum(self._residuals**2)) + 0.5 * float(self._x @ self.penalty_gradient(self._x))
 
     def linearize(self) -> Array:
         """Linearise at the point evaluated last, and the gradient there."""
@@ -217,14 +182,14 @@ class RetargetProblem:
         """Gradient of the merit where it was linearised; the limits may have changed since."""
         if self._continuous:
             return self.continuous_gradient()
-        return self.vjp(self._residuals, self._limit_pulls()) + self.bend(self._x)
+        return self.vjp(self._residuals, self._limit_pulls()) + self.penalty_gradient(self._x)
 
     def continuous_gradient(self) -> Array:
         """The same by the continuous adjoint, with a linearisation of its own; limits of effort are beyond it."""
         self._differentiate()
         density = self.objective.scatter(self._jacobian, self._residuals)
         pulls = self._simulator.continuous_adjoint(self.run, density)
-        return self._to_unknowns(*pulls, self._limit_pulls()) + self.bend(self._x)
+        return self._to_unknowns(*pulls, self._limit_pulls()) + self.penalty_gradient(self._x)
 
     def _limit_pulls(self) -> dict[str, Array]:
         limits = self._acting
@@ -237,32 +202,37 @@ class RetargetProblem:
 
     def _to_unknowns(self, by_value: Array, by_rate: Array, limited: dict[str, Array]) -> Array:
         """Derivatives by the motors' values and rates, and by limited curves, shape [T, M], gathered by unknown."""
-        pulled = self._gather(self.basis.values, by_value) + self._gather(self.basis.rates, by_rate)
-        for name, spline in self._splines.items():
+        space = self.space
+        pulled = space.gather(space.basis.values, by_value) + space.gather(space.basis.rates, by_rate)
+        for name, spline in space.splines.items():
             if name in limited:
-                pulled += self._gather(spline, limited[name])
+                pulled += space.gather(spline, limited[name])
         return pulled
 
     def jvp(self, direction: Array) -> tuple[Array, dict[str, Array]]:
         """Change of the weighted residuals along a direction, shape [T, K, 6], and of the limited quantities."""
-        bounds = {} if self._acting is None else self._acting.bounds
-        motion, effort = self._simulator.tangent(*self.offsets(direction), "effort" in bounds)
-        changes = {name: self._spread(spline, direction) for name, spline in self._splines.items() if name in bounds}
+        bounds, space = {} if self._acting is None else self._acting.bounds, self.space
+        motion, effort = self._simulator.tangent(*space.offsets(direction), "effort" in bounds)
+        changes = {name: space.spread(spline, direction) for name, spline in space.splines.items() if name in bounds}
         if "effort" in bounds:
             changes["effort"] = effort
         return self.objective.gather(self._jacobian, motion), changes
+
+    def penalty_gradient(self, x: Array) -> Array:
+        """Matrix of the regulariser times x."""
+        return self.space.penalty_gradient(x)
 
     def product(self, direction: Array) -> Array:
         """Gauss-Newton matrix times a direction: one tangent and one adjoint sweep."""
         residuals, changes = self.jvp(direction)
         if self.limits is not None:
             changes = {name: self.limits.curvature(name, self.limited[name]) * v for name, v in changes.items()}
-        return self.vjp(residuals, changes) + self.bend(direction)
+        return self.vjp(residuals, changes) + self.penalty_gradient(direction)
 
     def model_objective(self, point: ModelPoint) -> float:
         """The objective in the model about the point that was linearised."""
         x = self._x + point.step
-        return 0.5 * float(np.sum(point.residuals**2)) + 0.5 * float(x @ self.bend(x))
+        return 0.5 * float(np.sum(point.residuals**2)) + 0.5 * float(x @ self.penalty_gradient(x))
 
     def model_value(self, point: ModelPoint) -> float:
         """The merit in that model."""
@@ -273,12 +243,14 @@ class RetargetProblem:
         """Its gradient."""
         assert self.limits is not None
         pulls = {name: self.limits.gradient(name, v) for name, v in point.values.items()}
-        return self.vjp(point.residuals, pulls) + self.bend(self._x + point.step)
+        return self.vjp(point.residuals, pulls) + self.penalty_gradient(self._x + point.step)
 
     def model_slope(self, point: ModelPoint, way: ModelPoint) -> float:
         """Its slope along a direction."""
         assert self.limits is not None
-        slope = float(np.sum(point.residuals * way.residuals)) + float(way.step @ self.bend(self._x + point.step))
+        slope = float(np.sum(point.residuals * way.residuals)) + float(
+            way.step @ self.penalty_gradient(self._x + point.step)
+        )
         return slope + sum(
             float(np.sum(self.limits.gradient(name, v) * way.values[name])) for name, v in point.values.items()
         )
@@ -293,10 +265,15 @@ class RetargetProblem:
         Args:
             values: Limited quantities, which say which limits act; None: at the point evaluated last.
         """
-        response = self._rigid()
+        response, acting = self._rigid(), self._acting
         if self._preconditioner is None:
-            self._preconditioner = RigidPreconditioner(response, self.objective.weights, self.basis, self._penalty)
-        self._preconditioner.factor(fixed, self._metrics(response.inertia, values))
+            self._preconditioner = RigidPreconditioner(
+                response, self.objective.weights, self.space.basis, self.space.penalty
+            )
+        curvatures = {}
+        if acting is not None:
+            curvatures = {name: acting.curvature(name, v) for name, v in (values or self.limited).items()}
+        self._preconditioner.factor(fixed, limit_metrics(response.inertia, self.space, curvatures))
         return self._preconditioner.solve
 
     def damped(self, ratio: float, frequency: float) -> RetargetProblem:
@@ -313,38 +290,12 @@ class RetargetProblem:
 
     def rigid_gradient(self) -> Array:
         """Gradient of the errors at the point evaluated last if the robot were rigid: each is answered as it occurs."""
-        weighted = self.objective.weights * self._residuals
-        pulls = np.einsum("nkim,nki->nm", self._rigid().targets, weighted)
-        return np.asarray(self.basis.values.T @ pulls).ravel()
+        return rigid_gradient(self._rigid(), self.space, self.objective.weights, self._residuals)
 
     def _rigid(self) -> RigidResponse:
         if self._response is None:
-            self._response = self._rigid_response()
+            self._response = rigid_response(self.model, self.grid, self.curves, self.world, self.space.coupling)
         return self._response
-
-    def _rigid_response(self) -> RigidResponse:
-        rigid = rigid_model(self.model)
-        motion = rigid_motion(rigid, self.curves.angles, self.curves.rates, self.grid.h, self.world, self.grid.cyclic)
-        angles = self.model.joint_angles(self.curves.angles)
-        world, moved = rooted(self.world, len(motion.c)), np.flatnonzero(np.any(self.coupling, axis=1)).astype(np.int32)
-        times = self.grid.h * np.arange(len(angles), dtype=np.float64)
-        response = RigidResponse.along(rigid, motion.c, motion.q, angles, moved, world, times, _STRIDE)
-        return response.coupled(self.coupling[moved])
-
-    def _metrics(self, inertia: Array, limited: dict[str, Array] | None) -> list[tuple[csr_matrix, Array]]:
-        """What active limits add to the rigid robot's matrix: its efforts are inertia times acceleration."""
-        limits, found = self._acting, []
-        if limits is None:
-            return []
-        for name, values in (limited or self.limited).items():
-            weight = limits.curvature(name, values)
-            if not np.any(weight):
-                continue
-            if name == "effort":
-                found.append((self.basis.accelerations, np.einsum("nma,nm,nmb->nab", inertia, weight, inertia)))
-            else:
-                found.append((self._splines[name], np.einsum("ma,nm,mb->nab", self.coupling, weight, self.coupling)))
-        return found
 
     def gain(self, decrease: float, value: float) -> float:
         """How much of the root-mean-square error a decrease of the merit takes away [m]."""
@@ -358,6 +309,3 @@ class RetargetProblem:
     def tighten(self) -> bool:
         """Limits come into play where they are not kept, or get new multipliers; False where there is no more to do."""
         return self.limits is not None and self.limits.tighten(self.limited)
-
-
-_STRIDE = 8  # instants from one rigid response to the next

@@ -61,7 +61,7 @@ def inactive_intervals(
         tolerance: Error that does not matter [m].
         ranges: "auto", or "on": all of the shot is searched.
     """
-    grid, basis = problem.grid, problem.basis
+    grid, basis = problem.grid, problem.space.basis
     if ranges == "on" or grid.cyclic or not frequency > 0.0:
         return ()
     gradient = problem.rigid_gradient()
@@ -146,7 +146,7 @@ def with_gains(
     Args:
         locked_on: Function from a basis to which of its coefficients may not change at all.
     """
-    basis, motors = problem.basis, len(problem.motors)
+    basis, motors = problem.space.basis, len(problem.space.motors)
     problem.hold(first_change(problem.grid, basis, locked_on))
     problem.value(search.x)
     kept = ~left_out_on(basis, ranges, motors) | locked_on(basis)

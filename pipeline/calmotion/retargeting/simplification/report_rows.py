@@ -45,14 +45,14 @@ def search_rows(
             PRUNED * tolerance,
         )
         for curve in curves
-        if not curve.changed and curve.motor in problem.motors
+        if not curve.changed and curve.motor in problem.space.motors
     ]
     return rows
 
 
 def _knots_row(problem: RetargetProblem, character: Character, options: Options) -> Simplification:
     """Why knots are no closer than they are."""
-    closest = float(np.diff(problem.basis.knots).min())
+    closest = float(np.diff(problem.space.basis.knots).min())
     what = f"knots closer than {1e3 * closest:.3g} ms"
     if options.knot_spacing:
         return Simplification(what, "retarget.optimize.knot_spacing says so")

@@ -9,15 +9,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 import numpy as np
 
 from calmotion.retargeting.solver.truncated_cg import conjugate_gradients
 from calmotion.shot.character import Array, BoolArray
-
-if TYPE_CHECKING:
-    from calmotion.retargeting.problem.problem import RetargetProblem
 
 Values = dict[str, Array]
 
@@ -40,6 +37,37 @@ class ModelPoint:
         return ModelPoint(self.step + t * by.step, self.residuals + t * by.residuals, values)
 
 
+class Limits(Protocol):
+    """What the step needs of the limits of a problem."""
+
+    def update(self, values: Values) -> bool:
+        """Update the multipliers after a minimum of the model; False where all limits are kept."""
+
+    def curvature(self, name: str, v: Array) -> Array:
+        """Second derivative of the limits' cost by a limited quantity, of its shape."""
+
+
+class LimitedProblem(Protocol):
+    """What the step needs of a problem that is linearised."""
+
+    @property
+    def size(self) -> int: ...
+    @property
+    def residuals(self) -> Array: ...
+    @property
+    def limited(self) -> Values: ...
+    @property
+    def limits(self) -> Limits | None: ...
+    def jvp(self, direction: Array) -> tuple[Array, Values]: ...
+    def vjp(self, residuals: Array, limited: Values) -> Array: ...
+    def penalty_gradient(self, x: Array) -> Array: ...
+    def precondition(self, fixed: BoolArray, values: Values) -> Callable[[Array], Array]: ...
+    def model_value(self, point: ModelPoint) -> float: ...
+    def model_objective(self, point: ModelPoint) -> float: ...
+    def model_gradient(self, point: ModelPoint) -> Array: ...
+    def model_slope(self, point: ModelPoint, way: ModelPoint) -> float: ...
+
+
 @dataclass(eq=False)
 class LimitedStep:
     """The step to the model's minimum.
@@ -58,7 +86,7 @@ class LimitedStep:
 
 
 def limited_step(
-    problem: RetargetProblem, fixed: BoolArray, share: float, enough: float, max_products: int
+    problem: LimitedProblem, fixed: BoolArray, share: float, enough: float, max_products: int
 ) -> LimitedStep:
     """The minimum of the model at the point that was linearised.
 
@@ -99,7 +127,7 @@ def limited_step(
 
 
 def _newton_direction(
-    problem: RetargetProblem, here: ModelPoint, gradient: Array, fixed: BoolArray, share: float, enough: float,
+    problem: LimitedProblem, here: ModelPoint, gradient: Array, fixed: BoolArray, share: float, enough: float,
     max_products: int,
 ) -> tuple[ModelPoint, int]:  # fmt: skip
     """To the minimum of the model in which the limits that act here are all that do, and the products it took."""
@@ -112,7 +140,7 @@ def _newton_direction(
         residuals, values = problem.jvp(d)
         carried.append((residuals, values))
         weighted = {name: weights[name] * v for name, v in values.items()}
-        return np.where(fixed, 0.0, problem.vjp(residuals, weighted) + problem.bend(d))
+        return np.where(fixed, 0.0, problem.vjp(residuals, weighted) + problem.penalty_gradient(d))
 
     inverse = problem.precondition(fixed, here.values)
     path = conjugate_gradients(product, gradient, inverse, np.inf, share, enough, max_products)
@@ -128,7 +156,7 @@ def _newton_direction(
     return way, len(carried)
 
 
-def _search(problem: RetargetProblem, here: ModelPoint, way: ModelPoint) -> float:
+def _search(problem: LimitedProblem, here: ModelPoint, way: ModelPoint) -> float:
     """Where the model is least along a direction: its slope grows, so bisection finds where it vanishes."""
 
     def slope(t: float) -> float:

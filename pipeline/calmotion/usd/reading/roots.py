@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -12,9 +12,6 @@ from calmotion.usd.reading.context import Reading
 from calmotion.usd.reading.joints import JointPrim, read_joint
 from calmotion.usd.reading.stillness import carriers, codes_of, moves
 from calmotion.usd.transforms import Pose
-
-if TYPE_CHECKING:
-    from calmotion.usd.reading.character import Skeleton
 
 
 def world_side_prim(reading: Reading, joint: JointPrim):
@@ -34,26 +31,34 @@ def on_moving_prim(reading: Reading, joint: JointPrim) -> bool:
     return prim is not None and moves(reading, prim) is not None
 
 
-def moving_frames(reading: Reading, skeleton: Skeleton, clock: Clock) -> tuple[MovingFrame, ...]:
+def moving_frames(
+    reading: Reading, joints: Sequence[JointPrim], poses: dict[str, Pose], clock: Clock
+) -> tuple[MovingFrame, ...]:
     """Motion of the world-side frames of the joints that the shot moves.
+
+    Args:
+        reading: The stage.
+        joints: All joints of the character, in its order.
+        poses: Poses of the bodies where the joints were read, stage units.
+        clock: Of the shot.
 
     Raises:
         ShotError: A transform that has no rigid pose.
     """
     found = []
-    for index, joint in enumerate(skeleton.joints):
+    for index, joint in enumerate(joints):
         if joint.body0 != "":
             continue
         prim = reading.stage.GetPrimAtPath(joint.body1) if joint.prim is None else world_side_prim(reading, joint)
         if prim is None or moves(reading, prim) is None:
             continue
-        frames = clock.time_codes(clock.frame_times())
-        codes = np.unique(np.concatenate([frames, *(codes_of(mover) for mover in carriers(prim))]))
-        poses = [world_frame(reading.at(float(code)), joint, prim, skeleton.poses) for code in codes]
-        rotations = np.array([pose.rotation for pose in poses])
+        shown = clock.time_codes(clock.frame_times())
+        codes = np.unique(np.concatenate([shown, *(codes_of(mover) for mover in carriers(prim))]))
+        frames = [world_frame(reading.at(float(code)), joint, prim, poses) for code in codes]
+        rotations = np.array([frame.rotation for frame in frames])
         flips = np.where(np.sum(rotations[1:] * rotations[:-1], axis=1) < 0.0, -1.0, 1.0)
         rotations[1:] *= np.cumprod(flips)[:, None]
-        found.append(MovingFrame(index, clock.seconds(codes), np.array([pose.position for pose in poses]), rotations))
+        found.append(MovingFrame(index, clock.seconds(codes), np.array([f.position for f in frames]), rotations))
         reading.note(f"{prim.GetPath()}: moves as its transform is animated, and carries the character")
     return tuple(found)
 

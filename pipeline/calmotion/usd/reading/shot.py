@@ -105,7 +105,7 @@ def read_stage(stage, still: bool = False, given: MotorTracks | None = None) -> 
         reading = Reading(stage, units, clock.start)
         skeleton = read_skeleton(reading, clock, still, given_joints(stage, given))
         tracks = motor_tracks(reading, skeleton.drives, clock, given)
-        moving = moving_frames(reading, skeleton, clock)
+        moving = moving_frames(reading, skeleton.joints, skeleton.poses, clock)
         _note_dense_samples(tracks, clock, reading)
         return StageReading(reading, clock, skeleton, build_character(reading, skeleton), tracks, moving)
 

@@ -1,0 +1,215 @@
+"""Errors of every integrator against steps, its fate on stiff scenes, and its numerical damping."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from calmotion.benchmarks.scenes.beam_arm import beam_arm, quintic, shot_of
+from calmotion.benchmarks.scenes.four_bar import four_bar
+from calmotion.shot import Animation, Character, FEMeshes
+from calmotion.shot.character import Array
+
+WORKING_STEP = 1.0 / 240.0
+SHORT = 0.1  # run time [s]
+RK4_PARTS = (1, 1000, 4000)  # of the working step
+SECOND_ORDER = ("bdf2", "newmark", "generalized-alpha")
+# steps in a sample of the motion; explicit steps must resolve the fastest mode
+STEPS: dict[str, tuple[int, ...]] = {name: (8, 16, 32, 64) for name in SECOND_ORDER}
+STEPS |= {"rk4": (32, 64, 128), "radau": (1, 2, 4, 8)}
+# a motion that starts a little later starts from rest, as its spline rings before it; and one that is sampled densely
+# has small jumps of its third derivative, whose waves only small steps resolve
+RATE, LATER = 60.0, 0.25
+FINEST = 24
+
+
+@dataclass(frozen=True)
+class Measured:
+    """One simulation against the reference: largest error of the target [m], of any velocity [m/s, rad/s], and time."""
+
+    integrator: str
+    step_s: float
+    position_error: float
+    velocity_error: float
+    wall_s: float
+
+
+@dataclass(frozen=True)
+class Fate:
+    """What became of the stiff scene: `ends_s` is its duration where it ran to the end."""
+
+    integrator: str
+    step_s: float
+    outcome: str
+    ends_s: float
+    wall_s: float
+
+
+class Scene:
+    """A shot whose bodies are reduced once, to be simulated at any step by any integrator."""
+
+    def __init__(self, made: tuple[Character, FEMeshes], animation: Animation):
+        from calmotion.multibody.model.topology import span_tree
+        from calmotion.simulation.bodies import reduce_bodies
+
+        self.character, self.animation = made[0], animation
+        self.bodies = reduce_bodies(self.character, span_tree(self.character), made[1])
+
+    def run(self, step: float, integrator: str, seconds: float | None = None) -> Any:
+        """A `ForwardRun`, of the first seconds alone where they are given.
+
+        Raises:
+            SimulationFailure: It did not come to the end.
+        """
+        from calmotion.multibody.integrators.workspace import Workspace
+        from calmotion.simulation.forward import run_forward
+        from calmotion.simulation.inputs.curves import sample_tracks
+        from calmotion.simulation.prepare import Options, prepare
+
+        options = Options(step=step, pre_roll=0.0, integrator=integrator)
+        prepared = prepare(self.character, self.animation, self.bodies, options)
+        angles, rates = sample_tracks(self.animation.tracks, prepared.grid)
+        last = None if seconds is None else round(seconds / prepared.grid.h) + 1
+        workspace = Workspace.for_system(prepared.model.system)
+        world = prepared.world[:last]
+        return run_forward(
+            prepared.model, workspace, angles[:last], rates[:last], prepared.grid.h, world, integrator=integrator
+        )
+
+
+def arm_scene() -> Scene:
+    """A flexible arm on a driven joint, a quarter turn in half a second."""
+    move = quintic(np.pi / 2, 0.5, LATER)
+    return Scene(beam_arm(modes=3, elasticity="linear"), shot_of(move, LATER + 0.75, rate=RATE))
+
+
+def four_bar_scene() -> Scene:
+    """A four-bar with a flexible coupler, whose crank makes a turn in a second."""
+    return Scene(four_bar(modes=7, damping=0.1), shot_of(quintic(2.0 * np.pi, 1.0, LATER), LATER + 1.0, rate=RATE))
+
+
+def stiff_scene() -> Scene:
+    """Two steel links of 200 x 3 x 3 mm, both lifted by 86 degrees in 0.3 s with 150 g at the end, without damping."""
+    made = beam_arm(
+        links=2, length=0.2, thickness=0.003, youngs_modulus=2.1e11, density=7800.0, payload=0.15, damping=0.0,
+        elasticity="stvk", modes=8, cells=10,
+    )  # fmt: skip
+    return Scene(made, shot_of(quintic(1.5, 0.3), 2.0, 2))
+
+
+def orders(scene: Scene, steps: dict[str, tuple[int, ...]] = STEPS, finest: int = FINEST) -> list[Measured]:
+    """Errors at the samples of the motion, by integrator and step.
+
+    Args:
+        steps: Steps in a sample, by integrator.
+        finest: Those of the reference.
+    """
+    frame = float(scene.animation.frame_times[1])
+    reference = scene.run(frame / finest, "radau")
+    found = []
+    for integrator, counts in steps.items():
+        scene.run(frame / counts[0], integrator, 2.0 * frame)  # compiles
+        for count in counts:
+            run = scene.run(frame / count, integrator)
+            # a short run is timed more often, and the least disturbed one counts
+            again = [] if run.trajectory.wall_s > SHORT else [scene.run(frame / count, integrator) for _ in range(2)]
+            wall = min(item.trajectory.wall_s for item in (run, *again))
+            off = run.target_positions[::count] - reference.target_positions[::finest]
+            V, exact = run.trajectory.states.V[::count], reference.trajectory.states.V[::finest]
+            found.append(
+                Measured(
+                    integrator, frame / count, float(np.linalg.norm(off, axis=2).max()),
+                    float(np.abs(V - exact)[1:].max()), wall,
+                )
+            )  # fmt: skip
+    return found
+
+
+def order_of(rows: Sequence[Measured], integrator: str, error: str = "position_error") -> float:
+    """Order of an integrator: the largest slope between neighbouring steps.
+
+    Coarse steps do not resolve everything yet, and errors of fine ones reach that of the reference.
+    """
+    own = [row for row in rows if row.integrator == integrator]
+    steps, errors = np.log([row.step_s for row in own]), np.log([getattr(row, error) for row in own])
+    return float(np.max(np.diff(errors) / np.diff(steps)))
+
+
+def fates(scene: Scene, parts: Sequence[int] = RK4_PARTS) -> tuple[list[Fate], dict[str, tuple[Array, Array]]]:
+    """What becomes of the stiff scene, and the target's height over time by integrator."""
+    from calmotion.multibody.failure import SimulationFailure
+
+    cases: list[tuple[str, float, float | None]] = [(name, WORKING_STEP, None) for name in SECOND_ORDER]
+    cases += [("rk4", WORKING_STEP / part, 0.1) for part in parts]
+    found: list[Fate] = []
+    heights: dict[str, tuple[Array, Array]] = {}
+    for integrator, step, seconds in cases:
+        begin, outcome, end = time.perf_counter(), "runs to the end", seconds or float(scene.animation.frame_times[-1])
+        try:
+            run = scene.run(step, integrator, seconds)
+            heights[integrator] = _height(run, step)
+            if run.trajectory.refined:
+                outcome = f"needs {len(run.trajectory.refined)} smaller steps"
+        except SimulationFailure as failure:
+            outcome, end = failure.reason, failure.time_s
+            if integrator != "rk4":
+                # as far as it came
+                run = scene.run(step, integrator, end - 2.0 * step)
+                heights[integrator] = _height(run, step)
+        found.append(Fate(integrator, step, outcome, end, time.perf_counter() - begin))
+    return found, heights
+
+
+def _height(run: Any, step: float) -> tuple[Array, Array]:
+    """Times [s] and heights of the target [m]."""
+    values: Array = run.target_positions[:, 0, 2]
+    return np.linspace(0.0, step * (len(values) - 1), len(values)), values
+
+
+def damping(counts: Sequence[int] = (10, 20, 40, 80, 160)) -> list[tuple[int, float, float]]:
+    """Damping ratio that BDF2 gives an undamped vibration: (steps in a period, measured, from the scheme's root)."""
+    from calmotion.multibody.analysis.kinematics import rigid_state
+    from calmotion.multibody.integrators.simulation import simulate
+    from calmotion.multibody.integrators.workspace import Workspace
+    from calmotion.simulation.prepare import Options, prepare
+
+    scene = Scene(beam_arm(modes=1, elasticity="linear", damping=0.0, gravity=0.0), shot_of(quintic(0.0, 1.0), 1.0))
+    prepared = prepare(scene.character, scene.animation, scene.bodies, Options(pre_roll=0.0))
+    model, periods, found = prepared.model, 10, []
+    from calmotion.multibody.analysis.modes import system_modes
+
+    frequency = float(system_modes(model, np.zeros(len(model.motor)))[0][0])
+    for count in counts:
+        h = 1.0 / (frequency * count)
+        start = rigid_state(model, np.zeros(len(model.motor)))
+        _deflect(model, start, 1e-6)
+        none = np.zeros((periods * count + 1, len(model.motor)))
+        ws = Workspace.for_system(model.system)
+        u = simulate(model.system, start, none, none, h, ws, settled=False).states.u[:, 0, 0]
+        # amplitudes of the first and the last period
+        first, last = np.abs(u[: count + 1]).max(), np.abs(u[-count - 1 :]).max()
+        measured = float(np.log(first / last) / (2.0 * np.pi * (periods - 1)))
+        found.append((count, measured, _root_damping(2.0 * np.pi / count)))
+    return found
+
+
+def _deflect(model: Any, start: Any, size: float) -> None:
+    """Bend the only flexible component by `size`, its load following."""
+    system = model.system
+    start.u[0, 0] = size
+    start.c[1] += system.Phi[1, 0, :, 0] * size
+    turned = 0.5 * system.Psi[1, 0, :, 0] * size
+    start.q[1] = np.array([1.0, *turned])
+    start.q[1] /= np.linalg.norm(start.q[1])
+
+
+def _root_damping(phase: float) -> float:
+    """Damping ratio of BDF2 on an oscillator of so many radians a step: from 3/2 - 2/z + 1/(2 z^2) = i phase."""
+    inverse = np.roots([0.5, -2.0, 1.5 - 1j * phase])
+    z = 1.0 / inverse
+    exponent = np.log(z[np.argmin(np.abs(z - np.exp(1j * phase)))])
+    return float(-exponent.real / np.abs(exponent))

@@ -1,0 +1,77 @@
+"""Asking operators whether they run, and finding those that would make the same value."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from typing import Any
+
+from calmotion.host.errors import PluginError
+from calmotion.host.operators import Operator
+
+
+class _Watched(dict[type, Any]):
+    """Data of a run that remembers which absent values were asked for."""
+
+    def __init__(self, data: Mapping[type, Any]):
+        super().__init__(data)
+        self.absent: set[type] = set()
+
+    def __missing__(self, kind: type) -> Any:
+        self.absent.add(kind)
+        raise KeyError(kind)
+
+    def __contains__(self, kind: object) -> bool:
+        there = super().__contains__(kind)
+        if not there and isinstance(kind, type):
+            self.absent.add(kind)
+        return there
+
+    def get(self, kind: type, default: Any = None) -> Any:
+        return self[kind] if kind in self else default
+
+
+def poll(cls: type[Operator], data: Mapping[type, Any]) -> str | None:
+    """None when an operator runs on this data, else the reason why it does not.
+
+    Raises:
+        PluginError: The answer is neither.
+        Exception: Whatever the operator's poll raises.
+    """
+    reason = cls.poll(dict(data))
+    if reason is not None and not (isinstance(reason, str) and reason.strip()):
+        raise PluginError(
+            f"poll of {cls.idname} must return None or a reason", found=repr(reason), remedy="Return a text."
+        )
+    return reason
+
+
+def will_run(cls: type[Operator], data: Mapping[type, Any], coming: Collection[type]) -> bool:
+    """Whether an operator is certain to run once its inputs are there.
+
+    False where its poll declines or raises, and where it asks for a value that may still come: the answer may change.
+    """
+    watched = _Watched(data)
+    try:
+        reason = cls.poll(watched)
+    except Exception:
+        return False  # it fails by itself when its turn comes
+    return reason is None and not watched.absent.intersection(coming)
+
+
+def find_rivals(
+    remaining: Sequence[type[Operator]], data: Mapping[type, Any], made: Mapping[type, type[Operator]]
+) -> dict[type, tuple[type[Operator], ...]]:
+    """Operators that are certain to make the same value, by the value's type.
+
+    Args:
+        remaining: Operators of the plan that have not run.
+        data: What is known.
+        made: Which operator made a value in this run.
+    """
+    coming = {kind for cls in remaining for kind in cls.provides} - data.keys()
+    willing = [cls for cls in remaining if will_run(cls, data, coming)]
+    makers: dict[type, list[type[Operator]]] = {kind: [cls] for kind, cls in made.items()}
+    for cls in willing:
+        for kind in cls.provides:
+            makers.setdefault(kind, []).append(cls)
+    return {kind: tuple(found) for kind, found in makers.items() if len(found) > 1}

@@ -1,0 +1,78 @@
+"""The unknowns of a retargeting problem: spline coefficients, and the offsets of all motors that they stand for."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from scipy.sparse import csr_matrix
+
+from calmotion.retargeting.problem.offset_basis import OffsetBasis
+from calmotion.shot.character import Array, IntArray
+from calmotion.simulation.inputs.curves import Curves
+
+
+@dataclass(frozen=True, eq=False)
+class OffsetSpace:
+    """Coefficients x ordered by basis function, then motor, P functions and m motors; offsets of all M motors.
+
+    Attributes:
+        basis: Offset splines.
+        motors: Motors that may change, shape [m].
+        coupling: By how much each motor changes with each of `motors`, shape [M, m].
+        smoothness: Weight of int |offset''|^2 / 2 for each motor.
+        closeness: Weight of int |offset|^2 / 2 for each motor.
+    """
+
+    basis: OffsetBasis
+    motors: IntArray
+    coupling: Array
+    smoothness: float
+    closeness: float
+
+    @staticmethod
+    def uncoupled(basis: OffsetBasis, motors: IntArray, every: int, smoothness: float, closeness: float) -> OffsetSpace:
+        """The space in which each of some motors, out of `every` motor, changes alone."""
+        return OffsetSpace(basis, motors, np.eye(every)[:, motors], smoothness, closeness)
+
+    @property
+    def size(self) -> int:
+        """Number of unknowns, P * m."""
+        return self.basis.count * len(self.motors)
+
+    @cached_property
+    def penalty(self) -> csr_matrix:
+        """Matrix of the regulariser for one motor, shape [P, P]."""
+        return self.smoothness * self.basis.bending + self.closeness * self.basis.closeness
+
+    @cached_property
+    def splines(self) -> dict[str, csr_matrix]:
+        """Spline matrices [T, P] by the quantity that they give: `position`, `velocity` and `acceleration`."""
+        basis = self.basis
+        return {"position": basis.values, "velocity": basis.rates, "acceleration": basis.accelerations}
+
+    def on_basis(self, basis: OffsetBasis) -> OffsetSpace:
+        """The same motors over other splines."""
+        return replace(self, basis=basis)
+
+    def spread(self, spline: csr_matrix, x: Array) -> Array:
+        """Rows of a spline matrix times the coefficients, for all motors, shape [T, M]."""
+        return np.asarray(spline @ (x.reshape(self.basis.count, len(self.motors)) @ self.coupling.T))
+
+    def gather(self, spline: csr_matrix, by_motor: Array) -> Array:
+        """The transpose of `spread`: from shape [T, M] to the unknowns."""
+        return np.asarray(spline.T @ (by_motor @ self.coupling)).ravel()
+
+    def offsets(self, x: Array) -> tuple[Array, Array]:
+        """Offsets and their rates for all motors, shape [T, M]."""
+        return self.spread(self.basis.values, x), self.spread(self.basis.rates, x)
+
+    def changed(self, curves: Curves, x: Array) -> Curves:
+        """Curves of the motors with their offsets."""
+        values, rates, accelerations = (self.spread(spline, x) for spline in self.splines.values())
+        return Curves(curves.angles + values, curves.rates + rates, curves.accelerations + accelerations)
+
+    def penalty_gradient(self, x: Array) -> Array:
+        """Matrix of the regulariser times x: the gradient of smoothness and closeness."""
+        return np.asarray(self.penalty @ x.reshape(self.basis.count, len(self.motors))).ravel()

@@ -1,0 +1,56 @@
+"""The key of compiled kernels covers all that ends up in machine code."""
+
+import numba
+import numpy as np
+import pytest
+from calmotion.support import compilation
+from calmotion.support.compilation import kernel, kernel_folder, kernel_key
+
+
+@pytest.fixture
+def package(tmp_path):
+    """A package with one kernel, which imports a constant from a module without kernels."""
+    root = tmp_path / "calmotion"
+    (root / "support").mkdir(parents=True)
+    (root / "support" / "compilation.py").write_text("OPTIONS = {'fastmath': True}\n")
+    (root / "kernels.py").write_text("from calmotion.constants import G\n\n@kernel\ndef f(x):\n    return G * x\n")
+    (root / "constants.py").write_text("G = 9.81\n")
+    (root / "others.py").write_text("H = 1\n")
+    return root
+
+
+def test_the_key_changes_with_an_imported_constant_and_with_the_options(package):
+    before = kernel_key(package)
+    assert before == kernel_key(package)
+    (package / "others.py").write_text("H = 2\n")
+    assert before == kernel_key(package), "no kernel imports it"
+    (package / "constants.py").write_text("G = 1.62\n")
+    after = kernel_key(package)
+    assert after != before
+    (package / "support" / "compilation.py").write_text("OPTIONS = {'fastmath': False}\n")
+    assert kernel_key(package) not in (before, after)
+
+
+@pytest.mark.parametrize("module", ["numba", "llvmlite"])
+def test_the_key_changes_with_the_compiler(package, monkeypatch, module):
+    before = kernel_key(package)
+    monkeypatch.setattr(getattr(compilation, module), "__version__", "0.0.0")
+    assert kernel_key(package) != before
+
+
+def test_the_key_changes_with_the_optimisation_level(package, monkeypatch):
+    before = kernel_key(package)
+    monkeypatch.setattr(numba.config, "OPT", 3)
+    assert kernel_key(package) != before
+
+
+def test_kernels_are_kept_under_the_key():
+    assert kernel_key(compilation.PACKAGE).startswith(kernel_folder().name)
+
+
+def test_a_kernel_computes():
+    @kernel
+    def doubled(x):
+        return 2.0 * x
+
+    assert doubled(np.float64(1.5)) == 3.0

@@ -1,0 +1,36 @@
+"""Memory that is left: the least of what machine, container and process allow."""
+
+import math
+import subprocess
+import sys
+
+from calmotion.support import memory
+
+
+def test_the_machine_tells():
+    assert 1e6 < memory.available_memory() < 1e15 or memory.available_memory() == math.inf
+    assert memory.peak_memory() > 0.01
+
+
+def test_a_container_limits_it(tmp_path, monkeypatch):
+    (tmp_path / "max").write_text("3000000\n")
+    (tmp_path / "current").write_text("1000000\n")
+    monkeypatch.setattr(memory, "_GROUPS", ((str(tmp_path / "max"), str(tmp_path / "current")),))
+    assert memory.available_memory() == 2e6
+    (tmp_path / "max").write_text("max\n")
+    assert memory.available_memory() > 2e6
+
+
+def test_little_free_memory_limits_it(tmp_path, monkeypatch):
+    (tmp_path / "meminfo").write_text("MemTotal: 9000 kB\nMemAvailable:   2000 kB\n")
+    monkeypatch.setattr(memory, "_MEMINFO", str(tmp_path / "meminfo"))
+    assert memory.available_memory() == 2048000.0
+
+
+def test_a_limit_of_the_address_space_counts():
+    code = (
+        "import resource; resource.setrlimit(resource.RLIMIT_AS, (2**30, 2**30));"
+        "from calmotion.support.memory import available_memory; print(available_memory())"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert 0 < float(done.stdout) < 2**30

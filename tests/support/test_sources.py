@@ -1,0 +1,38 @@
+"""Hashes of sources: they change with every module that is imported, directly or not."""
+
+import pytest
+from calmotion.support.sources import PACKAGE, digest_of, source_digest, with_imports
+
+
+@pytest.fixture
+def package(tmp_path):
+    """A package of four modules; `d` is imported by none."""
+    root = tmp_path / "calmotion"
+    (root / "room").mkdir(parents=True)
+    (root / "a.py").write_text("from calmotion.room import (\n    b,\n)\n")
+    (root / "room" / "__init__.py").write_text("")
+    (root / "room" / "b.py").write_text("def f():\n    from calmotion.c import X\n    return X\n")
+    (root / "c.py").write_text("X = 1\n")
+    (root / "d.py").write_text("Y = 1\n")
+    return root
+
+
+def test_imports_are_followed_through_folders_and_functions(package):
+    found = with_imports([package / "a.py"], package.parent)
+    assert {str(path.relative_to(package)) for path in found} == {"a.py", "room/__init__.py", "room/b.py", "c.py"}
+
+
+def test_a_hash_changes_with_content_and_name(package):
+    one = digest_of([package / "c.py"])
+    assert one != digest_of([package / "d.py"])
+    (package / "c.py").write_text("X = 2\n")
+    assert one != digest_of([package / "c.py"])
+
+
+def test_rooms_have_hashes_of_their_own():
+    assert source_digest("multibody") != source_digest("retargeting") != source_digest("multibody", "retargeting")
+
+
+def test_a_kernel_brings_the_constants_that_it_imports():
+    found = {path.relative_to(PACKAGE).as_posix() for path in with_imports([PACKAGE / "multibody/kernels/assembly.py"])}
+    assert "multibody/kernels/joints.py" in found and "support/compilation.py" in found
