@@ -115,7 +115,7 @@ def _accurate(index: int, body: Body, solid: Solid, options: MeshOptions, carrie
         mesh = filled(index, body, solid, shape, size, options)
         found = compared(before, estimate(mesh.points, mesh.tets, body, carrier))
     if options.cache:
-        cache.store(key, size=np.array(size), error=np.array(found.error), nodes=np.array(found.nodes))
+        cache.store(key, {"size": np.array(size), "error": np.array(found.error), "nodes": np.array(found.nodes)})
     return _judged(mesh, found)
 
 

@@ -1,10 +1,11 @@
-"""Meshes kept in the user's cache folder, by the hash of what they were made from."""
+"""Cache of meshes in the cache folder of the user, by the hash of all inputs."""
 
 from __future__ import annotations
 
 import contextlib
 import hashlib
 import zipfile
+from collections.abc import Callable
 
 import numpy as np
 from calmotion.support.cache_folder import cache_folder
@@ -14,7 +15,7 @@ FOLDER = "tetrahedra"
 
 
 def cache_key(points: np.ndarray, triangles: np.ndarray, settings: dict[str, object]) -> str:
-    """Hash of a surface and of everything else that decides its mesh."""
+    """Hash of a surface and of all settings that affect its mesh."""
     digest = hashlib.sha256()
     for array in (np.ascontiguousarray(points, dtype="<f8"), np.ascontiguousarray(triangles, dtype="<i4")):
         digest.update(str(array.shape).encode())
@@ -24,7 +25,7 @@ def cache_key(points: np.ndarray, triangles: np.ndarray, settings: dict[str, obj
 
 
 def load(key: str, names: tuple[str, ...] = ("points", "tets")) -> tuple[np.ndarray, ...] | None:
-    """The arrays kept under a key; None when there are none, or the file is damaged."""
+    """The arrays stored under a key; None where there are none, or the file is damaged."""
     try:
         with np.load(cache_folder() / FOLDER / f"{key}.npz", allow_pickle=False) as file:
             return tuple(file[name] for name in names)
@@ -32,22 +33,29 @@ def load(key: str, names: tuple[str, ...] = ("points", "tets")) -> tuple[np.ndar
         return None
 
 
-def store(key: str, **arrays: np.ndarray) -> tuple[np.ndarray, ...]:
-    """Keep arrays; a reader sees all of them or nothing. A folder that cannot be written is passed over.
+def store(
+    key: str, arrays: dict[str, np.ndarray], usable: Callable[[tuple[np.ndarray, ...]], bool] = lambda stored: True
+) -> tuple[np.ndarray, ...]:
+    """Store arrays; a reader gets all of them or none. A folder that cannot be written is ignored.
 
-    The tetrahedraliser makes another mesh each time. Where two processes make one, both go on with the one that is
-    stored first: simulations of the same shot then agree.
+    The tetrahedraliser makes a different mesh each time. Where two processes make one, both continue with the one that
+    is stored first, so that simulations of the same shot agree.
+
+    Args:
+        key: Of `cache_key`.
+        arrays: By name.
+        usable: Whether stored arrays, in the same order, may be kept; a file with other ones is replaced.
 
     Returns:
-        The arrays that are kept under the key from now on.
+        The arrays that are stored under the key.
     """
     path, names = cache_folder() / FOLDER / f"{key}.npz", tuple(arrays)
     with contextlib.suppress(OSError):
-        for keep_existing in (True, False):  # a second time over a damaged file
+        for keep_existing in (True, False):  # the second time a damaged or unusable file is replaced
             with replaced(path, keep_existing) as temporary:
                 np.savez(temporary, **arrays)  # type: ignore[arg-type]
             remove_abandoned(path.parent)
             stored = load(key, names)
-            if stored is not None:
+            if stored is not None and usable(stored):
                 return stored
     return tuple(arrays.values())

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from calmotion.errors import ShotError
 from calmotion.geometry.closed_surfaces import boundary_walks, close
-from calmotion.geometry.orientation import patch_boundaries, patches_of, signs_that_close
+from calmotion.geometry.orientation import closing_signs, patch_boundaries, patches_of
 from calmotion.geometry.tetrahedra import surface_area, surface_volume
 
 from .junctions import split_at_junctions
@@ -93,7 +93,7 @@ def connected_pieces(points: np.ndarray, triangles: np.ndarray) -> list[Part]:
     from scipy.sparse.csgraph import connected_components
 
     patches = patches_of(triangles, _areas(Part(points, triangles)))
-    rows, columns = np.nonzero(patch_boundaries(_turned(triangles, patches.turn), patches.label, patches.count))
+    rows, columns = np.nonzero(patch_boundaries(_turned(triangles, patches.flip), patches.label, patches.count))
     bounds = coo_matrix((np.ones(len(rows)), (columns, rows)), shape=(patches.count, int(rows.max(initial=0)) + 1))
     count, group = connected_components(bounds @ bounds.T, directed=False)
     label = group[patches.label]
@@ -114,7 +114,7 @@ def _best_welded(points: np.ndarray, triangles: np.ndarray, path: str, repairs: 
     best, fewest = None, np.inf
     for tolerance in _WELDS:
         welded = _welded(points, triangles, tolerance * diagonal)
-        turned = _turned(welded.triangles, patches_of(welded.triangles, _areas(welded)).turn)
+        turned = _turned(welded.triangles, patches_of(welded.triangles, _areas(welded)).flip)
         count = sum(len(walk) for walk in boundary_walks(turned))
         if best is None or (count < fewest and len(turned)):
             best, fewest, used = welded, count, tolerance
@@ -191,9 +191,9 @@ def _agreed(piece: Part, path: str, repairs: list[str]) -> np.ndarray:
             "has only one side, as a Moebius strip has, so nothing is inside it", path=path,
             found=f"{int(np.isin(patches.label, patches.one_sided).sum())} triangles", remedy=REMEDY,
         )  # fmt: skip
-    triangles = _turned(piece.triangles, patches.turn)
+    triangles = _turned(piece.triangles, patches.flip)
     boundaries = patch_boundaries(triangles, patches.label, patches.count)
-    signs = signs_that_close(boundaries)
+    signs = closing_signs(boundaries)
     triangles = _turned(triangles, signs[patches.label] < 0.0)
     if (triangles != piece.triangles).any():
         repairs.append(f"{path}: made the orientation of the triangles agree")

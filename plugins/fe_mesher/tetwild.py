@@ -64,7 +64,7 @@ def tetrahedralize(
                 break
         assert found is not None
         if use_cache and not flat_tets(*found).any():
-            found = cache.store(key, points=found[0], tets=found[1])
+            found = cache.store(key, {"points": found[0], "tets": found[1]}, lambda kept: not flat_tets(*kept).any())
     return found[0], found[1]
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from calmotion.geometry.orientation import directed_edges, patch_boundaries, patches_of, signs_that_close
+from calmotion.geometry.orientation import closing_signs, directed_edges, patch_boundaries, patches_of
 from calmotion.geometry.tetrahedra import boundary_triangles, surface_volume
 
 
@@ -31,12 +31,12 @@ def test_turned_triangles_are_found_and_the_majority_stays(cube, share):
     mixed[::share] = mixed[::share][:, ::-1]
     patches = patches_of(mixed, ones(mixed))
     assert patches.count == 1 and len(patches.one_sided) == 0
-    assert np.array_equal(np.flatnonzero(patches.turn), np.arange(0, len(mixed), share))
+    assert np.array_equal(np.flatnonzero(patches.flip), np.arange(0, len(mixed), share))
 
 
 def test_what_agrees_is_left_alone_even_inside_out(cube):
     patches = patches_of(cube[1][:, ::-1], ones(cube[1]))
-    assert not patches.turn.any()
+    assert not patches.flip.any()
 
 
 def test_a_moebius_strip_has_one_side():
@@ -65,7 +65,7 @@ def test_patches_end_at_edges_of_more_than_two_triangles_and_turn_as_wholes(cube
     patches = patches_of(both, ones(both))
     assert patches.count == 3
     boundaries = patch_boundaries(both, patches.label, patches.count)
-    signs = signs_that_close(boundaries)
+    signs = closing_signs(boundaries)
     # whatever the wall does, no turning of whole patches makes fewer edges open than its own
     assert np.count_nonzero((boundaries * signs).sum(axis=1)) == 12
     rows = np.abs(boundaries[:, 0]) > 0.0
@@ -74,7 +74,7 @@ def test_patches_end_at_edges_of_more_than_two_triangles_and_turn_as_wholes(cube
     # without the wall the other two close, one of them turned
     (label,) = np.unique(patches.label[wall])
     outer = [k for k in range(3) if k != label]
-    pair = signs_that_close(boundaries[:, outer])
+    pair = closing_signs(boundaries[:, outer])
     turned = np.where(
         pair[np.searchsorted(outer, patches.label[~wall])][:, None] < 0, both[~wall][:, ::-1], both[~wall]
     )
@@ -83,5 +83,5 @@ def test_patches_end_at_edges_of_more_than_two_triangles_and_turn_as_wholes(cube
 
 def test_patches_that_fit_stay_as_they_are():
     boundaries = np.array([[1.0, -1.0], [-1.0, 1.0]])
-    assert signs_that_close(boundaries).tolist() == [1.0, 1.0]
-    assert abs(signs_that_close(np.abs(boundaries)).sum()) == 0.0
+    assert closing_signs(boundaries).tolist() == [1.0, 1.0]
+    assert abs(closing_signs(np.abs(boundaries)).sum()) == 0.0

@@ -64,19 +64,19 @@ def test_a_joint_that_rests_needs_no_hinge():
 def test_a_joint_that_turns_about_one_axis_needs_one():
     axis = np.array([[0.48, 0.6, 0.64]])
     row = hinges_for(turns(axis, waves(1)), 1e-7)
-    assert np.allclose(row.axes, axis) and np.allclose(row.angles, waves(1)) and row.off.max() < 1e-7
+    assert np.allclose(row.axes, axis) and np.allclose(row.angles, waves(1)) and row.residual.max() < 1e-7
 
 
 @pytest.mark.parametrize("oblique", [0.0, 0.3])
 def test_a_universal_joint_needs_two_also_where_oblique(oblique):
     axes = np.array([[0.0, 0.0, 1.0], [0.0, np.cos(oblique), np.sin(oblique)]])
     row = hinges_for(turns(axes, waves(2) * [1.0, 0.5]), np.radians(0.5))
-    assert len(row.axes) == 2 and row.off.max() < np.radians(0.5)
+    assert len(row.axes) == 2 and row.residual.max() < np.radians(0.5)
 
 
 def test_any_other_motion_needs_three_and_is_exact():
     row = hinges_for(turns(np.eye(3), waves(3)), 1e-7)
-    assert len(row.axes) == 3 and row.off.max() < 1e-7
+    assert len(row.axes) == 3 and row.residual.max() < 1e-7
     assert np.allclose(row.axes @ row.axes.T, np.eye(3), atol=1e-12)
     assert np.abs(np.diff(row.angles, axis=0)).max() < 0.3
 

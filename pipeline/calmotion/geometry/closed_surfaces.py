@@ -1,4 +1,4 @@
-"""Triangulated surfaces as oriented chains: what bounds them, closing small holes, inside and outside."""
+"""Triangulated surfaces as oriented chains: boundaries, closing of small holes, inside and outside."""
 
 from __future__ import annotations
 
@@ -28,11 +28,11 @@ class Closure:
 
 
 def boundary_walks(triangles: Indices) -> list[list[int]]:
-    """Closed walks along the boundary of a consistently oriented surface, in the direction that caps run in.
+    """Closed walks along the boundary of a consistently oriented surface, in the orientation of the caps.
 
-    Edges count with their direction, so edges with four triangles and the like cancel as they should. The boundary
-    of a boundary vanishes: as many edges leave each corner as arrive there, and every walk closes. A flat triangle
-    edge that is left over in both directions cancels.
+    Edges are counted with their direction: the boundary is the chain of edges that do not cancel, also where an edge
+    has four triangles. The boundary of a boundary is zero, so as many edges leave each corner as arrive there, and all
+    walks are closed.
     """
     start = triangles.ravel()
     end = np.roll(triangles, -1, axis=1).ravel()
@@ -42,7 +42,7 @@ def boundary_walks(triangles: Indices) -> list[list[int]]:
     np.add.at(net, inverse.ravel(), np.where(start < end, 1, -1))
     leaving: dict[int, list[int]] = {}
     for (a, b), count in zip(edges[net != 0].tolist(), net[net != 0].tolist(), strict=True):
-        # a cap runs against the surface along their common edge
+        # the cap has the opposite direction along the common edge
         tail, head = (b, a) if count > 0 else (a, b)
         leaving.setdefault(tail, []).extend([head] * abs(count))
     walks = []
@@ -55,17 +55,17 @@ def boundary_walks(triangles: Indices) -> list[list[int]]:
                 at[place] = len(walk)
                 walk.append(place)
                 place = leaving[place].pop()
-                if place in at:  # a loop is closed: cut it off, and go on from its corner
+                if place in at:  # the walk closes here: remove this part, and continue from its corner
                     loop = walk[at[place] :]
-                    for seen in loop:
-                        del at[seen]
+                    for corner_of_loop in loop:
+                        del at[corner_of_loop]
                     walk = walk[: len(walk) - len(loop)]
                     walks.append(loop)
     return walks
 
 
 def close(points: Array, triangles: Indices) -> Closure:
-    """Caps every hole of a consistently oriented surface with a fan.
+    """Cap each hole of a consistently oriented surface with a fan of triangles.
 
     Args:
         points: [m], shape [n, 3].
@@ -92,7 +92,7 @@ def close(points: Array, triangles: Indices) -> Closure:
 
 
 def winding_number(point: Array, points: Array, triangles: Indices) -> float:
-    """How often a surface winds around a point: 1 inside a closed outward surface, 0 outside.
+    """Winding number of a surface around a point: 1 inside a closed outward surface, 0 outside.
 
     Source: van Oosterom and Strackee 1983 (solid angle of a triangle); Jacobson et al. 2013.
     """

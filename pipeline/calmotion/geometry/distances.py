@@ -24,7 +24,7 @@ def closest_on_triangles(point: Array, triangles: Array) -> Array:
     candidates = np.stack([_closest_on_segments(point, p, q) for p, q in ((a, b), (b, c), (c, a))], axis=1)
     nearest = np.linalg.norm(candidates - point, axis=-1).argmin(axis=1)
     closest = candidates[np.arange(len(a)), nearest]
-    # the foot of the perpendicular, where it falls inside the triangle, is nearer than any edge
+    # the foot of the perpendicular is nearer than any edge where it is inside the triangle
     n = np.cross(b - a, c - a)
     area2 = np.einsum("ij,ij->i", n, n)
     good = area2 > 0.0
@@ -45,19 +45,20 @@ def _closest_on_segments(point: Array, a: Array, b: Array) -> Array:
 
 
 def ray_length(origin: Array, direction: Array, triangles: Array, skip: float) -> float:
-    """Distance along a unit direction to the first triangle that is farther than `skip`; infinite without one.
+    """Distance along a ray to the first triangle that is farther than `skip`; infinite without one.
 
     Args:
-        origin, direction: Shape [3].
+        origin: [m], shape [3].
+        direction: Unit vector, shape [3].
         triangles: Corners [m], shape [k, 3, 3].
-        skip: [m]; hits nearer than this are the surface that the ray starts on.
+        skip: [m]; nearer hits are on the surface where the ray starts.
     """
     return float(first_hit(*(np.ascontiguousarray(part) for part in (origin, direction, triangles)), float(skip)))
 
 
 @kernel
 def first_hit(origin, direction, triangles, skip):
-    """`ray_length`, of contiguous arrays.
+    """`ray_length` of contiguous arrays.
 
     Source: Möller and Trumbore 1997.
     """
@@ -73,7 +74,7 @@ def first_hit(origin, direction, triangles, skip):
         if not abs(det) > 1e-12 * scale:
             continue
         s0, s1, s2 = origin[0] - a[0], origin[1] - a[1], origin[2] - a[2]
-        # a slight widening: a ray along an edge must not slip between its two triangles
+        # triangles are slightly enlarged: a ray along an edge must not pass between two of them
         u = (s0 * p0 + s1 * p1 + s2 * p2) / det
         if u < -1e-9 or u > 1.0 + 1e-9:
             continue

@@ -13,9 +13,9 @@ def mass_of_tets(points: Array, tets: IntArray, density: float, mass: float | No
 
     Args:
         points: [m], shape [n, 3].
-        tets: Shape [m, 4], either way round.
+        tets: Shape [m, 4], of either orientation.
         density: [kg/m^3].
-        mass: Total mass [kg] that the density is scaled to; None keeps it.
+        mass: Total mass to which the density is scaled [kg]; None keeps the density.
 
     Source: int x x^T over a tetrahedron is V (sum x_i x_i^T + (sum x_i)(sum x_i)^T) / 20.
     """

@@ -1,4 +1,4 @@
-"""Triangles made to agree on which side is out: patches between non-manifold edges, turned as wholes."""
+"""Consistent orientation of triangles: patches between non-manifold edges, each of which is flipped as a whole."""
 
 from __future__ import annotations
 
@@ -12,23 +12,23 @@ from calmotion.shot.character import Array, BoolArray
 
 @dataclass(frozen=True, eq=False)
 class Patches:
-    """Triangles that hang together over edges of exactly two triangles.
+    """Sets of triangles that are connected by edges with exactly two triangles.
 
     Attributes:
         label: Patch of each triangle, 0 to `count` - 1, shape [m].
-        turn: Triangles to be turned so that each patch agrees with itself, bool, shape [m].
-        one_sided: Patches that cannot agree, as a Moebius strip cannot, ascending.
+        flip: Triangles to flip so that the orientation of each patch is consistent, shape [m].
+        one_sided: Patches without a consistent orientation, such as a Moebius strip, ascending.
         count: Number of patches.
     """
 
     label: Indices
-    turn: BoolArray
+    flip: BoolArray
     one_sided: Indices
     count: int
 
 
 def patches_of(triangles: Indices, areas: Array) -> Patches:
-    """The patches of a surface, each turned the way that most of its area is turned already.
+    """The patches of a surface, each with the orientation of most of its area.
 
     Args:
         triangles: Shape [m, 3].
@@ -44,28 +44,32 @@ def patches_of(triangles: Indices, areas: Array) -> Patches:
     twice = first[np.diff(np.append(first, len(order))) == 2]
     one, two = order[twice], order[twice + 1]
     faces = np.stack([one, two]) // 3
-    clash = forward[one] == forward[two]  # neighbours that agree run along their edge in opposite directions
+    clash = forward[one] == forward[two]  # consistent neighbours have opposite directions along their edge
     # two triangles may share two edges; the matrix then holds their sum
     graph = coo_matrix((np.ones(len(clash)), (faces[0], faces[1])), shape=(m, m)).tocsr()
     count, label = connected_components(graph, directed=False)
-    turn = np.zeros(m, dtype=bool)
+    flip = np.zeros(m, dtype=bool)
     if clash.any():
         differs: dict[tuple[int, int], bool] = {}
         for a, b, c in zip(*faces.tolist(), clash.tolist(), strict=True):
             differs[a, b] = differs[b, a] = c
         for patch in np.unique(label[faces[0][clash]]):
             start = int(np.flatnonzero(label == patch)[0])
-            found, before = breadth_first_order(graph, start, directed=False)
-            for face in found[1:].tolist():
-                turn[face] = turn[before[face]] ^ differs[face, int(before[face])]
-            if areas[found[turn[found]]].sum() > 0.5 * areas[found].sum():
-                turn[found] = ~turn[found]
-    wrong = clash ^ turn[faces[0]] ^ turn[faces[1]]
-    return Patches(label, turn, np.unique(label[faces[0][wrong]]), int(count))
+            faces_of_patch, before = breadth_first_order(graph, start, directed=False)
+            for face in faces_of_patch[1:].tolist():
+                flip[face] = flip[before[face]] ^ differs[face, int(before[face])]
+            if areas[faces_of_patch[flip[faces_of_patch]]].sum() > 0.5 * areas[faces_of_patch].sum():
+                flip[faces_of_patch] = ~flip[faces_of_patch]
+    wrong = clash ^ flip[faces[0]] ^ flip[faces[1]]
+    return Patches(label, flip, np.unique(label[faces[0][wrong]]), int(count))
 
 
 def directed_edges(triangles: Indices) -> tuple[Indices, BoolArray]:
-    """For each side of each triangle, [3m]: the number of its edge, and if it runs from low to high corner."""
+    """For each side of each triangle: the index of its edge, and whether it goes from the lower to the higher corner.
+
+    Returns:
+        Both of shape [3m].
+    """
     start = triangles.ravel()
     end = np.roll(triangles, -1, axis=1).ravel()
     low, high = np.minimum(start, end).astype(np.int64), np.maximum(start, end)
@@ -74,7 +78,7 @@ def directed_edges(triangles: Indices) -> tuple[Indices, BoolArray]:
 
 
 def patch_boundaries(triangles: Indices, label: Indices, count: int) -> Array:
-    """What bounds each patch: net passes along each edge that bounds some patch, dense, shape [edges, count]."""
+    """Boundary of each patch: net number of passes along each boundary edge, dense, shape [edges, count]."""
     from scipy.sparse import coo_matrix
 
     edge, forward = directed_edges(triangles)
@@ -84,14 +88,14 @@ def patch_boundaries(triangles: Indices, label: Indices, count: int) -> Array:
     return net[np.flatnonzero(np.diff(net.indptr))].toarray()
 
 
-def signs_that_close(boundaries: Array) -> Array:
-    """For each patch 1 or -1 (turned), so that the patches together have as little boundary as turning can reach.
+def closing_signs(boundaries: Array) -> Array:
+    """Signs of the patches, -1 for a flip, that reduce the length of their common boundary greedily.
 
     Args:
         boundaries: Of `patch_boundaries`, shape [edges, k].
 
     Returns:
-        Shape [k]. Greedy: the turn that helps most first, until none helps; patches that fit already stay.
+        Shape [k]. The flip with the largest reduction comes first, until none reduces it.
     """
     signs = np.ones(boundaries.shape[1])
     total = boundaries.sum(axis=1)

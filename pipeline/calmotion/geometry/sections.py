@@ -1,4 +1,4 @@
-"""Cross sections of a closed triangulated surface by planes across an axis: how large, where, and how full they are."""
+"""Cross sections of a closed triangulated surface by planes normal to an axis: area, moments, extent, outline."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ class Sections:
 
     Attributes:
         stations: Distance along the axis from its origin [m], shape [n].
-        area: [m^2], shape [n]; 0 where the plane meets nothing.
-        centroid: [m], shape [n, 3], axes of the points; the axis itself where the plane meets nothing.
+        area: [m^2], shape [n]; 0 where the plane does not intersect the surface.
+        centroid: [m], shape [n, 3], axes of the points; on the axis where the plane does not intersect the surface.
         second: Principal second moments of area about the centroid, ascending [m^4], shape [n, 2].
         extent: Sides of the bounding box in the principal axes [m], shape [n, 2]: along the axis of the smaller
             second moment's bending, so that a rectangle has its thickness first.
-        outline: Length of all outlines, of holes as well [m], shape [n].
+        outline: Length of all outlines, including those of holes [m], shape [n].
     """
 
     stations: Array
@@ -33,25 +33,25 @@ class Sections:
 
     @property
     def fill(self) -> Array:
-        """Area over that of the bounding box, shape [n]: 1 for a rectangle, pi/4 for an ellipse, little for a tube."""
+        """Area over that of the bounding box, shape [n]: 1 for a rectangle, pi/4 for an ellipse, small for a tube."""
         return self.area / np.maximum(self.extent.prod(axis=1), np.finfo(float).tiny)
 
     @property
     def compactness(self) -> Array:
-        """Area over that of the circle with the same outline, shape [n]: 1 for a circle, little for thin walls."""
+        """Area over that of the circle with the same outline, shape [n]: 1 for a circle, small for thin walls."""
         return 4.0 * np.pi * self.area / np.maximum(self.outline**2, np.finfo(float).tiny)
 
     @property
     def depth(self) -> Array:
-        """Twice the area over the outline [m], shape [n]: of a thin wall its thickness, of a square half its side."""
+        """Twice the area over the outline [m], shape [n]: the thickness of a thin wall, half the side of a square."""
         return 2.0 * self.area / np.maximum(self.outline, np.finfo(float).tiny)
 
 
 def cross_sections(points: Array, triangles: Indices, origin: Array, axis: Array, stations: Array) -> Sections:
-    """Sections by the planes across an axis.
+    """Sections by planes normal to an axis.
 
-    A corner in a plane counts as below it, so that the section is the one just beyond, outlines always close, and
-    faces within the plane do not matter.
+    A corner in a plane counts as below it. The section is therefore the one just above the plane, all outlines are
+    closed, and faces in the plane have no effect.
 
     Args:
         points: [m], shape [n, 3].
@@ -69,7 +69,7 @@ def cross_sections(points: Array, triangles: Indices, origin: Array, axis: Array
     def total(values: Array) -> Array:
         return np.bincount(which, values, minlength=count).astype(float)
 
-    # about the middle of each outline, so that one far from the axis loses no digits
+    # about the center of each outline, against cancellation far from the axis
     corners = np.maximum(total(np.ones(len(which))), 1.0)
     middle = np.stack([total(start[:, k]) / corners for k in range(2)], axis=1)
     p, q = start - middle[which], end - middle[which]
@@ -100,7 +100,7 @@ def cross_sections(points: Array, triangles: Indices, origin: Array, axis: Array
 def outlines(
     points: Array, triangles: Indices, origin: Array, axis: Array, stations: Array
 ) -> tuple[Indices, Array, Array]:
-    """The segments that bound sections, anticlockwise around material, seen against the axis.
+    """The segments that bound sections, anticlockwise around the material, seen against the axis.
 
     Args:
         points, triangles, origin, axis, stations: As of `cross_sections`.
@@ -118,7 +118,7 @@ def outlines(
     above = height[triangle] > level[:, None]
     after = np.roll(above, -1, axis=1)
     ends = []
-    # an outward face is left along its falling edge and entered along its rising one
+    # the outline leaves an outward face at its descending edge and enters it at its ascending edge
     for crossing in (above & ~after, ~above & after):
         edge = crossing.argmax(axis=1)
         a, b = corners[triangle, edge], corners[triangle, (edge + 1) % 3]

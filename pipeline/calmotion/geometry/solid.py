@@ -1,4 +1,4 @@
-"""Whether a body's geometry is one well-formed solid as it is, without repair, and what such a solid weighs."""
+"""The solid of a body whose geometry needs no repair, and its mass properties."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from calmotion.geometry.closed_surfaces import winding_number
 from calmotion.geometry.tetrahedra import Indices, boundary_triangles, oriented_tets, surface_volume
 from calmotion.shot.character import Array, Body, MassProperties, SurfaceMesh
 
-_FLAT = 1e-9  # of the cube of a part's size: a part without volume
+_FLAT = 1e-9  # volume of a component without volume, of the cube of its size
 
 
 @dataclass(frozen=True, eq=False)
@@ -21,7 +21,7 @@ class Solid:
 
     Attributes:
         points: [m], shape [n, 3], body frame.
-        triangles: Its closed surface, outward, that of cavities inward, shape [m, 3].
+        triangles: Its closed surface, outward; that of cavities inward, shape [m, 3].
         mass: Mass properties of its material.
     """
 
@@ -31,13 +31,13 @@ class Solid:
 
 
 def solid_of(body: Body) -> Solid | None:
-    """The solid that a flexible body is, with the mass of its finite elements but for what their mesh rounds off.
+    """The solid of a flexible body, with the mass of its finite elements up to the accuracy of their mesh.
 
-    Authored tetrahedra come before surfaces, as for the mesh. A `mass` of the body scales the density.
+    Authored tetrahedra take precedence over surfaces, as for the mesh. A `mass` of the body scales the density.
 
     Returns:
-        None where only meshing tells: it is not flexible, its geometry is in a file, it has no density, or its surfaces
-        are not one outward component, closed edge by edge, with no more than cavities inside.
+        None where the solid is not known without meshing: the body is not flexible, its geometry is in a file, it has
+        no density, or its surfaces are not one closed outward component with cavities.
     """
     if body.flexible is None or (body.flexible.mesh_file and body.tets is None):
         return None
@@ -48,22 +48,22 @@ def solid_of(body: Body) -> Solid | None:
     parts = _components(triangles)
     if parts is None or not _is_one_solid(points, triangles, parts):
         return None
-    own = None if body.mass is None else body.mass.mass
-    return Solid(points, triangles, mass_of_solid(points, triangles, body.flexible.material.density, own))
+    mass = None if body.mass is None else body.mass.mass
+    return Solid(points, triangles, mass_of_solid(points, triangles, body.flexible.material.density, mass))
 
 
 def mass_of_solid(points: Array, triangles: Indices, density: float, mass: float | None = None) -> MassProperties:
-    """Mass properties of what a closed surface encloses, exact.
+    """Mass properties of the inside of a closed surface, exact.
 
     Args:
         points: [m], shape [n, 3].
         triangles: Shape [m, 3], outward, those of cavities inward.
         density: [kg/m^3].
-        mass: Total mass [kg] that the density is scaled to; None keeps it.
+        mass: Total mass to which the density is scaled [kg]; None keeps the density.
 
-    Source: as of `fem.mesh_mass.mass_of_tets`, over the signed tetrahedra of the triangles and one point.
+    Source: as of `mesh_mass.mass_of_tets`, over the signed tetrahedra of the triangles and one point.
     """
-    middle = points.mean(axis=0)  # near the solid: no cancellation far from the origin
+    middle = points.mean(axis=0)  # against cancellation far from the origin
     corners = (points - middle)[triangles]
     volume = np.linalg.det(corners) / 6.0
     weight = volume * (density if mass is None else mass / float(volume.sum()))
@@ -76,11 +76,11 @@ def mass_of_solid(points: Array, triangles: Indices, density: float, mass: float
 
 
 def _outside(body: Body) -> tuple[Array, Indices] | None:
-    """Points, those at one place counting as one, and triangles of a body; None where they name nothing."""
+    """Points, merged where they coincide, and triangles of a body; None where they are not valid."""
     if body.tets is not None:
         try:
             tets, _ = oriented_tets(body.tets.points, body.tets.tets)
-        except ShotError:  # the mesher tells the user
+        except ShotError:  # the mesher reports it
             return None
         return _welded(np.asarray(body.tets.points, dtype=float), boundary_triangles(tets))
     surfaces = _without_copies(body.surfaces)
@@ -106,7 +106,7 @@ def _welded(points: Array, triangles: Indices) -> tuple[Array, Indices] | None:
 
 
 def _without_copies(surfaces: Sequence[SurfaceMesh]) -> list[SurfaceMesh]:
-    """Surfaces that have triangles, without those that repeat another one, as collision geometry often does."""
+    """Surfaces with triangles, without copies of other ones, which collision geometry often contains."""
     kept: list[SurfaceMesh] = []
     for surface in surfaces:
         copied = any(
@@ -119,7 +119,7 @@ def _without_copies(surfaces: Sequence[SurfaceMesh]) -> list[SurfaceMesh]:
 
 
 def _components(triangles: Indices) -> Indices | None:
-    """Number of the component of each triangle, by common edges; None unless each edge has two, opposed."""
+    """Index of the connected component of each triangle; None unless each edge has two consistent triangles."""
     start, end = triangles.ravel().astype(np.int64), np.roll(triangles, -1, axis=1).ravel().astype(np.int64)
     count = int(triangles.max()) + 1
     forward, backward = start * count + end, end * count + start
@@ -132,7 +132,7 @@ def _components(triangles: Indices) -> Indices | None:
     label = np.arange(len(triangles))
     while True:
         least = np.minimum(label, label[neighbour].min(axis=1))
-        np.minimum.at(least, label, least.copy())  # all that is known to hang together follows
+        np.minimum.at(least, label, least.copy())  # all triangles of the label so far
         least = least[least]
         if np.array_equal(least, label):
             return np.unique(label, return_inverse=True)[1].reshape(-1)
@@ -144,12 +144,12 @@ def _is_one_solid(points: Array, triangles: Indices, parts: Indices) -> bool:
     outer: list[Indices] = []
     cavities: list[Indices] = []
     for k in range(int(parts.max()) + 1):
-        own = triangles[parts == k]
-        corners = points[np.unique(own)]
-        volume = surface_volume(corners, np.searchsorted(np.unique(own), own))
+        component = triangles[parts == k]
+        corners = points[np.unique(component)]
+        volume = surface_volume(corners, np.searchsorted(np.unique(component), component))
         if abs(volume) <= _FLAT * float(np.linalg.norm(np.ptp(corners, axis=0))) ** 3:
             return False
-        (outer if volume > 0.0 else cavities).append(own)
+        (outer if volume > 0.0 else cavities).append(component)
     if len(outer) != 1:
         return False
-    return all(winding_number(points[own[0, 0]], points, outer[0]) > 0.5 for own in cavities)
+    return all(winding_number(points[cavity[0, 0]], points, outer[0]) > 0.5 for cavity in cavities)

@@ -11,7 +11,7 @@ from calmotion.errors import ShotError
 from calmotion.shot.character import Array, BoolArray, IntArray
 from calmotion.shot.meshes import MeshQuality
 
-Indices = NDArray[np.integer[Any]]  # of any width, inside the engine
+Indices = NDArray[np.integer[Any]]  # integers of any width
 
 _FACES = np.array([[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]])  # face i is opposite corner i, outward
 
@@ -47,7 +47,7 @@ def min_dihedral_deg(points: Array, tets: IntArray) -> float:
 
 def surface_volume(points: Array, triangles: Indices) -> float:
     """Volume enclosed by a closed, consistently outward surface [m^3] (divergence theorem)."""
-    # about the centroid, so that a surface far from the origin loses no digits
+    # about the centroid, against cancellation far from the origin
     x = (points - points.mean(axis=0))[triangles]
     return float(np.einsum("ij,ij->", np.cross(x[:, 0], x[:, 1]), x[:, 2]) / 6.0)
 
@@ -59,14 +59,14 @@ def surface_area(points: Array, triangles: Indices) -> float:
 
 
 def flat_tets(points: Array, tets: IntArray) -> BoolArray:
-    """Which tetrahedra have no volume, but for rounding; points of shape [n, 3], tetrahedra [m, 4]."""
+    """Whether each tetrahedron has no volume but rounding, shape [m]; points of shape [n, 3], tetrahedra [m, 4]."""
     x = points[tets]
     edge = np.linalg.norm(x[:, [1, 2, 3, 2, 3, 3]] - x[:, [0, 0, 0, 1, 1, 2]], axis=-1).max(axis=1)
     return np.abs(tet_volumes(points, tets)) <= 1e-9 * edge**3
 
 
 def oriented_tets(points: Array, tets: IntArray, path: str = "") -> tuple[IntArray, int]:
-    """The tetrahedra with corners swapped where that makes a volume positive.
+    """The tetrahedra with corners swapped where the volume was negative.
 
     Args:
         points: [m], shape [n, 3].
@@ -74,7 +74,7 @@ def oriented_tets(points: Array, tets: IntArray, path: str = "") -> tuple[IntArr
         path: Prim path or file for the error.
 
     Returns:
-        The tetrahedra, int32, shape [m, 4], and how many were turned.
+        The tetrahedra, int32, shape [m, 4], and the number of swaps.
 
     Raises:
         ShotError: No tetrahedra, an index out of range, a point that is not finite, or a flat element.
@@ -82,7 +82,7 @@ def oriented_tets(points: Array, tets: IntArray, path: str = "") -> tuple[IntArr
     tets = np.array(tets, dtype=np.int32).reshape(-1, 4)
     remedy = "Author a TetMesh with valid elements, or remove it so that a closed Mesh is tetrahedralised"
     if len(tets) == 0:
-        raise ShotError("has no tetrahedra", path=path, found=0, remedy=remedy)
+        raise ShotError("the mesh has no tetrahedra", path=path, found=0, remedy=remedy)
     if tets.min() < 0 or tets.max() >= len(points):
         raise ShotError(
             "a tetrahedron names a point that does not exist",
@@ -97,34 +97,34 @@ def oriented_tets(points: Array, tets: IntArray, path: str = "") -> tuple[IntArr
             "a tetrahedron has no volume",
             path=path, found=f"element {element}, {volumes[element]:.3g} m^3", remedy=remedy,
         )  # fmt: skip
-    turned = volumes < 0.0
-    tets[turned] = tets[turned][:, [0, 2, 1, 3]]
-    return tets, int(turned.sum())
+    inverted = volumes < 0.0
+    tets[inverted] = tets[inverted][:, [0, 2, 1, 3]]
+    return tets, int(inverted.sum())
 
 
 def without_unused_points(points: Array, tets: IntArray) -> tuple[Array, IntArray]:
-    """Points that some tetrahedron uses, in their order, and the tetrahedra renumbered."""
+    """Points that tetrahedra use, in their order, and the renumbered tetrahedra."""
     used, inverse = np.unique(tets, return_inverse=True)
     return np.ascontiguousarray(points[used]), inverse.reshape(tets.shape).astype(np.int32)
 
 
 def welded_tets(points: Array, tets: IntArray, tolerance: float) -> tuple[Array, IntArray, int]:
-    """Tetrahedra whose points in one place are one point.
+    """Tetrahedra with coincident points merged.
 
     Args:
         points: [m], shape [n, 3], every one used.
         tets: Shape [m, 4].
-        tolerance: Largest distance of points in one place, as a part of the bounding box's diagonal.
+        tolerance: Largest distance of coincident points, relative to the diagonal of the bounding box.
 
     Returns:
-        Points, tetrahedra, and how many points went into others.
+        Points, tetrahedra, and the number of points that were merged into others.
     """
     from scipy.sparse import coo_matrix
     from scipy.sparse.csgraph import connected_components
     from scipy.spatial import cKDTree
 
-    reach = tolerance * float(np.linalg.norm(np.ptp(points, axis=0)))
-    pairs = cKDTree(points).query_pairs(reach, output_type="ndarray")
+    distance = tolerance * float(np.linalg.norm(np.ptp(points, axis=0)))
+    pairs = cKDTree(points).query_pairs(distance, output_type="ndarray")
     n = len(points)
     graph = coo_matrix((np.ones(len(pairs)), pairs.T.reshape(2, -1)), shape=(n, n))
     count, label = connected_components(graph, directed=False)
@@ -134,7 +134,7 @@ def welded_tets(points: Array, tets: IntArray, tolerance: float) -> tuple[Array,
 
 
 def connected_parts(tets: IntArray) -> int:
-    """Number of parts that share no point; 1 for a body that holds together."""
+    """Number of parts that share no point; 1 for a connected body."""
     from scipy.sparse import coo_matrix
     from scipy.sparse.csgraph import connected_components
 
@@ -153,8 +153,8 @@ def measure_quality(
     Args:
         points: [m], shape [n, 3].
         tets: Shape [m, 4].
-        surface_volume: Volume of the surface it was made from [m^3]; None where there was none.
-        repairs: What was repaired before.
+        surface_volume: Volume of the surface that was meshed [m^3]; None where there was none.
+        repairs: Repairs of this surface.
     """
     volume = float(tet_volumes(points, tets).sum())
     error = 0.0 if surface_volume is None else abs(volume - surface_volume) / surface_volume

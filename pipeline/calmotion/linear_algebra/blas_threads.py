@@ -1,8 +1,8 @@
-"""One thread for the dense products of a factorisation.
+"""Dense products of a factorisation in one thread.
 
-OpenBLAS keeps its threads spinning between calls. Where a factorisation calls it thousands of times, or another
-process wants the cores, they wait for each other: on two cores that are also used by others a product of 0.4 ms took
-8 ms. One thread is never much slower here and often ten times faster.
+The threads of OpenBLAS spin between calls. A factorisation calls it thousands of times, and other processes may use the
+cores: on two cores shared with other processes a product of 0.4 ms took 8 ms. One thread is at most slightly slower
+here and often ten times faster.
 """
 
 from __future__ import annotations
@@ -15,8 +15,8 @@ from typing import Any
 
 @cache
 def _controller() -> Any:
-    """Looking for the loaded libraries takes milliseconds: once."""
-    import scipy.linalg  # noqa: F401  SciPy may bring a BLAS of its own
+    """The controller of the loaded libraries; the search for them takes milliseconds."""
+    import scipy.linalg  # noqa: F401  SciPy may load its own BLAS
     from threadpoolctl import ThreadpoolController
 
     return ThreadpoolController()
@@ -24,6 +24,6 @@ def _controller() -> Any:
 
 @contextmanager
 def one_blas_thread() -> Iterator[None]:
-    """Within it NumPy's and SciPy's dense products use one thread."""
+    """Context in which the dense products of NumPy and SciPy use one thread."""
     with _controller().limit(limits=1, user_api="blas"):
         yield

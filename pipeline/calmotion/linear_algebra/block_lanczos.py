@@ -1,7 +1,7 @@
-"""Lowest eigenpairs by a block Lanczos method on the inverse, with every vector kept orthogonal to all before.
+"""Lowest eigenpairs by the block Lanczos method on the inverse, with full reorthogonalisation.
 
-A block of vectors costs little more than one of them: the factors are read once for all. And a block finds all modes
-of one frequency (both bending pairs of a square link), where a single vector sees one of them.
+A block of vectors costs little more than one vector, because the factors are read once. A block also converges to all
+modes of a multiple frequency (both bending modes of a square link), a single vector only to one of them.
 
 Source: Golub and Underwood, The Block Lanczos Method for Computing Eigenvalues, 1977; Grimes, Lewis and Simon, A
 Shifted Block Lanczos Algorithm, SIAM Journal on Matrix Analysis and Applications 15(1), 1994.
@@ -17,10 +17,10 @@ from calmotion.linear_algebra.blas_threads import one_blas_thread
 from calmotion.linear_algebra.sparse_solver import SparseSolver
 from calmotion.shot.character import Array
 
-_WIDTH = 8
-_CONVERGED = 1e-10  # of the eigenvalue of the inverse: error of a mode; that of its frequency is its square
-_ROUNDING = 2e-15  # of the largest eigenvalue of the inverse: no residual is smaller than that
-_DEPENDENT = 1e-13
+_WIDTH = 8  # vectors of a block
+_CONVERGED = 1e-10  # residual over the eigenvalue of the inverse; the error of the frequency is its square
+_ROUNDING = 2e-15  # smallest possible residual over the largest eigenvalue of the inverse
+_DEPENDENT = 1e-13  # relative norm of linearly dependent vectors
 _MOST_STEPS = 200
 
 
@@ -31,11 +31,11 @@ def lowest_by_lanczos(
 
     Args:
         K, M: Sparse symmetric, shape [n, n], M positive definite.
-        count: How many; with `below` the fewest.
+        count: Number of pairs; with `below` the least number.
         shift: Of the solver.
         solver: Of K + shift M.
-        below: Every eigenvalue up to this one is found, and one above it.
-        most: But no more than this many.
+        below: All eigenvalues up to this one are computed, and one above it.
+        most: Largest number of pairs.
 
     Returns:
         Values, ascending, shape [count or more], and M-orthonormal vectors, shape [n, count or more].
@@ -52,7 +52,7 @@ def _lanczos(
 ) -> tuple[Array, Array]:
     n = K.shape[0]
     width = min(_WIDTH, max(2, count // 2), n)
-    # fixed, so that a run repeats to the last bit
+    # fixed, so that runs are reproducible
     start = np.random.default_rng(20190712).standard_normal((n, width))
     blocks: list[Array] = []
     block, _ = _normalized(solver.solve(M @ start), M, blocks, None)
@@ -93,16 +93,16 @@ def _combined(blocks: list[Array], share: Array) -> Array:
 
 
 def _normalized(W: Array, M: Any, blocks: list[Array], inner: Array | None) -> tuple[Array, Array]:
-    """M-orthonormal columns that span W beyond the blocks, and the factor R with W = blocks (...) + columns R.
+    """M-orthonormal columns of the part of W orthogonal to the blocks, and R with W = blocks (...) + columns R.
 
     Args:
         inner: Products of the blocks with M W; None when there are no blocks.
     """
     R = np.eye(W.shape[1])
     largest = np.sqrt(np.einsum("ij,ij->j", W, M @ W).max(initial=0.0)) if inner is None else np.abs(inner).max()
-    for turn in range(2):  # twice is enough
+    for repetition in range(2):  # the second pass removes the rounding of the first
         if inner is not None:
-            W = W - _combined(blocks, _inner(blocks, M @ W) if turn else inner)
+            W = W - _combined(blocks, _inner(blocks, M @ W) if repetition else inner)
         MW = M @ W
         gram = W.T @ MW
         values, vectors = np.linalg.eigh(0.5 * (gram + gram.T))
@@ -115,7 +115,7 @@ def _normalized(W: Array, M: Any, blocks: list[Array], inner: Array | None) -> t
 
 
 def _refined(K: Any, M: Any, modes: Array) -> tuple[Array, Array]:
-    """The eigenproblem in the span of the modes: values that are accurate to the square of the modes' error."""
+    """Ritz values and vectors in the span of the modes; the error of the values is the square of that of the modes."""
     from scipy.linalg import eigh
 
     values, U = eigh(modes.T @ (K @ modes), modes.T @ (M @ modes))

@@ -1,8 +1,8 @@
 """Sparse Cholesky factors as a tree of dense blocks, by BLAS and LAPACK on all cores.
 
-Eliminating a piece of the nested dissection touches the piece and its border, the nodes of pieces above it that
-elimination has connected it with. Their matrix (the front) gets the entries of the matrix and what the pieces below
-left on it (their Schur complements). Everything is dense there, so the work runs at the speed of matrix products.
+The elimination of a piece of the nested dissection involves the piece and its border: the nodes of pieces above it to
+which the elimination has connected it. Their dense matrix (the front) is the sum of the entries of the matrix and of
+the Schur complements of the pieces below. All work is on dense blocks, at the speed of matrix products.
 
 Source: Duff and Reid, The Multifrontal Solution of Indefinite Sparse Symmetric Linear Equations, ACM Transactions on
 Mathematical Software 9(3), 1983; Liu, The Multifrontal Method for Sparse Matrix Solution, SIAM Review 34(1), 1992.
@@ -21,7 +21,7 @@ from calmotion.support.compilation import kernel
 
 
 class NotPositiveDefinite(ArithmeticError):
-    """A matrix has no Cholesky factors: a body that is not held, or numbers that are not finite."""
+    """A matrix has no Cholesky factors: a body with a rigid motion, or numbers that are not finite."""
 
 
 @kernel
@@ -41,43 +41,43 @@ def _add_block(target: Array, update: Array, split: int, at: Array) -> None:
 
 
 class _Complements:
-    """Schur complements that wait for the piece above, each from the end of its own elimination until then.
+    """Schur complements between the elimination of a piece and that of the piece above it.
 
-    Children come before parents and no piece comes between: those of pieces at even depth are a stack, and those at
-    odd depth are another one, so that a complement never lies where one that it is made of lies.
+    Pieces are eliminated in postorder, so the complements form stacks: one of pieces at even depth and one of pieces at
+    odd depth. A complement is therefore never in the same stack as those that it is computed from.
     """
 
     def __init__(self, parent: Any, outer: Any):
         self._outer = outer
-        self._below: list[list[int]] = [[] for _ in parent]
+        self._children: list[list[int]] = [[] for _ in parent]
         depth = np.zeros(len(parent), dtype=np.int64)
         for k in range(len(parent) - 1, -1, -1):
             if parent[k] >= 0:
-                self._below[parent[k]].insert(0, k)
+                self._children[parent[k]].insert(0, k)
                 depth[k] = depth[parent[k]] + 1
         self._odd = depth % 2
         top, most = [0, 0], [0, 0]
         for k, odd in enumerate(self._odd):
             top[odd] += int(outer[k]) ** 2
             most[odd] = max(most[odd], top[odd])
-            top[1 - odd] -= sum(int(outer[j]) ** 2 for j in self._below[k])
+            top[1 - odd] -= sum(int(outer[j]) ** 2 for j in self._children[k])
         self._stacks = [np.empty(size) for size in most]
         self._top = [0, 0]
 
     def below(self, k: int) -> list[int]:
-        """The pieces right below a piece, last first."""
-        return self._below[k][::-1]
+        """The children of a piece, last first."""
+        return self._children[k][::-1]
 
     def push(self, k: int) -> Array:
-        """Room for the complement of a piece, zero, shape [outer, outer]."""
+        """A zero matrix for the complement of a piece, shape [outer, outer]."""
         odd, m = self._odd[k], int(self._outer[k])
         self._top[odd] += m * m
-        room = self._stacks[odd][self._top[odd] - m * m : self._top[odd]].reshape((m, m), order="F")
-        room[...] = 0.0
-        return room
+        complement = self._stacks[odd][self._top[odd] - m * m : self._top[odd]].reshape((m, m), order="F")
+        complement[...] = 0.0
+        return complement
 
     def pop(self, k: int) -> Array:
-        """The complement that was pushed last at this depth, valid until the next push."""
+        """The last complement of this depth, valid until the next push."""
         odd, m = self._odd[k], int(self._outer[k])
         self._top[odd] -= m * m
         return self._stacks[odd][self._top[odd] : self._top[odd] + m * m].reshape((m, m), order="F")
@@ -87,13 +87,13 @@ class MultifrontalCholesky:
     """Factors L L^T of a permuted symmetric positive definite matrix.
 
     Args:
-        matrix: Sparse, shape [n, n]; its lower triangle is read.
+        matrix: Sparse, shape [n, n]; only its lower triangle is read.
         graph: Sparse CSR pattern of its blocks, shape [n / block, n / block].
         dissection: Of the graph.
         block: Degrees of freedom of a node of the graph.
 
     Raises:
-        NotPositiveDefinite: It is not.
+        NotPositiveDefinite: The matrix is not positive definite.
     """
 
     def __init__(self, matrix: Any, graph: Any, dissection: Dissection, block: int):
@@ -101,14 +101,14 @@ class MultifrontalCholesky:
         self._order = (block * order[:, None] + np.arange(block)).ravel()
         self._start = block * dissection.start
         self._borders = [_expand(b, block) for b in _borders(graph[order][:, order].tocsr(), dissection)]
-        own = np.diff(self._start)
+        size = np.diff(self._start)
         outer = np.array([len(border) for border in self._borders], dtype=np.int64)
-        # one array for everything: the system then maps large pages, and no page twice
-        offset = np.concatenate([[0], np.cumsum(own * (own + outer))])
+        # one array for all blocks: the system then uses large pages
+        offset = np.concatenate([[0], np.cumsum(size * (size + outer))])
         self.entries = int(offset[-1])
         self._factors = np.zeros(self.entries)
         self._diagonal, self._below = [], []
-        for at, k, m in zip(offset[:-1], own, outer, strict=True):
+        for at, k, m in zip(offset[:-1], size, outer, strict=True):
             self._diagonal.append(self._factors[at : at + k * k].reshape((k, k), order="F"))
             self._below.append(self._factors[at + k * k : at + k * (k + m)].reshape((m, k), order="F"))
         with one_blas_thread():
@@ -139,9 +139,9 @@ class MultifrontalCholesky:
                 _add_triangle(F11, update, 0, at[:split])
                 _add_block(F21, update, split, at)
                 _add_triangle(F22, update, split, at[split:])
-            # the results take the place of the arguments: all are contiguous in the order of Fortran
+            # the results overwrite the arguments, which are contiguous in Fortran order
             _, info = dpotrf(F11, lower=1, clean=1, overwrite_a=1)
-            # OpenBLAS lets numbers pass that are none
+            # OpenBLAS does not report NaN
             if info != 0 or not np.isfinite(F11.diagonal()).all():
                 raise NotPositiveDefinite("the matrix is not positive definite")
             if len(border):
@@ -168,7 +168,7 @@ class MultifrontalCholesky:
 
 
 def _borders(graph: Any, dissection: Dissection) -> list[Any]:
-    """For each piece the later nodes that elimination connects it with, ascending; graph in order of elimination."""
+    """For each piece the later nodes to which the elimination connects it, ascending; graph in order of elimination."""
     borders: list[Any] = []
     from_below: list[list[Any]] = [[] for _ in dissection.parent]
     for k, above in enumerate(dissection.parent):

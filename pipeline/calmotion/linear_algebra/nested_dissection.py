@@ -1,7 +1,7 @@
-"""Nested dissection: an order of elimination that keeps the factors of a sparse symmetric matrix small.
+"""Nested dissection: an order of elimination with small fill-in of a sparse symmetric matrix.
 
 A graph is cut by a thin set of nodes (a separator), which is eliminated last; both sides are cut again, and so on.
-Each piece becomes one dense block of the factor, so the tree of pieces is also the plan of the factorisation.
+Each piece becomes one dense block of the factor, so the tree of pieces is also the elimination tree.
 
 Source: George, Nested Dissection of a Regular Finite Element Mesh, SIAM Journal on Numerical Analysis 10(2), 1973.
 """
@@ -16,11 +16,11 @@ import numpy as np
 from calmotion.linear_algebra.vertex_cover import vertex_cover
 from calmotion.shot.character import Array
 
-_LEAF = 48  # nodes of a piece that is not worth cutting
-_LANDMARKS = 4
-_SMALLEST_SIDE = 0.3  # of the nodes; thinner cuts may lie anywhere else
-_EQUAL = 1e-9  # lengths of axes, over the longest, and heights, over the largest, that differ by less are equal
-_DENSE = 0.5  # a separator that holds this share of its piece is none
+_LEAF = 48  # largest number of nodes of a piece that is not cut
+_LANDMARKS = 4  # nodes from which distances in the graph are measured
+_SMALLEST_SIDE = 0.3  # least share of the nodes on either side of a cut
+_EQUAL = 1e-9  # relative difference below which lengths of axes, or heights, are equal
+_DENSE = 0.5  # share of the nodes of a piece above which a separator is not used
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,7 +30,7 @@ class Dissection:
     Attributes:
         order: Nodes in the order of elimination, shape [n]; piece k holds order[start[k]:start[k + 1]].
         start: Shape [pieces + 1].
-        parent: Piece that a piece is cut off by, -1 for a root, shape [pieces].
+        parent: The separator that cuts off each piece, -1 for a root, shape [pieces].
     """
 
     order: Any
@@ -43,11 +43,11 @@ def dissect(graph: Any, points: Array | None = None) -> Dissection:
 
     Args:
         graph: Sparse CSR, symmetric pattern, shape [n, n]; values and the diagonal do not matter.
-        points: Where the nodes are, shape [n, d]; cuts are planes then. Without it, distances in the graph to a few
-            nodes far from each other take that place.
+        points: Coordinates of the nodes, shape [n, d]: cuts are planes. None: distances in the graph to a few nodes far
+            from each other are used as coordinates.
 
     Returns:
-        Pieces such that nodes of two different pieces are neighbours only if one piece is above the other.
+        Pieces such that nodes of two pieces are neighbours only if one piece is an ancestor of the other.
     """
     from scipy.sparse import csr_matrix
 
@@ -55,7 +55,7 @@ def dissect(graph: Any, points: Array | None = None) -> Dissection:
     graph = csr_matrix((np.ones(graph.nnz, dtype=np.int8), graph.indices, graph.indptr), shape=graph.shape)
     pieces: list[Any] = []
     parent: list[int] = []
-    # depth first, every piece after what it cuts off: the reverse of a walk that sees parents first
+    # the reverse of a depth-first walk in preorder: children come before their parent
     stack = [(np.arange(n), graph, None if points is None else np.asarray(points, dtype=float), -1)]
     while stack:
         nodes, part, where, above = stack.pop()
@@ -84,10 +84,10 @@ def dissect(graph: Any, points: Array | None = None) -> Dissection:
 
 
 def _levels(graph: Any) -> Array:
-    """Distances in the graph to a few nodes that are far from each other, and their differences: the three that vary
-    most, shape [n, 3].
+    """The three with the largest variance among the distances in the graph to a few nodes far from each other and the
+    differences of these distances, shape [n, 3].
 
-    They are whole numbers, so that the cuts do not depend on rounding.
+    They are integers, so cuts do not depend on rounding.
     """
     from scipy.sparse.csgraph import dijkstra
 
@@ -97,7 +97,7 @@ def _levels(graph: Any) -> Array:
     nearest = np.full(n, np.inf)
     for k in range(_LANDMARKS):
         distance = dijkstra(graph, unweighted=True, indices=landmark, directed=False)
-        # components that are not connected to the landmark lie beyond all others
+        # components that are not connected to the landmark are behind all others
         distances[:, k] = np.where(np.isinf(distance), n, distance)
         nearest = np.minimum(nearest, distances[:, k])
         landmark = int(nearest.argmax())
@@ -110,8 +110,8 @@ def _levels(graph: Any) -> Array:
 def _heights(points: Array) -> Array:
     """Coordinates of points along their principal axes, the longest first, shape [n, d].
 
-    Where axes are equally long any basis of their plane is principal; the one closest to the coordinate axes is taken.
-    Coordinates are rounded, so that points that rounding alone tells apart are at one height.
+    Where axes have equal lengths, any basis of their span is principal; the one nearest to the coordinate axes is used.
+    Coordinates are rounded, so points that differ by rounding have equal heights.
     """
     centered = points - points.mean(axis=0)
     lengths, axes = np.linalg.eigh(centered.T @ centered)
@@ -129,10 +129,10 @@ def _heights(points: Array) -> Array:
 
 
 def _cut(graph: Any, heights: Array) -> tuple[Any, Any, Any] | None:
-    """Separator and both sides (indices) of a graph, by the best level of one of several heights.
+    """Separator and both sides (indices) of a graph, from the best cut at one level of one of several heights.
 
-    A cut at c has the nodes of rank below c on its left. Those of them with a neighbour at c or beyond separate; how
-    many there are for every c at once is a running sum.
+    The nodes of rank below c are on the left of a cut at c. Those of them with a neighbour of rank c or above form the
+    separator; a cumulative sum gives their number for all c at once.
 
     Args:
         heights: Of the nodes along several directions, shape [n, directions].
@@ -146,10 +146,10 @@ def _cut(graph: Any, heights: Array) -> tuple[Any, Any, Any] | None:
         for sign in (1.0, -1.0):
             rank = np.empty(n, dtype=np.int64)
             rank[np.argsort(sign * height, kind="stable")] = np.arange(n)
-            reach = rank.copy()
-            np.maximum.at(reach, row, rank[graph.indices])
-            # a node of rank p that reaches to m separates for p < c <= m
-            step = np.bincount(rank + 1, minlength=n + 2) - np.bincount(reach + 1, minlength=n + 2)
+            highest = rank.copy()  # rank of the highest neighbour
+            np.maximum.at(highest, row, rank[graph.indices])
+            # a node of rank p with its highest neighbour at m is in the separator for p < c <= m
+            step = np.bincount(rank + 1, minlength=n + 2) - np.bincount(highest + 1, minlength=n + 2)
             k = int((np.cumsum(step)[low : high + 1] * balance).argmin())
             left = rank < low + k
             separator = vertex_cover(graph, left)

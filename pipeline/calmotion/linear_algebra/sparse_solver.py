@@ -1,4 +1,4 @@
-"""Direct solution of the sparse systems of elasticity."""
+"""Direct solver of the sparse systems of elasticity."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ class SparseSolver:
     """A factorised symmetric positive definite matrix: `solve(b)` for b of shape [n] or [n, k].
 
     Args:
-        matrix: Sparse, shape [n, n]. Where n is a multiple of three its degrees of freedom are taken to be the
-            vectors of nodes.
-        points: Of the nodes, shape [n / 3, 3]; they cost nothing and make a better order of elimination.
+        matrix: Sparse, shape [n, n]. Where n is a multiple of three, its degrees of freedom are the components of
+            vectors at nodes.
+        points: Coordinates of the nodes, shape [n / 3, 3], for a better order of elimination.
 
     Raises:
-        NotPositiveDefinite: It is not.
+        NotPositiveDefinite: The matrix is not positive definite.
     """
 
     def __init__(self, matrix: Any, points: Array | None = None):
@@ -38,7 +38,7 @@ class SparseSolver:
 
     @property
     def entries(self) -> int:
-        """Numbers that the factor keeps."""
+        """Number of entries of the factor."""
         return self._factors.entries
 
     def solve(self, b: Array) -> Array:

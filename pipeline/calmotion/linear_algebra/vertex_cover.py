@@ -1,7 +1,7 @@
-"""Fewest nodes that touch every edge between two sides of a graph.
+"""Minimum vertex cover of the edges between two sides of a graph.
 
-They are as many as the largest matching has edges (Koenig), and follow from it. SciPy's matching takes for ever on
-some meshes, hence our own, by augmenting paths from one node after the other.
+Its size is that of a maximum matching (theorem of Koenig), from which it follows. The matching of SciPy is extremely
+slow on some meshes; this one uses augmenting paths from one node after the other.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from calmotion.support.compilation import kernel
 
 
 def vertex_cover(graph: Any, left: BoolArray) -> Any:
-    """Nodes that touch every edge between the left nodes and the others, as few as there can be.
+    """The minimum vertex cover of the edges between the left nodes and the others.
 
     Args:
         graph: Sparse CSR, symmetric pattern, shape [n, n].
@@ -32,20 +32,20 @@ def vertex_cover(graph: Any, left: BoolArray) -> Any:
     np.cumsum(np.bincount(near_edge, minlength=len(near)), out=start[1:])
     head = far_edge.astype(np.int64)  # rows ascend, so edges are sorted by their near node
     of_near, of_far = np.full(len(near), -1), np.full(len(far), -1)
-    edge, stack, turn = np.zeros(len(near), np.int64), np.zeros(len(near), np.int64), np.zeros(len(far), np.int64)
-    _match(start, head, of_near, of_far, edge, stack, turn)
+    edge, stack, visited = np.zeros(len(near), np.int64), np.zeros(len(near), np.int64), np.zeros(len(far), np.int64)
+    _match(start, head, of_near, of_far, edge, stack, visited)
     reached_near, reached_far = np.zeros(len(near), dtype=np.bool_), np.zeros(len(far), dtype=np.bool_)
-    _reach(start, head, of_near, of_far, stack, reached_near, reached_far)
+    _mark_reached(start, head, of_near, of_far, stack, reached_near, reached_far)
     return np.concatenate([near[~reached_near], far[reached_far]])
 
 
 @kernel
-def _match(start, head, of_near, of_far, edge, stack, turn):
-    """Largest matching: partners into `of_near` and `of_far`, -1 for none.
+def _match(start, head, of_near, of_far, edge, stack, visited):
+    """Maximum matching: writes partners into `of_near` and `of_far`, -1 for none.
 
     Args:
         start, head: Edges of near node i go to the far nodes head[start[i]:start[i + 1]].
-        edge, stack, turn: Scratch: the edge that a near node is at, the path, the search that saw a far node last.
+        edge, stack, visited: Scratch: current edge of each near node, the path, last search that visited a far node.
     """
     search = 1
     for root in range(len(of_near)):
@@ -60,28 +60,28 @@ def _match(start, head, of_near, of_far, edge, stack, turn):
                     edge[stack[depth - 1]] += 1
                 continue
             k = head[edge[i]]
-            if turn[k] == search:
+            if visited[k] == search:
                 edge[i] += 1
                 continue
-            turn[k] = search
+            visited[k] = search
             if of_far[k] >= 0:
                 i = of_far[k]
                 stack[depth] = i
                 edge[i] = start[i]
                 depth += 1
                 continue
-            # a free end: every edge of the path becomes a pair
+            # a far node without a partner: augment along the path
             for d in range(depth):
                 i = stack[d]
                 of_near[i] = head[edge[i]]
                 of_far[head[edge[i]]] = i
-            # what a search without success saw leads nowhere, until the matching changes
+            # nodes visited without success lead to no free node until the matching changes
             search += 1
             depth = 0
 
 
 @kernel
-def _reach(start, head, of_near, of_far, stack, reached_near, reached_far):
+def _mark_reached(start, head, of_near, of_far, stack, reached_near, reached_far):
     """Nodes on alternating paths from near nodes without a partner."""
     depth = 0
     for i in range(len(of_near)):
@@ -96,7 +96,7 @@ def _reach(start, head, of_near, of_far, stack, reached_near, reached_far):
             k = head[e]
             if not reached_far[k]:
                 reached_far[k] = True
-                # there is a partner: else the matching could be larger
+                # it has a partner: otherwise the matching would not be maximum
                 i2 = of_far[k]
                 if not reached_near[i2]:
                     reached_near[i2] = True

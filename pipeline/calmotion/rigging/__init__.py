@@ -1,5 +1,5 @@
-"""From a skinned character to a robot: hinges that perform a skeleton's rotations, bodies cut from the skin.
+"""Rigging of a skinned character as a robot: hinges for the rotations of its skeleton, bodies cut from its skin.
 
-Arrays alone; `usd.rigging` reads the skeleton and writes the layer. From the outside: `links.make_links`,
-`hinge_rows.hinges_for`, `cutting.cut_skin`, `materials.MATERIALS`. Importing the package alone loads nothing.
+This package computes with arrays; `usd.rigging` reads the skeleton and writes the layer. Its interface:
+`links.make_links`, `hinge_rows.hinges_for`, `cutting.cut_skin`, `materials.MATERIALS`.
 """

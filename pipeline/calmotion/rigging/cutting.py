@@ -1,4 +1,4 @@
-"""Bodies cut from a skin: each triangle goes to the joint that moves it most, and the cuts are closed."""
+"""Bodies cut from a skin: each triangle belongs to the joint of largest weight, and the cuts are closed."""
 
 from __future__ import annotations
 
@@ -8,19 +8,19 @@ from calmotion.geometry.closed_surfaces import close
 from calmotion.geometry.tetrahedra import surface_volume
 from calmotion.shot.character import Array, IntArray
 
-_FLAT = 1e-7  # volume over the whole skin's, below which a piece is no body
+_FLAT = 1e-7  # volume of a negligible piece, of that of all pieces
 
 
 def cut_skin(points: Array, triangles: IntArray, weights: Array) -> dict[int, tuple[Array, IntArray]]:
     """Cut a skin into closed pieces.
 
     Args:
-        points: Shape [n, 3]; points at one place count as one.
+        points: [m], shape [n, 3]; coincident points are merged.
         triangles: Shape [m, 3].
-        weights: How much each joint moves each point, shape [n, j].
+        weights: Skin weight of each joint at each point, shape [n, j].
 
     Returns:
-        Points and outward triangles of the piece of each joint that has one with a volume.
+        Points and outward triangles of the piece of each joint whose piece has a volume.
     """
     places, same = np.unique(np.round(points, 9), axis=0, return_inverse=True)
     same = same.reshape(-1)
@@ -32,8 +32,8 @@ def cut_skin(points: Array, triangles: IntArray, weights: Array) -> dict[int, tu
     owners = np.argmax(merged[faces].sum(axis=1), axis=1)
     pieces = {}
     for joint in np.unique(owners):
-        used, own = np.unique(faces[owners == joint], return_inverse=True)
-        closure = close(places[used], own.reshape(-1, 3))
+        used, corners = np.unique(faces[owners == joint], return_inverse=True)
+        closure = close(places[used], corners.reshape(-1, 3))
         piece = closure.points, closure.triangles.astype(np.int32)
         volume = surface_volume(*piece)
         if volume < 0.0:

@@ -1,4 +1,4 @@
-"""Which joints of a skeleton become links of a robot, how each turns, and which of them matter."""
+"""Links of a robot from the joints of a skeleton, their hinges, and the targets among them."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from calmotion.shot.character import Array, IntArray
 
 Piece = tuple[Array, IntArray]  # points [n, 3] and triangles [m, 3]
 _WORDS = re.compile(r"hand|wrist|palm|foot|ankle|head", re.IGNORECASE)
-_TIP = 0.1  # share of a link's length that is its tip
+_TIP = 0.1  # length of the tip of a link, of the length of the link
 
 
 @dataclass(frozen=True, eq=False)
@@ -22,11 +22,11 @@ class Link:
     """A link of the robot.
 
     Attributes:
-        joint: Index of the joint of the skeleton that it turns with.
+        joint: Index of the joint of the skeleton whose rotation it has.
         name: Unique among the links.
-        parent: Index of the link that carries it, -1 for one that the world or the animation carries.
-        hinges: How it turns on that.
-        piece: Its geometry, in the world, as the shot begins, or None.
+        parent: Index of the link that carries it, -1 for a root.
+        hinges: Its rotation relative to the parent.
+        piece: Its geometry in the world at the first frame, or None.
     """
 
     joint: int
@@ -39,17 +39,18 @@ class Link:
 def make_links(
     joints: Sequence[str], parents: Sequence[int], turns: Array, skin: Piece, weights: Array, tolerance: float
 ) -> list[Link]:
-    """Links, each after the one that carries it.
+    """Links, parents first.
 
-    A joint that rests is part of the link above it; one that turns, but has no geometry and carries none, is left out.
+    A joint that does not rotate is part of the link of its parent. A joint without geometry that carries no geometry is
+    omitted.
 
     Args:
-        joints: Names, `Hip/Knee` and so on, parents first.
-        parents: Index of the joint above each, -1 for none.
-        turns: Rotation of each joint in its parent's axes since the first frame, shape [n, j, 3, 3].
-        skin: Of all joints.
-        weights: How much each joint moves each point of it, shape [points, j].
-        tolerance: What hinges may leave of a rotation [rad].
+        joints: Names such as `Hip/Knee`, parents first.
+        parents: Index of the parent of each joint, -1 for none.
+        turns: Rotation of each joint since the first frame, axes of its parent, shape [n, j, 3, 3].
+        skin: Points and triangles of the skin of all joints.
+        weights: Skin weight of each joint at each point, shape [points, j].
+        tolerance: Largest residual angle of the hinges [rad].
     """
     bearing = set(cut_skin(*skin, weights))
     for joint in reversed(range(len(joints))):
@@ -66,7 +67,7 @@ def make_links(
             if parents[joint] < 0 or len(row.axes):
                 link_of[joint] = len(links)
                 links.append(Link(joint, _unique(name, names), above, row, None))
-    # what rests together is cut as one
+    # the joints of one link are cut as one piece
     together = np.zeros((len(weights), len(links)))
     for joint, link in enumerate(link_of):
         if link >= 0:
@@ -91,16 +92,16 @@ def _unique(joint: str, taken: set[str]) -> str:
 
 
 def targets_of(links: Sequence[Link], joints: Sequence[str]) -> list[int]:
-    """The links whose motion matters: hands, feet and head by their names, else the outermost of each limb."""
+    """The links with targets: hands, feet and head by their names, else the outermost link of each limb."""
     carried = {link.parent for link in links}
     named = [k for k, link in enumerate(links) if _WORDS.search(joints[link.joint].split("/")[-1]) and link.piece]
     outer = [k for k in range(len(links)) if k not in carried and links[k].piece and links[k].parent >= 0]
-    found = []
+    targets = []
     for k in outer:
         chain = _chain(links, k)
-        # the fingers of a hand are as good as the hand
-        found.append(next((above for above in chain if above in named), k))
-    return sorted(dict.fromkeys(found)) or [k for k, link in enumerate(links) if link.piece][-1:]
+        # the target of fingers is that of their hand
+        targets.append(next((above for above in chain if above in named), k))
+    return sorted(dict.fromkeys(targets)) or [k for k, link in enumerate(links) if link.piece][-1:]
 
 
 def _chain(links: Sequence[Link], k: int) -> list[int]:
@@ -112,7 +113,7 @@ def _chain(links: Sequence[Link], k: int) -> list[int]:
 
 
 def tip_of(piece: Piece, origin: Array) -> Array:
-    """The middle of the end of a link that is farthest from where it turns, world, shape [3]."""
+    """Center of the tip of a link, the part farthest from its origin [m], world, shape [3]."""
     points, _ = piece
     away = np.linalg.norm(points - origin, axis=1)
     return np.asarray(points[away >= (1.0 - _TIP) * away.max()].mean(axis=0), dtype=np.float64)

@@ -1,4 +1,4 @@
-"""Materials that links are made of: typical values of data sheets, for solid parts."""
+"""Materials of links: typical values of data sheets for solid parts."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""What pictures and recordings share: playback of a computed motion, viewpoint, shading, spectrum."""
+"""Common parts of pictures and recordings: playback of a computed motion, viewpoint, shading, spectrum."""

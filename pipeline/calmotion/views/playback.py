@@ -1,4 +1,4 @@
-"""A computed motion as pictures need it: at any times, and as the points of the surfaces it carries."""
+"""Playback of a computed motion: at any times, and as points of the moving surfaces."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from calmotion.shot.result import Motion, Skin
 
 
 def sample_motion(motion: Motion, times: Array) -> Motion:
-    """The motion at other times, linear between steps, held before the first and after the last.
+    """The motion at other times: linear between steps, constant before the first and after the last.
 
-    The steps of a simulation are far shorter than the frames of a shot, so linear is enough to look at.
+    The steps of a simulation are much shorter than the frames of a shot, so linear interpolation is smooth enough.
 
     Args:
         motion: T steps.
@@ -36,7 +36,7 @@ def sample_motion(motion: Motion, times: Array) -> Motion:
 
     def blend_rotations(values: Array) -> Array:
         first, second = values[low], values[high]
-        # q and -q are the same rotation: take the nearer of the two.
+        # q and -q are the same rotation: use the nearer of the two.
         second = np.where(np.sum(first * second, axis=-1, keepdims=True) < 0.0, -second, second)
         share = weight.reshape(-1, *([1] * (values.ndim - 1)))
         mixed = (1.0 - share) * first + share * second
@@ -65,7 +65,7 @@ def deformed_points(points: Array, modes: Array | None, elastic: Array) -> Array
         elastic: Elastic coordinates, shape [f, r]; r = 0 for a motion in which the body does not deform.
 
     Returns:
-        [m], shape [f, n, 3]; [1, n, 3] when nothing deforms.
+        [m], shape [f, n, 3]; [1, n, 3] where the body is rigid.
     """
     if modes is None or elastic.shape[1] == 0:
         return points[None]
@@ -91,15 +91,15 @@ def rotation_matrices(quaternions: Array) -> Array:
 
 
 def carriers(bodies: Sequence[Body]) -> list[int]:
-    """For each body the one whose prim is its nearest ancestor, -1 for none: what its prim is placed in."""
+    """For each body the index of the body whose prim is its nearest ancestor, -1 for none."""
     index = {body.path: k for k, body in enumerate(bodies)}
-    found = []
+    indices = []
     for body in bodies:
         path = body.path
         while path and path not in index or path == body.path:
             path = path.rpartition("/")[0]
-        found.append(index.get(path, -1))
-    return found
+        indices.append(index.get(path, -1))
+    return indices
 
 
 def relative_poses(motion: Motion, body: int, carrier: int) -> tuple[Array, Array]:
@@ -111,16 +111,16 @@ def relative_poses(motion: Motion, body: int, carrier: int) -> tuple[Array, Arra
     positions, rotations = motion.positions[:, body], motion.rotations[:, body]
     if carrier < 0:
         return positions, rotations
-    turned = rotation_matrices(motion.rotations[:, carrier])
+    matrices = rotation_matrices(motion.rotations[:, carrier])
     offset = positions - motion.positions[:, carrier]
     w, v = motion.rotations[:, carrier, :1], -motion.rotations[:, carrier, 1:]
     real = w * rotations[:, :1] - np.sum(v * rotations[:, 1:], axis=1, keepdims=True)
     imaginary = w * rotations[:, 1:] + rotations[:, :1] * v + np.cross(v, rotations[:, 1:])
-    return np.einsum("fji,fj->fi", turned, offset), np.concatenate([real, imaginary], axis=1)
+    return np.einsum("fji,fj->fi", matrices, offset), np.concatenate([real, imaginary], axis=1)
 
 
 def deviations(surface: Array, modes: Array | None, body: int, motion: Motion, reference: Motion) -> Array:
-    """How far each point of a surface is from where it was meant to be.
+    """Distance of each point of a surface from its place in the reference motion.
 
     Args:
         surface: Undeformed points, body axes [m], shape [n, 3].
@@ -132,12 +132,12 @@ def deviations(surface: Array, modes: Array | None, body: int, motion: Motion, r
     Returns:
         Distances [m], shape [f, n].
     """
-    places = []
+    world = []
     for moved in (motion, reference):
         points = deformed_points(surface, modes, moved.elastic[body])
-        turned = np.einsum("fij,fnj->fni", rotation_matrices(moved.rotations[:, body]), points)
-        places.append(turned + moved.positions[:, body, None])
-    return np.linalg.norm(places[0] - places[1], axis=2)
+        rotated = np.einsum("fij,fnj->fni", rotation_matrices(moved.rotations[:, body]), points)
+        world.append(rotated + moved.positions[:, body, None])
+    return np.linalg.norm(world[0] - world[1], axis=2)
 
 
 def world_points(body: Body, index: int, skin: Skin | None, motion: Motion, row: int) -> list[Array]:

@@ -10,7 +10,7 @@ CREASE = np.cos(np.radians(40.0))
 
 
 def split_at_creases(points: Array, triangles: IntArray) -> tuple[IntArray, IntArray, Array]:
-    """Give each point one copy for each group of faces that meets at it smoothly.
+    """Copy each point once for each smooth group of faces around it.
 
     Args:
         points: [m], shape [n, 3].

@@ -1,4 +1,4 @@
-"""How much a target shakes at each frequency."""
+"""Amplitude spectrum of the error of a target."""
 
 from __future__ import annotations
 
@@ -8,18 +8,18 @@ from calmotion.shot.character import Array
 from calmotion.shot.result import Motion
 from calmotion.views.playback import sample_motion
 
-LEFT = 3e-4  # of the largest amplitude: frequencies beyond the last one above this are of no interest
+NEGLIGIBLE = 3e-4  # of the largest amplitude
 
 
 def error_spectrum(motion: Motion, reference: Motion, target: int) -> tuple[Array, Array]:
     """Amplitude of the position error of a target by frequency, from the first frame of the shot on.
 
-    The error's components are taken through Hann's window, scaled so that a sine of one amplitude, however directed,
-    has that amplitude at its frequency; what is constant is not part of it.
+    A Hann window is applied to the components of the error. The spectrum is scaled so that a sine in any direction has
+    its own amplitude at its frequency. The constant part of the error is removed.
 
     Args:
         motion: A simulated motion of equal steps.
-        reference: What was meant.
+        reference: The intended motion.
         target: Index of the target.
 
     Returns:
@@ -33,7 +33,7 @@ def error_spectrum(motion: Motion, reference: Motion, target: int) -> tuple[Arra
         return np.zeros(0), np.zeros(0)
     error = motion.target_positions[rows, target] - sample_motion(reference, times).target_positions[:, target]
     window = np.hanning(len(times))
-    # the mean as the window sees it, so that nothing of a constant error leaks into the lowest frequencies
+    # the windowed mean: a constant error does not leak into the lowest frequencies
     error = error - np.average(error, axis=0, weights=window)
     amplitudes = np.abs(np.fft.rfft(error * window[:, None], axis=0)) * (2.0 / window.sum())
     step = (times[-1] - times[0]) / (len(times) - 1)
@@ -41,6 +41,6 @@ def error_spectrum(motion: Motion, reference: Motion, target: int) -> tuple[Arra
 
 
 def highest_frequency(frequencies: Array, amplitudes: Array) -> float:
-    """The frequency above which nothing of interest happens [Hz]; 0 where nothing happens at all."""
-    worth = np.flatnonzero(amplitudes > LEFT * amplitudes.max(initial=0.0))
-    return float(frequencies[worth[-1]]) if len(worth) else 0.0
+    """The frequency above which all amplitudes are negligible [Hz]; 0 where all are zero."""
+    significant = np.flatnonzero(amplitudes > NEGLIGIBLE * amplitudes.max(initial=0.0))
+    return float(frequencies[significant[-1]]) if len(significant) else 0.0

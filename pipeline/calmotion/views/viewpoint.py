@@ -1,4 +1,4 @@
-"""Where to look at a character from: in front of what it does, a little to the side and above."""
+"""Viewpoint for a character: in front of its motion, slightly to the side and above."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ ELEVATION = np.radians(17.0)
 
 @dataclass(frozen=True, eq=False)
 class Viewpoint:
-    """A camera direction and the sphere that must be in the picture.
+    """A camera direction, and the sphere that the picture contains.
 
     Attributes:
         center: [m], shape [3], world.
@@ -32,15 +32,15 @@ class Viewpoint:
 
 
 def choose_viewpoint(character: Character, skins: tuple[Skin | None, ...], motion: Motion, rows: int = 12) -> Viewpoint:
-    """A viewpoint that sees the whole motion.
+    """A viewpoint from which the whole motion is visible.
 
-    The front of a character is taken to be the side its targets are on. Up is against gravity.
+    The front of a character is the side of its targets. Up is opposite to gravity.
 
     Args:
         character: The character.
         skins: One for each body.
-        motion: The motion to be seen.
-        rows: How many instants of it are looked at.
+        motion: The motion to show.
+        rows: Number of instants of the motion that are used.
     """
     clouds = [motion.target_positions.reshape(-1, 3)]
     fixed = []

@@ -24,10 +24,10 @@ def test_of_two_meshes_made_at_once_the_first_one_kept_serves_both(package, own_
     cache = package("cache")
     first, second = np.zeros((4, 3)), np.ones((4, 3))
     tets = np.arange(4)[None]
-    assert np.array_equal(cache.store("key", points=first, tets=tets)[0], first)
-    assert np.array_equal(cache.store("key", points=second, tets=tets)[0], first)
+    assert np.array_equal(cache.store("key", {"points": first, "tets": tets})[0], first)
+    assert np.array_equal(cache.store("key", {"points": second, "tets": tets})[0], first)
     next(own_cache.iterdir()).write_bytes(b"torn")
-    assert np.array_equal(cache.store("key", points=second, tets=tets)[0], second)
+    assert np.array_equal(cache.store("key", {"points": second, "tets": tets})[0], second)
     assert np.array_equal(cache.load("key")[0], second)
     assert [path.name for path in own_cache.iterdir()] == ["key.npz"]
 

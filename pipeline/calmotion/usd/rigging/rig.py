@@ -87,7 +87,9 @@ def rig_shot(path: str, output: str, options: RigOptions | None = None) -> Rig:
     layer.finish(provenance_of(path, stage, clock), output)
     write_layer(layer.layer, output, lambda temporary: _validate(temporary, len(layer.motors)))
     joints = tuple(
-        RiggedJoint(skeleton.joints[link.joint], layer.body(k), tuple(layer.motors_of[k]), float(link.hinges.off.max()))
+        RiggedJoint(
+            skeleton.joints[link.joint], layer.body(k), tuple(layer.motors_of[k]), float(link.hinges.residual.max())
+        )
         for k, link in enumerate(links)
         if link.parent >= 0
     )
