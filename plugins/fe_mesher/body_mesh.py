@@ -1,4 +1,4 @@
-"""From what a body carries to its tetrahedra."""
+"""Tetrahedra of a flexible body."""
 
 from __future__ import annotations
 
@@ -22,18 +22,19 @@ from .mesh_file import read_mesh_file
 from .repair import Solid, closed_solid, simplified
 from .tetwild import tetrahedralize
 
-# Tried for, and allowed. Half a percent of volume, lost where walls are thin, is more than that of a frequency; but
-# where tens of thousands of triangles take minutes, the first mesh that is allowed will do.
+# Wanted and largest allowed error. An error of half a percent of volume in thin walls is larger than that in a
+# frequency. Meshing tens of thousands of triangles takes minutes, so there the first allowed mesh is used.
 _GOOD_VOLUME, MAX_VOLUME_ERROR = 0.005, 0.01
 _ATTEMPTS = 3
 _REFINEMENTS = 1
-_WELD = 1e-6  # of the diagonal
-_DETAIL, _DENSE_DETAIL, _DENSE = 0.1, 0.5, 15_000  # of the envelope: detail that the mesh does not follow anyway
+_WELD = 1e-6  # distance of coincident points, of the diagonal
+# detail that is removed, of the envelope, which the mesh does not resolve; number of triangles of a dense surface
+_DETAIL, _DENSE_DETAIL, _DENSE = 0.1, 0.5, 15_000
 
 
 @dataclass(frozen=True)
 class MeshOptions:
-    """What the user set: element size [m] (negative: as the shot says), time limit [s], use of the cache."""
+    """Settings of the user: element size [m] (negative: that of the shot), time limit [s], use of the cache."""
 
     element_size: float = -1.0
     time_limit: float = 300.0
@@ -46,8 +47,8 @@ def mesh_body(index: int, body: Body, options: MeshOptions, carrier: Frame | Non
     Args:
         index: Of the body in its character.
         body: With `flexible` settings.
-        options: What the user set.
-        carrier: Where the joint towards the world takes hold of it, body frame.
+        options: Settings of the user.
+        carrier: Frame of the joint to its parent, body frame.
 
     Raises:
         ShotError: There is no geometry, it encloses no volume, or it cannot be meshed.
@@ -65,7 +66,7 @@ def mesh_body(index: int, body: Body, options: MeshOptions, carrier: Frame | Non
         surfaces = geometry
     if not any(len(surface.triangles) for surface in surfaces):
         raise ShotError(
-            "is flexible but has no geometry", path=body.path, found="neither TetMesh nor Mesh nor mesh file",
+            "this flexible body has no geometry", path=body.path, found="no TetMesh, Mesh or mesh file",
             remedy="Add a closed Mesh below it, or name a mesh file in calm:flexible:meshFile",
         )  # fmt: skip
     solid = solid_of(body, surfaces)
@@ -77,66 +78,66 @@ def mesh_body(index: int, body: Body, options: MeshOptions, carrier: Frame | Non
 
 
 def _authored(index: int, geometry: TetGeometry, repairs: tuple[str, ...]) -> FEMesh:
-    tets, turned = oriented_tets(geometry.points, geometry.tets, geometry.path)
+    tets, inverted = oriented_tets(geometry.points, geometry.tets, geometry.path)
     points, tets = without_unused_points(np.asarray(geometry.points, dtype=float), tets)
-    if turned:
-        repairs += (f"turned {turned} inverted tetrahedra",)
+    if inverted:
+        repairs += (f"reoriented {inverted} inverted tetrahedra",)
     if len(points) < len(geometry.points):
-        repairs += (f"dropped {len(geometry.points) - len(points)} points that no tetrahedron uses",)
+        repairs += (f"removed {len(geometry.points) - len(points)} points that no tetrahedron uses",)
     if connected_parts(tets) > 1:
         points, tets, merged = welded_tets(points, tets, _WELD)
         if merged:
-            repairs += (f"merged {merged} points that parts of the mesh have in one place",)
+            repairs += (f"merged {merged} coincident points of separate parts",)
     _refuse_loose_parts(tets, geometry.path)
     return FEMesh(index, points, tets, measure_quality(points, tets, repairs=repairs))
 
 
 def _accurate(index: int, body: Body, solid: Solid, options: MeshOptions, carrier: Frame | None) -> FEMesh:
-    """Tetrahedra as fine as the first frequencies need; the size that was found is kept with the meshes."""
+    """Tetrahedra fine enough for the first frequencies; their size is stored with the meshes."""
     shape = shape_of(solid.points, solid.triangles)
     assert body.flexible is not None
     held = None if carrier is None else carrier.position.tolist()
     rule = {"accuracy": ACCURACY, "nodes": MAX_NODES, "held": held, "poisson": body.flexible.material.poissons_ratio}
     rule["radius"] = body.flexible.interface_radius
     key = cache.cache_key(solid.points, solid.triangles, rule)
-    known = cache.load(key, ("size", "error", "nodes")) if options.cache else None
-    if known is not None:
-        size, error, nodes = (float(value) for value in known)
+    stored = cache.load(key, ("size", "error", "nodes")) if options.cache else None
+    if stored is not None:
+        size, error, nodes = (float(value) for value in stored)
         mesh = filled(index, body, solid, shape, size, options)
-        return _judged(mesh, Accuracy(error, int(nodes)))
+        return _with_accuracy(mesh, Accuracy(error, int(nodes)))
     size = element_size(shape)
     mesh = filled(index, body, solid, shape, size, options)
-    found = estimate(mesh.points, mesh.tets, body, carrier)
+    accuracy = estimate(mesh.points, mesh.tets, body, carrier)
     for _ in range(_REFINEMENTS):
-        smaller = finer(size, found, shape)
+        smaller = finer(size, accuracy, shape)
         if smaller is None:
             break
-        size, before = smaller, found
+        size, before = smaller, accuracy
         mesh = filled(index, body, solid, shape, size, options)
-        found = compared(before, estimate(mesh.points, mesh.tets, body, carrier))
+        accuracy = compared(before, estimate(mesh.points, mesh.tets, body, carrier))
     if options.cache:
-        cache.store(key, {"size": np.array(size), "error": np.array(found.error), "nodes": np.array(found.nodes)})
-    return _judged(mesh, found)
+        cache.store(key, {"size": np.array(size), "error": np.array(accuracy.error), "nodes": np.array(accuracy.nodes)})
+    return _with_accuracy(mesh, accuracy)
 
 
-def _judged(mesh: FEMesh, found: Accuracy) -> FEMesh:
-    repairs = mesh.quality.repairs + remark(found)
-    return replace(mesh, quality=replace(mesh.quality, repairs=repairs, frequency_error=found.error))
+def _with_accuracy(mesh: FEMesh, accuracy: Accuracy) -> FEMesh:
+    repairs = mesh.quality.repairs + remark(accuracy)
+    return replace(mesh, quality=replace(mesh.quality, repairs=repairs, frequency_error=accuracy.error))
 
 
 def filled(index: int, body: Body, solid: Solid, shape: Shape, size: float, options: MeshOptions) -> FEMesh:
-    """Tetrahedra of one size that fill a solid.
+    """Tetrahedra of uniform size that fill a solid.
 
     Args:
         index: Of the body in its character.
         body: For errors.
         solid: Closed.
-        shape: Measured on it.
+        shape: Of the solid.
         size: Edge length [m].
-        options: Time limit and cache; their element size does not matter here.
+        options: Time limit and cache; the element size is not used.
 
     Raises:
-        ShotError: It cannot be meshed, or the tetrahedra do not fill it.
+        ShotError: The solid cannot be meshed, or the tetrahedra do not fill it.
     """
     diagonal = float(np.linalg.norm(np.ptp(solid.points, axis=0)))
     dense = len(solid.triangles) > _DENSE
@@ -160,29 +161,29 @@ def filled(index: int, body: Body, solid: Solid, shape: Shape, size: float, opti
         _refuse_loose_parts(best.tets, body.path)
         return best
     error = abs(volumes[-1] / solid.volume - 1.0)
-    # ever closer envelopes that agree with each other, but not with the surface, blame the surface
+    # meshes of smaller envelopes with equal volumes that differ from that of the surface: the surface is wrong
     agree = abs(volumes[-1] - volumes[-2]) < 0.2 * error * solid.volume
     raise ShotError(
-        "the tetrahedra do not fill the surface" + (", which seems to run through itself" if agree else ""),
-        path=body.path, found=f"volume off by {100.0 * error:.2g}%, allowed {100.0 * MAX_VOLUME_ERROR:.2g}%",
+        "the tetrahedra do not fill the surface" + (", which seems to intersect itself" if agree else ""),
+        path=body.path, found=f"volume error {100.0 * error:.2g}%, allowed {100.0 * MAX_VOLUME_ERROR:.2g}%",
         remedy="Author a smaller calm:flexible:elementSize, repair the Mesh, or give a TetMesh or a mesh file",
     )  # fmt: skip
 
 
 def solid_of(body: Body, surfaces: tuple[SurfaceMesh, ...]) -> Solid:
-    """The solid of what is seen; of hidden (collision) geometry where what is seen is not closed."""
-    seen = tuple(s for s in surfaces if s.visible) or surfaces
+    """The solid of the visible surfaces, or of hidden (collision) surfaces where the visible ones are not closed."""
+    visible = tuple(s for s in surfaces if s.visible) or surfaces
     hidden = tuple(s for s in surfaces if not s.visible)
     try:
-        return closed_solid(seen, body.path)
+        return closed_solid(visible, body.path)
     except ShotError as error:
-        if not hidden or seen is surfaces:
+        if not hidden or visible is surfaces:
             raise
         try:
             solid = closed_solid(hidden, body.path)
         except ShotError:
             raise error from None
-        note = f"meshed the collision geometry, since {error.path} {error.problem}"
+        note = f"meshed the collision geometry instead of the visible surfaces ({error.path}: {error.problem})"
     return replace(solid, repairs=(note, *solid.repairs))
 
 
@@ -190,6 +191,6 @@ def _refuse_loose_parts(tets: np.ndarray, path: str) -> None:
     count = connected_parts(tets)
     if count > 1:
         raise ShotError(
-            "its tetrahedra do not hang together", path=path, found=f"{count} separate parts",
+            "its tetrahedra are not connected", path=path, found=f"{count} separate parts",
             remedy="Make the parts overlap or touch, or split them into several bodies",
         )  # fmt: skip

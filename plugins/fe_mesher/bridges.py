@@ -1,4 +1,4 @@
-"""Solids that miss each other by a hair, as parts of an assembly in CAD do, joined across the gap."""
+"""Bridges across narrow gaps between solids, such as those between parts of a CAD assembly."""
 
 from __future__ import annotations
 
@@ -9,20 +9,20 @@ import numpy as np
 from .closing import Part, connected_pieces
 from .uniting import manifold_of, part_of
 
-_GAP = 2e-3  # of the size of the body
-_SINK = 0.05  # of the gap: the bridge reaches into both sides
+_GAP = 2e-3  # largest gap, of the size of the body
+_SINK = 0.05  # overlap of a bridge with both sides, of the gap
 
 
 def bridged(solids: Sequence[Part]) -> tuple[Part | None, float]:
-    """The solids as one, where gaps that are narrow enough part them, and the widest such gap.
+    """The union of solids across narrow gaps, and the widest of these gaps.
 
-    Each triangle that looks onto another solid from nearby grows into a prism that reaches it.
+    Each triangle that faces another solid across a narrow gap is extruded to a prism up to that solid.
 
     Args:
-        solids: Disjoint, outward, in units of the body's size.
+        solids: Disjoint, outward, in units of the size of the body.
 
     Returns:
-        None when they are not one even so.
+        None instead of the union where it is not connected.
     """
     import manifold3d
 
@@ -47,23 +47,25 @@ def bridged(solids: Sequence[Part]) -> tuple[Part | None, float]:
 
 
 def _near(x: np.ndarray, facing: np.ndarray) -> list[tuple[int, float]]:
-    """Triangles whose middle sees another solid within the gap, along their normal: number and distance."""
+    """Triangles with another solid within the largest gap, along the normal at their center: index and distance."""
     from calmotion.geometry.distances import ray_length
 
     low, high = facing.reshape(-1, 3).min(axis=0) - _GAP, facing.reshape(-1, 3).max(axis=0) + _GAP
     normal = np.cross(x[:, 1] - x[:, 0], x[:, 2] - x[:, 0])
     length = np.linalg.norm(normal, axis=1)
     inside = ((x.max(axis=1) > low) & (x.min(axis=1) < high)).all(axis=1) & (length > 0.0)
-    found = []
+    near = []
     boxes_low, boxes_high = facing.min(axis=1), facing.max(axis=1)
     for i in np.flatnonzero(inside):
         n = normal[i] / length[i]
         middle = x[i].mean(axis=0)
-        # only triangles that the ray can reach; the scan over all of them would be quadratic
+        # only triangles whose boxes the ray can hit: testing all of them would take quadratic time
         end = middle + _GAP * n
-        reach = ((boxes_high >= np.minimum(middle, end) - 1e-9) & (boxes_low <= np.maximum(middle, end) + 1e-9)).all(1)
-        if reach.any():
-            gap = ray_length(middle - 1e-7 * n, n, facing[reach], 0.0)
+        candidates = (
+            (boxes_high >= np.minimum(middle, end) - 1e-9) & (boxes_low <= np.maximum(middle, end) + 1e-9)
+        ).all(1)
+        if candidates.any():
+            gap = ray_length(middle - 1e-7 * n, n, facing[candidates], 0.0)
             if gap <= _GAP:
-                found.append((int(i), gap))
-    return found
+                near.append((int(i), gap))
+    return near

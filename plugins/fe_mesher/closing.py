@@ -1,4 +1,4 @@
-"""One surface, however it was made, to closed parts: welded, agreed on its outside, rid of sheets, its holes capped."""
+"""Closed parts of a surface: welded, consistently oriented, without sheets, with capped holes."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from .junctions import split_at_junctions
 
 REMEDY = "Close the mesh, or name a closed one in calm:flexible:meshFile, or author a TetMesh below the body"
 
-# of the diagonal: STL files repeat their corners in single precision, hand-made ones less exactly
+# tolerances of the diagonal: STL files repeat corners in single precision, modelled surfaces less accurately
 _WELDS = (1e-6, 1e-5, 1e-4)
-_CRUMB = 1e-3  # of the area: triangles that hang in the air
-_SHEET, _FIN = 0.05, 0.3  # of the area: labels in the air, sheets that grow out of a closed part
-_HOLE, _HOLES = 5e-3, 2e-2  # of the area of a part: one hole, all of them
+_CRUMB = 1e-3  # of the area: stray triangles
+_SHEET, _FIN = 0.05, 0.3  # of the area: separate labels, sheets connected to a closed part
+_HOLE, _HOLES = 5e-3, 2e-2  # of the area of a part: one hole, all holes
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,7 +30,7 @@ class Part:
 
     @property
     def volume(self) -> float:
-        """Negative when it is inside out."""
+        """Volume; negative where the part is inside out."""
         return surface_volume(self.points, self.triangles)
 
 
@@ -42,24 +42,24 @@ class _Welded:
 
 
 def closed_parts(points: np.ndarray, triangles: np.ndarray, path: str, repairs: list[str]) -> list[Part]:
-    """The connected parts of a surface, each closed, some of them perhaps inside out.
+    """The connected parts of a surface, each closed; parts may be inside out.
 
     Args:
-        points: Finite, about the size of one, shape [n, 3].
+        points: Finite, scaled to a size of about one, shape [n, 3].
         triangles: Shape [m, 3].
-        path: Of the Mesh prim or file.
-        repairs: Sentences are added to it.
+        path: Mesh prim or file, for errors.
+        repairs: Messages are appended.
 
     Raises:
-        ShotError: It has holes too large to be guessed at, or only one side.
+        ShotError: The surface has large holes, or only one side.
     """
     welded = _best_welded(points, triangles, path, repairs)
     matched, splits = split_at_junctions(welded.points, welded.triangles, _WELDS[0])
     if splits:
-        repairs.append(f"{path}: split {splits} triangles where corners of others lie on their edges")
+        repairs.append(f"{path}: split {splits} triangles at corners of other triangles on their edges")
         welded = _Welded(welded.points, matched, welded.dropped)
     if welded.dropped:
-        repairs.append(f"{path}: dropped {welded.dropped} degenerate or repeated triangles")
+        repairs.append(f"{path}: removed {welded.dropped} degenerate or repeated triangles")
     parts: list[Part] = []
     opened: list[tuple[Part, ShotError]] = []
     crumbs = 0
@@ -73,56 +73,55 @@ def closed_parts(points: np.ndarray, triangles: np.ndarray, path: str, repairs: 
             else:
                 opened.append((piece, error))
     if crumbs:
-        repairs.append(f"{path}: dropped {crumbs} stray scraps of surface")
-    held = {tuple(point) for part in parts for point in part.points.tolist()}
+        repairs.append(f"{path}: removed {crumbs} stray scraps of surface")
+    points_of_parts = {tuple(point) for part in parts for point in part.points.tolist()}
     for piece, reason in opened:
-        on_a_part = sum(tuple(point) in held for point in piece.points.tolist()) >= 2
+        on_a_part = sum(tuple(point) in points_of_parts for point in piece.points.tolist()) >= 2
         if not parts or surface_area(piece.points, piece.triangles) > (_FIN if on_a_part else _SHEET) * area:
             raise reason
-        repairs.append(f"{path}: dropped a sheet that encloses nothing")
+        repairs.append(f"{path}: removed an open sheet")
     return [part for part in parts if not _is_flat(part)]
 
 
 def connected_pieces(points: np.ndarray, triangles: np.ndarray) -> list[Part]:
-    """Pieces of a surface that need each other to be closed, with the points they use, the largest first.
+    """Connected pieces of a surface with the points that they use, the largest first.
 
-    Surfaces that only touch along an edge, each closed without the other, are pieces of their own: where they overlap,
-    a union can then tell.
+    Closed surfaces that only touch along an edge are separate pieces, so that a union can resolve overlaps.
     """
     from scipy.sparse import coo_matrix
     from scipy.sparse.csgraph import connected_components
 
     patches = patches_of(triangles, _areas(Part(points, triangles)))
-    rows, columns = np.nonzero(patch_boundaries(_turned(triangles, patches.flip), patches.label, patches.count))
+    rows, columns = np.nonzero(patch_boundaries(_flipped(triangles, patches.flip), patches.label, patches.count))
     bounds = coo_matrix((np.ones(len(rows)), (columns, rows)), shape=(patches.count, int(rows.max(initial=0)) + 1))
     count, group = connected_components(bounds @ bounds.T, directed=False)
     label = group[patches.label]
     pieces = []
     for k in np.argsort(-np.bincount(label, minlength=count), kind="stable"):
-        used, own = np.unique(triangles[label == k], return_inverse=True)
-        pieces.append(Part(points[used], own.reshape(-1, 3)))
+        used, corners = np.unique(triangles[label == k], return_inverse=True)
+        pieces.append(Part(points[used], corners.reshape(-1, 3)))
     return pieces
 
 
 def _is_flat(part: Part) -> bool:
-    return abs(part.volume) <= 1e-9 * surface_area(part.points, part.triangles) ** 1.5
+    return bool(abs(part.volume) <= 1e-9 * surface_area(part.points, part.triangles) ** 1.5)
 
 
 def _best_welded(points: np.ndarray, triangles: np.ndarray, path: str, repairs: list[str]) -> _Welded:
-    """Welded with the least tolerance that closes the surface, or else that leaves the fewest open edges."""
+    """Welded with the least tolerance that closes the surface, or else with the fewest open edges."""
     diagonal = float(np.linalg.norm(np.ptp(points[triangles.ravel()], axis=0)))
     best, fewest = None, np.inf
     for tolerance in _WELDS:
         welded = _welded(points, triangles, tolerance * diagonal)
-        turned = _turned(welded.triangles, patches_of(welded.triangles, _areas(welded)).flip)
-        count = sum(len(walk) for walk in boundary_walks(turned))
-        if best is None or (count < fewest and len(turned)):
+        flipped = _flipped(welded.triangles, patches_of(welded.triangles, _areas(welded)).flip)
+        count = sum(len(walk) for walk in boundary_walks(flipped))
+        if best is None or (count < fewest and len(flipped)):
             best, fewest, used = welded, count, tolerance
         if count == 0:
             break
     assert best is not None
     if used > _WELDS[0]:
-        repairs.append(f"{path}: welded points up to {used:.0e} of its size apart")
+        repairs.append(f"{path}: welded points up to {used:.0e} of the size of the surface apart")
     return best
 
 
@@ -131,14 +130,14 @@ def _welded(points: np.ndarray, triangles: np.ndarray, tolerance: float) -> _Wel
     from scipy.sparse.csgraph import connected_components
     from scipy.spatial import cKDTree
 
-    used, own = np.unique(triangles, return_inverse=True)
+    used, corners = np.unique(triangles, return_inverse=True)
     places = points[used]
     pairs = cKDTree(places).query_pairs(tolerance, output_type="ndarray")
     graph = coo_matrix((np.ones(len(pairs)), pairs.T.reshape(2, -1)), shape=(len(places), len(places)))
     count, label = connected_components(graph, directed=False)
     first = np.full(count, len(places))
     np.minimum.at(first, label, np.arange(len(places)))
-    faces = label[own].reshape(-1, 3)
+    faces = label[corners].reshape(-1, 3)
     whole = (faces[:, 0] != faces[:, 1]) & (faces[:, 1] != faces[:, 2]) & (faces[:, 2] != faces[:, 0])
     faces = faces[whole]
     single = np.sort(np.unique(np.sort(faces, axis=1), axis=0, return_index=True)[1])
@@ -147,33 +146,36 @@ def _welded(points: np.ndarray, triangles: np.ndarray, tolerance: float) -> _Wel
 
 def _areas(surface: _Welded | Part) -> np.ndarray:
     x = surface.points[surface.triangles]
-    return 0.5 * np.linalg.norm(np.cross(x[:, 1] - x[:, 0], x[:, 2] - x[:, 0]), axis=1)
+    return np.asarray(0.5 * np.linalg.norm(np.cross(x[:, 1] - x[:, 0], x[:, 2] - x[:, 0]), axis=1))
 
 
-def _turned(triangles: np.ndarray, turn: np.ndarray) -> np.ndarray:
-    return np.where(turn[:, None], triangles[:, ::-1], triangles)
+def _flipped(triangles: np.ndarray, flip: np.ndarray) -> np.ndarray:
+    return np.where(flip[:, None], triangles[:, ::-1], triangles)
 
 
 def _closed(piece: Part, path: str, repairs: list[str]) -> Part:
-    """A connected piece without boundary."""
+    """A connected piece with its holes capped."""
     triangles = piece.triangles
     if boundary_walks(triangles):
-        triangles = _agreed(piece, path, repairs)
+        triangles = _oriented(piece, path, repairs)
     closure = close(piece.points, triangles)
     if len(closure.areas) == 0:
         return Part(piece.points, triangles)
     area = surface_area(piece.points, triangles)
     if area == 0.0:
         raise ShotError(
-            "has only triangles without area", path=path, found=f"{len(triangles)} triangles", remedy=REMEDY
+            "all triangles of this surface are without area",
+            path=path,
+            found=f"{len(triangles)} triangles",
+            remedy=REMEDY,
         )
     closed = Part(closure.points, closure.triangles)
-    # a single triangle that is missing can be told in one way only, however large it is
+    # a single missing triangle is unique, however large it is
     doubtful = closure.areas[closure.sides > 3]
     large = len(doubtful) and (doubtful.max() > _HOLE * area or doubtful.sum() > _HOLES * area)
     if large or _is_flat(closed):
         raise ShotError(
-            "is an open surface, so it has no inside to fill with tetrahedra", path=path,
+            "this is an open surface, which tetrahedra cannot fill", path=path,
             found=f"{len(closure.areas)} holes, the largest {100.0 * closure.areas.max() / area:.3g}% of the surface",
             remedy=REMEDY,
         )  # fmt: skip
@@ -182,41 +184,41 @@ def _closed(piece: Part, path: str, repairs: list[str]) -> Part:
     return closed
 
 
-def _agreed(piece: Part, path: str, repairs: list[str]) -> np.ndarray:
-    """Triangles that agree on the outside, without the sheets in between that keep the rest from closing."""
+def _oriented(piece: Part, path: str, repairs: list[str]) -> np.ndarray:
+    """Consistently oriented triangles, without sheets that keep the rest from closing."""
     areas = _areas(piece)
     patches = patches_of(piece.triangles, areas)
     if len(patches.one_sided):
         raise ShotError(
-            "has only one side, as a Moebius strip has, so nothing is inside it", path=path,
+            "this surface has only one side, such as a Moebius strip", path=path,
             found=f"{int(np.isin(patches.label, patches.one_sided).sum())} triangles", remedy=REMEDY,
         )  # fmt: skip
-    triangles = _turned(piece.triangles, patches.flip)
+    triangles = _flipped(piece.triangles, patches.flip)
     boundaries = patch_boundaries(triangles, patches.label, patches.count)
     signs = closing_signs(boundaries)
-    triangles = _turned(triangles, signs[patches.label] < 0.0)
+    triangles = _flipped(triangles, signs[patches.label] < 0.0)
     if (triangles != piece.triangles).any():
-        repairs.append(f"{path}: made the orientation of the triangles agree")
+        repairs.append(f"{path}: made the orientation of the triangles consistent")
     sheets = _sheets(piece.points, triangles, patches.label, boundaries * signs)
     if sheets:
-        repairs.append(f"{path}: dropped {len(sheets)} sheets that part the inside or stick out of it")
+        repairs.append(f"{path}: removed {len(sheets)} sheets that divide the inside or stick out of it")
         triangles = triangles[~np.isin(patches.label, sheets)]
     return triangles
 
 
 def _sheets(points: np.ndarray, triangles: np.ndarray, label: np.ndarray, boundaries: np.ndarray) -> list[int]:
-    """Patches without which the rest has no boundary; of several choices that which keeps the most volume."""
-    out: list[int] = []
-    left = list(range(boundaries.shape[1]))
+    """Patches whose removal closes the rest; of several choices the one of largest volume."""
+    sheets: list[int] = []
+    kept = list(range(boundaries.shape[1]))
     total = boundaries.sum(axis=1)
-    while np.any(total) and len(left) > 1:
-        rest = np.abs(total[:, None] - boundaries[:, left]).sum(axis=0)
-        best = [left[k] for k in np.flatnonzero(rest == rest.min())]
+    while np.any(total) and len(kept) > 1:
+        rest = np.abs(total[:, None] - boundaries[:, kept]).sum(axis=0)
+        best = [kept[k] for k in np.flatnonzero(rest == rest.min())]
         if rest.min() >= np.abs(total).sum():
             return []
-        volumes = [abs(surface_volume(points, triangles[~np.isin(label, [*out, k])])) for k in best]
+        volumes = [abs(surface_volume(points, triangles[~np.isin(label, [*sheets, k])])) for k in best]
         chosen = best[int(np.argmax(volumes))]
-        out.append(chosen)
-        left.remove(chosen)
+        sheets.append(chosen)
+        kept.remove(chosen)
         total = total - boundaries[:, chosen]
-    return out if not np.any(total) else []
+    return sheets if not np.any(total) else []

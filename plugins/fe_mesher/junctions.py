@@ -1,23 +1,23 @@
-"""T-junctions: corners of triangles on the open edges of others, which leave slits that no eye sees."""
+"""T-junctions: corners of triangles on open edges of other triangles, which leave invisible slits."""
 
 from __future__ import annotations
 
 import numpy as np
 from calmotion.geometry.orientation import directed_edges
 
-_PASSES = 8  # a triangle may have to be split at each of its edges, and its parts again
+_PASSES = 8  # a triangle may need a split at each of its edges, and its parts again
 
 
 def split_at_junctions(points: np.ndarray, triangles: np.ndarray, tolerance: float) -> tuple[np.ndarray, int]:
-    """Triangles with open edges split at the corners that lie on those edges.
+    """Triangles, split where corners of others are on their open edges.
 
     Args:
         points: Welded, shape [n, 3].
         triangles: Shape [m, 3].
-        tolerance: Largest distance of a corner to the edge, as a part of the edge's length.
+        tolerance: Largest distance of a corner to the edge, relative to the length of the edge.
 
     Returns:
-        The triangles, and how many were split.
+        The triangles, and the number of splits.
     """
     splits = 0
     for _ in range(_PASSES):
@@ -32,7 +32,7 @@ def split_at_junctions(points: np.ndarray, triangles: np.ndarray, tolerance: flo
 
 
 def _one_pass(points: np.ndarray, triangles: np.ndarray, tolerance: float) -> dict[int, np.ndarray]:
-    """Each triangle that is split at one of its edges, and what it becomes."""
+    """The parts of each triangle that is split at one of its edges."""
     from scipy.spatial import cKDTree
 
     edge, _ = directed_edges(triangles)

@@ -1,4 +1,4 @@
-"""External meshes, read with meshio."""
+"""Reading of external meshes with meshio."""
 
 from __future__ import annotations
 
@@ -11,17 +11,17 @@ from calmotion.shot import SurfaceMesh, TetGeometry
 
 from .cells import CORNERS, TRIANGLES, tets_of, triangles_of
 
-_CURVED = 1e-3  # of an edge: distance of a midpoint from its middle that is worth a word
+_CURVED = 1e-3  # distance of a midpoint from the center of its edge that is reported, of the edge
 
 
 def read_mesh_file(path: str, scale: float, body: str) -> tuple[TetGeometry | tuple[SurfaceMesh, ...], tuple[str, ...]]:
-    """The tetrahedra of a mesh file, or its surface where it has no volume elements, and what was changed.
+    """The tetrahedra of a mesh file, or its surface where it has no volume elements, and messages about changes.
 
-    Hexahedra, wedges and pyramids are cut into tetrahedra; quadratic elements give their corners, since ours get
-    midpoints of their own.
+    Hexahedra, wedges and pyramids are cut into tetrahedra. Only the corners of quadratic elements are used; midpoints
+    are computed later.
 
     Args:
-        path: File; Gmsh, VTK, Abaqus, Nastran, STL, OBJ, PLY and whatever else meshio reads.
+        path: File in any format that meshio reads (Gmsh, VTK, Abaqus, Nastran, STL, OBJ, PLY, ...).
         scale: Metres per unit of the file.
         body: Prim path of the body, for errors.
 
@@ -38,14 +38,16 @@ def read_mesh_file(path: str, scale: float, body: str) -> tuple[TetGeometry | tu
         mesh = _read(path)
         points = np.asarray(mesh.points, dtype=float) * scale
         cells = [(block.type, np.asarray(block.data, dtype=np.int64)) for block in mesh.cells if len(block.data)]
-    except (Exception, SystemExit) as error:  # meshio ends the process on a format it does not know
+    except (Exception, SystemExit) as error:  # meshio exits the process on an unknown format
         raise refuse("the mesh file cannot be read", f"{path}: {error}", "Use a format that meshio reads") from error
     if points.ndim != 2 or points.shape[1] != 3:
         raise refuse("the mesh file is not three-dimensional", path, "Give a volume mesh or a closed surface")
     for kind, data in cells:
         if data.min() < 0 or data.max() >= len(points):
             worst = int(data.min()) if data.min() < 0 else int(data.max())
-            raise refuse(f"an element of the mesh file ({kind}) names a node that does not exist", worst, "Repair it")
+            raise refuse(
+                f"an element of the mesh file ({kind}) refers to a node that does not exist", worst, "Repair it"
+            )
     volume = [(kind, data) for kind, data in cells if kind in CORNERS]
     if volume:
         tets = np.vstack([tets_of(kind, data) for kind, data in volume])
@@ -63,21 +65,21 @@ def read_mesh_file(path: str, scale: float, body: str) -> tuple[TetGeometry | tu
 def _read(path: str) -> Any:
     import meshio
 
-    # meshio takes .msh for ANSYS first; everybody else means Gmsh
+    # meshio tries ANSYS first for .msh; Gmsh is meant
     return meshio.read(path, file_format="gmsh" if path.lower().endswith(".msh") else None)
 
 
 def _changes(volume: list[tuple[str, np.ndarray]], points: np.ndarray, path: str) -> tuple[str, ...]:
-    """What the elements of a file lost on the way to linear tetrahedra."""
-    told = []
+    """Messages about the conversion of the elements of a file to linear tetrahedra."""
+    messages = []
     for kind, data in volume:
         if not kind.startswith("tetra"):
-            told.append(f"{path}: cut {len(data)} elements of type {kind} into tetrahedra")
+            messages.append(f"{path}: cut {len(data)} elements of type {kind} into tetrahedra")
         if kind == "tetra10":
-            # meshio orders the midpoints as VTK does: edges 01, 12, 20, 03, 13, 23
+            # meshio has the order of VTK for midpoints: edges 01, 12, 20, 03, 13, 23
             ends = points[data[:, [0, 1, 2, 0, 1, 2]]], points[data[:, [1, 2, 0, 3, 3, 3]]]
             away = np.linalg.norm(points[data[:, 4:]] - 0.5 * (ends[0] + ends[1]), axis=-1)
             curved = int((away > _CURVED * np.linalg.norm(ends[1] - ends[0], axis=-1)).any(axis=1).sum())
             if curved:
-                told.append(f"{path}: straightened the edges of {curved} curved tetrahedra")
-    return tuple(told)
+                messages.append(f"{path}: straightened the edges of {curved} curved tetrahedra")
+    return tuple(messages)

@@ -11,7 +11,7 @@ from calmotion.shot.model_choice import nothing_bends
 
 
 class TetrahedralizeFlexibleBodies(Operator):
-    """Makes one tetrahedral mesh for each flexible body."""
+    """One tetrahedral mesh for each flexible body."""
 
     idname = "fe.mesh"
     label = "Tetrahedralise flexible bodies"
@@ -25,7 +25,7 @@ class TetrahedralizeFlexibleBodies(Operator):
             -1.0,
             unit="m",
             minimum=1e-6,
-            description="Edge length of the elements of every body; -1: as the shot says, or automatic.",
+            description="Edge length of the elements of every body; -1: that of the shot, or automatic.",
         ),
         Property(
             "time_limit",
@@ -33,19 +33,19 @@ class TetrahedralizeFlexibleBodies(Operator):
             300.0,
             unit="s",
             minimum=1.0,
-            description="Longest time that meshing one body may take.",
+            description="Largest time for the mesh of one body.",
         ),
-        Property("cache", bool, True, description="Keep meshes in the user's cache folder and reuse them."),
+        Property("cache", bool, True, description="Store meshes in the cache folder and reuse them."),
     )
 
     @classmethod
     def poll(cls, data: Mapping[type, Any]) -> str | None:
-        """Left out where nothing bends."""
+        """The reason to skip it: nothing is flexible."""
         return nothing_bends(data)
 
     def execute(self, context: RunContext) -> Sequence[object]:
         """The meshes, in the order of the bodies."""
-        # trimesh and manifold3d load in half a second: only when something bends
+        # manifold3d takes half a second to load: only for flexible bodies
         from .accuracy import carrier_of
         from .body_mesh import MeshOptions, mesh_body
 

@@ -1,4 +1,4 @@
-"""From surfaces as robots have them to one closed solid: parts are closed one by one, manifold3d unites them."""
+"""One closed solid from the surfaces of a body: parts are closed one by one, manifold3d computes their union."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from .bridges import bridged
 from .closing import REMEDY, Part, closed_parts, connected_pieces
 from .uniting import NotManifold, united
 
-_TURNED, _PLACES = 0.02, 200  # share of the surface that may be inside out, measured in so many places
-_LOOSE = 1e-2  # of the volume: screws that touch nothing
+_INVERTED, _PLACES = 0.02, 200  # largest share of the surface that is inside out; number of sample points
+_LOOSE = 1e-2  # of the volume: loose pieces such as screws
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,7 +26,7 @@ class Solid:
         points: [m], shape [n, 3], body frame.
         triangles: Shape [m, 3], outward.
         volume: [m^3].
-        repairs: What was repaired, as sentences.
+        repairs: Messages about repairs.
     """
 
     points: np.ndarray
@@ -36,26 +36,29 @@ class Solid:
 
 
 def closed_solid(surfaces: Sequence[SurfaceMesh], body: str) -> Solid:
-    """One solid from the surfaces of a body: repaired, and united where there are several.
+    """One solid from the surfaces of a body: repaired, then united.
 
-    A closed shell inside another is a cavity where it faces the other way, and solid where it faces the same way.
+    A closed shell inside another one is a cavity where it has the opposite orientation, and solid otherwise.
 
     Args:
-        surfaces: Of the body, body frame.
+        surfaces: Surfaces of the body, body frame.
         body: Prim path of the body.
 
     Raises:
-        ShotError: A surface is open, or encloses no volume; the path is that of its Mesh prim.
+        ShotError: A surface is open or encloses no volume; the error has the path of its Mesh prim.
     """
     repairs: list[str] = []
     kept = _without_copies([_checked(surface, repairs) for surface in surfaces], repairs)
     if not kept:
         raise ShotError("its surfaces enclose no volume", path=body, found="no triangles", remedy=REMEDY)
-    # about the origin and of size one, so that no tolerance depends on the unit or on where the body is
-    every = np.vstack([surface.points[surface.triangles.ravel()] for surface in kept])
-    center, scale = 0.5 * (every.min(axis=0) + every.max(axis=0)), float(np.linalg.norm(np.ptp(every, axis=0)))
+    # centered and scaled to size one: tolerances do not depend on the unit or the position
+    all_points = np.vstack([surface.points[surface.triangles.ravel()] for surface in kept])
+    center, scale = (
+        0.5 * (all_points.min(axis=0) + all_points.max(axis=0)),
+        float(np.linalg.norm(np.ptp(all_points, axis=0))),
+    )
     if not scale > 0.0:
-        raise ShotError("its surfaces enclose no volume", path=body, found="all points in one place", remedy=REMEDY)
+        raise ShotError("its surfaces enclose no volume", path=body, found="all points coincide", remedy=REMEDY)
     kept = [replace(surface, points=(surface.points - center) / scale) for surface in kept]
     parts = _parts(kept, repairs)
     if not parts:
@@ -69,30 +72,30 @@ def closed_solid(surfaces: Sequence[SurfaceMesh], body: str) -> Solid:
     whole = _in_one_piece(whole, scale, repairs, body)
     if not whole.volume > 0.0:
         raise ShotError("its surfaces enclose no volume", path=body, found=f"{whole.volume:.3g} m^3", remedy=REMEDY)
-    turned = _inside_out(whole)
-    if turned > _TURNED:
+    inverted = _inside_out(whole)
+    if inverted > _INVERTED:
         raise ShotError(
-            "its surface runs through itself so that some of it is inside out", path=body,
-            found=f"{100.0 * turned:.2g}% of the surface", remedy="Untwist it, or author a TetMesh below the body",
+            "its surface intersects itself, and a part of it is inside out", path=body,
+            found=f"{100.0 * inverted:.2g}% of the surface", remedy="Untwist it, or author a TetMesh below the body",
         )  # fmt: skip
     points = whole.points * scale + center
     return Solid(points, whole.triangles.astype(np.int32), whole.volume * scale**3, tuple(repairs))
 
 
 def simplified(solid: Solid, tolerance: float) -> tuple[np.ndarray, np.ndarray]:
-    """Points and triangles of a solid without detail below a tolerance [m]: halves the time on dense scans and CAD."""
+    """Points and triangles of a solid without detail below a tolerance [m]; this halves the time for dense surfaces."""
     import manifold3d
 
     surface = manifold3d.Mesh64(solid.points, solid.triangles.astype(np.uint64))
     coarse = manifold3d.Manifold(surface).simplify(tolerance)
-    if coarse.is_empty():  # not a manifold to the last edge: the tetrahedraliser copes with it as it is
+    if coarse.is_empty():  # not an exact manifold: the tetrahedraliser takes the original surface
         return solid.points, solid.triangles
     mesh = coarse.to_mesh64()
     return np.array(mesh.vert_properties, dtype=float)[:, :3], np.array(mesh.tri_verts, dtype=np.int32)
 
 
 def _checked(surface: SurfaceMesh, repairs: list[str]) -> SurfaceMesh:
-    """A surface whose triangles name points that are there, and finite."""
+    """A surface whose triangles refer to existing, finite points."""
     points = np.asarray(surface.points, dtype=float).reshape(-1, 3)
     triangles = np.asarray(surface.triangles).reshape(-1, 3)
     if len(triangles) == 0:
@@ -100,7 +103,7 @@ def _checked(surface: SurfaceMesh, repairs: list[str]) -> SurfaceMesh:
     if triangles.min() < 0 or triangles.max() >= len(points):
         worst = int(triangles.min()) if triangles.min() < 0 else int(triangles.max())
         raise ShotError(
-            f"refers to points that do not exist (it has {len(points)})", path=surface.path,
+            f"a triangle refers to a point that does not exist ({len(points)} points)", path=surface.path,
             attribute="faceVertexIndices", found=worst, remedy="Correct the indices",
         )  # fmt: skip
     bad = ~np.isfinite(points).all(axis=1)
@@ -110,13 +113,13 @@ def _checked(surface: SurfaceMesh, repairs: list[str]) -> SurfaceMesh:
             found=f"point {int(triangles[bad[triangles]].min())}", remedy="Correct it, or remove its faces",
         )  # fmt: skip
     if bad.any():
-        repairs.append(f"{surface.path}: passed over {int(bad.sum())} points that are not finite and in no triangle")
+        repairs.append(f"{surface.path}: ignored {int(bad.sum())} unused points that are not finite")
         points = np.where(bad[:, None], points[triangles[0, 0]], points)
     return replace(surface, points=points, triangles=triangles)
 
 
 def _without_copies(surfaces: Sequence[SurfaceMesh], repairs: list[str]) -> list[SurfaceMesh]:
-    """Surfaces without those that repeat another one, as collision geometry often does."""
+    """Surfaces without copies of other ones, which collision geometry often contains."""
     kept: list[SurfaceMesh] = []
     for surface in surfaces:
         if len(surface.triangles) == 0:
@@ -124,7 +127,7 @@ def _without_copies(surfaces: Sequence[SurfaceMesh], repairs: list[str]) -> list
         for other in kept:
             same = surface.points.shape == other.points.shape and surface.triangles.shape == other.triangles.shape
             if same and np.allclose(surface.points, other.points, rtol=0.0, atol=1e-6 * np.ptp(other.points)):
-                repairs.append(f"left out {surface.path}, a copy of {other.path}")
+                repairs.append(f"ignored {surface.path}, a copy of {other.path}")
                 break
         else:
             kept.append(surface)
@@ -132,7 +135,7 @@ def _without_copies(surfaces: Sequence[SurfaceMesh], repairs: list[str]) -> list
 
 
 def _parts(surfaces: list[SurfaceMesh], repairs: list[str]) -> list[Part]:
-    """Closed and outward; open surfaces are joined first, since colours often cut one closed surface into several."""
+    """Closed outward parts. Open surfaces are joined first: closed surfaces are often divided by color."""
     parts: list[Part] = []
     opened: list[tuple[SurfaceMesh, ShotError]] = []
     for surface in surfaces:
@@ -161,23 +164,23 @@ def _parts(surfaces: list[SurfaceMesh], repairs: list[str]) -> list[Part]:
 
 
 def _outward(parts: list[Part], path: str, repairs: list[str]) -> list[Part]:
-    """Turns parts that are inside out; those inside another part are cavities, and stay inward as part of it."""
+    """Reorient parts that are inside out; inward parts inside another part are its cavities."""
     if sum(part.volume for part in parts) < 0.0:
-        repairs.append(f"{path}: turned the surface, which was inside out")
+        repairs.append(f"{path}: reoriented the surface, which was inside out")
         parts = [_inverted(part) for part in parts]
     solids = sorted((part for part in parts if part.volume > 0.0), key=lambda part: part.volume)
     for part in [part for part in parts if part.volume < 0.0]:
-        around = [i for i, s in enumerate(solids) if s.volume > -part.volume and _holds(s, part.points[0])]
+        around = [i for i, s in enumerate(solids) if s.volume > -part.volume and _contains(s, part.points[0])]
         if around:
-            solids[around[0]] = _together([solids[around[0]], part])
+            solids[around[0]] = _concatenated([solids[around[0]], part])
         else:
-            repairs.append(f"{path}: turned a part that was inside out")
+            repairs.append(f"{path}: reoriented a part that was inside out")
             solids.append(_inverted(part))
-    inside = sum(any(t.volume > s.volume and _holds(t, s.points[0]) for t in solids) for s in solids)
+    inside = sum(any(t.volume > s.volume and _contains(t, s.points[0]) for t in solids) for s in solids)
     if inside:
         repairs.append(
-            f"{path}: took {inside} closed shells inside others as solid, since they face outward; "
-            "turn them to make cavities"
+            f"{path}: treated {inside} closed shells inside others as solid, because they face outward; "
+            "reverse their orientation to make cavities"
         )
     return solids
 
@@ -186,19 +189,19 @@ def _inverted(part: Part) -> Part:
     return Part(part.points, part.triangles[:, ::-1])
 
 
-def _together(parts: Sequence[Part]) -> Part:
+def _concatenated(parts: Sequence[Part]) -> Part:
     starts = np.cumsum([0] + [len(part.points) for part in parts[:-1]])
     triangles = np.vstack([part.triangles + start for part, start in zip(parts, starts, strict=True)])
     return Part(np.vstack([part.points for part in parts]), triangles)
 
 
-def _holds(solid: Part, point: np.ndarray) -> bool:
+def _contains(solid: Part, point: np.ndarray) -> bool:
     low, high = solid.points.min(axis=0), solid.points.max(axis=0)
     return bool(((point > low) & (point < high)).all()) and winding_number(point, solid.points, solid.triangles) > 0.5
 
 
 def _inside_out(whole: Part) -> float:
-    """Share of a surface that has nothing of the body just below it; places lie evenly over it."""
+    """Share of a surface without material just below it, from evenly distributed sample points."""
     x = whole.points[whole.triangles]
     normal = np.cross(x[:, 1] - x[:, 0], x[:, 2] - x[:, 0])
     area = np.linalg.norm(normal, axis=1)
@@ -210,7 +213,7 @@ def _inside_out(whole: Part) -> float:
 
 
 def _in_one_piece(whole: Part, scale: float, repairs: list[str], body: str) -> Part:
-    """Without small solids that touch nothing, and with narrow gaps between large ones bridged."""
+    """One connected solid: small loose solids are removed, narrow gaps between large ones are bridged."""
     pieces = connected_pieces(whole.points, whole.triangles)
     solids = [piece for piece in pieces if piece.volume > 0.0]
     if len(solids) <= 1:
@@ -218,18 +221,18 @@ def _in_one_piece(whole: Part, scale: float, repairs: list[str], body: str) -> P
     least = _LOOSE * whole.volume
     loose = [piece for piece in solids if piece.volume < least]
     large = [piece for piece in solids if piece.volume >= least]
-    cavities = [p for p in pieces if p.volume < 0.0 and not any(_holds(solid, p.points[0]) for solid in loose)]
+    cavities = [p for p in pieces if p.volume < 0.0 and not any(_contains(solid, p.points[0]) for solid in loose)]
     if loose:
         lost = sum(piece.volume for piece in loose)
-        repairs.append(f"left out {len(loose)} loose pieces, {100.0 * lost / whole.volume:.2g}% of the volume")
+        repairs.append(f"removed {len(loose)} loose pieces, {100.0 * lost / whole.volume:.2g}% of the volume")
     if len(large) == 1:
-        return _together([*large, *cavities])
+        return _concatenated([*large, *cavities])
     joined, gap = bridged(large)
     if joined is None:
         sizes = ", ".join(f"{1e6 * scale**3 * piece.volume:.3g}" for piece in large)
         raise ShotError(
-            "its surfaces are separate solids that touch nowhere", path=body, found=f"{sizes} cm^3",
-            remedy="Make them overlap, or split them into several bodies",
+            "its surfaces are separate solids that do not touch", path=body, found=f"{sizes} cm^3",
+            remedy="Make them overlap, or divide them into several bodies",
         )  # fmt: skip
     repairs.append(f"bridged gaps of up to {1e3 * scale * gap:.2g} mm between {len(large)} separate solids")
-    return _together([joined, *cavities])
+    return _concatenated([joined, *cavities])

@@ -1,4 +1,4 @@
-"""fTetWild in a process of its own: it may crash or take forever, and then only that process is lost."""
+"""fTetWild in a separate process, because it may crash or not terminate."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ from . import cache
 
 _REMEDY = "Simplify or repair the Mesh, author a larger calm:flexible:elementSize, or give a TetMesh or a mesh file"
 _STOP_ENERGY = 10.0
-_TRIES = 3  # to get a mesh without flat elements
-# Passes that improve the elements. Where tens of thousands of triangles decide what there is to mesh, a few angles stay
-# below a degree however many passes there are, and passes are all that the time goes to.
+_TRIES = 3  # attempts at a mesh without flat elements
+# Passes that improve the elements. With tens of thousands of surface triangles, more passes do not improve the smallest
+# angles and take most of the time.
 _PASSES, _DENSE_PASSES, _DENSE = 80, 12, 15_000
 
 
@@ -28,23 +28,23 @@ def tetrahedralize(
 ) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
     """Tetrahedra of a closed surface.
 
-    fTetWild is not deterministic, so the first mesh of a surface is kept and used ever after; where it has an element
-    without volume, as happens now and then, it is made again.
+    fTetWild is not deterministic: the first mesh of a surface is stored and reused. A mesh with a flat element, which
+    fTetWild sometimes makes, is made again.
 
     Args:
         points: [m], shape [n, 3].
         triangles: Shape [m, 3].
         element_size: Edge length [m].
-        envelope: Largest distance to the surface, as a part of the bounding box's diagonal.
+        envelope: Largest distance to the surface, relative to the diagonal of the bounding box.
         path: Prim path, for errors.
         time_limit: [s].
-        use_cache: Whether the user's cache folder is read and written.
+        use_cache: Whether the cache folder is used.
 
     Returns:
         Points [m], shape [k, 3], and tetrahedra, shape [e, 4].
 
     Raises:
-        ShotError: It crashed, took too long, or made nothing.
+        ShotError: fTetWild crashed, exceeded the time limit, or made no tetrahedra.
     """
     passes = _DENSE_PASSES if len(triangles) > _DENSE else _PASSES
     settings: dict[str, object] = {
@@ -56,23 +56,23 @@ def tetrahedralize(
         "pytetwild": version("pytetwild"),
     }
     key = cache.cache_key(points, triangles, settings)
-    found = cache.load(key) if use_cache else None
-    if found is None or flat_tets(*found).any():
+    mesh = cache.load(key) if use_cache else None
+    if mesh is None or flat_tets(*mesh).any():
         for _ in range(_TRIES):
-            found = _run(points, triangles, element_size, envelope, passes, path, time_limit)
-            if not flat_tets(*found).any():
+            mesh = _run(points, triangles, element_size, envelope, passes, path, time_limit)
+            if not flat_tets(*mesh).any():
                 break
-        assert found is not None
-        if use_cache and not flat_tets(*found).any():
-            found = cache.store(key, {"points": found[0], "tets": found[1]}, lambda kept: not flat_tets(*kept).any())
-    return found[0], found[1]
+        assert mesh is not None
+        if use_cache and not flat_tets(*mesh).any():
+            mesh = cache.store(key, {"points": mesh[0], "tets": mesh[1]}, lambda kept: not flat_tets(*kept).any())
+    return mesh[0], mesh[1]
 
 
 def _run(
     points: np.ndarray, triangles: np.ndarray, element_size: float, envelope: float, passes: int, path: str,
     time_limit: float,
 ) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
-    # in units of the bounding box, about its centre: fTetWild's own tolerances then suit any robot
+    # in units of the bounding box, about its center: the tolerances of fTetWild then fit any size
     low, high = points.min(axis=0), points.max(axis=0)
     center, diagonal = 0.5 * (low + high), float(np.linalg.norm(high - low))
     with tempfile.TemporaryDirectory(prefix="calmotion-") as folder:
@@ -86,17 +86,18 @@ def _run(
             stop_energy=_STOP_ENERGY,
             passes=passes,
         )
-        # -P: the plugin's folder must not stand before the libraries on the path
+        # -P: the folder of the plugin must not precede the libraries on the path
         worker = Path(__file__).with_name("tetwild_worker.py")
         command = [sys.executable, "-P", str(worker), str(source), str(destination)]
         try:
-            # the tetrahedraliser leaves a file in the folder it runs in
+            # fTetWild writes a file into its working folder
             done = subprocess.run(
                 command, capture_output=True, timeout=time_limit, stdin=subprocess.DEVNULL, cwd=folder
             )
         except subprocess.TimeoutExpired:
             raise ShotError(
-                "tetrahedralising took too long", path=path, found=f"{len(triangles)} triangles, {time_limit:g} s",
+                "tetrahedralising exceeded the time limit", path=path,
+                found=f"{len(triangles)} triangles, {time_limit:g} s",
                 remedy=_REMEDY + ", or allow more with --set fe.mesh.time_limit=",
             ) from None  # fmt: skip
         if done.returncode != 0 or not destination.is_file():

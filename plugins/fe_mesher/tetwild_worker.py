@@ -1,4 +1,4 @@
-"""Run by `tetwild.py` in a process of its own: surface.npz -> tetrahedra.npz."""
+"""Process of `tetwild.py`: surface.npz -> tetrahedra.npz."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 
 
 def main(source: str, destination: str) -> None:
-    """Tetrahedralise the surface in one file into another."""
+    """Tetrahedralise the surface of the source file, and write the destination file."""
     # pytetwild 0.4 imports PyVista (and with it VTK) in its package's __init__ only to add a method to PyVista's
     # classes. A package without that __init__ gives the same compiled module and needs NumPy alone.
     spec = importlib.util.find_spec("pytetwild")
@@ -29,7 +29,7 @@ def main(source: str, destination: str) -> None:
             epsilon=float(file["envelope"]),
             stop_energy=float(file["stop_energy"]),
             num_opt_iter=int(file["passes"]),
-            # up to the element size: a third of the elements at the same volume error and better angles
+            # up to the element size: a third of the elements, with the same volume error and better angles
             coarsen=True,
             vtk_ordering=True,
             num_threads=1,

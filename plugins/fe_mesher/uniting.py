@@ -11,17 +11,17 @@ from .closing import Part
 
 
 class NotManifold(Exception):
-    """A part that is no manifold even where its edges are told apart by direction."""
+    """A part is not a manifold, not even with directed edges."""
 
 
 def united(parts: Sequence[Part]) -> Part:
-    """The union. A part that runs through itself stays as it is: only its parts against each other are resolved.
+    """The union of parts. Intersections of a part with itself are not resolved.
 
     Args:
         parts: Closed and outward, cavities inward.
 
     Raises:
-        NotManifold: A part is none, for manifold3d.
+        NotManifold: manifold3d refuses a part.
     """
     import manifold3d
 

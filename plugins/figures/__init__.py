@@ -20,14 +20,14 @@ class PlotFigures(Operator):
     uses = (SystemModes,)
     provides = (Figures,)
     properties = (
-        Property("dpi", int, 150, minimum=30, maximum=600, description="Resolution of the figures, dots an inch."),
+        Property("dpi", int, 150, minimum=30, maximum=600, description="Resolution of the figures, dots per inch."),
         Property("instants", int, 5, minimum=1, maximum=12, description="Number of instants in the filmstrip."),
     )
 
     @classmethod
     def poll(cls, data: Mapping[type, Any]) -> str | None:
         paths = data.get(OutputPaths)
-        return None if paths and paths.figures else "no figures are asked for (--figures)"
+        return None if paths and paths.figures else "no figures are requested (--figures)"
 
     def execute(self, context: RunContext) -> Sequence[object]:
         from .drawing import draw_figures
@@ -51,5 +51,5 @@ def register(host: Any) -> None:
 
 
 def unregister(host: Any) -> None:
-    """Take it out again."""
+    """Remove the operator from the host."""
     host.unregister_operator(PlotFigures)

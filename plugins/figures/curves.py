@@ -19,19 +19,19 @@ WIDTH = 9.0
 
 
 def runs_of(result: Result) -> list[tuple[Simulation, str, str, str]]:
-    """What was simulated, with color, line style and name."""
+    """The simulations of a result, with color, line style and name."""
     runs = [(result.before, BEFORE, "--" if result.after else "-", "before" if result.after else "as animated")]
     return runs + ([(result.after, AFTER, "-", "after")] if result.after else [])
 
 
 def worst_targets(result: Result) -> list[int]:
-    """The targets with the largest errors of the input, as many as a figure has room for, in the shot's order."""
+    """The targets with the largest errors of the input, at most `MOST_TARGETS`, in the order of the shot."""
     largest = result.before.position_errors[result.before.motion.judged].max(axis=0)
     return sorted(np.argsort(-largest, kind="stable")[:MOST_TARGETS].tolist())
 
 
 def plot_errors(character: Character, result: Result) -> Figure:
-    """Distance of each target to where it was meant to be [mm], and its rotation error [deg] where that counts."""
+    """Position error of each target [mm], and its rotation error [deg] where that has a weight."""
     shown = worst_targets(result)
     panels = [(k, False) for k in shown]
     panels += [(k, True) for k in shown if character.targets[k].rotation_weight > 0.0]
@@ -57,7 +57,7 @@ def plot_errors(character: Character, result: Result) -> Figure:
 
 
 def plot_motors(character: Character, result: Result, motors: Sequence[int]) -> Figure:
-    """Angle of each motor [deg], or length [mm], with its limits, and what the optimiser changed."""
+    """Angle of each motor [deg], or length [mm], with its limits, and the change by the optimiser."""
     columns = 2 if result.after else 1
     figure = new_figure(WIDTH, 0.6 + 1.75 * len(motors))
     grid = figure.subplots(len(motors), columns, sharex=True, squeeze=False)
@@ -89,20 +89,20 @@ def plot_motors(character: Character, result: Result, motors: Sequence[int]) -> 
 
 
 def draw_limits(axes: Axes, limits: np.ndarray, unit: str) -> None:
-    """The joint's limits, as lines where they are near the curve and always as text."""
+    """Limits of a joint: as text, and as lines where they are near the curve."""
     if not np.any(np.isfinite(limits)):
         return
     low, high = axes.get_ylim()
-    reach = 0.35 * max(high - low, 1e-6)
+    margin = 0.35 * max(high - low, 1e-6)
     for limit in limits:
-        if np.isfinite(limit) and low - reach < limit < high + reach:
+        if np.isfinite(limit) and low - margin < limit < high + margin:
             axes.axhline(limit, color=LIMIT, linewidth=1.0, linestyle=":")
     text = " to ".join(f"{limit:.0f}" if np.isfinite(limit) else "none" for limit in limits)
     axes.set_title(f"limits {text} {unit}", fontsize=SMALL, loc="right", color=LIMIT)
 
 
 def plot_convergence(result: Result) -> Figure:
-    """Objective and gradient at each iteration, over the work done so far."""
+    """Objective and gradient of each iteration over the number of simulations."""
     figure = new_figure(WIDTH, 3.2)
     work = [step.forward_simulations + step.linearized_sweeps for step in result.steps]
     panels = (
@@ -112,6 +112,6 @@ def plot_convergence(result: Result) -> Figure:
     for axes, (name, title, color) in zip(figure.subplots(1, 2), panels, strict=True):
         axes.semilogy(work, [getattr(step, name) for step in result.steps], color=color, marker="o", markersize=4)
         tidy(axes, "", title)
-        axes.set_xlabel("simulations and linearised sweeps so far; a dot is an iteration", fontsize=SMALL)
+        axes.set_xlabel("simulations and linearised sweeps (one dot for each iteration)", fontsize=SMALL)
         axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     return figure

@@ -1,4 +1,4 @@
-"""All figures of a result, one after the other."""
+"""All figures of a result."""
 
 from __future__ import annotations
 
@@ -29,20 +29,20 @@ def draw_figures(
     instants: int = 5,
     progress: Progress = lambda fraction, message: None,
 ) -> list[str]:
-    """Draw what the result holds.
+    """Draw the figures of a result.
 
     Args:
-        folder: Where to; made when it does not exist.
+        folder: Folder of the figures; it is created where it does not exist.
         character: The character.
         animation: For the times of its frames.
-        result: Of `simulate` (then without what comes after) or of `optimize`.
+        result: Of `simulate` (without figures of the optimiser) or of `optimize`.
         modes: Frequencies to mark in the spectra.
-        dpi: Dots an inch.
+        dpi: Dots per inch.
         instants: Number of instants in the filmstrip.
         progress: Called with a fraction in 0..1 and a message.
 
     Returns:
-        The paths that were written.
+        Paths of the figures.
 
     Raises:
         ShotError: When the folder cannot be written.

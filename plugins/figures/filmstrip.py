@@ -1,8 +1,9 @@
-"""The motion in pictures: each row one motion over the outline of what was meant, each column one instant."""
+"""The motion in pictures: each row is a motion over the silhouette of the intended one, each column an instant."""
 
 from __future__ import annotations
 
 import numpy as np
+from calmotion.geometry.tetrahedra import Indices
 from calmotion.shot import Animation, Character, Motion, Result, Simulation
 from calmotion.shot.character import Array
 from calmotion.support.naming import distinct_names
@@ -12,17 +13,17 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from .magnifier import choose_magnifier, draw_magnifier
-from .scene import Camera, draw_over_ghost, fit_camera, pose, prepare
+from .scene import Camera, View, draw_over_ghost, fit_camera, pose, prepare
 from .style import AFTER, BEFORE, INTENDED, NORMAL, SMALL, TEXT, new_figure
 
 PANEL = 340  # pixels across a panel, before it is drawn into the figure
-SMOOTH = 2  # rendered this much larger, then averaged
+SMOOTH = 2  # factor of the rendering, which is then averaged
 TRAIL_S = 0.5
 WIDTH = 12.0
 
 
 def choose_instants(animation: Animation, result: Result, count: int) -> Array:
-    """In each of `count` equal parts of the shot, the frame at which the input is farthest off; times [s]."""
+    """The frame of the largest error of the input in each of `count` equal parts of the shot; times [s]."""
     frames = animation.frame_times
     errors = result.before.position_errors
     worst = (
@@ -33,12 +34,12 @@ def choose_instants(animation: Animation, result: Result, count: int) -> Array:
 
 
 def draw_filmstrip(character: Character, animation: Animation, result: Result, count: int) -> Figure:
-    """The input and, where there is one, the optimised motion at the instants at which the input is worst.
+    """The input and, where there is one, the optimised motion at the instants of the largest errors of the input.
 
     Args:
         character: The character.
         animation: For the times of its frames.
-        result: What was computed.
+        result: Of `simulate` or `optimize`.
         count: Number of instants.
     """
     times = choose_instants(animation, result, count)
@@ -64,39 +65,37 @@ def draw_filmstrip(character: Character, animation: Animation, result: Result, c
     grid = figure.subplots(len(runs), len(times), squeeze=False)
     for row, (run, color, name), motion in zip(grid, runs, motions, strict=True):
         for column, axes in enumerate(row):
-            picture = draw_over_ghost(model, motion, reference, column, camera, SMOOTH)
+            panel = View(model, motion, reference, column, camera, SMOOTH)
+            picture = draw_over_ghost(panel)
             axes.imshow(picture, extent=(0, camera.size[0], camera.size[1], 0), interpolation="antialiased")
             draw_trails(axes, character, result.reference, times[column], camera, INTENDED, 1.0)
             draw_trails(axes, character, run.motion, times[column], camera, color, 1.4)
             if magnifier.useful:
-                target = int(targets[column])
-                draw_magnifier(
-                    axes, magnifier, model, motion, reference, column, target, camera, color, picture, SMOOTH
-                )
+                draw_magnifier(axes, magnifier, panel, int(targets[column]), color, picture)
             axes.set_axis_off()
             axes.set_xlim(0, camera.size[0])
             axes.set_ylim(camera.size[1], 0)
             title = f"{times[column]:.2f} s"
             if len(targets):
                 error = error_at(run, int(targets[column]), times[column])
-                title += f", {names[paths[targets[column]]]} {1e3 * error:.{1 if error > 1e-3 else 2}f} mm off"
+                title += f", {names[paths[targets[column]]]} {1e3 * error:.{1 if error > 1e-3 else 2}f} mm"
             axes.set_title(title, fontsize=SMALL, color=color, pad=2)
         place = {"ha": "right", "va": "center", "transform": row[0].transAxes, "rotation": 90}
         row[0].text(0.0, 0.5, name, fontsize=NORMAL, color=color, fontweight="bold", **place)
-    text = "Simulated motion over what was meant (green) when the input is farthest off"
+    text = "Simulated motion over the intended motion (green) at the largest errors of the input"
     if magnifier.useful:
-        text += f"; in the boxes the target named above, {magnifier.factor:g} times as large"
+        text += f"; insets: the target named above, enlarged {magnifier.factor:g} times"
     figure.suptitle(text, fontsize=NORMAL, color=TEXT)
     return figure
 
 
-def farthest_targets(run: Simulation, times: Array) -> Array:
-    """The target that is farthest off at each of the times, shape [n]; empty where there are no targets."""
+def farthest_targets(run: Simulation, times: Array) -> Indices:
+    """The target with the largest error at each of the times, shape [n]; empty where there are no targets."""
     errors = run.position_errors
     if not errors.shape[1]:
         return np.empty(0, dtype=int)
     at = [[error_at(run, target, time) for target in range(errors.shape[1])] for time in times]
-    return np.argmax(at, axis=1)
+    return np.asarray(np.argmax(at, axis=1))
 
 
 def error_at(run: Simulation, target: int, time: float) -> float:
@@ -107,7 +106,7 @@ def error_at(run: Simulation, target: int, time: float) -> float:
 def draw_trails(
     axes: Axes, character: Character, motion: Motion, time: float, camera: Camera, color: str, width: float
 ) -> None:
-    """The path of each target up to now."""
+    """The path of each target up to a time [s]."""
     start = max(time - TRAIL_S, 0.0)
     trail = sample_motion(motion, np.linspace(start, time, 60))
     for k in range(len(character.targets)):

@@ -1,4 +1,4 @@
-"""A small depth-buffered renderer for triangles, so that pictures need neither a screen nor a graphics card."""
+"""A depth-buffered renderer of triangles, which needs neither a screen nor a graphics card."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ Indices = NDArray[np.integer]
 
 @dataclass(frozen=True, eq=False)
 class Hits:
-    """What is seen in each pixel.
+    """The visible triangle of each pixel.
 
     Attributes:
         triangle: Index of the triangle, -1 for none, shape [height, width].
@@ -39,8 +39,10 @@ def rasterize(corners: Array, width: int, height: int) -> Hits:
     plane = corners[:, :, :2]
     edges = edge_functions(plane)
     # With y down, a triangle that faces the eye has a negative area.
-    seen = np.flatnonzero(cross(plane[:, 1] - plane[:, 0], plane[:, 2] - plane[:, 0]) < 0.0)
-    triangle, row = expand(seen, *pixel_range(plane[seen, :, 1].min(axis=1), plane[seen, :, 1].max(axis=1), height))
+    facing = np.flatnonzero(cross(plane[:, 1] - plane[:, 0], plane[:, 2] - plane[:, 0]) < 0.0)
+    triangle, row = expand(
+        facing, *pixel_range(plane[facing, :, 1].min(axis=1), plane[facing, :, 1].max(axis=1), height)
+    )
     span, column = expand(np.arange(len(triangle)), *pixel_range(*spans(edges[triangle], row + 0.5), width))
     triangle, row = triangle[span], row[span]
     place = np.column_stack([column + 0.5, row + 0.5, np.ones(len(row))])
@@ -69,7 +71,7 @@ def edge_functions(plane: Array) -> Array:
 
 
 def spans(edges: Array, y: Array) -> tuple[Array, Array]:
-    """Where the line at height y enters and leaves each triangle: [p, 3, 3] and [p] give two of [p]."""
+    """Ends of the line at height y in each triangle: [p, 3, 3] and [p] give two of [p]."""
     slope, value = edges[..., 0], edges[..., 1] * y[:, None] + edges[..., 2]
     root = -value / np.where(slope == 0.0, 1.0, slope)
     enter = np.where(slope > 0.0, root, -np.inf).max(axis=1, initial=-np.inf)
@@ -78,7 +80,7 @@ def spans(edges: Array, y: Array) -> tuple[Array, Array]:
 
 
 def pixel_range(low: Array, high: Array, size: int) -> tuple[Indices, Indices]:
-    """First pixel whose middle lies in [low, high], and how many do, within 0..size."""
+    """First pixel with its center in [low, high], and the number of such pixels, within 0..size."""
     first = np.ceil(np.clip(low, 0.0, size) - 0.5).astype(int)
     last = np.floor(np.clip(high, 0.0, size) - 0.5).astype(int)
     return first, np.maximum(last - first + 1, 0)

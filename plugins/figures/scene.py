@@ -1,4 +1,4 @@
-"""A character at one instant as a picture: camera, light, and the ghost of what was meant."""
+"""A picture of a character at one instant: camera, light, and the silhouette of the intended motion."""
 
 from __future__ import annotations
 
@@ -16,6 +16,8 @@ from numpy.typing import NDArray
 from .raster import Hits, rasterize
 from .style import INTENDED
 
+Pixels = NDArray[np.uint8]  # sRGB, shape [height, width, 3]
+
 PAPER = np.array([1.0, 1.0, 1.0])
 DEFAULT_COLOR = (0.55, 0.55, 0.57)
 AMBIENT, KEY, FILL = 0.34, 0.62, 0.16
@@ -23,7 +25,7 @@ AMBIENT, KEY, FILL = 0.34, 0.62, 0.16
 
 @dataclass(frozen=True, eq=False)
 class Model:
-    """The visible surfaces of a character, ready to draw.
+    """The visible surfaces of a character, prepared for drawing.
 
     Attributes:
         parts: For each surface: body index, points [n, 3], modes [n, 3, r] or None, normals [n, 3], triangles.
@@ -58,6 +60,27 @@ class Camera:
         return np.concatenate([self.center + self.scale * local[..., :2] / local[..., 2:], local[..., 2:]], axis=-1)
 
 
+@dataclass(frozen=True, eq=False)
+class View:
+    """One instant of a motion, and the camera.
+
+    Attributes:
+        model: Surfaces of the character.
+        motion: The motion in full color.
+        reference: The motion drawn as a silhouette.
+        row: Row of both motions.
+        camera: The camera.
+        smooth: Pixels of the camera for one of the picture, along either axis.
+    """
+
+    model: Model
+    motion: Motion
+    reference: Motion
+    row: int
+    camera: Camera
+    smooth: int
+
+
 def prepare(character: Character, skins: tuple[Skin | None, ...]) -> Model:
     """Split the surfaces for shading, once for all pictures."""
     parts, colors = [], []
@@ -79,15 +102,15 @@ def pose(model: Model, motion: Motion, row: int) -> tuple[Array, Array, IntArray
     corners, normals, owners = [np.zeros((0, 3, 3))], [np.zeros((0, 3, 3))], [np.zeros(0, dtype=np.int32)]
     for number, (body, points, modes, directions, triangles) in enumerate(model.parts):
         turn = rotation_matrices(motion.rotations[row, body])
-        bent = deformed_points(points, modes, motion.elastic[body][row : row + 1])[0]
-        corners.append((bent @ turn.T + motion.positions[row, body])[triangles])
+        deformed = deformed_points(points, modes, motion.elastic[body][row : row + 1])[0]
+        corners.append((deformed @ turn.T + motion.positions[row, body])[triangles])
         normals.append((directions @ turn.T)[triangles])
         owners.append(np.full(len(triangles), number, dtype=np.int32))
     return np.concatenate(corners), np.concatenate(normals), np.concatenate(owners)
 
 
 def fit_camera(view: Viewpoint, cloud: Array, width: int, height: int, margin: float = 0.04) -> Camera:
-    """The camera from the viewpoint's direction that just holds the cloud of world points [n, 3]."""
+    """The camera from the direction of a viewpoint whose picture just contains world points of shape [n, 3]."""
     forward = -view.toward_eye
     right = np.cross(forward, view.up)
     right = right / np.linalg.norm(right)
@@ -102,7 +125,7 @@ def fit_camera(view: Viewpoint, cloud: Array, width: int, height: int, margin: f
 
 
 def draw(model: Model, motion: Motion, row: int, camera: Camera) -> tuple[Array, Hits]:
-    """Color of each pixel in linear RGB, shape [height, width, 3], and what is hit there."""
+    """Color of each pixel in linear RGB, shape [height, width, 3], and the visible triangles."""
     corners, normals, owners = pose(model, motion, row)
     hits = rasterize(camera.project(corners), *camera.size)
     picture = np.broadcast_to(PAPER, (*hits.triangle.shape, 3)).copy()
@@ -115,22 +138,22 @@ def draw(model: Model, motion: Motion, row: int, camera: Camera) -> tuple[Array,
     fill = 0.8 * right - 0.2 * down - 0.5 * forward
     light = AMBIENT + KEY * np.maximum(normal @ (key / np.linalg.norm(key)), 0.0)
     light += FILL * np.maximum(normal @ (fill / np.linalg.norm(fill)), 0.0)
-    # Very dark paint is lifted a little, else its form is lost on paper.
+    # Very dark colors are made slightly lighter; otherwise shading would be invisible.
     paint = 0.03 + 0.97 * np.clip(model.colors[owners[triangles]], 0.0, 1.0)
     picture[rows, columns] = np.clip(paint * light[:, None] * 1.15, 0.0, 1.0)
     return picture, hits
 
 
-def draw_over_ghost(model: Model, motion: Motion, reference: Motion, row: int, camera: Camera, smooth: int) -> Array:
-    """The motion at one row in full color over the silhouette of the reference, 8 bits, `smooth` times smaller."""
-    picture, front = draw(model, motion, row, camera)
-    ghost = rasterize(camera.project(pose(model, reference, row)[0]), *camera.size)
+def draw_over_ghost(view: View) -> Pixels:
+    """The motion in full color over the silhouette of the reference."""
+    picture, front = draw(view.model, view.motion, view.row, view.camera)
+    ghost = rasterize(view.camera.project(pose(view.model, view.reference, view.row)[0]), *view.camera.size)
     red, green, blue = (channel**2.2 for channel in to_rgb(INTENDED))
-    return develop(lay_ghost(picture, front, ghost, (red, green, blue), 0.35), smooth)
+    return develop(lay_ghost(picture, front, ghost, (red, green, blue), 0.35), view.smooth)
 
 
 def lay_ghost(picture: Array, front: Hits, ghost: Hits, color: tuple[float, float, float], strength: float) -> Array:
-    """Lay the silhouette of another pose over a picture: stronger where it stands free, faint behind the character."""
+    """Draw the silhouette of another pose on a picture: filled beside the character, as an outline behind it."""
     there = ghost.triangle >= 0
     free = there & (front.triangle < 0)
     mixed = picture.copy()
@@ -152,9 +175,9 @@ def shrink(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
     return mask
 
 
-def develop(picture: Array, factor: int) -> Array:
+def develop(picture: Array, factor: int) -> Pixels:
     """Average blocks of `factor` x `factor` pixels and encode as sRGB, 8 bits."""
     height, width = picture.shape[0] // factor, picture.shape[1] // factor
     small = picture[: height * factor, : width * factor].reshape(height, factor, width, factor, 3).mean(axis=(1, 3))
     encoded = np.where(small <= 0.0031308, 12.92 * small, 1.055 * np.maximum(small, 1e-9) ** (1.0 / 2.4) - 0.055)
-    return np.round(255.0 * np.clip(encoded, 0.0, 1.0)).astype(np.uint8)
+    return np.asarray(np.round(255.0 * np.clip(encoded, 0.0, 1.0)), dtype=np.uint8)

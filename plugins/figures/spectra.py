@@ -1,4 +1,4 @@
-"""The shake by frequency, before and after, with the character's own frequencies marked."""
+"""Spectra of the errors before and after, with the natural frequencies of the character."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ from matplotlib.figure import Figure
 from .curves import WIDTH, runs_of, worst_targets
 from .style import LIMIT, SMALL, new_figure, tidy
 
-DECADES = 5.0
-NEAR = 0.05  # of the width: labels nearer than this are written as one
-ROOM = 1.15  # beyond the highest frequency of interest
+DECADES = 5.0  # of the vertical axis
+NEAR = 0.05  # of the width: distance below which labels are joined
+ROOM = 1.15  # end of the axis over the highest significant frequency
 
 
 def plot_spectra(character: Character, result: Result, modes: SystemModes | None) -> Figure:
@@ -51,7 +51,7 @@ def plot_spectra(character: Character, result: Result, modes: SystemModes | None
 
 
 def grouped(values: list[float], gap: float) -> list[list[float]]:
-    """Ascending values in groups, each value nearer than `gap` to the one before it."""
+    """Ascending values in groups, with less than `gap` between successive values of a group."""
     groups: list[list[float]] = []
     for value in values:
         if groups and value - groups[-1][-1] < gap:

@@ -1,4 +1,4 @@
-"""How our figures look, and how they are saved: no global state of matplotlib is touched."""
+"""Style and saving of figures, without changes of the global state of matplotlib."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ SMALL, NORMAL = 8.0, 9.5
 
 
 def new_figure(width: float, height: float) -> Figure:
-    """A white figure [inch] that belongs to no window."""
+    """A white figure without a window; width and height [inch]."""
     figure = Figure(figsize=(width, height), facecolor="white", layout="constrained")
     FigureCanvasAgg(figure)
     return figure

@@ -21,15 +21,15 @@ class WriteModeShapes(Operator):
     uses = (Animation, Source, ModelChoices)
     provides = (ModeShapes,)
     properties = (
-        Property("dpi", int, 150, minimum=30, maximum=600, description="Resolution of the pictures, dots an inch."),
-        Property("pictures", int, 8, minimum=1, maximum=30, description="Most modes in the picture of a body."),
+        Property("dpi", int, 150, minimum=30, maximum=600, description="Resolution of the pictures, dots per inch."),
+        Property("pictures", int, 8, minimum=1, maximum=30, description="Most modes in one picture."),
     )
 
     @classmethod
     def poll(cls, data: Mapping[type, Any]) -> str | None:
         paths = data.get(OutputPaths)
-        asked = None if paths and paths.modes else "no mode shapes are asked for (--modes)"
-        return nothing_bends(data) or asked
+        missing = None if paths and paths.modes else "no mode shapes are requested (--modes)"
+        return nothing_bends(data) or missing
 
     def execute(self, context: RunContext) -> Sequence[object]:
         from calmotion.simulation.bodies import flexible_modes
@@ -59,5 +59,5 @@ def register(host: Any) -> None:
 
 
 def unregister(host: Any) -> None:
-    """Take it out again."""
+    """Remove the operator from the host."""
     host.unregister_operator(WriteModeShapes)

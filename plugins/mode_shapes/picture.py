@@ -1,4 +1,4 @@
-"""A sheet of mode shapes: each mode's deformed surface, shaded by its displacement, over the outline at rest."""
+"""A sheet of mode shapes: the deformed surface, colored by displacement, and the undeformed outline."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ def draw_modes(
     """Draw the modes of one body.
 
     Args:
-        path: Of the picture.
-        title: The body.
+        path: File of the picture.
+        title: Prim path of the body.
         mesh: Its mesh.
         shapes: Displacements to show [m], shape [n, 3, r].
         frequencies: [Hz], shape [r] or longer.
-        dpi: Dots an inch.
+        dpi: Dots per inch.
     """
     from matplotlib import colormaps
     from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -44,7 +44,7 @@ def draw_modes(
     panel = float(np.clip(_WIDTH * height / width, 0.6, 1.2 * _WIDTH)) + 0.35  # and the title
     figure = Figure(figsize=(_WIDTH * max(columns, 2), panel * rows + 0.4), layout="constrained")
     FigureCanvasAgg(figure)
-    figure.suptitle(f"{title}, held at its root", fontsize=11)
+    figure.suptitle(f"{title}, clamped at its root", fontsize=11)
     axes = np.atleast_1d(figure.subplots(rows, columns, squeeze=False)).ravel()
     triangles = mesh.surface[:, :3]
     outline = _silhouette(mesh, toward)
@@ -79,7 +79,7 @@ def draw_modes(
 
 
 def view(nodes: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Unit vectors to the right, up and towards the eye: the body's longest extent lies across the picture."""
+    """Unit vectors to the right, up and towards the eye; the longest extent of the body is horizontal."""
     axes = np.linalg.svd(nodes - nodes.mean(axis=0), full_matrices=False)[2]
     long, middle, short = axes
     toward = 0.55 * middle + 0.75 * short + 0.35 * long
@@ -90,7 +90,7 @@ def view(nodes: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def _silhouette(mesh: QuadraticMesh, toward: np.ndarray) -> np.ndarray:
-    """Edges between a triangle that faces the eye and one that does not, and sharp ones that are seen, [e, 2]."""
+    """Edges between triangles that face the eye and ones that do not, and visible sharp edges, shape [e, 2]."""
     triangles = mesh.surface[:, :3]
     x = mesh.nodes[triangles]
     normal = np.cross(x[:, 1] - x[:, 0], x[:, 2] - x[:, 0])
@@ -101,7 +101,7 @@ def _silhouette(mesh: QuadraticMesh, toward: np.ndarray) -> np.ndarray:
     edges, owner = edges[order], owner[order]
     pair = np.flatnonzero(np.all(edges[1:] == edges[:-1], axis=1))
     a, b = owner[pair], owner[pair + 1]
-    seen = normal @ toward > 0.0
-    turning = seen[a] != seen[b]
-    sharp = (seen[a] | seen[b]) & (np.einsum("ij,ij->i", normal[a], normal[b]) < 0.6)
-    return edges[pair[turning | sharp]]
+    facing = normal @ toward > 0.0
+    contour = facing[a] != facing[b]
+    sharp = (facing[a] | facing[b]) & (np.einsum("ij,ij->i", normal[a], normal[b]) < 0.6)
+    return np.asarray(edges[pair[contour | sharp]])

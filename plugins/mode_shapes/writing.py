@@ -21,7 +21,7 @@ from .picture import draw_modes
 if TYPE_CHECKING:
     from calmotion.reduction.reduce import LinearModes
 
-SHOWN = 0.1  # largest displacement of a mode in the files, of the body's size
+SHOWN = 0.1  # largest displacement of a mode in the files, of the size of the body
 COLUMNS = ("body", "mode", "frequency_hz", "damping_ratio", "mass_x_kg", "mass_y_kg", "mass_z_kg", "mass_kg")
 Progress = Callable[[float, str], None]
 
@@ -33,33 +33,32 @@ def write_modes(
     """Write the modes of each body.
 
     Args:
-        folder: Where to; made when it does not exist.
-        modes: Bodies with their linear modes; the next is made when the one before is written.
-        total: How many there are, for the progress.
-        dpi: Of the pictures, dots an inch.
-        pictures: Most modes in the picture of a body.
+        folder: Folder of the files; it is created where it does not exist.
+        modes: Bodies with their linear modes; each is computed after the previous one is written.
+        total: Number of bodies, for the progress.
+        dpi: Of the pictures, dots per inch.
+        pictures: Largest number of modes in the picture of a body.
         progress: Called with a fraction in 0..1 and a message.
 
     Returns:
-        Paths of the files: `<body>.vtu` (quadratic tetrahedra in metres; a vector field for each mode, whose largest
-        displacement is a tenth of the body's size), `<body>.png`, and `modes.csv` (effective masses are those that a
-        mode carries when the root of the body is shaken along an axis of its frame; damping is that of the body by
-        itself, carrying nothing).
+        Paths of the files: `<body>.vtu` (quadratic tetrahedra in metres, and a vector field for each mode, scaled to a
+        largest displacement of a tenth of the size of the body), `<body>.png`, and `modes.csv` (effective masses for
+        excitation of the root along the axes of the body frame, damping of the single body without loads).
 
     Raises:
         ShotError: The folder cannot be written, or a body cannot be reduced.
     """
     target = Path(folder)
     written: list[str] = []
-    rows: list[tuple] = []
-    found: list[str] = []
+    rows: list[tuple[object, ...]] = []
+    paths: list[str] = []
     try:
         target.mkdir(parents=True, exist_ok=True)
         for k, (body, linear) in enumerate(modes):
             progress(k / total, body.path)
-            found.append(body.path)
-            name = distinct_names(found)[body.path].replace("/", "_")
-            if len({n.replace("/", "_") for n in distinct_names(found).values()}) < len(found):
+            paths.append(body.path)
+            name = distinct_names(paths)[body.path].replace("/", "_")
+            if len({n.replace("/", "_") for n in distinct_names(paths).values()}) < len(paths):
                 name = body.path.strip("/").replace("/", "_")
             shapes = scaled_modes(linear)
             frequencies = np.sqrt(np.maximum(linear.basis.omega_squared, 0.0)) / (2.0 * np.pi)
@@ -84,7 +83,7 @@ def write_modes(
 
 
 def scaled_modes(linear: LinearModes) -> np.ndarray:
-    """Modes [m], shape [n, 3, r], the largest displacement of each a tenth of the body's size."""
+    """Modes scaled to a largest displacement of a tenth of the size of the body [m], shape [n, 3, r]."""
     modes = linear.basis.modes
     size = float(np.linalg.norm(np.ptp(linear.model.mesh.nodes, axis=0)))
     largest = np.linalg.norm(modes, axis=1).max(axis=0, initial=0.0)
@@ -92,7 +91,7 @@ def scaled_modes(linear: LinearModes) -> np.ndarray:
 
 
 def write_vtu(path: Path, linear: LinearModes, shapes: np.ndarray) -> None:
-    """One body; the nodes of a quadratic tetrahedron stand in VTK's order already."""
+    """Write one body; the nodes of a quadratic tetrahedron are in the order of VTK already."""
     import meshio
 
     mesh = linear.model.mesh
@@ -101,7 +100,7 @@ def write_vtu(path: Path, linear: LinearModes, shapes: np.ndarray) -> None:
         meshio.Mesh(mesh.nodes, [("tetra10", mesh.tets)], point_data=fields).write(temporary)
 
 
-def table_rows(body: Body, linear: LinearModes, frequencies: np.ndarray) -> list[tuple]:
+def table_rows(body: Body, linear: LinearModes, frequencies: np.ndarray) -> list[tuple[object, ...]]:
     """Rows of `modes.csv`."""
     assert body.flexible is not None
     omega = 2.0 * np.pi * frequencies

@@ -34,14 +34,14 @@ def closest_on_triangles(point: Array, triangles: Array) -> Array:
     w = np.einsum("ij,ij->i", np.cross(b - a, foot - a), n) / safe
     inside = good & (v >= 0.0) & (w >= 0.0) & (v + w <= 1.0)
     closest[inside] = foot[inside]
-    return closest
+    return np.asarray(closest)
 
 
 def _closest_on_segments(point: Array, a: Array, b: Array) -> Array:
     d = b - a
     length2 = np.maximum(np.einsum("ij,ij->i", d, d), np.finfo(float).tiny)
     t = np.clip(np.einsum("ij,ij->i", point - a, d) / length2, 0.0, 1.0)
-    return a + t[:, None] * d
+    return np.asarray(a + t[:, None] * d)
 
 
 def ray_length(origin: Array, direction: Array, triangles: Array, skip: float) -> float:
@@ -57,7 +57,7 @@ def ray_length(origin: Array, direction: Array, triangles: Array, skip: float) -
 
 
 @kernel
-def first_hit(origin, direction, triangles, skip):
+def first_hit(origin: Array, direction: Array, triangles: Array, skip: float) -> float:
     """`ray_length` of contiguous arrays.
 
     Source: Möller and Trumbore 1997.

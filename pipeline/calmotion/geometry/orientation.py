@@ -85,7 +85,7 @@ def patch_boundaries(triangles: Indices, label: Indices, count: int) -> Array:
     sign = np.where(forward, 1.0, -1.0)
     net = coo_matrix((sign, (edge, np.repeat(label, 3))), shape=(int(edge.max()) + 1, count)).tocsr()
     net.eliminate_zeros()
-    return net[np.flatnonzero(np.diff(net.indptr))].toarray()
+    return np.asarray(net[np.flatnonzero(np.diff(net.indptr))].toarray())
 
 
 def closing_signs(boundaries: Array) -> Array:

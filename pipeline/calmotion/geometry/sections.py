@@ -34,7 +34,7 @@ class Sections:
     @property
     def fill(self) -> Array:
         """Area over that of the bounding box, shape [n]: 1 for a rectangle, pi/4 for an ellipse, small for a tube."""
-        return self.area / np.maximum(self.extent.prod(axis=1), np.finfo(float).tiny)
+        return np.asarray(self.area / np.maximum(self.extent.prod(axis=1), np.finfo(float).tiny))
 
     @property
     def compactness(self) -> Array:

@@ -19,7 +19,7 @@ _FACES = np.array([[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]])  # face i is opp
 def tet_volumes(points: Array, tets: IntArray) -> Array:
     """Signed volumes [m^3], shape [m]; positive when corner 3 is on the right-hand side of 0, 1, 2."""
     x = points[tets]
-    return np.einsum("ij,ij->i", np.cross(x[:, 1] - x[:, 0], x[:, 2] - x[:, 0]), x[:, 3] - x[:, 0]) / 6.0
+    return np.asarray(np.einsum("ij,ij->i", np.cross(x[:, 1] - x[:, 0], x[:, 2] - x[:, 0]), x[:, 3] - x[:, 0]) / 6.0)
 
 
 def face_normals(points: Array, tets: IntArray) -> Array:
@@ -27,7 +27,7 @@ def face_normals(points: Array, tets: IntArray) -> Array:
     x = points[tets]
     a, b, c = (x[:, _FACES[:, k]] for k in range(3))
     n = np.cross(b - a, c - a)
-    return n / np.maximum(np.linalg.norm(n, axis=-1, keepdims=True), np.finfo(float).tiny)
+    return np.asarray(n / np.maximum(np.linalg.norm(n, axis=-1, keepdims=True), np.finfo(float).tiny))
 
 
 def boundary_triangles(tets: IntArray) -> IntArray:
@@ -62,7 +62,7 @@ def flat_tets(points: Array, tets: IntArray) -> BoolArray:
     """Whether each tetrahedron has no volume but rounding, shape [m]; points of shape [n, 3], tetrahedra [m, 4]."""
     x = points[tets]
     edge = np.linalg.norm(x[:, [1, 2, 3, 2, 3, 3]] - x[:, [0, 0, 0, 1, 1, 2]], axis=-1).max(axis=1)
-    return np.abs(tet_volumes(points, tets)) <= 1e-9 * edge**3
+    return np.asarray(np.abs(tet_volumes(points, tets)) <= 1e-9 * edge**3)
 
 
 def oriented_tets(points: Array, tets: IntArray, path: str = "") -> tuple[IntArray, int]:

@@ -74,13 +74,13 @@ class _Complements:
         self._top[odd] += m * m
         complement = self._stacks[odd][self._top[odd] - m * m : self._top[odd]].reshape((m, m), order="F")
         complement[...] = 0.0
-        return complement
+        return np.asarray(complement)
 
     def pop(self, k: int) -> Array:
         """The last complement of this depth, valid until the next push."""
         odd, m = self._odd[k], int(self._outer[k])
         self._top[odd] -= m * m
-        return self._stacks[odd][self._top[odd] : self._top[odd] + m * m].reshape((m, m), order="F")
+        return np.asarray(self._stacks[odd][self._top[odd] : self._top[odd] + m * m].reshape((m, m), order="F"))
 
 
 class MultifrontalCholesky:

@@ -9,9 +9,12 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from calmotion.shot.character import BoolArray
 from calmotion.support.compilation import kernel
+
+Indices = NDArray[np.int64]
 
 
 def vertex_cover(graph: Any, left: BoolArray) -> Any:
@@ -40,7 +43,9 @@ def vertex_cover(graph: Any, left: BoolArray) -> Any:
 
 
 @kernel
-def _match(start, head, of_near, of_far, edge, stack, visited):
+def _match(
+    start: Indices, head: Indices, of_near: Indices, of_far: Indices, edge: Indices, stack: Indices, visited: Indices
+) -> None:
     """Maximum matching: writes partners into `of_near` and `of_far`, -1 for none.
 
     Args:
@@ -81,7 +86,10 @@ def _match(start, head, of_near, of_far, edge, stack, visited):
 
 
 @kernel
-def _mark_reached(start, head, of_near, of_far, stack, reached_near, reached_far):
+def _mark_reached(
+    start: Indices, head: Indices, of_near: Indices, of_far: Indices, stack: Indices,
+    reached_near: BoolArray, reached_far: BoolArray,
+) -> None:  # fmt: skip
     """Nodes on alternating paths from near nodes without a partner."""
     depth = 0
     for i in range(len(of_near)):

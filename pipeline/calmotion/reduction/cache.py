@@ -52,7 +52,7 @@ def cached_reduction(key_parts: object, compute: Callable[[], T]) -> T:
     key = cache_key(key_parts)
     path = cache_folder() / FOLDER / f"{key}.npz"
     try:
-        value = _load(path, key)
+        value: T = _load(path, key)
     except Exception:
         # a damaged file can cause any error: in the archive, the arrays, the structure, or a type that has changed
         pass

@@ -68,7 +68,7 @@ def energy_errors(mesh: QuadraticMesh, material: ElasticMaterial, u: Array) -> A
         # mu = 1: 2 e:e + lambda tr(e)^2, shear strains being doubled
         dense = 2.0 * (e[:, :, :3] ** 2).sum(axis=2) + (e[:, :, 3:] ** 2).sum(axis=2)
         dense += 2.0 * lame * e[:, :, :3].sum(axis=2) ** 2
-        return np.einsum("eq,eqk->k", integration.weights, dense)
+        return np.asarray(np.einsum("eq,eqk->k", integration.weights, dense))
 
     return energy(exact - strains) / energy(strains)
 

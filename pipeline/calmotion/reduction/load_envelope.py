@@ -59,7 +59,7 @@ def load_direction_envelope(load_envelope: LoadEnvelope, angle: float, size: flo
     share = min(angle, 1.0)
 
     def in_all_directions(load: Array) -> Array:
-        return np.maximum(np.abs(load), share * np.linalg.norm(load, axis=-1, keepdims=True))
+        return np.asarray(np.maximum(np.abs(load), share * np.linalg.norm(load, axis=-1, keepdims=True)))
 
     moment_of_force = share * size * np.linalg.norm(load_envelope.force, axis=-1, keepdims=True)
     return replace(

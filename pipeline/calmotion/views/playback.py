@@ -40,7 +40,7 @@ def sample_motion(motion: Motion, times: Array) -> Motion:
         second = np.where(np.sum(first * second, axis=-1, keepdims=True) < 0.0, -second, second)
         share = weight.reshape(-1, *([1] * (values.ndim - 1)))
         mixed = (1.0 - share) * first + share * second
-        return mixed / np.linalg.norm(mixed, axis=-1, keepdims=True)
+        return np.asarray(mixed / np.linalg.norm(mixed, axis=-1, keepdims=True))
 
     return Motion(
         times=times,
@@ -69,7 +69,7 @@ def deformed_points(points: Array, modes: Array | None, elastic: Array) -> Array
     """
     if modes is None or elastic.shape[1] == 0:
         return points[None]
-    return points[None] + np.einsum("nik,fk->fni", modes, elastic)
+    return np.asarray(points[None] + np.einsum("nik,fk->fni", modes, elastic))
 
 
 def modes_of(skin: Skin | None, surface: int) -> Array | None:
@@ -137,7 +137,7 @@ def deviations(surface: Array, modes: Array | None, body: int, motion: Motion, r
         points = deformed_points(surface, modes, moved.elastic[body])
         rotated = np.einsum("fij,fnj->fni", rotation_matrices(moved.rotations[:, body]), points)
         world.append(rotated + moved.positions[:, body, None])
-    return np.linalg.norm(world[0] - world[1], axis=2)
+    return np.asarray(np.linalg.norm(world[0] - world[1], axis=2))
 
 
 def world_points(body: Body, index: int, skin: Skin | None, motion: Motion, row: int) -> list[Array]:

@@ -32,7 +32,7 @@ def test_hidden_geometry_stands_in_for_an_open_mesh(host):
 def test_copies_count_once_and_hidden_geometry_not_at_all(package):
     shown = surface(box(), "/a")
     made = solid(package, shown, surface(box(), "/b"))
-    assert made.volume == pytest.approx(8e-5) and made.repairs == ("left out /b, a copy of /a",)
+    assert made.volume == pytest.approx(8e-5) and made.repairs == ("ignored /b, a copy of /a",)
     body = link(shown, surface(box((1.0, 1.0, 1.0)), "/c", visible=False))
     assert package("body_mesh").solid_of(body, body.surfaces).volume == pytest.approx(8e-5)
 
@@ -48,6 +48,6 @@ def test_tetrahedra_that_do_not_fill_the_surface_are_refused(host, package, monk
         return corners, tets
 
     monkeypatch.setattr(package("body_mesh"), "tetrahedralize", shrunken)
-    with pytest.raises(ShotError, match="do not fill .* seems to run through itself"):
+    with pytest.raises(ShotError, match="do not fill .* seems to intersect itself"):
         run(host, link(surface(box())))
     assert len(calls) == 3 and calls == sorted(calls, reverse=True)

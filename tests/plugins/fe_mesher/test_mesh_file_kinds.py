@@ -122,10 +122,10 @@ def test_parts_with_nodes_of_their_own_in_one_place_are_merged(package, tmp_path
     meshio.Mesh(apart, [("hexahedron", np.vstack([cells, cells + 8]))]).write(tmp_path / "two.vtu")
     made = mesh(package, tmp_path / "two.vtu")
     assert len(made.points) == 12 and made.quality.volume == pytest.approx(2000.0)
-    assert any("merged 4 points" in repair for repair in made.quality.repairs)
+    assert any("merged 4 coincident points" in repair for repair in made.quality.repairs)
     apart[8:] += [1.0, 0.0, 0.0]
     meshio.Mesh(apart, [("hexahedron", np.vstack([cells, cells + 8]))]).write(tmp_path / "gap.vtu")
-    with pytest.raises(ShotError, match="do not hang together"):
+    with pytest.raises(ShotError, match="are not connected"):
         mesh(package, tmp_path / "gap.vtu")
 
 

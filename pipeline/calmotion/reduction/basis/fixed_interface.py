@@ -147,7 +147,7 @@ class FixedInterface:
     def _weight(self, count: int) -> Array:
         """Nodal forces of the first unit accelerations, shape [3n, count]."""
         fields = unit_accelerations(self.model.mesh.nodes)[:, :, :count]
-        return self.mass @ fields.reshape(len(self.constraint), count)
+        return np.asarray(self.mass @ fields.reshape(len(self.constraint), count))
 
     def _residual(self, values: Array, vectors: Array, weight: Array, least: float) -> Array:
         used = weight > 0.0
@@ -163,7 +163,7 @@ class FixedInterface:
             # constraint and fixed-interface displacements are orthogonal in K, so their shares of the work add
             load = self.constraint.T @ loads
             work += np.einsum("ij,ij->j", load, self._by_patches(load))
-        return work
+        return np.asarray(work)
 
     def _work_weight(self) -> Array:
         """Accelerations that do at most unit work on the body, with one factor for linear and one for angular ones."""

@@ -195,7 +195,7 @@ def _without_modes(modes: Array, patch_motion: Array, M: Any, fields: Array, mot
 def _root(K: Array) -> Array:
     """Symmetric square root of a semidefinite matrix."""
     values, vectors = np.linalg.eigh(K)
-    return (vectors * np.sqrt(np.maximum(values, 0.0))) @ vectors.T
+    return np.asarray((vectors * np.sqrt(np.maximum(values, 0.0))) @ vectors.T)
 
 
 def _orthonormal(M: Array, K: Array) -> tuple[Array, Array]:

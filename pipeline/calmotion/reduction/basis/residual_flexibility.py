@@ -71,7 +71,7 @@ class StaticModel:
 def largest_displacement_by_mode(static: StaticModel) -> Array:
     """Bound of the displacement of any output by each mode under all loads [m], shape [r]."""
     share = np.abs(static.loads / static.omega_squared[:, None]).sum(axis=1)
-    return np.linalg.norm(static.outputs, axis=1).max(axis=0, initial=0.0) * share
+    return np.asarray(np.linalg.norm(static.outputs, axis=1).max(axis=0, initial=0.0) * share)
 
 
 def largest_displacement(response: Array) -> float:

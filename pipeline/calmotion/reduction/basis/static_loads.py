@@ -42,4 +42,4 @@ def peak_loads(load_envelope: LoadEnvelope) -> Array:
     products = [omega[i] * omega[j] for i, j in _PAIRS]
     wrenches = np.hstack([load_envelope.force, load_envelope.moment]).ravel()
     accelerations = np.concatenate([load_envelope.acceleration, load_envelope.angular_acceleration, products])
-    return np.abs(np.concatenate([accelerations, wrenches]))
+    return np.asarray(np.abs(np.concatenate([accelerations, wrenches])))

@@ -40,7 +40,7 @@ class GradientRule:
     def gradients(self, modes: Array, elements: slice = slice(None)) -> Array:
         """G_ij = d(displacement i)/dX_j of nodal fields of shape [n, 3, r]; shape [r, m, q, 3, 3]."""
         local = modes[self._tets[elements]]  # [m, 10, 3, r]
-        return np.einsum("eair,ajeq->reqij", local, self._shape[:, :, elements], optimize=True)
+        return np.asarray(np.einsum("eair,ajeq->reqij", local, self._shape[:, :, elements], optimize=True))
 
     def nodal_forces(self, stress: Array) -> Array:
         """int P : grad N, shape [n, 3], of a stress field P of shape [m, q, 3, 3] [Pa]."""
@@ -53,7 +53,7 @@ class GradientRule:
 def linear_stress(G: Array, lame: float, mu: float) -> Array:
     """C : sym(G) [Pa], shape of G [..., 3, 3]."""
     trace = np.trace(G, axis1=-2, axis2=-1)[..., None, None]
-    return mu * (G + np.swapaxes(G, -1, -2)) + lame * trace * np.eye(3)
+    return np.asarray(mu * (G + np.swapaxes(G, -1, -2)) + lame * trace * np.eye(3))
 
 
 def second_order_stress(A: Array, B: Array, lame: float, mu: float, material: str) -> Array:
@@ -71,7 +71,7 @@ def second_order_stress(A: Array, B: Array, lame: float, mu: float, material: st
     trace_a = np.trace(A, axis1=-2, axis2=-1)[..., None, None]
     trace_b = np.trace(B, axis1=-2, axis2=-1)[..., None, None]
     product = np.einsum("...ij,...ji->...", A, B)[..., None, None]
-    return -mu * (At @ Bt + Bt @ At) - lame * (trace_a * Bt + trace_b * At + product * np.eye(3))
+    return np.asarray(-mu * (At @ Bt + Bt @ At) - lame * (trace_a * Bt + trace_b * At + product * np.eye(3)))
 
 
 def second_order_force(

@@ -40,7 +40,7 @@ class Embedding:
         if len(outside):
             rotation = self._curl(modes, outside)
             moved[outside] += np.cross(rotation, self.arms[outside][:, :, None], axis=1)
-        return moved
+        return np.asarray(moved)
 
     def rotations(self, modes: Array) -> Array:
         """Small rotation (half the curl) at the points [rad per unit], shape [n, 3, r] -> [k, 3, r], body axes."""

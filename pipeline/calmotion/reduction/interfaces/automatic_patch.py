@@ -155,7 +155,7 @@ def _touched_normal(triangles: Array, gaps: Array, size: float) -> Array:
     """Outward unit normal at the nearest point of the surface, the area-weighted mean of the triangles there."""
     touched = triangles[gaps <= gaps.min() + 1e-9 * size]
     normal = np.cross(touched[:, 1] - touched[:, 0], touched[:, 2] - touched[:, 0]).sum(axis=0)
-    return normal / max(float(np.linalg.norm(normal)), np.finfo(float).tiny)
+    return np.asarray(normal / max(float(np.linalg.norm(normal)), np.finfo(float).tiny))
 
 
 def _depth(surface: Array, normal: Array, triangles: Array, size: float) -> float:

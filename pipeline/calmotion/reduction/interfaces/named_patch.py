@@ -47,4 +47,4 @@ def _node_normals(mesh: QuadraticMesh) -> Array:
     out = np.zeros_like(mesh.nodes)
     for column in range(mesh.surface.shape[1]):
         np.add.at(out, mesh.surface[:, column], area)
-    return out / np.maximum(np.linalg.norm(out, axis=1, keepdims=True), np.finfo(float).tiny)
+    return np.asarray(out / np.maximum(np.linalg.norm(out, axis=1, keepdims=True), np.finfo(float).tiny))

@@ -125,4 +125,4 @@ def spring_rows(roots: Array, second_order: Array, rotation: Array, directions: 
     pairs = 0.5 * (product + np.swapaxes(product, 2, 3))
     pairs[:, first == second] *= 0.5  # u_k u_l stands for both orders, u_k^2 for one
     entries = np.concatenate([strain, pairs], axis=1)[:, :, _ROWS, _COLUMNS]
-    return (roots @ np.swapaxes(entries, 1, 2)).reshape(6 * p, entries.shape[1])
+    return np.asarray((roots @ np.swapaxes(entries, 1, 2)).reshape(6 * p, entries.shape[1]))

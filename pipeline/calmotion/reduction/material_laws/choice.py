@@ -136,7 +136,7 @@ def work_of_loads(model: FEModel, fields: Array, motion: Array, load_envelope: L
     work = load_envelope.acceleration @ linear + load_envelope.angular_acceleration @ angular + centrifugal
     for force, moment, patch in zip(load_envelope.force, load_envelope.moment, np.abs(motion), strict=True):
         work += force @ patch[:3] + moment @ patch[3:]
-    return work
+    return np.asarray(work)
 
 
 def _largest_displacement(fields: Array, motion: Array, amplitudes: Array, lever_arm: Array | None = None) -> float:

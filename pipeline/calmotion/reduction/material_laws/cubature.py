@@ -92,7 +92,7 @@ def linear_tangent(lame: float, mu: float) -> Array:
     E = np.eye(3)
     C = lame * np.einsum("ij,kl->ijkl", E, E)
     C += mu * (np.einsum("ik,jl->ijkl", E, E) + np.einsum("il,jk->ijkl", E, E))
-    return C.reshape(9, 9)
+    return np.asarray(C.reshape(9, 9))
 
 
 def _forces(G: Array, poses: Array, omega_squared: Array, lame: float, mu: float) -> Array:
@@ -110,7 +110,7 @@ def _stiffness(G: Array, omega_squared: Array, lame: float, mu: float) -> Array:
     scaled = G / np.sqrt(omega_squared)
     first, second = np.triu_indices(len(omega_squared))
     stress = np.einsum("mn,cni->cmi", linear_tangent(lame, mu), scaled)
-    return np.einsum("cmp,cmp->pc", scaled[:, :, first], stress[:, :, second], optimize=True)
+    return np.asarray(np.einsum("cmp,cmp->pc", scaled[:, :, first], stress[:, :, second], optimize=True))
 
 
 def neohookean_stress(F: Array, lame: float, mu: float) -> Array:
@@ -126,7 +126,7 @@ def neohookean_stress(F: Array, lame: float, mu: float) -> Array:
     bounded = np.where(flat, LEAST_VOLUME, J)
     L = np.log(bounded) + np.where(flat, x - 0.5 * x * x, 0.0)
     slope = np.where(flat, (1.0 - x) / LEAST_VOLUME, 1.0 / bounded)
-    return mu * F + (lame * L - mu) * slope * cofactor
+    return np.asarray(mu * F + (lame * L - mu) * slope * cofactor)
 
 
 def greedy_cubature(columns: Array, target: Array, error: float, most: int) -> tuple[Array, Array, float]:
