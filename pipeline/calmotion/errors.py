@@ -50,6 +50,10 @@ class ShotError(Exception):
         }
 
 
+class IntegrationError(ShotError):
+    """A simulation that failed with one time step or integrator, and may succeed with another."""
+
+
 class ShotErrors(ShotError):
     """Several problems of one shot, found at once; its own fields are those of the first.
 

@@ -2,7 +2,7 @@
 
 import pytest
 from calmotion.accuracy.integrator_choice import FAST, by_fast_scheme
-from calmotion.errors import ShotError
+from calmotion.errors import IntegrationError, ShotError
 from calmotion.simulation.prepare import Options
 
 
@@ -15,7 +15,7 @@ class Simulation:
     def __call__(self, options):
         self.asked.append(options.scheme)
         if options.scheme in self.failing:
-            raise ShotError("joints come apart")
+            raise IntegrationError("joints come apart")
         return options.scheme
 
 
@@ -27,6 +27,18 @@ def test_the_fast_one_is_taken_where_it_does():
 def test_the_safe_one_follows_where_it_fails():
     run = Simulation(FAST)
     assert by_fast_scheme(Options(), run) == "bdf2" and run.asked == [FAST, "bdf2"]
+
+
+def test_a_shot_that_no_integrator_can_simulate_is_tried_once():
+    asked = []
+
+    def simulate(options):
+        asked.append(options.scheme)
+        raise ShotError("no static equilibrium")
+
+    with pytest.raises(ShotError, match="equilibrium"):
+        by_fast_scheme(Options(), simulate)
+    assert asked == [FAST]
 
 
 @pytest.mark.parametrize("asked", ["bdf2", "newmark", FAST])

@@ -9,7 +9,7 @@ from calmotion.accuracy.pod_subspace import ProjectedBodies
 from calmotion.accuracy.simulate_to_tolerance import WHOLE, found_tracks, planned_step, simulate_to_tolerance
 from calmotion.accuracy.step_error import distance, frames_of, simulate_at
 from calmotion.accuracy.verify import verify
-from calmotion.errors import ShotError
+from calmotion.errors import IntegrationError, ShotError
 from calmotion.multibody.model.topology import span_tree
 from calmotion.retargeting import to_tolerance as retarget
 from calmotion.retargeting.to_tolerance import optimize_to_tolerance
@@ -68,7 +68,7 @@ def test_the_step_that_is_planned_is_the_one_that_is_taken(arm, animation, bodie
 
     def fails(character, animation, bodies, options, step):
         if options.scheme != "bdf2":
-            raise ShotError("diverges")
+            raise IntegrationError("diverges")
         return plain(character, animation, bodies, options, step)
 
     options = Options(tolerance=1e-3)
@@ -101,7 +101,7 @@ def test_the_integrator_that_needs_fewest_steps_gives_way_where_it_fails(arm, an
 
     def comes_apart(character, animation, bodies, options, progress):
         if options.scheme != "bdf2":
-            raise ShotError("its joints come apart")
+            raise IntegrationError("its joints come apart")
         return plain(character, animation, bodies, options, progress)
 
     monkeypatch.setattr(to_tolerance, "simulate_shot", comes_apart)

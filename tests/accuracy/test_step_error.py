@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 from calmotion.accuracy.step_error import StepRun, largest_step, simulate_at, step_error
-from calmotion.errors import ShotError
-from calmotion.simulation.prepare import Options
+from calmotion.errors import IntegrationError, ShotError
+from calmotion.multibody.failure import SimulationFailure
+from calmotion.simulation.prepare import Options, failure_error, prepare
 
 
 def of_second_order(step):
@@ -36,7 +37,7 @@ def test_steps_are_those_that_were_taken():
 def test_steps_that_fail_are_too_large_and_the_last_one_ends_the_search():
     def fragile(step):
         if step > 0.03:
-            raise ShotError("diverges")
+            raise IntegrationError("diverges")
         return of_second_order(step)
 
     assert largest_step(fragile, 0.1, 1e-3, lambda run: 1.0)[0] == 0.025
@@ -44,9 +45,27 @@ def test_steps_that_fail_are_too_large_and_the_last_one_ends_the_search():
     assert step == 0.025 and error == pytest.approx(3.0 * 0.025**2, rel=1e-9)
 
     def never(step):
-        raise ShotError("diverges")
+        raise IntegrationError("diverges")
 
     assert largest_step(never, 0.1, 0.025, lambda run: 1.0) == (0.025, np.inf)
+
+
+def test_a_shot_that_no_step_can_simulate_is_tried_once():
+    tried = []
+
+    def unsupported(step):
+        tried.append(step)
+        raise ShotError("no static equilibrium")
+
+    with pytest.raises(ShotError, match="equilibrium"):
+        largest_step(unsupported, 0.1, 1e-3, lambda run: 1.0)
+    assert tried == [0.1]
+
+
+def test_only_failures_that_depend_on_the_step_may_be_tried_again(arm, animation, bodies):
+    prepared = prepare(arm, animation, bodies, Options(step=1 / 240))
+    for reason, kind in (("no static equilibrium", ShotError), ("diverged", IntegrationError)):
+        assert type(failure_error(prepared, SimulationFailure(0, 0, reason))) is kind
 
 
 def test_the_estimate_is_near_the_error_against_a_far_finer_step(arm, animation, bodies):

@@ -119,6 +119,6 @@ def test_a_loop_that_is_not_found_says_what_to_do(looping, dance, bodies, monkey
 
     monkeypatch.setattr(periodic, "LIMIT", 1)
     for job in (simulate_shot, optimize_shot):
-        with pytest.raises(ShotError, match="repeats itself") as error:
+        with pytest.raises(ShotError, match="no periodic motion") as error:
             job(looping, dance, bodies, OPTIONS, quiet)
         assert error.value.attribute == "calm:retarget:cyclic" and "calm:damping:ratio" in error.value.remedy

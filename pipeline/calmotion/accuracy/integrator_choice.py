@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import TypeVar
 
-from calmotion.errors import ShotError
+from calmotion.errors import IntegrationError
 from calmotion.simulation.prepare import Options
 
 FAST = "generalized-alpha"
@@ -26,6 +26,6 @@ def by_fast_scheme(options: Options, simulate: Callable[[Options], Found]) -> Fo
     if options.integrator is None:
         try:
             return simulate(replace(options, integrator=FAST))
-        except ShotError:
+        except IntegrationError:
             pass
     return simulate(options)

@@ -12,12 +12,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 
 import numpy as np
 
 from calmotion.accuracy.integrator_choice import by_fast_scheme
-from calmotion.accuracy.step_error import StepRun, distance, run_or_none, simulate_at
+from calmotion.accuracy.step_error import StepRun, distance, simulate_at
+from calmotion.errors import ShotError
 from calmotion.reduction.reduced_body import ReducedBody
 from calmotion.reduction.subspace import principal_subspace, projected_body
 from calmotion.shot import Animation, Character, Simplification
@@ -84,8 +84,11 @@ class ProjectedBodies:
     def _off(self, bodies: Sequence[ReducedBody] | None, known: ReferenceRun) -> float:
         """How far bodies are from a known simulation, by its own step and integrator, at any target and frame [m]."""
         options = replace(self._options, integrator=known.run.integrator or self._options.integrator)
-        run = run_or_none(partial(simulate_at, self._character, known.animation, bodies, options), known.run.step)
-        return np.inf if run is None else distance(run.positions, known.run.positions)
+        try:
+            run = simulate_at(self._character, known.animation, bodies, options, known.run.step)
+        except ShotError:  # with too few coordinates a body may not even find its equilibrium
+            return np.inf
+        return distance(run.positions, known.run.positions)
 
     def hold_for(self, animation: Animation, step: float) -> bool:
         """Whether the bodies do for other curves too, by one simulation with all coordinates; if not, they do now.

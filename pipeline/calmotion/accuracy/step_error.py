@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from calmotion.errors import ShotError
+from calmotion.errors import IntegrationError
 from calmotion.multibody.failure import SimulationFailure
 from calmotion.multibody.integrators.workspace import Workspace
 from calmotion.reduction.reduced_body import ReducedBody
@@ -86,7 +86,7 @@ def largest_step(
     """The largest step whose error is allowed: by halving the first, and then between two of these by the order.
 
     Args:
-        run: Simulates by a step [s]; may raise ShotError where that is too large.
+        run: Simulates by a step [s]; may raise IntegrationError where that is too large.
         first, last: Steps to begin and to end with [s].
         allowed: Error at the targets [m] that may be, from the finest run so far.
 
@@ -123,8 +123,12 @@ def _between(step: float, error: float, enough: float) -> tuple[float, float]:
 
 
 def run_or_none(run: Callable[[float], StepRun], step: float) -> StepRun | None:
-    """The run by a step, None where that fails."""
+    """The run by a step, None where that step fails.
+
+    Raises:
+        ShotError: The shot cannot be simulated by any step.
+    """
     try:
         return run(step)
-    except ShotError:
+    except IntegrationError:
         return None

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from calmotion.errors import ShotError
+from calmotion.errors import IntegrationError, ShotError
 from calmotion.multibody.analysis.deflection import most_bent
 from calmotion.multibody.analysis.modes import system_modes
 from calmotion.multibody.failure import SimulationFailure
@@ -127,8 +127,8 @@ def _refuse_unsupported(character: Character, animation: Animation, options: Opt
                 remedy="Leave it out, or set calm:retarget:cyclic to false.",
             )
         if options.scheme != "bdf2":
-            raise ShotError(
-                "shots that loop are simulated by BDF2 alone",
+            raise IntegrationError(
+                "only bdf2 simulates cyclic shots",
                 path=character.path,
                 attribute="--integrator",
                 found=options.scheme,
@@ -142,8 +142,8 @@ def _refuse_unsupported(character: Character, animation: Animation, options: Opt
             remedy=f"Use one of {', '.join(INTEGRATORS)}.",
         )
     if animation.moving and not follows_roots(options.scheme):
-        raise ShotError(
-            "this integrator does not know of roots that move",
+        raise IntegrationError(
+            "this integrator does not support roots that move",
             path=character.joints[animation.moving[0].joint].path,
             attribute="--integrator",
             found=options.scheme,
@@ -167,7 +167,7 @@ def refuse_half_turns(prepared: Prepared, angles: Array) -> None:
         turns = np.abs(np.diff(angles[:, k]))
         n = int(np.argmax(turns))
         if not turns[n] < np.pi:
-            raise ShotError(
+            raise IntegrationError(
                 f"this motor turns by {np.degrees(turns[n]):.0f} degrees within one step of {1e3 * grid.h:.3g} ms",
                 path=motor.path,
                 attribute=motor.attribute,
@@ -177,30 +177,33 @@ def refuse_half_turns(prepared: Prepared, angles: Array) -> None:
 
 
 def failure_error(prepared: Prepared, failure: SimulationFailure) -> ShotError:
-    """A failed step in the user's words: which body, which joint, when."""
+    """A failed step in the user's words: which body, which joint, when; an `IntegrationError` where another step or
+    integrator may succeed."""
     tree, character, system = prepared.model.tree, prepared.character, prepared.model.system
     if failure.reason == "does not settle":
-        return ShotError(
-            "no motion of the robot was found that repeats itself, loop after loop",
+        return IntegrationError(
+            "no periodic motion of the robot was found",
             path=character.path,
             attribute="calm:retarget:cyclic",
             found=True,
             remedy="Raise calm:damping:ratio, slow the loop down where it shakes most, or set calm:retarget:cyclic to "
             "false.",
         )
+    # the static start depends neither on the step nor on the integrator
+    kind = ShotError if failure.reason == "no static equilibrium" else IntegrationError
     when = failure.time_s + prepared.grid.times[0]
     what = f"{_REASONS[failure.reason]} at {when:.3f} s"
     bend = None if failure.state is None else most_bent(system, failure.state)
     if bend is not None and bend.share > _FAR:
         under = "just before" if failure.share == 1.0 else f"under {failure.share:.0%} of gravity"
-        return ShotError(
+        return kind(
             f"the simulation {what}: {under} this body bends by {1e3 * bend.distance:.3g} mm, "
             f"{bend.share:.0%} of its length, which its modes cannot follow much further",
             path=character.bodies[tree.body[bend.component]].path,
             remedy="Check physics:youngsModulus (in the stage's units), the loads and the speed of the motion.",
         )
     joint = character.joints[tree.joint[failure.component]]
-    return ShotError(
+    return kind(
         f"the simulation {what}, first at the joint {joint.path}",
         path=character.bodies[tree.body[failure.component]].path,
         remedy="Try a smaller --step; check the masses, the material and the motion of this joint there.",

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from calmotion.errors import ShotError
+from calmotion.errors import IntegrationError
 from calmotion.multibody.failure import SimulationFailure
 from calmotion.multibody.integrators.workspace import Workspace
 from calmotion.reduction.reduced_body import ReducedBody
@@ -123,7 +123,7 @@ def _refuse_open_joints(prepared: Prepared, gap: float, options: Options) -> Non
     """BDF2 keeps joints closed; the others hold them together in velocity, and drift where steps are coarse."""
     character = prepared.character
     if gap > CLOSED * character.retarget.allowed(options.tolerance):
-        raise ShotError(
+        raise IntegrationError(
             f"its joints come apart by {1e3 * gap:.2g} mm in the simulation",
             path=character.path,
             attribute="--integrator",
