@@ -1,5 +1,6 @@
 # make demo     optimise the bartender sample, and print the errors before and after
-# make test     lint, types and tests
+# make test     lint, format, types, documentation and tests
+# make docs     the documentation, in build/docs
 # make fuzz     ten minutes of random damage to shots and manifests
 # make samples  build the sample characters again (make pictures optimises and draws them)
 # make blender  the extension of Blender as a zip (make blender-test tests it; needs Python 3.11)
@@ -24,11 +25,11 @@ export PIP_DISABLE_PIP_VERSION_CHECK := 1
 # Two processes test at a time; threads of linear algebra that wait for each other would make that several times slower.
 test: export OPENBLAS_NUM_THREADS := 1
 
-.PHONY: help demo test fuzz samples pictures blender blender-test clean
+.PHONY: help demo test docs fuzz samples pictures blender blender-test clean
 .DELETE_ON_ERROR:
 
 help:
-	@sed -n 's/^# \{0,1\}//p' Makefile | sed -n '1,8p'
+	@sed -n 's/^# \{0,1\}//p' Makefile | sed -n '1,9p'
 
 demo: $(INSTALLED)
 	@mkdir -p build
@@ -43,9 +44,15 @@ test: $(INSTALLED_DEV)
 		if "$$@"; then summary="$$summary$$name: passed\n"; else summary="$$summary$$name: FAILED\n"; status=1; fi; \
 	}; \
 	check ruff $(RUN) -m ruff check .; \
+	check format $(RUN) -m ruff format --check --quiet .; \
 	check mypy $(RUN) -m mypy; \
+	check docs env NO_MKDOCS_2_WARNING=1 $(RUN) -m mkdocs build --strict --quiet; \
 	check pytest $(RUN) -m pytest -n 2 -q; \
 	echo "== summary"; printf "$$summary"; exit $$status
+
+docs: $(INSTALLED_DEV)
+	NO_MKDOCS_2_WARNING=1 $(RUN) -m mkdocs build --strict --quiet
+	@echo "build/docs/index.html"
 
 fuzz: $(INSTALLED_DEV)
 	CALMOTION_FUZZ=$${CALMOTION_FUZZ:-600} $(RUN) -m pytest -q -x tests/fuzz

@@ -79,7 +79,7 @@ def test_it_is_what_a_well_damped_robot_comes_to_in_many_loops(looping, dance, m
 
 
 def test_what_a_loop_cannot_do_is_refused(looping, dance, bodies):
-    with pytest.raises(ShotError, match="BDF2 alone") as error:
+    with pytest.raises(ShotError, match="only bdf2 simulates") as error:
         simulate_shot(looping, dance, bodies, dataclasses.replace(OPTIONS, integrator="newmark"), quiet)
     assert error.value.attribute == "--integrator"
     with pytest.raises(ShotError, match="ease into") as error:
