@@ -3,11 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
+import numpy.typing as npt
 
 from calmotion.errors import ShotError
 from calmotion.shot.character import Array
+
+if TYPE_CHECKING:
+    from pxr import Usd
 
 MOST_FRAMES = 10_000_000  # a day at 120 frames a second
 SHORTEST = 1e-6  # [s]
@@ -27,11 +32,11 @@ class Clock:
     time_codes_per_second: float
     frames_per_second: float
 
-    def seconds(self, time_codes):
+    def seconds(self, time_codes: npt.ArrayLike) -> Array:
         """Seconds after the first frame of time codes (a value or an array)."""
         return (np.asarray(time_codes, dtype=np.float64) - self.start) / self.time_codes_per_second
 
-    def time_codes(self, seconds):
+    def time_codes(self, seconds: npt.ArrayLike) -> Array:
         """Time codes of seconds after the first frame (a value or an array)."""
         codes = self.start + np.asarray(seconds, dtype=np.float64) * self.time_codes_per_second
         # Frames are mostly whole time codes: do not write 17.000000000000004.
@@ -51,7 +56,7 @@ class Clock:
         return np.asarray(every[np.concatenate([[True], np.diff(every) > 1e-6])], dtype=np.float64)
 
 
-def still_clock(stage) -> Clock:
+def still_clock(stage: Usd.Stage) -> Clock:
     """The clock of a stage in which nothing is animated: one frame, the first.
 
     Raises:
@@ -62,7 +67,7 @@ def still_clock(stage) -> Clock:
     return Clock(start, start, *_rates(stage))
 
 
-def _rates(stage) -> tuple[float, float]:
+def _rates(stage: Usd.Stage) -> tuple[float, float]:
     """Time codes and frames in a second; the latter as authored, else by the rule of `clock_of`."""
     rate = float(stage.GetTimeCodesPerSecond())
     unauthored = rate if rate >= _COARSEST else float(stage.GetFramesPerSecond())
@@ -80,7 +85,7 @@ def _rates(stage) -> tuple[float, float]:
     return rate, float(frames)
 
 
-def clock_of(stage, sample_codes: Array) -> Clock:
+def clock_of(stage: Usd.Stage, sample_codes: Array) -> Clock:
     """The clock of a stage.
 
     The range is that of the stage; where start or end is not authored, that of the samples. A frame is

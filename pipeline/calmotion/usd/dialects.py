@@ -9,8 +9,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from calmotion.errors import ShotError
+
+if TYPE_CHECKING:
+    from pxr import Usd
 
 USD, SI = "usd", "si"  # degrees and stage units, or radians and stage units as MuJoCo has them
 
@@ -77,7 +81,7 @@ GEARS = (
 )  # fmt: skip
 
 
-def number_of(prim, name: str) -> float | None:
+def number_of(prim: Usd.Prim, name: str) -> float | None:
     """A number that is authored by name, in whatever type; None where there is no value.
 
     Raises:
@@ -98,14 +102,14 @@ def number_of(prim, name: str) -> float | None:
     return float(value)
 
 
-def authored(prim, spelling: Spelling, drive: str) -> tuple[str, float] | None:
+def authored(prim: Usd.Prim, spelling: Spelling, drive: str) -> tuple[str, float] | None:
     """Name and value of an attribute where it is authored on a joint."""
     name = spelling.attribute.format(drive=drive)
     value = number_of(prim, name)
     return None if value is None else (name, value)
 
 
-def elsewhere(prim, spellings: tuple[Spelling, ...], drive: str) -> tuple[str, float, Spelling] | None:
+def elsewhere(prim: Usd.Prim, spellings: tuple[Spelling, ...], drive: str) -> tuple[str, float, Spelling] | None:
     """The first spelling that is authored and says something finite."""
     for spelling in spellings:
         found = authored(prim, spelling, drive)

@@ -4,9 +4,13 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterable
+from typing import TYPE_CHECKING
 
 from calmotion.errors import ShotError
 from calmotion.support.files import replaced
+
+if TYPE_CHECKING:
+    from pxr import Sdf
 
 EXTENSIONS = (".usda", ".usdc", ".usd")
 
@@ -35,7 +39,7 @@ def refuse_input_as_output(output: str, inputs: Iterable[str]) -> None:
             )
 
 
-def write_layer(layer, output: str, validate: Callable[[str], None]) -> None:
+def write_layer(layer: Sdf.Layer, output: str, validate: Callable[[str], None]) -> None:
     """Write an anonymous layer to a file, atomically.
 
     It is exported to a temporary file, opened again and validated before it replaces `output`, see `replaced`.

@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from calmotion.errors import ShotError
+
+if TYPE_CHECKING:
+    from pxr import Usd
 
 NAMES = ("CalmFlexibleBodyAPI", "CalmDampingAPI", "CalmMotorAPI", "CalmTargetAPI", "CalmRetargetAPI")
 
@@ -56,7 +60,7 @@ def register() -> None:
         )
 
 
-def value(prim, schema: str, attribute: str, time: float | None = None):
+def value(prim: Usd.Prim, schema: str, attribute: str, time: float | None = None) -> Any:
     """The value of an attribute of our schemas, authored or fallback.
 
     Args:
@@ -79,6 +83,6 @@ def value(prim, schema: str, attribute: str, time: float | None = None):
     return definition.GetAttributeFallbackValue(attribute) if definition else None
 
 
-def is_applied(prim, schema: str) -> bool:
+def is_applied(prim: Usd.Prim, schema: str) -> bool:
     """Whether an API schema is applied, also one that this USD does not know (`GetAppliedSchemas` leaves those out)."""
     return schema in prim.GetPrimTypeInfo().GetAppliedAPISchemas() or schema in prim.GetAppliedSchemas()

@@ -5,12 +5,17 @@ from __future__ import annotations
 import hashlib
 import os
 import re
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from calmotion.errors import ShotError, raise_all
 from calmotion.shot import InputLayer
 from calmotion.usd import schemas
+
+if TYPE_CHECKING:
+    from pxr import Pcp, Sdf, Usd
 
 METADATA_KEY = "calmotion"
 CURVES, MOTION, ROOT, RIG = "curves", "motion", "root", "rig"  # roles of layers that we write
@@ -27,7 +32,7 @@ _REFUSED = (
 
 
 @contextmanager
-def quiet():
+def quiet() -> Iterator[None]:
     """Hold back USD's own messages on stderr; what matters in them is raised as a ShotError."""
     from pxr import UsdUtils
 
@@ -40,7 +45,7 @@ def quiet():
 
 
 @contextmanager
-def refused_by_usd(stage):
+def refused_by_usd(stage: Usd.Stage) -> Iterator[None]:
     """What USD itself cannot evaluate, as a ShotError with the place that USD names."""
     from pxr import Tf
 
@@ -59,7 +64,7 @@ def refused_by_usd(stage):
         ) from error
 
 
-def open_layer(path: str):
+def open_layer(path: str) -> Sdf.Layer:
     """The root layer of a shot.
 
     Raises:
@@ -90,7 +95,7 @@ def open_layer(path: str):
     return layer
 
 
-def open_stage(path: str, *, muted: tuple[str, ...] = ()):
+def open_stage(path: str, *, muted: tuple[str, ...] = ()) -> Usd.Stage:
     """The composed stage of a shot, everything loaded and checked; registers our schemas first.
 
     Args:
@@ -119,7 +124,7 @@ def open_stage(path: str, *, muted: tuple[str, ...] = ()):
 
 def _alike(errors: list[ShotError]) -> list[ShotError]:
     """One error for all prims that lack the same file."""
-    groups: dict[tuple, list[ShotError]] = {}
+    groups: dict[tuple[str, ...], list[ShotError]] = {}
     for error in errors:
         groups.setdefault((error.problem, error.attribute, str(error.found), error.remedy), []).append(error)
     found = []
@@ -135,7 +140,7 @@ def _last_quoted(text: str) -> str:
     return quoted[-1] if quoted else ""
 
 
-def _refusal(error, shot: str) -> ShotError | None:
+def _refusal(error: Pcp.ErrorBase, shot: str) -> ShotError | None:
     """What to say of a composition error that means that something of the shot is missing."""
     if type(error).__name__ not in _REFUSED:
         return None
@@ -177,13 +182,13 @@ def files_named_by(path: str) -> tuple[str, ...]:
     return tuple(layer.ComputeAbsolutePath(name) for name in named)
 
 
-def role_of(layer) -> str:
+def role_of(layer: Sdf.Layer) -> str:
     """The role of a layer that we wrote, `curves`, `motion` or `root`; empty for anybody else's."""
     ours = layer.customLayerData.get(METADATA_KEY)
     return str(ours.get("role", "")) if isinstance(ours, dict) else ""
 
 
-def earlier_layers(stage, roles: tuple[str, ...] = (CURVES, MOTION)) -> tuple[str, ...]:
+def earlier_layers(stage: Usd.Stage, roles: tuple[str, ...] = (CURVES, MOTION)) -> tuple[str, ...]:
     """Identifiers of the layers in a stage that hold curves or motions that we computed."""
     return tuple(
         layer.identifier
@@ -192,7 +197,7 @@ def earlier_layers(stage, roles: tuple[str, ...] = (CURVES, MOTION)) -> tuple[st
     )
 
 
-def refuse_own_layer(stage, path: str) -> None:
+def refuse_own_layer(stage: Usd.Stage, path: str) -> None:
     """Refuse a layer of ours that was given instead of the root layer that opens it with its shot."""
     if role_of(stage.GetRootLayer()) in (CURVES, MOTION):
         raise ShotError(
@@ -207,7 +212,7 @@ def display_name(identifier: str, shot: str) -> str:
     return Path(os.path.relpath(os.path.realpath(identifier), os.path.dirname(os.path.realpath(shot)))).as_posix()
 
 
-def input_layers(stage, shot: str) -> tuple[InputLayer, ...]:
+def input_layers(stage: Usd.Stage, shot: str) -> tuple[InputLayer, ...]:
     """Every file that a stage was composed from, the shot first, relative to the shot's folder, with SHA-256.
 
     Layers of ours are among them where they are not muted.

@@ -99,14 +99,16 @@ def quaternion_from_rotation(rotation: Array) -> Array:
     """Unit quaternions (w, x, y, z), w >= 0, shape [..., 4], of rotation matrices [..., 3, 3]."""
     from scipy.spatial.transform import Rotation
 
-    return Rotation.from_matrix(rotation).as_quat(canonical=True, scalar_first=True)
+    quaternions: Array = Rotation.from_matrix(rotation).as_quat(canonical=True, scalar_first=True)
+    return quaternions
 
 
 def rotation_from_quaternion(quaternion: Array) -> Array:
     """Rotation matrices [..., 3, 3] of quaternions (w, x, y, z) [..., 4], which are normalised first."""
     from scipy.spatial.transform import Rotation
 
-    return Rotation.from_quat(quaternion, scalar_first=True).as_matrix()
+    rotations: Array = Rotation.from_quat(quaternion, scalar_first=True).as_matrix()
+    return rotations
 
 
 def axis_rotation(axis: str) -> Array:

@@ -2,7 +2,17 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, TypeVar
+
+from calmotion.errors import ShotError
+from calmotion.shot.character import Array
+
+if TYPE_CHECKING:
+    from pxr import Usd
+
+Quantity = TypeVar("Quantity", float, Array)
 
 EARTH_GRAVITY = 9.81  # m/s^2
 
@@ -19,50 +29,46 @@ class StageUnits:
     meters: float
     kilograms: float
 
-    def length(self, value):
+    def length(self, value: Quantity) -> Quantity:
         """To m."""
         return value * self.meters
 
-    def mass(self, value):
+    def mass(self, value: Quantity) -> Quantity:
         """To kg."""
         return value * self.kilograms
 
-    def density(self, value):
+    def density(self, value: Quantity) -> Quantity:
         """Mass / length^3, to kg/m^3."""
         return value * (self.kilograms / self.meters**3)
 
-    def inertia(self, value):
+    def inertia(self, value: Quantity) -> Quantity:
         """Mass length^2, to kg m^2."""
         return value * (self.kilograms * self.meters**2)
 
-    def pressure(self, value):
+    def pressure(self, value: Quantity) -> Quantity:
         """Mass / (length s^2), to Pa."""
         return value * (self.kilograms / self.meters)
 
-    def torque(self, value):
+    def torque(self, value: Quantity) -> Quantity:
         """Mass length^2 / s^2, to N m."""
         return value * (self.kilograms * self.meters**2)
 
-    def force(self, value):
+    def force(self, value: Quantity) -> Quantity:
         """Mass length / s^2, to N."""
         return value * (self.kilograms * self.meters)
 
-    def acceleration(self, value):
+    def acceleration(self, value: Quantity) -> Quantity:
         """Length / s^2, to m/s^2."""
         return value * self.meters
 
 
-def units_of(stage) -> StageUnits:
+def units_of(stage: Usd.Stage) -> StageUnits:
     """The units of a stage, with USD's fallbacks (0.01 m, 1 kg).
 
     Raises:
         ShotError: A unit that is not positive.
     """
-    import math
-
     from pxr import UsdGeom, UsdPhysics
-
-    from calmotion.errors import ShotError
 
     units = StageUnits(UsdGeom.GetStageMetersPerUnit(stage), UsdPhysics.GetStageKilogramsPerUnit(stage))
     for name, found in (("metersPerUnit", units.meters), ("kilogramsPerUnit", units.kilograms)):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -30,6 +30,9 @@ from calmotion.usd.reading.motors.posed_motors import posed_joints
 from calmotion.usd.reading.roots import on_moving_prim
 from calmotion.usd.reading.stillness import refuse_moving
 from calmotion.usd.transforms import Pose
+
+if TYPE_CHECKING:
+    from pxr import Usd
 
 
 @dataclass(frozen=True, eq=False)
@@ -202,7 +205,9 @@ def _body(reading: Reading, path: str, pose: Pose, joints: list[str]) -> Body:
     )
 
 
-def _moved(reading: Reading, bodies: list[str], joints: list[JointPrim], drives, wanted: list[str]) -> list[str]:
+def _moved(
+    reading: Reading, bodies: list[str], joints: list[JointPrim], drives: list[motors.Drive], wanted: list[str]
+) -> list[str]:
     """The bodies of every group that a motor moves or a target is on; a note for the others."""
     driven = {end for drive in drives for end in (drive.joint.body0, drive.joint.body1) if end} | set(wanted)
     kept = []
@@ -214,7 +219,9 @@ def _moved(reading: Reading, bodies: list[str], joints: list[JointPrim], drives,
     return kept
 
 
-def _held(reading: Reading, bodies, joints, prims, poses) -> list[JointPrim]:
+def _held(
+    reading: Reading, bodies: list[str], joints: list[JointPrim], prims: dict[str, Usd.Prim], poses: dict[str, Pose]
+) -> list[JointPrim]:
     """A joint to the world for each kinematic body, and for each group of bodies that has none."""
     added = []
     anchored = {j.body1 for j in joints if j.body0 == ""}

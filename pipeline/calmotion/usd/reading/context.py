@@ -5,13 +5,17 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from calmotion.errors import ShotError
+from calmotion.shot.character import Array
 from calmotion.usd.gf import matrix
 from calmotion.usd.schemas import is_applied
 from calmotion.usd.transforms import Pose, pose_from_matrix, refuse_infinite
 from calmotion.usd.units import StageUnits
+
+if TYPE_CHECKING:
+    from pxr import Usd
 
 T = TypeVar("T")
 R = TypeVar("R")
@@ -72,14 +76,14 @@ class Reading:
         """The same stage at another time code; what it notes is not kept."""
         return Reading(self.stage, self.units, code)
 
-    def world_matrix(self, prim):
+    def world_matrix(self, prim: Usd.Prim) -> Array:
         """Local-to-world matrix [4, 4] of a prim at the first frame, stage units, mapping column vectors; a ShotError
         where it is not finite."""
         found = matrix(self._xforms.GetLocalToWorldTransform(prim))
         refuse_infinite(found, str(prim.GetPath()))
         return found
 
-    def pose(self, prim) -> Pose:
+    def pose(self, prim: Usd.Prim) -> Pose:
         """World pose of a prim at the first frame, stage units; a ShotError if it shears."""
         return pose_from_matrix(self.world_matrix(prim), str(prim.GetPath()))
 
@@ -100,14 +104,14 @@ def grouped(notes: list[str]) -> tuple[str, ...]:
     return tuple(found)
 
 
-def prims_of(stage) -> Iterator:
+def prims_of(stage: Usd.Stage) -> Iterator[Usd.Prim]:
     """Every prim of a stage in depth-first order, those inside instances too."""
     from pxr import Usd
 
     return iter(stage.Traverse(Usd.TraverseInstanceProxies(Usd.PrimDefaultPredicate)))
 
 
-def prims_below(prim, stop) -> Iterator:
+def prims_below(prim: Usd.Prim, stop: Callable[[Usd.Prim], bool]) -> Iterator[Usd.Prim]:
     """A prim and those below it, depth first, not entering a prim below it for which `stop` holds."""
     from pxr import Usd
 
@@ -119,7 +123,7 @@ def prims_below(prim, stop) -> Iterator:
         yield below
 
 
-def is_rigid_body(prim) -> bool:
+def is_rigid_body(prim: Usd.Prim) -> bool:
     """Whether a prim is an enabled rigid body."""
     if not is_applied(prim, "PhysicsRigidBodyAPI"):
         return False

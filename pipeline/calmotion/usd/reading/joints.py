@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -13,6 +14,9 @@ from calmotion.shot.character import Array
 from calmotion.usd import gf
 from calmotion.usd.reading.context import Reading, prims_of
 from calmotion.usd.transforms import Pose, axis_rotation, quaternion_from_rotation, rotation_from_quaternion
+
+if TYPE_CHECKING:
+    from pxr import Usd
 
 _KINDS = {
     "PhysicsRevoluteJoint": "revolute", "PhysicsPrismaticJoint": "prismatic", "PhysicsFixedJoint": "fixed",
@@ -50,7 +54,7 @@ class JointPrim:
     closes_loop: bool = False
 
 
-def joint_prims(stage) -> list:
+def joint_prims(stage: Usd.Stage) -> list[Usd.Prim]:
     """The enabled joints of a stage, in its order."""
     from pxr import UsdPhysics
 
@@ -61,7 +65,7 @@ def joint_prims(stage) -> list:
     return found
 
 
-def read_joint(reading: Reading, prim, poses: dict[str, Pose]) -> JointPrim | None:
+def read_joint(reading: Reading, prim: Usd.Prim, poses: dict[str, Pose]) -> JointPrim | None:
     """A joint of the stage.
 
     Args:
@@ -120,7 +124,7 @@ def joint_to_world(body: str, pose: Pose, meters: float) -> JointPrim:
     return JointPrim(None, body, "fixed", "", body, pose.frame(meters), here)
 
 
-def _end(reading: Reading, prim, side: int, poses: dict[str, Pose]) -> tuple[str, Array, Array]:
+def _end(reading: Reading, prim: Usd.Prim, side: int, poses: dict[str, Pose]) -> tuple[str, Array, Array]:
     """One end of a joint: path of its body (empty: world), position [3] in stage units and rotation [3, 3] there."""
     name = f"physics:body{side}"
     relationship = prim.GetRelationship(name)
@@ -169,7 +173,7 @@ def _end(reading: Reading, prim, side: int, poses: dict[str, Pose]) -> tuple[str
     return path, poses[path].to_local(world[None])[0], poses[path].rotation.T @ pose.rotation @ rotation
 
 
-def _axis(prim) -> str:
+def _axis(prim: Usd.Prim) -> str:
     axis = prim.GetAttribute("physics:axis").Get()
     if axis not in ("X", "Y", "Z"):
         raise ShotError(
@@ -178,7 +182,7 @@ def _axis(prim) -> str:
     return str(axis)
 
 
-def _finite(prim, name: str, convert) -> Array:
+def _finite(prim: Usd.Prim, name: str, convert: Callable[[Any], Array]) -> Array:
     value = prim.GetAttribute(name).Get()
     found = convert(value)
     if not np.all(np.isfinite(found)):
@@ -186,7 +190,7 @@ def _finite(prim, name: str, convert) -> Array:
     return found
 
 
-def _limits(prim, to_si: float) -> tuple[float, float]:
+def _limits(prim: Usd.Prim, to_si: float) -> tuple[float, float]:
     """Lower and upper limit [rad or m], infinite where there is none."""
     values = []
     for name, unlimited in (("physics:lowerLimit", -np.inf), ("physics:upperLimit", np.inf)):

@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from calmotion.shot import Provenance
 from calmotion.usd import stages
 from calmotion.usd.clock import Clock
 from calmotion.usd.units import units_of
 
+if TYPE_CHECKING:
+    from pxr import Usd
 
-def provenance_of(path: str, stage, clock: Clock, earlier: tuple[str, ...] = ()) -> Provenance:
+
+def provenance_of(path: str, stage: Usd.Stage, clock: Clock, earlier: tuple[str, ...] = ()) -> Provenance:
     """The provenance of a shot.
 
     Args:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,8 +14,11 @@ from calmotion.usd.reading.joints import JointPrim, read_joint
 from calmotion.usd.reading.stillness import carriers, codes_of, moves
 from calmotion.usd.transforms import Pose
 
+if TYPE_CHECKING:
+    from pxr import Usd
 
-def world_side_prim(reading: Reading, joint: JointPrim):
+
+def world_side_prim(reading: Reading, joint: JointPrim) -> Usd.Prim | None:
     """The prim, no body, that a joint's end in the world names; None where it names none."""
     for side in (0, 1) if joint.prim is not None else ():
         relationship = joint.prim.GetRelationship(f"physics:body{side}")
@@ -63,7 +67,7 @@ def moving_frames(
     return tuple(found)
 
 
-def world_frame(reading: Reading, joint: JointPrim, prim, poses: dict[str, Pose]) -> Frame:
+def world_frame(reading: Reading, joint: JointPrim, prim: Usd.Prim, poses: dict[str, Pose]) -> Frame:
     """The world-side frame of a joint at the time of a reading.
 
     Args:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,6 +13,9 @@ from calmotion.shot.character import Array
 from calmotion.usd import gf, schemas
 from calmotion.usd.reading.context import Reading, prims_of
 from calmotion.usd.units import EARTH_GRAVITY
+
+if TYPE_CHECKING:
+    from pxr import Usd
 
 _SCHEMA = "CalmRetargetAPI"
 
@@ -27,7 +31,7 @@ def gravity(reading: Reading) -> Array:
     from pxr import UsdGeom
 
     up = UsdGeom.GetStageUpAxis(reading.stage)
-    down = 0.0 - np.eye(3)["XYZ".index(str(up))]
+    down: Array = 0.0 - np.eye(3)["XYZ".index(str(up))]
     scenes = [p for p in prims_of(reading.stage) if p.GetTypeName() == "PhysicsScene"]
     if not scenes:
         reading.note(f"the shot has no PhysicsScene; gravity is {EARTH_GRAVITY} m/s^2 down the {up} axis")
@@ -42,7 +46,7 @@ def gravity(reading: Reading) -> Array:
         if bad:
             raise ShotError("is not finite", path=scene.GetPath(), attribute=name, found=found, remedy="Correct it")
     size = float(np.linalg.norm(direction))
-    along = down if size == 0.0 else direction / size
+    along: Array = down if size == 0.0 else direction / size
     return along * (EARTH_GRAVITY if magnitude < 0.0 else reading.units.acceleration(magnitude))
 
 
@@ -77,7 +81,7 @@ def retarget_settings(reading: Reading, root: str) -> RetargetSettings:
     )
 
 
-def _positive(prim, name: str, *, zero: bool = False) -> float | None:
+def _positive(prim: Usd.Prim, name: str, *, zero: bool = False) -> float | None:
     attribute = f"calm:retarget:{name}"
     value = schemas.value(prim, _SCHEMA, attribute)
     if value is None or value == -1:
@@ -93,7 +97,7 @@ def _positive(prim, name: str, *, zero: bool = False) -> float | None:
     return float(value)
 
 
-def _choice(prim, name: str, allowed: tuple[str, ...]) -> str:
+def _choice(prim: Usd.Prim, name: str, allowed: tuple[str, ...]) -> str:
     attribute = f"calm:retarget:{name}"
     value = str(schemas.value(prim, _SCHEMA, attribute))
     if value not in allowed:

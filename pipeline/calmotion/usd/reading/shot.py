@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -36,6 +37,9 @@ from calmotion.usd.reading.stillness import carriers, codes_of
 from calmotion.usd.reading.targets import weight_tracks
 from calmotion.usd.reading.well_formed import broken_transforms, wrong_types
 from calmotion.usd.units import units_of
+
+if TYPE_CHECKING:
+    from pxr import Usd
 
 
 def read_shot(
@@ -95,7 +99,7 @@ class StageReading:
     moving: tuple[MovingFrame, ...]
 
 
-def read_stage(stage, still: bool = False, given: MotorTracks | None = None) -> StageReading:
+def read_stage(stage: Usd.Stage, still: bool = False, given: MotorTracks | None = None) -> StageReading:
     """Read a composed stage; arguments and errors as for `read_shot`."""
     with stages.refused_by_usd(stage):
         raise_all(list(wrong_types(stage)))
@@ -110,7 +114,7 @@ def read_stage(stage, still: bool = False, given: MotorTracks | None = None) -> 
         return StageReading(reading, clock, skeleton, build_character(reading, skeleton), tracks, moving)
 
 
-def shot_clock(stage, given: MotorTracks | None) -> Clock:
+def shot_clock(stage: Usd.Stage, given: MotorTracks | None) -> Clock:
     """The clock of a shot: its range is that of the stage, else of the samples of its drives, else of those of bodies
     and skeletons; one frame where nothing is animated."""
     from pxr import UsdSkel

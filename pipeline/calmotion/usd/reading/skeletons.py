@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -12,6 +13,9 @@ from calmotion.shot.character import Array
 from calmotion.usd import gf
 from calmotion.usd.reading.context import prims_of
 from calmotion.usd.transforms import pose_from_matrix
+
+if TYPE_CHECKING:
+    from pxr import Gf, Usd, UsdSkel
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,14 +52,14 @@ class BoundSkeleton:
             self._posed[code] = np.array([gf.matrix(m) for m in self._computed(code)])
         return self._posed[code]
 
-    def _computed(self, code: float):
+    def _computed(self, code: float) -> Sequence[Gf.Matrix4d]:
         from pxr import Tf
 
         try:
-            found = self.query.ComputeJointLocalTransforms(code)
+            transforms: Sequence[Gf.Matrix4d] = self.query.ComputeJointLocalTransforms(code)
         except Tf.ErrorException:
-            found = ()
-        if len(found) != len(self.joints):
+            transforms = ()
+        if len(transforms) != len(self.joints):
             raise ShotError(
                 "its animation cannot be evaluated: translations, rotations and scales must be as many as its joints",
                 path=(self.animation or self.prim).GetPath(),
@@ -63,7 +67,7 @@ class BoundSkeleton:
                 found=f"at time code {code:g}",
                 remedy="Author one of each for every joint that it names",
             )
-        return found
+        return transforms
 
     def placement(self, code: float) -> Array:
         """From the skeleton's space to the world, shape [4, 4]."""
@@ -86,7 +90,7 @@ class BoundSkeleton:
         return np.array([pose_from_matrix(self.locals_at(float(c))[joint], place).rotation for c in codes])
 
 
-def bound_skeletons(stage) -> list[BoundSkeleton]:
+def bound_skeletons(stage: Usd.Stage) -> list[BoundSkeleton]:
     """The skeletons of a stage, those that nothing is bound to as well.
 
     Raises:
@@ -113,7 +117,7 @@ def bound_skeletons(stage) -> list[BoundSkeleton]:
     return found
 
 
-def _bound(prim, query) -> BoundSkeleton:
+def _bound(prim: Usd.Prim, query: UsdSkel.SkeletonQuery) -> BoundSkeleton:
     animation = query.GetAnimQuery()
     joints = tuple(str(joint) for joint in query.GetJointOrder())
     rest = query.ComputeJointLocalTransforms(0.0, True)  # at rest

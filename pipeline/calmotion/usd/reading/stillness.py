@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from calmotion.errors import ShotError
 from calmotion.usd.gf import matrix
 from calmotion.usd.reading.context import Reading
 
+if TYPE_CHECKING:
+    from pxr import Usd
+
 _TOLERANCE = 1e-6  # relative to the size of the transform: what single precision leaves
 
 
-def refuse_moving(reading: Reading, held: dict, others: list) -> None:
+def refuse_moving(reading: Reading, held: dict[Usd.Prim, str], others: list[Usd.Prim]) -> None:
     """Refuse bodies that are held by the world and move in it; note where other transforms are animated.
 
     Args:
@@ -42,13 +47,13 @@ def refuse_moving(reading: Reading, held: dict, others: list) -> None:
         )
 
 
-def codes_of(prim) -> list[float]:
+def codes_of(prim: Usd.Prim) -> list[float]:
     from pxr import UsdGeom
 
     return list(UsdGeom.Xformable(prim).GetTimeSamples()) if prim.IsA(UsdGeom.Xformable) else []
 
 
-def carriers(prim) -> list:
+def carriers(prim: Usd.Prim) -> list[Usd.Prim]:
     """A prim and those above it that its place depends on."""
     from pxr import UsdGeom
 
@@ -61,7 +66,7 @@ def carriers(prim) -> list:
     return chain
 
 
-def moves(reading: Reading, prim):
+def moves(reading: Reading, prim: Usd.Prim) -> tuple[Usd.Prim, float] | None:
     """The first prim, from a body upwards, that really moves it, with the time code; None where it stays."""
     from pxr import UsdGeom
 

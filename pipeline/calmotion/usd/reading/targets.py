@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -14,6 +14,9 @@ from calmotion.usd import schemas
 from calmotion.usd.clock import Clock
 from calmotion.usd.reading.context import Reading, is_rigid_body, prims_of
 from calmotion.usd.transforms import Pose, pose_from_matrix, quaternion_from_rotation
+
+if TYPE_CHECKING:
+    from pxr import Usd
 
 _SCHEMA = "CalmTargetAPI"
 WEIGHTS = ("calm:target:positionWeight", "calm:target:rotationWeight")
@@ -31,7 +34,7 @@ def target_prims(reading: Reading) -> list[tuple[Any, str]]:
     return found
 
 
-def _carrier(prim) -> str:
+def _carrier(prim: Usd.Prim) -> str:
     from pxr import UsdGeom
 
     body = prim
@@ -55,7 +58,7 @@ def _carrier(prim) -> str:
     return str(body.GetPath())
 
 
-def read_target(reading: Reading, prim, body: int, pose: Pose) -> Target:
+def read_target(reading: Reading, prim: Usd.Prim, body: int, pose: Pose) -> Target:
     """An authored target.
 
     Args:
@@ -111,12 +114,12 @@ def outermost_target(body: Body, index: int, joints: tuple[Joint, ...]) -> Targe
     return Target(body.path, index, Frame(np.array(position), _UPRIGHT.copy()))
 
 
-def _varies(prim, name: str) -> bool:
+def _varies(prim: Usd.Prim, name: str) -> bool:
     attribute = prim.GetAttribute(name)
     return bool(attribute) and len(attribute.GetTimeSamples()) > 1
 
 
-def weight_tracks(stage, targets: Sequence[Target], clock: Clock) -> tuple[WeightTrack, ...]:
+def weight_tracks(stage: Usd.Stage, targets: Sequence[Target], clock: Clock) -> tuple[WeightTrack, ...]:
     """Weights of the targets that change in time, linear between their samples as USD has it.
 
     Raises:
@@ -135,7 +138,7 @@ def weight_tracks(stage, targets: Sequence[Target], clock: Clock) -> tuple[Weigh
     return tuple(found)
 
 
-def _checked(prim, name: str, value: float | None) -> float:
+def _checked(prim: Usd.Prim, name: str, value: float | None) -> float:
     if value is None or not (math.isfinite(value) and value >= 0.0):
         raise ShotError(
             "a weight must not be negative",
@@ -147,5 +150,5 @@ def _checked(prim, name: str, value: float | None) -> float:
     return float(value)
 
 
-def _weight(reading: Reading, prim, name: str) -> float:
+def _weight(reading: Reading, prim: Usd.Prim, name: str) -> float:
     return _checked(prim, name, schemas.value(prim, _SCHEMA, name, reading.start))

@@ -4,17 +4,21 @@ read, so that readers need not ask."""
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import TYPE_CHECKING
 
 from calmotion.errors import ShotError
 from calmotion.usd.reading.context import prims_of
 from calmotion.usd.schemas import NAMES
+
+if TYPE_CHECKING:
+    from pxr import Usd
 
 _PHYSICS = ("PhysicsMassAPI", "PhysicsRigidBodyAPI", "PhysicsCollisionAPI", "PhysicsMaterialAPI")
 _DRIVE, _DRIVES = "PhysicsDriveAPI", ("angular", "linear")
 _RESET, _INVERSE = "!resetXformStack!", "!invert!"
 
 
-def wrong_types(stage) -> Iterator[ShotError]:
+def wrong_types(stage: Usd.Stage) -> Iterator[ShotError]:
     """Authored properties of schemas that are read, and whose type is another than the schema's.
 
     USD takes such opinions without a word, and gives values of whatever type was authored. Names of ours, and of
@@ -44,7 +48,7 @@ def wrong_types(stage) -> Iterator[ShotError]:
                     break
 
 
-def broken_transforms(stage) -> Iterator[ShotError]:
+def broken_transforms(stage: Usd.Stage) -> Iterator[ShotError]:
     """Prims whose order of transform operations names what is none."""
     from pxr import Tf, UsdGeom
 
@@ -70,7 +74,7 @@ def broken_transforms(stage) -> Iterator[ShotError]:
             )
 
 
-def _type_of(definition, name: str) -> str:
+def _type_of(definition: Usd.PrimDefinition, name: str) -> str:
     """Type of a property of a schema, `rel` for a relationship; empty for one that the schema does not have."""
     from pxr import Sdf
 

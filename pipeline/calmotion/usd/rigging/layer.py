@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -19,6 +20,9 @@ from calmotion.usd.transforms import Pose, pose_from_matrix, quaternion_from_rot
 from calmotion.usd.units import units_of
 from calmotion.usd.writing.metadata import author_origin, author_stage_metadata
 from calmotion.usd.writing.root import relative_asset
+
+if TYPE_CHECKING:
+    from pxr import Usd, UsdPhysics
 
 _STILL = 1e-6  # of a matrix, over its size: a root that moves less stands
 _SERVO = 0.1  # radius of gyration of a servo, over the size of the link that it turns
@@ -37,8 +41,14 @@ class RobotLayer:
     """
 
     def __init__(
-        self, stage, skeleton: BoundSkeleton, codes: Array, links: Sequence[Link], material: Material, name: str
-    ):
+        self,
+        stage: Usd.Stage,
+        skeleton: BoundSkeleton,
+        codes: Array,
+        links: Sequence[Link],
+        material: Material,
+        name: str,
+    ) -> None:
         from pxr import Sdf, Usd
 
         self.layer = Sdf.Layer.CreateAnonymous(".usda")
@@ -142,7 +152,7 @@ class RobotLayer:
         if self._links[k].parent < 0 and self._moves(k):
             UsdPhysics.RigidBodyAPI(prim).CreateKinematicEnabledAttr(True)
 
-    def _author_body(self, path: str, pose: Pose, mass: MassProperties | None):
+    def _author_body(self, path: str, pose: Pose, mass: MassProperties | None) -> Usd.Prim:
         from pxr import Gf, UsdGeom, UsdPhysics
 
         xform = UsdGeom.Xform.Define(self._stage, path)
@@ -226,7 +236,7 @@ class RobotLayer:
             self.motors_of[k].append(path)
             body0, pose0 = body1, pose
 
-    def _place(self, joint, pose0: Pose, pose1: Pose, frame: Pose) -> None:
+    def _place(self, joint: UsdPhysics.Joint, pose0: Pose, pose1: Pose, frame: Pose) -> None:
         """Frames of a joint in both of its bodies, from that in the world."""
         from pxr import Gf
 
@@ -257,7 +267,7 @@ class RobotLayer:
         self.layer.documentation = f"Makes a robot of the skinned character in {os.path.basename(provenance.shot)}."
 
 
-def _names(stem: str):
+def _names(stem: str) -> Iterator[str]:
     yield stem
     yield from (f"{stem}_{k}" for k in range(2, 1000))
 

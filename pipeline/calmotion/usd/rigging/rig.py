@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -22,6 +23,9 @@ from calmotion.usd.reading.skeletons import BoundSkeleton, bound_skeletons
 from calmotion.usd.rigging.layer import RobotLayer
 from calmotion.usd.rigging.skins import read_skin
 from calmotion.usd.transforms import pose_from_matrix
+
+if TYPE_CHECKING:
+    from pxr import Usd
 
 
 @dataclass(frozen=True)
@@ -96,7 +100,7 @@ def rig_shot(path: str, output: str, options: RigOptions | None = None) -> Rig:
     return Rig(output, layer.robot, joints, layer.body_count, layer.mass, tuple(layer.targets))
 
 
-def _animated_skeleton(stage, path: str) -> tuple[BoundSkeleton, Clock]:
+def _animated_skeleton(stage: Usd.Stage, path: str) -> tuple[BoundSkeleton, Clock]:
     """The one skeleton that is animated, and the clock of the shot."""
     skeletons = bound_skeletons(stage)
     animated = [skeleton for skeleton in skeletons if len(skeleton.codes())]
@@ -120,7 +124,7 @@ def _animated_skeleton(stage, path: str) -> tuple[BoundSkeleton, Clock]:
     return animated[0], shot_clock(stage, None)
 
 
-def _links(stage, skeleton: BoundSkeleton, codes: Array, tolerance: float) -> list[Link]:
+def _links(stage: Usd.Stage, skeleton: BoundSkeleton, codes: Array, tolerance: float) -> list[Link]:
     skin = read_skin(stage, skeleton, float(codes[0]))
     if len(skin.triangles) == 0:
         raise ShotError(

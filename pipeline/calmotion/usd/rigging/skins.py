@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,6 +13,9 @@ from calmotion.usd import gf
 from calmotion.usd.reading.bodies.shapes import mesh_geometry
 from calmotion.usd.reading.context import prims_of
 from calmotion.usd.reading.skeletons import BoundSkeleton
+
+if TYPE_CHECKING:
+    from pxr import Usd, UsdSkel
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,7 +35,7 @@ class Skin:
     meshes: tuple[str, ...]
 
 
-def read_skin(stage, skeleton: BoundSkeleton, code: float) -> Skin:
+def read_skin(stage: Usd.Stage, skeleton: BoundSkeleton, code: float) -> Skin:
     """The skin of a skeleton at a time code.
 
     Raises:
@@ -63,7 +67,7 @@ def read_skin(stage, skeleton: BoundSkeleton, code: float) -> Skin:
     )
 
 
-def _skinned(skeleton: BoundSkeleton, target, code: float) -> tuple[Array, IntArray, Array]:
+def _skinned(skeleton: BoundSkeleton, target: UsdSkel.SkinningQuery, code: float) -> tuple[Array, IntArray, Array]:
     prim = target.GetPrim()
     rest, triangles = mesh_geometry(prim, code)
     points = gf.to_points(rest)

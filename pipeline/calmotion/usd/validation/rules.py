@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator
+from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
@@ -13,12 +14,15 @@ from calmotion.usd import schemas
 from calmotion.usd.reading.context import is_rigid_body, prims_of
 from calmotion.usd.reading.shot import StageReading, read_stage
 
+if TYPE_CHECKING:
+    from pxr import Usd
+
 READABLE, SCHEMAS, PLACES, LIMITS = "ShotIsReadable", "SchemasAreKnown", "SchemasFit", "AnimationKeepsLimits"
 _NAMESPACE = "calm:"
 _FREE_NAMES = ("calm:interface:",)  # relationships of subsets, which need no schema
 
 
-def unreadable(stage) -> Iterator[Finding]:
+def unreadable(stage: Usd.Stage) -> Iterator[Finding]:
     """What the reader refuses, what it reads otherwise than it is animated, and motors animated beyond their limits."""
     try:
         read = read_stage(stage)
@@ -48,7 +52,7 @@ def _beyond_limits(read: StageReading) -> Iterator[Finding]:
                 )  # fmt: skip
 
 
-def unknown_names(stage) -> Iterator[Finding]:
+def unknown_names(stage: Usd.Stage) -> Iterator[Finding]:
     """Attributes in our namespace that no schema of ours has, or whose schema is not applied: nothing reads them."""
     owners = _owners()
     for prim in prims_of(stage):
@@ -79,7 +83,7 @@ def _owners() -> dict[str, str]:
     return found
 
 
-def misplaced(stage) -> Iterator[Finding]:
+def misplaced(stage: Usd.Stage) -> Iterator[Finding]:
     """Schemas of ours on prims that they say nothing about; USD does not enforce that."""
     from pxr import UsdGeom, UsdPhysics, UsdShade
 
@@ -98,7 +102,9 @@ def misplaced(stage) -> Iterator[Finding]:
                 )  # fmt: skip
 
 
-RULES = {
+Rule: TypeAlias = "Callable[[Usd.Stage], Iterable[Finding]]"
+
+RULES: dict[str, tuple[Rule, str]] = {
     READABLE: (unreadable, "The shot can be processed, its motors can do what is animated, within their limits."),
     SCHEMAS: (unknown_names, "Every attribute in the namespace calm: is one that is read."),
     PLACES: (misplaced, "Schemas of Calmotion are on prims that they are about."),

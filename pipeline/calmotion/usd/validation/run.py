@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
-from typing import Any
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
 
 from calmotion.errors import ShotError, each
 from calmotion.shot.finding import ERROR, WARNING, Finding, Findings
 from calmotion.usd import stages
-from calmotion.usd.validation.rules import READABLE, RULES, finding_of
+from calmotion.usd.validation.rules import READABLE, RULES, Rule, finding_of
+
+if TYPE_CHECKING:
+    from pxr import Usd, UsdValidation
 
 _PLUGIN = "calmotion"
 
@@ -38,7 +41,7 @@ def validate_shot(path: str) -> Findings:
     return Findings(tuple(sorted(dict.fromkeys(found), key=lambda f: (f.level != ERROR, f.path, f.attribute))))
 
 
-def _checked(name: str, stage, rule: Callable[[Any], Iterable[Finding]]) -> list[Finding]:
+def _checked(name: str, stage: Usd.Stage, rule: Rule) -> list[Finding]:
     """What a rule finds; that USD cannot evaluate the shot is a finding, too."""
     try:
         with stages.refused_by_usd(stage):
@@ -47,7 +50,7 @@ def _checked(name: str, stage, rule: Callable[[Any], Iterable[Finding]]) -> list
         return [finding_of(error, ERROR, name)]
 
 
-def _of_usd(stage) -> list[Finding]:
+def _of_usd(stage: Usd.Stage) -> list[Finding]:
     """What USD's own validators find."""
     from pxr import UsdValidation
 
@@ -66,7 +69,7 @@ def _of_usd(stage) -> list[Finding]:
     return found
 
 
-def _place(error, stage) -> tuple[str, str]:
+def _place(error: UsdValidation.ValidationError, stage: Usd.Stage) -> tuple[str, str]:
     for site in error.GetSites():
         if site.IsProperty():
             path = site.GetProperty().GetPath()
@@ -93,12 +96,12 @@ def register_validators() -> None:
         registry.RegisterStageValidator(metadata, _as_validator(name, rule))
 
 
-def _as_validator(name: str, rule):
+def _as_validator(name: str, rule: Rule) -> Callable[[Usd.Stage, Any], list[UsdValidation.ValidationError]]:
     from pxr import Sdf, UsdValidation
 
     kinds = {ERROR: UsdValidation.ValidationErrorType.Error, WARNING: UsdValidation.ValidationErrorType.Warn}
 
-    def validate(stage, times):
+    def validate(stage: Usd.Stage, times: Any) -> list[UsdValidation.ValidationError]:
         errors = []
         for finding in rule(stage):
             text = ShotError(

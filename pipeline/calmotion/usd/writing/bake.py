@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from calmotion.shot import Character, Skin
@@ -12,12 +14,21 @@ from calmotion.usd.transforms import Pose, pose_from_matrix, rotation_from_quate
 from calmotion.usd.writing.curves import attribute_spec
 from calmotion.usd.writing.motions import BakedMotion
 
+if TYPE_CHECKING:
+    from pxr import Sdf, Usd
+
 _EQUAL = 1e-6  # of matrices, over the size of their entries: what single precision leaves
 _OP = "xformOp:transform:calmotion"  # a name of our own: never the type of an op that the shot has
 
 
 def bake_bodies(
-    layer, stage, character: Character, motion: BakedMotion, clock: Clock, meters: float, changed: bool = False
+    layer: Sdf.Layer,
+    stage: Usd.Stage,
+    character: Character,
+    motion: BakedMotion,
+    clock: Clock,
+    meters: float,
+    changed: bool = False,
 ) -> dict[str, int]:
     """Author one matrix for each body and frame, relative to its parent prim, in place of its other transform ops.
 
@@ -59,7 +70,13 @@ def bake_bodies(
 
 
 def bake_points(
-    layer, stage, character: Character, skins: tuple[Skin | None, ...], motion: BakedMotion, clock: Clock, meters: float
+    layer: Sdf.Layer,
+    stage: Usd.Stage,
+    character: Character,
+    skins: tuple[Skin | None, ...],
+    motion: BakedMotion,
+    clock: Clock,
+    meters: float,
 ) -> dict[str, int]:
     """Author the deformed points of the meshes of flexible bodies, and their extents.
 
@@ -101,7 +118,7 @@ def bake_points(
     return written
 
 
-def _rest_poses(stage, character: Character, start: float) -> dict[str, Pose]:
+def _rest_poses(stage: Usd.Stage, character: Character, start: float) -> dict[str, Pose]:
     """World poses of the bodies as authored at the first frame, stage units, with their scales."""
     from pxr import Usd, UsdGeom
 
@@ -124,7 +141,7 @@ def _world_matrices(rest: Pose, motion: BakedMotion, body: int, meters: float) -
 
 
 def _parent_matrices(
-    stage, parent, worlds: dict[str, Array], poses: dict[str, Pose], codes: Array, start: float
+    stage: Usd.Stage, parent: Usd.Prim, worlds: dict[str, Array], poses: dict[str, Pose], codes: Array, start: float
 ) -> Array:
     """Local-to-world matrices of the prim above a body, shape [f, 4, 4], carried by the body above that, if any."""
     from pxr import Usd, UsdGeom
@@ -142,7 +159,7 @@ def _parent_matrices(
     return worlds[path] @ np.linalg.inv(poses[path].matrix()) @ at_start
 
 
-def _same(local: Array, prim, codes: Array) -> bool:
+def _same(local: Array, prim: Usd.Prim, codes: Array) -> bool:
     """Whether local matrices, shape [f, 4, 4], are those that a prim is animated with."""
     from pxr import UsdGeom
 
@@ -151,7 +168,7 @@ def _same(local: Array, prim, codes: Array) -> bool:
     return bool(np.max(np.abs(local - authored)) <= _EQUAL * max(1.0, float(np.max(np.abs(authored)))))
 
 
-def _local_to_world(prim, code: float) -> Array:
+def _local_to_world(prim: Usd.Prim, code: float) -> Array:
     from pxr import Usd, UsdGeom
 
     return gf.matrix(UsdGeom.XformCache(Usd.TimeCode(code)).GetLocalToWorldTransform(prim))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -10,6 +11,9 @@ from calmotion.shot import Animation, Character, Motor, MotorCurve
 from calmotion.shot.character import Array
 from calmotion.usd.clock import Clock
 from calmotion.usd.schemas import is_applied
+
+if TYPE_CHECKING:
+    from pxr import Sdf, Usd
 
 
 def sample_times(frame_times: Array, samples_per_second: float | None) -> Array:
@@ -24,7 +28,8 @@ def sample_times(frame_times: Array, samples_per_second: float | None) -> Array:
     frame = float(frame_times[1] - frame_times[0])
     parts = max(1, int(np.ceil(frame * samples_per_second - 1e-9)))
     steps = np.arange((len(frame_times) - 1) * parts + 1)
-    return frame_times[0] + steps * (frame / parts)
+    times: Array = frame_times[0] + steps * (frame / parts)
+    return times
 
 
 def curve_values(animation: Animation, curve: MotorCurve, times: Array, cyclic: bool) -> Array:
@@ -37,9 +42,14 @@ def curve_values(animation: Animation, curve: MotorCurve, times: Array, cyclic: 
 
 
 def author_curves(
-    layer, character: Character, animation: Animation, curves: tuple[MotorCurve, ...], times: Array, clock: Clock,
+    layer: Sdf.Layer,
+    character: Character,
+    animation: Animation,
+    curves: tuple[MotorCurve, ...],
+    times: Array,
+    clock: Clock,
     meters: float,
-) -> dict[str, int]:  # fmt: skip
+) -> dict[str, int]:
     """Author each curve as an over with time samples, degrees or stage length.
 
     Args:
@@ -69,7 +79,7 @@ def author_curves(
     return written
 
 
-def ensure_drives(layer, stage, motors: Iterable[Motor]) -> None:
+def ensure_drives(layer: Sdf.Layer, stage: Usd.Stage, motors: Iterable[Motor]) -> None:
     """Apply the drives that motors' attributes belong to, where the shot has none (motors that an actuator of another
     dialect makes)."""
     from pxr import Sdf
@@ -82,7 +92,7 @@ def ensure_drives(layer, stage, motors: Iterable[Motor]) -> None:
             Sdf.CreatePrimInLayer(layer, motor.path).SetInfo("apiSchemas", schemas)
 
 
-def attribute_spec(layer, path: str, kind, uniform: bool = False):
+def attribute_spec(layer: Sdf.Layer, path: str, kind: Sdf.ValueTypeName, uniform: bool = False) -> Sdf.AttributeSpec:
     """The spec of an attribute in a layer, made with overs above it where needed."""
     from pxr import Sdf
 

@@ -2,15 +2,23 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING, Any
+
 import numpy as np
 
 from calmotion.shot import Character, Provenance, Result, Simulation
+from calmotion.shot.character import BoolArray
 from calmotion.usd import gf
 from calmotion.usd.stages import METADATA_KEY
 from calmotion.version import __version__
 
+if TYPE_CHECKING:
+    from pxr import Sdf
 
-def author_stage_metadata(layer, provenance: Provenance) -> None:
+Entries = dict[str, Any]  # values that USD stores in layer metadata
+
+
+def author_stage_metadata(layer: Sdf.Layer, provenance: Provenance) -> None:
     """The shot's units, axes, rates, range and default prim: a sublayer's are not taken over by what sublayers it."""
     root = layer.pseudoRoot
     root.SetInfo("metersPerUnit", provenance.meters_per_unit)
@@ -25,10 +33,15 @@ def author_stage_metadata(layer, provenance: Provenance) -> None:
 
 
 def author_origin(
-    layer, role: str, provenance: Provenance, *, settings: dict | None = None, errors: dict | None = None
+    layer: Sdf.Layer,
+    role: str,
+    provenance: Provenance,
+    *,
+    settings: Entries | None = None,
+    errors: Entries | None = None,
 ) -> None:
     """Record version, role, input layers with their hashes, settings and errors."""
-    entry = {
+    entry: Entries = {
         "version": __version__,
         "role": role,
         "inputs": gf.to_strings(item.path for item in provenance.layers),
@@ -43,10 +56,10 @@ def author_origin(
 
 def settings_of(
     character: Character, result: Result, bake: str, samples_per_second: float | None, splines: bool = False
-) -> dict:
+) -> Entries:
     """The settings that a result was computed and written with, as plain values that USD stores."""
     asked = character.retarget
-    found: dict[str, object] = {
+    found: Entries = {
         "step_s": float(result.step_s),
         "pre_roll_s": float(result.pre_roll_s),
         "reference": asked.reference,
@@ -66,9 +79,9 @@ def settings_of(
     return found
 
 
-def errors_of(character: Character, result: Result) -> dict:
+def errors_of(character: Character, result: Result) -> Entries:
     """Errors of each target before and after, in the order of `targets`."""
-    found: dict[str, object] = {"targets": gf.to_strings(target.path for target in character.targets)}
+    found: Entries = {"targets": gf.to_strings(target.path for target in character.targets)}
     for name, simulation in (("before", result.before), ("after", result.after)):
         if simulation is None:
             continue
@@ -85,6 +98,6 @@ def errors_of(character: Character, result: Result) -> dict:
     return found
 
 
-def _of_the_shot(simulation: Simulation):
+def _of_the_shot(simulation: Simulation) -> BoolArray:
     """The steps that count: not those of the pre-roll."""
     return simulation.motion.times >= -1e-9

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from calmotion.errors import ShotError
 from calmotion.shot import Animation, Character, MotorCurve, Provenance, Result
@@ -16,6 +16,9 @@ from calmotion.usd.writing.curves import author_curves, ensure_drives, sample_ti
 from calmotion.usd.writing.root import keeps_earlier_curves, root_path, write_root
 from calmotion.usd.writing.skeletal import author_skeletons
 from calmotion.usd.writing.splines import author_splines
+
+if TYPE_CHECKING:
+    from pxr import Sdf
 
 BAKES = ("none", "motors", "simulated")
 
@@ -132,7 +135,9 @@ class _Shot:
         return self.provenance.meters_per_unit
 
 
-def _write_curves(layer, shot: _Shot, result: Result, options: WriteOptions) -> tuple[dict[str, int], dict[str, int]]:
+def _write_curves(
+    layer: Sdf.Layer, shot: _Shot, result: Result, options: WriteOptions
+) -> tuple[dict[str, int], dict[str, int]]:
     """Author motor curves where they came from: attributes with their number of samples, and of knots."""
     character, animation, clock = shot.character, shot.animation, shot.clock
     curves: dict[str, tuple[MotorCurve, ...]] = {"drive": (), "bodies": (), "skeleton": ()}
@@ -176,7 +181,7 @@ def _performed(shot: _Shot, result: Result) -> motions.BakedMotion:
     return motions.simulated_motion(result.performed, shot.animation.frame_times)
 
 
-def _bake(layer, shot: _Shot, result: Result, options: WriteOptions) -> dict[str, int]:
+def _bake(layer: Sdf.Layer, shot: _Shot, result: Result, options: WriteOptions) -> dict[str, int]:
     """Author what is baked into the layer; see `WriteOptions.bake`."""
     if options.bake not in BAKES:
         raise ShotError("unknown bake", found=options.bake, remedy=f"Use one of {', '.join(BAKES)}")

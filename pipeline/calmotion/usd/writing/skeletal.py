@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from calmotion.shot import Animation, Character, MotorCurve
@@ -16,11 +19,19 @@ from calmotion.usd.transforms import pose_from_matrix, quaternion_from_rotation
 from calmotion.usd.units import units_of
 from calmotion.usd.writing.curves import attribute_spec, curve_values
 
+if TYPE_CHECKING:
+    from pxr import Sdf, Usd, UsdSkel
+
 
 def author_skeletons(
-    layer, stage, character: Character, animation: Animation, curves: tuple[MotorCurve, ...], times: Array,
+    layer: Sdf.Layer,
+    stage: Usd.Stage,
+    character: Character,
+    animation: Animation,
+    curves: tuple[MotorCurve, ...],
+    times: Array,
     clock: Clock,
-) -> dict[str, int]:  # fmt: skip
+) -> dict[str, int]:
     """Author the rotations of every SkelAnimation whose joints the curves turn; its other joints keep theirs.
 
     What the motors cannot follow of a joint is kept: its rotation L becomes D(new) D(old)^T L.
@@ -62,7 +73,9 @@ def author_skeletons(
     return written
 
 
-def _author(layer, stage, name: str, parts: list[tuple[HingeStack, Array]], clock: Clock, times: Array):
+def _author(
+    layer: Sdf.Layer, stage: Usd.Stage, name: str, parts: list[tuple[HingeStack, Array]], clock: Clock, times: Array
+) -> Iterator[tuple[str, int]]:
     """Write one animation; yields what was written."""
     from pxr import Sdf, UsdSkel
 
@@ -92,7 +105,9 @@ def _at_rest(stack: HingeStack) -> Array:
     return quaternion_from_rotation(rest.rotation)
 
 
-def _lengthen(layer, animation, name: str, joints: list[str], more: list[HingeStack], clock: Clock) -> None:
+def _lengthen(
+    layer: Sdf.Layer, animation: UsdSkel.Animation, name: str, joints: list[str], more: list[HingeStack], clock: Clock
+) -> None:
     """Add joints that the animation did not have, at rest but for their rotations."""
     from pxr import Sdf, Vt
 

@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from calmotion.shot import Animation, Character, MotorCurve
 from calmotion.shot.character import Array
 from calmotion.usd.clock import Clock
 from calmotion.usd.writing.curves import attribute_spec
+
+if TYPE_CHECKING:
+    from pxr import Sdf, Ts
 
 SAME = 1e-9  # times that are closer are one [s]
 
@@ -32,7 +37,7 @@ def hermite(animation: Animation, curve: MotorCurve, cyclic: bool) -> tuple[Arra
 
 
 def author_splines(
-    layer, character: Character, animation: Animation, curves: tuple[MotorCurve, ...], clock: Clock,
+    layer: Sdf.Layer, character: Character, animation: Animation, curves: tuple[MotorCurve, ...], clock: Clock,
     meters: float,
 ) -> dict[str, int]:  # fmt: skip
     """Author each curve as an over with a spline, degrees or stage length; one of a shot that loops repeats itself.
@@ -65,7 +70,7 @@ def author_splines(
     return written
 
 
-def bezier(times: Array, values: Array, before: Array, after: Array, kind: str):
+def bezier(times: Array, values: Array, before: Array, after: Array, kind: str) -> Ts.Spline:
     """A Ts.Spline that is the cubic Hermite interpolant: tangents as long as a third of their interval.
 
     Args:

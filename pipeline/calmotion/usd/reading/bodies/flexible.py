@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -14,11 +15,14 @@ from calmotion.usd.reading.bodies.materials import elastic_material
 from calmotion.usd.reading.context import Reading
 from calmotion.usd.transforms import Pose
 
+if TYPE_CHECKING:
+    from pxr import Usd
+
 _SCHEMA = "CalmFlexibleBodyAPI"
 _ELASTICITY = ("auto", "linear", "stvk", "neohookean")
 
 
-def flexible_settings(reading: Reading, prim, pose: Pose) -> FlexibleSettings | None:
+def flexible_settings(reading: Reading, prim: Usd.Prim, pose: Pose) -> FlexibleSettings | None:
     """The settings of a flexible body, or None for a rigid one.
 
     Raises:
@@ -52,7 +56,7 @@ def flexible_settings(reading: Reading, prim, pose: Pose) -> FlexibleSettings | 
     )
 
 
-def _automatic(prim, name: str) -> float:
+def _automatic(prim: Usd.Prim, name: str) -> float:
     """A positive value, or -1 for automatic."""
     value = schemas.value(prim, _SCHEMA, name)
     if value == -1:
@@ -68,12 +72,12 @@ def _automatic(prim, name: str) -> float:
     return float(value)
 
 
-def _length(reading: Reading, prim, name: str) -> float:
+def _length(reading: Reading, prim: Usd.Prim, name: str) -> float:
     value = _automatic(prim, name)
     return value if value == -1.0 else reading.units.length(value)
 
 
-def _mesh_file(prim) -> str:
+def _mesh_file(prim: Usd.Prim) -> str:
     """The external mesh, resolved against the layer that names it; empty when there is none."""
     name = "calm:flexible:meshFile"
     asset = schemas.value(prim, _SCHEMA, name)
@@ -90,7 +94,7 @@ def _mesh_file(prim) -> str:
     )
 
 
-def _mesh_scale(reading: Reading, prim, pose: Pose) -> float:
+def _mesh_scale(reading: Reading, prim: Usd.Prim, pose: Pose) -> float:
     """Metres per unit of an external mesh, which is in the body's own axes."""
     if not np.allclose(pose.scale, pose.scale[0], rtol=1e-5) or pose.scale[0] < 0.0:
         raise ShotError(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -15,12 +16,17 @@ from calmotion.usd.reading.bodies.shapes import finite_points, to_body
 from calmotion.usd.reading.context import Reading, is_rigid_body, prims_below
 from calmotion.usd.transforms import Pose
 
+if TYPE_CHECKING:
+    from pxr import Usd, UsdGeom
+
 FAMILY = "calmInterface"
 JOINT = "calm:interface:joint"
 _SIDES = np.array([[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]])  # outward faces of a tetrahedron
 
 
-def interfaces_of(reading: Reading, body_prim, pose: Pose, joints: Sequence[str]) -> tuple[InterfaceSurface, ...]:
+def interfaces_of(
+    reading: Reading, body_prim: Usd.Prim, pose: Pose, joints: Sequence[str]
+) -> tuple[InterfaceSurface, ...]:
     """The named interfaces of a body.
 
     A subset names its joint by the relationship `calm:interface:joint`, or by having the joint's name.
@@ -58,7 +64,7 @@ def interfaces_of(reading: Reading, body_prim, pose: Pose, joints: Sequence[str]
     return tuple(found)
 
 
-def _joint_of(prim, joints: Sequence[str]) -> str:
+def _joint_of(prim: Usd.Prim, joints: Sequence[str]) -> str:
     relationship = prim.GetRelationship(JOINT)
     named = [str(target) for target in relationship.GetForwardedTargets()] if relationship else []
     matching = [path for path in joints if path in named] if named else []
@@ -75,7 +81,7 @@ def _joint_of(prim, joints: Sequence[str]) -> str:
     return matching[0]
 
 
-def _triangles(prim, subset, geometry, time: float) -> tuple[Array, IntArray]:
+def _triangles(prim: Usd.Prim, subset: UsdGeom.Subset, geometry: Usd.Prim, time: float) -> tuple[Array, IntArray]:
     """Points of the geometry and the triangles of the subset."""
     kind = str(geometry.GetTypeName())
     element = str(subset.GetElementTypeAttr().Get())
@@ -120,7 +126,7 @@ def _triangles(prim, subset, geometry, time: float) -> tuple[Array, IntArray]:
     return points, triangles[:, ::-1].copy()
 
 
-def _check(prim, chosen, count: int) -> None:
+def _check(prim: Usd.Prim, chosen: IntArray, count: int) -> None:
     if chosen.min() < 0 or chosen.max() >= count:
         raise ShotError(
             f"this interface refers to elements that do not exist (there are {count})",

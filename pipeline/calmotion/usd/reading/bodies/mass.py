@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from calmotion.errors import ShotError
@@ -14,10 +16,13 @@ from calmotion.usd.reading.context import Reading
 from calmotion.usd.schemas import is_applied
 from calmotion.usd.transforms import Pose, rotation_from_quaternion
 
+if TYPE_CHECKING:
+    from pxr import Usd
+
 _DEFAULT_DENSITY = 1000.0  # kg/m^3: what UsdPhysics assumes for a collider without any density
 
 
-def mass_of(reading: Reading, prim, pose: Pose, shapes: list[Shape]) -> MassProperties | None:
+def mass_of(reading: Reading, prim: Usd.Prim, pose: Pose, shapes: list[Shape]) -> MassProperties | None:
     """The mass properties of a body.
 
     A mass on the body overrides everything below it. Otherwise each of its colliders (where it has none, each of
@@ -54,12 +59,12 @@ def mass_of(reading: Reading, prim, pose: Pose, shapes: list[Shape]) -> MassProp
     )
 
 
-def has_authored_mass(prim) -> bool:
+def has_authored_mass(prim: Usd.Prim) -> bool:
     """Whether a positive mass is authored on the body itself; refuses one that is not positive."""
     return _authored(prim, "physics:mass", "mass", zero_means_unauthored=False) is not None
 
 
-def _authored(prim, name: str, what: str, *, zero_means_unauthored: bool = True) -> float | None:
+def _authored(prim: Usd.Prim, name: str, what: str, *, zero_means_unauthored: bool = True) -> float | None:
     """A mass or density: None where not authored."""
     attribute = prim.GetAttribute(name)
     if not attribute or not attribute.HasAuthoredValue():
@@ -78,7 +83,7 @@ def _authored(prim, name: str, what: str, *, zero_means_unauthored: bool = True)
     return float(value)
 
 
-def _center(prim) -> Array | None:
+def _center(prim: Usd.Prim) -> Array | None:
     attribute = prim.GetAttribute("physics:centerOfMass")
     value = attribute.Get() if attribute and attribute.HasAuthoredValue() else None
     if value is None:
@@ -97,7 +102,7 @@ def _center(prim) -> Array | None:
     return found
 
 
-def _inertia(prim) -> Array | None:
+def _inertia(prim: Usd.Prim) -> Array | None:
     """The authored inertia tensor, body axes, stage units, shape [3, 3]."""
     attribute = prim.GetAttribute("physics:diagonalInertia")
     value = attribute.Get() if attribute and attribute.HasAuthoredValue() else None
@@ -131,7 +136,7 @@ def _inertia(prim) -> Array | None:
     return rotation @ np.diag(diagonal) @ rotation.T
 
 
-def _note_impossible(reading: Reading, prim, tensor: Array) -> None:
+def _note_impossible(reading: Reading, prim: Usd.Prim, tensor: Array) -> None:
     a, b, c = np.sort(np.linalg.eigvalsh(tensor))
     if c > (a + b) * (1.0 + 1e-3):
         reading.note(
@@ -140,7 +145,9 @@ def _note_impossible(reading: Reading, prim, tensor: Array) -> None:
         )
 
 
-def _from_geometry(reading: Reading, prim, shapes: list[Shape], body_mass: float | None) -> MassProperties | None:
+def _from_geometry(
+    reading: Reading, prim: Usd.Prim, shapes: list[Shape], body_mass: float | None
+) -> MassProperties | None:
     """What geometry and densities say, scaled to the authored mass of the body where there is one."""
     colliders = [s for s in shapes if s.collider]
     solids = colliders or [s for s in shapes if s.surface.visible]
@@ -204,7 +211,7 @@ def _hull_moments(reading: Reading, shape: Shape) -> Moments:
     return surface_moments(points, triangles)
 
 
-def _material_density(prim) -> float | None:
+def _material_density(prim: Usd.Prim) -> float | None:
     """The density of the physics material bound to a prim, the weakest opinion."""
     from pxr import UsdShade
 

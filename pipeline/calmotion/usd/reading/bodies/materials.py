@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from typing import TYPE_CHECKING
 
 from calmotion.errors import ShotError
 from calmotion.shot import ElasticMaterial
 from calmotion.usd import schemas
 from calmotion.usd.dialects import number_of
 from calmotion.usd.reading.context import Reading, is_rigid_body, prims_below
+
+if TYPE_CHECKING:
+    from pxr import Usd
 
 _SCHEMA = "PhysicsVolumeDeformableMaterialAPI"  # of the AOUSD proposal; usd-core does not define it
 _REMEDY = (
@@ -17,7 +22,7 @@ _REMEDY = (
 )
 
 
-def elastic_material(reading: Reading, body_prim) -> ElasticMaterial:
+def elastic_material(reading: Reading, body_prim: Usd.Prim) -> ElasticMaterial:
     """The material bound for physics to a body, else to geometry below it.
 
     Raises:
@@ -42,7 +47,7 @@ def elastic_material(reading: Reading, body_prim) -> ElasticMaterial:
     )
 
 
-def _material(reading: Reading, prim) -> ElasticMaterial:
+def _material(reading: Reading, prim: Usd.Prim) -> ElasticMaterial:
     units = reading.units
     modulus = _number(prim, "physics:youngsModulus", lambda x: x > 0.0, "must be positive")
     ratio = _number(prim, "physics:poissonsRatio", lambda x: -1.0 < x < 0.5, "must lie between -1 and 0.5, exclusively")
@@ -67,7 +72,7 @@ def _material(reading: Reading, prim) -> ElasticMaterial:
     )
 
 
-def _number(prim, name: str, allowed, problem: str) -> float:
+def _number(prim: Usd.Prim, name: str, allowed: Callable[[float], bool], problem: str) -> float:
     value = number_of(prim, name)
     if value is None:
         raise ShotError("is not authored", path=prim.GetPath(), attribute=name, remedy=_REMEDY)
@@ -76,7 +81,7 @@ def _number(prim, name: str, allowed, problem: str) -> float:
     return value
 
 
-def _rayleigh(prim, name: str) -> float | None:
+def _rayleigh(prim: Usd.Prim, name: str) -> float | None:
     value = schemas.value(prim, "CalmDampingAPI", name)
     if value is None:
         return None

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from calmotion.shot.character import Array, IntArray
+from calmotion.shot.character import Array, BoolArray, IntArray
 
 _TURN = 1e-6  # sine of the angle by which a corner may turn back in a polygon that counts as convex
 
 
-def triangulate(points: Array, counts: IntArray, corners: IntArray, keep) -> IntArray:
+def triangulate(points: Array, counts: IntArray, corners: IntArray, keep: BoolArray) -> IntArray:
     """Triangles of polygons, turned as the polygons are.
 
     A fan of a polygon with a dent folds over itself; its volume is right, but its surface runs through the air.
@@ -36,7 +36,7 @@ def triangulate(points: Array, counts: IntArray, corners: IntArray, keep) -> Int
     return triangles
 
 
-def _dented(points: Array, counts: IntArray, corners: IntArray, first: IntArray, wanted) -> IntArray:
+def _dented(points: Array, counts: IntArray, corners: IntArray, first: IntArray, wanted: BoolArray) -> IntArray:
     """Polygons of more than three corners with one that turns back."""
     polygon = np.repeat(np.arange(len(counts)), counts)
     place = np.arange(len(corners)) - first[polygon]
@@ -61,13 +61,15 @@ def _ears(x: Array, ring: IntArray) -> IntArray:
     axis = np.linalg.svd(normal[None])[2][1:]
     axis[1] *= np.sign(np.cross(axis[0], axis[1]) @ normal) or 1.0
     p = x @ axis.T
-    left, found = list(range(len(p))), []
+    left = list(range(len(p)))
+    ears: list[list[int]] = []
     while len(left) > 3:
         k = next((k for k in range(len(left)) if _is_ear(p, left, k)), 0)  # 0: it crosses itself, and nothing is right
-        found.append([left[k - 1], left[k], left[(k + 1) % len(left)]])
+        ears.append([left[k - 1], left[k], left[(k + 1) % len(left)]])
         del left[k]
-    found.append(left)
-    return ring[np.array(found)]
+    ears.append(left)
+    triangles: IntArray = ring[np.array(ears)]
+    return triangles
 
 
 def _is_ear(p: Array, left: list[int], k: int) -> bool:
@@ -81,4 +83,5 @@ def _is_ear(p: Array, left: list[int], k: int) -> bool:
 
 def _side(a: Array, b: Array, c: Array) -> Array:
     """Twice the area of the triangles a b c, positive to the left of a b."""
-    return (b[0] - a[0]) * (c[..., 1] - a[1]) - (b[1] - a[1]) * (c[..., 0] - a[0])
+    areas: Array = (b[0] - a[0]) * (c[..., 1] - a[1]) - (b[1] - a[1]) * (c[..., 0] - a[0])
+    return areas

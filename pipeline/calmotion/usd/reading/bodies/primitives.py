@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from calmotion.errors import ShotError
 from calmotion.shot.character import Array, IntArray
 from calmotion.usd.reading.bodies.moments import Moments
+
+if TYPE_CHECKING:
+    from pxr import Usd
 
 TYPES = ("Cube", "Sphere", "Cylinder", "Capsule", "Cone")
 _SIDES = 32  # facets around an axis: within 0.5 % of a circle
@@ -17,7 +22,7 @@ _CUBE = np.array(
 )
 
 
-def solid(prim, time: float) -> tuple[Array, IntArray, Moments]:
+def solid(prim: Usd.Prim, time: float) -> tuple[Array, IntArray, Moments]:
     """Triangulate one of UsdGeom's solids, in its own axes and stage units.
 
     Args:
@@ -62,7 +67,7 @@ def solid(prim, time: float) -> tuple[Array, IntArray, Moments]:
     return points @ turn.T, triangles, moments.mapped(turn, np.zeros(3))
 
 
-def _positive(prim, name: str, time: float) -> float:
+def _positive(prim: Usd.Prim, name: str, time: float) -> float:
     value = prim.GetAttribute(name).Get(time)
     if value is None or not (np.isfinite(value) and value > 0.0):
         raise ShotError(
@@ -71,7 +76,7 @@ def _positive(prim, name: str, time: float) -> float:
     return float(value)
 
 
-def _axis_permutation(prim, time: float) -> Array:
+def _axis_permutation(prim: Usd.Prim, time: float) -> Array:
     """The rotation, shape [3, 3], that takes z to the prim's axis (a permutation, so it is exact)."""
     axis = str(prim.GetAttribute("axis").Get(time) or "Z")
     order = {"X": [[0, 0, 1], [1, 0, 0], [0, 1, 0]], "Y": [[0, 1, 0], [0, 0, 1], [1, 0, 0]]}.get(axis)

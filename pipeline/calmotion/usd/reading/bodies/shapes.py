@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -17,6 +17,9 @@ from calmotion.usd.reading.bodies.polygons import triangulate
 from calmotion.usd.reading.context import Reading, is_rigid_body, prims_below
 from calmotion.usd.schemas import is_applied
 from calmotion.usd.transforms import Pose
+
+if TYPE_CHECKING:
+    from pxr import Usd
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,7 +39,7 @@ class Shape:
     collider: bool
 
 
-def shapes_of(reading: Reading, body_prim, pose: Pose) -> list[Shape]:
+def shapes_of(reading: Reading, body_prim: Usd.Prim, pose: Pose) -> list[Shape]:
     """The geometry below a body, up to bodies nested in it.
 
     Args:
@@ -85,7 +88,7 @@ def shapes_of(reading: Reading, body_prim, pose: Pose) -> list[Shape]:
     return shapes
 
 
-def tets_of(reading: Reading, body_prim, pose: Pose) -> TetGeometry | None:
+def tets_of(reading: Reading, body_prim: Usd.Prim, pose: Pose) -> TetGeometry | None:
     """The tetrahedra authored below a body, or None.
 
     Raises:
@@ -119,12 +122,12 @@ def tets_of(reading: Reading, body_prim, pose: Pose) -> TetGeometry | None:
     return TetGeometry(str(prim.GetPath()), points @ linear.T + offset, tets)
 
 
-def _is_elsewhere(prim) -> bool:
+def _is_elsewhere(prim: Usd.Prim) -> bool:
     """Whether what is below a prim is no geometry of the body above it: another body, or patterns of instances."""
     return is_rigid_body(prim) or prim.GetParent().GetTypeName() == "PointInstancer"
 
 
-def _pass_over(reading: Reading, prim, body_prim) -> None:
+def _pass_over(reading: Reading, prim: Usd.Prim, body_prim: Usd.Prim) -> None:
     """Point instances are not read: refused where a body is to be meshed, a note where they are only looks."""
     flexible = is_applied(body_prim, "CalmFlexibleBodyAPI")
     if flexible and body_prim.GetAttribute("calm:flexible:enabled").Get() is not False:
@@ -137,14 +140,14 @@ def _pass_over(reading: Reading, prim, body_prim) -> None:
     reading.note(f"{prim.GetPath()}: point instances are not read; the body is treated without them")
 
 
-def to_body(reading: Reading, prim, pose: Pose) -> tuple[Array, Array]:
+def to_body(reading: Reading, prim: Usd.Prim, pose: Pose) -> tuple[Array, Array]:
     """Linear part [3, 3] and offset [3] from a prim's own axes, stage units, to the body's frame, m."""
     world = reading.world_matrix(prim)
     scale = reading.units.length(1.0)
     return scale * pose.rotation.T @ world[:3, :3], scale * pose.rotation.T @ (world[:3, 3] - pose.position)
 
 
-def finite_points(prim, time: float) -> Array:
+def finite_points(prim: Usd.Prim, time: float) -> Array:
     """The points of a Mesh or TetMesh, its own axes and stage units, shape [n, 3].
 
     Raises:
@@ -156,7 +159,7 @@ def finite_points(prim, time: float) -> Array:
     return points
 
 
-def _check_indices(prim, name: str, found: IntArray, count: int) -> None:
+def _check_indices(prim: Usd.Prim, name: str, found: IntArray, count: int) -> None:
     if len(found) and (int(found.min()) < 0 or int(found.max()) >= count):
         raise ShotError(
             f"refers to points that do not exist (it has {count})",
@@ -167,7 +170,7 @@ def _check_indices(prim, name: str, found: IntArray, count: int) -> None:
         )
 
 
-def mesh_geometry(prim, time: float) -> tuple[Array, IntArray]:
+def mesh_geometry(prim: Usd.Prim, time: float) -> tuple[Array, IntArray]:
     """Points and right-handed triangles of a Mesh, its polygons cut up, its holes left out."""
     points = finite_points(prim, time)
     counts = gf.indices(prim.GetAttribute("faceVertexCounts").Get(time))
@@ -190,7 +193,7 @@ def mesh_geometry(prim, time: float) -> tuple[Array, IntArray]:
     return points, triangles
 
 
-def _shown_purposes(body_prim) -> set[str]:
+def _shown_purposes(body_prim: Usd.Prim) -> set[str]:
     """Purposes of the geometry by which a body is shown: guides and proxies where it has nothing else."""
     from pxr import UsdGeom
 
@@ -199,7 +202,7 @@ def _shown_purposes(body_prim) -> set[str]:
     return found - {"guide", "proxy"} or found
 
 
-def _is_visible(prim, time: float, purposes: set[str]) -> bool:
+def _is_visible(prim: Usd.Prim, time: float, purposes: set[str]) -> bool:
     from pxr import UsdGeom
 
     image = UsdGeom.Imageable(prim)
@@ -217,7 +220,7 @@ def _is_copy(points: Array, triangles: IntArray, earlier: list[Shape]) -> bool:
     return False
 
 
-def _color(prim, time: float) -> tuple[float, float, float] | None:
+def _color(prim: Usd.Prim, time: float) -> tuple[float, float, float] | None:
     """The display colour, else the diffuse colour of a preview surface; linear RGB."""
     from pxr import UsdGeom, UsdShade
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -20,6 +20,9 @@ from calmotion.usd.reading.motors.gearing import Gear, read_gear, resolve
 from calmotion.usd.reading.motors.motor_limits import effort_limit, own_limit, velocity_limit
 from calmotion.usd.reading.motors.tracks import sample_codes
 from calmotion.usd.units import StageUnits
+
+if TYPE_CHECKING:
+    from pxr import Usd
 
 ATTRIBUTE = "drive:angular:physics:targetPosition"
 LENGTH_ATTRIBUTE = "drive:linear:physics:targetPosition"
@@ -69,12 +72,12 @@ class Drive:
     skel_joint: str = ""
     gear: Gear | None = None
 
-    def attribute(self, stage) -> Any:
+    def attribute(self, stage: Usd.Stage) -> Any:
         """The target position of its drive, on a stage; invalid where the joint has no drive."""
         return stage.GetPrimAtPath(self.joint.path).GetAttribute(target_attribute(self.joint.kind))
 
 
-def actuated_joints(stage) -> dict[str, str]:
+def actuated_joints(stage: Usd.Stage) -> dict[str, str]:
     """Joints that an actuator of a MuJoCo conversion drives, itself or by a tendon, with the actuator's path (usd-core
     does not know these types)."""
     found = {}

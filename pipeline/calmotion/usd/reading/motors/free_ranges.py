@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -10,23 +11,26 @@ from calmotion.shot import FreeTrack, Motor
 from calmotion.usd import schemas
 from calmotion.usd.clock import Clock
 
+if TYPE_CHECKING:
+    from pxr import Usd
+
 _SCHEMA, _FREE = "CalmMotorAPI", "calm:motor:optimize"
 
 
-def may_change(prim) -> bool:
+def may_change(prim: Usd.Prim) -> bool:
     """Whether a motor may be changed at all."""
     samples = _free_samples(prim)
     return any(value for _, value in samples) if samples else bool(schemas.value(prim, _SCHEMA, _FREE))
 
 
-def _free_samples(prim) -> list[tuple[float, bool]]:
+def _free_samples(prim: Usd.Prim) -> list[tuple[float, bool]]:
     attribute = prim.GetAttribute(_FREE)
     if not attribute or not schemas.is_applied(prim, _SCHEMA):
         return []
     return [(code, bool(attribute.Get(code))) for code in attribute.GetTimeSamples()]
 
 
-def free_tracks(stage, motors: Sequence[Motor], clock: Clock) -> tuple[FreeTrack, ...]:
+def free_tracks(stage: Usd.Stage, motors: Sequence[Motor], clock: Clock) -> tuple[FreeTrack, ...]:
     """When motors may be changed, of those for which the shot animates calm:motor:optimize: each sample holds until
     the next."""
     found = []

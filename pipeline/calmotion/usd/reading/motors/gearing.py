@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -11,6 +12,9 @@ from calmotion.errors import ShotError
 from calmotion.usd.dialects import GEARS, SI, GearSpelling, number_of
 from calmotion.usd.reading.joints import JointPrim
 from calmotion.usd.units import StageUnits
+
+if TYPE_CHECKING:
+    from pxr import Usd
 
 
 @dataclass(frozen=True)
@@ -72,7 +76,7 @@ def _to_si(kind: str, spelling: GearSpelling, units: StageUnits) -> float:
     return 1.0 if spelling.angles == SI else float(np.deg2rad(1.0))
 
 
-def _number(prim, name: str, fallback: float) -> float:
+def _number(prim: Usd.Prim, name: str, fallback: float) -> float:
     value = number_of(prim, name)
     value = fallback if value is None else value
     if not math.isfinite(value):

@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from calmotion.errors import ShotError
 from calmotion.shot import MotorTracks, Track
 from calmotion.usd.reading.joints import JointPrim, joint_prims
 
+if TYPE_CHECKING:
+    from pxr import Usd
 
-def given_joints(stage, given: MotorTracks | None) -> tuple[str, ...]:
+
+def given_joints(stage: Usd.Stage, given: MotorTracks | None) -> tuple[str, ...]:
     """Paths of the joints that are named.
 
     Raises:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -11,6 +13,9 @@ from calmotion.usd import schemas
 from calmotion.usd.dialects import EFFORT_LIMIT, VELOCITY_LIMIT, Spelling, authored, elsewhere
 from calmotion.usd.reading.joints import JointPrim
 from calmotion.usd.units import StageUnits
+
+if TYPE_CHECKING:
+    from pxr import Usd
 
 _SCHEMA = "CalmMotorAPI"
 
@@ -40,7 +45,9 @@ def velocity_limit(joint: JointPrim, drive: str, units: StageUnits, notes: list[
     return float(limit if math.isfinite(limit) else _of_others(joint, VELOCITY_LIMIT[1:], drive, to_si, notes))
 
 
-def _of_others(joint: JointPrim, spellings: tuple[Spelling, ...], drive: str, to_si, notes: list[str]) -> float:
+def _of_others(
+    joint: JointPrim, spellings: tuple[Spelling, ...], drive: str, to_si: Callable[[float], float], notes: list[str]
+) -> float:
     found = elsewhere(joint.prim, spellings, drive)
     if found is None:
         return math.inf
@@ -51,12 +58,12 @@ def _of_others(joint: JointPrim, spellings: tuple[Spelling, ...], drive: str, to
     return float(to_si(value))
 
 
-def own_limit(prim, name: str) -> float:
+def own_limit(prim: Usd.Prim, name: str) -> float:
     """A limit of ours in stage units; infinite where there is none."""
     return positive(prim, name, schemas.value(prim, _SCHEMA, name))
 
 
-def positive(prim, name: str, value) -> float:
+def positive(prim: Usd.Prim, name: str, value: float | None) -> float:
     """A limit as it was found, which must be positive."""
     if value is None or not value > 0.0:
         raise ShotError(

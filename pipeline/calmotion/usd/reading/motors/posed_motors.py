@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -18,6 +19,9 @@ from calmotion.usd.reading.roots import world_frame, world_side_prim
 from calmotion.usd.reading.stillness import carriers, codes_of, moves
 from calmotion.usd.transforms import pose_from_matrix, rotation_from_quaternion
 from calmotion.usd.units import StageUnits
+
+if TYPE_CHECKING:
+    from pxr import Usd
 
 MOVED = 1e-6  # a relative pose that changes by more is animated [rad or m]
 OFF_AXIS = 1e-3  # a pose farther off the joint's axis than this is reported [rad]
@@ -39,7 +43,7 @@ class JointMotion:
     gap: Array
 
 
-def pose_codes(stage, joints: Sequence[JointPrim], clock: Clock) -> Array:
+def pose_codes(stage: Usd.Stage, joints: Sequence[JointPrim], clock: Clock) -> Array:
     """Time codes at which bodies of joints are posed: their samples within the shot, and its frames; empty where no
     body has any."""
     found: set[float] = set()
@@ -90,7 +94,7 @@ def _about_z(R: Array, x: Array, slides: bool) -> JointMotion:
     return JointMotion(angle, tilt, np.linalg.norm(x, axis=1))
 
 
-def _poses(stage, paths: Sequence[str], codes: Array, units: StageUnits) -> dict[str, tuple[Array, Array]]:
+def _poses(stage: Usd.Stage, paths: Sequence[str], codes: Array, units: StageUnits) -> dict[str, tuple[Array, Array]]:
     """World rotations [n, 3, 3] and origins [n, 3] [m] of bodies."""
     from pxr import UsdGeom
 

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -25,6 +26,9 @@ from calmotion.usd.reading.motors.driven_motors import SKEL_JOINT, SKELETON, Dri
 from calmotion.usd.reading.motors.posed_motors import OFF_ANCHOR, OFF_AXIS, joint_motions
 from calmotion.usd.reading.skeletons import BoundSkeleton, bound_skeletons, skeleton_with
 from calmotion.usd.transforms import pose_from_matrix, rotation_from_quaternion
+
+if TYPE_CHECKING:
+    from pxr import Usd
 
 SKEL_POSE = "calm:motor:skelPose"
 MOST = 3  # motors that one joint of a skeleton takes
@@ -56,7 +60,8 @@ class HingeStack:
         turn = Rotation.identity(len(angles))
         for k, axis in enumerate(self.axes):
             turn = turn * Rotation.from_rotvec((angles[:, k] - self.start[k])[:, None] * axis)
-        return turn.as_matrix()
+        rotations: Array = turn.as_matrix()
+        return rotations
 
 
 def hinge_stacks(reading: Reading, drives: Sequence[Drive]) -> list[HingeStack]:
@@ -92,7 +97,7 @@ def hinge_stacks(reading: Reading, drives: Sequence[Drive]) -> list[HingeStack]:
     return found
 
 
-def performed_on(stacks: Sequence[HingeStack], stage) -> list[HingeStack]:
+def performed_on(stacks: Sequence[HingeStack], stage: Usd.Stage) -> list[HingeStack]:
     """The same motors on the skeletons of another stage, a result of ours: where the bodies stand, and so the pose
     that angles count from, is that of the stage without our layers."""
     skeletons = {skeleton.prim.GetPath(): skeleton for skeleton in bound_skeletons(stage)} if stacks else {}

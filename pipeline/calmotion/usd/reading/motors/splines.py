@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from calmotion.errors import ShotError
@@ -10,6 +12,9 @@ from calmotion.shot.character import Array
 from calmotion.usd.clock import Clock
 from calmotion.usd.reading.context import Reading
 
+if TYPE_CHECKING:
+    from pxr import Gf, Ts, Usd
+
 STEP = 0.01  # a step is played within so much time, since no motor jumps [s]
 _JUMP = 1e-6  # of a value, over the range of the spline, from which it is a step
 _CORNER = 1e-3  # of a slope, over the steepest, from which it is a corner
@@ -17,7 +22,7 @@ _EXACT = 2e-8  # by how much the track may differ from the spline between sample
 _ROUNDS = 8  # of halving
 
 
-def read_spline(attribute, clock: Clock, reading: Reading, to_si: float) -> Track:
+def read_spline(attribute: Usd.Attribute, clock: Clock, reading: Reading, to_si: float) -> Track:
     """A spline as a track that differs from it by less than a millionth of a radian or metre.
 
     It is sampled at its knots and at the frames, where a smooth one is read back exactly, and more densely where its
@@ -51,13 +56,13 @@ def read_spline(attribute, clock: Clock, reading: Reading, to_si: float) -> Trac
     return track
 
 
-def _interval(frames: Array):
+def _interval(frames: Array) -> Gf.Interval:
     from pxr import Gf
 
     return Gf.Interval(float(frames[0]), float(frames[-1]))
 
 
-def _breaks(spline, knots: Array, size: float) -> tuple[Array, Array]:
+def _breaks(spline: Ts.Spline, knots: Array, size: float) -> tuple[Array, Array]:
     """Time codes of the knots at which a spline jumps, and of those at which it has a corner."""
     slopes = np.array([[spline.EvalPreDerivative(k), spline.EvalDerivative(k)] for k in knots]).reshape(-1, 2)
     jumps = np.array([abs(spline.Eval(k) - spline.EvalPreValue(k)) for k in knots])
@@ -67,12 +72,14 @@ def _breaks(spline, knots: Array, size: float) -> tuple[Array, Array]:
     return knots[step], knots[corner & ~step]
 
 
-def _track(spline, codes: Array, breaks: Array, clock: Clock, to_si: float) -> Track:
+def _track(spline: Ts.Spline, codes: Array, breaks: Array, clock: Clock, to_si: float) -> Track:
     values = np.array([spline.Eval(code) for code in codes])
     return Track(clock.seconds(codes), to_si * values, clock.seconds(breaks))
 
 
-def _exact(spline, codes: Array, breaks: Array, lines: list[tuple[float, float]], clock: Clock, to_si: float) -> Array:
+def _exact(
+    spline: Ts.Spline, codes: Array, breaks: Array, lines: list[tuple[float, float]], clock: Clock, to_si: float
+) -> Array:
     """Time codes with more of them where the track would differ from the spline, but for the lines of steps."""
     from calmotion.shot.curves import held_curve
 
@@ -89,7 +96,7 @@ def _exact(spline, codes: Array, breaks: Array, lines: list[tuple[float, float]]
     return codes
 
 
-def _tell(spline, attribute, steps: Array, corners: Array, reading: Reading) -> None:
+def _tell(spline: Ts.Spline, attribute: Usd.Attribute, steps: Array, corners: Array, reading: Reading) -> None:
     """Doubts about what excites the structure."""
     if len(steps):
         jump = max(steps, key=lambda code: abs(spline.Eval(code) - spline.EvalPreValue(code)))
@@ -117,7 +124,7 @@ def _tell(spline, attribute, steps: Array, corners: Array, reading: Reading) -> 
         )
 
 
-def value_at(attribute, code: float) -> float:
+def value_at(attribute: Usd.Attribute, code: float) -> float:
     """The value of an attribute at a time code, which must be a finite number."""
     value = attribute.Get(code)
     try:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from calmotion.errors import ShotError
@@ -11,11 +13,14 @@ from calmotion.usd.clock import Clock
 from calmotion.usd.reading.context import Reading
 from calmotion.usd.reading.motors.splines import read_spline, value_at
 
+if TYPE_CHECKING:
+    from pxr import Sdf, Usd
+
 MOST = 1_000_000  # samples of one motor
 _CLOSE = 1e-4  # samples closer than this share of a frame are at one time
 
 
-def sample_codes(attribute) -> Array:
+def sample_codes(attribute: Usd.Attribute) -> Array:
     """Time codes of the samples of an attribute; the knots of its spline where it has no samples."""
     codes = attribute.GetTimeSamples()
     if not codes and attribute.HasSpline():
@@ -23,7 +28,7 @@ def sample_codes(attribute) -> Array:
     return np.array(codes, dtype=np.float64)
 
 
-def read_track(attribute, clock: Clock, reading: Reading, to_si: float) -> Track:
+def read_track(attribute: Usd.Attribute, clock: Clock, reading: Reading, to_si: float) -> Track:
     """The track of a motor.
 
     Samples are taken where they are, also outside the shot. Where they begin after the first frame or end
@@ -57,7 +62,7 @@ def read_track(attribute, clock: Clock, reading: Reading, to_si: float) -> Track
     return Track(clock.seconds(codes), to_si * values)
 
 
-def _refuse_too_many(attribute) -> None:
+def _refuse_too_many(attribute: Usd.Attribute) -> None:
     count = attribute.GetNumTimeSamples()
     if count > MOST:
         raise ShotError(
@@ -69,7 +74,7 @@ def _refuse_too_many(attribute) -> None:
         )
 
 
-def _apart(codes: Array, clock: Clock, path, notes: list[str]) -> Array:
+def _apart(codes: Array, clock: Clock, path: Sdf.Path, notes: list[str]) -> Array:
     """Time codes without those that another follows at once: nothing smooth goes through two values there."""
     least = _CLOSE * clock.time_codes_per_second / clock.frames_per_second
     follows = np.append(np.diff(codes) < least, False)
@@ -78,4 +83,5 @@ def _apart(codes: Array, clock: Clock, path, notes: list[str]) -> Array:
             f"{path}: of samples at nearly the same time the last counts ({int(follows.sum())} left out, the first at "
             f"time code {codes[follows][0]:.9g})"
         )
-    return codes[~follows]
+    kept: Array = codes[~follows]
+    return kept
