@@ -5,13 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from boxes import box_tets, fe_mesh
-from calmotion.multibody.kernels.neohookean import neohookean_forces
 from calmotion.reduction.interfaces.interface_patches import AttachmentFrame
 from calmotion.reduction.reduce import reduce_body
 from calmotion.reduction.reduced_body import Elasticity, Invariants, Marker, ReducedBody
 from calmotion.reduction.subspace import principal_subspace, projected_body
 from calmotion.shot import Body, FlexibleSettings, Frame
-from stvk_call import call_stvk
+from law_call import call_neohookean, call_stvk
 
 IDENTITY = np.array([1.0, 0.0, 0.0, 0.0])
 
@@ -59,8 +58,7 @@ def forces(body, u, v):
             law.data.reshape(r + p * (p + 1) // 2, -1), u, v, law.retardation, True, res, P, K, law.strain_projection
         )
     else:
-        scratch = np.zeros((18, 18)), np.zeros((18, r))
-        neohookean_forces(r, u, v, *law.lame, law.retardation, 0, law.points, law.data, True, *scratch, res, P, K)
+        call_neohookean(law.points, u, v, law.lame, law.retardation, law.data, True, res, P, K)
     return res[6:], P[6:, 6:], K[6:, 6:]
 
 

@@ -27,8 +27,7 @@ def first_frequencies(beam, spin):
     zero = np.zeros(1)
     for _ in range(30):
         Hv, Vd = np.zeros((1, 4, 4)), np.zeros_like(state.V)
-        assemble(system, STATIC, state.c, state.q, state.u, state.V, Vd, state.lam, zero, zero, Hv, True, ws.work,
-                 ws.blocks)  # fmt: skip
+        assemble(system, STATIC, state, Vd, zero, zero, Hv, True, ws.work, ws.blocks)
         K, P, D = (block[0, 6 : 6 + r, 6 : 6 + r].copy() for block in (ws.blocks.K, ws.blocks.P, ws.blocks.D))
         step = np.linalg.solve(K, -ws.blocks.res[0, 6 : 6 + r])
         state.u[0, :r] += step

@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 from calmotion import ShotError
-from calmotion.multibody.kernels.moving_frames import pack
+from calmotion.multibody.model.moving_markers import pack
 from calmotion.shot import MovingFrame
 from calmotion.simulation.cyclic import eased, refuse_open_loops
 from scipy.spatial.transform import Rotation

@@ -22,7 +22,7 @@ from calmotion.accuracy.step_error import (
     simulate_at,
     step_error,
 )
-from calmotion.multibody.integrators.schemes import SCHEMES
+from calmotion.multibody.integrators.coefficients import IMPLICIT
 from calmotion.reduction.reduced_body import ReducedBody
 from calmotion.shot import Accuracy, Animation, Character, Result, Simplification, Track
 from calmotion.shot.character import Array
@@ -163,7 +163,7 @@ def chooses_step(character: Character, options: Options) -> bool:
     """Whether the step is to follow from the tolerance."""
     if options.tolerance is None or options.step is not None or character.retarget.time_step is not None:
         return False
-    return options.scheme in SCHEMES and not character.retarget.cyclic
+    return options.scheme in IMPLICIT and not character.retarget.cyclic
 
 
 def allowed_step_error(options: Options, left_out: float) -> float:

@@ -53,7 +53,8 @@ def ray_length(origin: Array, direction: Array, triangles: Array, skip: float) -
         triangles: Corners [m], shape [k, 3, 3].
         skip: [m]; nearer hits are on the surface where the ray starts.
     """
-    return float(first_hit(*(np.ascontiguousarray(part) for part in (origin, direction, triangles)), float(skip)))
+    start, way = np.ascontiguousarray(origin), np.ascontiguousarray(direction)
+    return float(first_hit(start, way, np.ascontiguousarray(triangles), float(skip)))
 
 
 @kernel

@@ -13,10 +13,10 @@ from calmotion.multibody.analysis.kinematics import rigid_state
 from calmotion.multibody.integrators.simulation import simulate
 from calmotion.multibody.integrators.trajectory import Trajectory, copy_of_instant
 from calmotion.multibody.integrators.workspace import Workspace
-from calmotion.multibody.kernels.moving_frames import rooted
 from calmotion.multibody.model.model import Model, start_angles
+from calmotion.multibody.model.moving_markers import rooted
 from calmotion.multibody.model.system import State
-from calmotion.multibody.sensitivity.periodic import Monodromy, find_loop
+from calmotion.multibody.sensitivity.periodic import Monodromy, find_periodic_motion
 from calmotion.shot import Animation, Character, Track
 from calmotion.shot.character import Array
 from calmotion.shot.curves import CLOSED, open_by
@@ -53,7 +53,7 @@ class SteadyState:
             SimulationFailure: None was found.
         """
         start = self._start or self._from_rest(joint_angles, joint_rates)
-        loop, self.known = find_loop(
+        loop, self.known = find_periodic_motion(
             self.model.system, (start[0], start[1]), joint_angles, joint_rates, self.h, self._workspace, self.world,
             self.known,
         )  # fmt: skip
@@ -63,7 +63,7 @@ class SteadyState:
     @property
     def growth(self) -> float:
         """By how much a disturbance of the motion found last grows at most from one loop to the next."""
-        return 0.0 if self.known is None else self.known.growth
+        return 0.0 if self.known is None else self.known.floquet_multiplier
 
     def _from_rest(self, joint_angles: Array, joint_rates: Array) -> list[State]:
         """The last two instants of a loop after one that got up to speed."""

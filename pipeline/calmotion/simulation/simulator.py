@@ -8,10 +8,11 @@ from calmotion.multibody.analysis.kinematics import target_frames
 from calmotion.multibody.integrators.simulation import simulate_from
 from calmotion.multibody.integrators.workspace import Workspace
 from calmotion.multibody.model.model import Model
+from calmotion.multibody.sensitivity.adjoint import adjoint
 from calmotion.multibody.sensitivity.continuous_adjoint import continuous_adjoint
 from calmotion.multibody.sensitivity.linearization import Linearization, linearize
 from calmotion.multibody.sensitivity.periodic import Monodromy, periodic_adjoint, periodic_tangent
-from calmotion.multibody.sensitivity.sweeps import adjoint, tangent
+from calmotion.multibody.sensitivity.tangent import tangent
 from calmotion.shot.character import Array
 from calmotion.simulation.cyclic import SteadyState
 from calmotion.simulation.forward import ForwardRun, run_forward

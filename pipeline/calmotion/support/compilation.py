@@ -14,7 +14,7 @@ import sys
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar, cast
 
 # Compiling is most of a first run. At level 1 it takes two thirds of the time, and the kernels, whose loops are short,
 # run no slower. numba reads the level once, so it must be set before its first import; a user's own choice stays.
@@ -28,9 +28,11 @@ from numba import config, njit  # noqa: E402
 from calmotion.support.cache_folder import cache_folder
 from calmotion.support.sources import digest_of, with_imports
 
+Function = TypeVar("Function", bound=Callable[..., Any])
+
 PACKAGE = Path(__file__).parents[1]
 # Flags for the kernels that a kernel calls: numba compiles these anew for every literal True and False they are given.
-YES, NO = np.bool_(True), np.bool_(False)
+YES, NO = cast(bool, np.bool_(True)), cast(bool, np.bool_(False))
 FUSED = {"contract"}  # a product and a sum in one rounding; nothing that would reorder or drop terms
 _KERNEL = re.compile(rb"kernel\ndef ")
 _WITHOUT_ARRAYS: dict[str, Any] = {"_nrt": False, "no_cfunc_wrapper": True, "nogil": True}  # of its own making
@@ -58,16 +60,17 @@ def kernel_key(package: Path) -> str:
     return hashlib.sha256(f"{level} {digest_of(sources)}".encode()).hexdigest()
 
 
-def kernel(function: Callable[..., Any]) -> Any:
+def kernel(function: Function) -> Function:
     """Compile a function with numba when it is first called, and keep the result on disk.
 
     It must not allocate: without reference counting it compiles in a fraction of the time. It runs without the
-    interpreter's lock.
+    interpreter's lock. Arrays that it returns are views without a reference, so that only another `kernel` may call
+    one that returns any, neither Python nor an `allocating_kernel`.
     """
     return _compile(function, **_WITHOUT_ARRAYS)
 
 
-def inlined_kernel(function: Callable[..., Any]) -> Any:
+def inlined_kernel(function: Function) -> Function:
     """A `kernel` that one other calls: compiled into that one, and by itself only where Python calls it.
 
     Of a kernel that another calls numba makes machine code twice, by itself and in the other, and three times where
@@ -76,18 +79,18 @@ def inlined_kernel(function: Callable[..., Any]) -> Any:
     return _compile(function, **_WITHOUT_ARRAYS, inline="always")
 
 
-def allocating_kernel(function: Callable[..., Any]) -> Any:
+def allocating_kernel(function: Function) -> Function:
     """`kernel` for a function that makes arrays."""
     return _compile(function)
 
 
-def _compile(function: Callable[..., Any], **options: Any) -> Any:
+def _compile(function: Function, **options: Any) -> Function:
     if os.environ.get("NUMBA_CACHE_DIR"):
-        return njit(cache=True, fastmath=FUSED, **options)(function)
+        return cast(Function, njit(cache=True, fastmath=FUSED, **options)(function))
     # numba picks the folder when a function is decorated; other users of numba keep theirs
     before = config.CACHE_DIR
     config.CACHE_DIR = str(kernel_folder())
     try:
-        return njit(cache=True, fastmath=FUSED, **options)(function)
+        return cast(Function, njit(cache=True, fastmath=FUSED, **options)(function))
     finally:
         config.CACHE_DIR = before

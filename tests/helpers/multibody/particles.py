@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from calmotion.multibody.kernels import components as component_kernels
 from calmotion.multibody.model.system import LINEAR, NEOHOOKEAN, STVK, System, allocate_state, components
 from scipy.spatial.transform import Rotation
 
@@ -79,10 +80,15 @@ def nonlinear(system, laws, rng, stiffness=50.0) -> System:
     )
 
 
-def without_turning(system, straight) -> System:
+def component_of(system, b):
+    """Component b of a system, as the kernels of one component take it."""
+    return component_kernels.component_of.py_func(system, b)
+
+
+def without_rotation(system, nonrotating) -> System:
     """The system, these components being told never to turn."""
-    chosen = np.isin(np.arange(len(system.parent)), straight)
-    return system._replace(turning=components(~chosen), straight=components(chosen))
+    chosen = np.isin(np.arange(len(system.parent)), nonrotating)
+    return system._replace(rotating=components(~chosen), nonrotating=components(chosen))
 
 
 def particle_system(
@@ -128,8 +134,8 @@ def particle_system(
         S=pad((size, size, 3, 3), S),
         axial=pad((size, size, 3), [axial(s) for s in S]),
         axial0=pad((size, 3), [np.einsum("n,nja->ja", p.masses, moments(p)) for p in parts]),
-        turning=np.arange(count, dtype=np.int32),
-        straight=np.zeros(0, dtype=np.int32),
+        rotating=np.arange(count, dtype=np.int32),
+        nonrotating=np.zeros(0, dtype=np.int32),
         stiffness=pad((size,), [np.full(r, stiffness) * (1 + np.arange(r)) for r in elastic]),
         damping=pad((size, size), [0.35 * np.eye(r) + 0.05 for r in elastic]),
         law=np.zeros(count, dtype=np.int32),

@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
-from calmotion.multibody.integrators.schemes import SCHEMES, generalized_alpha_scheme, newmark_scheme
+from calmotion.multibody.integrators.coefficients import IMPLICIT, generalized_alpha_integrator, newmark_integrator
 
 
-@pytest.mark.parametrize("integrator", SCHEMES)
+@pytest.mark.parametrize("integrator", IMPLICIT)
 def test_it_is_of_second_order_in_positions_velocities_and_multipliers(flexible_tree, integrator):
     exact = flexible_tree(3200, integrator).states
     errors = []
@@ -22,14 +22,14 @@ def test_it_is_of_second_order_in_positions_velocities_and_multipliers(flexible_
 
 
 def test_all_schemes_go_to_the_same_motion(flexible_tree):
-    ends = [flexible_tree(1600, integrator).states.c[-1] for integrator in SCHEMES]
+    ends = [flexible_tree(1600, integrator).states.c[-1] for integrator in IMPLICIT]
     assert np.abs(np.ptp(ends, axis=0)).max() < 3e-7
 
 
 @pytest.mark.parametrize("radius", [1.0, 0.8, 0.3, 0.0])
 def test_spectral_radius_at_infinite_frequency(radius):
     """The recursion of (D, h V, h^2 a) for a motion whose V' must vanish (an infinite stiffness holds D at 0)."""
-    scheme = generalized_alpha_scheme(1.0, radius)
+    scheme = generalized_alpha_integrator(1.0, radius)
     beta, gamma = scheme.newmark_beta, scheme.newmark_gamma
     # x_n = 0 gives a_n from V and a before it; then V_n
     a = np.array([-1.0 / beta, -(0.5 / beta - 1.0)])
@@ -43,6 +43,6 @@ def test_spectral_radius_at_infinite_frequency(radius):
 
 
 def test_newmark_is_the_trapezoidal_rule():
-    scheme = newmark_scheme(0.01)
+    scheme = newmark_integrator(0.01)
     assert (scheme.velocity, scheme.acceleration) == (200.0, 200.0)
-    assert generalized_alpha_scheme(0.01, 1.0).alpha_m == generalized_alpha_scheme(0.01, 1.0).alpha_f == 0.5
+    assert generalized_alpha_integrator(0.01, 1.0).alpha_m == generalized_alpha_integrator(0.01, 1.0).alpha_f == 0.5

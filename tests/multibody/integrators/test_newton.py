@@ -5,9 +5,9 @@ import pytest
 from arms import chain, compiled
 from calmotion.multibody.analysis.kinematics import rigid_state
 from calmotion.multibody.integrators import newton
-from calmotion.multibody.integrators.schemes import bdf2_scheme
+from calmotion.multibody.integrators.coefficients import bdf2_integrator
 from calmotion.multibody.integrators.workspace import Workspace
-from calmotion.multibody.model.system import allocate_state
+from calmotion.multibody.model.system import Instants, allocate_state
 
 
 def fallen(h, rate, predicted=None):
@@ -23,10 +23,8 @@ def fallen(h, rate, predicted=None):
     if predicted is not None:
         guess = rigid_state(model, np.array([predicted]))
         now.c[:], now.q[:], now.turn[0, 1] = guess.c, guess.q, predicted
-    result = newton.step(
-        system, bdf2_scheme(h), h, *states, now, zero, zero, predicted is not None, ws.work, ws.blocks, ws.factors,
-        ws.scratch,
-    )  # fmt: skip
+    instants = Instants(*states, now)
+    result = newton.step(system, bdf2_integrator(h), instants, zero, zero, predicted is not None, ws)
     return result, now
 
 

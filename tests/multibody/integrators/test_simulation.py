@@ -6,12 +6,14 @@ from arms import chain, compiled
 from calmotion.multibody.analysis.kinematics import rigid_poses, rigid_state, target_frames
 from calmotion.multibody.failure import SimulationFailure
 from calmotion.multibody.integrators import newton
-from calmotion.multibody.integrators.schemes import bdf2_scheme
+from calmotion.multibody.integrators.coefficients import bdf2_integrator
 from calmotion.multibody.integrators.simulation import simulate, simulate_from
 from calmotion.multibody.integrators.workspace import Workspace
 from calmotion.multibody.kernels import inertia
-from calmotion.multibody.model.system import allocate_state
-from particles import particle_system
+from calmotion.multibody.kernels.components import ComponentMotion
+from calmotion.multibody.kernels.work import allocate_work
+from calmotion.multibody.model.system import Instants, allocate_state
+from particles import component_of, particle_system
 from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
@@ -30,21 +32,7 @@ def pendulum_tip(h):
     zero = np.zeros(1)
     for _ in range(round(10.0 / h) - 1):
         now = allocate_state(system)
-        code, *_ = newton.step(
-            system,
-            bdf2_scheme(h),
-            h,
-            states[-2],
-            states[-1],
-            now,
-            zero,
-            zero,
-            False,
-            ws.work,
-            ws.blocks,
-            ws.factors,
-            ws.scratch,
-        )
+        code, *_ = newton.step(system, bdf2_integrator(h), Instants(*states[-2:], now), zero, zero, False, ws)
         assert code == newton.CONVERGED
         states.append(now)
     last = states[-1]
@@ -96,31 +84,12 @@ class FreeBody:
 
     def rates(self, c, R, u, V):
         r, system = self.r, self.system
-        s, Z, B, W, tmp = np.zeros(3), np.zeros((3, 3)), np.zeros((r, 3, 3)), np.zeros((3, 3)), np.zeros(3)
-        inertia.deformed_integrals(r, system.s[0], system.Z[0], system.M3[0], system.M4[0], system.S[0], u, s, Z, B)
+        work, component = allocate_work(system), component_of(system, 0)
+        inertia.deformed_integrals(component, u, work)
         res, D, zero = np.zeros(6 + r), np.zeros((6 + r, 6 + r)), np.zeros(3)
-        inertia.body_residual(
-            r,
-            system.mass[0],
-            system.M3[0],
-            system.S[0],
-            system.axial[0],
-            system.stiffness[0],
-            system.damping[0],
-            zero,
-            V[3:6],
-            zero,
-            u,
-            V[6:],
-            np.zeros(r),
-            s,
-            Z,
-            B,
-            W,
-            tmp,
-            res,
-        )
-        inertia.mass_matrix(r, system.mass[0], system.M3[0], s, Z, B, D)
+        motion = ComponentMotion(zero, V[3:6], zero, u, V[6:], np.zeros(r))
+        inertia.body_residual(component, motion, work, res)
+        inertia.mass_matrix(component, work, D)
         a = np.linalg.solve(D, -res)
         return np.concatenate([R @ a[:3], a[3:]])
 
@@ -174,21 +143,7 @@ def free_flight(h):
     zero = np.zeros(1)
     for _ in range(round(0.5 / h)):
         now = allocate_state(body.system)
-        code, *_ = newton.step(
-            body.system,
-            bdf2_scheme(h),
-            h,
-            states[-2],
-            states[-1],
-            now,
-            zero,
-            zero,
-            False,
-            ws.work,
-            ws.blocks,
-            ws.factors,
-            ws.scratch,
-        )
+        code, *_ = newton.step(body.system, bdf2_integrator(h), Instants(*states[-2:], now), zero, zero, False, ws)
         assert code == newton.CONVERGED
         states.append(now)
         R = Rotation.from_quat(np.roll(now.q[0], -1)).as_matrix()
@@ -196,7 +151,7 @@ def free_flight(h):
     return drift, reference
 
 
-def test_free_flexible_body_keeps_momentum_and_energy_at_the_order_of_the_scheme():
+def test_free_flexible_body_keeps_momentum_and_energy_at_the_order_of_the_integrator():
     (coarse, exact), (fine, _) = free_flight(2e-3), free_flight(1e-3)
     assert exact < 1e-9, "the independent integration itself keeps them"
     orders = np.log2(coarse / fine)

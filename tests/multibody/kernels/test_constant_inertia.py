@@ -1,4 +1,4 @@
-"""Bodies that never turn: their rows against sums over particles, and against those of bodies that may turn."""
+"""Non-rotating bodies: their rows against sums over particles, and against those of rotating bodies."""
 
 import numpy as np
 import pytest
@@ -7,9 +7,11 @@ from calmotion.multibody.analysis.reactions import reactions
 from calmotion.multibody.integrators.simulation import simulate
 from calmotion.multibody.integrators.workspace import Workspace
 from calmotion.multibody.kernels import constant_inertia
+from calmotion.multibody.kernels.components import ComponentMotion
+from calmotion.multibody.kernels.work import allocate_work
 from calmotion.multibody.model.model import rigid_model
 from gantries import ASIDE, STILL, UP, drive, gantry
-from particles import particle_system
+from particles import component_of, particle_system
 from test_inertia import by_particles
 
 ALL = ("Bridge", "Trolley", "Beam0", "Beam1", "Tool")
@@ -25,18 +27,16 @@ def component(r):
 
 def residual(system, state):
     a, al, u, v, vd = state
-    s, res = np.zeros(3), np.zeros(6 + len(u))
-    constant_inertia.straight_residual(
-        len(u), system.mass[0], system.s[0], system.Z[0], system.M3[0], system.axial0[0], system.stiffness[0],
-        system.damping[0], a, al, u, v, vd, s, res,
-    )  # fmt: skip
-    return res, s
+    work, res = allocate_work(system), np.zeros(6 + len(u))
+    motion = ComponentMotion(a, np.zeros(3), al, u, v, vd)
+    constant_inertia.nonrotating_residual(component_of(system, 0), motion, work, res)
+    return res, work
 
 
-def mass_matrix(system, s):
+def mass_matrix(system, work):
     r = system.size - 6
     D = np.zeros((6 + r, 6 + r))
-    constant_inertia.straight_mass_matrix(r, system.mass[0], s, system.Z[0], system.M3[0], system.axial0[0], D)
+    constant_inertia.nonrotating_mass_matrix(component_of(system, 0), work, D)
     return D
 
 
@@ -57,8 +57,8 @@ def test_rows_are_the_work_of_the_particles_where_nothing_turns_or_nothing_is_de
 @pytest.mark.parametrize("r", [0, 5])
 def test_mass_matrix_is_symmetric_and_gives_the_acceleration_terms(r):
     system, _, (a, al, u, v, vd) = component(r)
-    found, s = residual(system, (a, al, u, v, vd))
-    D = mass_matrix(system, s)
+    found, work = residual(system, (a, al, u, v, vd))
+    D = mass_matrix(system, work)
     change = found - residual(system, (0.0 * a, 0.0 * al, u, v, 0.0 * vd))[0]
     assert np.abs(D - D.T).max() < 1e-15
     assert np.abs(D @ np.concatenate([a, al, vd]) - change).max() < 1e-12 * np.abs(change).max()
@@ -70,8 +70,9 @@ def test_jacobians_match_central_differences(r):
     n, e = 6 + r, 1e-3
     D = mass_matrix(system, residual(system, (a, al, u, v, vd))[1])
     P, K = np.zeros((n, n)), np.zeros((n, n))
-    constant_inertia.straight_velocity_jacobian(r, system.damping[0], P)
-    constant_inertia.straight_position_jacobian(r, system.M3[0], system.stiffness[0], a, al, D, K)
+    one, motion = component_of(system, 0), ComponentMotion(a, np.zeros(3), al, u, v, vd)
+    constant_inertia.nonrotating_velocity_jacobian(one, P)
+    constant_inertia.nonrotating_position_jacobian(one, motion, D, K)
 
     def change(da=0.0, du=0.0, dv=0.0):
         ends = [residual(system, (a + k * da, al, u + k * du, v + k * dv, vd))[0] for k in (e, -e)]
@@ -126,7 +127,7 @@ def test_a_body_that_turns_moves_otherwise_when_it_is_told_that_it_does_not():
 def test_the_list_of_bodies_that_never_turn_survives_making_them_rigid():
     model = gantry([STILL], ALL[:3])
     for system in (model.system, rigid_model(model).system):
-        assert list(system.straight) == [0, 1, 2] and list(system.turning) == [3]
+        assert list(system.nonrotating) == [0, 1, 2] and list(system.rotating) == [3]
         assert not len(system.stvk) and not len(system.neohookean)
     states = run(rigid_model(model), 0.2)[0]
     assert not states.u.size and np.abs(states.q[:, :, 1:]).max() < 1e-15

@@ -2,11 +2,16 @@
 
 import numpy as np
 import pytest
-from calmotion.multibody.kernels.assembly import allocate_work, assemble
-from calmotion.multibody.linear_solver import closed_chains as loops
+from calmotion.multibody.kernels.assembly import assemble
+from calmotion.multibody.kernels.work import allocate_work
 from calmotion.multibody.linear_solver import elimination
-from calmotion.multibody.linear_solver.closed_chains import allocate_border
-from calmotion.multibody.model.system import Blocks, Scheme, allocate_blocks, allocate_factors
+from calmotion.multibody.linear_solver.closed_chains import (
+    factor_closed_chains,
+    solve_system,
+    solve_system_transposed,
+)
+from calmotion.multibody.linear_solver.step_matrix import allocate_border, allocate_solution, step_matrix
+from calmotion.multibody.model.system import Blocks, Integrator, allocate_blocks
 from dense import constrains, dense_matrix, join, multipliers, split
 from particles import random_state
 from test_assembly import TREES, put_world, tree
@@ -23,46 +28,27 @@ def eliminated(name):
     work = allocate_work(system)
     put_world(work, np.random.default_rng(4))
     state.lam[~constrains(system)] = 0.0
-    assemble(
-        system,
-        Scheme(50.0, 50.0, 1.0, 100.0),
-        state.c,
-        state.q,
-        state.u,
-        state.V,
-        zero,
-        state.lam,
-        vector,
-        vector,
-        Hv,
-        True,
-        work,
-        blocks,
-    )
+    integrator = Integrator(50.0, 50.0, 1.0, 100.0)
+    assemble(system, integrator, state, zero, vector, vector, Hv, True, work, blocks)
     A = dense_matrix(system, Blocks(*[part.copy() for part in blocks]))
     for joint, constrained in enumerate(constrains(system)):
         for k in np.flatnonzero(~constrained) + multipliers(system, joint).start:
             A[k, k] = 1.0
-    factors = allocate_factors(system)
-    assert elimination.factor(system, blocks, factors.lu, factors.pivots, factors.Z, np.zeros(system.size)) == -1
-    return system, blocks, factors, A
+    matrix = step_matrix(system, blocks)
+    assert elimination.factor(system, blocks, matrix, np.zeros(system.size)) == -1
+    return system, blocks, matrix, A
 
 
 @pytest.mark.parametrize("name", TREES)
 @pytest.mark.parametrize("transposed", [False, True], ids=["plain", "transposed"])
 def test_solution_is_that_of_the_dense_matrix(name, transposed):
-    system, blocks, factors, A = eliminated(name)
+    system, _, matrix, A = eliminated(name)
     b = np.random.default_rng(3).normal(size=len(A))
     x, lam = split(system, b)
-    border = allocate_border(system)
-    shared = (blocks.Lc, blocks.Lp, blocks.Hc[len(system.parent) :], blocks.Hp, blocks.Nc, blocks.Jp)
-    block = np.zeros(system.size + 6)
-    loops.factor_loops(system, *shared, factors.lu, factors.pivots, factors.Z, border, block)
-    solve = loops.solve_system_transposed if transposed else loops.solve_system
-    solve(
-        system, *shared, factors.lu, factors.pivots, factors.Z, border.inverse, x, lam, border.X, border.lam, border.y,
-        border.x, block,
-    )  # fmt: skip
+    border, scratch = allocate_border(system), allocate_solution(system)
+    factor_closed_chains(system, matrix, border, scratch)
+    solve = solve_system_transposed if transposed else solve_system
+    solve(system, matrix, x, lam, scratch)
     M = A.T if transposed else A
     found = join(system, x, lam)
     assert np.abs(M @ found - b).max() < 1e-12 * (np.abs(M) @ np.abs(found)).max()
@@ -70,10 +56,10 @@ def test_solution_is_that_of_the_dense_matrix(name, transposed):
 
 
 def test_singular_component_is_named():
-    system, blocks, factors, _ = eliminated("flexible chain")
+    system, blocks, matrix, _ = eliminated("flexible chain")
     blocks.K[1] = 0.0
     blocks.Lc[1] = 0.0
-    assert elimination.factor(system, blocks, factors.lu, factors.pivots, factors.Z, np.zeros(system.size)) == 1
+    assert elimination.factor(system, blocks, matrix, np.zeros(system.size)) == 1
 
 
 def test_dense_factors_solve_a_matrix_that_needs_pivoting():

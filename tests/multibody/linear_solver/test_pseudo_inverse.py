@@ -2,14 +2,13 @@
 
 import numpy as np
 import pytest
-from calmotion.multibody.linear_solver.pseudo_inverse import pseudo_inverse
+from calmotion.multibody.linear_solver.pseudo_inverse import allocate_decomposition, pseudo_inverse
 
 
 def compute(A):
     n = len(A)
-    out, null, left, right = np.zeros((4, n, n))
-    v, x = np.zeros((2, n))
-    rank = pseudo_inverse(n, A.copy(), out, null, left, right, np.zeros(n, np.int64), v, x)
+    out, null = np.zeros((2, n, n))
+    rank = pseudo_inverse(n, A.copy(), out, null, allocate_decomposition(n))
     return rank, out, null[:, : n - rank]
 
 

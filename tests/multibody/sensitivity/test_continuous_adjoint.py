@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 import test_sweeps
+from calmotion.multibody.sensitivity.adjoint import adjoint
 from calmotion.multibody.sensitivity.continuous_adjoint import continuous_adjoint
-from calmotion.multibody.sensitivity.linearization import bytes_of_an_instant, linearize
-from calmotion.multibody.sensitivity.sweeps import adjoint
+from calmotion.multibody.sensitivity.linearization import linearize
+from calmotion.multibody.sensitivity.linearized_steps import bytes_of_an_instant
 from test_sweeps import CASES, Case
 
 EASE = 0.12

@@ -4,18 +4,16 @@ import numpy as np
 import pytest
 from calmotion.multibody.integrators.simulation import simulate
 from calmotion.multibody.model.system import LINEAR, NEOHOOKEAN, STVK, State
-from calmotion.multibody.sensitivity.linearization import bytes_of_an_instant, linearize
+from calmotion.multibody.sensitivity.linearization import linearize
+from calmotion.multibody.sensitivity.linearized_steps import bytes_of_an_instant
 from calmotion.multibody.sensitivity.periodic import (
-    SWAY,
-    Memory,
+    FREQUENCY,
     Monodromy,
-    adjoint_from,
-    find_loop,
-    opening,
+    find_periodic_motion,
     periodic_adjoint,
     periodic_tangent,
-    tangent_from,
 )
+from calmotion.multibody.sensitivity.perturbation import Perturbation, adjoint_from, end_difference, tangent_from
 from test_sweeps import Case, rigid_start
 
 STEPS, LENGTH = 60, 0.6
@@ -48,7 +46,7 @@ class Looping(Case):
         system = self.system
         more = 0.5 * np.sqrt(3000.0) * np.eye(system.damping.shape[1])
         self.system = system._replace(damping=system.damping + more, retardation=system.retardation + 2e-3)
-        self.known = None
+        self.monodromy = None
         self.start = self.warmed()
         rng = np.random.default_rng(5)
         shape = (len(TIMES), 4)
@@ -69,7 +67,9 @@ class Looping(Case):
         return tuple(State(*[part[n].copy() for part in states]) for n in (-2, -1))
 
     def loop(self, p):
-        found, self.known = find_loop(self.system, self.start, *curves(p), H, self.ws, None, self.known)
+        found, self.monodromy = find_periodic_motion(
+            self.system, self.start, *curves(p), H, self.ws, None, self.monodromy
+        )
         states = found.trajectory.states
         self.start = tuple(State(*[part[n].copy() for part in states]) for n in (0, 1))
         return found
@@ -89,8 +89,8 @@ def looping(request):
 
 def test_the_loop_closes_and_is_where_a_long_simulation_ends_up(looping):
     case, found, _, monodromy = looping
-    assert found.gap < 1e-8
-    apart = opening(case.system, found.trajectory.states)
+    assert found.distance < 1e-8
+    apart = end_difference(case.system, found.trajectory.states)
     assert np.abs(apart.elastic).max() < 1e-7 and np.abs(apart.velocity).max() < 1e-5
     slowest = np.abs(np.linalg.eigvals(monodromy.B @ monodromy.Q)).max()
     if slowest > 0.9:
@@ -106,8 +106,8 @@ def test_sweeps_from_a_memory_are_transposes(looping):
     case, found, lin, _ = looping
     rng = np.random.default_rng(1)
     system, total = case.system, len(TIMES)
-    length = len(Memory.of(system).vector)
-    start, end = (Memory.of(system, rng.normal(size=length)) for _ in range(2))
+    length = len(Perturbation.of(system).vector)
+    start, end = (Perturbation.of(system, rng.normal(size=length)) for _ in range(2))
     for memory in (start, end):
         for b, r in enumerate(system.elastic):
             memory.elastic[:, b, r:] = memory.velocity[:, b, 6 + r :] = 0.0
@@ -124,12 +124,13 @@ def test_sweeps_from_a_memory_are_transposes(looping):
 
 def test_few_columns_hold_the_derivative_of_the_loop(looping):
     case, _, lin, monodromy = looping
-    zero = np.zeros((2, *lin.angles.shape))
+    zero = np.zeros((2, *lin.inputs.angles.shape))
     vector = np.random.default_rng(2).normal(size=monodromy.B.shape[1])
-    end = tangent_from(lin, Memory.of(case.system, vector).scaled(SWAY), *zero)[2].scaled(1.0 / SWAY).vector
+    start = Perturbation.of(case.system, vector).scaled(FREQUENCY)
+    end = tangent_from(lin, start, *zero)[2].scaled(1.0 / FREQUENCY).vector
     assert np.abs(monodromy.Q @ (monodromy.B @ vector) - end).max() < 1e-9 * np.abs(end).max()
     assert len(monodromy.B) < 0.3 * len(vector)
-    b = Memory.of(case.system, np.random.default_rng(3).normal(size=len(vector)))
+    b = Perturbation.of(case.system, np.random.default_rng(3).normal(size=len(vector)))
     solved = monodromy.solve(b, case.system)
     back = tangent_from(lin, solved, *zero)[2]
     assert np.abs(solved.vector - back.vector - b.vector).max() < 1e-8 * np.abs(solved.vector).max()

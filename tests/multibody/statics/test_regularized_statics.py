@@ -6,11 +6,16 @@ from arms import chain, compiled
 from calmotion.benchmarks.scenes.neutral_hinges import push_rod, turning
 from calmotion.multibody.analysis.kinematics import rigid_state
 from calmotion.multibody.integrators.workspace import Workspace
-from calmotion.multibody.linear_solver.closed_chains import factor_loops
+from calmotion.multibody.linear_solver.closed_chains import factor_closed_chains
 from calmotion.multibody.linear_solver.elimination import factor
 from calmotion.multibody.model.system import Blocks
 from calmotion.multibody.statics.equilibrium import equilibrium, linearize
-from calmotion.multibody.statics.regularized_statics import hold, is_held, solve_statics, solve_statics_transposed
+from calmotion.multibody.statics.regularized_statics import (
+    is_regularized,
+    regularize,
+    solve_statics,
+    solve_statics_transposed,
+)
 from dense import dense_matrix, join, split
 from scipy.spatial.transform import Rotation
 
@@ -44,21 +49,16 @@ def test_solutions_are_those_of_the_whole_matrix(made, transposed):
     model = compiled(push_rod(*made))
     system = model.system
     _, ws = resting(model)
-    blocks, factors, border, block = ws.blocks, ws.factors, ws.scratch.border, ws.scratch.block
+    blocks, matrix, solution = ws.blocks, ws.matrix, ws.scratch.solution
     A = dense_matrix(system, Blocks(*[part.copy() for part in blocks]))
     A = A.T if transposed else A  # free rows of joints are zero
     b = A @ np.random.default_rng(3).normal(size=len(A))  # that has a solution, though multipliers are redundant
-    hold(system, blocks.D, blocks.K, blocks.Nc)
-    tree = (factors.lu, factors.pivots, factors.Z)
-    shared = (blocks.Lc, blocks.Lp, blocks.Hc[len(system.parent) :], blocks.Hp, blocks.Nc, blocks.Jp, *tree)
-    assert factor(system, blocks, *tree, block) == -1
-    factor_loops(system, *shared, border, block)
+    regularize(system, blocks.D, blocks.K, blocks.Nc)
+    assert factor(system, blocks, matrix, solution.block) == -1
+    factor_closed_chains(system, matrix, ws.scratch.border, solution)
     x, lam = split(system, b)
     solve = solve_statics_transposed if transposed else solve_statics
-    solve(
-        system, blocks.D, *shared, border.inverse, x, lam, border.X, border.lam, border.y, border.x, block,
-        np.zeros_like(x), np.zeros_like(lam),
-    )  # fmt: skip
+    solve(system, blocks.D, matrix, x, lam, solution)
     found, expected = join(system, x, lam), np.linalg.lstsq(A, b, rcond=1e-10)[0]
     assert np.abs(A @ found - b).max() < 1e-9 * np.abs(b).max()
     motion = slice(0, 6 * len(system.parent))
@@ -77,6 +77,6 @@ def test_what_nothing_holds_keeps_its_angle_and_goes_with_what_carries_it(gravit
 def test_what_motors_hold_needs_nothing():
     model = compiled(chain(2, driven=(0, 1)))
     K, D, Nc = np.zeros((2, 6, 6)), np.ones((2, 6, 6)), np.zeros((2, 6, 3))
-    hold(model.system, D, K, Nc)
-    assert not K.any() and not Nc.any() and not is_held(model.system)
-    assert is_held(compiled(chain(2, driven=(0,))).system)
+    regularize(model.system, D, K, Nc)
+    assert not K.any() and not Nc.any() and not is_regularized(model.system)
+    assert is_regularized(compiled(chain(2, driven=(0,))).system)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from boxes import box_tets
 from calmotion.errors import ShotError
-from calmotion.multibody.kernels.neohookean import JOIN, neohookean_forces
+from calmotion.multibody.kernels.neohookean import JOIN
 from calmotion.reduction.basis.craig_bampton import reduced_basis
 from calmotion.reduction.basis.modal_derivatives import Support, extended_basis
 from calmotion.reduction.elements.assembly import assemble
@@ -18,6 +18,7 @@ from calmotion.reduction.material_laws.cubature import (
     neohookean_stress,
 )
 from calmotion.shot import FlexibleSettings
+from law_call import call_neohookean
 
 
 @pytest.fixture(scope="module")
@@ -33,9 +34,7 @@ def arm(plastic):
 
 def reduced(r, data, points, lame, mu, u):
     res, P, K = np.zeros(6 + r), np.zeros((6 + r, 6 + r)), np.zeros((6 + r, 6 + r))
-    neohookean_forces(
-        r, u, np.zeros(r), lame, mu, 0.0, 0, points, data, True, np.zeros((18, 18)), np.zeros((18, r)), res, P, K
-    )
+    call_neohookean(points, u, np.zeros(r), (lame, mu), 0.0, data, True, res, P, K)
     return res[6:], K[6:, 6:]
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from calmotion.reduction.material_laws.reduced_poses import equilibrium, stvk_force
-from stvk_call import call_stvk
+from law_call import call_stvk
 
 
 def gram_of(rng, r):

@@ -55,28 +55,26 @@ def against_splu(repeats: int = 200) -> Sparse:
 
     from calmotion.benchmarks.speed.step_matrix import dense_step_matrix, flat, solve_again, split
     from calmotion.multibody.analysis.kinematics import rigid_state
-    from calmotion.multibody.integrators.schemes import bdf2_scheme
+    from calmotion.multibody.integrators.coefficients import bdf2_integrator
     from calmotion.multibody.kernels.assembly import assemble
 
     model = prepared(*branches())
     system, ws = model.system, Workspace.for_system(model.system)
     angles, rates = motion(model, 5)
-    state, scheme = rigid_state(model, angles[0]), bdf2_scheme(STEP)
+    state, integrator = rigid_state(model, angles[0]), bdf2_integrator(STEP)
     Hv = np.zeros((len(system.parent), 4, 4))
-    Hv[:, 0, 0] = scheme.velocity
-    Hv[:, 1:, 1:] = scheme.velocity * np.eye(3)
-    assemble(
-        system, scheme, state.c, state.q, state.u, state.V, np.zeros_like(state.V), state.lam, angles[3], rates[3], Hv,
-        True, ws.work, ws.blocks,
-    )  # fmt: skip
+    Hv[:, 0, 0] = integrator.velocity
+    Hv[:, 1:, 1:] = integrator.velocity * np.eye(3)
+    Vd = np.zeros_like(state.V)
+    assemble(system, integrator, state, Vd, angles[3], rates[3], Hv, True, ws.work, ws.blocks)
     matrix = csc_matrix(dense_step_matrix(system, ws.blocks))
     right = np.random.default_rng(0).normal(size=matrix.shape[0])
-    K, factors = ws.blocks.K.copy(), ws.factors
+    K = ws.blocks.K.copy()
     rows = split(system, right)
     x, lam = (np.zeros_like(part) for part in rows)
 
     def ours() -> None:
-        solve_again(system, ws.blocks, factors, K, *rows, x, lam, ws.scratch.block, INSIDE)
+        solve_again(system, ws.blocks, ws.matrix, K, *rows, x, lam, ws.scratch.solution.block, INSIDE)
 
     theirs = splu(matrix).solve(right)
     ours()

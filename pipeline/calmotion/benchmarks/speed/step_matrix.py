@@ -55,12 +55,12 @@ def flat(system: System, x: Array, lam: Array) -> Array:
 
 
 @kernel
-def solve_again(system, blocks, factors, K, right, right_lam, x, lam, block, repeats):
+def solve_again(system, blocks, matrix, K, right, right_lam, x, lam, block, repeats):
     """Factorise and solve so many times, from a loop that is compiled, as a simulation does."""
     for _ in range(repeats):
         for b in range(len(K)):
             copy_rows(K[b], blocks.K[b])
         copy_rows(right, x)
         copy_rows(right_lam, lam)
-        factor(system, blocks, factors.lu, factors.pivots, factors.Z, block)
-        solve(system, blocks.Lp, blocks.Hp, blocks.Nc, blocks.Jp, factors.lu, factors.pivots, factors.Z, x, lam, block)
+        factor(system, blocks, matrix, block)
+        solve(system, matrix, x, lam, block)

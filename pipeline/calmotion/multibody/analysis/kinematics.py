@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
-from calmotion.multibody.kernels.markers import allocate_marker, marker_jacobian, marker_values
-from calmotion.multibody.kernels.moving_frames import rooted
+from calmotion.multibody.kernels.components import ComponentMarker
+from calmotion.multibody.kernels.markers import MarkerWork, allocate_marker, marker_jacobian, marker_values
 from calmotion.multibody.kernels.so3 import matrix_of, quaternion_of
 from calmotion.multibody.model.model import Model
+from calmotion.multibody.model.moving_markers import rooted
 from calmotion.multibody.model.system import State, System, allocate_state
 from calmotion.shot.character import Array, IntArray
-from calmotion.support.compilation import allocating_kernel
+from calmotion.support.compilation import allocating_kernel, kernel
 
 
 @allocating_kernel
-def _rigid_poses(system, values, world, c, q, R):
+def _rigid_poses(system: System, values: Array, world: Array, c: Array, q: Array, R: Array) -> None:
     """Poses of all components for joint angles and lengths, shape [T, B]; R is scratch, shape [B, 3, 3]."""
     A, near, x = np.zeros((3, 3)), np.zeros((3, 3)), np.zeros(3)
     for n in range(values.shape[0]):
@@ -63,8 +66,8 @@ def rigid_poses(model: Model, joint_angles: Array, world: Array | None = None) -
     """Poses of the undeformed character.
 
     Args:
-        joint_angles: Angles [rad] (or lengths [m]) of the components' joints, shape [T, B] or, with those of loops
-            behind, [T, J]; free joints included.
+        joint_angles: Angles [rad] (or lengths [m]) of the components' joints, shape [T, B], or of all joints,
+            [T, J]; free joints included.
         world: Moving markers of the world, shape [T, W, 18]; needed where the system has any.
 
     Returns:
@@ -81,49 +84,67 @@ def rigid_state(model: Model, joint_angles: Array, world: Array | None = None) -
     return state
 
 
-@allocating_kernel
-def _target_frames(targets, elastic, law, c, q, u, m, R, positions, quaternions):
-    component, position, rotation, Phi, Psi = targets
-    V = np.zeros(6 + u.shape[2])
+class TargetWork(NamedTuple):
+    """The target markers as the kernels take them, and scratch: a marker, a rotation matrix, velocities of zero."""
+
+    component: IntArray
+    position: Array
+    rotation: Array
+    Phi: Array
+    Psi: Array
+    marker: MarkerWork
+    R: Array
+    V: Array
+
+
+def _target_work(model: Model) -> TargetWork:
+    t, size = model.targets, model.system.size
+    marker = allocate_marker(size)
+    return TargetWork(t.component, t.position, t.rotation, t.Phi, t.Psi, marker, np.zeros((3, 3)), np.zeros(size))
+
+
+@kernel
+def _target_marker(system: System, targets: TargetWork, k: int) -> ComponentMarker:
+    b = targets.component[k]
+    return ComponentMarker(
+        system.elastic[b], system.law[b], targets.position[k], targets.rotation[k], targets.Phi[k], targets.Psi[k]
+    )
+
+
+@kernel
+def _target_frames(
+    system: System, targets: TargetWork, c: Array, q: Array, u: Array, positions: Array, quaternions: Array
+) -> None:
+    m, R = targets.marker, targets.R
     for n in range(c.shape[0]):
-        for k in range(len(component)):
-            b = component[k]
+        for k in range(len(targets.component)):
+            b = targets.component[k]
             matrix_of(q[n, b], R)
-            marker_values(elastic[b], law[b], position[k], rotation[k], Phi[k], Psi[k], c[n, b], R, u[n, b], V, m)
+            marker_values(_target_marker(system, targets, k), c[n, b], R, u[n, b], targets.V, m)
             for i in range(3):
                 positions[n, k, i] = m.p[i]
             quaternion_of(m.R, quaternions[n, k])
-
-
-def target_arrays(model: Model) -> tuple[IntArray, Array, Array, Array, Array]:
-    """The target markers as the tuple that the kernels take."""
-    t = model.targets
-    return (t.component, t.position, t.rotation, t.Phi, t.Psi)
 
 
 def target_frames(model: Model, c: Array, q: Array, u: Array) -> tuple[Array, Array]:
     """Motion of the targets: positions [m], shape [T, K, 3], and quaternions, shape [T, K, 4], world."""
     count = len(model.targets.component)
     positions, quaternions = np.zeros((len(c), count, 3)), np.zeros((len(c), count, 4))
-    _target_frames(
-        target_arrays(model), model.system.elastic, model.system.law, c, q, u, allocate_marker(model.system.size),
-        np.zeros((3, 3)), positions, quaternions,
-    )  # fmt: skip
+    _target_frames(model.system, _target_work(model), c, q, u, positions, quaternions)
     return positions, quaternions
 
 
-@allocating_kernel
-def _target_jacobians(targets, elastic, law, c, q, u, m, R, J):
-    component, position, rotation, Phi, Psi = targets
-    V = np.zeros(6 + u.shape[2])
+@kernel
+def _target_jacobians(system: System, targets: TargetWork, c: Array, q: Array, u: Array, J: Array) -> None:
+    m, R = targets.marker, targets.R
     for n in range(c.shape[0]):
-        for k in range(len(component)):
-            b = component[k]
-            r = elastic[b]
+        for k in range(len(targets.component)):
+            b = targets.component[k]
+            marker = _target_marker(system, targets, k)
             matrix_of(q[n, b], R)
-            marker_values(r, law[b], position[k], rotation[k], Phi[k], Psi[k], c[n, b], R, u[n, b], V, m)
-            marker_jacobian(r, rotation[k], Phi[k], Psi[k], m)
-            for a in range(6 + r):
+            marker_values(marker, c[n, b], R, u[n, b], targets.V, m)
+            marker_jacobian(marker, m)
+            for a in range(6 + marker.r):
                 for i in range(3):
                     J[n, k, i, a] = R[i, 0] * m.Jp[0, a] + R[i, 1] * m.Jp[1, a] + R[i, 2] * m.Jp[2, a]
                     J[n, k, 3 + i, a] = m.Jf[i, a]
@@ -131,17 +152,7 @@ def _target_jacobians(targets, elastic, law, c, q, u, m, R, J):
 
 def target_jacobians(model: Model, c: Array, q: Array, u: Array) -> Array:
     """Derivative of the targets' frames by their component's coordinates (R^T dc, dphi, du), shape [T, K, 6, N]:
-    rows 0-2 the position in world axes, rows 3-5 the turning in the target's own axes."""
+    rows 0-2 the position in world axes, rows 3-5 the rotation in target axes."""
     J = np.zeros((len(c), len(model.targets.component), 6, model.system.size))
-    _target_jacobians(
-        target_arrays(model),
-        model.system.elastic,
-        model.system.law,
-        c,
-        q,
-        u,
-        allocate_marker(model.system.size),
-        np.zeros((3, 3)),
-        J,
-    )
+    _target_jacobians(model.system, _target_work(model), c, q, u, J)
     return J

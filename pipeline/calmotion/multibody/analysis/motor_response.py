@@ -1,4 +1,4 @@
-"""How the rigid robot follows its motors at once: the motions of bodies and the efforts that each motor causes."""
+"""Instantaneous response of the rigid robot to its motors: motions of the bodies and efforts by each motor."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import numpy as np
 
 from calmotion.multibody.failure import SimulationFailure
 from calmotion.multibody.integrators.workspace import Workspace
-from calmotion.multibody.linear_solver.closed_chains import factor_loops, solve_system
+from calmotion.multibody.linear_solver.closed_chains import factor_closed_chains, solve_system
 from calmotion.multibody.linear_solver.elimination import factor
 from calmotion.multibody.model.model import Model
 from calmotion.multibody.model.system import System, allocate_state
@@ -17,13 +17,13 @@ from calmotion.shot.character import Array, IntArray
 def motor_responses(
     rigid: Model, c: Array, q: Array, joint_angles: Array, motors: IntArray, world: Array, times: Array
 ) -> tuple[Array, Array]:
-    """The rigid robot's response to each motor, the others held; loops and free joints included.
+    """The rigid robot's response to each motor, the others fixed; closed chains and free joints included.
 
-    With the mass matrix in place of a stiffness, what a motor's angle imposes on the joints gives the derivatives of
-    the poses by it (where motors determine them; free joints follow by inertia), and the multipliers are the efforts
-    that a unit acceleration takes: the columns of the mass matrix in the motors' angles.
+    With the mass matrix in place of the stiffness, a unit change of a motor's angle gives the derivatives of the poses
+    by it (where motors determine them; free joints follow by inertia), and the multipliers are the efforts of a unit
+    acceleration: the columns of the mass matrix in the motors' angles.
 
-    It uses what statics has compiled already, one instant at a time.
+    It calls the kernels of statics, which are compiled already, one instant at a time.
 
     Args:
         rigid: The rigid model.
@@ -42,31 +42,25 @@ def motor_responses(
     """
     system = rigid.system._replace(gravity=np.zeros(3))
     count, joints = len(system.parent), len(system.rows)
-    turned = rigid.joint_angles(np.eye(int(max(rigid.motor)) + 1)[motors])
+    imposed_by = rigid.joint_angles(np.eye(int(max(rigid.motor)) + 1)[motors])
     ws, state = Workspace.for_system(system), allocate_state(system)
-    blocks, factors, scratch = ws.blocks, ws.factors, ws.scratch
-    x, lam, border, closing = scratch.x, scratch.lam, scratch.border, blocks.Hc[count:]
-    tree = (factors.lu, factors.pivots, factors.Z)
+    blocks, scratch = ws.blocks, ws.scratch
+    x, lam = scratch.x, scratch.lam
     motions = np.zeros((len(c), count, system.size, len(motors)))
     efforts = np.zeros((len(c), len(motors), joints))
     for n in range(len(c)):
         state.c[:], state.q[:], ws.work.world[:] = c[n], q[n], world[n]
         linearize(system, state, joint_angles[n], ws)
         blocks.K[:] = blocks.D
-        bad = factor(system, blocks, *tree, scratch.block)
+        bad = factor(system, blocks, ws.matrix, scratch.solution.block)
         if bad >= 0:
             raise SimulationFailure(float(times[n]), bad, "singular")
         if joints > count:
-            factor_loops(
-                system, blocks.Lc, blocks.Lp, closing, blocks.Hp, blocks.Nc, blocks.Jp, *tree, border, scratch.block
-            )  # fmt: skip
-        for m, imposed in enumerate(turned):
+            factor_closed_chains(system, ws.matrix, scratch.border, scratch.solution)
+        for m, imposed in enumerate(imposed_by):
             x[:] = 0.0
             lam[:] = -blocks.by_angle * imposed[:, None]
-            solve_system(
-                system, blocks.Lc, blocks.Lp, closing, blocks.Hp, blocks.Nc, blocks.Jp, *tree, border.inverse, x, lam,
-                border.X, border.lam, border.y, border.x, scratch.block,
-            )  # fmt: skip
+            solve_system(system, ws.matrix, x, lam, scratch.solution)
             motions[n, :, :, m] = x
             efforts[n, m] = _along_axes(system, ws.work.R, lam)
     by_motor = np.stack([rigid.motor_values(efforts[:, m]) for m in range(len(motors))], axis=2)
@@ -74,10 +68,10 @@ def motor_responses(
 
 
 def _along_axes(system: System, R: Array, lam: Array) -> Array:
-    """Efforts of joints that are driven, from multipliers of shape [J, 6]; of sliders by the undeformed axis."""
-    found = lam[:, 5].copy()
+    """Efforts of driven joints from multipliers of shape [J, 6]; those of sliders along the undeformed axis."""
+    efforts = lam[:, 5].copy()
     for j in np.flatnonzero(system.sliding):
         parent = system.side[j, 0]
         axis = system.rotation[j, 0, :, 2]
-        found[j] = (axis if parent < 0 else R[parent] @ axis) @ lam[j, :3]
-    return found
+        efforts[j] = (axis if parent < 0 else R[parent] @ axis) @ lam[j, :3]
+    return efforts

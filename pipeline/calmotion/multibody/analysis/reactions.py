@@ -6,24 +6,24 @@ from typing import NamedTuple
 
 import numpy as np
 
-from calmotion.multibody.integrators.trajectory import Trajectory
-from calmotion.multibody.kernels.assembly import Work, allocate_work
+from calmotion.multibody.integrators.trajectory import Inputs, Trajectory, instant_of
 from calmotion.multibody.kernels.joints import joint_kinematics
 from calmotion.multibody.kernels.sliders import slides_freely
 from calmotion.multibody.kernels.so3 import matrix_of
+from calmotion.multibody.kernels.work import Work, allocate_work
 from calmotion.multibody.linear_solver.closed_chains import copy_rows
-from calmotion.multibody.model.system import System
+from calmotion.multibody.model.system import State, System
 from calmotion.shot.character import Array
-from calmotion.support.compilation import allocating_kernel
+from calmotion.support.compilation import kernel
 
 
 class Reactions(NamedTuple):
-    """What each joint does to the component on its side 1, at that side's frame, world axes.
+    """Force and moment of each joint on the component on its side 1, at that side's frame, world axes.
 
     Attributes:
         forces: [N], shape [T, J, 3].
         moments: [N m], shape [T, J, 3].
-        efforts: Along the joint's axis, as its value grows: moments [N m], or forces [N] of a slider, shape [T, J].
+        efforts: Along the joint's axis, positive as its value: moments [N m], or forces [N] of a slider, shape [T, J].
         axes: Of the frame on the joint's side 0, as columns, world, shape [T, J, 3, 3].
     """
 
@@ -33,16 +33,16 @@ class Reactions(NamedTuple):
     axes: Array
 
 
-@allocating_kernel
-def _reactions(system, states, angles, rates, world, work, forces, moments, efforts, frames):
-    for n in range(len(angles)):
-        copy_rows(world[n], work.world)
+@kernel
+def _reactions(system: System, states: State, inputs: Inputs, work: Work, out: Reactions) -> None:
+    forces, moments, efforts, frames = out.forces, out.moments, out.efforts, out.axes
+    for n in range(len(inputs.angles)):
+        copy_rows(inputs.world[n], work.world)
         for b in range(len(system.parent)):
             matrix_of(states.q[n, b], work.R[b])
         for joint in range(len(system.rows)):
-            joint_kinematics(
-                system, joint, angles[n, joint], rates[n, joint], states.c[n], states.u[n], states.V[n], work
-            )
+            angle, rate = inputs.angles[n, joint], inputs.rates[n, joint]
+            joint_kinematics(system, joint, angle, rate, instant_of(states, n), work)
             lam, axes = states.lam[n, joint], work.i.R
             for i in range(3):
                 m = 0.0
@@ -73,9 +73,9 @@ def reactions(system: System, trajectory: Trajectory, angles: Array, rates: Arra
     """
     total, joints = len(angles), len(system.rows)
     work: Work = allocate_work(system)
-    found = Reactions(
+    result = Reactions(
         np.zeros((total, joints, 3)), np.zeros((total, joints, 3)), np.zeros((total, joints)),
         np.zeros((total, joints, 3, 3)),
     )  # fmt: skip
-    _reactions(system, trajectory.states, angles, rates, trajectory.world, work, *found)
-    return found
+    _reactions(system, trajectory.states, Inputs(angles, rates, trajectory.world), work, result)
+    return result

@@ -13,11 +13,13 @@ backwards as constant, velocities as zero.
 from __future__ import annotations
 
 from calmotion.multibody.kernels.so3 import inverse_right_jacobian, right_jacobian, right_jacobian_derivative
+from calmotion.multibody.model.system import Instants, System
+from calmotion.shot.character import Array
 from calmotion.support.compilation import kernel
 
 
 @kernel
-def rotation_rate(h, turn_now, turn_before, J, omega):
+def rotation_rate(h: float, turn_now: Array, turn_before: Array, J: Array, omega: Array) -> None:
     """omega_n of the backward difference, shape [3]; J is scratch and holds J_r(theta_n) afterwards."""
     right_jacobian(turn_now, J)
     for i in range(3):
@@ -28,7 +30,7 @@ def rotation_rate(h, turn_now, turn_before, J, omega):
 
 
 @kernel
-def rotation_rate_jacobian(h, turn_now, turn_before, J, T, Wt, Hv):
+def rotation_rate_jacobian(h: float, turn_now: Array, turn_before: Array, T: Array, Wt: Array, Hv: Array) -> None:
     """d omega_n / d dphi_n into Hv[1:4, 1:4] and d omega_n / d theta_n into Wt; T holds J_r^-1 afterwards."""
     right_jacobian_derivative(turn_now, turn_before, 1.0, Wt)
     for i in range(3):
@@ -42,8 +44,9 @@ def rotation_rate_jacobian(h, turn_now, turn_before, J, T, Wt, Hv):
 
 
 @kernel
-def velocities(system, h, now, before, before2, J, Vd):
+def velocities(system: System, h: float, instants: Instants, J: Array, Vd: Array) -> None:
     """Velocities (into now.V) and accelerations (into Vd, shape [B, N]) of instant n by the backward difference."""
+    before2, before, now = instants.before2, instants.before, instants.now
     c1, c2 = 2.0 / h, 0.5 / h
     for b in range(len(system.parent)):
         for i in range(3):
@@ -56,8 +59,13 @@ def velocities(system, h, now, before, before2, J, Vd):
 
 
 @kernel
-def position_to_velocity(system, h, now, before, J, T, Wt, Hv):
-    """How the velocity of instant n follows its position, into Hv, shape [B, 4, 4]; see `assemble`."""
+def position_to_velocity(system: System, h: float, instants: Instants, T: Array, Wt: Array, Hv: Array) -> None:
+    """Derivative of the velocity of instant n by its position, into Hv, shape [B, 4, 4]; see `assemble`.
+
+    Args:
+        T, Wt: Scratch, shape [3, 3].
+    """
+    before, now = instants.before, instants.now
     for b in range(len(system.parent)):
         Hv[b, 0, 0] = 1.5 / h
-        rotation_rate_jacobian(h, now.turn[b], before.turn[b], J, T, Wt, Hv[b])
+        rotation_rate_jacobian(h, now.turn[b], before.turn[b], T, Wt, Hv[b])

@@ -1,49 +1,51 @@
 """All integrators behind one interface.
 
-`bdf2` (the default, and the one that is differentiated), `newmark` and `generalized-alpha` are implicit schemes on the
-index-2 form; `rk4` is explicit, on the index-1 form, and `radau` of order 5, for reference solutions.
+`bdf2` (the default, and the one with derivatives), `newmark` and `generalized-alpha` are implicit, on the index-2 form;
+`rk4` is explicit, on the index-1 form, and `radau` of order 5, for reference solutions.
 """
 
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 
 import numpy as np
 
 from calmotion.multibody.failure import SimulationFailure
 from calmotion.multibody.integrators import radau, runge_kutta
+from calmotion.multibody.integrators.coefficients import IMPLICIT
 from calmotion.multibody.integrators.drives import hermite_drive, stage_inputs
-from calmotion.multibody.integrators.schemes import SCHEMES
 from calmotion.multibody.integrators.simulation import largest_gap, simulate
-from calmotion.multibody.integrators.trajectory import Trajectory, copy_of_instant
+from calmotion.multibody.integrators.trajectory import Inputs, Trajectory, copy_of_instant
 from calmotion.multibody.integrators.workspace import Workspace
-from calmotion.multibody.kernels.moving_frames import rooted
+from calmotion.multibody.model.moving_markers import rooted
 from calmotion.multibody.model.system import State, System
 from calmotion.multibody.statics.equilibrium import equilibrium
 from calmotion.shot.character import Array
 
-INTEGRATORS = (*SCHEMES, "rk4", "radau")
-BLOWN_UP = 1e6  # velocity [m/s, rad/s]
+INTEGRATORS = (*IMPLICIT, "rk4", "radau")
+DIVERGED = 1e6  # velocity [m/s, rad/s]
 
 
 def follows_roots(integrator: str) -> bool:
-    """Whether an integrator knows of roots that move."""
-    return integrator in SCHEMES
+    """Whether an integrator supports moving roots."""
+    return integrator in IMPLICIT
 
 
 def integrate(
-    system: System, start: State, angles: Array, rates: Array, h: float, workspace: Workspace, progress=None,
-    settled: bool = True, integrator: str = "bdf2", world: Array | None = None,
+    system: System, start: State, angles: Array, rates: Array, h: float, workspace: Workspace,
+    progress: Callable[[float], None] | None = None, settled: bool = True, integrator: str = "bdf2",
+    world: Array | None = None,
 ) -> Trajectory:  # fmt: skip
     """`simulation.simulate` by any integrator of `INTEGRATORS`; same arguments, results and errors.
 
-    Between instants `rk4` and `radau` see cubics through angles and rates, which a cubic spline with knots on
-    instants is.
+    Between instants `rk4` and `radau` use cubics through angles and rates, which is exact for a cubic spline with
+    knots on instants.
     """
-    if integrator in SCHEMES:
+    if integrator in IMPLICIT:
         return simulate(system, start, angles, rates, h, workspace, progress, settled, integrator, world)
     if np.any(system.moving >= 0):
-        raise ValueError(f"{integrator} does not know of roots that move")
+        raise ValueError(f"{integrator} does not support moving roots")
     begin, ws, total = time.perf_counter(), workspace, len(angles)
     first, solved = equilibrium(system, start, angles[0], ws) if settled else (start, 0)
     times: Array = h * np.arange(total, dtype=np.float64)
@@ -56,14 +58,12 @@ def integrate(
             part[0] = value
         inputs = stage_inputs(drive, times, runge_kutta.STAGES)
         slopes = runge_kutta.allocate_slopes(system)
-        instant, component = runge_kutta.advance(
-            system, h, states, inputs, ws.work, ws.blocks, ws.factors, ws.scratch, slopes, BLOWN_UP
-        )
+        instant, component = runge_kutta.advance(system, h, states, inputs, ws, slopes, DIVERGED)
         if component >= 0:
             last = copy_of_instant(states, instant - 1)
             raise SimulationFailure(instant * h, component, "diverged", last)
     world = rooted(None, total)
-    gap = largest_gap(system, angles, rates, states, world, ws.work)
+    gap = largest_gap(system, Inputs(angles, rates, world), states, ws.work)
     if progress is not None:
         progress(1.0)
     return Trajectory(h, states, world, solved, 0, gap, time.perf_counter() - begin, integrator)

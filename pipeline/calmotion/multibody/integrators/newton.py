@@ -1,87 +1,48 @@
 """One implicit step by Newton's method, safeguarded; compiled.
 
-The first correction of a step uses its own tangent. Later ones keep its factors while the corrections shrink fast, as
-they cost a residual each and no factorisation; what is left then is estimated from the rate of shrinking. A correction
-that the next one, by the same factors, does not confirm (the natural monotonicity test: Deuflhard, Newton Methods for
-Nonlinear Problems, 2004, section 2.1.3) is taken back and halved.
+The first correction of a step uses the tangent at its state. Later ones keep the factors while the corrections shrink
+fast, as they cost a residual each and no factorisation; the remaining error is estimated from the rate of shrinking. A
+correction that the next one, by the same factors, does not confirm (the natural monotonicity test: Deuflhard, Newton
+Methods for Nonlinear Problems, 2004, section 2.1.3) is taken back and halved.
 """
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
 from calmotion.multibody.integrators import bdf2, newmark
+from calmotion.multibody.integrators.workspace import Scratch, Workspace
 from calmotion.multibody.kernels.assembly import assemble
 from calmotion.multibody.kernels.sliders import LENGTH, slides_freely
 from calmotion.multibody.kernels.so3 import inverse_right_jacobian, matrix_of, turn
-from calmotion.multibody.linear_solver.closed_chains import (
-    Border,
-    allocate_border,
-    copy_rows,
-    factor_loops,
-    solve_system,
-)
+from calmotion.multibody.linear_solver.closed_chains import copy_rows, factor_closed_chains, solve_system
 from calmotion.multibody.linear_solver.elimination import factor
 from calmotion.multibody.linear_solver.least_multipliers import least_multipliers
-from calmotion.multibody.model.system import BACKWARD_DIFFERENCE, JOINT_ROWS, State, System, allocate_state
+from calmotion.multibody.linear_solver.step_matrix import StepMatrix
+from calmotion.multibody.model.system import (
+    BACKWARD_DIFFERENCE,
+    JOINT_ROWS,
+    Blocks,
+    Instants,
+    Integrator,
+    State,
+    System,
+)
 from calmotion.shot.character import Array
 from calmotion.support.compilation import NO, YES, inlined_kernel, kernel
 
 CONVERGED, SINGULAR, NOT_CONVERGED = 0, 1, 2
 LIMIT = 40
-QUADRATIC = 1e-8  # a correction by a fresh tangent below this leaves about its square [m, rad]
-LEFT = 1e-13  # error that may be left where factors were kept [m, rad]
+QUADRATIC = 1e-8  # a correction by a fresh tangent below this leaves an error of about its square [m, rad]
+LEFT = 1e-13  # acceptable error where factors were kept [m, rad]
 FLOOR = 1e-12  # corrections below this are rounding
 SLOW = 0.1  # shrinking of the corrections by less than this asks for a new tangent
 SMALLEST = 1.0 / 256.0  # part of a correction below which the step is given up
 HUGE = 1e6
 
 
-class Scratch(NamedTuple):
-    """What a step writes to, besides `Work`, `Blocks` and `Factors`.
-
-    Attributes:
-        J, T, Wt: Small matrices.
-        Hv: How velocities follow positions, shape [B, 4, 4].
-        Vd: Accelerations, shape [B, N].
-        x, lam: Correction, shapes [B, N] and [J, 6].
-        block, border: Scratch of `elimination` and `loops`.
-        memory: Accelerations of the instant before: those of the motion, those of Newmark's formulas, and room for the
-            new ones of these, shape [3, B, N]. Zero before a start at rest.
-        kept: The state before a correction.
-        taken, taken_lam: That correction.
-    """
-
-    J: Array
-    T: Array
-    Wt: Array
-    Hv: Array
-    Vd: Array
-    x: Array
-    lam: Array
-    block: Array
-    border: Border
-    memory: Array
-    kept: State
-    taken: Array
-    taken_lam: Array
-
-
-def allocate_scratch(system: System) -> Scratch:
-    """Scratch for one system."""
-    count, size, joints = len(system.parent), system.size, len(system.rows)
-    square = (3, 3)
-    return Scratch(
-        np.zeros(square), np.zeros(square), np.zeros(square), np.zeros((count, 4, 4)), np.zeros((count, size)),
-        np.zeros((count, size)), np.zeros((joints, JOINT_ROWS)), np.zeros(size + JOINT_ROWS), allocate_border(system),
-        np.zeros((3, count, size)), allocate_state(system), np.zeros((count, size)), np.zeros((joints, JOINT_ROWS)),
-    )  # fmt: skip
-
-
 @kernel
-def correct(system, before, now, R, x, lam, part, T):
+def correct(system: System, before: State, now: State, R: Array, x: Array, lam: Array, part: float, T: Array) -> None:
     """Add a part of a Newton correction (x, shape [B, N], and lam) to a state of rotation matrices R."""
     for b in range(len(system.parent)):
         inverse_right_jacobian(now.turn[b], T)
@@ -103,7 +64,7 @@ def correct(system, before, now, R, x, lam, part, T):
 
 
 @kernel
-def worst_component(system, x):
+def worst_component(system: System, x: Array) -> int:
     """Component with the largest (or a non-finite) correction."""
     worst = 0
     big = -1.0
@@ -119,7 +80,7 @@ def worst_component(system, x):
 
 
 @inlined_kernel
-def _predict(system, h, before, now, memory):
+def _predict(system: System, h: float, before: State, now: State, memory: Array) -> None:
     """The new instant by Taylor's formula."""
     for b in range(len(system.parent)):
         for i in range(3):
@@ -132,7 +93,7 @@ def _predict(system, h, before, now, memory):
 
 
 @kernel
-def _copy_positions(source, out):
+def _copy_positions(source: State, out: State) -> None:
     """Everything of a state but its velocities."""
     copy_rows(source.c, out.c)
     copy_rows(source.q, out.q)
@@ -142,55 +103,51 @@ def _copy_positions(source, out):
 
 
 @kernel
-def _velocities(system, scheme, h, before2, before, now, scratch):
-    if scheme.family == BACKWARD_DIFFERENCE:
-        bdf2.velocities(system, h, now, before, before2, scratch.J, scratch.Vd)
+def _velocities(system: System, integrator: Integrator, instants: Instants, scratch: Scratch) -> None:
+    """Velocities and accelerations of the new instant from its positions."""
+    if integrator.family == BACKWARD_DIFFERENCE:
+        bdf2.velocities(system, integrator.h, instants, scratch.J, scratch.Vd)
     else:
-        newmark.velocities(system, scheme, h, now, before, scratch.memory, scratch.Vd)
+        newmark.velocities(system, integrator, instants, scratch.memory, scratch.Vd)
 
 
 @inlined_kernel
-def _linearize(system, scheme, h, before, now, angle, rate, work, blocks, factors, scratch):
-    """Residual, tangent and factors at a state; returns -1 or the component that is singular."""
-    if scheme.family == BACKWARD_DIFFERENCE:
-        bdf2.position_to_velocity(system, h, now, before, scratch.J, scratch.T, scratch.Wt, scratch.Hv)
+def _linearize(
+    system: System, integrator: Integrator, instants: Instants, angle: Array, rate: Array, ws: Workspace
+) -> int:
+    """Residual, tangent and factors at the new state; returns -1 or the component that is singular."""
+    scratch, now = ws.scratch, instants.now
+    if integrator.family == BACKWARD_DIFFERENCE:
+        bdf2.position_to_velocity(system, integrator.h, instants, scratch.T, scratch.Wt, scratch.Hv)
     else:
-        newmark.position_to_velocity(system, scheme, h, now, scratch.T, scratch.Hv)
-    assemble(
-        system, scheme, now.c, now.q, now.u, now.V, scratch.Vd, now.lam, angle, rate, scratch.Hv, YES, work, blocks
-    )
-    bad = factor(system, blocks, factors.lu, factors.pivots, factors.Z, scratch.block)
+        newmark.position_to_velocity(system, integrator, now, scratch.T, scratch.Hv)
+    assemble(system, integrator, now, scratch.Vd, angle, rate, scratch.Hv, YES, ws.work, ws.blocks)
+    bad = factor(system, ws.blocks, ws.matrix, scratch.solution.block)
     if bad < 0 and len(system.rows) > len(system.parent):
-        factor_loops(
-            system, blocks.Lc, blocks.Lp, blocks.Hc[len(system.parent) :], blocks.Hp, blocks.Nc, blocks.Jp, factors.lu,
-            factors.pivots, factors.Z, scratch.border, scratch.block,
-        )  # fmt: skip
+        factor_closed_chains(system, ws.matrix, scratch.border, scratch.solution)
     return bad
 
 
 @kernel
-def solve_correction(system, blocks, factors, scratch):
-    """Newton's correction from the residual in the blocks, by the factors at hand, into scratch.x and scratch.lam."""
-    x, lam, border = scratch.x, scratch.lam, scratch.border
+def solve_correction(system: System, blocks: Blocks, matrix: StepMatrix, scratch: Scratch) -> None:
+    """Newton's correction from the residual in the blocks, by the present factors, into scratch.x and scratch.lam."""
+    x, lam = scratch.x, scratch.lam
     for b in range(len(system.parent)):
         for i in range(6 + system.elastic[b]):
             x[b, i] = -blocks.res[b, i]
     for j in range(len(system.rows)):
         for i in range(JOINT_ROWS):
             lam[j, i] = -blocks.gap[j, i]
-    solve_system(
-        system, blocks.Lc, blocks.Lp, blocks.Hc[len(system.parent) :], blocks.Hp, blocks.Nc, blocks.Jp, factors.lu,
-        factors.pivots, factors.Z, border.inverse, x, lam, border.X, border.lam, border.y, border.x, scratch.block,
-    )  # fmt: skip
+    solve_system(system, matrix, x, lam, scratch.solution)
 
 
 @kernel
-def largest_entry(system, x):
+def largest_entry(system: System, x: Array) -> float:
     """Largest entry of a correction, NaN where one is not a number."""
     largest = 0.0
     for b in range(len(system.parent)):
         for i in range(6 + system.elastic[b]):
-            t = abs(x[b, i])
+            t: float = abs(x[b, i])
             if not (t <= largest):
                 largest = t
                 if np.isnan(t):
@@ -199,38 +156,39 @@ def largest_entry(system, x):
 
 
 @inlined_kernel
-def step(system, scheme, h, before2, before, now, angle, rate, predicted, work, blocks, factors, scratch):
+def step(
+    system: System, integrator: Integrator, instants: Instants, angle: Array, rate: Array, predicted: bool,
+    ws: Workspace,
+) -> tuple[int, int, int, int]:  # fmt: skip
     """One implicit step from two instants to the next.
 
     Args:
-        before2, before, now: States; `now` is filled. Newmark's family does not look at `before2`.
+        instants: `now` is filled. Newmark's family does not read `before2`.
         angle, rate: Angle (or length) and rate of each joint's motor at the new instant, shape [J].
-        predicted: Whether `now` already holds positions and multipliers to start from.
-        scratch: Its `memory` is that of `before`, and of `now` afterwards.
+        predicted: Whether `now` already contains positions and multipliers to start from.
+        ws: The memory of its scratch is that of `before`, and of `now` afterwards.
 
     Returns:
-        (code, factorisations, residuals, component): CONVERGED, or why not and at which component.
+        (code, factorisations, residuals, component): CONVERGED, or the reason for the failure and its component.
     """
+    work, blocks, scratch, before, now = ws.work, ws.blocks, ws.scratch, instants.before, instants.now
     x, lam = scratch.x, scratch.lam
     if not predicted:
-        _predict(system, h, before, now, scratch.memory)
+        _predict(system, integrator.h, before, now, scratch.memory)
     fresh = True  # whether to linearise here
-    taken_fresh = False  # whether the correction taken last came from a tangent of its own
+    taken_fresh = False  # whether the correction taken last came from a tangent at its own state
     part, last = 1.0, np.inf  # how much of it was taken, and its size
     factorisations = 0
     for iteration in range(LIMIT):
-        _velocities(system, scheme, h, before2, before, now, scratch)
+        _velocities(system, integrator, instants, scratch)
         if fresh:
             factorisations += 1
-            bad = _linearize(system, scheme, h, before, now, angle, rate, work, blocks, factors, scratch)
+            bad = _linearize(system, integrator, instants, angle, rate, ws)
             if bad >= 0:
                 return SINGULAR, factorisations, iteration + 1, bad
         else:
-            assemble(
-                system, scheme, now.c, now.q, now.u, now.V, scratch.Vd, now.lam, angle, rate, scratch.Hv, NO, work,
-                blocks,
-            )  # fmt: skip
-        solve_correction(system, blocks, factors, scratch)
+            assemble(system, integrator, now, scratch.Vd, angle, rate, scratch.Hv, NO, work, blocks)
+        solve_correction(system, blocks, ws.matrix, scratch)
         size = largest_entry(system, x)
         if fresh:
             if not (size < HUGE):
@@ -240,7 +198,7 @@ def step(system, scheme, h, before2, before, now, angle, rate, predicted, work, 
                 fresh, part = True, 1.0
                 continue
         else:
-            # not confirmed: back to where it was taken from
+            # not confirmed: back to the state before it
             _copy_positions(scratch.kept, now)
             if not taken_fresh:
                 fresh = True
@@ -259,17 +217,17 @@ def step(system, scheme, h, before2, before, now, angle, rate, predicted, work, 
         correct(system, before, now, work.R, x, lam, part, scratch.T)
         enough = size < QUADRATIC if fresh else (size < FLOOR or ratio * size < (1.0 - ratio) * LEFT)
         if enough:
-            _finish(system, scheme, h, before2, before, now, scratch)
+            _finish(system, integrator, instants, scratch)
             return CONVERGED, factorisations, iteration + 1, -1
         taken_fresh, last, fresh = fresh, size, False
     return NOT_CONVERGED, factorisations, LIMIT, worst_component(system, x)
 
 
 @inlined_kernel
-def _finish(system, scheme, h, before2, before, now, scratch):
-    """Velocities of the converged instant, what the next step remembers, and multipliers of least norm."""
-    _velocities(system, scheme, h, before2, before, now, scratch)
+def _finish(system: System, integrator: Integrator, instants: Instants, scratch: Scratch) -> None:
+    """Velocities of the converged instant, the memory of the next step, and multipliers of least norm."""
+    _velocities(system, integrator, instants, scratch)
     copy_rows(scratch.Vd, scratch.memory[0])
     copy_rows(scratch.memory[2], scratch.memory[1])
     if len(system.rows) > len(system.parent):
-        least_multipliers(system, scratch.border, now.lam)
+        least_multipliers(system, scratch.border, instants.now.lam)

@@ -12,12 +12,11 @@ Source: E. Hairer, G. Wanner, Solving Ordinary Differential Equations II, sectio
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from calmotion.multibody.failure import SimulationFailure
 from calmotion.multibody.integrators.drives import Drive, stage_inputs
+from calmotion.multibody.integrators.workspace import Workspace
 from calmotion.multibody.kernels.assembly import assemble
 from calmotion.multibody.kernels.sliders import LENGTH, has_row, slides_freely
 from calmotion.multibody.kernels.so3 import (
@@ -30,9 +29,6 @@ from calmotion.multibody.kernels.so3 import (
 from calmotion.multibody.linear_solver.index1 import VELOCITY_ROWS
 from calmotion.multibody.model.system import JOINT_ROWS, State, System, allocate_state
 from calmotion.shot.character import Array
-
-if TYPE_CHECKING:
-    from calmotion.multibody.integrators.workspace import Workspace
 
 _ROOT = np.sqrt(6.0)
 NODES = np.array([(4.0 - _ROOT) / 10.0, (4.0 + _ROOT) / 10.0, 1.0])
@@ -150,10 +146,7 @@ class _Stepper:
         """Residuals and their derivatives by position, velocity, acceleration and multipliers at stage i, dense."""
         system, ws, stage = self.system, self.ws, self.stages[i]
         Hv = np.zeros_like(ws.scratch.Hv)
-        assemble(
-            system, VELOCITY_ROWS, stage.c, stage.q, stage.u, stage.V, self.Vd[i], stage.lam, inputs[i, 0],
-            inputs[i, 1], Hv, True, ws.work, ws.blocks,
-        )  # fmt: skip
+        assemble(system, VELOCITY_ROWS, stage, self.Vd[i], inputs[i, 0], inputs[i, 1], Hv, True, ws.work, ws.blocks)
         blocks, x, m = ws.blocks, self.offset[-1], len(self.rows)
         K, P, D = np.zeros((x, x)), np.zeros((x, x)), np.zeros((x, x))
         L, H = np.zeros((x, m)), np.zeros((m, x))

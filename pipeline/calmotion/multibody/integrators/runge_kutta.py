@@ -1,6 +1,6 @@
 """The classical Runge-Kutta method of fourth order on the index-1 form; compiled.
 
-For comparison: it is explicit, so that stiff bodies need steps far below what their motion asks for.
+For comparison: it is explicit, so that stiff bodies need steps far shorter than those that resolve their motion.
 
 A step integrates (c, theta, u, V), theta being the rotation vector from the step's start, theta' = J_r^-1(theta) omega
 (H. Munthe-Kaas, Runge-Kutta methods on Lie groups, 1998).
@@ -12,6 +12,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from calmotion.multibody.integrators.trajectory import instant_of
+from calmotion.multibody.integrators.workspace import Workspace
 from calmotion.multibody.kernels.so3 import inverse_right_jacobian, turn
 from calmotion.multibody.linear_solver.closed_chains import copy_rows
 from calmotion.multibody.linear_solver.index1 import accelerations
@@ -19,8 +21,8 @@ from calmotion.multibody.model.system import State, System, allocate_state
 from calmotion.shot.character import Array
 from calmotion.support.compilation import inlined_kernel, kernel
 
-STAGES = np.array([0.0, 0.5, 1.0])  # where in a step it looks at the motors
-FIRMNESS = 10.0  # Baumgarte's coefficient [1/s]; one that grew with 1/h would take the method's order from it
+STAGES = np.array([0.0, 0.5, 1.0])  # instants of a step at which it evaluates the motors
+BAUMGARTE = 10.0  # Baumgarte's coefficient [1/s]; one that grew with 1/h would take the method's order from it
 
 
 class Slopes(NamedTuple):
@@ -43,7 +45,7 @@ def allocate_slopes(system: System) -> Slopes:
 
 
 @kernel
-def _place(system, start, share, h, slopes):
+def _place(system: System, start: State, share: float, h: float, slopes: Slopes) -> None:
     """The state share * h along the slopes."""
     stage = slopes.stage
     for b in range(len(system.parent)):
@@ -58,7 +60,7 @@ def _place(system, start, share, h, slopes):
 
 
 @inlined_kernel
-def _slope(system, Vd, slopes):
+def _slope(system: System, Vd: Array, slopes: Slopes) -> None:
     """Slopes at the stage's state."""
     stage, T = slopes.stage, slopes.T
     for b in range(len(system.parent)):
@@ -74,7 +76,7 @@ def _slope(system, Vd, slopes):
 
 
 @inlined_kernel
-def step(system, h, start, now, inputs, work, blocks, factors, scratch, slopes):
+def step(system: System, h: float, start: State, now: State, inputs: Array, ws: Workspace, slopes: Slopes) -> int:
     """One step from `start` to `now`.
 
     Args:
@@ -91,15 +93,12 @@ def step(system, h, start, now, inputs, work, blocks, factors, scratch, slopes):
     for stage in range(4):
         _place(system, start, 0.0 if stage == 0 else (1.0 if stage == 3 else 0.5), h, slopes)
         at = 0 if stage == 0 else (2 if stage == 3 else 1)
-        bad = accelerations(
-            system, slopes.stage, inputs[at, 0], inputs[at, 1], inputs[at, 2], FIRMNESS, work, blocks, factors,
-            scratch,
-        )  # fmt: skip
+        bad = accelerations(system, slopes.stage, inputs[at, 0], inputs[at, 1], inputs[at, 2], BAUMGARTE, ws)
         if bad >= 0:
             return bad
         if stage == 0:
             copy_rows(slopes.stage.lam, start.lam)
-        _slope(system, scratch.Vd, slopes)
+        _slope(system, ws.scratch.Vd, slopes)
         weight = 1.0 / 3.0 if stage in (1, 2) else 1.0 / 6.0
         for b in range(count):
             for i in range(6 + system.elastic[b]):
@@ -118,23 +117,22 @@ def step(system, h, start, now, inputs, work, blocks, factors, scratch, slopes):
 
 
 @kernel
-def advance(system, h, states, inputs, work, blocks, factors, scratch, slopes, limit):
+def advance(
+    system: System, h: float, states: State, inputs: Array, ws: Workspace, slopes: Slopes, limit: float
+) -> tuple[int, int]:
     """Steps 1.. of a trajectory from its first instant.
 
     Args:
         states: Arrays of `State` with a leading time axis; the first is given.
         inputs: Shape [T - 1, 3, 3, J], see `step`.
-        limit: Velocity [m/s, rad/s] beyond which the motion has blown up.
+        limit: Velocity [m/s, rad/s] above which the motion has diverged.
 
     Returns:
-        The instant and the component where it went wrong, or the number of instants and -1.
+        The instant and the component of a failure, or the number of instants and -1.
     """
     for n in range(1, len(states.c)):
-        start = State(
-            states.c[n - 1], states.q[n - 1], states.u[n - 1], states.turn[n - 1], states.V[n - 1], states.lam[n - 1]
-        )
-        now = State(states.c[n], states.q[n], states.u[n], states.turn[n], states.V[n], states.lam[n])
-        bad = step(system, h, start, now, inputs[n - 1], work, blocks, factors, scratch, slopes)
+        start, now = instant_of(states, n - 1), instant_of(states, n)
+        bad = step(system, h, start, now, inputs[n - 1], ws, slopes)
         if bad >= 0:
             return n, bad
         for b in range(len(system.parent)):

@@ -1,23 +1,31 @@
-"""A forward simulation: static equilibrium at the start, then an implicit scheme over given joint angles."""
+"""A forward simulation: static equilibrium at the start, then an implicit integrator over given joint angles."""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
 from calmotion.multibody.failure import SimulationFailure
 from calmotion.multibody.integrators import bdf2, newton
+from calmotion.multibody.integrators.coefficients import IMPLICIT
 from calmotion.multibody.integrators.refinement import refined_step
-from calmotion.multibody.integrators.schemes import SCHEMES
-from calmotion.multibody.integrators.trajectory import Trajectory, copy_of_instant, instant_of
-from calmotion.multibody.integrators.workspace import Workspace
+from calmotion.multibody.integrators.trajectory import (
+    Inputs,
+    Record,
+    Trajectory,
+    copy_of_instant,
+    instant_of,
+    instants_of,
+)
+from calmotion.multibody.integrators.workspace import Scratch, Workspace
 from calmotion.multibody.kernels.joints import joint_kinematics
-from calmotion.multibody.kernels.moving_frames import rooted
 from calmotion.multibody.kernels.so3 import matrix_of
+from calmotion.multibody.kernels.work import Work
 from calmotion.multibody.linear_solver.closed_chains import copy_rows
-from calmotion.multibody.model.system import State, System
+from calmotion.multibody.model.moving_markers import rooted
+from calmotion.multibody.model.system import Integrator, State, System
 from calmotion.multibody.statics.consistent_start import initial_acceleration, instant_before
 from calmotion.multibody.statics.equilibrium import equilibrium
 from calmotion.shot.character import Array
@@ -25,14 +33,14 @@ from calmotion.support.compilation import NO, kernel
 
 
 @kernel
-def _largest_gap(system, angle, rate, now, work):
+def _largest_gap(system: System, angle: Array, rate: Array, now: State, work: Work) -> float:
     gap = 0.0
     for b in range(len(system.parent)):
         matrix_of(now.q[b], work.R[b])
     for joint in range(len(system.rows)):
         if system.rows[joint] == 0:
             continue
-        joint_kinematics(system, joint, angle[joint], rate[joint], now.c, now.u, now.V, work)
+        joint_kinematics(system, joint, angle[joint], rate[joint], now, work)
         d = 0.0
         for i in range(3):
             d += (work.j.p[i] - work.i.p[i]) ** 2
@@ -41,49 +49,45 @@ def _largest_gap(system, angle, rate, now, work):
 
 
 @kernel
-def largest_gap(system, angles, rates, states, world, work):
+def largest_gap(system: System, inputs: Inputs, states: State, work: Work) -> float:
     """Largest position gap of a joint over a trajectory [m]."""
     gap = 0.0
-    for n in range(len(angles)):
-        copy_rows(world[n], work.world)
-        gap = max(gap, _largest_gap(system, angles[n], rates[n], instant_of(states, n), work))
+    for n in range(len(inputs.angles)):
+        copy_rows(inputs.world[n], work.world)
+        gap = max(gap, _largest_gap(system, inputs.angles[n], inputs.rates[n], instant_of(states, n), work))
     return gap
 
 
 @kernel
 def _advance(
-    system, scheme, h, first, last, earlier, states, angles, rates, world, margins, costs, work, blocks, factors,
-    scratch,
-):  # fmt: skip
+    system: System, integrator: Integrator, first: int, last: int, inputs: Inputs, record: Record, ws: Workspace
+) -> tuple[int, int, int]:
     """Steps first..last-1 of a trajectory, with their margins and costs; returns (code, instant, component)."""
     for n in range(first, last):
-        before = instant_of(states, n - 1)
-        before2 = earlier if n == 1 else instant_of(states, n - 2)
-        copy_rows(world[n], work.world)
-        code, more, count, component = newton.step(
-            system, scheme, h, before2, before, instant_of(states, n), angles[n], rates[n], NO, work, blocks,
-            factors, scratch,
-        )  # fmt: skip
-        costs[n, 0] += count
-        costs[n, 1] += more
+        angle, rate = inputs.angles[n], inputs.rates[n]
+        instants = instants_of(record.earlier, record.states, n)
+        copy_rows(inputs.world[n], ws.work.world)
+        code, factorisations, solutions, component = newton.step(system, integrator, instants, angle, rate, NO, ws)
+        record.costs[n, 0] += solutions
+        record.costs[n, 1] += factorisations
         if code != newton.CONVERGED:
             return code, n, component
-        margins[n] = scratch.border.margin[0]
-        costs[n, 2] = _largest_gap(system, angles[n], rates[n], instant_of(states, n), work)
+        record.margins[n] = ws.scratch.border.margin[0]
+        record.costs[n, 2] = _largest_gap(system, angle, rate, instants.now, ws.work)
     return newton.CONVERGED, last, -1
 
 
 @kernel
-def _recall(system, h, states, n, scratch):
-    """What a step of BDF2 remembers after instant n >= 1 of a trajectory."""
-    now, before, before2 = instant_of(states, n), instant_of(states, n - 1), instant_of(states, max(n - 2, 0))
-    bdf2.velocities(system, h, now, before, before2, scratch.J, scratch.Vd)
+def _recall(system: System, h: float, record: Record, n: int, scratch: Scratch) -> None:
+    """The memory of BDF2 after instant n >= 1 of a trajectory."""
+    bdf2.velocities(system, h, instants_of(record.earlier, record.states, n), scratch.J, scratch.Vd)
     copy_rows(scratch.Vd, scratch.memory[0])
 
 
 def simulate(
-    system: System, start: State, angles: Array, rates: Array, h: float, workspace: Workspace, progress=None,
-    settled: bool = True, integrator: str = "bdf2", world: Array | None = None,
+    system: System, start: State, angles: Array, rates: Array, h: float, workspace: Workspace,
+    progress: Callable[[float], None] | None = None, settled: bool = True, integrator: str = "bdf2",
+    world: Array | None = None,
 ) -> Trajectory:  # fmt: skip
     """Simulate the system from static equilibrium, or from a state that is given.
 
@@ -98,7 +102,7 @@ def simulate(
         progress: Called with a fraction in 0..1 now and then, or None.
         settled: False releases the system at `start` as it is, with its velocities, without looking for the
             equilibrium.
-        integrator: A name of `schemes.SCHEMES`.
+        integrator: A name of `coefficients.IMPLICIT`.
         world: Moving markers of the world, shape [T, W, 18]; needed where the system has any.
 
     Returns:
@@ -126,9 +130,8 @@ def simulate(
         ws.scratch.memory[:2] = acceleration
     margins, costs = np.zeros(total), np.zeros((total, 3))
     costs[0, 0] = solved
-    return _march(
-        system, integrator, 1, earlier, states, angles, rates, world, h, ws, progress, margins, costs, begin
-    )  # fmt: skip
+    inputs, record = Inputs(angles, rates, world), Record(earlier, states, margins, costs)
+    return _march(system, integrator, h, 1, inputs, record, ws, begin, progress)
 
 
 def simulate_on(
@@ -152,25 +155,23 @@ def simulate_on(
     for part, first, second in zip(states, before2, before, strict=True):
         part[0], part[1] = first, second
     ws.scratch.memory[:] = (before.V - before2.V) / h
-    return _march(
-        system, "bdf2", 2, before2, states, angles, rates, rooted(world, total), h, ws, None, np.zeros(total),
-        np.zeros((total, 3)), begin,
-    )  # fmt: skip
+    record = Record(before2, states, np.zeros(total), np.zeros((total, 3)))
+    return _march(system, "bdf2", h, 2, Inputs(angles, rates, rooted(world, total)), record, ws, begin)
 
 
 def simulate_from(
     system: System, known: Trajectory, first: int, angles: Array, rates: Array, workspace: Workspace
 ) -> Trajectory:
-    """What `simulate` finds by BDF2, where a simulation is known that begins alike.
+    """The result of `simulate` by BDF2, continued from a known simulation with the same beginning.
 
     Args:
-        known: By BDF2 from static equilibrium; not changed.
+        known: Simulated by BDF2 from static equilibrium; not changed.
         first: Its instants before this one are kept, two or more, the last of them not a refined one.
         angles, rates: As `simulate` takes them; up to `first` those of the known simulation.
 
     Returns:
-        The trajectory, to the last bit that of a whole simulation; the time that its beginning took is the share that
-        it had in the known one.
+        The trajectory, to the last bit that of a whole simulation; the time of its beginning is the share that it had
+        in the known one.
 
     Raises:
         SimulationFailure: A step that cannot be solved.
@@ -182,40 +183,41 @@ def simulate_from(
         part[:first] = value[:first]
     begin -= known.wall_s * float(costs[:, 0].sum()) / max(1.0, float(known.costs[:, 0].sum()))
     ws.scratch.memory[:] = 0.0
-    _recall(system, known.h, states, first - 1, ws.scratch)
+    record = Record(copy_of_instant(states, 0), states, margins, costs)
+    _recall(system, known.h, record, first - 1, ws.scratch)
+    refined = [n for n in known.refined if n < first]
     return _march(
-        system, "bdf2", first, copy_of_instant(states, 0), states, angles, rates, known.world, known.h, ws, None,
-        margins, costs, begin, [n for n in known.refined if n < first],
-    )  # fmt: skip
+        system, "bdf2", known.h, first, Inputs(angles, rates, known.world), record, ws, begin, refined=refined
+    )
 
 
 def _march(
-    system: System, integrator: str, done: int, earlier: State, states: State, angles: Array, rates: Array,
-    world: Array, h: float, ws: Workspace, progress, margins: Array, costs: Array, begin: float,
-    before: Sequence[int] = (),
+    system: System, integrator: str, h: float, done: int, inputs: Inputs, record: Record, ws: Workspace, begin: float,
+    progress: Callable[[float], None] | None = None, refined: Sequence[int] = (),
 ) -> Trajectory:  # fmt: skip
-    """All steps from instant `done` on, into `states`, `margins` and `costs`; `earlier` is the instant before the
-    first, and `before` those before `done` that were refined."""
-    total, scheme, refined = len(angles), SCHEMES[integrator](h), list(before)
+    """All steps from instant `done` on, into the record.
+
+    Args:
+        begin: Time when the simulation was started [s].
+        refined: Those before `done`.
+    """
+    total, coefficients, all_refined = len(inputs.angles), IMPLICIT[integrator](h), list(refined)
     chunk = total if progress is None else max(1, total // 50)
     while done < total:
         last = min(done + chunk, total)
-        code, done, component = _advance(
-            system, scheme, h, done, last, earlier, states, angles, rates, world, margins, costs, ws.work, ws.blocks,
-            ws.factors, ws.scratch,
-        )  # fmt: skip
+        code, done, component = _advance(system, coefficients, done, last, inputs, record, ws)
         if code != newton.CONVERGED:
             reason = "singular" if code == newton.SINGULAR else "diverged"
-            exact = refined_step(system, integrator, h, done, earlier, states, angles, rates, world, ws)
+            exact = refined_step(system, integrator, h, done, inputs, record, ws)
             if exact is None:
-                raise SimulationFailure(done * h, component, reason, copy_of_instant(states, done - 1))
+                raise SimulationFailure(done * h, component, reason, copy_of_instant(record.states, done - 1))
             if not exact:
-                refined.append(done)
+                all_refined.append(done)
             done += 1
         if progress is not None:
             progress(done / total)
-    solved, factorisations = (int(part) for part in costs[:, :2].sum(axis=0))
+    solved, factorisations = (int(cost) for cost in record.costs[:, :2].sum(axis=0))
     return Trajectory(
-        h, states, world, solved, factorisations, float(costs[:, 2].max()), time.perf_counter() - begin, integrator,
-        tuple(refined), margins, costs,
+        h, record.states, inputs.world, solved, factorisations, float(record.costs[:, 2].max()),
+        time.perf_counter() - begin, integrator, tuple(all_refined), record.margins, record.costs,
     )  # fmt: skip

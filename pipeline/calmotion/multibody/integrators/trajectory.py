@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 
-from calmotion.multibody.model.system import State
+from calmotion.multibody.model.system import Instants, State
 from calmotion.shot.character import Array
 from calmotion.support.compilation import kernel
 
@@ -23,10 +24,10 @@ class Trajectory:
         factorisations: In all.
         max_joint_gap: Largest position gap of a joint [m].
         wall_s: Time it took [s].
-        integrator: Name of the scheme.
+        integrator: Its name.
         refined: Instants that only smaller steps reached.
-        margins: How far the closed loops are from a pose in which they have one more way to move, shape [T]: see
-            `loops.Border`; zeros where there are none.
+        margins: Distance of the closed chains from a pose in which they have one more degree of freedom, shape [T]: see
+            `closed_chains.Border`; zeros where there are none.
         costs: Of each instant: linear systems solved, factorisations, largest position gap of a joint [m]; shape
             [T, 3], empty where they were not counted.
     """
@@ -44,10 +45,44 @@ class Trajectory:
     costs: Array = field(default_factory=lambda: np.zeros((0, 3)))
 
 
+class Inputs(NamedTuple):
+    """What drives a simulation.
+
+    Attributes:
+        angles, rates: Angle [rad] (or length [m]) and rate of each joint's motor, shape [T, J].
+        world: Moving markers of the world, shape [T, W, 18].
+    """
+
+    angles: Array
+    rates: Array
+    world: Array
+
+
+class Record(NamedTuple):
+    """What the steps of a simulation fill.
+
+    Attributes:
+        earlier: The state of the instant before the first.
+        states, margins, costs: See `Trajectory`.
+    """
+
+    earlier: State
+    states: State
+    margins: Array
+    costs: Array
+
+
 @kernel
-def instant_of(states, n):
+def instant_of(states: State, n: int) -> State:
     """Views of instant n of a trajectory."""
     return State(states.c[n], states.q[n], states.u[n], states.turn[n], states.V[n], states.lam[n])
+
+
+@kernel
+def instants_of(earlier: State, states: State, n: int) -> Instants:
+    """Views of instant n >= 1 of a trajectory and the two before it."""
+    before2 = earlier if n == 1 else instant_of(states, n - 2)
+    return Instants(before2, instant_of(states, n - 1), instant_of(states, n))
 
 
 def copy_of_instant(states: State, n: int) -> State:

@@ -1,48 +1,48 @@
-"""Inertia, elastic, damping and gravity terms of a component that never turns, and their Jacobians; compiled.
+"""Inertia, elastic, damping and gravity terms of a non-rotating component, and their Jacobians; compiled.
 
-What an angular velocity or a deformation changes of the inertia is left out. With s = s0 + M3^T u, J = tr(Z0) E - Z0,
+The change of the inertia by angular velocity and deformation is neglected. With s = s0 + M3^T u, J = tr(Z0) E - Z0,
 b_k = axial(M4_k) and a = R^T (c'' - g), in body axes, the rows are
 
     translation  m a + alpha x s + M3^T v'
     rotation     s x a + J alpha + sum_k v'_k b_k
     elastic j    M3_j . a + b_j . alpha + v'_j + k_j u_j + d_j v_j
 
-which is `inertia` for omega = 0, its J(u) and b_k(u) taken at u = 0. Where the frame cannot turn these two act on
-nothing but the moment that holds it, and nothing is lost; where it turns a little, with the deflection of what carries
-it, terms of second order in the deflection are. The center of mass still moves with u, as its weight bends what
-carries it; a holds gravity and acceleration alike, so that s is one and the same for both, and for the mass matrix to
-be symmetric.
+which is `inertia` for omega = 0, its J(u) and b_k(u) taken at u = 0. Where the frame cannot rotate, these two affect
+only the reaction moment, and the motion is exact. Where the frame rotates a little, by the deflection of the component
+that carries it, terms of second order in the deflection are neglected. The center of mass still moves with u, as its
+weight deflects the component that carries it. The vector a combines gravity and acceleration, so that both use the
+same s and the mass matrix is symmetric.
 """
 
 from __future__ import annotations
 
+from calmotion.multibody.kernels.components import Component, ComponentMotion
 from calmotion.multibody.kernels.inertia import rigid_mass_matrix
+from calmotion.multibody.kernels.work import Work
+from calmotion.shot.character import Array
 from calmotion.support.compilation import kernel
 
 
 @kernel
-def straight_residual(r, mass, s0, Z0, M3, axial0, stiffness, damping, a, al, u, v, vd, s, res):
-    """Rows of one component without its joints, into res, shape [6 + r], and s, shape [3].
-
-    Args:
-        axial0: b_k, shape [r, 3].
-        a, al: R^T (c'' - g), alpha, body axes, shape [3].
-        u, v, vd: Elastic coordinates, their rates and accelerations, shape [r].
-    """
+def nonrotating_residual(component: Component, motion: ComponentMotion, work: Work, res: Array) -> None:
+    """Rows of one component without its joints, into res, shape [6 + r]; leaves s in work.s."""
+    r, mass, s0, Z0 = component.r, component.mass, component.s, component.Z
+    M3, axial0, stiffness, damping = component.M3, component.axial0, component.stiffness, component.damping
+    a, al, u, v, vd, s = motion.a, motion.al, motion.u, motion.v, motion.vd, work.s
     trace = Z0[0, 0] + Z0[1, 1] + Z0[2, 2]
     for i in range(3):
         t = s0[i]
         f = mass * a[i]
-        m = trace * al[i]
+        moment = trace * al[i]
         for k in range(3):
-            m -= Z0[i, k] * al[k]
+            moment -= Z0[i, k] * al[k]
         for j in range(r):
             t += M3[j, i] * u[j]
             f += M3[j, i] * vd[j]
-            m += axial0[j, i] * vd[j]
+            moment += axial0[j, i] * vd[j]
         s[i] = t
         res[i] = f
-        res[3 + i] = m
+        res[3 + i] = moment
     for i in range(3):
         k, m = (i + 1) % 3, (i + 2) % 3
         res[i] += al[k] * s[m] - al[m] * s[k]
@@ -57,9 +57,10 @@ def straight_residual(r, mass, s0, Z0, M3, axial0, stiffness, damping, a, al, u,
 
 
 @kernel
-def straight_mass_matrix(r, mass, s, Z0, M3, axial0, D):
-    """D, shape [6 + r, 6 + r]: the rows by (a, alpha, v'), symmetric."""
-    rigid_mass_matrix(mass, s, Z0, D)
+def nonrotating_mass_matrix(component: Component, work: Work, D: Array) -> None:
+    """D, shape [6 + r, 6 + r]: the rows by (a, alpha, v'), symmetric; needs `nonrotating_residual` first."""
+    r, M3, axial0 = component.r, component.M3, component.axial0
+    rigid_mass_matrix(component.mass, work.s, component.Z, D)
     for j in range(r):
         for i in range(3):
             D[6 + j, i] = M3[j, i]
@@ -72,8 +73,9 @@ def straight_mass_matrix(r, mass, s, Z0, M3, axial0, D):
 
 
 @kernel
-def straight_velocity_jacobian(r, damping, P):
-    """P, shape [6 + r, 6 + r]: the rows by (c', omega, v) at fixed acceleration, of which only v moves any."""
+def nonrotating_velocity_jacobian(component: Component, P: Array) -> None:
+    """P, shape [6 + r, 6 + r]: the rows by (c', omega, v) at fixed acceleration; only those by v are not zero."""
+    r, damping = component.r, component.damping
     for i in range(6 + r):
         for k in range(6 + r):
             P[i, k] = 0.0
@@ -83,12 +85,13 @@ def straight_velocity_jacobian(r, damping, P):
 
 
 @kernel
-def straight_position_jacobian(r, M3, stiffness, a, al, D, K):
+def nonrotating_position_jacobian(component: Component, motion: ComponentMotion, D: Array, K: Array) -> None:
     """K, shape [6 + r, 6 + r]: the rows by (R^T dc, dphi, du) at fixed c', omega, v and their rates.
 
     Args:
-        D: From `straight_mass_matrix`.
+        D: From `nonrotating_mass_matrix`.
     """
+    r, M3, stiffness, a, al = component.r, component.M3, component.stiffness, motion.a, motion.al
     n = 6 + r
     # turning the body turns a: da = [a]x dphi
     for i in range(n):

@@ -16,13 +16,14 @@ from __future__ import annotations
 import math
 
 from calmotion.multibody.kernels.so3 import exponential, right_jacobian, right_jacobian_derivative
+from calmotion.shot.character import Array
 from calmotion.support.compilation import kernel
 
 LINEAR_BODY = 0
 
 
 @kernel
-def _cosine(psi):
+def _cosine(psi: Array) -> float:
     s = psi[0] * psi[0] + psi[1] * psi[1] + psi[2] * psi[2]
     if not (s < 1.0):
         return math.nan
@@ -30,7 +31,7 @@ def _cosine(psi):
 
 
 @kernel
-def interface_rotation(kind, psi, R, H):
+def interface_rotation(kind: int, psi: Array, R: Array, H: Array) -> None:
     """R and H with R^T dR = [H dpsi]x, shapes [3, 3]; H of -psi is its transpose."""
     if kind == LINEAR_BODY:
         exponential(psi, R)
@@ -62,7 +63,7 @@ def interface_rotation(kind, psi, R, H):
 
 
 @kernel
-def interface_rotation_derivative(kind, psi, b, sign, out):
+def interface_rotation_derivative(kind: int, psi: Array, b: Array, sign: float, out: Array) -> None:
     """d/dpsi of H(sign psi) b into out, shape [3, 3]; sign +1 or -1."""
     if kind == LINEAR_BODY:
         right_jacobian_derivative(psi, b, sign, out)

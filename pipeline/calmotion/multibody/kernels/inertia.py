@@ -12,12 +12,17 @@ which is formulation, section 1 (Seed (4)-(10), (19)-(22), with the rows of c an
 
 from __future__ import annotations
 
+from calmotion.multibody.kernels.components import Component, ComponentMotion
+from calmotion.multibody.kernels.work import Work
+from calmotion.shot.character import Array
 from calmotion.support.compilation import kernel
 
 
 @kernel
-def deformed_integrals(r, s0, Z0, M3, M4, S, u, s, Z, B):
-    """s, Z and B_j (shapes [3], [3, 3], [r, 3, 3]) of the deformed component."""
+def deformed_integrals(component: Component, u: Array, work: Work) -> None:
+    """s, Z and B_j (shapes [3], [3, 3], [r, 3, 3]) of the deformed component into the scratch."""
+    r, s0, Z0, M3, M4, S = component.r, component.s, component.Z, component.M3, component.M4, component.S
+    s, Z, B = work.s, work.Z, work.B
     for i in range(3):
         t = s0[i]
         for j in range(r):
@@ -40,7 +45,7 @@ def deformed_integrals(r, s0, Z0, M3, M4, S, u, s, Z, B):
 
 
 @kernel
-def _gradient_of_acceleration(al, om, W):
+def _gradient_of_acceleration(al: Array, om: Array, W: Array) -> None:
     """W = [alpha]x + [omega]x^2."""
     w2 = om[0] * om[0] + om[1] * om[1] + om[2] * om[2]
     for a in range(3):
@@ -56,7 +61,7 @@ def _gradient_of_acceleration(al, om, W):
 
 
 @kernel
-def _axial_of_product(Z, W, out):
+def _axial_of_product(Z: Array, W: Array, out: Array) -> None:
     """out = axial(Z W^T), with axial(y z^T) = y x z."""
     for i in range(3):
         k, m = (i + 1) % 3, (i + 2) % 3
@@ -67,7 +72,7 @@ def _axial_of_product(Z, W, out):
 
 
 @kernel
-def _elastic_momentum(r, M3, v):
+def _elastic_momentum(r: int, M3: Array, v: Array) -> tuple[float, float, float]:
     """int rho Phi v = M3^T v."""
     p0 = 0.0
     p1 = 0.0
@@ -80,14 +85,15 @@ def _elastic_momentum(r, M3, v):
 
 
 @kernel
-def body_residual(r, mass, M3, S, axial, stiffness, damping, a, om, al, u, v, vd, s, Z, B, W, tmp, res):
-    """Rows of one component without its joints, into res, shape [6 + r]; needs `deformed_integrals` first.
+def body_residual(component: Component, motion: ComponentMotion, work: Work, res: Array) -> None:
+    """Rows of one component without its joints, into res, shape [6 + r].
 
-    Args:
-        a, om, al: R^T (c'' - g), omega, alpha, body axes, shape [3].
-        u, v, vd: Elastic coordinates, their rates and accelerations, shape [r].
-        W, tmp: Scratch, shapes [3, 3] and [3]; W holds [alpha]x + [omega]x^2 afterwards.
+    Needs `deformed_integrals` first; leaves [alpha]x + [omega]x^2 in work.W.
     """
+    r, mass, M3, axial = component.r, component.mass, component.M3, component.axial
+    stiffness, damping = component.stiffness, component.damping
+    a, om, al, u, v, vd = motion.a, motion.om, motion.al, motion.u, motion.v, motion.vd
+    s, Z, B, W, tmp = work.s, work.Z, work.B, work.W, work.tmp
     _gradient_of_acceleration(al, om, W)
     p0, p1, p2 = _elastic_momentum(r, M3, v)
     for i in range(3):
@@ -119,13 +125,13 @@ def body_residual(r, mass, M3, S, axial, stiffness, damping, a, om, al, u, v, vd
             for k in range(3):
                 t += W[i, k] * B[j, k, i]
         for k in range(r):
-            turning = om[0] * axial[k, j, 0] + om[1] * axial[k, j, 1] + om[2] * axial[k, j, 2]
-            t += v[k] * (damping[j, k] + 2.0 * turning)
+            rotating = om[0] * axial[k, j, 0] + om[1] * axial[k, j, 1] + om[2] * axial[k, j, 2]
+            t += v[k] * (damping[j, k] + 2.0 * rotating)
         res[6 + j] = t
 
 
 @kernel
-def rigid_mass_matrix(mass, s, Z, D):
+def rigid_mass_matrix(mass: float, s: Array, Z: Array, D: Array) -> None:
     """The part of `mass_matrix` by (a, alpha), shape [6, 6]."""
     trace = Z[0, 0] + Z[1, 1] + Z[2, 2]
     for i in range(3):
@@ -148,9 +154,10 @@ def rigid_mass_matrix(mass, s, Z, D):
 
 
 @kernel
-def mass_matrix(r, mass, M3, s, Z, B, D):
+def mass_matrix(component: Component, work: Work, D: Array) -> None:
     """D, shape [6 + r, 6 + r]: the rows by (a, alpha, v'), symmetric. Formulation, section 1."""
-    rigid_mass_matrix(mass, s, Z, D)
+    r, M3, B = component.r, component.M3, work.B
+    rigid_mass_matrix(component.mass, work.s, work.Z, D)
     for j in range(r):
         for i in range(3):
             k, m = (i + 1) % 3, (i + 2) % 3
@@ -165,8 +172,10 @@ def mass_matrix(r, mass, M3, s, Z, B, D):
 
 
 @kernel
-def velocity_jacobian(r, M3, axial, damping, om, v, s, Z, B, P):
+def velocity_jacobian(component: Component, motion: ComponentMotion, work: Work, P: Array) -> None:
     """P, shape [6 + r, 6 + r]: the rows by (c', omega, v) at fixed acceleration; its first three columns are zero."""
+    r, M3, axial, damping = component.r, component.M3, component.axial, component.damping
+    om, v, s, Z, B = motion.om, motion.v, work.s, work.Z, work.B
     n = 6 + r
     for i in range(n):
         for k in range(n):
@@ -226,18 +235,22 @@ def velocity_jacobian(r, M3, axial, damping, om, v, s, Z, B, P):
                 g += 2.0 * v[l] * axial[l, j, i]
             P[6 + j, 3 + i] = g
         for k in range(r):
-            turning = om[0] * axial[k, j, 0] + om[1] * axial[k, j, 1] + om[2] * axial[k, j, 2]
-            P[6 + j, 6 + k] = 2.0 * turning + damping[j, k]
+            rotating = om[0] * axial[k, j, 0] + om[1] * axial[k, j, 1] + om[2] * axial[k, j, 2]
+            P[6 + j, 6 + k] = 2.0 * rotating + damping[j, k]
 
 
 @kernel
-def position_jacobian(r, M3, S, axial, stiffness, a, om, v, vd, B, W, D, E, T, tmp, K):
+def position_jacobian(component: Component, motion: ComponentMotion, work: Work, D: Array, K: Array) -> None:
     """K, shape [6 + r, 6 + r]: the rows by (R^T dc, dphi, du) at fixed c', omega, v and their rates.
 
+    Needs `body_residual` first.
+
     Args:
-        W, D: From `body_residual` and `mass_matrix`.
-        E, T, tmp: Scratch, shapes [3, 3], [3, 3], [3].
+        D: From `mass_matrix`.
     """
+    r, M3, S, axial, stiffness = component.r, component.M3, component.S, component.axial, component.stiffness
+    a, om, v, vd = motion.a, motion.om, motion.v, motion.vd
+    B, W, E, T, tmp = work.B, work.W, work.E, work.T, work.tmp
     n = 6 + r
     # turning the body turns a: da = [a]x dphi
     for i in range(n):

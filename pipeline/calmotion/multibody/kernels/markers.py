@@ -18,6 +18,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from calmotion.multibody.kernels.components import ComponentMarker
 from calmotion.multibody.kernels.finite_rotation import interface_rotation, interface_rotation_derivative
 from calmotion.multibody.kernels.so3 import cross
 from calmotion.shot.character import Array
@@ -58,7 +59,7 @@ def allocate_marker(size: int) -> MarkerWork:
 
 
 @kernel
-def fixed_marker(position, rotation, m):
+def fixed_marker(position: Array, rotation: Array, m: MarkerWork) -> None:
     """A marker of the world: constant frame, no velocity."""
     for i in range(3):
         m.p[i] = position[i]
@@ -72,7 +73,7 @@ WORLD_MARKER = 18  # entries of a moving marker of the world
 
 
 @kernel
-def moving_marker(frame, m):
+def moving_marker(frame: Array, m: MarkerWork) -> None:
     """A marker of the world whose motion is given: position, velocity, angular velocity in its own axes, and its
     rotation matrix by rows, shape [18]."""
     for i in range(3):
@@ -84,8 +85,13 @@ def moving_marker(frame, m):
 
 
 @kernel
-def marker_values(r, kind, position, rotation, Phi, Psi, c, Rb, u, V, m):
-    """Position, velocity, rotation and angular velocity of the marker, into m."""
+def marker_values(marker: ComponentMarker, c: Array, Rb: Array, u: Array, V: Array, m: MarkerWork) -> None:
+    """Position, velocity, rotation and angular velocity of the marker, into m.
+
+    Args:
+        c, Rb, u, V: Origin, rotation matrix, elastic coordinates and velocities of its component.
+    """
+    r, position, rotation, Phi, Psi = marker.r, marker.position, marker.rotation, marker.Phi, marker.Psi
     om = V[3:6]
     for i in range(3):
         y = position[i]
@@ -104,7 +110,7 @@ def marker_values(r, kind, position, rotation, Phi, Psi, c, Rb, u, V, m):
     cross(om, m.y, m.yd)
     for i in range(3):
         m.yd[i] += m.p[i]
-    interface_rotation(kind, m.psi, m.ex, m.jr)
+    interface_rotation(marker.law, m.psi, m.ex, m.jr)
     for i in range(3):
         p = c[i]
         pd = V[i]
@@ -134,7 +140,7 @@ def marker_values(r, kind, position, rotation, Phi, Psi, c, Rb, u, V, m):
 
 
 @kernel
-def _minus_skew(y, out, column):
+def _minus_skew(y: Array, out: Array, column: int) -> None:
     """out[:, column:column+3] = -[y]x."""
     out[0, column] = 0.0
     out[0, column + 1] = y[2]
@@ -148,7 +154,7 @@ def _minus_skew(y, out, column):
 
 
 @kernel
-def _rotate_rows(rotation, B, Psi, r, out):
+def _rotate_rows(rotation: Array, B: Array, Psi: Array, r: int, out: Array) -> None:
     """out[:, 6:] = R_0^T B Psi."""
     for i in range(3):
         b0 = rotation[0, i] * B[0, 0] + rotation[1, i] * B[1, 0] + rotation[2, i] * B[2, 0]
@@ -159,8 +165,9 @@ def _rotate_rows(rotation, B, Psi, r, out):
 
 
 @kernel
-def marker_jacobian(r, rotation, Phi, Psi, m):
+def marker_jacobian(marker: ComponentMarker, m: MarkerWork) -> None:
     """Jp and Jf of the marker; needs `marker_values` first."""
+    r, rotation, Phi, Psi = marker.r, marker.rotation, marker.Phi, marker.Psi
     for i in range(3):
         for k in range(3):
             m.Jp[i, k] = 0.0
@@ -177,8 +184,9 @@ def marker_jacobian(r, rotation, Phi, Psi, m):
 
 
 @kernel
-def marker_velocity_jacobian(r, kind, rotation, Phi, Psi, V, m):
+def marker_velocity_jacobian(marker: ComponentMarker, V: Array, m: MarkerWork) -> None:
     """Gp and Gf of the marker; needs `marker_values` first."""
+    r, rotation, Phi, Psi = marker.r, marker.rotation, marker.Phi, marker.Psi
     om = V[3:6]
     for i in range(3):
         k, n = (i + 1) % 3, (i + 2) % 3
@@ -189,7 +197,7 @@ def marker_velocity_jacobian(r, kind, rotation, Phi, Psi, V, m):
             m.Gp[i, 6 + j] = om[k] * Phi[n, j] - om[n] * Phi[k, j]
     _minus_skew(m.yd, m.Gp, 3)
     # d(exp(-psi) omega) = [e]x J_r dpsi, and d(J_r(psi) psid)
-    interface_rotation_derivative(kind, m.psi, m.psid, 1.0, m.A)
+    interface_rotation_derivative(marker.law, m.psi, m.psid, 1.0, m.A)
     for i in range(3):
         k, n = (i + 1) % 3, (i + 2) % 3
         for l in range(3):
@@ -198,14 +206,15 @@ def marker_velocity_jacobian(r, kind, rotation, Phi, Psi, V, m):
 
 
 @kernel
-def add_wrench_stiffness(r, kind, rotation, Phi, Psi, f, t, sign, m, K):
+def add_wrench_stiffness(marker: ComponentMarker, f: Array, t: Array, sign: float, m: MarkerWork, K: Array) -> None:
     """K += sign * d(generalised force)/d(R^T dc, dphi, du) for a force f fixed in the world and a moment t fixed
-    in marker axes. ModelChoices `marker_values` first.
+    in marker axes; needs `marker_values` first.
 
     Args:
         f: R^T f, body axes, shape [3].
         t: Moment in marker axes, shape [3].
     """
+    r, rotation, Phi, Psi = marker.r, marker.rotation, marker.Phi, marker.Psi
     # [f]x in A
     _minus_skew(f, m.A, 0)
     for i in range(3):
@@ -242,7 +251,7 @@ def add_wrench_stiffness(r, kind, rotation, Phi, Psi, f, t, sign, m, K):
         for j in range(r):
             K[3 + i, 6 + j] += sign * (m.C[i, 0] * Psi[0, j] + m.C[i, 1] * Psi[1, j] + m.C[i, 2] * Psi[2, j])
     # J_r(psi)^T = J_r(-psi)
-    interface_rotation_derivative(kind, m.psi, b, -1.0, m.A)
+    interface_rotation_derivative(marker.law, m.psi, b, -1.0, m.A)
     for j in range(r):
         for i in range(3):
             m.C[0, i] = Psi[0, j] * m.A[0, i] + Psi[1, j] * m.A[1, i] + Psi[2, j] * m.A[2, i]

@@ -16,13 +16,16 @@ from __future__ import annotations
 
 import math
 
+from calmotion.multibody.kernels.components import ElasticLaw
+from calmotion.multibody.kernels.work import LawWork
+from calmotion.shot.character import Array
 from calmotion.support.compilation import kernel
 
 JOIN = 0.2  # volume ratio below which the logarithm is continued as a parabola; `fem.cubature` does the same
 
 
 @kernel
-def volumetric(J, lame, mu):
+def volumetric(J: float, lame: float, mu: float) -> tuple[float, float, float]:
     """(g, g', energy density of the terms in J) [Pa]."""
     if J >= JOIN:
         L, d1, d2 = math.log(J), 1.0 / J, -1.0 / (J * J)
@@ -36,18 +39,19 @@ def volumetric(J, lame, mu):
 
 
 @kernel
-def cofactor(F, out):
+def cofactor(F: Array, out: Array) -> float:
     """cof F = J F^-T of a matrix given as nine entries, row by row; returns J."""
     for i in range(3):
         a, b = 3 * ((i + 1) % 3), 3 * ((i + 2) % 3)
         for j in range(3):
             k, l = (j + 1) % 3, (j + 2) % 3
             out[3 * i + j] = F[a + k] * F[b + l] - F[a + l] * F[b + k]
-    return F[0] * out[0] + F[1] * out[1] + F[2] * out[2]
+    J: float = F[0] * out[0] + F[1] * out[1] + F[2] * out[2]
+    return J
 
 
 @kernel
-def stress_tangent(F, mu, g, dg, cof, A):
+def stress_tangent(F: Array, mu: float, g: float, dg: float, cof: Array, A: Array) -> None:
     """dP/dF, shape [9, 9], both indices row by row."""
     for m in range(9):
         for n in range(9):
@@ -70,8 +74,9 @@ def stress_tangent(F, mu, g, dg, cof, A):
 
 
 @kernel
-def viscous_stress(F, Fd, lame, mu, beta, S, P):
+def viscous_stress(law: ElasticLaw, F: Array, Fd: Array, S: Array, P: Array) -> None:
     """P += beta F S with S = C : sym(F^T F'), which is left in S (nine entries)."""
+    lame, mu, beta = law.lame[0], law.lame[1], law.retardation
     trace = 0.0
     for i in range(3):
         for j in range(3):
@@ -92,8 +97,9 @@ def viscous_stress(F, Fd, lame, mu, beta, S, P):
 
 
 @kernel
-def _viscous_direction(F, Fd, S, dF, dFd, lame, mu, out):
+def _viscous_direction(law: ElasticLaw, F: Array, Fd: Array, S: Array, dF: Array, dFd: Array, out: Array) -> None:
     """Derivative of F S(F, F') in the direction (dF, dF'), nine entries each."""
+    lame, mu = law.lame[0], law.lame[1]
     trace = 0.0
     for i in range(3):
         for j in range(3):
@@ -115,7 +121,9 @@ def _viscous_direction(F, Fd, S, dF, dFd, lame, mu, out):
 
 
 @kernel
-def _deformation(r, u, v, at, cubature, F, Fd):
+def _deformation(law: ElasticLaw, u: Array, v: Array, at: int, F: Array, Fd: Array) -> None:
+    """Deformation gradient and its rate, nine entries each, at the point whose modes' gradients start at `at`."""
+    r, cubature = law.r, law.data
     for m in range(9):
         F[m] = 0.0
         Fd[m] = 0.0
@@ -134,19 +142,20 @@ def _deformation(r, u, v, at, cubature, F, Fd):
 
 
 @kernel
-def neohookean_forces(r, u, v, lame, mu, beta, at, count, cubature, tangent, w, Y, res, P, K):
+def neohookean_forces(
+    law: ElasticLaw, u: Array, v: Array, tangent: bool, work: LawWork, res: Array, P: Array, K: Array
+) -> None:
     """Adds the forces to res[6:], and with `tangent` their derivatives by v and by u to P and K.
 
     Args:
+        law: Its data start with a correction of the stiffness (r x r, for the part that the points do not integrate
+            exactly), then for each point its weight [m^3] and the displacement gradients of the modes, 9 x r, row by
+            row.
         u, v: Elastic coordinates and their rates, shape [r].
-        lame, mu: Lame's constants [Pa].
-        beta: Retardation time of Kelvin-Voigt damping [s].
-        at, count, cubature: Where this body's points start in a flat array, and how many there are. The array holds
-            a correction of the stiffness (r x r, for the part that the points do not integrate exactly), then for
-            each point its weight [m^3] and the displacement gradients of the modes, 9 x r, row by row.
-        w, Y: Scratch, shapes [18, 18] and [18, r].
         res, P, K: Shapes [6 + r], [6 + r, 6 + r] twice.
     """
+    r, lame, mu, beta = law.r, law.lame[0], law.lame[1], law.retardation
+    at, cubature, w, Y = law.start, law.data, work.point, work.rows
     for i in range(r):
         t = 0.0
         for k in range(r):
@@ -157,17 +166,17 @@ def neohookean_forces(r, u, v, lame, mu, beta, at, count, cubature, tangent, w, 
         res[6 + i] += t
     F, Fd, stress, cof, S = w[0], w[1], w[2], w[3], w[4]
     A = w[9:]
-    for point in range(count):
+    for point in range(law.points):
         start = at + r * r + point * (1 + 9 * r)
         weight = cubature[start]
         G = start + 1
-        _deformation(r, u, v, G, cubature, F, Fd)
+        _deformation(law, u, v, G, F, Fd)
         J = cofactor(F, cof)
         g, dg, _ = volumetric(J, lame, mu)
         for m in range(9):
             stress[m] = mu * F[m] + g * cof[m]
         if beta != 0.0:
-            viscous_stress(F, Fd, lame, mu, beta, S, stress)
+            viscous_stress(law, F, Fd, S, stress)
         for m in range(9):
             s = weight * stress[m]
             for i in range(r):
@@ -182,7 +191,7 @@ def neohookean_forces(r, u, v, lame, mu, beta, at, count, cubature, tangent, w, 
                     t += A[m, n] * cubature[G + n * r + k]
                 Y[m, k] = weight * t
         if beta != 0.0:
-            _viscous_rows(r, F, Fd, S, lame, mu, beta, weight, G, cubature, w, Y)
+            _viscous_rows(law, weight, G, work)
         for m in range(9):
             for i in range(r):
                 s = cubature[G + m * r + i]
@@ -197,17 +206,23 @@ def neohookean_forces(r, u, v, lame, mu, beta, at, count, cubature, tangent, w, 
 
 
 @kernel
-def _viscous_rows(r, F, Fd, S, lame, mu, beta, weight, G, cubature, w, Y):
-    """Adds the viscous stress's derivative by u to Y[:9] and puts that by v into Y[9:]."""
-    dF, zero, out = w[5], w[6], w[7]
+def _viscous_rows(law: ElasticLaw, weight: float, G: int, work: LawWork) -> None:
+    """Adds the viscous stress's derivative by u to the first nine rows and writes that by v to the next nine.
+
+    Args:
+        weight: Of the point [m^3].
+        G: Where the gradients of the modes at the point start in the law's data.
+    """
+    r, beta, cubature, w, Y = law.r, law.retardation, law.data, work.point, work.rows
+    F, Fd, S, dF, zero, out = w[0], w[1], w[4], w[5], w[6], w[7]
     for m in range(9):
         zero[m] = 0.0
     for k in range(r):
         for m in range(9):
             dF[m] = cubature[G + m * r + k]
-        _viscous_direction(F, Fd, S, dF, zero, lame, mu, out)
+        _viscous_direction(law, F, Fd, S, dF, zero, out)
         for m in range(9):
             Y[m, k] += weight * beta * out[m]
-        _viscous_direction(F, Fd, S, zero, dF, lame, mu, out)
+        _viscous_direction(law, F, Fd, S, zero, dF, out)
         for m in range(9):
             Y[9 + m, k] = weight * beta * out[m]

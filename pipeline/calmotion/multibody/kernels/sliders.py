@@ -1,39 +1,43 @@
-"""Joints with a length: the parent-side marker is moved along its own z axis by it; compiled.
+"""Prismatic joints: the parent-side marker is moved along its own z axis by the joint's length; compiled.
 
 With A = R^T R_m the marker's axes in the body's, d the length and z the marker's third axis, the marker's point moves
 by R_m z d. A force f (world) at the moved point is the force f at the marker and the moment d z x R_m^T f about it, so
-that what `markers` knows of a marker serves a slider too.
+that the functions of `markers` apply to sliders.
 
 Where a motor sets d, the joint has the six rows of a weld. On a free slider d = z . R_m^T (p_j - p_m) follows the
-motion: rows and force are taken in the marker's axes, those along z fall away, and their place (number LENGTH) is
-taken by the length as an unknown of its own: its row is its definition, and its column how the force on the parent
-moves with it, which nothing else in the tree's equations could hold.
+motion: rows and force are taken in the marker's axes, those along z are removed, and their place (number LENGTH) is
+taken by the length as an unknown: its row is its definition, and its column the derivative of the force on the parent
+by the length, which no other term of the tree's equations contains.
 """
 
 from __future__ import annotations
 
-from calmotion.multibody.model.system import JOINT_ROWS
+from calmotion.multibody.kernels.markers import MarkerWork
+from calmotion.multibody.model.system import JOINT_ROWS, System
+from calmotion.shot.character import Array
 from calmotion.support.compilation import kernel
 
 LENGTH = 2
 
 
 @kernel
-def slides_freely(system, joint):
+def slides_freely(system: System, joint: int) -> bool:
     """Whether a joint is a slider without a motor."""
-    return system.sliding[joint] != 0 and system.rows[joint] < JOINT_ROWS
+    free: bool = system.sliding[joint] != 0 and system.rows[joint] < JOINT_ROWS
+    return free
 
 
 @kernel
-def has_row(system, joint, i):
+def has_row(system: System, joint: int, i: int) -> bool:
     """Whether row i of a joint is one of its constraints."""
     if slides_freely(system, joint):
         return i != LENGTH
-    return i < system.rows[joint]
+    present: bool = i < system.rows[joint]
+    return present
 
 
 @kernel
-def free_length(mi, mj):
+def free_length(mi: MarkerWork, mj: MarkerWork) -> float:
     """Length of a free slider, before `slide`."""
     t = 0.0
     for i in range(3):
@@ -42,7 +46,7 @@ def free_length(mi, mj):
 
 
 @kernel
-def slide(value, rate, m):
+def slide(value: float, rate: float, m: MarkerWork) -> None:
     """Move the marker: its position and velocity, after `marker_values`, `fixed_marker` or `moving_marker`."""
     for i in range(3):
         m.p[i] += m.R[i, 2] * value
@@ -51,7 +55,7 @@ def slide(value, rate, m):
 
 
 @kernel
-def _marker_axes(Rb, m):
+def _marker_axes(Rb: Array, m: MarkerWork) -> None:
     """A = R^T R_m into m.C."""
     for i in range(3):
         for k in range(3):
@@ -62,7 +66,7 @@ def _marker_axes(Rb, m):
 
 
 @kernel
-def slide_jacobian(n, value, Rb, m):
+def slide_jacobian(n: int, value: float, Rb: Array, m: MarkerWork) -> None:
     """Jp of the moved point, after `marker_jacobian`."""
     _marker_axes(Rb, m)
     for a in range(n):
@@ -71,10 +75,10 @@ def slide_jacobian(n, value, Rb, m):
 
 
 @kernel
-def slide_velocity_jacobian(n, value, rate, Rb, m):
+def slide_velocity_jacobian(n: int, value: float, rate: float, Rb: Array, m: MarkerWork) -> None:
     """Gp of the moved point, after `marker_velocity_jacobian`."""
     _marker_axes(Rb, m)
-    # the velocity that sliding adds, in marker axes
+    # the velocity added by sliding, in marker axes
     q0, q1, q2 = value * m.w[1], -value * m.w[0], rate
     for a in range(n):
         f0, f1, f2 = m.Jf[0, a], m.Jf[1, a], m.Jf[2, a]
@@ -86,14 +90,17 @@ def slide_velocity_jacobian(n, value, rate, Rb, m):
 
 
 @kernel
-def slide_wrench(n, value, f, t, sign, Rb, m, K, moment, on_parent):
-    """The moment that stands for a force at the moved point, and what follows from it.
+def slide_wrench(
+    n: int, value: float, f: Array, t: Array, sign: float, Rb: Array, m: MarkerWork, K: Array, moment: Array,
+    on_parent: Array,
+) -> None:  # fmt: skip
+    """The moment about the marker of a force at the moved point, and its derivatives.
 
     Args:
         f: R^T f, body axes, shape [3].
         t: Moment in marker axes, shape [3].
         moment: t + d z x R_m^T f, for `add_wrench_stiffness`; result, shape [3].
-        K: += sign * derivative of the generalised force by the marker's turning under a fixed f, shape [n, n].
+        K: += sign * derivative of the generalised force by the marker's rotation under a fixed f, shape [n, n].
         on_parent: sign * derivative of the generalised force by the length; result, shape [n].
     """
     _marker_axes(Rb, m)
@@ -107,20 +114,20 @@ def slide_wrench(n, value, f, t, sign, Rb, m, K, moment, on_parent):
     for a in range(n):
         on_parent[a] = sign * (m.Jf[1, a] * f0 - m.Jf[0, a] * f1)
         for k in range(n):
-            # a turning dphi changes R_m^T f by f x dphi
+            # a rotation dphi changes R_m^T f by f x dphi
             g0 = f1 * m.Jf[2, k] - f2 * m.Jf[1, k]
             g1 = f2 * m.Jf[0, k] - f0 * m.Jf[2, k]
             K[a, k] += sign * value * (m.Jf[1, a] * g0 - m.Jf[0, a] * g1)
 
 
 @kernel
-def turning_force(n, f, m, Rb, Rm, sign, out):
-    """out += sign * derivative of the generalised force of R_m f by the turning of R_m.
+def rotated_force(n: int, f: Array, m: MarkerWork, Rb: Array, Rm: Array, sign: float, out: Array) -> None:
+    """out += sign * derivative of the generalised force of R_m f by the rotation of R_m.
 
     Args:
-        f: Force in the axes that turn, shape [3].
+        f: Force in the axes that rotate, shape [3].
         m: Marker at whose point it acts, on the body of rotation Rb.
-        Rm: Rotation that turns.
+        Rm: Rotation matrix of these axes.
         out: Shape [n, 3].
     """
     for k in range(3):
@@ -135,13 +142,13 @@ def turning_force(n, f, m, Rb, Rm, sign, out):
 
 
 @kernel
-def free_rows(n, Rm, length, moved, by_length, H):
+def free_rows(n: int, Rm: Array, length: Array, moved: Array, by_length: Array, H: Array) -> None:
     """Constraint rows of a free slider from those of a driven one: H, shape [6, n], by the coordinates of one side.
 
     Args:
         Rm: Rotation of the parent-side marker.
         length: Derivative of the length by the same coordinates, shape [n].
-        moved: What the marker's turning adds to the first three rows, shape [3, n].
+        moved: Derivative of the first two rows by the marker's rotation, shape [2, n].
         by_length: The first three rows by the length, world axes.
     """
     for a in range(n):
@@ -154,7 +161,7 @@ def free_rows(n, Rm, length, moved, by_length, H):
 
 
 @kernel
-def free_columns(n, Rm, L):
+def free_columns(n: int, Rm: Array, L: Array) -> None:
     """Columns of a free slider's force from those of a driven one, world axes: L, shape [n, 6]."""
     for a in range(n):
         x, y, z = L[a, 0], L[a, 1], L[a, 2]

@@ -10,13 +10,14 @@ import math
 
 import numpy as np
 
+from calmotion.shot.character import Array
 from calmotion.support.compilation import allocating_kernel, kernel
 
 _SMALL = 1e-2  # below this squared angle the four-term series are exact to rounding
 
 
 @kernel
-def cross(a, b, out):
+def cross(a: Array, b: Array, out: Array) -> None:
     """out = a x b; `out` must not alias."""
     out[0] = a[1] * b[2] - a[2] * b[1]
     out[1] = a[2] * b[0] - a[0] * b[2]
@@ -24,7 +25,7 @@ def cross(a, b, out):
 
 
 @kernel
-def coefficients(angle2):
+def coefficients(angle2: float) -> tuple[float, float, float, float, float]:
     """sin(a)/a, (1 - cos a)/a^2, (a - sin a)/a^3 and the derivatives of the last two by a^2."""
     x = angle2
     if x < _SMALL:
@@ -45,7 +46,7 @@ def coefficients(angle2):
 
 
 @kernel
-def _polynomial(t, a, b, out):
+def _polynomial(t: Array, a: float, b: float, out: Array) -> None:
     """out = E + a [t]x + b [t]x^2."""
     x, y, z = t[0], t[1], t[2]
     n = x * x + y * y + z * z
@@ -61,21 +62,21 @@ def _polynomial(t, a, b, out):
 
 
 @kernel
-def exponential(t, out):
+def exponential(t: Array, out: Array) -> None:
     """Rotation matrix of the rotation vector t (shape [3], rad) into out (shape [3, 3])."""
     a0, a1, _, _, _ = coefficients(t[0] * t[0] + t[1] * t[1] + t[2] * t[2])
     _polynomial(t, a0, a1, out)
 
 
 @kernel
-def right_jacobian(t, out):
+def right_jacobian(t: Array, out: Array) -> None:
     """J_r(t) into out, shape [3, 3]; J_r(-t) is its transpose, the left Jacobian."""
     _, a1, a2, _, _ = coefficients(t[0] * t[0] + t[1] * t[1] + t[2] * t[2])
     _polynomial(t, -a1, a2, out)
 
 
 @kernel
-def inverse_right_jacobian(t, out):
+def inverse_right_jacobian(t: Array, out: Array) -> None:
     """J_r(t)^-1 into out, shape [3, 3], for |t| < 2 pi."""
     x = t[0] * t[0] + t[1] * t[1] + t[2] * t[2]
     a0, a1, _, _, _ = coefficients(x)
@@ -87,7 +88,7 @@ def inverse_right_jacobian(t, out):
 
 
 @kernel
-def right_jacobian_derivative(t, b, sign, out):
+def right_jacobian_derivative(t: Array, b: Array, sign: float, out: Array) -> None:
     """d/dt of J_r(sign t) b into out, shape [3, 3]; sign +1 or -1."""
     _, a1, a2, d1, d2 = coefficients(t[0] * t[0] + t[1] * t[1] + t[2] * t[2])
     t0, t1, t2 = t[0], t[1], t[2]
@@ -127,7 +128,7 @@ def right_jacobian_derivative(t, b, sign, out):
 
 
 @kernel
-def matrix_of(q, out):
+def matrix_of(q: Array, out: Array) -> None:
     """Rotation matrix of the quaternion q (w, x, y, z), normalised, into out."""
     w, x, y, z = q[0], q[1], q[2], q[3]
     n = 2.0 / (w * w + x * x + y * y + z * z)
@@ -143,7 +144,7 @@ def matrix_of(q, out):
 
 
 @kernel
-def turn(q, t, out):
+def turn(q: Array, t: Array, out: Array) -> None:
     """out = q exp(t) as unit quaternions; renormalised, which changes it by rounding alone."""
     x2 = 0.25 * (t[0] * t[0] + t[1] * t[1] + t[2] * t[2])
     a0, _, _, _, _ = coefficients(x2)
@@ -161,7 +162,7 @@ def turn(q, t, out):
 
 
 @allocating_kernel
-def logarithm(R, out):
+def logarithm(R: Array, out: Array) -> None:
     """Rotation vector of the rotation matrix R, |out| <= pi, into out."""
     # through the quaternion, largest component first, which is well conditioned at every angle
     q = np.empty(4)
@@ -176,7 +177,7 @@ def logarithm(R, out):
 
 
 @kernel
-def quaternion_of(R, out):
+def quaternion_of(R: Array, out: Array) -> None:
     """Unit quaternion (w, x, y, z), w >= 0, of the rotation matrix R into out."""
     tr = R[0, 0] + R[1, 1] + R[2, 2]
     if tr > 0.0:

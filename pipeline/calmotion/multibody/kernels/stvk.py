@@ -1,6 +1,6 @@
 """Elastic and viscous forces of a St. Venant-Kirchhoff body in reduced coordinates; compiled.
 
-With w = W u the few directions that its quadratic strain sees (all of u where W is none),
+With w = W u the coordinates in the subspace of its quadratic strain (all of u where there is no W),
 z(u) = (u_k; w_k w_l for k <= l) and A the Gram matrix of the strains that belong to it
 (`reduction.elements.elastic_forms`), the energy is z^T A z / 2. Kelvin-Voigt damping adds b C:E' to the stress C:E,
 hence, with J = dz/du,
@@ -9,18 +9,29 @@ hence, with J = dz/du,
     by v       b J^T A J
     by u       J^T A (J + b dz'/du) + d(J^T)/du A (z + b z')
 
-Both are exact: the force is a cubic polynomial, and a rigid turn of the body, of which z holds no strain, costs
-nothing. As pairs are bilinear, J + b dz'/du is J at u + b v.
+Both are exact: the force is a cubic polynomial, and a rigid rotation of the body, whose z has no strain, has no
+energy. As pairs are bilinear, J + b dz'/du is J at u + b v.
 """
 
 from __future__ import annotations
 
+from calmotion.multibody.kernels.components import ElasticLaw
+from calmotion.multibody.kernels.work import LawWork
+from calmotion.shot.character import Array
 from calmotion.support.compilation import kernel
 
 
 @kernel
-def _seen(r, p, at, W, u, w):
-    """w = W u, shape [p]; W starts at `at` of a flat array, and is none where p is r."""
+def _size(law: ElasticLaw) -> int:
+    """Number of strain coordinates, r + p (p + 1) / 2."""
+    return law.r + (law.points * (law.points + 1)) // 2
+
+
+@kernel
+def _project_to_subspace(law: ElasticLaw, u: Array, w: Array) -> None:
+    """w = W u, shape [p]; w = u where p is r, as there is no W then."""
+    r, p, W = law.r, law.points, law.data
+    at = law.start + _size(law) ** 2
     for a in range(p):
         if p == r:
             w[a] = u[a]
@@ -32,8 +43,9 @@ def _seen(r, p, at, W, u, w):
 
 
 @kernel
-def strain_coordinates(r, p, u, v, w, rate, beta, z):
+def strain_coordinates(law: ElasticLaw, u: Array, v: Array, w: Array, rate: Array, z: Array) -> None:
     """z + beta z' into z, shape [r + p (p + 1) / 2], of coordinates u, w and their rates v, rate."""
+    r, p, beta = law.r, law.points, law.retardation
     n = r
     for k in range(r):
         z[k] = u[k] + beta * v[k]
@@ -44,18 +56,19 @@ def strain_coordinates(r, p, u, v, w, rate, beta, z):
 
 
 @kernel
-def _pair_row(r, p, i, l):
+def _pair_row(r: int, p: int, i: int, l: int) -> int:
     """Row of A that belongs to the pair (i, l)."""
     k, n = min(i, l), max(i, l)
     return r + k * p - (k * (k - 1)) // 2 + n - k
 
 
 @kernel
-def _project(r, p, w, at, A, size, Y):
-    """Y = J^T A, shape [p, size], with J the derivative of z by w; A starts at `at` of a flat array.
+def _gram_rows(law: ElasticLaw, w: Array, Y: Array) -> None:
+    """Y = J^T A, shape [p, size], with J the derivative of z by w.
 
-    The part of single coordinates is in it where these are w.
+    It contains the rows of the single coordinates where these are w.
     """
+    r, p, at, A, size = law.r, law.points, law.start, law.data, _size(law)
     for i in range(p):
         y = Y[i]
         first = A[at + i * size : at + (i + 1) * size]
@@ -91,8 +104,9 @@ def _project(r, p, w, at, A, size, Y):
 
 
 @kernel
-def _stress(size, at, A, z, stress):
-    """stress = A z, shape [size]: sums of rows of the symmetric A, as they run in vectors and dot products do not."""
+def _stress(law: ElasticLaw, z: Array, stress: Array) -> None:
+    """stress = A z, shape [size]: sums of rows of the symmetric A, as these vectorise and dot products do not."""
+    at, A, size = law.start, law.data, _size(law)
     for m in range(size):
         stress[m] = 0.0
     n = 0
@@ -112,8 +126,8 @@ def _stress(size, at, A, z, stress):
 
 
 @kernel
-def _times_pairs(p, pairs, x, row):
-    """row = pairs^T J_w(x), shape [p]: what a row of A is worth in the directions, at w = x."""
+def _times_pairs(p: int, pairs: Array, x: Array, row: Array) -> None:
+    """row = pairs^T J_w(x), shape [p]: a row of A by the coordinates of the subspace, at w = x."""
     for a in range(p):
         row[a] = 0.0
     n = 0
@@ -126,8 +140,10 @@ def _times_pairs(p, pairs, x, row):
 
 
 @kernel
-def _add_carried(r, p, at, W, scale, row, out):
-    """out += scale row W, of what stands in the directions to what stands in the coordinates."""
+def _add_from_subspace(law: ElasticLaw, scale: float, row: Array, out: Array) -> None:
+    """out += scale row W: from the coordinates of the subspace to the elastic coordinates."""
+    r, p, W = law.r, law.points, law.data
+    at = law.start + _size(law) ** 2
     if p == r:
         for k in range(r):
             out[k] += scale * row[k]
@@ -141,8 +157,9 @@ def _add_carried(r, p, at, W, scale, row, out):
 
 
 @kernel
-def _along(r, p, a, x, stress, Y, row):
-    """row = Y_pairs[a] J_w(x), and what the pairs of `stress` do as w turns; none where that is empty."""
+def _tangent_row(law: ElasticLaw, a: int, x: Array, stress: Array, Y: Array, row: Array) -> None:
+    """row = Y_pairs[a] J_w(x) + d(J_w^T)/dw stress; without the latter where `stress` is empty."""
+    r, p = law.r, law.points
     _times_pairs(p, Y[a, r:], x, row)
     if len(stress) == 0:
         return
@@ -152,67 +169,70 @@ def _along(r, p, a, x, stress, Y, row):
 
 
 @kernel
-def _add_tangent(r, p, x, stress, scale, at, A, size, Y, row, inner, out):
-    """out[6:, 6:] += scale (J(w)^T A J(x) + d(J^T)/du stress), the last none where `stress` is empty."""
+def _add_tangent(law: ElasticLaw, x: Array, stress: Array, scale: float, work: LawWork, out: Array) -> None:
+    """out[6:, 6:] += scale (J(w)^T A J(x) + d(J^T)/du stress), without the latter where `stress` is empty.
+
+    Needs `_gram_rows` first.
+    """
+    r, p, at, A, size = law.r, law.points, law.start, law.data, _size(law)
+    Y, row, inner = work.rows, work.row, work.inner
     if p == r:
         for a in range(r):
-            _along(r, p, a, x, stress, Y, row)
-            own = out[6 + a, 6:]
+            _tangent_row(law, a, x, stress, Y, row)
+            elastic = out[6 + a, 6:]
             for k in range(r):
-                own[k] += scale * (Y[a, k] + row[k])
+                elastic[k] += scale * (Y[a, k] + row[k])
         return
     W = at + size * size
-    # by the directions first: inner = Y_u + (Y_pairs J_w(x) + d(J_w^T)/dw stress) W
+    # by the subspace first: inner = Y_u + (Y_pairs J_w(x) + d(J_w^T)/dw stress) W
     for a in range(p):
-        _along(r, p, a, x, stress, Y, row)
+        _tangent_row(law, a, x, stress, Y, row)
         for k in range(r):
             inner[a, k] = Y[a, k]
-        _add_carried(r, p, W, A, 1.0, row, inner[a])
+        _add_from_subspace(law, 1.0, row, inner[a])
     for i in range(r):
         start = at + i * size
         line = A[start : start + size]
         _times_pairs(p, line[r:], x, row)
-        own = out[6 + i, 6:]
+        elastic = out[6 + i, 6:]
         for k in range(r):
-            own[k] += scale * line[k]
-        _add_carried(r, p, W, A, scale, row, own)
+            elastic[k] += scale * line[k]
+        _add_from_subspace(law, scale, row, elastic)
         for a in range(p):
             factor = scale * A[W + a * r + i]
             for k in range(r):
-                own[k] += factor * inner[a, k]
+                elastic[k] += factor * inner[a, k]
 
 
 @kernel
-def stvk_forces(r, p, u, v, beta, at, A, tangent, z, Y, seen, row, inner, res, P, K):
+def stvk_forces(
+    law: ElasticLaw, u: Array, v: Array, tangent: bool, work: LawWork, res: Array, P: Array, K: Array
+) -> None:
     """Adds the forces to res[6:], and with `tangent` their derivatives by v and by u to P and K.
 
     Args:
-        r, p: Elastic coordinates, and directions that the quadratic strain sees.
+        law: Its data start with the Gram matrix, shape [size, size], with W after it where p is below r; see
+            `LawWork` for p and size.
         u, v: Elastic coordinates and their rates, shape [r].
-        beta: Retardation time of Kelvin-Voigt damping [s].
-        at, A: Flat array of Gram matrices, each with its W after it where p is below r, and where this body's starts.
-        z, Y, seen, row, inner: Scratch, shapes [2 size], [p, size], [3, p], [p] and [p, r], with
-            size = r + p (p + 1) / 2.
         res, P, K: Shapes [6 + r], [6 + r, 6 + r] twice.
     """
-    size = r + (p * (p + 1)) // 2
-    W = at + size * size
-    w, rate, x = seen[0], seen[1], seen[2]
-    _seen(r, p, W, A, u, w)
-    _seen(r, p, W, A, v, rate)
-    strain_coordinates(r, p, u, v, w, rate, beta, z)
-    stress = z[size:]
-    _stress(size, at, A, z, stress)
-    own = res[6:]
+    r, p, beta, size = law.r, law.points, law.retardation, _size(law)
+    w, rate, x = work.subspace[0], work.subspace[1], work.subspace[2]
+    z, stress = work.strain, work.strain[size:]
+    _project_to_subspace(law, u, w)
+    _project_to_subspace(law, v, rate)
+    strain_coordinates(law, u, v, w, rate, z)
+    _stress(law, z, stress)
+    elastic = res[6:]
     for k in range(r):
-        own[k] += stress[k]
-    _times_pairs(p, stress[r:], w, row)
-    _add_carried(r, p, W, A, 1.0, row, own)
+        elastic[k] += stress[k]
+    _times_pairs(p, stress[r:], w, work.row)
+    _add_from_subspace(law, 1.0, work.row, elastic)
     if not tangent:
         return
-    _project(r, p, w, at, A, size, Y)
+    _gram_rows(law, w, work.rows)
     for a in range(p):
         x[a] = w[a] + beta * rate[a]
-    _add_tangent(r, p, x, stress, 1.0, at, A, size, Y, row, inner, K)
+    _add_tangent(law, x, stress, 1.0, work, K)
     if beta != 0.0:
-        _add_tangent(r, p, w, stress[:0], beta, at, A, size, Y, row, inner, P)
+        _add_tangent(law, w, stress[:0], beta, work, P)

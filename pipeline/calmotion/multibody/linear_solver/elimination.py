@@ -5,25 +5,27 @@ F = [[Nc Jp], [Hp]] (its rows, parent's columns) and through [0, Lp] (parent's r
 eliminating it changes the parent's K by -Lp (D_b^-1)_multiplier-rows F. With Z = D_b^-T [0; E] that is
 -Lp (Z_x^T Nc Jp + Z_m^T Hp), and the same Z serves every later solve, plain or transposed.
 
-Within a block elastic coordinates stand first, then those of the rigid body, then multipliers: a frame is held where
-its joint is, so that the joint's rows do not have the elastic ones, and the factors keep those zeros.
+Within a block the elastic coordinates come first, then those of the rigid body, then the multipliers: a component's
+frame is fixed to it at its joint, so that the joint's rows are zero at the elastic coordinates, and so are the factors.
 """
 
 from __future__ import annotations
 
 from calmotion.multibody.kernels.sliders import has_row
-from calmotion.multibody.model.system import JOINT_ROWS
+from calmotion.multibody.linear_solver.step_matrix import StepMatrix
+from calmotion.multibody.model.system import JOINT_ROWS, Blocks, System
+from calmotion.shot.character import Array, IntArray
 from calmotion.support.compilation import kernel
 
 
 @kernel
-def place(i, r):
+def place(i: int, r: int) -> int:
     """Where coordinate i of a component with r elastic ones stands in its block."""
     return r + i if i < 6 else i - 6
 
 
 @kernel
-def lu_factor(n, A, piv):
+def lu_factor(n: int, A: Array, piv: IntArray) -> bool:
     """In-place LU with partial pivoting of A[:n, :n]; False when a pivot is zero or not finite."""
     for k in range(n):
         p = k
@@ -53,7 +55,7 @@ def lu_factor(n, A, piv):
 
 
 @kernel
-def lu_solve(n, A, piv, x):
+def lu_solve(n: int, A: Array, piv: IntArray, x: Array) -> None:
     """x <- A^-1 x with the factors of `lu_factor`."""
     for k in range(n):
         p = piv[k]
@@ -74,7 +76,7 @@ def lu_solve(n, A, piv, x):
 
 
 @kernel
-def lu_solve_transposed(n, A, piv, x):
+def lu_solve_transposed(n: int, A: Array, piv: IntArray, x: Array) -> None:
     """x <- A^-T x with the factors of `lu_factor`."""
     for i in range(n):
         x[i] /= A[i, i]
@@ -94,8 +96,8 @@ def lu_solve_transposed(n, A, piv, x):
 
 
 @kernel
-def _multiplier_rows(n, m, A, piv, Z):
-    """Z <- the last m columns of A^-T, shape [n + m, m], row by row, so that what is worked on lies together."""
+def _multiplier_rows(n: int, m: int, A: Array, piv: IntArray, Z: Array) -> None:
+    """Z <- the last m columns of A^-T, shape [n + m, m]; row by row, which is contiguous in memory."""
     for i in range(n + m):
         for k in range(m):
             Z[i, k] = 0.0
@@ -126,17 +128,18 @@ def _multiplier_rows(n, m, A, piv, Z):
 
 
 @kernel
-def factor(system, blocks, lu, piv, Z, row):
+def factor(system: System, blocks: Blocks, matrix: StepMatrix, row: Array) -> int:
     """Eliminate all components; `blocks.K` of parents is overwritten by their Schur complements.
 
     Args:
-        lu, piv, Z: Results, see `system.Factors`.
+        matrix: That of the blocks; `lu`, `pivots` and `Z` are results.
         row: Scratch, shape [N] or longer.
 
     Returns:
         -1, or the index of the component whose block is singular.
     """
     m = JOINT_ROWS
+    lu, piv, Z = matrix.lu, matrix.pivots, matrix.Z
     for b in range(len(system.parent) - 1, -1, -1):
         r = system.elastic[b]
         n = 6 + r
@@ -188,9 +191,10 @@ def factor(system, blocks, lu, piv, Z, row):
 
 
 @kernel
-def solve(system, Lp, Hp, Nc, Jp, lu, piv, Z, x, lam, block):
+def solve(system: System, matrix: StepMatrix, x: Array, lam: Array, block: Array) -> None:
     """(x, lam) <- K^-1 (x, lam): x of shape [B, N], lam of shape [B, 6]; `block` is scratch, shape [N + 6]."""
     m = JOINT_ROWS
+    Lp, Hp, Nc, Jp, Z = matrix.Lp, matrix.Hp, matrix.Nc, matrix.Jp, matrix.Z
     count = len(system.parent)
     for b in range(count - 1, -1, -1):
         p = system.parent[b]
@@ -227,7 +231,7 @@ def solve(system, Lp, Hp, Nc, Jp, lu, piv, Z, x, lam, block):
                 for a in range(np_):
                     t += Hp[b, i, a] * x[p, a]
                 block[n + i] -= t
-        lu_solve(n + m, lu[b], piv[b], block)
+        lu_solve(n + m, matrix.lu[b], matrix.pivots[b], block)
         for i in range(n):
             x[b, i] = block[place(i, r)]
         for i in range(m):
@@ -235,9 +239,10 @@ def solve(system, Lp, Hp, Nc, Jp, lu, piv, Z, x, lam, block):
 
 
 @kernel
-def solve_transposed(system, Lp, Hp, Nc, Jp, lu, piv, Z, x, lam, block):
+def solve_transposed(system: System, matrix: StepMatrix, x: Array, lam: Array, block: Array) -> None:
     """(x, lam) <- K^-T (x, lam), same shapes as `solve`."""
     m = JOINT_ROWS
+    Lp, Hp, Nc, Jp, Z = matrix.Lp, matrix.Hp, matrix.Nc, matrix.Jp, matrix.Z
     count = len(system.parent)
     for b in range(count - 1, -1, -1):
         p = system.parent[b]
@@ -247,7 +252,7 @@ def solve_transposed(system, Lp, Hp, Nc, Jp, lu, piv, Z, x, lam, block):
             block[place(i, r)] = x[b, i]
         for i in range(m):
             block[n + i] = lam[b, i]
-        lu_solve_transposed(n + m, lu[b], piv[b], block)
+        lu_solve_transposed(n + m, matrix.lu[b], matrix.pivots[b], block)
         for i in range(n):
             x[b, i] = block[place(i, r)]
         for i in range(m):

@@ -5,15 +5,16 @@ from __future__ import annotations
 import numpy as np
 
 from calmotion.multibody.kernels.sliders import has_row
-from calmotion.multibody.linear_solver.closed_chains import UNKNOWNS
-from calmotion.multibody.model.system import JOINT_ROWS
+from calmotion.multibody.linear_solver.step_matrix import UNKNOWNS, Border
+from calmotion.multibody.model.system import JOINT_ROWS, System
+from calmotion.shot.character import Array
 from calmotion.support.compilation import kernel
 
 
 @kernel
-def least_multipliers(system, border, lam):
-    """Take from all multipliers, shape [J, 6], what does no work in any motion: redundant constraints share the load
-    so that the sum of squares is least. After `factor_loops`."""
+def least_multipliers(system: System, border: Border, lam: Array) -> None:
+    """Remove from all multipliers, shape [J, 6], the part that does no work in any motion: redundant constraints share
+    the load so that the sum of squares is least. After `factor_closed_chains`."""
     joints, count = len(system.rows), len(system.parent)
     n = UNKNOWNS * (joints - count)
     few = n - border.rank[0]
@@ -48,7 +49,7 @@ def least_multipliers(system, border, lam):
 
 
 @kernel
-def _remove(joints, unit, lam):
+def _remove(joints: int, unit: Array, lam: Array) -> None:
     """lam -= (unit . lam) unit."""
     t = 0.0
     for joint in range(joints):

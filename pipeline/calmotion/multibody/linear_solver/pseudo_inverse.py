@@ -8,15 +8,41 @@ sections 5.4-5.5.
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
-from calmotion.support.compilation import kernel
+import numpy as np
 
-RANK = 1e-9  # pivots below this part of the largest count as zero
+from calmotion.multibody.model.system import CountArray
+from calmotion.shot.character import Array
+from calmotion.support.compilation import inlined_kernel, kernel
+
+RANK = 1e-9  # pivots below this fraction of the largest count as zero
+
+
+class Decomposition(NamedTuple):
+    """Scratch of the decomposition of a matrix of n rows.
+
+    Attributes:
+        left, right: Reflectors, one a row, shape [n, n].
+        order: Column of each pivot, shape [n].
+        v, x: Vectors, shape [n].
+    """
+
+    left: Array
+    right: Array
+    order: CountArray
+    v: Array
+    x: Array
+
+
+def allocate_decomposition(n: int) -> Decomposition:
+    """Scratch for matrices of n rows."""
+    return Decomposition(np.zeros((n, n)), np.zeros((n, n)), np.zeros(n, np.int64), np.zeros(n), np.zeros(n))
 
 
 @kernel
-def _reflector(n, start, x, v):
-    """v with (E - v v^T) x zero beyond `start`, entries from `start`; returns the entry that stays."""
+def _reflector(n: int, start: int, x: Array, v: Array) -> float:
+    """v with (E - v v^T) x zero beyond `start`, entries from `start`; returns the entry that remains."""
     size = 0.0
     for i in range(start, n):
         size += x[i] * x[i]
@@ -39,24 +65,12 @@ def _reflector(n, start, x, v):
     return kept
 
 
-@kernel
-def pseudo_inverse(n, A, out, null, left, right, order, v, x):
-    """The inverse of A[:n, :n] on its range into `out`, and its null space.
-
-    Args:
-        A: Overwritten.
-        out: Result, shape [n, n].
-        null: Orthonormal basis of the null space in its first n - rank columns, shape [n, n].
-        left, right: Scratch for the reflectors, shapes [n, n].
-        order: Scratch, shape [n], integers.
-        v, x: Scratch, shape [n].
-
-    Returns:
-        The rank.
-    """
+@inlined_kernel
+def _reflect_from_left(n: int, A: Array, scratch: Decomposition) -> int:
+    """A P = Q [R11 R12; 0 0] in place, Q by reflectors, with column pivoting; returns the rank."""
+    left, order, v, x = scratch.left, scratch.order, scratch.v, scratch.x
     for k in range(n):
         order[k] = k
-    rank = n
     first = 0.0
     for k in range(n):
         best, size = k, -1.0
@@ -69,8 +83,7 @@ def pseudo_inverse(n, A, out, null, left, right, order, v, x):
         if k == 0:
             first = size
         if size <= RANK * RANK * first or not (size > 0.0):
-            rank = k
-            break
+            return k
         if best != k:
             for i in range(n):
                 t = A[i, k]
@@ -93,64 +106,94 @@ def pseudo_inverse(n, A, out, null, left, right, order, v, x):
         A[k, k] = kept
         for i in range(k + 1, n):
             A[i, k] = 0.0
-    # from the right: rows rank - 1 .. 0 of [R11 R12] to [T 0]
-    if rank < n:
-        for k in range(rank - 1, -1, -1):
-            # reflect in the entries k and rank .. n - 1
-            size = A[k, k] * A[k, k]
+    return n
+
+
+@inlined_kernel
+def _reflect_from_right(n: int, rank: int, A: Array, scratch: Decomposition) -> None:
+    """[R11 R12] = [T 0] Z^T in place, Z by reflectors; rows rank - 1 .. 0."""
+    right, v = scratch.right, scratch.v
+    for k in range(rank - 1, -1, -1):
+        # reflect in the entries k and rank .. n - 1
+        size = A[k, k] * A[k, k]
+        for c in range(rank, n):
+            size += A[k, c] * A[k, c]
+        size = math.sqrt(size)
+        kept = -size if A[k, k] >= 0.0 else size
+        for c in range(n):
+            v[c] = A[k, c] if c >= rank else 0.0
+        v[k] = A[k, k] - kept
+        norm = 0.0
+        for c in range(n):
+            norm += v[c] * v[c]
+        scale = math.sqrt(2.0 / norm) if norm > 0.0 else 0.0
+        for c in range(n):
+            v[c] *= scale
+            right[k, c] = v[c]
+        for i in range(k + 1):
+            t = A[i, k] * v[k]
             for c in range(rank, n):
-                size += A[k, c] * A[k, c]
-            size = math.sqrt(size)
-            kept = -size if A[k, k] >= 0.0 else size
-            for c in range(n):
-                v[c] = A[k, c] if c >= rank else 0.0
-            v[k] = A[k, k] - kept
-            norm = 0.0
-            for c in range(n):
-                norm += v[c] * v[c]
-            scale = math.sqrt(2.0 / norm) if norm > 0.0 else 0.0
-            for c in range(n):
-                v[c] *= scale
-                right[k, c] = v[c]
-            for i in range(k + 1):
-                t = A[i, k] * v[k]
-                for c in range(rank, n):
-                    t += A[i, c] * v[c]
-                A[i, k] -= t * v[k]
-                for c in range(rank, n):
-                    A[i, c] -= t * v[c]
+                t += A[i, c] * v[c]
+            A[i, k] -= t * v[k]
+            for c in range(rank, n):
+                A[i, c] -= t * v[c]
+
+
+@inlined_kernel
+def _solve_unit_vector(n: int, rank: int, A: Array, column: int, scratch: Decomposition) -> None:
+    """x <- Z [T^-1 0; 0 0] Q^T e of a unit vector e, before the columns are put in order."""
+    left, x = scratch.left, scratch.x
+    for i in range(n):
+        x[i] = 0.0
+    x[column] = 1.0
+    for k in range(rank):
+        t = 0.0
+        for i in range(k, n):
+            t += left[k, i] * x[i]
+        for i in range(k, n):
+            x[i] -= left[k, i] * t
+    for k in range(rank - 1, -1, -1):
+        t = x[k]
+        for c in range(k + 1, rank):
+            t -= A[k, c] * x[c]
+        x[k] = t / A[k, k]
+    for k in range(rank, n):
+        x[k] = 0.0
+    _apply_right(n, rank, scratch.right, x)
+
+
+@kernel
+def pseudo_inverse(n: int, A: Array, out: Array, null: Array, scratch: Decomposition) -> int:
+    """The inverse of A[:n, :n] on its range into `out`, and its null space.
+
+    Args:
+        A: Overwritten; its first diagonal entries are the pivots then.
+        out: Result, shape [n, n].
+        null: Orthonormal basis of the null space in its first n - rank columns, shape [n, n].
+
+    Returns:
+        The rank.
+    """
+    order, x = scratch.order, scratch.x
+    rank = _reflect_from_left(n, A, scratch)
+    if rank < n:
+        _reflect_from_right(n, rank, A, scratch)
     for column in range(n):
-        for i in range(n):
-            x[i] = 0.0
-        x[column] = 1.0
-        for k in range(rank):
-            t = 0.0
-            for i in range(k, n):
-                t += left[k, i] * x[i]
-            for i in range(k, n):
-                x[i] -= left[k, i] * t
-        for k in range(rank - 1, -1, -1):
-            t = x[k]
-            for c in range(k + 1, rank):
-                t -= A[k, c] * x[c]
-            x[k] = t / A[k, k]
-        for k in range(rank, n):
-            x[k] = 0.0
-        _apply_right(n, rank, right, x)
+        _solve_unit_vector(n, rank, A, column, scratch)
         for k in range(n):
             out[order[k], column] = x[k]
     for column in range(n - rank):
         for i in range(n):
             x[i] = 0.0
         x[rank + column] = 1.0
-        _apply_right(n, rank, right, x)
+        _apply_right(n, rank, scratch.right, x)
         for k in range(n):
             null[order[k], column] = x[k]
     return rank
 
 
 @kernel
-def _apply_right(n, rank, right, x):
+def _apply_right(n: int, rank: int, right: Array, x: Array) -> None:
     """x <- Z x."""
     if rank == n:
         return

@@ -109,11 +109,11 @@ def compile_model(character: Character, tree: Tree, bodies: Sequence[ReducedBody
         if body.elasticity is None:
             stiffness[k, :r] = body.stiffness
     joints = joint_arrays(character, tree, bodies, anchors, r_max, moving)
-    straight = np.array([character.bodies[b].straight for b in tree.body], bool)
+    nonrotating = np.array([character.bodies[b].straight for b in tree.body], bool)
     system = System(
         parent=np.array(tree.parent, np.int32), elastic=elastic, mass=mass, s=s, Z=Z, M3=M3, M4=M4, S=S, axial=axial,
-        axial0=axial0, turning=components(~straight), straight=components(straight), stiffness=stiffness,
-        damping=damping, gravity=np.asarray(character.gravity, dtype=float),
+        axial0=axial0, rotating=components(~nonrotating), nonrotating=components(nonrotating),
+        stiffness=stiffness, damping=damping, gravity=np.asarray(character.gravity, dtype=float),
         **_elastic_laws([bodies[b] for b in tree.body]), **joints.arrays,
     )  # fmt: skip
     targets = _targets(character, tree, bodies, anchors, r_max)

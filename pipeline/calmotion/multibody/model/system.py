@@ -34,7 +34,7 @@ class System(NamedTuple):
         mass, s, Z, M3, M4, S: Inertia integrals, see `fem.Invariants`.
         axial: axial(S[j, k]) = int rho phi_j x phi_k, shape [B, R, R, 3].
         axial0: axial(M4[j]) = int rho X x phi_j, shape [B, R, 3].
-        turning, straight: Components with the inertia of `inertia`, and those with that of `constant_inertia`.
+        rotating, nonrotating: Components with the inertia of `inertia`, and those with that of `constant_inertia`.
         stiffness: Diagonal, shape [B, R]; zero for a nonlinear body.
         damping: Symmetric, shape [B, R, R]; of a nonlinear body, what goes by mass.
         law: Elastic law: LINEAR, STVK, NEOHOOKEAN, shape [B].
@@ -61,8 +61,8 @@ class System(NamedTuple):
     S: Array
     axial: Array
     axial0: Array
-    turning: IntArray
-    straight: IntArray
+    rotating: IntArray
+    nonrotating: IntArray
     stiffness: Array
     damping: Array
     law: IntArray
@@ -82,11 +82,12 @@ class System(NamedTuple):
     @property
     def size(self) -> int:
         """Position coordinates of the largest component, N = 6 + R."""
-        return 6 + self.M3.shape[1]
+        size: int = 6 + self.M3.shape[1]
+        return size
 
 
-class Scheme(NamedTuple):
-    """How a step turns positions into velocities and accelerations.
+class Integrator(NamedTuple):
+    """Coefficients of an implicit integrator, or of the static equations.
 
     Attributes:
         velocity: d(velocity)/d(position) [1/s]; 0 for statics.
@@ -96,6 +97,7 @@ class Scheme(NamedTuple):
         family: BACKWARD_DIFFERENCE, or NEWMARK with the coefficients that follow.
         newmark_beta, newmark_gamma: Of Newmark's formulas.
         alpha_m, alpha_f: Share of the previous instant in the inertia and in the forces (generalised-alpha).
+        h: Time step [s]; 0 for statics.
     """
 
     velocity: float
@@ -107,6 +109,7 @@ class Scheme(NamedTuple):
     newmark_gamma: float = 0.5
     alpha_m: float = 0.0
     alpha_f: float = 0.0
+    h: float = 0.0
 
 
 class State(NamedTuple):
@@ -128,6 +131,14 @@ class State(NamedTuple):
     turn: Array
     V: Array
     lam: Array
+
+
+class Instants(NamedTuple):
+    """The states of a step: the two instants before it, and the new one."""
+
+    before2: State
+    before: State
+    now: State
 
 
 class Blocks(NamedTuple):
@@ -167,16 +178,6 @@ class Blocks(NamedTuple):
     gap: Array
 
 
-class Factors(NamedTuple):
-    """The eliminated step matrix: `lu`, `pivots` of each component with its joint, and `Z`, the transposed
-    solutions for its multipliers, shapes [B, N + 6, N + 6], [B, N + 6], [B, N + 6, 6]; in the order of
-    `elimination.place`."""
-
-    lu: Array
-    pivots: IntArray
-    Z: Array
-
-
 def components(chosen: BoolArray) -> IntArray:
     """Numbers of the components that are chosen by an array of shape [B]."""
     return np.flatnonzero(chosen).astype(np.int32)
@@ -214,14 +215,3 @@ def allocate_blocks(system: System, instants: int | None = None) -> Blocks:
         zeros(joints, size, 3), zeros(joints, 3, size), zeros(*row), zeros(*row), zeros(joints, size),
         zeros(count, size), zeros(*row),
     )  # fmt: skip
-
-
-def allocate_factors(system: System, instants: int | None = None) -> Factors:
-    """Zeroed factors, for one instant or with a leading axis of that many instants."""
-    count, size = len(system.parent), system.size + JOINT_ROWS
-    lead = () if instants is None else (instants,)
-    return Factors(
-        np.zeros(lead + (count, size, size)),
-        np.zeros(lead + (count, size), dtype=np.int32),
-        np.zeros(lead + (count, size, JOINT_ROWS)),
-    )

@@ -1,11 +1,11 @@
-"""The simulation linearised about a trajectory: blocks and factors of every instant, for `sweeps`; compiled.
+"""The simulation linearised about a trajectory: blocks and factors of every instant, for the sweeps; compiled.
 
 A perturbation at instant n is (R^T dc, dphi, du) of each component. With (dV, dtheta) following from it and the
 earlier instants by the backward differences of `bdf2`, each step reads
 
     K z_n = -( P h_V + D h_A + r_theta dtheta_m + r_rate dtheta_m' )
 
-with h_V, h_A the part of dV, dV' that earlier instants determine.
+with h_V, h_A the parts of dV, dV' that depend on earlier instants.
 """
 
 from __future__ import annotations
@@ -19,22 +19,29 @@ import numpy as np
 from calmotion.multibody.analysis.reactions import reactions
 from calmotion.multibody.failure import SimulationFailure
 from calmotion.multibody.integrators.bdf2 import position_to_velocity, velocities
-from calmotion.multibody.integrators.schemes import bdf2_scheme
-from calmotion.multibody.integrators.trajectory import Trajectory, instant_of
-from calmotion.multibody.integrators.workspace import Workspace
+from calmotion.multibody.integrators.coefficients import bdf2_integrator
+from calmotion.multibody.integrators.trajectory import Inputs, Trajectory, instant_of, instants_of
+from calmotion.multibody.integrators.workspace import Scratch, Workspace
 from calmotion.multibody.kernels.assembly import assemble
-from calmotion.multibody.linear_solver.closed_chains import UNKNOWNS, copy_rows, factor_loops
+from calmotion.multibody.linear_solver.closed_chains import copy_rows, factor_closed_chains
 from calmotion.multibody.linear_solver.elimination import factor
-from calmotion.multibody.model.system import JOINT_ROWS, Blocks, System
+from calmotion.multibody.linear_solver.step_matrix import matrix_at
+from calmotion.multibody.model.system import Blocks, Instants, Integrator, State, System
+from calmotion.multibody.sensitivity.linearized_steps import (
+    LinearizedSteps,
+    allocate_steps,
+    bytes_of_an_instant,
+    steps_between,
+)
 from calmotion.multibody.statics.equilibrium import STATIC
-from calmotion.multibody.statics.regularized_statics import hold
-from calmotion.shot.character import Array, IntArray
-from calmotion.support.compilation import YES, kernel
+from calmotion.multibody.statics.regularized_statics import regularize
+from calmotion.shot.character import Array
+from calmotion.support.compilation import YES, inlined_kernel, kernel
 from calmotion.support.memory import available_memory
 
-MEMORY = 4e9  # most that a linearisation takes [bytes]
+MEMORY = 4e9  # upper limit of a linearisation [bytes]
 SHARE = 0.5  # of the memory that is free
-_FEW = 64  # instants that are not worth another thread
+_FEW = 64  # instants of a thread at least
 
 
 def processors() -> int:
@@ -42,63 +49,57 @@ def processors() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
+@inlined_kernel
+def _velocity_map(
+    system: System, integrator: Integrator, continuous: bool, instants: Instants, scratch: Scratch, Hv: Array
+) -> None:
+    """Accelerations of an instant into the scratch, and the derivative of its velocities by positions into Hv."""
+    velocities(system, integrator.h, instants, scratch.J, scratch.Vd)
+    if continuous:
+        for b in range(len(system.parent)):
+            for i in range(4):
+                for k in range(4):
+                    Hv[b, i, k] = integrator.velocity if i == k else 0.0
+    else:
+        position_to_velocity(system, integrator.h, instants, scratch.T, scratch.Wt, Hv)
+
+
 @kernel
 def _linearize(
-    system, static, scheme, continuous, h, states, angles, rates, world, first, last, work, blocks, scratch, data,
-    pivots,
-):  # fmt: skip
+    system: System, integrator: Integrator, continuous: bool, states: State, inputs: Inputs, first: int, last: int,
+    ws: Workspace, steps: LinearizedSteps,
+) -> tuple[int, int]:  # fmt: skip
     """Blocks and factors of instants first..last-1; returns -1 or the component that is singular, and the instant."""
-    J, T, Wt, Vd, block, border = scratch.J, scratch.T, scratch.Wt, scratch.Vd, scratch.block, scratch.border
-    P, D, Lc, Lp, Hc, Hp, Nc, Jp, by_angle, by_rate, on_parent, lu, Z, inverse, R, Hv = data
-    count, size = Vd.shape
-    joints = len(system.rows)
+    work, blocks, scratch = ws.work, ws.blocks, ws.scratch
+    count, joints = len(system.parent), len(system.rows)
     for n in range(first, last):
         at = n - first
-        now = instant_of(states, n)
+        now, Hv, matrix = instant_of(states, n), steps.Hv[at], matrix_at(steps.matrix, at)
         if n == 0:
-            for b in range(count):
-                for i in range(4):
-                    for k in range(4):
-                        Hv[0, b, i, k] = 0.0
-                for i in range(size):
-                    Vd[b, i] = 0.0
+            Hv[:] = 0.0
+            scratch.Vd[:] = 0.0
         else:
-            before = instant_of(states, n - 1)
-            before2 = instant_of(states, max(n - 2, 0))
-            velocities(system, h, now, before, before2, J, Vd)
-            if continuous:
-                for b in range(count):
-                    for i in range(4):
-                        for k in range(4):
-                            Hv[at, b, i, k] = scheme.velocity if i == k else 0.0
-            else:
-                position_to_velocity(system, h, now, before, J, T, Wt, Hv[at])
-        copy_rows(world[n], work.world)
-        # the sweeps read these in place, so they are made there
+            instants = instants_of(instant_of(states, 0), states, n)
+            _velocity_map(system, integrator, continuous, instants, scratch, Hv)
+        copy_rows(inputs.world[n], work.world)
+        # the sweeps read these in place, so they are computed there
         here = Blocks(
-            blocks.K, P[at], D[at], Lc[at], Lp[at], blocks.Hc, Hp[at], Nc[at], Jp[at], by_angle[at], by_rate[at],
-            on_parent[at], blocks.res, blocks.gap,
+            blocks.K, steps.P[at], steps.D[at], matrix.Lc, matrix.Lp, blocks.Hc, matrix.Hp, matrix.Nc, matrix.Jp,
+            steps.by_angle[at], steps.by_rate[at], steps.on_parent[at], blocks.res, blocks.gap,
         )  # fmt: skip
-        kind = static if n == 0 else scheme
-        assemble(
-            system, kind, now.c, now.q, now.u, now.V, Vd, now.lam, angles[n], rates[n], Hv[at], YES, work, here
-        )  # fmt: skip
+        kind = STATIC if n == 0 else integrator
+        assemble(system, kind, now, scratch.Vd, inputs.angles[n], inputs.rates[n], Hv, YES, work, here)
         if n == 0:
-            hold(system, here.D, here.K, here.Nc)
-        bad = factor(system, here, lu[at], pivots[at], Z[at], block)
+            regularize(system, here.D, here.K, here.Nc)
+        bad = factor(system, here, matrix, scratch.solution.block)
         if bad >= 0:
             return bad, n
         if joints > count:
             for j in range(count, joints):
-                copy_rows(blocks.Hc[j], Hc[at, j - count])
-            factor_loops(
-                system, Lc[at], Lp[at], Hc[at], Hp[at], Nc[at], Jp[at], lu[at], pivots[at], Z[at], border, block
-            )
-            copy_rows(border.inverse, inverse[at])
+                copy_rows(blocks.Hc[j], matrix.Hc[j - count])
+            factor_closed_chains(system, matrix, scratch.border, scratch.solution)
         for b in range(count):
-            for i in range(3):
-                for k in range(3):
-                    R[at, b, i, k] = work.R[b, i, k]
+            copy_rows(work.R[b], steps.R[at, b])
     return -1, 0
 
 
@@ -117,53 +118,39 @@ def linearize(
 
     Args:
         angles, rates: The joint angles (or lengths) and rates it was simulated with, shape [T, J].
-        previous: A linearisation of the same size whose memory is used again (it becomes invalid).
-        memory: Most that blocks and factors may take [bytes]; None: what the machine has to spare.
+        previous: A linearisation whose memory is used again if it has the same size (it becomes invalid).
+        memory: Limit for blocks and factors [bytes]; None: by the free memory of the machine.
         continuous: For `continuous_adjoint`: a step's velocities follow its positions by 3/2h alone.
-        begin: First instant whose equations count: 0, the static start, 2 where two instants were given, or one before
-            which nothing changes; derivatives by what acts before it are then zero.
+        begin: First instant whose equations are linearised: 0, the static start; 2 where two instants were given; or a
+            later one where earlier inputs do not change, derivatives by which are then zero.
 
     Raises:
         SimulationFailure: A singular step, or one that had to be refined: its equations are not those of the others.
-        ValueError: A simulation by another integrator than BDF2, whose sweeps these are.
+        ValueError: A simulation by another integrator than BDF2.
     """  # fmt: skip
     if trajectory.integrator != "bdf2":
-        raise ValueError("sweeps are those of BDF2")
+        raise ValueError("only BDF2 has derivatives")
     if trajectory.refined:
         raise SimulationFailure(trajectory.refined[0] * trajectory.h, 0, "refined")
-    held = 0 if previous is None else len(previous.pivots) * bytes_of_an_instant(system)
-    size = window_size(system, len(angles) - begin, spare_memory(held) if memory is None else memory)
-    if previous is not None and len(previous.pivots) == size:
-        data, pivots = previous.data, previous.pivots
-    else:
-        data = tuple(np.zeros((size, *shape)) for shape in _shapes(system))
-        pivots = np.zeros((size, len(system.parent), system.size + JOINT_ROWS), np.int32)
-    made = Linearization(system, trajectory, angles, rates, workspace, data, pivots, continuous, begin)
+    reused = 0 if previous is None else previous.size * bytes_of_an_instant(system)
+    size = window_size(system, len(angles) - begin, spare_memory(reused) if memory is None else memory)
+    steps = allocate_steps(system, size) if previous is None or previous.size != size else previous.steps
+    made = Linearization(
+        system, trajectory, Inputs(angles, rates, trajectory.world), workspace, steps, continuous, begin
+    )
     if previous is not None:
         made._helpers = previous._helpers
     made.load(begin)
     return made
 
 
-def _shapes(system: System) -> list[tuple[int, ...]]:
-    """Shapes of what is kept of an instant, in the order of `Linearization.data`."""
-    count, size, joints, m = len(system.parent), system.size, len(system.rows), JOINT_ROWS
-    loops = joints - count
-    border = UNKNOWNS * loops
-    return [
-        (count, size, size), (count, size, size), (joints, size, m), (joints, size, m), (loops, m, size),
-        (joints, m, size), (joints, size, 3), (joints, 3, size), (joints, m), (joints, m), (joints, size),
-        (count, size + m, size + m), (count, size + m, m), (border, border), (count, 3, 3), (count, 4, 4),
-    ]  # fmt: skip
-
-
-def spare_memory(held: float = 0.0) -> float:
-    """What a linearisation may take [bytes]: a share of the memory that is free, at most `MEMORY`.
+def spare_memory(reused: float = 0.0) -> float:
+    """Memory for a linearisation [bytes]: a share of the free memory, at most `MEMORY`.
 
     Args:
-        held: Of it, what an earlier linearisation has that is used again [bytes].
+        reused: Memory of an earlier linearisation that is used again [bytes].
     """
-    return min(MEMORY, SHARE * (available_memory() + held))
+    return min(MEMORY, SHARE * (available_memory() + reused))
 
 
 def window_size(system: System, instants: int, memory: float) -> int:
@@ -171,27 +158,27 @@ def window_size(system: System, instants: int, memory: float) -> int:
     return max(2, min(instants, int(min(memory, MEMORY) / bytes_of_an_instant(system))))
 
 
-def bytes_of_an_instant(system: System) -> int:
-    """What is kept of an instant takes so much memory."""
-    return 8 * sum(int(np.prod(shape)) for shape in _shapes(system))
-
-
 class Linearization:
-    """What the sweeps need of every instant: blocks of `system.Blocks`, factors, rotations, velocity maps.
+    """The linearised equations of all instants, for the sweeps.
 
-    Where all instants together would take too much memory they are made window by window, anew in each sweep.
+    Where all instants together would take too much memory, they are computed window by window in each sweep.
     """
 
     def __init__(
-        self, system: System, trajectory: Trajectory, angles: Array, rates: Array, workspace: Workspace,
-        data: tuple[Array, ...], pivots: IntArray, continuous: bool = False, begin: int = 0,
+        self, system: System, trajectory: Trajectory, inputs: Inputs, workspace: Workspace, steps: LinearizedSteps,
+        continuous: bool = False, begin: int = 0,
     ):  # fmt: skip
         self.continuous, self._begin = continuous, begin
-        self.system, self.trajectory, self.angles, self.rates = system, trajectory, angles, rates
-        self.workspace, self.data, self.pivots = workspace, data, pivots
+        self.system, self.trajectory, self.inputs = system, trajectory, inputs
+        self.workspace, self.steps = workspace, steps
         self._loaded = -1
         self._axes = np.zeros((0, len(system.rows), 3, 3))
         self._helpers: list[Workspace] = []  # one for each further processor
+
+    @property
+    def size(self) -> int:
+        """Number of instants of a window."""
+        return len(self.steps.P)
 
     def is_of(self, trajectory: Trajectory, begin: int) -> bool:
         """Whether it is that of a simulation from an instant on."""
@@ -199,20 +186,20 @@ class Linearization:
 
     def axes(self, wanted: bool) -> Array:
         """Axes of the joints' parent-side markers where sliders need them for their efforts, shape [T, J, 3, 3]."""
-        total, joints = self.angles.shape
+        total, joints = self.inputs.angles.shape
         if len(self._axes) != total and wanted:
             self._axes = np.zeros((total, joints, 3, 3))
             if np.any(self.system.sliding):
-                self._axes[:] = reactions(self.system, self.trajectory, self.angles, self.rates).axes
+                self._axes[:] = reactions(self.system, self.trajectory, self.inputs.angles, self.inputs.rates).axes
         return self._axes
 
     def windows(self) -> list[tuple[int, int]]:
         """First instant and the one after the last of every window."""
-        total, size = len(self.angles), len(self.pivots)
-        return [(first, min(first + size, total)) for first in range(self._begin, total, size)]
+        total = len(self.inputs.angles)
+        return [(first, min(first + self.size, total)) for first in range(self._begin, total, self.size)]
 
     def load(self, first: int) -> None:
-        """Make the blocks of the window that starts at an instant, if they are not there.
+        """Compute the window that starts at an instant, if it is not there.
 
         Raises:
             SimulationFailure: A singular step.
@@ -220,16 +207,14 @@ class Linearization:
         if first == self._loaded:
             return
         self._loaded = -1
-        trajectory, ws = self.trajectory, self.workspace
-        last = min(first + len(self.pivots), len(self.angles))
+        trajectory, integrator = self.trajectory, bdf2_integrator(self.trajectory.h)
+        last = min(first + self.size, len(self.inputs.angles))
 
-        def part(start: int, end: int, own: Workspace) -> tuple[int, int]:
-            here = slice(start - first, end - first)
+        def part(start: int, end: int, workspace: Workspace) -> tuple[int, int]:
+            steps = steps_between(self.steps, slice(start - first, end - first))
             return _linearize(
-                self.system, STATIC, bdf2_scheme(trajectory.h), self.continuous, trajectory.h, trajectory.states,
-                self.angles, self.rates, trajectory.world, start, end, own.work, own.blocks, own.scratch,
-                tuple(array[here] for array in self.data), self.pivots[here],
-            )  # fmt: skip
+                self.system, integrator, self.continuous, trajectory.states, self.inputs, start, end, workspace, steps
+            )
 
         # instants do not depend on each other, and kernels run without the interpreter's lock
         share = max(_FEW, math.ceil((last - first) / processors()))
@@ -238,11 +223,11 @@ class Linearization:
             self._helpers.append(Workspace.for_system(self.system))
         with ThreadPoolExecutor(max(1, len(self._helpers))) as pool:
             others = [
-                pool.submit(part, start, min(start + share, last), own)
-                for start, own in zip(starts[1:], self._helpers, strict=False)
+                pool.submit(part, start, min(start + share, last), workspace)
+                for start, workspace in zip(starts[1:], self._helpers, strict=False)
             ]
-            found = [part(first, min(first + share, last), ws), *(other.result() for other in others)]
-        for bad, instant in found:
+            results = [part(first, min(first + share, last), self.workspace), *(other.result() for other in others)]
+        for bad, instant in results:
             if bad >= 0:
                 raise SimulationFailure(instant * trajectory.h, bad, "singular")
         self._loaded = first

@@ -1,22 +1,18 @@
 """Starting in motion: consistent accelerations at the first instant, and the instant before it.
 
 BDF2 needs two earlier instants. From rest in equilibrium the one before the start is the start itself. Otherwise it is
-continued backwards to second order, x(-h) = x - h V + h^2/2 a, V(-h) = V - h a, which keeps the scheme's order; a
+continued backwards to second order, x(-h) = x - h V + h^2/2 a, V(-h) = V - h a, which keeps the integrator's order; a
 follows from the equations of motion with the constraints differentiated once more.
 """
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from calmotion.multibody.failure import SimulationFailure
+from calmotion.multibody.integrators.workspace import Workspace
 from calmotion.multibody.kernels.so3 import turn
 from calmotion.multibody.linear_solver.index1 import accelerations
 from calmotion.multibody.model.system import State, System
 from calmotion.shot.character import Array
-
-if TYPE_CHECKING:
-    from calmotion.multibody.integrators.workspace import Workspace
 
 
 def initial_acceleration(
@@ -35,7 +31,7 @@ def initial_acceleration(
         SimulationFailure: A singular system.
     """
     here = State(*[part.copy() for part in state])
-    bad = accelerations(system, here, angle, rate, acceleration, 0.0, ws.work, ws.blocks, ws.factors, ws.scratch)
+    bad = accelerations(system, here, angle, rate, acceleration, 0.0, ws)
     if bad >= 0:
         raise SimulationFailure(0.0, bad, "singular")
     return ws.scratch.Vd.copy(), here.lam

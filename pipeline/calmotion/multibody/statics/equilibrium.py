@@ -2,29 +2,25 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from calmotion.multibody.failure import SimulationFailure
 from calmotion.multibody.integrators.newton import correct, worst_component
+from calmotion.multibody.integrators.workspace import Workspace
 from calmotion.multibody.kernels.assembly import assemble
-from calmotion.multibody.linear_solver.closed_chains import factor_loops, solve_system
+from calmotion.multibody.linear_solver.closed_chains import factor_closed_chains, solve_system
 from calmotion.multibody.linear_solver.elimination import factor
 from calmotion.multibody.linear_solver.least_multipliers import least_multipliers
-from calmotion.multibody.model.system import Scheme, State, System, allocate_state
-from calmotion.multibody.statics.regularized_statics import hold
+from calmotion.multibody.model.system import Integrator, State, System, allocate_state
+from calmotion.multibody.statics.regularized_statics import regularize
 from calmotion.shot.character import Array
 
-if TYPE_CHECKING:
-    from calmotion.multibody.integrators.workspace import Workspace
-
-STATIC = Scheme(velocity=0.0, acceleration=0.0, gamma=0.0, alpha=1.0)
+STATIC = Integrator(velocity=0.0, acceleration=0.0, gamma=0.0, alpha=1.0)
 TOLERANCE = 1e-11
-LIMIT = 400
-FEW = 30  # iterations that a small part of gravity must need at most
+LIMIT = 400  # iterations
+LOAD_STEP_LIMIT = 30  # of a load step
 PSEUDO_TIME = (1e2, 1e4, 1e6)  # first factors of the mass matrix, 1/time^2
-FIRST_PART, SMALLEST_PART = 0.2, 1e-3  # of gravity
+FIRST_LOAD_STEP, SMALLEST_LOAD_STEP = 0.2, 1e-3  # fractions of gravity
 
 
 def linearize(system: System, state: State, angle: Array, ws: Workspace) -> None:
@@ -36,31 +32,29 @@ def linearize(system: System, state: State, angle: Array, ws: Workspace) -> None
     Hv, Vd = ws.scratch.Hv, ws.scratch.Vd
     Hv[:] = 0.0
     Vd[:] = 0.0
-    assemble(
-        system, STATIC, state.c, state.q, state.u, state.V, Vd, state.lam, angle, np.zeros_like(angle), Hv, True,
-        ws.work, ws.blocks,
-    )  # fmt: skip
+    assemble(system, STATIC, state, Vd, angle, np.zeros_like(angle), Hv, True, ws.work, ws.blocks)
 
 
 def equilibrium(system: System, start: State, angle: Array, ws: Workspace) -> tuple[State, int]:
     """The state at rest in which gravity, elasticity and the joints are in balance.
 
-    Newton's method from the given pose. Where it does not converge at once gravity is brought up in parts; where joints
-    move freely, or that fails too, the mass matrix over a growing pseudo time step squared is added, which follows the
-    damped fall into a stable equilibrium. What nothing holds or moves, as a wheel, stays where it is.
+    Newton's method from the given pose. Where it does not converge, gravity is increased in steps (load stepping);
+    where joints move freely, or load stepping fails, the mass matrix over a growing pseudo time step squared is added
+    (pseudo-transient continuation), which leads to a stable equilibrium. A component that no stiffness acts on, as a
+    wheel, keeps its pose.
 
     Returns:
         The state and the number of iterations.
 
     Raises:
-        SimulationFailure: No equilibrium was found; with that under the largest part of gravity that has one.
+        SimulationFailure: No equilibrium was found; its state is that of the largest fraction of gravity that has one.
     """
     used = 0
     reached, share, component = start, 0.0, 0
     free = bool(np.any((system.rows > 0) & (system.rows < 6)))
-    for method in ("fall", "parts") if free else ("newton", "parts", "fall"):
-        if method == "parts":
-            reached, share, component, iterations = _in_parts(system, start, angle, ws)
+    for method in ("pseudo-transient", "load stepping") if free else ("newton", "load stepping", "pseudo-transient"):
+        if method == "load stepping":
+            reached, share, component, iterations = _by_load_stepping(system, start, angle, ws)
             used += iterations
             if share == 1.0:
                 return reached, used
@@ -82,21 +76,21 @@ def _at_rest(start: State) -> State:
     return state
 
 
-def _in_parts(system: System, start: State, angle: Array, ws: Workspace) -> tuple[State, float, int, int]:
-    """Gravity brought up from a little: the equilibrium reached, under which part of it, the component where it ended
-    (-1 where all of it was reached), and the iterations."""
-    reached, share, part, used, component = _at_rest(start), 0.0, FIRST_PART, 0, -1
-    while share < 1.0 and part >= SMALLEST_PART:
-        more = min(part, 1.0 - share)
-        state = State(*[item.copy() for item in reached])
-        lighter = system._replace(gravity=(share + more) * system.gravity)
-        failed, iterations = _iterate(lighter, state, angle, ws, 0.0, FEW)
+def _by_load_stepping(system: System, start: State, angle: Array, ws: Workspace) -> tuple[State, float, int, int]:
+    """Equilibrium under gravity that is increased in steps: the last one, its fraction of gravity, the component of the
+    failure (-1 where all of gravity was reached), and the iterations."""
+    reached, share, load_step, used, component = _at_rest(start), 0.0, FIRST_LOAD_STEP, 0, -1
+    while share < 1.0 and load_step >= SMALLEST_LOAD_STEP:
+        load_step = min(load_step, 1.0 - share)
+        state = State(*[part.copy() for part in reached])
+        lighter = system._replace(gravity=(share + load_step) * system.gravity)
+        failed, iterations = _iterate(lighter, state, angle, ws, 0.0, LOAD_STEP_LIMIT)
         used += iterations
         if failed < 0:
-            reached, share, part, component = state, share + more, 2.0 * more, -1
+            reached, share, load_step, component = state, share + load_step, 2.0 * load_step, -1
             reached.turn[:] = 0.0
         else:
-            part, component = 0.5 * more, failed
+            load_step, component = 0.5 * load_step, failed
     return reached, share, component, used
 
 
@@ -104,44 +98,39 @@ def _iterate(
     system: System, state: State, angle: Array, ws: Workspace, inertia: float, limit: int = LIMIT
 ) -> tuple[int, int]:
     """Newton or pseudo-transient iteration in place; (-1, iterations), or the component where it failed."""
-    x, lam, block, border, T = ws.scratch.x, ws.scratch.lam, ws.scratch.block, ws.scratch.border, ws.scratch.T
-    count, loops = len(system.parent), len(system.rows) > len(system.parent)
+    x, lam, solution, border = ws.scratch.x, ws.scratch.lam, ws.scratch.solution, ws.scratch.border
+    chains_closed = len(system.rows) > len(system.parent)
     before = allocate_state(system)
     previous = np.inf
     for iteration in range(limit):
         linearize(system, state, angle, ws)
-        blocks, factors = ws.blocks, ws.factors
+        blocks = ws.blocks
         blocks.K[:] += inertia * blocks.D
-        hold(system, blocks.D, blocks.K, blocks.Nc)
-        component = factor(system, blocks, factors.lu, factors.pivots, factors.Z, block)
+        regularize(system, blocks.D, blocks.K, blocks.Nc)
+        component = factor(system, blocks, ws.matrix, solution.block)
         if component >= 0:
             return component, iteration + 1
         x[:] = -blocks.res
         lam[:] = -blocks.gap
-        closing = blocks.Hc[count:]
-        tree = (factors.lu, factors.pivots, factors.Z)
-        if loops:
-            factor_loops(system, blocks.Lc, blocks.Lp, closing, blocks.Hp, blocks.Nc, blocks.Jp, *tree, border, block)
-        solve_system(
-            system, blocks.Lc, blocks.Lp, closing, blocks.Hp, blocks.Nc, blocks.Jp, *tree, border.inverse, x, lam,
-            border.X, border.lam, border.y, border.x, block,
-        )  # fmt: skip
+        if chains_closed:
+            factor_closed_chains(system, ws.matrix, border, solution)
+        solve_system(system, ws.matrix, x, lam, solution)
         size = float(np.max(np.abs(x)))
         if not np.isfinite(size):
             return worst_component(system, x), iteration + 1
-        # a step keeps each component's turn moderate, so that the linearisation means something
+        # a step keeps each component's rotation moderate, so that the linearisation is valid
         scale = min(1.0, 0.5 / max(size, 1e-300))
         x *= scale
         lam *= scale
         before.q[:] = state.q
         state.turn[:] = 0.0
-        correct(system, before, state, ws.work.R, x, lam, 1.0, T)
+        correct(system, before, state, ws.work.R, x, lam, 1.0, ws.scratch.T)
         if size < TOLERANCE and inertia == 0.0:
-            if loops:
+            if chains_closed:
                 least_multipliers(system, border, state.lam)
             return -1, iteration + 1
         if inertia > 0.0:
-            # switched evolution relaxation: less inertia as the correction shrinks, none at the end
+            # switched evolution relaxation: inertia decreases with the correction, to zero at the end
             inertia *= 0.5 if size <= previous else 1.5
             if inertia < 1e-6 or size < 1e-6:
                 inertia = 0.0

@@ -1,31 +1,34 @@
-"""Static equations of a system whose tree may have no stiffness of its own somewhere; compiled.
+"""Static equations of a system whose tree has no stiffness of its own somewhere, regularised; compiled.
 
-At rest a hinge of the tree may be held by nothing but the loop that it is part of (a linkage in a horizontal plane, or
-a balanced one), or by nothing at all (a wheel, a door): it keeps its angle then, but the tree cannot be eliminated.
-Each hinge that moves freely therefore gets a weak spring that acts on what it carries, and what hangs by a ball or a
-free slider in a system with loops keeps a small part of its inertia. With E the matrix of both, refinement takes them
-out of the solution again,
+At rest a hinge of the tree may have no other support than the closed chain that it is part of (a linkage in a
+horizontal plane, or a balanced one), or none at all (a wheel, a door): it keeps its angle then, but the tree cannot be
+eliminated. Each hinge that moves freely therefore gets a weak spring that acts on the component that it carries, and a
+component on a ball joint or a free slider in a system with closed chains keeps a small fraction of its inertia. With E
+the matrix of both, iterative refinement removes them from the solution,
 
     (K + E) x_k+1 = r + E x_k
 
-which converges as HOLD to the squared frequencies at which it swings, and at once where loops or nothing hold it.
-Weaker springs would converge faster, but a hinge without stiffness would turn so much farther than others that
-redundant constraints no longer show.
+which converges as REGULARIZATION to the squared angular frequencies at which the hinge swings, and at once where
+closed chains or nothing support it. Weaker springs would converge faster, but a hinge without stiffness would rotate
+so much farther than others that redundant constraints could not be detected.
 """
 
 from __future__ import annotations
 
 from calmotion.multibody.linear_solver.closed_chains import copy_rows, solve_system, solve_system_transposed
+from calmotion.multibody.linear_solver.step_matrix import SolutionScratch, StepMatrix
+from calmotion.multibody.model.system import System
+from calmotion.shot.character import Array
 from calmotion.support.compilation import NO, YES, kernel
 
-HOLD = 1e-2  # stiffness over inertia [1/s^2]
-REFINED = 8  # solutions after the first: what swings once in six seconds is known to rounding, and in twenty to 1e-9
-HINGE = 5  # rows of a joint that turns freely about one axis (or slides along it)
+REGULARIZATION = 1e-2  # stiffness over inertia [1/s^2]
+REFINEMENTS = 8  # solutions after the first: exact to rounding for a period of six seconds, to 1e-9 for twenty
+HINGE = 5  # rows of a joint that rotates freely about one axis (or slides along it)
 
 
 @kernel
-def is_held(system):
-    """Whether anything of its tree is."""
+def is_regularized(system: System) -> bool:
+    """Whether any component of the tree is."""
     for b in range(len(system.parent)):
         if _spring(system, b) or _inertia(system, b):
             return True
@@ -33,30 +36,30 @@ def is_held(system):
 
 
 @kernel
-def _spring(system, b):
-    """Whether a component hangs by a free hinge."""
+def _spring(system: System, b: int) -> bool:
+    """Whether a component is carried by a free hinge."""
     return system.rows[b] == HINGE and not system.sliding[b]
 
 
 @kernel
-def _inertia(system, b):
-    """Whether it keeps a part of its inertia."""
+def _inertia(system: System, b: int) -> bool:
+    """Whether it keeps a fraction of its inertia."""
     free = 0 < system.rows[b] <= HINGE and not _spring(system, b)
     return free and len(system.rows) > len(system.parent)
 
 
 @kernel
-def _stiffness(system, D, b):
-    """Of its spring: part of its inertia about the axis."""
+def _stiffness(system: System, D: Array, b: int) -> float:
+    """Of its spring: a fraction of its inertia about the axis."""
     t = 0.0
     for i in range(3):
         for k in range(3):
             t += system.rotation[b, 1, i, 2] * D[b, 3 + i, 3 + k] * system.rotation[b, 1, k, 2]
-    return HOLD * t
+    return REGULARIZATION * t
 
 
 @kernel
-def hold(system, D, K, Nc):
+def regularize(system: System, D: Array, K: Array, Nc: Array) -> None:
     """Add E to the tangents; arguments as of `system.Blocks`."""
     for b in range(len(system.parent)):
         if _spring(system, b):
@@ -65,16 +68,16 @@ def hold(system, D, K, Nc):
                 moment = stiffness * system.rotation[b, 1, i, 2]
                 for k in range(3):
                     K[b, 3 + i, 3 + k] += moment * system.rotation[b, 1, k, 2]
-                # the parent-side marker turns about its z axis
+                # the parent-side marker rotates about its z axis
                 Nc[b, 3 + i, 2] -= moment
         elif _inertia(system, b):
             for i in range(6 + system.elastic[b]):
                 for k in range(6 + system.elastic[b]):
-                    K[b, i, k] += HOLD * D[b, i, k]
+                    K[b, i, k] += REGULARIZATION * D[b, i, k]
 
 
 @kernel
-def _add_held(system, D, Jp, x, out, transposed):
+def _add_regularization(system: System, D: Array, Jp: Array, x: Array, out: Array, transposed: bool) -> None:
     """out += E x, or E^T x; shapes [B, N]."""
     for b in range(len(system.parent)):
         p = system.side[b, 0]
@@ -94,46 +97,45 @@ def _add_held(system, D, Jp, x, out, transposed):
         elif _inertia(system, b):
             for i in range(6 + system.elastic[b]):
                 for k in range(6 + system.elastic[b]):
-                    out[b, i] += HOLD * D[b, i, k] * x[b, k]
+                    out[b, i] += REGULARIZATION * D[b, i, k] * x[b, k]
 
 
 @kernel
-def _again(system, D, Jp, rx, rlam, x, lam, X, transposed):
-    """(x, lam) <- (r + E x, rlam), by the scratch X."""
-    copy_rows(rx, X)
-    _add_held(system, D, Jp, x, X, transposed)
-    copy_rows(X, x)
-    copy_rows(rlam, lam)
+def _refine(
+    system: System, D: Array, matrix: StepMatrix, x: Array, lam: Array, scratch: SolutionScratch, transposed: bool
+) -> None:
+    """(x, lam) <- (r + E x, r_lam), the right-hand side of the next refinement."""
+    copy_rows(scratch.right, scratch.X)
+    _add_regularization(system, D, matrix.Jp, x, scratch.X, transposed)
+    copy_rows(scratch.X, x)
+    copy_rows(scratch.right_lam, lam)
 
 
 @kernel
-def solve_statics(
-    system, D, Lc, Lp, Hc, Hp, Nc, Jp, lu, piv, Z, inverse, x, lam, X, tree, y, g, block, rx, rlam
-):  # fmt: skip
-    """`solve_system` of the static equations, by factors of what is held.
+def solve_statics(system: System, D: Array, matrix: StepMatrix, x: Array, lam: Array, scratch: SolutionScratch) -> None:
+    """`solve_system` of the static equations, by factors of the regularised ones.
 
     Args:
-        D: Of the blocks that were held, shape [B, N, N]; others as of `solve_system`.
-        rx, rlam: Scratch, of the shapes of x and lam.
+        D: Of the blocks that were regularised, shape [B, N, N].
     """
-    copy_rows(x, rx)
-    copy_rows(lam, rlam)
-    solve_system(system, Lc, Lp, Hc, Hp, Nc, Jp, lu, piv, Z, inverse, x, lam, X, tree, y, g, block)
-    if is_held(system):
-        for _ in range(REFINED):
-            _again(system, D, Jp, rx, rlam, x, lam, X, NO)
-            solve_system(system, Lc, Lp, Hc, Hp, Nc, Jp, lu, piv, Z, inverse, x, lam, X, tree, y, g, block)
+    copy_rows(x, scratch.right)
+    copy_rows(lam, scratch.right_lam)
+    solve_system(system, matrix, x, lam, scratch)
+    if is_regularized(system):
+        for _ in range(REFINEMENTS):
+            _refine(system, D, matrix, x, lam, scratch, NO)
+            solve_system(system, matrix, x, lam, scratch)
 
 
 @kernel
 def solve_statics_transposed(
-    system, D, Lc, Lp, Hc, Hp, Nc, Jp, lu, piv, Z, inverse, x, lam, X, tree, y, g, block, rx, rlam
-):  # fmt: skip
+    system: System, D: Array, matrix: StepMatrix, x: Array, lam: Array, scratch: SolutionScratch
+) -> None:
     """The transposed equations; same arguments."""
-    copy_rows(x, rx)
-    copy_rows(lam, rlam)
-    solve_system_transposed(system, Lc, Lp, Hc, Hp, Nc, Jp, lu, piv, Z, inverse, x, lam, X, tree, y, g, block)
-    if is_held(system):
-        for _ in range(REFINED):
-            _again(system, D, Jp, rx, rlam, x, lam, X, YES)
-            solve_system_transposed(system, Lc, Lp, Hc, Hp, Nc, Jp, lu, piv, Z, inverse, x, lam, X, tree, y, g, block)
+    copy_rows(x, scratch.right)
+    copy_rows(lam, scratch.right_lam)
+    solve_system_transposed(system, matrix, x, lam, scratch)
+    if is_regularized(system):
+        for _ in range(REFINEMENTS):
+            _refine(system, D, matrix, x, lam, scratch, YES)
+            solve_system_transposed(system, matrix, x, lam, scratch)

@@ -6,8 +6,8 @@ import numpy as np
 from scipy.sparse import csr_matrix
 
 from calmotion.multibody.analysis.rigid_response import RigidResponse
-from calmotion.multibody.kernels.moving_frames import rooted
 from calmotion.multibody.model.model import Model, rigid_model
+from calmotion.multibody.model.moving_markers import rooted
 from calmotion.retargeting.problem.offset_space import OffsetSpace
 from calmotion.shot.character import Array
 from calmotion.simulation.inputs.curves import Curves

@@ -8,8 +8,8 @@ import numpy as np
 from scipy.spatial.transform import Rotation, RotationSpline
 
 from calmotion.multibody.kernels.markers import WORLD_MARKER
-from calmotion.multibody.kernels.moving_frames import pack
 from calmotion.multibody.kernels.so3 import right_jacobian
+from calmotion.multibody.model.moving_markers import pack
 from calmotion.shot.animation import MovingFrame, Track
 from calmotion.shot.character import Array
 from calmotion.shot.curves import curve_of

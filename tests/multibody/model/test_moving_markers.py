@@ -1,7 +1,7 @@
 """Moving markers of the world between two instants."""
 
 import numpy as np
-from calmotion.multibody.kernels.moving_frames import between, pack
+from calmotion.multibody.model.moving_markers import between, pack
 from scipy.spatial.transform import Rotation
 
 

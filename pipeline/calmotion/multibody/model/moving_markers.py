@@ -29,7 +29,8 @@ def rooted(world: Array | None, total: int) -> Array:
 def between(world: Array, h: float, share: float) -> Array:
     """Markers at a share of the way between two instants h [s] apart, shape [2, W, 18]; cubic in position and turn."""
     if world.shape[1] == 0:
-        return world[0]
+        only: Array = world[0]
+        return only
     first, last = world
     start, end = (Rotation.from_matrix(rows[:, 9:].reshape(-1, 3, 3)) for rows in (first, last))
     turn = (start.inv() * end).as_rotvec()
