@@ -66,7 +66,7 @@ def test_it_moves_with_its_energy_kept_at_the_order_of_the_scheme():
     drifts = []
     for h in (4e-3, 2e-3):
         model, trajectory = released(h, 4.0)
-        assert len(model.tree.loops) == 1 and trajectory.refined == ()
+        assert len(model.tree.closing) == 1 and trajectory.refined == ()
         kinetic, potential = energies(model, trajectory.states)
         drifts.append(np.abs(kinetic + potential - potential[0] - kinetic[0]).max() / kinetic.max())
         assert kinetic.max() > 5.0, "it falls"

@@ -1,4 +1,4 @@
-"""What a simulation raises when it cannot go on."""
+"""The exception of a simulation that cannot continue."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ class SimulationFailure(Exception):
     """A step that could not be solved.
 
     Attributes:
-        time_s: When [s].
-        component: Where the correction was largest.
+        time_s: Time of the step, from the start of the simulation [s].
+        component: The component with the largest correction.
         reason: "singular", "diverged", "refined" or "no static equilibrium".
-        state: The last state that was found, or None.
-        share: Part of gravity up to which there was an equilibrium; 1 once there was one.
+        state: The last converged state, or None.
+        share: Largest fraction of gravity with an equilibrium; 1 after the start.
     """
 
     def __init__(self, time_s: float, component: int, reason: str, state: State | None = None, share: float = 1.0):

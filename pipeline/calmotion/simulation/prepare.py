@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from calmotion.errors import IntegrationError, ShotError
-from calmotion.multibody.analysis.deflection import most_bent
+from calmotion.multibody.analysis.deflection import largest_deflection
 from calmotion.multibody.analysis.modes import system_modes
 from calmotion.multibody.failure import SimulationFailure
 from calmotion.multibody.integrators.integrate import INTEGRATORS, follows_roots
@@ -193,7 +193,7 @@ def failure_error(prepared: Prepared, failure: SimulationFailure) -> ShotError:
     kind = ShotError if failure.reason == "no static equilibrium" else IntegrationError
     when = failure.time_s + prepared.grid.times[0]
     what = f"{_REASONS[failure.reason]} at {when:.3f} s"
-    bend = None if failure.state is None else most_bent(system, failure.state)
+    bend = None if failure.state is None else largest_deflection(system, failure.state)
     if bend is not None and bend.share > _FAR:
         under = "just before" if failure.share == 1.0 else f"under {failure.share:.0%} of gravity"
         return kind(

@@ -55,7 +55,7 @@ def _simulated_motion(model: Model, grid: TimeGrid, run: ForwardRun, motors: int
 def _by_joint(model: Model, joints: int, values: Array) -> Array:
     """From the system's joints and sides to the character's, shape [T, J, 3]; a joint that is left out carries none."""
     out = np.zeros((len(values), joints, 3))
-    out[:, [*model.tree.joint, *model.tree.loops]] = model.sign[:, None] * values
+    out[:, [*model.tree.joint, *model.tree.closing]] = model.sign[:, None] * values
     return out
 
 

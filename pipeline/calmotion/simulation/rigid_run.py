@@ -11,7 +11,7 @@ from calmotion.geometry.mesh_mass import mass_of_tets
 from calmotion.multibody.analysis.reactions import reactions
 from calmotion.multibody.integrators.workspace import Workspace
 from calmotion.multibody.model.model import Model, body_anchors, compile_model, rigid_body
-from calmotion.multibody.model.topology import Tree, loop_members
+from calmotion.multibody.model.topology import Tree, chain_members
 from calmotion.reduction.load_envelope import LoadEnvelope
 from calmotion.reduction.reduced_body import ReducedBody
 from calmotion.shot import Animation, Character, FEMeshes
@@ -86,7 +86,7 @@ def excitation_of(character: Character, model: Model, run: ForwardRun, h: float)
     force, moment = found.forces, found.moments
     closed = _in_loops(model)
     component_of = {body: k for k, body in enumerate(tree.body)}
-    number = {joint: k for k, joint in enumerate((*tree.joint, *tree.loops))}
+    number = {joint: k for k, joint in enumerate((*tree.joint, *tree.closing))}
     result = []
     for index, anchors in enumerate(body_anchors(character, tree)):
         b = component_of[index]
@@ -117,7 +117,7 @@ def _in_loops(model: Model) -> set[int]:
     """Components that are part of a closed loop."""
     system = model.system
     closing = range(len(system.parent), len(system.rows))
-    return set().union(*(loop_members(system.parent, system.side[joint]) for joint in closing))
+    return set().union(*(chain_members(system.parent, system.side[joint]) for joint in closing))
 
 
 def highest_frequency(signal: Array, h: float) -> float:

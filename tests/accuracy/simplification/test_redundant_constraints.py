@@ -39,7 +39,7 @@ def test_the_second_pin_of_a_clevis_holds_nothing(links):
     found, tree = _of(shot)
     assert found.redundant_rows == 5 * links
     assert found.redundant == found.joints
-    names = [shot.character.joints[tree.loops[k - len(tree.body)]].path for k in found.redundant]
+    names = [shot.character.joints[tree.closing[k - len(tree.body)]].path for k in found.redundant]
     assert all("Right" in name for name in names) and len(names) == links
 
 

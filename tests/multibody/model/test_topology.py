@@ -28,13 +28,13 @@ def test_the_loosest_joint_closes_a_loop():
     closing = dataclasses.replace(character.joints[1], path="/C/Extra", body0=0, body1=2)
     ball = dataclasses.replace(closing, path="/C/Ball", kind="spherical")
     tree = span_tree(dataclasses.replace(character, joints=(*character.joints, closing)))
-    assert sorted(tree.joint) == [0, 1, 2] and tree.loops == (3,)
+    assert sorted(tree.joint) == [0, 1, 2] and tree.closing == (3,)
     # a ball before a hinge, and whatever the shot asks for before all others
     swapped = dataclasses.replace(character, joints=(ball, *character.joints), motors=())
-    assert span_tree(swapped).loops == (0,)
+    assert span_tree(swapped).closing == (0,)
     asked = dataclasses.replace(character.joints[2], closes_loop=True)
     wanted = dataclasses.replace(character, joints=(*character.joints[:2], asked, ball), motors=())
-    assert span_tree(wanted).loops == (2,)
+    assert span_tree(wanted).closing == (2,)
 
 
 def test_a_body_without_a_way_to_the_world_is_refused():

@@ -47,7 +47,7 @@ def analyse(
     allowed = SHARE * character.retarget.allowed(options.tolerance)
     rows: list[ModelChoice] = [ModelChoice("loops", "closed loops", False, "no joint closes one")]
     stiffness: Mapping[int, Stiffness] = {}
-    if tree.loops or any(body.flexible for body in character.bodies):
+    if tree.closing or any(body.flexible for body in character.bodies):
         # what simulates the rigid robot takes a while to load, and a rigid shot without loops does not need it
         from calmotion.accuracy.simplification.by_rigid_run import decide
 

@@ -13,7 +13,7 @@ from calmotion.accuracy.simplification.redundant_constraints import closures_of
 from calmotion.geometry.solid import solid_of
 from calmotion.multibody.model.joint_arrays import BodyAnchors
 from calmotion.multibody.model.model import Model, body_anchors, rigid_body
-from calmotion.multibody.model.topology import Tree, loop_members
+from calmotion.multibody.model.topology import Tree, chain_members
 from calmotion.reduction.load_envelope import LoadEnvelope
 from calmotion.shot import Animation, Body, Character, MassProperties, ModelChoice
 from calmotion.shot.model_choice import AUTO, OFF, ON
@@ -147,10 +147,10 @@ def _loops(
     if not found.joints:
         return character, [ModelChoice("loops", "closed loops", False, "no joint closes one")]
     joints, rows = list(character.joints), []
-    order = [*tree.joint, *tree.loops]
+    order = [*tree.joint, *tree.closing]
     for k in found.joints:
         item = joints[order[k]]
-        members = loop_members(tree.parent, model.system.side[k])
+        members = chain_members(tree.parent, model.system.side[k])
         bends = any(character.bodies[tree.body[b]].bends for b in members)
         if k in found.redundant and choice != ON and (choice == OFF or not bends):
             joints[order[k]] = replace(item, redundant=True)

@@ -1,4 +1,4 @@
-"""Poses in which a closed loop has one more way to move than elsewhere: dead centres, where a linkage may branch."""
+"""Dead centres: poses in which a closed chain has one more degree of freedom, where a linkage may branch."""
 
 from __future__ import annotations
 
@@ -6,14 +6,14 @@ import numpy as np
 
 from calmotion.shot.character import Array
 
-NEAR = 0.1  # part of its usual size below which a loop's margin has all but gone
+NEAR = 0.1  # fraction of its median below which a margin is that of a dead centre
 
 
 def dead_centres(margins: Array) -> list[int]:
-    """Instants at which the closed loops pass such a pose closely: sharp minima of their margin.
+    """Instants at which the closed chains pass close to a dead centre: sharp minima of their margin.
 
     Args:
-        margins: Of a `simulation.Trajectory`, shape [T]; the first instant has none.
+        margins: Of a `trajectory.Trajectory`, shape [T]; the first instant has none.
     """
     inner = margins[1:]
     if len(inner) < 3 or not np.any(inner > 0.0):

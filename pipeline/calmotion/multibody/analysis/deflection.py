@@ -1,4 +1,4 @@
-"""How far bodies bend: what tells a user why a simulation went wrong, or how far a robot sags."""
+"""Deflection of bodies: a cause of failed simulations, and the sag of a robot."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ import numpy as np
 from calmotion.multibody.model.system import State, System
 
 
-class Bend(NamedTuple):
+class Deflection(NamedTuple):
     """Deflection of one component.
 
     Attributes:
-        component: Which.
-        distance: Largest displacement of one of its joints against the one that carries it [m].
-        length: Distance of these two, undeformed [m].
+        component: Its index.
+        distance: Largest displacement of one of its joints relative to the joint that carries it [m].
+        length: Undeformed distance of these two joints [m].
     """
 
     component: int
@@ -28,21 +28,21 @@ class Bend(NamedTuple):
         return self.distance / self.length if self.length > 0.0 else 0.0
 
 
-def bends(system: System, state: State) -> list[Bend]:
+def deflections(system: System, state: State) -> list[Deflection]:
     """Deflection of every component that has elastic coordinates and joints beyond the one that carries it."""
-    found = []
+    result = []
     for b, r in enumerate(system.elastic):
         markers = [(j, k) for j, pair in enumerate(system.side) for k in (0, 1) if pair[k] == b and (j, k) != (b, 1)]
         if not r or not markers:
             continue
         root = system.position[b, 1]
-        moved = [float(np.linalg.norm(system.Phi[j, k] @ state.u[b])) for j, k in markers]
-        worst = int(np.argmax(moved))
+        displaced = [float(np.linalg.norm(system.Phi[j, k] @ state.u[b])) for j, k in markers]
+        worst = int(np.argmax(displaced))
         length = float(np.linalg.norm(system.position[markers[worst]] - root))
-        found.append(Bend(b, moved[worst], length))
-    return found
+        result.append(Deflection(b, displaced[worst], length))
+    return result
 
 
-def most_bent(system: System, state: State) -> Bend | None:
-    """The component that bends most for its length, None where nothing can bend."""
-    return max(bends(system, state), key=lambda bend: bend.share, default=None)
+def largest_deflection(system: System, state: State) -> Deflection | None:
+    """Deflection of the component with the largest ratio to its length; None for a rigid robot."""
+    return max(deflections(system, state), key=lambda deflection: deflection.share, default=None)

@@ -1,4 +1,4 @@
-"""Natural modes of the whole character, joints held by their motors."""
+"""Natural modes of the whole character, joints locked by their motors."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from calmotion.shot.character import Array
 
 def system_modes(model: Model, joint_angles: Array, world: Array | None = None) -> tuple[Array, Array]:
     """Undamped natural frequencies [Hz], ascending, and damping ratios of their modes, about the equilibrium at joint
-    angles of shape [B], moving roots held at `world`, shape [W, 18].
+    angles of shape [B], moving roots fixed at `world`, shape [W, 18].
 
     Motions that the joints forbid are projected out; free joints count as motions. A negative stiffness (an
     unstable pose) gives a frequency of zero, and a ratio of zero. Modes couple through the damping; ratios are those
     of each mode by itself.
 
     Raises:
-        SimulationFailure: No equilibrium was found.
+        SimulationFailure: No equilibrium.
     """
     system, workspace = model.system, Workspace.for_system(model.system)
     if world is not None:
@@ -37,8 +37,8 @@ def system_modes(model: Model, joint_angles: Array, world: Array | None = None) 
 def elastic_modes(model: Model) -> tuple[Array, list[Array]]:
     """Natural modes of the undeformed character in the pose in which the shot was authored, without gravity.
 
-    From the singular values of a root of the stiffness: squares of frequencies would be known only to a rounding of
-    the largest, which leaves nothing of slow modes, and a frequency to motions of free joints that have none.
+    From the singular values of a root of the stiffness: squares of frequencies would have a rounding error relative to
+    the largest one, which exceeds those of slow modes, and motions of free joints would have a frequency.
 
     Returns:
         Angular frequencies [rad/s], ascending, shape [n]; and for each component its elastic coordinates in the modes,
@@ -53,11 +53,11 @@ def elastic_modes(model: Model) -> tuple[Array, list[Array]]:
     if not size:
         return np.zeros(0), [np.zeros((int(r), 0)) for r in system.elastic]
     unit = solve_triangular(cholesky(allowed.T @ M @ allowed, lower=True), allowed.T, lower=True).T
-    _, roots, turned = svd(np.concatenate([_root(K[own, own]) @ unit[own] for own in parts]))
+    _, roots, rotation = svd(np.concatenate([_root(K[part, part]) @ unit[part] for part in parts]))
     omega = np.zeros(size)
     omega[: len(roots)] = roots
-    shapes = unit @ turned.T
-    return omega[::-1], [shapes[own, ::-1] for own in parts]
+    shapes = unit @ rotation.T
+    return omega[::-1], [shapes[part, ::-1] for part in parts]
 
 
 def _root(K: Array) -> Array:
@@ -74,7 +74,7 @@ def _natural_modes(
     if not allowed.shape[1]:
         return np.zeros(0), allowed, C
     stiffness = allowed.T @ K @ allowed
-    # symmetric up to what the moments' axes leave, which vanishes on allowed motions
+    # symmetric but for a part from the axes of the moments, which vanishes on allowed motions
     values, shapes = eigh(0.5 * (stiffness + stiffness.T), allowed.T @ M @ allowed)
     return np.sqrt(np.maximum(values, 0.0)), allowed @ shapes, C
 
@@ -89,19 +89,19 @@ def _matrices(
     total = int(offset[-1])
     (K, M, C), H = np.zeros((3, total, total)), np.zeros((6 * len(system.rows), total))
     for b, r in enumerate(system.elastic):
-        own = slice(offset[b], offset[b] + 6 + r)
-        K[own, own] = blocks.K[b, : 6 + r, : 6 + r]
-        M[own, own] = blocks.D[b, : 6 + r, : 6 + r]
-        C[own, own] = blocks.P[b, : 6 + r, : 6 + r]
+        part = slice(offset[b], offset[b] + 6 + r)
+        K[part, part] = blocks.K[b, : 6 + r, : 6 + r]
+        M[part, part] = blocks.D[b, : 6 + r, : 6 + r]
+        C[part, part] = blocks.P[b, : 6 + r, : 6 + r]
     for joint, (p, b) in enumerate(system.side):
         n = int(6 + system.elastic[b])
-        own, rows = slice(offset[b], offset[b] + n), slice(6 * joint, 6 * joint + 6)
-        H[rows, own] = blocks.Hc[joint, :, :n]
+        part, rows = slice(offset[b], offset[b] + n), slice(6 * joint, 6 * joint + 6)
+        H[rows, part] = blocks.Hc[joint, :, :n]
         free = slides_freely(system, joint)
         if p >= 0:
             m = int(6 + system.elastic[p])
             parent = slice(offset[p], offset[p] + m)
-            K[own, parent] += blocks.Nc[joint, :n] @ blocks.Jp[joint, :, :m]
+            K[part, parent] += blocks.Nc[joint, :n] @ blocks.Jp[joint, :, :m]
             H[rows, parent] = blocks.Hp[joint, :, :m]
             if free:
                 # the parent's rows by the length, which follows the coordinates of both

@@ -1,4 +1,4 @@
-"""How the rigid robot's targets and motor efforts respond to its motors."""
+"""Response of the rigid robot's targets and motor efforts to its motors."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from calmotion.shot.character import Array, IntArray
 
 @dataclass(frozen=True, eq=False)
 class RigidResponse:
-    """How the rigid robot's targets and efforts follow its motors, at some instants of a motion.
+    """Derivatives of the rigid robot's targets and efforts by its motors, at some instants of a motion.
 
     Attributes:
-        targets: Targets' frames by motor angles, shape [T, K, 6, m]: position in world axes [m/rad], turning in the
-            target's own axes.
+        targets: Targets' frames by motor angles, shape [T, K, 6, m]: position in world axes [m/rad], rotation
+            in target axes [rad/rad].
         inertia: Efforts of all motors by motor accelerations [kg m^2], shape [T, M, m].
     """
 
@@ -30,14 +30,14 @@ class RigidResponse:
         cls, rigid: Model, c: Array, q: Array, joint_angles: Array, motors: IntArray, world: Array, times: Array,
         stride: int = 1,
     ) -> RigidResponse:  # fmt: skip
-        """The response along a motion; computed at every `stride`-th instant and held in between, which is enough to
-        precondition with.
+        """The response along a motion; computed at every `stride`-th instant and constant in between, which suffices
+        for a preconditioner.
 
         Args:
             rigid: The rigid model.
             c, q: Its poses, shapes [T, B, 3], [T, B, 4].
             joint_angles: Of its joints, shape [T, J].
-            motors: Those that may change, m of them.
+            motors: Those that may change, shape [m].
             world: Moving markers, shape [T, W, 18].
             times: Of the poses, from the start of the simulation [s], shape [T].
             stride: Distance of the instants at which it is computed.
@@ -50,9 +50,9 @@ class RigidResponse:
         motions, inertia = motor_responses(rigid, c, q, joint_angles[few].copy(), motors, world[few].copy(), times[few])
         J = target_jacobians(rigid, c, q, np.zeros(c.shape[:2] + (0,)))
         targets = np.einsum("nkia,nkam->nkim", J, motions[:, rigid.targets.component])
-        held = np.minimum(np.arange(len(joint_angles)) // stride, len(c) - 1)
-        return cls(targets[held], inertia[held])
+        nearest = np.minimum(np.arange(len(joint_angles)) // stride, len(c) - 1)
+        return cls(targets[nearest], inertia[nearest])
 
     def coupled(self, coupling: Array) -> RigidResponse:
-        """The response to motors that move others with them; `coupling` of shape [m, leaders]."""
+        """The response to motors with others geared to them; `coupling` of shape [m, leaders]."""
         return RigidResponse(self.targets @ coupling, self.inertia @ coupling)

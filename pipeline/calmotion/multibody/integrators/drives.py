@@ -1,4 +1,4 @@
-"""Motor inputs between instants, for integrators that look there."""
+"""Motor inputs between instants, for integrators that evaluate them there."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def hermite_drive(times: Array, angles: Array, rates: Array) -> Drive:
     derivatives = [curve, curve.derivative(), curve.derivative(2)]
 
     def drive(t: Array) -> tuple[Array, Array, Array]:
-        first, second, third = (np.asarray(item(t)) for item in derivatives)
+        first, second, third = (np.asarray(derivative(t)) for derivative in derivatives)
         return first, second, third
 
     return drive
@@ -37,10 +37,10 @@ def hermite_drive(times: Array, angles: Array, rates: Array) -> Drive:
 def stage_inputs(drive: Drive, times: Array, shares: Array) -> Array:
     """Inputs at shares of every step, shape [T - 1, shares, 3, J]: angle, rate and acceleration.
 
-    A step's own piece of the curve counts at its ends, where accelerations may jump.
+    At the ends of a step, where accelerations may jump, the polynomial of that step is used.
     """
     h = np.diff(times)
-    # a hair inside the step
+    # slightly inside the step
     at = times[:-1, None] + h[:, None] * np.clip(shares, 1e-12, 1.0 - 1e-12)
     values = drive(at.ravel())
     return np.stack([v.reshape(*at.shape, v.shape[-1]) for v in values], axis=2)

@@ -1,6 +1,6 @@
 """Newmark's formulas and the generalised-alpha method on the rotation group; compiled.
 
-With a the method's own acceleration and D the change of position over the step (c_n - c_{n-1}, the rotation vector
+With a the acceleration of the method and D the change of position over the step (c_n - c_{n-1}, the rotation vector
 theta_n in body axes, u_n - u_{n-1}):
 
     a_n = (D - h V_{n-1}) / (beta h^2) - (1/(2 beta) - 1) a_{n-1}

@@ -1,6 +1,6 @@
 """Radau IIA with three stages, for reference solutions: order 5 in positions and velocities, 3 in multipliers.
 
-The index-2 system (Seed (31), with alpha = 0: what the constraints drift in position is of the order of the method).
+The index-2 system (Seed (31), with alpha = 0: the drift of the constraints in position is of the order of the method).
 Unknowns of a step are its stages' coordinates X = (c - c_0, theta, u - u_0), theta the rotation vector from the step's
 start, and multipliers; with d the inverse of the Butcher matrix
 
@@ -83,10 +83,10 @@ class _Stepper:
         self.stages = [allocate_state(system) for _ in NODES]
         self.sizes = 6 + system.elastic
         self.offset = np.concatenate([[0], np.cumsum(self.sizes)])
-        self.own = [slice(a, b) for a, b in zip(self.offset[:-1], self.offset[1:], strict=True)]
+        self.coordinates = [slice(a, b) for a, b in zip(self.offset[:-1], self.offset[1:], strict=True)]
         rows = [(j, i) for j in range(len(system.rows)) for i in range(JOINT_ROWS) if has_row(system, j, i)]
         self.rows = np.array(rows, int).reshape(-1, 2)
-        self.loops = len(system.rows) > len(system.parent)
+        self.chains_closed = len(system.rows) > len(system.parent)
         self.Vd = [np.zeros_like(self.stages[0].V) for _ in NODES]
 
     def _flat(self, values: Array) -> Array:
@@ -103,39 +103,39 @@ class _Stepper:
         """V and V' of all stages from their coordinates; returns theta' of each, shape [B, 3]."""
         X = np.array([self._coordinates(before, stage) for stage in self.stages])
         slopes = DIFFERENCES @ X / h
-        J, turning = np.zeros((3, 3)), []
+        J, theta_rates = np.zeros((3, 3)), []
         for stage, slope in zip(self.stages, slopes, strict=True):
             rates = np.zeros_like(before.c)
-            for b, own in enumerate(self.own):
-                stage.V[b, : self.sizes[b]] = slope[own]
-                rates[b] = slope[own][3:6]
+            for b, part in enumerate(self.coordinates):
+                stage.V[b, : self.sizes[b]] = slope[part]
+                rates[b] = slope[part][3:6]
                 right_jacobian(stage.turn[b], J)
                 stage.V[b, 3:6] = J @ rates[b]
-            turning.append(rates)
+            theta_rates.append(rates)
         gained = np.array([stage.V - before.V for stage in self.stages])
         for i, Vd in enumerate(self.Vd):
             Vd[:] = np.einsum("j,jbn->bn", DIFFERENCES[i], gained) / h
-        return turning
+        return theta_rates
 
-    def _velocity_jacobian(self, turning: list[Array], h: float) -> tuple[Array, Array]:
+    def _velocity_jacobian(self, theta_rates: list[Array], h: float) -> tuple[Array, Array]:
         """dV of all stages (translations in world axes) by all their corrections (body axes), shape [3 x, 3 x]; and the
         turn of translations from world into body axes, shape [3 x, 3 x]."""
         x, s = self.offset[-1], len(NODES)
         dV, turned = np.zeros((s * x, s * x)), np.eye(s * x)
         Ji, Jj, A, R = np.zeros((3, 3)), np.zeros((3, 3)), np.zeros((3, 3)), np.zeros((3, 3))
         for i, stage in enumerate(self.stages):
-            for b, own in enumerate(self.own):
-                at = i * x + own.start
+            for b, part in enumerate(self.coordinates):
+                at = i * x + part.start
                 right_jacobian(stage.turn[b], Ji)
                 for j, other in enumerate(self.stages):
-                    to, d = j * x + own.start, DIFFERENCES[i, j] / h
+                    to, d = j * x + part.start, DIFFERENCES[i, j] / h
                     matrix_of(other.q[b], R)
                     inverse_right_jacobian(other.turn[b], Jj)
                     dV[at : at + 3, to : to + 3] = d * R
                     dV[at + 3 : at + 6, to + 3 : to + 6] = d * Ji @ Jj
                     elastic = np.arange(6, self.sizes[b])
                     dV[at + elastic, to + elastic] = d
-                right_jacobian_derivative(stage.turn[b], turning[i][b], 1.0, A)
+                right_jacobian_derivative(stage.turn[b], theta_rates[i][b], 1.0, A)
                 inverse_right_jacobian(stage.turn[b], Jj)
                 dV[at + 3 : at + 6, at + 3 : at + 6] += A @ Jj
                 matrix_of(stage.q[b], R)
@@ -150,24 +150,24 @@ class _Stepper:
         blocks, x, m = ws.blocks, self.offset[-1], len(self.rows)
         K, P, D = np.zeros((x, x)), np.zeros((x, x)), np.zeros((x, x))
         L, H = np.zeros((x, m)), np.zeros((m, x))
-        for b, own in enumerate(self.own):
+        for b, part in enumerate(self.coordinates):
             n = self.sizes[b]
-            K[own, own], P[own, own], D[own, own] = blocks.K[b, :n, :n], blocks.P[b, :n, :n], blocks.D[b, :n, :n]
+            K[part, part], P[part, part], D[part, part] = blocks.K[b, :n, :n], blocks.P[b, :n, :n], blocks.D[b, :n, :n]
         for j, (p, b) in enumerate(system.side):
-            own, n = self.own[b], self.sizes[b]
+            part, n = self.coordinates[b], self.sizes[b]
             rows = np.flatnonzero(self.rows[:, 0] == j)
             kept = self.rows[rows, 1]
-            L[own, rows] = blocks.Lc[j, :n][:, kept]
-            H[rows, own] = blocks.Hc[j, kept, :n]
+            L[part, rows] = blocks.Lc[j, :n][:, kept]
+            H[rows, part] = blocks.Hc[j, kept, :n]
             if p < 0:
                 continue
-            parent, k = self.own[p], self.sizes[p]
+            parent, k = self.coordinates[p], self.sizes[p]
             L[parent, rows] = blocks.Lp[j, :k][:, kept]
             H[rows, parent] = blocks.Hp[j, kept, :k]
-            K[own, parent] += blocks.Nc[j, :n] @ blocks.Jp[j, :, :k]
+            K[part, parent] += blocks.Nc[j, :n] @ blocks.Jp[j, :, :k]
             if slides_freely(system, j):
                 # the parent's rows by the length, which follows the coordinates of both
-                K[parent, own] -= np.outer(blocks.Lp[j, :k, LENGTH], blocks.Hc[j, LENGTH, :n])
+                K[parent, part] -= np.outer(blocks.Lp[j, :k, LENGTH], blocks.Hc[j, LENGTH, :n])
                 K[parent, parent] -= np.outer(blocks.Lp[j, :k, LENGTH], blocks.Hp[j, LENGTH, :k])
         gap = blocks.gap[self.rows[:, 0], self.rows[:, 1]]
         return self._flat(blocks.res), gap, K, P, D, L, H
@@ -183,8 +183,8 @@ class _Stepper:
             for b in range(len(before.c)):
                 turn(before.q[b], stage.turn[b], stage.q[b])
         for _ in range(LIMIT):
-            turning = self._velocities(before, h)
-            dV, turned = self._velocity_jacobian(turning, h)
+            theta_rates = self._velocities(before, h)
+            dV, turned = self._velocity_jacobian(theta_rates, h)
             # accelerations follow from velocities as velocities from positions
             dA = (np.kron(DIFFERENCES, np.eye(x)) / h) @ dV
             dV, dA = turned @ dV, turned @ dA
@@ -198,9 +198,9 @@ class _Stepper:
                 A[rows, : s * x] = -L.T @ dV[at]
                 A[rows, at] += H
                 right[at], right[rows] = -res, -gap
-            if self.loops:
-                # Redundant constraints: the motion is unique, of the multipliers those of least norm. Which are
-                # redundant shows once accelerations and forces are the unknowns, and velocities the constraints.
+            if self.chains_closed:
+                # Redundant constraints: the motion is unique, and the multipliers are those of least norm. The rank is
+                # determined with accelerations and forces as unknowns and velocities as constraints.
                 A[:, : s * x] *= h * h
                 A[s * x :] /= h
                 right[s * x :] /= h
@@ -222,8 +222,8 @@ class _Stepper:
 
     def _correct(self, before: State, stage: State, correction: Array) -> None:
         R, T = np.zeros((3, 3)), np.zeros((3, 3))
-        for b, own in enumerate(self.own):
-            change = correction[own]
+        for b, part in enumerate(self.coordinates):
+            change = correction[part]
             matrix_of(stage.q[b], R)
             inverse_right_jacobian(stage.turn[b], T)
             stage.c[b] += R @ change[:3]

@@ -1,4 +1,4 @@
-"""A step that Newton's method does not solve, approached through smaller steps.
+"""A step that Newton's method does not solve, divided into smaller steps.
 
 Their end is the initial guess for the step itself, whose equations are then solved as everywhere else, so that
 gradients are exact. Where they still cannot be solved, the end of the smaller steps is the result.
@@ -29,13 +29,13 @@ def _copy(source: State, out: State) -> None:
 
 def _turn_between(first: State, last: State) -> Array:
     """Rotation vectors from one state to another, body axes [rad], shape [B, 3]."""
-    turns = np.zeros_like(first.turn)
+    vectors = np.zeros_like(first.turn)
     A, B = np.zeros((3, 3)), np.zeros((3, 3))
-    for b in range(len(turns)):
+    for b in range(len(vectors)):
         matrix_of(first.q[b], A)
         matrix_of(last.q[b], B)
-        logarithm(A.T @ B, turns[b])
-    return turns
+        logarithm(A.T @ B, vectors[b])
+    return vectors
 
 
 def refined_step(

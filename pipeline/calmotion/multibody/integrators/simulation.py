@@ -91,7 +91,7 @@ def simulate(
 ) -> Trajectory:  # fmt: skip
     """Simulate the system from static equilibrium, or from a state that is given.
 
-    A step that Newton's method cannot solve is approached through smaller ones (`refinement`).
+    A step that Newton's method cannot solve is divided into smaller ones (`refinement`).
 
     Args:
         system: The compiled system.
@@ -99,9 +99,8 @@ def simulate(
         angles, rates: Angle [rad] (or length [m]) and rate of each joint's motor, shape [T, J].
         h: Time step [s].
         workspace: Scratch of this system.
-        progress: Called with a fraction in 0..1 now and then, or None.
-        settled: False releases the system at `start` as it is, with its velocities, without looking for the
-            equilibrium.
+        progress: Called with a fraction in 0..1 at intervals, or None.
+        settled: False starts from `start`, with its velocities, in place of the equilibrium.
         integrator: A name of `coefficients.IMPLICIT`.
         world: Moving markers of the world, shape [T, W, 18]; needed where the system has any.
 
@@ -138,7 +137,7 @@ def simulate_on(
     system: System, before2: State, before: State, angles: Array, rates: Array, h: float, workspace: Workspace,
     world: Array | None = None,
 ) -> Trajectory:  # fmt: skip
-    """Go on from two instants by BDF2.
+    """Continue from two instants by BDF2.
 
     Args:
         before2, before: The states of instants 0 and 1.

@@ -14,7 +14,7 @@ from calmotion.support.compilation import kernel
 
 @dataclass(frozen=True, eq=False)
 class Trajectory:
-    """States of all instants; arrays of `State` with a leading time axis, and what they cost.
+    """States of all instants; arrays of `State` with a leading time axis, and their cost.
 
     Attributes:
         h: Step [s].

@@ -93,7 +93,7 @@ def nonrotating_position_jacobian(component: Component, motion: ComponentMotion,
     """
     r, M3, stiffness, a, al = component.r, component.M3, component.stiffness, motion.a, motion.al
     n = 6 + r
-    # turning the body turns a: da = [a]x dphi
+    # rotating the body changes a: da = [a]x dphi
     for i in range(n):
         for k in range(n):
             K[i, k] = 0.0

@@ -2,13 +2,13 @@
 
 LINEAR_BODY: psi is a rotation vector, R = exp(psi).
 
-Any other: the basis holds the displacements of a patch that has turned by a finite rotation, R - E restricted
-to the patch, and psi is the axial vector of its skew part: psi = sin(a) n for a turn by a about n. Hence
+Any other: the basis contains the displacements of a patch after a finite rotation, R - E restricted to the patch,
+and psi is the axial vector of its skew part: psi = sin(a) n for a rotation by a about n. Hence
 
     R = E + [psi]x + c [psi]x^2,      c = 1 / (1 + C),  C = cos(a) = sqrt(1 - psi.psi)
     R^T dR = [H dpsi]x,               H = E - c [psi]x + (c / C) psi psi^T
 
-up to (not including) a quarter turn, where it is not a number and the step is refused.
+up to (not including) a rotation by 90 degrees, where it is not a number and the step fails.
 """
 
 from __future__ import annotations

@@ -252,7 +252,7 @@ def position_jacobian(component: Component, motion: ComponentMotion, work: Work,
     a, om, v, vd = motion.a, motion.om, motion.v, motion.vd
     B, W, E, T, tmp = work.B, work.W, work.E, work.T, work.tmp
     n = 6 + r
-    # turning the body turns a: da = [a]x dphi
+    # rotating the body changes a: da = [a]x dphi
     for i in range(n):
         for k in range(3):
             K[i, k] = 0.0

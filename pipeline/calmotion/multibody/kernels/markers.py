@@ -1,6 +1,6 @@
 """Kinematics of a marker on a (flexible) component, its Jacobians and the forces that act through it; compiled.
 
-A marker sits at y = X + Phi u in the body frame and is turned by exp(psi), psi = Psi u, before its rest rotation:
+A marker sits at y = X + Phi u in the body frame and is rotated by exp(psi), psi = Psi u, before its rest rotation:
 
     p = c + R y            p' = w + R (omega x y + Phi v)
     R_m = R exp(psi) R_0   omega_m = R_0^T ( exp(-psi) omega + J_r(psi) Psi v )
@@ -74,7 +74,7 @@ WORLD_MARKER = 18  # entries of a moving marker of the world
 
 @kernel
 def moving_marker(frame: Array, m: MarkerWork) -> None:
-    """A marker of the world whose motion is given: position, velocity, angular velocity in its own axes, and its
+    """A marker of the world whose motion is given: position, velocity, angular velocity in marker axes, and its
     rotation matrix by rows, shape [18]."""
     for i in range(3):
         m.p[i] = frame[i]

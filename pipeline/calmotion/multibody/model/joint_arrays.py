@@ -1,4 +1,4 @@
-"""The joints of a character as flat arrays: those of the tree, by component, then those that close loops."""
+"""The joints of a character as flat arrays: those of the tree, by component, then those that close chains."""
 
 from __future__ import annotations
 
@@ -39,8 +39,8 @@ def body_anchors(character: Character, tree: Tree) -> list[BodyAnchors]:
 
 
 def _side(character: Character, joint: int, body: int) -> Frame:
-    item = character.joints[joint]
-    return item.frame0 if item.body0 == body else item.frame1
+    ends = character.joints[joint]
+    return ends.frame0 if ends.body0 == body else ends.frame1
 
 
 def rotation_matrix(quaternion: Array) -> Array:
@@ -52,7 +52,7 @@ def rotation_matrix(quaternion: Array) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class JointArrays:
-    """What `System` and `Model` say of the joints."""
+    """Entries of `System` and `Model` for the joints."""
 
     arrays: dict[str, Any]
     motor: IntArray
@@ -64,13 +64,13 @@ def joint_arrays(
     character: Character, tree: Tree, bodies: Sequence[ReducedBody], anchors: list[BodyAnchors], r_max: int,
     moving: Sequence[int] = (),
 ) -> JointArrays:  # fmt: skip
-    """Joints of the tree, by component, then those that close loops.
+    """Joints of the tree, by component, then those that close chains.
 
     Args:
-        moving: Joints whose world-side frame moves as it is told, in the order of `assembly.Work.world`.
+        moving: Joints whose world-side frame has a prescribed motion, in the order of `work.Work.world`.
     """
     component_of = {WORLD: -1} | {b: k for k, b in enumerate(tree.body)}
-    order = [*tree.joint, *tree.loops]
+    order = [*tree.joint, *tree.closing]
     count = len(order)
     side, rows = np.zeros((count, 2), np.int32), np.zeros(count, np.int32)
     sliding, motor, sign = np.zeros(count, np.int32), np.full(count, -1, np.int32), np.ones(count)
@@ -78,34 +78,34 @@ def joint_arrays(
     position, rotation = np.zeros((count, 2, 3)), np.zeros((count, 2, 3, 3))
     Phi, Psi = np.zeros((count, 2, 3, r_max)), np.zeros((count, 2, 3, r_max))
     rest = np.zeros(count)
-    motor_of = {item.joint: k for k, item in enumerate(character.motors)}
-    for k, joint in enumerate(order):
-        item = character.joints[joint]
-        # a loop's joint, too, has the world on its first side or nowhere
-        flipped = tree.flipped[k] if k < len(tree.body) else item.body1 == WORLD
-        ends = [(item.body0, item.frame0), (item.body1, item.frame1)]
+    motor_of = {motor.joint: k for k, motor in enumerate(character.motors)}
+    for k, index in enumerate(order):
+        joint = character.joints[index]
+        # a joint that closes a chain has the world on its first side, too, or on none
+        flipped = tree.flipped[k] if k < len(tree.body) else joint.body1 == WORLD
+        ends = [(joint.body0, joint.frame0), (joint.body1, joint.frame1)]
         if flipped:
             ends.reverse()
         bodies_of = [body for body, _ in ends]
-        for own, (body, frame) in enumerate(ends):
-            side[k, own] = component_of[body]
+        for end, (body, frame) in enumerate(ends):
+            side[k, end] = component_of[body]
             none = np.zeros((3, 0))
             marker = Marker(frame.position, frame.rotation, none, none)
             if body != WORLD:
-                marker = bodies[body].markers[anchors[body].joints.index(joint)]
+                marker = bodies[body].markers[anchors[body].joints.index(index)]
             r = marker.Phi.shape[1]
-            position[k, own], rotation[k, own] = marker.position, rotation_matrix(marker.rotation)
-            Phi[k, own, :, :r], Psi[k, own, :, :r] = marker.Phi, marker.Psi
-        if item.kind == "spherical":
-            # a ball has no axes of its own: those of its second side are laid so that the authored pose is zero
+            position[k, end], rotation[k, end] = marker.position, rotation_matrix(marker.rotation)
+            Phi[k, end, :, :r], Psi[k, end, :, :r] = marker.Phi, marker.Psi
+        if joint.kind == "spherical":
+            # a ball joint has no axes: those of its second side are chosen so that the authored pose has zero rotation
             turns = [np.eye(3) if b == WORLD else rotation_matrix(character.bodies[b].rest.rotation) for b in bodies_of]
             rotation[k, 1] = turns[1].T @ turns[0] @ rotation[k, 0]
         sign[k] = -1.0 if flipped else 1.0
-        motor[k] = motor_of.get(joint, -1)
-        sliding[k] = item.kind == "prismatic"
-        moved[k] = moving.index(joint) if joint in moving else -1
-        rows[k] = _ROWS[item.kind] if motor[k] < 0 else 6
-        rest[k] = _rest_value(character, bodies_of, position[k], rotation[k], item.kind == "prismatic")
+        motor[k] = motor_of.get(index, -1)
+        sliding[k] = joint.kind == "prismatic"
+        moved[k] = moving.index(index) if index in moving else -1
+        rows[k] = _ROWS[joint.kind] if motor[k] < 0 else 6
+        rest[k] = _rest_value(character, bodies_of, position[k], rotation[k], joint.kind == "prismatic")
     arrays = {
         "side": side, "rows": rows, "sliding": sliding, "moving": moved, "position": position, "rotation": rotation,
         "Phi": Phi, "Psi": Psi,

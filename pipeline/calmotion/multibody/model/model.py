@@ -36,7 +36,7 @@ class Model:
         system: The flat arrays.
         tree: Order of the components.
         motor: Motor that drives each joint, -1 for none, shape [J]: the joints of the tree, by component, then
-            those that close loops.
+            those that close chains.
         sign: +1, or -1 where the joint's angle runs against the tree, shape [J].
         targets: The target markers.
         rest_angles: Angle [rad] (or length [m]) of each joint in the pose the shot was authored in, shape [J].
@@ -82,7 +82,7 @@ def compile_model(character: Character, tree: Tree, bodies: Sequence[ReducedBody
     """Compile a character whose bodies are given reduced, with the markers of `body_anchors`.
 
     Args:
-        moving: Joints to the world whose frame there moves as it is told (moving roots).
+        moving: Joints to the world whose frame there has a prescribed motion (moving roots).
     """
     anchors = body_anchors(character, tree)
     count = len(tree.body)
@@ -121,22 +121,22 @@ def compile_model(character: Character, tree: Tree, bodies: Sequence[ReducedBody
 
 
 def _elastic_laws(bodies: Sequence[ReducedBody]) -> dict[str, Any]:
-    """What `System` says of elastic laws, bodies in the order of the components."""
+    """Entries of `System` for the elastic laws, bodies in the order of the components."""
     count = len(bodies)
     law, points, start = np.full(count, LINEAR, np.int32), np.zeros(count, np.int64), np.zeros(count, np.int64)
     retardation, lame = np.zeros(count), np.zeros((count, 2))
     arrays: list[Array] = []
     size = 0
     for k, body in enumerate(bodies):
-        item = body.elasticity
-        if item is None:
+        elasticity = body.elasticity
+        if elasticity is None:
             continue
-        law[k] = {"stvk": STVK, "neohookean": NEOHOOKEAN}[item.law]
-        retardation[k], lame[k], start[k] = item.retardation, item.lame, size
-        points[k] = item.points if item.law == "neohookean" else len(body.stiffness)
-        data = item.data
-        if item.strain_projection is not None:
-            points[k], data = len(item.strain_projection), np.concatenate([data, item.strain_projection.ravel()])
+        law[k] = {"stvk": STVK, "neohookean": NEOHOOKEAN}[elasticity.law]
+        retardation[k], lame[k], start[k] = elasticity.retardation, elasticity.lame, size
+        points[k] = elasticity.points if elasticity.law == "neohookean" else len(body.stiffness)
+        data, projection = elasticity.data, elasticity.strain_projection
+        if projection is not None:
+            points[k], data = len(projection), np.concatenate([data, projection.ravel()])
         arrays.append(data)
         size += data.size
     data = np.concatenate(arrays) if arrays else np.zeros(0)
@@ -154,8 +154,8 @@ def _targets(
     Phi, Psi = np.zeros((count, 3, r_max)), np.zeros((count, 3, r_max))
     position, rotation = np.zeros((count, 3)), np.zeros((count, 3, 3))
     for k, target in enumerate(character.targets):
-        own = anchors[target.body]
-        marker = bodies[target.body].markers[len(own.joints) + own.targets.index(k)]
+        frames = anchors[target.body]
+        marker = bodies[target.body].markers[len(frames.joints) + frames.targets.index(k)]
         r = marker.Phi.shape[1]
         position[k], rotation[k] = marker.position, rotation_matrix(marker.rotation)
         Phi[k, :, :r], Psi[k, :, :r] = marker.Phi, marker.Psi
@@ -199,7 +199,7 @@ def rigid_model(model: Model) -> Model:
 
 
 def moves_freely(model: Model) -> BoolArray:
-    """Which joints no motor holds."""
+    """Which joints move freely: they have no motor and are no welds."""
     rows = model.system.rows
     return (rows > 0) & (rows < 6)
 
@@ -211,7 +211,7 @@ def start_angles(model: Model, joint_angles: Array) -> Array:
 
 
 def with_damping(model: Model, ratio: float, frequency: float) -> Model:
-    """A model with more damping: Kelvin-Voigt's, which grows with the frequency.
+    """A model with additional Kelvin-Voigt damping, which is proportional to the frequency.
 
     Args:
         ratio: Of critical, at the given frequency.
@@ -219,8 +219,8 @@ def with_damping(model: Model, ratio: float, frequency: float) -> Model:
     """
     system, retardation = model.system, ratio / (np.pi * frequency)
     added = retardation * system.stiffness[:, :, None] * np.eye(system.stiffness.shape[1])
-    more = system._replace(damping=system.damping + added, retardation=system.retardation + retardation)
-    return replace(model, system=more)
+    damped = system._replace(damping=system.damping + added, retardation=system.retardation + retardation)
+    return replace(model, system=damped)
 
 
 __all__ = [

@@ -1,6 +1,6 @@
-"""Markers of the world that move as they are told: what roots of characters hang from.
+"""Markers of the world with a prescribed motion: the moving roots of characters.
 
-A marker at an instant is a row of 18 numbers: position [m], velocity [m/s], angular velocity in the marker's own axes
+A marker at an instant is a row of 18 numbers: position [m], velocity [m/s], angular velocity in marker axes
 [rad/s], rotation matrix by rows.
 """
 
@@ -22,19 +22,20 @@ def pack(positions: Array, velocities: Array, spins: Array, matrices: Array) -> 
 
 
 def rooted(world: Array | None, total: int) -> Array:
-    """Moving markers at all instants, shape [T, W, 18]: those given, or none."""
+    """Moving markers at all instants, shape [T, W, 18]; empty where none are given."""
     return np.zeros((total, 0, WORLD_MARKER)) if world is None else world
 
 
 def between(world: Array, h: float, share: float) -> Array:
-    """Markers at a share of the way between two instants h [s] apart, shape [2, W, 18]; cubic in position and turn."""
+    """Markers at a fraction of a step h [s] from its two instants, shape [2, W, 18]; cubic in position and rotation
+    vector."""
     if world.shape[1] == 0:
         only: Array = world[0]
         return only
     first, last = world
     start, end = (Rotation.from_matrix(rows[:, 9:].reshape(-1, 3, 3)) for rows in (first, last))
     turn = (start.inv() * end).as_rotvec()
-    # the rotation vector's rate at both ends: omega = J_r theta', and J_r turns theta into itself
+    # the rotation vector's rate at both ends: omega = J_r theta', and J_r theta = theta
     rates = np.stack([first[:, 6:9], np.linalg.solve(_right_jacobian(turn), last[:, 6:9, None])[..., 0]])
     s = share
     h00, h10, h01, h11 = 1 - 3 * s**2 + 2 * s**3, s - 2 * s**2 + s**3, 3 * s**2 - 2 * s**3, s**3 - s**2

@@ -1,8 +1,8 @@
 """The compiled multibody system: flat arrays that the kernels read, one row a component, parents before children.
 
 Each component hangs by one joint from its parent (-1: the world): component b by joint b. Further joints, from
-number B on, close loops. Arrays are padded to the largest number of elastic coordinates. Side 0 of a joint is on the
-parent, side 1 on the component; a loop's joint may have the world on side 0, never on side 1.
+number B on, close chains. Arrays are padded to the largest number of elastic coordinates. Side 0 of a joint is on the
+parent, side 1 on the component; a joint that closes a chain may have the world on side 0, never on side 1.
 """
 
 from __future__ import annotations
@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 
 from calmotion.shot.character import Array, BoolArray, IntArray
 
-CountArray = NDArray[np.int64]  # as Python's own integers reach a kernel, which is then compiled for both at once
+CountArray = NDArray[np.int64]  # the type of Python's integers in a kernel, so that it is compiled once for both
 JOINT_ROWS = 6
 BACKWARD_DIFFERENCE, NEWMARK = 0, 1  # families of time-stepping formulas
-LINEAR, STVK, NEOHOOKEAN = 0, 1, 2  # elastic laws; `finite_rotation` tells linear from nonlinear by zero
+LINEAR, STVK, NEOHOOKEAN = 0, 1, 2  # elastic laws; `finite_rotation` distinguishes linear and nonlinear by zero
 
 
 class System(NamedTuple):
@@ -30,19 +30,20 @@ class System(NamedTuple):
         rows: Number of constraint rows of each joint: 6 (weld, motor), 5 (free hinge or slider), 3 (ball) or 0
             (floating), shape [J].
         sliding: Whether a joint has a length along its axis instead of an angle, shape [J].
-        moving: Row of `assembly.Work.world` that moves the world-side marker of a joint, -1 for none, shape [J].
-        mass, s, Z, M3, M4, S: Inertia integrals, see `fem.Invariants`.
+        moving: Row of `work.Work.world` that moves the world-side marker of a joint, -1 for none, shape [J].
+        mass, s, Z, M3, M4, S: Inertia integrals, see `reduced_body.Invariants`.
         axial: axial(S[j, k]) = int rho phi_j x phi_k, shape [B, R, R, 3].
         axial0: axial(M4[j]) = int rho X x phi_j, shape [B, R, 3].
         rotating, nonrotating: Components with the inertia of `inertia`, and those with that of `constant_inertia`.
         stiffness: Diagonal, shape [B, R]; zero for a nonlinear body.
-        damping: Symmetric, shape [B, R, R]; of a nonlinear body, what goes by mass.
+        damping: Symmetric, shape [B, R, R]; of a nonlinear body, the mass-proportional part.
         law: Elastic law: LINEAR, STVK, NEOHOOKEAN, shape [B].
         stvk, neohookean: Components of these laws.
         retardation: Kelvin-Voigt coefficient of nonlinear bodies [s], shape [B].
         lame: Lame's constants [Pa], shape [B, 2], where the law is NEOHOOKEAN.
-        points: Number of cubature points, or of directions that a STVK body's quadratic strain sees, shape [B].
-        data_start, data: What `elastic` and `neohookean` read of each body, in one array, and where it starts.
+        points: Number of cubature points, or dimension of the subspace of a STVK body's quadratic strain, shape [B].
+        data_start, data: Data of `kernels.stvk` and `kernels.neohookean` of all bodies in one array, and where those of
+            each body start.
         position, rotation, Phi, Psi: Joint markers, shapes [J, 2, 3], [J, 2, 3, 3], [J, 2, 3, R] twice.
         gravity: [m/s^2], shape [3].
     """
@@ -144,18 +145,18 @@ class Instants(NamedTuple):
 class Blocks(NamedTuple):
     """The linearised equations of one instant, component by component (see `assembly.assemble`).
 
-    Unknowns of a component are (R^T dc, dphi, du) in body axes and its joint's multipliers. What concerns a joint
-    has one entry for each of the J joints; "component" and "parent" are then its sides 1 and 0.
+    Unknowns of a component are (R^T dc, dphi, du) in body axes and its joint's multipliers. An array of joints
+    has one entry for each of the J joints; "component" and "parent" are its sides 1 and 0.
 
     Attributes:
-        K: Tangent of its own rows, shape [B, N, N].
+        K: Tangent of its rows by its position, shape [B, N, N].
         P: By its velocity, dV-dot included, shape [B, N, N].
         D: By its acceleration (its mass matrix), shape [B, N, N].
         Lc, Lp: By the joint's multipliers: the component's rows, its parent's rows, shape [J, N, 6].
         Hc, Hp: The joint's constraint rows, by the component and by its parent, shape [J, 6, N]. A free slider has
             its length in place of a multiplier and the definition of it in place of a row, see `sliders`.
-        Nc: The component's rows by the turning of the parent-side marker, shape [J, N, 3].
-        Jp: Turning of the parent-side marker by the parent's coordinates, shape [J, 3, N].
+        Nc: The component's rows by the rotation of the parent-side marker, shape [J, N, 3].
+        Jp: Rotation of the parent-side marker by the parent's coordinates, shape [J, 3, N].
         by_angle, by_rate: The joint's rows by the motor's angle (or length) and rate, shape [J, 6].
         on_parent: The parent's rows by the motor's length, shape [J, N]; zero where it is an angle.
         res: Residual of its rows, shape [B, N].

@@ -1,4 +1,4 @@
-"""The tree of a character's bodies and joints, seen from the world."""
+"""The spanning tree of a character's bodies and joints, rooted at the world."""
 
 from __future__ import annotations
 
@@ -18,26 +18,26 @@ class Tree:
         parent: Parent component of each, -1 for the world.
         joint: Joint that carries each component.
         flipped: Whether the component is `body0` of that joint, so that its angle runs backwards.
-        loops: Joints that are not in the tree: each closes a loop; without those that are redundant.
+        closing: Joints that are not in the tree, each of which closes a chain; without redundant ones.
     """
 
     body: tuple[int, ...]
     parent: tuple[int, ...]
     joint: tuple[int, ...]
     flipped: tuple[bool, ...]
-    loops: tuple[int, ...] = ()
+    closing: tuple[int, ...] = ()
 
 
 def span_tree(character: Character) -> Tree:
     """Order the bodies of a character from the world outwards.
 
-    Where joints close a loop, one of them is left out of the tree: the one that constrains least, so that motors and
-    welds stay in it.
+    Where joints form a closed chain, one of them is not in the tree: the one that constrains least, so that motors and
+    welds are in it.
 
     Raises:
         ShotError: A body that no chain of joints connects to the world.
     """
-    inside, loops = _spanning(character)
+    inside, closing = _spanning(character)
     touching: dict[int, list[int]] = {}
     for index in inside:
         joint = character.joints[index]
@@ -54,26 +54,26 @@ def span_tree(character: Character) -> Tree:
             joint = character.joints[index]
             other = joint.body1 if joint.body0 == current else joint.body0
             if other in component_of:
-                continue  # the way we came
+                continue  # the joint to the parent
             component_of[other] = len(body)
             body.append(other)
             parent.append(component_of[current])
             joint_of.append(index)
             flipped.append(joint.body0 == other)
             queue.append(other)
-    for index, item in enumerate(character.bodies):
+    for index, unconnected in enumerate(character.bodies):
         if index not in component_of:
             raise ShotError(
                 "no chain of joints connects this body to the world",
-                path=item.path,
+                path=unconnected.path,
                 remedy="Add a joint to its neighbour, or a PhysicsFixedJoint with an empty body0.",
             )
-    needed = tuple(index for index in loops if not character.joints[index].redundant)
+    needed = tuple(index for index in closing if not character.joints[index].redundant)
     return Tree(tuple(body), tuple(parent), tuple(joint_of), tuple(flipped), needed)
 
 
-def loop_members(parent: Sequence[int] | IntArray, ends: Sequence[int] | IntArray) -> set[int]:
-    """Components of the loop that a joint between two of them closes.
+def chain_members(parent: Sequence[int] | IntArray, ends: Sequence[int] | IntArray) -> set[int]:
+    """Components of the closed chain that a joint between two of them closes.
 
     Args:
         parent: Of each component, -1 for the world.
@@ -90,30 +90,30 @@ def loop_members(parent: Sequence[int] | IntArray, ends: Sequence[int] | IntArra
 
 
 def _spanning(character: Character) -> tuple[list[int], list[int]]:
-    """Joints of a spanning tree, and those that close loops (Kruskal's algorithm, firmest joints first)."""
+    """Joints of a spanning tree, and those that close chains (Kruskal's algorithm, most constraining joints first)."""
     driven = {motor.joint for motor in character.motors}
 
-    def looseness(index: int) -> tuple[int, int]:
+    def freedom(index: int) -> tuple[int, int]:
         joint = character.joints[index]
-        # a free slider has no stiffness of its own at rest, which a tree must have
+        # a free slider has no stiffness at rest, which the joints of the tree need
         kind = 0 if index in driven else {"fixed": 1, "revolute": 2, "spherical": 3, "prismatic": 4}[joint.kind]
         return (5 if joint.closes_loop else kind), index
 
     group = {index: index for index in range(WORLD, len(character.bodies))}
 
-    def leader(item: int) -> int:
-        while group[item] != item:
-            group[item] = group[group[item]]
-            item = group[item]
-        return item
+    def leader(body: int) -> int:
+        while group[body] != body:
+            group[body] = group[group[body]]
+            body = group[body]
+        return body
 
-    inside, loops = [], []
-    for index in sorted(range(len(character.joints)), key=looseness):
+    inside, closing = [], []
+    for index in sorted(range(len(character.joints)), key=freedom):
         joint = character.joints[index]
         one, other = leader(joint.body0), leader(joint.body1)
         if one == other:
-            loops.append(index)
+            closing.append(index)
         else:
             group[one] = other
             inside.append(index)
-    return sorted(inside), sorted(loops)
+    return sorted(inside), sorted(closing)
