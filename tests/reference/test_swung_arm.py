@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 from beams import pushed_beam
+from spin_up import EA, EI, LARGEST, PER_LENGTH, PUBLISHED
+from spin_up import LENGTH as LONG
+from spin_up import angle as spin_up
 from swung_arm import LENGTH, THICKNESS, SwungArm, quintic
-from test_spin_up import EA, EI, LARGEST, PER_LENGTH, PUBLISHED
-from test_spin_up import LENGTH as LONG
-from test_spin_up import angle as spin_up
 
 E, AREA, SECOND = 1.8e9, THICKNESS**2, THICKNESS**4 / 12.0
 

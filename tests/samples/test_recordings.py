@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 from sample_recordings import check_recording
-from test_samples import KINDS, path_of
+from sample_shots import KINDS, path_of
 
 # bodies and skeletons are animated in other tests, too
 LONG = dict.fromkeys(("dancer", "drummer", "boxer"), pytest.mark.long)

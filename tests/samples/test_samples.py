@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,26 +12,9 @@ from calmotion.usd.reading import read_shot
 from calmotion.usd.validation import validate_shot
 from pxr import Gf, Usd, UsdGeom, UsdPhysics
 from sample_recordings import check_recording
-
-SAMPLES = Path(__file__).resolve().parents[2] / "samples"
-
-KINDS = {
-    "bartender": ("Z", 1.0, "drive", 24.0),
-    "dancer": ("Y", 1.0, "bodies", 30.0),
-    "rapper": ("Z", 0.01, "drive", 24.0),
-    "drummer": ("Z", 1.0, "skeleton", 24.0),
-    "boxer": ("Z", 1.0, "drive", 24.0),
-}
-"""Up axis, metres per unit, what animates the motors, and frames per second."""
-
-FIGURE = "figure"
-"""The character of two samples, in a layer of its own that nothing animates."""
+from sample_shots import FIGURE, KINDS, SAMPLES, path_of
 
 each_sample = pytest.mark.parametrize("name", KINDS)
-
-
-def path_of(name: str) -> Path:
-    return SAMPLES / name / f"{name}.usda"
 
 
 def stage_of(name: str):
