@@ -1,5 +1,7 @@
 # make demo     optimise the bartender sample, and print the errors before and after
 # make test     lint, format, types, documentation and tests
+# make test-lowest    the tests with the lowest supported versions of the dependencies (needs Python 3.11)
+# make test-portable  the tests as on other processors, with meshes made anew and other numbers of threads
 # make docs     the documentation, in build/docs
 # make fuzz     ten minutes of random damage to shots and manifests
 # make samples  build the sample characters again (make pictures optimises and draws them)
@@ -22,14 +24,16 @@ PYTHON ?= $(shell for python in python3 python3.13 python3.12 python3.11 python;
 	command -v $$python >/dev/null 2>&1 && $$python -c '$(CHECK)' >/dev/null 2>&1 && echo $$python && break; done)
 
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
+# What test-lowest and test-portable run: TESTS="tests/linear_algebra -k ordering" for less than all.
+TESTS ?= tests
 # Two processes test at a time; threads of linear algebra that wait for each other would make that several times slower.
 test: export OPENBLAS_NUM_THREADS := 1
 
-.PHONY: help demo test docs fuzz samples pictures blender blender-test clean
+.PHONY: help demo test test-lowest test-portable docs fuzz samples pictures blender blender-test clean
 .DELETE_ON_ERROR:
 
 help:
-	@sed -n 's/^# \{0,1\}//p' Makefile | sed -n '1,9p'
+	@sed -n 's/^# \{0,1\}//p' Makefile | sed -n '1,11p'
 
 demo: $(INSTALLED)
 	@mkdir -p build
@@ -53,6 +57,34 @@ test: $(INSTALLED_DEV)
 docs: $(INSTALLED_DEV)
 	NO_MKDOCS_2_WARNING=1 $(RUN) -m mkdocs build --strict --quiet
 	@echo "build/docs/index.html"
+
+# An environment of its own, in which each dependency has its lower bound of pyproject.toml.
+LOWEST_VENV ?= .venv-lowest
+$(LOWEST_VENV)/.installed: pyproject.toml .ci/lowest_versions.py
+	python3.11 -m venv --clear $(LOWEST_VENV)
+	$(LOWEST_VENV)/bin/python .ci/lowest_versions.py > $(LOWEST_VENV)/lowest.txt
+	$(LOWEST_VENV)/bin/python -m pip install --quiet --constraint $(LOWEST_VENV)/lowest.txt --editable '.[dev]'
+	@touch $@
+
+test-lowest: export OPENBLAS_NUM_THREADS := 1
+test-lowest: $(LOWEST_VENV)/.installed
+	$(LOWEST_VENV)/bin/python -m pytest -n 2 -q $(TESTS)
+
+# Each line: kernels of OpenBLAS, threads, and what NumPy and numba may use. Each run has a cache folder of its own, so
+# that meshes and kernels are made anew. Results that a test compares must not depend on any of this.
+test-portable: $(INSTALLED_DEV)
+	@status=0; summary=; \
+	run() { \
+		name=$$1; shift; echo "== $$name"; cache=$$(mktemp -d); \
+		if env XDG_CACHE_HOME="$$cache" "$$@" $(RUN) -m pytest -n 2 -q $(TESTS); then result=passed; \
+		else result=FAILED; status=1; fi; \
+		summary="$$summary$$name: $$result\n"; rm -rf "$$cache"; \
+	}; \
+	run "Haswell, 1 thread" OPENBLAS_CORETYPE=Haswell OPENBLAS_NUM_THREADS=1; \
+	run "Sandybridge, 2 threads" OPENBLAS_CORETYPE=Sandybridge OPENBLAS_NUM_THREADS=2; \
+	run "Prescott, 3 threads, no AVX" OPENBLAS_CORETYPE=Prescott OPENBLAS_NUM_THREADS=3 NUMBA_CPU_NAME=x86-64-v2 \
+		NPY_DISABLE_CPU_FEATURES=X86_V3; \
+	echo "== summary"; printf "$$summary"; exit $$status
 
 fuzz: $(INSTALLED_DEV)
 	CALMOTION_FUZZ=$${CALMOTION_FUZZ:-600} $(RUN) -m pytest -q -x tests/fuzz
@@ -78,7 +110,7 @@ pictures: $(INSTALLED)
 	$(RUN) samples/pictures.py
 
 clean:
-	rm -rf $(VENV) $(BLENDER_VENV) build dist .mypy_cache .pytest_cache .ruff_cache
+	rm -rf $(VENV) $(LOWEST_VENV) $(BLENDER_VENV) build dist .mypy_cache .pytest_cache .ruff_cache
 	find pipeline plugins samples tests -name __pycache__ -type d -prune -exec rm -rf {} +
 
 # The interpreter that the environment was made with may be gone: then it is made again.

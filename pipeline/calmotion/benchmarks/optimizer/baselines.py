@@ -80,7 +80,8 @@ def _row(
     judged = np.flatnonzero(grid.judged)
 
     def errors(shift: int) -> Array:
-        return np.linalg.norm(positions[judged] - meant[np.maximum(judged - shift, 0)], axis=2)
+        distances: Array = np.linalg.norm(positions[judged] - meant[np.maximum(judged - shift, 0)], axis=2)
+        return distances
 
     shifts = range(0, int(LONGEST_DELAY / grid.h), max(1, int(0.002 / grid.h)))
     best = min(shifts, key=lambda shift: float(errors(shift).max()))

@@ -103,7 +103,8 @@ def performance(seconds: float = 4.0, rate: float = 24.0) -> Animation:
 
     def sampled(keys: tuple[tuple[float, float], ...]) -> Array:
         at, values = np.array([(0.0, 0.0), *keys, (keys[-1][0] + 1.0, keys[-1][1])]).T
-        return np.radians(PchipInterpolator(at, values)(np.minimum(times, at[-1])))
+        angles: Array = np.radians(PchipInterpolator(at, values)(np.minimum(times, at[-1])))
+        return angles
 
     waist, shoulder, elbow = map(sampled, (_WAIST, _SHOULDER, _ELBOW))
     tracks = tuple(Track(times, values) for values in (waist, shoulder, shoulder + elbow))

@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from calmotion.errors import ShotError
 from calmotion.shot import Body, ElasticMaterial, FlexibleSettings, Frame
+
+if TYPE_CHECKING:
+    from calmotion.usd.reading.context import Reading
 
 # of polyamide as printed links are; relative errors of frequencies do not depend on its stiffness and density
 POLYAMIDE = ElasticMaterial("", 1.8e9, 0.35, 1200.0)
@@ -77,7 +81,7 @@ def _split(source: str) -> tuple[str, str]:
     return (file, prim) if colon and len(file) > 1 else (source, "")
 
 
-def _carriers(reading, stage) -> dict[str, Frame]:
+def _carriers(reading: Reading, stage: Any) -> dict[str, Frame]:
     """The frame of the first joint that has a body as its second one."""
     from calmotion.usd.reading.context import is_rigid_body, prims_of
     from calmotion.usd.reading.joints import joint_prims, read_joint

@@ -97,7 +97,7 @@ def _loaded(host: Host, path: Path) -> tuple[Character, Animation]:
     return data[Character], data[Animation]
 
 
-def _carried_out(host: Host, given: list, wanted: list) -> Any:
+def _carried_out(host: Host, given: list[object], wanted: list[type]) -> Any:
     run = host.run(given, wanted).finish()
     for failure in run.failures():
         raise failure.error or ShotError(failure.reason)

@@ -6,6 +6,7 @@ import numpy as np
 
 from calmotion.multibody.linear_solver.closed_chains import copy_rows
 from calmotion.multibody.linear_solver.elimination import factor, solve
+from calmotion.multibody.linear_solver.step_matrix import StepMatrix
 from calmotion.multibody.model.system import JOINT_ROWS, Blocks, System
 from calmotion.shot.character import Array
 from calmotion.support.compilation import kernel
@@ -55,7 +56,10 @@ def flat(system: System, x: Array, lam: Array) -> Array:
 
 
 @kernel
-def solve_again(system, blocks, matrix, K, right, right_lam, x, lam, block, repeats):
+def solve_again(
+    system: System, blocks: Blocks, matrix: StepMatrix, K: Array, right: Array, right_lam: Array, x: Array, lam: Array,
+    block: Array, repeats: int,
+) -> None:  # fmt: skip
     """Factorise and solve so many times, from a loop that is compiled, as a simulation does."""
     for _ in range(repeats):
         for b in range(len(K)):
