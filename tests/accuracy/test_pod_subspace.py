@@ -63,8 +63,8 @@ def test_what_is_left_out_is_told(nonlinear, known):
     found = held(character, bodies, known)
     rows = [body.left_out[-1] for body in found.bodies[:2]]
     for row, few, all_of_them, body in zip(rows, found.bodies, bodies, character.bodies, strict=False):
-        missing = len(all_of_them.stiffness) - len(few.stiffness)
-        assert row.what == f"{missing} of {len(all_of_them.stiffness)} elastic coordinates of {body.path}"
+        few_of_all = f"{len(few.stiffness)} of {len(all_of_them.stiffness)}"
+        assert row.what == f"{body.path}: POD subspace of {few_of_all} elastic coordinates"
     assert sum(row.estimated_error_m for row in rows) == pytest.approx(found.error_m)
 
 

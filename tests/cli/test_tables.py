@@ -22,13 +22,12 @@ def test_the_accuracy_is_told_where_it_is_known():
         (none, ""),
         (
             with_mesh,
-            "simulated to about 0.3 mm at the targets (0.1 mm of it the time step), the finite elements to 0.5 mm\n",
+            "estimated simulation error 0.3 mm (0.1 mm of it by the time step); mesh error 0.5 mm\n",
         ),
         (
             told | {"verified_step_s": 5e-4, "verified_modes": 44},
-            "simulated to about 0.3 mm at the targets (0.1 mm of it the time step), "
-            "the finite-element mesh not counted\n"
-            "verified: a run with steps of 0.5 ms and 44 elastic coordinates has the targets within 0.2 mm\n",
+            "estimated simulation error 0.3 mm (0.1 mm of it by the time step)\n"
+            "measured simulation error 0.2 mm, against a run with steps of 0.5 ms and 44 elastic coordinates\n",
         ),
     ):
         stream = io.StringIO()

@@ -1,5 +1,7 @@
 """The analysis of needs in the pipeline: what it leaves out is not run, and everything can be forced."""
 
+import re
+
 import pytest
 from calmotion.benchmarks.scenes.simplification_shots import clevis_arm, mixed_arm, steel_arm
 from calmotion.host import NotAsked
@@ -28,14 +30,13 @@ def test_what_hardly_bends_is_neither_meshed_nor_reduced(host):
     shot = steel_arm()
     run = host.run([shot.character, shot.animation, _source()], [Result]).finish()
     for idname in ("fe.mesh", "fem.reduce"):
-        assert _outcomes(run)[idname] == ("left out", "nothing bends noticeably in this shot")
+        assert _outcomes(run)[idname] == ("left out", "no body deflects noticeably in this shot")
     result = run.get(Result)
     assert run.get(FEMeshes) is None and result.skins == (None,) * 3
     rows = {row.what: row for row in result.left_out}
-    row = rows["finite elements of /Arm/Link0"]
-    assert "bends by at most" in row.why and 0.0 < row.estimated_error_m < 1e-3
-    assert "closed loops" in rows
-    assert sum("finite elements of /Arm/Link0" in row.what for row in result.left_out) == 1
+    row = rows["/Arm/Link0: rigid"]
+    assert "deflection is at most" in row.why and 0.0 < row.estimated_error_m < 1e-3
+    assert sum("/Arm/Link0" in row.what and "rigid" in row.what for row in result.left_out) == 1
 
 
 def test_kept_it_is_simulated_as_flexible(host):
@@ -51,9 +52,9 @@ def test_what_is_left_out_counts_in_the_accuracy(host):
     shot = steel_arm()
     given = [shot.character, shot.animation, Source(path="shot.usda", command="simulate", tolerance=1e-3)]
     result = host.run(given, [Result]).finish().get(Result)
-    costs = [row.estimated_error_m for row in result.left_out if row.what.startswith("finite elements of /Arm/Link")]
+    costs = [row.estimated_error_m for row in result.left_out if re.fullmatch(r"/Arm/Link\d: rigid", row.what)]
     assert result.accuracy.left_out_m == pytest.approx(sum(costs))
-    steps = [row for row in result.left_out if "time steps shorter" in row.what]
+    steps = [row for row in result.left_out if row.what.startswith("time step")]
     assert len(steps) == 1 and "tolerance of 1 mm" in steps[0].why
     assert steps[0].estimated_error_m == result.accuracy.step_m
 
@@ -76,7 +77,7 @@ def test_an_inspection_plans_the_step_where_one_matters(host):
     shot = mixed_arm()
     run = host.run([shot.character, shot.animation, _source("inspect")], [ModelChoices, PlannedStep]).finish()
     row = run.get(PlannedStep).row
-    assert row.what == "time steps shorter than 8.33 ms" and row.why == "the step was asked for"
+    assert row.what == "time step 8.33 ms" and row.why == "given by --step"
     assert 0.0 < row.estimated_error_m < 0.1
     poll = host.operators["needs.step"].poll
     character, _ = small_shot()

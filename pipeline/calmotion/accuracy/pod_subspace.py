@@ -164,7 +164,7 @@ def _told(
     told = list(few)
     for b in fewer:
         count, left = len(bodies[b].stiffness), len(few[b].stiffness)
-        what = f"{count - left} of {count} elastic coordinates of {character.bodies[b].path}"
-        row = Simplification(what, "the shot does not move them", error / len(fewer))
+        what = f"{character.bodies[b].path}: POD subspace of {left} of {count} elastic coordinates"
+        row = Simplification(what, "the shot does not excite the others", error / len(fewer))
         told[b] = replace(few[b], left_out=(*few[b].left_out, row))
     return tuple(told)

@@ -110,14 +110,14 @@ def with_step(result: Result, character: Character, options: Options) -> Result:
 def step_row(character: Character, options: Options, step: float, error: float | None) -> Simplification:
     """Why steps [s] are no shorter, and their error at the targets [m]."""
     if options.step is not None:
-        why = "the step was asked for"
+        why = "given by --step"
     elif character.retarget.time_step is not None:
-        why = "calm:retarget:timeStep says so"
+        why = "given by calm:retarget:timeStep"
     elif chooses_step(character, options):
-        why = f"they keep the tolerance of {1e3 * (options.tolerance or 0.0):g} mm by {NAMES[options.scheme]}"
+        why = f"it keeps the tolerance of {1e3 * (options.tolerance or 0.0):g} mm with {NAMES[options.scheme]}"
     else:
-        why = "at 1/480 s motions of 10 Hz are simulated to better than a percent"
-    return Simplification(f"time steps shorter than {1e3 * step:.3g} ms", why, error)
+        why = "steps of 1/480 s simulate motions of 10 Hz to better than one percent"
+    return Simplification(f"time step {1e3 * step:.3g} ms", why, error)
 
 
 def planned_step(character: Character, animation: Animation, bodies: Bodies, options: Options) -> Simplification:

@@ -26,7 +26,7 @@ def _print_findings(console: Console, report: dict[str, Any]) -> None:
                 console.print(f"  {label}: {finding[label]}", markup=False, highlight=False, soft_wrap=True)
     levels = [finding["level"] for finding in report["findings"]]
     counts = ", ".join(f"{levels.count(level)} {level}s" for level in (ERROR, WARNING))
-    console.print(f"{report['shot']}: {counts if levels else 'nothing was found'}", markup=False, soft_wrap=True)
+    console.print(f"{report['shot']}: {counts if levels else 'no findings'}", markup=False, soft_wrap=True)
 
 
 def _print_contents(console: Console, report: dict[str, Any]) -> None:
@@ -69,7 +69,7 @@ def _print_contents(console: Console, report: dict[str, Any]) -> None:
     if report["system_frequencies_hz"]:
         modes = zip(report["system_frequencies_hz"], report["system_damping_ratios"], strict=True)
         shown = ", ".join(f"{frequency:.4g} Hz ({ratio:.2g})" for frequency, ratio in modes)
-        console.print(f"modes of the whole character in its first pose, and their damping ratios: {shown}, ...")
+        console.print(f"natural frequencies of the character in its first pose (damping ratios): {shown}, ...")
     print_left_out(console, report["left_out"])
     if report["mode_shapes"]:
         console.print(f"mode shapes: {', '.join(report['mode_shapes'])}", soft_wrap=True)
@@ -82,7 +82,7 @@ def _body_row(body: dict[str, Any]) -> list[str]:
     shown = ", ".join(frequencies[:6]) + (", ..." if len(frequencies) > 6 else "")
     return [
         body["path"],
-        body["kind"] if body["kind"] == body["simulated"] else f"{body['kind']}, here {body['simulated']}",
+        body["kind"] if body["kind"] == body["simulated"] else f"{body['kind']}, simulated as {body['simulated']}",
         "-" if body["mass_kg"] is None else f"{body['mass_kg']:.4g} kg",
         str(body.get("elements", "-")),
         f"{shown} Hz" if shown else "-",

@@ -49,7 +49,7 @@ def print_table(
         table.add_row(*(names.get(cell, cell) for cell in row))
     console.print(table)
     if any(name != path for path, name in names.items()):
-        console.print("(names are the ends of prim paths; --json has the paths)")
+        console.print("(names are the ends of prim paths; --json has whole paths)")
 
 
 def console_on(stream: TextIO) -> Console:
@@ -58,11 +58,11 @@ def console_on(stream: TextIO) -> Console:
 
 
 def print_left_out(console: Console, rows: Sequence[dict[str, Any]]) -> None:
-    """What was left out and why."""
+    """The simplifications, each with its reason and estimated error."""
     for row in rows:
         error = row["estimated_error_m"]
-        cost = "" if error is None else f" (error about {length(error)})"
-        console.print(f"left out: {row['what']}: {row['why']}{cost}")
+        cost = "" if error is None else f"; estimated error {length(error)}"
+        console.print(f"simplified: {row['what']} ({row['why']}){cost}")
 
 
 def print_limits(console: Console, limits: Sequence[dict[str, Any]], optimized: bool) -> None:
@@ -76,7 +76,7 @@ def print_limits(console: Console, limits: Sequence[dict[str, Any]], optimized: 
         values = [limit, before, after] if optimized else [limit, after]
         rows.append([row["path"], row["quantity"], *values, f"{row['time_s']:.3f} s", verdict])
     heads = ["limit", "before", "after"] if optimized else ["limit", "reached"]
-    print_table(console, "Limits of motors that matter", ["motor", "quantity", *heads, "at", ""], rows, texts=2)
+    print_table(console, "Active limits of motors", ["motor", "quantity", *heads, "at", ""], rows, texts=2)
 
 
 def print_accuracy(console: Console, report: dict[str, Any]) -> None:
@@ -84,19 +84,19 @@ def print_accuracy(console: Console, report: dict[str, Any]) -> None:
     if report["estimated_error_m"] is not None:
         error, step = length(report["estimated_error_m"]), length(report["estimated_step_error_m"])
         mesh = report["estimated_mesh_error_m"]
-        more = "the finite-element mesh not counted" if mesh is None else f"the finite elements to {length(mesh)}"
-        console.print(f"simulated to about {error} at the targets ({step} of it the time step), {more}")
+        of_mesh = "" if mesh is None else f"; mesh error {length(mesh)}"
+        console.print(f"estimated simulation error {error} ({step} of it by the time step){of_mesh}")
     if report["verified_error_m"] is not None:
         console.print(
-            f"verified: a run with steps of {1000 * report['verified_step_s']:.4g} ms and {report['verified_modes']} "
-            f"elastic coordinates has the targets within {length(report['verified_error_m'])}"
+            f"measured simulation error {length(report['verified_error_m'])}, against a run with steps of "
+            f"{1000 * report['verified_step_s']:.4g} ms and {report['verified_modes']} elastic coordinates"
         )
     asked, measured, estimated = report["tolerance_m"], report["verified_error_m"], report["estimated_error_m"] or 0.0
     # estimates add up bounds, so only one far above the tolerance tells something
     if asked is not None and (estimated > _FAR * asked if measured is None else measured > asked):
         console.print(
-            f"the tolerance of {length(asked)} is not kept: where links bend far, or near to buckling, small errors "
-            "grow; a stiffer robot or a slower motion can be simulated more closely"
+            f"the tolerance of {length(asked)} is not kept: with large deflections, or near buckling, small errors "
+            "grow; use a stiffer robot or a slower motion"
         )
 
 
@@ -119,15 +119,15 @@ def print_run(report: dict[str, Any], stream: TextIO) -> None:
         )
         if report["stopped"] not in ("converged", ""):
             gain = report["expected_further_gain_m"]
-            more = "" if gain is None else f", {length(gain)} less error expected of one more iteration"
+            more = "" if gain is None else f", {length(gain)} expected gain of one more iteration"
             console.print(f"stopped: {report['stopped']}{more}")
         kept = [motor["path"] for motor in report["motors"] if not motor["changed"]]
         if kept:
-            console.print(f"motors that did not change: {', '.join(kept)}")
+            console.print(f"motors without changes: {', '.join(kept)}")
     print_limits(console, report["limits"], optimized)
     sag = max((target[f"sag{suffixes[-1]}_m"] or 0.0 for target in report["targets"]), default=0.0)
     if sag > 1e-6:
-        console.print(f"at rest, before the motion, the targets are off by up to {length(sag)}")
+        console.print(f"largest sag of a target at rest: {length(sag)}")
     seams = [target[f"seam{suffixes[-1]}_m"] for target in report["targets"]]
     if seams and seams[0] is not None:
         console.print(f"at the end of a cycle the targets are {length(max(seams))} from where they began")
@@ -137,15 +137,13 @@ def print_run(report: dict[str, Any], stream: TextIO) -> None:
             console.print(f"the cyclic motion is unstable: a disturbance grows {factor} in each cycle")
     if report["dead_centres_s"]:
         times = [f"{time:.3f}" for time in report["dead_centres_s"]]
-        more = f" and {len(times) - 5} times more" if len(times) > 5 else ""
-        console.print(
-            f"closed loops pass a dead centre, where they could go two ways, at {', '.join(times[:5])} s{more}"
-        )
+        more = f" and {len(times) - 5} more times" if len(times) > 5 else ""
+        console.print(f"closed chains pass a dead centre at {', '.join(times[:5])} s{more}")
     if report["refined_steps"]:
-        console.print(f"{report['refined_steps']} steps were only reached by smaller ones: try a smaller --step")
+        console.print(f"{report['refined_steps']} steps needed smaller steps in between: try a smaller --step")
     console.print(
         f"{report['steps']} steps of {1000 * report['step_s']:.4g} ms, {report['dof']} coordinates, "
-        f"{report['modes']} of them elastic; {report['total_wall_s']:.1f} s in all"
+        f"{report['modes']} of them elastic; {report['total_wall_s']:.1f} s in total"
         + (f", {report['peak_memory_gb']:.2f} GB" if report["peak_memory_gb"] else "")
     )
     print_accuracy(console, report)

@@ -186,7 +186,7 @@ class Run:
 
         made = {cls.idname: all(kind in self.data for kind in cls.provides) for cls in self.plan.operators}
         return tuple(
-            Simplification(result.label, result.reason)
+            Simplification(f"{result.label}: skipped", result.reason)
             for result in self.results
             if result.outcome == Outcome.LEFT_OUT
             and not made[result.idname]

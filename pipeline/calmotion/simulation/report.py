@@ -111,12 +111,12 @@ def left_out_rows(prepared: Prepared) -> list[Simplification]:
     character, grid = prepared.character, prepared.grid
     rigid = [body.path for body in character.bodies if body.flexible is None]
     names = ", ".join(distinct_names(rigid).values())
-    rows = [Simplification("finite elements of " + names, "rigid: no CalmFlexibleBodyAPI")] if rigid else []
+    rows = [Simplification(f"{names}: rigid", "without CalmFlexibleBodyAPI")] if rigid else []
     rows += [row for body in prepared.bodies for row in body.left_out]
     if not grid.pre_roll:
-        rows.append(Simplification("pre-roll", "the shot loops" if grid.cyclic else "the shot starts at rest"))
+        rows.append(Simplification("no pre-roll", "the shot is cyclic" if grid.cyclic else "the shot starts at rest"))
     locked = [motor.path for motor in character.motors if not motor.optimize]
-    rows += [Simplification("optimisation of " + path, "calm:motor:optimize is false") for path in locked]
+    rows += [Simplification(f"{path}: not optimised", "calm:motor:optimize is false") for path in locked]
     return rows
 
 

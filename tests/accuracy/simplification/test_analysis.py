@@ -44,7 +44,7 @@ def test_thick_steel_is_rigid_and_its_estimate_holds():
     needs = _analyse(shot)
     assert not any(body.bends for body in needs.character.bodies)
     estimates = [row.estimated_error_m for row in _rows(needs, "bodies")]
-    assert len(needs.left_out) >= 2 and all("bends by at most" in row.why for row in _rows(needs, "bodies"))
+    assert len(needs.left_out) >= 2 and all("deflection is at most" in row.why for row in _rows(needs, "bodies"))
     error = distance(_simulated(shot, needs.character), _simulated(shot, _analyse(shot, {"bodies": ON}).character))
     assert 0.0 < error < sum(estimates) < SHARE * 1e-3
 

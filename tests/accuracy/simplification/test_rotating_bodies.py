@@ -29,7 +29,7 @@ def test_a_carriage_and_what_is_welded_to_it_never_turn_and_that_costs_nothing()
     for name in ("Carriage", "Mast0", "Mast1"):
         assert not by_name[name].turns and by_name[name].error_m is None
     # nothing says how far the masts bend, and with them their loads turn
-    assert by_name["Load0"].turns and "bends" in by_name["Load0"].why
+    assert by_name["Load0"].turns and "deflection" in by_name["Load0"].why
 
 
 def test_what_a_bending_body_carries_turns_by_as_much_as_that_bends():
@@ -44,7 +44,7 @@ def test_motors_that_move_or_may_be_changed_turn_bodies():
     assert all(item.turns for item in _found(shot))
     held = tuple(Track(t.times, np.full_like(t.values, 0.3)) for t in shot.animation.tracks)
     still = replace(shot, animation=replace(shot.animation, tracks=held, current=held))
-    assert all("may turn" in item.why or "carried" in item.why for item in _found(still))
+    assert all("may rotate" in item.why or "attached" in item.why for item in _found(still))
     simulated = _found(still, changes=False)
     assert not simulated[0].turns and simulated[1].turns  # the second hangs from what bends
 

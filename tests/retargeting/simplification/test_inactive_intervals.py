@@ -49,7 +49,7 @@ def pausing(before=HELD, after=0.6):
 
 
 def rows_of(result):
-    return [row for row in result.left_out if row.what.startswith("changes of the motion from")]
+    return [row for row in result.left_out if row.what.startswith("inactive interval from")]
 
 
 def largest(simulation):
@@ -79,7 +79,7 @@ def test_a_hold_before_a_move_is_left_out_and_costs_nothing(arm, bodies, everywh
     tolerance = arm.retarget.allowed(None)
     assert not rows_of(everywhere)
     (row,) = rows_of(result)
-    assert row.what.startswith("changes of the motion from 0 s to 1.") and "next to nothing" in row.why
+    assert row.what.startswith("inactive interval from 0 s to 1.") and "almost nothing" in row.why
     assert 0.0 < row.estimated_error_m < MISSED * tolerance
     until = float(row.what.split()[-2])
     assert until > HELD - 0.6, "a quarter of the hold may be needed to prepare the move"

@@ -45,7 +45,7 @@ def analyse(
         return ModelChoices(_asked(character, forced), (), forced)
     tree = span_tree(character)
     allowed = SHARE * character.retarget.allowed(options.tolerance)
-    rows: list[ModelChoice] = [ModelChoice("loops", "closed loops", False, "no joint closes one")]
+    rows: list[ModelChoice] = []
     stiffness: Mapping[int, Stiffness] = {}
     if tree.closing or any(body.flexible for body in character.bodies):
         # what simulates the rigid robot takes a while to load, and a rigid shot without loops does not need it
@@ -82,11 +82,11 @@ def _asked(character: Character, forced: Mapping[str, str]) -> Character:
 def _turning(found: list[Turning], choice: str, allowed: float) -> list[Turning]:
     """What is decided of what was found."""
     if choice == ON:
-        return [replace(item, turns=True, why="forced on") for item in found]
+        return [replace(item, turns=True, why="forced by the user") for item in found]
     if choice == OFF:
-        return [replace(item, turns=False, why="forced off") for item in found]
+        return [replace(item, turns=False, why="forced by the user") for item in found]
     return [
-        replace(item, turns=True, why="what carries it bends too far")
+        replace(item, turns=True, why="a body that carries it deflects too far")
         if (item.error_m or 0.0) > allowed / len(found)
         else item
         for item in found
@@ -103,6 +103,7 @@ def _straight(character: Character, found: list[Turning], forced: bool) -> tuple
     rows = []
     for (turns, why), members in groups.items():
         errors = [error for k in members if (error := found[k].error_m) is not None]
-        what = "turning of " + ", ".join(names[bodies[k].path] for k in members)
+        terms = "gyroscopic terms" if turns else "no gyroscopic terms"
+        what = ", ".join(names[bodies[k].path] for k in members) + f": {terms}"
         rows.append(ModelChoice("turning", what, turns, why, sum(errors) if errors else None, forced))
     return replace(character, bodies=bodies), rows

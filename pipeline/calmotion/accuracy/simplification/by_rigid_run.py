@@ -104,20 +104,21 @@ def _bodies(
         body, own, settings = bodies[k], stiffness.get(k), bodies[k].flexible
         assert settings is not None
         error = None if own is None else own.displacement_m
-        bends = "" if error is None else f"it bends by at most {1e3 * error:.2g} mm"
+        deflects = "" if error is None else f"its deflection is at most {1e3 * error:.2g} mm"
         if choice != AUTO:
-            stiff, why, is_forced = choice == OFF, f"forced {choice}", True
+            stiff, why, is_forced = choice == OFF, "forced by the user", True
         elif settings.mode_count >= 0 or settings.elasticity != "auto":
-            stiff, why, is_forced = False, "the shot says how it is to be simulated", True
+            stiff, why, is_forced = False, "its attributes fix the model", True
         else:
             stiff, is_forced = error is not None and spent + error <= allowed, False
-            why = bends or "only finite elements tell how far it bends"
+            why = deflects or "only finite elements can estimate its deflection"
         if stiff and k not in masses:
-            stiff, why = False, "its mass is only known from its mesh"
+            stiff, why = False, "only the mesh gives its mass"
         if stiff:
             bodies[k] = replace(body, stiff=True, mass=masses[k])
             spent += error or 0.0
-        rows.append(ModelChoice("bodies", f"finite elements of {body.path}", not stiff, why, error, is_forced))
+        model = "rigid" if stiff else "flexible"
+        rows.append(ModelChoice("bodies", f"{body.path}: {model}", not stiff, why, error, is_forced))
     return replace(character, bodies=tuple(bodies)), rows
 
 
@@ -133,7 +134,7 @@ def _motors(character: Character, model: Model, run: ForwardRun, choice: str) ->
             motors[k] = replace(motors[k], idle=True)
             rows.append(
                 ModelChoice(
-                    "motors", f"optimisation of {motors[k].path}", False, "it moves no target", None, choice == OFF
+                    "motors", f"{motors[k].path}: not optimised", False, "it moves no target", None, choice == OFF
                 )
             )
     return replace(character, motors=tuple(motors)), rows
@@ -145,7 +146,7 @@ def _loops(
     """Closed loops, and joints that could be left out of them."""
     found = closures_of(model, run)
     if not found.joints:
-        return character, [ModelChoice("loops", "closed loops", False, "no joint closes one")]
+        return character, []
     joints, rows = list(character.joints), []
     order = [*tree.joint, *tree.closing]
     for k in found.joints:
@@ -154,12 +155,14 @@ def _loops(
         bends = any(character.bodies[tree.body[b]].bends for b in members)
         if k in found.redundant and choice != ON and (choice == OFF or not bends):
             joints[order[k]] = replace(item, redundant=True)
-            why = "other joints hold all that it holds; its force is shown as zero"
-            rows.append(ModelChoice("loops", f"the joint {item.path}", False, why, None, choice == OFF))
+            why = "other joints transmit its forces, and its own are shown as zero"
+            rows.append(ModelChoice("loops", f"{item.path}: joint omitted", False, why, None, choice == OFF))
         else:
-            rows.append(ModelChoice("loops", f"the joint {item.path}", True, "it closes a loop", None, choice != AUTO))
+            rows.append(
+                ModelChoice("loops", f"{item.path}: joint kept", True, "it closes a chain", None, choice != AUTO)
+            )
     left = [k for k in found.joints if not joints[order[k]].redundant]
     if found.redundant_rows and left:
-        why = f"{found.redundant_rows} rows of all joints follow from others, and are met by forces of least norm"
+        why = f"{found.redundant_rows} constraint rows follow from others; the forces of least norm are used"
         rows.append(ModelChoice("loops", "redundant constraints", True, why))
     return replace(character, joints=tuple(joints)), rows

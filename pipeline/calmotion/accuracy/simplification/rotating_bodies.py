@@ -19,6 +19,7 @@ from calmotion.shot import Animation, Character
 if TYPE_CHECKING:
     from calmotion.accuracy.deflection_bound.bound import Stiffness
 
+STILL_BY = "it does not rotate: attached by fixed and prismatic joints and idle motors"
 STILL = 1e-9  # changes of an angle [rad] that are rounding
 
 
@@ -59,12 +60,14 @@ def turning_of(
         if by is not None:
             found[body] = Turning(True, by)
         elif before is not None and before.turns:
-            found[body] = Turning(True, f"it is carried by {character.bodies[tree.body[parent]].path}, which turns")
+            found[body] = Turning(True, f"it is attached to {character.bodies[tree.body[parent]].path}, which rotates")
         elif unknown[parent]:
-            found[body] = Turning(True, "nothing tells how far what carries it bends")
+            found[body] = Turning(True, "the deflection of the bodies that carry it is not known")
         else:
             error = angle * (way + (own.displacement_m if own and item.bends else 0.0))
-            found[body] = Turning(False, "only welds, sliders and resting motors carry it", error or None)
+            found[body] = Turning(
+                False, "it does not rotate: attached by fixed and prismatic joints and idle motors", error or None
+            )
         if item.bends:
             bent[k] = (angle + (own.rotation if own else 0.0), way + (own.displacement_m if own else 0.0))
             unknown[k] = unknown[parent] or own is None
@@ -78,7 +81,7 @@ def _turned_by(character: Character, animation: Animation, joint: int, changes: 
     item = character.joints[joint]
     frame = next((frame for frame in animation.moving if frame.joint == joint), None)
     if frame is not None and np.ptp(frame.rotations, axis=0).max() > STILL:
-        return "its root is animated to turn"
+        return "its root is animated to rotate"
     if item.kind in ("fixed", "prismatic"):
         return None
     motor = next((k for k, motor in enumerate(character.motors) if motor.joint == joint), None)
@@ -88,9 +91,9 @@ def _turned_by(character: Character, animation: Animation, joint: int, changes: 
         character.motors[follows.leader]
     )  # fmt: skip
     if any(_moves(tracks[motor].values) for tracks in (animation.tracks, animation.current)):
-        return f"{item.path} turns it"
+        return f"{item.path} rotates it"
     if changes and leader.optimize and not leader.idle:
-        return f"{item.path} may turn it"
+        return f"{item.path} may rotate it"
     return None
 
 

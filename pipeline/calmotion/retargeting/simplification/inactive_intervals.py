@@ -168,8 +168,8 @@ def quiet_rows(ranges: Sequence[InactiveInterval]) -> list[Simplification]:
     """What the user is told of them."""
     return [
         Simplification(
-            f"changes of the motion from {_seconds(math.ceil(100 * item.start))} to {_seconds(int(100 * item.stop))}",
-            "they would gain next to nothing there",
+            f"inactive interval from {_seconds(math.ceil(100 * item.start))} to {_seconds(int(100 * item.stop))}",
+            "changes there would gain almost nothing",
             item.gain,
         )
         for item in ranges

@@ -34,14 +34,14 @@ def search_rows(
     rows = [*quiet_rows(quiet), _knots_row(problem, character, options)]
     rows += [
         Simplification(
-            "optimisation of " + character.motors[k].path, "it moves no target; this is what it could help", gain
+            character.motors[k].path + ": not optimised", "it moves no target; the error is its possible gain", gain
         )
         for k, gain in zip(idle, [idle_gain_m, *[None] * len(idle)], strict=False)
     ]
     rows += [
         Simplification(
-            "changes of " + character.motors[curve.motor].path,
-            f"they would gain less than {PRUNED:.0%} of the tolerance",
+            character.motors[curve.motor].path + ": curve unchanged",
+            f"a change would gain less than {PRUNED:.0%} of the tolerance",
             PRUNED * tolerance,
         )
         for curve in curves
@@ -53,10 +53,10 @@ def search_rows(
 def _knots_row(problem: RetargetProblem, character: Character, options: Options) -> Simplification:
     """Why knots are no closer than they are."""
     closest = float(np.diff(problem.space.basis.knots).min())
-    what = f"knots closer than {1e3 * closest:.3g} ms"
+    what = f"knots at least {1e3 * closest:.3g} ms apart"
     if options.knot_spacing:
-        return Simplification(what, "retarget.optimize.knot_spacing says so")
+        return Simplification(what, "given by retarget.optimize.knot_spacing")
     if character.retarget.knot_spacing:
-        return Simplification(what, "calm:retarget:knotSpacing says so")
+        return Simplification(what, "given by calm:retarget:knotSpacing")
     tolerance = character.retarget.allowed(options.tolerance)
-    return Simplification(what, f"finer ones promise less than {FINER:.0%} of the tolerance", FINER * tolerance)
+    return Simplification(what, f"finer knots promise less than {FINER:.0%} of the tolerance", FINER * tolerance)
