@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import os
 import re
 import subprocess
@@ -26,6 +27,37 @@ def test_every_path_on_a_page_exists(page):
 def _exists(name: str) -> bool:
     alone = [path for path in PACKAGE.rglob(name) if path.is_dir()] if name.count("/") == 1 else []
     return bool(alone) or any((place / name).exists() for place in PLACES)
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(REPOSITORY)))
+def test_every_make_command_on_a_page_exists(page):
+    targets = set(re.findall(r"^([\w-]+):(?!=)", (REPOSITORY / "Makefile").read_text(), re.MULTILINE))
+    text = page.read_text()
+    named = re.findall(r"`make ([a-z-]+)|^ {4}make ([a-z-]+)", text, re.MULTILINE)
+    assert {name for pair in named for name in pair if name} <= targets
+
+
+def test_every_symbol_of_the_formulation_is_in_the_module_that_is_named():
+    page = (REPOSITORY / "docs" / "formulation.md").read_text()
+    rows = re.findall(r"^\| \$.*\| (`[^|]+`) \| `([\w/]+\.py)` \|$", page, re.MULTILINE)
+    assert len(rows) > 15
+    for names, module in rows:
+        for name in re.findall(r"`([\w.]+)`", names):
+            assert _defines((PACKAGE / module).read_text(), *name.split(".")), f"{module} has no {name}"
+
+
+def _defines(source: str, name: str, field: str = "") -> bool:
+    nodes = [node for node in ast.walk(ast.parse(source)) if getattr(node, "name", "") == name]
+    return bool(nodes) and (
+        not field or re.search(rf"^    (def )?{field}\b", ast.unparse(nodes[0]), re.MULTILINE) is not None
+    )
+
+
+def test_every_measured_row_of_simplifications_has_its_times():
+    page = (REPOSITORY / "docs" / "accuracy.md").read_text()
+    table = page.split("| simplified | shot |")[1].split("\n\n")[0]
+    rows = [line.split("|")[1:-1] for line in table.splitlines()[2:]]
+    assert len(rows) > 10 and all(len(row) == 9 for row in rows)
 
 
 def test_the_pages_of_the_architecture_name_every_room():
@@ -55,3 +87,5 @@ def test_the_documentation_builds_without_a_warning(tmp_path):
     assert done.returncode == 0, done.stderr
     formulas = (tmp_path / "formulation" / "index.html").read_text()
     assert formulas.count("<math") > 50 and "arithmatex" not in formulas
+    pages = "".join(path.read_text() for path in tmp_path.rglob("*.html"))
+    assert re.findall(r'<(?:script|link|img)[^>]+(?:src|href)="(?:https?:)?//[^"]*"', pages) == []
