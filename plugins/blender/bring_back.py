@@ -80,8 +80,8 @@ def _put_on_objects(
         worlds = {part.name: source.evaluated_get(graph).matrix_world.copy() for part, source in pairs}
         for part, _ in pairs:
             above = part.parent.matrix_world if part.parent else Matrix()
-            meant = worlds.get(part.parent.name, above) if part.parent else above
-            new[part.name].append((meant @ part.matrix_parent_inverse).inverted() @ worlds[part.name])
+            parent_world = worlds.get(part.parent.name, above) if part.parent else above
+            new[part.name].append((parent_world @ part.matrix_parent_inverse).inverted() @ worlds[part.name])
             old[part.name].append(part.matrix_basis.copy())
     changed = [name for name in new if any(_differ(a, b) for a, b in zip(old[name], new[name], strict=True))]
     for name in changed:

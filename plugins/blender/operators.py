@@ -35,7 +35,7 @@ class CALMOTION_OT_optimize(bpy.types.Operator):
             cls.poll_message_set("Select an armature with an action, or a part of animated objects")
             return False
         if character.type != "ARMATURE" and not context.scene.calmotion.robot_layer:
-            cls.poll_message_set("Objects need a layer with their robot: name it above")
+            cls.poll_message_set("Animated objects need a robot layer: choose it above")
             return False
         return True
 

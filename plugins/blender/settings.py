@@ -18,17 +18,17 @@ class CalmotionSettings(bpy.types.PropertyGroup):
     )
     material: bpy.props.EnumProperty(
         name="Material",
-        description="What the links of a robot that is made of the skin are made of",
+        description="Material of the links, where the robot is made of the skin",
         items=[(name, name.capitalize(), "") for name in MATERIALS],
     )
     flexible: bpy.props.StringProperty(
         name="Flexible",
-        description="Bones whose links bend: names with commas between, or all",
+        description="Bones with flexible links: names separated by commas, or all",
         default="all",
     )
     tolerance: bpy.props.FloatProperty(
         name="Tolerance",
-        description="Error at the targets that does not matter",
+        description="Acceptable error at the targets",
         default=0.001,
         min=1e-6,
         soft_max=0.1,

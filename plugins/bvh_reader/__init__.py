@@ -22,7 +22,7 @@ class ReadMotion(Operator):
             "map",
             str,
             "",
-            description="Which channel drives which motor, with a factor and an offset if need be: "
+            description="Which channel drives which motor, optionally with a factor and an offset: "
             '"RightArm.Zrotation=shoulder, RightForeArm.Yrotation=elbow*-1+90deg"',
         ),
         Property("unit", float, 0.01, unit="m", minimum=1e-9, description="Length of the file's unit, for positions"),

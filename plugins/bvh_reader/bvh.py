@@ -54,7 +54,9 @@ def read_bvh(path: str) -> BvhMotion:
         raise _wrong(path, motion + 3, "the frame time must be positive", lines[motion + 2])
     rows = [row for row in enumerate(lines[motion + 3 :], motion + 4) if row[1].strip()]
     if len(rows) != int(count) or not rows:
-        raise _wrong(path, motion + 2, "the number of frames is another", f"{count:g} said, {len(rows)} there")
+        raise _wrong(
+            path, motion + 2, "the number of frames does not match `Frames:`", f"Frames: {count:g}, rows: {len(rows)}"
+        )
     return BvhMotion(path, channels, frame_time, np.array([_row(path, n, line, len(channels)) for n, line in rows]))
 
 
@@ -68,13 +70,15 @@ def _channels(path: str, lines: list[str]) -> Iterator[str]:
         if words[0].upper() in ("ROOT", "JOINT"):
             joint = " ".join(words[1:])
             if not joint or joint in seen:
-                raise _wrong(path, number, "every joint has a name of its own", line)
+                raise _wrong(path, number, "each joint needs a unique name", line)
             seen.add(joint)
         elif words[0].upper() == "CHANNELS":
             axes = words[2:]
             known = all(axis in _AXES for axis in axes)
             if not joint or not known or len(words) < 2 or words[1] != str(len(axes)):
-                raise _wrong(path, number, f"channels are some of {', '.join(_AXES)}, and their number", line)
+                raise _wrong(
+                    path, number, f"CHANNELS needs the number of channels, and names among {', '.join(_AXES)}", line
+                )
             yield from (f"{joint}.{axis}" for axis in axes)
 
 
@@ -85,7 +89,7 @@ def _number(path: str, lines: list[str], index: int, label: str) -> float:
             raise ValueError
         return float(text[len(label) :])
     except ValueError:
-        raise _wrong(path, index + 1, f"here stands `{label}` and a number", text or "nothing") from None
+        raise _wrong(path, index + 1, f"expected `{label}` and a number", text or "nothing") from None
 
 
 def _row(path: str, number: int, line: str, count: int) -> list[float]:

@@ -43,7 +43,7 @@ def read_mapping(text: str, motion: BvhMotion) -> list[Entry]:
 def _entry(text: str, motion: BvhMotion) -> Entry:
     match = _ENTRY.fullmatch(text.replace(" ", ""))
     if not match:
-        raise _wrong("this is no entry of a mapping", text, "Write it like RightArm.Zrotation=shoulder*-1+90deg")
+        raise _wrong("this is not an entry of a mapping", text, "Write it like RightArm.Zrotation=shoulder*-1+90deg")
     channel, motor = match["channel"], match["motor"]
     if channel not in motion.channels:
         known = ", ".join(motion.channels)
@@ -55,7 +55,7 @@ def _entry(text: str, motion: BvhMotion) -> Entry:
         factor = float(match["factor"] or 1.0)
         offset = parse_quantity(match["offset"] or "0", "rad" if turns else "m")
     except (ValueError, ShotError) as error:
-        raise _wrong("this is no entry of a mapping", text, str(error)) from None
+        raise _wrong("this is not an entry of a mapping", text, str(error)) from None
     return Entry(channel, motor, factor, offset)
 
 
@@ -73,7 +73,7 @@ def mapped_tracks(motion: BvhMotion, entries: list[Entry], *, unit: float, start
         start: Time in the file at which the shot begins [s].
 
     Raises:
-        ShotError: The motion ends before that.
+        ShotError: The motion ends before the shot begins.
     """
     times = np.arange(len(motion.frames), dtype=np.float64) * motion.frame_time - start
     if times[-1] <= 0.0:
@@ -88,8 +88,8 @@ def mapped_tracks(motion: BvhMotion, entries: list[Entry], *, unit: float, start
     for entry in entries:
         column = motion.frames[:, motion.channels.index(entry.channel)]
         turns = entry.channel.endswith("rotation")
-        own = np.unwrap(np.radians(column)) if turns else unit * column
+        channel_values = np.unwrap(np.radians(column)) if turns else unit * column
         if entry.motor in values:
             raise SettingError("two channels drive one motor", path="bvh.read.map", found=entry.motor)
-        values[entry.motor] = entry.factor * own + entry.offset
+        values[entry.motor] = entry.factor * channel_values + entry.offset
     return MotorTracks(motion.path, times, values)

@@ -1,4 +1,4 @@
-"""Robots out of skinned characters."""
+"""Robots from skinned characters."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ class RigSkeleton(Operator):
     requires = (Source, OutputPaths)
     provides = (Rig,)
     properties = (
-        Property("material", str, "nylon", choices=tuple(MATERIALS), description="What the links are made of"),
+        Property("material", str, "nylon", choices=tuple(MATERIALS), description="Material of the links"),
         Property(
             "angle_tolerance",
             float,
@@ -27,7 +27,7 @@ class RigSkeleton(Operator):
             unit="deg",
             minimum=0.0,
             maximum=45.0,
-            description="What the hinges of a joint may leave of its rotation: more of it needs fewer hinges",
+            description="Largest residual angle between a joint and its hinges; a larger one needs fewer hinges",
         ),
         Property(
             "servo_share",
@@ -37,7 +37,7 @@ class RigSkeleton(Operator):
             maximum=10.0,
             description="Mass of a servo between two hinges, over that of the link that they turn",
         ),
-        Property("flexible", str, "none", description="Links that bend: all, none, or names with commas between"),
+        Property("flexible", str, "none", description="Flexible links: all, none, or names separated by commas"),
     )
 
     @classmethod
@@ -45,7 +45,7 @@ class RigSkeleton(Operator):
         return None if data[Source].command == "rig" else NotAsked("the command is another")
 
     def execute(self, context: RunContext) -> Sequence[object]:
-        """What was made."""
+        """The robot."""
         import numpy as np
         from calmotion.usd.rigging import RigOptions, rig_shot
 

@@ -11,7 +11,7 @@ from calmotion.shot.run import OutputPaths, Source
 
 
 class ReadShot(Operator):
-    """Reads a shot, and refuses what cannot be processed before anything costly starts."""
+    """Reads a shot, and refuses a wrong one before costly steps start."""
 
     idname = "usd.read"
     label = "Read the shot"
@@ -20,13 +20,13 @@ class ReadShot(Operator):
     provides = (Character, Animation, Provenance)
 
     def execute(self, context: RunContext) -> Sequence[object]:
-        """The character, its animation, and what a writer must know."""
+        """The character, its animation and its provenance."""
         # pxr loads in a third of a second: only when a shot is read
         from calmotion.usd.reading import read_shot
         from calmotion.usd.writing import refuse_inputs
 
         source = context.get(Source)
-        # what a robot is can be looked at before anything animates it
+        # `inspect` accepts a robot without animation
         character, animation, provenance = read_shot(
             source.path, still=source.command == "inspect", given=context.get(MotorTracks)
         )
@@ -39,7 +39,7 @@ class ReadShot(Operator):
 
 
 class ValidateShot(Operator):
-    """Lists everything that is wrong with a shot at once, by our rules and those of USD."""
+    """Lists all errors and warnings about a shot, by Calmotion's rules and USD's validators."""
 
     idname = "usd.validate"
     label = "Check the shot"

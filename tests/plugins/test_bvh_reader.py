@@ -82,9 +82,9 @@ def test_a_shot_may_begin_later_in_the_motion(read, tmp_path):
     [
         ("", "no motor is driven", "Arm.Zrotation"),
         ("Arm.Zrotaton=a", "no such channel", "Did you mean Arm.Zrotation?"),
-        ("Arm.Zrotation", "no entry of a mapping", "*-1+90deg"),
-        ("Arm.Zrotation=a*x", "no entry of a mapping", "*-1+90deg"),
-        ("Arm.Zrotation=a+3mm", "no entry of a mapping", "unit"),
+        ("Arm.Zrotation", "not an entry of a mapping", "*-1+90deg"),
+        ("Arm.Zrotation=a*x", "not an entry of a mapping", "*-1+90deg"),
+        ("Arm.Zrotation=a+3mm", "not an entry of a mapping", "unit"),
         ("Arm.Zrotation=a,Arm.Xrotation=a", "two channels drive one motor", ""),
     ],
 )

@@ -85,7 +85,7 @@ def test_a_layer_of_ours_is_told_by_its_role_and_refused_as_a_shot(tmp_path):
     found = stages.earlier_layers(stages.open_stage(str(tmp_path / "root.usda")))
     assert [stages.display_name(name, str(tmp_path / "root.usda")) for name in found] == ["ours.usda"]
     with pytest.raises(ShotError, match="written by Calmotion"):
-        stages.refuse_own_layer(stages.open_stage(str(tmp_path / "ours.usda")), "ours.usda")
+        stages.refuse_result_layer(stages.open_stage(str(tmp_path / "ours.usda")), "ours.usda")
 
 
 @pytest.mark.parametrize("data", [{}, {"calmotion": "text"}, {"calmotion": {"other": 1}}])

@@ -1,4 +1,4 @@
-"""What the animator authored: a sampled track for each motor, and the shot's frames."""
+"""The animation of a shot: a sampled track for each motor, and the frames."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class Track:
 
 @dataclass(frozen=True, eq=False)
 class MotorTracks:
-    """Tracks that come from beside the shot, such as a motion capture.
+    """Tracks that are given in addition to the shot, such as a motion capture.
 
     Attributes:
         origin: Where they come from, for messages.
@@ -43,7 +43,7 @@ class MotorTracks:
 
 @dataclass(frozen=True, eq=False)
 class MovingFrame:
-    """The world-side frame of a joint, where the shot moves it: what a moving root hangs from.
+    """The world-side frame of a joint, where the shot moves it (a moving root).
 
     Attributes:
         joint: Index of the joint.
@@ -106,10 +106,10 @@ class Animation:
 
     Attributes:
         frame_times: Times of the shot's frames [s] after the first one, shape [f], first 0.
-        tracks: One for each motor of the character, in its order: the animator's intent.
-        current: The same where the shot already carries a layer of ours and the user asks for what is composed
+        tracks: One for each motor of the character, in its order: the intended motion.
+        current: The tracks with earlier results applied, where the shot carries results of Calmotion
             (`simulate`, the start of `optimize`); otherwise the same object as `tracks`.
-        moving: Moving roots, none for a character that stands where it is.
+        moving: Moving roots, none for a character with a fixed root.
         weights: Weights of targets that change in time; the others are those of `Target`.
         free: When motors may be changed, where that changes in time.
     """

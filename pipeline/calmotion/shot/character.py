@@ -77,7 +77,7 @@ class FlexibleSettings:
         mode_count: Number of elastic coordinates to keep.
         max_frequency: Highest frequency of fixed-interface modes to keep [Hz].
         element_size: Edge length of the elements [m].
-        interface_radius: Radius around a joint anchor that moves rigidly with it [m].
+        interface_radius: Radius of the interface patch around the origin of a joint [m].
         mesh_file: External mesh file, resolved; empty when the geometry is in the shot.
         mesh_scale: Metres per unit of that file.
         elasticity: `auto`, `linear`, `stvk` or `neohookean`.
@@ -121,13 +121,13 @@ class SurfaceMesh:
 
     @property
     def drawn(self) -> bool:
-        """Whether pictures show anything of it."""
+        """Whether it appears in pictures."""
         return self.visible and len(self.triangles) > 0
 
 
 @dataclass(frozen=True, eq=False)
 class InterfaceSurface:
-    """The part of a body's surface that a joint holds, named in the shot.
+    """An interface patch: the part of a body's surface that is attached to a joint, named in the shot.
 
     Attributes:
         path: Prim path of the subset.
@@ -160,10 +160,10 @@ class Body:
         surfaces: Geometry for pictures and meshing, body frame.
         tets: Tetrahedra authored in the shot, or None.
         flexible: Settings, or None for a rigid body.
-        interfaces: Parts of the surface that name the joint which holds them.
-        stiff: Whether it is simulated as rigid although it is flexible, since this shot hardly bends it; it then has a
-            `mass`.
-        straight: Whether it never turns in this shot, so that its inertia does not change.
+        interfaces: Interface patches that are named in the shot.
+        stiff: Whether it is simulated as rigid although it is flexible, since its deflection in this shot is negligible; it
+            then has a `mass`.
+        straight: Whether it does not rotate in this shot, so that its inertia is constant.
     """
 
     path: str
@@ -193,8 +193,8 @@ class Joint:
             length of a prismatic joint that of frame1 beyond frame0 along z.
         frame0, frame1: The joint frame in body0 (in the world for -1) and in body1.
         lower, upper: Limits [rad or m], infinite when there are none.
-        closes_loop: Whether the shot asks that this joint, rather than another, be the one that closes a loop.
-        redundant: Whether it is left out of the dynamics, since other joints hold all that it would hold.
+        closes_loop: Whether the shot excludes this joint from the spanning tree, so that it closes a chain.
+        redundant: Whether it is left out of the dynamics, since other joints impose the same constraints.
     """
 
     path: str
@@ -257,7 +257,7 @@ class Motor:
 
 @dataclass(frozen=True, eq=False)
 class Target:
-    """A frame whose motion matters.
+    """A frame whose error is measured.
 
     Attributes:
         path: Prim path.
@@ -273,21 +273,21 @@ class Target:
     rotation_weight: float = 0.0
 
 
-DEFAULT_TOLERANCE = 1e-3  # error at the targets that does not matter where nobody says [m]
+DEFAULT_TOLERANCE = 1e-3  # acceptable error at the targets where none is given [m]
 
 
 @dataclass(frozen=True, eq=False)
 class RetargetSettings:
-    """What the shot asks of the optimisation; None means: choose automatically.
+    """The shot's settings of the optimisation; None: chosen automatically.
 
     Attributes:
-        tolerance: Error at the targets that does not matter [m].
+        tolerance: Acceptable error at the targets [m].
         time_step: Step of the simulation [s].
         knot_spacing: Distance of the spline's knots [s].
         smoothness: Weight of the regulariser.
         reference: `rigid` or `static`.
         endpoints: `free` or `kept`.
-        cyclic: The shot loops.
+        cyclic: Whether the shot is cyclic.
     """
 
     tolerance: float | None = None
@@ -299,7 +299,7 @@ class RetargetSettings:
     cyclic: bool = False
 
     def allowed(self, asked: float | None = None) -> float:
-        """Error at the targets that does not matter [m]: what is asked for, else the shot's own, else 1 mm."""
+        """Acceptable error at the targets [m]: the requested one, else the shot's, else 1 mm."""
         return asked or self.tolerance or DEFAULT_TOLERANCE
 
 
@@ -310,7 +310,7 @@ class Character:
     Attributes:
         path: Prim path of its root.
         gravity: [m/s^2], shape [3], world.
-        notes: What the reader decided where the shot was silent, as sentences for the user.
+        notes: Assumptions of the reader where the shot does not say, as sentences for the user.
     """
 
     path: str

@@ -1,4 +1,4 @@
-"""What the motors are told at any time: the curves of a result, for whoever plays them."""
+"""Commanded values of the motors at any time: the curves of a result."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from calmotion.shot.curves import Sample, curve_of
 
 
 def optimized_curve(animation: Animation, curve: MotorCurve, cyclic: bool) -> Sample:
-    """The curve of a motor in a result: the animator's, corners and all, and the smooth offset."""
+    """The curve of a motor in a result: the animator's curve, with its corners, plus the smooth offset."""
     end = float(animation.frame_times[-1])
     base = curve_of(animation.tracks[curve.motor], end, cyclic)
     if not curve.changed:

@@ -17,7 +17,7 @@ TURN = 2.0 * np.pi
 SAME = 1e-9  # times that are closer are one [s]
 
 
-CLOSED = 1e-4  # by how much the ends of a loop may differ [rad or m]
+CLOSED = 1e-4  # largest gap between the ends of a cyclic shot [rad or m]
 
 
 def interpolate(track: Track, end: float) -> PPoly:
@@ -41,7 +41,7 @@ def interpolate(track: Track, end: float) -> PPoly:
     if len(times) < 4 and not (held_before or held_after):
         return CubicSpline(times, values, bc_type="not-a-knot")
     if len(times) == 2 and (held_before != held_after):
-        # one condition too many for a line: both ends at rest
+        # a line takes two end conditions: both ends at rest
         left = right = (1, 0.0)
     return CubicSpline(times, values, bc_type=(left, right))
 
@@ -66,16 +66,16 @@ def held_curve(track: Track, end: float) -> Sample:
     first, last = spline.x[0], spline.x[-1]
 
     def sample(times: Array, order: int) -> Array:
-        found = np.asarray(spline(np.clip(times, first, last), order))
-        return found if order == 0 else np.where((times < first) | (times > last), 0.0, found)
+        values = np.asarray(spline(np.clip(times, first, last), order))
+        return values if order == 0 else np.where((times < first) | (times > last), 0.0, values)
 
     return sample
 
 
-def looped_curve(track: Track, end: float) -> Sample:
-    """A track over all times of a shot that loops: the periodic C2 cubic interpolant through its samples.
+def cyclic_curve(track: Track, end: float) -> Sample:
+    """A track over all times of a cyclic shot: the periodic C2 cubic interpolant through its samples.
 
-    What a loop gains in whole turns goes on. Ends that differ otherwise are made to meet: see `open_by`.
+    Whole turns per cycle accumulate. Any other difference of the ends is removed: see `cycle_gap`.
     """
     once = held_curve(track, end)
     inner = (track.times > 1e-9) & (track.times < end - 1e-9)
@@ -86,7 +86,7 @@ def looped_curve(track: Track, end: float) -> Sample:
     values[-1] = values[0]
     corners = track.corners[(track.corners >= 0.0) & (track.corners <= end)]
     if len(corners):
-        # loops on both sides make what is beside the corners periodic, too
+        # cycles before and after make the pieces next to the corners periodic
         around = np.array([-end, 0.0, end])[:, None]
         three = Track((times[:-1] + around).ravel(), np.tile(values[:-1], 3), (corners + around).ravel())
         spline = interpolate(three, 0.0)
@@ -94,22 +94,22 @@ def looped_curve(track: Track, end: float) -> Sample:
         spline = CubicSpline(times, values, bc_type="periodic")
 
     def sample(times: Array, order: int) -> Array:
-        found = np.asarray(spline(np.mod(times, end), order))
-        return found + (gain * times / end if order == 0 else gain / end if order == 1 else 0.0)
+        periodic = np.asarray(spline(np.mod(times, end), order))
+        return periodic + (gain * times / end if order == 0 else gain / end if order == 1 else 0.0)
 
     return sample
 
 
 def curve_of(track: Track, end: float, cyclic: bool) -> Sample:
-    """A track over a shot that plays once, or loops."""
-    return (looped_curve if cyclic else held_curve)(track, end)
+    """A track over a shot that plays once, or a cyclic shot."""
+    return (cyclic_curve if cyclic else held_curve)(track, end)
 
 
-def open_by(track: Track, end: float, turning: bool) -> float:
-    """How far the ends of a loop are apart [rad or m].
+def cycle_gap(track: Track, end: float, turning: bool) -> float:
+    """Gap between the ends of a track in a cyclic shot [rad or m].
 
     Args:
-        end: Last frame, which is the first of the next loop [s].
+        end: Last frame, which is the first of the next cycle [s].
         turning: Whether whole turns do not count.
     """
     first, last = held_curve(track, end)(np.array([0.0, end]), 0)

@@ -1,4 +1,4 @@
-"""What a check before the costly work found."""
+"""Findings of the validation of a shot."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ ERROR, WARNING = "error", "warning"
 
 @dataclass(frozen=True)
 class Finding:
-    """One thing that is wrong with a shot, or looks wrong.
+    """An error or a warning about a shot.
 
     Attributes:
         level: `error` (the shot cannot be processed, or USD calls it invalid) or `warning`.

@@ -1,4 +1,4 @@
-"""How the values of a motor are shown to people: angles in degrees, lengths in millimetres."""
+"""Units in which the values of a motor are displayed: angles in degrees, lengths in millimetres."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ class Measure(NamedTuple):
     """Words and units for one kind of motor.
 
     Attributes:
-        name, effort: What it sets, and with what.
+        name, effort: Name of the value, and of the effort.
         unit, effort_unit, si: Unit that is shown, unit of the effort, unit of the value in SI.
         factor: From SI to the unit that is shown.
     """

@@ -9,14 +9,14 @@ from calmotion.shot.character import Array, IntArray
 
 @dataclass(frozen=True, eq=False)
 class MeshQuality:
-    """What was measured on a tetrahedral mesh.
+    """Quality measures of a tetrahedral mesh.
 
     Attributes:
         min_dihedral_deg: Smallest dihedral angle [deg].
         volume: [m^3].
         volume_error: Relative difference to the volume of the (repaired) input surface; 0 for authored tetrahedra.
         repairs: What was repaired, as sentences.
-        frequency_error: By what part the first frequencies are estimated to be too high; None where that is not known.
+        frequency_error: Estimated relative error of the first frequencies; None where it is not known.
     """
 
     min_dihedral_deg: float
@@ -34,7 +34,7 @@ class FEMesh:
         body: Body index.
         points: Corner points [m], shape [n, 3], body frame.
         tets: Shape [m, 4], int32, positive volumes.
-        quality: What was measured.
+        quality: Its quality measures.
     """
 
     body: int

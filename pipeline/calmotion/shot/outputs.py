@@ -20,8 +20,8 @@ class WrittenLayer:
 
 @dataclass(frozen=True)
 class RiggedJoint:
-    """What became of one joint of a skeleton: the body that turns with it, the joints that turn that, and the angle
-    [rad] that they leave of the animation."""
+    """The robot's part for one joint of a skeleton: its body, its motors, and the residual angle [rad] between the
+    animation and the motors."""
 
     joint: str
     body: str
@@ -31,12 +31,12 @@ class RiggedJoint:
 
 @dataclass(frozen=True)
 class Rig:
-    """A robot that was made of a skinned character.
+    """The robot of a skinned character.
 
     Attributes:
         layer: Path of the layer, which opens with the shot beneath it.
         robot: Prim path of the robot.
-        joints: What turns, each with its motors.
+        joints: The joints of the skeleton with their motors.
         bodies: Number of bodies, servos included.
         mass: Of all of them [kg].
         targets: Prim paths.
@@ -90,7 +90,7 @@ class Verification:
     """A run compared with a finer one of the same curves.
 
     Attributes:
-        error_m: Largest distance of any target, at any frame, to where the finer run has it [m].
+        error_m: Largest distance between a target in both runs, over all frames [m].
         step_s: Step of the finer run [s].
         modes: Its elastic coordinates.
     """

@@ -1,4 +1,4 @@
-"""Where a shot came from, and in what units it must go back."""
+"""Origin and units of a shot."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ class InputLayer:
 
 @dataclass(frozen=True)
 class Provenance:
-    """What the writer must know of the shot that was read.
+    """Origin, units and range of the shot, for writing results.
 
     Attributes:
         shot: Path of the shot as given.
@@ -23,7 +23,7 @@ class Provenance:
         meters_per_unit, kilograms_per_unit, up_axis: Of the stage, fallbacks applied.
         time_codes_per_second, frames_per_second, start_time_code, end_time_code: Of the stage.
         default_prim: Name of the default prim, or empty.
-        earlier_layers: Layers of ours that the shot already carries, which were muted to read the intent.
+        earlier_layers: Layers of earlier results in the shot, which were muted to read the intended motion.
     """
 
     shot: str

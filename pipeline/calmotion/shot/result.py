@@ -1,4 +1,4 @@
-"""What comes back: simulated motions, errors, curves, and the optimiser's progress."""
+"""Results: simulated motions, errors, curves, and the optimiser's progress."""
 
 from __future__ import annotations
 
@@ -57,11 +57,9 @@ class Simulation:
         wall_s: Time of this forward simulation alone [s].
         sag: How far each target hangs below (or beside) the reference at rest, before it moves [m], shape [K].
         refined_steps: Steps that only smaller ones reached.
-        dead_centres: Times at which closed loops pass a pose in which they could branch [s], shape [n].
-        seam: How far each target is, where a shot that loops begins again, from where it began [m], shape [K]; empty
-            for one that plays once.
-        growth: By how much a disturbance of such a motion grows at most from one loop to the next; where that is more
-            than 1 the robot would not stay in it.
+        dead_centres: Times at which closed chains pass a singular pose [s], shape [n].
+        seam: Gap of each target between start and end of a cycle [m], shape [K]; empty for a shot that is not cyclic.
+        growth: Largest Floquet multiplier of the periodic motion; above 1 the motion is unstable.
     """
 
     motion: Motion
@@ -106,7 +104,7 @@ class MotorCurve:
 
 @dataclass(frozen=True, eq=False)
 class Simplification:
-    """Something the run left out: what, why, and the error this costs at the targets (None: none, exact)."""
+    """A model simplification: what was left out, why, and the estimated error at the targets (None: exact)."""
 
     what: str
     why: str
@@ -160,13 +158,13 @@ class ModeTable:
 
 @dataclass(frozen=True)
 class Accuracy:
-    """How far the targets of a simulated motion are from where a finer simulation would have them.
+    """Estimated distance of the simulated targets from those of a finer simulation.
 
     Attributes:
         step_m: Estimated error of the time step [m].
-        left_out_m: Estimated error of what the shot and the reduced bodies do without [m].
+        left_out_m: Estimated error of the model simplifications [m].
         mesh_m: Estimated error of the finite-element meshes [m]; None where it is not known.
-        asked_m: The tolerance that was asked for [m]; None where the shot's own or the usual one holds.
+        asked_m: The requested tolerance [m]; None where the shot's or the default one holds.
     """
 
     step_m: float
@@ -176,7 +174,7 @@ class Accuracy:
 
     @property
     def estimated_m(self) -> float:
-        """Of both [m]. The mesh is not in it: another one is another robot, and no tolerance refines it."""
+        """Sum of `step_m` and `left_out_m` [m], without the mesh error: the tolerance does not refine the mesh."""
         return self.step_m + self.left_out_m
 
 
@@ -185,7 +183,7 @@ class Result:
     """What a run computed. `simulate` fills `before` alone; `optimize` also `after` and what follows it.
 
     Attributes:
-        reference: The motion that was meant: the input on a rigid robot; same times as the simulations.
+        reference: The intended motion: the input on a rigid robot; same times as the simulations.
         before: The input, simulated.
         after: The optimised curves, simulated, or None.
         skins: One for each body; None for a rigid one.

@@ -1,12 +1,8 @@
-"""What the user asked for."""
+"""Settings of a run, as the user gave them."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
-    pass
 
 
 @dataclass(frozen=True)
@@ -16,7 +12,7 @@ class Source:
     Attributes:
         path: The shot.
         command: `inspect`, `simulate` or `optimize`.
-        tolerance: Error at the targets that does not matter [m], or None for the shot's own.
+        tolerance: Acceptable error at the targets [m], or None for the shot's.
         step: Time step [s], or None for automatic.
         integrator: Name of the integrator, or None for automatic.
         pre_roll: Length of the pre-roll [s], or None for automatic.

@@ -19,7 +19,7 @@ from calmotion.multibody.model.system import State
 from calmotion.multibody.sensitivity.periodic import Monodromy, find_periodic_motion
 from calmotion.shot import Animation, Character, Track
 from calmotion.shot.character import Array
-from calmotion.shot.curves import CLOSED, open_by
+from calmotion.shot.curves import CLOSED, cycle_gap
 from calmotion.simulation.inputs.roots import root_at
 
 EASE = 1.0  # in which the loop gets up to speed, before one of it leads to a first guess [s]
@@ -110,7 +110,7 @@ def refuse_open_loops(character: Character, animation: Animation) -> None:
     end = float(animation.frame_times[-1])
     for motor, tracks in zip(character.motors, zip(animation.tracks, animation.current, strict=True), strict=True):
         turning = character.joints[motor.joint].kind == "revolute"
-        apart = max(open_by(track, end, turning) for track in tracks)
+        apart = max(cycle_gap(track, end, turning) for track in tracks)
         if apart > CLOSED:
             shown = f"{np.degrees(apart):.3g} degrees" if turning else f"{1e3 * apart:.3g} mm"
             raise ShotError(
@@ -123,7 +123,7 @@ def refuse_open_loops(character: Character, animation: Animation) -> None:
     for frame in animation.moving:
         first, last = root_at(frame, 0.0), root_at(frame, end)
         turned = float((first.inv() * last).magnitude())
-        away = max(open_by(Track(frame.times, column), end, False) for column in frame.positions.T)
+        away = max(cycle_gap(Track(frame.times, column), end, False) for column in frame.positions.T)
         if max(turned, away) > CLOSED:
             raise ShotError(
                 "calm:retarget:cyclic is true, but at the last frame this root is not where it was at the first",

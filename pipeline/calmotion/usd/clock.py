@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 MOST_FRAMES = 10_000_000  # a day at 120 frames a second
 SHORTEST = 1e-6  # [s]
-_COARSEST = 10.0  # time codes in a second, below which they are not frames
+_COARSEST = 10.0  # time codes per second; below this a time code is not a frame
 
 
 @dataclass(frozen=True)
@@ -49,15 +49,15 @@ class Clock:
         return np.arange(count + 1) / self.frames_per_second
 
     def merged(self, time_codes: Array) -> Array:
-        """Those time codes that are within the shot, and those of the frames, ascending; one next to another is the
-        same."""
+        """The given time codes within the shot together with those of the frames, ascending; time codes closer than
+        1e-6 are merged."""
         inside = time_codes[(time_codes >= self.start) & (time_codes <= self.end)]
         every = np.union1d(self.time_codes(self.frame_times()), inside)
         return np.asarray(every[np.concatenate([[True], np.diff(every) > 1e-6])], dtype=np.float64)
 
 
 def still_clock(stage: Usd.Stage) -> Clock:
-    """The clock of a stage in which nothing is animated: one frame, the first.
+    """The clock of a stage without animation: it has one frame, the first.
 
     Raises:
         ShotError: A rate that is not positive.
@@ -68,18 +68,18 @@ def still_clock(stage: Usd.Stage) -> Clock:
 
 
 def _rates(stage: Usd.Stage) -> tuple[float, float]:
-    """Time codes and frames in a second; the latter as authored, else by the rule of `clock_of`."""
+    """Time codes per second and frames per second; see `clock_of` for unauthored frame rates."""
     rate = float(stage.GetTimeCodesPerSecond())
     unauthored = rate if rate >= _COARSEST else float(stage.GetFramesPerSecond())
     layers = [layer for layer in (stage.GetSessionLayer(), stage.GetRootLayer()) if layer]
     frames = next((x.framesPerSecond for x in layers if x.HasFramesPerSecond()), unauthored)
-    for name, found in (("timeCodesPerSecond", rate), ("framesPerSecond", frames)):
-        if not (np.isfinite(found) and found > 0.0):
+    for name, value in (("timeCodesPerSecond", rate), ("framesPerSecond", frames)):
+        if not (np.isfinite(value) and value > 0.0):
             raise ShotError(
                 "must be positive",
                 path=stage.GetRootLayer().identifier,
                 attribute=name,
-                found=found,
+                found=value,
                 remedy="Author a positive rate",
             )
     return rate, float(frames)
@@ -88,9 +88,9 @@ def _rates(stage: Usd.Stage) -> tuple[float, float]:
 def clock_of(stage: Usd.Stage, sample_codes: Array) -> Clock:
     """The clock of a stage.
 
-    The range is that of the stage; where start or end is not authored, that of the samples. A frame is
-    1/framesPerSecond where that is authored, else one time code; but where time codes are so coarse that they must
-    be seconds or the like, USD's fallback of 24 frames a second.
+    The stage gives the range; where start or end is not authored, the samples give it. The frame rate is
+    framesPerSecond where that is authored, else one frame per time code. Below 10 time codes per second a time code is
+    not a frame, and USD's fallback of 24 frames per second holds.
 
     Args:
         stage: The Usd.Stage.
@@ -122,7 +122,7 @@ def clock_of(stage: Usd.Stage, sample_codes: Array) -> Clock:
     seconds = (clock.end - clock.start) / rate
     if not seconds * frames < MOST_FRAMES:
         raise ShotError(
-            f"the shot has more frames than can be meant (at most {MOST_FRAMES})",
+            f"the shot has too many frames (at most {MOST_FRAMES} are supported)",
             path=root.identifier,
             attribute="endTimeCode",
             found=f"startTimeCode {start:g}, endTimeCode {end:g} at {rate:g} a second, {frames:g} frames a second",
@@ -130,7 +130,7 @@ def clock_of(stage: Usd.Stage, sample_codes: Array) -> Clock:
         )
     if not seconds > SHORTEST:
         raise ShotError(
-            "the shot is too short to hold a motion",
+            "the shot is shorter than a microsecond",
             path=root.identifier,
             attribute="endTimeCode",
             found=f"{seconds:g} s",

@@ -1,8 +1,7 @@
-"""The words that USD physics files in the wild use for what we read, and which of them wins.
+"""Attribute names of USD physics dialects, in the order of precedence.
 
-For each quantity the spellings are in order of priority: ours, then UsdPhysics, Newton, MuJoCo (`mjc:`, of the
-mujoco-usd-converter), PhysX. The first one that is authored is taken. None of the last three is known to usd-core, so
-all are read by name.
+For each quantity the first authored name counts: Calmotion, UsdPhysics, Newton, MuJoCo (`mjc:`, of the
+mujoco-usd-converter), PhysX. usd-core does not define the schemas of the last three, so all are read by name.
 """
 
 from __future__ import annotations
@@ -21,10 +20,10 @@ USD, SI = "usd", "si"  # degrees and stage units, or radians and stage units as 
 
 @dataclass(frozen=True)
 class Spelling:
-    """One dialect's word for a quantity of a joint.
+    """The attribute in which a dialect stores a quantity of a joint.
 
     Attributes:
-        dialect: Whose it is.
+        dialect: Name of the dialect.
         attribute: Name; `{drive}` stands for angular or linear.
     """
 
@@ -48,13 +47,13 @@ MIMIC_AXES = ("rotX", "rotY", "rotZ", "transX", "transY", "transZ", "X", "Y", "Z
 
 @dataclass(frozen=True)
 class GearSpelling:
-    """One dialect's words for a joint that is geared to another: value = sign (offset + ratio * leader).
+    """How a dialect describes a joint that is geared to another: value = sign (offset + ratio * leader).
 
     Attributes:
         leader: Name of the relationship to the joint that leads.
         offset, ratio: Names of the attributes.
-        enabled: Name of the attribute that switches it off, or empty.
-        default_ratio: Where none is authored.
+        enabled: Name of the attribute that switches the gear off, or empty.
+        default_ratio: Ratio where none is authored.
     """
 
     dialect: str
@@ -82,10 +81,10 @@ GEARS = (
 
 
 def number_of(prim: Usd.Prim, name: str) -> float | None:
-    """A number that is authored by name, in whatever type; None where there is no value.
+    """The value of a numeric attribute, of any numeric type; None where none is authored.
 
     Raises:
-        ShotError: It is no number.
+        ShotError: The value is not a number.
     """
     attribute = prim.GetAttribute(name)
     value = attribute.Get() if attribute and attribute.HasAuthoredValue() else None
@@ -109,10 +108,10 @@ def authored(prim: Usd.Prim, spelling: Spelling, drive: str) -> tuple[str, float
     return None if value is None else (name, value)
 
 
-def elsewhere(prim: Usd.Prim, spellings: tuple[Spelling, ...], drive: str) -> tuple[str, float, Spelling] | None:
-    """The first spelling that is authored and says something finite."""
+def first_finite(prim: Usd.Prim, spellings: tuple[Spelling, ...], drive: str) -> tuple[str, float, Spelling] | None:
+    """Name, value and spelling of the first authored attribute whose value is not infinite."""
     for spelling in spellings:
-        found = authored(prim, spelling, drive)
-        if found is not None and not math.isinf(found[1]):
-            return *found, spelling
+        limit = authored(prim, spelling, drive)
+        if limit is not None and not math.isinf(limit[1]):
+            return *limit, spelling
     return None

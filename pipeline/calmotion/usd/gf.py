@@ -1,4 +1,4 @@
-"""The one place where Gf and Vt values become NumPy arrays and back.
+"""Conversion of Gf and Vt values to NumPy arrays and back.
 
 Gf multiplies row vectors from the left; here a matrix maps column vectors, `x -> A x + t`, as everywhere else in
 the engine. Quaternions are (w, x, y, z).
@@ -98,7 +98,7 @@ def to_strings(values: Iterable[object]) -> Vt.StringArray:
 
 
 def to_doubles(values: Iterable[float]) -> Vt.DoubleArray:
-    """A Vt.DoubleArray, for the same reason."""
+    """A Vt.DoubleArray; a Python list in layer metadata writes a file that cannot be opened again."""
     from pxr import Vt
 
     return Vt.DoubleArray([float(v) for v in values])

@@ -33,7 +33,7 @@ def refuse_input_as_output(output: str, inputs: Iterable[str]) -> None:
         same = os.path.realpath(output) == os.path.realpath(name)
         if same or (os.path.exists(output) and os.path.exists(name) and os.path.samefile(output, name)):
             raise ShotError(
-                "the output is one of the layers that the shot is made of, and those are never written to",
+                "the output is a layer of the shot, and input layers are never written to",
                 path=output,
                 remedy="Choose another output",
             )
@@ -47,7 +47,7 @@ def write_layer(layer: Sdf.Layer, output: str, validate: Callable[[str], None]) 
     Args:
         layer: The Sdf.Layer; its content is written in the format that the extension of `output` names.
         output: Destination.
-        validate: Called with the path of the temporary file; raises what is wrong with it.
+        validate: Called with the path of the temporary file; raises a ShotError if the file is wrong.
 
     Raises:
         ShotError: The file cannot be written, or cannot be opened again.

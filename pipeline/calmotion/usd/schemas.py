@@ -1,4 +1,4 @@
-"""Calmotion's codeless schemas: where they are, and telling USD about them in time."""
+"""Calmotion's codeless schemas: their folder, and their registration in USD."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def register() -> None:
     """Make USD know the schemas; calling it again does nothing.
 
     USD reads schemas once, when its schema registry is first used (any stage with a typed prim does that), and
-    takes no notice of later ones, without a word. So this is called before a stage is opened, and checks.
+    ignores later ones silently. Call this before a stage is opened; it checks that USD knows the schemas.
 
     Raises:
         ShotError: Called too late in this process.
@@ -53,7 +53,7 @@ def register() -> None:
     missing = [name for name in NAMES if registry.FindAppliedAPIPrimDefinition(name) is None]
     if missing:
         raise ShotError(
-            "USD was used in this process before Calmotion's schemas were registered, and it reads schemas once",
+            "USD read its schemas before Calmotion's were registered, and reads them only once per process",
             found=", ".join(missing),
             remedy="Call calmotion.usd.schemas.register() before any stage is opened, "
             "or put calmotion.usd.schemas.plugin_path() into PXR_PLUGINPATH_NAME before the process starts",
@@ -61,7 +61,7 @@ def register() -> None:
 
 
 def value(prim: Usd.Prim, schema: str, attribute: str, time: float | None = None) -> Any:
-    """The value of an attribute of our schemas, authored or fallback.
+    """The authored value of an attribute of a Calmotion schema, else its fallback.
 
     Args:
         prim: The Usd.Prim; the schema need not be applied.
@@ -76,9 +76,9 @@ def value(prim: Usd.Prim, schema: str, attribute: str, time: float | None = None
 
     authored = prim.GetAttribute(attribute)
     if authored and authored.HasAuthoredValue():
-        found = authored.Get() if time is None else authored.Get(time)
-        if found is not None:
-            return found
+        authored_value = authored.Get() if time is None else authored.Get(time)
+        if authored_value is not None:
+            return authored_value
     definition = Usd.SchemaRegistry().FindAppliedAPIPrimDefinition(schema)
     return definition.GetAttributeFallbackValue(attribute) if definition else None
 

@@ -1,4 +1,4 @@
-"""Opening a shot: what is broken is refused with its place, and layers of ours are told from the animator's."""
+"""Opening a shot: composition errors become ShotErrors, and layers that Calmotion wrote are recognised."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from pxr import Pcp, Sdf, Usd
 
 METADATA_KEY = "calmotion"
-CURVES, MOTION, ROOT, RIG = "curves", "motion", "root", "rig"  # roles of layers that we write
+CURVES, MOTION, ROOT, RIG = "curves", "motion", "root", "rig"  # roles of the layers that Calmotion writes
 
 _ARCS = {"reference": "references", "payload": "payload", "sublayer": "subLayers"}
 _REFUSED = (
@@ -33,7 +33,7 @@ _REFUSED = (
 
 @contextmanager
 def quiet() -> Iterator[None]:
-    """Hold back USD's own messages on stderr; what matters in them is raised as a ShotError."""
+    """Suppress USD's messages on stderr; errors are raised as ShotErrors instead."""
     from pxr import UsdUtils
 
     delegate = UsdUtils.CoalescingDiagnosticDelegate()
@@ -46,21 +46,21 @@ def quiet() -> Iterator[None]:
 
 @contextmanager
 def refused_by_usd(stage: Usd.Stage) -> Iterator[None]:
-    """What USD itself cannot evaluate, as a ShotError with the place that USD names."""
+    """Turn an error of USD into a ShotError with the prim and attribute that USD names."""
     from pxr import Tf
 
     try:
         yield
     except Tf.ErrorException as error:
         lines = [line for line in str(error).splitlines() if line.strip()]
-        text = lines[0].rpartition(" : ")[2].strip().strip("'") if lines else "an error without words"
+        text = lines[0].rpartition(" : ")[2].strip().strip("'") if lines else "an error without a message"
         site = re.search(r"<(/[^>.]*)\.?([^>]*)>", text)
         raise ShotError(
             "USD cannot evaluate the shot",
             path=site.group(1) if site else stage.GetRootLayer().identifier,
             attribute=site.group(2) if site else "",
             found=text,
-            remedy="Mend what it names; usdview and `calmotion inspect --strict` tell more",
+            remedy="Correct the prim or attribute; usdview and `calmotion inspect --strict` give details",
         ) from error
 
 
@@ -87,7 +87,7 @@ def open_layer(path: str) -> Sdf.Layer:
         reason = _last_quoted(str(error))
     if layer is None:
         raise ShotError(
-            "this is not a USD file, or a broken one",
+            "this is not a USD file, or it is damaged",
             path=path,
             found=reason or None,
             remedy="Name a .usda, .usdc, .usd or .usdz file that opens in a USD viewer",
@@ -96,7 +96,7 @@ def open_layer(path: str) -> Sdf.Layer:
 
 
 def open_stage(path: str, *, muted: tuple[str, ...] = ()) -> Usd.Stage:
-    """The composed stage of a shot, everything loaded and checked; registers our schemas first.
+    """The composed stage of a shot, everything loaded and checked; registers Calmotion's schemas first.
 
     Args:
         path: File of the shot.
@@ -118,21 +118,23 @@ def open_stage(path: str, *, muted: tuple[str, ...] = ()) -> Usd.Stage:
         if muted:
             stage.MuteAndUnmuteLayers(list(muted), [])
         errors = stage.GetCompositionErrors()
-    raise_all(_alike([refusal for error in errors if (refusal := _refusal(error, path))]))
+    raise_all(_merged([refusal for error in errors if (refusal := _refusal(error, path))]))
     return stage
 
 
-def _alike(errors: list[ShotError]) -> list[ShotError]:
-    """One error for all prims that lack the same file."""
+def _merged(errors: list[ShotError]) -> list[ShotError]:
+    """Merge the errors of prims that lack the same file."""
     groups: dict[tuple[str, ...], list[ShotError]] = {}
     for error in errors:
         groups.setdefault((error.problem, error.attribute, str(error.found), error.remedy), []).append(error)
-    found = []
+    merged = []
     for (problem, attribute, _, remedy), group in groups.items():
-        more = f", here and at {len(group) - 1} other prims" if len(group) > 1 else ""
+        others = f", here and at {len(group) - 1} other prims" if len(group) > 1 else ""
         paths = sorted(error.path for error in group)
-        found.append(ShotError(problem + more, path=paths[0], attribute=attribute, found=group[0].found, remedy=remedy))
-    return found
+        merged.append(
+            ShotError(problem + others, path=paths[0], attribute=attribute, found=group[0].found, remedy=remedy)
+        )
+    return merged
 
 
 def _last_quoted(text: str) -> str:
@@ -141,7 +143,7 @@ def _last_quoted(text: str) -> str:
 
 
 def _refusal(error: Pcp.ErrorBase, shot: str) -> ShotError | None:
-    """What to say of a composition error that means that something of the shot is missing."""
+    """The ShotError for a composition error that leaves out a part of the shot; None for any other."""
     if type(error).__name__ not in _REFUSED:
         return None
     text = str(error).strip()
@@ -183,13 +185,13 @@ def files_named_by(path: str) -> tuple[str, ...]:
 
 
 def role_of(layer: Sdf.Layer) -> str:
-    """The role of a layer that we wrote, `curves`, `motion` or `root`; empty for anybody else's."""
-    ours = layer.customLayerData.get(METADATA_KEY)
-    return str(ours.get("role", "")) if isinstance(ours, dict) else ""
+    """The role of a layer that Calmotion wrote (`curves`, `motion`, `root` or `rig`); empty for any other layer."""
+    origin = layer.customLayerData.get(METADATA_KEY)
+    return str(origin.get("role", "")) if isinstance(origin, dict) else ""
 
 
 def earlier_layers(stage: Usd.Stage, roles: tuple[str, ...] = (CURVES, MOTION)) -> tuple[str, ...]:
-    """Identifiers of the layers in a stage that hold curves or motions that we computed."""
+    """Identifiers of the layers in a stage with one of the given roles, the root layer excepted."""
     return tuple(
         layer.identifier
         for layer in stage.GetUsedLayers(True)
@@ -197,11 +199,11 @@ def earlier_layers(stage: Usd.Stage, roles: tuple[str, ...] = (CURVES, MOTION)) 
     )
 
 
-def refuse_own_layer(stage: Usd.Stage, path: str) -> None:
-    """Refuse a layer of ours that was given instead of the root layer that opens it with its shot."""
+def refuse_result_layer(stage: Usd.Stage, path: str) -> None:
+    """Refuse a layer of results that was given instead of the root layer, which sublayers it and the shot."""
     if role_of(stage.GetRootLayer()) in (CURVES, MOTION):
         raise ShotError(
-            "this layer was written by Calmotion and holds opinions over a shot, not a shot",
+            "this layer was written by Calmotion and holds only results, not the shot",
             path=path,
             remedy="Open the root layer beside it, whose name ends in _root, or the shot itself",
         )
@@ -215,7 +217,7 @@ def display_name(identifier: str, shot: str) -> str:
 def input_layers(stage: Usd.Stage, shot: str) -> tuple[InputLayer, ...]:
     """Every file that a stage was composed from, the shot first, relative to the shot's folder, with SHA-256.
 
-    Layers of ours are among them where they are not muted.
+    Layers of earlier results are included unless they are muted.
     """
     files = [os.path.realpath(shot)]
     for layer in stage.GetUsedLayers(True):

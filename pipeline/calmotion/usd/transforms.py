@@ -1,4 +1,4 @@
-"""Rigid poses out of affine transforms, and rotations between their forms. NumPy alone; stage or SI length alike."""
+"""Rigid poses of affine transforms, and conversions of rotations. Lengths may be in stage units or SI."""
 
 from __future__ import annotations
 
@@ -69,21 +69,21 @@ def pose_from_matrix(matrix: Array, path: str) -> Pose:
     rotation = linear / scale
     if np.max(np.abs(rotation.T @ rotation - np.eye(3))) > _SHEAR_TOLERANCE:
         raise ShotError(
-            "its transform shears (a scale that differs by axis above a rotation does that), so it has no rigid pose",
+            "its transform shears and so has no rigid pose (a cause is a non-uniform scale above a rotation)",
             path=path,
             attribute="xformOpOrder",
             remedy="Freeze the scale of the prims above it into their geometry",
         )
-    # Remove what single precision left: the nearest rotation.
+    # Remove rounding errors of single precision: take the nearest rotation.
     u, _, vt = np.linalg.svd(rotation)
     return Pose(u @ vt, matrix[:3, 3].copy(), scale)
 
 
 def refuse_infinite(matrix: Array, path: str) -> None:
-    """Refuse a transform with values that are not finite, or so large that their products are not.
+    """Refuse a transform with values that are not finite, or that exceed 1e30.
 
     Raises:
-        ShotError: It has.
+        ShotError: The transform has such a value.
     """
     if not np.all(np.abs(matrix) < _HUGE):
         raise ShotError(
@@ -91,7 +91,7 @@ def refuse_infinite(matrix: Array, path: str) -> None:
             path=path,
             attribute="xformOpOrder",
             found=f"{float(np.max(np.abs(matrix))):g}",
-            remedy="Correct it",
+            remedy="Correct the transform",
         )
 
 

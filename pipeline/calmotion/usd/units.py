@@ -1,4 +1,4 @@
-"""The one place where stage units become SI and back; seconds are seconds in both."""
+"""Conversion between stage units and SI; seconds are the same in both."""
 
 from __future__ import annotations
 
@@ -71,19 +71,19 @@ def units_of(stage: Usd.Stage) -> StageUnits:
     from pxr import UsdGeom, UsdPhysics
 
     units = StageUnits(UsdGeom.GetStageMetersPerUnit(stage), UsdPhysics.GetStageKilogramsPerUnit(stage))
-    for name, found in (("metersPerUnit", units.meters), ("kilogramsPerUnit", units.kilograms)):
-        if not (math.isfinite(found) and found > 0.0):
+    for name, value in (("metersPerUnit", units.meters), ("kilogramsPerUnit", units.kilograms)):
+        if not (math.isfinite(value) and value > 0.0):
             raise ShotError(
                 "the unit of the stage must be positive",
                 path=stage.GetRootLayer().identifier,
                 attribute=name,
-                found=found,
+                found=value,
                 remedy=f"Author a positive {name} in the root layer",
             )
     up = str(UsdGeom.GetStageUpAxis(stage))
     if up not in ("X", "Y", "Z"):
         raise ShotError(
-            "there is no such up axis",
+            "unknown up axis",
             path=stage.GetRootLayer().identifier,
             attribute="upAxis",
             found=up or "an empty name",

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from calmotion.shot import Track
-from calmotion.shot.curves import curve_of, interpolate, looped_curve, open_by
+from calmotion.shot.curves import curve_of, cycle_gap, cyclic_curve, interpolate
 from calmotion.simulation.inputs.curves import needed_pre_roll, sample_tracks
 from calmotion.simulation.inputs.time_grid import make_grid
 
@@ -29,7 +29,7 @@ def test_sparse_tracks_are_interpolated_and_held(count):
 
 def test_a_loop_is_smooth_at_its_seam_and_goes_on_in_whole_turns():
     values = 0.3 * np.sin(2 * np.pi * FRAMES + 0.7) + 4 * np.pi * FRAMES
-    curve = looped_curve(Track(FRAMES, values), FRAMES[-1])
+    curve = cyclic_curve(Track(FRAMES, values), FRAMES[-1])
     assert np.allclose(curve(FRAMES, 0), values)
     for order in range(3):
         before, after = curve(np.array([1.0 - 1e-9]), order), curve(np.array([1.0 + 1e-9]), order)
@@ -41,7 +41,7 @@ def test_a_loop_is_smooth_at_its_seam_and_goes_on_in_whole_turns():
 def test_sparse_samples_of_a_loop_are_completed_at_its_ends():
     for times in (np.array([0.5]), np.array([0.25, 0.75]), np.array([-0.2, 0.4, 1.3])):
         track = Track(times, np.cos(2 * np.pi * times))
-        curve = looped_curve(track, 1.0)
+        curve = cyclic_curve(track, 1.0)
         inside = times[(times >= 0.0) & (times <= 1.0)]
         assert np.allclose(curve(inside, 0), np.cos(2 * np.pi * inside))
         assert np.allclose(curve(np.array([0.0]), 0), curve(np.array([1.0]), 0))
@@ -49,8 +49,8 @@ def test_sparse_samples_of_a_loop_are_completed_at_its_ends():
 
 def test_loops_that_do_not_close_are_noticed():
     almost = Track(FRAMES, FRAMES * (2 * np.pi + 0.01))
-    assert open_by(almost, 1.0, turning=True) == pytest.approx(0.01)
-    assert open_by(almost, 1.0, turning=False) == pytest.approx(2 * np.pi + 0.01)
+    assert cycle_gap(almost, 1.0, turning=True) == pytest.approx(0.01)
+    assert cycle_gap(almost, 1.0, turning=False) == pytest.approx(2 * np.pi + 0.01)
 
 
 def test_a_corner_is_kept_and_the_rest_is_smooth():

@@ -61,7 +61,7 @@ def test_a_joint_on_a_prim_that_moves_moves_with_it(tmp_path):
     character, animation, _ = read_shot(str(write_arm(tmp_path / "arm.usda", edit)))
     check(animation.moving, character, 1.0)
     assert character.joints[animation.moving[0].joint].path == STAND
-    assert any("/Cart" in note and "carries the character" in note for note in character.notes)
+    assert any("/Cart" in note and "moves the root of the character" in note for note in character.notes)
 
 
 def test_a_kinematic_body_that_stands_still_is_held(tmp_path):

@@ -1,4 +1,4 @@
-"""Bodies, joints, motors and targets put together into a Character."""
+"""A Character of bodies, joints, motors and targets."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from calmotion.errors import ShotError, raise_all
 from calmotion.shot import Body, Character, Joint, RetargetSettings
 from calmotion.usd.clock import Clock
 from calmotion.usd.reading import scene, targets, topology
+from calmotion.usd.reading.animated_transforms import refuse_moving
 from calmotion.usd.reading.bodies import mass
 from calmotion.usd.reading.bodies.flexible import flexible_settings
 from calmotion.usd.reading.bodies.interfaces import interfaces_of
@@ -28,7 +29,6 @@ from calmotion.usd.reading.joints import (
 from calmotion.usd.reading.motors import driven_motors as motors
 from calmotion.usd.reading.motors.posed_motors import posed_joints
 from calmotion.usd.reading.roots import on_moving_prim
-from calmotion.usd.reading.stillness import refuse_moving
 from calmotion.usd.transforms import Pose
 
 if TYPE_CHECKING:
@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Skeleton:
-    """What moves and what drives it, before geometry and mass are read.
+    """The bodies, joints and motors, before geometry and mass are read.
 
     Attributes:
         bodies: Paths of the bodies, from the world outwards.
@@ -55,15 +55,15 @@ class Skeleton:
 
 
 def read_skeleton(reading: Reading, clock: Clock, still: bool, given: Sequence[str] = ()) -> Skeleton:
-    """Find the bodies, joints and motors of the character; what no motor reaches is left out.
+    """Find the bodies, joints and motors of the character; bodies without connection to a motor or target are skipped.
 
     Args:
         clock: The clock of the shot.
-        still: Whether nothing has to be animated.
+        still: Whether a character without animation is accepted.
         given: Joints whose tracks are given beside the shot.
 
     Raises:
-        ShotError: No bodies, no joints or no motors. What is wrong with single ones is kept in the reading.
+        ShotError: No bodies, no joints or no motors. Problems of single prims are added to the reading.
     """
     stage = reading.stage
     root_file = stage.GetRootLayer().identifier
@@ -74,12 +74,12 @@ def read_skeleton(reading: Reading, clock: Clock, still: bool, given: Sequence[s
             "no bodies: the shot has no prim with PhysicsRigidBodyAPI",
             path=skeletons[0].GetPath() if skeletons else root_file,
             found="a skinned character without physics" if skeletons else None,
-            remedy="Make a robot of it with `calmotion rig`, and open what that writes"
+            remedy="Run `calmotion rig` on it, and open the layer that it writes"
             if skeletons
             else "Apply PhysicsRigidBodyAPI to the moving parts of the character",
         )
-    found = joint_prims(stage)
-    if not found:
+    joints_of_stage = joint_prims(stage)
+    if not joints_of_stage:
         raise ShotError(
             "no joints: the shot has no enabled PhysicsRevoluteJoint or PhysicsFixedJoint",
             path=topology.common_path(list(prims)),
@@ -87,15 +87,15 @@ def read_skeleton(reading: Reading, clock: Clock, still: bool, given: Sequence[s
         )
     poses = dict(reading.each(prims, lambda path: (path, reading.pose(prims[path]))))
     raise_all(reading.problems)  # joints refer to poses
-    joints = [joint for joint in reading.each(found, lambda prim: read_joint(reading, prim, poses)) if joint]
+    joints = [joint for joint in reading.each(joints_of_stage, lambda prim: read_joint(reading, prim, poses)) if joint]
     root = topology.common_path(list(prims))
     drives = motors.read_drives(reading, joints, root, posed_joints(reading, joints, clock), given, still)
     target_prims = targets.target_prims(reading)
-    bodies = _moved(reading, list(prims), joints, drives, [body for _, body in target_prims])
+    bodies = _moving_bodies(reading, list(prims), joints, drives, [body for _, body in target_prims])
     kept = set(bodies)
     joints = [j for j in joints if (j.body0 or j.body1) in kept]
     reading.each(joints, refuse_unsupported)
-    joints += _held(reading, bodies, joints, prims, poses)
+    joints += _world_joints(reading, bodies, joints, prims, poses)
     far = topology.distances(bodies, joints)
     bodies = list(far)
     joints.sort(key=lambda j: max(far.get(j.body0, 0), far.get(j.body1, 0)))  # stable: the shot's order otherwise
@@ -104,7 +104,7 @@ def read_skeleton(reading: Reading, clock: Clock, still: bool, given: Sequence[s
     held = {j.body1: j.path for j in joints if j.body0 == "" and j.prim is not None and not on_moving_prim(reading, j)}
     roots = {j.body1 for j in joints if j.body0 == ""}
     posing = any(drive.source == motors.BODIES for drive in drives)
-    with reading.going_on():
+    with reading.collecting_problems():
         others = [] if posing else [prims[b] for b in bodies if b not in roots]
         refuse_moving(reading, {prims[b]: held[b] for b in held}, others)
     return Skeleton(bodies, {b: poses[b] for b in bodies}, joints, drives, target_prims)
@@ -114,7 +114,7 @@ def build_character(reading: Reading, skeleton: Skeleton) -> Character:
     """Read geometry, mass, materials, targets and settings of a skeleton.
 
     Raises:
-        ShotError: Everything that is wrong with the shot, what `read_skeleton` kept included.
+        ShotError: All problems of the shot, those of `read_skeleton` included.
     """
     numbers = {path: k for k, path in enumerate(skeleton.bodies)}
     touching = {path: [j.path for j in skeleton.joints if path in (j.body0, j.body1)] for path in skeleton.bodies}
@@ -139,7 +139,7 @@ def build_character(reading: Reading, skeleton: Skeleton) -> Character:
     chosen = tuple(
         reading.each(
             [(prim, body) for prim, body in skeleton.targets if body in numbers],
-            lambda found: targets.read_target(reading, found[0], numbers[found[1]], skeleton.poses[found[1]]),
+            lambda target: targets.read_target(reading, target[0], numbers[target[1]], skeleton.poses[target[1]]),
         )
     )
     index = {drive.joint.path: k for k, drive in enumerate(skeleton.drives)}
@@ -148,9 +148,9 @@ def build_character(reading: Reading, skeleton: Skeleton) -> Character:
     )
     root = topology.common_path(skeleton.bodies)
     gravity, settings = np.zeros(3), RetargetSettings()
-    with reading.going_on():
+    with reading.collecting_problems():
         gravity = scene.gravity(reading)
-    with reading.going_on():
+    with reading.collecting_problems():
         settings = scene.retarget_settings(reading, root)
     raise_all(reading.problems)
     if not chosen:
@@ -205,7 +205,7 @@ def _body(reading: Reading, path: str, pose: Pose, joints: list[str]) -> Body:
     )
 
 
-def _moved(
+def _moving_bodies(
     reading: Reading, bodies: list[str], joints: list[JointPrim], drives: list[motors.Drive], wanted: list[str]
 ) -> list[str]:
     """The bodies of every group that a motor moves or a target is on; a note for the others."""
@@ -215,23 +215,23 @@ def _moved(
         if driven.intersection(group):
             kept += group
         else:
-            reading.note(f"{group[0]}: no motor moves this body or those joined to it ({len(group)}); left out")
+            reading.note(f"{group[0]}: no motor moves this body or those connected to it ({len(group)}); not simulated")
     return kept
 
 
-def _held(
+def _world_joints(
     reading: Reading, bodies: list[str], joints: list[JointPrim], prims: dict[str, Usd.Prim], poses: dict[str, Pose]
 ) -> list[JointPrim]:
     """A joint to the world for each kinematic body, and for each group of bodies that has none."""
     added = []
-    anchored = {j.body1 for j in joints if j.body0 == ""}
+    attached = {j.body1 for j in joints if j.body0 == ""}
     for group in topology.components(bodies, joints):
-        kinematic = [b for b in group if prims[b].GetAttribute("physics:kinematicEnabled").Get() and b not in anchored]
+        kinematic = [b for b in group if prims[b].GetAttribute("physics:kinematicEnabled").Get() and b not in attached]
         added += [joint_to_world(body, poses[body], reading.units.length(1.0)) for body in kinematic]
-        if kinematic or anchored.intersection(group):
+        if kinematic or attached.intersection(group):
             continue
         carried = {j.body1 for j in joints}
         root = next(iter([b for b in group if b not in carried] or group))
-        reading.note(f"{root}: no joint holds the character in the world; this body is held at its pose")
+        reading.note(f"{root}: no joint connects the character with the world; this body is fixed at its pose")
         added.append(joint_to_world(root, poses[root], reading.units.length(1.0)))
     return added

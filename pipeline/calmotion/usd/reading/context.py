@@ -1,4 +1,4 @@
-"""What every part of the reader needs: the stage, its units, poses at the first frame, and a place for notes."""
+"""The state of reading a stage: its units, poses at the first frame, and collected notes, warnings and errors."""
 
 from __future__ import annotations
 
@@ -29,9 +29,9 @@ class Reading:
         stage: The Usd.Stage.
         units: Its units.
         start: Time code of the first frame.
-        notes: Sentences for the user about what was decided where the shot was silent.
-        problems: What is wrong with the shot, as far as it was read.
-        doubts: What can be processed, but not as it is authored; notes for the user, too.
+        notes: Sentences for the user about assumptions where the shot does not say.
+        problems: Errors of the shot that were found so far.
+        warnings: What can be processed, but not exactly as authored; also among the notes.
     """
 
     stage: Any
@@ -39,7 +39,7 @@ class Reading:
     start: float
     notes: list[str] = field(default_factory=list)
     problems: list[ShotError] = field(default_factory=list)
-    doubts: list[ShotError] = field(default_factory=list)
+    warnings: list[ShotError] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         from pxr import UsdGeom
@@ -47,41 +47,41 @@ class Reading:
         self._xforms = UsdGeom.XformCache(self.start)
 
     def note(self, text: str) -> None:
-        """Keep a sentence for the user, once."""
+        """Add a sentence for the user, unless it is there already."""
         if text not in self.notes:
             self.notes.append(text)
 
-    def doubt(self, problem: ShotError) -> None:
-        """Keep what can be processed, but not as it is authored, and tell the user."""
-        self.doubts.append(problem)
+    def warn(self, problem: ShotError) -> None:
+        """Add a warning, and a note for the user."""
+        self.warnings.append(problem)
         self.note(problem.message())
 
     @contextmanager
-    def going_on(self) -> Iterator[None]:
-        """Keep the problem that ends this block, so that one reading finds all of them."""
+    def collecting_problems(self) -> Iterator[None]:
+        """Add the ShotError that ends this block to the problems, so that one reading finds all of them."""
         try:
             yield
         except ShotError as problem:
             self.problems.append(problem)
 
-    def each(self, items: Iterable[T], read: Callable[[T], R]) -> list[R]:
-        """What is read of each item, the problems of some kept and the others read all the same."""
-        found = []
-        for item in items:
-            with self.going_on():
-                found.append(read(item))
-        return found
+    def each(self, elements: Iterable[T], read: Callable[[T], R]) -> list[R]:
+        """Read each element; a ShotError of one is added to the problems, and the others are still read."""
+        values = []
+        for element in elements:
+            with self.collecting_problems():
+                values.append(read(element))
+        return values
 
     def at(self, code: float) -> Reading:
-        """The same stage at another time code; what it notes is not kept."""
+        """The same stage at another time code, with empty notes."""
         return Reading(self.stage, self.units, code)
 
     def world_matrix(self, prim: Usd.Prim) -> Array:
         """Local-to-world matrix [4, 4] of a prim at the first frame, stage units, mapping column vectors; a ShotError
         where it is not finite."""
-        found = matrix(self._xforms.GetLocalToWorldTransform(prim))
-        refuse_infinite(found, str(prim.GetPath()))
-        return found
+        world = matrix(self._xforms.GetLocalToWorldTransform(prim))
+        refuse_infinite(world, str(prim.GetPath()))
+        return world
 
     def pose(self, prim: Usd.Prim) -> Pose:
         """World pose of a prim at the first frame, stage units; a ShotError if it shears."""
@@ -89,19 +89,19 @@ class Reading:
 
 
 def grouped(notes: list[str]) -> tuple[str, ...]:
-    """Notes with those that say the same of several prims put into one."""
+    """The notes; equal notes about several prims are merged into one."""
     groups: dict[str, list[str]] = {}
     for note in notes:
         place, colon, text = note.partition(": ")
         groups.setdefault(text if colon and place.startswith("/") else note, []).append(place)
-    found = []
+    merged = []
     for text, places in groups.items():
         if text.startswith(places[0]) and len(places) == 1:
-            found.append(text)
+            merged.append(text)
         else:
-            more = f" and {len(places) - 1} others" if len(places) > 1 else ""
-            found.append(f"{places[0]}{more}: {text}")
-    return tuple(found)
+            others = f" and {len(places) - 1} others" if len(places) > 1 else ""
+            merged.append(f"{places[0]}{others}: {text}")
+    return tuple(merged)
 
 
 def prims_of(stage: Usd.Stage) -> Iterator[Usd.Prim]:

@@ -39,7 +39,7 @@ class JointPrim:
         body0, body1: Paths of the bodies, empty for the world.
         frame0, frame1: Frames in them, m.
         lower, upper: Limits [rad or m].
-        closes_loop: Whether the shot says that this joint closes a loop.
+        closes_loop: Whether the shot excludes this joint from the spanning tree (it closes a chain).
     """
 
     prim: Any
@@ -119,7 +119,7 @@ def read_joint(reading: Reading, prim: Usd.Prim, poses: dict[str, Pose]) -> Join
 
 
 def joint_to_world(body: str, pose: Pose, meters: float) -> JointPrim:
-    """A joint that holds a body where it is at the first frame."""
+    """A fixed joint between the world and a body at its pose at the first frame."""
     here = Frame(np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0]))
     return JointPrim(None, body, "fixed", "", body, pose.frame(meters), here)
 
@@ -177,17 +177,17 @@ def _axis(prim: Usd.Prim) -> str:
     axis = prim.GetAttribute("physics:axis").Get()
     if axis not in ("X", "Y", "Z"):
         raise ShotError(
-            "there is no such axis", path=prim.GetPath(), attribute="physics:axis", found=axis, remedy="Use X, Y or Z"
+            "unknown axis", path=prim.GetPath(), attribute="physics:axis", found=axis, remedy="Use X, Y or Z"
         )
     return str(axis)
 
 
 def _finite(prim: Usd.Prim, name: str, convert: Callable[[Any], Array]) -> Array:
     value = prim.GetAttribute(name).Get()
-    found = convert(value)
-    if not np.all(np.isfinite(found)):
+    converted = convert(value)
+    if not np.all(np.isfinite(converted)):
         raise ShotError("is not finite", path=prim.GetPath(), attribute=name, found=value, remedy="Correct the value")
-    return found
+    return converted
 
 
 def _limits(prim: Usd.Prim, to_si: float) -> tuple[float, float]:
@@ -198,7 +198,9 @@ def _limits(prim: Usd.Prim, to_si: float) -> tuple[float, float]:
         value = attribute.Get() if attribute.HasAuthoredValue() else None
         value = unlimited if value is None else float(value)
         if np.isnan(value):
-            raise ShotError("is not a number", path=prim.GetPath(), attribute=name, found=value, remedy="Correct it")
+            raise ShotError(
+                "is not a number", path=prim.GetPath(), attribute=name, found=value, remedy="Author a number"
+            )
         values.append(to_si * value)
     lower, upper = values
     if lower > upper:

@@ -1,4 +1,4 @@
-"""Roots that the shot moves: kinematic bodies, and joints on prims that are no bodies and move."""
+"""Roots that the shot moves: kinematic bodies, and joints on animated prims that are not bodies."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ import numpy as np
 
 from calmotion.shot import Frame, MovingFrame
 from calmotion.usd.clock import Clock
+from calmotion.usd.reading.animated_transforms import carriers, codes_of, moves
 from calmotion.usd.reading.context import Reading
 from calmotion.usd.reading.joints import JointPrim, read_joint
-from calmotion.usd.reading.stillness import carriers, codes_of, moves
 from calmotion.usd.transforms import Pose
 
 if TYPE_CHECKING:
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 def world_side_prim(reading: Reading, joint: JointPrim) -> Usd.Prim | None:
-    """The prim, no body, that a joint's end in the world names; None where it names none."""
+    """The prim that the world-side end of a joint names; None where it names none."""
     for side in (0, 1) if joint.prim is not None else ():
         relationship = joint.prim.GetRelationship(f"physics:body{side}")
         for target in relationship.GetForwardedTargets() if relationship else []:
@@ -63,7 +63,7 @@ def moving_frames(
         flips = np.where(np.sum(rotations[1:] * rotations[:-1], axis=1) < 0.0, -1.0, 1.0)
         rotations[1:] *= np.cumprod(flips)[:, None]
         found.append(MovingFrame(index, clock.seconds(codes), np.array([f.position for f in frames]), rotations))
-        reading.note(f"{prim.GetPath()}: moves as its transform is animated, and carries the character")
+        reading.note(f"{prim.GetPath()}: its transform is animated, and moves the root of the character")
     return tuple(found)
 
 
@@ -71,7 +71,7 @@ def world_frame(reading: Reading, joint: JointPrim, prim: Usd.Prim, poses: dict[
     """The world-side frame of a joint at the time of a reading.
 
     Args:
-        prim: What carries it.
+        prim: The prim that carries the frame.
         poses: Poses of the bodies where the joints were read, stage units.
     """
     if joint.prim is None:

@@ -1,4 +1,4 @@
-"""What concerns the character as a whole: gravity, and what the shot asks of the optimisation."""
+"""Gravity, and the shot's settings of the optimisation."""
 
 from __future__ import annotations
 
@@ -41,10 +41,13 @@ def gravity(reading: Reading) -> Array:
         reading.note(f"{scene.GetPath()}: the shot has several PhysicsScene prims; gravity is taken from this one")
     direction = gf.vector(scene.GetAttribute("physics:gravityDirection").Get(reading.start))
     magnitude = float(scene.GetAttribute("physics:gravityMagnitude").Get(reading.start))
-    for name, found in (("physics:gravityDirection", direction), ("physics:gravityMagnitude", magnitude)):
-        bad = np.isnan(found).any() or (np.isposinf(found).any() or (name.endswith("n") and np.isinf(found).any()))
+    for name, value in (("physics:gravityDirection", direction), ("physics:gravityMagnitude", magnitude)):
+        # a magnitude of -inf is the fallback of UsdPhysics
+        bad = np.isnan(value).any() or np.isposinf(value).any() or (name.endswith("n") and np.isinf(value).any())
         if bad:
-            raise ShotError("is not finite", path=scene.GetPath(), attribute=name, found=found, remedy="Correct it")
+            raise ShotError(
+                "is not finite", path=scene.GetPath(), attribute=name, found=value, remedy="Author a finite value"
+            )
     size = float(np.linalg.norm(direction))
     along: Array = down if size == 0.0 else direction / size
     return along * (EARTH_GRAVITY if magnitude < 0.0 else reading.units.acceleration(magnitude))
@@ -63,8 +66,8 @@ def retarget_settings(reading: Reading, root: str) -> RetargetSettings:
     prim = reading.stage.GetPrimAtPath(root)
     while prim and not schemas.is_applied(prim, _SCHEMA):
         prim = prim.GetParent()
-    elsewhere = [p for p in prims_of(reading.stage) if schemas.is_applied(p, _SCHEMA) and p != prim]
-    for other in elsewhere:
+    others = [p for p in prims_of(reading.stage) if schemas.is_applied(p, _SCHEMA) and p != prim]
+    for other in others:
         if not (prim and prim.GetPath().HasPrefix(other.GetPath())):
             reading.note(f"{other.GetPath()}: {_SCHEMA} is neither on the root of the character nor above it; ignored")
     if not prim:
@@ -102,7 +105,7 @@ def _choice(prim: Usd.Prim, name: str, allowed: tuple[str, ...]) -> str:
     value = str(schemas.value(prim, _SCHEMA, attribute))
     if value not in allowed:
         raise ShotError(
-            "has a value that does not exist",
+            "has an unknown value",
             path=prim.GetPath(),
             attribute=attribute,
             found=value,

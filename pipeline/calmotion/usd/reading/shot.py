@@ -1,4 +1,4 @@
-"""The reader's table of contents: a file becomes a Character, an Animation and a Provenance."""
+"""Reading a shot: a file becomes a Character, an Animation and a Provenance."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from calmotion.errors import raise_all
 from calmotion.shot import Animation, Character, MotorTracks, MovingFrame, Provenance, Track
 from calmotion.usd import stages
 from calmotion.usd.clock import Clock, clock_of, still_clock
+from calmotion.usd.reading.animated_transforms import carriers, codes_of
 from calmotion.usd.reading.character import Skeleton, build_character, read_skeleton
 from calmotion.usd.reading.context import Reading, is_rigid_body, prims_of
 from calmotion.usd.reading.joints import joint_prims
@@ -33,7 +34,6 @@ from calmotion.usd.reading.motors.skeletal_motors import HingeStack, hinge_stack
 from calmotion.usd.reading.motors.tracks import read_track, sample_codes
 from calmotion.usd.reading.provenance import provenance_of
 from calmotion.usd.reading.roots import moving_frames
-from calmotion.usd.reading.stillness import carriers, codes_of
 from calmotion.usd.reading.targets import weight_tracks
 from calmotion.usd.reading.well_formed import broken_transforms, wrong_types
 from calmotion.usd.units import units_of
@@ -47,13 +47,13 @@ def read_shot(
 ) -> tuple[Character, Animation, Provenance]:
     """Read a shot.
 
-    Layers that Calmotion wrote earlier are muted for the character and for the intent; what they composed to is
-    in `Animation.current`.
+    Layers that Calmotion wrote earlier are muted to read the character and the intended motion; the motion with them
+    is in `Animation.current`.
 
     Args:
         path: A .usda, .usdc, .usd or .usdz file.
         still: Whether a character that nothing animates is read as well; its animation is then one frame.
-        given: Tracks from beside the shot, which replace those of the motors that they name.
+        given: Tracks given in addition to the shot, which replace those of the motors that they name.
 
     Returns:
         The character, its animation, and what a writer must know.
@@ -63,7 +63,7 @@ def read_shot(
             things are wrong.
     """
     composed = stages.open_stage(path)
-    stages.refuse_own_layer(composed, path)
+    stages.refuse_result_layer(composed, path)
     earlier = stages.earlier_layers(composed)
     stage = stages.open_stage(path, muted=earlier) if earlier else composed
     with stages.quiet():
@@ -71,7 +71,7 @@ def read_shot(
         reading, clock, character, tracks = read.reading, read.clock, read.character, read.tracks
         current = tracks
         if earlier:
-            # a motion that we predicted is no animation, but curves of bodies and skeletons are
+            # predicted motions are not animation; optimised curves of bodies and skeletons are
             motions = stages.earlier_layers(composed, (stages.MOTION,))
             result = stages.open_stage(path, muted=motions) if motions else composed
             asked = Reading(result, reading.units, clock.start)
@@ -79,7 +79,7 @@ def read_shot(
             current = motor_tracks(asked, read.skeleton.drives, clock, given, standing)
             raise_all(asked.problems)
             names = ", ".join(stages.display_name(layer, path) for layer in earlier)
-            note = f"the shot carries results of Calmotion ({names}); the intent is the animation beneath them"
+            note = f"the shot carries results of Calmotion ({names}); the intended motion is the animation beneath them"
             character = dataclasses.replace(character, notes=(*character.notes, note))
     provenance = provenance_of(path, stage, clock, earlier)
     weights = weight_tracks(stage, character.targets, clock)
@@ -89,7 +89,7 @@ def read_shot(
 
 @dataclass(frozen=True, eq=False)
 class StageReading:
-    """What one stage says, before layers of ours are taken into account."""
+    """The content of one stage."""
 
     reading: Reading
     clock: Clock
@@ -140,10 +140,10 @@ def motor_tracks(
     reading: Reading, drives: Sequence[Drive], clock: Clock, given: MotorTracks | None = None,
     standing: Sequence[HingeStack] | None = None,
 ) -> tuple[Track, ...]:  # fmt: skip
-    """The tracks of the motors, from wherever each has its own.
+    """The tracks of the motors, each read from its source.
 
     Args:
-        reading: The stage that is asked; problems and notes are kept in it.
+        reading: The stage to read; receives problems and notes.
         standing: Where that stage carries curves of ours, the skeletons' joints as the bodies stand without them; then
             a motor that held still may be animated.
     """
@@ -158,12 +158,12 @@ def motor_tracks(
         found[joint.path] = posed_track(motion, joint, codes, clock, reading)
     stacks = hinge_stacks(reading, drives) if standing is None else performed_on(standing, stage)
     for stack in stacks:
-        with reading.going_on():
+        with reading.collecting_problems():
             found |= skeletal_tracks(stack, clock, reading)
     for drive in drives:
         unit, path = to_si(drive.joint.kind, reading.units), drive.joint.path
         attribute = drive.attribute(stage)
-        with reading.going_on():
+        with reading.collecting_problems():
             if drive.source == DRIVE or (standing is not None and attribute and len(sample_codes(attribute))):
                 found[path] = read_track(attribute, clock, reading, unit)
             elif drive.source == GIVEN and given is not None:
@@ -179,7 +179,7 @@ def motor_tracks(
 
 
 def _note_dense_samples(tracks: tuple[Track, ...], clock: Clock, reading: Reading) -> None:
-    """Say so where the animation has more detail than the frames, at which curves are written."""
+    """Note that the animation is sampled more densely than the frames."""
     frame = 1.0 / clock.frames_per_second
     if any(len(track.times) > 1 and np.median(np.diff(track.times)) < 0.75 * frame for track in tracks):
         reading.note(

@@ -77,12 +77,12 @@ class BoundSkeleton:
 
     def in_skeleton(self, local: Array) -> Array:
         """Transforms in the skeleton's space out of local ones, shape [j, 4, 4]."""
-        found = np.empty_like(local)
-        with np.errstate(invalid="ignore", over="ignore"):  # what is not finite is refused with its place afterwards
+        transforms = np.empty_like(local)
+        with np.errstate(invalid="ignore", over="ignore"):  # pose_from_matrix refuses values that are not finite
             for joint in range(len(local)):
                 above = self.parent(joint)
-                found[joint] = local[joint] if above < 0 else found[above] @ local[joint]
-        return found
+                transforms[joint] = local[joint] if above < 0 else transforms[above] @ local[joint]
+        return transforms
 
     def local_rotations(self, joint: int, codes: Array) -> Array:
         """Rotations of a joint in its parent's axes, shape [n, 3, 3]."""
@@ -91,10 +91,10 @@ class BoundSkeleton:
 
 
 def bound_skeletons(stage: Usd.Stage) -> list[BoundSkeleton]:
-    """The skeletons of a stage, those that nothing is bound to as well.
+    """All skeletons of a stage, bound or not.
 
     Raises:
-        ShotError: One whose joints are no tree, or without a pose at rest.
+        ShotError: One whose joints are no tree, or without a rest pose.
     """
     from pxr import Usd, UsdSkel
 
@@ -125,7 +125,7 @@ def _bound(prim: Usd.Prim, query: UsdSkel.SkeletonQuery) -> BoundSkeleton:
         bind = query.GetJointWorldBindTransforms()
         if len(bind) != len(joints):
             raise ShotError(
-                "a skeleton without a pose at rest",
+                "a skeleton without a rest pose",
                 path=prim.GetPath(),
                 attribute="restTransforms",
                 found=f"{len(rest)} transforms for {len(joints)} joints",

@@ -1,4 +1,4 @@
-"""Targets: the frames whose motion matters, authored or chosen."""
+"""Targets: the frames whose errors are measured, authored or chosen."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def target_prims(reading: Reading) -> list[tuple[Any, str]]:
     found = []
     for prim in prims_of(reading.stage):
         if schemas.is_applied(prim, _SCHEMA):
-            with reading.going_on():
+            with reading.collecting_problems():
                 found.append((prim, _carrier(prim)))
     return found
 
@@ -70,11 +70,11 @@ def read_target(reading: Reading, prim: Usd.Prim, body: int, pose: Pose) -> Targ
     Raises:
         ShotError: Weights that are negative, not finite, or both zero; a transform that shears.
     """
-    own = pose_from_matrix(reading.world_matrix(prim), str(prim.GetPath()))
+    target_pose = pose_from_matrix(reading.world_matrix(prim), str(prim.GetPath()))
     weights = [_weight(reading, prim, name) for name in WEIGHTS]
     if weights == [0.0, 0.0] and not any(_varies(prim, name) for name in WEIGHTS):
         raise ShotError(
-            "a target without any weight",
+            "both weights of the target are zero",
             path=prim.GetPath(),
             attribute="calm:target:positionWeight",
             found="0, and calm:target:rotationWeight 0",
@@ -84,8 +84,8 @@ def read_target(reading: Reading, prim: Usd.Prim, body: int, pose: Pose) -> Targ
         path=str(prim.GetPath()),
         body=body,
         frame=Frame(
-            reading.units.length(pose.to_local(own.position[None])[0]),
-            quaternion_from_rotation(pose.rotation.T @ own.rotation),
+            reading.units.length(pose.to_local(target_pose.position[None])[0]),
+            quaternion_from_rotation(pose.rotation.T @ target_pose.rotation),
         ),
         position_weight=weights[0],
         rotation_weight=weights[1],
@@ -100,15 +100,15 @@ def outermost_target(body: Body, index: int, joints: tuple[Joint, ...]) -> Targe
         index: Its index.
         joints: The joints of the character.
     """
-    own = [j for j in joints if index in (j.body0, j.body1)]
-    anchors = [j.frame1.position if j.body1 == index else j.frame0.position for j in own]
-    anchor = np.mean(anchors, axis=0) if anchors else np.zeros(3)
+    attached = [j for j in joints if index in (j.body0, j.body1)]
+    origins = [j.frame1.position if j.body1 == index else j.frame0.position for j in attached]
+    center = np.mean(origins, axis=0) if origins else np.zeros(3)
     points = [s.points for s in body.surfaces if s.visible] or [s.points for s in body.surfaces]
     if body.tets is not None:
         points.append(body.tets.points)
     if points:
         cloud = np.concatenate(points)
-        position = cloud[int(np.argmax(np.linalg.norm(cloud - anchor, axis=1)))]
+        position = cloud[int(np.argmax(np.linalg.norm(cloud - center, axis=1)))]
     else:
         position = np.zeros(3) if body.mass is None else body.mass.center
     return Target(body.path, index, Frame(np.array(position), _UPRIGHT.copy()))

@@ -1,5 +1,4 @@
-"""Properties of other types than their schemas say, and transforms that cannot be evaluated: found before anything is
-read, so that readers need not ask."""
+"""Checks before reading: types of authored properties, and orders of transform operations. Readers rely on them."""
 
 from __future__ import annotations
 
@@ -19,15 +18,15 @@ _RESET, _INVERSE = "!resetXformStack!", "!invert!"
 
 
 def wrong_types(stage: Usd.Stage) -> Iterator[ShotError]:
-    """Authored properties of schemas that are read, and whose type is another than the schema's.
+    """Authored properties whose type differs from that of their schema.
 
-    USD takes such opinions without a word, and gives values of whatever type was authored. Names of ours, and of
-    masses and drives, count also where their schema is not applied.
+    USD accepts such opinions silently and returns values of the authored type. Attributes of Calmotion, masses and
+    drives are checked even where their schema is not applied.
     """
     from pxr import Sdf, Usd
 
     known = _known()
-    # also classes and what nothing defines: a material is bound wherever it is
+    # also classes and undefined prims: materials may be bound there
     for prim in stage.Traverse(Usd.TraverseInstanceProxies(Usd.PrimIsActive)):
         definition = prim.GetPrimDefinition()
         for prop in prim.GetAuthoredProperties():
@@ -39,7 +38,7 @@ def wrong_types(stage: Usd.Stage) -> Iterator[ShotError]:
                 found = str(spec.typeName) if isinstance(spec, Sdf.AttributeSpec) else "rel"
                 if found != wanted and not _alike(found, wanted):
                     yield ShotError(
-                        "is authored with another type than its schema says",
+                        "is authored with a type that differs from its schema",
                         path=prim.GetPath(),
                         attribute=name,
                         found=f"{found or 'no type'} in {spec.layer.identifier}",
@@ -49,7 +48,7 @@ def wrong_types(stage: Usd.Stage) -> Iterator[ShotError]:
 
 
 def broken_transforms(stage: Usd.Stage) -> Iterator[ShotError]:
-    """Prims whose order of transform operations names what is none."""
+    """Prims whose xformOpOrder names an operation that does not exist or has a wrong type."""
     from pxr import Tf, UsdGeom
 
     for prim in prims_of(stage):

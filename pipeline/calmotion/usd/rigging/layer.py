@@ -1,4 +1,4 @@
-"""The layer that makes a robot of a skeleton: bodies, joints, motors and targets, authored with UsdPhysics."""
+"""The robot of a skeleton: bodies, joints, motors and targets, authored with UsdPhysics."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from calmotion.usd.writing.root import relative_asset
 if TYPE_CHECKING:
     from pxr import Usd, UsdPhysics
 
-_STILL = 1e-6  # of a matrix, over its size: a root that moves less stands
+_STILL = 1e-6  # a root whose matrix changes by less, relative to its size, does not move
 _SERVO = 0.1  # radius of gyration of a servo, over the size of the link that it turns
 
 
@@ -52,7 +52,7 @@ class RobotLayer:
         from pxr import Sdf, Usd
 
         self.layer = Sdf.Layer.CreateAnonymous(".usda")
-        # what is authored is known to be where it will be: over the shot
+        # author in a stage of its own; the layer is later put over the shot
         self._stage = Usd.Stage.CreateInMemory()
         self._stage.GetRootLayer().TransferContent(self.layer)
         self._units, self._skeleton, self._codes, self._links = units_of(stage), skeleton, codes, links
@@ -83,7 +83,7 @@ class RobotLayer:
 
         Args:
             servo_share: Mass of a servo between two hinges, over that of the link that they turn.
-            flexible: Names of the links that bend.
+            flexible: Names of the flexible links.
             targets: The links whose tips are targets.
         """
         from pxr import UsdGeom
@@ -92,7 +92,7 @@ class RobotLayer:
             self._stage.OverridePrim(path)
         robot = UsdGeom.Xform.Define(self._stage, self.robot)
         robot.SetResetXformStack(True)
-        # the skin is what renders; the parts are for who asks for them
+        # only the skin is rendered; the bodies have the purpose guide
         robot.CreatePurposeAttr(UsdGeom.Tokens.guide)
         UsdGeom.Scope.Define(self._stage, f"{self.robot}/joints")
         self._author_material()
@@ -103,7 +103,7 @@ class RobotLayer:
             load = known.mass if known is not None else lightest
             self._author_link(k, known or self._servo(k, servo_share * load), link.name in flexible)
             if link.parent < 0:
-                self._hold(k)
+                self._attach_root(k)
             else:
                 self._hinge(k, servo_share * load)
         for k in targets:
@@ -133,7 +133,7 @@ class RobotLayer:
         return surface_moments(self._poses[k].to_local(piece[0]), piece[1]).mass_properties(density)
 
     def _servo(self, k: int, mass: float) -> MassProperties:
-        """A servo as heavy as asked for, about where it turns."""
+        """Mass properties of a servo at its joint."""
         near = [self._links[k], *(link for link in self._links if link.parent == k)]
         size = max((float(np.max(np.ptp(link.piece[0], axis=0))) for link in near if link.piece), default=1.0)
         return MassProperties(mass, np.zeros(3), mass * (_SERVO * size) ** 2 * np.eye(3))
@@ -190,8 +190,8 @@ class RobotLayer:
         size = max(1.0, float(np.max(np.abs(first))))
         return any(np.max(np.abs(world[joint] - first)) > _STILL * size for world in self._worlds)
 
-    def _hold(self, k: int) -> None:
-        """Hold a root in the world, or let the animation carry it."""
+    def _attach_root(self, k: int) -> None:
+        """Fix a root to the world, or animate its transform."""
         from pxr import UsdGeom, UsdPhysics
 
         if not self._moves(k):
@@ -259,7 +259,7 @@ class RobotLayer:
         self.targets.append(path)
 
     def finish(self, provenance: Provenance, output: str) -> None:
-        """Take what was authored into the layer, and put the shot beneath it."""
+        """Move the authored robot into the layer, and sublayer the shot."""
         self.layer.TransferContent(self._stage.GetRootLayer())
         author_stage_metadata(self.layer, provenance)
         author_origin(self.layer, RIG, provenance)

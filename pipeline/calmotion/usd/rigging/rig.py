@@ -1,4 +1,4 @@
-"""The rigger's table of contents: a file with a skinned character becomes a layer that makes a robot of it."""
+"""Rigging: a file with a skinned character becomes a layer with a robot."""
 
 from __future__ import annotations
 
@@ -33,10 +33,10 @@ class RigOptions:
     """How a robot is made.
 
     Attributes:
-        material: Name of the material of its links, one of `rig.materials.MATERIALS`.
-        angle_tolerance: What the hinges of a joint may leave of its rotation [rad].
+        material: Name of the material of its links, one of `calmotion.rigging.materials.MATERIALS`.
+        angle_tolerance: Largest residual angle between a joint and its hinges [rad].
         servo_share: Mass of a servo between two hinges, over that of the link that they turn.
-        flexible: Names of the links that bend, `all`, or empty.
+        flexible: Names of the flexible links, `all`, or empty.
     """
 
     material: str = "nylon"
@@ -144,7 +144,7 @@ def _links(stage: Usd.Stage, skeleton: BoundSkeleton, codes: Array, tolerance: f
             "the skin encloses no volume, so its bodies have no mass",
             path=skin.meshes[0],
             attribute="points",
-            remedy="Bind a mesh with an inside to the skeleton",
+            remedy="Bind a closed mesh to the skeleton",
         )
     return links
 
@@ -154,5 +154,5 @@ def _validate(temporary: str, motors: int) -> None:
     character, _, _ = read_shot(temporary)
     if len(character.motors) != motors:
         raise ShotError(
-            "what was written has lost motors", path=os.path.basename(temporary), found=len(character.motors)
+            "motors are missing from the written layer", path=os.path.basename(temporary), found=len(character.motors)
         )

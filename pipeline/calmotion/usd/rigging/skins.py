@@ -78,7 +78,7 @@ def _skinned(skeleton: BoundSkeleton, target: UsdSkel.SkinningQuery, code: float
             "the mesh is bound to a skeleton, but cannot be skinned",
             path=prim.GetPath(),
             attribute="primvars:skel:jointIndices",
-            remedy="Author as many joint indices and weights as its points need, of joints that there are",
+            remedy="Author joint indices and weights for each point, with joints that exist",
         )
     width = target.GetNumInfluencesPerComponent()
     order = target.GetJointOrder()

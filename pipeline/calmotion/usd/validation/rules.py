@@ -1,4 +1,4 @@
-"""Our rules: functions from a stage to findings."""
+"""Calmotion's rules: functions from a stage to findings."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ _NAMESPACE = "calm:"
 _FREE_NAMES = ("calm:interface:",)  # relationships of subsets, which need no schema
 
 
-def unreadable(stage: Usd.Stage) -> Iterator[Finding]:
-    """What the reader refuses, what it reads otherwise than it is animated, and motors animated beyond their limits."""
+def reading_findings(stage: Usd.Stage) -> Iterator[Finding]:
+    """Errors and warnings of the reader, and motors that are animated beyond their limits."""
     try:
         read = read_stage(stage)
     except ShotError as error:
         yield from (finding_of(one, ERROR, READABLE) for one in each(error))
         return
-    yield from (finding_of(one, WARNING, READABLE) for one in read.reading.doubts)
+    yield from (finding_of(one, WARNING, READABLE) for one in read.reading.warnings)
     yield from _beyond_limits(read)
 
 
@@ -48,12 +48,12 @@ def _beyond_limits(read: StageReading) -> Iterator[Finding]:
             if beyond and abs(value - limit) > 1e-6:
                 yield Finding(
                     WARNING, LIMITS, motor.path, motor.attribute, "the animation goes beyond the limit of the joint",
-                    f"{value / unit:.6g}, limit {limit / unit:.6g}", "Animate within the limit, or correct it",
+                    f"{value / unit:.6g}, limit {limit / unit:.6g}", "Animate within the limit, or correct the limit",
                 )  # fmt: skip
 
 
-def unknown_names(stage: Usd.Stage) -> Iterator[Finding]:
-    """Attributes in our namespace that no schema of ours has, or whose schema is not applied: nothing reads them."""
+def unknown_attributes(stage: Usd.Stage) -> Iterator[Finding]:
+    """Attributes in the namespace calm: that no schema has, or whose schema is not applied; they are not read."""
     owners = _owners()
     for prim in prims_of(stage):
         for prop in prim.GetAuthoredProperties():
@@ -63,7 +63,7 @@ def unknown_names(stage: Usd.Stage) -> Iterator[Finding]:
             place = str(prim.GetPath())
             if name not in owners:
                 near = difflib.get_close_matches(name, owners, 1, 0.6)
-                remedy = f"Did you mean {near[0]}?" if near else f"The names are {', '.join(sorted(owners))}"
+                remedy = f"The nearest name is {near[0]}" if near else f"The names are {', '.join(sorted(owners))}"
                 yield Finding(WARNING, SCHEMAS, place, name, "no schema of Calmotion has this attribute", "", remedy)
             elif not schemas.is_applied(prim, owners[name]):
                 yield Finding(
@@ -83,8 +83,8 @@ def _owners() -> dict[str, str]:
     return found
 
 
-def misplaced(stage: Usd.Stage) -> Iterator[Finding]:
-    """Schemas of ours on prims that they say nothing about; USD does not enforce that."""
+def wrong_prims(stage: Usd.Stage) -> Iterator[Finding]:
+    """Calmotion's schemas on prims of the wrong kind, which USD does not check."""
     from pxr import UsdGeom, UsdPhysics, UsdShade
 
     fits = {
@@ -98,14 +98,17 @@ def misplaced(stage: Usd.Stage) -> Iterator[Finding]:
             if schemas.is_applied(prim, schema) and not allowed(prim):
                 yield Finding(
                     WARNING, PLACES, str(prim.GetPath()), "apiSchemas", f"{schema} belongs on {what}",
-                    str(prim.GetTypeName()) or "a prim without a type", "Move it there, or remove it",
+                    str(prim.GetTypeName()) or "a prim without a type", "Move the schema there, or remove it",
                 )  # fmt: skip
 
 
 Rule: TypeAlias = "Callable[[Usd.Stage], Iterable[Finding]]"
 
 RULES: dict[str, tuple[Rule, str]] = {
-    READABLE: (unreadable, "The shot can be processed, its motors can do what is animated, within their limits."),
-    SCHEMAS: (unknown_names, "Every attribute in the namespace calm: is one that is read."),
-    PLACES: (misplaced, "Schemas of Calmotion are on prims that they are about."),
+    READABLE: (
+        reading_findings,
+        "The shot can be processed, and its motors can follow the animation within their limits.",
+    ),
+    SCHEMAS: (unknown_attributes, "Every attribute in the namespace calm: is one that is read."),
+    PLACES: (wrong_prims, "Calmotion's schemas are applied to prims of the right kind."),
 }

@@ -1,4 +1,4 @@
-"""Running our rules and USD's validators over a shot."""
+"""Validation of a shot by Calmotion's rules and USD's validators."""
 
 from __future__ import annotations
 
@@ -23,11 +23,11 @@ def validate_shot(path: str) -> Findings:
         path: File of the shot.
 
     Returns:
-        Findings of our rules and of every validator that this USD has, errors first, else by place.
+        Findings of Calmotion's rules and of every validator of the installed USD, errors first, else by place.
     """
     try:
         stage = stages.open_stage(path)
-        stages.refuse_own_layer(stage, path)
+        stages.refuse_result_layer(stage, path)
     except ShotError as error:
         return Findings(tuple(finding_of(one, ERROR, READABLE) for one in each(error)))
     muted = stages.earlier_layers(stage)
@@ -37,12 +37,12 @@ def validate_shot(path: str) -> Findings:
         found = []
         for name, (rule, _) in RULES.items():
             found += _checked(name, stage, rule)
-        found += _checked("usdValidation", stage, _of_usd)
+        found += _checked("usdValidation", stage, _usd_findings)
     return Findings(tuple(sorted(dict.fromkeys(found), key=lambda f: (f.level != ERROR, f.path, f.attribute))))
 
 
 def _checked(name: str, stage: Usd.Stage, rule: Rule) -> list[Finding]:
-    """What a rule finds; that USD cannot evaluate the shot is a finding, too."""
+    """The findings of a rule; an error of USD itself counts as a finding."""
     try:
         with stages.refused_by_usd(stage):
             return list(rule(stage))
@@ -50,8 +50,8 @@ def _checked(name: str, stage: Usd.Stage, rule: Rule) -> list[Finding]:
         return [finding_of(error, ERROR, name)]
 
 
-def _of_usd(stage: Usd.Stage) -> list[Finding]:
-    """What USD's own validators find."""
+def _usd_findings(stage: Usd.Stage) -> list[Finding]:
+    """The findings of USD's own validators."""
     from pxr import UsdValidation
 
     registry = UsdValidation.ValidationRegistry()
@@ -82,7 +82,7 @@ def _place(error: UsdValidation.ValidationError, stage: Usd.Stage) -> tuple[str,
 
 
 def register_validators() -> None:
-    """Register our rules in USD's validation framework, as stage validators; calling it again does nothing."""
+    """Register Calmotion's rules in USD's validation framework, as stage validators; calling it again does nothing."""
     from pxr import UsdValidation
 
     registry = UsdValidation.ValidationRegistry()

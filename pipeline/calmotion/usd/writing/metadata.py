@@ -1,4 +1,4 @@
-"""What a layer says about itself: stage metadata, and where it came from in `customLayerData["calmotion"]`."""
+"""Metadata of a layer: that of the stage, and the origin in `customLayerData["calmotion"]`."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ Entries = dict[str, Any]  # values that USD stores in layer metadata
 
 
 def author_stage_metadata(layer: Sdf.Layer, provenance: Provenance) -> None:
-    """The shot's units, axes, rates, range and default prim: a sublayer's are not taken over by what sublayers it."""
+    """The shot's units, axes, rates, range and default prim: a layer does not inherit them from its sublayers."""
     root = layer.pseudoRoot
     root.SetInfo("metersPerUnit", provenance.meters_per_unit)
     root.SetInfo("kilogramsPerUnit", provenance.kilograms_per_unit)
@@ -44,8 +44,8 @@ def author_origin(
     entry: Entries = {
         "version": __version__,
         "role": role,
-        "inputs": gf.to_strings(item.path for item in provenance.layers),
-        "sha256": gf.to_strings(item.sha256 for item in provenance.layers),
+        "inputs": gf.to_strings(source.path for source in provenance.layers),
+        "sha256": gf.to_strings(source.sha256 for source in provenance.layers),
     }
     if settings:
         entry["settings"] = settings
@@ -58,20 +58,20 @@ def settings_of(
     character: Character, result: Result, bake: str, samples_per_second: float | None, splines: bool = False
 ) -> Entries:
     """The settings that a result was computed and written with, as plain values that USD stores."""
-    asked = character.retarget
+    retarget = character.retarget
     found: Entries = {
         "step_s": float(result.step_s),
         "pre_roll_s": float(result.pre_roll_s),
-        "reference": asked.reference,
-        "endpoints": asked.endpoints,
-        "cyclic": asked.cyclic,
+        "reference": retarget.reference,
+        "endpoints": retarget.endpoints,
+        "cyclic": retarget.cyclic,
         "bake": bake,
         "splines": splines,
     }
     for name, value in (
-        ("tolerance_m", asked.tolerance),
-        ("knot_spacing_s", asked.knot_spacing),
-        ("smoothness", asked.smoothness),
+        ("tolerance_m", retarget.tolerance),
+        ("knot_spacing_s", retarget.knot_spacing),
+        ("smoothness", retarget.smoothness),
         ("samples_per_second", samples_per_second),
     ):
         if value is not None:
@@ -85,7 +85,7 @@ def errors_of(character: Character, result: Result) -> Entries:
     for name, simulation in (("before", result.before), ("after", result.after)):
         if simulation is None:
             continue
-        shown = _of_the_shot(simulation)
+        shown = _after_pre_roll(simulation)
         for quantity, unit, values in (
             ("error", "m", simulation.position_errors[shown]),
             ("rotation_error", "rad", simulation.rotation_errors[shown]),
@@ -98,6 +98,6 @@ def errors_of(character: Character, result: Result) -> Entries:
     return found
 
 
-def _of_the_shot(simulation: Simulation) -> BoolArray:
-    """The steps that count: not those of the pre-roll."""
+def _after_pre_roll(simulation: Simulation) -> BoolArray:
+    """Which steps follow the pre-roll, shape [T]."""
     return simulation.motion.times >= -1e-9

@@ -1,4 +1,4 @@
-"""The writer's table of contents: a Result becomes a layer and a root layer."""
+"""Writing a Result: a layer with the curves, and a root layer."""
 
 from __future__ import annotations
 
@@ -103,11 +103,11 @@ def refuse_inputs(provenance: Provenance, output: str) -> None:
     """Refuse an output that would overwrite a layer of the shot, with itself or with its root layer.
 
     Raises:
-        ShotError: It would, or it is not named like a layer.
+        ShotError: The output is an input, or has no extension of a USD layer.
     """
     folder = os.path.dirname(os.path.realpath(provenance.shot))
-    inputs = [os.path.join(folder, item.path) for item in provenance.layers]
-    inputs += [os.path.join(folder, item) for item in provenance.earlier_layers]
+    inputs = [os.path.join(folder, layer.path) for layer in provenance.layers]
+    inputs += [os.path.join(folder, layer) for layer in provenance.earlier_layers]
     for name in (output, root_path(output)):
         refuse_input_as_output(name, inputs)
 
@@ -115,14 +115,14 @@ def refuse_inputs(provenance: Provenance, output: str) -> None:
 def _curves_to_write(character: Character, result: Result, provenance: Provenance) -> tuple[MotorCurve, ...]:
     """The curves that changed, all of them where curves of an earlier result would show through; never those of motors
     that are geared to others, which follow by themselves."""
-    every = keeps_earlier_curves(provenance)
-    own = (curve for curve in result.curves if character.motors[curve.motor].follows is None)
-    return tuple(curve for curve in own if curve.changed or every)
+    write_all = keeps_earlier_curves(provenance)
+    independent = (curve for curve in result.curves if character.motors[curve.motor].follows is None)
+    return tuple(curve for curve in independent if curve.changed or write_all)
 
 
 @dataclass(frozen=True, eq=False)
 class _Shot:
-    """The shot that a result is written over: its stage, layers of ours muted, and what was read from it."""
+    """The shot that a result is written over: its stage, with earlier results muted, and what was read from it."""
 
     stage: Any
     character: Character
@@ -191,7 +191,7 @@ def _bake(layer: Sdf.Layer, shot: _Shot, result: Result, options: WriteOptions) 
     posed = next((motor for motor in shot.character.motors if motor.source == "bodies"), None)
     if posed is not None and options.bake == "simulated" and not simulated_only:
         raise ShotError(
-            "this motor's curve is the motion of its bodies, which the predicted motion would take the place of",
+            "this motor is animated by its bodies, whose transforms the predicted motion would replace",
             path=posed.path,
             attribute=posed.attribute,
             found="--bake=simulated",
@@ -214,11 +214,15 @@ def _validate(temporary: str, written: dict[str, int], knots: dict[str, int]) ->
 
     layer = Sdf.Layer.OpenAsAnonymous(temporary)
     if not stages.role_of(layer):
-        raise ShotError("what was written does not say where it came from", path=temporary, attribute="customLayerData")
+        raise ShotError(
+            "the written layer lacks its origin (customLayerData.calmotion)",
+            path=temporary,
+            attribute="customLayerData",
+        )
     for path, count in written.items():
         found = layer.GetNumTimeSamplesForPath(Sdf.Path(path))
         if found != count:
-            raise ShotError("what was written has lost samples", path=path, found=f"{found} of {count}")
+            raise ShotError("samples are missing from the written layer", path=path, found=f"{found} of {count}")
     for path, count in knots.items():
         spec = layer.GetAttributeAtPath(Sdf.Path(path))
         found = len(spec.GetSpline().GetKnots()) if spec and spec.HasSpline() else 0

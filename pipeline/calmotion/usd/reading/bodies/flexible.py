@@ -1,4 +1,4 @@
-"""Which bodies bend, and how they are to be meshed and reduced."""
+"""Flexible bodies: which they are, and how to mesh and reduce them."""
 
 from __future__ import annotations
 

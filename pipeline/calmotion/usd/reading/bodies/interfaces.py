@@ -48,7 +48,7 @@ def interfaces_of(
         if not subset or subset.GetFamilyNameAttr().Get() != FAMILY:
             continue
         joint = _joint_of(prim, joints)
-        earlier = next((item.path for item in found if item.joint == joint), None)
+        earlier = next((surface.path for surface in found if surface.joint == joint), None)
         if earlier is not None:
             raise ShotError(
                 f"the joint {joint} has an interface on this body already",
@@ -92,7 +92,7 @@ def _triangles(prim: Usd.Prim, subset: UsdGeom.Subset, geometry: Usd.Prim, time:
             "this interface is empty",
             path=prim.GetPath(),
             attribute="indices",
-            remedy="List the faces that the joint holds, or remove the subset",
+            remedy="List the faces that are attached to the joint, or remove the subset",
         )
     if kind == "Mesh" and element == "face":
         counts = gf.indices(geometry.GetAttribute("faceVertexCounts").Get(time))

@@ -46,7 +46,7 @@ def mass_of(reading: Reading, prim: Usd.Prim, pose: Pose, shapes: list[Shape]) -
     mass = _authored(prim, "physics:mass", "mass", zero_means_unauthored=False)
     center, tensor = _center(prim), _inertia(prim)
     if tensor is not None:
-        _note_impossible(reading, prim, tensor)
+        _note_impossible_inertia(reading, prim, tensor)
     if mass is not None and center is not None and tensor is not None:
         return MassProperties(units.mass(mass), units.length(pose.scale * center), units.inertia(tensor))
     solid = _from_geometry(reading, prim, shapes, body_mass=None if mass is None else units.mass(mass))
@@ -88,10 +88,10 @@ def _center(prim: Usd.Prim) -> Array | None:
     value = attribute.Get() if attribute and attribute.HasAuthoredValue() else None
     if value is None:
         return None
-    found = gf.vector(value)
-    if np.all(np.isneginf(found)):
+    center = gf.vector(value)
+    if np.all(np.isneginf(center)):
         return None
-    if not np.all(np.isfinite(found)):
+    if not np.all(np.isfinite(center)):
         raise ShotError(
             "the centre of mass is not finite",
             path=prim.GetPath(),
@@ -99,7 +99,7 @@ def _center(prim: Usd.Prim) -> Array | None:
             found=value,
             remedy="Correct it, or remove the attribute so that it follows from the geometry",
         )
-    return found
+    return center
 
 
 def _inertia(prim: Usd.Prim) -> Array | None:
@@ -136,12 +136,12 @@ def _inertia(prim: Usd.Prim) -> Array | None:
     return rotation @ np.diag(diagonal) @ rotation.T
 
 
-def _note_impossible(reading: Reading, prim: Usd.Prim, tensor: Array) -> None:
+def _note_impossible_inertia(reading: Reading, prim: Usd.Prim, tensor: Array) -> None:
     a, b, c = np.sort(np.linalg.eigvalsh(tensor))
     if c > (a + b) * (1.0 + 1e-3):
         reading.note(
-            f"{prim.GetPath()}: no real body has this physics:diagonalInertia (its largest value exceeds the sum of "
-            "the other two); it is used as it is"
+            f"{prim.GetPath()}: physics:diagonalInertia is physically impossible (its largest value exceeds the sum "
+            "of the other two); it is used as authored"
         )
 
 
@@ -154,10 +154,10 @@ def _from_geometry(
     density = _authored(prim, "physics:density", "density")
     parts: list[MassProperties] = []
     for shape in solids:
-        own = shape.prim != prim  # a body may itself be its only geometry
-        part_density = _authored(shape.prim, "physics:density", "density") if own else None
+        separate = shape.prim != prim  # a body may itself be its only geometry
+        part_density = _authored(shape.prim, "physics:density", "density") if separate else None
         part_density = part_density or density or _material_density(shape.prim)
-        part_mass = _authored(shape.prim, "physics:mass", "mass") if own else None
+        part_mass = _authored(shape.prim, "physics:mass", "mass") if separate else None
         si = None if part_density is None else reading.units.density(part_density)
         if si is None and (colliders or body_mass is not None or part_mass is not None):
             si = _DEFAULT_DENSITY

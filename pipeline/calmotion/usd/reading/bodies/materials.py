@@ -26,7 +26,7 @@ def elastic_material(reading: Reading, body_prim: Usd.Prim) -> ElasticMaterial:
     """The material bound for physics to a body, else to geometry below it.
 
     Raises:
-        ShotError: There is none, or a value of it that no elastic solid has.
+        ShotError: No elastic material is bound, or one of its values is out of range.
     """
     from pxr import UsdShade
 

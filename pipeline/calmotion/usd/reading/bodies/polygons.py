@@ -1,4 +1,4 @@
-"""Polygons cut into triangles: fans where a polygon is convex, ears where it is not."""
+"""Triangulation of polygons: fans for convex polygons, ear clipping for others."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ _TURN = 1e-6  # sine of the angle by which a corner may turn back in a polygon t
 
 
 def triangulate(points: Array, counts: IntArray, corners: IntArray, keep: BoolArray) -> IntArray:
-    """Triangles of polygons, turned as the polygons are.
+    """Triangles of polygons, with the orientation of the polygons.
 
-    A fan of a polygon with a dent folds over itself; its volume is right, but its surface runs through the air.
+    Convex polygons are cut into fans; polygons with a reflex corner by ear clipping, since a fan would overlap itself.
 
     Args:
         points: Shape [n, 3].
@@ -30,14 +30,16 @@ def triangulate(points: Array, counts: IntArray, corners: IntArray, keep: BoolAr
     base = first[fans]
     triangles = np.stack([corners[base], corners[base + step + 1], corners[base + step + 2]], axis=1).astype(np.int32)
     begin = np.cumsum(cut) - cut
-    for polygon in _dented(points, counts, corners, first, cut > 1):
+    for polygon in _with_reflex_corner(points, counts, corners, first, cut > 1):
         ring = corners[first[polygon] : first[polygon] + counts[polygon]]
         triangles[begin[polygon] : begin[polygon] + cut[polygon]] = _ears(points[ring], ring)
     return triangles
 
 
-def _dented(points: Array, counts: IntArray, corners: IntArray, first: IntArray, wanted: BoolArray) -> IntArray:
-    """Polygons of more than three corners with one that turns back."""
+def _with_reflex_corner(
+    points: Array, counts: IntArray, corners: IntArray, first: IntArray, wanted: BoolArray
+) -> IntArray:
+    """Polygons of more than three corners with a reflex corner."""
     polygon = np.repeat(np.arange(len(counts)), counts)
     place = np.arange(len(corners)) - first[polygon]
     following = first[polygon] + (place + 1) % counts[polygon]
@@ -64,7 +66,9 @@ def _ears(x: Array, ring: IntArray) -> IntArray:
     left = list(range(len(p)))
     ears: list[list[int]] = []
     while len(left) > 3:
-        k = next((k for k in range(len(left)) if _is_ear(p, left, k)), 0)  # 0: it crosses itself, and nothing is right
+        k = next(
+            (k for k in range(len(left)) if _is_ear(p, left, k)), 0
+        )  # 0: the polygon crosses itself and has no valid triangulation
         ears.append([left[k - 1], left[k], left[(k + 1) % len(left)]])
         del left[k]
     ears.append(left)

@@ -54,7 +54,7 @@ def shapes_of(reading: Reading, body_prim: Usd.Prim, pose: Pose) -> list[Shape]:
     purposes = _shown_purposes(body_prim)
     for prim in prims_below(body_prim, _is_elsewhere):
         if prim.GetTypeName() == "PointInstancer":
-            _pass_over(reading, prim, body_prim)
+            _refuse_or_note_instances(reading, prim, body_prim)
         kind = str(prim.GetTypeName())
         if kind == "Mesh":
             points, triangles = mesh_geometry(prim, reading.start)
@@ -127,8 +127,8 @@ def _is_elsewhere(prim: Usd.Prim) -> bool:
     return is_rigid_body(prim) or prim.GetParent().GetTypeName() == "PointInstancer"
 
 
-def _pass_over(reading: Reading, prim: Usd.Prim, body_prim: Usd.Prim) -> None:
-    """Point instances are not read: refused where a body is to be meshed, a note where they are only looks."""
+def _refuse_or_note_instances(reading: Reading, prim: Usd.Prim, body_prim: Usd.Prim) -> None:
+    """Point instances are not read: a ShotError for a flexible body, a note for a rigid one."""
     flexible = is_applied(body_prim, "CalmFlexibleBodyAPI")
     if flexible and body_prim.GetAttribute("calm:flexible:enabled").Get() is not False:
         raise ShotError(
@@ -137,7 +137,7 @@ def _pass_over(reading: Reading, prim: Usd.Prim, body_prim: Usd.Prim) -> None:
             found="PointInstancer",
             remedy="Make them Mesh prims or instanceable references, or move them out of the body",
         )
-    reading.note(f"{prim.GetPath()}: point instances are not read; the body is treated without them")
+    reading.note(f"{prim.GetPath()}: point instances are not read; the body is used without them")
 
 
 def to_body(reading: Reading, prim: Usd.Prim, pose: Pose) -> tuple[Array, Array]:
@@ -155,14 +155,16 @@ def finite_points(prim: Usd.Prim, time: float) -> Array:
     """
     points = gf.points(prim.GetAttribute("points").Get(time))
     if not np.all(np.isfinite(points)):
-        raise ShotError("its points are not finite", path=prim.GetPath(), attribute="points", remedy="Correct them")
+        raise ShotError(
+            "its points are not finite", path=prim.GetPath(), attribute="points", remedy="Correct the points"
+        )
     return points
 
 
 def _check_indices(prim: Usd.Prim, name: str, found: IntArray, count: int) -> None:
     if len(found) and (int(found.min()) < 0 or int(found.max()) >= count):
         raise ShotError(
-            f"refers to points that do not exist (it has {count})",
+            f"refers to points that do not exist (the prim has {count})",
             path=prim.GetPath(),
             attribute=name,
             found=int(found.min()) if found.min() < 0 else int(found.max()),
@@ -177,7 +179,7 @@ def mesh_geometry(prim: Usd.Prim, time: float) -> tuple[Array, IntArray]:
     corners = gf.indices(prim.GetAttribute("faceVertexIndices").Get(time))
     if int(counts.min(initial=0)) < 0 or int(counts.sum()) != len(corners):
         raise ShotError(
-            "the faces use another number of corners than there are",
+            "faceVertexCounts do not sum to the number of faceVertexIndices",
             path=prim.GetPath(),
             attribute="faceVertexCounts",
             found=f"{int(counts.sum())} and {len(corners)}",

@@ -17,7 +17,7 @@ from calmotion.usd.reading.context import Reading, prims_of
 from calmotion.usd.reading.joints import JointPrim, refuse_unsupported
 from calmotion.usd.reading.motors.free_ranges import may_change
 from calmotion.usd.reading.motors.gearing import Gear, read_gear, resolve
-from calmotion.usd.reading.motors.motor_limits import effort_limit, own_limit, velocity_limit
+from calmotion.usd.reading.motors.motor_limits import calmotion_limit, effort_limit, velocity_limit
 from calmotion.usd.reading.motors.tracks import sample_codes
 from calmotion.usd.units import StageUnits
 
@@ -116,7 +116,7 @@ def read_drives(
     kinds = {joint.path: joint.kind for joint in joints}
     actuated, drives, gears = actuated_joints(reading.stage), {}, {}
     for joint in joints:
-        with reading.going_on():
+        with reading.collecting_problems():
             if joint.prim is None or joint.kind not in _DRIVES:
                 _refuse_wrong_motor(joint)
                 continue
@@ -126,8 +126,8 @@ def read_drives(
             drive = _drive(joint, actuated, reading, posed, given, still or gear is not None)
             if drive is not None:
                 drives[joint.path] = drive
-    with reading.going_on():
-        _engage(drives, resolve(gears), {joint.path: joint for joint in joints}, reading)
+    with reading.collecting_problems():
+        _add_geared_motors(drives, resolve(gears), {joint.path: joint for joint in joints}, reading)
     found = [drives[joint.path] for joint in joints if joint.path in drives]
     if reading.problems:
         return found
@@ -142,12 +142,12 @@ def read_drives(
         )
     if not still and all(drive.source in (HELD, GEARED) for drive in found):
         raise ShotError(
-            "a motor without animation, and no other motor is animated either",
+            "a motor without animation, and no other motor is animated",
             path=found[0].joint.path,
             attribute=target_attribute(found[0].joint.kind),
             remedy=_remedy(found[0].joint.kind),
         )
-    _refuse_rivals(found, reading)
+    _refuse_duplicate_motors(found, reading)
     for drive in found:
         if drive.joint.prim.IsInstanceProxy():
             reading.problems.append(
@@ -161,8 +161,8 @@ def read_drives(
     return found
 
 
-def _refuse_rivals(drives: Sequence[Drive], reading: Reading) -> None:
-    """Two motors between the same bodies cannot both have their way."""
+def _refuse_duplicate_motors(drives: Sequence[Drive], reading: Reading) -> None:
+    """Refuse two motors between the same two bodies: they would prescribe one angle twice."""
     first: dict[frozenset[str], Drive] = {}
     for drive in drives:
         pair = frozenset((drive.joint.body0, drive.joint.body1))
@@ -170,7 +170,7 @@ def _refuse_rivals(drives: Sequence[Drive], reading: Reading) -> None:
         if rival is not drive:
             reading.problems.append(
                 ShotError(
-                    "two motors are between the same two bodies, and cannot both have their way",
+                    "two motors drive the same pair of bodies",
                     path=drive.joint.path,
                     attribute=target_attribute(drive.joint.kind),
                     found=rival.joint.path,
@@ -179,15 +179,17 @@ def _refuse_rivals(drives: Sequence[Drive], reading: Reading) -> None:
             )
 
 
-def _engage(drives: dict[str, Drive], gears: dict[str, Gear], joints: dict[str, JointPrim], reading: Reading) -> None:
-    """Make motors of the joints that are geared to motors."""
+def _add_geared_motors(
+    drives: dict[str, Drive], gears: dict[str, Gear], joints: dict[str, JointPrim], reading: Reading
+) -> None:
+    """Add a motor for each joint that is geared to a motor."""
     for path, gear in gears.items():
         if gear.leader not in drives:
             raise ShotError(
                 "the joint is geared to one that no motor drives",
                 path=path,
                 found=gear.leader,
-                remedy="Make that one a motor, or remove the gear and close a loop of bodies and joints instead",
+                remedy="Drive the leading joint with a motor, or model the gear as a closed chain of bodies and joints",
             )
         if path in drives and drives[path].source not in (HELD, GEARED):
             reading.note(f"{path}: it is geared to {gear.leader}, so its own animation is not used")
@@ -215,7 +217,7 @@ def read_motor(drive: Drive, index: int, motors: dict[str, int], reading: Readin
         source=drive.source if drive.source in _WRITTEN_AS else DRIVE,
         optimize=may_change(prim),
         max_velocity=velocity_limit(drive.joint, kind, reading.units, reading.notes),
-        max_acceleration=float(from_stage(own_limit(prim, "calm:motor:maxAcceleration"))),
+        max_acceleration=float(from_stage(calmotion_limit(prim, "calm:motor:maxAcceleration"))),
         max_torque=effort_limit(drive.joint, kind, reading.units, reading.notes),
         linear=linear,
         follows=None if gear is None else Follows(motors[gear.leader], gear.ratio, gear.offset),

@@ -66,8 +66,8 @@ def read_gear(joint: JointPrim, kinds: dict[str, str], units: StageUnits) -> Gea
 def _gear(joint: JointPrim, spelling: GearSpelling, leader: str, leader_kind: str, units: StageUnits) -> Gear:
     ratio = _number(joint.prim, spelling.ratio, spelling.default_ratio)
     offset = _number(joint.prim, spelling.offset, 0.0)
-    own, its = (_to_si(kind, spelling, units) for kind in (joint.kind, leader_kind))
-    return Gear(leader, spelling.sign * ratio * own / its, spelling.sign * offset * own)
+    follower_unit, leader_unit = (_to_si(kind, spelling, units) for kind in (joint.kind, leader_kind))
+    return Gear(leader, spelling.sign * ratio * follower_unit / leader_unit, spelling.sign * offset * follower_unit)
 
 
 def _to_si(kind: str, spelling: GearSpelling, units: StageUnits) -> float:
@@ -85,7 +85,7 @@ def _number(prim: Usd.Prim, name: str, fallback: float) -> float:
 
 
 def resolve(gears: dict[str, Gear]) -> dict[str, Gear]:
-    """Gears whose leaders follow nobody: chains multiplied out.
+    """Gears with chains resolved, so that no leader is geared itself.
 
     Raises:
         ShotError: Joints that are geared to each other in a circle.
@@ -99,7 +99,7 @@ def resolve(gears: dict[str, Gear]) -> dict[str, Gear]:
                     "joints are geared to each other in a circle",
                     path=path,
                     found=" -> ".join([*seen, gear.leader]),
-                    remedy="Let one of them lead",
+                    remedy="Remove one of the gears, so that one joint leads",
                 )
             seen.append(gear.leader)
             above = gears[gear.leader]

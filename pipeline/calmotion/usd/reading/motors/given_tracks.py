@@ -1,4 +1,4 @@
-"""Motors' tracks that are given beside the shot, by the names or paths of joints."""
+"""Tracks that are given in addition to the shot, by the names or paths of joints."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Limits of a motor, in whichever dialect they are authored."""
+"""Limits of a motor in any supported dialect."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 
 from calmotion.errors import ShotError
 from calmotion.usd import schemas
-from calmotion.usd.dialects import EFFORT_LIMIT, VELOCITY_LIMIT, Spelling, authored, elsewhere
+from calmotion.usd.dialects import EFFORT_LIMIT, VELOCITY_LIMIT, Spelling, authored, first_finite
 from calmotion.usd.reading.joints import JointPrim
 from calmotion.usd.units import StageUnits
 
@@ -21,56 +21,56 @@ _SCHEMA = "CalmMotorAPI"
 
 
 def effort_limit(joint: JointPrim, drive: str, units: StageUnits, notes: list[str]) -> float:
-    """Largest torque [N m] or force [N]; the lower of ours and that of UsdPhysics, else what another dialect says.
+    """Largest torque [N m] or force [N]; the lower of Calmotion's and UsdPhysics' limit, else that of another dialect.
 
     Raises:
         ShotError: A limit that is not positive.
     """
     to_si = units.force if joint.kind == "prismatic" else units.torque
-    limit = to_si(own_limit(joint.prim, "calm:motor:maxTorque"))
+    limit = to_si(calmotion_limit(joint.prim, "calm:motor:maxTorque"))
     force = authored(joint.prim, EFFORT_LIMIT[1], drive)
     if force is not None:
         limit = min(limit, to_si(positive(joint.prim, *force)))
-    return float(limit if math.isfinite(limit) else _of_others(joint, EFFORT_LIMIT[2:], drive, to_si, notes))
+    return float(limit if math.isfinite(limit) else _dialect_limit(joint, EFFORT_LIMIT[2:], drive, to_si, notes))
 
 
 def velocity_limit(joint: JointPrim, drive: str, units: StageUnits, notes: list[str]) -> float:
-    """Largest speed [rad/s or m/s]; ours, else what another dialect says.
+    """Largest speed [rad/s or m/s]; Calmotion's limit, else that of another dialect.
 
     Raises:
         ShotError: A limit that is not positive.
     """
     to_si = units.length if joint.kind == "prismatic" else np.deg2rad
-    limit = to_si(own_limit(joint.prim, "calm:motor:maxVelocity"))
-    return float(limit if math.isfinite(limit) else _of_others(joint, VELOCITY_LIMIT[1:], drive, to_si, notes))
+    limit = to_si(calmotion_limit(joint.prim, "calm:motor:maxVelocity"))
+    return float(limit if math.isfinite(limit) else _dialect_limit(joint, VELOCITY_LIMIT[1:], drive, to_si, notes))
 
 
-def _of_others(
+def _dialect_limit(
     joint: JointPrim, spellings: tuple[Spelling, ...], drive: str, to_si: Callable[[float], float], notes: list[str]
 ) -> float:
-    found = elsewhere(joint.prim, spellings, drive)
+    found = first_finite(joint.prim, spellings, drive)
     if found is None:
         return math.inf
     name, value, spelling = found
     if not value > 0.0:
-        return math.inf  # 0 is how these dialects say that there is no limit
+        return math.inf  # in these dialects 0 means no limit
     notes.append(f"{joint.path}: its limit is taken from {name} ({spelling.dialect})")
     return float(to_si(value))
 
 
-def own_limit(prim: Usd.Prim, name: str) -> float:
-    """A limit of ours in stage units; infinite where there is none."""
+def calmotion_limit(prim: Usd.Prim, name: str) -> float:
+    """A limit of CalmMotorAPI in stage units; infinite where there is none."""
     return positive(prim, name, schemas.value(prim, _SCHEMA, name))
 
 
 def positive(prim: Usd.Prim, name: str, value: float | None) -> float:
-    """A limit as it was found, which must be positive."""
+    """The value of a limit; raises a ShotError unless it is positive."""
     if value is None or not value > 0.0:
         raise ShotError(
             "a limit must be positive",
             path=prim.GetPath(),
             attribute=name,
             found=value,
-            remedy="Correct the limit, or remove the attribute (then there is none)",
+            remedy="Correct the limit, or remove the attribute (the motor then has no limit)",
         )
     return float(value)

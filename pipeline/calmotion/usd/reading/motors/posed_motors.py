@@ -1,4 +1,4 @@
-"""Motors' tracks out of the transforms of the bodies that they join."""
+"""Tracks of motors from the animated transforms of their bodies."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from calmotion.shot import Track
 from calmotion.shot.character import Array, Frame
 from calmotion.usd import gf
 from calmotion.usd.clock import Clock
+from calmotion.usd.reading.animated_transforms import carriers, codes_of, moves
 from calmotion.usd.reading.context import Reading
 from calmotion.usd.reading.joints import JointPrim
 from calmotion.usd.reading.roots import world_frame, world_side_prim
-from calmotion.usd.reading.stillness import carriers, codes_of, moves
 from calmotion.usd.transforms import pose_from_matrix, rotation_from_quaternion
 from calmotion.usd.units import StageUnits
 
@@ -24,8 +24,8 @@ if TYPE_CHECKING:
     from pxr import Usd
 
 MOVED = 1e-6  # a relative pose that changes by more is animated [rad or m]
-OFF_AXIS = 1e-3  # a pose farther off the joint's axis than this is reported [rad]
-OFF_ANCHOR = 1e-4  # the same of its anchor [m]
+TILT_TOLERANCE = 1e-3  # a pose farther off the joint's axis than this is reported [rad]
+GAP_TOLERANCE = 1e-4  # joint frames farther apart than this are reported [m]
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,7 +35,7 @@ class JointMotion:
     Attributes:
         values: Angle [rad], unwrapped, or length [m], shape [n].
         tilt: How far the pose is off the joint's axis [rad], shape [n].
-        gap: How far the anchors are apart, but for a sliding joint's length [m], shape [n].
+        gap: Distance between the two joint frames, the length of a prismatic joint excluded [m], shape [n].
     """
 
     values: Array
@@ -63,7 +63,7 @@ def joint_motions(reading: Reading, joints: Sequence[JointPrim], codes: Array) -
 
     Args:
         reading: The stage; its first frame is where the joints were read.
-        joints: Those that are wanted.
+        joints: Joints to evaluate.
         codes: Time codes, ascending, shape [n].
     """
     bodies = {end for joint in joints for end in (joint.body0, joint.body1) if end}
@@ -129,7 +129,7 @@ def posed_joints(reading: Reading, joints: Sequence[JointPrim], clock: Clock) ->
     codes = pose_codes(reading.stage, able, clock)
     if len(codes) == 0:
         return []
-    driven = _driven_by_hand(reading, able, codes)
+    driven = _animated_bodies(reading, able, codes)
     motions = joint_motions(reading, able, codes)
     return [
         joint.path
@@ -138,8 +138,8 @@ def posed_joints(reading: Reading, joints: Sequence[JointPrim], clock: Clock) ->
     ]
 
 
-def _driven_by_hand(reading: Reading, joints: Sequence[JointPrim], codes: Array) -> set[str]:
-    """Bodies that the shot moves in the world, but for roots: what only a root turns away from is not animated."""
+def _animated_bodies(reading: Reading, joints: Sequence[JointPrim], codes: Array) -> set[str]:
+    """Bodies that the shot moves in the world, without kinematic roots, whose motion animates no joint."""
     bodies = sorted({end for joint in joints for end in (joint.body0, joint.body1) if end})
     poses = _poses(reading.stage, bodies, codes, reading.units)
     return {
@@ -151,20 +151,20 @@ def _driven_by_hand(reading: Reading, joints: Sequence[JointPrim], codes: Array)
 
 
 def posed_track(motion: JointMotion, joint: JointPrim, codes: Array, clock: Clock, reading: Reading) -> Track:
-    """The track of a motor; a doubt where the bodies do not move as the joint lets them."""
+    """The track of a motor; a warning where the bodies do not move as the joint allows."""
     for values, limit, what, unit, factor in (
-        (motion.tilt, OFF_AXIS, "off its axis", "degrees", float(np.degrees(1.0))),
-        (motion.gap, OFF_ANCHOR, "away from its anchor", "mm", 1e3),
+        (motion.tilt, TILT_TOLERANCE, "off its axis", "degrees", float(np.degrees(1.0))),
+        (motion.gap, GAP_TOLERANCE, "away from its joint frame", "mm", 1e3),
     ):
         worst = int(np.argmax(values))
         if values[worst] > limit:
-            reading.doubt(
+            reading.warn(
                 ShotError(
-                    f"its bodies are animated {what}, which the robot will not do",
+                    f"its bodies are animated {what}, which the joint does not allow",
                     path=joint.path,
                     attribute="xformOpOrder",
                     found=f"{factor * values[worst]:.3g} {unit} at time code {codes[worst]:g}",
-                    remedy="Animate the bodies as the joint lets them move",
+                    remedy="Animate the bodies only as the joint allows",
                 )
             )
     return Track(clock.seconds(codes), motion.values)

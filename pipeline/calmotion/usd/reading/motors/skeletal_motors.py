@@ -1,10 +1,10 @@
-"""Motors' tracks out of a UsdSkel animation.
+"""Tracks of motors from a UsdSkel animation.
 
 A motor names a joint of a skeleton. The bodies as authored stand where the skeleton is at rest, or as at the first
 frame (`calm:motor:skelPose`), and turn with it: with L(t) the joint's rotation in its parent's axes, the product
 D = L(t) L(there)^T turns the robot's body about axes fixed in the body before it. One motor takes the part of D about
 its axis; two or three that name the same joint, one carrying the next, take a product of rotations about theirs
-(`rig.hinge_rows`).
+(`calmotion.rigging.hinge_rows`).
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from calmotion.usd import schemas
 from calmotion.usd.clock import Clock
 from calmotion.usd.reading.context import Reading
 from calmotion.usd.reading.motors.driven_motors import SKEL_JOINT, SKELETON, Drive
-from calmotion.usd.reading.motors.posed_motors import OFF_ANCHOR, OFF_AXIS, joint_motions
+from calmotion.usd.reading.motors.posed_motors import GAP_TOLERANCE, TILT_TOLERANCE, joint_motions
 from calmotion.usd.reading.skeletons import BoundSkeleton, bound_skeletons, skeleton_with
 from calmotion.usd.transforms import pose_from_matrix, rotation_from_quaternion
 
@@ -82,7 +82,7 @@ def hinge_stacks(reading: Reading, drives: Sequence[Drive]) -> list[HingeStack]:
         return []
     skeletons, found = bound_skeletons(reading.stage), []
     for token, stack in wanted.items():
-        with reading.going_on():
+        with reading.collecting_problems():
             first = stack[0].joint
             skeleton, joint = skeleton_with(skeletons, token, first.path, SKEL_JOINT)
             if len(stack) > MOST or any(drive.joint.kind != "revolute" for drive in stack):
@@ -91,15 +91,15 @@ def hinge_stacks(reading: Reading, drives: Sequence[Drive]) -> list[HingeStack]:
                     path=first.path,
                     attribute=SKEL_JOINT,
                     found=f"{token} on {', '.join(drive.joint.path for drive in stack)}",
-                    remedy="Name another joint of the skeleton, or remove the attribute from what is too many",
+                    remedy="Name another joint of the skeleton, or remove the attribute from the surplus motors",
                 )
             found.append(_stack(reading, skeleton, joint, _outwards(stack)))
     return found
 
 
 def performed_on(stacks: Sequence[HingeStack], stage: Usd.Stage) -> list[HingeStack]:
-    """The same motors on the skeletons of another stage, a result of ours: where the bodies stand, and so the pose
-    that angles count from, is that of the stage without our layers."""
+    """The same motors on the skeletons of another stage, which carries results. The pose that angles count from
+    remains that of the stage without results."""
     skeletons = {skeleton.prim.GetPath(): skeleton for skeleton in bound_skeletons(stage)} if stacks else {}
     return [replace(stack, skeleton=skeletons[stack.skeleton.prim.GetPath()]) for stack in stacks]
 
@@ -154,22 +154,22 @@ def _axis(reading: Reading, drive: Drive) -> Array:
 
 
 def skeletal_tracks(stack: HingeStack, clock: Clock, reading: Reading) -> dict[str, Track]:
-    """Tracks of the motors of a stack, by the path of their joint; a doubt where they cannot follow the skeleton."""
+    """Tracks of the motors of a stack, by the path of their joint; a warning where they cannot follow the skeleton."""
     codes = clock.merged(stack.skeleton.codes())
     D = stack.skeleton.local_rotations(stack.joint, codes) @ stack.reference.T
     angles, off = follow(stack.axes, D)
-    _doubt_stretch(stack, codes, reading)
+    _warn_of_translation(stack, codes, reading)
     worst = int(np.argmax(off))
-    if off[worst] > OFF_AXIS:
+    if off[worst] > TILT_TOLERANCE:
         names = ", ".join(drive.joint.path for drive in stack.drives)
-        reading.doubt(
+        reading.warn(
             ShotError(
                 f"{stack.skeleton.joints[stack.joint]} of {stack.skeleton.prim.GetPath()} is animated off the axes of "
-                "its motors, which the robot will not do",
+                "its motors, which the motors do not allow",
                 path=names,
                 attribute=SKEL_JOINT,
                 found=f"{np.degrees(off[worst]):.3g} degrees at time code {codes[worst]:g}",
-                remedy="Animate the skeleton as the hinges let it move, or add a motor",
+                remedy="Animate the skeleton only about the axes of its motors, or add a motor",
             )
         )
     return {
@@ -178,17 +178,17 @@ def skeletal_tracks(stack: HingeStack, clock: Clock, reading: Reading) -> dict[s
     }
 
 
-def _doubt_stretch(stack: HingeStack, codes: Array, reading: Reading) -> None:
-    """A doubt where the animation moves a joint of the skeleton away from the one above it."""
+def _warn_of_translation(stack: HingeStack, codes: Array, reading: Reading) -> None:
+    """Warn where the animation moves a joint of the skeleton away from the one above it."""
     places = np.array([stack.skeleton.locals_at(float(code))[stack.joint, :3, 3] for code in codes])
     scale = np.linalg.det(stack.skeleton.placement(reading.start)[:3, :3]) ** (1.0 / 3.0)
     moved = reading.units.length(scale * np.linalg.norm(places - places[0], axis=1))
     worst = int(np.argmax(moved))
-    if moved[worst] > OFF_ANCHOR:
-        reading.doubt(
+    if moved[worst] > GAP_TOLERANCE:
+        reading.warn(
             ShotError(
                 f"{stack.skeleton.joints[stack.joint]} of {stack.skeleton.prim.GetPath()} is moved away from the joint "
-                "above it, which the robot will not do",
+                "above it, which the motors do not allow",
                 path=stack.drives[0].joint.path,
                 attribute=SKEL_JOINT,
                 found=f"{1e3 * moved[worst]:.3g} mm at time code {codes[worst]:g}",

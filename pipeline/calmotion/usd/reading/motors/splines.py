@@ -1,4 +1,4 @@
-"""Splines of drives as tracks: as authored, corners and steps included."""
+"""Splines of drives as tracks, with their corners and steps."""
 
 from __future__ import annotations
 
@@ -15,24 +15,24 @@ from calmotion.usd.reading.context import Reading
 if TYPE_CHECKING:
     from pxr import Gf, Ts, Usd
 
-STEP = 0.01  # a step is played within so much time, since no motor jumps [s]
-_JUMP = 1e-6  # of a value, over the range of the spline, from which it is a step
-_CORNER = 1e-3  # of a slope, over the steepest, from which it is a corner
-_EXACT = 2e-8  # by how much the track may differ from the spline between samples [rad or m]
-_ROUNDS = 8  # of halving
+STEP = 0.01  # duration over which a step is played, since no motor can jump [s]
+_JUMP = 1e-6  # smallest step, relative to the range of the spline
+_CORNER = 1e-3  # smallest change of slope at a corner, relative to the steepest slope
+_EXACT = 2e-8  # largest difference between track and spline between samples [rad or m]
+_ROUNDS = 8  # largest number of refinements
 
 
 def read_spline(attribute: Usd.Attribute, clock: Clock, reading: Reading, to_si: float) -> Track:
     """A spline as a track that differs from it by less than a millionth of a radian or metre.
 
     It is sampled at its knots and at the frames, where a smooth one is read back exactly, and more densely where its
-    tangents need it. At corners the track has corners; a step is a steep line. Both are told, since nothing excites a
-    structure more.
+    tangents need it. Corners stay corners; a step becomes a steep line. Both raise a warning, since they excite the
+    structure.
 
     Args:
         attribute: The drive's target position, degrees or stage length.
         clock: The clock of the shot.
-        reading: Notes and doubts for the user are kept in it.
+        reading: Receives notes and warnings for the user.
         to_si: Radians, or metres, in its unit.
 
     Raises:
@@ -43,16 +43,16 @@ def read_spline(attribute: Usd.Attribute, clock: Clock, reading: Reading, to_si:
     knots = np.array(list(spline.GetKnotsWithLoopsBaked(_interval(frames)).keys()), dtype=np.float64)
     inner = knots[(knots > frames[0]) & (knots < frames[-1])]
     codes = clock.merged(inner)
-    values = np.array([value_at(attribute, code) for code in codes])  # refuses what is no number
+    values = np.array([value_at(attribute, code) for code in codes])  # raises a ShotError if a value is not a number
     steps, corners = _breaks(spline, inner, float(np.ptp(values)))
     ramp = STEP * clock.time_codes_per_second
     starts = np.array([max(code - ramp, 0.5 * (code + codes[codes < code].max())) for code in steps])
     breaks = np.unique(np.concatenate([steps, starts, corners]))
     lines = list(zip(starts, steps, strict=True))
-    codes = _exact(spline, np.unique(np.concatenate([codes, starts])), breaks, lines, clock, to_si)
+    codes = _refined_codes(spline, np.unique(np.concatenate([codes, starts])), breaks, lines, clock, to_si)
     track = _track(spline, codes, breaks, clock, to_si)
     reading.note(f"{path}: the spline is read at its knots and at the frames of the shot")
-    _tell(spline, attribute, steps, corners, reading)
+    _warn_of_breaks(spline, attribute, steps, corners, reading)
     return track
 
 
@@ -77,17 +77,17 @@ def _track(spline: Ts.Spline, codes: Array, breaks: Array, clock: Clock, to_si: 
     return Track(clock.seconds(codes), to_si * values, clock.seconds(breaks))
 
 
-def _exact(
+def _refined_codes(
     spline: Ts.Spline, codes: Array, breaks: Array, lines: list[tuple[float, float]], clock: Clock, to_si: float
 ) -> Array:
-    """Time codes with more of them where the track would differ from the spline, but for the lines of steps."""
+    """Time codes, refined where the track would differ from the spline by more than the tolerance, except in steps."""
     from calmotion.shot.curves import held_curve
 
     end = float(clock.seconds(codes[-1]))
     for _ in range(_ROUNDS):
         middles = 0.5 * (codes[:-1] + codes[1:])
-        found = held_curve(_track(spline, codes, breaks, clock, to_si), end)(clock.seconds(middles), 0)
-        far = np.abs(found - to_si * np.array([spline.Eval(code) for code in middles])) > _EXACT
+        sampled = held_curve(_track(spline, codes, breaks, clock, to_si), end)(clock.seconds(middles), 0)
+        far = np.abs(sampled - to_si * np.array([spline.Eval(code) for code in middles])) > _EXACT
         for start, step in lines:
             far &= ~((middles > start) & (middles < step))
         if not far.any():
@@ -96,30 +96,32 @@ def _exact(
     return codes
 
 
-def _tell(spline: Ts.Spline, attribute: Usd.Attribute, steps: Array, corners: Array, reading: Reading) -> None:
-    """Doubts about what excites the structure."""
+def _warn_of_breaks(
+    spline: Ts.Spline, attribute: Usd.Attribute, steps: Array, corners: Array, reading: Reading
+) -> None:
+    """Warn of steps and corners, which excite the structure."""
     if len(steps):
         jump = max(steps, key=lambda code: abs(spline.Eval(code) - spline.EvalPreValue(code)))
-        reading.doubt(
+        reading.warn(
             ShotError(
                 f"the spline jumps, which is played within {1e3 * STEP:g} ms and excites the structure",
                 path=attribute.GetPrimPath(),
                 attribute=attribute.GetName(),
                 found=f"{len(steps)} times, most at time code {jump:g}: from {spline.EvalPreValue(jump):.6g} to "
                 f"{spline.Eval(jump):.6g}",
-                remedy="Ease into it, if no jump is meant",
+                remedy="Replace the step by a smooth transition, unless it is intended",
             )
         )
     if len(corners):
         sharpest = max(corners, key=lambda code: abs(spline.EvalDerivative(code) - spline.EvalPreDerivative(code)))
-        reading.doubt(
+        reading.warn(
             ShotError(
                 "the spline has corners, which excite the structure",
                 path=attribute.GetPrimPath(),
                 attribute=attribute.GetName(),
                 found=f"{len(corners)}, the sharpest at time code {sharpest:g}: from "
                 f"{spline.EvalPreDerivative(sharpest):.6g} to {spline.EvalDerivative(sharpest):.6g} a time code",
-                remedy="Smooth the tangents, if no corner is meant",
+                remedy="Smooth the tangents, unless the corners are intended",
             )
         )
 

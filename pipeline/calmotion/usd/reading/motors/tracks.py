@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from pxr import Sdf, Usd
 
 MOST = 1_000_000  # samples of one motor
-_CLOSE = 1e-4  # samples closer than this share of a frame are at one time
+_CLOSE = 1e-4  # samples closer than this share of a frame count as simultaneous
 
 
 def sample_codes(attribute: Usd.Attribute) -> Array:
@@ -38,7 +38,7 @@ def read_track(attribute: Usd.Attribute, clock: Clock, reading: Reading, to_si: 
     Args:
         attribute: The drive's target position, degrees or stage length.
         clock: The clock of the shot.
-        reading: Notes and doubts for the user are kept in it.
+        reading: Receives notes and warnings for the user.
         to_si: Radians, or metres, in its unit.
 
     Raises:
@@ -52,7 +52,7 @@ def read_track(attribute: Usd.Attribute, clock: Clock, reading: Reading, to_si: 
         return read_spline(attribute, clock, reading, to_si)
     if len(codes) == 0:
         codes = frames[[0, -1]]
-    codes = _apart(codes, clock, path, notes)
+    codes = _without_near_duplicates(codes, clock, path, notes)
     values = np.array([value_at(attribute, code) for code in codes])
     held = (frames < codes[0] - 1e-9, frames > codes[-1] + 1e-9)
     if len(attribute.GetTimeSamples()) > 0 and (held[0].any() or held[1].any()):
@@ -66,7 +66,7 @@ def _refuse_too_many(attribute: Usd.Attribute) -> None:
     count = attribute.GetNumTimeSamples()
     if count > MOST:
         raise ShotError(
-            f"has more samples than can be meant (at most {MOST})",
+            f"has too many samples (at most {MOST} are supported)",
             path=attribute.GetPrimPath(),
             attribute=attribute.GetName(),
             found=count,
@@ -74,14 +74,14 @@ def _refuse_too_many(attribute: Usd.Attribute) -> None:
         )
 
 
-def _apart(codes: Array, clock: Clock, path: Sdf.Path, notes: list[str]) -> Array:
-    """Time codes without those that another follows at once: nothing smooth goes through two values there."""
+def _without_near_duplicates(codes: Array, clock: Clock, path: Sdf.Path, notes: list[str]) -> Array:
+    """Of time codes closer than `_CLOSE`, the last: no smooth curve passes through two values there."""
     least = _CLOSE * clock.time_codes_per_second / clock.frames_per_second
     follows = np.append(np.diff(codes) < least, False)
     if follows.any():
         notes.append(
-            f"{path}: of samples at nearly the same time the last counts ({int(follows.sum())} left out, the first at "
-            f"time code {codes[follows][0]:.9g})"
+            f"{path}: of samples at nearly the same time only the last is used ({int(follows.sum())} ignored, the "
+            f"first at time code {codes[follows][0]:.9g})"
         )
     kept: Array = codes[~follows]
     return kept

@@ -1,4 +1,4 @@
-"""Where the shot moves bodies by their transforms although a joint holds them in the world."""
+"""Animated transforms of bodies and of the prims above them."""
 
 from __future__ import annotations
 
@@ -13,24 +13,24 @@ from calmotion.usd.reading.context import Reading
 if TYPE_CHECKING:
     from pxr import Usd
 
-_TOLERANCE = 1e-6  # relative to the size of the transform: what single precision leaves
+_TOLERANCE = 1e-6  # relative to the size of the transform: rounding errors of single precision
 
 
 def refuse_moving(reading: Reading, held: dict[Usd.Prim, str], others: list[Usd.Prim]) -> None:
-    """Refuse bodies that are held by the world and move in it; note where other transforms are animated.
+    """Refuse animated bodies that a joint fixes to the world; note where other transforms are animated.
 
     Args:
         reading: The stage.
-        held: Prims of the bodies with a joint to the world, and its path.
+        held: Prims of the bodies with a joint to the world, and the path of that joint.
         others: Prims of the other bodies.
 
     Raises:
-        ShotError: A body moves that a joint holds where it is.
+        ShotError: A body is animated although a joint fixes it to the world.
     """
     for prim, joint in held.items():
-        found = moves(reading, prim)
-        if found is not None:
-            mover, code = found
+        movement = moves(reading, prim)
+        if movement is not None:
+            mover, code = movement
             raise ShotError(
                 f"the transform that carries the character's root is animated, but {joint} holds it in the world",
                 path=mover.GetPath(),
@@ -48,13 +48,14 @@ def refuse_moving(reading: Reading, held: dict[Usd.Prim, str], others: list[Usd.
 
 
 def codes_of(prim: Usd.Prim) -> list[float]:
+    """Time codes at which the local transform of a prim has samples."""
     from pxr import UsdGeom
 
     return list(UsdGeom.Xformable(prim).GetTimeSamples()) if prim.IsA(UsdGeom.Xformable) else []
 
 
 def carriers(prim: Usd.Prim) -> list[Usd.Prim]:
-    """A prim and those above it that its place depends on."""
+    """A prim and the prims above it, up to one that resets the transform stack."""
     from pxr import UsdGeom
 
     chain, above = [], prim
@@ -67,7 +68,7 @@ def carriers(prim: Usd.Prim) -> list[Usd.Prim]:
 
 
 def moves(reading: Reading, prim: Usd.Prim) -> tuple[Usd.Prim, float] | None:
-    """The first prim, from a body upwards, that really moves it, with the time code; None where it stays."""
+    """The first prim, from a body upwards, that moves the body, with the time code; None if there is none."""
     from pxr import UsdGeom
 
     start = reading.world_matrix(prim)
