@@ -62,7 +62,7 @@ def test_sparse_samples_follow_what_usd_composes_at_the_frames(tmp_path):
     # between samples USD blends matrices, whose translation leaves the anchors; the turn is what a motor can do
     _, turned = worst_gap(path, character, animation)
     assert turned < 1e-6
-    assert any("anchor" in note for note in character.notes)
+    assert any("away from its joint frame" in note for note in character.notes)
 
 
 def test_nested_bodies_are_read_as_they_are_composed(tmp_path):
@@ -108,7 +108,9 @@ def test_what_a_motor_cannot_do_is_reported_with_its_size(tmp_path):
             op.Set(tilt * pose(frame, 1.0)[1] * away, frame)
 
     _, character, _ = read(tmp_path, edit)
-    tilted, gap = (next(n for n in character.notes if word in n) for word in ("off its axis", "anchor"))
+    tilted, gap = (
+        next(n for n in character.notes if word in n) for word in ("off its axis", "away from its joint frame")
+    )
     assert ELBOW in tilted and "6 degrees" in tilted and "time code 24" in tilted
     assert ELBOW in gap and "2 mm" in gap
 
