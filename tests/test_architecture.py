@@ -34,6 +34,9 @@ FLOORS = (
 FLOOR = {room: floor for floor, rooms in enumerate(FLOORS) for room in rooms}
 MODULES_OF_A_FOLDER = 14
 LINES_OF_A_MODULE = 350
+LINES_OF_A_FUNCTION = 80
+PARAMETERS_OF_A_FUNCTION = 10
+SAMPLES = PACKAGE.parents[1] / "samples"
 
 
 def name_of(path: Path) -> str:
@@ -112,3 +115,61 @@ def test_folders_and_modules_stay_small():
     sources = [path for root in (PACKAGE, PLUGINS) for path in root.rglob("*.py")]
     long = {str(path): n for path in sources if (n := len(path.read_text().splitlines())) > LINES_OF_A_MODULE}
     assert not long
+
+
+def parameters_of(function: ast.FunctionDef | ast.AsyncFunctionDef) -> int:
+    """Number of parameters, without the instance or class of a method."""
+    given = function.args
+    names = [*given.posonlyargs, *given.args, *given.kwonlyargs]
+    own = bool(names) and names[0].arg in ("self", "cls")
+    return len(names) - own + (given.vararg is not None) + (given.kwarg is not None)
+
+
+def without_reason(source: str) -> list[str]:
+    """Functions over a limit without `# long: reason` or `# parameters: reason`, directly above or in the first lines.
+
+    The first lines are those up to the first statement after the docstring.
+    """
+    lines, found = source.splitlines(), []
+    for node in ast.walk(ast.parse(source)):
+        if not isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
+            continue
+        begin = min([node.lineno, *(decorator.lineno for decorator in node.decorator_list)])
+        documented = len(node.body) > 1 and ast.get_docstring(node, clean=False) is not None
+        first = node.body[documented].lineno
+        comments = [lines[row].strip() for row in range(begin - 1, first)]
+        above = begin - 2
+        while above >= 0 and lines[above].strip().startswith("#"):
+            comments.append(lines[above].strip())
+            above -= 1
+        assert node.end_lineno is not None
+        over = {
+            "# long: ": node.end_lineno - node.lineno + 1 > LINES_OF_A_FUNCTION,
+            "# parameters: ": parameters_of(node) > PARAMETERS_OF_A_FUNCTION,
+        }
+        if any(large and not any(mark in line for line in comments) for mark, large in over.items()):
+            found.append(node.name)
+    return found
+
+
+def test_functions_stay_small_or_give_a_reason():
+    root = PACKAGE.parents[1]
+    found = {
+        f"{path.relative_to(root).as_posix()}: {name}"
+        for folder in (PACKAGE, PLUGINS, SAMPLES)
+        for path in folder.rglob("*.py")
+        for name in without_reason(path.read_text())
+    }
+    assert not found, "split them, or give the reason: `# long: ...`, `# parameters: ...`"
+
+
+def test_a_reason_is_read_above_a_function_and_in_its_first_lines():
+    names = ", ".join(f"p{k}" for k in range(11))
+    body = '    """What it does."""\n' + "    x = 1\n" * 80
+    assert without_reason(f"def f({names}):\n    pass\n") == ["f"]
+    assert without_reason(f"# parameters: given by USD\n@d\ndef f({names}):\n    pass\n") == []
+    assert without_reason(f"# long: one table\ndef f({names}):\n    pass\n") == ["f"], "the reason of another limit"
+    assert without_reason(f"class A:\n    def f(self, {', '.join(names.split(', ')[1:])}):\n        pass\n") == []
+    assert without_reason(f"def f():\n{body}") == ["f"]
+    assert without_reason(body.join(["def f():\n", ""]).replace("    x", "    # long: one table\n    x", 1)) == []
+    assert without_reason(f"def f():\n{body}    # long: too late\n    x = 2\n") == ["f"]

@@ -41,7 +41,7 @@ def host_with(*folders: str | Path) -> Host:
     for folder in folders:
         plugin = host.add(Location(Path(folder).resolve(), "test"))
         host.load(plugin)
-        if plugin.state is PluginState.FAILED:
+        if _has_failed(plugin):
             raise PluginError(f"the plugin {plugin.id} failed: {plugin.error}") from plugin.error
     return host
 
@@ -100,7 +100,7 @@ def check_plugin(folder: str | Path) -> list[str]:
     names: list[list[str]] = []
     for attempt in ("", " when it is called a second time"):
         host.load(plugin)
-        if plugin.state is PluginState.FAILED:
+        if _has_failed(plugin):
             return [*problems, f"register fails{attempt}: {type(plugin.error).__name__}: {plugin.error}"]
         if not plugin.operators:
             problems.append(f"register adds no operator{attempt}")
@@ -108,13 +108,18 @@ def check_plugin(folder: str | Path) -> list[str]:
         if not attempt:
             problems += _undocumented(plugin)
         forgotten = host.unload(plugin)
-        if plugin.state is PluginState.FAILED:
+        if _has_failed(plugin):
             return [*problems, f"unregister fails{attempt}: {type(plugin.error).__name__}: {plugin.error}"]
         if forgotten:
             problems.append(f"unregister forgets{attempt}: {', '.join(cls.idname for cls in forgotten)}")
     if names[0] != names[-1]:
         problems.append("register adds other operators when it is called a second time")
     return problems
+
+
+def _has_failed(plugin: Plugin) -> bool:
+    """Whether it failed by now: its state changes as the host loads and unloads it."""
+    return plugin.state is PluginState.FAILED
 
 
 def _undocumented(plugin: Plugin) -> list[str]:

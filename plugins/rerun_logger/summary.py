@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from calmotion.host import OperatorResult
 from calmotion.shot import Character, Result, Simulation
+from calmotion.shot.character import Array
 from calmotion.shot.outputs import SystemModes
 from calmotion.support.naming import distinct_names
 
@@ -52,7 +53,7 @@ def errors_table(character: Character, result: Result) -> str:
     return "## Errors at the targets\n" + "\n".join([HEAD, *rows])
 
 
-def error_cell(simulation: Simulation | None, target: int, rotation: bool, measure) -> str:
+def error_cell(simulation: Simulation | None, target: int, rotation: bool, measure: Callable[[Array], float]) -> str:
     """Position error, and rotation error where it counts."""
     if simulation is None:
         return "-"

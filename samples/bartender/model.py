@@ -37,6 +37,7 @@ def cup() -> Shape:
     return lathe(outside + inside, sides=32)
 
 
+# long: one table of the figure's measures, body after body
 def bodies() -> tuple[BodySpec, ...]:
     """Every body, parents before children."""
     torso = skin(

@@ -80,7 +80,7 @@ class Checkpoint:
             values |= {f"limit {name}": y for name, y in limits.multipliers.items()}
         values["state"] = np.frombuffer(json.dumps(state).encode(), np.uint8)
         with contextlib.suppress(OSError), replaced(self.path) as temporary:
-            np.savez(temporary, **values)  # type: ignore[arg-type]
+            np.savez(temporary, **values)
 
     def load(self, limits: LimitTerms | None) -> tuple[Search, IntArray] | None:
         """The search that was kept and the frames that carry knots in it, its multipliers put into the limits; None

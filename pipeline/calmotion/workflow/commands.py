@@ -142,6 +142,7 @@ def verify(result: SimulationResult) -> Verification:
     return result.verify()
 
 
+# parameters: one for each option of the command, all but the shot by keyword
 def inspect(
     shot: Shot | Path,
     *,

@@ -19,8 +19,8 @@ def loops():
     return pair("loops", clevis_arm(2), "simulate", {"loops": ON}, 1, FAST)
 
 
-def test_a_redundant_joint_costs_time_and_changes_nothing(loops):
-    assert loops.error_m < 1e-9 and loops.ratio > 1.0  # two loops are a dense system of 18 unknowns a step
+def test_a_redundant_joint_changes_nothing(loops):
+    assert loops.error_m < 1e-9
     assert loops.all_with_s > loops.with_s and loops.all_without_s > loops.without_s
     assert loops.ratio == loops.with_s / loops.without_s
 

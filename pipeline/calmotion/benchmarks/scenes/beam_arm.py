@@ -43,6 +43,7 @@ def beam_mesh(length: float, thickness: float, cells: int, across: int = 2) -> t
     return points, oriented_tets(points, mesh.t.T)[0]
 
 
+# parameters: dimensions, material and discretisation in SI units; a benchmark names the few in which its arm differs
 def beam_arm(
     links: int = 1, length: float = 0.6, thickness: float = 0.02, youngs_modulus: float = 1.8e9,
     density: float = 1200.0, payload: float = 0.2, damping: float = 0.01, gravity: float = 9.81,
