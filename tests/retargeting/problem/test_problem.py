@@ -106,19 +106,20 @@ def test_model_is_the_merit_to_second_order(linearized):
     problem, x, gradient, _ = linearized
     if problem.limits is None:
         pytest.skip("there are no limits")
-    from calmotion.retargeting.solver.limited_step import ModelPoint
+    from calmotion.retargeting.solver.limited_step import LimitedModel, ModelPoint
 
     d = np.random.default_rng(3).normal(size=len(x))
     residuals, values = problem.jvp(d)
     way = ModelPoint(d, residuals, values)
-    start = ModelPoint(0.0 * d, problem.residuals, dict(problem.limited))
-    assert problem.model_value(start) == pytest.approx(problem.merit(), rel=1e-12)
-    assert problem.model_slope(start, way) == pytest.approx(gradient @ d, rel=1e-10)
+    model = LimitedModel(problem)
+    start = model.start
+    assert model.merit(start) == pytest.approx(problem.merit(), rel=1e-12)
+    assert model.slope(start, way) == pytest.approx(gradient @ d, rel=1e-10)
     there = start.moved(way, 1e-3)
     e = 1e-6
-    slope = (problem.model_value(there.moved(way, e)) - problem.model_value(there.moved(way, -e))) / (2 * e)
-    assert problem.model_slope(there, way) == pytest.approx(slope, rel=1e-5)
-    assert problem.model_gradient(there) @ d == pytest.approx(problem.model_slope(there, way), rel=1e-10)
+    slope = (model.merit(there.moved(way, e)) - model.merit(there.moved(way, -e))) / (2 * e)
+    assert model.slope(there, way) == pytest.approx(slope, rel=1e-5)
+    assert model.gradient(there) @ d == pytest.approx(model.slope(there, way), rel=1e-10)
 
 
 def test_static_start_follows_the_curves(arm, bodies, animation):

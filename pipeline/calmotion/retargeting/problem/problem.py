@@ -15,7 +15,7 @@ from calmotion.retargeting.problem.limits import LimitTerms
 from calmotion.retargeting.problem.offset_basis import OffsetBasis
 from calmotion.retargeting.problem.offset_space import OffsetSpace
 from calmotion.retargeting.problem.rigid_approximation import limit_metrics, rigid_gradient, rigid_response
-from calmotion.retargeting.solver.limited_step import LimitedStep, ModelPoint, limited_step
+from calmotion.retargeting.solver.limited_step import LimitedStep, limited_step
 from calmotion.retargeting.solver.preconditioner import RigidPreconditioner
 from calmotion.shot.character import Array, BoolArray, IntArray
 from calmotion.simulation.forward import ForwardRun, limited_values
@@ -51,7 +51,7 @@ class RetargetProblem:
         self._continuous = continuous
         self._residuals = self._inverse = self._jacobian = np.zeros(0)
         self._limited: dict[str, Array] | None = None
-        self._x = self._linearized_x = np.zeros(0)
+        self.x = self._linearized_x = np.zeros(0)  # points evaluated and linearised last
         self._preconditioner: RigidPreconditioner | None = None
         self._response: RigidResponse | None = None
         # objective of an error of one metre everywhere
@@ -65,7 +65,7 @@ class RetargetProblem:
         """
         other = copy(self)
         other.space, other._preconditioner = self.space.on_basis(basis), None
-        other._x = x
+        other.x = x
         other._linearized_x = np.zeros(0)
         return other
 
@@ -78,7 +78,7 @@ class RetargetProblem:
         other = copy(self)
         other.space = replace(self.space, motors=motors, coupling=coupling)
         other.limits, other._response, other._preconditioner = None, None, None
-        other._x = np.zeros(other.space.size)
+        other.x = np.zeros(other.space.size)
         return other
 
     @property
@@ -145,7 +145,7 @@ class RetargetProblem:
         self._residuals, self._inverse = self.objective.residuals(
             self._run.target_positions, self._run.target_rotations
         )
-        self._x = x.copy()
+        self.x = x.copy()
         self._limited = None
         return self.merit()
 
@@ -157,22 +157,22 @@ class RetargetProblem:
     @property
     def changed_curves(self) -> Curves:
         """The motors' curves at the point evaluated last."""
-        return self.space.changed(self.curves, self._x)
+        return self.space.changed(self.curves, self.x)
 
     def objective_value(self) -> float:
         """The objective at the point evaluated last, without what limits add to it."""
-        return 0.5 * float(np.sum(self._residuals**2)) + 0.5 * float(self._x @ self.penalty_gradient(self._x))
+        return 0.5 * float(np.sum(self._residuals**2)) + 0.5 * float(self.x @ self.penalty_gradient(self.x))
 
     def linearize(self) -> Array:
         """Linearise at the point evaluated last, and the gradient there."""
         self._simulator.linearize(self.run)
-        self._linearized_x = self._x
+        self._linearized_x = self.x
         self._differentiate()
         return self.gradient()
 
     def linearized_at(self, x: Array) -> bool:
         """Whether this is the point evaluated last, and linearised."""
-        return np.array_equal(x, self._x) and np.array_equal(x, self._linearized_x)
+        return np.array_equal(x, self.x) and np.array_equal(x, self._linearized_x)
 
     def _differentiate(self) -> None:
         states = self.run.trajectory.states
@@ -182,14 +182,14 @@ class RetargetProblem:
         """Gradient of the merit where it was linearised; the limits may have changed since."""
         if self._continuous:
             return self.continuous_gradient()
-        return self.vjp(self._residuals, self._limit_pulls()) + self.penalty_gradient(self._x)
+        return self.vjp(self._residuals, self._limit_pulls()) + self.penalty_gradient(self.x)
 
     def continuous_gradient(self) -> Array:
         """The same by the continuous adjoint, with a linearisation of its own; limits of effort are beyond it."""
         self._differentiate()
         density = self.objective.scatter(self._jacobian, self._residuals)
         pulls = self._simulator.continuous_adjoint(self.run, density)
-        return self._to_unknowns(*pulls, self._limit_pulls()) + self.penalty_gradient(self._x)
+        return self._to_unknowns(*pulls, self._limit_pulls()) + self.penalty_gradient(self.x)
 
     def _limit_pulls(self) -> dict[str, Array]:
         limits = self._acting
@@ -228,32 +228,6 @@ class RetargetProblem:
         if self.limits is not None:
             changes = {name: self.limits.curvature(name, self.limited[name]) * v for name, v in changes.items()}
         return self.vjp(residuals, changes) + self.penalty_gradient(direction)
-
-    def model_objective(self, point: ModelPoint) -> float:
-        """The objective in the model about the point that was linearised."""
-        x = self._x + point.step
-        return 0.5 * float(np.sum(point.residuals**2)) + 0.5 * float(x @ self.penalty_gradient(x))
-
-    def model_value(self, point: ModelPoint) -> float:
-        """The merit in that model."""
-        assert self.limits is not None
-        return self.model_objective(point) + self.limits.value(point.values)
-
-    def model_gradient(self, point: ModelPoint) -> Array:
-        """Its gradient."""
-        assert self.limits is not None
-        pulls = {name: self.limits.gradient(name, v) for name, v in point.values.items()}
-        return self.vjp(point.residuals, pulls) + self.penalty_gradient(self._x + point.step)
-
-    def model_slope(self, point: ModelPoint, way: ModelPoint) -> float:
-        """Its slope along a direction."""
-        assert self.limits is not None
-        slope = float(np.sum(point.residuals * way.residuals)) + float(
-            way.step @ self.penalty_gradient(self._x + point.step)
-        )
-        return slope + sum(
-            float(np.sum(self.limits.gradient(name, v) * way.values[name])) for name, v in point.values.items()
-        )
 
     def limited_step(self, fixed: BoolArray, share: float, enough: float, max_products: int) -> LimitedStep:
         """The step to the model's minimum where limits act."""

@@ -38,34 +38,51 @@ class ModelPoint:
 
 
 class Limits(Protocol):
-    """What the step needs of the limits of a problem."""
+    """Limits as terms of an augmented Lagrangian, evaluated at values of the limited quantities."""
 
-    def update(self, values: Values) -> bool:
-        """Update the multipliers after a minimum of the model; False where all limits are kept."""
+    def value(self, values: Values) -> float:
+        """The sum of the terms."""
+
+    def gradient(self, name: str, v: Array) -> Array:
+        """Derivative of the terms with respect to the values of one quantity, shape of v."""
 
     def curvature(self, name: str, v: Array) -> Array:
-        """Second derivative of the limits' cost by a limited quantity, of its shape."""
+        """Second derivative of the terms where they act, shape of v."""
+
+    def update(self, values: Values) -> bool:
+        """New multipliers after a minimum; False, and no new ones, where all limits are kept."""
 
 
 class LimitedProblem(Protocol):
-    """What the step needs of a problem that is linearised."""
+    """A least-squares problem with limits, linearised at the point x that was evaluated last; n unknowns."""
 
     @property
-    def size(self) -> int: ...
+    def x(self) -> Array:
+        """The point, shape [n]."""
+
     @property
-    def residuals(self) -> Array: ...
+    def residuals(self) -> Array:
+        """Weighted residuals there."""
+
     @property
-    def limited(self) -> Values: ...
+    def limited(self) -> Values:
+        """Values of the limited quantities there."""
+
     @property
-    def limits(self) -> Limits | None: ...
-    def jvp(self, direction: Array) -> tuple[Array, Values]: ...
-    def vjp(self, residuals: Array, limited: Values) -> Array: ...
-    def penalty_gradient(self, x: Array) -> Array: ...
-    def precondition(self, fixed: BoolArray, values: Values) -> Callable[[Array], Array]: ...
-    def model_value(self, point: ModelPoint) -> float: ...
-    def model_objective(self, point: ModelPoint) -> float: ...
-    def model_gradient(self, point: ModelPoint) -> Array: ...
-    def model_slope(self, point: ModelPoint, way: ModelPoint) -> float: ...
+    def limits(self) -> Limits | None:
+        """The limits; None where there are none."""
+
+    def jvp(self, direction: Array) -> tuple[Array, Values]:
+        """Change of the residuals and of the limited quantities along a direction of shape [n]."""
+
+    def vjp(self, residuals: Array, limited: Values) -> Array:
+        """The transpose of `jvp`, shape [n]."""
+
+    def penalty_gradient(self, x: Array) -> Array:
+        """Matrix of the regulariser times x, shape [n]."""
+
+    def precondition(self, fixed: BoolArray, values: Values | None = None) -> Callable[[Array], Array]:
+        """An approximate inverse of the Gauss-Newton matrix; values of the limited quantities say which limits act."""
 
 
 @dataclass(eq=False)
@@ -85,6 +102,42 @@ class LimitedStep:
     eased: float
 
 
+class LimitedModel:
+    """Residuals and limited quantities linear in the step, squared and penalised: a convex, piecewise quadratic merit.
+
+    Args:
+        problem: Linearised at the point evaluated last.
+    """
+
+    def __init__(self, problem: LimitedProblem):
+        assert problem.limits is not None
+        self.problem, self.limits = problem, problem.limits
+        self.start = ModelPoint(np.zeros(len(problem.x)), problem.residuals, dict(problem.limited))
+
+    def objective(self, point: ModelPoint) -> float:
+        """The objective, without the terms of the limits."""
+        x = self.problem.x + point.step
+        return 0.5 * float(np.sum(point.residuals**2)) + 0.5 * float(x @ self.problem.penalty_gradient(x))
+
+    def merit(self, point: ModelPoint) -> float:
+        """The objective and the terms of the limits."""
+        return self.objective(point) + self.limits.value(point.values)
+
+    def gradient(self, point: ModelPoint) -> Array:
+        """Gradient of the merit, shape [n]."""
+        pulls = {name: self.limits.gradient(name, v) for name, v in point.values.items()}
+        regularized = self.problem.penalty_gradient(self.problem.x + point.step)
+        return self.problem.vjp(point.residuals, pulls) + regularized
+
+    def slope(self, point: ModelPoint, way: ModelPoint) -> float:
+        """Slope of the merit along a direction."""
+        regularized = self.problem.penalty_gradient(self.problem.x + point.step)
+        slope = float(np.sum(point.residuals * way.residuals)) + float(way.step @ regularized)
+        return slope + sum(
+            float(np.sum(self.limits.gradient(name, v) * way.values[name])) for name, v in point.values.items()
+        )
+
+
 def limited_step(
     problem: LimitedProblem, fixed: BoolArray, share: float, enough: float, max_products: int
 ) -> LimitedStep:
@@ -96,22 +149,21 @@ def limited_step(
         share, enough: As `truncated_cg.conjugate_gradients` takes them.
         max_products: Most products of one solution.
     """
-    limits = problem.limits
-    assert limits is not None
-    start = ModelPoint(np.zeros(problem.size), problem.residuals, dict(problem.limited))
-    here, gained, products = start, 0.0, 0
+    model = LimitedModel(problem)
+    start = here = model.start
+    gained, products = 0.0, 0
     for _ in range(INNER):
-        gradient = np.where(fixed, 0.0, problem.model_gradient(here))
-        way, used = _newton_direction(problem, here, gradient, fixed, share, enough, max_products)
+        gradient = np.where(fixed, 0.0, model.gradient(here))
+        way, used = _newton_direction(model, here, gradient, fixed, share, enough, max_products)
         products += used
-        t = _search(problem, here, way)
-        before = problem.model_value(here)
+        t = _line_search(model, here, way)
+        before = model.merit(here)
         here = here.moved(way, t)
-        decrease = before - problem.model_value(here)
+        decrease = before - model.merit(here)
         gained += decrease
         if products > MOST * max_products:
             break
-        if decrease <= max(enough, share * gained) and not limits.update(here.values):
+        if decrease <= max(enough, share * gained) and not model.limits.update(here.values):
             break
 
     def predicted(t: float) -> float:
@@ -120,20 +172,18 @@ def limited_step(
             start.residuals + t * (here.residuals - start.residuals),
             {name: v + t * (here.values[name] - v) for name, v in start.values.items()},
         )
-        return problem.model_value(start) - problem.model_value(there)
+        return model.merit(start) - model.merit(there)
 
-    eased = problem.model_objective(start) - problem.model_objective(here)
-    return LimitedStep(here.step, products, predicted, eased)
+    return LimitedStep(here.step, products, predicted, model.objective(start) - model.objective(here))
 
 
 def _newton_direction(
-    problem: LimitedProblem, here: ModelPoint, gradient: Array, fixed: BoolArray, share: float, enough: float,
+    model: LimitedModel, here: ModelPoint, gradient: Array, fixed: BoolArray, share: float, enough: float,
     max_products: int,
 ) -> tuple[ModelPoint, int]:  # fmt: skip
     """To the minimum of the model in which the limits that act here are all that do, and the products it took."""
-    limits = problem.limits
-    assert limits is not None
-    weights = {name: limits.curvature(name, v) for name, v in here.values.items()}
+    problem = model.problem
+    weights = {name: model.limits.curvature(name, v) for name, v in here.values.items()}
     carried: list[tuple[Array, Values]] = []
 
     def product(d: Array) -> Array:
@@ -156,11 +206,11 @@ def _newton_direction(
     return way, len(carried)
 
 
-def _search(problem: LimitedProblem, here: ModelPoint, way: ModelPoint) -> float:
+def _line_search(model: LimitedModel, here: ModelPoint, way: ModelPoint) -> float:
     """Where the model is least along a direction: its slope grows, so bisection finds where it vanishes."""
 
     def slope(t: float) -> float:
-        return problem.model_slope(here.moved(way, t), way)
+        return model.slope(here.moved(way, t), way)
 
     low, high = 0.0, 1.0
     while slope(high) < 0.0 and high < FAR:
