@@ -1,4 +1,4 @@
-"""Where a search stands, on disk: written whole or not at all, and read back only for the same problem."""
+"""State of a search on disk: written atomically, and read only for the same problem and the same code."""
 
 from __future__ import annotations
 
@@ -20,19 +20,19 @@ from calmotion.shot.character import BoolArray, IntArray
 from calmotion.support.files import replaced
 from calmotion.support.sources import source_digest
 
-# Another version of the engine would not go on from where this one stood.
+# The state of a search belongs to the code that computed it.
 _ROOMS = ("linear_algebra", "multibody", "retargeting", "simulation", "support")
 _OF_LIMITS = ("rho", "left", "reached", "stalled", "on")
 
 
 def checkpoint_path(layer: str) -> Path:
-    """The file beside a layer in which its optimisation keeps where it stands."""
+    """The file beside a layer that contains the state of its optimisation."""
     path = Path(layer)
     return path.with_name(f".{path.name}.checkpoint.npz")
 
 
 def problem_key(problem: RetargetProblem, fixed: BoolArray, settings: object) -> str:
-    """Hash of everything that a search follows from, the sources of the engine included."""
+    """Hash of all inputs of a search and of the sources of the engine."""
     digest = hashlib.sha256(f"{source_digest(*_ROOMS)} {settings!r}".encode())
     space, curves, objective = problem.space, problem.curves, problem.objective
     reference = objective.reference
@@ -53,7 +53,7 @@ def problem_key(problem: RetargetProblem, fixed: BoolArray, settings: object) ->
 
 @dataclass(frozen=True, eq=False)
 class Checkpoint:
-    """Keeps the search of one problem in one file; None keeps nothing.
+    """The state of the search of one problem in one file; without a path nothing is written.
 
     Attributes:
         path: The file.
@@ -64,7 +64,7 @@ class Checkpoint:
     key: str
 
     def save(self, search: Search, limits: LimitTerms | None, breaks: IntArray) -> None:
-        """Replace what the file holds. A folder that cannot be written is passed over: the run itself goes on."""
+        """Write the state. If the folder cannot be written, nothing happens and the run continues."""
         if self.path is None:
             return
         values: dict[str, Any] = {
@@ -83,8 +83,10 @@ class Checkpoint:
             np.savez(temporary, **values)
 
     def load(self, limits: LimitTerms | None) -> tuple[Search, IntArray] | None:
-        """The search that was kept and the frames that carry knots in it, its multipliers put into the limits; None
-        where there is none of this problem."""
+        """The stored search and the frames of its knots; None if the file has no state of this problem.
+
+        The stored multipliers are written into the limits.
+        """
         if self.path is None:
             return None
         try:

@@ -46,10 +46,10 @@ def _curves(problem: RetargetProblem, motors: int, x: Array) -> tuple[tuple[Moto
     changes, largest = np.any(offsets > 0.0, axis=0), np.max(offsets[grid.judged], axis=0)
     curves = []
     for motor in range(motors):
-        values, own, changed = problem.curves.angles[grid.frames, motor], by_motor[:, motor], bool(changes[motor])
+        values, changed = problem.curves.angles[grid.frames, motor], bool(changes[motor])
         if changed:
-            values = values + basis.at_frames @ own
-        knots = useful_knots(basis, own) if changed else basis.knots[[0, -1]]
+            values = values + basis.at_frames @ by_motor[:, motor]
+        knots = useful_knots(basis, by_motor[:, motor]) if changed else basis.knots[[0, -1]]
         curves.append(MotorCurve(motor, changed, knots, values, float(largest[motor])))
     return tuple(curves), coefficients.ravel()
 
@@ -68,11 +68,11 @@ def optimize_shot(
 ) -> Result:
     """Retarget a shot: change its motor curves so that the flexible robot moves as it was animated to.
 
-    An interrupt (Ctrl-C) ends the search; the best curves so far are then the result.
+    An interrupt (Ctrl-C) ends the search; the result then has the best curves so far.
 
     Args:
-        checkpoint: File in which the search is kept after each iteration, and from which it goes on when it is there;
-            None keeps nothing.
+        checkpoint: File that stores the search after each iteration, and from which a search resumes if the file
+            exists; None stores nothing.
 
     Raises:
         ShotError: The shot cannot be processed.
@@ -95,13 +95,13 @@ def optimize_shot(
 
 
 def refuse_other_integrators(options: Options) -> None:
-    """Raise ShotError where a search is to be by another integrator than the one that is differentiated."""
+    """Raise ShotError for integrators other than BDF2, the only one with derivatives."""
     if options.scheme != "bdf2":
         raise ShotError(
             "optimize supports only bdf2",
             attribute="--integrator",
             found=options.scheme,
-            remedy="Leave it out, or use it with `calmotion simulate`.",
+            remedy="Remove the option, or use it with `calmotion simulate`.",
         )
 
 
@@ -109,7 +109,7 @@ def _optimized(
     prepared: Prepared, animation: Animation, posed: tuple[RetargetProblem, Array, bool], intended: IntendedMotion,
     options: Options, progress: Progress, checkpoint: Path | None,
 ) -> Result:  # fmt: skip
-    """Simulate the input, search, simulate what was found."""
+    """Simulate the input, search, simulate the result."""
     character, begin = prepared.character, time.perf_counter()
     problem, start, adaptive = posed
     tolerance = character.retarget.allowed(options.tolerance)
@@ -167,13 +167,13 @@ def _optimized(
 
 
 def _expected(search: Search) -> float | None:
-    """The gain that one more iteration was expected to bring [m]; None where that was not worked out."""
+    """The predicted gain of one more iteration [m]; None if it was not computed."""
     gain = search.history[-1].gain if search.history else np.nan
     return gain if np.isfinite(gain) else None
 
 
 def _used(problem: RetargetProblem, character: Character) -> list[Excess]:
-    """How far all motors go within all their limits, at the point evaluated last."""
+    """Use of all limits of the motors at the point evaluated last."""
     bounds = motor_bounds(character)
     values = limited_values(problem.model, bounds, problem.changed_curves, problem.run)
     return excesses(bounds, values, problem.grid.judged)

@@ -1,4 +1,4 @@
-"""The search for offsets: Gauss-Newton on knots that are refined, without inactive intervals and worthless offsets."""
+"""The search for offsets: Gauss-Newton on adaptive knots, with inactive intervals and pruning of small offsets."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from calmotion.retargeting.checkpoint import Checkpoint
-from calmotion.retargeting.problem.adaptive_knots import carried, wanted_breaks
+from calmotion.retargeting.problem.adaptive_knots import converted, refined_breaks
 from calmotion.retargeting.problem.offset_basis import OffsetBasis, basis_on
 from calmotion.retargeting.problem.posing import locked_coefficients
 from calmotion.retargeting.problem.problem import RetargetProblem
@@ -15,11 +15,11 @@ from calmotion.retargeting.simplification.idle_motors import idle_gain, idle_mot
 from calmotion.retargeting.simplification.inactive_intervals import (
     InactiveInterval,
     first_change,
+    inactive_coefficients,
     inactive_intervals,
-    left_out_on,
     with_gains,
 )
-from calmotion.retargeting.simplification.pruning import block_energies, worthless
+from calmotion.retargeting.simplification.pruning import block_energies, negligible_coefficients
 from calmotion.retargeting.simplification.report_rows import FINER, PRUNED
 from calmotion.retargeting.solver.damping_homotopy import damping_homotopy
 from calmotion.retargeting.solver.gauss_newton import Search, minimize
@@ -30,25 +30,25 @@ from calmotion.shot.model_choice import OFF
 from calmotion.simulation.prepare import Options
 from calmotion.simulation.simulate import Progress
 
-WORTH = 0.005  # of the tolerance: what an iteration must be expected to gain
-MISSED = 0.01  # of the tolerance: what changes in inactive intervals may gain together
+WORTH = 0.005  # share of the tolerance: a smaller predicted gain ends the search
+MISSED = 0.01  # share of the tolerance that changes in the inactive intervals may gain together
 
 
 @dataclass(eq=False)
 class RetargetSearch:
-    """A search and all that it changes on its way.
+    """A search and its state.
 
     Attributes:
-        problem: On the knots of the moment.
-        search: Where the search stands.
+        problem: On the current knots.
+        search: State of the minimisation.
         inactive: Intervals in which no motor changes.
         character, animation, options: Of the shot.
         tolerance: Acceptable error [m].
-        frequency: The lowest of the character [Hz].
+        frequency: Lowest frequency of the character [Hz].
         adaptive: Whether knots are refined.
-        checkpoint: Where the search is kept.
-        progress: Is told of each iteration.
-        idle_gain: Gain that idle motors promise at the end [m]; None where there are none.
+        checkpoint: Stores the search after each iteration.
+        progress: Called after each iteration.
+        idle_gain: Gain that idle motors would bring at the end [m]; None where there are none.
         interrupted: Whether the user ended it.
     """
 
@@ -67,7 +67,7 @@ class RetargetSearch:
     interrupted: bool = False
 
     def run(self, start: Array) -> None:
-        """Search from a point, or go on from the checkpoint; an interrupt (Ctrl-C) ends it where it is.
+        """Search from a point, or resume from the checkpoint; an interrupt (Ctrl-C) ends the search.
 
         Args:
             start: Shape [n].
@@ -81,40 +81,40 @@ class RetargetSearch:
                 self.search = damping_homotopy(self.problem, start, fixed, self.frequency)
             self._descend(fixed)
             if len(idle_motors(self.character)):
-                self._look_at_idle_motors()
+                self._estimate_idle_gain()
             fixed = self.hold()
-            self.progress(0.9, "removing offsets that gain nothing")
+            self.progress(0.9, "removing negligible offsets")
             self._prune(fixed)
         except KeyboardInterrupt:
             self.interrupted = True
             self.progress(0.95, "interrupted: writing the best so far")
 
     def hold(self) -> BoolArray:
-        """Coefficients that stay as they are, shape [n]; the simulation before the first of the others is kept."""
+        """The fixed coefficients, shape [n], bool; simulations reuse the motion before the first free one acts."""
         self.problem.hold(first_change(self.problem.grid, self.problem.space.basis, self._fixed_on))
         return self._fixed_on(self.problem.space.basis)
 
     def locked_on(self, basis: OffsetBasis) -> BoolArray:
-        """Coefficients on some basis that the shot locks, shape [n]."""
+        """Coefficients of a basis that the shot locks, shape [n], bool."""
         return locked_coefficients(self.animation, basis, self.problem.space.motors, self.problem.grid.end)
 
     def _fixed_on(self, basis: OffsetBasis) -> BoolArray:
-        return self.locked_on(basis) | left_out_on(basis, self.inactive, len(self.problem.space.motors))
+        return self.locked_on(basis) | inactive_coefficients(basis, self.inactive, len(self.problem.space.motors))
 
     def _resume(self) -> bool:
-        """Go on from the checkpoint; whether there is one."""
+        """Resume from the checkpoint; whether there is one."""
         resumed = self.checkpoint.load(self.problem.limits)
         if resumed is None:
             return False
         self.search, breaks = resumed
         basis = basis_on(self.problem.grid, breaks, self.problem.space.basis.kept_ends)
         self.problem = self.problem.on_basis(basis, self.search.x)
-        if np.any(self.search.x[left_out_on(basis, self.inactive, len(self.problem.space.motors))]):
-            self.inactive = ()  # it had gone on with them
+        if np.any(self.search.x[inactive_coefficients(basis, self.inactive, len(self.problem.space.motors))]):
+            self.inactive = ()  # the stored search had already continued with all coefficients
         return True
 
     def _descend(self, fixed: BoolArray) -> None:
-        """Minimise on knots that are refined, then with the inactive intervals where they promise too much."""
+        """Minimise and refine the knots; then include the inactive intervals if they would gain too much."""
         while True:
             if not self.search.reason:
                 self.search = minimize(
@@ -144,23 +144,23 @@ class RetargetSearch:
         self.checkpoint.save(self.search, self.problem.limits, self.problem.space.basis.breaks)
 
     def _refine(self) -> bool:
-        """Go over to finer knots where they promise enough; whether they do."""
+        """Continue on finer knots if these gain enough; whether they do."""
         if not self.problem.linearized_at(self.search.x):
             self._linearize()
-        breaks = wanted_breaks(self.problem, self.search.x, self._fixed_on, FINER * self.tolerance)
+        breaks = refined_breaks(self.problem, self.search.x, self._fixed_on, FINER * self.tolerance)
         if breaks is None:
             return False
         space = self.problem.space
         basis = basis_on(self.problem.grid, breaks, space.basis.kept_ends)
-        # what does not change stays exactly so
+        # fixed coefficients stay exactly zero
         x = np.where(
-            self._fixed_on(basis), 0.0, carried(space.basis, basis, self.search.x, len(space.motors))
+            self._fixed_on(basis), 0.0, converted(space.basis, basis, self.search.x, len(space.motors))
         )  # fmt: skip
         self.problem, self.search = self.problem.on_basis(basis, x), _restarted(self.search, x)
         return True
 
-    def _look_at_idle_motors(self) -> None:
-        """The gain that idle motors promise where the search ended; they act at any time of the shot."""
+    def _estimate_idle_gain(self) -> None:
+        """Estimate the gain of idle motors at the end of the search; their offsets act at any time of the shot."""
         self.problem.hold(0)
         self._linearize()
         self.idle_gain = idle_gain(self.problem, self.character)
@@ -172,19 +172,19 @@ class RetargetSearch:
         self.search = replace(self.search, evaluations=evaluations, gradients=gradients)
 
     def _prune(self, fixed: BoolArray) -> None:
-        """Set offsets that gain next to nothing to zero; all stay where that costs too much."""
+        """Set negligible offsets to zero; keep all if that costs too much."""
         problem, search, motors = self.problem, self.search, len(self.problem.space.motors)
         value = problem.value(search.x)
         problem.linearize()
         budget = problem.worth(PRUNED * self.tolerance)
         energy = block_energies(search.x, motors, problem.product(search.x))
-        dropped = worthless(search.x, motors, energy, budget) & ~fixed
+        dropped = negligible_coefficients(search.x, motors, energy, budget) & ~fixed
         if not np.any(search.x[dropped]):
             return
-        held = fixed | dropped
-        begin = replace(search, x=np.where(held, 0.0, search.x), reason="", radius=np.inf)
+        fixed = fixed | dropped
+        begin = replace(search, x=np.where(fixed, 0.0, search.x), reason="", radius=np.inf)
         pruned = minimize(
-            problem, begin, held, WORTH * self.tolerance, max_iterations=self.options.max_iterations + 3
+            problem, begin, fixed, WORTH * self.tolerance, max_iterations=self.options.max_iterations + 3
         )  # fmt: skip
         after = problem.value(pruned.x)
         limits = problem.limits
@@ -197,5 +197,5 @@ class RetargetSearch:
 
 
 def _restarted(search: Search, x: Array) -> Search:
-    """A search that goes on over other coefficients."""
+    """The search restarted over other coefficients, with its counts and history."""
     return replace(search, x=x, radius=np.inf, recycled=Recycled.none(len(x)), reason="")

@@ -43,18 +43,18 @@ from calmotion.shot.model_choice import OFF
 from calmotion.simulation.prepare import Options
 from calmotion.simulation.simulate import Progress
 
-MARGIN, MOST = 0.8, 3  # by which a step that was too large is made too small, and how often that is done
+MARGIN, MOST = 0.8, 3  # safety factor of a new step, and most searches
 
 
 def optimize_to_tolerance(
     character: Character, animation: Animation, bodies: Bodies, options: Options, progress: Progress,
     checkpoint: Path | None = None, known: ReferenceRun | None = None,
 ) -> Result:  # fmt: skip
-    """As `optimize_shot`, likewise, and with directions of bodies always.
+    """As `optimize_shot`, with the time step and the POD subspaces of the bodies chosen by their errors.
 
-    The search begins with a step at which the input's shake is known well enough to be taken away. What is left of it
-    afterwards is known far better; where the tolerance asks for more, the search goes on with a finer step, and where
-    the links bend in other directions by now with these as well.
+    The first search uses a step that resolves the vibration of the input to a share of its size. The remaining
+    vibration is much smaller, so its error is known afterwards; if it exceeds the tolerance, the search continues with
+    a finer step, and if the deflections have left the POD subspaces, with new ones.
     """
     refuse_other_integrators(options)
     input_shot = replace(animation, current=animation.tracks)
@@ -74,18 +74,18 @@ def optimize_to_tolerance(
         step, _ = largest_step(trial, FIRST, LAST, lambda run: max(enough, OF_SHAKE * shake(run)))
     result: Result | None = None
     for _ in range(MOST):
-        own = held.bodies
+        reduced = held.bodies
         of_step = replace(options, step=step) if chooses else options
-        found = _searched(character, animation, own, of_step, progress, checkpoint)
-        result = with_modes(found if result is None else _added(result, found), bodies)
+        latest = _searched(character, animation, reduced, of_step, progress, checkpoint)
+        result = with_modes(latest if result is None else _continued(result, latest), bodies)
         if result.interrupted:
             break
-        result = _estimated(result, character, animation, own, options)
+        result = _estimated(result, character, animation, reduced, options)
         assert result.accuracy is not None
         animation = replace(animation, current=found_tracks(result, animation))
         allowed = allowed_step_error(options, result.accuracy.left_out_m) if chooses else np.inf
         fine = result.accuracy.step_m <= allowed or step <= LAST
-        ended = found.iterations >= options.max_iterations  # by its limit: it is not worth more
+        ended = latest.iterations >= options.max_iterations  # a new POD subspace would allow no further iteration
         if fine and (ended or held.hold_for(animation, own_step(character, options))):
             break
         if not fine:
@@ -98,46 +98,46 @@ def _searched(
     character: Character, animation: Animation, bodies: Bodies, options: Options, progress: Progress,
     checkpoint: Path | None,
 ) -> Result:  # fmt: skip
-    """One search; where motors that were left out of it promise too much it goes on with them."""
-    found = optimize_shot(character, animation, bodies, options, progress, checkpoint)
+    """One search; it continues with the idle motors if these would gain too much."""
+    first = optimize_shot(character, animation, bodies, options, progress, checkpoint)
     enough = ENOUGH * character.retarget.allowed(options.tolerance)
-    if found.interrupted or found.idle_gain_m is None or found.idle_gain_m <= enough or options.motors == OFF:
-        return found
+    if first.interrupted or first.idle_gain_m is None or first.idle_gain_m <= enough or options.motors == OFF:
+        return first
     motors = tuple(replace(motor, idle=False) for motor in character.motors)
-    animation = replace(animation, current=found_tracks(found, animation))
+    animation = replace(animation, current=found_tracks(first, animation))
     every = replace(character, motors=motors)
-    return _added(found, optimize_shot(every, animation, bodies, options, progress, checkpoint))
+    return _continued(first, optimize_shot(every, animation, bodies, options, progress, checkpoint))
 
 
 def _estimated(result: Result, character: Character, animation: Animation, bodies: Bodies, options: Options) -> Result:
-    """The result with its accuracy, from a simulation of the curves that were found by twice the step."""
+    """The result with its accuracy, from a simulation of its curves with twice the step."""
     fine = frames_of(result, animation.frame_times)
     trial = partial(
         simulate_at, character, replace(animation, current=found_tracks(result, animation)), bodies, options
     )
     coarse = run_or_none(trial, 2.0 * result.step_s)
-    if coarse is None or coarse.step < 1.5 * fine.step:  # it fails, or a frame is no longer than the step
+    if coarse is None or coarse.step < 1.5 * fine.step:  # it failed, or the step cannot be longer than a frame
         coarse, fine = fine, trial(0.5 * result.step_s)
     accuracy = Accuracy(step_error(coarse, fine), omitted_error(bodies), mesh_error(bodies), options.tolerance)
     return with_step(replace(result, accuracy=accuracy), character, options)
 
 
-def _added(first: Result, then: Result) -> Result:
-    """A search that went on: its last part, with the work of both."""
+def _continued(first: Result, second: Result) -> Result:
+    """The result of the second search, with the work of both."""
     done = first.steps[-1]
     steps = tuple(
         OptimizerStep(
             s.objective, s.gradient_norm, done.forward_simulations + s.forward_simulations,
             done.linearized_sweeps + s.linearized_sweeps,
         )
-        for s in then.steps
+        for s in second.steps
     )  # fmt: skip
     return replace(
-        then,
+        second,
         steps=first.steps + steps,
-        gradients=first.gradients + then.gradients,
-        linearized_sweeps=first.linearized_sweeps + then.linearized_sweeps,
-        forward_simulations=first.forward_simulations + then.forward_simulations,
-        iterations=first.iterations + then.iterations,
-        wall_s=first.wall_s + then.wall_s,
+        gradients=first.gradients + second.gradients,
+        linearized_sweeps=first.linearized_sweeps + second.linearized_sweeps,
+        forward_simulations=first.forward_simulations + second.forward_simulations,
+        iterations=first.iterations + second.iterations,
+        wall_s=first.wall_s + second.wall_s,
     )

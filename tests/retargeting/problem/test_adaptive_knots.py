@@ -8,11 +8,11 @@ from calmotion.retargeting.optimize import optimize_shot
 from calmotion.retargeting.problem import adaptive_knots
 from calmotion.retargeting.problem.adaptive_knots import (
     breaks_for,
-    carried,
+    converted,
     fitted,
     halved,
+    refined_breaks,
     useful_knots,
-    wanted_breaks,
 )
 from calmotion.retargeting.problem.offset_basis import basis_on, make_basis, uniform_breaks
 from calmotion.retargeting.solver.gauss_newton import Search, minimize
@@ -51,7 +51,7 @@ def test_finer_knots_hold_the_same_offsets(cyclic, kept):
     old = make_basis(grid, 0.1, kept)
     new = basis_on(grid, halved(grid, old.breaks, np.arange(len(old.breaks) - 1) % 3 == 0), kept)
     x = np.random.default_rng(0).normal(size=2 * old.count)
-    y = carried(old, new, x, 2)
+    y = converted(old, new, x, 2)
     assert new.count > old.count
     assert np.abs(new.values @ y.reshape(-1, 2) - old.values @ x.reshape(-1, 2)).max() < 1e-11
     assert np.abs(new.accelerations @ y.reshape(-1, 2) - old.accelerations @ x.reshape(-1, 2)).max() < 1e-6
@@ -98,11 +98,11 @@ def test_knots_are_wanted_where_something_is_to_be_gained(arm, bodies):
     x = minimize(problem, Search.start(np.zeros(problem.size)), free(problem.space.basis), 1e-6).x
     problem.value(x)
     problem.linearize()
-    breaks = wanted_breaks(problem, x, free, 1e-6)
+    breaks = refined_breaks(problem, x, free, 1e-6)
     new = np.setdiff1d(breaks, problem.space.basis.breaks) / 120.0
     assert len(new) >= 4 and len(breaks) < len(halved(problem.grid, problem.space.basis.breaks))
     assert new.max() < 0.75
-    assert wanted_breaks(problem, x, free, 1.0) is None, "nothing gains a metre"
+    assert refined_breaks(problem, x, free, 1.0) is None, "nothing gains a metre"
 
 
 def test_knots_that_follow_the_motion_reach_what_uniform_ones_do_not(arm, bodies, monkeypatch):

@@ -72,7 +72,7 @@ def test_offsets_of_a_loop_are_smooth_at_its_seam_and_read_back_exactly(kept):
         assert not kept or np.abs(part[first]).max() < 1e-9
     if not kept:
         assert np.allclose(basis.values.toarray().sum(axis=1), 1.0)
-        assert np.allclose(basis.bending.toarray().sum(axis=1), 0.0, atol=1e-6), "a constant does not bend"
+        assert np.allclose(basis.curvature_gram.toarray().sum(axis=1), 0.0, atol=1e-6), "a constant does not bend"
     p = np.random.default_rng(0).normal(size=basis.count)
     track = Track(FRAMES, np.sin(2 * np.pi * FRAMES))
     curves = sample_curves([track], grid)

@@ -13,8 +13,8 @@ from calmotion.retargeting.search import MISSED
 from calmotion.retargeting.simplification.inactive_intervals import (
     InactiveInterval,
     first_change,
+    inactive_coefficients,
     inactive_intervals,
-    left_out_on,
 )
 from calmotion.shot import Animation, FreeTrack, Track
 from calmotion.simulation.prepare import Options
@@ -188,7 +188,7 @@ def test_nothing_acts_before_the_first_change_on_finer_knots_either(arm, bodies)
     grid, basis = problem.grid, basis_on(problem.grid, np.arange(0, 73, 6), False)
 
     def fixed_on(until):
-        return lambda some: left_out_on(some, (InactiveInterval(0.0, until, 0.0),), 2)
+        return lambda some: inactive_coefficients(some, (InactiveInterval(0.0, until, 0.0),), 2)
 
     assert first_change(grid, basis, lambda some: np.zeros(2 * some.count, bool)) == 0
     for until in (0.1, 0.5, 0.6, 0.75):

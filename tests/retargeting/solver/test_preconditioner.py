@@ -31,8 +31,8 @@ def test_bands_hold_the_sum_over_instants(parts):
     metric = np.einsum("nab,ncb->nac", response.inertia, response.inertia)
     gram = BandedGram(basis.count, 3, basis.wraps)
     gram.add(basis.accelerations, metric)
-    gram.add_matrix(basis.bending)
-    expected = dense(basis.accelerations, metric) + np.kron(basis.bending.toarray(), np.eye(3))
+    gram.add_matrix(basis.curvature_gram)
+    expected = dense(basis.accelerations, metric) + np.kron(basis.curvature_gram.toarray(), np.eye(3))
     expected = expected[np.ix_(gram.order, gram.order)]
     banded = gram.banded()
     assert len(banded) < len(expected) / 2
@@ -43,7 +43,7 @@ def test_bands_hold_the_sum_over_instants(parts):
 
 def test_preconditioner_inverts_the_rigid_gauss_newton_matrix(parts):
     basis, response, weights = parts
-    penalty = 1e-6 * basis.bending + 1e-4 * basis.closeness
+    penalty = 1e-6 * basis.curvature_gram + 1e-4 * basis.closeness
     pre = RigidPreconditioner(response, weights, basis, penalty)
     J = response.targets * weights[..., None]
     H = dense(basis.values, np.einsum("nkia,nkib->nab", J, J)) + np.kron(penalty.toarray(), np.eye(3))

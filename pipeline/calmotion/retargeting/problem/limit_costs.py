@@ -1,4 +1,4 @@
-"""What a limit costs: how far the error would fall without it, by one Gauss-Newton step."""
+"""Cost of a limit: the decrease of the error that it prevents, estimated by one Gauss-Newton step without it."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from calmotion.retargeting.problem.problem import RetargetProblem
 from calmotion.retargeting.solver.limited_step import limited_step
 from calmotion.shot.character import BoolArray
 
-MOST = 4  # limits whose cost is worked out, those with the largest multipliers first
-PRODUCTS, SHARE = 30, 0.05
+MOST = 4  # number of limits whose cost is estimated, largest multipliers first
+PRODUCTS, SHARE = 30, 0.05  # most products of a step, and share of the decrease that it may leave
 
 
 def limit_costs(problem: RetargetProblem, fixed: BoolArray) -> dict[tuple[int, str], float]:
-    """Fall of the root-mean-square error that each binding limit prevents [m], by motor and quantity.
+    """Decrease of the root-mean-square error that each binding limit prevents [m], by motor and quantity.
 
     Args:
         problem: Evaluated last where the search ended.

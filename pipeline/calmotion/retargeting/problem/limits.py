@@ -5,7 +5,7 @@ With c = (v - limit) / scale for the upper side of a quantity v (the lower one a
     sum over instants and limits of  rho h / 2 (max(0, c + y)^2 - y^2)
 
 is added to the objective, and at each minimum y <- max(0, c + y) (Hestenes 1969, Powell 1969, Rockafellar 1973). Limits
-are drawn in by a small share, so that they hold exactly where the search ends.
+are narrowed by a small share, so that the original limits hold exactly at the end of the search.
 """
 
 from __future__ import annotations
@@ -17,9 +17,9 @@ import numpy as np
 from calmotion.shot.character import Array, BoolArray
 from calmotion.simulation.motor_limits import Bounds
 
-MARGIN = 1e-4  # share of a limit by which it is drawn in
-GROWTH, SLOW = 10.0, 0.25  # of the penalty, where a round left more than this share of the violation
-STALLED, PATIENCE = 0.8, 3  # so many minima in a row that each leave more than this share: limits are out of reach
+MARGIN = 1e-4  # share by which a limit is narrowed
+GROWTH, SLOW = 10.0, 0.25  # the penalty grows by the first if an update leaves more than the second of the violation
+STALLED, PATIENCE = 0.8, 3  # updates end after so many minima in a row that each leave more than this share of it
 
 
 @dataclass(eq=False)
@@ -28,15 +28,15 @@ class LimitTerms:
 
     Attributes:
         bounds: Bounds by quantity.
-        judged: Which instants count, shape [T].
+        judged: Instants at which limits must hold, shape [T], bool.
         h: Step [s].
         rho: Penalty.
         multipliers: By quantity, upper and lower side, shape [2, T, M].
         left: Largest excess at the last update.
-        reached: Largest excess at the last minimum of the whole problem.
-        stalled: How many of these in a row hardly changed it.
-        on: Whether the terms count. They do once a minimum without them does not keep the limits: from the input,
-            which may be far beyond, that minimum is the best start.
+        reached: Largest excess at the last minimum of the problem.
+        stalled: Number of minima in a row that hardly reduced it.
+        on: Whether the terms are part of the merit. They are once a minimum without them violates limits; that minimum
+            is a better start than the input, which may violate them by far.
     """
 
     bounds: dict[str, Bounds]
@@ -70,24 +70,29 @@ class LimitTerms:
         return 0.5 * self.rho * self.h * total
 
     def gradient(self, name: str, v: Array) -> Array:
-        """Derivative of the terms by a quantity's values, shape [T, M]."""
+        """Derivative of the terms with respect to the values of a quantity, shape [T, M]."""
         upper, lower = np.maximum(0.0, self._sides(name, v) + self.multipliers[name])
-        return self.rho * self.h * (upper - lower) / self.bounds[name].scale
+        derivative: Array = self.rho * self.h * (upper - lower) / self.bounds[name].scale
+        return derivative
 
     def curvature(self, name: str, v: Array) -> Array:
         """Second derivative of the terms where they act, shape [T, M]."""
         if not self.on:
             return np.zeros(v.shape)
         active = np.sum(self._sides(name, v) + self.multipliers[name] > 0.0, axis=0)
-        return active * (self.rho * self.h / self.bounds[name].scale ** 2)
+        second: Array = active * (self.rho * self.h / self.bounds[name].scale ** 2)
+        return second
 
     def excess(self, values: dict[str, Array]) -> float:
-        """Largest excess over the limits as they were drawn in, at most 0 where all are kept."""
+        """Largest excess over the narrowed limits; at most 0 if all are kept."""
         return max(float(np.max(self._sides(name, values[name]))) for name in self.bounds)
 
     def tighten(self, values: dict[str, Array]) -> bool:
-        """Switch the terms on where limits are not kept, and update them at a minimum with them: False where all are
-        kept, or nothing more can be done."""
+        """Switch the terms on if limits are violated, or update the multipliers at a minimum with the terms.
+
+        Returns:
+            Whether the merit changed; False if all limits are kept or further updates do not help.
+        """
         if not self.on:
             self.on = not self.kept(values)
             return self.on
@@ -97,7 +102,7 @@ class LimitTerms:
         return self.stalled < PATIENCE and self.update(values)
 
     def update(self, values: dict[str, Array]) -> bool:
-        """New multipliers after a minimum of the model; False, and none, where all limits are kept."""
+        """Update the multipliers after a minimum of the model; False, without an update, if all limits are kept."""
         excess = self.excess(values)
         if excess <= MARGIN:
             return False
@@ -106,12 +111,12 @@ class LimitTerms:
         if excess > SLOW * self.left:
             self.rho *= GROWTH
             for name in self.multipliers:
-                self.multipliers[name] /= GROWTH  # they stand for y rho
+                self.multipliers[name] /= GROWTH  # y rho stays the same
         self.left = excess
         return True
 
     def without(self, motor: int, quantity: str) -> LimitTerms:
-        """The same terms but for one limit of one motor."""
+        """The same terms without one limit of one motor."""
         bound = self.bounds[quantity]
         lower, upper = bound.lower.copy(), bound.upper.copy()
         lower[motor], upper[motor] = -np.inf, np.inf

@@ -1,4 +1,4 @@
-"""Cubic B-splines of what is added to the motor curves."""
+"""Cubic B-splines of the offsets that are added to the motor curves."""
 
 from __future__ import annotations
 
@@ -24,11 +24,11 @@ class OffsetBasis:
         knots: Their times [s], shape [n].
         values, rates, accelerations: Basis and its derivatives at the grid's instants, sparse, shape [T, P].
         at_frames: Basis at the frames, sparse, shape [f, P].
-        bend: Second derivatives at the two Gauss points of each interval between knots, shape [2 (n - 1), P].
-        bending: Gram matrix of the second derivatives, pre-roll included, shape [P, P] [1/s^3].
+        curvatures: Second derivatives at the two Gauss points of each interval between knots, shape [2 (n - 1), P].
+        curvature_gram: Gram matrix of the second derivatives, pre-roll included, shape [P, P] [1/s^3].
         closeness: Gram matrix of the functions themselves, pre-roll included, shape [P, P] [s].
         support: First and last time at which each basis function acts [s], shape [P, 2]; the pre-roll counts as 0.
-            In a loop it may begin before 0: it then also acts at the end.
+            In a cyclic shot it may begin before 0: it then also acts at the end.
         wraps: Whether the last functions are neighbours of the first.
         kept_ends: Whether the offset vanishes at the first and last frame.
     """
@@ -39,8 +39,8 @@ class OffsetBasis:
     rates: csr_matrix
     accelerations: csr_matrix
     at_frames: csr_matrix
-    bend: csr_matrix
-    bending: csr_matrix
+    curvatures: csr_matrix
+    curvature_gram: csr_matrix
     closeness: csr_matrix
     support: Array
     wraps: bool
@@ -49,12 +49,15 @@ class OffsetBasis:
     @property
     def count(self) -> int:
         """Number of coefficients of one motor."""
-        return self.values.shape[1]
+        return int(self.values.shape[1])
 
 
 def knot_frames(grid: TimeGrid) -> IntArray:
-    """Frames that may carry an inner knot; never the second or the last but one, so that samples at the frames with
-    not-a-knot ends hold the spline exactly. In a loop, whose interpolant has none of these, all may."""
+    """Frames that may carry an inner knot.
+
+    The second frame and the last but one are excluded, so that the interpolant of the frames with not-a-knot ends
+    reproduces the spline exactly. The periodic interpolant of a cyclic shot allows all frames.
+    """
     margin, last = 1 if grid.cyclic else 2, len(grid.frame_times) - 1
     return np.arange(margin, last - margin + 1, dtype=np.int32)
 
@@ -79,9 +82,9 @@ def basis_on(grid: TimeGrid, breaks: IntArray, kept_ends: bool) -> OffsetBasis:
         breaks: Frames that carry a knot, ascending, the first and the last among them.
         kept_ends: Whether the offset vanishes, with its slope, at the first and last frame.
 
-    Slope and curvature are zero at the end, so that no motor is thrown in the last frames, where nothing that
-    follows is judged; and at the start unless there is a pre-roll, since the system then starts at rest. Offsets of a
-    shot that loops are periodic, or, kept at the seam, have no curvature there.
+    Slope and curvature are zero at the end: errors after the last frame have no weight, so offsets could otherwise
+    accelerate motors there. They are zero at the start if there is no pre-roll, because the system starts at rest.
+    Offsets of a cyclic shot are periodic; if the end poses are kept, their curvature is zero at the seam.
     """
     knots = grid.frame_times[breaks]
     wraps = grid.cyclic and not kept_ends and len(knots) > 4
@@ -99,16 +102,16 @@ def basis_on(grid: TimeGrid, breaks: IntArray, kept_ends: bool) -> OffsetBasis:
     # two Gauss points integrate the squared second derivative of a cubic exactly
     width = np.diff(knots)[:, None]
     points = (0.5 * (knots[:-1] + knots[1:])[:, None] + 0.5 * width * np.array([-1, 1]) / math.sqrt(3)).ravel()
-    bend = csr_matrix(sample(points, 2))
-    bending = bend.T @ diags(np.repeat(0.5 * width.ravel(), 2)) @ bend
+    curvatures = csr_matrix(sample(points, 2))
+    curvature_gram = curvatures.T @ diags(np.repeat(0.5 * width.ravel(), 2)) @ curvatures
     stored = csr_matrix(values)
     near = stored[grid.judged] if grid.cyclic else stored
     if not grid.cyclic and grid.pre_steps:
         before = csr_matrix(accelerations[: grid.pre_steps])
-        bending = bending + grid.h * (before.T @ before)
+        curvature_gram = curvature_gram + grid.h * (before.T @ before)
     return OffsetBasis(
-        breaks, knots, stored, csr_matrix(rates), csr_matrix(accelerations), stored[grid.frames], bend,
-        csr_matrix(bending),
+        breaks, knots, stored, csr_matrix(rates), csr_matrix(accelerations), stored[grid.frames], curvatures,
+        csr_matrix(curvature_gram),
         grid.h * (near.T @ near), support, wraps, kept_ends,
     )  # fmt: skip
 
@@ -122,7 +125,7 @@ def _open(knots: Array) -> tuple[BSpline, Array, Array]:
 
 
 def _periodic(knots: Array) -> tuple[BSpline, Array, Array]:
-    """The same over a loop: functions that leave it at the end come in again at the start."""
+    """The same for a cyclic shot: functions that extend beyond the end continue at the start."""
     length, inner = knots[-1] - knots[0], len(knots) - 1
     padded = np.concatenate([knots[inner - DEGREE : -1] - length, knots, knots[1 : DEGREE + 1] + length])
     count = inner + DEGREE
@@ -131,7 +134,7 @@ def _periodic(knots: Array) -> tuple[BSpline, Array, Array]:
 
 
 def _ends(merge: Array, kept_ends: bool, grid: TimeGrid) -> Array:
-    """Which combinations of open B-splines keep what is to be kept at the ends, as columns."""
+    """Combinations of open B-splines that satisfy the end conditions, as columns."""
     count = len(merge)
     if kept_ends:
         order = 3 if grid.cyclic else 2

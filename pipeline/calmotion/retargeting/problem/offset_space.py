@@ -1,4 +1,4 @@
-"""The unknowns of a retargeting problem: spline coefficients, and the offsets of all motors that they stand for."""
+"""The unknowns of a retargeting problem: spline coefficients, and the offsets of all motors that follow from them."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ class OffsetSpace:
         basis: Offset splines.
         motors: Motors that may change, shape [m].
         coupling: By how much each motor changes with each of `motors`, shape [M, m].
-        smoothness: Weight of int |offset''|^2 / 2 for each motor.
+        smoothness: Weight of the curvature penalty int |offset''|^2 / 2 of each motor.
         closeness: Weight of int |offset|^2 / 2 for each motor.
     """
 
@@ -44,7 +44,7 @@ class OffsetSpace:
     @cached_property
     def penalty(self) -> csr_matrix:
         """Matrix of the regulariser for one motor, shape [P, P]."""
-        return self.smoothness * self.basis.bending + self.closeness * self.basis.closeness
+        return self.smoothness * self.basis.curvature_gram + self.closeness * self.basis.closeness
 
     @cached_property
     def splines(self) -> dict[str, csr_matrix]:

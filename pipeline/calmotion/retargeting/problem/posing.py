@@ -1,4 +1,4 @@
-"""The retargeting problem that a shot poses: what may change, what is wanted, what must be kept."""
+"""The retargeting problem of a shot: its unknowns, objective and limits."""
 
 from __future__ import annotations
 
@@ -20,25 +20,28 @@ from calmotion.simulation.prepare import Options, Prepared
 from calmotion.simulation.target_errors import Objective
 
 SMOOTHNESS = 1e-10
-CLOSENESS = 1e-4  # an offset of 0.1 rad weighs as much as an error of 1 mm [m^2/rad^2]
+CLOSENESS = 1e-4  # an offset of 0.1 rad has the weight of an error of 1 mm [m^2/rad^2]
 
 
 def pose(
-    prepared: Prepared, animation: Animation, curves: Curves, meant: IntendedMotion, options: Options
+    prepared: Prepared, animation: Animation, curves: Curves, intended: IntendedMotion, options: Options
 ) -> tuple[RetargetProblem, Array, bool]:
-    """The problem that a shot poses, where its search begins, and whether its knots are to follow the motion.
+    """The retargeting problem of a shot, the start of its search, shape [n], and whether its knots are adaptive.
 
     Args:
-        curves: The animator's.
-        meant: What the targets should do.
+        prepared: The shot's model and time grid.
+        animation: Its curves, weights and locked intervals.
+        curves: The animator's curves on the grid.
+        intended: The intended motion of the targets.
+        options: Of the run.
 
     Raises:
-        ShotError: Nothing may change, or options contradict each other.
+        ShotError: No motor may change, or options contradict each other.
     """
     character, grid, settings = prepared.character, prepared.grid, prepared.character.retarget
     motors = leaders(character)
     coupling = coupling_of(character, motors)
-    kept_ends, offsets = settings.endpoints == "kept", carried_offsets(prepared, animation, motors)
+    kept_ends, offsets = settings.endpoints == "kept", existing_offsets(prepared, animation, motors)
     spacing = options.knot_spacing or settings.knot_spacing
     if spacing:
         breaks = uniform_breaks(grid, spacing)
@@ -65,15 +68,15 @@ def pose(
     continuous = options.adjoint == "continuous"
     if continuous and ("effort" in bounds or grid.cyclic):
         raise ShotError(
-            f"the continuous adjoint {'plays a shot once' if grid.cyclic else 'cannot keep limits of effort'}",
+            f"the continuous adjoint does not support {'cyclic shots' if grid.cyclic else 'limits of motor efforts'}",
             path=character.path,
             attribute="retarget.optimize.adjoint",
             found=options.adjoint,
-            remedy="Use the discrete one.",
+            remedy="Use the discrete adjoint.",
         )
     smoothness = next(v for v in (options.smoothness, settings.smoothness, SMOOTHNESS) if v is not None)
     problem = RetargetProblem(
-        prepared.model, grid, curves, Objective.over(prepared.model, meant.reference, grid, animation.weights),
+        prepared.model, grid, curves, Objective.over(prepared.model, intended.reference, grid, animation.weights),
         OffsetSpace(basis, motors, coupling, smoothness, CLOSENESS), prepared.world,
         LimitTerms(bounds, grid.judged, grid.h, 1.0) if bounds else None, continuous,
     )  # fmt: skip
@@ -81,17 +84,17 @@ def pose(
     return problem, np.where(fixed, 0.0, start), not spacing
 
 
-def carried_offsets(prepared: Prepared, animation: Animation, motors: IntArray) -> Array:
-    """The offsets that the shot already carries, shape [T, m]; zero when it carries none."""
+def existing_offsets(prepared: Prepared, animation: Animation, motors: IntArray) -> Array:
+    """The offsets that the shot already contains, shape [T, m]; zero when it contains none."""
     if animation.current is animation.tracks:
         return np.zeros((len(prepared.grid.times), len(motors)))
-    meant, _ = sample_tracks([animation.tracks[k] for k in motors], prepared.grid)
+    intended, _ = sample_tracks([animation.tracks[k] for k in motors], prepared.grid)
     current, _ = sample_tracks([animation.current[k] for k in motors], prepared.grid)
-    return current - meant
+    return current - intended
 
 
 def locked_coefficients(animation: Animation, basis: OffsetBasis, motors: IntArray, end: float) -> BoolArray:
-    """Coefficients that would change a curve where the shot locks it, ordered by basis function, then motor.
+    """Which coefficients change a curve where the shot locks it, shape [P * m], by basis function, then motor.
 
     Args:
         end: Last frame of the shot [s].
@@ -102,7 +105,7 @@ def locked_coefficients(animation: Animation, basis: OffsetBasis, motors: IntArr
     for track in animation.free:
         if track.motor in column:
             for start, stop in track.locked(end):
-                # functions of a loop that begin before it also act at its end
+                # functions of a cyclic shot that begin before its start also act at its end
                 for late in (0.0, end) if basis.wraps else (0.0,):
                     fixed[(first + late < stop) & (last + late > start), column[track.motor]] = True
     return fixed.ravel()

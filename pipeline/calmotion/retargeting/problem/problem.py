@@ -15,7 +15,6 @@ from calmotion.retargeting.problem.limits import LimitTerms
 from calmotion.retargeting.problem.offset_basis import OffsetBasis
 from calmotion.retargeting.problem.offset_space import OffsetSpace
 from calmotion.retargeting.problem.rigid_approximation import limit_metrics, rigid_gradient, rigid_response
-from calmotion.retargeting.solver.limited_step import LimitedStep, limited_step
 from calmotion.retargeting.solver.preconditioner import RigidPreconditioner
 from calmotion.shot.character import Array, BoolArray, IntArray
 from calmotion.simulation.forward import ForwardRun, limited_values
@@ -54,7 +53,7 @@ class RetargetProblem:
         self.x = self._linearized_x = np.zeros(0)  # points evaluated and linearised last
         self._preconditioner: RigidPreconditioner | None = None
         self._response: RigidResponse | None = None
-        # objective of an error of one metre everywhere
+        # twice the objective of an error of one metre at every instant
         self._unit = max(float(np.sum(objective.weights**2)) / max(1, 3 * len(model.targets.component)), 1e-300)
 
     def on_basis(self, basis: OffsetBasis, x: Array) -> RetargetProblem:
@@ -126,7 +125,7 @@ class RetargetProblem:
         return self._limited
 
     def hold(self, first: int) -> None:
-        """From now on only coefficients change that act from an instant on: see `Simulator.hold`."""
+        """Keep the motor curves before an instant fixed from now on: see `Simulator.hold`."""
         self._simulator.hold(first)
 
     def forget(self) -> None:
@@ -134,7 +133,7 @@ class RetargetProblem:
         self._simulator.forget()
 
     def value(self, x: Array) -> float:
-        """The objective and what limits add to it; infinite where the simulation fails."""
+        """The merit: the objective and the terms of the limits; infinite if the simulation fails."""
         values, rates = self.space.offsets(x)
         angles, rates = self.curves.angles + values, self.curves.rates + rates
         try:
@@ -150,7 +149,7 @@ class RetargetProblem:
         return self.merit()
 
     def merit(self) -> float:
-        """The merit at the point evaluated last, with the limits as they are now."""
+        """The merit at the point evaluated last, with the current multipliers."""
         value, limits = self.objective_value(), self._acting
         return value if limits is None else value + limits.value(self.limited)
 
@@ -160,7 +159,7 @@ class RetargetProblem:
         return self.space.changed(self.curves, self.x)
 
     def objective_value(self) -> float:
-        """The objective at the point evaluated last, without what limits add to it."""
+        """The objective at the point evaluated last, without the terms of the limits."""
         return 0.5 * float(np.sum(self._residuals**2)) + 0.5 * float(self.x @ self.penalty_gradient(self.x))
 
     def linearize(self) -> Array:
@@ -185,7 +184,7 @@ class RetargetProblem:
         return self.vjp(self._residuals, self._limit_pulls()) + self.penalty_gradient(self.x)
 
     def continuous_gradient(self) -> Array:
-        """The same by the continuous adjoint, with a linearisation of its own; limits of effort are beyond it."""
+        """The same by the continuous adjoint, which has its own linearisation and does not support limits of effort."""
         self._differentiate()
         density = self.objective.scatter(self._jacobian, self._residuals)
         pulls = self._simulator.continuous_adjoint(self.run, density)
@@ -229,10 +228,6 @@ class RetargetProblem:
             changes = {name: self.limits.curvature(name, self.limited[name]) * v for name, v in changes.items()}
         return self.vjp(residuals, changes) + self.penalty_gradient(direction)
 
-    def limited_step(self, fixed: BoolArray, share: float, enough: float, max_products: int) -> LimitedStep:
-        """The step to the model's minimum where limits act."""
-        return limited_step(self, fixed, share, enough, max_products)
-
     def precondition(self, fixed: BoolArray, values: dict[str, Array] | None = None) -> Callable[[Array], Array]:
         """The rigid robot's Gauss-Newton matrix, inverted over the entries that are not fixed.
 
@@ -258,7 +253,7 @@ class RetargetProblem:
         return other
 
     def lever(self) -> float:
-        """How far the motor that moves them most moves the targets, root-mean-square and weighted [m/rad]."""
+        """Largest lever arm of a motor: weighted root-mean-square motion of the targets per angle [m/rad]."""
         weighted = self._rigid().targets * self.objective.weights[..., None]
         return float(np.sqrt(np.max(np.sum(weighted**2, axis=(0, 1, 2))) / self._unit))
 
@@ -272,14 +267,14 @@ class RetargetProblem:
         return self._response
 
     def gain(self, decrease: float, value: float) -> float:
-        """How much of the root-mean-square error a decrease of the merit takes away [m]."""
+        """Decrease of the root-mean-square error that corresponds to a decrease of the merit [m]."""
         now = np.sqrt(2.0 * max(value, 0.0) / self._unit)
         return float(now - np.sqrt(2.0 * max(value - decrease, 0.0) / self._unit))
 
     def worth(self, gain: float) -> float:
-        """The decrease of the objective that takes so much of the root-mean-square error away [m], from here."""
+        """Decrease of the objective that reduces the root-mean-square error by a gain [m], from the current point."""
         return float(self._unit * gain * max(self.error, gain))
 
     def tighten(self) -> bool:
-        """Limits come into play where they are not kept, or get new multipliers; False where there is no more to do."""
+        """Switch the limits on if they are violated, or update their multipliers; whether the merit changed."""
         return self.limits is not None and self.limits.tighten(self.limited)

@@ -1,4 +1,4 @@
-"""The rigid robot in place of the flexible one: gradient and preconditioner without a simulation."""
+"""The rigid robot as an approximation of the flexible one: gradient and preconditioner without a simulation."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def rigid_response(model: Model, grid: TimeGrid, curves: Curves, world: Array | 
 
 
 def rigid_gradient(response: RigidResponse, space: OffsetSpace, weights: Array, residuals: Array) -> Array:
-    """Gradient of the errors if the robot were rigid: each error is answered at the instant when it occurs.
+    """Gradient of the errors if the robot were rigid: an offset acts at its own instant alone.
 
     Args:
         response: Of the rigid robot.
@@ -49,7 +49,7 @@ def rigid_gradient(response: RigidResponse, space: OffsetSpace, weights: Array, 
 
 
 def limit_metrics(inertia: Array, space: OffsetSpace, curvatures: dict[str, Array]) -> list[tuple[csr_matrix, Array]]:
-    """What active limits add to the rigid robot's matrix: its efforts are inertia times acceleration.
+    """Terms of the active limits in the Gauss-Newton matrix of the rigid robot; efforts are inertia times acceleration.
 
     Args:
         inertia: Efforts by accelerations of the unknowns' motors, shape [T, M, m].

@@ -1,7 +1,7 @@
-"""Motors that were left out of a search since they move no target: what they promise where it ended.
+"""Idle motors: motors that move no target of a rigid robot and are not part of the search.
 
-On a rigid robot they move none. On a flexible one they could still act by their inertia, as a counterweight does; the
-gradient over their offsets, which the adjoint knows anyway, and two steps of conjugate gradients tell how much.
+On a flexible robot they could still act through their inertia, as a counterweight does. The adjoint gives the gradient
+with respect to their offsets without further simulation, and two steps of conjugate gradients estimate the gain.
 """
 
 from __future__ import annotations
@@ -14,16 +14,16 @@ from calmotion.shot.character import IntArray
 from calmotion.simulation.inputs.gearing import coupling_of
 
 STEPS = 2  # of conjugate gradients
-ENOUGH = 0.05  # of the tolerance: what they must promise to be taken into the search after all
+ENOUGH = 0.05  # share of the tolerance: idle motors with a larger gain join the search
 
 
 def idle_motors(character: Character) -> IntArray:
-    """The motors that are left out though they may change."""
+    """Indices of the motors that may change but are idle."""
     return np.flatnonzero([m.optimize and m.idle and m.follows is None for m in character.motors]).astype(np.int32)
 
 
 def idle_gain(problem: RetargetProblem, character: Character) -> float | None:
-    """By how much the root-mean-square error would fall with the idle motors' help [m]; None where there are none.
+    """Decrease of the root-mean-square error that the idle motors would bring [m]; None where there are none.
 
     Args:
         problem: Linearised where its search ended; its state does not change.
@@ -33,16 +33,16 @@ def idle_gain(problem: RetargetProblem, character: Character) -> float | None:
         return None
     other = problem.over_motors(motors, coupling_of(character, motors))
     residual = -other.gradient()
-    way, square = residual, float(residual @ residual)
-    found = 0.0
+    direction, square = residual, float(residual @ residual)
+    decrease = 0.0
     for _ in range(STEPS):
-        bent = other.product(way)
-        curvature = float(way @ bent)
+        product = other.product(direction)
+        curvature = float(direction @ product)
         if not (square > 0.0 and curvature > 0.0):
             break
         length = square / curvature
-        found += 0.5 * length * square
-        residual = residual - length * bent
+        decrease += 0.5 * length * square
+        residual = residual - length * product
         before, square = square, float(residual @ residual)
-        way = residual + (square / before) * way
-    return problem.gain(found, problem.objective_value())
+        direction = residual + (square / before) * direction
+    return problem.gain(decrease, problem.objective_value())

@@ -1,14 +1,15 @@
-"""Ranges of a shot in which its motors need no change, found before the search and left out of it.
+"""Inactive intervals of a shot: the search keeps the motor curves unchanged there.
 
-Where a rigid robot would have next to nothing to correct, offsets would only be there to act on what comes later. How
-much later follows from the lowest frequency: offsets that prepare a motion begin within a period before it. At the end
-of the search the gradient over the coefficients that were left out tells what they would have gained; where that
-matters the search goes on with them.
+They are determined before the search from a rigid robot. Where the rigid robot has almost no error to correct, an
+offset could only serve the motion that follows, and such offsets begin within one period of the lowest frequency before
+that motion. After the search, the gradient with respect to the omitted coefficients gives the gain that was missed; if
+that gain matters, the search continues with all coefficients.
 
-The gradient of the flexible robot would not do at the start: it tells that a shake could be stopped long before it
-begins, as its adjoint dies away backwards as slowly as the shake does forwards. At the end there is no shake.
+The gradient of the flexible robot is no criterion before the search: its adjoint decays backwards as slowly as the
+vibration decays forwards, so it assigns a gain to offsets long before the vibration begins. After the search there is
+no vibration.
 
-Most is saved by a beginning that stays as it is: its simulation is known from the first one on.
+An inactive interval at the start saves most, because every simulation shares its beginning with the first one.
 """
 
 from __future__ import annotations
@@ -28,20 +29,20 @@ from calmotion.shot import Simplification
 from calmotion.shot.character import Array, BoolArray
 from calmotion.simulation.inputs.time_grid import TimeGrid
 
-QUIET = 0.002  # of the tolerance: what ranges that are left out may promise together
-PERIODS = 1.0  # of the lowest frequency, by which a range keeps away from what is not quiet
-SHORTEST = 0.25  # range that is left out [s]
+NEGLIGIBLE = 0.002  # share of the tolerance that the inactive intervals may gain together
+PERIODS = 1.0  # distance of an inactive interval from active functions, in periods of the lowest frequency
+SHORTEST = 0.25  # length of the shortest inactive interval [s]
 FixedOn = Callable[[OffsetBasis], BoolArray]
 
 
 @dataclass(frozen=True)
 class InactiveInterval:
-    """A range of a shot in which no motor is to change.
+    """An interval of a shot in which the search changes no motor.
 
     Attributes:
         start, stop: [s].
-        gain: By how much the root-mean-square error would fall with changes there [m]: as a rigid robot's would before
-            the search, as the robot's own would after it.
+        gain: Decrease of the root-mean-square error that offsets in the interval would bring [m]: of the rigid robot
+            before the search, of the flexible robot after it.
     """
 
     start: float
@@ -52,82 +53,83 @@ class InactiveInterval:
 def inactive_intervals(
     problem: RetargetProblem, start: Array, frequency: float, tolerance: float, ranges: str = "auto"
 ) -> tuple[InactiveInterval, ...]:
-    """The ranges that a search may leave out; none in a shot that loops, or that is quiet throughout.
+    """The inactive intervals of a shot; none in a cyclic shot, or where no coefficient is active.
 
     Args:
         problem: Evaluated last at zero, the input.
-        start: Where the search begins, shape [n]; a range that is changed there is not quiet.
-        frequency: The lowest one of the character [Hz].
-        tolerance: Error that does not matter [m].
-        ranges: "auto", or "on": all of the shot is searched.
+        start: Where the search begins, shape [n]; functions with an offset there are active.
+        frequency: Lowest frequency of the character [Hz].
+        tolerance: Acceptable error [m].
+        ranges: "auto", or "on": there are no inactive intervals.
     """
     grid, basis = problem.grid, problem.space.basis
     if ranges == "on" or grid.cyclic or not frequency > 0.0:
         return ()
     gradient = problem.rigid_gradient()
     solved = problem.precondition(np.zeros(problem.size, bool))(gradient)
-    promised = 0.5 * np.abs(gradient * solved).reshape(basis.count, -1).sum(axis=1)
-    # what is worth so much now is worth more when the error has fallen
-    budget = problem.worth(QUIET * tolerance) * min(1.0, tolerance / max(problem.error, tolerance))
-    order = np.argsort(promised)
-    loud = np.any(np.abs(start).reshape(basis.count, -1) > UNCHANGED, axis=1)
-    loud[order[np.cumsum(promised[order]) > budget]] = True
+    gains = 0.5 * np.abs(gradient * solved).reshape(basis.count, -1).sum(axis=1)
+    # the same decrease of the objective is a larger part of the error once the error is smaller
+    budget = problem.worth(NEGLIGIBLE * tolerance) * min(1.0, tolerance / max(problem.error, tolerance))
+    order = np.argsort(gains)
+    active = np.any(np.abs(start).reshape(basis.count, -1) > UNCHANGED, axis=1)
+    active[order[np.cumsum(gains[order]) > budget]] = True
     exceeding = grid.times[_exceeding(problem)]
     away = PERIODS / frequency
-    intervals = np.concatenate([basis.support[loud], np.stack([exceeding, exceeding], axis=1)]) + [-away, away]
-    if not len(intervals):
+    needed = np.concatenate([basis.support[active], np.stack([exceeding, exceeding], axis=1)]) + [-away, away]
+    if not len(needed):
         return ()
     value = problem.objective_value()
     return tuple(
-        InactiveInterval(a, b, problem.gain(float(promised[_acting(basis, a, b)].sum()), value))
-        for a, b in _gaps(intervals, grid.end)
+        InactiveInterval(a, b, problem.gain(float(gains[_acting(basis, a, b)].sum()), value))
+        for a, b in _gaps(needed, grid.end)
         if b - a >= SHORTEST
     )
 
 
 def _exceeding(problem: RetargetProblem) -> BoolArray:
     """Instants at which the point evaluated last exceeds a limit, shape [T]."""
-    found, limits = np.zeros(len(problem.grid.times), bool), problem.limits
+    exceeded, limits = np.zeros(len(problem.grid.times), bool), problem.limits
     if limits is not None:
         for name, values in problem.limited.items():
-            found |= np.any(limits.gradient(name, values) != 0.0, axis=1)
-    return found
+            exceeded |= np.any(limits.gradient(name, values) != 0.0, axis=1)
+    return exceeded
 
 
 def _gaps(intervals: Array, end: float) -> list[tuple[float, float]]:
-    """What intervals, shape [n, 2], leave of the time from 0 to the end."""
-    found, reached = [], 0.0
+    """The gaps that intervals of shape [n, 2] leave between 0 and the end."""
+    gaps, reached = [], 0.0
     for first, last in intervals[np.argsort(intervals[:, 0])]:
         if first > reached:
-            found.append((reached, float(first)))
+            gaps.append((reached, float(first)))
         reached = max(reached, float(last))
-    return [*found, (reached, end)] if reached < end else found
+    return [*gaps, (reached, end)] if reached < end else gaps
 
 
 def _acting(basis: OffsetBasis, start: float, stop: float) -> BoolArray:
-    """Which functions act in a range, shape [P]."""
+    """Which basis functions act in an interval, shape [P]."""
     first, last = basis.support.T
-    return (first < stop) & (last > start)
+    acting: BoolArray = (first < stop) & (last > start)
+    return acting
 
 
-def left_out_on(basis: OffsetBasis, ranges: Sequence[InactiveInterval], motors: int) -> BoolArray:
-    """Coefficients that would change a motor's curve in any of the ranges, shape [P * m]."""
-    found = np.zeros(basis.count, bool)
-    for item in ranges:
-        found |= _acting(basis, item.start, item.stop)
-    return np.repeat(found, motors)
+def inactive_coefficients(basis: OffsetBasis, intervals: Sequence[InactiveInterval], motors: int) -> BoolArray:
+    """Which coefficients change a motor curve in any of the intervals, shape [P * m]."""
+    inactive = np.zeros(basis.count, bool)
+    for interval in intervals:
+        inactive |= _acting(basis, interval.start, interval.stop)
+    return np.repeat(inactive, motors)
 
 
 def first_change(grid: TimeGrid, basis: OffsetBasis, fixed_on: FixedOn) -> int:
-    """An instant before which no coefficient acts that is not fixed, on these knots and on those halfway between.
+    """Index of an instant before which only fixed coefficients act, on these knots and on the next finer ones.
 
     Args:
-        fixed_on: Function from a basis to which of its coefficients stay as they are.
+        fixed_on: Maps a basis to its fixed coefficients, shape [n], bool.
     """
 
-    def start_on(some: OffsetBasis) -> float:
-        free = ~np.all(fixed_on(some).reshape(some.count, -1), axis=1)
-        return float(np.min(some.support[free, 0], initial=grid.end))
+    def start_on(on: OffsetBasis) -> float:
+        free = ~np.all(fixed_on(on).reshape(on.count, -1), axis=1)
+        return float(np.min(on.support[free, 0], initial=grid.end))
 
     start = 0.0 if grid.cyclic else start_on(basis)
     if start > 0.0:
@@ -138,41 +140,50 @@ def first_change(grid: TimeGrid, basis: OffsetBasis, fixed_on: FixedOn) -> int:
 
 
 def with_gains(
-    problem: RetargetProblem, search: Search, ranges: Sequence[InactiveInterval], locked_on: FixedOn
+    problem: RetargetProblem, search: Search, intervals: Sequence[InactiveInterval], locked_on: FixedOn
 ) -> tuple[tuple[InactiveInterval, ...], Search]:
-    """The ranges with what changes in them would gain after a search, by one step of the linearised robot; the search
-    counts the work. Leaves the problem with nothing held but what is locked.
+    """The intervals with their gains after a search, from one preconditioned gradient step of the linearised robot.
+
+    Only locked coefficients remain fixed in the problem afterwards.
 
     Args:
-        locked_on: Function from a basis to which of its coefficients may not change at all.
+        problem: Of the search.
+        search: Where it ended.
+        intervals: The inactive intervals.
+        locked_on: Maps a basis to the coefficients that the shot locks, shape [n], bool.
+
+    Returns:
+        The intervals, and the search with this work counted.
     """
     basis, motors = problem.space.basis, len(problem.space.motors)
     problem.hold(first_change(problem.grid, basis, locked_on))
     problem.value(search.x)
-    kept = ~left_out_on(basis, ranges, motors) | locked_on(basis)
-    gradient = np.where(kept, 0.0, problem.linearize())
-    step = problem.precondition(kept)(gradient)
+    fixed = ~inactive_coefficients(basis, intervals, motors) | locked_on(basis)
+    gradient = np.where(fixed, 0.0, problem.linearize())
+    step = problem.precondition(fixed)(gradient)
     curvature = float(step @ problem.product(step))
     slopes = np.abs(gradient * step).reshape(basis.count, motors).sum(axis=1)
-    whole = 0.5 * float(gradient @ step) ** 2 / curvature if curvature > 0.0 else 0.0
+    total = 0.5 * float(gradient @ step) ** 2 / curvature if curvature > 0.0 else 0.0
     value = problem.objective_value()
-    shares = [float(slopes[_acting(basis, r.start, r.stop)].sum()) / max(float(slopes.sum()), 1e-300) for r in ranges]
+    shares = [
+        float(slopes[_acting(basis, r.start, r.stop)].sum()) / max(float(slopes.sum()), 1e-300) for r in intervals
+    ]
     counted = replace(
         search, evaluations=search.evaluations + 1, gradients=search.gradients + 1, products=search.products + 1
     )
-    found = (replace(r, gain=problem.gain(share * whole, value)) for r, share in zip(ranges, shares, strict=True))
-    return tuple(found), counted
+    measured = (replace(r, gain=problem.gain(share * total, value)) for r, share in zip(intervals, shares, strict=True))
+    return tuple(measured), counted
 
 
-def quiet_rows(ranges: Sequence[InactiveInterval]) -> list[Simplification]:
-    """What the user is told of them."""
+def interval_rows(intervals: Sequence[InactiveInterval]) -> list[Simplification]:
+    """The rows of the report about inactive intervals."""
     return [
         Simplification(
-            f"inactive interval from {_seconds(math.ceil(100 * item.start))} to {_seconds(int(100 * item.stop))}",
+            f"inactive interval from {_seconds(math.ceil(100 * r.start))} to {_seconds(int(100 * r.stop))}",
             "changes there would gain almost nothing",
-            item.gain,
+            r.gain,
         )
-        for item in ranges
+        for r in intervals
     ]
 
 

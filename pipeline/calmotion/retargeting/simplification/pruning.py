@@ -1,4 +1,4 @@
-"""Offsets that gain next to nothing, set to exactly zero: motors and ranges that the animator finds untouched."""
+"""Negligible offsets are set to exactly zero, so that their motors and intervals keep the animator's curves."""
 
 from __future__ import annotations
 
@@ -6,18 +6,18 @@ import numpy as np
 
 from calmotion.shot.character import Array, BoolArray
 
-UNCHANGED = 1e-5  # an offset that stays below this angle [rad] is none
+UNCHANGED = 1e-5  # largest offset that counts as zero [rad]
 BLOCK = 8  # neighbouring coefficients of a motor that vanish together; four already make a curve vanish
 
 
-def worthless(x: Array, motors: int, energy: Array, budget: float) -> BoolArray:
-    """Which coefficients to fix at zero.
+def negligible_coefficients(x: Array, motors: int, energy: Array, budget: float) -> BoolArray:
+    """Which coefficients can be fixed at zero within a budget.
 
     Args:
         x: Coefficients, ordered by basis function, then motor, shape [P * m].
         motors: m.
-        energy: x_b^T H_b x_b / 2 of each block, shape [blocks, m]: what the objective would lose without it.
-        budget: Most that all of them together may cost, in the objective.
+        energy: x_b^T H_b x_b / 2 of each block, shape [blocks, m]: increase of the objective if the block is zero.
+        budget: Largest increase of the objective, of all blocks together.
 
     Returns:
         Shape [P * m].
@@ -32,7 +32,7 @@ def worthless(x: Array, motors: int, energy: Array, budget: float) -> BoolArray:
 
 
 def block_energies(x: Array, motors: int, product: Array) -> Array:
-    """|x_b^T (M x)_b| / 2 of each block, shape [blocks, m]: their energies where M couples neighbours little.
+    """|x_b^T (M x)_b| / 2 of each block, shape [blocks, m]: their energies if M couples blocks weakly.
 
     Args:
         x: Coefficients, ordered by basis function, then motor, shape [P * m].
@@ -43,4 +43,5 @@ def block_energies(x: Array, motors: int, product: Array) -> Array:
     blocks = -(-count // BLOCK)
     padded = np.zeros((blocks * BLOCK, motors))
     padded[:count] = np.abs(x * product).reshape(count, motors)
-    return 0.5 * padded.reshape(blocks, BLOCK, motors).sum(axis=1)
+    energies: Array = 0.5 * padded.reshape(blocks, BLOCK, motors).sum(axis=1)
+    return energies

@@ -1,4 +1,4 @@
-"""What a search left out, and what that costs: ranges, knots, motors."""
+"""The rows of the report about the simplifications of a search: inactive intervals, knots, motors."""
 
 from __future__ import annotations
 
@@ -8,30 +8,30 @@ import numpy as np
 
 from calmotion.retargeting.problem.problem import RetargetProblem
 from calmotion.retargeting.simplification.idle_motors import idle_motors
-from calmotion.retargeting.simplification.inactive_intervals import InactiveInterval, quiet_rows
+from calmotion.retargeting.simplification.inactive_intervals import InactiveInterval, interval_rows
 from calmotion.shot import Character, MotorCurve, Simplification
 from calmotion.simulation.settings import Options
 
-FINER = 0.01  # of the tolerance: what finer knots must promise
-PRUNED = 0.02  # of the tolerance: what offsets that are dropped may cost together
+FINER = 0.01  # share of the tolerance that finer knots must gain
+PRUNED = 0.02  # share of the tolerance that the removed offsets may cost together
 
 
 def search_rows(
-    problem: RetargetProblem, character: Character, curves: Sequence[MotorCurve], quiet: Sequence[InactiveInterval],
+    problem: RetargetProblem, character: Character, curves: Sequence[MotorCurve], inactive: Sequence[InactiveInterval],
     options: Options, idle_gain_m: float | None,
 ) -> list[Simplification]:  # fmt: skip
     """The rows of a search that ended.
 
     Args:
-        problem: On the knots of its end.
+        problem: On the final knots.
         curves: Of all motors.
-        quiet: Ranges that were left out.
-        options: With what was asked for.
-        idle_gain_m: What idle motors promise [m]; None where there are none.
+        inactive: The inactive intervals.
+        options: Of the run.
+        idle_gain_m: Gain that idle motors would bring [m]; None where there are none.
     """
     tolerance = character.retarget.allowed(options.tolerance)
     idle = idle_motors(character)
-    rows = [*quiet_rows(quiet), _knots_row(problem, character, options)]
+    rows = [*interval_rows(inactive), _knots_row(problem, character, options)]
     rows += [
         Simplification(
             character.motors[k].path + ": not optimised", "it moves no target; the error is its possible gain", gain
@@ -51,7 +51,7 @@ def search_rows(
 
 
 def _knots_row(problem: RetargetProblem, character: Character, options: Options) -> Simplification:
-    """Why knots are no closer than they are."""
+    """The closest distance of knots, and its reason."""
     closest = float(np.diff(problem.space.basis.knots).min())
     what = f"knots at least {1e3 * closest:.3g} ms apart"
     if options.knot_spacing:
@@ -59,4 +59,4 @@ def _knots_row(problem: RetargetProblem, character: Character, options: Options)
     if character.retarget.knot_spacing:
         return Simplification(what, "given by calm:retarget:knotSpacing")
     tolerance = character.retarget.allowed(options.tolerance)
-    return Simplification(what, f"finer knots promise less than {FINER:.0%} of the tolerance", FINER * tolerance)
+    return Simplification(what, f"finer knots would gain less than {FINER:.0%} of the tolerance", FINER * tolerance)

@@ -1,8 +1,8 @@
-"""A good start where the input shakes wildly: the same problem on a robot that is damped more and more lightly.
+"""Damping homotopy: a start for inputs with large vibrations, from solutions with less and less damping.
 
-The curves that are sought do not excite vibration, so damping hardly matters to them; but about a motion that shakes
-by a large angle the linearised robot says little of the real one. Solutions with strong damping take few products,
-and each is a start for the next.
+Damping hardly affects the optimal curves, since these excite no vibration. It affects the search: about a motion that
+vibrates with a large amplitude the linearisation is poor. Problems with strong damping need few products, and each
+solution is the start of the next problem.
 """
 
 from __future__ import annotations
@@ -14,18 +14,20 @@ from calmotion.retargeting.solver.gauss_newton import Search, minimize
 from calmotion.retargeting.solver.recycling import Recycled
 from calmotion.shot.character import Array, BoolArray
 
-FAR = 0.1  # error over the lever of the motor that moves targets most [rad], from which on it is worth it
-DAMPING = (0.2, 0.05)  # of the lowest mode, ratios of critical
-GAIN = 1e-3  # that ends a stage, over the error at its start
-STEPS = 5  # of a stage at most
+FAR = 0.1  # error over the largest lever arm of a motor [rad] from which the homotopy is used
+DAMPING = (0.2, 0.05)  # damping ratios of the lowest mode
+GAIN = 1e-3  # predicted gain that ends a stage, relative to the error at its start
+STEPS = 5  # most iterations of a stage
 
 
 def damping_homotopy(problem: RetargetProblem, start: Array, fixed: BoolArray, frequency: float) -> Search:
-    """A search that begins at the given point, or near the optimum where that is far.
+    """A search that begins at the given point, or at the result of the homotopy if the error there is large.
 
     Args:
         problem: Evaluated last at the start.
-        frequency: The lowest one of the character [Hz].
+        start: Shape [n].
+        fixed: Unknowns that keep their values, shape [n].
+        frequency: Lowest frequency of the character [Hz].
     """
     evaluations = gradients = products = 0
     x = start
@@ -34,11 +36,11 @@ def damping_homotopy(problem: RetargetProblem, start: Array, fixed: BoolArray, f
             damped = problem.damped(ratio, frequency)
             if not np.isfinite(damped.value(x)):
                 continue
-            found = minimize(damped, Search.start(x), fixed, GAIN * damped.error, max_iterations=STEPS)
-            x = found.x
-            evaluations, gradients = evaluations + found.evaluations + 1, gradients + found.gradients
-            products += found.products
-        # a start that is no better, or cannot be simulated, was no start
+            stage = minimize(damped, Search.start(x), fixed, GAIN * damped.error, max_iterations=STEPS)
+            x = stage.x
+            evaluations, gradients = evaluations + stage.evaluations + 1, gradients + stage.gradients
+            products += stage.products
+        # a result that is no better, or cannot be simulated, is not used
         reached, before = problem.value(x), problem.value(start)
         evaluations += 2
         x = x if reached < before else start

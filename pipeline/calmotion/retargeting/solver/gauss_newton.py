@@ -8,18 +8,18 @@ from typing import Protocol
 
 import numpy as np
 
-from calmotion.retargeting.solver.limited_step import LimitedStep
+from calmotion.retargeting.solver.limited_step import LimitedProblem, LimitedStep, limited_step
 from calmotion.retargeting.solver.recycling import Recycled
 from calmotion.retargeting.solver.truncated_cg import Path, conjugate_gradients
 from calmotion.shot.character import Array, BoolArray
 
 PAIRS = 24  # directions that are kept for the next system
-TRIES = 10  # smaller and smaller steps before an iteration gives up
-SHARE = 0.01  # of an iteration's decrease, that it may leave to the next one
-ACCEPTED = 0.05  # least share of the predicted decrease that a step must bring
+TRIES = 10  # most reductions of a step in one iteration
+SHARE = 0.01  # share of the decrease of an iteration at which conjugate gradients end
+ACCEPTED = 0.05  # smallest share of the predicted decrease for a step to be accepted
 
 
-class LeastSquares(Protocol):
+class LeastSquares(LimitedProblem, Protocol):
     """A problem min G(x), G = 1/2 |r(x)|^2 + quadratic, that can be linearised where it was last evaluated."""
 
     def value(self, x: Array) -> float:
@@ -31,27 +31,21 @@ class LeastSquares(Protocol):
     def product(self, direction: Array) -> Array:
         """Gauss-Newton matrix times a direction."""
 
-    def precondition(self, fixed: BoolArray) -> Callable[[Array], Array]:
-        """An approximate inverse of the Gauss-Newton matrix, for the entries that are not fixed."""
-
     @property
     def limits_act(self) -> bool:
         """Whether limits are part of the merit now, so that `limited_step` finds the step."""
-
-    def limited_step(self, fixed: BoolArray, share: float, enough: float, max_products: int) -> LimitedStep:
-        """The step to the minimum of the model with limits; may change the merit."""
 
     def merit(self) -> float:
         """The merit at the point evaluated last, as it is now."""
 
     def gain(self, decrease: float, value: float) -> float:
-        """What a decrease of the merit is worth, in a measure that the user knows [m]."""
+        """Decrease of the root-mean-square error that corresponds to a decrease of the merit [m]."""
 
     def worth(self, gain: float) -> float:
-        """The decrease of the merit that is worth so much, at the point evaluated last."""
+        """Decrease of the merit that corresponds to a gain [m], at the point evaluated last."""
 
     def tighten(self) -> bool:
-        """Called at a minimum: whether the merit was changed, so that the search goes on (limits not yet kept)."""
+        """Called at a minimum: whether the merit changed because limits are violated, so that the search continues."""
 
 
 @dataclass(frozen=True)
@@ -70,15 +64,15 @@ class Iterate:
 
 @dataclass(frozen=True, eq=False)
 class Search:
-    """Where a search stands between two iterations; it goes on from here as if it had not stopped.
+    """State of a search between two iterations; a search that resumes from it gives the same result.
 
     Attributes:
         x: The best point, shape [n].
         radius: Of the trust region.
-        recycled: What earlier systems taught.
+        recycled: Search directions of earlier linear systems.
         history: Iterates so far, first the start.
         evaluations, gradients, products: Counts.
-        reason: Why it ended; empty while it has not.
+        reason: Why it ended; empty while it runs.
     """
 
     x: Array
@@ -131,10 +125,10 @@ def minimize(
     """Minimise over the entries that are not fixed.
 
     Args:
-        search: Where to begin or to go on.
+        search: State to begin or to resume from.
         fixed: Entries that keep their values, shape [n].
-        gain: A predicted gain of less ends the search [m].
-        max_iterations: Most iterations, those of earlier parts of the search included.
+        gain: A smaller predicted gain ends the search [m].
+        max_iterations: Most iterations, including those of the state.
         max_products: Most products of one iteration.
         on_iterate: Called with the search after every iteration.
     """
@@ -155,7 +149,7 @@ def minimize(
         norm = float(np.linalg.norm(gradient))
         enough = problem.worth(gain)
         if problem.limits_act:
-            limited = problem.limited_step(fixed, SHARE, enough, max_products)
+            limited = limited_step(problem, fixed, SHARE, enough, max_products)
             calls.products += limited.products
             value, predicted = problem.merit(), limited.predicted(1.0)
         else:
@@ -173,7 +167,7 @@ def minimize(
                 better = _step(calls, x, value, path, radius)
         if better is None:
             if expected >= gain:
-                calls.value(x)  # steps that failed were evaluated last
+                calls.value(x)  # the point evaluated last is that of a rejected step
             if problem.tighten():
                 value, radius = problem.merit(), np.inf
                 if on_iterate is not None:
@@ -186,29 +180,29 @@ def minimize(
 
 
 def _limited_step(calls: _Counter, x: Array, value: float, limited: LimitedStep) -> tuple[Array, float, float] | None:
-    """The same where limits act: as much of the step as the simulation agrees with."""
+    """The same under limits: the step is shortened until the simulation agrees with the model."""
     t = 1.0
     for _ in range(TRIES):
-        found, predicted = calls.value(x + t * limited.step), limited.predicted(t)
-        if predicted > 0.0 and value - found > ACCEPTED * predicted:
-            return x + t * limited.step, found, np.inf
+        merit, predicted = calls.value(x + t * limited.step), limited.predicted(t)
+        if predicted > 0.0 and value - merit > ACCEPTED * predicted:
+            return x + t * limited.step, merit, np.inf
         t *= 0.3
     return None
 
 
 def _step(calls: _Counter, x: Array, value: float, path: Path, radius: float) -> tuple[Array, float, float] | None:
-    """The point that a step within the region leads to, its merit, and the next region; None where none is better."""
+    """The point after a step in the trust region, its merit and the next radius; None if no step is accepted."""
     size = radius
     for _ in range(TRIES):
         step, predicted, length = path.within(size)
         if not predicted > 0.0:
             return None
-        found = calls.value(x + step)
-        share = (value - found) / predicted
+        merit = calls.value(x + step)
+        share = (value - merit) / predicted
         if share > ACCEPTED:
             if share < 0.25:
-                return x + step, found, 0.5 * length
+                return x + step, merit, 0.5 * length
             grown = length >= 0.99 * size and share > 0.7
-            return x + step, found, 2.5 * length if grown else max(size, 2.0 * length)
-        size = (0.1 if not np.isfinite(found) else 0.25) * length
+            return x + step, merit, 2.5 * length if grown else max(size, 2.0 * length)
+        size = (0.1 if not np.isfinite(merit) else 0.25) * length
     return None

@@ -1,8 +1,9 @@
 """A Gauss-Newton step under limits: the convex model of objective and limits, minimised without simulating.
 
 With residuals r + J s and limited quantities v + A s linear in the step s, the model is piecewise quadratic. Semismooth
-Newton finds its minimum: conjugate gradients for the limits that act, an exact search along their solution, and again
-with those that act there. Multipliers are updated inside the model, so that its minimum keeps the limits.
+Newton finds its minimum: conjugate gradients with the active limits fixed, an exact line search along the solution,
+and again with the limits that are active there. Multipliers are updated inside the model, so that its minimum keeps
+the limits.
 """
 
 from __future__ import annotations
@@ -18,14 +19,14 @@ from calmotion.shot.character import Array, BoolArray
 
 Values = dict[str, Array]
 
-INNER = 20  # solutions with other limits acting, at most
-MOST = 8  # times the products of one solution, for all of them
-FAR = 4.0  # the farthest that a search goes along one solution
+INNER = 20  # most Newton iterations
+MOST = 8  # most products of all iterations, over those of one
+FAR = 4.0  # longest step of a line search, over the Newton step
 
 
 @dataclass(eq=False)
 class ModelPoint:
-    """A point of the model: the step, what it does to residuals and limited quantities."""
+    """A point of the model: step, residuals and limited quantities; or a direction, with their changes."""
 
     step: Array
     residuals: Array
@@ -91,9 +92,9 @@ class LimitedStep:
 
     Attributes:
         step: Shape [n].
-        products: How many it took.
+        products: Number of products with the Gauss-Newton matrix.
         predicted: Decrease of the merit that the model predicts for a share of the step.
-        eased: Decrease of the objective alone, without what limits add to it.
+        eased: Decrease of the objective, without the terms of the limits.
     """
 
     step: Array
@@ -129,12 +130,12 @@ class LimitedModel:
         regularized = self.problem.penalty_gradient(self.problem.x + point.step)
         return self.problem.vjp(point.residuals, pulls) + regularized
 
-    def slope(self, point: ModelPoint, way: ModelPoint) -> float:
+    def slope(self, point: ModelPoint, direction: ModelPoint) -> float:
         """Slope of the merit along a direction."""
         regularized = self.problem.penalty_gradient(self.problem.x + point.step)
-        slope = float(np.sum(point.residuals * way.residuals)) + float(way.step @ regularized)
+        slope = float(np.sum(point.residuals * direction.residuals)) + float(direction.step @ regularized)
         return slope + sum(
-            float(np.sum(self.limits.gradient(name, v) * way.values[name])) for name, v in point.values.items()
+            float(np.sum(self.limits.gradient(name, v) * direction.values[name])) for name, v in point.values.items()
         )
 
 
@@ -150,67 +151,67 @@ def limited_step(
         max_products: Most products of one solution.
     """
     model = LimitedModel(problem)
-    start = here = model.start
+    start = point = model.start
     gained, products = 0.0, 0
     for _ in range(INNER):
-        gradient = np.where(fixed, 0.0, model.gradient(here))
-        way, used = _newton_direction(model, here, gradient, fixed, share, enough, max_products)
+        gradient = np.where(fixed, 0.0, model.gradient(point))
+        direction, used = _newton_direction(model, point, gradient, fixed, share, enough, max_products)
         products += used
-        t = _line_search(model, here, way)
-        before = model.merit(here)
-        here = here.moved(way, t)
-        decrease = before - model.merit(here)
+        t = _line_search(model, point, direction)
+        before = model.merit(point)
+        point = point.moved(direction, t)
+        decrease = before - model.merit(point)
         gained += decrease
         if products > MOST * max_products:
             break
-        if decrease <= max(enough, share * gained) and not model.limits.update(here.values):
+        if decrease <= max(enough, share * gained) and not model.limits.update(point.values):
             break
 
     def predicted(t: float) -> float:
         there = ModelPoint(
-            t * here.step,
-            start.residuals + t * (here.residuals - start.residuals),
-            {name: v + t * (here.values[name] - v) for name, v in start.values.items()},
+            t * point.step,
+            start.residuals + t * (point.residuals - start.residuals),
+            {name: v + t * (point.values[name] - v) for name, v in start.values.items()},
         )
         return model.merit(start) - model.merit(there)
 
-    return LimitedStep(here.step, products, predicted, model.objective(start) - model.objective(here))
+    return LimitedStep(point.step, products, predicted, model.objective(start) - model.objective(point))
 
 
 def _newton_direction(
-    model: LimitedModel, here: ModelPoint, gradient: Array, fixed: BoolArray, share: float, enough: float,
+    model: LimitedModel, point: ModelPoint, gradient: Array, fixed: BoolArray, share: float, enough: float,
     max_products: int,
 ) -> tuple[ModelPoint, int]:  # fmt: skip
-    """To the minimum of the model in which the limits that act here are all that do, and the products it took."""
+    """Direction to the minimum of the model with the active limits fixed, and the number of its products."""
     problem = model.problem
-    weights = {name: model.limits.curvature(name, v) for name, v in here.values.items()}
-    carried: list[tuple[Array, Values]] = []
+    weights = {name: model.limits.curvature(name, v) for name, v in point.values.items()}
+    changes: list[tuple[Array, Values]] = []
 
     def product(d: Array) -> Array:
         residuals, values = problem.jvp(d)
-        carried.append((residuals, values))
+        changes.append((residuals, values))
         weighted = {name: weights[name] * v for name, v in values.items()}
         return np.where(fixed, 0.0, problem.vjp(residuals, weighted) + problem.penalty_gradient(d))
 
-    inverse = problem.precondition(fixed, here.values)
+    inverse = problem.precondition(fixed, point.values)
     path = conjugate_gradients(product, gradient, inverse, np.inf, share, enough, max_products)
-    way = ModelPoint(
-        path.steps[-1], np.zeros_like(here.residuals), {name: np.zeros_like(v) for name, v in here.values.items()}
+    direction = ModelPoint(
+        path.steps[-1], np.zeros_like(point.residuals), {name: np.zeros_like(v) for name, v in point.values.items()}
     )
-    for k, (residuals, values) in enumerate(carried[: len(path.p)]):
+    for k, (residuals, values) in enumerate(changes[: len(path.p)]):
         along = path.p[k]
         a = float(along @ (path.steps[k + 1] - path.steps[k])) / float(along @ along)
-        way.residuals += a * residuals
+        direction.residuals += a * residuals
         for name, v in values.items():
-            way.values[name] += a * v
-    return way, len(carried)
+            direction.values[name] += a * v
+    return direction, len(changes)
 
 
-def _line_search(model: LimitedModel, here: ModelPoint, way: ModelPoint) -> float:
-    """Where the model is least along a direction: its slope grows, so bisection finds where it vanishes."""
+def _line_search(model: LimitedModel, point: ModelPoint, direction: ModelPoint) -> float:
+    """The minimum of the model along a direction, by bisection of its slope, which increases."""
 
     def slope(t: float) -> float:
-        return model.slope(here.moved(way, t), way)
+        return model.slope(point.moved(direction, t), direction)
 
     low, high = 0.0, 1.0
     while slope(high) < 0.0 and high < FAR:

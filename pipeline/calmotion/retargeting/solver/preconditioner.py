@@ -15,8 +15,8 @@ class BandedGram:
     """Sums of `sum_n b_n b_n^T (x) W_n` over rows b_n of spline matrices, unknowns ordered by basis function, then
     motor; block-banded, since at any time only DEGREE + 1 functions act.
 
-    Functions that go round in a loop are put in the order first, last, second, last but one ... so that neighbours
-    stay near each other across the seam.
+    Periodic functions are ordered first, last, second, last but one ..., so that neighbours across the seam stay close
+    in the order.
     """
 
     def __init__(self, count: int, motors: int, wraps: bool = False):
@@ -24,7 +24,7 @@ class BandedGram:
         Args:
             count: Number of basis functions.
             motors: Unknowns of each.
-            wraps: Whether they go round in a loop.
+            wraps: Whether the functions are periodic.
         """
         functions = np.arange(count)
         folded = np.where(2 * functions < count, 2 * functions, 2 * (count - functions) - 1)
@@ -80,7 +80,7 @@ def _rows(basis: csr_matrix) -> tuple[IntArray, Array]:
 
 
 class RigidPreconditioner:
-    """Banded Cholesky factor of `B^T (J^T W J) B + penalty` and of what limits add to it."""
+    """Banded Cholesky factor of `B^T (J^T W J) B + penalty`, plus the terms of the limits."""
 
     def __init__(self, response: RigidResponse, weights: Array, basis: OffsetBasis, penalty: csr_matrix):
         """
@@ -99,23 +99,23 @@ class RigidPreconditioner:
         self._banded = gram.banded()
         self._scale = float(np.max(self._banded[0]))
 
-    def factor(self, fixed: BoolArray, more: list[tuple[csr_matrix, Array]] | None = None) -> None:
-        """Factorise with the unknowns where `fixed` (shape [P * M], bool) is true left out.
+    def factor(self, fixed: BoolArray, terms: list[tuple[csr_matrix, Array]] | None = None) -> None:
+        """Factorise with the unknowns where `fixed` (shape [P * M], bool) is true excluded.
 
         Args:
-            more: Spline matrices and metrics of further terms, as `BandedGram.add` takes them.
+            terms: Spline matrices and metrics of the limits, as `BandedGram.add` takes them.
         """
         banded = self._banded.copy()
-        if more:
+        if terms:
             gram = BandedGram(*self._shape)
-            for basis, metric in more:
+            for basis, metric in terms:
                 gram.add(basis, metric)
             banded += gram.banded()
         fixed = fixed[self._order]
         for d in range(1, len(banded)):
             banded[d, : banded.shape[1] - d] *= ~fixed[d:]
         banded[:, fixed] = 0.0
-        # directions that no target sees get a floor, so that the factor exists
+        # a small diagonal, so that the factor exists for directions that move no target
         banded[0] += max(1e-9 * self._scale, 1e-12 * float(np.max(banded[0])))
         banded[0, fixed] = 1.0
         self._factor = cholesky_banded(banded, lower=True)

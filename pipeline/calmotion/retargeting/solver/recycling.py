@@ -1,4 +1,4 @@
-"""What conjugate gradients learned about one Gauss-Newton matrix, kept to precondition the next one."""
+"""Search directions of conjugate gradients, recycled to precondition the next Gauss-Newton matrix."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class Recycled:
 
     @classmethod
     def none(cls, size: int) -> Recycled:
-        """Nothing learned."""
+        """No pairs."""
         return cls(np.zeros((0, size)), np.zeros((0, size)))
 
     def inverse(self, base: Callable[[Array], Array]) -> Callable[[Array], Array]:
@@ -46,7 +46,7 @@ class Recycled:
         return apply
 
     def followed_by(self, p: Array, Hp: Array, most: int) -> Recycled:
-        """The pairs of a new solution, evenly chosen; the old ones stay while there is room."""
+        """With the pairs of a new solution, evenly sampled, and the newest old pairs up to `most` in all."""
         good = np.einsum("ij,ij->i", p, Hp) > 0.0
         p, Hp = p[good], Hp[good]
         if len(p) > most:

@@ -1,4 +1,4 @@
-"""Conjugate gradients for the model of a trust region, with the whole way kept: a smaller region costs no product."""
+"""Truncated conjugate gradients in a trust region; all iterates are kept, so that a smaller region costs no product."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 
 from calmotion.shot.character import Array
 
-_LEFT = 1.5  # r P^-1 r times this bounds the decrease that is left
+_LEFT = 1.5  # r P^-1 r times this bounds the remaining decrease
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,11 +32,11 @@ class Path:
 
     @property
     def length(self) -> float:
-        """Length of the whole way."""
+        """Length of the last step."""
         return float(self.lengths[-1])
 
     def within(self, radius: float) -> tuple[Array, float, float]:
-        """The step that reaches a radius, or the last one; the decrease that the model predicts, and its length."""
+        """The step to the boundary of a trust region or the last step, its predicted decrease, and its length."""
         k = int(np.searchsorted(self.lengths, radius))
         if k >= len(self.lengths):
             step, curved, length = self.steps[-1], self.curved[-1], self.length
@@ -56,17 +56,17 @@ def conjugate_gradients(
 ) -> Path:  # fmt: skip
     """Minimise g s + s H s / 2 by preconditioned conjugate gradients (Steihaug 1983).
 
-    With r the residual and P the preconditioner, r P^-1 r / 2 is the decrease that is left where P is H; it was never
-    found to be less than a third of what is left, so it says when to end: where too little is left to matter. The
-    decrease of a step says nothing, it stalls on stiff directions first.
+    With r the residual and P the preconditioner, r P^-1 r / 2 is the remaining decrease if P is H. In all measurements
+    it was at least a third of the remaining decrease, so it is the criterion to end. The decrease of single steps is no
+    criterion: it stalls on stiff directions first.
 
     Args:
         product: H times a vector.
         gradient: g, shape [n].
         inverse: The preconditioner.
         radius: Of the trust region, in the preconditioner's metric.
-        share: Ends where less than this share of the decrease so far is left.
-        enough: Ends where a decrease of less than this is left.
+        share: Ends when the remaining decrease is below this share of the decrease so far.
+        enough: Ends when the remaining decrease is below this value.
         limit: Most products.
     """
     n = len(gradient)
