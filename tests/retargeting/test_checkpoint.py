@@ -10,13 +10,9 @@ from calmotion.retargeting.optimize import optimize_shot
 from calmotion.retargeting.problem import adaptive_knots
 from calmotion.retargeting.problem.problem import RetargetProblem
 from calmotion.simulation.prepare import Options
-from posed import jerking, make_problem
+from posed import ignore_progress, jerking, make_problem
 
 OPTIONS = Options(step=1 / 240)
-
-
-def quiet(fraction, message):
-    pass
 
 
 @pytest.fixture(scope="module")
@@ -28,7 +24,7 @@ def limited(arm):
 
 @pytest.fixture(scope="module")
 def whole(limited, animation, bodies):
-    return optimize_shot(limited, animation, bodies, OPTIONS, quiet)
+    return optimize_shot(limited, animation, bodies, OPTIONS, ignore_progress)
 
 
 class Killed(Exception):
@@ -56,9 +52,9 @@ def test_a_killed_search_ends_at_the_same_result(
     with monkeypatch.context() as patch:
         stopping(patch, evaluations, Killed())
         with pytest.raises(Killed):
-            optimize_shot(limited, animation, bodies, OPTIONS, quiet, path)
+            optimize_shot(limited, animation, bodies, OPTIONS, ignore_progress, path)
     assert path.exists() == (evaluations > 3)
-    again = optimize_shot(limited, animation, bodies, OPTIONS, quiet, path)
+    again = optimize_shot(limited, animation, bodies, OPTIONS, ignore_progress, path)
     assert again.objective_after == pytest.approx(whole.objective_after, rel=1e-9)
     for one, other in zip(again.curves, whole.curves, strict=True):
         assert np.abs(one.frame_values - other.frame_values).max() < 1e-9
@@ -71,12 +67,12 @@ def test_a_search_that_was_killed_on_finer_knots_goes_on_with_them(
 ):  # fmt: skip
     monkeypatch.setattr(adaptive_knots, "FIRST", 0.1)
     path = tmp_path / "kept.npz"
-    direct = optimize_shot(arm, jerking(), bodies, OPTIONS, quiet)
+    direct = optimize_shot(arm, jerking(), bodies, OPTIONS, ignore_progress)
     with monkeypatch.context() as patch:
         stopping(patch, evaluations, Killed())
         with pytest.raises(Killed):
-            optimize_shot(arm, jerking(), bodies, OPTIONS, quiet, path)
-    again = optimize_shot(arm, jerking(), bodies, OPTIONS, quiet, path)
+            optimize_shot(arm, jerking(), bodies, OPTIONS, ignore_progress, path)
+    again = optimize_shot(arm, jerking(), bodies, OPTIONS, ignore_progress, path)
     assert again.parameters == direct.parameters
     assert again.objective_after == pytest.approx(direct.objective_after, rel=1e-9)
     for one, other in zip(again.curves, direct.curves, strict=True):
@@ -88,17 +84,17 @@ def test_an_interrupt_keeps_the_best_so_far(limited, animation, bodies, whole, t
     path = tmp_path / "kept.npz"
     with monkeypatch.context() as patch:
         stopping(patch, 4, KeyboardInterrupt())
-        early = optimize_shot(limited, animation, bodies, OPTIONS, quiet, path)
+        early = optimize_shot(limited, animation, bodies, OPTIONS, ignore_progress, path)
     assert early.interrupted and early.stopped == "interrupted" and not whole.interrupted
     assert early.objective_before > early.objective_after
     assert any(curve.changed for curve in early.curves)
-    late = optimize_shot(limited, animation, bodies, OPTIONS, quiet, path)
+    late = optimize_shot(limited, animation, bodies, OPTIONS, ignore_progress, path)
     assert late.objective_after == pytest.approx(whole.objective_after, rel=1e-9) and not late.interrupted
 
 
 def test_what_another_problem_left_is_not_used(limited, animation, bodies, tmp_path, monkeypatch):
     path = tmp_path / "kept.npz"
-    optimize_shot(limited, animation, bodies, OPTIONS, quiet, path)
+    optimize_shot(limited, animation, bodies, OPTIONS, ignore_progress, path)
     started = []
     find = search.minimize
 
@@ -108,11 +104,11 @@ def test_what_another_problem_left_is_not_used(limited, animation, bodies, tmp_p
 
     monkeypatch.setattr(search, "minimize", watched)
     other = dataclasses.replace(limited, gravity=0.9 * limited.gravity)
-    optimize_shot(other, animation, bodies, OPTIONS, quiet, path)
+    optimize_shot(other, animation, bodies, OPTIONS, ignore_progress, path)
     assert started[0] == 0
     path.write_bytes(b"torn")
     started.clear()
-    optimize_shot(limited, animation, bodies, OPTIONS, quiet, path)
+    optimize_shot(limited, animation, bodies, OPTIONS, ignore_progress, path)
     assert started[0] == 0
 
 

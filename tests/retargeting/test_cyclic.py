@@ -11,13 +11,10 @@ from calmotion.shot import Animation, FreeTrack, Track
 from calmotion.simulation.bodies import reduce_bodies
 from calmotion.simulation.prepare import Options
 from calmotion.simulation.simulate import simulate_shot
+from posed import ignore_progress
 
 OPTIONS = Options(step=1 / 240)
 FRAMES = np.arange(37) / 24.0
-
-
-def quiet(fraction, message):
-    pass
 
 
 @pytest.fixture(scope="module")
@@ -35,7 +32,7 @@ def dance():
 
 @pytest.fixture(scope="module")
 def result(looping, dance, bodies):
-    return optimize_shot(looping, dance, bodies, OPTIONS, quiet)
+    return optimize_shot(looping, dance, bodies, OPTIONS, ignore_progress)
 
 
 def test_a_loop_is_calm_and_closes(result):
@@ -53,7 +50,7 @@ def test_a_loop_is_calm_and_closes(result):
 
 def test_written_curves_simulated_again_give_the_reported_errors(result, looping, dance, bodies):
     tracks = tuple(Track(FRAMES, curve.frame_values) for curve in result.curves)
-    again = simulate_shot(looping, Animation(FRAMES, dance.tracks, tracks), bodies, OPTIONS, quiet)
+    again = simulate_shot(looping, Animation(FRAMES, dance.tracks, tracks), bodies, OPTIONS, ignore_progress)
     assert np.abs(again.before.position_errors - result.after.position_errors).max() < 1e-8
 
 
@@ -64,14 +61,14 @@ def test_it_is_what_a_well_damped_robot_comes_to_in_many_loops(looping, dance, m
     damped = tuple(dataclasses.replace(body, flexible=flexible) if body.flexible else body for body in looping.bodies)
     character = dataclasses.replace(looping, bodies=damped)
     bodies = reduce_bodies(character, span_tree(character), meshes)
-    found = simulate_shot(character, dance, bodies, OPTIONS, quiet)
+    found = simulate_shot(character, dance, bodies, OPTIONS, ignore_progress)
     loops, frames = 8, len(FRAMES) - 1
     times = np.arange(loops * frames + 1) / 24.0
     tracks = tuple(
         Track(times, np.append(np.tile(track.values[:-1], loops), track.values[-1])) for track in dance.tracks
     )
     once = dataclasses.replace(character, retarget=dataclasses.replace(character.retarget, cyclic=False))
-    long = simulate_shot(once, Animation(times, tracks, tracks), bodies, OPTIONS, quiet)
+    long = simulate_shot(once, Animation(times, tracks, tracks), bodies, OPTIONS, ignore_progress)
     # the last loop but one: the interpolant of the last ends differently
     last = long.before.motion.target_positions[-721:-360]
     assert np.abs(last - found.before.motion.target_positions).max() < 1e-5
@@ -80,16 +77,16 @@ def test_it_is_what_a_well_damped_robot_comes_to_in_many_loops(looping, dance, m
 
 def test_what_a_loop_cannot_do_is_refused(looping, dance, bodies):
     with pytest.raises(ShotError, match="only bdf2 simulates") as error:
-        simulate_shot(looping, dance, bodies, dataclasses.replace(OPTIONS, integrator="newmark"), quiet)
+        simulate_shot(looping, dance, bodies, dataclasses.replace(OPTIONS, integrator="newmark"), ignore_progress)
     assert error.value.attribute == "--integrator"
     with pytest.raises(ShotError, match="ease into") as error:
-        simulate_shot(looping, dance, bodies, dataclasses.replace(OPTIONS, pre_roll=0.5), quiet)
+        simulate_shot(looping, dance, bodies, dataclasses.replace(OPTIONS, pre_roll=0.5), ignore_progress)
     assert error.value.attribute == "--pre-roll"
 
 
 def test_a_range_locked_at_the_seam_is_locked_on_both_sides_of_it(looping, dance, bodies):
     locks = (FreeTrack(0, np.array([0.0, 0.1]), np.array([False, True])),)
-    found = optimize_shot(looping, dataclasses.replace(dance, free=locks), bodies, OPTIONS, quiet)
+    found = optimize_shot(looping, dataclasses.replace(dance, free=locks), bodies, OPTIONS, ignore_progress)
     values, meant = found.curves[0].frame_values, dance.tracks[0].values
     assert np.abs((values - meant)[[0, 1, 2, -1]]).max() < 1e-12 and np.abs(values - meant).max() > 1e-4
 
@@ -98,7 +95,7 @@ def test_a_loop_that_does_not_close_is_refused(looping, dance, bodies):
     values = dance.tracks[1].values + np.linspace(0.0, 0.05, len(FRAMES))
     tracks = (dance.tracks[0], Track(FRAMES, values))
     with pytest.raises(ShotError, match="not its first again") as error:
-        simulate_shot(looping, Animation(FRAMES, tracks, tracks), bodies, OPTIONS, quiet)
+        simulate_shot(looping, Animation(FRAMES, tracks, tracks), bodies, OPTIONS, ignore_progress)
     assert error.value.path == "/Arm/Elbow" and "2.86 degrees" in str(error.value) and error.value.remedy
 
 
@@ -108,7 +105,7 @@ def test_whole_turns_of_a_loop_are_no_jump(looping, dance, bodies):
     tracks = (Track(FRAMES, w * FRAMES), dance.tracks[1])
     joints = (dataclasses.replace(looping.joints[0], lower=-np.inf, upper=np.inf), *looping.joints[1:])
     turning = dataclasses.replace(looping, joints=joints)
-    found = simulate_shot(turning, Animation(FRAMES, tracks, tracks), bodies, OPTIONS, quiet)
+    found = simulate_shot(turning, Animation(FRAMES, tracks, tracks), bodies, OPTIONS, ignore_progress)
     assert found.before.seam.max() < 1e-3
     # the forearm feels the same pull all the way: its tip is off by the centrifugal stretch and the sway alone
     assert 1e-3 < found.before.position_errors[:, 1].max() < 0.2
@@ -120,5 +117,5 @@ def test_a_loop_that_is_not_found_says_what_to_do(looping, dance, bodies, monkey
     monkeypatch.setattr(periodic, "LIMIT", 1)
     for job in (simulate_shot, optimize_shot):
         with pytest.raises(ShotError, match="no periodic motion") as error:
-            job(looping, dance, bodies, OPTIONS, quiet)
+            job(looping, dance, bodies, OPTIONS, ignore_progress)
         assert error.value.attribute == "calm:retarget:cyclic" and "calm:damping:ratio" in error.value.remedy

@@ -8,12 +8,9 @@ from calmotion.retargeting.optimize import optimize_shot
 from calmotion.retargeting.solver.damping_homotopy import FAR, damping_homotopy
 from calmotion.retargeting.solver.gauss_newton import Search, minimize
 from calmotion.simulation.prepare import Options, modes_of, prepare
+from posed import ignore_progress
 
 OPTIONS = Options(step=1 / 120)
-
-
-def quiet(fraction, message):
-    pass
 
 
 @pytest.fixture(scope="module")
@@ -27,7 +24,7 @@ def largest(simulation):
 
 @pytest.fixture(scope="module")
 def result(shot):
-    return optimize_shot(shot.character, shot.animation, shot.bodies, OPTIONS, quiet)
+    return optimize_shot(shot.character, shot.animation, shot.bodies, OPTIONS, ignore_progress)
 
 
 def test_the_hand_that_was_off_by_a_quarter_of_a_metre_follows_to_a_few_millimetres(result):

@@ -17,14 +17,18 @@ from calmotion.simulation.target_errors import Objective
 FINE_FRAMES = np.arange(181) / 120.0
 
 
+def ignore_progress(fraction, message):
+    """A progress callback for runs whose progress is not tested."""
+
+
 def make_problem(character, bodies, animation, pre_roll=0.0, kept=False, limited=False, static=False, smoothness=1e-6):
     prepared = prepare(character, animation, bodies, Options(step=1 / 240, pre_roll=pre_roll))
     model, grid = prepared.model, prepared.grid
     curves = sample_curves(animation.tracks, grid)
-    meant = rigid_motion(model, curves.angles, curves.rates, grid.h)
+    intended = rigid_motion(model, curves.angles, curves.rates, grid.h)
     if static:
-        meant = static_motion(model, meant, curves.angles, grid.judged)
-    objective = Objective.over(model, meant.reference, grid, animation.weights)
+        intended = static_motion(model, intended, curves.angles, grid.judged)
+    objective = Objective.over(model, intended.reference, grid, animation.weights)
     basis = make_basis(grid, 0.1, kept)
     limits = LimitTerms(motor_bounds(character), grid.judged, grid.h, 3.0, on=True) if limited else None
     motors = np.arange(len(character.motors), dtype=np.int32)

@@ -14,12 +14,9 @@ from calmotion.retargeting.to_tolerance import optimize_to_tolerance
 from calmotion.shot.model_choice import ON
 from calmotion.simulation.bodies import reduce_bodies
 from calmotion.simulation.prepare import Options, load_envelopes
+from posed import ignore_progress
 
 FAST = Options(step=1 / 240)
-
-
-def quiet(fraction, message):
-    pass
 
 
 @pytest.fixture(scope="module")
@@ -39,12 +36,12 @@ def _marked(shot, forced=None):
 
 @pytest.fixture(scope="module")
 def lean(shot, bodies):
-    return optimize_shot(_marked(shot), shot.animation, bodies, FAST, quiet)
+    return optimize_shot(_marked(shot), shot.animation, bodies, FAST, ignore_progress)
 
 
 def test_a_head_stays_as_it_is_and_costs_little(shot, bodies, lean):
     assert list(idle_motors(_marked(shot))) == [2, 3]
-    every = optimize_shot(_marked(shot, {"motors": ON}), shot.animation, bodies, FAST, quiet)
+    every = optimize_shot(_marked(shot, {"motors": ON}), shot.animation, bodies, FAST, ignore_progress)
     assert [curve.changed for curve in lean.curves] == [True, True, False, False]
     assert lean.parameters < every.parameters and every.idle_gain_m is None
     unit = np.sqrt(2.0 * lean.objective_after / np.mean(lean.after.position_errors[lean.after.motion.judged] ** 2))
@@ -58,8 +55,8 @@ def test_a_head_stays_as_it_is_and_costs_little(shot, bodies, lean):
 
 def test_where_they_promise_much_the_search_goes_on_with_them(shot, bodies, monkeypatch):
     monkeypatch.setattr(to_tolerance, "ENOUGH", -1.0)
-    result = optimize_to_tolerance(_marked(shot), shot.animation, bodies, FAST, quiet)
+    result = optimize_to_tolerance(_marked(shot), shot.animation, bodies, FAST, ignore_progress)
     assert result.idle_gain_m is None
     assert not any("Nod" in row.what and "moves no target" in row.why for row in result.left_out)
-    kept = optimize_to_tolerance(_marked(shot), shot.animation, bodies, replace(FAST, motors="off"), quiet)
+    kept = optimize_to_tolerance(_marked(shot), shot.animation, bodies, replace(FAST, motors="off"), ignore_progress)
     assert kept.idle_gain_m is not None and kept.parameters < result.parameters

@@ -1,4 +1,4 @@
-"""Ranges that need no change are found, left out, and searched all the same where that would have gained something."""
+"""Inactive intervals: detected before the search, kept unchanged, and searched after all if that gains enough."""
 
 import dataclasses
 
@@ -19,14 +19,10 @@ from calmotion.retargeting.simplification.inactive_intervals import (
 from calmotion.shot import Animation, FreeTrack, Track
 from calmotion.simulation.prepare import Options
 from calmotion.simulation.simulator import Simulator
-from posed import jerking, looped, make_problem
+from posed import ignore_progress, jerking, looped, make_problem
 
 OPTIONS = Options(step=1 / 240)
 HELD, MOVE = 1.5, 0.9
-
-
-def quiet(fraction, message):
-    pass
 
 
 def ease(times, start, length):
@@ -62,20 +58,20 @@ def root_mean_square(result):
 
 @pytest.fixture(scope="module")
 def everywhere(arm, bodies):
-    return optimize_shot(still(arm), pausing(), bodies, dataclasses.replace(OPTIONS, ranges="on"), quiet)
+    return optimize_shot(still(arm), pausing(), bodies, dataclasses.replace(OPTIONS, ranges="on"), ignore_progress)
 
 
 def test_a_hold_before_a_move_is_left_out_and_costs_nothing(arm, bodies, everywhere, monkeypatch):
     simulated, run = [], Simulator.run
 
     def counted(self, angles, rates):
-        found = run(self, angles, rates)
+        motion = run(self, angles, rates)
         if self.model.system.size > 6:
-            simulated.append(found.trajectory)
-        return found
+            simulated.append(motion.trajectory)
+        return motion
 
     monkeypatch.setattr(Simulator, "run", counted)
-    result = optimize_shot(still(arm), pausing(), bodies, OPTIONS, quiet)
+    result = optimize_shot(still(arm), pausing(), bodies, OPTIONS, ignore_progress)
     tolerance = arm.retarget.allowed(None)
     assert not rows_of(everywhere)
     (row,) = rows_of(result)
@@ -103,14 +99,14 @@ def test_where_the_beginning_is_off_nothing_is_left_out_and_nothing_is_different
         animation = dataclasses.replace(animation, free=locks)
     with monkeypatch.context() as patch:
         patch.setattr(RetargetProblem, "hold", lambda self, first: (held.append(first), hold(self, first)))
-        result = optimize_shot(arm, animation, bodies, OPTIONS, quiet)
+        result = optimize_shot(arm, animation, bodies, OPTIONS, ignore_progress)
     assert not rows_of(result) and (max(held) > 0.5 * 240) == locked
     if not locked:
         assert result.after.position_errors[0, 1] < 0.5 * result.before.position_errors[0, 1]
     with monkeypatch.context() as patch:
         patch.setattr(RetargetProblem, "hold", lambda self, first: None)
         patch.setattr(search, "inactive_intervals", lambda *a: ())
-        plain = optimize_shot(arm, animation, bodies, OPTIONS, quiet)
+        plain = optimize_shot(arm, animation, bodies, OPTIONS, ignore_progress)
     for one, other in zip(result.curves, plain.curves, strict=True):
         assert np.array_equal(one.frame_values, other.frame_values)
     assert result.objective_after == plain.objective_after
@@ -124,7 +120,7 @@ def test_what_is_left_out_stays_so_on_finer_knots(arm, bodies, monkeypatch):
     times = np.arange(len(slow.frame_times) + 90) / 120.0
     tracks = tuple(Track(times, np.interp(times - 0.75, k.times, k.values)) for k in slow.tracks)
     first = make_problem(arm, bodies, Animation(times, tracks, tracks)).size
-    result = optimize_shot(still(arm), Animation(times, tracks, tracks), bodies, OPTIONS, quiet)
+    result = optimize_shot(still(arm), Animation(times, tracks, tracks), bodies, OPTIONS, ignore_progress)
     (row,) = rows_of(result)
     before, after = result.before.motion, result.after.motion
     early = after.times <= float(row.what.split()[-2])
@@ -136,40 +132,40 @@ def test_what_is_left_out_stays_so_on_finer_knots(arm, bodies, monkeypatch):
 def test_a_range_that_would_have_gained_something_is_searched_after_all(arm, bodies, everywhere, monkeypatch):
     too_much = (InactiveInterval(0.0, HELD + 0.45, 0.0),)
     monkeypatch.setattr(search, "inactive_intervals", lambda *a: too_much)
-    result = optimize_shot(still(arm), pausing(), bodies, OPTIONS, quiet)
+    result = optimize_shot(still(arm), pausing(), bodies, OPTIONS, ignore_progress)
     assert not rows_of(result) and result.stopped == "converged"
     assert abs(root_mean_square(result) - root_mean_square(everywhere)) < 0.02 * arm.retarget.allowed(None)
     assert result.gradients > everywhere.gradients
     # as it would stay without that
     monkeypatch.setattr(search, "MISSED", 1e9)
-    worse = optimize_shot(still(arm), pausing(), bodies, OPTIONS, quiet)
+    worse = optimize_shot(still(arm), pausing(), bodies, OPTIONS, ignore_progress)
     (row,) = rows_of(worse)
     lost = root_mean_square(worse) - root_mean_square(result)
     assert lost > 1e-3 and 0.05 * lost < row.estimated_error_m < 2.0 * lost
 
 
 def test_ranges_keep_away_from_errors_limits_and_changes(arm, bodies):
-    def found(character, start=None, ranges="auto", animation=None):
+    def intervals_of(character, start=None, ranges="auto", animation=None):
         problem = make_problem(character, bodies, animation or pausing(after=3.0), static=True, limited=True)
         problem.value(np.zeros(problem.size))
         start = np.zeros(problem.size) if start is None else start(problem)
         return inactive_intervals(problem, start, 5.0, 1e-3, ranges)
 
-    first, *more = found(arm)
+    first, *others = intervals_of(arm)
     assert first.start == 0.0 and HELD - 0.6 < first.stop < HELD - 0.2 and 0.0 <= first.gain < 2e-6
-    assert all(item.start > HELD + MOVE for item in more)
-    assert found(arm, ranges="on") == ()
+    assert all(item.start > HELD + MOVE for item in others)
+    assert intervals_of(arm, ranges="on") == ()
 
     def early(problem):
         return np.repeat(1e-3 * (problem.space.basis.support[:, 1] < 0.5), 2)
 
-    changed, *_ = found(arm, early)
+    changed, *_ = intervals_of(arm, early)
     assert 0.3 < changed.start < 0.8 and changed.stop == first.stop
     # the shoulder may not be where it is held
     tight = tuple(dataclasses.replace(j, upper=0.3) if j.upper else j for j in arm.joints)
-    assert all(item.start > HELD for item in found(dataclasses.replace(arm, joints=tight)))
+    assert all(item.start > HELD for item in intervals_of(dataclasses.replace(arm, joints=tight)))
     loop = looped(arm, pausing())
-    assert found(loop[0], animation=loop[1]) == ()
+    assert intervals_of(loop[0], animation=loop[1]) == ()
 
 
 def test_a_shot_that_is_quiet_throughout_and_one_without_vibration(arm, bodies):

@@ -11,14 +11,14 @@ class Problem:
 
     limits_act = False
 
-    def __init__(self, seed=0, rows=12, columns=5, bend=0.1):
+    def __init__(self, seed=0, rows=12, columns=5, quadratic=0.1):
         rng = np.random.default_rng(seed)
         self.A, self.B = rng.normal(size=(rows, columns)), rng.normal(size=(rows, columns))
-        self.b, self.bend = rng.normal(size=rows), bend
+        self.b, self.quadratic = rng.normal(size=rows), quadratic
         self.calls = 0
 
     def residual(self, x):
-        return self.A @ x + self.bend * (self.B @ x) ** 2 - self.b
+        return self.A @ x + self.quadratic * (self.B @ x) ** 2 - self.b
 
     def value(self, x):
         self.x = x.copy()
@@ -26,7 +26,7 @@ class Problem:
         return 0.5 * float(np.sum(self.residual(x) ** 2))
 
     def linearize(self):
-        self.J = self.A + 2 * self.bend * (self.B @ self.x)[:, None] * self.B
+        self.J = self.A + 2 * self.quadratic * (self.B @ self.x)[:, None] * self.B
         return self.J.T @ self.residual(self.x)
 
     def product(self, direction):
@@ -62,26 +62,26 @@ FREE = np.zeros(5, bool)
 @pytest.mark.parametrize("seed", range(5))
 def test_minimum_is_stationary_and_every_iterate_is_lower(seed):
     problem = Problem(seed)
-    found = minimize(problem, Search.start(np.zeros(5)), FREE, 1e-14, max_iterations=60)
-    problem.value(found.x)
-    assert np.abs(problem.linearize()).max() < 1e-5 and found.reason == "converged"
-    values = [iterate.value for iterate in found.history]
+    search = minimize(problem, Search.start(np.zeros(5)), FREE, 1e-14, max_iterations=60)
+    problem.value(search.x)
+    assert np.abs(problem.linearize()).max() < 1e-5 and search.reason == "converged"
+    values = [iterate.value for iterate in search.history]
     assert all(b < a for a, b in zip(values, values[1:], strict=False))
-    assert found.evaluations == problem.calls - 1
+    assert search.evaluations == problem.calls - 1
 
 
 def test_a_curved_valley_is_followed_to_its_end():
-    found = minimize(Rosenbrock(), Search.start(np.array([-1.2, 1.0])), np.zeros(2, bool), 1e-18, max_iterations=60)
-    assert np.allclose(found.x, 1.0, atol=1e-6)
+    search = minimize(Rosenbrock(), Search.start(np.array([-1.2, 1.0])), np.zeros(2, bool), 1e-18, max_iterations=60)
+    assert np.allclose(search.x, 1.0, atol=1e-6)
 
 
 def test_fixed_entries_stay_and_the_others_are_optimal():
     problem = Problem(3)
     fixed = np.array([False, True, False, False, True])
     start = np.array([0.0, 0.3, 0.0, 0.0, -0.2])
-    found = minimize(problem, Search.start(start), fixed, 1e-14, max_iterations=60)
-    assert np.array_equal(found.x[fixed], start[fixed])
-    problem.value(found.x)
+    search = minimize(problem, Search.start(start), fixed, 1e-14, max_iterations=60)
+    assert np.array_equal(search.x[fixed], start[fixed])
+    problem.value(search.x)
     assert np.abs(problem.linearize()[~fixed]).max() < 1e-5
 
 
@@ -96,8 +96,8 @@ def test_a_search_goes_on_from_any_iterate_as_if_it_had_not_stopped():
 
 
 def test_gain_that_is_expected_at_the_end_is_less_than_asked_for():
-    found = minimize(Problem(1), Search.start(np.zeros(5)), FREE, 1e-3)
-    assert found.reason == "converged" and 0.0 <= found.history[-1].gain < 1e-3
+    search = minimize(Problem(1), Search.start(np.zeros(5)), FREE, 1e-3)
+    assert search.reason == "converged" and 0.0 <= search.history[-1].gain < 1e-3
 
 
 def test_points_that_cannot_be_evaluated_are_kept_away_from():
@@ -106,8 +106,8 @@ def test_points_that_cannot_be_evaluated_are_kept_away_from():
             value = super().value(x)
             return np.inf if np.linalg.norm(x) > 0.2 else value
 
-    found = minimize(Walled(2), Search.start(np.zeros(5)), FREE, 1e-12, max_iterations=40)
-    assert np.isfinite(found.history[-1].value) and np.linalg.norm(found.x) <= 0.2
+    search = minimize(Walled(2), Search.start(np.zeros(5)), FREE, 1e-12, max_iterations=40)
+    assert np.isfinite(search.history[-1].value) and np.linalg.norm(search.x) <= 0.2
 
 
 def test_what_was_learned_preconditions_the_next_system():
