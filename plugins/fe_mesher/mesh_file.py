@@ -65,7 +65,7 @@ def read_mesh_file(path: str, scale: float, body: str) -> tuple[TetGeometry | tu
 def _read(path: str) -> Any:
     import meshio
 
-    # meshio tries ANSYS first for .msh; Gmsh is meant
+    # meshio tries ANSYS first for .msh, which is the suffix of Gmsh files
     return meshio.read(path, file_format="gmsh" if path.lower().endswith(".msh") else None)
 
 

@@ -101,10 +101,10 @@ def pose(model: Model, motion: Motion, row: int) -> tuple[Array, Array, IntArray
     """Corners [m, 3, 3] and their normals [m, 3, 3] in the world at one row, and the surface of each triangle [m]."""
     corners, normals, owners = [np.zeros((0, 3, 3))], [np.zeros((0, 3, 3))], [np.zeros(0, dtype=np.int32)]
     for number, (body, points, modes, directions, triangles) in enumerate(model.parts):
-        turn = rotation_matrices(motion.rotations[row, body])
+        matrix = rotation_matrices(motion.rotations[row, body])
         deformed = deformed_points(points, modes, motion.elastic[body][row : row + 1])[0]
-        corners.append((deformed @ turn.T + motion.positions[row, body])[triangles])
-        normals.append((directions @ turn.T)[triangles])
+        corners.append((deformed @ matrix.T + motion.positions[row, body])[triangles])
+        normals.append((directions @ matrix.T)[triangles])
         owners.append(np.full(len(triangles), number, dtype=np.int32))
     return np.concatenate(corners), np.concatenate(normals), np.concatenate(owners)
 

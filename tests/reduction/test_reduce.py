@@ -27,7 +27,7 @@ def body(helpers, plastic):
 
 
 @pytest.fixture
-def anchors(helpers):
+def attachments(helpers):
     return [
         AttachmentFrame("/Arm/hand", helpers.frame(0.6, 0.0, 0.0), "interface"),
         AttachmentFrame("/Arm/shoulder", helpers.frame(0.0, 0.0, 0.0), "interface"),
@@ -36,8 +36,8 @@ def anchors(helpers):
     ]
 
 
-def test_the_root_stands_still_and_the_tip_moves_with_its_patch(mesh, body, anchors):
-    reduced = reduce_body(mesh, body, anchors, [], 1)
+def test_the_root_stands_still_and_the_tip_moves_with_its_patch(mesh, body, attachments):
+    reduced = reduce_body(mesh, body, attachments, [], 1)
     hand, shoulder, target, beyond = reduced.markers
     r = len(reduced.stiffness)
     assert r == 10 and np.abs(shoulder.Phi).max() == 0.0 and np.abs(shoulder.Psi).max() == 0.0
@@ -49,14 +49,14 @@ def test_the_root_stands_still_and_the_tip_moves_with_its_patch(mesh, body, anch
     assert np.abs(beyond_rotation - target.Psi).max() < 1e-10 * np.abs(target.Psi).max()
 
 
-def test_either_end_can_be_the_root(mesh, body, anchors):
-    one, other = reduce_body(mesh, body, anchors, [], 0), reduce_body(mesh, body, anchors, [], 1)
+def test_either_end_can_be_the_root(mesh, body, attachments):
+    one, other = reduce_body(mesh, body, attachments, [], 0), reduce_body(mesh, body, attachments, [], 1)
     assert np.allclose(one.frequencies[:4], other.frequencies[:4], rtol=1e-3)
     assert np.abs(one.markers[0].Phi).max() == 0.0 and np.abs(one.markers[1].Phi).max() > 0.0
 
 
-def test_the_invariants_are_those_of_the_solid(mesh, body, anchors, plastic):
-    reduced = reduce_body(mesh, body, anchors, [], 1)
+def test_the_invariants_are_those_of_the_solid(mesh, body, attachments, plastic):
+    reduced = reduce_body(mesh, body, attachments, [], 1)
     m = plastic.density * np.prod(SIZE)
     a2, b2, c2 = np.square(SIZE)
     inertia = m / 12.0 * np.diag([b2 + c2, a2 + c2, a2 + b2])
@@ -67,18 +67,18 @@ def test_the_invariants_are_those_of_the_solid(mesh, body, anchors, plastic):
     assert np.abs(inv.M - np.eye(len(reduced.stiffness))).max() < 1e-10
 
 
-def test_an_authored_mass_is_kept(mesh, body, anchors):
+def test_an_authored_mass_is_kept(mesh, body, attachments):
     heavy = replace(body, mass=MassProperties(5.0, np.zeros(3), np.eye(3)))
-    light, reduced = reduce_body(mesh, body, anchors, [], 1), reduce_body(mesh, heavy, anchors, [], 1)
+    light, reduced = reduce_body(mesh, body, attachments, [], 1), reduce_body(mesh, heavy, attachments, [], 1)
     assert reduced.invariants.mass == pytest.approx(5.0, rel=1e-12)
     ratio = np.sqrt(light.invariants.mass / 5.0)
     assert np.allclose(reduced.frequencies, light.frequencies * ratio, rtol=1e-6)
 
 
-def test_a_skin_moves_with_the_body(mesh, body, anchors):
+def test_a_skin_moves_with_the_body(mesh, body, attachments):
     points = np.array([[0.0, 0.005, 0.005], [0.6, 0.0, 0.0], [0.3, 0.0, 0.0101]])
     surface = SurfaceMesh("/Arm/link/skin", points, np.array([[0, 1, 2]], dtype=np.int32))
-    reduced = reduce_body(mesh, body, anchors, [surface], 1)
+    reduced = reduce_body(mesh, body, attachments, [surface], 1)
     (skin,) = reduced.skin
     assert skin.shape == (3, 3, len(reduced.stiffness))
     assert np.abs(skin[0]).max() < 1e-12
@@ -86,8 +86,8 @@ def test_a_skin_moves_with_the_body(mesh, body, anchors):
     assert np.abs(skin[2]).max() > 1e-3
 
 
-def test_the_same_body_reduces_to_the_same_numbers(mesh, body, anchors):
-    one, two = reduce_body(mesh, body, anchors, [], 1), reduce_body(mesh, body, anchors, [], 1)
+def test_the_same_body_reduces_to_the_same_numbers(mesh, body, attachments):
+    one, two = reduce_body(mesh, body, attachments, [], 1), reduce_body(mesh, body, attachments, [], 1)
     assert np.array_equal(one.stiffness, two.stiffness)
     assert np.array_equal(one.invariants.S, two.invariants.S)
     assert np.array_equal(one.markers[0].Phi, two.markers[0].Phi)
@@ -96,27 +96,27 @@ def test_the_same_body_reduces_to_the_same_numbers(mesh, body, anchors):
 @pytest.mark.parametrize(
     ("field", "value"), [("youngs_modulus", 0.0), ("poissons_ratio", 0.5), ("density", -1.0), ("density", np.nan)]
 )
-def test_a_material_that_is_none_is_refused(mesh, body, anchors, field, value):
+def test_a_material_that_is_none_is_refused(mesh, body, attachments, field, value):
     bad = replace(body, flexible=replace(body.flexible, material=replace(body.flexible.material, **{field: value})))
     with pytest.raises(ShotError) as caught:
-        reduce_body(mesh, bad, anchors, [], 1)
+        reduce_body(mesh, bad, attachments, [], 1)
     assert caught.value.path == "/Looks/Plastic"
 
 
-def test_a_body_that_nothing_carries_is_refused(mesh, body, anchors):
+def test_a_body_that_nothing_carries_is_refused(mesh, body, attachments):
     with pytest.raises(ShotError, match="no joint connects this flexible body"):
-        reduce_body(mesh, body, anchors, [], 2)
+        reduce_body(mesh, body, attachments, [], 2)
 
 
-def test_what_a_mesh_is_off_by_is_a_part_of_the_deflection(mesh, body, anchors):
+def test_what_a_mesh_is_off_by_is_a_part_of_the_deflection(mesh, body, attachments):
     none = np.zeros(3)
     force = np.zeros((2, 3))
     force[0, 2] = 2.0
     loads = LoadEnvelope(none, none, none, force, np.zeros((2, 3)))
     judged = replace(mesh, quality=replace(mesh.quality, frequency_error=0.01))
-    error = reduce_body(judged, body, anchors, [], 1, loads).mesh_error_m
+    error = reduce_body(judged, body, attachments, [], 1, loads).mesh_error_m
     # two percent of the stiffness, of twice the deflection at rest
     at_rest = 2.0 * 0.6**3 / (3.0 * 1.8e9 * 0.02**4 / 12.0)
     assert 0.04 * at_rest < error < 0.06 * at_rest
-    assert reduce_body(mesh, body, anchors, [], 1, loads).mesh_error_m is None
-    assert reduce_body(judged, body, anchors, [], 1).mesh_error_m is None
+    assert reduce_body(mesh, body, attachments, [], 1, loads).mesh_error_m is None
+    assert reduce_body(judged, body, attachments, [], 1).mesh_error_m is None

@@ -43,9 +43,11 @@ def rng():
 def flexible(law, material):
     points, tets = box_tets((12, 1, 1), (0.6, 0.02, 0.02), (0.0, -0.01, -0.01))
     settings = FlexibleSettings(material, mode_count=6, elasticity=law)
-    anchors = [AttachmentFrame(f"/C/{x}", Frame(np.array([x, 0.0, 0.0]), IDENTITY), "interface") for x in (0.0, 0.6)]
+    attachments = [
+        AttachmentFrame(f"/C/{x}", Frame(np.array([x, 0.0, 0.0]), IDENTITY), "interface") for x in (0.0, 0.6)
+    ]
     body = Body("/C/Arm", Frame(np.zeros(3), IDENTITY), None, flexible=settings)
-    return reduce_body(fe_mesh(points, tets), body, anchors, (), 0)
+    return reduce_body(fe_mesh(points, tets), body, attachments, (), 0)
 
 
 def forces(body, u, v):

@@ -15,8 +15,8 @@ class Closure:
     """A surface with its holes capped.
 
     Attributes:
-        points: [m], shape [n, 3]; the input's, then one for each cap of more than three edges.
-        triangles: Shape [m, 3]; the input's, then the caps.
+        points: [m], shape [n, 3]; those of the input, then one for each cap of more than three edges.
+        triangles: Shape [m, 3]; those of the input, then the caps.
         areas: Area of each cap [m^2].
         sides: Number of edges of each cap.
     """

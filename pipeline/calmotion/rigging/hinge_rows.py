@@ -131,16 +131,18 @@ def _product(axes: Array, angles: Array) -> Rotation:
     return product
 
 
-def _first(axes: Array, turn: Array) -> Array:
+def _first(axes: Array, rotation: Array) -> Array:
     """Angles for the first rotation: the smallest solution of Gauss-Newton from several starting points."""
     starts = [np.zeros(len(axes)), *(s * 1.5 * e for e in np.eye(len(axes)) for s in (-1.0, 1.0))]
-    solutions = [_nearest(axes, turn, start) for start in starts]
-    residuals = [float((_product(axes, q[None]).inv() * Rotation.from_matrix(turn)).magnitude()[0]) for q in solutions]
+    solutions = [_nearest(axes, rotation, start) for start in starts]
+    residuals = [
+        float((_product(axes, q[None]).inv() * Rotation.from_matrix(rotation)).magnitude()[0]) for q in solutions
+    ]
     good = [q for q, residual in zip(solutions, residuals, strict=True) if residual < min(residuals) + 1e-6]
     return min(good, key=lambda q: float(np.abs(q).max()))
 
 
-def _nearest(axes: Array, turn: Array, q: Array) -> Array:
+def _nearest(axes: Array, rotation: Array, q: Array) -> Array:
     """Angles of the product nearest to a rotation matrix, by damped Gauss-Newton."""
     for _ in range(_STEPS):
         product = np.eye(3)
@@ -149,7 +151,7 @@ def _nearest(axes: Array, turn: Array, q: Array) -> Array:
             columns.append(product @ axis)
             product = product @ _rotation(axis, q[k])
         J = np.array(columns).T
-        step = np.linalg.solve(J.T @ J + 1e-9 * np.eye(len(axes)), J.T @ _vector(turn @ product.T))
+        step = np.linalg.solve(J.T @ J + 1e-9 * np.eye(len(axes)), J.T @ _vector(rotation @ product.T))
         q = q + step * min(1.0, 0.7 / max(float(np.max(np.abs(step))), 1e-300))
         if np.max(np.abs(step)) < _SMALL:
             break

@@ -37,7 +37,7 @@ class Link:
 
 
 def make_links(
-    joints: Sequence[str], parents: Sequence[int], turns: Array, skin: Piece, weights: Array, tolerance: float
+    joints: Sequence[str], parents: Sequence[int], rotations: Array, skin: Piece, weights: Array, tolerance: float
 ) -> list[Link]:
     """Links, parents first.
 
@@ -47,7 +47,7 @@ def make_links(
     Args:
         joints: Names such as `Hip/Knee`, parents first.
         parents: Index of the parent of each joint, -1 for none.
-        turns: Rotation of each joint since the first frame, axes of its parent, shape [n, j, 3, 3].
+        rotations: Rotation of each joint since the first frame, axes of its parent, shape [n, j, 3, 3].
         skin: Points and triangles of the skin of all joints.
         weights: Skin weight of each joint at each point, shape [points, j].
         tolerance: Largest residual angle of the hinges [rad].
@@ -63,7 +63,9 @@ def make_links(
         above = int(link_of[parents[joint]]) if parents[joint] >= 0 else -1
         link_of[joint] = above
         if joint in bearing:
-            row = hinges_for(turns[:, joint], tolerance) if parents[joint] >= 0 else HingeRow(*_none(len(turns)))
+            row = (
+                hinges_for(rotations[:, joint], tolerance) if parents[joint] >= 0 else HingeRow(*_none(len(rotations)))
+            )
             if parents[joint] < 0 or len(row.axes):
                 link_of[joint] = len(links)
                 links.append(Link(joint, _unique(name, names), above, row, None))

@@ -153,9 +153,9 @@ def world_points(body: Body, index: int, skin: Skin | None, motion: Motion, row:
     Returns:
         For each surface [m], shape [n_s, 3].
     """
-    turn = rotation_matrices(motion.rotations[row, index])
+    matrix = rotation_matrices(motion.rotations[row, index])
     elastic = motion.elastic[index][row : row + 1]
     return [
-        deformed_points(surface.points, modes_of(skin, s), elastic)[0] @ turn.T + motion.positions[row, index]
+        deformed_points(surface.points, modes_of(skin, s), elastic)[0] @ matrix.T + motion.positions[row, index]
         for s, surface in enumerate(body.surfaces)
     ]

@@ -23,9 +23,11 @@ def loads(size):
 def link(material, tolerance, load_envelope, **more):
     points, tets = box_tets((12, 2, 2), (0.3, 0.03, 0.04), (0.0, -0.015, -0.02))
     settings = FlexibleSettings(material, elasticity="stvk", mode_count=12, **more)
-    anchors = [AttachmentFrame(f"/C/{x}", Frame(np.array([x, 0.0, 0.0]), IDENTITY), "interface") for x in (0.0, 0.3)]
+    attachments = [
+        AttachmentFrame(f"/C/{x}", Frame(np.array([x, 0.0, 0.0]), IDENTITY), "interface") for x in (0.0, 0.3)
+    ]
     body = Body("/C/Link", Frame(np.zeros(3), IDENTITY), None, flexible=settings)
-    return reduce_body(fe_mesh(points, tets), body, anchors, (), 0, load_envelope, tolerance)
+    return reduce_body(fe_mesh(points, tets), body, attachments, (), 0, load_envelope, tolerance)
 
 
 def whole_gram(body):

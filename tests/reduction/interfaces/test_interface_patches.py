@@ -15,14 +15,14 @@ def beam(helpers):
 
 
 @pytest.fixture
-def anchor(helpers):
+def attachment(helpers):
     return lambda name, *position, kind="interface": AttachmentFrame(name, helpers.frame(*position), kind)
 
 
-def test_a_given_radius_takes_the_surface_within_it(beam, anchor):
+def test_a_given_radius_takes_the_surface_within_it(beam, attachment):
     """By area, so that a patch does not grow or shrink by an element as the mesh happens to lie."""
     center = np.array([0.3, 0.0, 0.01])
-    (patch,) = interface_patches(beam, [anchor("/j", *center)], 0.025, "/b")
+    (patch,) = interface_patches(beam, [attachment("/j", *center)], 0.025, "/b")
     distance = np.linalg.norm(beam.nodes - center, axis=1)
     surface = np.isin(np.arange(len(beam.nodes)), beam.surface_nodes)
     inside = np.flatnonzero(surface & (distance <= 0.025))
@@ -34,42 +34,42 @@ def test_a_given_radius_takes_the_surface_within_it(beam, anchor):
     assert distance[out].min() >= distance[patch.nodes].max() - 1e-12
 
 
-def test_patches_never_share_a_node_and_anchors_at_one_place_share_a_patch(beam, anchor):
-    anchors = [
-        anchor("/a", 0.28, 0, 0.01), anchor("/t", 0.1, 0, 0, kind="point"),
-        anchor("/b", 0.32, 0, 0.01), anchor("/c", 0.28, 0, 0.01),
+def test_patches_never_share_a_node_and_anchors_at_one_place_share_a_patch(beam, attachment):
+    attachments = [
+        attachment("/a", 0.28, 0, 0.01), attachment("/t", 0.1, 0, 0, kind="point"),
+        attachment("/b", 0.32, 0, 0.01), attachment("/c", 0.28, 0, 0.01),
     ]  # fmt: skip
-    first, second = interface_patches(beam, anchors, 0.05, "/b")
+    first, second = interface_patches(beam, attachments, 0.05, "/b")
     assert first.attachments == (0, 3) and second.attachments == (2,)
     assert not np.intersect1d(first.nodes, second.nodes).size
     assert (beam.nodes[first.nodes, 0] <= 0.3 + 1e-12).all() and (beam.nodes[second.nodes, 0] >= 0.3 - 1e-12).all()
 
 
-def test_a_radius_finer_than_the_mesh_takes_the_triangle_that_is_touched(beam, anchor):
-    (patch,) = interface_patches(beam, [anchor("/j", 0.312, 0.003, 0.01)], 1e-3, "/b")
+def test_a_radius_finer_than_the_mesh_takes_the_triangle_that_is_touched(beam, attachment):
+    (patch,) = interface_patches(beam, [attachment("/j", 0.312, 0.003, 0.01)], 1e-3, "/b")
     assert len(patch.nodes) == 6 and spans_a_plane(beam.nodes[patch.nodes])
 
 
-def test_an_anchor_off_the_body_is_refused_with_its_distance(beam, anchor):
+def test_an_anchor_off_the_body_is_refused_with_its_distance(beam, attachment):
     with pytest.raises(ShotError) as caught:
-        interface_patches(beam, [anchor("/Arm/elbow", 0.3, 0.0, 0.11)], 0.02, "/Arm/link")
+        interface_patches(beam, [attachment("/Arm/elbow", 0.3, 0.0, 0.11)], 0.02, "/Arm/link")
     assert caught.value.path == "/Arm/link" and caught.value.attribute == "calm:flexible:interfaceRadius"
     assert "/Arm/elbow" in str(caught.value) and "0.1 m away" in str(caught.value)
-    assert len(interface_patches(beam, [anchor("/Arm/elbow", 0.3, 0.0, 0.11)], 0.12, "/Arm/link")) == 1
+    assert len(interface_patches(beam, [attachment("/Arm/elbow", 0.3, 0.0, 0.11)], 0.12, "/Arm/link")) == 1
 
 
-def test_the_automatic_radius_does_not_reach_for_an_anchor_in_the_air(beam, anchor):
+def test_the_automatic_radius_does_not_reach_for_an_anchor_in_the_air(beam, attachment):
     with pytest.raises(ShotError, match="0.09 m away"):
-        interface_patches(beam, [anchor("/j", 0.3, 0.0, 0.1)], -1.0, "/b")
+        interface_patches(beam, [attachment("/j", 0.3, 0.0, 0.1)], -1.0, "/b")
 
 
-def test_the_axis_of_a_bore_is_held_by_a_band_of_its_wall(helpers, anchor):
+def test_the_axis_of_a_bore_is_held_by_a_band_of_its_wall(helpers, attachment):
     points, tets = helpers.box((8, 8, 2), (0.1, 0.1, 0.02), origin=(-0.05, -0.05, -0.01))
     center = points[tets].mean(axis=1)
     tets = tets[np.abs(center[:, :2]).max(axis=1) > 0.025]
     used = np.unique(tets)
     ring = quadratic_mesh(points[used], np.searchsorted(used, tets).astype(np.int32))
-    (patch,) = interface_patches(ring, [anchor("/j", 0, 0, 0)], -1.0, "/b")
+    (patch,) = interface_patches(ring, [attachment("/j", 0, 0, 0)], -1.0, "/b")
     assert np.abs(ring.nodes[patch.nodes][:, :2]).max() < 0.049
     for direction in ((1, 0), (-1, 0), (0, 1), (0, -1)):
         assert (ring.nodes[patch.nodes][:, :2] @ direction).max() >= 0.025 - 1e-12

@@ -26,7 +26,7 @@ def plate():
     return quadratic_mesh(*box_tets((10, 10, 1), (0.2, 0.2, 0.001)))
 
 
-def anchor(path, position, triangles=None):
+def attachment(path, position, triangles=None):
     surface = None if triangles is None else InterfaceSurface(f"{path}/part", path, triangles)
     return AttachmentFrame(path, Frame(np.asarray(position, dtype=float), IDENTITY), "interface", surface)
 
@@ -45,25 +45,25 @@ def test_a_surface_a_little_off_the_mesh_is_found(plate):
 
 
 def test_named_patches_come_first_and_the_others_get_the_rest(plate):
-    a = anchor("/J/a", (0.0, 0.1, 0.0), square(0.0, 0.04, 0.0, 0.2, 0.001))
-    b = anchor("/J/b", (0.06, 0.1, 0.001))
+    a = attachment("/J/a", (0.0, 0.1, 0.0), square(0.0, 0.04, 0.0, 0.2, 0.001))
+    b = attachment("/J/b", (0.06, 0.1, 0.001))
     first, second = interface_patches(plate, [a, b], 0.05, "/Plate")
     assert len(first.nodes) == 5 * 21 and first.attachments == (0,)
     assert not np.intersect1d(first.nodes, second.nodes).size and len(second.nodes)
 
 
 def test_two_names_at_one_place_stay_two(plate):
-    a = anchor("/J/a", (0.1, 0.1, 0.0), square(0.0, 0.04, 0.0, 0.2, 0.001))
-    b = anchor("/J/b", (0.1, 0.1, 0.0), square(0.16, 0.2, 0.0, 0.2, 0.001))
+    a = attachment("/J/a", (0.1, 0.1, 0.0), square(0.0, 0.04, 0.0, 0.2, 0.001))
+    b = attachment("/J/b", (0.1, 0.1, 0.0), square(0.16, 0.2, 0.0, 0.2, 0.001))
     assert len(interface_patches(plate, [a, b], -1.0, "/Plate")) == 2
 
 
 def test_too_small_and_overlapping_ones_are_refused(plate):
-    tiny = anchor("/J/a", (0.1, 0.1, 0.0), square(0.103, 0.107, 0.103, 0.107, 0.001))
+    tiny = attachment("/J/a", (0.1, 0.1, 0.0), square(0.103, 0.107, 0.103, 0.107, 0.001))
     with pytest.raises(ShotError, match="too small") as caught:
         interface_patches(plate, [tiny], -1.0, "/Plate")
     assert caught.value.path == "/J/a/part"
-    one = anchor("/J/a", (0.0, 0.1, 0.0), square(0.0, 0.1, 0.0, 0.2, 0.001))
-    other = anchor("/J/b", (0.2, 0.1, 0.0), square(0.08, 0.2, 0.0, 0.2, 0.001))
+    one = attachment("/J/a", (0.0, 0.1, 0.0), square(0.0, 0.1, 0.0, 0.2, 0.001))
+    other = attachment("/J/b", (0.2, 0.1, 0.0), square(0.08, 0.2, 0.0, 0.2, 0.001))
     with pytest.raises(ShotError, match="overlaps"):
         interface_patches(plate, [one, other], -1.0, "/Plate")

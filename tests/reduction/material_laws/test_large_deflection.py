@@ -15,11 +15,11 @@ def arm(law, material):
     body = Body(
         "/C/Arm", Frame(np.zeros(3), IDENTITY), None, flexible=FlexibleSettings(material, mode_count=6, elasticity=law)
     )
-    anchors = [
+    attachments = [
         AttachmentFrame("/C/J", Frame(np.zeros(3), IDENTITY), "interface"),
         AttachmentFrame("/C/W", Frame(np.array([0.6, 0.0, 0.0]), IDENTITY), "interface"),
     ]
-    return reduce_body(fe_mesh(points, tets), body, anchors, (), 0)
+    return reduce_body(fe_mesh(points, tets), body, attachments, (), 0)
 
 
 def test_a_linear_body_has_no_law(plastic):
