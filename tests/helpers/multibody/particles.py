@@ -166,3 +166,14 @@ def random_state(rng, system, spread=0.5):
     state.lam[:] = rng.normal(size=state.lam.shape)
     state.lam[np.arange(6) >= system.rows[:, None]] = 0.0
     return state
+
+
+def by_particles(system, part, state):
+    """Virtual work of all particles on (translation, rotation, modes), body axes."""
+    a, om, al, u, v, vd = state
+    y, yv, yvd = part.points + part.modes @ u, part.modes @ v, part.modes @ vd
+    acceleration = a + np.cross(al, y) + np.cross(om, np.cross(om, y)) + 2 * np.cross(om, yv) + yvd
+    force = part.masses[:, None] * acceleration
+    r = len(u)
+    elastic = np.einsum("nij,ni->j", part.modes, force) + system.stiffness[0, :r] * u + system.damping[0, :r, :r] @ v
+    return np.concatenate([force.sum(0), np.cross(y, force).sum(0), elastic])

@@ -12,7 +12,7 @@ from calmotion.multibody.model.topology import span_tree
 from calmotion.multibody.statics.equilibrium import equilibrium
 from calmotion.simulation.bodies import reduce_bodies
 from particles import particle_system
-from test_sweeps import rigid_start
+from sweep_cases import rigid_start
 
 
 def test_hanging_double_pendulum_has_its_textbook_frequencies():

@@ -11,8 +11,7 @@ from calmotion.multibody.kernels.components import ComponentMotion
 from calmotion.multibody.kernels.work import allocate_work
 from calmotion.multibody.model.model import rigid_model
 from gantries import ASIDE, STILL, UP, drive, gantry
-from particles import component_of, particle_system
-from test_inertia import by_particles
+from particles import by_particles, component_of, particle_system
 
 ALL = ("Bridge", "Trolley", "Beam0", "Beam1", "Tool")
 

@@ -5,7 +5,7 @@ import pytest
 from calmotion.multibody.kernels import inertia
 from calmotion.multibody.kernels.components import ComponentMotion
 from calmotion.multibody.kernels.work import allocate_work
-from particles import component_of, particle_system
+from particles import by_particles, component_of, particle_system
 
 
 def component(r, seed=0):
@@ -22,17 +22,6 @@ def residual(system, r, state, work):
     res = np.zeros(6 + r)
     inertia.body_residual(component_of(system, 0), ComponentMotion(*state), work, res)
     return res
-
-
-def by_particles(system, part, state):
-    """Virtual work of all particles on (translation, rotation, modes), body axes."""
-    a, om, al, u, v, vd = state
-    y, yv, yvd = part.points + part.modes @ u, part.modes @ v, part.modes @ vd
-    acceleration = a + np.cross(al, y) + np.cross(om, np.cross(om, y)) + 2 * np.cross(om, yv) + yvd
-    force = part.masses[:, None] * acceleration
-    r = len(u)
-    elastic = np.einsum("nij,ni->j", part.modes, force) + system.stiffness[0, :r] * u + system.damping[0, :r, :r] @ v
-    return np.concatenate([force.sum(0), np.cross(y, force).sum(0), elastic])
 
 
 @pytest.mark.parametrize("r", [0, 1, 4, 9])

@@ -14,7 +14,7 @@ from calmotion.multibody.linear_solver.step_matrix import allocate_border, alloc
 from calmotion.multibody.model.system import Blocks, Integrator, allocate_blocks
 from dense import constrains, dense_matrix, join, multipliers, split
 from particles import random_state
-from test_assembly import TREES, put_world, tree
+from trees import TREES, put_world, tree
 
 
 def eliminated(name):

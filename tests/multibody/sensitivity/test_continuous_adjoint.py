@@ -2,19 +2,19 @@
 
 import numpy as np
 import pytest
-import test_sweeps
+import sweep_cases
 from calmotion.multibody.sensitivity.adjoint import adjoint
 from calmotion.multibody.sensitivity.continuous_adjoint import continuous_adjoint
 from calmotion.multibody.sensitivity.linearization import linearize
 from calmotion.multibody.sensitivity.linearized_steps import bytes_of_an_instant
-from test_sweeps import CASES, Case
+from sweep_cases import CASES, Case
 
 EASE = 0.12
 
 
 def smooth(p):
-    """Angles and rates like those of `test_sweeps`, but with an acceleration that starts from zero."""
-    w, t = 3.0 + 2.0 * np.arange(4), test_sweeps.TIMES[:, None]
+    """Angles and rates like those of `sweep_cases`, but with an acceleration that starts from zero."""
+    w, t = 3.0 + 2.0 * np.arange(4), sweep_cases.TIMES[:, None]
     s = np.minimum(t / EASE, 1.0)
     share, rate = s**3 * (10.0 - 15.0 * s + 6.0 * s * s), 30.0 * s**2 * (1.0 - s) ** 2 / EASE
     return (1.0 + share * (np.cos(w * t) - 1.0)) @ p, (rate * (np.cos(w * t) - 1.0) - share * w * np.sin(w * t)) @ p
@@ -22,10 +22,10 @@ def smooth(p):
 
 def gradients(monkeypatch, name, h, memory=4e9):
     """Gradients by all coefficients of an integral over time, by both adjoints, shape [4, J] each."""
-    monkeypatch.setattr(test_sweeps, "H", h)
-    monkeypatch.setattr(test_sweeps, "TIMES", np.arange(0.0, 0.3 + h / 2, h))
-    monkeypatch.setattr(test_sweeps, "curves", smooth)
-    case, times = Case(*CASES[name]), test_sweeps.TIMES
+    monkeypatch.setattr(sweep_cases, "H", h)
+    monkeypatch.setattr(sweep_cases, "TIMES", np.arange(0.0, 0.3 + h / 2, h))
+    monkeypatch.setattr(sweep_cases, "curves", smooth)
+    case, times = Case(*CASES[name]), sweep_cases.TIMES
     weight = np.full(len(times), h)
     weight[[0, -1]] *= 0.5
     rng = np.random.default_rng(3)

@@ -14,7 +14,7 @@ from calmotion.multibody.sensitivity.periodic import (
     periodic_tangent,
 )
 from calmotion.multibody.sensitivity.perturbation import Perturbation, adjoint_from, end_difference, tangent_from
-from test_sweeps import Case, rigid_start
+from sweep_cases import Case, rigid_start
 
 STEPS, LENGTH = 60, 0.6
 H = LENGTH / STEPS
@@ -38,7 +38,7 @@ def curves(p, times=TIMES):
 
 
 class Looping(Case):
-    """The tree of `test_sweeps`, damped, over a loop."""
+    """The tree of `sweep_cases`, damped, over a loop."""
 
     def __init__(self, *arguments):
         super().__init__(*arguments)
@@ -102,7 +102,7 @@ def test_the_loop_closes_and_is_where_a_long_simulation_ends_up(looping):
     assert np.abs(case.warmed(2)[1].c - here.c[1]).max() > 1e-5, "two loops are not enough"
 
 
-def test_sweeps_from_a_memory_are_transposes(looping):
+def sweep_cases_from_a_memory_are_transposes(looping):
     case, found, lin, _ = looping
     rng = np.random.default_rng(1)
     system, total = case.system, len(TIMES)

@@ -5,7 +5,7 @@ from calmotion.multibody.analysis.kinematics import rigid_state, target_frames
 from calmotion.multibody.integrators.workspace import Workspace
 from calmotion.multibody.statics.equilibrium import equilibrium, linearize
 from particles import particle_system
-from test_sweeps import rigid_start
+from sweep_cases import rigid_start
 
 
 @pytest.mark.parametrize("start", [0.0, 1.0, -2.5])
