@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from calmotion.accuracy.simplification.influence import influence
 from calmotion.benchmarks.scenes.linkage_arm import linkage_arm, performance
-from calmotion.benchmarks.scenes.simplification_shots import NeedsShot, arm_with_head
+from calmotion.benchmarks.scenes.simplification_shots import SimplificationShot, arm_with_head
 from calmotion.multibody.analysis.kinematics import rigid_poses, target_frames
 from calmotion.multibody.model.topology import span_tree
 from calmotion.shot import Follows
@@ -48,7 +48,7 @@ def test_against_differences_of_poses():
 
 def test_of_a_linkage_every_motor_counts():
     character, meshes = linkage_arm()
-    found = _of(NeedsShot("linkage", character, performance(), meshes))
+    found = _of(SimplificationShot("linkage", character, performance(), meshes))
     assert np.all(found > 0.1)
 
 

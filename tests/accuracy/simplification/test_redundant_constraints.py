@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 from calmotion.accuracy.simplification.redundant_constraints import Closures, closures_of
 from calmotion.benchmarks.scenes.linkage_arm import linkage_arm, performance
-from calmotion.benchmarks.scenes.simplification_shots import NeedsShot, clevis_arm, plastic_arm
+from calmotion.benchmarks.scenes.simplification_shots import SimplificationShot, clevis_arm, plastic_arm
 from calmotion.multibody.model.topology import span_tree
 from calmotion.shot import Motor
 from calmotion.simulation.prepare import Options, grid_of
@@ -27,7 +27,7 @@ def test_no_loops():
 
 def test_a_planar_four_bar_has_three_redundant_rows_and_needs_its_joint():
     character, meshes = linkage_arm()
-    found, tree = _of(NeedsShot("linkage", character, performance(), meshes))
+    found, tree = _of(SimplificationShot("linkage", character, performance(), meshes))
     assert found.joints == (len(tree.body),)
     assert found.redundant_rows == 3
     assert found.redundant == ()

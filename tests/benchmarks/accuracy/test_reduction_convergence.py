@@ -4,7 +4,7 @@ import csv
 import json
 
 import pytest
-from calmotion.benchmarks.accuracy import reduction_convergence as settling
+from calmotion.benchmarks.accuracy import reduction_convergence
 from calmotion.benchmarks.accuracy.reference_bench import Bench
 from calmotion.benchmarks.common import shots
 from calmotion.benchmarks.common.shots import Unreduced
@@ -19,7 +19,7 @@ def shot():
 
 @pytest.fixture(scope="module")
 def rows(shot):
-    return list(settling.settling(Bench(shot), (1e-2, 1e-4, 1e-6)))
+    return list(reduction_convergence.convergence(Bench(shot), (1e-2, 1e-4, 1e-6)))
 
 
 def test_what_a_finer_reduction_moves_falls(rows):
@@ -30,15 +30,15 @@ def test_what_a_finer_reduction_moves_falls(rows):
 
 def test_the_command_writes_tables_and_one_object(shot, rows, monkeypatch, capsys, tmp_path):
     monkeypatch.setattr(shots, "load_unreduced", lambda path: shot)
-    monkeypatch.setattr(settling, "settling", lambda bench, tolerances: iter(rows))
+    monkeypatch.setattr(reduction_convergence, "convergence", lambda bench, tolerances: iter(rows))
     table, text = tmp_path / "rows.csv", tmp_path / "rows.md"
-    assert settling.main(["arm.usda", "--json", "--csv", str(table), "--markdown", str(text)]) == 0
+    assert reduction_convergence.main(["arm.usda", "--json", "--csv", str(table), "--markdown", str(text)]) == 0
     shown = capsys.readouterr()
     assert [row["coordinates"] for row in json.loads(shown.out)["rows"]] == [row.coordinates for row in rows]
     assert len(shown.err.splitlines()) == 3 and len(text.read_text().splitlines()) == 5
     with open(table, newline="") as file:
         moved = [row["moved_m"] for row in csv.DictReader(file)]
     assert moved[0] == "" and [float(text) for text in moved[1:]] == [row.moved_m for row in rows[1:]]
-    assert settling.main(["arm.usda"]) == 0
+    assert reduction_convergence.main(["arm.usda"]) == 0
     shown = capsys.readouterr().out
     assert "reductions get finer" in shown and all(row.coordinates in shown for row in rows)

@@ -5,7 +5,7 @@ import json
 from functools import partial
 
 import pytest
-from calmotion.benchmarks.accuracy import simplification as needs
+from calmotion.benchmarks.accuracy import simplification
 from calmotion.benchmarks.accuracy.simplification import Pair, pair
 from calmotion.benchmarks.scenes.simplification_shots import clevis_arm, held_arm, steel_arm
 from calmotion.shot.model_choice import ON
@@ -37,7 +37,7 @@ def test_options_of_one_side_alone(monkeypatch):
         seen.append((dict(options_forced), options))
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(needs, "run", run)
+    monkeypatch.setattr(simplification, "run", run)
     with pytest.raises(KeyboardInterrupt):
         pair("knots", held_arm(), "optimize", {}, 1, None, Options(knot_spacing=0.1))
     assert seen == [({}, Options(knot_spacing=0.1))]
@@ -46,18 +46,18 @@ def test_options_of_one_side_alone(monkeypatch):
 def test_the_command_writes_a_table_and_one_object(loops, monkeypatch, capsys, tmp_path):
     other = Pair("turning", "gantry", "simulate", 2.0, 1.0, 4.0, 3.0, 1e-12, 0.0)
     made = [partial(lambda kind, found: found, item.kind, item) for item in (loops, other)]
-    monkeypatch.setattr(needs, "pairs", lambda repeats: made)
+    monkeypatch.setattr(simplification, "pairs", lambda repeats: made)
     table = tmp_path / "pairs.csv"
-    assert needs.main(["--json", "--csv", str(table)]) == 0
+    assert simplification.main(["--json", "--csv", str(table)]) == 0
     report = json.loads(capsys.readouterr().out)
     assert [row["kind"] for row in report["pairs"]] == ["loops", "turning"] and report["pairs"][1]["ratio"] == 2.0
     with open(table, newline="") as file:
         assert [float(row["with_s"]) for row in csv.DictReader(file)] == [loops.with_s, 2.0]
-    assert needs.main(["--only", "turning"]) == 0
+    assert simplification.main(["--only", "turning"]) == 0
     shown = capsys.readouterr().out
     assert "gantry" in shown and "clevis" not in shown
 
 
 def test_every_kind_has_a_pair():
-    kinds = [make.args[0] for make in needs.pairs(1)]
-    assert set(kinds) == {*needs.KINDS, "knots", "step", "everything"} and kinds.count("everything") == 3
+    kinds = [make.args[0] for make in simplification.pairs(1)]
+    assert set(kinds) == {*simplification.KINDS, "knots", "step", "everything"} and kinds.count("everything") == 3

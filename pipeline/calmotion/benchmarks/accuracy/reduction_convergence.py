@@ -1,9 +1,9 @@
-"""How far a reduction settles: where the targets move when its tolerance falls by ten, with nothing else changed.
+"""Convergence of the reduction: how far the targets move when its tolerance falls by ten and nothing else changes.
 
-`calmotion bench settling [SHOT ...] [--csv FILE] [--markdown FILE]` reduces each shot to ever smaller tolerances, and
-simulates it as animated with all coordinates and one step. What a reduction leaves out is estimated for each body at
-rest; this is what it does to the motion. A series that does not fall tells that links bend farther than a basis of
-modes and their derivatives follows.
+`calmotion bench reduction-convergence [SHOT ...] [--csv FILE] [--markdown FILE]` reduces each shot to ever smaller
+tolerances, and simulates it as animated with all coordinates and one step. The error of a reduction is estimated for
+each body at rest; this measures its effect on the motion. If a series does not fall, links deflect farther than a basis
+of modes and their derivatives can represent.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ SEEN = 1e-6  # reductions finer than this see pairs of coordinates as for this [
 
 
 @dataclass(frozen=True)
-class Settling:
+class ConvergenceRow:
     """One reduction of one shot.
 
     Attributes:
@@ -45,7 +45,7 @@ class Settling:
     run_s: float
 
 
-def settling(bench: Bench, tolerances: Sequence[float] = TOLERANCES) -> Iterator[Settling]:
+def convergence(bench: Bench, tolerances: Sequence[float] = TOLERANCES) -> Iterator[ConvergenceRow]:
     """Reductions to one tolerance [m] after another, each as it is measured."""
     before = None
     for tolerance in tolerances:
@@ -55,14 +55,14 @@ def settling(bench: Bench, tolerances: Sequence[float] = TOLERANCES) -> Iterator
         took = time.perf_counter() - begin
         moved = None if before is None else distance(positions, before)
         counts = sorted(len(body.stiffness) for body in bodies if len(body.stiffness))
-        yield Settling(bench.shot.name, tolerance, ", ".join(map(str, counts)), moved, took)
+        yield ConvergenceRow(bench.shot.name, tolerance, ", ".join(map(str, counts)), moved, took)
         before = positions
 
 
 HEADS = ("shot", "reduced to", "moved", "coordinates", "simulation")
 
 
-def cells(rows: Sequence[Settling]) -> list[list[str]]:
+def cells(rows: Sequence[ConvergenceRow]) -> list[list[str]]:
     """The table for a person, without its heads."""
     from calmotion.cli.tables import length
 
@@ -75,14 +75,14 @@ def main(arguments: list[str] | None = None) -> int:
     """The command."""
     from calmotion.benchmarks.common.shots import load_unreduced
 
-    options = table_parser("settling", __doc__, SAMPLES, TOLERANCES).parse_args(arguments)
-    rows: list[Settling] = []
+    options = table_parser("reduction-convergence", __doc__, SAMPLES, TOLERANCES).parse_args(arguments)
+    rows: list[ConvergenceRow] = []
     for path in options.shots:
-        for row in settling(Bench(load_unreduced(path)), options.tolerances):
+        for row in convergence(Bench(load_unreduced(path)), options.tolerances):
             rows.append(row)
             print(", ".join(cells([row])[0]), file=sys.stderr, flush=True)  # the next may take long
             if options.csv:
-                write_rows(options.csv, Settling, rows)
+                write_rows(options.csv, ConvergenceRow, rows)
     if options.markdown:
         Path(options.markdown).write_text(markdown(HEADS, cells(rows)), encoding="utf-8")
     if options.json:

@@ -1,8 +1,9 @@
-"""What leaving something out is worth: pairs of runs with and without it, their times and the error that it costs.
+"""What each model simplification saves: pairs of runs with and without it, their times and the error that it adds.
 
-`calmotion bench needs [--csv FILE]` runs shots made in code each of which has something that it does not need, and
-three of them (a rigid one, one in which nothing turns, one without loops) with everything forced on. A time is the
-median of runs in turn; an error is the largest distance of any target, at any frame, between the two of a pair.
+`calmotion bench simplification [--csv FILE]` runs shots made in code, each of which allows one simplification, and
+three of them (a rigid one, one without rotating bodies, one without closed chains) with all simplifications
+switched off. A time is the median of alternating runs; an error is the largest distance of any target, at any
+frame, between the two runs of a pair.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ from calmotion.benchmarks.accuracy.work_precision import machine
 from calmotion.benchmarks.common.fresh_cache import fresh_cache
 from calmotion.benchmarks.common.tables import write_rows
 from calmotion.benchmarks.scenes.simplification_shots import (
-    NeedsShot,
+    SimplificationShot,
     arm_with_head,
     clevis_arm,
     firm_arm,
@@ -89,15 +90,18 @@ class Outcome:
     estimated_m: float
 
 
-def run(shot: NeedsShot, command: str, forced: Mapping[str, str], options: Options) -> Outcome:
+def run(shot: SimplificationShot, command: str, forced: Mapping[str, str], options: Options) -> Outcome:
     """Analyse, reduce, and simulate or optimise a shot."""
     begin = time.perf_counter()
     optimizes = command == "optimize"
-    needs = analyse(shot.character, shot.animation, options, forced, optimizes)
+    choices = analyse(shot.character, shot.animation, options, forced, optimizes)
     options = replace(
-        options, ranges=needs.choice("ranges"), motors=needs.choice("motors"), directions=needs.choice("directions")
+        options,
+        ranges=choices.choice("ranges"),
+        motors=choices.choice("motors"),
+        directions=choices.choice("directions"),
     )
-    character, bodies = needs.character, None
+    character, bodies = choices.character, None
     if any(body.bends for body in character.bodies):
         loads = load_envelopes(character, shot.animation, shot.meshes, options)
         # finite elements anew each time, as for a user who comes with a new character
@@ -106,12 +110,12 @@ def run(shot: NeedsShot, command: str, forced: Mapping[str, str], options: Optio
     work: Callable[..., Result] = optimize_to_tolerance if optimizes else simulate_to_tolerance
     result = work(character, shot.animation, bodies, options, lambda fraction, message: None)
     whole = time.perf_counter() - begin
-    estimated = sum(row.estimated_error_m or 0.0 for row in (*needs.left_out, *result.left_out))
+    estimated = sum(row.estimated_error_m or 0.0 for row in (*choices.left_out, *result.left_out))
     return Outcome(frames_of(result, shot.animation.frame_times), result.wall_s, whole, estimated)
 
 
 def pair(
-    kind: str, shot: NeedsShot, command: str, forced: Mapping[str, str], repeats: int = REPEATS,
+    kind: str, shot: SimplificationShot, command: str, forced: Mapping[str, str], repeats: int = REPEATS,
     given: Options | None = None, more: Options | None = None,
 ) -> Pair:  # fmt: skip
     """A shot as it is and with something forced on.
@@ -170,7 +174,7 @@ def print_pairs(found: Sequence[Pair]) -> None:
 
 def main(arguments: list[str] | None = None) -> int:
     """The command."""
-    parser = argparse.ArgumentParser(prog="calmotion bench needs", description=__doc__)
+    parser = argparse.ArgumentParser(prog="calmotion bench simplification", description=__doc__)
     parser.add_argument("--json", action="store_true", help="print one JSON object on stdout, and nothing else there")
     parser.add_argument("--csv", metavar="FILE", help="also write a table")
     parser.add_argument("--only", metavar="KIND", action="append", help="only this kind of thing; may be repeated")

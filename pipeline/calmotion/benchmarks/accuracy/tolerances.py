@@ -44,7 +44,7 @@ class Kept:
         step_s, coordinates: What it chose.
         wall_s: Analysis, reduction, choices and the run, the mesh at hand [s].
         run_s: The simulation or the search alone [s].
-        shake_before_m, shake_after_m: Largest error of the input and of the result against what was meant [m].
+        shake_before_m, shake_after_m: Largest error of the input and of the result against the intended motion [m].
     """
 
     shot: str
@@ -106,18 +106,18 @@ class Tolerances:
         )  # fmt: skip
 
     def _run(self, options: Options, command: str) -> tuple[Result, int, float]:
-        """The result, its elastic coordinates, and what the analysis of needs estimates to leave out [m]."""
+        """The result, its elastic coordinates, and the estimated error of the model simplifications [m]."""
         shot, animation = self.shot, self.shot.animation
-        needs = analyse(shot.character, animation, options, {}, command == "optimize")
-        character, more = needs.character, sum(row.estimated_error_m or 0.0 for row in needs.left_out)
+        choices = analyse(shot.character, animation, options, {}, command == "optimize")
+        character, more = choices.character, sum(row.estimated_error_m or 0.0 for row in choices.left_out)
         quiet = lambda fraction, message: None  # noqa: E731  (a callback, twice)
         search = command == "optimize"
-        settled = converged_reduction(character, animation, shot.meshes, options, retargeted=search)
-        bodies, known = settled.bodies, settled.known
+        reduction = converged_reduction(character, animation, shot.meshes, options, retargeted=search)
+        bodies, known = reduction.bodies, reduction.known
         if search:
             result = optimize_to_tolerance(character, animation, bodies, options, quiet, known=known)
         else:
-            result = simulate_to_tolerance(character, animation, bodies, options, quiet, settled.error_m, known)
+            result = simulate_to_tolerance(character, animation, bodies, options, quiet, reduction.error_m, known)
         return result, sum(u.shape[1] for u in result.before.motion.elastic), more
 
 

@@ -68,16 +68,16 @@ def chosen_points(bench: Bench, reference: Reference, tolerances: Sequence[float
     points = [bench.measure(reference, "default", "default", default, MAX_STEP)]
     for tolerance in tolerances:
         options = Options(tolerance=tolerance)
-        settled = converged_reduction(character, animation, shot.meshes, options)
-        held = project_to_tolerance(character, animation, settled.bodies, options, settled.known)
-        bodies = held.bodies or settled.bodies
-        choice = partial(_step_and_scheme, character, animation, bodies, settled.error_m + held.error_m)
+        reduction = converged_reduction(character, animation, shot.meshes, options)
+        held = project_to_tolerance(character, animation, reduction.bodies, options, reduction.known)
+        bodies = held.bodies or reduction.bodies
+        choice = partial(_step_and_integrator, character, animation, bodies, reduction.error_m + held.error_m)
         step, integrator = by_fast_scheme(options, choice)
         points.append(bench.measure(reference, "tolerance", setting_of(tolerance), bodies, step, integrator))
     return points
 
 
-def _step_and_scheme(
+def _step_and_integrator(
     character: Character, animation: Animation, bodies: Sequence[ReducedBody], left_out: float, options: Options
 ) -> tuple[float, str]:
     return chosen_step(character, animation, bodies, options, left_out)[0], options.scheme

@@ -102,10 +102,10 @@ def load(name: str) -> BenchShot:
     for result in run:
         if result.error is not None:
             raise result.error
-    needs, animation_found, reduced = run.get(ModelChoices), run.get(Animation), run.get(ReducedBodies)
-    if needs is None or animation_found is None or reduced is None:
+    choices, animation_found, reduced = run.get(ModelChoices), run.get(Animation), run.get(ReducedBodies)
+    if choices is None or animation_found is None or reduced is None:
         raise ShotError("has nothing flexible to retarget", path=name)
-    return BenchShot(Path(name).stem, needs.character, animation_found, reduced.bodies)
+    return BenchShot(Path(name).stem, choices.character, animation_found, reduced.bodies)
 
 
 def _made(name: str) -> tuple[Character, Animation, FEMeshes]:

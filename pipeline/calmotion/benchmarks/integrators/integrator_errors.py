@@ -171,7 +171,7 @@ def _height(run: Any, step: float) -> tuple[Array, Array]:
 
 
 def damping(counts: Sequence[int] = (10, 20, 40, 80, 160)) -> list[tuple[int, float, float]]:
-    """Damping ratio that BDF2 gives an undamped vibration: (steps in a period, measured, from the scheme's root)."""
+    """Damping ratio that BDF2 gives an undamped vibration: (steps in a period, measured, from its root)."""
     from calmotion.multibody.analysis.kinematics import rigid_state
     from calmotion.multibody.integrators.simulation import simulate
     from calmotion.multibody.integrators.workspace import Workspace

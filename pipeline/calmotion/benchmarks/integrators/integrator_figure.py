@@ -38,7 +38,7 @@ def draw(
     axes[2].legend(frameon=False, fontsize=8)
     counts, found, expected = zip(*damped, strict=True)
     axes[3].loglog(counts, found, "o", color=COLORS["bdf2"], label="measured")
-    axes[3].loglog(counts, expected, "-", color=COLORS["bdf2"], lw=1, label="root of the scheme")
+    axes[3].loglog(counts, expected, "-", color=COLORS["bdf2"], lw=1, label="root of the integrator")
     axes[3].set_title("Damping ratio that BDF2 adds", loc="left", fontsize=10)
     axes[3].set_xlabel("steps in a period")
     axes[3].legend(frameon=False, fontsize=8)

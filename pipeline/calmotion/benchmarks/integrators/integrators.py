@@ -48,7 +48,7 @@ def main(arguments: list[str] | None = None) -> int:
         figures.append(draw(options.figures, measured, heights, damped))
     if options.json:
         report = {name: [asdict(row) for row in rows] for name, rows in measured.items()}
-        columns = ("steps_in_a_period", "measured", "of_the_scheme")
+        columns = ("steps_in_a_period", "measured", "of_the_root")
         print(
             json.dumps(
                 {
@@ -95,7 +95,7 @@ def print_tables(
     fated = [[f.integrator, f"{f.step_s:.2g}", f.outcome, f"{f.ends_s:.4g}", f"{f.wall_s:.2f}"] for f in outcomes]
     print_table(console, "Two thin steel links", ["integrator", "step [s]", "outcome", "at [s]", "time [s]"], fated)
     ratios = [[str(count), f"{100 * one:.3g} %", f"{100 * other:.3g} %"] for count, one, other in damped]
-    print_table(console, "Damping of BDF2", ["steps in a period", "measured", "of the scheme"], ratios, texts=0)
+    print_table(console, "Damping of BDF2", ["steps in a period", "measured", "of the root"], ratios, texts=0)
 
 
 if __name__ == "__main__":

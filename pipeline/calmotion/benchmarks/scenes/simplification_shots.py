@@ -31,7 +31,7 @@ _SIDE = np.roll(np.array([0.0, np.sqrt(0.5), 0.0, np.sqrt(0.5)]), 1)  # z to x: 
 
 
 @dataclass(frozen=True, eq=False)
-class NeedsShot:
+class SimplificationShot:
     """A shot with meshes for all bodies that may bend."""
 
     name: str
@@ -54,37 +54,39 @@ def _with_geometry(character: Character, meshes: FEMeshes) -> Character:
     return replace(character, bodies=tuple(bodies))
 
 
-def plastic_arm(rate: float = 24.0) -> NeedsShot:
+def plastic_arm(rate: float = 24.0) -> SimplificationShot:
     """Two plastic links that swing, animated at so many frames a second."""
     character, meshes = beam_arm(2, length=0.3, thickness=0.014, payload=0.2)
-    return NeedsShot("arm", _with_geometry(character, meshes), _swing(rate=rate), meshes)
+    return SimplificationShot("arm", _with_geometry(character, meshes), _swing(rate=rate), meshes)
 
 
-def firm_arm() -> NeedsShot:
+def firm_arm() -> SimplificationShot:
     """The same of thicker plastic, which bends by less than a twentieth of that."""
     character, meshes = beam_arm(2, length=0.3, thickness=0.03, payload=0.1)
-    return NeedsShot("firm arm", _with_geometry(character, meshes), _swing(), meshes)
+    return SimplificationShot("firm arm", _with_geometry(character, meshes), _swing(), meshes)
 
 
-def steel_arm() -> NeedsShot:
+def steel_arm() -> SimplificationShot:
     """The same of thick steel, which is declared flexible but does not bend noticeably."""
     character, meshes = beam_arm(
         2, length=0.2, thickness=0.08, youngs_modulus=2.1e11, density=7800.0, payload=0.2, cells=8
     )
-    return NeedsShot("steel arm", _with_geometry(character, meshes), _swing(), meshes)
+    return SimplificationShot("steel arm", _with_geometry(character, meshes), _swing(), meshes)
 
 
-def mixed_arm(cells: int = 8, across: int = 2) -> NeedsShot:
+def mixed_arm(cells: int = 8, across: int = 2) -> SimplificationShot:
     """A plastic link, always of the same modes, on one of thick steel, whose mesh has so many cells."""
     character, meshes = beam_arm(2, length=0.3, thickness=0.014, payload=0.2, modes=8)
     settings = FlexibleSettings(ElasticMaterial("/Arm/Steel", 2.1e11, 0.3, 7800.0))
     bodies = (replace(character.bodies[0], flexible=settings), *character.bodies[1:])
     thick = FEMesh(0, *beam_mesh(0.3, 0.08, cells, across), MeshQuality(0.0, 0.0, 0.0))
     meshes = FEMeshes((thick, meshes.meshes[1]))
-    return NeedsShot("steel and plastic", _with_geometry(replace(character, bodies=bodies), meshes), _swing(), meshes)
+    return SimplificationShot(
+        "steel and plastic", _with_geometry(replace(character, bodies=bodies), meshes), _swing(), meshes
+    )
 
 
-def gantry(masts: int = 3) -> NeedsShot:
+def gantry(masts: int = 3) -> SimplificationShot:
     """A carriage on a slider, with plastic masts and loads on it that sway but never turn."""
     material = ElasticMaterial("/Gantry/Plastic", 1.8e9, 0.35, 1200.0, 0.01)
     settings = FlexibleSettings(material, mode_count=24, elasticity="linear")
@@ -108,10 +110,10 @@ def gantry(masts: int = 3) -> NeedsShot:
         "/Gantry", tuple(bodies), tuple(joints), motors, tuple(targets), np.array([0.0, 0.0, -9.81])
     )  # fmt: skip
     made = FEMeshes(tuple(meshes))
-    return NeedsShot("gantry", _with_geometry(character, made), shot_of(quintic(0.5, 0.5, 0.2), 2.0), made)
+    return SimplificationShot("gantry", _with_geometry(character, made), shot_of(quintic(0.5, 0.5, 0.2), 2.0), made)
 
 
-def clevis_arm(links: int = 6) -> NeedsShot:
+def clevis_arm(links: int = 6) -> SimplificationShot:
     """Rigid links whose hinges have two pins each, as drawn in CAD: one drives, the other closes a loop that holds
     nothing; and a plastic tool at the end."""
     arm, meshes = beam_arm(1, length=0.3, thickness=0.014, payload=0.1)
@@ -138,10 +140,10 @@ def clevis_arm(links: int = 6) -> NeedsShot:
     move, back = quintic(0.15, 0.4, 0.2), quintic(-0.2, 0.4, 0.9)
     animation = shot_of(lambda t: move(t) + back(t), 2.0, links)
     meshes = FEMeshes((replace(meshes.meshes[0], body=links),))
-    return NeedsShot("clevis arm", _with_geometry(character, meshes), animation, meshes)
+    return SimplificationShot("clevis arm", _with_geometry(character, meshes), animation, meshes)
 
 
-def arm_with_head(features: int = 0) -> NeedsShot:
+def arm_with_head(features: int = 0) -> SimplificationShot:
     """The plastic arm with a head on its elbow: two motors that nod and shake it, and no target on it.
 
     Args:
@@ -166,17 +168,17 @@ def arm_with_head(features: int = 0) -> NeedsShot:
     own = range(len(character.joints), len(joints))
     motors = (*character.motors, *(Motor(k, joints[k].path, _ANGLE) for k in own))
     character = replace(character, bodies=bodies, joints=tuple(joints), motors=motors)
-    return NeedsShot("arm with a head", character, _swing(motors=len(motors)), shot.meshes)
+    return SimplificationShot("arm with a head", character, _swing(motors=len(motors)), shot.meshes)
 
 
-def held_arm() -> NeedsShot:
+def held_arm() -> SimplificationShot:
     """The plastic arm held for two seconds before it moves, its sag not counting as an error."""
     shot = plastic_arm()
     character = replace(shot.character, retarget=replace(shot.character.retarget, reference="static"))
     times = np.arange(round(4.0 * 24) + 1) / 24.0
     values = quintic(0.8, 0.4, 2.2)(times)
     tracks = (Track(times, values),) * 2
-    return NeedsShot("held arm", character, Animation(times, tracks, tracks), shot.meshes)
+    return SimplificationShot("held arm", character, Animation(times, tracks, tracks), shot.meshes)
 
 
 def _frame(x: float, y: float = 0.0, z: float = 0.0, rotation: Array = IDENTITY) -> Frame:
