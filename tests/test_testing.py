@@ -60,7 +60,7 @@ def test_one_operator_runs_on_given_values(repository, tmp_path):
     paths = OutputPaths(csv=str(tmp_path / "table.csv"))
     values = [synthetic.character(), synthetic.result(), paths]
     assert run_operator(host, "table.write", values) == (CsvFile(paths.csv),)
-    with pytest.raises(PluginError, match="no table was asked for"):
+    with pytest.raises(PluginError, match="no table is requested"):
         run_operator(host, "table.write", [*values[:2], OutputPaths()])
 
 

@@ -1,18 +1,27 @@
-"""Writes targets and motors of a run as a CSV table."""
+"""Tables of a result: targets and motors at each time step, and motor curves for a controller."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
-from calmotion.host import Host, Operator, RunContext
-from calmotion.shot import Character, Result
+from calmotion.host import Host, NotAsked, Operator, Property, RunContext
+from calmotion.shot import Animation, Character, Provenance, Result
 from calmotion.shot.outputs import CsvFile
 from calmotion.shot.run import OutputPaths
 
 
+@dataclass(frozen=True)
+class ControllerCurves:
+    """Path of the table of curves, and its number of rows."""
+
+    path: str
+    rows: int
+
+
 class WriteTable(Operator):
-    """One row a time step, from the first frame of the shot on; a pre-roll is not written."""
+    """One row for each time step, from the first frame of the shot on; a pre-roll is not written."""
 
     idname = "table.write"
     label = "Write the table"
@@ -21,9 +30,11 @@ class WriteTable(Operator):
 
     @classmethod
     def poll(cls, data: Mapping[type, Any]) -> str | None:
-        return None if data[OutputPaths].csv else "no table was asked for"
+        """Skipped where no table is requested."""
+        return None if data[OutputPaths].csv else NotAsked("no table is requested (--csv)")
 
     def execute(self, context: RunContext) -> Sequence[object]:
+        """Write the table; its path."""
         from calmotion.shot.table import columns
 
         from .table import write_table
@@ -34,9 +45,50 @@ class WriteTable(Operator):
         return (CsvFile(path),)
 
 
+class ExportCurves(Operator):
+    """One row for each instant, one column for each motor; the header has rate, units and limits.
+
+    Run it with `--run curves.export --set curves.export.file=FILE`.
+    """
+
+    idname = "curves.export"
+    label = "Export the motor curves"
+    requires = (Character, Animation, Provenance, Result)
+    provides = (ControllerCurves,)
+    properties = (
+        Property("file", str, "", description="File to write"),
+        Property("rate", float, 500.0, unit="Hz", minimum=1.0, maximum=1e5, description="Rows a second"),
+        Property("angles", str, "rad", choices=("rad", "deg"), description="Unit of angles; lengths are in m"),
+    )
+
+    def execute(self, context: RunContext) -> Sequence[object]:
+        """Write the curves; their path."""
+        from .curves import write_curves
+
+        values = context.properties
+        rows = write_curves(
+            values.file,
+            context.get(Character),
+            context.get(Animation),
+            context.get(Provenance),
+            context.get(Result),
+            rate=values.rate,
+            degrees=values.angles == "deg",
+        )
+        context.report("info", f"{values.file}: {rows} rows for a controller at {values.rate:g} Hz")
+        return (ControllerCurves(values.file, rows),)
+
+
+OPERATORS = (WriteTable, ExportCurves)
+
+
 def register(host: Host) -> None:
-    host.register_operator(WriteTable)
+    """Register the operators."""
+    for operator in OPERATORS:
+        host.register_operator(operator)
 
 
 def unregister(host: Host) -> None:
-    host.unregister_operator(WriteTable)
+    """Undo `register`."""
+    for operator in reversed(OPERATORS):
+        host.unregister_operator(operator)

@@ -306,8 +306,8 @@ def test_inspecting_a_rigid_shot_imports_neither_finite_elements_nor_rerun(tmp_p
     assert {row["what"] for row in report["left_out"]} == {
         "Tetrahedralise flexible bodies: skipped",
         "Reduce flexible bodies: skipped",
-        "Find the frequencies of the character: skipped",
-        "Find out which time step the shot needs: skipped",
+        "Compute the natural frequencies: skipped",
+        "Choose the time step: skipped",
     }
     heavy = ("rerun", "skfem", "trimesh", "pytetwild", "meshio", "numba", "matplotlib", "calmotion.fem")
     assert not [name for name in modules if name.startswith(heavy)]

@@ -12,11 +12,12 @@ from calmotion.testing import check_plugin
 @pytest.mark.parametrize(
     "name",
     [
+        "body_reduction",
         "bvh_reader",
-        "csv_export",
         "fe_mesher",
         "figures",
         "mode_shapes",
+        "model_analysis",
         "rerun_logger",
         "skel_rigger",
         "table_writer",
@@ -34,7 +35,7 @@ def test_no_bundled_plugin_is_missing_here(repository):
     assert found == set(test_bundled_plugin_conforms.pytestmark[0].args[1])
 
 
-@pytest.mark.parametrize("name", ["bvh_reader", "csv_export"])
+@pytest.mark.parametrize("name", ["bvh_reader", "table_writer"])
 def test_plugins_from_outside_use_what_others_may_use_too(repository, name):
     public = ("calmotion.errors", "calmotion.support.files", "calmotion.host", "calmotion.shot")
     for file in (repository / "plugins" / name).glob("*.py"):

@@ -13,7 +13,14 @@ from calmotion.testing import host_with, run_operator, small_shot
 
 @pytest.fixture(scope="module")
 def host(repository):
-    return host_with(repository / "plugins" / "vibration_optimizer")
+    names = ("model_analysis", "body_reduction", "vibration_optimizer")
+    return host_with(*(repository / "plugins" / name for name in names))
+
+
+@pytest.fixture(scope="module")
+def with_mesher(repository):
+    names = ("fe_mesher", "model_analysis", "body_reduction", "vibration_optimizer")
+    return host_with(*(repository / "plugins" / name for name in names))
 
 
 def source(command):
@@ -50,9 +57,8 @@ def test_flexible_shot_without_a_mesh_says_what_is_missing(host):
     assert "mesh" in error.value.problem and error.value.path.startswith("/")
 
 
-def test_properties_reach_the_optimiser(host, repository):
-    plugins = repository / "plugins"
-    both = host_with(plugins / "fe_mesher", plugins / "vibration_optimizer")
+def test_properties_reach_the_optimiser(with_mesher):
+    both = with_mesher
     character, animation = small_shot(flexible=True)
     run = both.run(
         [character, animation, source("optimize")],
@@ -71,9 +77,8 @@ def test_properties_reach_the_optimiser(host, repository):
     assert len(run.get(ReducedBodies).bodies) == len(character.bodies)
 
 
-def test_a_result_is_verified_where_that_is_asked_for(host, repository):
-    plugins = repository / "plugins"
-    both = host_with(plugins / "fe_mesher", plugins / "vibration_optimizer")
+def test_a_result_is_verified_where_that_is_asked_for(host, with_mesher):
+    both = with_mesher
     character, animation = small_shot(flexible=True)
     asked = Source(path="shot.usda", command="simulate", tolerance=1e-5, verify=True)
     run = both.run([character, animation, asked], [Result, Verification])

@@ -182,4 +182,4 @@ def test_wrong_arguments_are_setting_errors(shot_file, given, problem):
 
 def test_keep_wins_over_leave_out():
     assert _forced([], []) == {}
-    assert _forced(["modes"], ["all"]) == {"needs.analyse": dict.fromkeys(KINDS, OFF) | {"modes": ON}}
+    assert _forced(["modes"], ["all"]) == {"accuracy.analyse": dict.fromkeys(KINDS, OFF) | {"modes": ON}}

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from calmotion.shot.character import Character
-from calmotion.shot.result import Simplification
+from calmotion.shot.result import Result, Simplification
 
 # What can be forced on or off.
 KINDS = ("bodies", "turning", "loops", "modes", "directions", "elasticity", "motors", "ranges")
@@ -62,6 +62,24 @@ class ModelChoices:
     def choice(self, kind: str) -> str:
         """`auto`, `on` or `off`."""
         return self.forced.get(kind, AUTO)
+
+
+def simplified_character(character: Character, choices: ModelChoices | None) -> Character:
+    """The character, marked with its simplifications where they are known."""
+    return character if choices is None else choices.character
+
+
+def with_choices(result: Result, choices: ModelChoices | None) -> Result:
+    """A result whose simplifications and estimated error include those of the model."""
+    if choices is None:
+        return result
+    accuracy = result.accuracy
+    if accuracy is not None:
+        error = sum(row.estimated_error_m or 0.0 for row in choices.left_out)
+        accuracy = replace(accuracy, left_out_m=accuracy.left_out_m + error)
+    # a search reports more about its motors
+    rows = choices.left_out if result.after is None else choices.left_out_but("motors")
+    return replace(result, left_out=(*rows, *result.left_out), accuracy=accuracy)
 
 
 def nothing_bends(data: Mapping[type, Any]) -> str | None:

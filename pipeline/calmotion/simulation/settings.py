@@ -3,6 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
+
+from calmotion.shot.model_choice import ModelChoices
+from calmotion.shot.run import Source
 
 
 @dataclass(frozen=True)
@@ -30,3 +34,19 @@ class Options:
     def scheme(self) -> str:
         """The integrator of a simulation for which none is chosen."""
         return self.integrator or "bdf2"
+
+
+def requested_options(source: Source | None, choices: ModelChoices | None = None, **more: Any) -> Options:
+    """What the user asked for.
+
+    Args:
+        source: The user's request; None: nothing is overridden.
+        choices: Simplifications, some of which the user may have forced.
+        more: Fields of `Options` that no request holds.
+    """
+    if choices is not None:
+        more |= {kind: choices.choice(kind) for kind in ("directions", "motors", "ranges")}
+    if source is not None:
+        asked = {name: getattr(source, name) for name in ("tolerance", "step", "pre_roll", "integrator")}
+        more = asked | more
+    return Options(**more)

@@ -246,4 +246,4 @@ def _forced(keep: Sequence[str], leave_out: Sequence[str]) -> Settings:
     forced: dict[str, object] = {}
     for given, choice in ((leave_out, OFF), (keep, ON)):
         forced |= {kind: choice for name in given for kind in (KINDS if name == "all" else (name,))}
-    return {"needs.analyse": forced} if forced else {}
+    return {"accuracy.analyse": forced} if forced else {}

@@ -63,7 +63,7 @@ def load_unreduced(path: str, element_size: float | None = None) -> Unreduced:
 
     # everything is kept, so that what could be left out can be compared with it
     settings: dict[str, dict[str, object]] = {
-        "needs.analyse": dict.fromkeys(("bodies", "turning", "loops", "motors"), ON)
+        "accuracy.analyse": dict.fromkeys(("bodies", "turning", "loops", "motors"), ON)
     }
     if element_size is not None:
         settings["fe.mesh"] = {"element_size": element_size}

@@ -31,7 +31,7 @@ def export(repository, shot, tmp_path):
         character, animation, simulated = shot
         settings = {"file": str(tmp_path / "out" / "curves.csv")} | settings
         values = [character, animation, PROVENANCE, result or simulated]
-        host = host_with(repository / "plugins" / "csv_export")
+        host = host_with(repository / "plugins" / "table_writer")
         (found,) = run_operator(host, "curves.export", values, {"curves.export": settings})
         return found
 

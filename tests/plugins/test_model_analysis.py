@@ -15,7 +15,8 @@ from calmotion.testing import host_with, run_operator, small_shot
 @pytest.fixture(scope="module")
 def host(repository):
     plugins = repository / "plugins"
-    return host_with(plugins / "fe_mesher", plugins / "vibration_optimizer")
+    names = ("fe_mesher", "model_analysis", "body_reduction", "vibration_optimizer")
+    return host_with(*(plugins / name for name in names))
 
 
 def _source(command="simulate", **more):
@@ -44,7 +45,7 @@ def test_kept_it_is_simulated_as_flexible(host):
     given = [shot.character, shot.animation, _source()]
     lean = host.run(given, [FEMeshes]).finish()
     assert [mesh.body for mesh in lean.get(FEMeshes).meshes] == [1]
-    full = host.run(given, [FEMeshes], settings={"needs.analyse": {"bodies": "on"}}).finish()
+    full = host.run(given, [FEMeshes], settings={"accuracy.analyse": {"bodies": "on"}}).finish()
     assert [mesh.body for mesh in full.get(FEMeshes).meshes] == [0, 1]
 
 
@@ -62,7 +63,7 @@ def test_what_is_left_out_counts_in_the_accuracy(host):
 def test_mode_shapes_need_finite_elements(host):
     shot = steel_arm()
     given = [shot.character, shot.animation, _source("inspect"), OutputPaths(modes="somewhere")]
-    (needs,) = run_operator(host, "needs.analyse", given)
+    (needs,) = run_operator(host, "accuracy.analyse", given)
     assert needs.character.bodies[0].bends and needs.forced == {"bodies": ON}
 
 
@@ -79,7 +80,7 @@ def test_an_inspection_plans_the_step_where_one_matters(host):
     row = run.get(PlannedStep).row
     assert row.what == "time step 8.33 ms" and row.why == "given by --step"
     assert 0.0 < row.estimated_error_m < 0.1
-    poll = host.operators["needs.step"].poll
+    poll = host.operators["accuracy.step"].poll
     character, _ = small_shot()
     assert "motors alone" in poll({Character: character, Source: _source("inspect")})
     assert isinstance(poll({Source: _source("simulate")}), NotAsked)

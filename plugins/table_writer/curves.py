@@ -13,7 +13,7 @@ from calmotion.shot.commanded import commanded_values
 from calmotion.support.files import write_text
 
 
-def write_table(
+def write_curves(
     file: str, character: Character, animation: Animation, provenance: Provenance, result: Result, *, rate: float,
     degrees: bool,
 ) -> int:  # fmt: skip

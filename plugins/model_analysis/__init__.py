@@ -1,0 +1,128 @@
+"""Error control: simplifications of the model, the time step, and the measured error of a result."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+from calmotion.accuracy.reduced_bodies import ReducedBodies
+from calmotion.host import NotAsked, Operator, Property, RunContext
+from calmotion.shot import Animation, Character, FEMeshes, ModelChoices, Result
+from calmotion.shot.model_choice import AUTO, KINDS, OFF, ON, nothing_bends, simplified_character
+from calmotion.shot.outputs import PlannedStep, ShapedTracks, Verification
+from calmotion.shot.run import OutputPaths, Source
+
+_FORCED = {
+    "bodies": "Finite elements of all flexible bodies, or of none",
+    "turning": "Gyroscopic terms of all bodies, or of none",
+    "loops": "All joints that close chains, or only those that are not redundant",
+    "modes": "As many modes as for a thousandth of the tolerance, or only those that the motion excites",
+    "elasticity": "Nonlinear elasticity of all flexible bodies, or linear",
+    "motors": "All motors that may change, or only those that move a target, without a check at the end",
+    "directions": "All elastic coordinates of nonlinear bodies and all pairs of them, or the smallest subspaces",
+    "ranges": "The whole shot, or only its active intervals, without a check at the end",
+}
+
+
+class AnalyseShot(Operator):
+    """Decides on the simplifications of the model, before meshes and finite elements are made."""
+
+    idname = "accuracy.analyse"
+    label = "Analyse the shot"
+    requires = (Character, Animation)
+    uses = (Source, OutputPaths)
+    provides = (ModelChoices,)
+    properties = tuple(
+        Property(kind, str, AUTO, choices=(AUTO, ON, OFF), description=f"{_FORCED[kind]}; auto: by the tolerance")
+        for kind in KINDS
+    )
+
+    def execute(self, context: RunContext) -> Sequence[object]:
+        from calmotion.accuracy.simplification.analysis import analyse
+        from calmotion.simulation.settings import requested_options
+
+        source, paths = context.get(Source), context.get(OutputPaths)
+        forced = {kind: getattr(context.properties, kind) for kind in KINDS}
+        if paths is not None and paths.modes and forced["bodies"] == AUTO:
+            forced["bodies"] = ON  # their mode shapes are asked for
+        changes = source is None or source.command != "simulate"
+        options = requested_options(source)
+        return [analyse(context.get(Character), context.get(Animation), options, forced, changes)]
+
+
+class PlanStep(Operator):
+    """The time step with which the shot as animated would be simulated, and its error at the targets."""
+
+    idname = "accuracy.step"
+    label = "Choose the time step"
+    requires = (Character, Animation)
+    uses = (ReducedBodies, ModelChoices, Source)
+    provides = (PlannedStep,)
+
+    @classmethod
+    def poll(cls, data: Mapping[type, Any]) -> str | None:
+        source, character = data.get(Source), data.get(Character)
+        if source is not None and source.command != "inspect":
+            return NotAsked("other commands choose it themselves")
+        reason = nothing_bends(data)
+        if reason is None or character is None:
+            return None
+        driven = {motor.joint for motor in character.motors}
+        free = any(k not in driven and joint.kind != "fixed" for k, joint in enumerate(character.joints))
+        return None if free else f"{reason}, and motors alone determine the motion"
+
+    def execute(self, context: RunContext) -> Sequence[object]:
+        from calmotion.accuracy.simulate_to_tolerance import planned_step
+        from calmotion.simulation.settings import requested_options
+
+        context.progress(0.0, "simulating the shot as animated")
+        reduced, choices = context.get(ReducedBodies), context.get(ModelChoices)
+        character = simplified_character(context.get(Character), choices)
+        bodies = None if reduced is None else reduced.bodies
+        options = requested_options(context.get(Source), choices)
+        return [PlannedStep(planned_step(character, context.get(Animation), bodies, options))]
+
+
+class VerifyResult(Operator):
+    """Compares the result with a finer run of the same curves, with a quarter of the step and more modes."""
+
+    idname = "retarget.verify"
+    label = "Compare with a finer run"
+    requires = (Character, Animation, Source, Result)
+    uses = (FEMeshes, ReducedBodies, ShapedTracks, ModelChoices)
+    provides = (Verification,)
+
+    @classmethod
+    def poll(cls, data: Mapping[type, Any]) -> str | None:
+        source = data.get(Source)
+        return NotAsked("no --verify was asked for") if source is None or not source.verify else None
+
+    def execute(self, context: RunContext) -> Sequence[object]:
+        from calmotion.accuracy.verify import verify
+        from calmotion.simulation.settings import requested_options
+
+        animation, shaped = context.get(Animation), context.get(ShapedTracks)
+        if shaped is not None:
+            animation = replace(animation, current=shaped.tracks)
+        reduced, choices = context.get(ReducedBodies), context.get(ModelChoices)
+        character = simplified_character(context.get(Character), choices)
+        bodies = None if reduced is None else reduced.bodies
+        options = requested_options(context.get(Source), choices)
+        meshes, result = context.get(FEMeshes), context.get(Result)
+        return [Verification(*verify(character, animation, meshes, bodies, result, options, context.progress))]
+
+
+OPERATORS = (AnalyseShot, PlanStep, VerifyResult)
+
+
+def register(host: Any) -> None:
+    """Register the operators."""
+    for operator in OPERATORS:
+        host.register_operator(operator)
+
+
+def unregister(host: Any) -> None:
+    """Undo `register`."""
+    for operator in reversed(OPERATORS):
+        host.unregister_operator(operator)
