@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Callable, Collection
 from dataclasses import dataclass
 
 from calmotion.multibody.analysis.kinematics import rigid_state, target_frames
@@ -33,7 +33,7 @@ class ForwardRun:
 
 def run_forward(
     model: Model, workspace: Workspace, angles: Array, rates: Array, h: float, world: Array | None = None,
-    progress=None, integrator: str = "bdf2", steady: SteadyState | None = None,
+    progress: Callable[[float], None] | None = None, integrator: str = "bdf2", steady: SteadyState | None = None,
 ) -> ForwardRun:  # fmt: skip
     """Simulate motor curves, from rest or in a loop.
 

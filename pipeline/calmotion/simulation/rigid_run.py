@@ -134,7 +134,7 @@ def highest_frequency(signal: Array, h: float) -> float:
 def _carried_center(center: Array, R: Array, omega: Array, angular: Array) -> Array:
     """Acceleration of the center of mass relative to the origin, world axes, shape [T, 3]."""
     local = np.cross(angular, center) + np.cross(omega, np.cross(omega, center))
-    return np.einsum("tij,tj->ti", R, local)
+    return np.asarray(np.einsum("tij,tj->ti", R, local))
 
 
 def _reach(model: Model, run: ForwardRun, R: Array) -> Array:
@@ -152,11 +152,12 @@ def _reach(model: Model, run: ForwardRun, R: Array) -> Array:
 
 
 def _peak(signal: Array) -> Array:
-    return np.abs(signal).max(axis=0)
+    return np.asarray(np.abs(signal).max(axis=0))
 
 
 def _matrices(q: Array) -> Array:
     """Rotation matrices, shape [..., 3, 3], of unit quaternions (w, x, y, z)."""
     from scipy.spatial.transform import Rotation
 
-    return Rotation.from_quat(np.roll(q, -1, axis=-1).reshape(-1, 4)).as_matrix().reshape(q.shape[:-1] + (3, 3))
+    matrices = Rotation.from_quat(np.roll(q, -1, axis=-1).reshape(-1, 4)).as_matrix()
+    return np.asarray(matrices.reshape(q.shape[:-1] + (3, 3)))

@@ -17,7 +17,7 @@ from calmotion.support.compilation import allocating_kernel
 
 
 @allocating_kernel
-def _rotation_errors(reference, actual, errors, inverse):
+def _rotation_errors(reference: Array, actual: Array, errors: Array, inverse: Array) -> None:
     """Rotation vector of R_ref^T R, and J_r^-1 of it, for quaternions of shape [T, K, 4]."""
     A = np.zeros((3, 3))
     B = np.zeros((3, 3))
@@ -43,7 +43,7 @@ def rotation_errors(reference: Array, actual: Array) -> tuple[Array, Array]:
 
 @dataclass(frozen=True, eq=False)
 class Reference:
-    """What the targets should do: positions [m], shape [T, K, 3], and quaternions, shape [T, K, 4], world."""
+    """The intended motion of the targets: positions [m], shape [T, K, 3], and quaternions, shape [T, K, 4], world."""
 
     positions: Array
     rotations: Array
@@ -54,8 +54,8 @@ class Objective:
     """G = 1/2 int sum_k ( w_k |x_k - x^_k|^2 + w'_k |log(R^_k^T R_k)|^2 ) dt over the judged time.
 
     Attributes:
-        model: The model whose targets are meant.
-        reference: What they should do.
+        model: The model that has the targets.
+        reference: Their intended motion.
         weights: Square roots of weight times step, shape [T, K, 6]; zero where nothing is judged.
     """
 
@@ -102,4 +102,4 @@ class Objective:
 
     def gather(self, J: Array, motion: Array) -> Array:
         """J times a change of the components' coordinates of shape [T, B, N], shape [T, K, 6]."""
-        return np.einsum("nkia,nka->nki", J, motion[:, self.model.targets.component])
+        return np.asarray(np.einsum("nkia,nka->nki", J, motion[:, self.model.targets.component]))

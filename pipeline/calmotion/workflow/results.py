@@ -6,7 +6,7 @@ import os
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
@@ -17,6 +17,8 @@ from calmotion.shot.outputs import CsvFile, Figures, Recording, Verification, Wr
 from calmotion.shot.run import OutputPaths
 from calmotion.shot.table import columns
 from calmotion.workflow.run import Outcome, again
+
+T = TypeVar("T")
 
 if TYPE_CHECKING:
     from calmotion.workflow.problems import Problem
@@ -264,7 +266,7 @@ class SimulationResult:
         source = self._outcome.require(Source)
         return again(self._outcome, Verification, replace(source, verify=True))
 
-    def _made(self, kind: type[Any], outputs: OutputPaths) -> Any:
+    def _made(self, kind: type[T], outputs: OutputPaths) -> T:
         return again(self._outcome, kind, outputs)
 
     def _motion_of(self, simulation: Simulation) -> RobotMotion:

@@ -44,4 +44,4 @@ def influence(character: Character, rigid: Model, run: ForwardRun, motors: IntAr
     arm = np.where(positions > 0.0, np.sqrt(rotations / np.where(positions > 0.0, positions, 1.0)), rotations > 0.0)
     reach = np.linalg.norm(found[:, :, :3], axis=2) * (positions > 0.0)[:, None]
     turn = np.linalg.norm(found[:, :, 3:], axis=2) * arm[:, None]
-    return (reach + turn).max(axis=(0, 1), initial=0.0)
+    return np.asarray((reach + turn).max(axis=(0, 1), initial=0.0))
