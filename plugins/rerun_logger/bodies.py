@@ -25,13 +25,13 @@ def log_bodies(
     character: Character,
     result: Result,
     motion: Motion,
-    meant: Motion,
+    intended: Motion,
     scale: float,
 ) -> None:
     """A transform for each body and frame, its meshes once, the vertices of those that bend, the colors of those off.
 
     Args:
-        motion, meant: At the shot's frames.
+        motion, intended: At the shot's frames.
         scale: Deviation that has the whole color change [m].
     """
     frames = rr.TimeColumn(TIME, duration=motion.times)
@@ -50,7 +50,7 @@ def log_bodies(
                 color, colors = GHOST, None
                 if root != REFERENCE:
                     color = display_color(surface.color)
-                    colors = deviation_colors(color, surface.points, modes, index, motion, meant, scale)
+                    colors = deviation_colors(color, surface.points, modes, index, motion, intended, scale)
                 log_mesh(recording, entity, surface, points, color, colors, frames)
 
 

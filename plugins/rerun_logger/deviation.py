@@ -1,4 +1,4 @@
-"""Deviation from what was meant, as a color of the surfaces: the part's own where there is none, vermillion at most."""
+"""Error against the intended motion as a color of the surfaces: the own color without error, vermillion at most."""
 
 from __future__ import annotations
 

@@ -46,7 +46,7 @@ def make_blueprint(character: Character, animation: Animation, result: Result, s
     """The views that fit what the result holds; `scale` is the deviation of the strongest color [m]."""
     optimized = result.after is not None
     eye = choose_eye(character, animation, result)
-    legend = f"intended: green; the redder, the farther off, up to {1e3 * scale:.3g} mm"
+    legend = f"intended motion: green; others coloured by error, red at {1e3 * scale:.3g} mm"
     views = [spatial_view(f"Input, simulated ({legend})", INPUT, eye)]
     if optimized:
         views.append(spatial_view(f"Optimised ({legend})", OPTIMIZED, eye))
@@ -90,7 +90,7 @@ def choose_eye(character: Character, animation: Animation, result: Result) -> rr
 
 
 def spatial_view(name: str, root: str, eye: rrb.EyeControls3D) -> rrb.Spatial3DView:
-    """One motion over the ghost of what was meant."""
+    """One motion over the intended motion."""
     return rrb.Spatial3DView(
         origin="/",
         contents=[f"/{root}/**", f"/{REFERENCE}/**", f"/trails/{root}/**", f"/trails/{REFERENCE}/**"],

@@ -1,4 +1,4 @@
-"""The text of a recording: errors before and after, sizes, what was left out, and how the optimiser went."""
+"""The text of a recording: errors before and after, sizes, simplifications, and the progress of the optimiser."""
 
 from __future__ import annotations
 
@@ -85,14 +85,14 @@ def sizes(character: Character, result: Result, system: SystemModes | None) -> s
 
 
 def left_out(result: Result) -> str:
-    """What the run left out, and what that costs."""
+    """The simplifications of the run, with their estimated errors."""
     if not result.left_out:
-        return "## Left out\nNothing."
+        return "## Simplifications\nNone."
     rows = ["| what | why | estimated error |", "|---|---|---:|"]
     for item in result.left_out:
         cost = "none" if item.estimated_error_m is None else f"{1e3 * item.estimated_error_m:.3g} mm"
         rows.append(f"| {item.what} | {item.why} | {cost} |")
-    return "## Left out\n" + "\n".join(rows)
+    return "## Simplifications\n" + "\n".join(rows)
 
 
 def operators_table(operators: Sequence[OperatorResult]) -> str:

@@ -80,7 +80,7 @@ def project_to_tolerance(
 
     Args:
         known: The shot, simulated with the bodies, where that was done.
-        shake: How far a run is from what is meant, where that will be taken away [m].
+        shake: How far a run is from what is intended, where that will be taken away [m].
     """
     share = UNASKED if options.tolerance is None else HELD
     least = share * character.retarget.allowed(options.tolerance)
@@ -185,10 +185,10 @@ def mesh_error(bodies: Bodies) -> float | None:
 
 
 def intended_positions(character: Character, animation: Animation, bodies: Bodies, options: Options) -> Array:
-    """Where the targets are meant to be at the frames [m], shape [f, K, 3]."""
+    """Intended positions of the targets at the frames [m], shape [f, K, 3]."""
     prepared = prepare(character, animation, bodies, replace(options, step=FIRST))
-    meant = intended_motion(prepared, *sample_tracks(animation.tracks, prepared.grid))
-    return meant.reference.positions[prepared.grid.frames]
+    intended = intended_motion(prepared, *sample_tracks(animation.tracks, prepared.grid))
+    return intended.reference.positions[prepared.grid.frames]
 
 
 def found_tracks(result: Result, animation: Animation) -> tuple[Track, ...]:

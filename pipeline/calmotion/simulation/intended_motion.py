@@ -18,7 +18,7 @@ from calmotion.simulation.target_errors import Reference
 
 @dataclass(frozen=True, eq=False)
 class IntendedMotion:
-    """The motion that is meant: body poses (by component) and targets, shapes [T, B, ...], [T, K, ...]."""
+    """The intended motion: body poses (by component) and targets, shapes [T, B, ...], [T, K, ...]."""
 
     c: Array
     q: Array
@@ -61,7 +61,7 @@ def static_motion(
         SimulationFailure: A pose without static equilibrium.
     """
     ws, joint_angles = Workspace.for_system(model.system), model.joint_angles(angles)
-    meant = IntendedMotion(
+    intended = IntendedMotion(
         rigid.c.copy(), rigid.q.copy(), rigid.target_positions.copy(), rigid.target_rotations.copy()
     )  # fmt: skip
     state: State | None = None
@@ -73,7 +73,7 @@ def static_motion(
             ws.work.world[:] = world[n]
             ws.work.world[:, 3:9] = 0.0
         state, _ = equilibrium(model.system, state, joint_angles[n], ws)
-        meant.c[n], meant.q[n] = state.c, state.q
+        intended.c[n], intended.q[n] = state.c, state.q
         positions, rotations = target_frames(model, state.c[None], state.q[None], state.u[None])
-        meant.target_positions[n], meant.target_rotations[n] = positions[0], rotations[0]
-    return meant
+        intended.target_positions[n], intended.target_rotations[n] = positions[0], rotations[0]
+    return intended

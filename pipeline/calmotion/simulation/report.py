@@ -65,7 +65,7 @@ def _shown(grid: TimeGrid) -> slice:
 
 
 def reference_motion(model: Model, grid: TimeGrid, rigid: IntendedMotion, angles: Array) -> Motion:
-    """The motion that was meant; it has no efforts."""
+    """The intended motion; it has no efforts."""
     shown = _shown(grid)
     times, angles = grid.times[shown], angles[shown]
     return Motion(

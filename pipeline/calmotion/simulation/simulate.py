@@ -72,10 +72,10 @@ def simulate_shot(
     workspace = Workspace.for_system(model.system)
     curves = sample_curves(animation.current, grid)
     angles, rates = curves.angles, curves.rates
-    meant, meant_rates = sample_tracks(animation.tracks, grid)
+    intended, intended_rates = sample_tracks(animation.tracks, grid)
     refuse_half_turns(prepared, angles)
     try:
-        reference = intended_motion(prepared, meant, meant_rates)
+        reference = intended_motion(prepared, intended, intended_rates)
         progress(0.0, "compiling kernels, once")
         run_forward(model, workspace, angles[:3], rates[:3], grid.h, world[:3], integrator=options.scheme)
         begin = time.perf_counter()
@@ -92,8 +92,8 @@ def simulate_shot(
     bounds = motor_bounds(character)
     used = excesses(bounds, limited_values(model, bounds, curves, run), grid.judged)
     residuals, _ = objective.residuals(run.target_positions, run.target_rotations)
-    intent = reference_motion(model, grid, reference, meant)
-    as_meant = animation.current is animation.tracks and character.retarget.reference == "rigid"
+    intent = reference_motion(model, grid, reference, intended)
+    as_intended = animation.current is animation.tracks and character.retarget.reference == "rigid"
     return Result(
         reference=intent,
         before=simulation_of(prepared, run, reference.reference),
@@ -115,7 +115,7 @@ def simulate_shot(
         dof=model.dof,
         left_out=tuple(left_out_rows(prepared)),
         limits=limit_uses(used, used, grid),
-        performed=intent if as_meant else performed_motion(prepared, curves),
+        performed=intent if as_intended else performed_motion(prepared, curves),
     )
 
 
