@@ -54,7 +54,7 @@ def test_another_robot_s_loops_begin_near_those_of_this_one(arm, animation, bodi
 def with_a_held_beginning(make, until):
     """Two equal problems, which of their coefficients act before a time, and random values of the others."""
     problem, other = make(), make()
-    fixed = np.repeat(problem.basis.support[:, 0] < until, len(problem.motors))
+    fixed = np.repeat(problem.space.basis.support[:, 0] < until, len(problem.space.motors))
     x = np.where(fixed, 0.0, 0.01 * np.random.default_rng(0).normal(size=problem.size))
     return problem, other, fixed, x
 
@@ -87,7 +87,8 @@ def test_where_a_beginning_is_held_all_is_as_it_would_be_otherwise(arm, bodies, 
     one, two = problem.linearize(), other.linearize()
     assert np.abs(one - two)[~fixed].max() < 1e-12 * np.abs(two).max()
     if not problem.grid.pre_steps:
-        assert not np.any(one[: len(problem.motors)] == two[: len(problem.motors)]), "what is held is not worked out"
+        motors = len(problem.space.motors)
+        assert not np.any(one[:motors] == two[:motors]), "what is held is not worked out"
     d = np.where(fixed, 0.0, np.random.default_rng(1).normal(size=len(x)))
     one, two = problem.product(d), other.product(d)
     assert np.abs(one - two)[~fixed].max() < 1e-12 * np.abs(two).max()

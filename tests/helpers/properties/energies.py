@@ -5,7 +5,9 @@ from __future__ import annotations
 import numpy as np
 from calmotion.multibody.analysis.reactions import reactions
 from calmotion.multibody.kernels import inertia
+from calmotion.multibody.kernels.components import component_of
 from calmotion.multibody.kernels.so3 import matrix_of
+from calmotion.multibody.kernels.work import allocate_work
 from calmotion.multibody.model.system import LINEAR, STVK, System
 from calmotion.simulation.forward import ForwardRun
 
@@ -13,20 +15,19 @@ from calmotion.simulation.forward import ForwardRun
 def energy(system: System, states) -> tuple[np.ndarray, np.ndarray]:
     """Kinetic energy and all of it [J] at every instant, shape [T] each; laws linear or St. Venant-Kirchhoff."""
     kinetic, stored = np.zeros(len(states.c)), np.zeros(len(states.c))
-    R = np.zeros((3, 3))
+    R, scratch = np.zeros((3, 3)), allocate_work(system)
     for b, r in enumerate(system.elastic):
-        s, Z, B, D = np.zeros(3), np.zeros((3, 3)), np.zeros((r, 3, 3)), np.zeros((6 + r, 6 + r))
-        M3 = np.ascontiguousarray(system.M3[b, :r])
-        M4 = np.ascontiguousarray(system.M4[b, :r])
-        S = np.ascontiguousarray(system.S[b, :r, :r])
+        component, D = component_of.py_func(system, b), np.zeros((6 + r, 6 + r))
         for n in range(len(states.c)):
             u, V = states.u[n, b, :r], states.V[n, b, : 6 + r].copy()
-            inertia.deformed_integrals(r, system.s[b], system.Z[b], M3, M4, S, u, s, Z, B)
-            inertia.mass_matrix(r, system.mass[b], M3, s, Z, B, D)
+            inertia.deformed_integrals(component, states.u[n, b], scratch)
+            inertia.mass_matrix(component, scratch, D)
             matrix_of(states.q[n, b], R)
             V[:3] = R.T @ V[:3]
             kinetic[n] += 0.5 * V @ D @ V
-            stored[n] += _strain_energy(system, b, u) - system.gravity @ (system.mass[b] * states.c[n, b] + R @ s)
+            stored[n] += _strain_energy(system, b, u) - system.gravity @ (
+                system.mass[b] * states.c[n, b] + R @ scratch.s
+            )
     return kinetic, kinetic + stored
 
 

@@ -153,7 +153,7 @@ def test_a_clean_shot_passes_the_gate_and_a_broken_one_does_not(calmotion, tmp_p
     clean = write_arm(tmp_path / "clean.usda", principal_axes)
     done = calmotion("inspect", clean, "--strict")
     assert done.returncode == 0, done.stdout
-    assert "nothing was found" in done.stdout
+    assert "no findings" in done.stdout
     bad = write_arm(tmp_path / "bad.usda", broken)
     done = calmotion("inspect", bad, "--strict", "--json")
     assert done.returncode == 1
