@@ -1,6 +1,7 @@
 import pytest
 from calmotion.errors import ShotError
-from calmotion.host import Outcome, PluginError, Property
+from calmotion.host import Outcome, Plan, PluginError, Property, Run
+from calmotion.host.properties import values_of
 from fakes import Coal, Iron, Ore, Steel, host_of, operator
 
 DIG = operator("mine.dig", provides=[Ore])
@@ -157,6 +158,18 @@ def test_an_answer_that_may_change_is_no_rivalry_yet():
     burn = operator("wood.burn", provides=[Coal])
     run = host_of(DIG, burn, MELT, late).run([], [Iron, Coal]).finish()
     assert run.get(Iron) is not None and outcomes(run)["smithy.late"] is Outcome.LEFT_OUT
+
+
+def test_a_rival_that_comes_too_late_does_not_take_the_value_away():
+    """Its poll declines until there is coal; by then the value is made, and others use it."""
+    late = operator("smithy.late", requires=[Ore], uses=[Coal], provides=[Iron],
+                    poll=lambda data: None if data.get(Coal) else "there is no coal")  # fmt: skip
+    burn = operator("wood.burn", requires=[Iron], provides=[Coal])
+    alloy = operator("smithy.alloy", requires=[Iron, Coal], provides=[Steel])
+    plan = Plan((DIG, MELT, burn, alloy, late), (Steel,), (Iron,))
+    properties = {cls.idname: values_of((), {}, cls.idname) for cls in plan.operators}
+    run = Run(plan, {}, properties, {cls.idname: "smithy" for cls in plan.operators}).finish()
+    assert run.get(Steel) is not None and outcomes(run)["smithy.late"] is Outcome.FAILED
 
 
 def test_a_poll_that_raises_or_answers_nonsense_is_a_failure():

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from graphlib import CycleError, TopologicalSorter
 
 from calmotion.host.errors import PlanError
@@ -26,11 +28,11 @@ class Plan:
     wanted: tuple[type, ...]
     optional: tuple[type, ...]
 
-    @property
-    def contested(self) -> bool:
-        """Whether several operators make values of the same type."""
-        kinds = [kind for cls in self.operators for kind in cls.provides]
-        return len(set(kinds)) < len(kinds)
+    @cached_property
+    def contested(self) -> frozenset[type]:
+        """Types that more than one operator makes."""
+        makers = Counter(kind for cls in self.operators for kind in cls.provides)
+        return frozenset(kind for kind, count in makers.items() if count > 1)
 
     def useful(self, lost: Collection[type], known: Collection[type]) -> set[type[Operator]]:
         """The operators that are still needed where some types cannot be made.

@@ -59,19 +59,19 @@ def will_run(cls: type[Operator], data: Mapping[type, Any], coming: Collection[t
 
 
 def find_rivals(
-    remaining: Sequence[type[Operator]], data: Mapping[type, Any], made: Mapping[type, type[Operator]]
+    remaining: Sequence[type[Operator]], data: Mapping[type, Any], contested: Collection[type]
 ) -> dict[type, tuple[type[Operator], ...]]:
     """Operators that are certain to make the same value, by the value's type.
 
     Args:
         remaining: Operators of the plan that have not run.
         data: What is known.
-        made: Which operator made a value in this run.
+        contested: Types that more than one operator of the plan makes.
     """
     coming = {kind for cls in remaining for kind in cls.provides} - data.keys()
-    willing = [cls for cls in remaining if will_run(cls, data, coming)]
-    makers: dict[type, list[type[Operator]]] = {kind: [cls] for kind, cls in made.items()}
-    for cls in willing:
-        for kind in cls.provides:
-            makers.setdefault(kind, []).append(cls)
-    return {kind: tuple(found) for kind, found in makers.items() if len(found) > 1}
+    rivals = {}
+    for kind in coming.intersection(contested):
+        makers = tuple(cls for cls in remaining if kind in cls.provides and will_run(cls, data, coming))
+        if len(makers) > 1:
+            rivals[kind] = makers
+    return rivals

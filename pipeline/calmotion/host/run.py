@@ -96,8 +96,8 @@ class Run:
 
     def __iter__(self) -> Iterator[OperatorResult]:
         for index, cls in enumerate(self.plan.operators):
-            if self.plan.contested:  # rivals are refused before any work that only they would use
-                self._refused |= find_rivals(self.plan.operators[index:], self.data, self._made)
+            # rivals are refused before any work that only they would use
+            self._refused |= find_rivals(self.plan.operators[index:], self.data, self.plan.contested)
             result = self._step(cls)
             self.results.append(result)
             yield result
