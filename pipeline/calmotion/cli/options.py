@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 if TYPE_CHECKING:
     from calmotion.cli.output import Output
+    from calmotion.cli.progress import ProgressDisplay
     from calmotion.workflow.shot import Shot
 
 Commands: TypeAlias = "argparse._SubParsersAction[argparse.ArgumentParser]"
@@ -131,6 +132,26 @@ def opened_shot(args: argparse.Namespace) -> Shot:
     if not args.quiet:
         tell_failed_plugins(shot.host)
     return shot
+
+
+def run_arguments(args: argparse.Namespace, display: ProgressDisplay) -> dict[str, Any]:
+    """The keyword arguments of the workflow's functions that every command on a shot has.
+
+    Raises:
+        SettingError: An assignment of `--set` cannot be read.
+    """
+    return {
+        "operators": args.run,
+        "settings": assignments(args),
+        "progress": display,
+        "on_operator": display.done,
+    }
+
+
+def simulation_arguments(args: argparse.Namespace) -> dict[str, Any]:
+    """The keyword arguments of the workflow's functions that `simulation_options` added."""
+    names = ("tolerance", "step", "integrator", "pre_roll", "keep", "leave_out")
+    return {name: getattr(args, name) for name in names}
 
 
 def assignments(args: argparse.Namespace) -> dict[str, dict[str, object]]:

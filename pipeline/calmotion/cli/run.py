@@ -6,7 +6,7 @@ import argparse
 from collections.abc import Callable
 from typing import Any
 
-from calmotion.cli.options import assignments, opened_shot
+from calmotion.cli.options import opened_shot, run_arguments, simulation_arguments
 from calmotion.cli.output import FAILED, INTERRUPTED, Output, conclude
 from calmotion.cli.progress import ProgressDisplay
 from calmotion.shot.run import OutputPaths
@@ -34,18 +34,10 @@ def run_shot(
     with ProgressDisplay(args.quiet, args.progress) as display:
         result = function(
             shot,
-            tolerance=args.tolerance,
-            step=args.step,
-            integrator=args.integrator,
-            pre_roll=args.pre_roll,
-            keep=args.keep,
-            leave_out=args.leave_out,
             verify=args.verify,
             outputs=OutputPaths(layer=args.output, rrd=args.rrd, csv=args.csv, figures=args.figures),
-            operators=args.run,
-            settings=assignments(args),
-            progress=display,
-            on_operator=display.done,
+            **simulation_arguments(args),
+            **run_arguments(args, display),
             **options,
         )
     conclude(result.report(), result.problems, output, None if args.quiet else print_run)

@@ -41,6 +41,7 @@ class Motion:
     @property
     def judged(self) -> slice:
         """The rows from the first frame of the shot on: what lies before is a pre-roll."""
+        # times are sums of steps: rounding may put the first frame just before 0
         return slice(int(np.searchsorted(self.times, -1e-9)), None)
 
 

@@ -98,20 +98,10 @@ def optimize(
 
     Args:
         shot: The shot, or its USD file.
-        tolerance: Acceptable error at the targets, [m] or text with a unit (`"1mm"`); None: the shot's own.
-        step: Time step, [s] or text with a unit; None: from the tolerance.
+        tolerance, step, pre_roll, keep, leave_out, verify, outputs, operators, settings, progress, on_operator, cancel:
+            As of `simulate`.
         integrator: `bdf2`, the only one for the optimiser.
-        pre_roll: Time that eases into the motion, [s] or text with a unit; None: automatic.
         adjoint: `discrete` (None; exact gradients) or `continuous` (to compare with).
-        keep, leave_out: Kinds of simplification that are forbidden or forced (`bodies`, `turning`, `loops`, `modes`,
-            `directions`, `elasticity`, `motors`, `ranges`, or `all`); the others follow from the tolerance.
-        verify: Measure the error against a finer run as well.
-        outputs: Files to write in the same run; the result's methods write them later as well.
-        operators: Idnames of operators of plugins to run as well.
-        settings: Settings of operators, stronger than those of the shot.
-        progress: Called with a `Progress`.
-        on_operator: Called after each operator with its outcome, duration and notes.
-        cancel: Called often; the run stops when it returns True.
 
     Raises:
         ShotError: The shot cannot be processed; a `RunError` names the operators and plugins that failed.

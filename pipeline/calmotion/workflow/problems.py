@@ -4,9 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TypeVar
 
 from calmotion.errors import ShotError, ShotErrors, each
 from calmotion.host import HostError, OperatorResult, Run
+
+T = TypeVar("T")
 
 
 @dataclass(frozen=True)
@@ -57,6 +60,23 @@ def problems_of(run: Run, wanted: Sequence[type]) -> list[Problem]:
             reasons = "; ".join(f"{row.idname}: {row.reason}" for row in run.results if row.idname in makers)
             problems.append(Problem(HostError(f"there is no {kind.__name__}", found=reasons or None)))
     return problems
+
+
+def value_of(run: Run, kind: type[T], problems: Sequence[Problem] = ()) -> T:
+    """The value of a type that a run has made.
+
+    Args:
+        run: The run.
+        kind: The type.
+        problems: What went wrong in the run, where that is known already.
+
+    Raises:
+        RunError: The run did not make it.
+    """
+    value = run.get(kind)
+    if value is None:
+        raise RunError(problems or problems_of(run, [kind]))
+    return value
 
 
 def _problems(result: OperatorResult) -> list[Problem]:

@@ -6,7 +6,6 @@ import math
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from calmotion.host import OperatorResult, Run
 from calmotion.shot import Character, LimitUse, Result, Simplification, Simulation
@@ -19,31 +18,23 @@ from calmotion.version import __version__
 LIMIT_KEPT = 1e-6  # relative excess that is rounding
 
 
-def judged_steps(simulation: Simulation) -> NDArray[np.bool_]:
-    """Which steps count, shape [T]: those of the shot, not of the pre-roll."""
-    # Times are sums of steps, so the first frame may come out a rounding before 0.
-    return simulation.motion.times >= -1e-9
-
-
-def error_norms(errors: Array, judged: NDArray[np.bool_]) -> tuple[Array, Array]:
-    """Largest and root-mean-square error of each target over the judged steps.
+def error_norms(errors: Array) -> tuple[Array, Array]:
+    """Largest and root-mean-square error of each target.
 
     Args:
-        errors: [m] or [rad], shape [T, K].
-        judged: Shape [T].
+        errors: Of the time steps that count, [m] or [rad], shape [T, K].
 
     Returns:
         Two arrays of shape [K], in the unit of `errors`.
     """
-    counted = errors[judged]
-    return np.max(counted, axis=0, initial=0.0), np.sqrt(np.mean(counted**2, axis=0))
+    return np.max(errors, axis=0, initial=0.0), np.sqrt(np.mean(errors**2, axis=0))
 
 
 def target_errors(character: Character, simulation: Simulation, suffix: str) -> list[dict[str, Any]]:
     """The errors of each target, with keys as in the contract: `max_error<suffix>_m` and so on."""
-    judged = judged_steps(simulation)
-    position = error_norms(simulation.position_errors, judged)
-    rotation = error_norms(simulation.rotation_errors, judged)
+    counted = simulation.motion.judged
+    position = error_norms(simulation.position_errors[counted])
+    rotation = error_norms(simulation.rotation_errors[counted])
     return [
         {
             "path": target.path,

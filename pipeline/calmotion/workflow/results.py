@@ -6,7 +6,7 @@ import os
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -17,8 +17,6 @@ from calmotion.shot.outputs import CsvFile, Figures, Recording, Verification, Wr
 from calmotion.shot.run import OutputPaths
 from calmotion.shot.table import columns
 from calmotion.workflow.run import Outcome, again
-
-T = TypeVar("T")
 
 if TYPE_CHECKING:
     from calmotion.workflow.problems import Problem
@@ -192,7 +190,7 @@ class SimulationResult:
         Raises:
             RunError: It cannot be written.
         """
-        return self._made(CsvFile, OutputPaths(csv=os.fspath(path))).path
+        return again(self._outcome, CsvFile, OutputPaths(csv=os.fspath(path))).path
 
     def record(self, path: Path) -> str:
         """Write a recording for the rerun viewer; returns the path.
@@ -200,7 +198,7 @@ class SimulationResult:
         Raises:
             RunError: It cannot be written.
         """
-        return self._made(Recording, OutputPaths(rrd=os.fspath(path))).path
+        return again(self._outcome, Recording, OutputPaths(rrd=os.fspath(path))).path
 
     def draw(self, folder: Path) -> tuple[str, ...]:
         """Draw the figures into a folder; returns their paths.
@@ -208,7 +206,7 @@ class SimulationResult:
         Raises:
             RunError: They cannot be written.
         """
-        return self._made(Figures, OutputPaths(figures=os.fspath(folder))).paths
+        return again(self._outcome, Figures, OutputPaths(figures=os.fspath(folder))).paths
 
     def write(
         self,
@@ -265,9 +263,6 @@ class SimulationResult:
 
         source = self._outcome.require(Source)
         return again(self._outcome, Verification, replace(source, verify=True))
-
-    def _made(self, kind: type[T], outputs: OutputPaths) -> T:
-        return again(self._outcome, kind, outputs)
 
     def _motion_of(self, simulation: Simulation) -> RobotMotion:
         motion, reference, rows = simulation.motion, self.result.reference, simulation.motion.judged

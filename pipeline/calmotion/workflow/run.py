@@ -13,7 +13,7 @@ from calmotion.errors import ShotError
 from calmotion.host import Host, OperatorResult, Run, SettingError, Settings, merge, nearest
 from calmotion.shot.outputs import CsvFile, Figures, Recording, WrittenLayer
 from calmotion.shot.run import OutputPaths, Source
-from calmotion.workflow.problems import Cancelled, Problem, RunError, problems_of
+from calmotion.workflow.problems import Cancelled, Problem, problems_of, value_of
 from calmotion.workflow.shot import Shot
 
 T = TypeVar("T")
@@ -87,14 +87,11 @@ class Outcome:
             Cancelled: The caller stopped the run before.
             KeyboardInterrupt: The user interrupted the run before.
         """
-        value = self.run.get(kind)
-        if value is not None:
-            return value
-        if self.cancelled:
-            raise Cancelled(f"{self.shot.path}: cancelled before there was a result")
-        if self.interrupted:
+        if self.interrupted and self.run.get(kind) is None:
+            if self.cancelled:
+                raise Cancelled(f"{self.shot.path}: cancelled before there was a result")
             raise KeyboardInterrupt
-        raise RunError(self.problems)
+        return value_of(self.run, kind, self.problems)
 
 
 def carry_out(
@@ -270,7 +267,4 @@ def again(outcome: Outcome, wanted: type[T], *values: object, settings: Settings
     given |= {type(value): value for value in values}
     data: list[Any] = list(given.values())
     run = host.run(data, [wanted], settings=merge([outcome.shot.settings, settings or {}])).finish()
-    made = run.get(wanted)
-    if made is None:
-        raise RunError(problems_of(run, [wanted]))
-    return made
+    return value_of(run, wanted)

@@ -10,7 +10,7 @@ from typing import TypeVar
 from calmotion.host import Host, Settings, merge, open_host, read_assignment, read_settings_file
 from calmotion.shot import Animation, Character, Provenance
 from calmotion.shot.run import OutputPaths, Source
-from calmotion.workflow.problems import RunError, problems_of
+from calmotion.workflow.problems import problems_of, value_of
 
 T = TypeVar("T")
 _READ: tuple[type, ...] = (Character, Animation, Provenance)
@@ -62,8 +62,9 @@ class Shot:
         if not self._read:
             given = (Source(self.path, "simulate", motion=self.motion), OutputPaths())
             run = self.host.run(given, _READ, settings=self.settings).finish()
-            if any(run.get(kind) is None for kind in _READ):
-                raise RunError(problems_of(run, _READ))
+            problems = problems_of(run, _READ)
+            for kind in _READ:
+                value_of(run, kind, problems)
             self.keep(run.data)
         return self
 

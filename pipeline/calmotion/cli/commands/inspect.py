@@ -5,7 +5,15 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING
 
-from calmotion.cli.options import Commands, assignments, file_argument, opened_shot, shot_command, simulation_options
+from calmotion.cli.options import (
+    Commands,
+    file_argument,
+    opened_shot,
+    run_arguments,
+    shot_command,
+    simulation_arguments,
+    simulation_options,
+)
 
 if TYPE_CHECKING:
     from calmotion.cli.output import Output
@@ -37,18 +45,10 @@ def _run(args: argparse.Namespace, output: Output) -> int:
     with ProgressDisplay(args.quiet, args.progress) as display:
         inspection = inspect(
             shot,
-            tolerance=args.tolerance,
-            step=args.step,
-            integrator=args.integrator,
-            pre_roll=args.pre_roll,
-            keep=args.keep,
-            leave_out=args.leave_out,
             strict=args.strict,
             modes=args.modes,
-            operators=args.run,
-            settings=assignments(args),
-            progress=display,
-            on_operator=display.done,
+            **simulation_arguments(args),
+            **run_arguments(args, display),
         )
     findings = inspection.findings
     show = None if args.quiet and not args.strict else print_inspection

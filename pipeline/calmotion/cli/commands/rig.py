@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING, Any, TextIO
 
-from calmotion.cli.options import Commands, assignments, file_argument, opened_shot, shot_command
+from calmotion.cli.options import Commands, file_argument, opened_shot, run_arguments, shot_command
 
 if TYPE_CHECKING:
     from calmotion.cli.output import Output
@@ -29,10 +29,7 @@ def _run(args: argparse.Namespace, output: Output) -> int:
 
     shot = opened_shot(args)
     with ProgressDisplay(args.quiet, args.progress) as display:
-        made = rig(
-            shot, args.output, operators=args.run, settings=assignments(args), progress=display,
-            on_operator=display.done,
-        )  # fmt: skip
+        made = rig(shot, args.output, **run_arguments(args, display))
     conclude(rig_report(made), (), output, None if args.quiet else _print)
     return 0
 

@@ -6,8 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from calmotion.shot import Character, Provenance, Result, Simulation
-from calmotion.shot.character import BoolArray
+from calmotion.shot import Character, Provenance, Result
 from calmotion.usd import gf
 from calmotion.usd.stages import METADATA_KEY
 from calmotion.version import __version__
@@ -59,7 +58,7 @@ def settings_of(
 ) -> Entries:
     """The settings that a result was computed and written with, as plain values that USD stores."""
     retarget = character.retarget
-    found: Entries = {
+    entries: Entries = {
         "step_s": float(result.step_s),
         "pre_roll_s": float(result.pre_roll_s),
         "reference": retarget.reference,
@@ -75,29 +74,24 @@ def settings_of(
         ("samples_per_second", samples_per_second),
     ):
         if value is not None:
-            found[name] = float(value)
-    return found
+            entries[name] = float(value)
+    return entries
 
 
 def errors_of(character: Character, result: Result) -> Entries:
     """Errors of each target before and after, in the order of `targets`."""
-    found: Entries = {"targets": gf.to_strings(target.path for target in character.targets)}
+    entries: Entries = {"targets": gf.to_strings(target.path for target in character.targets)}
     for name, simulation in (("before", result.before), ("after", result.after)):
         if simulation is None:
             continue
-        shown = _after_pre_roll(simulation)
+        counted = simulation.motion.judged
         for quantity, unit, values in (
-            ("error", "m", simulation.position_errors[shown]),
-            ("rotation_error", "rad", simulation.rotation_errors[shown]),
+            ("error", "m", simulation.position_errors[counted]),
+            ("rotation_error", "rad", simulation.rotation_errors[counted]),
         ):
-            found[f"max_{quantity}_{name}_{unit}"] = gf.to_doubles(np.max(values, axis=0))
-            found[f"rms_{quantity}_{name}_{unit}"] = gf.to_doubles(np.sqrt(np.mean(values**2, axis=0)))
-    found["objective_before"] = float(result.objective_before)
+            entries[f"max_{quantity}_{name}_{unit}"] = gf.to_doubles(np.max(values, axis=0))
+            entries[f"rms_{quantity}_{name}_{unit}"] = gf.to_doubles(np.sqrt(np.mean(values**2, axis=0)))
+    entries["objective_before"] = float(result.objective_before)
     if result.objective_after is not None:
-        found["objective_after"] = float(result.objective_after)
-    return found
-
-
-def _after_pre_roll(simulation: Simulation) -> BoolArray:
-    """Which steps follow the pre-roll, shape [T]."""
-    return simulation.motion.times >= -1e-9
+        entries["objective_after"] = float(result.objective_after)
+    return entries
