@@ -11,26 +11,11 @@ from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
 import pytest
+from floors import FLOORS
 
 PACKAGE = Path(__file__).resolve().parents[1] / "pipeline" / "calmotion"
 PLUGINS = PACKAGE.parents[1] / "plugins"
 
-# From the lowest floor to the highest; rooms of one floor do not know each other.
-FLOORS = (
-    ("errors", "version"),
-    ("support",),
-    ("shot",),
-    ("geometry", "linear_algebra", "views"),
-    ("reduction", "rigging"),
-    ("multibody", "usd"),
-    ("simulation",),
-    ("accuracy",),
-    ("retargeting",),
-    ("host",),
-    ("workflow", "testing"),
-    ("cli", "pytest_plugin"),
-    ("benchmarks", "__main__"),
-)
 FLOOR = {room: floor for floor, rooms in enumerate(FLOORS) for room in rooms}
 MODULES_OF_A_FOLDER = 14
 LINES_OF_A_MODULE = 350

@@ -10,6 +10,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from floors import FLOORS
 
 REPOSITORY = Path(__file__).resolve().parents[1]
 PACKAGE = REPOSITORY / "pipeline" / "calmotion"
@@ -75,8 +76,6 @@ def test_the_pages_of_the_architecture_name_every_room():
 
 
 def test_the_floors_are_those_that_are_checked():
-    from test_architecture import FLOORS
-
     page = (REPOSITORY / "docs" / "architecture.md").read_text()
     listed = re.findall(r"^\d+\. (.*)$", page, re.MULTILINE)
     floor = {name.removesuffix(".py"): n for n, line in enumerate(listed) for name in re.findall(r"`([\w.]+)`", line)}

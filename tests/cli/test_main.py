@@ -20,6 +20,7 @@ from calmotion.shot import Animation, Character, InputLayer, ModeTable, Provenan
 from calmotion.shot.outputs import WrittenLayer
 from calmotion.shot.run import OutputPaths, Source
 from fakes import host_of, operator
+from one_hinge import ONE_HINGE
 
 LAYERS = (InputLayer("shot.usda", "0" * 64),)
 PROVENANCE = Provenance("shot.usda", LAYERS, 0.01, 1.0, "Y", 24.0, 24.0, 1.0, 25.0, "Robot")
@@ -262,36 +263,9 @@ def test_inspect_says_what_is_left_out(run):
     assert "-114.6° .. 114.6°" in out  # the joint's limits, 2 rad
 
 
-RIGID_SHOT = """#usda 1.0
-(
-    defaultPrim = "Robot"
-    endTimeCode = 24
-    kilogramsPerUnit = 1
-    metersPerUnit = 1
-    startTimeCode = 0
-    timeCodesPerSecond = 24
-    upAxis = "Z"
-)
-def Xform "Robot" (prepend apiSchemas = ["PhysicsArticulationRootAPI"])
-{
-    def Cube "Link" (prepend apiSchemas = ["PhysicsRigidBodyAPI", "PhysicsMassAPI"])
-    {
-        float physics:mass = 2
-        double size = 0.2
-    }
-    def PhysicsRevoluteJoint "Hinge" (prepend apiSchemas = ["PhysicsDriveAPI:angular"])
-    {
-        uniform token physics:axis = "Z"
-        rel physics:body1 = </Robot/Link>
-        float drive:angular:physics:targetPosition.timeSamples = { 0: 0, 12: 30, 24: 0 }
-    }
-}
-"""
-
-
 def test_inspecting_a_rigid_shot_imports_neither_finite_elements_nor_rerun(tmp_path):
     shot = tmp_path / "rigid.usda"
-    shot.write_text(RIGID_SHOT)
+    shot.write_text(ONE_HINGE)
     code = (
         "import json, sys; from calmotion.cli.main import main; status = main(['inspect', sys.argv[1], '--json']);"
         "print(json.dumps([status, sorted(sys.modules)]), file=sys.stderr)"

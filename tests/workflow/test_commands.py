@@ -11,44 +11,13 @@ import numpy as np
 import pytest
 from calmotion.shot.model_choice import KINDS, OFF, ON
 from calmotion.workflow.commands import _forced
-
-SHOT = """#usda 1.0
-(
-    defaultPrim = "Robot"
-    endTimeCode = 24
-    kilogramsPerUnit = 1
-    metersPerUnit = 1
-    startTimeCode = 0
-    timeCodesPerSecond = 24
-    upAxis = "Z"
-)
-def Xform "Robot" (prepend apiSchemas = ["PhysicsArticulationRootAPI"])
-{
-    def Cube "Link" (prepend apiSchemas = ["PhysicsRigidBodyAPI", "PhysicsMassAPI"])
-    {
-        float physics:mass = 2
-        double size = 0.2
-        def Xform "Tip" (prepend apiSchemas = ["CalmTargetAPI"])
-        {
-            double3 xformOp:translate = (0.1, 0, 0)
-            uniform token[] xformOpOrder = ["xformOp:translate"]
-        }
-    }
-    def PhysicsRevoluteJoint "Hinge" (prepend apiSchemas = ["PhysicsDriveAPI:angular"])
-    {
-        uniform token physics:axis = "Z"
-        rel physics:body1 = </Robot/Link>
-        float drive:angular:physics:targetPosition.timeSamples = { 0: 0, 6: 10, 12: 30, 18: 20, 24: 0 }
-    }
-}
-"""
-TIP, HINGE = "/Robot/Link/Tip", "/Robot/Hinge"
+from one_hinge import HINGE, ONE_HINGE, TIP
 
 
 @pytest.fixture
 def shot_file(tmp_path):
     path = tmp_path / "shot.usda"
-    path.write_text(SHOT)
+    path.write_text(ONE_HINGE)
     return path
 
 
@@ -65,7 +34,7 @@ def test_an_opened_shot_tells_what_is_in_it(shot_file):
 
 
 def test_a_shot_that_cannot_be_read_raises_with_the_place(tmp_path):
-    (tmp_path / "no.usda").write_text(SHOT.replace('"PhysicsDriveAPI:angular"', ""))
+    (tmp_path / "no.usda").write_text(ONE_HINGE.replace('"PhysicsDriveAPI:angular"', ""))
     with pytest.raises(cm.ShotError) as raised:
         cm.open_shot(tmp_path / "no.usda")
     assert raised.value.problem and raised.value.problems[0].operator == "usd.read"

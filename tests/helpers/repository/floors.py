@@ -1,0 +1,18 @@
+"""The floors of the package: a room imports from lower floors only (docs/architecture.md)."""
+
+# From the lowest floor to the highest; rooms of one floor do not know each other.
+FLOORS = (
+    ("errors", "version"),
+    ("support",),
+    ("shot",),
+    ("geometry", "linear_algebra", "views"),
+    ("reduction", "rigging"),
+    ("multibody", "usd"),
+    ("simulation",),
+    ("accuracy",),
+    ("retargeting",),
+    ("host",),
+    ("workflow", "testing"),
+    ("cli", "pytest_plugin"),
+    ("benchmarks", "__main__"),
+)
