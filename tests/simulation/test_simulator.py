@@ -33,8 +33,8 @@ def test_derivatives_by_motors_are_transposes(arm, animation, bodies, cyclic):
     forward = np.sum(motion * gradient) + np.sum(efforts * effort)
     backward = np.sum(by_value * values) + np.sum(by_rate * rates)
     assert abs(forward - backward) < 1e-10 * np.linalg.norm(efforts) * np.linalg.norm(effort)
-    growth = simulator.run(curves.angles, curves.rates).growth
-    assert (growth > 0.0) == cyclic and growth < 1.0
+    floquet_multiplier = simulator.run(curves.angles, curves.rates).floquet_multiplier
+    assert (floquet_multiplier > 0.0) == cyclic and floquet_multiplier < 1.0
 
 
 def test_another_robot_s_loops_begin_near_those_of_this_one(arm, animation, bodies):

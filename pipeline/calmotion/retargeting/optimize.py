@@ -119,7 +119,9 @@ def _optimized(
         raise failure_error(prepared, problem.failure)
     before, before_value, used_before = problem.run, problem.objective_value(), _used(problem, character)
     if problem.limits is not None:
-        problem.limits.rho = FIRST_PENALTY * max(before_value, problem.worth(1e-3 * tolerance)) / problem.grid.end
+        problem.limits.rho = (
+            FIRST_PENALTY * max(before_value, problem.merit_of_gain(1e-3 * tolerance)) / problem.grid.end
+        )
     locked = locked_coefficients(animation, problem.space.basis, problem.space.motors, problem.grid.end)
     kept = Checkpoint(checkpoint, problem_key(problem, locked, (options, tolerance)))
     searched = RetargetSearch(

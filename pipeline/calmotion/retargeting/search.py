@@ -176,7 +176,7 @@ class RetargetSearch:
         problem, search, motors = self.problem, self.search, len(self.problem.space.motors)
         value = problem.value(search.x)
         problem.linearize()
-        budget = problem.worth(PRUNED * self.tolerance)
+        budget = problem.merit_of_gain(PRUNED * self.tolerance)
         energy = block_energies(search.x, motors, problem.product(search.x))
         dropped = negligible_coefficients(search.x, motors, energy, budget) & ~fixed
         if not np.any(search.x[dropped]):

@@ -163,7 +163,7 @@ class Body:
         interfaces: Interface patches that are named in the shot.
         stiff: Whether a flexible body is simulated as rigid, since its deflection in this shot is negligible;
             it then has a `mass`.
-        straight: Whether it does not rotate in this shot, so that its inertia is constant.
+        non_rotating: Whether it does not rotate in this shot, so that its inertia is constant.
     """
 
     path: str
@@ -174,7 +174,7 @@ class Body:
     flexible: FlexibleSettings | None = None
     interfaces: tuple[InterfaceSurface, ...] = ()
     stiff: bool = False
-    straight: bool = False
+    non_rotating: bool = False
 
     @property
     def bends(self) -> bool:
@@ -193,7 +193,7 @@ class Joint:
             length of a prismatic joint that of frame1 beyond frame0 along z.
         frame0, frame1: The joint frame in body0 (in the world for -1) and in body1.
         lower, upper: Limits [rad or m], infinite when there are none.
-        closes_loop: Whether the shot excludes this joint from the spanning tree, so that it closes a chain.
+        closes_chain: Whether the shot excludes this joint from the spanning tree, so that it closes a chain.
         redundant: Whether it is left out of the dynamics, since other joints impose the same constraints.
     """
 
@@ -205,7 +205,7 @@ class Joint:
     frame1: Frame
     lower: float = -np.inf
     upper: float = np.inf
-    closes_loop: bool = False
+    closes_chain: bool = False
     redundant: bool = False
 
 

@@ -60,7 +60,7 @@ class Simulation:
         refined_steps: Steps that only smaller ones reached.
         dead_centres: Times at which closed chains pass a singular pose [s], shape [n].
         seam: Gap of each target between start and end of a cycle [m], shape [K]; empty for a shot that is not cyclic.
-        growth: Largest Floquet multiplier of the periodic motion; above 1 the motion is unstable.
+        floquet_multiplier: Largest Floquet multiplier of the periodic motion; above 1 the motion is unstable.
     """
 
     motion: Motion
@@ -73,7 +73,7 @@ class Simulation:
     refined_steps: int = 0
     dead_centres: Array = field(default_factory=lambda: np.zeros(0))
     seam: Array = field(default_factory=lambda: np.zeros(0))
-    growth: float = 0.0
+    floquet_multiplier: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)

@@ -67,7 +67,7 @@ def reduce_bodies(
         frames = fem_anchors(character, body, anchors)
         load_envelope = None if load_envelopes is None else load_envelopes[index]
         # what has no bearing on the reduction does not make it another one
-        body = replace(body, straight=False)
+        body = replace(body, non_rotating=False)
         parts = (mesh_of[index], body, frames, body.surfaces, anchors.root, load_envelope, allowed / flexible)
         result.append(cached_reduction(parts, partial(_reduced, full, index, parts)))
     return _damped(character, tree, result)

@@ -61,8 +61,8 @@ class SteadyState:
         return loop.trajectory
 
     @property
-    def growth(self) -> float:
-        """By how much a disturbance of the motion found last grows at most from one loop to the next."""
+    def floquet_multiplier(self) -> float:
+        """Largest factor by which a disturbance of the last periodic motion grows from one cycle to the next."""
         return 0.0 if self.known is None else self.known.floquet_multiplier
 
     def _from_rest(self, joint_angles: Array, joint_rates: Array) -> list[State]:

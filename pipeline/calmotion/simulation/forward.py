@@ -20,7 +20,7 @@ from calmotion.simulation.inputs.curves import Curves
 class ForwardRun:
     """One forward simulation and what the targets do in it.
 
-    `growth` is that of `Monodromy` for a loop, 0 for a shot that plays once.
+    `floquet_multiplier` is the largest of the periodic motion, 0 for a shot that plays once.
     """
 
     trajectory: Trajectory
@@ -28,7 +28,7 @@ class ForwardRun:
     joint_rates: Array
     target_positions: Array
     target_rotations: Array
-    growth: float = 0.0
+    floquet_multiplier: float = 0.0
 
 
 def run_forward(
@@ -54,8 +54,8 @@ def run_forward(
         )
     states = trajectory.states
     positions, rotations = target_frames(model, states.c, states.q, states.u)
-    growth = 0.0 if steady is None else steady.growth
-    return ForwardRun(trajectory, joint_angles, joint_rates, positions, rotations, growth)
+    floquet_multiplier = 0.0 if steady is None else steady.floquet_multiplier
+    return ForwardRun(trajectory, joint_angles, joint_rates, positions, rotations, floquet_multiplier)
 
 
 def limited_values(model: Model, names: Collection[str], curves: Curves, run: ForwardRun) -> dict[str, Array]:

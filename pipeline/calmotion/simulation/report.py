@@ -101,7 +101,7 @@ def simulation_of(prepared: Prepared, run: ForwardRun, reference: Reference) -> 
         sag=np.zeros(0) if grid.cyclic else errors[0].copy(),
         refined_steps=len(run.trajectory.refined),
         dead_centres=grid.times[dead_centres(run.trajectory.margins)],
-        growth=run.growth,
+        floquet_multiplier=run.floquet_multiplier,
         seam=np.linalg.norm(off[-1] - off[shown][0], axis=1) if grid.cyclic else np.zeros(0),
     )
 

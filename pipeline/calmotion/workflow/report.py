@@ -102,7 +102,7 @@ def run_report(run: Run, character: Character, result: Result, command: str, tot
         "limits": [limit_row(character, limit) for limit in result.limits],
         "max_joint_gap_m": final.max_joint_gap,
         "refined_steps": final.refined_steps,
-        "loop_growth": final.growth,
+        "loop_growth": final.floquet_multiplier,
         "dead_centres_s": final.dead_centres.tolist(),
         **_accuracy(run, result),
         "frequencies_hz": {character.bodies[table.body].path: table.frequencies for table in result.modes},

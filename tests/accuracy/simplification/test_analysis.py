@@ -82,8 +82,8 @@ def test_without_geometry_finite_elements_decide():
 def test_everything_can_be_forced_off_and_on():
     shot = plastic_arm()
     off, on = _analyse(shot, dict.fromkeys(KINDS, OFF)), _analyse(shot, dict.fromkeys(KINDS, ON))
-    assert not any(b.bends for b in off.character.bodies) and all(b.straight for b in off.character.bodies)
-    assert on.character.bodies[0].bends and not any(b.straight for b in on.character.bodies)
+    assert not any(b.bends for b in off.character.bodies) and all(b.non_rotating for b in off.character.bodies)
+    assert on.character.bodies[0].bends and not any(b.non_rotating for b in on.character.bodies)
     flexible = on.character.bodies[0].flexible
     assert flexible.elasticity == "stvk" and flexible.modes_share < 1.0 and flexible.pairs_share == 0.0
     assert off.character.bodies[0].flexible.elasticity == "linear"
@@ -111,8 +111,8 @@ def test_loops_of_bodies_that_bend_are_kept():
 def test_nothing_on_a_gantry_turns_as_far_as_that_can_be_told():
     shot = gantry(1)
     needs = _analyse(shot)
-    straight = [body.straight for body in needs.character.bodies]
-    assert straight[:2] == [True, True]
+    non_rotating = [body.non_rotating for body in needs.character.bodies]
+    assert non_rotating[:2] == [True, True]
     full = _analyse(shot, {"turning": ON}).character
     assert distance(_simulated(shot, needs.character), _simulated(shot, full)) < 1e-10
 

@@ -83,12 +83,12 @@ def _turn(kind, f):
     return np.array([(0.0, 0.0, slope), (0.0, -slope, 0.0), (f(LENGTH), 0.0, 0.0), (0.0, 0.0, 0.0)][kind])
 
 
-def gantry(beams, straight, gravity=9.81, hinged=False, **options):
+def gantry(beams, non_rotating, gravity=9.81, hinged=False, **options):
     """A carriage that slides along x on one that slides along y, and a chain of beams on it that ends in a tool.
 
     Args:
         beams: How each beam lies on what carries it, quaternions.
-        straight: Names of the bodies that are told never to turn: Bridge, Trolley, Beam0.., Tool.
+        non_rotating: Names of the bodies that are marked as non-rotating: Bridge, Trolley, Beam0.., Tool.
         hinged: Whether the trolley turns about z instead of sliding.
         options: Of `beam`.
 
@@ -102,7 +102,8 @@ def gantry(beams, straight, gravity=9.81, hinged=False, **options):
     names = ["Bridge", "Trolley", *(f"Beam{k}" for k in range(len(beams))), "Tool"]
     rest = Frame(np.zeros(3), STILL)
     bodies = tuple(
-        Body(f"/G/{name}", rest, small if name == "Tool" else heavy, straight=name in straight) for name in names
+        Body(f"/G/{name}", rest, small if name == "Tool" else heavy, non_rotating=name in non_rotating)
+        for name in names
     )
 
     def at(x=0.0, rotation=STILL):

@@ -261,7 +261,7 @@ def linkages(draw) -> Shot:
     with patch.multiple(four_bar, **lengths):
         character, meshes = four_bar.four_bar(elasticity=draw(st.sampled_from(("linear", "stvk"))))
     # where a loop is cut decides how the coupler is carried, so the shot says it
-    joints = tuple(replace(joint, closes_loop=k == 3) for k, joint in enumerate(character.joints))
+    joints = tuple(replace(joint, closes_chain=k == 3) for k, joint in enumerate(character.joints))
     character = replace(character, joints=joints, gravity=np.array(draw(directions())))
     times = np.arange(FRAMES + 1) / RATE
     tracks = (Track(times, sum(turn * quintic(1.0, seconds, start)(times) for turn, start, seconds in draw(MOVES))),)

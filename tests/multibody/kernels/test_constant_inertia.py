@@ -98,7 +98,7 @@ def run(model, reach, steps=150):
 
 def test_nothing_is_lost_where_the_frames_cannot_turn():
     """A beam on rigid slides; what hangs on it turns with its tip, and is told so."""
-    exact, told = (run(gantry([STILL], straight), 0.2) for straight in ((), ALL[:3]))
+    exact, told = (run(gantry([STILL], non_rotating), 0.2) for non_rotating in ((), ALL[:3]))
     bent = np.abs(exact[0].u).max(axis=(0, 1))
     assert np.abs(exact[0].q[:, -1] - exact[0].q[0, 0]).max() > 1e-3, "the tool does turn"
     assert np.abs(told[0].u - exact[0].u).max() < 1e-12 * bent.max()
@@ -111,7 +111,7 @@ def test_what_is_lost_on_carriers_that_bend_is_of_second_order(beams):
     """A beam on the end of another one: its frame turns with the deflection. All loads grow together."""
     lost = []
     for part in (1.0, 0.5, 0.25):
-        exact, told = (run(gantry(beams, straight, 9.81 * part), 0.2 * part) for straight in ((), ALL))
+        exact, told = (run(gantry(beams, non_rotating, 9.81 * part), 0.2 * part) for non_rotating in ((), ALL))
         lost.append([np.abs(found - expected).max() for found, expected in zip(told[1:], exact[1:], strict=True)])
     orders = np.log2(np.array(lost[:-1]) / lost[1:])
     assert np.all(orders > 1.9), (orders, lost)
@@ -119,7 +119,7 @@ def test_what_is_lost_on_carriers_that_bend_is_of_second_order(beams):
 
 
 def test_a_body_that_turns_moves_otherwise_when_it_is_told_that_it_does_not():
-    exact, told = (run(gantry([STILL], straight, hinged=True), 1.0)[0] for straight in ((), ALL))
+    exact, told = (run(gantry([STILL], non_rotating, hinged=True), 1.0)[0] for non_rotating in ((), ALL))
     assert np.abs(told.u - exact.u).max() > 0.01 * np.abs(exact.u).max()
 
 

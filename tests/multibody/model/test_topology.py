@@ -32,7 +32,7 @@ def test_the_loosest_joint_closes_a_loop():
     # a ball before a hinge, and whatever the shot asks for before all others
     swapped = dataclasses.replace(character, joints=(ball, *character.joints), motors=())
     assert span_tree(swapped).closing == (0,)
-    asked = dataclasses.replace(character.joints[2], closes_loop=True)
+    asked = dataclasses.replace(character.joints[2], closes_chain=True)
     wanted = dataclasses.replace(character, joints=(*character.joints[:2], asked, ball), motors=())
     assert span_tree(wanted).closing == (2,)
 

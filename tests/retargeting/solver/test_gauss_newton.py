@@ -38,7 +38,7 @@ class Problem:
     def gain(self, decrease, value):
         return decrease
 
-    def worth(self, gain):
+    def merit_of_gain(self, gain):
         return gain
 
     def tighten(self):

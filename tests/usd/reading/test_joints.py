@@ -123,7 +123,7 @@ def test_a_joint_that_closes_a_loop_is_read_as_a_joint(tmp_path):
 
     joints = read(tmp_path, edit).joints
     assert len(joints) == 4
-    assert [joint.closes_loop for joint in joints].count(True) == 1
+    assert [joint.closes_chain for joint in joints].count(True) == 1
 
 
 def test_a_ball_is_read(tmp_path):

@@ -95,7 +95,7 @@ def _turning(found: list[Turning], choice: str, allowed: float) -> list[Turning]
 
 def _straight(character: Character, found: list[Turning], forced: bool) -> tuple[Character, list[ModelChoice]]:
     """The character with its bodies marked, and a row for each reason."""
-    bodies = tuple(replace(b, straight=not t.turns) for b, t in zip(character.bodies, found, strict=True))
+    bodies = tuple(replace(b, non_rotating=not t.turns) for b, t in zip(character.bodies, found, strict=True))
     names = distinct_names([body.path for body in bodies])
     groups: dict[tuple[bool, str], list[int]] = {}
     for k, item in enumerate(found):

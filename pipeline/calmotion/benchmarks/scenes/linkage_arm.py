@@ -68,7 +68,7 @@ def linkage_arm(
     )
 
     def hinge(name: str, body0: int, body1: int, at0: Frame, at1: Frame, closes: bool = False) -> Joint:
-        return Joint(f"/Rapper/{name}", "revolute", body0, body1, at0, at1, closes_loop=closes)
+        return Joint(f"/Rapper/{name}", "revolute", body0, body1, at0, at1, closes_chain=closes)
 
     pin = _at(0.0, -CRANK, LIFTS)
     joints = (

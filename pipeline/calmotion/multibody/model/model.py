@@ -109,7 +109,7 @@ def compile_model(character: Character, tree: Tree, bodies: Sequence[ReducedBody
         if body.elasticity is None:
             stiffness[k, :r] = body.stiffness
     joints = joint_arrays(character, tree, bodies, anchors, r_max, moving)
-    nonrotating = np.array([character.bodies[b].straight for b in tree.body], bool)
+    nonrotating = np.array([character.bodies[b].non_rotating for b in tree.body], bool)
     system = System(
         parent=np.array(tree.parent, np.int32), elastic=elastic, mass=mass, s=s, Z=Z, M3=M3, M4=M4, S=S, axial=axial,
         axial0=axial0, rotating=components(~nonrotating), nonrotating=components(nonrotating),

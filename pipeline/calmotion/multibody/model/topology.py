@@ -97,7 +97,7 @@ def _spanning(character: Character) -> tuple[list[int], list[int]]:
         joint = character.joints[index]
         # a free slider has no stiffness at rest, which the joints of the tree need
         kind = 0 if index in driven else {"fixed": 1, "revolute": 2, "spherical": 3, "prismatic": 4}[joint.kind]
-        return (5 if joint.closes_loop else kind), index
+        return (5 if joint.closes_chain else kind), index
 
     group = {index: index for index in range(WORLD, len(character.bodies))}
 

@@ -271,8 +271,8 @@ class RetargetProblem:
         now = np.sqrt(2.0 * max(value, 0.0) / self._unit)
         return float(now - np.sqrt(2.0 * max(value - decrease, 0.0) / self._unit))
 
-    def worth(self, gain: float) -> float:
-        """Decrease of the objective that reduces the root-mean-square error by a gain [m], from the current point."""
+    def merit_of_gain(self, gain: float) -> float:
+        """Decrease of the merit that reduces the root-mean-square error by `gain` [m], from the current point."""
         return float(self._unit * gain * max(self.error, gain))
 
     def tighten(self) -> bool:

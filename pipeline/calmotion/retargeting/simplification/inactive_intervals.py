@@ -69,7 +69,7 @@ def inactive_intervals(
     solved = problem.precondition(np.zeros(problem.size, bool))(gradient)
     gains = 0.5 * np.abs(gradient * solved).reshape(basis.count, -1).sum(axis=1)
     # the same decrease of the objective is a larger part of the error once the error is smaller
-    budget = problem.worth(NEGLIGIBLE * tolerance) * min(1.0, tolerance / max(problem.error, tolerance))
+    budget = problem.merit_of_gain(NEGLIGIBLE * tolerance) * min(1.0, tolerance / max(problem.error, tolerance))
     order = np.argsort(gains)
     active = np.any(np.abs(start).reshape(basis.count, -1) > UNCHANGED, axis=1)
     active[order[np.cumsum(gains[order]) > budget]] = True

@@ -41,7 +41,7 @@ class LeastSquares(LimitedProblem, Protocol):
     def gain(self, decrease: float, value: float) -> float:
         """Decrease of the root-mean-square error that corresponds to a decrease of the merit [m]."""
 
-    def worth(self, gain: float) -> float:
+    def merit_of_gain(self, gain: float) -> float:
         """Decrease of the merit that corresponds to a gain [m], at the point evaluated last."""
 
     def tighten(self) -> bool:
@@ -147,7 +147,7 @@ def minimize(
             return here("iteration limit")
         gradient = calls.gradient()
         norm = float(np.linalg.norm(gradient))
-        enough = problem.worth(gain)
+        enough = problem.merit_of_gain(gain)
         if problem.limits_act:
             limited = limited_step(problem, fixed, SHARE, enough, max_products)
             calls.products += limited.products

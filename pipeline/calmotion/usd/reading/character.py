@@ -131,7 +131,7 @@ def build_character(reading: Reading, skeleton: Skeleton) -> Character:
             j.frame1,
             j.lower,
             j.upper,
-            j.closes_loop,
+            j.closes_chain,
         )
         for j in skeleton.joints
     )

@@ -39,7 +39,7 @@ class JointPrim:
         body0, body1: Paths of the bodies, empty for the world.
         frame0, frame1: Frames in them, m.
         lower, upper: Limits [rad or m].
-        closes_loop: Whether the shot excludes this joint from the spanning tree (it closes a chain).
+        closes_chain: Whether the shot excludes this joint from the spanning tree (it closes a chain).
     """
 
     prim: Any
@@ -51,7 +51,7 @@ class JointPrim:
     frame1: Frame
     lower: float = -np.inf
     upper: float = np.inf
-    closes_loop: bool = False
+    closes_chain: bool = False
 
 
 def joint_prims(stage: Usd.Stage) -> list[Usd.Prim]:
