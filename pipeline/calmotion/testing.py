@@ -83,10 +83,10 @@ def _only(host: Host, idname: str) -> Host:
 
 
 def check_plugin(folder: str | Path) -> list[str]:
-    """Check that a plugin keeps to the rules.
+    """Check a plugin against the rules.
 
     Its manifest is valid, what it requires is installed, it registers well-formed operators under names of
-    its own, `unregister` takes back exactly those, and both can be called again.
+    its own, `unregister` removes exactly those, and both can be called again.
 
     Returns:
         What is wrong, one sentence each; empty when nothing is.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Calmotion as an extension of Blender: export, optimise in a process of its own, bring the animation back."""
+"""Calmotion as an extension of Blender: export, optimise in a separate process, import the animation."""
 
 from __future__ import annotations
 

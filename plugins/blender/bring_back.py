@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Bringing an optimised animation back: what changed of bones or objects, as keys of new actions."""
+"""Importing an optimised animation: changed bones and objects get keys in new actions."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ from pathlib import Path
 import bpy
 from mathutils import Matrix, Quaternion
 
-CHANGED = 2e-5  # what differs by less is as it was [rad or m]
+CHANGED = 2e-5  # a smaller difference counts as unchanged [rad or m]
 _PATHS = {"QUATERNION": "rotation_quaternion", "AXIS_ANGLE": "rotation_axis_angle"}
 
 
 def bring_back(context: bpy.types.Context, character: bpy.types.Object, root: Path) -> list[str]:
-    """Put the animation of a USD layer onto a character.
+    """Apply the animation of a USD layer to a character.
 
-    Actions that it had are kept, and copied; in the copies, the curves of what changed are replaced.
+    Its actions are kept and copied; in the copies, the curves of changed bones and objects are replaced.
 
     Args:
         root: Layer that opens the result with its shot.
@@ -26,7 +26,7 @@ def bring_back(context: bpy.types.Context, character: bpy.types.Object, root: Pa
         The names of the bones or objects that changed.
 
     Raises:
-        RuntimeError: The layer does not hold this character.
+        RuntimeError: The layer does not contain this character.
     """
     scene, frame = context.scene, context.scene.frame_current
     before, names = set(bpy.data.objects), {kind: set(getattr(bpy.data, kind)) for kind in _KINDS}
@@ -66,12 +66,12 @@ def _put_on_bones(
 def _put_on_objects(
     context: bpy.types.Context, top: bpy.types.Object, imported: list[bpy.types.Object], frames: range
 ) -> list[str]:
-    """Transforms come in by a cache, so they are looked up frame by frame."""
+    """Imported transforms come from a cache file, so they are read frame by frame."""
     parts = [top, *top.children_recursive]
     sources = {_exported_name(re.sub(r"\.\d{3}$", "", obj.name)): obj for obj in imported}
     pairs = [(part, sources[_exported_name(part.name)]) for part in parts if _exported_name(part.name) in sources]
     if not pairs:
-        raise RuntimeError("the optimised layer holds none of the objects of this character")
+        raise RuntimeError("the optimised layer contains no object of this character")
     new: dict[str, list[Matrix]] = {part.name: [] for part, _ in pairs}
     old: dict[str, list[Matrix]] = {part.name: [] for part, _ in pairs}
     for number in frames:
@@ -113,7 +113,7 @@ def _matching(imported: list[bpy.types.Object], armature: bpy.types.Object) -> b
     for obj in imported:
         if obj.type == "ARMATURE" and wanted <= set(obj.pose.bones.keys()):
             return obj
-    raise RuntimeError("the optimised layer holds no armature with the bones of this one")
+    raise RuntimeError("the optimised layer contains no armature with the bones of this one")
 
 
 def _basis(armature: bpy.types.Object, source: bpy.types.Object, name: str) -> Matrix:
@@ -165,7 +165,7 @@ def _key_rotations(
 
 
 def _set(bone: bpy.types.PoseBone | bpy.types.Object, path: str, turn: Quaternion, previous: object) -> object:
-    """Turn a bone as its mode has it, near the previous value; that value."""
+    """Set the rotation of a bone in its rotation mode, near the previous value; returns the value."""
     if path == "rotation_quaternion":
         value = turn.copy()
         if previous is not None:
@@ -194,7 +194,7 @@ def _forget(action: bpy.types.Action, data: bpy.types.AnimData, path: str) -> No
 
 
 def _remove(imported: list[bpy.types.Object], names: dict[str, set]) -> None:
-    """Take away what the import made."""
+    """Remove the imported objects."""
     for obj in imported:
         bpy.data.objects.remove(obj, do_unlink=True)
     for kind, kept in names.items():

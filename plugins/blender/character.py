@@ -9,7 +9,7 @@ import bpy
 
 
 def character_of(context: bpy.types.Context) -> bpy.types.Object | None:
-    """The character that is selected: its armature, or the topmost object of what is parented to each other."""
+    """The selected character: its armature, or the topmost parent of animated objects."""
     for obj in (context.active_object, *context.selected_objects):
         top = obj
         while obj is not None:
@@ -28,14 +28,14 @@ def is_animated(character: bpy.types.Object) -> bool:
 
 
 def parts_of(character: bpy.types.Object) -> list[bpy.types.Object]:
-    """A character and all that it moves, each after what moves it."""
+    """A character and all objects that it moves, parents first."""
     parts = [character, *character.children_recursive]
     moved = [obj for obj in bpy.context.scene.objects if obj not in parts and obj.find_armature() is character]
     return parts + moved if character.type == "ARMATURE" else parts
 
 
 def export_character(context: bpy.types.Context, character: bpy.types.Object, path: Path) -> Path:
-    """Write a character, with its animation, in metres; the selection stays as it was."""
+    """Write a character, with its animation, in metres; the selection stays unchanged."""
     active, selected = context.view_layer.objects.active, list(context.selected_objects)
     parts = parts_of(character)
     try:

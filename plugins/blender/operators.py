@@ -18,7 +18,7 @@ _RUNNING: dict[str, PipelineRun] = {}  # by the name of the scene; one for each
 
 
 class CALMOTION_OT_optimize(bpy.types.Operator):
-    """Take the shake out of the character's animation, as a new action"""
+    """Optimise the animation so that the robot does not shake; the result is a new action"""
 
     bl_idname = "calmotion.optimize"
     bl_label = "Optimize Motion"
@@ -26,21 +26,21 @@ class CALMOTION_OT_optimize(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """Where an animated character is selected and nothing runs."""
+        """Whether an animated character is selected and no optimisation runs."""
         if context.scene.name in _RUNNING:
             cls.poll_message_set("Calmotion is running")
             return False
         character = character_of(context)
         if character is None or not is_animated(character):
-            cls.poll_message_set("Select an armature with an action, or a part of animated objects")
+            cls.poll_message_set("Select an armature with an action, or one of several animated objects")
             return False
         if character.type != "ARMATURE" and not context.scene.calmotion.robot_layer:
-            cls.poll_message_set("Animated objects need a robot layer: choose it above")
+            cls.poll_message_set("Choose a robot layer for animated objects")
             return False
         return True
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        """Run to the end, and wait for it."""
+        """Run, and wait for the end."""
         run = self._begin(context)
         if run is None:
             return {"CANCELLED"}
@@ -48,7 +48,7 @@ class CALMOTION_OT_optimize(bpy.types.Operator):
         return self._finish(context)
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
-        """Run beside Blender, with progress; Escape cancels."""
+        """Run in the background, with progress; Escape cancels."""
         if self._begin(context) is None:
             return {"CANCELLED"}
         self._timer = context.window_manager.event_timer_add(0.2, window=context.window)
@@ -56,7 +56,7 @@ class CALMOTION_OT_optimize(bpy.types.Operator):
         return {"RUNNING_MODAL"}
 
     def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
-        """Show how far it is."""
+        """Show the progress."""
         run, settings = self._run, context.scene.calmotion
         if event.type == "ESC" and event.value == "PRESS":
             run.cancel()
@@ -75,7 +75,7 @@ class CALMOTION_OT_optimize(bpy.types.Operator):
         """Export, and start the process; None where that cannot be done, which is reported."""
         command, settings = command_of(context), context.scene.calmotion
         if command is None:
-            self.report({"ERROR"}, "calmotion was not found: name its command in the preferences of the extension")
+            self.report({"ERROR"}, "The command calmotion was not found; set it in the preferences of the extension")
             return None
         character = character_of(context)
         assert character is not None  # poll
@@ -89,12 +89,12 @@ class CALMOTION_OT_optimize(bpy.types.Operator):
         return self._run
 
     def _finish(self, context: bpy.types.Context) -> set[str]:
-        """Bring the result back, or tell what went wrong."""
+        """Import the result, or report what went wrong."""
         run, settings = _RUNNING.pop(context.scene.name), context.scene.calmotion
         settings.progress, settings.status = 0.0, run.outcome or ""
         try:
             if run.outcome == "cancelled":
-                self.report({"WARNING"}, "Calmotion was cancelled; the animation is as it was")
+                self.report({"WARNING"}, "Calmotion was cancelled; the animation is unchanged")
                 return {"CANCELLED"}
             if run.outcome != "done":
                 for error in run.errors:
@@ -107,7 +107,7 @@ class CALMOTION_OT_optimize(bpy.types.Operator):
                 return {"CANCELLED"}
             before, after = (1e3 * run.report[f"max_error_{when}_m"] for when in ("before", "after"))
             settings.status = f"{before:.3g} mm -> {after:.3g} mm"
-            self.report({"INFO"}, f"{len(changed)} of the bones or objects changed, error {settings.status}")
+            self.report({"INFO"}, f"{len(changed)} bones or objects changed; largest error {settings.status}")
             return {"FINISHED"}
         finally:
             preferences = preferences_of(context)
@@ -116,14 +116,14 @@ class CALMOTION_OT_optimize(bpy.types.Operator):
 
 
 class CALMOTION_OT_cancel(bpy.types.Operator):
-    """Stop the optimisation; the animation stays as it was"""
+    """Stop the optimisation; the animation stays unchanged"""
 
     bl_idname = "calmotion.cancel"
     bl_label = "Cancel"
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """While it runs."""
+        """Whether an optimisation runs."""
         return context.scene.name in _RUNNING
 
     def execute(self, context: bpy.types.Context) -> set[str]:
@@ -133,7 +133,7 @@ class CALMOTION_OT_cancel(bpy.types.Operator):
 
 
 def _folder(context: bpy.types.Context) -> Path:
-    """Where files go: beside the .blend file, or nowhere that lasts while there is none."""
+    """The folder of the files: beside the .blend file, or a temporary one if it is not saved."""
     if bpy.data.filepath:
         blend = Path(bpy.data.filepath)
         folder = blend.parent / f"{blend.stem}_calmotion"

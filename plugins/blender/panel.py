@@ -9,7 +9,7 @@ from .preferences import command_of
 
 
 class CALMOTION_PT_panel(bpy.types.Panel):
-    """Settings, the button, and how far it is."""
+    """Settings, the button, and the progress."""
 
     bl_idname = "CALMOTION_PT_panel"
     bl_label = "Calmotion"
@@ -18,7 +18,7 @@ class CALMOTION_PT_panel(bpy.types.Panel):
     bl_category = "Calmotion"
 
     def draw(self, context: bpy.types.Context) -> None:
-        """Draw it."""
+        """Draw the panel."""
         layout, settings = self.layout, context.scene.calmotion
         layout.use_property_split = True
         layout.prop(settings, "robot_layer")
@@ -28,7 +28,7 @@ class CALMOTION_PT_panel(bpy.types.Panel):
         made.prop(settings, "flexible")
         layout.prop(settings, "tolerance")
         if command_of(context) is None:
-            layout.label(text="calmotion was not found: see the preferences", icon="ERROR")
+            layout.label(text="The command calmotion was not found: see the preferences", icon="ERROR")
         layout.operator("calmotion.optimize", icon="ANIM_DATA")
         if bpy.ops.calmotion.cancel.poll():
             layout.progress(factor=settings.progress, text=settings.status)

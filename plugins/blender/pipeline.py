@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Running calmotion in a process of its own: its commands, its progress, and stopping it. Does not import bpy."""
+"""Runs calmotion in a separate process: commands, progress, cancelling. Does not import bpy."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from pathlib import Path
 
 ENDED = {0: "done", 130: "interrupted"}
 PROGRESS = "progress\t"
-_PATIENCE = 20.0  # for a process that was asked to stop [s]
+_PATIENCE = 20.0  # wait after a request to stop [s]
 
 
 @dataclass(frozen=True)
@@ -39,8 +39,8 @@ def job_for(
         command: The words that start calmotion.
         shot: The exported character.
         folder: Where layers go.
-        robot: Layer with a robot, or empty: one is made of the skin.
-        material, flexible: Of a robot that is made.
+        robot: Layer with a robot; empty: a robot is made from the skin.
+        material, flexible: Of a robot that is made from the skin.
         tolerance: [m].
     """
     rigged, result = folder / "robot.usda", folder / "calm.usda"
@@ -59,7 +59,7 @@ def job_for(
 
 
 def composed(robot: str, shot: Path, target: Path) -> str:
-    """The text of a layer that puts a robot over an exported character, whose rates and units it takes over."""
+    """The text of a layer that puts a robot over an exported character, with its rates and units."""
     head = [
         line.strip()
         for line in shot.read_text(encoding="utf-8").splitlines()[:40]
@@ -73,7 +73,7 @@ def composed(robot: str, shot: Path, target: Path) -> str:
 
 
 class PipelineRun:
-    """A job that runs in the background; ask it how far it is."""
+    """A job that runs in the background."""
 
     def __init__(self, job: Job):
         self.job = job
@@ -100,7 +100,7 @@ class PipelineRun:
         self._thread.join(seconds)
 
     def cancel(self) -> None:
-        """Ask the process to stop, and make it if it does not."""
+        """Ask the process to stop, and kill it if it does not."""
         self._cancelled = True
         process = self._process
         if process is None or process.poll() is not None:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Where Calmotion is on this machine."""
+"""How Calmotion is started on this machine."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ class CalmotionPreferences(bpy.types.AddonPreferences):
 
     command: bpy.props.StringProperty(
         name="Command",
-        description="How calmotion is started, such as /opt/calmotion/bin/calmotion; empty: as a shell finds it",
+        description="Command that starts Calmotion, such as /opt/calmotion/bin/calmotion; empty: from the PATH",
     )
     keep_files: bpy.props.BoolProperty(
         name="Keep Files", description="Keep the exported shot and the layers beside the .blend file", default=True
     )
 
     def draw(self, context: bpy.types.Context) -> None:
-        """Show them."""
+        """Draw the preferences."""
         self.layout.prop(self, "command")
         self.layout.prop(self, "keep_files")
 
@@ -38,7 +38,7 @@ def preferences_of(context: bpy.types.Context) -> CalmotionPreferences | None:
 
 
 def command_of(context: bpy.types.Context) -> list[str] | None:
-    """The words that start calmotion: of the preferences, the environment, or as a shell finds it; None without one."""
+    """The words that start calmotion: from the preferences, the environment, or the PATH; None without one."""
     preferences = preferences_of(context)
     words = shlex.split((preferences.command if preferences else "") or os.environ.get(COMMAND_VARIABLE, ""))
     if not words:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the user chooses for a scene."""
+"""The settings of a scene."""
 
 from __future__ import annotations
 
@@ -13,17 +13,17 @@ class CalmotionSettings(bpy.types.PropertyGroup):
 
     robot_layer: bpy.props.StringProperty(
         name="Robot",
-        description="USD layer with bodies, joints and motors over the exported character; empty: make one of the skin",
+        description="USD layer with the robot of the exported character; empty: make a robot from the skin",
         subtype="FILE_PATH",
     )
     material: bpy.props.EnumProperty(
         name="Material",
-        description="Material of the links, where the robot is made of the skin",
+        description="Material of the links of a robot that is made from the skin",
         items=[(name, name.capitalize(), "") for name in MATERIALS],
     )
     flexible: bpy.props.StringProperty(
         name="Flexible",
-        description="Bones with flexible links: names separated by commas, or all",
+        description="Names of the bones with flexible links, separated by commas, or all",
         default="all",
     )
     tolerance: bpy.props.FloatProperty(

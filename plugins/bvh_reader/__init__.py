@@ -34,8 +34,8 @@ class ReadMotion(Operator):
         """Only for files that are named `.bvh`."""
         motion = data[Source].motion
         if motion is None:
-            return NotAsked("no --motion was asked for")
-        return None if motion.lower().endswith(".bvh") else NotAsked("the motion is no BVH file")
+            return NotAsked("no motion is given (--motion)")
+        return None if motion.lower().endswith(".bvh") else NotAsked("the motion is not a BVH file")
 
     def execute(self, context: RunContext) -> Sequence[object]:
         """The tracks."""

@@ -33,7 +33,7 @@ class LogRecording(Operator):
     @classmethod
     def poll(cls, data: Mapping[type, Any]) -> str | None:
         paths = data.get(OutputPaths)
-        return None if paths and paths.rrd else "no recording is asked for (--rrd)"
+        return None if paths and paths.rrd else "no recording is requested (--rrd)"
 
     def execute(self, context: RunContext) -> Sequence[object]:
         from .recording import write_recording

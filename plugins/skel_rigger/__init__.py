@@ -42,7 +42,7 @@ class RigSkeleton(Operator):
 
     @classmethod
     def poll(cls, data: Mapping[type, Any]) -> str | None:
-        return None if data[Source].command == "rig" else NotAsked("the command is another")
+        return None if data[Source].command == "rig" else NotAsked("only `calmotion rig` makes a robot")
 
     def execute(self, context: RunContext) -> Sequence[object]:
         """The robot."""
@@ -50,7 +50,7 @@ class RigSkeleton(Operator):
         from calmotion.usd.rigging import RigOptions, rig_shot
 
         values, output = context.properties, context.get(OutputPaths).layer
-        assert output is not None  # the command line asks for it
+        assert output is not None  # the command line requires it
         names = [] if values.flexible == "none" else [name.strip() for name in values.flexible.split(",")]
         options = RigOptions(
             material=values.material,

@@ -42,9 +42,9 @@ class WriteResult(Operator):
 
     @classmethod
     def poll(cls, data: Mapping[type, Any]) -> str | None:
-        """Left out where no layer is asked for."""
+        """Skipped where no layer is requested."""
         outputs = data.get(OutputPaths)
-        return "no layer is asked for" if outputs is not None and outputs.layer is None else None
+        return "no layer is requested (-o)" if outputs is not None and outputs.layer is None else None
 
     def execute(self, context: RunContext) -> Sequence[object]:
         """The paths of both layers."""
@@ -60,7 +60,7 @@ class WriteResult(Operator):
             str(context.get(OutputPaths).layer),
             WriteOptions(samples_per_second=rate if rate > 0.0 else None, splines=values.splines, bake=values.bake),
         )
-        context.report("info", f"{root} opens {layer} with the shot")
+        context.report("info", f"open {root} to see {layer} together with the shot")
         return (WrittenLayer(layer=layer, root=root),)
 
 

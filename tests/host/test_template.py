@@ -44,7 +44,7 @@ def test_it_runs_by_its_name_and_tells_what_it_found(calmotion, repository, tmp_
 
 @pytest.mark.parametrize("name", ["Speed", "1x", "a-b", ""])
 def test_a_wrong_name_is_refused(tmp_path, name):
-    with pytest.raises(PluginError, match="no name for a plugin"):
+    with pytest.raises(PluginError, match="not a valid name for a plugin"):
         write_template(name, tmp_path)
 
 

@@ -61,7 +61,7 @@ def test_what_nothing_drives_never_gains_energy(shot):
     try:
         run = integrate(
             system, rigid_state(prepared.model, rest), angles, 0.0 * angles, H, Workspace.for_system(system),
-            settled=False,
+            from_equilibrium=False,
         )  # fmt: skip
     except SimulationFailure:
         assume(False)

@@ -59,7 +59,7 @@ def released(h, seconds):
     model = bricard()
     none = np.zeros((round(seconds / h) + 1, len(model.system.rows)))
     start, ws = rigid_state(model, none[0]), Workspace.for_system(model.system)
-    return model, simulate(model.system, start, none, none, h, ws, settled=False)
+    return model, simulate(model.system, start, none, none, h, ws, from_equilibrium=False)
 
 
 def test_it_moves_with_its_energy_kept_at_the_order_of_the_scheme():

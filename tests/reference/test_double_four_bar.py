@@ -27,7 +27,9 @@ def run(step, duration=10.0):
             start.V[k, 0] = 1.0
     count = round(duration / step) + 1
     still = np.zeros((count, len(model.system.rows)))
-    motion = simulate(model.system, start, still, still, step, Workspace.for_system(model.system), settled=False)
+    motion = simulate(
+        model.system, start, still, still, step, Workspace.for_system(model.system), from_equilibrium=False
+    )
     states = motion.states
     return target_frames(model, states.c, states.q, states.u)[0][:, 0], motion
 

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 
 def print_inspection(report: dict[str, Any], stream: TextIO) -> None:
-    """Print what is in a shot, and what a check found."""
+    """Print the content of a shot, or the findings of a check."""
     console = console_on(stream)
     (_print_findings if "findings" in report else _print_contents)(console, report)
 
@@ -43,7 +43,7 @@ def _print_contents(console: Console, report: dict[str, Any]) -> None:
         f"gravity ({gravity}) m/s²"
     )
     for layer in report["earlier_layers"]:
-        console.print(f"carries an optimised layer: {layer}", soft_wrap=True)
+        console.print(f"contains an optimised layer: {layer}", soft_wrap=True)
     bodies = [_body_row(body) for body in report["bodies"]]
     print_table(console, "Bodies", ["body", "kind", "mass", "elements", "frequencies"], bodies, texts=2)
     print_table(
@@ -56,7 +56,7 @@ def _print_contents(console: Console, report: dict[str, Any]) -> None:
     print_table(
         console,
         "Motors",
-        ["motor", "track", "limits", "peak speed", "speed limit", "effort limit", "optimised"],
+        ["motor", "track", "limits", "peak speed", "speed limit", "effort limit", "may change"],
         [_motor_row(motor) for motor in report["motors"]],
     )
     print_table(

@@ -14,7 +14,17 @@ if TYPE_CHECKING:
 Commands: TypeAlias = "argparse._SubParsersAction[argparse.ArgumentParser]"
 Command: TypeAlias = "Callable[[argparse.Namespace, Output], int]"
 # Those of `calmotion.shot.model_choice`, written out since `--help` does not import the engine; a test compares them.
-KINDS = ("bodies", "turning", "loops", "modes", "directions", "elasticity", "motors", "ranges")
+MEANINGS = {
+    "bodies": "rigid bodies in place of flexible ones",
+    "turning": "no gyroscopic terms for non-rotating bodies",
+    "loops": "no redundant constraints of closed chains",
+    "modes": "fewer modes",
+    "directions": "subspaces for nonlinear bodies and their quadratic strain",
+    "elasticity": "linear elastic law",
+    "motors": "no optimisation of motors without influence on the targets",
+    "ranges": "no optimisation in inactive intervals",
+}
+KINDS = tuple(MEANINGS)
 
 
 def shot_command(commands: Commands, name: str, function: Command, text: str) -> argparse.ArgumentParser:
@@ -38,7 +48,7 @@ def shot_command(commands: Commands, name: str, function: Command, text: str) ->
         metavar="OPERATOR",
         action="append",
         default=[],
-        help="run this operator of a plugin as well, such as curves.export; may be repeated",
+        help="also run this operator of a plugin, such as curves.export; may be repeated",
     )
     file_argument(command, "--settings", metavar="FILE", help="TOML file with a table for each operator")
     command.add_argument(
@@ -73,10 +83,13 @@ def run_options(command: argparse.ArgumentParser) -> None:
         nargs="?",
         const="motors",
         choices=("motors", "simulated"),
-        help="write body transforms as well: of a rigid robot with the new curves, or of the predicted motion",
+        help="also write body transforms: those of a rigid robot with the new curves (motors, the default), or those "
+        "of the predicted motion (simulated)",
     )
     outputs.add_argument(
-        "--samples-per-second", metavar="HZ", help="write denser samples than the frames, for linear interpolation"
+        "--samples-per-second",
+        metavar="HZ",
+        help="write more samples than the frames, for linear interpolation",
     )
     outputs.add_argument(
         "--splines",
@@ -109,18 +122,24 @@ def simulation_options(command: argparse.ArgumentParser, integrators: str) -> No
     )
     model.add_argument("--integrator", metavar="NAME", default=None, help=integrators)
     model.add_argument(
-        "--pre-roll", metavar="TIME", type=_quantity("s"), help="time that eases into the motion (default: automatic)"
+        "--pre-roll",
+        metavar="TIME",
+        type=_quantity("s"),
+        help="time before the first frame in which the robot eases into the motion (default: automatic)",
     )
-    group = command.add_argument_group("model simplification (by default it follows from the tolerance)")
-    for flag, text in (("--keep", "do not simplify"), ("--leave-out", "always simplify")):
+    meanings = "; ".join(f"{kind}: {meaning}" for kind, meaning in MEANINGS.items())
+    group = command.add_argument_group(
+        "model simplification", f"By default the tolerance decides. Kinds: {meanings}; all: all of these."
+    )
+    for flag, text in (("--keep", "never make"), ("--leave-out", "always make")):
         group.add_argument(
             flag, metavar="KIND", action="append", default=[], choices=("all", *KINDS),
-            help=f"{text} {', '.join(KINDS[:-1])}, {KINDS[-1]} or all; may be repeated",
+            help=f"{text} simplifications of this kind; may be repeated",
         )  # fmt: skip
 
 
 def opened_shot(args: argparse.Namespace) -> Shot:
-    """The shot that the arguments name, not yet read; plugins that could not be loaded are told on stderr.
+    """The shot that the arguments name, not yet read; plugins that could not be loaded are reported on stderr.
 
     Raises:
         SettingError: A folder holds no plugin, or the settings cannot be read.

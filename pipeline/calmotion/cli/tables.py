@@ -11,7 +11,7 @@ from rich.table import Table
 
 from calmotion.support.naming import distinct_names
 
-_FAR = 2.0  # times the tolerance: an estimate beyond says that it is not kept
+_FAR = 2.0  # an estimate of more than this many tolerances means that the tolerance is not kept
 
 
 def length(meters: float | None) -> str:
@@ -28,7 +28,7 @@ LONG = 60  # characters of a prim path beyond which a table shows names
 
 
 def name_paths(paths: Sequence[str]) -> dict[str, str]:
-    """Prim paths as they are when all are short, else by names that tell them apart."""
+    """Prim paths as they are when all are short, else by distinct names."""
     if max(map(len, paths), default=0) <= LONG:
         return {path: path for path in paths}
     return distinct_names(paths)
@@ -80,7 +80,7 @@ def print_limits(console: Console, limits: Sequence[dict[str, Any]], optimized: 
 
 
 def print_accuracy(console: Console, report: dict[str, Any]) -> None:
-    """How far the simulation itself may be off."""
+    """Estimated and measured error of the simulation itself."""
     if report["estimated_error_m"] is not None:
         error, step = length(report["estimated_error_m"]), length(report["estimated_step_error_m"])
         mesh = report["estimated_mesh_error_m"]
@@ -92,7 +92,7 @@ def print_accuracy(console: Console, report: dict[str, Any]) -> None:
             f"{1000 * report['verified_step_s']:.4g} ms and {report['verified_modes']} elastic coordinates"
         )
     asked, measured, estimated = report["tolerance_m"], report["verified_error_m"], report["estimated_error_m"] or 0.0
-    # estimates add up bounds, so only one far above the tolerance tells something
+    # an estimate is a sum of bounds, so only one far above the tolerance is evidence
     if asked is not None and (estimated > _FAR * asked if measured is None else measured > asked):
         console.print(
             f"the tolerance of {length(asked)} is not kept: with large deflections, or near buckling, small errors "
@@ -114,7 +114,7 @@ def print_run(report: dict[str, Any], stream: TextIO) -> None:
     if optimized:
         console.print(
             f"objective {report['objective_before']:.6g} -> {report['objective_after']:.6g} in {report['iterations']} "
-            f"iterations, {report['forward_simulations']} simulations, {report['linearized_sweeps']} linearized "
+            f"iterations, {report['forward_simulations']} simulations, {report['linearized_sweeps']} linearised "
             f"sweeps, {report['wall_s']:.2f} s"
         )
         if report["stopped"] not in ("converged", ""):
@@ -130,7 +130,7 @@ def print_run(report: dict[str, Any], stream: TextIO) -> None:
         console.print(f"largest sag of a target at rest: {length(sag)}")
     seams = [target[f"seam{suffixes[-1]}_m"] for target in report["targets"]]
     if seams and seams[0] is not None:
-        console.print(f"at the end of a cycle the targets are {length(max(seams))} from where they began")
+        console.print(f"largest distance of a target between start and end of a cycle: {length(max(seams))}")
         growth = report["loop_growth"]
         if growth is None or growth > 1.0:
             factor = "without bound" if growth is None else f"by a factor of {growth:.3g}"
@@ -140,11 +140,11 @@ def print_run(report: dict[str, Any], stream: TextIO) -> None:
         more = f" and {len(times) - 5} more times" if len(times) > 5 else ""
         console.print(f"closed chains pass a dead centre at {', '.join(times[:5])} s{more}")
     if report["refined_steps"]:
-        console.print(f"{report['refined_steps']} steps needed smaller steps in between: try a smaller --step")
+        console.print(f"{report['refined_steps']} steps were divided into smaller ones: try a smaller --step")
     console.print(
         f"{report['steps']} steps of {1000 * report['step_s']:.4g} ms, {report['dof']} coordinates, "
         f"{report['modes']} of them elastic; {report['total_wall_s']:.1f} s in total"
-        + (f", {report['peak_memory_gb']:.2f} GB" if report["peak_memory_gb"] else "")
+        + (f", peak memory {report['peak_memory_gb']:.2f} GB" if report["peak_memory_gb"] else "")
     )
     print_accuracy(console, report)
     print_left_out(console, report["left_out"])

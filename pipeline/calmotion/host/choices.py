@@ -40,7 +40,10 @@ def disabled_plugins(environment: Mapping[str, str] | None = None) -> frozenset[
         return frozenset()
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
         raise SettingError(
-            "the choice of plugins cannot be read", path=str(file), found=error, remedy="Mend or remove the file."
+            "the list of disabled plugins cannot be read",
+            path=str(file),
+            found=error,
+            remedy="Correct or remove the file.",
         ) from error
     if not (isinstance(found, list) and all(isinstance(name, str) for name in found)):
         raise SettingError(
@@ -48,7 +51,7 @@ def disabled_plugins(environment: Mapping[str, str] | None = None) -> frozenset[
             path=str(file),
             attribute="disabled",
             found=repr(found),
-            remedy="Mend or remove the file.",
+            remedy="Correct or remove the file.",
         )
     return frozenset(found)
 
@@ -63,14 +66,14 @@ def choose(plugin_id: str, enabled: bool, environment: Mapping[str, str] | None 
     kept = kept - {plugin_id} if enabled else kept | {plugin_id}
     file = configuration_folder(environment) / FILE_NAME
     names = ", ".join(f'"{name}"' for name in sorted(kept))
-    head = "# Plugins that are not loaded; `calmotion plugins enable ID` takes one off the list.\n"
+    head = "# Plugins that are not loaded; `calmotion plugins enable ID` removes one from the list.\n"
     try:
         write_text(file, f"{head}disabled = [{names}]\n")
     except OSError as error:
         raise SettingError(
-            "the choice of plugins cannot be kept",
+            "the list of disabled plugins cannot be saved",
             path=str(file),
             found=error.strerror,
-            remedy=f"Make the folder writable, or name another with {FOLDER_VARIABLE}.",
+            remedy=f"Make the folder writable, or name another one with {FOLDER_VARIABLE}.",
         ) from error
     return file

@@ -18,4 +18,4 @@ class SettingError(HostError):
 
 
 class PlanError(HostError):
-    """The operators that are there cannot make what was asked for."""
+    """The available operators cannot make the wanted values."""

@@ -82,7 +82,11 @@ def _check_values(manifest: Manifest, file: Path) -> None:
 
     if not re.fullmatch(r"[a-z][a-z0-9_]*", manifest.id):
         raise PluginError(
-            "must be a small Python name", path=str(file), attribute="id", found=manifest.id, remedy="Use a-z, 0-9, _."
+            "must be a lower-case name",
+            path=str(file),
+            attribute="id",
+            found=manifest.id,
+            remedy="Use a-z, 0-9, _.",
         )
     if manifest.id != file.parent.name:
         raise PluginError(

@@ -33,7 +33,7 @@ class RunContext:
         properties: Values of its properties.
         on_progress: Called with a fraction in 0..1 and a message.
         records: What it reported so far.
-        results: What became of the operators before it.
+        results: Outcomes of the earlier operators.
         fraction: How far it said that it is, 0..1.
     """
 
@@ -46,7 +46,7 @@ class RunContext:
     fraction: float = 0.0
 
     def get(self, kind: type[T]) -> T:
-        """The value of a type; None for one of `uses` that nobody provided.
+        """The value of a type; None for one of `uses` that no operator provided.
 
         Raises:
             PluginError: When the operator does not declare the type, since the order then does not know of it.
@@ -59,19 +59,19 @@ class RunContext:
         return self.data.get(kind)  # type: ignore[return-value]
 
     def progress(self, fraction: float, message: str = "") -> None:
-        """Say how far the operator is, 0..1."""
+        """Report the progress of the operator, 0..1."""
         self.fraction = min(max(float(fraction), 0.0), 1.0)
         self.on_progress(self.fraction, message)
 
     def report(self, level: str, text: str) -> None:
-        """Tell the user something; `level` is `info` or `warning`."""
+        """Report a message to the user; `level` is `info` or `warning`."""
         if level not in LEVELS:
             raise PluginError("unknown level of a report", found=level, remedy=f"Use one of {', '.join(LEVELS)}.")
         self.records.append(Record(level, text))
 
 
 class NotAsked(str):
-    """A reason of a poll that is no news: what nobody asked for is not listed among what was left out."""
+    """A reason of a poll that is not reported: the user did not request the output."""
 
 
 class Operator:
@@ -118,7 +118,7 @@ def check_operator(cls: object) -> None:
         raise PluginError(problem, path=f"operator {name}", found=found, remedy=remedy)
 
     if not (isinstance(cls.idname, str) and re.fullmatch(r"[a-z][a-z0-9_]*(\.[a-z][a-z0-9_]*)+", cls.idname)):
-        refuse("idname must be small names with dots between", repr(cls.idname), "Write one like fe.mesh.")
+        refuse("idname must be lower-case names separated by dots", repr(cls.idname), "Write one like fe.mesh.")
     if not (isinstance(cls.label, str) and cls.label.strip()):
         refuse("label is empty", remedy="Say in a few words what it does.")
     for attribute in ("requires", "uses", "provides"):
@@ -131,7 +131,7 @@ def check_operator(cls: object) -> None:
         refuse("provides is empty", remedy="An operator makes at least one value.")
     both = set(cls.provides) & set(cls.requires + cls.uses) | set(cls.requires) & set(cls.uses)
     if both:
-        refuse("a type stands in two of requires, uses and provides", ", ".join(sorted(k.__name__ for k in both)))
+        refuse("a type is in two of requires, uses and provides", ", ".join(sorted(k.__name__ for k in both)))
     if not (isinstance(cls.properties, tuple) and all(isinstance(p, Property) for p in cls.properties)):
         refuse("properties must be a tuple of Property", repr(cls.properties))
     if len({p.name for p in cls.properties}) != len(cls.properties):

@@ -117,7 +117,7 @@ def _sort(operators: Operators) -> list[type[Operator]]:
     except CycleError as error:
         circle = " -> ".join(cls.idname for cls in reversed(error.args[1]))
         raise PlanError(
-            "operators need each other in a circle", found=circle, remedy="Leave one of their plugins out."
+            "operators need each other in a circle", found=circle, remedy="Disable one of their plugins."
         ) from None
     order: list[type[Operator]] = []
     rank = {cls: index for index, cls in enumerate(operators)}

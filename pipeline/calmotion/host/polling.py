@@ -10,7 +10,7 @@ from calmotion.host.operators import Operator
 
 
 class _Watched(dict[type, Any]):
-    """Data of a run that remembers which absent values were asked for."""
+    """Data of a run that remembers which absent values a poll has read."""
 
     def __init__(self, data: Mapping[type, Any]):
         super().__init__(data)

@@ -101,10 +101,10 @@ class Host:
             for other in self.plugins:
                 if other.id == plugin.id and other.manifest is not None:
                     raise PluginError(
-                        f"a plugin with the id {plugin.id} is already there",
+                        f"a plugin with the id {plugin.id} exists already",
                         path=str(location.folder),
                         found=other.location.folder,
-                        remedy="Rename one of the two, or leave one out.",
+                        remedy="Rename or disable one of the two.",
                     )
         except PluginError as error:
             plugin.fail(error)
@@ -174,7 +174,7 @@ class Host:
         plugin = self._asking("unregister_operator")
         if cls not in plugin.operators:
             raise PluginError(
-                "the plugin takes back an operator that it did not register", path=plugin.id, found=cls.__name__
+                "the plugin unregisters an operator that it did not register", path=plugin.id, found=cls.__name__
             )
         plugin.operators.remove(cls)
 

@@ -1,4 +1,4 @@
-"""Carrying out a plan: one result for each operator, whatever happens to the others."""
+"""Carrying out a plan: one result for each operator, also where others fail."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ Progress = Callable[[str, float, str], None]
 
 
 class Outcome(StrEnum):
-    """What became of an operator in a run."""
+    """The outcome of an operator in a run."""
 
     DONE = "done"
     LEFT_OUT = "left out"
@@ -33,7 +33,7 @@ class Outcome(StrEnum):
 
 @dataclass(frozen=True)
 class OperatorResult:
-    """What became of one operator.
+    """The outcome of one operator.
 
     Attributes:
         idname, label, plugin: Which operator, and the plugin it belongs to.
@@ -180,8 +180,8 @@ class Run:
         )
 
     def left_out(self) -> tuple[Simplification, ...]:
-        """What the polls left out, for the report; not an operator whose values another one made, or that nobody asked
-        for."""
+        """What the polls left out, for the report; not an operator whose values another one made, or whose
+        output was not requested."""
         from calmotion.shot import Simplification
 
         made = {cls.idname: all(kind in self.data for kind in cls.provides) for cls in self.plan.operators}

@@ -31,7 +31,7 @@ packages = ["{name}"]
     "README.md": """\
 # {title}
 
-A plugin for Calmotion. It tells the peak speed of every motor of a shot.
+A plugin for Calmotion. It reports the peak speed of every motor of a shot.
 
     pip install -e .
     pytest
@@ -93,15 +93,15 @@ class ReportSpeeds(Operator):
         \"\"\"The values of `provides`, in that order.\"\"\"
         import numpy as np
 
-        found = {{}}
+        peaks = {{}}
         motors, tracks = context.get(Character).motors, context.get(Animation).tracks
         for number, (motor, track) in enumerate(zip(motors, tracks, strict=True)):
             context.progress(number / len(motors), motor.path)
             speeds = np.abs(np.diff(track.values) / np.diff(track.times))
-            peak = found[motor.path] = float(speeds.max(initial=0.0))
+            peak = peaks[motor.path] = float(speeds.max(initial=0.0))
             near = peak > context.properties.share * motor.max_velocity
             context.report("warning" if near else "info", f"{{motor.path}}: {{peak:.3g}} a second at most")
-        return (PeakSpeeds(found),)
+        return (PeakSpeeds(peaks),)
 
 
 def register(host: Host) -> None:
@@ -114,7 +114,7 @@ def unregister(host: Host) -> None:
     host.unregister_operator(ReportSpeeds)
 """,
     "tests/test_{name}.py": """\
-\"\"\"The plugin keeps to the rules, and does what it says; the fixtures come with Calmotion.\"\"\"
+\"\"\"The plugin passes the checks, and its operator works; the fixtures come with Calmotion.\"\"\"
 
 from pathlib import Path
 
@@ -125,7 +125,7 @@ from calmotion.testing import check_plugin, run_operator
 FOLDER = Path(__file__).resolve().parents[1] / "{name}"
 
 
-def test_the_plugin_keeps_to_the_rules():
+def test_the_plugin_passes_the_checks():
     assert check_plugin(FOLDER) == []
 
 
@@ -146,7 +146,7 @@ def write_template(name: str, parent: Path) -> Path:
         PluginError: The name is none for a plugin, or the folder is there already, or cannot be made.
     """
     if not re.fullmatch(r"[a-z][a-z0-9_]*", name):
-        raise PluginError("is no name for a plugin", path=name, remedy="Use a-z, 0-9 and _, a letter first.")
+        raise PluginError("is not a valid name for a plugin", path=name, remedy="Use a-z, 0-9 and _, a letter first.")
     folder = parent / name
     values = {
         "name": name,
@@ -161,7 +161,7 @@ def write_template(name: str, parent: Path) -> Path:
             path.parent.mkdir(exist_ok=True)
             path.write_text(text.format(**values), encoding="utf-8")
     except FileExistsError:
-        raise PluginError("the folder is there already", path=str(folder), remedy="Choose another name.") from None
+        raise PluginError("the folder exists already", path=str(folder), remedy="Choose another name.") from None
     except OSError as error:
         raise PluginError("the folder cannot be made", path=str(folder), found=error.strerror) from error
     return folder

@@ -163,7 +163,7 @@ def _law(
     """The elastic law of a body, and its simplifications."""
     settings = body.flexible
     assert settings is not None
-    law, what = settings.elasticity, f"nonlinear elasticity of {body.path}"
+    law, what = settings.elasticity, f"{body.path}: linear elasticity"
     if law != "auto":
         return law, (Simplification(what, "calm:flexible:elasticity is linear"),) if law == "linear" else ()
     if load_envelope is None:
@@ -174,7 +174,7 @@ def _law(
     if choice.law == "neohookean":
         return choice.law, ()
     if choice.law == "stvk":
-        what = f"nonlinear material of {body.path}"
+        what = f"{body.path}: linear material, with nonlinear strain"
     return choice.law, (Simplification(what, choice.reason, choice.error_m),)
 
 
@@ -201,8 +201,8 @@ def _omitted_modes(basis: Basis, body: Body, load_envelope: LoadEnvelope | None)
     kept = len(basis.omega_squared)
     return (
         Simplification(
-            f"linear modes of {body.path} except {kept}",
-            "the loads of this shot excite them by less than the tolerance",
+            f"{body.path}: only {kept} linear modes",
+            "the loads of this shot excite the others by less than the tolerance",
             basis.cut_error_m,
         ),
     )
@@ -213,8 +213,8 @@ def _omitted_strain(law: Elasticity, body: Body) -> tuple[Simplification, ...]:
     if law.strain_projection is None:
         return ()
     p, r = law.strain_projection.shape
-    what = f"quadratic strain in {r - p} of {r} elastic coordinates of {body.path}"
-    return (Simplification(what, "the loads of this shot cause almost no rotation in them", law.strain_error_m),)
+    what = f"{body.path}: quadratic strain in {p} of {r} elastic coordinates"
+    return (Simplification(what, "the loads of this shot cause almost no rotation in the others", law.strain_error_m),)
 
 
 def _markers(

@@ -31,7 +31,7 @@ class RiggedJoint:
 
 @dataclass(frozen=True)
 class Rig:
-    """The robot of a skinned character.
+    """The robot that is made from a skinned character.
 
     Attributes:
         layer: Path of the layer, which opens with the shot beneath it.

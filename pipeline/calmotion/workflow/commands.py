@@ -94,7 +94,7 @@ def optimize(
     """Find motor curves with which the flexible robot performs the intended motion.
 
     An interrupted or cancelled run that has curves already returns the best of them (`interrupted` is True). With
-    `outputs.layer` a checkpoint is kept beside the layer, and the same call goes on from it.
+    `outputs.layer` a checkpoint is kept beside the layer, and the same call resumes from it.
 
     Args:
         shot: The shot, or its USD file.
@@ -149,7 +149,7 @@ def inspect(
     progress: ProgressCallback | None = None,
     on_operator: OperatorCallback | None = None,
 ) -> Inspection:
-    """What is in a shot, its natural frequencies, and how its model is simplified and why.
+    """The content of a shot, its natural frequencies, and the simplifications of its model with their reasons.
 
     Args:
         shot: The shot, or its USD file.
@@ -181,7 +181,7 @@ def rig(
     progress: ProgressCallback | None = None,
     on_operator: OperatorCallback | None = None,
 ) -> Rig:
-    """Make a robot of a skinned character: bodies, joints, motors and targets.
+    """Make a robot from a skinned character: bodies, joints, motors and targets.
 
     Args:
         shot: USD file of a UsdSkel character.
@@ -214,7 +214,7 @@ def _source(
     tolerance: float | str | None, step: float | str | None, integrator: str | None, pre_roll: float | str | None,
     shaper: str | None = None, verify: bool = False,
 ) -> Source:  # fmt: skip
-    """What the user asked for, in SI units."""
+    """The settings of the user, in SI units."""
     return Source(
         path="",
         command="",

@@ -1,4 +1,4 @@
-"""What is in a shot: the object of `inspect --json`, from the values of a run."""
+"""The content of a shot: the object of `inspect --json`, from the values of a run."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def wanted_of(strict: bool, modes: bool) -> tuple[tuple[type, ...], tuple[type, 
 
     Args:
         strict: Whether the shot is only checked, without costly work.
-        modes: Whether mode shapes are asked for.
+        modes: Whether mode shapes are requested.
     """
     wanted: tuple[type, ...] = (Findings,) if strict else _CONTENTS
     optional = _CONTENTS if strict else (ModelChoices, ReducedBodies, SystemModes, PlannedStep)

@@ -72,7 +72,7 @@ def limit_row(character: Character, limit: LimitUse) -> dict[str, Any]:
 
 
 def operator_row(result: OperatorResult) -> dict[str, Any]:
-    """What became of an operator."""
+    """The outcome of an operator."""
     return {
         "operator": result.idname,
         "plugin": result.plugin,

@@ -246,7 +246,7 @@ class SimulationResult:
         """
         operator = self.shot.host.operators.get("curves.export")
         if operator is None:
-            raise ShotError("no plugin is there that exports curves", remedy="Enable the plugin with curves.export")
+            raise ShotError("no plugin exports curves", remedy="Enable the plugin with curves.export")
         options: dict[str, object] = {"file": os.fspath(path), "rate": rate, "angles": "deg" if degrees else "rad"}
         again(self._outcome, operator.provides[0], settings={"curves.export": options})
         return os.fspath(path)
@@ -294,14 +294,14 @@ class OptimizationResult(SimulationResult):
     """An optimised shot: `motion`, `targets` and `motors` are those with the optimised curves.
 
     Attributes:
-        before: The animation as it was, simulated.
+        before: The animation before the optimisation, simulated.
     """
 
     _command = "optimize"
 
     @cached_property
     def before(self) -> RobotMotion:
-        """The animation as it was, simulated."""
+        """The animation before the optimisation, simulated."""
         return self._motion_of(self.result.before)
 
     @property

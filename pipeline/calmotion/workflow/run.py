@@ -42,7 +42,7 @@ class Progress:
 
 @dataclass(frozen=True)
 class Hooks:
-    """What a caller wants to hear of a run, and how it stops one.
+    """Callbacks of a run, and how the caller stops it.
 
     Attributes:
         progress: Called often with a `Progress`.
@@ -61,11 +61,11 @@ class _Stop(KeyboardInterrupt):
 
 @dataclass(frozen=True, eq=False)
 class Outcome:
-    """What became of a run.
+    """The outcome of a run.
 
     Attributes:
         shot: The shot.
-        run: The host's run: every value by its type, and what became of each operator.
+        run: The host's run: every value by its type, and the outcome of each operator.
         problems: What went wrong.
         interrupted: Whether the user interrupted it, or the caller cancelled it.
         cancelled: Whether the caller did.
@@ -115,7 +115,7 @@ def carry_out(
         wanted: Types that must come out.
         optional: Types that are made where an operator can.
         operators: Idnames of operators to run as well.
-        source: What the user asked for of the simulation; path, command and motion are filled in.
+        source: Settings of the simulation; path, command and motion are filled in.
         outputs: Files to write.
         known: Values that exist already; the shot's when None.
         settings: Settings of operators, stronger than the shot's.
@@ -221,7 +221,7 @@ def _files_asked_for(host: Host, outputs: OutputPaths) -> list[type]:
         if not host.providers(kind):
             failed = "; ".join(f"{plugin.id}: {plugin.error}" for plugin in host.failures())
             raise SettingError(
-                "no plugin is there that writes this",
+                "no plugin writes this output",
                 path=option,
                 found=path,
                 remedy=f"Plugins that failed: {failed}" if failed else f"Install one that provides {kind.__name__}.",
@@ -241,7 +241,7 @@ def _prepare_folders(shot: str, outputs: OutputPaths) -> None:
         if path is None:
             continue
         if os.path.realpath(path) == os.path.realpath(shot):
-            raise SettingError("this is the shot, which is never written to", path=option, found=path)
+            raise SettingError("this file is the shot, which is never overwritten", path=option, found=path)
         try:
             (Path(path) if name == "figures" else Path(path).parent).mkdir(parents=True, exist_ok=True)
         except OSError as error:

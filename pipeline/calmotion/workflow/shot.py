@@ -22,7 +22,7 @@ Given = Mapping[str, object] | Path | None
 class Shot:
     """A shot of a character in USD.
 
-    Read when something of it is first asked for; `open_shot` reads at once.
+    The file is read when a value of it is first used; `open_shot` reads at once.
 
     Args:
         path: USD file.

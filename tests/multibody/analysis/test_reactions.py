@@ -82,7 +82,7 @@ def test_a_free_slider_carries_nothing_along_its_axis():
     model = compile_model(character, tree, [rigid_body(body, body_anchors(character, tree)[0])])
     none = np.zeros((len(T), 1))
     start, ws = rigid_state(model, np.zeros(1)), Workspace.for_system(model.system)
-    trajectory = simulate(model.system, start, none, none, H, ws, settled=False)
+    trajectory = simulate(model.system, start, none, none, H, ws, from_equilibrium=False)
     found = reactions(model.system, trajectory, none, none)
     axis = slope.apply([0.0, 0.0, 1.0])
     assert np.abs(found.efforts).max() < 1e-9 and np.abs(found.forces @ axis).max() < 1e-9

@@ -25,7 +25,7 @@ def swing(integrator, h, seconds=10.0):
     none = np.zeros((round(seconds / h) + 1, 1))
     ws = Workspace.for_system(model.system)
     start = rigid_state(model, np.zeros(1))
-    trajectory = integrate(model.system, start, none, none, h, ws, settled=False, integrator=integrator)
+    trajectory = integrate(model.system, start, none, none, h, ws, from_equilibrium=False, integrator=integrator)
     states = trajectory.states
     return target_frames(model, states.c, states.q, states.u)[0][-1, 0], trajectory
 
@@ -46,5 +46,7 @@ def test_it_blows_up_where_the_step_does_not_resolve_a_body(flexible_tree):
     first = type(start)(*[part[0].copy() for part in start])
     angles = np.zeros((201, 4))
     with pytest.raises(SimulationFailure, match="diverged") as failure:
-        integrate(stiff, first, angles, angles, 1e-3, Workspace.for_system(stiff), integrator="rk4", settled=False)
+        integrate(
+            stiff, first, angles, angles, 1e-3, Workspace.for_system(stiff), integrator="rk4", from_equilibrium=False
+        )
     assert failure.value.state is not None and failure.value.time_s < 0.2

@@ -56,7 +56,7 @@ def test_from_a_start_in_motion_it_is_of_second_order():
         model, state = released()
         still = np.zeros((steps + 1, 1))
         run = simulate(
-            model.system, state, still, still, 0.4 / steps, Workspace.for_system(model.system), settled=False
+            model.system, state, still, still, 0.4 / steps, Workspace.for_system(model.system), from_equilibrium=False
         )
         tip = target_frames(model, run.states.c, run.states.q, run.states.u)[0][-1, 0]
         errors.append(np.linalg.norm(tip - [np.cos(angle), 0.0, -np.sin(angle)]))

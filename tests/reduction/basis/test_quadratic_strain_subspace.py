@@ -88,7 +88,7 @@ def test_what_is_left_out_is_told(plastic):
     body = link(plastic, 1e-4, loads(30.0))
     p, r = body.elasticity.strain_projection.shape
     row = body.left_out[-1]
-    assert row.what == f"quadratic strain in {r - p} of {r} elastic coordinates of /C/Link"
+    assert row.what == f"/C/Link: quadratic strain in {p} of {r} elastic coordinates"
     assert 0.0 < row.estimated_error_m <= 2.5e-5
 
 

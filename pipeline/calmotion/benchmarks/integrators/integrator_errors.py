@@ -189,7 +189,7 @@ def damping(counts: Sequence[int] = (10, 20, 40, 80, 160)) -> list[tuple[int, fl
         _deflect(model, start, 1e-6)
         none = np.zeros((periods * count + 1, len(model.motor)))
         ws = Workspace.for_system(model.system)
-        u = simulate(model.system, start, none, none, h, ws, settled=False).states.u[:, 0, 0]
+        u = simulate(model.system, start, none, none, h, ws, from_equilibrium=False).states.u[:, 0, 0]
         # amplitudes of the first and the last period
         first, last = np.abs(u[: count + 1]).max(), np.abs(u[-count - 1 :]).max()
         measured = float(np.log(first / last) / (2.0 * np.pi * (periods - 1)))

@@ -88,11 +88,11 @@ def step_time(model: Model, steps: int, repeats: int = 3) -> float:
     angles, rates = motion(model, steps)
     ws = Workspace.for_system(model.system)
     start, _ = equilibrium(model.system, rigid_state(model, angles[0]), angles[0], ws)
-    simulate(model.system, start, angles[:3], rates[:3], STEP, ws, settled=False)
+    simulate(model.system, start, angles[:3], rates[:3], STEP, ws, from_equilibrium=False)
     times = []
     for _ in range(repeats):
         begin = time.perf_counter()
-        simulate(model.system, start, angles, rates, STEP, ws, settled=False)
+        simulate(model.system, start, angles, rates, STEP, ws, from_equilibrium=False)
         times.append(time.perf_counter() - begin)
     return float(np.median(times)) / steps
 

@@ -76,7 +76,7 @@ def study(folder: Path) -> Iterator[Row]:
         frames = len(animation.frame_times)
         yield Row(
             name, outcome, len(character.bodies), len(character.joints), len(character.motors), frames,
-            time.perf_counter() - start, f"motors by {', '.join(sources)}" if frames > 1 else "nothing animates it",
+            time.perf_counter() - start, f"motors by {', '.join(sources)}" if frames > 1 else "no animation",
         )  # fmt: skip
 
 

@@ -26,7 +26,7 @@ def add_to(commands: Commands) -> None:
         help="measure error against run time",
         description="Measure error against run time. `calmotion bench NAME --help` lists the arguments of a benchmark.",
     )
-    command.add_argument("name", metavar="NAME", choices=tuple(BENCHMARKS), help=" or ".join(BENCHMARKS))
+    command.add_argument("name", metavar="NAME", choices=tuple(BENCHMARKS), help=", ".join(BENCHMARKS))
     command.add_argument("arguments", nargs=argparse.REMAINDER, help="arguments of the benchmark")
     command.set_defaults(command=_run, json=False)
 

@@ -1,4 +1,4 @@
-"""`calmotion inspect`: what is in the shot, and how its model is simplified."""
+"""`calmotion inspect`: the content of a shot, and how its model is simplified."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 def add_to(commands: Commands) -> None:
     """Add the command."""
-    command = shot_command(commands, "inspect", _run, "show what is in the shot, and which simplifications it allows")
+    command = shot_command(commands, "inspect", _run, "show the content of the shot and the model simplifications")
     file_argument(
         command, "--modes", metavar="DIR",
         help="folder for the mode shapes of the flexible bodies (.vtu, .png) and their table",

@@ -1,4 +1,4 @@
-"""`calmotion optimize`: motor curves that do not shake."""
+"""`calmotion optimize`: motor curves with which the robot does not shake."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 def add_to(commands: Commands) -> None:
     """Add the command."""
-    command = shot_command(commands, "optimize", _run, "find motor curves that do not shake, and write them")
+    command = shot_command(commands, "optimize", _run, "change the motor curves so that the robot does not shake")
     file_argument(command, "-o", "--output", metavar="LAYER", required=True, help="USD layer to write")
     run_options(command)
     simulation_options(command, "optimize supports only bdf2")

@@ -101,7 +101,7 @@ def check_plugins(args: argparse.Namespace, output: Output) -> int:
         for problem in problems:
             print(f"{args.folder}: {problem}", file=output.stream)
         if not problems:
-            print(f"{args.folder}: keeps to the rules", file=output.stream)
+            print(f"{args.folder}: OK", file=output.stream)
     return 1 if problems else 0
 
 
@@ -109,7 +109,7 @@ def choose_plugin(args: argparse.Namespace, output: Output) -> int:
     """Enable or disable a plugin for all later runs.
 
     Raises:
-        SettingError: There is no plugin of this id, or the choice cannot be kept.
+        SettingError: There is no plugin of this id, or the choice cannot be saved.
     """
     from calmotion.host.choices import choose, disabled_plugins
 
@@ -127,15 +127,15 @@ def choose_plugin(args: argparse.Namespace, output: Output) -> int:
     if output.json:
         output.object({"id": args.id, "state": state, "file": str(file)})
     else:
-        print(f"{args.id} is {state} (kept in {file})", file=output.stream)
+        print(f"{args.id} is {state} (saved in {file})", file=output.stream)
     return 0
 
 
 def new_plugin(args: argparse.Namespace, output: Output) -> int:
-    """Begin a plugin.
+    """Create a plugin.
 
     Raises:
-        PluginError: The name is none for a plugin, or the folder is there already.
+        PluginError: The name is not valid, or the folder exists already.
     """
     from calmotion.host.template import write_template
 
@@ -143,7 +143,7 @@ def new_plugin(args: argparse.Namespace, output: Output) -> int:
     if output.json:
         output.object({"id": args.name, "folder": str(folder)})
         return 0
-    print(f"made {folder}; next:", file=output.stream)
+    print(f"created {folder}; next steps:", file=output.stream)
     for line in (f"pip install -e {folder}", f"pytest {folder}", f"calmotion plugins check {folder / args.name}"):
         print(f"    {line}", file=output.stream)
     return 0

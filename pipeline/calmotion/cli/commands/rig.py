@@ -1,4 +1,4 @@
-"""`calmotion rig`: a robot out of a skinned character."""
+"""`calmotion rig`: a robot from a skinned character."""
 
 from __future__ import annotations
 
@@ -14,10 +14,15 @@ if TYPE_CHECKING:
 def add_to(commands: Commands) -> None:
     """Add the command."""
     command = shot_command(
-        commands, "rig", _run, "make a robot of a skinned character: bodies, joints, motors, targets"
+        commands, "rig", _run, "make a robot from a skinned character: bodies, joints, motors, targets"
     )
     file_argument(
-        command, "-o", "--output", metavar="LAYER", required=True, help="USD layer to write; it opens the shot"
+        command,
+        "-o",
+        "--output",
+        metavar="LAYER",
+        required=True,
+        help="USD layer to write, over the shot",
     )
 
 
@@ -42,7 +47,7 @@ def _print(report: dict[str, Any], stream: TextIO) -> None:
         [j["joint"].split("/")[-1], j["body"], str(len(j["motors"])), angle(j["angle_error_rad"])]
         for j in report["joints"]
     ]
-    print_table(console, "Joints that turn", ["joint", "body", "hinges", "residual angle"], rows, texts=2)
+    print_table(console, "Rotating joints", ["joint", "body", "hinges", "residual angle"], rows, texts=2)
     console.print(
         f"{report['robot']}: {report['bodies']} bodies, {report['motors']} motors, {report['mass_kg']:.4g} kg; "
         f"largest residual angle {angle(report['max_angle_error_rad'])}",
@@ -52,7 +57,7 @@ def _print(report: dict[str, Any], stream: TextIO) -> None:
     for target in report["targets"]:
         console.print(f"target: {target}", markup=False, soft_wrap=True)
     console.print(
-        f"{report['layer']} opens as a shot; to make links flexible, apply CalmFlexibleBodyAPI or run again with "
+        f"{report['layer']} is a shot; for flexible links apply CalmFlexibleBodyAPI or run again with "
         "--set rig.skeleton.flexible=all",
         markup=False,
         soft_wrap=True,

@@ -18,13 +18,13 @@ def add_to(commands: Commands) -> None:
     command.add_argument(
         "--shaper",
         metavar="KIND",
-        help="filter the tracks with an input shaper (zv, zvd, zv2, zvd2) or lowpass, to compare with",
+        help="for comparison, filter the tracks: zv, zvd, zv2, zvd2 (input shapers) or lowpass",
     )
     run_options(command)
     simulation_options(
         command,
-        "bdf2, newmark, generalized-alpha, rk4 or radau (default: generalized-alpha with a tolerance, which needs half "
-        "the steps, else bdf2)",
+        "bdf2, newmark, generalized-alpha, rk4 or radau (default: generalized-alpha if a tolerance is given, since it "
+        "needs half as many steps; otherwise bdf2)",
     )
 
 

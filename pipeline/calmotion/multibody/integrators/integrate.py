@@ -34,7 +34,7 @@ def follows_roots(integrator: str) -> bool:
 
 def integrate(
     system: System, start: State, angles: Array, rates: Array, h: float, workspace: Workspace,
-    progress: Callable[[float], None] | None = None, settled: bool = True, integrator: str = "bdf2",
+    progress: Callable[[float], None] | None = None, from_equilibrium: bool = True, integrator: str = "bdf2",
     world: Array | None = None,
 ) -> Trajectory:  # fmt: skip
     """`simulation.simulate` by any integrator of `INTEGRATORS`; same arguments, results and errors.
@@ -43,11 +43,11 @@ def integrate(
     knots on instants.
     """
     if integrator in IMPLICIT:
-        return simulate(system, start, angles, rates, h, workspace, progress, settled, integrator, world)
+        return simulate(system, start, angles, rates, h, workspace, progress, from_equilibrium, integrator, world)
     if np.any(system.moving >= 0):
         raise ValueError(f"{integrator} does not support moving roots")
     begin, ws, total = time.perf_counter(), workspace, len(angles)
-    first, solved = equilibrium(system, start, angles[0], ws) if settled else (start, 0)
+    first, solved = equilibrium(system, start, angles[0], ws) if from_equilibrium else (start, 0)
     times: Array = h * np.arange(total, dtype=np.float64)
     drive = hermite_drive(times, angles, rates)
     if integrator == "radau":

@@ -86,7 +86,7 @@ def _recall(system: System, h: float, record: Record, n: int, scratch: Scratch) 
 
 def simulate(
     system: System, start: State, angles: Array, rates: Array, h: float, workspace: Workspace,
-    progress: Callable[[float], None] | None = None, settled: bool = True, integrator: str = "bdf2",
+    progress: Callable[[float], None] | None = None, from_equilibrium: bool = True, integrator: str = "bdf2",
     world: Array | None = None,
 ) -> Trajectory:  # fmt: skip
     """Simulate the system from static equilibrium, or from a state that is given.
@@ -100,7 +100,7 @@ def simulate(
         h: Time step [s].
         workspace: Scratch of this system.
         progress: Called with a fraction in 0..1 at intervals, or None.
-        settled: False starts from `start`, with its velocities, in place of the equilibrium.
+        from_equilibrium: False starts from `start`, with its velocities, in place of the equilibrium.
         integrator: A name of `coefficients.IMPLICIT`.
         world: Moving markers of the world, shape [T, W, 18]; needed where the system has any.
 
@@ -116,13 +116,13 @@ def simulate(
     if world.shape[1:] != ws.work.world.shape:
         raise ValueError(f"world must hold the motion of {len(ws.work.world)} markers")
     ws.work.world[:] = world[0]
-    first, solved = equilibrium(system, start, angles[0], ws) if settled else (start, 0)
+    first, solved = equilibrium(system, start, angles[0], ws) if from_equilibrium else (start, 0)
     states = State(*[np.zeros((total,) + part.shape) for part in first])
     for part, value in zip(states, first, strict=True):
         part[0] = value
     earlier = State(*[part[0] for part in states])  # before the start the system rests
     ws.scratch.memory[:] = 0.0
-    if not settled:
+    if not from_equilibrium:
         motors = np.gradient(rates[:3], h, axis=0)[0] if total > 2 else np.zeros_like(rates[0])
         acceleration, states.lam[0] = initial_acceleration(system, first, angles[0], rates[0], motors, ws)
         earlier, states.turn[0] = instant_before(system, first, acceleration, h)

@@ -36,8 +36,8 @@ def refuse_moving(reading: Reading, held: dict[Usd.Prim, str], others: list[Usd.
                 path=mover.GetPath(),
                 attribute="xformOpOrder",
                 found=f"it moves at time code {code:g}",
-                remedy="For a root that moves set physics:kinematicEnabled on its body and remove that joint; else "
-                "leave the root and what is above it still",
+                remedy="For a moving root, set physics:kinematicEnabled on its body and remove that joint; otherwise "
+                "remove the animation of the root and of the prims above it",
             )
     animated = [p for p in others if codes_of(p)]
     if animated:

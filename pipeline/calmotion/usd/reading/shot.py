@@ -183,6 +183,6 @@ def _note_dense_samples(tracks: tuple[Track, ...], clock: Clock, reading: Readin
     frame = 1.0 / clock.frames_per_second
     if any(len(track.times) > 1 and np.median(np.diff(track.times)) < 0.75 * frame for track in tracks):
         reading.note(
-            f"the animation is sampled more densely than its {clock.frames_per_second:g} frames a second, at which "
-            "curves are written unless more samples are asked for"
+            f"the animation has more samples than its {clock.frames_per_second:g} frames a second; curves are written "
+            "at the frames, unless --samples-per-second requests more"
         )

@@ -46,7 +46,7 @@ class RigOptions:
 
 
 def rig_shot(path: str, output: str, options: RigOptions | None = None) -> Rig:
-    """Make a robot of a skinned character.
+    """Make a robot from a skinned character.
 
     The bodies stand as the skeleton does at the first frame. Each joint that turns gets the fewest hinges that follow
     it, each with a motor that names the joint of the skeleton, so that the animation stays where it is and results are
@@ -116,7 +116,7 @@ def _animated_skeleton(stage: Usd.Stage, path: str) -> tuple[BoundSkeleton, Cloc
         )
     if len(animated) > 1:
         raise ShotError(
-            "several skeletons are animated, and a robot is made of one",
+            "several skeletons are animated, but a robot is made from one",
             path=animated[1].prim.GetPath(),
             found=", ".join(str(skeleton.prim.GetPath()) for skeleton in animated),
             remedy="Deactivate the others in a layer over the shot",

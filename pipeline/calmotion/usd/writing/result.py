@@ -66,10 +66,10 @@ def write_result(
     options = options or WriteOptions()
     if options.splines and options.samples_per_second is not None:
         raise ShotError(
-            "curves are written as splines or as samples, not as both",
+            "curves can be written as splines or as samples, not as both",
             attribute="--splines",
             found="--samples-per-second as well",
-            remedy="Leave one of them out",
+            remedy="Remove one of the two options",
         )
     refuse_inputs(provenance, output)
     role = stages.MOTION if result.after is None else stages.CURVES
@@ -152,7 +152,7 @@ def _write_curves(
             path=motor.path,
             attribute=motor.attribute,
             found="--splines" if options.splines else "--samples-per-second",
-            remedy="Leave the option out, or animate the motor by its drive",
+            remedy="Remove the option, or animate the motor by its drive",
         )
     ensure_drives(layer, shot.stage, [character.motors[curve.motor] for curve in curves["drive"]])
     times = sample_times(animation.frame_times, options.samples_per_second)
@@ -195,7 +195,7 @@ def _bake(layer: Sdf.Layer, shot: _Shot, result: Result, options: WriteOptions) 
             path=posed.path,
             attribute=posed.attribute,
             found="--bake=simulated",
-            remedy="Leave it out, and then run `calmotion simulate --bake=simulated` on the root layer",
+            remedy="Remove the option, and then run `calmotion simulate --bake=simulated` on the root layer",
         )
     if options.bake == "motors":
         motion = _performed(shot, result)

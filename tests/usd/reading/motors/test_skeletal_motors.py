@@ -69,6 +69,6 @@ def test_motors_of_one_joint_must_carry_each_other(tmp_path):
         other.GetRelationship("physics:body0").SetTargets(["/Arm/base"])
         other.GetRelationship("physics:body1").SetTargets(["/Arm/fore"])
 
-    with pytest.raises(ShotError, match="must carry each other") as caught:
+    with pytest.raises(ShotError, match="must form a chain") as caught:
         read(tmp_path, edit)
     assert "/Arm/joints/other" in caught.value.found

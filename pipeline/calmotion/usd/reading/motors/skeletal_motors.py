@@ -105,7 +105,7 @@ def performed_on(stacks: Sequence[HingeStack], stage: Usd.Stage) -> list[HingeSt
 
 
 def _outwards(stack: list[Drive]) -> tuple[Drive, ...]:
-    """Motors in the order in which they carry each other."""
+    """Motors in the order of their chain."""
     carried = {drive.joint.body0: drive for drive in stack}
     first = [d for d in stack if d.joint.body0 not in {other.joint.body1 for other in stack}]
     order = [first[0]] if first else []
@@ -113,11 +113,11 @@ def _outwards(stack: list[Drive]) -> tuple[Drive, ...]:
         order.append(carried[order[-1].joint.body1])
     if len(order) != len(stack):
         raise ShotError(
-            "the motors of one joint of a skeleton must carry each other",
+            "the motors of one joint of a skeleton must form a chain",
             path=stack[0].joint.path,
             attribute=SKEL_JOINT,
             found=", ".join(drive.joint.path for drive in stack),
-            remedy="Put them one after the other, each on the body that the one before turns",
+            remedy="Put each motor on the body that the previous one rotates",
         )
     return tuple(order)
 
@@ -133,11 +133,11 @@ def _stack(reading: Reading, skeleton: BoundSkeleton, joint: int, drives: tuple[
 
 
 def _stands_at_rest(drives: tuple[Drive, ...]) -> bool:
-    """Whether the bodies stand where the skeleton is at rest."""
+    """Whether the authored poses of the bodies correspond to the rest pose of the skeleton."""
     poses = {str(schemas.value(drive.joint.prim, "CalmMotorAPI", SKEL_POSE)) for drive in drives}
     if len(poses) > 1 or not poses <= {"rest", "start"}:
         raise ShotError(
-            "the bodies of one joint stand in one pose of the skeleton, rest or start",
+            "the motors of one joint of a skeleton must have the same pose, rest or start",
             path=drives[0].joint.path,
             attribute=SKEL_POSE,
             found=", ".join(sorted(poses)),
