@@ -62,7 +62,7 @@ def test_an_operator_that_fails_is_named_and_the_rest_is_done(calmotion, make_pl
         ("x = (", "SyntaxError"),
     ],
 )
-def test_a_plugin_that_cannot_be_loaded_is_told_with_its_traceback(calmotion, make_plugin, shot, source, word):
+def test_a_plugin_that_cannot_be_loaded_is_reported_with_its_traceback(calmotion, make_plugin, shot, source, word):
     folder = make_plugin("broken", source)
     done = calmotion("inspect", shot, "--plugins", folder, "--strict", "--json")
     assert done.returncode in (0, 1)

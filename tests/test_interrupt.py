@@ -35,7 +35,7 @@ def kept(layer):
     return layer.with_name(f".{layer.name}.checkpoint.npz")
 
 
-def test_an_interrupt_writes_the_best_so_far_and_the_same_command_goes_on(repository, tmp_path):
+def test_an_interrupt_writes_the_best_so_far_and_the_same_command_resumes(repository, tmp_path):
     layer = tmp_path / "calm.usda"
     process = started(repository, layer)
     while not kept(layer).exists() and process.poll() is None:

@@ -51,7 +51,7 @@ def test_a_broken_rule_is_named(make_plugin, source, problem):
     assert problem in found
 
 
-def test_a_folder_without_a_manifest_is_no_plugin(tmp_path):
+def test_a_folder_without_a_manifest_is_not_a_plugin(tmp_path):
     assert check_plugin(tmp_path) == ["the folder holds no plugin.toml"]
 
 

@@ -45,7 +45,7 @@ def test_a_tighter_tolerance_keeps_more(arm, animation, meshes):
     assert counts[0] < counts[1]
 
 
-def test_a_shake_that_will_be_taken_away_need_not_be_known_as_well(arm, animation, meshes):
+def test_a_shake_that_will_be_removed_needs_less_accuracy(arm, animation, meshes):
     def count(tolerance, **kwargs):
         options = Options(tolerance=tolerance, step=STEP)
         return sum(

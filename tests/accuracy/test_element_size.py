@@ -56,7 +56,7 @@ def test_cost_limits_the_size():
 
 
 @pytest.mark.parametrize(("size", "counts"), [((0.4, 0.02, 0.02), (40, 2, 2)), ((0.1, 0.1, 0.005), (20, 20, 1))])
-def test_nodes_are_foreseen_from_volume_and_area(helpers, size, counts):
+def test_the_number_of_nodes_is_estimated_from_volume_and_area(helpers, size, counts):
     """The mesher's tetrahedra are nearly regular; these bricks cut in six, which are not, need up to twice as many."""
     points, tets = helpers.box(counts, size)
     found = expected_nodes(shape_of(points, boundary_triangles(tets)), size[0] / counts[0])

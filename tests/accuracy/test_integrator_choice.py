@@ -42,7 +42,7 @@ def test_a_shot_that_no_integrator_can_simulate_is_tried_once():
 
 
 @pytest.mark.parametrize("asked", ["bdf2", "newmark", FAST])
-def test_one_that_was_asked_for_is_the_only_one(asked):
+def test_a_requested_integrator_is_the_only_one(asked):
     run = Simulation(asked)
     with pytest.raises(ShotError, match="apart"):
         by_fast_scheme(Options(integrator=asked), run)

@@ -58,7 +58,7 @@ def test_a_tighter_error_keeps_more_and_one_that_cannot_be_kept_all(nonlinear, k
     assert kept[2].hold_for(known.animation, STEP)
 
 
-def test_what_is_left_out_is_told(nonlinear, known):
+def test_simplifications_are_reported(nonlinear, known):
     character, bodies = nonlinear
     found = held(character, bodies, known)
     rows = [body.left_out[-1] for body in found.bodies[:2]]
@@ -68,7 +68,7 @@ def test_what_is_left_out_is_told(nonlinear, known):
     assert sum(row.estimated_error_m for row in rows) == pytest.approx(found.error_m)
 
 
-def test_bodies_learn_from_curves_that_bend_them_otherwise(nonlinear, animation):
+def test_a_pod_subspace_is_extended_by_curves_that_deflect_bodies_differently(nonlinear, animation):
     character, bodies = nonlinear
     still = Track(animation.frame_times, np.zeros(len(animation.frame_times)))
     swing, lift = ((animation.tracks[0], still), (still, animation.tracks[1]))

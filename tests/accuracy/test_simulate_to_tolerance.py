@@ -121,7 +121,7 @@ def test_an_optimisation_keeps_its_tolerance(arm, animation, bodies, tolerance):
     assert result.accuracy.left_out_m == sum(row.estimated_error_m or 0.0 for b in bodies for row in b.left_out)
 
 
-def test_a_search_that_goes_on_counts_all_its_work(arm, animation, bodies, monkeypatch):
+def test_a_resumed_search_counts_all_its_work(arm, animation, bodies, monkeypatch):
     parts = []
     plain = retarget.optimize_shot
 
@@ -139,7 +139,7 @@ def test_a_search_that_goes_on_counts_all_its_work(arm, animation, bodies, monke
     assert parts[1].steps[0].objective < 1.5 * parts[0].objective_after, "it goes on from what was found"
 
 
-def test_an_optimisation_without_a_tolerance_tells_the_error_of_its_step(arm, animation, bodies):
+def test_an_optimisation_without_a_tolerance_reports_the_error_of_its_step(arm, animation, bodies):
     options = Options(step=1 / 240)
     result = optimize_to_tolerance(arm, animation, bodies, options, quiet)
     assert result.step_s == pytest.approx(1 / 240)
@@ -159,7 +159,7 @@ def test_verifying_measures_the_distance_to_a_finer_run(arm, animation, meshes, 
     assert verify(arm, animation, meshes, bodies, wrong, options, quiet)[0] == pytest.approx(0.02, abs=1.1 * error)
 
 
-def test_a_search_goes_on_where_links_bend_otherwise_than_they_are_held(arm, animation, meshes, monkeypatch):
+def test_a_search_continues_where_the_pod_subspace_does_not_fit(arm, animation, meshes, monkeypatch):
     character = with_elasticity(arm, "stvk")
     loads = load_envelopes(character, animation, meshes, Options())
     bodies = reduce_bodies(character, span_tree(character), meshes, None, loads, 1e-3)

@@ -39,7 +39,7 @@ def pipeline():
     return module
 
 
-def test_the_manifest_says_what_blender_asks_for():
+def test_the_manifest_has_the_fields_that_blender_requires():
     manifest = tomllib.loads((EXTENSION / "blender_manifest.toml").read_text())
     assert manifest["schema_version"] == "1.0.0" and manifest["type"] == "add-on"
     assert re.fullmatch(r"\d+\.\d+\.\d+", manifest["version"])
@@ -121,7 +121,7 @@ sys.exit(1)
     assert run.outcome == "failed" and run.errors == ["/a.b: is wrong. Mend it"]
 
 
-def test_a_program_that_dies_without_words_is_told(pipeline, tmp_path):
+def test_a_program_that_ends_without_a_message_is_reported(pipeline, tmp_path):
     run = pipeline.PipelineRun(job(pipeline, script(tmp_path, "sys.exit(3)"), tmp_path)).start()
     run.wait(30.0)
     assert run.outcome == "failed" and "status 3" in run.errors[0]
@@ -141,7 +141,7 @@ def test_cancelling_stops_the_program(pipeline, tmp_path):
     assert run.outcome == "cancelled" and not run.running
 
 
-def test_the_real_program_tells_its_progress(pipeline, repository, tmp_path, monkeypatch):
+def test_the_real_program_reports_its_progress(pipeline, repository, tmp_path, monkeypatch):
     sys.path.insert(0, str(HERE.parent / "helpers" / "usd"))
     import small_shots
 

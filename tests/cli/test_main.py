@@ -168,7 +168,7 @@ def refuse(context):
     raise ShotError("has no mass", path="/Robot/Arm", attribute="physics:mass", found=0.0, remedy="Author a density.")
 
 
-def test_a_shot_error_is_told_with_place_found_and_remedy(run):
+def test_a_shot_error_is_printed_with_place_found_and_remedy(run):
     status, out, err = run("inspect", "shot.usda", read=refuse)
     assert (status, out) == (1, "")
     for part in ("has no mass", "/Robot/Arm.physics:mass", "0.0", "Author a density."):
@@ -257,7 +257,7 @@ def test_inspect_reports_bodies_motors_and_frequencies(run):
     assert report["joints"][0]["body0"] == "" and report["left_out"] == []
 
 
-def test_inspect_says_what_is_left_out(run):
+def test_inspect_reports_simplifications(run):
     status, out, _ = run("inspect", "shot.usda", reduce_poll=lambda data: "nothing is flexible")
     assert status == 0 and "simplified: fem reduce: skipped (nothing is flexible)" in out
     assert "-114.6° .. 114.6°" in out  # the joint's limits, 2 rad

@@ -9,7 +9,7 @@ from calmotion.cli.options import KINDS, assignments
 from calmotion.shot import model_choice
 
 
-def test_the_command_line_knows_every_kind():
+def test_the_command_line_has_every_kind():
     assert KINDS == model_choice.KINDS
 
 

@@ -7,13 +7,13 @@ def test_short_paths_stay_whole():
     assert name_paths(["/A/b", "/A/c"]) == {"/A/b": "/A/b", "/A/c": "/A/c"}
 
 
-def test_long_paths_are_named_by_as_few_last_names_as_tell_them_apart():
+def test_long_paths_are_shortened_to_their_last_distinct_names():
     deep = "/Robot/" + "link/" * 20
     names = name_paths([deep + "left/hand", deep + "right/hand", deep + "head"])
     assert sorted(names.values()) == ["head", "left/hand", "right/hand"]
 
 
-def test_the_accuracy_is_told_where_it_is_known():
+def test_the_accuracy_is_reported_where_it_is_known():
     names = ("tolerance_m", "estimated_error_m", "estimated_step_error_m", "estimated_mesh_error_m", "verified_error_m")
     none = dict.fromkeys(names)
     told = none | {"estimated_error_m": 3e-4, "estimated_step_error_m": 1e-4, "verified_error_m": 2e-4}
@@ -35,7 +35,7 @@ def test_the_accuracy_is_told_where_it_is_known():
         assert stream.getvalue() == expected
 
 
-def test_a_tolerance_that_is_not_kept_is_told():
+def test_a_tolerance_that_is_not_kept_is_reported():
     report = {"tolerance_m": 1e-4, "estimated_step_error_m": 1e-5, "estimated_mesh_error_m": None}
     report |= {"verified_step_s": 5e-4, "verified_modes": 44}
     for estimated, verified, told in (

@@ -43,7 +43,7 @@ def test_two_holes_that_touch_at_a_corner_are_closed_apart(box):
     assert surface_volume(closure.points, closure.triangles) == pytest.approx(1.0, rel=1e-12)
 
 
-def test_the_winding_number_tells_inside_outside_and_twice_inside(box):
+def test_the_winding_number_distinguishes_inside_outside_and_twice_inside(box):
     points, triangles = box
     assert winding_number(np.array([0.4, 0.5, 0.6]), points, triangles) == pytest.approx(1.0)
     assert winding_number(np.array([1.4, 0.5, 0.6]), points, triangles) == pytest.approx(0.0, abs=1e-12)

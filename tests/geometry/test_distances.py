@@ -46,7 +46,7 @@ def test_a_ray_finds_the_first_triangle_beyond_what_is_skipped():
     assert ray_length(np.array([0.7, 0.7, 0.0]), up, stack, 0.0) == np.inf
 
 
-def test_rays_meet_what_linear_equations_say():
+def test_rays_intersect_as_linear_equations_say():
     rng = np.random.default_rng(4)
     triangles, origins, directions = rng.normal(size=(60, 3, 3)), rng.normal(size=(100, 3)), rng.normal(size=(100, 3))
     directions /= np.linalg.norm(directions, axis=1)[:, None]

@@ -25,7 +25,7 @@ def test_every_edge_of_a_closed_surface_is_passed_once_in_each_direction(cube):
 
 
 @pytest.mark.parametrize("share", [3, 4, 10])
-def test_turned_triangles_are_found_and_the_majority_stays(cube, share):
+def test_flipped_triangles_are_found_and_the_majority_keeps_its_orientation(cube, share):
     points, triangles = cube
     mixed = triangles.copy()
     mixed[::share] = mixed[::share][:, ::-1]
@@ -50,7 +50,7 @@ def test_a_moebius_strip_has_one_side():
     assert len(patches_of(band, ones(band)).one_sided) == 0
 
 
-def test_patches_end_at_edges_of_more_than_two_triangles_and_turn_as_wholes(cube):
+def test_patches_end_at_edges_of_more_than_two_triangles_and_are_reoriented_as_a_whole(cube):
     points, triangles = cube
     # two cubes that share the wall between them; the second is inside out
     beside = triangles[:, ::-1] + len(points)
@@ -81,7 +81,7 @@ def test_patches_end_at_edges_of_more_than_two_triangles_and_turn_as_wholes(cube
     assert abs(surface_volume(places, turned)) == pytest.approx(2.0, rel=1e-12)
 
 
-def test_patches_that_fit_stay_as_they_are():
+def test_patches_that_fit_are_unchanged():
     boundaries = np.array([[1.0, -1.0], [-1.0, 1.0]])
     assert closing_signs(boundaries).tolist() == [1.0, 1.0]
     assert abs(closing_signs(np.abs(boundaries)).sum()) == 0.0

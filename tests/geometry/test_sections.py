@@ -61,7 +61,7 @@ def test_a_station_through_corners_is_the_section_just_beyond():
     assert np.allclose(found.area, [0.04**2, 0.02**2, 0.0], rtol=1e-12)
 
 
-def test_a_station_beyond_the_body_meets_nothing():
+def test_a_station_beyond_the_body_has_no_section():
     found = cut(box((0.4, 0.06, 0.02)), [-0.1, 0.2, 0.5])
     assert found.area[[0, 2]].tolist() == [0.0, 0.0] and found.fill[[0, 2]].tolist() == [0.0, 0.0]
     assert np.isfinite(found.centroid).all() and np.array_equal(found.second[[0, 2]], np.zeros((2, 2)))

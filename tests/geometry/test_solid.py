@@ -45,7 +45,7 @@ def test_a_surface_cut_into_several_is_one_solid():
     alike(found.mass, mass_of_solid(points, triangles, 1200.0))
 
 
-def test_a_copy_of_a_surface_is_passed_over():
+def test_a_copy_of_a_surface_is_skipped():
     assert solid_of(body_of(box((0.3, 0.04, 0.02)), box((0.3, 0.04, 0.02)))) is not None
 
 

@@ -17,7 +17,7 @@ def test_a_regular_tetrahedron_has_its_known_volume_and_angle():
     assert turned == 1 - int((t.tet_volumes(REGULAR, np.array([[0, 1, 2, 3]])) > 0)[0])
 
 
-def test_inverted_tetrahedra_are_turned_and_counted(helpers):
+def test_inverted_tetrahedra_are_reoriented_and_counted(helpers):
     points, tets = helpers.box((2, 2, 2), (1, 2, 3))
     mixed = tets.copy()
     mixed[::3] = mixed[::3][:, [1, 0, 2, 3]]
@@ -64,7 +64,7 @@ def test_points_without_an_element_are_dropped(helpers):
         (np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0]]), [[0, 1, 2, 3]], "element 0"),
     ],
 )
-def test_elements_that_are_none_are_refused_with_their_place(points, tets, found):
+def test_elements_that_do_not_exist_are_refused_with_their_place(points, tets, found):
     with pytest.raises(ShotError) as caught:
         t.oriented_tets(points, tets, "/Arm/Tets")
     assert caught.value.path == "/Arm/Tets" and found in str(caught.value.found)

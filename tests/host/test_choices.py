@@ -12,7 +12,7 @@ def environment(tmp_path):
     return {"CALMOTION_CONFIG": str(tmp_path / "config")}
 
 
-def test_a_choice_is_kept_and_taken_back(environment):
+def test_a_disabled_plugin_is_remembered_and_enabled_again(environment):
     assert disabled_plugins(environment) == frozenset()
     file = choose("figures", False, environment)
     choose("rerun_logger", False, environment)
@@ -31,7 +31,7 @@ def test_a_disabled_plugin_is_not_imported_and_its_operators_are_not_there(envir
     assert host.plugin("smithy").state is PluginState.FAILED
 
 
-def test_what_is_missing_for_a_disabled_plugin_is_said(environment):
+def test_missing_requirements_of_a_disabled_plugin_are_reported(environment):
     from calmotion.host import PlanError
     from calmotion.shot import Character
     from calmotion.shot.run import Source

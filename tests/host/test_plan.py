@@ -52,7 +52,7 @@ def test_a_circle_is_named():
     assert all(name in circle.value.found for name in ("smithy.melt", "smithy.alloy", "smithy.scrap"))
 
 
-def test_a_circle_that_is_not_needed_does_no_harm():
+def test_a_circle_of_operators_that_is_not_needed_is_ignored():
     one = operator("a.one", requires=[Steel], provides=[Coal])
     two = operator("a.two", requires=[Coal], provides=[Steel])
     assert names(make_plan([DIG, one, two], [], [Ore])) == ["mine.dig"]

@@ -29,7 +29,7 @@ def load(*folders):
     return host
 
 
-def test_a_plugin_registers_and_takes_back(make_plugin):
+def test_a_plugin_registers_and_unregisters(make_plugin):
     host = load(make_plugin("anvil", GOOD))
     plugin = host.plugin("anvil")
     assert plugin.state is PluginState.REGISTERED and list(host.operators) == ["smithy.first"]

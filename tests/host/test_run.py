@@ -125,7 +125,7 @@ def test_two_operators_that_both_want_to_make_a_value_are_refused_and_named():
     assert "smithy.melt" in str(run.failures()[0].error) and "smithy.again" in str(run.failures()[0].error)
 
 
-def test_rivals_are_refused_before_any_costly_operator_runs():
+def test_conflicting_operators_are_refused_before_any_costly_one_runs():
     executed = []
 
     def dig(context):
@@ -142,7 +142,7 @@ def test_rivals_are_refused_before_any_costly_operator_runs():
     assert "more than one operator makes Iron" in run.results[0].reason
 
 
-def test_what_rivals_do_not_need_is_done_all_the_same():
+def test_operators_without_a_conflict_still_run():
     again = operator("smithy.again", requires=[Ore], provides=[Iron])
     alloy = operator("smithy.alloy", requires=[Iron], provides=[Steel])
     burn = operator("wood.burn", requires=[Ore], provides=[Coal])
@@ -151,7 +151,7 @@ def test_what_rivals_do_not_need_is_done_all_the_same():
     assert outcomes(run)["smithy.melt"] is outcomes(run)["smithy.again"] is Outcome.FAILED
 
 
-def test_an_answer_that_may_change_is_no_rivalry_yet():
+def test_an_answer_that_may_change_is_not_a_conflict_yet():
     """The poll asks for coal, which is made later and makes it decline."""
     late = operator("smithy.late", requires=[Ore], uses=[Coal], provides=[Iron],
                     poll=lambda data: "there is coal" if data.get(Coal) else None)  # fmt: skip

@@ -29,7 +29,7 @@ def test_its_test_passes_with_the_fixtures_that_come_with_calmotion(calmotion, r
     assert "2 passed" in ran.stdout
 
 
-def test_it_runs_by_its_name_and_tells_what_it_found(calmotion, repository, tmp_path):
+def test_it_runs_by_its_name_and_reports_its_results(calmotion, repository, tmp_path):
     calmotion("plugins", "new", "speed_watch", "--folder", tmp_path)
     shot = repository / "samples" / "bartender" / "bartender.usda"
     done = calmotion(

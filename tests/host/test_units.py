@@ -22,7 +22,7 @@ from calmotion.host import SettingError, parse_quantity
         ("12", "", 12.0),
     ],
 )
-def test_a_quantity_is_read_in_the_unit_that_is_asked_for(text, unit, value):
+def test_a_quantity_is_converted_to_the_requested_unit(text, unit, value):
     assert parse_quantity(text, unit) == pytest.approx(value, rel=1e-15)
 
 

@@ -23,7 +23,7 @@ def membrane(n, copies=1):
 
 @pytest.mark.parametrize("copies", [1, 5])
 @pytest.mark.parametrize("count", [1, 7, 40])
-def test_all_of_the_lowest_are_found_however_often_they_are_there(copies, count):
+def test_all_of_the_lowest_modes_are_found_also_multiple_ones(copies, count):
     K, exact = membrane(20, copies)
     M = 3.0 * identity(K.shape[0], format="csr")
     values, vectors = lowest_by_lanczos(K, M, count, 0.0, SparseSolver(K), None, K.shape[0])

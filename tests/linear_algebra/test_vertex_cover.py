@@ -48,5 +48,5 @@ def test_a_large_cut_has_a_cover_as_small_as_the_largest_matching():
     assert len(cover) == len(matching) // 2
 
 
-def test_nothing_across_needs_nothing():
+def test_a_graph_without_edges_across_needs_no_separator():
     assert len(vertex_cover(csr_matrix((4, 4)), np.array([True, True, False, False]))) == 0

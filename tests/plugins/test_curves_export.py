@@ -57,7 +57,7 @@ def test_rows_come_at_the_rate_of_the_controller(export, shot):
     assert rows[0, 1] == pytest.approx(animation.tracks[0].values[0])
 
 
-def test_the_header_tells_rate_units_and_limits(export):
+def test_the_header_has_rate_units_and_limits(export):
     comments, _, _ = read(export(rate=250.0).path)
     assert comments[0] == "# shot: arm.usda" and comments[1] == "# rate_hz: 250" and "angle rad" in comments[2]
     assert "/Arm/Shoulder: velocity 2 rad/s, effort 8 N m" in comments[3]

@@ -102,7 +102,7 @@ def test_motor_curves_show_limits_and_the_change(figures):
     assert lines_of(angle)["before"].get_ydata().max() == pytest.approx(90.0)
 
 
-def test_many_targets_are_cut_to_the_worst_and_the_figure_says_so(figures):
+def test_of_many_targets_the_figure_shows_the_worst_and_says_so(figures):
     character, result = synthetic.character(), synthetic.result(optimized=False)
     target = character.targets[0]
     targets = tuple(dataclasses.replace(target, path=f"/Robot/T{k}", rotation_weight=0.0) for k in range(12))
@@ -145,7 +145,7 @@ def test_triangles_that_share_an_edge_leave_no_gap_and_those_outside_are_clipped
     assert hits.triangle.shape == (16, 20) and set(np.unique(hits.triangle)) == {0, 1}
 
 
-def test_the_camera_holds_the_whole_motion_and_up_is_up(figures):
+def test_the_camera_shows_the_whole_motion_and_up_is_up(figures):
     character, result = synthetic.character(), synthetic.result()
     motion = result.before.motion
     view = choose_viewpoint(character, result.skins, motion)
@@ -173,7 +173,7 @@ def test_the_bent_link_is_drawn_where_the_simulation_puts_it(figures):
     np.testing.assert_allclose(np.linalg.norm(normals, axis=-1), 1.0)
 
 
-def test_it_is_left_out_when_no_figures_are_asked_for():
+def test_it_is_skipped_when_no_figures_are_requested():
     values = [synthetic.character(), synthetic.animation(), synthetic.result(), OutputPaths()]
     with pytest.raises(PluginError, match="--figures"):
         run_operator(host_with(PLUGIN), "figures.plot", values)

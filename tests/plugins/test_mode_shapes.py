@@ -74,7 +74,7 @@ def test_the_vtk_file_has_quadratic_elements_of_the_right_order_and_a_field_for_
         assert np.linalg.norm(field, axis=1).max() == pytest.approx(0.1 * size, rel=1e-6)
 
 
-def test_without_modes_asked_for_it_does_not_run(repository_folder):
+def test_without_requested_modes_it_does_not_run(repository_folder):
     host = host_with(repository_folder / "plugins" / "mode_shapes")
     poll = host.operators["modes.write"].poll
     assert "--modes" in poll({OutputPaths: OutputPaths()})

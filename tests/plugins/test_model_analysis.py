@@ -27,7 +27,7 @@ def _outcomes(run):
     return {result.idname: (str(result.outcome), result.reason) for result in run.results}
 
 
-def test_what_hardly_bends_is_neither_meshed_nor_reduced(host):
+def test_bodies_with_a_small_deflection_are_neither_meshed_nor_reduced(host):
     shot = steel_arm()
     run = host.run([shot.character, shot.animation, _source()], [Result]).finish()
     for idname in ("fe.mesh", "fem.reduce"):
@@ -49,7 +49,7 @@ def test_kept_it_is_simulated_as_flexible(host):
     assert [mesh.body for mesh in full.get(FEMeshes).meshes] == [0, 1]
 
 
-def test_what_is_left_out_counts_in_the_accuracy(host):
+def test_simplifications_count_in_the_accuracy(host):
     shot = steel_arm()
     given = [shot.character, shot.animation, Source(path="shot.usda", command="simulate", tolerance=1e-3)]
     result = host.run(given, [Result]).finish().get(Result)
@@ -67,7 +67,7 @@ def test_mode_shapes_need_finite_elements(host):
     assert needs.character.bodies[0].bends and needs.forced == {"bodies": ON}
 
 
-def test_forces_of_a_joint_that_is_left_out_are_zero_and_the_others_carry_them(host):
+def test_forces_of_a_redundant_joint_are_zero_and_the_other_joints_carry_them(host):
     shot = clevis_arm(1)
     result = host.run([shot.character, shot.animation, _source()], [Result]).finish().get(Result)
     forces = result.before.motion.joint_forces
@@ -86,6 +86,6 @@ def test_an_inspection_plans_the_step_where_one_matters(host):
     assert isinstance(poll({Source: _source("simulate")}), NotAsked)
 
 
-def test_kinds_that_are_none_are_wrong_usage(calmotion):
+def test_unknown_kinds_are_wrong_usage(calmotion):
     wrong = calmotion("simulate", "shot.usda", "--keep", "everything")
     assert wrong.returncode == 2 and "turning" in wrong.stderr

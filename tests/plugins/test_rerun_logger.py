@@ -171,7 +171,7 @@ def test_trails_run_through_the_places_of_the_target(columns):
     np.testing.assert_allclose(np.linalg.norm(strip, axis=1), synthetic.LENGTH, rtol=1e-4)
 
 
-def test_the_summary_names_what_was_left_out_and_the_errors(columns):
+def test_the_summary_lists_simplifications_and_errors(columns):
     text = columns["/summary", "TextDocument:text"][1][0][0]
     result = synthetic.result()
     assert "modes above 40 Hz" in text and "0.02 mm" in text
@@ -187,7 +187,7 @@ def test_the_summary_names_the_characters_frequencies_where_they_are_known(tmp_p
     assert "in its first pose: 3.2, 12.5 Hz" in text
 
 
-def test_the_recording_carries_its_own_layout(tmp_path):
+def test_the_recording_contains_its_layout(tmp_path):
     from rerun.chunk import RrdReader
 
     write(tmp_path / "out.rrd", synthetic.result())
@@ -210,7 +210,7 @@ def test_long_curves_are_thinned_and_the_frames_kept(tmp_path):
     assert len(columns["/input/Robot/Tip", "Transform3D:translation"][0]) == synthetic.FRAMES
 
 
-def test_it_is_left_out_when_no_recording_is_asked_for():
+def test_it_is_skipped_when_no_recording_is_requested():
     values = [synthetic.character(), synthetic.animation(), synthetic.result(), OutputPaths()]
     with pytest.raises(PluginError, match="--rrd"):
         run_operator(host_with(PLUGIN), "rerun.log", values)
@@ -248,7 +248,7 @@ def test_writing_a_recording_leaves_no_trace_in_the_home_folder(tmp_path):
     assert (tmp_path / "out.rrd").is_file() and not list(home.rglob("*rerun*"))
 
 
-def test_the_summary_tells_what_ran_and_what_did_not(tmp_path):
+def test_the_summary_lists_operators_that_ran_and_that_were_skipped(tmp_path):
     from calmotion.host import OperatorResult, Outcome
 
     steps = (

@@ -23,7 +23,7 @@ def test_real_shots_are_read_with_their_motors(repository, shared_data):
         assert animation.frame_times[-1] > 7.9
 
 
-def test_a_real_shot_with_closed_loops_is_read_whole(repository, shared_data):
+def test_a_real_shot_with_closed_chains_is_read_completely(repository, shared_data):
     character, _, _ = read(repository, shared_data / "shots" / "dr_legs_walk.usda")
     assert len(character.motors) == 12
     assert sum(joint.kind == "revolute" for joint in character.joints) == 36

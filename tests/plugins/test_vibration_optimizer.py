@@ -77,7 +77,7 @@ def test_properties_reach_the_optimiser(with_mesher):
     assert len(run.get(ReducedBodies).bodies) == len(character.bodies)
 
 
-def test_a_result_is_verified_where_that_is_asked_for(host, with_mesher):
+def test_a_result_is_verified_on_request(host, with_mesher):
     both = with_mesher
     character, animation = small_shot(flexible=True)
     asked = Source(path="shot.usda", command="simulate", tolerance=1e-5, verify=True)
@@ -102,7 +102,7 @@ def test_locked_motors_only_are_refused(host):
     assert error.value.attribute == "calm:motor:optimize"
 
 
-def test_shaped_tracks_are_simulated_where_they_are_asked_for(host):
+def test_shaped_tracks_are_simulated_on_request(host):
     character, animation = small_shot()
     (plain,) = run_operator(host, "retarget.simulate", [character, animation, source("simulate")])
     assert isinstance(host.operators["retarget.shape"].poll({Source: source("simulate")}), NotAsked)

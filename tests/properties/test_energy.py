@@ -54,7 +54,7 @@ def forward(shot):
 
 
 @given(shots(kinds=("fixed", "hinge", "ball", "slider")))
-def test_what_nothing_drives_never_gains_energy(shot):
+def test_a_robot_without_drives_never_gains_energy(shot):
     prepared = prepared_for(shot, 0.0)
     system, rest = prepared.model.system, prepared.model.rest_angles
     angles = np.tile(rest, (RELEASED + 1, 1))

@@ -160,7 +160,7 @@ def test_a_file_never_makes_objects_of_other_types(folder, monkeypatch):
         cached_reduction("typed", a_body)
 
 
-def test_a_folder_that_cannot_be_written_is_passed_over(tmp_path, monkeypatch):
+def test_a_folder_that_cannot_be_written_is_skipped(tmp_path, monkeypatch):
     blocked = tmp_path / "file"
     blocked.write_text("")
     monkeypatch.setenv("CALMOTION_CACHE", str(blocked))

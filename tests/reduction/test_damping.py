@@ -67,7 +67,7 @@ def test_a_nonlinear_body_has_the_ratio_up_to_its_last_paired_mode_and_more_abov
     assert np.linalg.matrix_rank(found.damping, tol=1e-9) == EXACT_MODES - 1, "above them no coordinate is resisted"
 
 
-def test_modes_of_others_and_motions_of_frequency_zero_do_not_matter():
+def test_modes_of_other_bodies_and_rigid_motions_have_no_effect():
     omega, shapes = loaded_modes()
     expected = damped(body("stvk"), MATERIAL, omega, shapes)
     more = np.concatenate([[0.0, 5.0, 6.0, 7.0], omega])

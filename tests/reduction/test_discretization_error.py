@@ -22,7 +22,7 @@ def held(model):
     ],
     ids=["slender beam", "stubby beam", "plate"],
 )
-def test_the_estimate_holds_the_true_error_and_is_not_far_above_it(helpers, plastic, size, coarse, fine):
+def test_the_estimate_covers_the_true_error_and_is_not_far_above_it(helpers, plastic, size, coarse, fine):
     model, finer = (assemble(*helpers.box(counts, size), plastic) for counts in (coarse, fine))
     found, estimate = frequency_errors(model, plastic, 1, held(model))
     true = found / frequencies(finer, 1, held(finer)) - 1.0
@@ -30,7 +30,7 @@ def test_the_estimate_holds_the_true_error_and_is_not_far_above_it(helpers, plas
     assert true[0] < estimate[0] < 5.0 * true[0]
 
 
-def test_the_estimate_falls_as_the_mesh_gets_finer_faster_without_a_clamp(helpers, plastic):
+def test_the_estimate_decreases_with_the_mesh_size_and_faster_without_a_clamp(helpers, plastic):
     free, clamped = [], []
     for n in (1, 2):
         model = assemble(*helpers.box((10 * n, 2 * n, 2 * n), (0.2, 0.04, 0.04)), plastic)

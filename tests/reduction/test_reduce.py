@@ -96,7 +96,7 @@ def test_the_same_body_reduces_to_the_same_numbers(mesh, body, attachments):
 @pytest.mark.parametrize(
     ("field", "value"), [("youngs_modulus", 0.0), ("poissons_ratio", 0.5), ("density", -1.0), ("density", np.nan)]
 )
-def test_a_material_that_is_none_is_refused(mesh, body, attachments, field, value):
+def test_a_prim_that_is_not_a_material_is_refused(mesh, body, attachments, field, value):
     bad = replace(body, flexible=replace(body.flexible, material=replace(body.flexible.material, **{field: value})))
     with pytest.raises(ShotError) as caught:
         reduce_body(mesh, bad, attachments, [], 1)

@@ -93,7 +93,7 @@ def test_forces_are_those_of_the_whole_body_along_the_subspace(law, plastic, rng
         np.testing.assert_allclose(own, whole, rtol=1e-9, atol=1e-9 * np.abs(whole).max())
 
 
-def test_a_subspace_holds_its_motion_but_for_what_may_be_missing(particles, rng):
+def test_a_subspace_contains_its_motion_up_to_the_allowed_error(particles, rng):
     body = of_particles(*particles)
     motion = rng.normal(size=(50, 5)) * np.array([1.0, 0.3, 1e-2, 1e-4, 1e-6])
     counts = []
@@ -117,7 +117,7 @@ def test_a_body_at_rest_is_rigid(particles):
 
 
 @pytest.mark.parametrize("count", [2, 3, 4])
-def test_a_quadratic_strain_that_sees_part_of_a_body_sees_no_more_of_it_within_a_subspace(particles, rng, count):
+def test_a_strain_subspace_of_a_body_stays_the_same_in_a_pod_subspace(particles, rng, count):
     fields = rng.normal(size=(5 + 6, 15))
     law = Elasticity("stvk", 0.1, (fields @ fields.T).ravel(), strain_projection=rng.normal(size=(3, 5)))
     body = replace(of_particles(*particles), elasticity=law)

@@ -51,14 +51,14 @@ def block(shared_data):
     return folder, model, ours
 
 
-def test_our_stiffness_is_that_of_abaqus(block):
+def test_the_stiffness_matrix_is_that_of_abaqus(block):
     folder, model, ours = block
     dofs = (3 * ours[:, None] + np.arange(3)).ravel()
     theirs = read_matrix(folder / "blockC3D10_STIF1.mtx", len(dofs))
     assert abs(model.stiffness[dofs][:, dofs] - theirs).max() < 1e-6 * abs(theirs).max()
 
 
-def test_our_mass_is_that_of_abaqus(block):
+def test_the_mass_matrix_is_that_of_abaqus(block):
     folder, model, ours = block
     dofs = (3 * ours[:, None] + np.arange(3)).ravel()
     theirs = read_matrix(folder / "blockC3D10_MASS1.mtx", len(dofs))

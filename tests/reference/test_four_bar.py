@@ -48,13 +48,13 @@ def turning():
     return model, angle, tips, run
 
 
-def test_one_joint_closes_the_loop_and_the_motor_stays_in_the_tree(turning):
+def test_one_joint_closes_the_chain_and_the_motor_stays_in_the_tree(turning):
     model = turning[0]
     assert len(model.system.rows) == 4 and len(model.system.parent) == 3
     assert model.motor[:3].max() == 0 and model.motor[3] == -1
 
 
-def test_its_positions_are_unique_through_full_turns(turning):
+def test_its_positions_are_unique_through_full_revolutions(turning):
     _, angle, tips, run = turning
     assert np.abs(tips[:, [0, 2]] - closure(angle)).max() < 1e-6
     assert np.abs(tips[:, 1]).max() < 1e-9

@@ -61,7 +61,7 @@ class Arm:
         return x[:, 0][:, [0, 2]], np.abs(np.arctan2(across[:, 0], across[:, 2])).max()
 
 
-def test_a_gentle_swing_is_that_of_the_linear_body():
+def test_a_slow_swing_equals_that_of_the_linear_body():
     arm = Arm(1.8e9)
     angle, rate = quintic(np.pi / 4, 1.0)
     truth, slope = arm.truth(angle, 1.2)
@@ -69,7 +69,7 @@ def test_a_gentle_swing_is_that_of_the_linear_body():
     assert arm.difference("linear", truth, angle, rate, 1.2) < 0.01
 
 
-def test_at_thirty_degrees_the_nonlinear_basis_holds_and_the_linear_one_fails():
+def test_at_thirty_degrees_the_nonlinear_basis_is_accurate_and_the_linear_one_fails():
     arm = Arm(3.9e8)
     angle, rate = quintic(np.pi / 2, 0.5)
     truth, slope = arm.truth(angle, 0.7)
@@ -80,7 +80,7 @@ def test_at_thirty_degrees_the_nonlinear_basis_holds_and_the_linear_one_fails():
 
 
 @pytest.mark.parametrize("law", ["stvk", "neohookean"])
-def test_a_tip_load_bends_it_as_far(law):
+def test_a_tip_load_deflects_it_equally(law):
     arm = Arm(1.8e9, law)
     loads = np.zeros_like(arm.full.nodes)
     loads[arm.end, 2] = 90.0 / len(arm.end)
@@ -118,7 +118,7 @@ def test_the_forces_of_the_unreduced_body_are_derivatives_of_its_energy(law):
 
 
 @pytest.mark.parametrize("law", ["stvk", "neohookean"])
-def test_a_rigid_turn_costs_nothing_and_a_patch_is_stretched_evenly(law):
+def test_a_rigid_rotation_has_no_energy_and_a_patch_is_stretched_evenly(law):
     full = Arm(1.8e9, law).full
     turned = Rotation.from_rotvec([0.4, -1.0, 0.7]).apply(full.nodes) + [0.1, 0.2, 0.3]
     stiffness = 1.8e9 * THICKNESS

@@ -34,7 +34,7 @@ def link():
 
 
 @pytest.mark.parametrize("force", [(0.0, 90.0, 120.0), (300.0, 0.0, 200.0), (-200.0, 60.0, 80.0)])
-def test_a_link_bends_as_its_mesh_does(link, force):
+def test_a_reduced_link_deflects_like_its_mesh(link, force):
     """Across, under tension and under compression: by 22 to 34 mm of 300 mm."""
     reduced, data, full = link
     moved, turn = pull(full, *ends(full.nodes), TIP, force)

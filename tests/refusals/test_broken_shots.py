@@ -43,7 +43,7 @@ def test_a_broken_shot_is_refused_by_its_place_with_a_remedy(capfd, tmp_path, na
 
 
 @pytest.mark.parametrize("name", [name for name, case in CASES.items() if not case.place])
-def test_what_can_be_repaired_is_processed_and_the_repair_told(capfd, tmp_path, name):
+def test_repairable_shots_are_processed_and_the_repair_is_reported(capfd, tmp_path, name):
     case = CASES[name]
     shot = case.make(tmp_path)
     before = state(tmp_path)
@@ -99,7 +99,7 @@ def test_a_disk_that_is_full_leaves_no_half_of_a_file(repository, tmp_path):
     assert write_in_a_process(tmp_path, repository, unlimited).returncode == 0
 
 
-def test_a_folder_that_cannot_be_written_to_is_told(calmotion, tmp_path):
+def test_a_folder_that_cannot_be_written_to_is_reported(calmotion, tmp_path):
     import small_shots
 
     shot = small_shots.write_arm(tmp_path / "shot.usda")

@@ -62,7 +62,7 @@ def test_a_killed_search_ends_at_the_same_result(
 
 
 @pytest.mark.parametrize("evaluations", [5, 7, 9])
-def test_a_search_that_was_killed_on_finer_knots_goes_on_with_them(
+def test_a_search_that_was_killed_on_finer_knots_resumes_with_them(
     arm, bodies, tmp_path, monkeypatch, evaluations
 ):  # fmt: skip
     monkeypatch.setattr(adaptive_knots, "FIRST", 0.1)
@@ -92,7 +92,7 @@ def test_an_interrupt_keeps_the_best_so_far(limited, animation, bodies, whole, t
     assert late.objective_after == pytest.approx(whole.objective_after, rel=1e-9) and not late.interrupted
 
 
-def test_what_another_problem_left_is_not_used(limited, animation, bodies, tmp_path, monkeypatch):
+def test_a_checkpoint_of_another_problem_is_not_used(limited, animation, bodies, tmp_path, monkeypatch):
     path = tmp_path / "kept.npz"
     optimize_shot(limited, animation, bodies, OPTIONS, ignore_progress, path)
     started = []
@@ -112,7 +112,7 @@ def test_what_another_problem_left_is_not_used(limited, animation, bodies, tmp_p
     assert started[0] == 0
 
 
-def test_the_key_tells_regularisation_and_code_apart(arm, animation, bodies, monkeypatch):
+def test_the_key_depends_on_regularisation_and_code(arm, animation, bodies, monkeypatch):
     def key(smoothness):
         problem = make_problem(arm, bodies, animation, smoothness=smoothness)
         return problem_key(problem, np.zeros(problem.size, bool), OPTIONS)

@@ -35,7 +35,7 @@ def result(looping, dance, bodies):
     return optimize_shot(looping, dance, bodies, OPTIONS, ignore_progress)
 
 
-def test_a_loop_is_calm_and_closes(result):
+def test_a_cyclic_shot_has_no_shake_and_no_seam(result):
     before, after = (s.position_errors[:, 1].max() for s in (result.before, result.after))
     assert before > 0.01 and after < 0.15 * before
     assert result.objective_after < 0.1 * result.objective_before and result.stopped == "converged"
@@ -54,7 +54,7 @@ def test_written_curves_simulated_again_give_the_reported_errors(result, looping
     assert np.abs(again.before.position_errors - result.after.position_errors).max() < 1e-8
 
 
-def test_it_is_what_a_well_damped_robot_comes_to_in_many_loops(looping, dance, meshes):
+def test_it_equals_the_motion_of_a_well_damped_robot_after_many_cycles(looping, dance, meshes):
     """Simulated from rest, eight loops long, as one shot that plays once."""
     plastic = dataclasses.replace(looping.bodies[0].flexible.material, damping_ratio=0.9)
     flexible = dataclasses.replace(looping.bodies[0].flexible, material=plastic)
@@ -75,7 +75,7 @@ def test_it_is_what_a_well_damped_robot_comes_to_in_many_loops(looping, dance, m
     assert np.abs(long.before.motion.target_positions[240:601] - found.before.motion.target_positions).max() > 1e-4
 
 
-def test_what_a_loop_cannot_do_is_refused(looping, dance, bodies):
+def test_options_that_do_not_fit_a_cyclic_shot_are_refused(looping, dance, bodies):
     with pytest.raises(ShotError, match="only bdf2 simulates") as error:
         simulate_shot(looping, dance, bodies, dataclasses.replace(OPTIONS, integrator="newmark"), ignore_progress)
     assert error.value.attribute == "--integrator"
@@ -91,7 +91,7 @@ def test_a_range_locked_at_the_seam_is_locked_on_both_sides_of_it(looping, dance
     assert np.abs((values - meant)[[0, 1, 2, -1]]).max() < 1e-12 and np.abs(values - meant).max() > 1e-4
 
 
-def test_a_loop_that_does_not_close_is_refused(looping, dance, bodies):
+def test_a_cyclic_shot_that_does_not_close_is_refused(looping, dance, bodies):
     values = dance.tracks[1].values + np.linspace(0.0, 0.05, len(FRAMES))
     tracks = (dance.tracks[0], Track(FRAMES, values))
     with pytest.raises(ShotError, match="not its first again") as error:
@@ -99,7 +99,7 @@ def test_a_loop_that_does_not_close_is_refused(looping, dance, bodies):
     assert error.value.path == "/Arm/Elbow" and "2.86 degrees" in str(error.value) and error.value.remedy
 
 
-def test_whole_turns_of_a_loop_are_no_jump(looping, dance, bodies):
+def test_whole_revolutions_of_a_cyclic_shot_are_not_a_jump(looping, dance, bodies):
     """A shoulder that goes round and round; a shot that plays it once starts in motion."""
     w = 2.0 * np.pi / FRAMES[-1]
     tracks = (Track(FRAMES, w * FRAMES), dance.tracks[1])
@@ -111,7 +111,7 @@ def test_whole_turns_of_a_loop_are_no_jump(looping, dance, bodies):
     assert 1e-3 < found.before.position_errors[:, 1].max() < 0.2
 
 
-def test_a_loop_that_is_not_found_says_what_to_do(looping, dance, bodies, monkeypatch):
+def test_a_periodic_motion_that_is_not_found_has_a_remedy(looping, dance, bodies, monkeypatch):
     from calmotion.multibody.sensitivity import periodic
 
     monkeypatch.setattr(periodic, "LIMIT", 1)

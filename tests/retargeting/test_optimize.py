@@ -57,7 +57,7 @@ def test_the_largest_offset_is_that_of_the_shot_without_the_pre_roll(arm, animat
     assert motion.times[0] < 0.0
 
 
-def test_optimising_the_result_again_finds_nothing_left(result, arm, animation, bodies):
+def test_optimising_the_result_again_gains_nothing(result, arm, animation, bodies):
     tracks = tuple(Track(animation.frame_times, curve.frame_values) for curve in result.curves)
     again = optimize_shot(arm, Animation(animation.frame_times, animation.tracks, tracks), bodies, OPTIONS, checked)
     assert again.iterations <= 2
@@ -103,7 +103,7 @@ def test_a_range_in_which_a_motor_is_locked_keeps_its_curve(arm, animation, bodi
         optimize_shot(arm, dataclasses.replace(animation, free=locks), bodies, OPTIONS, checked)
 
 
-def test_where_nothing_is_gained_the_curves_stay_exactly_as_they_were(arm, animation, bodies):
+def test_without_gain_the_curves_stay_exactly_the_same(arm, animation, bodies):
     """Nothing is judged in the second half."""
     weights = tuple(
         WeightTrack(target, rotation, np.array([0.7, 0.75]), np.array([value, 0.0]))

@@ -41,12 +41,12 @@ def test_a_joint_without_triangles_has_no_piece():
     assert set(cut_skin(points, triangles, weights)) == {1}
 
 
-def test_a_sheet_is_no_body():
+def test_a_sheet_is_not_a_body():
     points = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
     assert cut_skin(points, np.array([[0, 1, 2], [0, 2, 3]], np.int32), np.ones((4, 1))) == {}
 
 
-def test_an_inward_skin_is_turned_outward():
+def test_an_inward_skin_is_reoriented():
     points, triangles = tube()
     (x, t), *_ = cut_skin(points, triangles[:, ::-1].copy(), np.ones((len(points), 1))).values()
     a, b, c = (x[t[:, k]] for k in range(3))

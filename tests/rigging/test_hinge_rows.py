@@ -32,7 +32,7 @@ AXES = {
 
 
 @pytest.mark.parametrize("axes", AXES.values(), ids=AXES.keys())
-def test_hinges_in_a_row_are_found_again(axes):
+def test_angles_of_successive_hinges_are_recovered(axes):
     times = np.linspace(0.0, 2.0, 60)
     meant = np.stack([0.9 * np.sin((1.0 + k) * times + k) for k in range(len(axes))], axis=1)
     turn = Rotation.identity(len(times))
@@ -42,7 +42,7 @@ def test_hinges_in_a_row_are_found_again(axes):
     assert np.abs(found - meant).max() < 1e-9 and off.max() < 1e-9
 
 
-def test_a_hinge_takes_the_part_about_its_axis_and_tells_the_rest():
+def test_a_hinge_takes_the_rotation_about_its_axis_and_reports_the_residual():
     axis = np.array([[0.0, 0.0, 1.0]])
     swing = Rotation.from_rotvec([0.05, 0.0, 0.0])
     turn = Rotation.from_rotvec(np.linspace(0.0, 12.0, 50)[:, None] * axis) * swing
@@ -51,7 +51,7 @@ def test_a_hinge_takes_the_part_about_its_axis_and_tells_the_rest():
 
 
 @pytest.mark.parametrize("angle", [-3.1, -1.7, 1.7, 3.1])
-def test_a_hinge_begins_within_half_a_turn(angle):
+def test_a_hinge_starts_within_180_degrees(angle):
     axis = np.array([[0.0, 0.6, 0.8]])
     assert follow(axis, Rotation.from_rotvec(angle * axis).as_matrix())[0] == pytest.approx(angle)
 
@@ -61,7 +61,7 @@ def test_a_joint_that_rests_needs_no_hinge():
     assert row.axes.shape == (0, 3) and row.angles.shape == (5, 0)
 
 
-def test_a_joint_that_turns_about_one_axis_needs_one():
+def test_a_joint_that_rotates_about_one_axis_needs_one_hinge():
     axis = np.array([[0.48, 0.6, 0.64]])
     row = hinges_for(turns(axis, waves(1)), 1e-7)
     assert np.allclose(row.axes, axis) and np.allclose(row.angles, waves(1)) and row.residual.max() < 1e-7
@@ -86,7 +86,7 @@ def test_a_looser_tolerance_needs_fewer_hinges():
     assert len(hinges_for(D, np.radians(2.0)).axes) == 1 and len(hinges_for(D, 1e-6).axes) == 3
 
 
-def test_many_turns_stay_one_hinge():
+def test_many_revolutions_stay_one_hinge():
     angles = np.linspace(0.0, 30.0, 300)[:, None]
     row = hinges_for(turns(np.array([[0.0, 0.0, 1.0]]), angles), 1e-6)
     assert len(row.axes) == 1 and np.allclose(np.abs(row.angles), angles)

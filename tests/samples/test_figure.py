@@ -52,7 +52,7 @@ def test_thirteen_motors_and_four_flexible_links(name):
 
 
 @each_shot
-def test_what_a_hand_holds_has_a_mass_of_its_own_and_the_target(name):
+def test_a_body_in_a_hand_has_its_own_mass_and_the_target(name):
     stage = Usd.Stage.Open(str(shot_of(name)))
     prop, mass = {"drummer": ("Stick", 0.055), "boxer": ("Glove", 0.2)}[name]
     for side in ("Left", "Right"):

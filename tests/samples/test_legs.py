@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 
 
-def test_legs_with_closed_loops_walk(calmotion, shared_data, tmp_path):
+def test_legs_with_closed_chains_walk(calmotion, shared_data, tmp_path):
     shot = shared_data / "shots" / "dr_legs_walk.usda"
     done = calmotion("simulate", shot, "--json", "--quiet", "--step", "8.34ms")
     assert done.returncode == 0, done.stderr

@@ -6,7 +6,7 @@ import json
 from pxr import Usd
 
 
-def test_a_real_robot_with_soft_arms_is_calmed(calmotion, repository, shared_data, tmp_path):
+def test_the_shake_of_a_real_robot_with_soft_arms_is_removed(calmotion, repository, shared_data, tmp_path):
     folder = repository / "samples" / "real"
     spec = importlib.util.spec_from_file_location("compose", folder / "compose.py")
     module = importlib.util.module_from_spec(spec)

@@ -11,7 +11,7 @@ LONG = dict.fromkeys(("dancer", "drummer", "boxer"), pytest.mark.long)
 
 
 @pytest.mark.parametrize("name", [pytest.param(name, marks=LONG.get(name, ())) for name in KINDS])
-def test_the_recording_of_a_simulation_holds_what_the_table_holds(name, calmotion, tmp_path):
+def test_the_recording_of_a_simulation_contains_the_data_of_the_table(name, calmotion, tmp_path):
     files = tmp_path / "table.csv", tmp_path / "run.rrd"
     run = calmotion(
         "simulate", path_of(name), "--csv", files[0], "--rrd", files[1], "--set", "rerun.log.samples_per_plot=100000"

@@ -15,7 +15,7 @@ TIMES = H * (np.arange(STEPS + 2) - 1)
 RATE = 2.0 * np.pi / (STEPS * H)
 
 
-def test_a_loop_gets_up_to_speed_from_rest_and_goes_on_as_it_is():
+def test_a_first_cycle_from_rest_reaches_the_cyclic_motion():
     angles = np.stack([np.sin(RATE * TIMES), RATE * TIMES], axis=1)  # the second one turns round and round
     rates = np.stack([RATE * np.cos(RATE * TIMES), np.full_like(TIMES, RATE)], axis=1)
     turning = Rotation.from_rotvec(np.outer(0.5 * np.sin(RATE * TIMES), [0.0, 0.6, 0.8]))

@@ -106,7 +106,7 @@ def test_highest_frequency_of_known_signals():
     assert highest_frequency(np.zeros((1, 3)), 1e-3) == 0.0
 
 
-def test_a_robot_at_rest_feels_its_weight_and_nothing_else():
+def test_the_load_of_a_robot_at_rest_is_its_weight():
     character = turntable()
     times = np.arange(25) / 24.0
     tracks = [Track(times, np.full(25, 0.4))]

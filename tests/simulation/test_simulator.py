@@ -37,7 +37,7 @@ def test_derivatives_by_motors_are_transposes(arm, animation, bodies, cyclic):
     assert (floquet_multiplier > 0.0) == cyclic and floquet_multiplier < 1.0
 
 
-def test_another_robot_s_loops_begin_near_those_of_this_one(arm, animation, bodies):
+def test_the_cycles_of_a_changed_robot_start_near_those_of_this_one(arm, animation, bodies):
     from calmotion.multibody.model.model import with_damping
 
     character, animation = looped(arm, animation)
@@ -60,7 +60,7 @@ def with_a_held_beginning(make, until):
 
 
 @pytest.mark.parametrize("kind", ["arm", "pre-roll", "linkage"])
-def test_where_a_beginning_is_held_all_is_as_it_would_be_otherwise(arm, bodies, animation, kind):
+def test_a_kept_beginning_does_not_change_the_result(arm, bodies, animation, kind):
     if kind == "linkage":
         character, meshes = linkage_arm(modes=4)
         parts = character, reduce_bodies(character, span_tree(character), meshes), performance(0.8)
@@ -94,7 +94,7 @@ def test_where_a_beginning_is_held_all_is_as_it_would_be_otherwise(arm, bodies, 
     assert np.abs(one - two)[~fixed].max() < 1e-12 * np.abs(two).max()
 
 
-def test_a_motion_that_is_known_is_simulated_again_only_where_that_is_asked_for(arm, bodies, animation):
+def test_a_known_motion_is_simulated_again_only_on_request(arm, bodies, animation):
     prepared = prepare(arm, animation, bodies, Options(step=1 / 240))
     grid, curves = prepared.grid, sample_curves(animation.tracks, prepared.grid)
     simulator = Simulator(prepared.model, grid.h, prepared.world, False)

@@ -23,7 +23,7 @@ def test_a_file_is_replaced_as_a_whole_and_is_as_public_as_others(tmp_path):
     assert stat.S_IMODE(file.stat().st_mode) == 0o666 & ~mask
 
 
-def test_the_temporary_file_has_another_name_each_time_and_belongs_to_its_owner_alone(tmp_path):
+def test_temporary_files_have_random_names_and_are_private(tmp_path):
     seen = []
     for _ in range(3):
         with replaced(tmp_path / "layer.usda") as temporary:

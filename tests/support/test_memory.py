@@ -7,7 +7,7 @@ import sys
 from calmotion.support import memory
 
 
-def test_the_machine_tells():
+def test_memory_of_the_machine_is_read():
     assert 1e6 < memory.available_memory() < 1e15 or memory.available_memory() == math.inf
     assert memory.peak_memory() > 0.01
 

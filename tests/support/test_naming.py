@@ -1,7 +1,7 @@
 from calmotion.support.naming import distinct_names
 
 
-def test_as_few_last_parts_as_tell_paths_apart():
+def test_paths_are_shortened_to_their_last_distinct_parts():
     names = distinct_names(["/R/left/hand", "/R/right/hand", "/R/head"])
     assert names == {"/R/left/hand": "left/hand", "/R/right/hand": "right/hand", "/R/head": "head"}
 

@@ -21,7 +21,7 @@ def accept(path: str) -> None:
 
 
 @pytest.mark.parametrize("name", ["out.usda", "out.usdc", "out.usd", "new/folder/out.usda"])
-def test_what_is_written_opens_again_and_nothing_else_is_left(tmp_path, name):
+def test_the_written_layer_opens_again_and_no_other_file_is_left(tmp_path, name):
     output = tmp_path / name
     write_layer(small_layer("A"), str(output), accept)
     assert Sdf.Layer.FindOrOpen(str(output)).GetPrimAtPath("/A")

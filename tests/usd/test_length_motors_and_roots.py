@@ -100,7 +100,7 @@ def riding(stage):
         turn.Set(60.0 * share, frame)
 
 
-def test_an_arm_that_rides_is_carried_shaken_and_calmed(calmotion, tmp_path):
+def test_an_arm_on_a_moving_root_is_carried_shakes_and_is_optimised(calmotion, tmp_path):
     shot = write_arm(tmp_path / "ride.usda", riding)
     done = calmotion("optimize", shot, "-o", tmp_path / "calm.usda", "--json", "--csv", tmp_path / "calm.csv")
     assert done.returncode == 0, done.stdout + done.stderr

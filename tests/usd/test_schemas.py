@@ -105,7 +105,7 @@ assert target.GetAttribute("calm:target:rotationWeight").IsDefined()
 """
 
 
-def test_usd_alone_knows_the_schemas_by_the_search_path(repository):
+def test_usd_without_calmotion_finds_the_schemas_by_the_search_path(repository):
     """As usdview and other applications use them: without any code of ours."""
     environment = {k: v for k, v in os.environ.items() if k != "PYTHONPATH"} | {"PXR_PLUGINPATH_NAME": str(FOLDER)}
     shot = repository / "samples" / "bartender" / "bartender.usda"

@@ -76,7 +76,7 @@ def test_inputs_are_listed_with_their_hashes_the_shot_first(tmp_path):
     assert layers[0].sha256 == hashlib.sha256(shot.read_bytes()).hexdigest()
 
 
-def test_a_layer_of_ours_is_told_by_its_role_and_refused_as_a_shot(tmp_path):
+def test_a_layer_that_calmotion_wrote_is_recognised_by_its_role_and_refused_as_a_shot(tmp_path):
     layer = Sdf.Layer.CreateNew(str(tmp_path / "ours.usda"))
     layer.customLayerData = {"calmotion": {"role": "curves"}}
     layer.Save()
@@ -89,7 +89,7 @@ def test_a_layer_of_ours_is_told_by_its_role_and_refused_as_a_shot(tmp_path):
 
 
 @pytest.mark.parametrize("data", [{}, {"calmotion": "text"}, {"calmotion": {"other": 1}}])
-def test_other_layer_data_is_nobody_of_ours(data):
+def test_layer_data_of_other_programs_is_ignored(data):
     layer = Sdf.Layer.CreateAnonymous()
     layer.customLayerData = data
     assert stages.role_of(layer) == ""

@@ -41,7 +41,7 @@ def test_a_quaternion_that_changes_sign_between_steps_is_the_same_rotation():
     np.testing.assert_allclose(rotation_matrices(between.rotations), rotation_matrices(plain.rotations), atol=1e-12)
 
 
-def test_outside_its_span_a_motion_holds():
+def test_outside_its_span_a_motion_is_constant():
     motion = synthetic.motion(synthetic.SHAKE)
     held = sample_motion(motion, np.array([-9.0, 99.0]))
     np.testing.assert_allclose(held.motor_values, motion.motor_values[[0, -1]])

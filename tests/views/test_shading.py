@@ -35,7 +35,7 @@ def test_a_round_tube_stays_smooth_around_and_sharp_at_its_end():
     assert np.abs(side[:, 2]).max() == pytest.approx(0.0)
 
 
-def test_triangles_without_area_do_no_harm():
+def test_triangles_without_area_are_ignored():
     points, triangles = synthetic.box((0, 0, 0), (1, 1, 1))
     _, _, normals = split_at_creases(points, np.vstack([triangles, [[0, 0, 1]]]).astype(np.int32))
     assert np.all(np.isfinite(normals))

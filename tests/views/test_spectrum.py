@@ -51,7 +51,7 @@ def test_the_reference_may_have_other_steps():
     assert frequencies[np.argmax(amplitudes)] == pytest.approx(3.0, abs=0.2)
 
 
-def test_nothing_is_made_of_too_few_steps_or_of_no_error():
+def test_zero_errors_have_a_zero_spectrum_and_too_few_steps_have_none():
     still = motion_of(TIMES, np.zeros((len(TIMES), 3)))
     frequencies, amplitudes = error_spectrum(still, still, 0)
     assert not amplitudes.any() and highest_frequency(frequencies, amplitudes) == 0.0

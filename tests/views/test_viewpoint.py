@@ -10,7 +10,7 @@ import synthetic
 from calmotion.views.viewpoint import choose_viewpoint
 
 
-def test_the_sphere_holds_every_target_but_not_the_hidden_guide():
+def test_the_sphere_contains_every_target_but_not_the_hidden_guide():
     result = synthetic.result()
     motion = result.before.motion
     view = choose_viewpoint(synthetic.character(), result.skins, motion)

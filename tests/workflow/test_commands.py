@@ -26,7 +26,7 @@ def simulated(shot_file):
     return cm.simulate(cm.open_shot(shot_file), step="4ms")
 
 
-def test_an_opened_shot_tells_what_is_in_it(shot_file):
+def test_an_opened_shot_lists_its_content(shot_file):
     shot = cm.open_shot(shot_file)
     assert shot.targets == (TIP,) and shot.motors == (HINGE,)
     assert shot.animation.frame_times[-1] == pytest.approx(1.0)
@@ -115,7 +115,7 @@ def test_a_result_can_be_verified(simulated):
     assert verification.step_s < simulated.report()["step_s"] and verification.error_m >= 0.0
 
 
-def test_progress_tells_stage_fraction_and_time_left(shot_file):
+def test_progress_has_stage_fraction_and_time_left(shot_file):
     seen = []
     cm.simulate(shot_file, step="4ms", progress=seen.append)
     assert {state.stage for state in seen} >= {"Read the shot", "Simulate the shot"}

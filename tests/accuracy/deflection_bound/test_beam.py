@@ -16,7 +16,7 @@ def beam(solid=BAR, start=START, end=END, wall=1.0):
     return beam_between(whole, PLASTIC, wall, np.array(start), np.array(end))
 
 
-def test_a_square_bar_turns_as_its_torsion_lets_it():
+def test_a_square_bar_twists_as_in_theory():
     shear = PLASTIC.youngs_modulus / (2 * (1 + PLASTIC.poissons_ratio))
     # A^4 / (40 I_p) = 0.15 a^4, where 0.1406 a^4 is exact
     assert beam().turn.sum() == pytest.approx(LENGTH / (shear * 0.15 * SIDE**4))
@@ -38,7 +38,7 @@ def test_all_hangs_on_a_slice_but_what_is_between_it_and_the_root():
     assert hang[:, [0, 2]].all() and np.array_equal(hang[:, 1], found.middle[:, 0] <= 0.2)
 
 
-def test_a_narrow_slot_is_seen():
+def test_a_narrow_slot_is_detected():
     neck = 0.002
     parts = [box((0.1, SIDE, SIDE), (0, -SIDE / 2, -SIDE / 2)), box((neck, 0.004, SIDE), (0.1, -0.002, -SIDE / 2))]
     parts.append(box((0.1, SIDE, SIDE), (0.1 + neck, -SIDE / 2, -SIDE / 2)))
@@ -61,7 +61,7 @@ def test_a_slanted_body_is_no_stiffer_than_a_straight_one():
     assert slanted.turn.sum() >= beam().turn.sum() and along.turn.sum() >= beam().turn.sum()
 
 
-def test_what_is_no_beam_is_refused():
+def test_bodies_that_are_not_beams_are_refused():
     assert beam(tube((LENGTH, 0.04, 0.04), 0.003), (0.0, 0.02, 0.02), (LENGTH, 0.02, 0.02)) is None
     assert beam(box((LENGTH, 0.6, 0.02), (0.0, -0.3, -0.01))) is None
     assert beam(end=(0.6, 0.0, 0.0)) is None  # beyond the body

@@ -134,13 +134,13 @@ def plain(surface=None, **settings):
     ],
     ids=["ends", "sides", "several", "flat", "short", "cube", "cylinder", "tapered", "stepped"],
 )
-def test_plain_bars_bend_less_than_said_but_not_far_less(solid, places, joints, seed):
+def test_the_deflection_of_plain_bars_is_below_the_bound_but_not_far_below(solid, places, joints, seed):
     found = ratios(solid, places, joints, seed)
     assert (found >= OVERSHOOT).all() and (found < LOOSEST).all(), found
 
 
 @pytest.mark.parametrize("part", ["acceleration", "angular_acceleration", "angular_velocity", "force", "moment"])
-def test_every_load_alone_bends_less_than_said(part):
+def test_the_deflection_by_each_load_is_below_the_bound(part):
     nothing = {name: np.zeros(3) for name in ("acceleration", "angular_acceleration", "angular_velocity")}
     nothing |= {name: np.zeros((2, 3)) for name in ("force", "moment")}
     load = np.array([3.0, 2.0, 1.0]) if nothing[part].ndim == 1 else np.array([[0.0, 0.0, 0.0], [3.0, 2.0, 1.0]])
@@ -188,19 +188,19 @@ AWKWARD = {
 
 
 @pytest.mark.parametrize("solid, places", AWKWARD.values(), ids=AWKWARD.keys())
-def test_awkward_bodies_bend_less_than_said(solid, places):
+def test_the_deflection_of_awkward_bodies_is_below_the_bound(solid, places):
     found = ratios(solid, places, 2)
     assert (found >= OVERSHOOT).all(), found
 
 
-def test_a_body_that_carries_nothing_bends_as_far_as_its_far_end():
+def test_a_body_without_children_deflects_most_at_its_far_end():
     solid, far = bar(), (0.3, 0.015, 0.015)
     load_envelope = loads(np.random.default_rng(0), 1)
     alone = static_reach(body_of(surface_of(solid)), anchors_of(ENDS[:1], 1), load_envelope)
     assert alone.displacement_m > OVERSHOOT * finite_elements(solid, anchors_of([ENDS[0], far], 1), load_envelope)[0]
 
 
-def test_a_stiffer_material_bends_less_and_a_longer_reach_farther():
+def test_a_stiffer_material_deflects_less_and_a_longer_lever_arm_more():
     soft, steel = plain(), plain(material=STEEL)
     assert 0.0 < steel.displacement_m < 0.1 * soft.displacement_m
     body, anchors = body_of(box((0.3, 0.03, 0.03), (0.0, -0.015, -0.015))), anchors_of(ENDS, 2)
@@ -211,7 +211,7 @@ def test_a_stiffer_material_bends_less_and_a_longer_reach_farther():
     assert far.displacement_m == pytest.approx(near.displacement_m + far.rotation) and far.rotation == near.rotation
 
 
-def test_at_rest_nothing_bends():
+def test_at_rest_no_body_deflects():
     still = LoadEnvelope(*np.zeros((3, 3)), *np.zeros((2, 2, 3)))
     body = body_of(box((0.3, 0.03, 0.03), (0.0, -0.015, -0.015)))
     assert static_reach(body, anchors_of(ENDS, 2), still) == Stiffness(0.0, 0.0)
@@ -224,7 +224,7 @@ def test_anchors_at_the_root_do_not_move():
     assert found[0] == found[1]
 
 
-def test_what_a_beam_does_not_tell_is_not_told():
+def test_a_body_that_is_not_a_beam_has_no_estimate():
     whole = box((0.3, 0.03, 0.03), (0.0, -0.015, -0.015))
     thin = tube((0.3, 0.03, 0.03), 0.002)
     refused = {
@@ -242,13 +242,13 @@ def test_what_a_beam_does_not_tell_is_not_told():
     assert plain() is not None
 
 
-def test_bodies_of_closed_loops_are_not_told():
+def test_bodies_of_closed_chains_have_no_estimate():
     body = body_of(box((0.3, 0.03, 0.03), (0.0, -0.015, -0.015)))
     load_envelope = replace(loads(np.random.default_rng(0), 2), closed_chain=True)
     assert static_reach(body, anchors_of(ENDS, 2), load_envelope) is None
 
 
-def test_it_does_not_depend_on_where_the_body_frame_is_turned():
+def test_it_does_not_depend_on_the_orientation_of_the_body_frame():
     turn = rotated(np.array([1.0, 0.0, 0.0]), np.pi / 2)  # peaks are along axes: only quarter turns keep them
     points, triangles = box((0.3, 0.02, 0.03), (0.0, -0.01, -0.015))
     load_envelope = loads(np.random.default_rng(0), 2)

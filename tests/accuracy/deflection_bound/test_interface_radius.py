@@ -48,5 +48,5 @@ def test_a_named_surface_counts_where_it_is_smaller():
     assert grip_radius(*BAR, body, np.array([0.3, 0.02, 0.01]), 0.25) == pytest.approx(0.003)
 
 
-def test_a_joint_far_from_the_surface_holds_nothing():
+def test_a_joint_far_from_the_surface_has_no_interface_patch():
     assert grip(BAR, (0.5, 0.02, 0.01)) is None

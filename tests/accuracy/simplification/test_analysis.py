@@ -39,7 +39,7 @@ def _rows(needs, kind):
     return [row for row in needs.rows if row.kind == kind]
 
 
-def test_thick_steel_is_rigid_and_its_estimate_holds():
+def test_thick_steel_is_rigid_and_its_error_is_below_the_estimate():
     shot = steel_arm()
     needs = _analyse(shot)
     assert not any(body.bends for body in needs.character.bodies)
@@ -49,7 +49,7 @@ def test_thick_steel_is_rigid_and_its_estimate_holds():
     assert 0.0 < error < sum(estimates) < SHARE * 1e-3
 
 
-def test_only_what_hardly_bends_is_rigid():
+def test_only_bodies_with_a_small_deflection_are_rigid():
     needs = _analyse(mixed_arm())
     assert [body.bends for body in needs.character.bodies] == [False, True, False]
     assert needs.character.bodies[0].mass.mass == pytest.approx(7800 * 0.3 * 0.08**2)
@@ -59,7 +59,7 @@ def test_a_tighter_tolerance_keeps_it():
     assert _analyse(mixed_arm(), options=replace(FAST, tolerance=1e-7)).character.bodies[0].bends
 
 
-def test_what_the_shot_says_of_a_body_is_done():
+def test_bodies_with_explicit_settings_stay_flexible():
     shot = steel_arm()
     for change in ({"mode_count": 4}, {"elasticity": "stvk"}):
         asked = replace(
@@ -91,7 +91,7 @@ def test_everything_can_be_forced_off_and_on():
     assert on.choice("ranges") == ON
 
 
-def test_the_second_pins_of_a_clevis_are_left_out_and_the_motion_stays():
+def test_the_second_pins_of_a_clevis_are_removed_and_the_motion_is_the_same():
     shot = clevis_arm(2)
     needs = _analyse(shot)
     assert [j.redundant for j in needs.character.joints] == [False, True, False, True, False, False]
@@ -100,7 +100,7 @@ def test_the_second_pins_of_a_clevis_are_left_out_and_the_motion_stays():
     assert distance(_simulated(shot, needs.character), _simulated(shot, full)) < 1e-9
 
 
-def test_loops_of_bodies_that_bend_are_kept():
+def test_joints_of_closed_chains_with_flexible_bodies_are_kept():
     shot = clevis_arm(2)
     bodies = list(shot.character.bodies)
     bodies[0] = replace(bodies[0], flexible=bodies[2].flexible)  # which is not meshed: the analysis asks before that
@@ -108,7 +108,7 @@ def test_loops_of_bodies_that_bend_are_kept():
     assert [j.redundant for j in kept.character.joints][:4] == [False, False, False, True]
 
 
-def test_nothing_on_a_gantry_turns_as_far_as_that_can_be_told():
+def test_no_body_of_a_gantry_rotates_within_the_known_deflection():
     shot = gantry(1)
     needs = _analyse(shot)
     non_rotating = [body.non_rotating for body in needs.character.bodies]

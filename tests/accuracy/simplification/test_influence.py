@@ -62,7 +62,7 @@ def test_what_is_geared_to_a_motor_counts_with_it():
     assert found[2] == pytest.approx(0.15, rel=1e-3)
 
 
-def test_only_targets_that_weigh_count_and_turns_where_they_do():
+def test_only_weighted_targets_count_and_rotations_only_with_a_rotation_weight():
     shot = arm_with_head()
 
     def with_weights(position, rotation):

@@ -22,7 +22,7 @@ def _stiff(displacement, rotation):
     return Stiffness(displacement, rotation)
 
 
-def test_a_carriage_and_what_is_welded_to_it_never_turn_and_that_costs_nothing():
+def test_a_carriage_and_bodies_fixed_to_it_do_not_rotate_and_the_error_is_zero():
     shot = gantry(2)
     found = _found(shot)
     by_name = dict(zip([b.path.split("/")[-1] for b in shot.character.bodies], found, strict=True))
@@ -32,14 +32,14 @@ def test_a_carriage_and_what_is_welded_to_it_never_turn_and_that_costs_nothing()
     assert by_name["Load0"].turns and "deflection" in by_name["Load0"].why
 
 
-def test_what_a_bending_body_carries_turns_by_as_much_as_that_bends():
+def test_bodies_on_a_flexible_body_rotate_with_its_deflection():
     shot = gantry(1)
     found = _found(shot, {1: _stiff(2e-3, 0.01)})
     assert not found[2].turns
     assert found[2].error_m == pytest.approx(0.01 * 2e-3)
 
 
-def test_motors_that_move_or_may_be_changed_turn_bodies():
+def test_active_motors_and_motors_that_may_change_rotate_bodies():
     shot = plastic_arm()
     assert all(item.turns for item in _found(shot))
     held = tuple(Track(t.times, np.full_like(t.values, 0.3)) for t in shot.animation.tracks)
@@ -68,7 +68,7 @@ def test_only_the_optimised_curve_moves():
     assert _found(shown, changes=False)[0].turns
 
 
-def test_roots_that_turn():
+def test_rotating_roots():
     shot = gantry(1)
     times = np.array([0.0, 1.0])
     still = np.tile([1.0, 0.0, 0.0, 0.0], (2, 1))
@@ -78,7 +78,7 @@ def test_roots_that_turn():
         assert _found(moved)[0].turns == turns
 
 
-def test_free_joints_turn_what_hangs_from_them():
+def test_bodies_that_hang_from_free_joints_rotate():
     shot = arm_with_head()
     motors = shot.character.motors[:-1]
     free = replace(shot, character=replace(shot.character, motors=motors))

@@ -6,7 +6,7 @@ from calmotion.benchmarks.accuracy.pareto import front, over_fastest, print_over
 from calmotion.benchmarks.accuracy.reference_bench import Point
 
 
-def test_the_front_has_what_nothing_beats():
+def test_the_front_has_the_settings_that_no_other_beats():
     made = [(1.0, 5.0), (2.0, 3.0), (2.5, 4.0), (3.0, 1.0), (0.5, np.nan), (4.0, 1.0)]
     points = [Point("a", "bdf2", str(k), 0.1, 1, *pair) for k, pair in enumerate(made)]
     assert [point.setting for point in front(points)] == ["0", "1", "3"]
@@ -29,7 +29,7 @@ def test_a_choice_is_compared_with_the_fastest_that_keeps_the_tolerance(points):
     assert over_fastest(points[-1:], [1e-2, 1e-3]) == {1e-3: (1.0, points[-1])}
 
 
-def test_the_fastest_is_told(points, capsys):
+def test_the_fastest_setting_is_reported(points, capsys):
     print_over_fastest(points, [1e-2, 1e-3])
     assert capsys.readouterr().out == (
         "1 mm: 1.60 times the run time of the fastest setting that keeps it (newmark, fastest, 1 coordinates)\n"

@@ -22,7 +22,7 @@ def rows(shot):
     return list(reduction_convergence.convergence(Bench(shot), (1e-2, 1e-4, 1e-6)))
 
 
-def test_what_a_finer_reduction_moves_falls(rows):
+def test_the_change_by_a_finer_reduction_decreases(rows):
     assert rows[0].moved_m is None
     assert 1e-2 > rows[1].moved_m > 5.0 * rows[2].moved_m > 0.0
     assert int(rows[0].coordinates) < int(rows[1].coordinates) < int(rows[2].coordinates)

@@ -25,7 +25,7 @@ def test_a_redundant_joint_changes_nothing(loops):
     assert loops.ratio == loops.with_s / loops.without_s
 
 
-def test_what_hardly_bends_is_left_out_at_less_than_what_is_estimated():
+def test_bodies_with_a_small_deflection_become_rigid_within_the_estimated_error():
     found = pair("bodies", steel_arm(), "simulate", {"bodies": ON, "modes": ON}, 1, FAST)
     assert 0.0 < found.error_m < found.estimated_m < 0.5e-3
 

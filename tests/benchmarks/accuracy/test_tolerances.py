@@ -42,7 +42,7 @@ def test_results_keep_their_tolerance(rows):
     assert rows[1].coordinates >= rows[0].coordinates
 
 
-def test_the_command_tells_whether_they_are_kept(shot, rows, monkeypatch, capsys, tmp_path):
+def test_the_command_reports_whether_tolerances_are_kept(shot, rows, monkeypatch, capsys, tmp_path):
     found = list(rows)
     monkeypatch.setattr(tolerances, "load_unreduced", lambda path: shot)
     warmed = []

@@ -51,7 +51,7 @@ def of(points, series):
 
 
 @pytest.mark.long
-def test_the_bar_of_the_reference_holds_against_a_finer_one(bench, reference):
+def test_the_error_bar_of_the_reference_covers_a_finer_one(bench, reference):
     finer = bench.run(bench.bodies(1e-7), 1 / 7680)
     assert distance(finer.positions, reference.positions) < 1.5 * reference.bar_m < 2e-4
 
@@ -74,7 +74,7 @@ def test_more_modes_are_nearer(points):
     assert many.error_m <= few.error_m and many.coordinates > few.coordinates
 
 
-def test_finer_reductions_are_nearer_and_pairs_that_are_left_out_do_not_show(points):
+def test_finer_reductions_are_closer_and_omitted_pairs_have_no_noticeable_effect(points):
     coarse, fine = of(points, "reduction")
     assert fine.error_m < coarse.error_m and fine.coordinates > coarse.coordinates
     (every,) = of(points, "pairs")
@@ -105,9 +105,7 @@ def test_the_command_writes_a_table_a_picture_and_one_object(bench, reference, p
     assert (tmp_path / "work_precision_arm.png").samefile(figure)
 
 
-def test_adjoints_and_optimisers_are_part_of_the_report_where_that_is_asked_for(
-    bench, reference, points, monkeypatch, capsys, tmp_path
-):
+def test_adjoints_and_optimisers_are_reported_on_request(bench, reference, points, monkeypatch, capsys, tmp_path):
     rows = [
         GradientError("arm", name, 0.1 / k, 1.0, 0.4, 1e-9, error / k, 1e-10)
         for name, error in (("discrete", 1e-2), ("continuous", 2e-2))

@@ -32,7 +32,7 @@ def test_every_case_runs_or_is_refused_with_a_reason(case):
         )
 
 
-def test_what_flies_away_or_is_no_number_has_failed(monkeypatch):
+def test_divergence_and_nan_are_failures(monkeypatch):
     (weightless,) = (case for case in CASES if (case.group, case.name) == ("gravity", "none"))
     monkeypatch.setattr(outcomes, "REACH", 0.5)
     assert run_case(Case("a", "b", weightless.scene)).outcome == FAILED

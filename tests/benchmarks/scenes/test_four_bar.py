@@ -34,7 +34,7 @@ def deflected(modes):
     return off.max(), off[0, 0], np.abs(run.trajectory.states.lam).max()
 
 
-def test_modes_chosen_for_a_loop_give_way_in_every_direction():
+def test_modes_chosen_for_a_closed_chain_deflect_in_every_direction():
     """Few modes by number lock: twist that they carry slightly and that nothing else gives holds the bending."""
     exact, sag, load = deflected(16)
     assert sag > 1e-4 and load < 5.0

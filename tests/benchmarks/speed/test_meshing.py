@@ -28,7 +28,7 @@ def test_links_are_named_by_path_or_name_or_taken_all(shot):
         read_links(f"{shot}:foot")
 
 
-def test_the_table_shows_errors_that_fall_towards_the_finest_mesh(shot, tmp_path, capsys):
+def test_the_table_shows_errors_that_decrease_towards_the_finest_mesh(shot, tmp_path, capsys):
     file = tmp_path / "table.csv"
     assert meshing.main([f"{shot}:fore", "--sizes", "40mm", "16mm", "-o", str(file)]) == 0
     with open(file, newline="") as text:
@@ -46,7 +46,7 @@ def test_the_table_shows_errors_that_fall_towards_the_finest_mesh(shot, tmp_path
     assert len(lines) == 4 and lines[2].startswith("| fore | 40 |") and "| - |" in lines[3]
 
 
-def test_what_cannot_be_meshed_is_told_and_the_rest_goes_on(shot, tmp_path, capsys):
+def test_links_that_cannot_be_meshed_are_reported_and_the_others_are_measured(shot, tmp_path, capsys):
     assert meshing.main([f"{shot}:foot", "--sizes", "1"]) == 1
     assert "no such link" in capsys.readouterr().err
 

@@ -8,7 +8,7 @@ from calmotion.benchmarks.speed.reduction import SHAPES, box_mesh, main, measure
 
 
 @pytest.mark.parametrize("shape", SHAPES)
-def test_what_it_measures_of_a_small_link_holds(shape):
+def test_the_measured_values_of_a_small_link_are_right(shape):
     result = measure(shape, 1500, 10)
     assert 0.8 * 1500 < result["nodes"] < 1.25 * 1500
     assert result["residual"] < 1e-7 and result["orthonormality"] < 1e-10
@@ -18,7 +18,7 @@ def test_what_it_measures_of_a_small_link_holds(shape):
     assert f"{result['nodes']} nodes" in text and "peak memory" in text
 
 
-def test_a_box_fills_its_extent_with_about_as_many_nodes_as_asked_for():
+def test_a_box_mesh_fills_its_extent_with_about_the_requested_number_of_nodes():
     for size in SHAPES.values():
         points, tets = box_mesh(size, 5000)
         assert np.allclose(np.ptp(points, axis=0), size)

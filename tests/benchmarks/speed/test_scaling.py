@@ -42,7 +42,7 @@ def test_run_times_are_compared_at_equal_error():
     assert time_at(runs, "a", 1e-4) == pytest.approx(0.1) and time_at(runs, "b", 1e-4) == pytest.approx(0.02)
 
 
-def test_our_arm_is_of_second_order_in_time():
+def test_the_simulated_arm_converges_at_second_order():
     code = exudyn_arm.Ours("bdf2")
     exact, _ = code.run(3840)
     errors = [np.abs(code.run(steps)[0] - exact).max() for steps in (240, 480)]

@@ -27,7 +27,7 @@ def test_driven_rigid_character_has_none():
     assert [len(part) for part in system_modes(compiled(chain(2, driven=(0, 1))), np.zeros(2))] == [0, 0]
 
 
-def test_equilibrium_is_a_minimum_of_the_potential_seen_by_the_modes():
+def test_equilibrium_is_a_minimum_of_the_potential_in_the_modes():
     """Clamped flexible body without gravity: its own frequencies."""
     system, _ = particle_system(np.random.default_rng(0), [-1], [3])
     from types import SimpleNamespace

@@ -5,7 +5,7 @@ from calmotion.multibody.integrators.drives import hermite_drive, stage_inputs
 from scipy.interpolate import CubicSpline
 
 
-def test_a_cubic_spline_with_knots_on_instants_is_given_back():
+def test_a_cubic_spline_with_knots_on_instants_is_reproduced():
     times = np.linspace(0.0, 1.0, 11)
     spline = CubicSpline(times[::2], np.sin(5.0 * times[::2])[:, None] * [1.0, -2.0])
     drive = hermite_drive(times, spline(times), spline(times, 1))

@@ -36,7 +36,7 @@ def test_one_factorisation_serves_a_step_and_it_converges_to_rounding():
 
 
 @pytest.mark.parametrize("off", [0.5, 1.5, -2.0])
-def test_a_far_guess_comes_to_the_same_state(off):
+def test_a_distant_guess_converges_to_the_same_state(off):
     _, now = fallen(5e-3, 10.0)
     (code, *_), found = fallen(5e-3, 10.0, predicted=now.turn[0, 1] + off)
     assert code == newton.CONVERGED

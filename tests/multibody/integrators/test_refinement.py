@@ -49,7 +49,7 @@ def test_the_end_of_smaller_steps_is_a_guess_for_the_step_itself(monkeypatch):
     linearize(model.system, found, angles, rates, ws)
 
 
-def test_where_smaller_steps_stand_in_there_is_no_gradient(monkeypatch):
+def test_a_run_with_subdivided_steps_has_no_gradient(monkeypatch):
     model = compiled(chain(2, driven=(0, 1), length=0.3))
     expected, angles, rates, ws = driven(model, 0.4)
     from calmotion.multibody.integrators import simulation

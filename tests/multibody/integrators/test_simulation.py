@@ -176,7 +176,7 @@ def test_failure_names_time_and_component():
 
 
 @pytest.mark.parametrize("first", [2, 3, 40])
-def test_a_simulation_that_goes_on_from_a_known_one_is_that_of_the_whole(first):
+def test_a_continued_simulation_equals_the_whole_one(first):
     model, h = compiled(chain(3, driven=(0, 1, 2), length=0.3)), 1 / 240
     system, ws = model.system, Workspace.for_system(model.system)
     times = h * np.arange(120)

@@ -96,7 +96,7 @@ def run(model, reach, steps=150):
     return found.states, tool, reactions(model.system, found, angles, rates).efforts[:, :2]
 
 
-def test_nothing_is_lost_where_the_frames_cannot_turn():
+def test_non_rotating_frames_are_simulated_without_error():
     """A beam on rigid slides; what hangs on it turns with its tip, and is told so."""
     exact, told = (run(gantry([STILL], non_rotating), 0.2) for non_rotating in ((), ALL[:3]))
     bent = np.abs(exact[0].u).max(axis=(0, 1))
@@ -107,7 +107,7 @@ def test_nothing_is_lost_where_the_frames_cannot_turn():
 
 
 @pytest.mark.parametrize("beams", [[UP, ASIDE], [STILL, STILL]], ids=["mast and boom", "boom"])
-def test_what_is_lost_on_carriers_that_bend_is_of_second_order(beams):
+def test_the_error_on_flexible_parents_is_of_second_order(beams):
     """A beam on the end of another one: its frame turns with the deflection. All loads grow together."""
     lost = []
     for part in (1.0, 0.5, 0.25):
@@ -118,12 +118,12 @@ def test_what_is_lost_on_carriers_that_bend_is_of_second_order(beams):
     assert lost[0][0] < 1e-3, "[m], of a deflection of 0.2 m"
 
 
-def test_a_body_that_turns_moves_otherwise_when_it_is_told_that_it_does_not():
+def test_a_rotating_body_that_is_marked_as_non_rotating_moves_differently():
     exact, told = (run(gantry([STILL], non_rotating, hinged=True), 1.0)[0] for non_rotating in ((), ALL))
     assert np.abs(told.u - exact.u).max() > 0.01 * np.abs(exact.u).max()
 
 
-def test_the_list_of_bodies_that_never_turn_survives_making_them_rigid():
+def test_non_rotating_bodies_stay_marked_when_they_become_rigid():
     model = gantry([STILL], ALL[:3])
     for system in (model.system, rigid_model(model).system):
         assert list(system.nonrotating) == [0, 1, 2] and list(system.rotating) == [3]

@@ -49,5 +49,5 @@ def test_the_jacobian_and_its_derivative(kind):
     assert np.allclose(out, np.transpose(transposed), atol=1e-8)
 
 
-def test_beyond_a_quarter_turn_it_is_not_a_number():
+def test_beyond_90_degrees_it_is_nan():
     assert np.isnan(maps(1, [0.0, 1.01, 0.0])[0]).any()

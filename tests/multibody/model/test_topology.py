@@ -23,7 +23,7 @@ def test_parents_come_before_children_whatever_the_order_of_bodies_and_joints():
     assert tree.flipped == (False, False, True, False)
 
 
-def test_the_loosest_joint_closes_a_loop():
+def test_the_loosest_joint_closes_a_chain():
     character = chain(3, driven=(0, 2))
     closing = dataclasses.replace(character.joints[1], path="/C/Extra", body0=0, body1=2)
     ball = dataclasses.replace(closing, path="/C/Ball", kind="spherical")

@@ -87,7 +87,7 @@ def looping(request):
     return case, found, lin, Monodromy.of(lin)
 
 
-def test_the_loop_closes_and_is_where_a_long_simulation_ends_up(looping):
+def test_the_cycle_closes_and_is_the_limit_of_a_long_simulation(looping):
     case, found, _, monodromy = looping
     assert found.distance < 1e-8
     apart = end_difference(case.system, found.trajectory.states)
@@ -122,7 +122,7 @@ def sweep_cases_from_a_memory_are_transposes(looping):
     assert abs(forward - backward) < 1e-11 * (np.linalg.norm(moved.vector) * np.linalg.norm(end.vector))
 
 
-def test_few_columns_hold_the_derivative_of_the_loop(looping):
+def test_few_columns_contain_the_derivative_of_the_cycle(looping):
     case, _, lin, monodromy = looping
     zero = np.zeros((2, *lin.inputs.angles.shape))
     vector = np.random.default_rng(2).normal(size=monodromy.B.shape[1])

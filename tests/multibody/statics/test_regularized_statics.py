@@ -66,7 +66,7 @@ def test_solutions_are_those_of_the_whole_matrix(made, transposed):
 
 
 @pytest.mark.parametrize("gravity", [(0, 0, -9.81), (0, -9.81, 0)], ids=["wheel", "door"])
-def test_what_nothing_holds_keeps_its_angle_and_goes_with_what_carries_it(gravity):
+def test_a_free_joint_without_stiffness_keeps_its_angle_and_moves_with_its_parent(gravity):
     model = compiled(turning(gravity, 0.1 * (gravity[2] == 0)))
     state, ws = resting(model)
     for rotation in Rotation.from_quat(np.roll(state.q, -1, axis=1)).as_rotvec():
@@ -74,7 +74,7 @@ def test_what_nothing_holds_keeps_its_angle_and_goes_with_what_carries_it(gravit
     assert np.abs(ws.blocks.res).max() < 1e-10
 
 
-def test_what_motors_hold_needs_nothing():
+def test_joints_with_motors_need_no_regularisation():
     model = compiled(chain(2, driven=(0, 1)))
     K, D, Nc = np.zeros((2, 6, 6)), np.ones((2, 6, 6)), np.zeros((2, 6, 3))
     regularize(model.system, D, K, Nc)

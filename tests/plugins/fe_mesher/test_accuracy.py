@@ -18,7 +18,7 @@ def test_the_size_that_accuracy_needs_is_found_once_and_kept(host, package, own_
     assert 0.0 < first.quality.frequency_error == again.quality.frequency_error < 0.05
 
 
-def test_a_mesh_that_is_not_fine_enough_is_made_again_and_what_is_missing_is_told(host, package, monkeypatch):
+def test_a_mesh_that_is_too_coarse_is_refined_and_the_remaining_error_is_reported(host, package, monkeypatch):
     accuracy, body_mesh = package("accuracy"), package("body_mesh")
     estimates = iter([accuracy.Accuracy(0.05, 1000, np.ones(3)), accuracy.Accuracy(0.03, 5000, np.ones(3) * 0.9)])
     monkeypatch.setattr(body_mesh, "estimate", lambda *arguments: next(estimates))

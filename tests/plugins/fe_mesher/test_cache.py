@@ -20,7 +20,7 @@ def test_a_mesh_is_made_once_and_then_read_from_the_cache(host, package, own_cac
     assert [path.suffix for path in own_cache.iterdir()] == [".npz"]
 
 
-def test_of_two_meshes_made_at_once_the_first_one_kept_serves_both(package, own_cache):
+def test_two_processes_that_make_the_same_mesh_use_the_first_one(package, own_cache):
     cache = package("cache")
     first, second = np.zeros((4, 3)), np.ones((4, 3))
     tets = np.arange(4)[None]
@@ -32,7 +32,7 @@ def test_of_two_meshes_made_at_once_the_first_one_kept_serves_both(package, own_
     assert [path.name for path in own_cache.iterdir()] == ["key.npz"]
 
 
-def test_the_key_of_a_mesh_holds_everything_that_decides_it(package):
+def test_the_key_of_a_mesh_contains_everything_that_determines_it(package):
     key = package("cache").cache_key
     points, triangles = np.eye(3), np.array([[0, 1, 2]])
     keys = [
@@ -45,7 +45,7 @@ def test_the_key_of_a_mesh_holds_everything_that_decides_it(package):
     assert keys[0] == key(points.copy(), triangles.astype(np.int64), {"size": 1.0})
 
 
-def test_a_cache_that_cannot_be_written_is_no_error(host, monkeypatch, tmp_path):
+def test_a_cache_that_cannot_be_written_is_not_an_error(host, monkeypatch, tmp_path):
     (tmp_path / "file").write_text("")
     monkeypatch.setenv("CALMOTION_CACHE", str(tmp_path / "file"))
     assert len(run(host, link(surface(box((0.05, 0.02, 0.02))), element_size=0.01))) == 1

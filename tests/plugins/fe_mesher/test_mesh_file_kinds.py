@@ -50,7 +50,7 @@ def pyramids():
 
 @pytest.mark.parametrize(("kind", "make"), [("hexahedron", bricks), ("wedge", wedges), ("pyramid", pyramids)])
 @pytest.mark.parametrize("suffix", ["vtu", "msh", "inp", "bdf"])
-def test_volume_elements_are_cut_into_tetrahedra_that_meet_face_to_face(package, tmp_path, kind, make, suffix):
+def test_volume_elements_are_cut_into_conforming_tetrahedra(package, tmp_path, kind, make, suffix):
     if (kind, suffix) in (("pyramid", "inp"), ("pyramid", "bdf")):
         pytest.skip("the format has no such element in meshio")
     points, cells = make()
@@ -80,7 +80,7 @@ def tets10(bulge=0.0):
 
 
 @pytest.mark.parametrize("suffix", ["vtu", "msh", "inp", "bdf"])
-def test_quadratic_tetrahedra_give_their_corners_and_curved_ones_are_told(package, tmp_path, suffix):
+def test_quadratic_tetrahedra_give_their_corners_and_curved_ones_are_reported(package, tmp_path, suffix):
     for bulge in (0.0, 0.5):
         nodes, tets = tets10(bulge)
         extra = {"file_format": "gmsh"} if suffix == "msh" else {}

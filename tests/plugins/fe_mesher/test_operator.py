@@ -17,7 +17,7 @@ def test_the_plugin_keeps_to_the_rules():
     assert check_plugin(PLUGIN) == []
 
 
-def test_a_character_that_does_not_bend_is_left_out(host):
+def test_a_rigid_character_is_skipped(host):
     with pytest.raises(PluginError, match="nothing is flexible"):
         run(host, Body("/Arm/link", REST, None, (surface(box()),)))
 

@@ -23,7 +23,7 @@ def test_a_mesh_that_runs_through_itself_has_the_volume_of_what_it_covers(host, 
     assert mesh.quality.volume == pytest.approx(1.52e-4, rel=1e-2)
 
 
-def test_a_mesh_inside_out_and_single_triangles_turned_are_set_right(package):
+def test_a_mesh_inside_out_and_single_flipped_triangles_are_repaired(package):
     inside_out = box()
     inside_out.invert()
     made = solid(package, surface(inside_out))
@@ -36,7 +36,7 @@ def test_a_mesh_inside_out_and_single_triangles_turned_are_set_right(package):
     assert any("orientation" in repair for repair in made.repairs)
 
 
-def test_small_holes_loose_corners_and_scraps_are_repaired_and_told(package):
+def test_small_holes_loose_corners_and_scraps_are_repaired_and_reported(package):
     ball = trimesh.creation.icosphere(subdivisions=4, radius=0.05)
     faces = np.array(ball.faces)[3:]
     soup = np.array(ball.vertices)[faces].reshape(-1, 3)  # every triangle with corners of its own, as in an STL file
@@ -60,7 +60,7 @@ def test_a_cavity_stays_hollow_whatever_the_orientation_of_the_whole(package):
     assert solid(package, surface(hollow)).volume == pytest.approx(expected, rel=1e-6)
 
 
-def test_parts_that_do_not_touch_are_refused_but_a_loose_screw_is_left_out(package):
+def test_parts_that_do_not_touch_are_refused_but_a_loose_screw_is_removed(package):
     far = surface(box(at=(0, 0.1, 0)), "/far")
     with pytest.raises(ShotError, match="do not touch") as caught:
         solid(package, surface(box()), far)
@@ -105,7 +105,7 @@ def test_solids_a_hair_apart_are_bridged_and_not_thickened(package):
         solid(package, parts[0], surface(box((0.1, 0.02, 0.02), at=(0.02, 0, 0.021)), "/b"))
 
 
-def test_detail_below_the_tolerance_is_left_out_and_the_shape_kept(package):
+def test_detail_below_the_tolerance_is_removed_and_the_shape_kept(package):
     ball = trimesh.creation.icosphere(subdivisions=5, radius=0.05)
     made = solid(package, surface(ball))
     points, triangles = package("repair").simplified(made, 1e-4)

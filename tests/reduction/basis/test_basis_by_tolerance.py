@@ -100,7 +100,7 @@ def peaks_of(load_envelope, rng):
 
 
 @pytest.mark.parametrize("tolerance", [1e-2, 1e-3, 1e-4, 1e-6])
-def test_what_is_cut_is_never_more_than_said_and_not_much_less(body, tolerance):
+def test_the_error_of_omitted_modes_is_below_the_estimate_but_not_far_below(body, tolerance):
     load_envelope = an_excitation()
     basis = body.basis(load_envelope=load_envelope, tolerance=tolerance)
     rng = np.random.default_rng(3)
@@ -192,7 +192,7 @@ def test_a_basis_by_tolerance_is_orthonormal_and_its_patch_rigid(body):
     assert np.abs(basis.modes[body.tip] - expected).max() < 1e-12 * np.abs(expected).max()
 
 
-def test_residual_vectors_hold_all_but_a_thousandth_of_the_work_and_lower_frequency_errors(body):
+def test_residual_vectors_contain_all_but_a_thousandth_of_the_work_and_lower_frequency_errors(body):
     """Nobody says what excites the body: fixed-interface modes below a limit under which there are none."""
     settings = replace(body.settings, max_frequency=1.0)
     corrected = body.basis(settings)
@@ -211,7 +211,7 @@ def test_residual_vectors_hold_all_but_a_thousandth_of_the_work_and_lower_freque
     assert np.abs(u - v).max() < 2e-3 * np.abs(u).max()
 
 
-def test_a_body_that_carries_nothing_is_judged_by_its_surface(body):
+def test_the_deflection_of_a_body_without_children_is_that_of_its_surface(body):
     none = np.zeros((0, 3))
     load_envelope = LoadEnvelope(np.array([0.0, 0.0, 9.81]), np.zeros(3), np.zeros(3), none, none)
     basis = reduced_basis(

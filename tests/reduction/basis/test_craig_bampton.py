@@ -29,7 +29,7 @@ def ends(model):
     return np.flatnonzero(x < 1e-9), np.flatnonzero(x > 0.6 - 1e-9)
 
 
-def test_a_body_held_at_its_root_keeps_its_own_lowest_modes(model, settings):
+def test_a_body_clamped_at_its_root_keeps_its_lowest_modes(model, settings):
     root, _ = ends(model)
     basis = reduced_basis(model, root, [], [], settings)
     full = frequencies(model, len(basis.omega_squared), root)
@@ -56,7 +56,7 @@ def test_a_patch_moves_as_a_rigid_one(model, settings):
     assert np.abs(basis.modes[tip] - expected).max() < 1e-12 * np.abs(expected).max()
 
 
-def test_a_force_at_a_patch_bends_the_reduced_body_exactly_as_the_full_one(model, settings):
+def test_a_force_at_a_patch_deflects_the_reduced_body_exactly_as_the_full_one(model, settings):
     """Constraint modes are the static responses to what the patch can do: no error whatever the number of modes."""
     root, tip = ends(model)
     basis = reduced_basis(model, root, [tip], [TIP], settings)
@@ -106,7 +106,7 @@ def test_a_highest_frequency_keeps_the_modes_below_it_and_residual_vectors_for_t
     assert basis.residual <= 1
 
 
-def test_its_own_weight_bends_the_automatic_basis_by_the_right_amount(model, settings):
+def test_its_own_weight_deflects_the_automatic_basis_by_the_right_amount(model, settings):
     root, _ = ends(model)
     basis = reduced_basis(model, root, [], [], settings)
     n = len(model.mesh.nodes)

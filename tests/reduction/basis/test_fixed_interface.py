@@ -23,7 +23,7 @@ def test_constraint_modes_leave_the_interior_without_force(held):
     assert np.abs(force[held.interior]).max() < 1e-9 * np.abs(force).max()
 
 
-def test_columns_are_orthogonal_in_stiffness_and_all_loads_are_held_by_them(held):
+def test_columns_are_orthogonal_in_stiffness_and_span_all_loads(held):
     peaks = np.linspace(1.0, 4.0, 12)
     columns = held.all_needed(1e3, peaks)
     K = columns.T @ (held.model.stiffness @ columns)
@@ -42,7 +42,7 @@ def test_accelerations_that_do_not_occur_need_no_vectors(held):
     assert held.all_needed(0.0, one).shape[1] == 6 + 8 + 1
 
 
-def test_the_usual_basis_holds_all_but_a_thousandth_of_the_work_of_a_uniform_acceleration(held, plastic):
+def test_the_usual_basis_contains_all_but_a_thousandth_of_the_work_of_a_uniform_acceleration(held, plastic):
     columns, residual = held.usual(FlexibleSettings(plastic))
     assert columns.shape[1] <= 6 + 8 + 6 and residual <= 6
     weight = held.mass @ unit_accelerations(held.model.mesh.nodes)[:, :, :6].reshape(-1, 6)

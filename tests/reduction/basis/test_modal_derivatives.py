@@ -26,7 +26,7 @@ def arm(plastic):
     return model, support, basis, plastic
 
 
-def test_a_bent_beam_keeps_its_length(arm):
+def test_a_deflected_beam_keeps_its_length(arm):
     """The derivative of a bending mode with itself draws the tip in by the integral of the slope squared."""
     model, support, basis, material = arm
     found = modal_derivatives(model, support, basis, 1, material, "stvk")
@@ -42,7 +42,7 @@ def test_a_bent_beam_keeps_its_length(arm):
     assert np.abs(fields[support.root]).max() == 0.0
 
 
-def test_a_patch_turns_by_a_finite_rotation(arm):
+def test_a_patch_rotates_by_a_finite_rotation(arm):
     model, support, basis, material = arm
     found = modal_derivatives(model, support, basis, 1, material, "stvk")
     fields, motion = found.fields, found.motion

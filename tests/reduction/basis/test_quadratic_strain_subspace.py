@@ -51,7 +51,7 @@ def tip(body, size):
 
 
 @pytest.mark.parametrize("size", [60.0, 300.0])
-def test_a_link_bends_as_one_whose_strain_sees_everything(plastic, size, monkeypatch):
+def test_a_link_with_a_strain_subspace_deflects_like_one_with_the_full_quadratic_strain(plastic, size, monkeypatch):
     tolerance = 1e-5
     few = link(plastic, tolerance, loads(size))
     seen = few.elasticity.strain_projection
@@ -70,7 +70,7 @@ def test_a_link_bends_as_one_whose_strain_sees_everything(plastic, size, monkeyp
     assert np.linalg.norm(linear - whole) > 2.0 * tolerance
 
 
-def test_a_tighter_tolerance_sees_more(plastic):
+def test_a_tighter_tolerance_has_a_larger_strain_subspace(plastic):
     counts = []
     for tolerance in (1e-3, 1e-5, 1e-7):
         law = link(plastic, tolerance, loads(30.0)).elasticity
@@ -78,13 +78,13 @@ def test_a_tighter_tolerance_sees_more(plastic):
     assert counts == sorted(counts) and counts[0] < counts[-1]
 
 
-def test_turns_of_interfaces_are_seen_as_they_are(plastic):
+def test_rotations_of_interfaces_are_in_the_strain_subspace(plastic):
     body = link(plastic, 1e-4, loads(30.0))
     Psi, W = body.markers[1].Psi, body.elasticity.strain_projection
     assert np.linalg.lstsq(W.T, Psi.T, rcond=None)[1].sum() < 1e-18 * np.sum(Psi**2)
 
 
-def test_what_is_left_out_is_told(plastic):
+def test_simplifications_are_reported(plastic):
     body = link(plastic, 1e-4, loads(30.0))
     p, r = body.elasticity.strain_projection.shape
     row = body.left_out[-1]
@@ -97,5 +97,5 @@ def test_all_pairs_can_be_kept(plastic):
     assert body.elasticity.strain_projection is None and not any("quadratic" in row.what for row in body.left_out)
 
 
-def test_without_loads_everything_is_seen(plastic):
+def test_without_loads_the_strain_subspace_is_the_whole_space(plastic):
     assert link(plastic, 1e-4, None).elasticity.strain_projection is None

@@ -25,7 +25,7 @@ def system():
     return csr_matrix(K), M, values[:6], modes[:, :6], rng.normal(size=(40, 4))
 
 
-def test_modes_and_residual_vectors_together_hold_the_whole_static_response(system):
+def test_modes_and_residual_vectors_together_span_the_static_response(system):
     K, M, values, modes, loads = system
     weight = np.array([1.0, 10.0, 0.1, 1.0])
     V, work = residual_vectors(K, loads, weight, values, modes, SparseSolver(K))
@@ -40,7 +40,7 @@ def test_modes_and_residual_vectors_together_hold_the_whole_static_response(syst
     assert work.sum() == pytest.approx(left)
 
 
-def test_loads_that_modes_hold_already_need_no_vectors(system):
+def test_loads_in_the_span_of_the_modes_need_no_vectors(system):
     K, M, values, modes, _ = system
     V, work = residual_vectors(K, M @ modes[:, :3], np.ones(3), values, modes, SparseSolver(K))
     assert V.shape[1] == 0 and len(work) == 0
@@ -52,7 +52,7 @@ def static_model(rng, r=12, loads=5, outputs=2):
 
 
 @pytest.mark.parametrize("tolerance", [10.0, 1.0, 0.1, 0.01, 0.0])
-def test_what_is_missing_is_what_was_said_and_within_the_tolerance(tolerance):
+def test_the_missing_part_is_as_estimated_and_within_the_tolerance(tolerance):
     static = static_model(np.random.default_rng(6))
     kept = np.arange(12) < 3
     combination, residual, missing = needed_coordinates(static, kept, tolerance)
@@ -73,7 +73,7 @@ def test_residual_vectors_are_never_more_than_loads_and_fewer_for_a_larger_toler
     assert counts[0] == 0 and counts[-1] == 5 and (np.diff(counts) >= 0).all()
 
 
-def test_nothing_to_choose_from_is_no_error():
+def test_when_all_modes_are_kept_no_residual_is_left():
     static = static_model(np.random.default_rng(8))
     combination, residual, missing = needed_coordinates(static, np.ones(12, bool), 0.0)
     assert np.allclose(combination, np.eye(12)) and not residual.any() and missing == 0.0

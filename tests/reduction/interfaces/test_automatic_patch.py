@@ -23,7 +23,7 @@ def beam(helpers):
     return quadratic_mesh(*helpers.box((20, 2, 2), (0.6, 0.02, 0.02), origin=(0, -0.01, -0.01)))
 
 
-def test_the_end_face_of_a_beam_is_held_whole_and_nothing_of_its_sides(beam):
+def test_the_patch_is_the_whole_end_face_of_a_beam_without_its_sides(beam):
     face, _ = look(beam, (0.6, 0.0, 0.0))
     assert np.array_equal(np.sort(face), np.flatnonzero(beam.nodes[:, 0] > 0.6 - 1e-9))
 

@@ -63,7 +63,7 @@ def test_the_automatic_radius_does_not_reach_for_an_anchor_in_the_air(beam, atta
         interface_patches(beam, [attachment("/j", 0.3, 0.0, 0.1)], -1.0, "/b")
 
 
-def test_the_axis_of_a_bore_is_held_by_a_band_of_its_wall(helpers, attachment):
+def test_the_patch_of_a_bore_is_a_band_of_its_wall(helpers, attachment):
     points, tets = helpers.box((8, 8, 2), (0.1, 0.1, 0.02), origin=(-0.05, -0.05, -0.01))
     center = points[tets].mean(axis=1)
     tets = tets[np.abs(center[:, :2]).max(axis=1) > 0.025]

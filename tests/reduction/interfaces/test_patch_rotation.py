@@ -69,7 +69,7 @@ def test_springs_are_stretched_by_the_green_strain_of_a_patch():
     assert np.allclose(spring_rows(roots, held, rotation) @ z, np.concatenate(expected), rtol=1e-12)
 
 
-def test_springs_let_a_patch_turn_by_any_angle():
+def test_springs_let_a_patch_rotate_by_any_angle():
     """In coordinates of sin(a) n and of the second order, as `dynamics.finite_rotation` has them."""
     turn = Rotation.from_rotvec([0.5, -0.3, 0.7]).as_matrix()
     axial = 0.5 * np.array([turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]])

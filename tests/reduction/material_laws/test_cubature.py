@@ -38,7 +38,7 @@ def reduced(r, data, points, lame, mu, u):
     return res[6:], K[6:, 6:]
 
 
-def test_few_points_bend_the_arm_as_all_do(arm):
+def test_few_cubature_points_deflect_the_arm_as_all_do(arm):
     model, basis, material = arm
     r = len(basis.omega_squared)
     lame, mu = lame_constants(material.youngs_modulus, material.poissons_ratio)

@@ -42,7 +42,7 @@ def test_intervals_are_halved_where_frames_and_the_least_distance_allow_it(grid)
 
 @pytest.mark.parametrize("cyclic", [False, True])
 @pytest.mark.parametrize("kept", [False, True])
-def test_finer_knots_hold_the_same_offsets(cyclic, kept):
+def test_finer_knots_contain_the_same_offsets(cyclic, kept):
     grid = make_grid(FINE_FRAMES, 1 / 240, 0.0, cyclic)
     old = make_basis(grid, 0.1, kept)
     new = basis_on(grid, halved(grid, old.breaks, np.arange(len(old.breaks) - 1) % 3 == 0), kept)
@@ -55,7 +55,7 @@ def test_finer_knots_hold_the_same_offsets(cyclic, kept):
         assert np.array_equal(useful_knots(new, y.reshape(-1, 2)[:, motor]), old.knots)
 
 
-def test_an_offset_that_is_carried_gets_the_knots_that_it_needs(grid):
+def test_an_offset_on_coarse_knots_gets_the_knots_that_it_needs(grid):
     fine = basis_on(grid, np.union1d(uniform_breaks(grid, 0.05), np.arange(60, 80, 3)).astype(np.int32), False)
     offsets = fine.values @ np.random.default_rng(1).normal(size=(fine.count, 2))
     breaks = breaks_for(grid, False, offsets)
@@ -68,7 +68,7 @@ def test_an_offset_that_is_carried_gets_the_knots_that_it_needs(grid):
     assert np.array_equal(breaks_for(grid, False, offsets), plain.breaks)
 
 
-def test_ranges_without_an_offset_carry_no_knots(grid):
+def test_intervals_without_an_offset_have_no_knots(grid):
     basis = make_basis(grid, 0.05, False)
     coefficients = np.random.default_rng(3).normal(size=basis.count)
     coefficients[8:20] = 0.0

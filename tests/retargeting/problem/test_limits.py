@@ -76,7 +76,7 @@ def test_all_limits_together(arm, animation, bodies, free):
     assert result.objective_after < 0.2 * result.objective_before
 
 
-def test_a_limit_that_nothing_can_keep_is_told_as_exceeded(arm, animation, bodies, free):
+def test_a_limit_that_cannot_be_kept_is_reported_as_exceeded(arm, animation, bodies, free):
     """The shoulder cannot even hold the arm."""
     result = optimize_shot(
         with_limits(arm, max_torque=[np.inf, 0.05]), animation, bodies, dataclasses.replace(OPTIONS, max_iterations=6),

@@ -61,7 +61,7 @@ def test_kept_ends_leave_value_and_slope_there():
 
 
 @pytest.mark.parametrize("kept", [False, True])
-def test_offsets_of_a_loop_are_smooth_at_its_seam_and_read_back_exactly(kept):
+def test_offsets_of_a_cyclic_shot_are_smooth_at_its_seam_and_read_back_exactly(kept):
     grid = make_grid(FRAMES, 1 / 240, 0.0, cyclic=True)
     basis = make_basis(grid, 0.1, kept)
     assert basis.wraps != kept

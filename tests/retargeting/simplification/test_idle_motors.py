@@ -39,7 +39,7 @@ def lean(shot, bodies):
     return optimize_shot(_marked(shot), shot.animation, bodies, FAST, ignore_progress)
 
 
-def test_a_head_stays_as_it_is_and_costs_little(shot, bodies, lean):
+def test_a_motor_of_the_head_is_not_optimised_and_the_loss_is_small(shot, bodies, lean):
     assert list(idle_motors(_marked(shot))) == [2, 3]
     every = optimize_shot(_marked(shot, {"motors": ON}), shot.animation, bodies, FAST, ignore_progress)
     assert [curve.changed for curve in lean.curves] == [True, True, False, False]
@@ -53,7 +53,7 @@ def test_a_head_stays_as_it_is_and_costs_little(shot, bodies, lean):
     assert "/Arm/Shake: not optimised" in rows and "/Arm/Nod: curve unchanged" not in rows
 
 
-def test_where_they_promise_much_the_search_goes_on_with_them(shot, bodies, monkeypatch):
+def test_the_search_continues_on_finer_knots_where_they_promise_a_gain(shot, bodies, monkeypatch):
     monkeypatch.setattr(to_tolerance, "ENOUGH", -1.0)
     result = optimize_to_tolerance(_marked(shot), shot.animation, bodies, FAST, ignore_progress)
     assert result.idle_gain_m is None

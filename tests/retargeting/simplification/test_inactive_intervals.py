@@ -61,7 +61,7 @@ def everywhere(arm, bodies):
     return optimize_shot(still(arm), pausing(), bodies, dataclasses.replace(OPTIONS, ranges="on"), ignore_progress)
 
 
-def test_a_hold_before_a_move_is_left_out_and_costs_nothing(arm, bodies, everywhere, monkeypatch):
+def test_an_inactive_interval_before_a_move_is_skipped_without_loss(arm, bodies, everywhere, monkeypatch):
     simulated, run = [], Simulator.run
 
     def counted(self, angles, rates):
@@ -91,7 +91,7 @@ def test_a_hold_before_a_move_is_left_out_and_costs_nothing(arm, bodies, everywh
 
 
 @pytest.mark.parametrize("locked", [False, True])
-def test_where_the_beginning_is_off_nothing_is_left_out_and_nothing_is_different(arm, bodies, monkeypatch, locked):
+def test_with_an_early_error_no_interval_is_inactive_and_the_result_is_the_same(arm, bodies, monkeypatch, locked):
     """The rigid robot does not sag, and the first pose is to be its; where it is locked it is simulated once."""
     animation, held, hold = pausing(0.8, 0.2), [], RetargetProblem.hold
     if locked:
@@ -114,7 +114,7 @@ def test_where_the_beginning_is_off_nothing_is_left_out_and_nothing_is_different
         assert dataclasses.astuple(one)[0::2] == dataclasses.astuple(other)[0::2]
 
 
-def test_what_is_left_out_stays_so_on_finer_knots(arm, bodies, monkeypatch):
+def test_inactive_intervals_stay_inactive_on_finer_knots(arm, bodies, monkeypatch):
     monkeypatch.setattr(adaptive_knots, "FIRST", 0.1)
     slow = jerking(0.9)
     times = np.arange(len(slow.frame_times) + 90) / 120.0
@@ -168,7 +168,7 @@ def test_ranges_keep_away_from_errors_limits_and_changes(arm, bodies):
     assert intervals_of(loop[0], animation=loop[1]) == ()
 
 
-def test_a_shot_that_is_quiet_throughout_and_one_without_vibration(arm, bodies):
+def test_a_shot_without_active_intervals_and_one_without_vibration(arm, bodies):
     times = np.arange(49) / 24.0
     tracks = (Track(times, 0.2 + 0.0 * times), Track(times, 0.0 * times))
     problem = make_problem(arm, bodies, Animation(times, tracks, tracks), static=True)
@@ -179,7 +179,7 @@ def test_a_shot_that_is_quiet_throughout_and_one_without_vibration(arm, bodies):
     assert inactive_intervals(problem, np.zeros(problem.size), 0.0, 1e-3) == ()
 
 
-def test_nothing_acts_before_the_first_change_on_finer_knots_either(arm, bodies):
+def test_finer_knots_before_the_first_change_have_no_effect(arm, bodies):
     problem = make_problem(arm, bodies, pausing(), pre_roll=0.2)
     grid, basis = problem.grid, basis_on(problem.grid, np.arange(0, 73, 6), False)
 

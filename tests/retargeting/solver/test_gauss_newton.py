@@ -85,7 +85,7 @@ def test_fixed_entries_stay_and_the_others_are_optimal():
     assert np.abs(problem.linearize()[~fixed]).max() < 1e-5
 
 
-def test_a_search_goes_on_from_any_iterate_as_if_it_had_not_stopped():
+def test_a_search_resumes_from_any_iterate_with_the_same_result():
     kept = []
     whole = minimize(
         Rosenbrock(), Search.start(np.array([-1.2, 1.0])), np.zeros(2, bool), 1e-18, on_iterate=kept.append
@@ -95,7 +95,7 @@ def test_a_search_goes_on_from_any_iterate_as_if_it_had_not_stopped():
         assert np.array_equal(again.x, whole.x) and len(again.history) == len(whole.history)
 
 
-def test_gain_that_is_expected_at_the_end_is_less_than_asked_for():
+def test_the_expected_gain_at_the_end_is_below_the_requested_gain():
     search = minimize(Problem(1), Search.start(np.zeros(5)), FREE, 1e-3)
     assert search.reason == "converged" and 0.0 <= search.history[-1].gain < 1e-3
 
@@ -110,7 +110,7 @@ def test_points_that_cannot_be_evaluated_are_kept_away_from():
     assert np.isfinite(search.history[-1].value) and np.linalg.norm(search.x) <= 0.2
 
 
-def test_what_was_learned_preconditions_the_next_system():
+def test_products_of_one_system_precondition_the_next():
     rng = np.random.default_rng(4)
     M = rng.normal(size=(30, 30))
     H = M @ M.T + 0.1 * np.eye(30)

@@ -26,7 +26,7 @@ def dense(basis_matrix, metric):
     return np.einsum("nax,nab,nby->xy", columns, metric, columns)
 
 
-def test_bands_hold_the_sum_over_instants(parts):
+def test_bands_contain_the_sum_over_instants(parts):
     basis, response, _ = parts
     metric = np.einsum("nab,ncb->nac", response.inertia, response.inertia)
     gram = BandedGram(basis.count, 3, basis.wraps)

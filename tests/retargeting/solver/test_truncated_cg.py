@@ -49,7 +49,7 @@ def test_it_ends_at_the_radius_where_little_is_left_and_at_the_limit(system):
     assert len(solve(H, g, limit=2).p) == 2
 
 
-def test_nothing_to_gain_takes_no_product(system):
+def test_a_search_without_gain_takes_no_product(system):
     H, _ = system
     path = solve(H, np.zeros(8))
     assert len(path.p) == 0 and np.array_equal(path.within(np.inf)[0], np.zeros(8))

@@ -27,7 +27,7 @@ def test_sparse_tracks_are_interpolated_and_held(count):
     assert rates[0, 0] == 0.0 and rates[-1, 0] == 0.0
 
 
-def test_a_loop_is_smooth_at_its_seam_and_goes_on_in_whole_turns():
+def test_a_cyclic_curve_is_smooth_at_its_seam_also_with_whole_revolutions():
     values = 0.3 * np.sin(2 * np.pi * FRAMES + 0.7) + 4 * np.pi * FRAMES
     curve = cyclic_curve(Track(FRAMES, values), FRAMES[-1])
     assert np.allclose(curve(FRAMES, 0), values)
@@ -38,7 +38,7 @@ def test_a_loop_is_smooth_at_its_seam_and_goes_on_in_whole_turns():
     assert np.allclose(curve(FRAMES, 1), curve(FRAMES - 2.0, 1))
 
 
-def test_sparse_samples_of_a_loop_are_completed_at_its_ends():
+def test_sparse_samples_of_a_cyclic_shot_are_completed_at_its_ends():
     for times in (np.array([0.5]), np.array([0.25, 0.75]), np.array([-0.2, 0.4, 1.3])):
         track = Track(times, np.cos(2 * np.pi * times))
         curve = cyclic_curve(track, 1.0)
@@ -47,7 +47,7 @@ def test_sparse_samples_of_a_loop_are_completed_at_its_ends():
         assert np.allclose(curve(np.array([0.0]), 0), curve(np.array([1.0]), 0))
 
 
-def test_loops_that_do_not_close_are_noticed():
+def test_chains_that_do_not_close_are_noticed():
     almost = Track(FRAMES, FRAMES * (2 * np.pi + 0.01))
     assert cycle_gap(almost, 1.0, turning=True) == pytest.approx(0.01)
     assert cycle_gap(almost, 1.0, turning=False) == pytest.approx(2 * np.pi + 0.01)
@@ -63,14 +63,14 @@ def test_a_corner_is_kept_and_the_rest_is_smooth():
     assert np.abs(rounded(fine, 0) - curve(fine, 0)).max() > 1e-3, "without it the corner would be rounded"
 
 
-def test_what_is_held_before_and_after_corners_is_at_rest():
+def test_constant_parts_before_and_after_corners_are_at_rest():
     track = Track(np.array([0.25, 0.5, 0.75]), np.array([0.0, 1.0, 0.0]), np.array([0.5]))
     curve = curve_of(track, 1.0, False)
     assert np.allclose(curve(np.array([0.0, 0.1, 0.9, 1.0]), 1), 0.0)
     assert np.allclose(curve(track.times, 0), track.values)
 
 
-def test_a_loop_keeps_its_corners():
+def test_a_cyclic_curve_keeps_its_corners():
     values = np.abs(FRAMES - 0.5)
     curve = curve_of(Track(FRAMES, values, np.array([0.5])), 1.0, True)
     fine = np.linspace(0.3, 0.7, 201)
@@ -80,6 +80,6 @@ def test_a_loop_keeps_its_corners():
     assert np.abs(np.diff(across)) < 1e-5, "its seam is no corner"
 
 
-def test_a_shot_without_motors_has_curves_of_none():
+def test_a_shot_without_motors_has_no_curves():
     angles, rates = sample_tracks([], make_grid(FRAMES, None, 0.0))
     assert angles.shape == rates.shape == (len(make_grid(FRAMES, None, 0.0).times), 0)

@@ -49,7 +49,7 @@ def test_velocities_are_those_of_the_motion(pre_roll):
         assert np.abs(world[0, 3:9]).max() < 1e-12, "a pre-roll starts at rest"
 
 
-def test_a_root_that_loops_is_smooth_at_the_seam():
+def test_a_cyclic_root_is_smooth_at_the_seam():
     wave = 2.0 * np.pi * FRAMES
     rotations = Rotation.from_rotvec(np.outer(0.4 * np.sin(wave + 0.3), AXIS))
     walked = np.outer(0.2 * np.sin(wave), [1.0, 0.5, 0.0])
@@ -104,7 +104,7 @@ def motion(t):
     return values, np.stack([0.05 * (1.0 - c), 0.3 * (1.0 - c)], axis=1)
 
 
-def test_a_told_root_moves_the_robot_as_motors_would():
+def test_a_prescribed_root_moves_the_robot_as_motors_would():
     tips = {}
     for h in (1.0 / 240.0, 1.0 / 480.0):
         t = np.arange(0.0, 1.0 + h / 2, h)

@@ -9,7 +9,7 @@ from calmotion.simulation.inputs.time_grid import make_grid
 FRAMES = np.arange(25) / 24.0
 
 
-def test_grid_divides_frames_and_is_no_coarser_than_asked():
+def test_grid_divides_frames_and_is_not_coarser_than_requested():
     grid = make_grid(FRAMES, 1 / 100, 0.31)
     assert grid.substeps == 5 and grid.h <= 1 / 100
     assert np.allclose(grid.times[grid.frames], FRAMES) and grid.pre_roll >= 0.31
@@ -26,7 +26,7 @@ def test_pre_roll_leaves_rest_and_meets_the_curve_smoothly():
     assert abs(acceleration[n] - acceleration[n - 1]) < 0.1 and abs(acceleration[0]) < 0.1
 
 
-def test_a_loop_has_the_last_instant_of_the_one_before_and_judges_its_first_frame_once():
+def test_a_cycle_starts_from_the_last_instant_of_the_previous_one_and_counts_its_first_frame_once():
     grid = make_grid(FRAMES, 1 / 240, 0.0, cyclic=True)
     assert np.allclose(grid.times[:3], [-grid.h, 0.0, grid.h]) and np.allclose(grid.times[grid.frames], FRAMES)
     assert grid.quadrature.sum() == pytest.approx(grid.end) and np.all(grid.quadrature[:2] == 0.0)

@@ -20,7 +20,7 @@ def move(stage, path: str, far: float) -> None:
 
 
 @pytest.mark.parametrize("path", [BASE, "/Arm"])
-def test_a_root_that_moves_and_is_held_is_refused_with_what_moves_it(tmp_path, path):
+def test_a_moving_root_that_is_fixed_to_the_world_is_refused_with_the_prim_that_moves_it(tmp_path, path):
     with pytest.raises(ShotError, match="holds it in the world") as caught:
         read(tmp_path, lambda stage: move(stage, path, 0.1))
     assert caught.value.path == path and "12" in caught.value.found and "kinematicEnabled" in caught.value.remedy

@@ -51,7 +51,7 @@ def test_bodies_and_joints_go_from_the_world_outwards(tmp_path):
     assert character.path == "/Arm"
 
 
-def test_without_a_default_prim_the_root_is_what_holds_all_bodies(tmp_path):
+def test_without_a_default_prim_the_root_is_the_common_parent_of_all_bodies(tmp_path):
     character = read(tmp_path, lambda stage: stage.ClearDefaultPrim())
     assert character.path == "/Arm"
 
@@ -64,7 +64,7 @@ def test_a_character_without_a_joint_to_the_world_is_held_at_its_pose(tmp_path):
     assert any("fixed at its pose" in note and BASE in note for note in character.notes)
 
 
-def test_a_kinematic_body_is_what_holds_it(tmp_path):
+def test_a_kinematic_body_is_the_root(tmp_path):
     def edit(stage):
         stage.RemovePrim("/Arm/joints/stand")
         UsdPhysics.RigidBodyAPI(stage.GetPrimAtPath(FORE)).CreateKinematicEnabledAttr(True)
@@ -73,7 +73,7 @@ def test_a_kinematic_body_is_what_holds_it(tmp_path):
     assert character.bodies[character.joints[0].body1].path == FORE
 
 
-def test_what_no_motor_moves_is_left_out_with_a_note(tmp_path):
+def test_bodies_that_no_motor_moves_are_removed_with_a_note(tmp_path):
     def edit(stage):
         drum = UsdGeom.Cube.Define(stage, "/Drum").GetPrim()
         UsdPhysics.RigidBodyAPI.Apply(drum)
@@ -106,7 +106,7 @@ def test_nested_bodies_have_their_own_poses(tmp_path):
     assert character.targets[0].path == f"{FORE}/finger"
 
 
-def test_a_disabled_body_is_no_body(tmp_path):
+def test_a_disabled_body_is_ignored(tmp_path):
     def edit(stage):
         UsdPhysics.RigidBodyAPI(stage.GetPrimAtPath(BASE)).CreateRigidBodyEnabledAttr(False)
 

@@ -126,7 +126,7 @@ def test_time_codes_that_are_not_frames(tmp_path):
     assert np.allclose(np.diff(times), np.diff(times)[0]) and len(times) == FRAMES + 1
 
 
-def test_a_spline_that_repeats_itself_goes_on_through_the_shot(tmp_path):
+def test_a_repeating_spline_covers_the_whole_shot(tmp_path):
     def looping(stage, inner):
         reference(stage, inner)
         spline = Ts.Spline("float")

@@ -57,7 +57,7 @@ def test_the_scale_of_a_body_is_in_its_anchors(tmp_path):
     assert np.allclose(joint(read(tmp_path, edit), ELBOW).frame0.position, [LENGTH, 0, 0], atol=1e-6)
 
 
-def test_a_body_that_is_no_rigid_body_is_the_world(tmp_path):
+def test_a_prim_that_is_not_a_rigid_body_is_the_world(tmp_path):
     def edit(stage):
         pedestal = UsdGeom.Xform.Define(stage, "/Arm/pedestal")
         pedestal.AddTranslateOp().Set(Gf.Vec3d(0, 2, 0))
@@ -114,7 +114,7 @@ def test_a_disabled_joint_is_not_there(tmp_path):
     assert len(read(tmp_path, edit).joints) == 3
 
 
-def test_a_joint_that_closes_a_loop_is_read_as_a_joint(tmp_path):
+def test_a_joint_that_closes_a_chain_is_read_as_a_joint(tmp_path):
     def edit(stage):
         extra = UsdPhysics.RevoluteJoint.Define(stage, "/Arm/joints/loop")
         extra.CreateBody0Rel().SetTargets([BASE])

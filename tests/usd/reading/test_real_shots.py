@@ -40,7 +40,7 @@ def test_every_shot_loads_or_is_refused_with_a_place_and_a_remedy(rows, shared_d
             assert row.outcome != REFUSED or row.reason.count(". ") >= 1, row
 
 
-def test_a_reference_that_is_missing_is_told_once_with_the_file(rows):
+def test_a_missing_reference_is_reported_once_with_the_file(rows):
     reason = rows["robots/dr_legs/usd/dr_legs.usda"].reason
     assert "Geometry/surfaces.usd" in reason and "30 other prims" in reason and reason.count("cannot be opened") == 1
 
@@ -72,7 +72,7 @@ def test_a_robot_of_a_skeleton_does_what_the_skeleton_does(shared_data, tmp_path
     assert far < 1e-6 and turned < 1e-6
 
 
-def test_the_one_hinge_turns_by_as_much_as_was_animated(shared_data, tmp_path):
+def test_the_hinge_rotates_by_the_animated_angle(shared_data, tmp_path):
     rig = rig_shot(str(shared_data / "skel/RiggedSimple/RiggedSimple.usdz"), str(tmp_path / "rig.usda"))
     (joint,) = rig.joints
     assert len(joint.motors) == 1

@@ -37,7 +37,7 @@ def test_without_a_scene_gravity_is_the_earths_down_the_up_axis(tmp_path):
         ((0, 0, 0), 981.0, [0, 0, -9.81]),
     ],
 )
-def test_the_conventions_of_usdphysics_hold(tmp_path, direction, magnitude, expected):
+def test_the_conventions_of_usdphysics_are_followed(tmp_path, direction, magnitude, expected):
     found = read(tmp_path, lambda stage: scene(stage, direction, magnitude), Scale(0.01, 1.0)).gravity
     assert np.allclose(found, expected, atol=1e-6)
 

@@ -68,7 +68,7 @@ def test_a_copy_of_a_mesh_for_collisions_is_not_shown_twice(shared_data):
     assert [s.visible for s in elbow.surfaces] == [True, False]
 
 
-def test_the_legs_keep_their_loops_and_end_at_the_feet(shared_data):
+def test_the_legs_keep_their_closed_chains_and_end_at_the_feet(shared_data):
     character, animation, _ = read_shot(str(shared_data / "shots" / "dr_legs_walk.usda"))
     assert (len(character.bodies), len(character.motors)) == (31, 12)
     assert sum(j.kind == "revolute" for j in character.joints) == 36

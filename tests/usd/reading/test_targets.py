@@ -99,7 +99,7 @@ def test_a_target_without_a_transform_is_refused(tmp_path):
 @pytest.mark.parametrize(
     "weights", [{"positionWeight": -1.0}, {"rotationWeight": float("nan")}, {"positionWeight": 0.0}]
 )
-def test_weights_that_weigh_nothing_are_refused(tmp_path, weights):
+def test_zero_weights_are_refused(tmp_path, weights):
     with pytest.raises(ShotError) as caught:
         read(tmp_path, lambda stage: make_target(stage, **weights))
     assert caught.value.path == HAND and caught.value.attribute.startswith("calm:target:")

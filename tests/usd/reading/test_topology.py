@@ -26,14 +26,14 @@ def test_distances_count_joints_from_the_world_outwards():
     assert list(distances(list("dcba"), CHAIN))[0] == "a"
 
 
-def test_leaves_are_the_outermost_bodies_also_in_loops():
+def test_leaves_are_the_outermost_bodies_also_in_closed_chains():
     assert leaves(list("abcd"), CHAIN) == ["c", "d"]
     four_bar = [joint("", "base"), joint("base", "left"), joint("base", "right"), joint("left", "top"),
                 joint("right", "top")]  # fmt: skip
     assert leaves(["base", "left", "right", "top"], four_bar) == ["top"]
 
 
-def test_the_common_path_is_the_deepest_that_holds_all():
+def test_the_common_path_is_the_deepest_that_contains_all():
     assert common_path(["/a/b/c", "/a/b/d"]) == "/a/b"
     assert common_path(["/a/b", "/a/bc"]) == "/a"
     assert common_path(["/a/b"]) == "/a/b"

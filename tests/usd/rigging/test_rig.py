@@ -101,7 +101,7 @@ def test_the_robot_does_what_the_skeleton_does(tmp_path, options):
     assert far < 1e-6 and turned < 2e-6
 
 
-def test_a_looser_tolerance_needs_fewer_hinges_and_says_what_it_leaves(tmp_path):
+def test_a_looser_tolerance_needs_fewer_hinges_and_reports_the_residual_angle(tmp_path):
     shot = skinned(tmp_path / "worm.usda")
     rig = rig_shot(str(shot), str(tmp_path / "rig.usda"), RigOptions(angle_tolerance=np.radians(80.0)))
     assert len(rig.joints) == 0 or sum(len(j.motors) for j in rig.joints) < 3
@@ -114,7 +114,7 @@ def test_a_root_that_moves_is_carried_by_its_transform(tmp_path):
     assert np.ptp(animation.moving[0].positions[:, 2]) == pytest.approx(0.1, abs=1e-6)
 
 
-def test_links_that_bend_are_as_asked_for(tmp_path):
+def test_the_requested_links_are_flexible(tmp_path):
     shot = skinned(tmp_path / "worm.usda")
     rig_shot(str(shot), str(tmp_path / "rig.usda"), RigOptions(material="pla", flexible=("upper",)))
     character, _, _ = read_shot(str(tmp_path / "rig.usda"))

@@ -46,14 +46,14 @@ PLACES = {
 }
 
 
-def test_the_reader_tells_everything_at_once(tmp_path):
+def test_the_reader_reports_all_problems_at_once(tmp_path):
     with pytest.raises(ShotErrors) as caught:
         read_shot(str(write_arm(tmp_path / "arm.usda", broken)))
     assert {(error.path, error.attribute) for error in caught.value.errors} == PLACES
     assert all(error.remedy for error in caught.value.errors)
 
 
-def test_several_missing_files_are_told_at_once(tmp_path):
+def test_several_missing_files_are_reported_at_once(tmp_path):
     shot = write_arm(tmp_path / "arm.usda")
     layer = Sdf.Layer.OpenAsAnonymous(str(shot))
     for path in (FORE, BASE):
@@ -79,7 +79,7 @@ def test_findings_are_those_of_the_reader_and_of_usd(tmp_path):
     assert any(item.rule == "usdPhysicsValidators:RigidBodyChecker" and item.path == FORE for item in items)
 
 
-def test_a_misspelt_attribute_is_told_with_the_nearest_name(tmp_path):
+def test_a_misspelt_attribute_is_reported_with_the_nearest_name(tmp_path):
     def edit(stage):
         stage.GetPrimAtPath(ELBOW).AddAppliedSchema("CalmMotorAPI")
         set_float(stage, ELBOW, "calm:motor:maxVelocty", 3.0)
@@ -88,7 +88,7 @@ def test_a_misspelt_attribute_is_told_with_the_nearest_name(tmp_path):
     assert (item.path, item.attribute) == (ELBOW, "calm:motor:maxVelocty") and "calm:motor:maxVelocity" in item.remedy
 
 
-def test_an_attribute_whose_schema_is_not_applied_is_told(tmp_path):
+def test_an_attribute_whose_schema_is_not_applied_is_reported(tmp_path):
     (item,) = of_rule(findings(tmp_path, lambda s: set_float(s, ELBOW, "calm:motor:maxTorque", 3.0)), "SchemasAreKnown")
     assert item.path == ELBOW and "CalmMotorAPI" in item.remedy
 
@@ -97,7 +97,7 @@ def test_an_attribute_whose_schema_is_not_applied_is_told(tmp_path):
     ("schema", "path"),
     [("CalmFlexibleBodyAPI", "/Arm/joints"), ("CalmDampingAPI", FORE), ("CalmMotorAPI", FORE)],
 )
-def test_a_schema_in_the_wrong_place_is_told(tmp_path, schema, path):
+def test_a_schema_on_the_wrong_prim_is_reported(tmp_path, schema, path):
     def edit(stage):
         UsdGeom.Xform.Define(stage, "/Arm/joints")
         stage.GetPrimAtPath(path).AddAppliedSchema(schema)
@@ -116,13 +116,13 @@ def test_schemas_in_their_places_are_fine(tmp_path):
     assert not of_rule(items, "SchemasFit") and not of_rule(items, "SchemasAreKnown")
 
 
-def test_an_animation_beyond_a_limit_is_told(tmp_path):
+def test_an_animation_beyond_a_limit_is_reported(tmp_path):
     items = findings(tmp_path, lambda stage: set_float(stage, ELBOW, "physics:upperLimit", 50.0))
     (item,) = of_rule(items, "AnimationKeepsLimits")
     assert item.path == ELBOW and "70" in item.found and "50" in item.found
 
 
-def test_bodies_off_their_joints_are_told(tmp_path):
+def test_bodies_off_their_joints_are_reported(tmp_path):
     def edit(stage):
         posed(stage)
         op = UsdGeom.Xformable(stage.GetPrimAtPath(FORE)).GetOrderedXformOps()[0]
@@ -132,7 +132,7 @@ def test_bodies_off_their_joints_are_told(tmp_path):
     assert item.level == "warning" and item.path == ELBOW and "50 mm at time code 12" in item.found
 
 
-def test_our_rules_run_in_usd_s_own_framework(tmp_path):
+def test_calmotion_s_rules_run_in_usd_s_own_framework(tmp_path):
     register_validators()
     register_validators()  # once is enough, twice no harm
     stage = Usd.Stage.Open(str(write_arm(tmp_path / "arm.usda", broken)))
@@ -149,7 +149,7 @@ def principal_axes(stage) -> None:
         stage.GetPrimAtPath(path).CreateAttribute("physics:principalAxes", Sdf.ValueTypeNames.Quatf).Set(Gf.Quatf(1))
 
 
-def test_a_clean_shot_passes_the_gate_and_a_broken_one_does_not(calmotion, tmp_path):
+def test_a_correct_shot_passes_the_strict_check_and_a_broken_one_does_not(calmotion, tmp_path):
     clean = write_arm(tmp_path / "clean.usda", principal_axes)
     done = calmotion("inspect", clean, "--strict")
     assert done.returncode == 0, done.stdout

@@ -124,7 +124,7 @@ def test_rigid_bodies_keep_the_points_of_their_meshes(tmp_path):
     assert not found.layer.GetPrimAtPath(f"{FORE}/skin")
 
 
-def test_the_extent_holds_the_deformed_points(tmp_path):
+def test_the_extent_contains_the_deformed_points(tmp_path):
     found = baked(tmp_path, modes=2)
     mesh = found.stage.GetPrimAtPath(f"{FORE}/skin")
     points = gf.points(mesh.GetAttribute("points").Get(3))

@@ -27,7 +27,7 @@ def authored(path, attribute, linear):
 
 
 @pytest.mark.parametrize(("rate", "parts"), [(24.0, 1), (25.0, 2), (96.0, 4), (1.0, 1)])
-def test_samples_are_at_least_as_dense_as_asked_for_and_hold_the_frames(rate, parts):
+def test_samples_are_at_least_as_dense_as_requested_and_contain_the_frames(rate, parts):
     times = sample_times(FRAMES, rate)
     assert len(times) == 12 * parts + 1
     assert np.allclose(times[::parts], FRAMES)

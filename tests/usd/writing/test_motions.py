@@ -28,6 +28,6 @@ def test_an_interrupted_run_gives_the_frames_it_reached():
     assert len(found.times) == 5
 
 
-def test_frames_that_are_no_steps_are_a_mistake_of_ours():
+def test_frames_that_are_not_steps_are_an_internal_error():
     with pytest.raises(ValueError, match="not steps"):
         simulated_motion(motion(np.arange(100) / 100.0), np.arange(20) / 24.0)

@@ -84,7 +84,7 @@ def test_root_layer_opens_and_reads_back_as_intent_and_current(optimised):
     assert provenance.earlier_layers and len(character.motors) == 2
 
 
-def test_root_layer_says_units_and_time_and_names_its_layers_relatively(optimised):
+def test_root_layer_has_units_and_time_and_relative_paths_of_its_layers(optimised):
     _, root = optimised.write()
     layer = Sdf.Layer.FindOrOpen(root)
     assert [path.lstrip("./") for path in layer.subLayerPaths] == ["calm.usda", "shot.usda"]
@@ -94,7 +94,7 @@ def test_root_layer_says_units_and_time_and_names_its_layers_relatively(optimise
     assert UsdGeom.GetStageUpAxis(stage) == "Z" and layer.defaultPrim == "Arm"
 
 
-def test_metadata_holds_version_hashes_and_errors(optimised):
+def test_metadata_contain_version_hashes_and_errors(optimised):
     layer_path, _ = optimised.write()
     data = Sdf.Layer.FindOrOpen(layer_path).customLayerData["calmotion"]
     assert data["version"] and list(data["sha256"]) == [digest(optimised.shot)]

@@ -73,7 +73,7 @@ def test_a_motion_over_a_result_keeps_its_curves(tmp_path):
     assert names(shot_layers(moved, (stages.MOTION,))) == ["calm.usda", "arm.usda"]
 
 
-def test_curves_that_somebody_took_into_a_shot_of_their_own_are_noticed(tmp_path):
+def test_curves_that_were_copied_into_another_shot_are_noticed(tmp_path):
     write_arm(tmp_path / "arm.usda")
     layer_of_ours(tmp_path / "calm.usda", stages.CURVES, 5.0)
     own = tmp_path / "own.usda"

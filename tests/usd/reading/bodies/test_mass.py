@@ -24,7 +24,7 @@ def test_authored_values_are_taken_as_they_are(tmp_path):
     assert np.allclose(mass.inertia, np.diag([1e-4, 7e-3, 7e-3]))
 
 
-def test_principal_axes_turn_the_inertia(tmp_path):
+def test_principal_axes_rotate_the_inertia(tmp_path):
     def edit(stage):
         turn = Gf.Quatf(float(np.cos(np.pi / 4)), 0, 0, float(np.sin(np.pi / 4)))  # a quarter about z: x to y
         UsdPhysics.MassAPI(stage.GetPrimAtPath(FORE)).CreatePrincipalAxesAttr(turn)

@@ -91,7 +91,7 @@ def test_instanced_geometry_is_read_but_cannot_be_written_back(tmp_path):
     assert surface.points[:, 1].mean() == pytest.approx(0.5)
 
 
-def test_holes_are_left_out(tmp_path):
+def test_holes_are_not_part_of_the_polygon(tmp_path):
     def edit(stage):
         UsdGeom.Mesh(stage.GetPrimAtPath(f"{FORE}/skin")).CreateHoleIndicesAttr([0, 3])
 
@@ -155,7 +155,7 @@ def points_instanced(stage):
     instancer.CreateProtoIndicesAttr([0, 0])
 
 
-def test_point_instances_are_passed_over_on_a_rigid_body_and_refused_on_a_flexible_one(tmp_path):
+def test_point_instances_are_skipped_on_a_rigid_body_and_refused_on_a_flexible_one(tmp_path):
     character, _, _ = read_shot(str(write_arm(tmp_path / "rigid.usda", points_instanced)))
     fore = next(b for b in character.bodies if b.path == FORE)
     assert [s.path for s in fore.surfaces] == [f"{FORE}/skin"]

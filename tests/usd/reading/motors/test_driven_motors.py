@@ -63,7 +63,7 @@ def test_a_drive_that_pulls_nowhere_leaves_its_joint_free(tmp_path):
     assert any("moves freely" in note for note in character.notes)
 
 
-def test_a_drive_with_stiffness_alone_holds_zero(tmp_path):
+def test_a_drive_with_only_a_stiffness_keeps_angle_zero(tmp_path):
     def edit(stage):
         clear(stage, ELBOW)
         UsdPhysics.DriveAPI(stage.GetPrimAtPath(ELBOW), "angular").CreateStiffnessAttr(100.0)
@@ -111,7 +111,7 @@ def test_a_motor_inside_an_instance_is_refused(tmp_path):
     assert "instanceable" in caught.value.remedy
 
 
-def test_a_fixed_joint_is_no_motor(tmp_path):
+def test_a_fixed_joint_is_not_a_motor(tmp_path):
     with pytest.raises(ShotError, match="fixed joint cannot be a motor"):
         read(tmp_path, lambda stage: stage.GetPrimAtPath("/Arm/joints/stand").AddAppliedSchema("CalmMotorAPI"))
 

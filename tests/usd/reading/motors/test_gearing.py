@@ -72,7 +72,7 @@ def test_the_dialect_of_higher_priority_wins(tmp_path):
     assert character.motors[1].follows.ratio == pytest.approx(-0.5)
 
 
-def test_a_gear_that_is_switched_off_is_none(tmp_path):
+def test_a_disabled_gear_is_ignored(tmp_path):
     def edit(stage):
         newton(stage)
         stage.GetPrimAtPath(ELBOW).CreateAttribute("newton:mimicEnabled", Sdf.ValueTypeNames.Bool).Set(False)
@@ -98,7 +98,7 @@ def test_a_rack_is_geared_in_metres_for_radians(tmp_path):
     assert character.motors[1].follows.ratio == pytest.approx(0.005 / (2.0 * np.pi))
 
 
-def test_an_animation_of_its_own_is_not_used_and_that_is_said(tmp_path):
+def test_the_animation_of_a_geared_joint_is_ignored_with_a_note(tmp_path):
     character, animation, _ = read(tmp_path, newton)
     assert np.allclose(animation.tracks[1].values, 10.0 * RADIANS - 0.5 * animation.tracks[0].values)
     assert any(ELBOW in note and "not used" in note for note in character.notes)
@@ -117,7 +117,7 @@ def test_a_leader_that_no_motor_drives_is_refused(tmp_path):
 
 
 @pytest.mark.parametrize("target", [ELBOW, "/Arm/joints/stand", "/Arm/nothing"])
-def test_a_leader_that_is_none_is_refused(tmp_path, target):
+def test_a_leader_that_is_not_a_joint_is_refused(tmp_path, target):
     def edit(stage):
         newton(stage)
         stage.GetPrimAtPath(ELBOW).GetRelationship("newton:mimicJoint").SetTargets([target])

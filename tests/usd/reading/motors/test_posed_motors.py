@@ -35,7 +35,7 @@ def test_a_shot_in_centimetres_is_the_same(tmp_path):
     assert max(worst_gap(path, character, animation)) < 1e-6
 
 
-def test_many_turns_are_unwrapped(tmp_path):
+def test_many_revolutions_are_unwrapped(tmp_path):
     def turn(frame):
         return 60.0 * frame, -45.0 * frame
 
@@ -51,7 +51,7 @@ def test_many_turns_are_unwrapped(tmp_path):
 
 
 @pytest.mark.parametrize("first", [-92.0, 120.0, 179.0, -179.0])
-def test_an_angle_beyond_a_quarter_turn_is_read_as_it_is(tmp_path, first):
+def test_an_angle_beyond_90_degrees_is_read_unchanged(tmp_path, first):
     _, _, animation = read(tmp_path, lambda stage: posed(stage, turn=lambda frame: (first + 0.01 * frame, -first)))
     assert np.degrees([track.values[0] for track in animation.tracks]) == pytest.approx([first, -first])
 
@@ -65,7 +65,7 @@ def test_sparse_samples_follow_what_usd_composes_at_the_frames(tmp_path):
     assert any("away from its joint frame" in note for note in character.notes)
 
 
-def test_nested_bodies_are_read_as_they_are_composed(tmp_path):
+def test_nested_bodies_are_read_with_their_composed_transforms(tmp_path):
     def edit(stage):
         posed(stage)
         # a forearm whose transform is relative to a prim that moves as well

@@ -59,7 +59,7 @@ def test_a_joint_that_no_skeleton_has_is_refused_with_those_there_are(tmp_path):
     assert ARM in caught.value.remedy
 
 
-def test_motors_of_one_joint_must_carry_each_other(tmp_path):
+def test_motors_of_one_joint_must_form_a_chain(tmp_path):
     def edit(stage):
         skeletal(stage)
         # the shoulder carries the elbow: these do. A third motor on the base does not.

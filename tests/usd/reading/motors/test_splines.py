@@ -63,7 +63,7 @@ def test_the_track_is_the_spline_between_the_frames_too(tmp_path, name):
     assert np.abs(found - meant(spline, FINE)).max() < 1e-6
 
 
-def test_corners_are_kept_and_told(tmp_path):
+def test_corners_are_kept_and_reported(tmp_path):
     _, (character, animation, _), _ = read(tmp_path, "corners")
     assert np.allclose(animation.tracks[1].corners, [6 / RATE, 15 / RATE])
     note = next(note for note in character.notes if "corners" in note)
@@ -72,7 +72,7 @@ def test_corners_are_kept_and_told(tmp_path):
     assert not len(animation.tracks[1].corners) and not any("corners" in note for note in character.notes)
 
 
-def test_a_step_is_played_in_a_hundredth_of_a_second_and_told(tmp_path):
+def test_a_step_of_a_curve_becomes_a_ramp_of_10_ms_and_is_reported(tmp_path):
     _, (character, animation, _), spline = read(tmp_path, "a step")
     found = curve_of(animation.tracks[1], 1.0, False)(FINE, 0)
     step = 16 / RATE
