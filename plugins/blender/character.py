@@ -15,8 +15,8 @@ def character_of(context: bpy.types.Context) -> bpy.types.Object | None:
         while obj is not None:
             if obj.type == "ARMATURE":
                 return obj
-            found = obj.find_armature()
-            top, obj = obj, found if found is not None else obj.parent
+            armature = obj.find_armature()
+            top, obj = obj, armature if armature is not None else obj.parent
         if top is not None and is_animated(top):
             return top
     return None

@@ -42,6 +42,6 @@ def command_of(context: bpy.types.Context) -> list[str] | None:
     preferences = preferences_of(context)
     words = shlex.split((preferences.command if preferences else "") or os.environ.get(COMMAND_VARIABLE, ""))
     if not words:
-        found = shutil.which("calmotion")
-        return [found] if found else None
+        command = shutil.which("calmotion")
+        return [command] if command else None
     return words if shutil.which(words[0]) else None

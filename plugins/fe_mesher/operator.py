@@ -49,8 +49,8 @@ class TetrahedralizeFlexibleBodies(Operator):
         from .accuracy import carrier_of
         from .body_mesh import MeshOptions, mesh_body
 
-        needs = context.get(ModelChoices)
-        character = context.get(Character) if needs is None else needs.character
+        choices = context.get(ModelChoices)
+        character = context.get(Character) if choices is None else choices.character
         options = MeshOptions(
             element_size=context.properties.element_size,
             time_limit=context.properties.time_limit,

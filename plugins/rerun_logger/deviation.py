@@ -37,15 +37,15 @@ def deviation_colors(
     """Colors of the points of a surface at each frame, shape [f, n, 4], or None where the deviation cannot be seen.
 
     Args:
-        color: The surface's own, 8 bits.
+        color: Color of the surface, 8 bits.
         points, modes, body, motion, reference: As for `deviations`.
         scale: Deviation that has the whole color change [m].
     """
     share = deviations(points, modes, body, motion, reference) / max(scale, 1e-12)
     if share.max(initial=0.0) < SEEN:
         return None
-    own = np.array(color[:3], dtype=float)
-    mixed = own + np.clip(share, 0.0, 1.0)[..., None] * (OFF - own)
-    found = np.full((*share.shape, 4), 255, dtype=np.uint8)
-    found[..., :3] = mixed.round()
-    return found
+    base = np.array(color[:3], dtype=float)
+    mixed = base + np.clip(share, 0.0, 1.0)[..., None] * (OFF - base)
+    colors = np.full((*share.shape, 4), 255, dtype=np.uint8)
+    colors[..., :3] = mixed.round()
+    return colors

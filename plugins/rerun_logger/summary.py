@@ -71,8 +71,8 @@ def sizes(character: Character, result: Result, system: SystemModes | None) -> s
         f"- time step {1e3 * result.step_s:g} ms, pre-roll {result.pre_roll_s:g} s",
     ]
     if system is not None:
-        found = ", ".join(f"{f:.1f}" for f in system.frequencies[:SHOWN_MODES])
-        lines.append(f"- modes of the whole character in its first pose: {found} Hz")
+        frequencies = ", ".join(f"{f:.1f}" for f in system.frequencies[:SHOWN_MODES])
+        lines.append(f"- modes of the whole character in its first pose: {frequencies} Hz")
     names = distinct_names([body.path for body in character.bodies])
     for table in result.modes:
         shown = ", ".join(f"{f:.1f}" for f in table.frequencies[:6])
@@ -89,9 +89,9 @@ def left_out(result: Result) -> str:
     if not result.left_out:
         return "## Simplifications\nNone."
     rows = ["| what | why | estimated error |", "|---|---|---:|"]
-    for item in result.left_out:
-        cost = "none" if item.estimated_error_m is None else f"{1e3 * item.estimated_error_m:.3g} mm"
-        rows.append(f"| {item.what} | {item.why} | {cost} |")
+    for row in result.left_out:
+        cost = "none" if row.estimated_error_m is None else f"{1e3 * row.estimated_error_m:.3g} mm"
+        rows.append(f"| {row.what} | {row.why} | {cost} |")
     return "## Simplifications\n" + "\n".join(rows)
 
 

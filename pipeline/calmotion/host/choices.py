@@ -35,7 +35,7 @@ def disabled_plugins(environment: Mapping[str, str] | None = None) -> frozenset[
     """
     file = configuration_folder(environment) / FILE_NAME
     try:
-        found = tomllib.loads(file.read_text(encoding="utf-8")).get("disabled", [])
+        ids = tomllib.loads(file.read_text(encoding="utf-8")).get("disabled", [])
     except (FileNotFoundError, NotADirectoryError):
         return frozenset()
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
@@ -45,15 +45,15 @@ def disabled_plugins(environment: Mapping[str, str] | None = None) -> frozenset[
             found=error,
             remedy="Correct or remove the file.",
         ) from error
-    if not (isinstance(found, list) and all(isinstance(name, str) for name in found)):
+    if not (isinstance(ids, list) and all(isinstance(name, str) for name in ids)):
         raise SettingError(
             "must be a list of ids",
             path=str(file),
             attribute="disabled",
-            found=repr(found),
+            found=repr(ids),
             remedy="Correct or remove the file.",
         )
-    return frozenset(found)
+    return frozenset(ids)
 
 
 def choose(plugin_id: str, enabled: bool, environment: Mapping[str, str] | None = None) -> Path:

@@ -58,11 +58,11 @@ def find_entry_points() -> list[Location]:
     """Plugins of installed distributions: entry points whose value is a package that holds `plugin.toml`."""
     from importlib.metadata import entry_points
 
-    found = []
+    locations = []
     for point in sorted(entry_points(group=ENTRY_POINT_GROUP), key=lambda point: point.name):
         origin = f"entry point {point.name}" + (f" of {point.dist.name}" if point.dist else "")
-        found.append(Location(_package_folder(point.module) or Path(point.name), origin, point.module))
-    return found
+        locations.append(Location(_package_folder(point.module) or Path(point.name), origin, point.module))
+    return locations
 
 
 def _package_folder(module: str) -> Path | None:
@@ -92,26 +92,26 @@ def discover(folders: Iterable[str | Path] = (), environment: Mapping[str, str] 
     """
     variables = os.environ if environment is None else environment
     bundled = bundled_folder()
-    found = find_in_folder(bundled, "bundled") if bundled and bundled.is_dir() else []
-    found += find_entry_points()
+    locations = find_in_folder(bundled, "bundled") if bundled and bundled.is_dir() else []
+    locations += find_entry_points()
     for text in variables.get(FOLDERS_VARIABLE, "").split(os.pathsep):
-        found += _named(Path(text), FOLDERS_VARIABLE) if text.strip() else []
+        locations += _named(Path(text), FOLDERS_VARIABLE) if text.strip() else []
     for folder in folders:
-        found += _named(Path(folder), "--plugins")
-    unique = {location.folder: location for location in reversed(found)}
-    return [location for location in found if unique.pop(location.folder, None)]
+        locations += _named(Path(folder), "--plugins")
+    unique = {location.folder: location for location in reversed(locations)}
+    return [location for location in locations if unique.pop(location.folder, None)]
 
 
 def _named(folder: Path, origin: str) -> list[Location]:
     folder = folder.expanduser()
-    found = find_in_folder(folder, f"{origin} {folder}") if folder.is_dir() else []
-    if not found:
+    locations = find_in_folder(folder, f"{origin} {folder}") if folder.is_dir() else []
+    if not locations:
         raise SettingError(
             f"{origin} names a folder without a plugin",
             path=str(folder),
             remedy=f"Name a folder that holds {FILE_NAME}, or whose sub-folders do.",
         )
-    return found
+    return locations
 
 
 def import_plugin(plugin_id: str, location: Location) -> ModuleType:

@@ -84,10 +84,10 @@ class Host:
         Raises:
             PluginError: When there is none.
         """
-        found = sorted((p for p in self.plugins if p.id == plugin_id), key=lambda p: p.state == PluginState.FAILED)
-        if not found:
+        matching = sorted((p for p in self.plugins if p.id == plugin_id), key=lambda p: p.state == PluginState.FAILED)
+        if not matching:
             raise PluginError("there is no such plugin", path=plugin_id, remedy="See calmotion plugins list.")
-        return found[0]
+        return matching[0]
 
     def plugin_of(self, idname: str) -> Plugin:
         """The plugin that registered an operator."""

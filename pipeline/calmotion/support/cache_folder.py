@@ -8,8 +8,8 @@ from pathlib import Path
 
 def cache_folder() -> Path:
     """The user's cache folder of calmotion: `$CALMOTION_CACHE`, else `calmotion` in the system's cache folder."""
-    own = os.environ.get("CALMOTION_CACHE")
-    if own:
-        return Path(own)
+    chosen = os.environ.get("CALMOTION_CACHE")
+    if chosen:
+        return Path(chosen)
     base = os.environ.get("XDG_CACHE_HOME") or os.environ.get("LOCALAPPDATA") or Path.home() / ".cache"
     return Path(base) / "calmotion"

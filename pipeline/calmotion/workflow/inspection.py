@@ -81,10 +81,10 @@ class Inspection:
 def inspect_report(run: Run) -> dict[str, Any]:
     """The object of `inspect --json`; SI units and radians, as the names of the keys say."""
     character, animation, provenance = run.data[Character], run.data[Animation], run.data[Provenance]
-    reduced, modes, needs = run.get(ReducedBodies), run.get(SystemModes), run.get(ModelChoices)
+    reduced, modes, choices = run.get(ReducedBodies), run.get(SystemModes), run.get(ModelChoices)
     tables = {table.body: table for table in reduced.modes} if reduced else {}
     names = [body.path for body in character.bodies]
-    bends = [body.bends for body in (needs.character if needs else character).bodies]
+    bends = [body.bends for body in (choices.character if choices else character).bodies]
     return {
         "command": "inspect",
         "version": __version__,
@@ -130,17 +130,17 @@ def inspect_report(run: Run) -> dict[str, Any]:
         "system_damping_ratios": modes.damping[:SHOWN_MODES].tolist() if modes else [],
         "mode_shapes": list(shapes.paths) if (shapes := run.get(ModeShapes)) else [],
         "notes": list(character.notes),
-        "needs": [dataclasses.asdict(row) for row in needs.rows] if needs else [],
-        "left_out": [left_out_row(row) for row in (*run.left_out(), *_without(needs, reduced, run.get(PlannedStep)))],
+        "needs": [dataclasses.asdict(row) for row in choices.rows] if choices else [],
+        "left_out": [left_out_row(row) for row in (*run.left_out(), *_without(choices, reduced, run.get(PlannedStep)))],
         "operators": [operator_row(row) for row in run.results],
     }
 
 
 def _without(
-    needs: ModelChoices | None, reduced: ReducedBodies | None, step: PlannedStep | None
+    choices: ModelChoices | None, reduced: ReducedBodies | None, step: PlannedStep | None
 ) -> Sequence[Simplification]:
-    """What the shot and its flexible bodies do without."""
-    rows = list(needs.left_out) if needs else []
+    """The simplifications of the shot and of its flexible bodies."""
+    rows = list(choices.left_out) if choices else []
     rows += [row for body in reduced.bodies for row in body.left_out] if reduced else []
     return [*rows, step.row] if step else rows
 

@@ -13,24 +13,24 @@ if TYPE_CHECKING:
 
 def front(points: Sequence[Point]) -> list[Point]:
     """Those than which none is both faster and better, by run time."""
-    found: list[Point] = []
+    front: list[Point] = []
     for point in sorted(points, key=lambda p: (p.wall_s, p.error_m)):
-        if np.isfinite(point.error_m) and (not found or point.error_m < found[-1].error_m):
-            found.append(point)
-    return found
+        if np.isfinite(point.error_m) and (not front or point.error_m < front[-1].error_m):
+            front.append(point)
+    return front
 
 
 def over_fastest(points: Sequence[Point], tolerances: Sequence[float]) -> dict[float, tuple[float, Point]]:
     """How much longer the choice for each tolerance [m] takes than the fastest setting that keeps it, and that."""
-    found = {}
+    ratios = {}
     chosen = {p.setting: p for p in points if p.series == "tolerance"}
     for tolerance in tolerances:
-        own = chosen.get(setting_of(tolerance))
-        if own is not None:
+        choice = chosen.get(setting_of(tolerance))
+        if choice is not None:
             keeping = [p for p in points if p.series != "elements" and p.error_m <= tolerance]
-            fastest = min(keeping, key=lambda p: p.wall_s, default=own)
-            found[tolerance] = own.wall_s / fastest.wall_s, fastest
-    return found
+            fastest = min(keeping, key=lambda p: p.wall_s, default=choice)
+            ratios[tolerance] = choice.wall_s / fastest.wall_s, fastest
+    return ratios
 
 
 def setting_of(tolerance: float) -> str:

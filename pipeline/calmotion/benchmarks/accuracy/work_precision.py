@@ -82,15 +82,15 @@ def main(arguments: list[str] | None = None) -> int:
     for name in options.shots:
         bench = Bench(load_unreduced(name), options.repeats)
         reference = bench.reference()
-        own = forward_points(bench, reference) + chosen_points(bench, reference)
-        own += element_points(bench) if options.elements else []
+        shot_points = forward_points(bench, reference) + chosen_points(bench, reference)
+        shot_points += element_points(bench) if options.elements else []
         bars[bench.shot.name] = reference.bar_m
-        points += own
+        points += shot_points
         if options.csv:
             write_rows(options.csv, Point, points)  # the next shot may take long
         if not options.json:
-            print_points(own, reference.bar_m)
-            print_over_fastest(own, TOLERANCES)
+            print_points(shot_points, reference.bar_m)
+            print_over_fastest(shot_points, TOLERANCES)
         if options.optimizer:
             from calmotion.benchmarks.common.shots import load
             from calmotion.benchmarks.integrators.gradient_error import errors
@@ -114,16 +114,16 @@ def main(arguments: list[str] | None = None) -> int:
             figures.append(draw_gradients(options.figures, gradients))
     if options.json:
         rows = [asdict(point) for point in points]
-        found = {"machine": machine(), "reference_error_m": bars, "points": rows, "figures": figures}
-        found["over_fastest"] = {
+        report = {"machine": machine(), "reference_error_m": bars, "points": rows, "figures": figures}
+        report["over_fastest"] = {
             shot: {
                 t: ratio for t, (ratio, _) in over_fastest([p for p in points if p.shot == shot], TOLERANCES).items()
             }
             for shot in bars
         }
         if options.optimizer:
-            found |= {"gradients": [asdict(r) for r in gradients], "optimizers": [asdict(r) for r in converged]}
-        print(json.dumps(found))
+            report |= {"gradients": [asdict(r) for r in gradients], "optimizers": [asdict(r) for r in converged]}
+        print(json.dumps(report))
     else:
         for figure in figures:
             print(f"wrote {figure}")

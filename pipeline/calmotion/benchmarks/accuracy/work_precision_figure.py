@@ -44,19 +44,19 @@ def draw(folder: str, points: Sequence[Point], bar: float) -> str:
         label="Pareto front",
     )  # fmt: skip
     for series, (color, style) in STYLES.items():
-        own = [p for p in points if p.series == series and np.isfinite(p.error_m)]
-        if not own:
+        in_series = [p for p in points if p.series == series and np.isfinite(p.error_m)]
+        if not in_series:
             continue
         label = "elements (against the finest mesh)" if series == "elements" else series
-        sizes = [0] if series not in COLORS else sorted({p.coordinates for p in own})
+        sizes = [0] if series not in COLORS else sorted({p.coordinates for p in in_series})
         for size in sizes:  # a line for each number of coordinates
-            line = [p for p in own if p.coordinates == size] if size else own
+            line = [p for p in in_series if p.coordinates == size] if size else in_series
             axes.loglog(
                 [p.wall_s for p in line], [1e3 * p.error_m for p in line], style, color=color, ms=4, lw=1,
                 label=label if size == sizes[0] else None,
             )  # fmt: skip
         if series == "law":
-            for p in own:
+            for p in in_series:
                 axes.annotate(
                     SHORT[p.setting], (p.wall_s, 1e3 * p.error_m), (4, 4), textcoords="offset points", fontsize=7
                 )

@@ -25,25 +25,25 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--figures", metavar="DIR", help="also draw error against run time, to this folder")
     parser.add_argument("--json", action="store_true", help="print one JSON object on stdout, and nothing else there")
     options = parser.parse_args(arguments)
-    found: list[GradientError] = []
+    measured: list[GradientError] = []
     for name in options.shots:
-        found += errors(load(name))
+        measured += errors(load(name))
         if not options.json:
-            print_gradients(found, found[-1].shot)
+            print_gradients(measured, measured[-1].shot)
     figures = []
     if options.figures:
         from calmotion.benchmarks.integrators.gradient_figure import draw
 
-        figures.append(draw(options.figures, found))
+        figures.append(draw(options.figures, measured))
     if options.json:
-        print(json.dumps({"gradients": [asdict(row) for row in found], "figures": figures}))
+        print(json.dumps({"gradients": [asdict(row) for row in measured], "figures": figures}))
         return 0
     for figure in figures:
         print(figure)
     return 0
 
 
-def print_gradients(found: Sequence[GradientError], name: str) -> None:
+def print_gradients(measured: Sequence[GradientError], name: str) -> None:
     """The table of one shot for a person."""
     from calmotion.cli.tables import console_on, print_table
 
@@ -53,7 +53,7 @@ def print_gradients(found: Sequence[GradientError], name: str) -> None:
             row.adjoint, f"1/{1.0 / row.step_s:.0f} s", f"{row.forward_s:.3f} s", f"{row.gradient_s:.3f} s",
             f"{row.same_step:.1e}", f"{row.floor:.1e}", f"{row.fine:.1e}",
         ]
-        for row in found if row.shot == name
+        for row in measured if row.shot == name
     ]  # fmt: skip
     print_table(console_on(sys.stdout), f"{name}: gradients against central differences", heads, rows)
 

@@ -36,8 +36,8 @@ def draw(
     axes[2].set_xlabel("time [s]")
     axes[2].set_ylabel("height of the load [m]")
     axes[2].legend(frameon=False, fontsize=8)
-    counts, found, expected = zip(*damped, strict=True)
-    axes[3].loglog(counts, found, "o", color=COLORS["bdf2"], label="measured")
+    counts, ratios, expected = zip(*damped, strict=True)
+    axes[3].loglog(counts, ratios, "o", color=COLORS["bdf2"], label="measured")
     axes[3].loglog(counts, expected, "-", color=COLORS["bdf2"], lw=1, label="root of the integrator")
     axes[3].set_title("Damping ratio that BDF2 adds", loc="left", fontsize=10)
     axes[3].set_xlabel("steps in a period")
@@ -48,8 +48,8 @@ def draw(
 
 def _errors(panel: Any, name: str, rows: list[Measured]) -> None:
     for integrator in dict.fromkeys(row.integrator for row in rows):
-        own = [row for row in rows if row.integrator == integrator]
-        times, errors = [row.wall_s for row in own], [row.position_error for row in own]
+        selected = [row for row in rows if row.integrator == integrator]
+        times, errors = [row.wall_s for row in selected], [row.position_error for row in selected]
         panel.loglog(times, errors, "o-", color=COLORS[integrator], lw=1.2, ms=4, label=integrator)
     panel.set_title(f"{name}: error against run time", loc="left", fontsize=10)
     panel.set_xlabel("run time [s]")

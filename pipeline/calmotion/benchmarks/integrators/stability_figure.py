@@ -32,10 +32,10 @@ def draw_map(folder: str, name: str, quantity: str, cells: Sequence[Cell]) -> st
     panels = figure.subplots(1, len(integrators), sharey=True, squeeze=False, width_ratios=widths)[0]
     default = [cell for cell in cells if cell.integrator == integrators[0]]
     for panel, integrator in zip(panels, integrators, strict=True):
-        own = [cell for cell in cells if cell.integrator == integrator]
-        for cell in own:
+        selected = [cell for cell in cells if cell.integrator == integrator]
+        for cell in selected:
             _tile(panel, steps[integrator].index(cell.step_s), values.index(cell.value), cell)
-        _boundary(panel, own, steps[integrator], values, color=LINE, lw=2.4)
+        _boundary(panel, selected, steps[integrator], values, color=LINE, lw=2.4)
         if integrator != integrators[0]:
             _boundary(panel, default, steps[integrator], values, color=INK, lw=1.1, ls=(0, (3, 2)))
         panel.set_xlim(-0.5, len(steps[integrator]) - 0.5)
@@ -68,10 +68,10 @@ def _tile(panel: Any, x: float, y: float, cell: Cell) -> None:
 
 def _boundary(panel: Any, cells: Sequence[Cell], steps: Sequence[float], values: Sequence[float], **style: Any) -> None:
     """A line left of the largest step from which on all smaller ones run."""
-    found = largest_steps(cells)
+    limits = largest_steps(cells)
     points: list[tuple[float, float]] = []
     for row, value in enumerate(values):
-        largest = found.get(value)
+        largest = limits.get(value)
         at = sum(step > largest * 1.001 for step in steps) if largest is not None else len(steps)
         points += [(at - 0.5, row - 0.5), (at - 0.5, row + 0.5)]
     panel.plot(*zip(*points, strict=True), solid_joinstyle="miter", clip_on=False, **style)

@@ -148,7 +148,7 @@ class Ours:
 
 def compare(codes: dict[str, Any] | None = None, repeats: int = 3) -> list[Run]:
     """Work and precision of both."""
-    found = []
+    results = []
     chosen = codes or {
         "exudyn": Exudyn(),
         "ours, bdf2": Ours("bdf2"),
@@ -159,13 +159,13 @@ def compare(codes: dict[str, Any] | None = None, repeats: int = 3) -> list[Run]:
         for steps in STEPS:
             runs = [code.run(steps) for _ in range(repeats)]
             error = float(np.linalg.norm(runs[0][0] - exact, axis=1).max())
-            found.append(Run(name, steps, error, float(np.median([wall for _, wall in runs]))))
-    return found
+            results.append(Run(name, steps, error, float(np.median([wall for _, wall in runs]))))
+    return results
 
 
 def time_at(runs: list[Run], code: str, error: float) -> float:
     """Run time of a code at an error [s], by interpolation (or continuation) of logarithms."""
-    own = sorted((run for run in runs if run.code == code), key=lambda run: run.error)
-    errors, walls = np.log([run.error for run in own]), np.log([run.wall_s for run in own])
+    selected = sorted((run for run in runs if run.code == code), key=lambda run: run.error)
+    errors, walls = np.log([run.error for run in selected]), np.log([run.wall_s for run in selected])
     slope = np.polyfit(errors, walls, 1)
     return float(np.exp(np.polyval(slope, np.log(error))))

@@ -62,9 +62,9 @@ def four_bar(
     for k, (name, length, mass) in enumerate(zip(names, (CRANK, COUPLER, ROCKER), (0.05, 0.0, 0.15), strict=True)):
         start, end = (points[k], points[k + 1]) if name != "Rocker" else (points[3], points[2])
         inertia = mass * length**2 / 12.0 * np.diag([0.01, 1.0, 1.0])
-        own = MassProperties(mass, np.array([0.5 * length, 0.0, 0.0]), inertia)
+        properties = MassProperties(mass, np.array([0.5 * length, 0.0, 0.0]), inertia)
         flexible = settings if name == "Coupler" else None
-        bodies.append(Body(f"/Bars/{name}", _pose(start, end), None if flexible else own, flexible=flexible))
+        bodies.append(Body(f"/Bars/{name}", _pose(start, end), None if flexible else properties, flexible=flexible))
     axis = Rotation.from_quat(np.roll(LIFTS, -1))
 
     def side(body: int, point: Array) -> Frame:

@@ -87,12 +87,12 @@ def _carriers(reading: Reading, stage: Any) -> dict[str, Frame]:
     from calmotion.usd.reading.joints import joint_prims, read_joint
 
     poses = {str(prim.GetPath()): reading.pose(prim) for prim in prims_of(stage) if is_rigid_body(prim)}
-    found: dict[str, Frame] = {}
+    frames: dict[str, Frame] = {}
     for prim in joint_prims(stage):
         try:
             joint = read_joint(reading, prim, poses)
         except ShotError:
             continue  # what is wrong with a joint does not matter to the mesh of another link
         if joint is not None and joint.body1 and np.isfinite(joint.frame1.position).all():
-            found.setdefault(joint.body1, joint.frame1)
-    return found
+            frames.setdefault(joint.body1, joint.frame1)
+    return frames

@@ -165,8 +165,8 @@ def arm_with_head(features: int = 0) -> SimplificationShot:
     joints += [
         Joint(f"/Arm/Turn{k}", "revolute", count + 1, count + 2 + k, _frame(0.0), _frame(0.0)) for k in range(features)
     ]
-    own = range(len(character.joints), len(joints))
-    motors = (*character.motors, *(Motor(k, joints[k].path, _ANGLE) for k in own))
+    added = range(len(character.joints), len(joints))
+    motors = (*character.motors, *(Motor(k, joints[k].path, _ANGLE) for k in added))
     character = replace(character, bodies=bodies, joints=tuple(joints), motors=motors)
     return SimplificationShot("arm with a head", character, _swing(motors=len(motors)), shot.meshes)
 

@@ -43,8 +43,8 @@ def links(count: int, modes: int, cells: int = 4) -> tuple[Character, list[Reduc
     short, meshes = beam_arm(links=2, cells=cells, **made)  # type: ignore[arg-type]
     bodies = reduce_bodies(short, span_tree(short), meshes)
     if count == 1:
-        single, own = beam_arm(links=1, cells=cells, **made)  # type: ignore[arg-type]
-        return single, reduce_bodies(single, span_tree(single), own)
+        single, meshes = beam_arm(links=1, cells=cells, **made)  # type: ignore[arg-type]
+        return single, reduce_bodies(single, span_tree(single), meshes)
     chain, _ = beam_arm(links=count, cells=cells, **made)  # type: ignore[arg-type]
     load = body_anchors(chain, span_tree(chain))[-1]
     return chain, [bodies[0]] * count + [rigid_body(chain.bodies[-1], load)]

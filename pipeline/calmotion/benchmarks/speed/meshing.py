@@ -95,30 +95,30 @@ def _row(link: Link, size: float, mesh: Any, mesh_time: float) -> Row:
     settings = link.body.flexible
     assert settings is not None
     model = assemble(mesh.points, mesh.tets, settings.material)
-    held, reduce_time = None, float("nan")
+    clamped, reduce_time = None, float("nan")
     if link.carrier is not None:
         anchor = AttachmentFrame(link.body.path, link.carrier, "interface")
         try:
-            held = interface_patches(model.mesh, [anchor], settings.interface_radius, link.body.path)[0].nodes
+            clamped = interface_patches(model.mesh, [anchor], settings.interface_radius, link.body.path)[0].nodes
             start = time.perf_counter()
             reduce_body(mesh, link.body, [anchor], (), 0)
             reduce_time = time.perf_counter() - start
         except ShotError:
-            held = None  # a joint off the link's surface says nothing about its mesh
-    found, errors = frequency_errors(model, settings.material, 3, held)
+            clamped = None  # a joint off the link's surface says nothing about its mesh
+    frequencies, errors = frequency_errors(model, settings.material, 3, clamped)
     return Row(
         link=link.name,
         size=1e3 * size,
         nodes=len(model.mesh.nodes),
         mesh_time=mesh_time,
         reduce_time=reduce_time,
-        f1=float(found[0]),
-        f2=float(found[1]),
-        f3=float(found[2]),
+        f1=float(frequencies[0]),
+        f2=float(frequencies[1]),
+        f3=float(frequencies[2]),
         error=float("nan"),
         estimate=100.0 * float(errors.max()),
         volume_error=100.0 * mesh.quality.volume_error,
-        held="free" if held is None else "joint",
+        held="free" if clamped is None else "joint",
     )
 
 

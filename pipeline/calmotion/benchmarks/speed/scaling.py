@@ -93,7 +93,7 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--json", action="store_true", help="print one JSON object on stdout, and nothing else there")
     parser.add_argument("--figures", metavar="DIR", help="also draw the laws of growth, to this folder")
     options = parser.parse_args(arguments)
-    found = growths((4, 8, 16, 32), (1_000, 5_000), (4, 8, 16, 32)) if options.quick else growths()
+    measured = growths((4, 8, 16, 32), (1_000, 5_000), (4, 8, 16, 32)) if options.quick else growths()
     sparse = against_splu()
     from calmotion.benchmarks.scenes import exudyn_arm
 
@@ -102,22 +102,22 @@ def main(arguments: list[str] | None = None) -> int:
     if options.figures:
         from calmotion.benchmarks.speed.scaling_figure import draw
 
-        figures.append(draw(options.figures, found, peers))
+        figures.append(draw(options.figures, measured, peers))
     if options.json:
-        print(json.dumps(_report(found, sparse, peers) | {"figures": figures}))
+        print(json.dumps(_report(measured, sparse, peers) | {"figures": figures}))
         return 0
-    _print(found, sparse, peers)
+    _print(measured, sparse, peers)
     for figure in figures:
         print(f"wrote {figure}")
     return 0
 
 
-def _report(found: Sequence[Growth], sparse: Sparse, peers: list[Any]) -> dict[str, Any]:
+def _report(measured: Sequence[Growth], sparse: Sparse, peers: list[Any]) -> dict[str, Any]:
     from calmotion.benchmarks.scenes.exudyn_arm import LEVELS, time_at
 
     codes = [code for code in dict.fromkeys(run.code for run in peers) if code != "exudyn"]
     return {
-        "growth": [asdict(item) | {"exponent": item.exponent} for item in found],
+        "growth": [asdict(growth) | {"exponent": growth.exponent} for growth in measured],
         "sparse": asdict(sparse) | {"times_faster": sparse.splu_s / sparse.ours_s},
         "exudyn": [asdict(run) for run in peers],
         "times_faster_than_exudyn": [
@@ -128,16 +128,18 @@ def _report(found: Sequence[Growth], sparse: Sparse, peers: list[Any]) -> dict[s
     }
 
 
-def _print(found: Sequence[Growth], sparse: Sparse, peers: list[Any]) -> None:
+def _print(measured: Sequence[Growth], sparse: Sparse, peers: list[Any]) -> None:
     from calmotion.cli.tables import console_on, print_table
 
-    report = _report(found, sparse, peers)
+    report = _report(measured, sparse, peers)
     console = console_on(sys.stdout)
-    for item in found:
+    for growth in measured:
         shown = [
-            [f"{value:,}", f"{1e6 * seconds:,.0f}"] for value, seconds in zip(item.values, item.seconds, strict=True)
+            [f"{value:,}", f"{1e6 * seconds:,.0f}"]
+            for value, seconds in zip(growth.values, growth.seconds, strict=True)
         ]
-        print_table(console, f"{item.name}: exponent {item.exponent:.2f}", [item.name, "time [us]"], shown, texts=0)
+        title = f"{growth.name}: exponent {growth.exponent:.2f}"
+        print_table(console, title, [growth.name, "time [us]"], shown, texts=0)
     console.print(
         f"14 bodies of 10 modes ({sparse.unknowns} unknowns): factorisation and solution {1e6 * sparse.ours_s:.0f} us, "
         f"SuperLU {1e6 * sparse.splu_s:.0f} us ({sparse.splu_s / sparse.ours_s:.1f} times as long; solutions agree to "

@@ -14,24 +14,24 @@ if TYPE_CHECKING:
 BLUE, COLORS = "#0072b2", {"exudyn": "#d55e00", "ours, bdf2": "#0072b2", "ours, generalized-alpha": "#e69f00"}
 
 
-def draw(folder: str, found: Sequence[Growth], peers: Sequence[Run]) -> str:
+def draw(folder: str, measured: Sequence[Growth], peers: Sequence[Run]) -> str:
     """Draw to `<folder>/scaling.png` and return the path."""
     from matplotlib.figure import Figure
     from matplotlib.ticker import NullFormatter
 
-    count = len(found) + bool(peers)
+    count = len(measured) + bool(peers)
     figure = Figure(figsize=(3.6 * count, 3.4), layout="constrained")
     axes = figure.subplots(1, count, squeeze=False)[0]
-    for panel, item in zip(axes, found, strict=False):
-        panel.loglog(item.values, [1e3 * seconds for seconds in item.seconds], "o-", color=BLUE, lw=1.2, ms=4)
-        panel.set_title(f"exponent {item.exponent:.2f}", loc="left", fontsize=10)
-        panel.set_xlabel(item.name)
-        mark_measured(panel, item.values, [f"{value:,}" for value in item.values])
+    for panel, growth in zip(axes, measured, strict=False):
+        panel.loglog(growth.values, [1e3 * seconds for seconds in growth.seconds], "o-", color=BLUE, lw=1.2, ms=4)
+        panel.set_title(f"exponent {growth.exponent:.2f}", loc="left", fontsize=10)
+        panel.set_xlabel(growth.name)
+        mark_measured(panel, growth.values, [f"{value:,}" for value in growth.values])
         panel.yaxis.set_minor_formatter(NullFormatter())
-        panel.set_ylabel("whole simulation [ms]" if item.name == "steps" else "step [ms]")
+        panel.set_ylabel("whole simulation [ms]" if growth.name == "steps" else "step [ms]")
     for code in dict.fromkeys(run.code for run in peers):
-        own = [run for run in peers if run.code == code]
-        times, errors = [run.wall_s for run in own], [run.error for run in own]
+        selected = [run for run in peers if run.code == code]
+        times, errors = [run.wall_s for run in selected], [run.error for run in selected]
         axes[-1].loglog(times, errors, "o-", color=COLORS[code], lw=1.2, ms=4, label=code)
     if peers:
         axes[-1].set_title("the swung arm, 14 modes", loc="left", fontsize=10)

@@ -25,17 +25,17 @@ def dense_step_matrix(system: System, blocks: Blocks) -> Array:
     total = int(start[-1])
     A = np.zeros((total + JOINT_ROWS * len(system.rows),) * 2)
     for b, r in enumerate(system.elastic):
-        own = slice(start[b], start[b + 1])
-        A[own, own] = blocks.K[b, : 6 + r, : 6 + r]
+        block = slice(start[b], start[b + 1])
+        A[block, block] = blocks.K[b, : 6 + r, : 6 + r]
     for joint, (p, b) in enumerate(system.side):
-        own, n = slice(start[b], start[b + 1]), int(6 + system.elastic[b])
+        block, n = slice(start[b], start[b + 1]), int(6 + system.elastic[b])
         first = total + JOINT_ROWS * joint
         rows = slice(first, first + JOINT_ROWS)
-        A[own, rows], A[rows, own] = blocks.Lc[joint, :n], blocks.Hc[joint, :, :n]
+        A[block, rows], A[rows, block] = blocks.Lc[joint, :n], blocks.Hc[joint, :, :n]
         if p >= 0:
             parent, m = slice(start[p], start[p + 1]), int(6 + system.elastic[p])
             A[parent, rows], A[rows, parent] = blocks.Lp[joint, :m], blocks.Hp[joint, :, :m]
-            A[own, parent] += blocks.Nc[joint, :n] @ blocks.Jp[joint, :, :m]
+            A[block, parent] += blocks.Nc[joint, :n] @ blocks.Jp[joint, :, :m]
         idle = np.arange(first + system.rows[joint], first + JOINT_ROWS)
         A[idle, idle] = 1.0
     return A

@@ -58,11 +58,11 @@ def joint_prims(stage: Usd.Stage) -> list[Usd.Prim]:
     """The enabled joints of a stage, in its order."""
     from pxr import UsdPhysics
 
-    found = []
+    enabled = []
     for prim in prims_of(stage):
         if prim.IsA(UsdPhysics.Joint) and prim.GetAttribute("physics:jointEnabled").Get() is not False:
-            found.append(prim)
-    return found
+            enabled.append(prim)
+    return enabled
 
 
 def read_joint(reading: Reading, prim: Usd.Prim, poses: dict[str, Pose]) -> JointPrim | None:

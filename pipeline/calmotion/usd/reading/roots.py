@@ -49,7 +49,7 @@ def moving_frames(
     Raises:
         ShotError: A transform that has no rigid pose.
     """
-    found = []
+    moving = []
     for index, joint in enumerate(joints):
         if joint.body0 != "":
             continue
@@ -62,9 +62,9 @@ def moving_frames(
         rotations = np.array([frame.rotation for frame in frames])
         flips = np.where(np.sum(rotations[1:] * rotations[:-1], axis=1) < 0.0, -1.0, 1.0)
         rotations[1:] *= np.cumprod(flips)[:, None]
-        found.append(MovingFrame(index, clock.seconds(codes), np.array([f.position for f in frames]), rotations))
+        moving.append(MovingFrame(index, clock.seconds(codes), np.array([f.position for f in frames]), rotations))
         reading.note(f"{prim.GetPath()}: its transform is animated, and moves the root of the character")
-    return tuple(found)
+    return tuple(moving)
 
 
 def world_frame(reading: Reading, joint: JointPrim, prim: Usd.Prim, poses: dict[str, Pose]) -> Frame:

@@ -148,34 +148,34 @@ def motor_tracks(
             a motor that held still may be animated.
     """
     stage = reading.stage
-    found: dict[str, Track] = {}
+    tracks: dict[str, Track] = {}
     posed = [d for d in drives if d.source == BODIES or (d.source == HELD and d.held is None)]
     bodies = [drive.joint for drive in posed]
     codes = pose_codes(stage, bodies, clock)
     if len(codes) == 0:
         codes = np.unique([clock.start, clock.end])
     for joint, motion in zip(bodies, joint_motions(reading, bodies, codes), strict=True):
-        found[joint.path] = posed_track(motion, joint, codes, clock, reading)
+        tracks[joint.path] = posed_track(motion, joint, codes, clock, reading)
     stacks = hinge_stacks(reading, drives) if standing is None else performed_on(standing, stage)
     for stack in stacks:
         with reading.collecting_problems():
-            found |= skeletal_tracks(stack, clock, reading)
+            tracks |= skeletal_tracks(stack, clock, reading)
     for drive in drives:
         unit, path = to_si(drive.joint.kind, reading.units), drive.joint.path
         attribute = drive.attribute(stage)
         with reading.collecting_problems():
             if drive.source == DRIVE or (standing is not None and attribute and len(sample_codes(attribute))):
-                found[path] = read_track(attribute, clock, reading, unit)
+                tracks[path] = read_track(attribute, clock, reading, unit)
             elif drive.source == GIVEN and given is not None:
-                found[path] = given_track(given, drive.joint)
+                tracks[path] = given_track(given, drive.joint)
             elif drive.source == HELD and drive.held is not None:
                 ends = np.unique([clock.start, clock.end])
-                found[path] = Track(clock.seconds(ends), np.full(len(ends), drive.held))
+                tracks[path] = Track(clock.seconds(ends), np.full(len(ends), drive.held))
     for drive in drives:
-        if drive.gear is not None and drive.gear.leader in found:
-            led = found[drive.gear.leader]
-            found[drive.joint.path] = Track(led.times, drive.gear.offset + drive.gear.ratio * led.values, led.corners)
-    return tuple(found[drive.joint.path] for drive in drives if drive.joint.path in found)
+        if drive.gear is not None and drive.gear.leader in tracks:
+            led = tracks[drive.gear.leader]
+            tracks[drive.joint.path] = Track(led.times, drive.gear.offset + drive.gear.ratio * led.values, led.corners)
+    return tuple(tracks[drive.joint.path] for drive in drives if drive.joint.path in tracks)
 
 
 def _note_dense_samples(tracks: tuple[Track, ...], clock: Clock, reading: Reading) -> None:

@@ -32,15 +32,15 @@ def distances(bodies: list[str], joints: list[JointPrim]) -> dict[str, int]:
     """Number of joints between each body and the world; the bodies from near to far."""
     neighbours = _neighbours(bodies, joints)
     roots = [j.body1 for j in joints if j.body0 == ""]
-    found = {body: 1 for body in roots}
-    queue = deque(found)
+    depths = {body: 1 for body in roots}
+    queue = deque(depths)
     while queue:
         body = queue.popleft()
         for other in neighbours[body]:
-            if other not in found:
-                found[other] = found[body] + 1
+            if other not in depths:
+                depths[other] = depths[body] + 1
                 queue.append(other)
-    return found
+    return depths
 
 
 def leaves(bodies: list[str], joints: list[JointPrim]) -> list[str]:

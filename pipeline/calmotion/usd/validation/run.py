@@ -34,11 +34,11 @@ def validate_shot(path: str) -> Findings:
     if muted:
         stage = stages.open_stage(path, muted=muted)
     with stages.quiet():
-        found = []
+        findings = []
         for name, (rule, _) in RULES.items():
-            found += _checked(name, stage, rule)
-        found += _checked("usdValidation", stage, _usd_findings)
-    return Findings(tuple(sorted(dict.fromkeys(found), key=lambda f: (f.level != ERROR, f.path, f.attribute))))
+            findings += _checked(name, stage, rule)
+        findings += _checked("usdValidation", stage, _usd_findings)
+    return Findings(tuple(sorted(dict.fromkeys(findings), key=lambda f: (f.level != ERROR, f.path, f.attribute))))
 
 
 def _checked(name: str, stage: Usd.Stage, rule: Rule) -> list[Finding]:
@@ -58,15 +58,15 @@ def _usd_findings(stage: Usd.Stage) -> list[Finding]:
     names = [m.name for m in registry.GetAllValidatorMetadata() if not m.name.startswith(f"{_PLUGIN}:")]
     context = UsdValidation.ValidationContext(registry.GetOrLoadValidatorsByName(names))
     kinds = {UsdValidation.ValidationErrorType.Error: ERROR, UsdValidation.ValidationErrorType.Warn: WARNING}
-    found = []
+    findings = []
     for error in context.Validate(stage):
         level = kinds.get(error.GetType())
         if level is None:
             continue
         path, attribute = _place(error, stage)
         rule = str(error.GetIdentifier()).rpartition(".")[0]
-        found.append(Finding(level, rule, path, attribute, error.GetMessage().strip().rstrip(".")))
-    return found
+        findings.append(Finding(level, rule, path, attribute, error.GetMessage().strip().rstrip(".")))
+    return findings
 
 
 def _place(error: UsdValidation.ValidationError, stage: Usd.Stage) -> tuple[str, str]:

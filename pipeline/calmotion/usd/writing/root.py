@@ -54,12 +54,12 @@ def shot_layers(shot: str, replaced: tuple[str, ...]) -> list[str]:
     layer = stages.open_layer(shot)
     if stages.role_of(layer) != stages.ROOT:
         return [os.path.realpath(shot)]
-    found = []
+    layers = []
     for asset in layer.subLayerPaths:
         path = layer.ComputeAbsolutePath(asset)
         if stages.role_of(stages.open_layer(path)) not in replaced:
-            found += shot_layers(path, replaced)
-    return found
+            layers += shot_layers(path, replaced)
+    return layers
 
 
 def keeps_earlier_curves(provenance: Provenance) -> bool:

@@ -120,5 +120,5 @@ def _lengthen(
     ):
         spec = attribute_spec(layer, f"{name}.{attribute.GetName()}", kind)
         for code in attribute.GetTimeSamples() or [clock.start]:
-            own = gf.points(attribute.Get(code))
-            layer.SetTimeSample(spec.path, float(code), gf.to_vectors(np.concatenate([own, extra]), kind))
+            values = gf.points(attribute.Get(code))
+            layer.SetTimeSample(spec.path, float(code), gf.to_vectors(np.concatenate([values, extra]), kind))

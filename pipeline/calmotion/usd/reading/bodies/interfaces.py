@@ -42,13 +42,13 @@ def interfaces_of(
     """
     from pxr import UsdGeom
 
-    found: list[InterfaceSurface] = []
+    surfaces: list[InterfaceSurface] = []
     for prim in prims_below(body_prim, is_rigid_body):
         subset = UsdGeom.Subset(prim)
         if not subset or subset.GetFamilyNameAttr().Get() != FAMILY:
             continue
         joint = _joint_of(prim, joints)
-        earlier = next((surface.path for surface in found if surface.joint == joint), None)
+        earlier = next((surface.path for surface in surfaces if surface.joint == joint), None)
         if earlier is not None:
             raise ShotError(
                 f"the joint {joint} has an interface on this body already",
@@ -60,8 +60,8 @@ def interfaces_of(
         corners = (points @ linear.T + offset)[triangles]
         if np.linalg.det(linear) < 0.0:
             corners = corners[:, ::-1].copy()
-        found.append(InterfaceSurface(str(prim.GetPath()), joint, corners))
-    return tuple(found)
+        surfaces.append(InterfaceSurface(str(prim.GetPath()), joint, corners))
+    return tuple(surfaces)
 
 
 def _joint_of(prim: Usd.Prim, joints: Sequence[str]) -> str:

@@ -32,12 +32,12 @@ def elastic_material(reading: Reading, body_prim: Usd.Prim) -> ElasticMaterial:
 
     bound = None
     for prim in prims_below(body_prim, is_rigid_body):
-        found, _ = UsdShade.MaterialBindingAPI(prim).ComputeBoundMaterial("physics")
-        if not found:
+        material, _ = UsdShade.MaterialBindingAPI(prim).ComputeBoundMaterial("physics")
+        if not material:
             continue
-        bound = bound or found.GetPrim()
-        if schemas.is_applied(found.GetPrim(), _SCHEMA) or found.GetPrim().GetAttribute("physics:youngsModulus"):
-            return _material(reading, found.GetPrim())
+        bound = bound or material.GetPrim()
+        if schemas.is_applied(material.GetPrim(), _SCHEMA) or material.GetPrim().GetAttribute("physics:youngsModulus"):
+            return _material(reading, material.GetPrim())
     raise ShotError(
         "a flexible body without an elastic material",
         path=body_prim.GetPath(),

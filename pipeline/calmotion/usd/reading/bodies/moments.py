@@ -70,10 +70,10 @@ def surface_moments(points: Array, triangles: IntArray) -> Moments:
     corners = np.empty((len(triangles), 4, 3))
     corners[:, 0] = points.mean(axis=0)
     corners[:, 1:] = points[triangles]
-    found = tetrahedron_moments(corners)
-    if found.volume < 0.0:
-        return Moments(-found.volume, found.center, -found.second)
-    return found
+    moments = tetrahedron_moments(corners)
+    if moments.volume < 0.0:
+        return Moments(-moments.volume, moments.center, -moments.second)
+    return moments
 
 
 def is_closed(triangles: IntArray, points: Array) -> bool:

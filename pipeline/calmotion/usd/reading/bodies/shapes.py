@@ -94,17 +94,17 @@ def tets_of(reading: Reading, body_prim: Usd.Prim, pose: Pose) -> TetGeometry | 
     Raises:
         ShotError: Several TetMesh prims, or one whose tetrahedra do not fit its points.
     """
-    found = [p for p in prims_below(body_prim, _is_elsewhere) if p.GetTypeName() == "TetMesh"]
-    if not found:
+    tet_meshes = [p for p in prims_below(body_prim, _is_elsewhere) if p.GetTypeName() == "TetMesh"]
+    if not tet_meshes:
         return None
-    if len(found) > 1:
+    if len(tet_meshes) > 1:
         raise ShotError(
             "a body has one TetMesh",
             path=body_prim.GetPath(),
-            found=", ".join(str(p.GetPath()) for p in found),
+            found=", ".join(str(p.GetPath()) for p in tet_meshes),
             remedy="Merge them into one, or keep one of them",
         )
-    prim = found[0]
+    prim = tet_meshes[0]
     points = finite_points(prim, reading.start)
     tets = gf.indices(prim.GetAttribute("tetVertexIndices").Get(reading.start), 4)
     if len(tets) == 0 or len(points) == 0:
@@ -200,8 +200,8 @@ def _shown_purposes(body_prim: Usd.Prim) -> set[str]:
     from pxr import UsdGeom
 
     geometry = [p for p in prims_below(body_prim, _is_elsewhere) if p.IsA(UsdGeom.Gprim)]
-    found = {str(UsdGeom.Imageable(prim).ComputePurpose()) for prim in geometry}
-    return found - {"guide", "proxy"} or found
+    purposes = {str(UsdGeom.Imageable(prim).ComputePurpose()) for prim in geometry}
+    return purposes - {"guide", "proxy"} or purposes
 
 
 def _is_visible(prim: Usd.Prim, time: float, purposes: set[str]) -> bool:

@@ -33,10 +33,10 @@ def _free_samples(prim: Usd.Prim) -> list[tuple[float, bool]]:
 def free_tracks(stage: Usd.Stage, motors: Sequence[Motor], clock: Clock) -> tuple[FreeTrack, ...]:
     """When motors may be changed, of those for which the shot animates calm:motor:optimize: each sample holds until
     the next."""
-    found = []
+    ranges = []
     for index, motor in enumerate(motors):
         samples = _free_samples(stage.GetPrimAtPath(motor.path))
         if len({value for _, value in samples}) > 1:
             codes, values = zip(*samples, strict=True)
-            found.append(FreeTrack(index, clock.seconds(np.array(codes, dtype=np.float64)), np.array(values, bool)))
-    return tuple(found)
+            ranges.append(FreeTrack(index, clock.seconds(np.array(codes, dtype=np.float64)), np.array(values, bool)))
+    return tuple(ranges)
