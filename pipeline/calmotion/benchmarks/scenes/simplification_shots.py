@@ -172,13 +172,13 @@ def arm_with_head(features: int = 0) -> SimplificationShot:
 
 
 def held_arm() -> SimplificationShot:
-    """The plastic arm held for two seconds before it moves, its sag not counting as an error."""
+    """The plastic arm, at rest for two seconds before it moves, its sag not counting as an error."""
     shot = plastic_arm()
     character = replace(shot.character, retarget=replace(shot.character.retarget, reference="static"))
     times = np.arange(round(4.0 * 24) + 1) / 24.0
     values = quintic(0.8, 0.4, 2.2)(times)
     tracks = (Track(times, values),) * 2
-    return SimplificationShot("held arm", character, Animation(times, tracks, tracks), shot.meshes)
+    return SimplificationShot("pausing arm", character, Animation(times, tracks, tracks), shot.meshes)
 
 
 def _frame(x: float, y: float = 0.0, z: float = 0.0, rotation: Array = IDENTITY) -> Frame:
