@@ -61,7 +61,7 @@ def read_bvh(path: str) -> BvhMotion:
 
 
 def _channels(path: str, lines: list[str]) -> Iterator[str]:
-    """Names of the channels of all joints, of which nothing else matters here."""
+    """Names of the channels of all joints."""
     joint, seen = "", set()
     for number, line in enumerate(lines, 2):
         words = line.split()

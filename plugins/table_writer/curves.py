@@ -17,7 +17,7 @@ def write_curves(
     file: str, character: Character, animation: Animation, provenance: Provenance, result: Result, *, rate: float,
     degrees: bool,
 ) -> int:  # fmt: skip
-    """Write what the motors are told, atomically; returns the number of rows.
+    """Write the motor curves atomically; returns the number of rows.
 
     Raises:
         ShotError: No file is named, or it cannot be written.

@@ -1,1 +1,1 @@
-"""Measurements behind `calmotion bench`; nothing imports this room but the command itself."""
+"""The benchmarks of `calmotion bench`; only this command imports them."""

@@ -1,1 +1,1 @@
-"""The command line: one file a command. Importing the package alone loads nothing."""
+"""The command line: one file for each command. Importing the package loads no other module."""

@@ -32,7 +32,7 @@ class Output:
 
 @contextmanager
 def protected_stdout(as_json: bool) -> Iterator[Output]:
-    """The stream for results; with `as_json`, whatever else prints to stdout goes to stderr instead.
+    """The stream for results; with `as_json`, all other output to stdout goes to stderr.
 
     Native libraries print past `sys.stdout`, so the file descriptor is redirected as well.
     """
@@ -99,7 +99,7 @@ def conclude(
 
 
 def tell_failed_plugins(host: Host) -> None:
-    """Tell of plugins that could not be loaded, each with its own traceback; the run goes on without them."""
+    """Report plugins that could not be loaded, each with its traceback; the run continues without them."""
     for plugin in host.failures():
         print(plugin.traceback, end="", file=sys.stderr)
         print(f"warning: the plugin {plugin.id} is not used: {plugin.error}", file=sys.stderr, flush=True)

@@ -1,4 +1,4 @@
-"""Progress of a run on stderr: bars on a terminal, one line an operator in a log, lines for a program where it asks.
+"""Progress of a run on stderr: bars on a terminal, one line for each operator in a log.
 
 A program that runs calmotion reads lines `progress<tab>stage<tab>fraction<tab>message` (`--progress`).
 """
@@ -54,7 +54,7 @@ class ProgressDisplay:
         self._bars.update(self._tasks[stage], completed=fraction, message=message)
 
     def done(self, result: OperatorResult) -> None:
-        """Show what became of an operator, and what it reported."""
+        """Show the outcome of an operator, and its messages."""
         if self._quiet:
             return
         if self._bars is None and result.outcome in (Outcome.DONE, Outcome.FAILED):

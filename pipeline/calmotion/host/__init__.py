@@ -1,4 +1,4 @@
-"""The host of plugins: it finds and registers them, orders their operators by data, and runs what is needed."""
+"""The host of plugins: it finds and registers them, orders their operators by data, and runs those that are needed."""
 
 from calmotion.host.errors import HostError, PlanError, PluginError, SettingError
 from calmotion.host.manifest import Manifest, read_manifest

@@ -1,4 +1,4 @@
-"""Where plugins are looked for, and importing one. Nothing next to a shot is ever looked at or imported."""
+"""Discovery and import of plugins. Files beside a shot are never read or imported."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ FOLDERS_VARIABLE = "CALMOTION_PLUGINS"
 
 @dataclass(frozen=True)
 class Location:
-    """A place that should hold a plugin.
+    """A place of a plugin.
 
     Attributes:
         folder: The folder with `plugin.toml`.

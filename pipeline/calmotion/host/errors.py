@@ -10,7 +10,7 @@ class HostError(ShotError):
 
 
 class PluginError(HostError):
-    """A plugin, its manifest or one of its operators is not as it must be."""
+    """A plugin, its manifest or one of its operators does not follow the rules."""
 
 
 class SettingError(HostError):

@@ -17,7 +17,7 @@ _LISTS = ("tags", "requires")
 
 @dataclass(frozen=True)
 class Manifest:
-    """What `plugin.toml` says.
+    """The content of `plugin.toml`.
 
     Attributes:
         id: Name of the plugin's folder.

@@ -1,4 +1,4 @@
-"""What an operator is: the step that a plugin adds, and what it sees while it runs."""
+"""Operators, the steps that plugins add, and their context while they run."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class Record:
 
 @dataclass
 class RunContext:
-    """What an operator sees while it runs.
+    """The context of a running operator: its inputs, properties, progress and messages.
 
     Attributes:
         operator: The operator's class.
@@ -96,7 +96,7 @@ class Operator:
     @classmethod
     def poll(cls, data: Mapping[type, Any]) -> str | None:
         """None when it runs on this data, else the reason why it is left out, as a clause for the user (`NotAsked`
-        where that is no news)."""
+        where it need not be reported)."""
         return None
 
     def execute(self, context: RunContext) -> Sequence[object]:

@@ -102,7 +102,7 @@ class Verification:
 
 @dataclass(frozen=True, eq=False)
 class PlannedStep:
-    """The time step that a simulation of the shot would take: what it leaves out."""
+    """The time step of a simulation of the shot, as a row of the simplifications."""
 
     row: Simplification
 

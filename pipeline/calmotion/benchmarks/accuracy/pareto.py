@@ -1,4 +1,4 @@
-"""The Pareto front of error and run time, and how far a choice is from the fastest setting that does as well."""
+"""The Pareto front of error and run time, and ratios of run times to the fastest setting with the same error."""
 
 from __future__ import annotations
 

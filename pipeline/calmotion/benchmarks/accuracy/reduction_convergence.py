@@ -1,9 +1,9 @@
-"""Convergence of the reduction: how far the targets move when its tolerance falls by ten and nothing else changes.
+"""Convergence of the reduction: change of the targets when only its tolerance decreases by a factor of ten.
 
 `calmotion bench reduction-convergence [SHOT ...] [--csv FILE] [--markdown FILE]` reduces each shot to ever smaller
 tolerances, and simulates it as animated with all coordinates and one step. The error of a reduction is estimated for
-each body at rest; this measures its effect on the motion. If a series does not fall, links deflect farther than a basis
-of modes and their derivatives can represent.
+each body at rest; this measures its effect on the motion. If a series does not decrease, the deflections are
+too large for a basis of modes and modal derivatives.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
-"""What each model simplification saves: pairs of runs with and without it, their times and the error that it adds.
+"""Gain of each model simplification: pairs of runs with and without it, their times and the error that it adds.
 
-`calmotion bench simplification [--csv FILE]` runs shots made in code, each of which allows one simplification, and
+`calmotion bench simplification [--csv FILE]` runs synthetic shots, each of which allows one simplification, and
 three of them (a rigid one, one without rotating bodies, one without closed chains) with all simplifications
 switched off. A time is the median of alternating runs; an error is the largest distance of any target, at any
 frame, between the two runs of a pair.
@@ -177,8 +177,10 @@ def main(arguments: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(prog="calmotion bench simplification", description=__doc__)
     parser.add_argument("--json", action="store_true", help="print one JSON object on stdout, and nothing else there")
     parser.add_argument("--csv", metavar="FILE", help="also write a table")
-    parser.add_argument("--only", metavar="KIND", action="append", help="only this kind of thing; may be repeated")
-    parser.add_argument("--repeats", type=int, default=REPEATS, help="of which times are the median")
+    parser.add_argument(
+        "--only", metavar="KIND", action="append", help="only this kind of simplification; may be repeated"
+    )
+    parser.add_argument("--repeats", type=int, default=REPEATS, help="repetitions; times are medians")
     options = parser.parse_args(arguments)
     chosen = [make for make in pairs(options.repeats) if not options.only or make.args[0] in options.only]
     found = [make() for make in chosen]

@@ -1,9 +1,9 @@
-"""Whether `--tolerance` is kept: shots simulated or retargeted to it, each measured against a finer simulation.
+"""Measured errors of shots that are simulated or optimised with `--tolerance`, against a finer simulation.
 
-`calmotion bench tolerances [SHOT ...] [--csv FILE]` simulates each shot as animated to each tolerance, with all that
-the program leaves out and chooses for it, and measures the result against a simulation with everything kept, a far
-smaller step and far more coordinates. With `--optimize` it retargets each shot, and simulates the curves that it finds
-again. The error is the largest distance of any target, at any frame, between the two.
+`calmotion bench tolerances [SHOT ...] [--csv FILE]` simulates each shot as animated with each tolerance, with the
+choices of the program, and measures the result against a simulation without simplifications, with a much smaller step
+and many more coordinates. With `--optimize` it optimises each shot, and simulates the optimised curves again. The error
+is the largest distance of any target, at any frame, between the two.
 """
 
 from __future__ import annotations
@@ -160,7 +160,7 @@ def print_rows(rows: Sequence[Kept]) -> None:
 def main(arguments: list[str] | None = None) -> int:
     """The command: exit status 1 when a tolerance is not kept."""
     parser = table_parser("tolerances", __doc__, SAMPLES, TOLERANCES)
-    parser.add_argument("--optimize", action="store_true", help="retarget the shots, which takes far longer")
+    parser.add_argument("--optimize", action="store_true", help="optimise the shots, which takes much longer")
     options = parser.parse_args(arguments)
     rows: list[Kept] = []
     for path in options.shots:

@@ -1,11 +1,10 @@
-"""Error against run time: every choice of the simulation, measured against a reference that is itself measured.
+"""Error against run time for all settings of the simulation, against a reference with a measured error.
 
-`calmotion bench work-precision [SHOT ...] [--csv FILE] [--figures DIR]` simulates each shot as animated by many
-settings: step and integrator, reduction, directions that bodies are held to, elastic law, elements, and what
-`--tolerance` chooses. The error is the largest distance of any target, at any frame, to a reference with a far smaller
-step and far more coordinates; how far that is from its own limit is its error bar, below which nothing is told apart.
-Times are medians of the simulation. Each choice of a tolerance is compared with the fastest setting of all that keeps
-it.
+`calmotion bench work-precision [SHOT ...] [--csv FILE] [--figures DIR]` simulates each shot as animated with many
+settings: step and integrator, reduction, POD subspace, elastic law, elements, and the choices of `--tolerance`. The
+error is the largest distance of any target, at any frame, to a reference with a much smaller step and many more
+coordinates. The error of the reference is shown as its error bar; smaller errors cannot be compared. Times are medians
+of the simulation. The choices for each tolerance are compared with the fastest setting that keeps the tolerance.
 """
 
 from __future__ import annotations
@@ -35,7 +34,7 @@ LBFGS = 200  # most evaluations of the quasi-Newton method
 
 
 def machine() -> dict[str, object]:
-    """What the times were measured on."""
+    """The machine of the measurement."""
     return {
         "processor": platform.processor() or platform.machine(),
         "cores": os.cpu_count(),
@@ -65,13 +64,13 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--json", action="store_true", help="print one JSON object on stdout, and nothing else there")
     parser.add_argument("--csv", metavar="FILE", help="also write a table")
     parser.add_argument("--figures", metavar="DIR", help="also draw error against run time, to this folder")
-    parser.add_argument("--elements", action="store_true", help="also vary the size of elements, which takes long")
+    parser.add_argument("--elements", action="store_true", help="also vary the element size; takes long")
     parser.add_argument(
         "--optimizer",
         action="store_true",
-        help="also judge both adjoints by differences, and Gauss-Newton beside L-BFGS, which takes long",
+        help="also compare both adjoints with differences, and Gauss-Newton with L-BFGS; takes long",
     )
-    parser.add_argument("--repeats", type=int, default=REPEATS, help="of which times are the median")
+    parser.add_argument("--repeats", type=int, default=REPEATS, help="repetitions; times are medians")
     options = parser.parse_args(arguments)
     from calmotion.benchmarks.accuracy.work_precision_points import chosen_points, element_points, forward_points
 

@@ -1,4 +1,4 @@
-"""The figure of `work_precision`: error against run time, the Pareto front, and what the program chooses."""
+"""The figure of `work_precision`: error against run time, the Pareto front, and the choices of the program."""
 
 from __future__ import annotations
 

@@ -61,7 +61,7 @@ def forward_points(bench: Bench, reference: Reference) -> list[Point]:
 
 
 def chosen_points(bench: Bench, reference: Reference, tolerances: Sequence[float] = TOLERANCES) -> list[Point]:
-    """What the program chooses: with no tolerance asked for, and for some."""
+    """The choices of the program, without a tolerance and with several."""
     shot = bench.shot
     character, animation = shot.character, shot.animation
     default = bench.bodies(shot.character.retarget.allowed())

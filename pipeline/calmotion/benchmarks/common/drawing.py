@@ -1,4 +1,4 @@
-"""What the figures of the benchmarks share."""
+"""Common elements of the figures."""
 
 from __future__ import annotations
 

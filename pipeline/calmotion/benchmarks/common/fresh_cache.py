@@ -1,4 +1,4 @@
-"""The user's cache folder out of the way: what is measured is made anew."""
+"""An empty cache folder in place of the user's, so that measured results are computed again."""
 
 from __future__ import annotations
 

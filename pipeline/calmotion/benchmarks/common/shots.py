@@ -1,4 +1,4 @@
-"""The shots that benchmarks of the retargeting run on: files, or characters made in code."""
+"""The shots of the benchmarks: files, or synthetic characters."""
 
 from __future__ import annotations
 

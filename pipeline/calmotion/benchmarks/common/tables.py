@@ -26,7 +26,7 @@ def markdown(heads: Sequence[str], rows: Iterable[Sequence[str]], rule: str = "-
 def table_parser(
     name: str, description: str | None, shots: Sequence[str], tolerances: Sequence[float]
 ) -> argparse.ArgumentParser:
-    """The arguments of a benchmark that takes shots to tolerances, and tells them as a table."""
+    """The arguments of a benchmark that simulates shots with several tolerances and prints a table."""
     parser = argparse.ArgumentParser(prog=f"calmotion bench {name}", description=description)
     parser.add_argument("shots", metavar="SHOT", nargs="*", default=list(shots), help="USD file (default: samples)")
     parser.add_argument("--tolerances", metavar="METRES", nargs="+", type=float, default=list(tolerances))

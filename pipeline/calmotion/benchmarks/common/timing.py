@@ -1,4 +1,4 @@
-"""How long something takes."""
+"""Timing of an action."""
 
 from __future__ import annotations
 

@@ -1,9 +1,9 @@
-"""Both adjoints against central differences: how exact their gradients are, and what they cost.
+"""Accuracy and run time of the gradients of both adjoints, against central differences.
 
-`calmotion bench gradients [SHOT ...]` takes the gradient of each shot's objective by the discrete and by the continuous
-adjoint at smaller and smaller steps. The judge are central differences of the whole simulation along random
-directions, at the same step (is it the gradient of what is simulated?) and at a quarter of the smallest step (is it the
-gradient that is meant?).
+`calmotion bench gradients [SHOT ...]` computes the gradient of each shot's objective by the discrete and by the
+continuous adjoint at decreasing steps. It compares them with central differences of the whole simulation along random
+directions, at the same step (error of the discrete objective) and at a quarter of the smallest step (error of the
+continuous objective).
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Errors of every integrator against steps, its fate on stiff scenes, and its numerical damping."""
+"""Errors of every integrator against the step, its outcome on stiff scenes, and its numerical damping."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ class Measured:
 
 @dataclass(frozen=True)
 class Fate:
-    """What became of the stiff scene: `ends_s` is its duration where it ran to the end."""
+    """Outcome of the stiff scene: `ends_s` is its duration where it ran to the end."""
 
     integrator: str
     step_s: float
@@ -140,7 +140,7 @@ def order_of(rows: Sequence[Measured], integrator: str, error: str = "position_e
 
 
 def fates(scene: Scene, parts: Sequence[int] = RK4_PARTS) -> tuple[list[Fate], dict[str, tuple[Array, Array]]]:
-    """What becomes of the stiff scene, and the target's height over time by integrator."""
+    """Outcome of the stiff scene, and the target's height over time by integrator."""
     from calmotion.multibody.failure import SimulationFailure
 
     cases: list[tuple[str, float, float | None]] = [(name, WORKING_STEP, None) for name in SECOND_ORDER]

@@ -1,12 +1,12 @@
-"""The integrators compared: orders, a stiff nonlinear scene, and BDF2's numerical damping.
+"""Comparison of the integrators: orders, a stiff nonlinear scene, and the numerical damping of BDF2.
 
 `calmotion bench integrators [--figures DIR] [--json]` measures
 
 - errors of positions and velocities against the step, on a flexible arm with a driven joint and on a four-bar with a
   flexible coupler, against Radau IIA at a fine step;
-- what becomes of two thin steel links in a fast motion at the working step (Seed, section 3): RK4 at once, even with
-  steps thousands of times smaller, Newmark later, BDF2 not at all;
-- how much BDF2 damps a vibration, which has no other damping, by the number of steps in a period.
+- the outcome for two thin steel links in a fast motion at the working step (Seed, section 3): RK4 fails at once, even
+  with steps thousands of times smaller, Newmark fails later, BDF2 runs to the end;
+- the numerical damping of an undamped vibration by BDF2, for several numbers of steps in a period.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ def main(arguments: list[str] | None = None) -> int:
     """The command."""
     parser = argparse.ArgumentParser(prog="calmotion bench integrators", description=__doc__)
     parser.add_argument("--json", action="store_true", help="print one JSON object on stdout, and nothing else there")
-    parser.add_argument("--figures", metavar="DIR", help="also draw everything, to this folder")
+    parser.add_argument("--figures", metavar="DIR", help="also draw figures into this folder")
     options = parser.parse_args(arguments)
     scenes: dict[str, Callable[[], Scene]] = {"flexible arm": arm_scene, "four-bar, flexible coupler": four_bar_scene}
     measured = {name: orders(make()) for name, make in scenes.items()}

@@ -1,4 +1,4 @@
-"""Scenes that are hard to simulate, and what became of each."""
+"""Scenes that are hard to simulate, and the outcome of each."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ class Case:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What became of a case.
+    """The outcome of a case.
 
     Attributes:
         group, name: Of the case.
@@ -194,7 +194,7 @@ def judged(
     group: str, name: str, character: Character, animation: Animation, bodies: Sequence[ReducedBody], options: Options,
     gap: float | None = None,
 ) -> Outcome:  # fmt: skip
-    """Simulate a shot and say what became of it.
+    """Simulate a shot and return the outcome.
 
     Args:
         group, name: Of the outcome.

@@ -1,8 +1,8 @@
-"""Stiff and extreme scenes: each must run to its end, or be refused with a reason; never a NaN, never silent.
+"""Stiff and extreme scenes: each must run to its end, or be refused with a reason, without NaN.
 
-`calmotion bench stability [--json] [--csv FILE] [--figures DIR] [--only TEXT]` runs every case of `CASES` through the
-engine as a shot would be, then every cell of the maps over stiffness, speed, load and step by each integrator
-(`stability_map`), and prints what became of them. It ends with exit status 1 when a case or a cell fails.
+`calmotion bench stability [--json] [--csv FILE] [--figures DIR] [--only TEXT]` simulates every case of `CASES` like a
+shot, then every cell of the maps over stiffness, speed, load and step by each integrator
+(`stability_map`), and prints the outcomes. It ends with exit status 1 when a case or a cell fails.
 """
 
 from __future__ import annotations

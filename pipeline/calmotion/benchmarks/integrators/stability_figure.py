@@ -1,4 +1,4 @@
-"""Maps of stability, a panel an integrator."""
+"""Maps of stability, one panel for each integrator."""
 
 from __future__ import annotations
 

@@ -43,7 +43,7 @@ Rows = tuple[str, tuple[float, ...], Callable[[float], Any]]
 
 @dataclass(frozen=True)
 class Cell:
-    """What became of one simulation of a map.
+    """The outcome of one simulation of a map.
 
     Attributes:
         map: Name of the map.

@@ -1,9 +1,8 @@
-"""What practitioners do otherwise, on the same shot: input shapers and a low-pass filter beside the optimised curves.
+"""Input shapers and a low-pass filter in comparison with the optimised curves.
 
 `calmotion bench baselines [SHOT ...]` simulates each shot as animated, through ZV and ZVD shapers for its lowest mode
 and for its lowest two, through a low-pass filter, and optimised. Errors are those of the worst target against the
-animation as it is timed and, since shapers delay the motion, against the animation delayed by as much as suits each
-method best.
+animation and, since shapers delay the motion, against the animation with the delay that is best for each method.
 """
 
 from __future__ import annotations
@@ -31,7 +30,7 @@ LONGEST_DELAY = 0.6  # that is tried [s]
 
 @dataclass(frozen=True)
 class Row:
-    """One way to make one shot calmer.
+    """One method on one shot.
 
     Attributes:
         shot, method: Names.

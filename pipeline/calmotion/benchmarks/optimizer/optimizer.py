@@ -1,7 +1,7 @@
-"""Gauss-Newton against a quasi-Newton method, and what gradients and products cost.
+"""Gauss-Newton against a quasi-Newton method, and run times of gradients and products.
 
 `calmotion bench optimizer [SHOT ...]` optimises each shot by Gauss-Newton and by L-BFGS (scipy) on the same exact
-gradient, and tells how much time each takes to come within 1% of the converged objective, in forward simulations of the
+gradient, and reports the time until each is within 1% of the converged objective, in forward simulations of the
 same shot in the same run. It then times one gradient and one Gauss-Newton product for 10 to 2000 unknowns.
 """
 
@@ -93,7 +93,7 @@ def _largest(problem: RetargetProblem) -> float:
 
 
 def _reference(shot: BenchShot, prepared: Prepared, zero: Array) -> Search:
-    """A solution well beyond what is compared."""
+    """A solution that is converged further than those that are compared."""
     problem, free = make_problem(shot, prepared, 0.05), np.zeros(len(zero), bool)
     problem.value(zero)
     start = damping_homotopy(problem, zero, free, lowest_frequency(prepared, shot.animation))

@@ -1,4 +1,4 @@
-"""Arms of prismatic beams made in code, for benchmarks: no shot, no mesher, the same numbers everywhere."""
+"""Synthetic arms of prismatic beams: no shot and no mesher, so results are the same on every machine."""
 
 from __future__ import annotations
 

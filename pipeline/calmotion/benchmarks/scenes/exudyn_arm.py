@@ -1,4 +1,4 @@
-"""The swung arm by Exudyn's reduced flexible bodies and by ours: run time against error.
+"""The swung arm with reduced flexible bodies of Exudyn and of Calmotion: run time against error.
 
 0.6 m of plastic, 20 mm square, a rigid cube of 0.2 kg at its end; a quarter turn in half a second, and half a second
 after it; no gravity, damping in proportion to stiffness. Six interface modes and eight more on both sides, the same

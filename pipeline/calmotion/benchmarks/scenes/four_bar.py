@@ -1,4 +1,4 @@
-"""A four-bar with a flexible coupler, made in code: the closed loop that benchmarks and tests share."""
+"""A four-bar with a flexible coupler, a synthetic closed chain for benchmarks and tests."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""An arm whose elbow is turned by a four-bar linkage from the shoulder, made in code: a rapper's arm, a closed loop."""
+"""A synthetic arm with a closed chain: a four-bar linkage drives the elbow from the shoulder, as on the rapper."""
 
 from __future__ import annotations
 

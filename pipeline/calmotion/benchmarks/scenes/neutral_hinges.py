@@ -1,4 +1,4 @@
-"""Rigid characters whose passive hinges have no stiffness at rest: loops alone hold them, or nothing does."""
+"""Rigid characters whose passive hinges have no stiffness at rest; some of them are constrained by closed chains."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def push_rod(gravity: Sequence[float] = (0.0, 0.0, -9.81), offset: float = 0.0, 
 
 
 def truss() -> Character:
-    """Two pinned bars on a turntable that form a triangle: a loop without freedom, each bar balanced at its pin."""
+    """Two pinned bars on a turntable that form a closed chain without degrees of freedom, with balanced bars."""
     mass = MassProperties(_HEAVY, np.zeros(3), _SMALL)
     origin, far = (0.0, 0.0, 0.0), (0.6, 0.0, 0.0)
     bodies = (

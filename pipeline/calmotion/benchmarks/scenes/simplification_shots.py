@@ -1,4 +1,4 @@
-"""Shots made in code each of which has something that it does not need, to measure what leaving it out is worth."""
+"""Synthetic shots, each of which allows one simplification, to measure its gain and its error."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ _SIDE = np.roll(np.array([0.0, np.sqrt(0.5), 0.0, np.sqrt(0.5)]), 1)  # z to x: 
 
 @dataclass(frozen=True, eq=False)
 class SimplificationShot:
-    """A shot with meshes for all bodies that may bend."""
+    """A shot with meshes for all flexible bodies."""
 
     name: str
     character: Character
@@ -46,7 +46,7 @@ def _swing(seconds: float = 2.0, motors: int = 2, rate: float = 24.0) -> Animati
 
 
 def _with_geometry(character: Character, meshes: FEMeshes) -> Character:
-    """The character with its meshes as authored tetrahedra: what tells a body's stiffness before finite elements."""
+    """The character with its meshes as authored tetrahedra: they determine the stiffness of a body before meshing."""
     bodies = list(character.bodies)
     for mesh in meshes.meshes:
         body = bodies[mesh.body]
@@ -61,13 +61,13 @@ def plastic_arm(rate: float = 24.0) -> SimplificationShot:
 
 
 def firm_arm() -> SimplificationShot:
-    """The same of thicker plastic, which bends by less than a twentieth of that."""
+    """The same of thicker plastic, with less than a twentieth of the deflection."""
     character, meshes = beam_arm(2, length=0.3, thickness=0.03, payload=0.1)
     return SimplificationShot("firm arm", _with_geometry(character, meshes), _swing(), meshes)
 
 
 def steel_arm() -> SimplificationShot:
-    """The same of thick steel, which is declared flexible but does not bend noticeably."""
+    """The same of thick steel, which is declared flexible but has a negligible deflection."""
     character, meshes = beam_arm(
         2, length=0.2, thickness=0.08, youngs_modulus=2.1e11, density=7800.0, payload=0.2, cells=8
     )
@@ -87,7 +87,7 @@ def mixed_arm(cells: int = 8, across: int = 2) -> SimplificationShot:
 
 
 def gantry(masts: int = 3) -> SimplificationShot:
-    """A carriage on a slider, with plastic masts and loads on it that sway but never turn."""
+    """A carriage on a slider, with plastic masts and loads on it that sway but do not rotate."""
     material = ElasticMaterial("/Gantry/Plastic", 1.8e9, 0.35, 1200.0, 0.01)
     settings = FlexibleSettings(material, mode_count=24, elasticity="linear")
     # a mast stands along z: the beam's x axis is turned there
@@ -114,8 +114,8 @@ def gantry(masts: int = 3) -> SimplificationShot:
 
 
 def clevis_arm(links: int = 6) -> SimplificationShot:
-    """Rigid links whose hinges have two pins each, as drawn in CAD: one drives, the other closes a loop that holds
-    nothing; and a plastic tool at the end."""
+    """Rigid links whose hinges have two pins each, as drawn in CAD: one is driven, the other closes a
+    chain with redundant constraints; and a plastic tool at the end."""
     arm, meshes = beam_arm(1, length=0.3, thickness=0.014, payload=0.1)
     length, width = 0.15, 0.03
     inertia = MassProperties(0.4, np.array([0.5 * length, 0.0, 0.0]), 1e-3 * np.eye(3))

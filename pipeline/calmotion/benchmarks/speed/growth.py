@@ -1,4 +1,4 @@
-"""How the cost of a step grows with links and modes."""
+"""Growth of the run time of a step with the number of links and modes."""
 
 from __future__ import annotations
 

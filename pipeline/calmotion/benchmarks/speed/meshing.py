@@ -1,8 +1,8 @@
-"""What a mesh costs and what it is worth: time and error against element size, for links of real robots.
+"""Time and error of meshes against element size, for links of real robots.
 
 `calmotion bench meshing FILE[:PRIM] ... [--sizes 2 1.4 1 0.7] [-o table.md|table.csv]` meshes each link
 with elements of several sizes, given in metres with a unit (`8mm`) or as multiples of the automatic size. Errors of
-frequencies are relative to the mesh with the most nodes, which has an error of its own: its estimate is shown too.
+frequencies are relative to the mesh with the most nodes, which itself has an error; its estimate is shown too.
 """
 
 from __future__ import annotations
@@ -104,7 +104,7 @@ def _row(link: Link, size: float, mesh: Any, mesh_time: float) -> Row:
             reduce_body(mesh, link.body, [anchor], (), 0)
             reduce_time = time.perf_counter() - start
         except ShotError:
-            clamped = None  # a joint off the link's surface says nothing about its mesh
+            clamped = None  # a joint off the link's surface is not a property of its mesh
     frequencies, errors = frequency_errors(model, settings.material, 3, clamped)
     return Row(
         link=link.name,

@@ -1,8 +1,8 @@
 """Which shots of a folder load, and why the others do not.
 
-`calmotion bench reading FOLDER ... [-o table.md]` reads every USD file as `calmotion inspect` does; a skinned character
-without physics is made a robot of first (`calmotion rig`). Files that one beside or above them opens as payloads,
-references or sublayers are parts, not shots, and are passed over.
+`calmotion bench reading FOLDER ... [-o table.md]` reads every USD file as `calmotion inspect` does; for a skinned
+character without physics it first makes a robot (`calmotion rig`). Files that another file beside or above
+them opens as payload, reference or sublayer are parts, not shots, and are skipped.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
-"""How long a reduction takes, how much memory it needs, and how exact its modes are.
+"""Run time and memory of a reduction, and the accuracy of its modes.
 
 `calmotion bench reduction [--nodes 50000] [--modes 30]` reduces a slender and a bulky link of that many
-nodes, clamped at one end and with a moving interface at the other, each in a process of its own, whose peak memory is
-the one that is shown.
+nodes, clamped at one end and with a moving interface at the other, each in a separate process, so that the peak
+memory is that of one reduction.
 """
 
 from __future__ import annotations
@@ -116,9 +116,9 @@ def report(shape: str, result: dict[str, Any]) -> str:
 def main(arguments: list[str] | None = None) -> int:
     """The command."""
     parser = argparse.ArgumentParser(prog="calmotion bench reduction", description=__doc__)
-    parser.add_argument("--nodes", type=int, default=50000, help="nodes of the quadratic mesh, about")
+    parser.add_argument("--nodes", type=int, default=50000, help="approximate number of nodes of the quadratic mesh")
     parser.add_argument("--modes", type=int, default=30, help="modes of the reduced body")
-    parser.add_argument("--shape", choices=[*SHAPES], help="one of the shapes alone")
+    parser.add_argument("--shape", choices=[*SHAPES], help="only this shape")
     parser.add_argument("--child", action="store_true", help=argparse.SUPPRESS)
     options = parser.parse_args(arguments)
     if options.child:

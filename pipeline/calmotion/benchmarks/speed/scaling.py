@@ -1,4 +1,4 @@
-"""How run time grows: with bodies, with duration, with modes; and against a sparse solver and against Exudyn.
+"""Growth of the run time with bodies, duration and modes, and comparison with a sparse solver and with Exudyn.
 
 `calmotion bench scaling [--quick] [--figures DIR] [--json]` measures, in one run and with one thread,
 
