@@ -50,5 +50,5 @@ def test_a_wrong_name_is_refused(tmp_path, name):
 
 def test_nothing_is_written_over(tmp_path):
     write_template("speed_watch", tmp_path)
-    with pytest.raises(PluginError, match="there already"):
+    with pytest.raises(PluginError, match="exists already"):
         write_template("speed_watch", tmp_path)
