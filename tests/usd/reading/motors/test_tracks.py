@@ -110,4 +110,4 @@ def test_samples_between_the_frames_give_a_note(tmp_path):
     character, animation, _ = read(tmp_path, lambda stage: stage.SetFramesPerSecond(12.0))
     assert len(animation.frame_times) == 13
     assert any("more samples" in note for note in character.notes)
-    assert not any("more densely" in note for note in read(tmp_path)[0].notes)
+    assert not any("more samples" in note for note in read(tmp_path)[0].notes)
