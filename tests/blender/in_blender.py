@@ -198,7 +198,7 @@ def check_objects(folder: Path) -> None:
     bpy.ops.wm.save_as_mainfile(filepath=str(folder / "objects.blend"))
     bpy.context.view_layer.objects.active = arm
     arm.select_set(True)
-    assert not bpy.ops.calmotion.optimize.poll(), "robot layer for animated objects"
+    assert not bpy.ops.calmotion.optimize.poll(), "objects need a robot layer"
     (folder / "robot_of_objects.usda").write_text(ROBOT)
     scene.calmotion.robot_layer = str(folder / "robot_of_objects.usda")
     old = arm.animation_data.action

@@ -1,4 +1,4 @@
-"""Beams with known answers: evidence, reference problems 1 and 2."""
+"""Beams with analytic solutions: frequencies of a clamped beam, and deflection under its own weight."""
 
 from __future__ import annotations
 
@@ -89,7 +89,7 @@ def test_the_slender_limit():
 
 @pytest.mark.parametrize(("poissons_ratio", "tolerance"), [(0.0, 5e-4), (0.3, 1.5e-2)])
 def test_a_cantilever_sags_under_its_own_weight(poissons_ratio, tolerance):
-    """Evidence 2: rho g A L^4 / 8 E I = 14.715 mm, and rho g L^2 / 2 k G more by shear (k = 5/6).
+    """Beam theory: rho g A L^4 / 8 E I = 14.715 mm, and rho g L^2 / 2 k G more by shear (k = 5/6).
 
     Without lateral contraction beam theory is what the solid does. With it, the clamped face may not contract as the
     beam's sections do, and at 10 to 1 the solid is one per cent stiffer.

@@ -1,4 +1,4 @@
-"""Evidence 7, the Bricard mechanism: five bars of 1 m and 1 kg and the ground along six edges of a cube, six hinges.
+"""Bricard mechanism (IFToMM): five bars of 1 m and 1 kg and the ground along six edges of a cube, six hinges.
 
 Each hinge is across the two bars that it joins. By counting it cannot move (one constraint is redundant), yet it does.
 """

@@ -9,7 +9,7 @@ from calmotion.multibody.integrators.workspace import Workspace
 from calmotion.shot import WORLD
 from mechanisms import mechanism
 
-# first top corner, (|x|, z) [m], by the equation of one coordinate that it reduces to; evidence, 6
+# first top corner, (|x|, z) [m], by its equation of motion in one coordinate, theta'' = -(3.5 g / 3) cos theta
 EXACT = {4.0: (0.11761610, 0.99305914), 10.0: (0.32845811, 0.94451854)}
 
 

@@ -1,4 +1,4 @@
-"""The reduced body against the unreduced one on the same mesh: the arm of evidence 8, from gentle to 30 degrees."""
+"""The reduced body against the unreduced one on the same mesh: the swung arm, up to 30 degrees."""
 
 import numpy as np
 import pytest

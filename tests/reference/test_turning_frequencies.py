@@ -1,4 +1,4 @@
-"""Frequencies of a cantilever that turns steadily (evidence, 3): what a linear floating frame misses."""
+"""Frequencies of a rotating cantilever, whose stiffening a linear floating frame misses."""
 
 import numpy as np
 import pytest

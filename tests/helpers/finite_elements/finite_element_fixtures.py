@@ -21,7 +21,7 @@ def steel():
 
 @pytest.fixture(scope="session")
 def plastic():
-    """Of the swung arm, evidence 8."""
+    """Of the swung arm of `tests/reference/test_swung_arm.py`."""
     return ElasticMaterial("/Looks/Plastic", 1.8e9, 0.35, 1200.0)
 
 

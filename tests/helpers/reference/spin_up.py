@@ -6,7 +6,7 @@ from turning_beam import TurningBeam
 
 LENGTH, EA, EI, PER_LENGTH = 10.0, 2.8e7, 1.4e4, 1.2
 SPIN, RISE = 6.0, 15.0
-# transverse tip displacement at these times, and the largest [m]; evidence, 4
+# transverse tip displacement at these times, and the largest [m]; Simo and Vu-Quoc 1986
 PUBLISHED = {2.5: -0.1510, 5.0: -0.4683, 7.5: -0.5592, 10.0: -0.3632, 12.5: -0.1130}
 LARGEST, LARGEST_AT = -0.5739, 6.76
 

@@ -1,4 +1,4 @@
-"""The arm of evidence 8, unreduced: a slender beam with a rigid cube around the middle of its end, on a driven hinge.
+"""The swung arm, unreduced: a slender beam with a rigid cube around the middle of its end, on a driven hinge.
 
 from swung_arm import SwungArm, quintic
 arm = SwungArm(youngs_modulus=1.8e9, law="stvk", cells=(30, 1, 1))

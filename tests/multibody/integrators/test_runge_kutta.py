@@ -32,7 +32,7 @@ def swing(integrator, h, seconds=10.0):
 
 @pytest.mark.parametrize("integrator, h", [("rk4", 1e-3), ("radau", 2e-2)])
 def test_a_pendulum_comes_to_its_published_place(integrator, h):
-    """evidence.md, problem 5: (-0.27508746, -0.96141921) at t = 10 s, released towards the other side."""
+    """Pendulum of 1 m released level: (-0.27508746, -0.96141921) at t = 10 s; here to the other side."""
     tip, trajectory = swing(integrator, h)
     assert np.abs(tip[[0, 2]] - [0.27508746, -0.96141921]).max() < 3e-8
     assert trajectory.max_joint_gap < 1e-8

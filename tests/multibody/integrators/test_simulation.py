@@ -40,7 +40,7 @@ def pendulum_tip(h):
 
 
 def test_pendulum_released_level_converges_at_second_order_to_the_published_position():
-    """evidence.md, problem 5: (-0.27508746, -0.96141921) at t = 10 s, released towards the other side."""
+    """Pendulum of 1 m released level: (-0.27508746, -0.96141921) at t = 10 s; here to the other side."""
     errors = [np.linalg.norm(pendulum_tip(h)[[0, 2]] - [0.27508746, -0.96141921]) for h in (4e-3, 2e-3, 1e-3)]
     orders = np.log2(np.array(errors[:-1]) / errors[1:])
     assert np.all(np.abs(orders - 2.0) < 0.1) and errors[-1] < 1e-4, (orders, errors)

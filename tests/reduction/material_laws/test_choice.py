@@ -1,4 +1,4 @@
-"""The law that is chosen, against what the laws make of an arm that is swung (evidence, 8)."""
+"""The choice of the elastic law, against simulations of the swung arm with each law."""
 
 import numpy as np
 import pytest
