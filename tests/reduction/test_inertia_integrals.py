@@ -1,4 +1,4 @@
-"""Inertia integrals against direct quadrature of Seed (4)-(9): formulation, section 5, identities 1 and 2."""
+"""Inertia integrals against direct quadrature of Seed (4)-(9): docs/formulation.md, identities 1 and 2."""
 
 from __future__ import annotations
 

@@ -21,7 +21,7 @@ def inertia_integrals(nodes: Array, mass: Any, modes: Array) -> Invariants:
         mass: Scalar mass matrix [kg], sparse, shape [n, n].
         modes: Nodal displacement of each mode, shape [n, 3, r], body axes.
 
-    Source: Seed (11)-(18); formulation, section 1.
+    Source: Seed (11)-(18); docs/formulation.md, "A flexible body".
     """
     n, _, r = modes.shape
     flat = np.ascontiguousarray(modes.reshape(n, 3 * r))

@@ -51,7 +51,7 @@ def reduce_body(
     Raises:
         ShotError: The material constants are not physical, or an attachment frame is away from the body.
 
-    Source: Seed (11)-(20); formulation, section 1.
+    Source: Seed (11)-(20); docs/formulation.md, "A flexible body".
     """
     linear = linear_modes(mesh, body, attachments, root, load_envelope, tolerance, full)
     model, moving, basis, load_envelope = linear.model, linear.moving, linear.basis, linear.load_envelope

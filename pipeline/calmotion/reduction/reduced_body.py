@@ -116,7 +116,7 @@ class ReducedBody:
 
 
 def rigid_invariants(mass: MassProperties) -> Invariants:
-    """The integrals of a rigid body (r = 0) from its mass properties; formulation, section 1."""
+    """The integrals of a rigid body (r = 0) from its mass properties; docs/formulation.md."""
     inertia = mass.inertia
     about_center = 0.5 * np.trace(inertia) * np.eye(3) - inertia
     return Invariants(
