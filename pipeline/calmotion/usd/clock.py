@@ -1,4 +1,4 @@
-"""Between time codes of a stage and seconds after the first frame of the shot."""
+"""Conversion between time codes of a stage and seconds after the first frame of the shot."""
 
 from __future__ import annotations
 

@@ -38,7 +38,7 @@ def plugin_path() -> str:
 
 
 def register() -> None:
-    """Make USD know the schemas; calling it again does nothing.
+    """Register the schemas in USD; calling it again does nothing.
 
     USD reads schemas once, when its schema registry is first used (any stage with a typed prim does that), and
     ignores later ones silently. Call this before a stage is opened; it checks that USD knows the schemas.

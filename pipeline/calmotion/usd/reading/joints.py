@@ -1,4 +1,4 @@
-"""Joints: what they connect, and their frames with the axis turned to z."""
+"""Joints: their bodies, and their frames with the axis along z."""
 
 from __future__ import annotations
 

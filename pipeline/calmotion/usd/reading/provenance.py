@@ -1,4 +1,4 @@
-"""Where a shot came from, for what is written over it."""
+"""Provenance of a shot: its layers, their hashes, and the units of its stage."""
 
 from __future__ import annotations
 

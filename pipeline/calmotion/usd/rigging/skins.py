@@ -1,4 +1,4 @@
-"""The skin of a skeleton as it is posed at a time: points, triangles, and how much each joint moves each point."""
+"""The skin of a skeleton at a time: points, triangles, and the weight of each joint at each point."""
 
 from __future__ import annotations
 

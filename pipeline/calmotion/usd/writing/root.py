@@ -50,7 +50,7 @@ def write_root(layer: str, provenance: Provenance, role: str) -> str:
 
 
 def shot_layers(shot: str, replaced: tuple[str, ...]) -> list[str]:
-    """The layers to put below a new result: the shot, or what our earlier root layer opens but for `replaced`."""
+    """The layers to put below a new result: the shot, or the layers of an earlier root layer but for `replaced`."""
     layer = stages.open_layer(shot)
     if stages.role_of(layer) != stages.ROOT:
         return [os.path.realpath(shot)]
@@ -63,7 +63,7 @@ def shot_layers(shot: str, replaced: tuple[str, ...]) -> list[str]:
 
 
 def keeps_earlier_curves(provenance: Provenance) -> bool:
-    """Whether curves of an earlier result stay below new ones, since no root layer of ours opens them."""
+    """Whether curves of an earlier result stay below new ones, since no root layer that Calmotion wrote opens them."""
     if not provenance.earlier_layers:
         return False
     below = shot_layers(provenance.shot, (stages.CURVES, stages.MOTION))

@@ -1,4 +1,4 @@
-"""Parts of a body's surface that name the joint which holds them: GeomSubsets of family `calmInterface`."""
+"""Parts of a body's surface that name the joint attached to them: GeomSubsets of family `calmInterface`."""
 
 from __future__ import annotations
 

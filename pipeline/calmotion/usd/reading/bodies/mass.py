@@ -148,7 +148,7 @@ def _note_impossible_inertia(reading: Reading, prim: Usd.Prim, tensor: Array) ->
 def _from_geometry(
     reading: Reading, prim: Usd.Prim, shapes: list[Shape], body_mass: float | None
 ) -> MassProperties | None:
-    """What geometry and densities say, scaled to the authored mass of the body where there is one."""
+    """Mass properties from geometry and densities, scaled to the authored mass of the body where there is one."""
     colliders = [s for s in shapes if s.collider]
     solids = colliders or [s for s in shapes if s.surface.visible]
     density = _authored(prim, "physics:density", "density")
