@@ -1,1 +1,1 @@
-"""Surfaces and tetrahedra as geometry: closed surfaces, orientation, distances, cross sections, solids."""
+"""Surfaces and tetrahedra as geometry: closed surfaces, orientation, distances, solids."""

@@ -161,8 +161,7 @@ class Body:
         tets: Tetrahedra authored in the shot, or None.
         flexible: Settings, or None for a rigid body.
         interfaces: Interface patches that are named in the shot.
-        stiff: Whether a flexible body is simulated as rigid, since its deflection in this shot is negligible;
-            it then has a `mass`.
+        stiff: Whether a flexible body is simulated as rigid, as the user forces it; it then has a `mass`.
         non_rotating: Whether it does not rotate in this shot, so that its inertia is constant.
     """
 

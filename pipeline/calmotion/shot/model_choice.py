@@ -92,5 +92,5 @@ def nothing_bends(data: Mapping[type, Any]) -> str | None:
     if character is not None and not any(body.flexible for body in character.bodies):
         return "nothing is flexible: no body has CalmFlexibleBodyAPI"
     if needs is not None and not any(body.bends for body in needs.character.bodies):
-        return "no body deflects noticeably in this shot"
+        return "the user forced all bodies to be rigid"
     return None

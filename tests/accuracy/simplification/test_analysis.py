@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from calmotion.accuracy.simplification.analysis import SHARE, analyse
+from calmotion.accuracy.simplification.analysis import analyse
 from calmotion.accuracy.step_error import distance, simulate_at
 from calmotion.benchmarks.scenes.simplification_shots import (
     arm_with_head,
@@ -12,10 +12,8 @@ from calmotion.benchmarks.scenes.simplification_shots import (
     gantry,
     mixed_arm,
     plastic_arm,
-    steel_arm,
 )
 from calmotion.multibody.model.topology import span_tree
-from calmotion.shot.character import with_settings
 from calmotion.shot.model_choice import KINDS, OFF, ON
 from calmotion.simulation.bodies import reduce_bodies
 from calmotion.simulation.prepare import Options, load_envelopes
@@ -39,42 +37,28 @@ def _rows(needs, kind):
     return [row for row in needs.rows if row.kind == kind]
 
 
-def test_thick_steel_is_rigid_and_its_error_is_below_the_estimate():
-    shot = steel_arm()
-    needs = _analyse(shot)
-    assert not any(body.bends for body in needs.character.bodies)
-    estimates = [row.estimated_error_m for row in _rows(needs, "bodies")]
-    assert len(needs.left_out) >= 2 and all("deflection is at most" in row.why for row in _rows(needs, "bodies"))
-    error = distance(_simulated(shot, needs.character), _simulated(shot, _analyse(shot, {"bodies": ON}).character))
-    assert 0.0 < error < sum(estimates) < SHARE * 1e-3
+@pytest.mark.parametrize("shot", [mixed_arm(), plastic_arm()], ids=["steel and plastic", "plastic"])
+def test_all_flexible_bodies_keep_their_finite_elements_unless_the_user_forces_them(shot):
+    flexible = [body.flexible is not None for body in shot.character.bodies]
+    for options in (FAST, replace(FAST, tolerance=1.0)):
+        choices = _analyse(shot, options=options)
+        assert [body.bends for body in choices.character.bodies] == flexible and not _rows(choices, "bodies")
+    kept = _analyse(shot, {"bodies": ON})
+    assert [body.bends for body in kept.character.bodies] == flexible
+    assert all(row.needed and row.forced for row in _rows(kept, "bodies"))
 
 
-def test_only_bodies_with_a_small_deflection_are_rigid():
-    needs = _analyse(mixed_arm())
-    assert [body.bends for body in needs.character.bodies] == [False, True, False]
-    assert needs.character.bodies[0].mass.mass == pytest.approx(7800 * 0.3 * 0.08**2)
+def test_bodies_that_are_forced_to_be_rigid_have_the_mass_of_their_geometry():
+    choices = _analyse(mixed_arm(), {"bodies": OFF})
+    assert not any(body.bends for body in choices.character.bodies)
+    assert choices.character.bodies[0].mass.mass == pytest.approx(7800 * 0.3 * 0.08**2)
+    assert len(_rows(choices, "bodies")) == 2 and all(row.forced for row in _rows(choices, "bodies"))
 
 
-def test_a_tighter_tolerance_keeps_it():
-    assert _analyse(mixed_arm(), options=replace(FAST, tolerance=1e-7)).character.bodies[0].bends
-
-
-def test_bodies_with_explicit_settings_stay_flexible():
-    shot = steel_arm()
-    for change in ({"mode_count": 4}, {"elasticity": "stvk"}):
-        asked = replace(
-            shot, character=with_settings(shot.character, lambda own, change=change: replace(own, **change))
-        )
-        assert [b.bends for b in _analyse(asked).character.bodies] == [True, True, False]
-
-
-def test_without_geometry_finite_elements_decide():
-    shot = steel_arm()
+def test_a_body_whose_mass_only_the_mesh_gives_stays_flexible():
+    shot = mixed_arm()
     bodies = tuple(replace(body, tets=None) for body in shot.character.bodies)
     bare = replace(shot, character=replace(shot.character, bodies=bodies))
-    needs = _analyse(bare)
-    assert needs.character.bodies[0].bends
-    assert "only finite elements" in _rows(needs, "bodies")[0].why
     forced = _analyse(bare, {"bodies": OFF})
     assert forced.character.bodies[0].bends and "mesh" in _rows(forced, "bodies")[0].why
 
@@ -108,7 +92,7 @@ def test_joints_of_closed_chains_with_flexible_bodies_are_kept():
     assert [j.redundant for j in kept.character.joints][:4] == [False, False, False, True]
 
 
-def test_no_body_of_a_gantry_rotates_within_the_known_deflection():
+def test_the_carriage_and_the_mast_of_a_gantry_do_not_rotate():
     shot = gantry(1)
     needs = _analyse(shot)
     non_rotating = [body.non_rotating for body in needs.character.bodies]

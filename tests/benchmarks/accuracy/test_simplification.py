@@ -7,7 +7,7 @@ from functools import partial
 import pytest
 from calmotion.benchmarks.accuracy import simplification
 from calmotion.benchmarks.accuracy.simplification import Pair, pair
-from calmotion.benchmarks.scenes.simplification_shots import clevis_arm, held_arm, steel_arm
+from calmotion.benchmarks.scenes.simplification_shots import clevis_arm, held_arm
 from calmotion.shot.model_choice import ON
 from calmotion.simulation.prepare import Options
 
@@ -23,11 +23,6 @@ def test_a_redundant_joint_changes_nothing(loops):
     assert loops.error_m < 1e-9
     assert loops.all_with_s > loops.with_s and loops.all_without_s > loops.without_s
     assert loops.ratio == loops.with_s / loops.without_s
-
-
-def test_bodies_with_a_small_deflection_become_rigid_within_the_estimated_error():
-    found = pair("bodies", steel_arm(), "simulate", {"bodies": ON, "modes": ON}, 1, FAST)
-    assert 0.0 < found.error_m < found.estimated_m < 0.5e-3
 
 
 def test_options_of_one_side_alone(monkeypatch):
@@ -58,6 +53,7 @@ def test_the_command_writes_a_table_and_one_object(loops, monkeypatch, capsys, t
     assert "gantry" in shown and "clevis" not in shown
 
 
-def test_every_kind_has_a_pair():
+def test_every_kind_that_the_program_chooses_has_a_pair():
     kinds = [make.args[0] for make in simplification.pairs(1)]
-    assert set(kinds) == {*simplification.KINDS, "knots", "step", "everything"} and kinds.count("everything") == 3
+    chosen = {*simplification.KINDS} - {"bodies"}  # which only the user chooses
+    assert set(kinds) == {*chosen, "knots", "step", "everything"} and kinds.count("everything") == 2

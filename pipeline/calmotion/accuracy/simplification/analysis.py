@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 from functools import partial
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -18,10 +17,6 @@ from calmotion.shot.model_choice import AUTO, OFF, ON
 from calmotion.simulation.settings import Options
 from calmotion.support.naming import distinct_names
 
-if TYPE_CHECKING:
-    from calmotion.accuracy.deflection_bound.bound import Stiffness
-
-SHARE = 0.2  # of the tolerance, that bodies taken as rigid may take together, and those taken as not turning
 FINE, NONE = 1e-3, np.inf  # shares of the tolerance for modes that are left out, where modes are forced on and off
 
 
@@ -44,18 +39,16 @@ def analyse(
     if len(animation.frame_times) < 2:
         return ModelChoices(_asked(character, forced), (), forced)
     tree = span_tree(character)
-    allowed = SHARE * character.retarget.allowed(options.tolerance)
     rows: list[ModelChoice] = []
-    stiffness: Mapping[int, Stiffness] = {}
     if tree.closing or any(body.flexible for body in character.bodies):
         # what simulates the rigid robot takes a while to load, and a rigid shot without loops does not need it
         from calmotion.accuracy.simplification.by_rigid_run import decide
 
         try:
-            character, rows, stiffness = decide(character, animation, options, tree, choice, allowed, changes)
+            character, rows = decide(character, animation, options, tree, choice, changes)
         except SimulationFailure:
             return ModelChoices(_asked(character, forced), (), forced)
-    found = _turning(turning_of(character, animation, tree, stiffness, changes), choice("turning"), allowed)
+    found = _turning(turning_of(character, animation, tree, changes), choice("turning"))
     character, more = _straight(character, found, "turning" in forced)
     return ModelChoices(_asked(character, forced), (*rows, *more), forced)
 
@@ -79,18 +72,13 @@ def _asked(character: Character, forced: Mapping[str, str]) -> Character:
     return with_settings(character, settings)
 
 
-def _turning(found: list[Turning], choice: str, allowed: float) -> list[Turning]:
+def _turning(found: list[Turning], choice: str) -> list[Turning]:
     """What is decided of what was found."""
     if choice == ON:
         return [replace(item, turns=True, why="forced by the user") for item in found]
     if choice == OFF:
         return [replace(item, turns=False, why="forced by the user") for item in found]
-    return [
-        replace(item, turns=True, why="a body that carries it deflects too far")
-        if (item.error_m or 0.0) > allowed / len(found)
-        else item
-        for item in found
-    ]
+    return found
 
 
 def _straight(character: Character, found: list[Turning], forced: bool) -> tuple[Character, list[ModelChoice]]:
@@ -102,8 +90,7 @@ def _straight(character: Character, found: list[Turning], forced: bool) -> tuple
         groups.setdefault((item.turns, item.why), []).append(k)
     rows = []
     for (turns, why), members in groups.items():
-        errors = [error for k in members if (error := found[k].error_m) is not None]
         terms = "gyroscopic terms" if turns else "no gyroscopic terms"
         what = ", ".join(names[bodies[k].path] for k in members) + f": {terms}"
-        rows.append(ModelChoice("turning", what, turns, why, sum(errors) if errors else None, forced))
+        rows.append(ModelChoice("turning", what, turns, why, None, forced))
     return replace(character, bodies=bodies), rows

@@ -7,20 +7,17 @@ from dataclasses import replace
 
 import numpy as np
 
-from calmotion.accuracy.deflection_bound.bound import Stiffness, static_reach
 from calmotion.accuracy.simplification.influence import NOTHING, influence
 from calmotion.accuracy.simplification.redundant_constraints import closures_of
 from calmotion.geometry.solid import solid_of
-from calmotion.multibody.model.joint_arrays import BodyAnchors
 from calmotion.multibody.model.model import Model, body_anchors, rigid_body
 from calmotion.multibody.model.topology import Tree, chain_members
-from calmotion.reduction.load_envelope import LoadEnvelope
 from calmotion.shot import Animation, Body, Character, MassProperties, ModelChoice
 from calmotion.shot.model_choice import AUTO, OFF, ON
 from calmotion.simulation.forward import ForwardRun
 from calmotion.simulation.inputs.gearing import leaders
 from calmotion.simulation.prepare import grid_of
-from calmotion.simulation.rigid_run import excitation_of, rigid_run
+from calmotion.simulation.rigid_run import rigid_run
 from calmotion.simulation.settings import Options
 
 STEP = 1.0 / 100.0  # of the rigid robot's simulation [s]: loads are those of the animation, and safe bounds follow
@@ -28,18 +25,17 @@ STEP = 1.0 / 100.0  # of the rigid robot's simulation [s]: loads are those of th
 
 def decide(
     character: Character, animation: Animation, options: Options, tree: Tree, choice: Callable[[str], str],
-    allowed: float, changes: bool,
-) -> tuple[Character, list[ModelChoice], dict[int, Stiffness]]:  # fmt: skip
-    """Decide which bodies bend, which loops are needed and which motors move targets.
+    changes: bool,
+) -> tuple[Character, list[ModelChoice]]:  # fmt: skip
+    """Decide which bodies are rigid, which joints of closed chains are needed and which motors move targets.
 
     Args:
         tree: Of the character.
-        choice: From a kind of need to `auto`, `on` or `off`.
-        allowed: What bodies taken as rigid may cost together at the targets [m].
+        choice: From a kind of simplification to `auto`, `on` or `off`.
         changes: Whether motors' curves are to be changed.
 
     Returns:
-        The character marked with the decisions, these, and how far flexible bodies bend, where that can be told.
+        The character marked with the decisions, and these.
 
     Raises:
         SimulationFailure: The rigid robot cannot follow its tracks.
@@ -47,19 +43,17 @@ def decide(
     solids = {k: solid_of(body) for k, body in enumerate(character.bodies) if body.flexible is not None}
     known = {k: None if solid is None else solid.mass for k, solid in solids.items()}
     rough = replace(character, bodies=tuple(_with_mass(k, body, known) for k, body in enumerate(character.bodies)))
-    anchors = body_anchors(rough, tree)
-    rigid = [rigid_body(body, own) for body, own in zip(rough.bodies, anchors, strict=True)]
+    character, rows = _bodies(character, known, choice("bodies"))
+    if not (changes or tree.closing):
+        return character, rows
+    rigid = [rigid_body(body, own) for body, own in zip(rough.bodies, body_anchors(rough, tree), strict=True)]
     grid = grid_of(character, animation, replace(options, step=STEP))
     model, run = rigid_run(character, animation, grid, tree, rigid)
-    character, rows = _motors(character, model, run, choice("motors")) if changes else (character, [])
-    # loads of one body depend on the masses of all
-    trusted = all(mass is not None for mass in known.values())
-    stiffness = _stiffness(rough, anchors, excitation_of(character, model, run, grid.h)) if trusted else {}
-    masses = {k: mass for k, mass in known.items() if mass is not None}
-    character, more = _bodies(character, stiffness, masses, allowed, choice("bodies"))
-    rows += more
+    if changes:
+        character, more = _motors(character, model, run, choice("motors"))
+        rows += more
     character, more = _loops(character, tree, model, run, choice("loops"))
-    return character, rows + more, stiffness
+    return character, rows + more
 
 
 def _with_mass(index: int, body: Body, known: Mapping[int, MassProperties | None]) -> Body:
@@ -80,45 +74,22 @@ def _guessed_mass(body: Body) -> MassProperties:
     return MassProperties(mass, 0.5 * (corners.min(axis=0) + corners.max(axis=0)), np.diag(across))
 
 
-def _stiffness(
-    character: Character, anchors: list[BodyAnchors], loads: tuple[LoadEnvelope, ...]
-) -> dict[int, Stiffness]:
-    """How far flexible bodies bend, where that can be told."""
-    found = {
-        k: static_reach(body, own, load)
-        for k, (body, own, load) in enumerate(zip(character.bodies, anchors, loads, strict=True))
-        if body.flexible is not None
-    }
-    return {k: stiffness for k, stiffness in found.items() if stiffness is not None}
-
-
 def _bodies(
-    character: Character, stiffness: Mapping[int, Stiffness], masses: Mapping[int, MassProperties], allowed: float,
-    choice: str,
-) -> tuple[Character, list[ModelChoice]]:  # fmt: skip
-    """Flexible bodies that are simulated as rigid."""
-    bodies, rows, spent = list(character.bodies), [], 0.0
-    flexible = [k for k, body in enumerate(bodies) if body.flexible is not None]
-    # those that bend least first, as long as all together stay within what is allowed
-    for k in sorted(flexible, key=lambda k: stiffness[k].displacement_m if k in stiffness else np.inf):
-        body, own, settings = bodies[k], stiffness.get(k), bodies[k].flexible
-        assert settings is not None
-        error = None if own is None else own.displacement_m
-        deflects = "" if error is None else f"its deflection is at most {1e3 * error:.2g} mm"
-        if choice != AUTO:
-            stiff, why, is_forced = choice == OFF, "forced by the user", True
-        elif settings.mode_count >= 0 or settings.elasticity != "auto":
-            stiff, why, is_forced = False, "its attributes fix the model", True
-        else:
-            stiff, is_forced = error is not None and spent + error <= allowed, False
-            why = deflects or "only finite elements can estimate its deflection"
-        if stiff and k not in masses:
-            stiff, why = False, "only the mesh gives its mass"
-        if stiff:
-            bodies[k] = replace(body, stiff=True, mass=masses[k])
-            spent += error or 0.0
-        model = "rigid" if stiff else "flexible"
-        rows.append(ModelChoice("bodies", f"{body.path}: {model}", not stiff, why, error, is_forced))
+    character: Character, masses: Mapping[int, MassProperties | None], choice: str
+) -> tuple[Character, list[ModelChoice]]:
+    """Flexible bodies that the user forces to be rigid or flexible; the others keep their finite elements."""
+    if choice == AUTO:
+        return character, []
+    bodies, rows = list(character.bodies), []
+    for k, mass in masses.items():
+        body, why = bodies[k], "forced by the user"
+        rigid = choice == OFF and mass is not None
+        if rigid:
+            bodies[k] = replace(body, stiff=True, mass=mass)
+        elif choice == OFF:
+            why = "only the mesh gives its mass"
+        model = "rigid" if rigid else "flexible"
+        rows.append(ModelChoice("bodies", f"{body.path}: {model}", not rigid, why, None, True))
     return replace(character, bodies=tuple(bodies)), rows
 
 

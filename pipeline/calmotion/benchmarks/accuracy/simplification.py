@@ -1,7 +1,7 @@
 """Gain of each model simplification: pairs of runs with and without it, their times and the error that it adds.
 
 `calmotion bench simplification [--csv FILE]` runs synthetic shots, each of which allows one simplification, and
-three of them (a rigid one, one without rotating bodies, one without closed chains) with all simplifications
+two of them (one without rotating bodies, one without closed chains) with all simplifications
 switched off. A time is the median of alternating runs; an error is the largest distance of any target, at any
 frame, between the two runs of a pair.
 """
@@ -31,9 +31,7 @@ from calmotion.benchmarks.scenes.simplification_shots import (
     firm_arm,
     gantry,
     held_arm,
-    mixed_arm,
     plastic_arm,
-    steel_arm,
 )
 from calmotion.multibody.model.topology import span_tree
 from calmotion.retargeting.to_tolerance import optimize_to_tolerance
@@ -141,7 +139,6 @@ def pairs(repeats: int = REPEATS) -> list[partial[Pair]]:
     finest, finer_steps = Options(knot_spacing=1.0 / 60.0), Options(step=1.0 / 3840.0)
     everything = dict.fromkeys(KINDS, ON)
     return [
-        partial(pair, "bodies", mixed_arm(30, 8), "simulate", {"bodies": ON}, repeats),
         partial(pair, "turning", gantry(), "simulate", {"turning": ON}, repeats),
         partial(pair, "loops", clevis_arm(), "simulate", {"loops": ON}, repeats),
         partial(pair, "modes", firm_arm(), "simulate", {"modes": ON}, repeats),
@@ -151,7 +148,6 @@ def pairs(repeats: int = REPEATS) -> list[partial[Pair]]:
         partial(pair, "ranges", held_arm(), "optimize", {"ranges": ON}, repeats),
         partial(pair, "knots", plastic_arm(60.0), "optimize", {}, repeats, None, finest),
         partial(pair, "step", firm_arm(), "simulate", {}, repeats, None, finer_steps),
-        partial(pair, "everything", steel_arm(), "simulate", everything, repeats),
         partial(pair, "everything", gantry(), "simulate", everything, repeats),
         partial(pair, "everything", firm_arm(), "simulate", everything, repeats),
     ]

@@ -66,14 +66,6 @@ def firm_arm() -> SimplificationShot:
     return SimplificationShot("firm arm", _with_geometry(character, meshes), _swing(), meshes)
 
 
-def steel_arm() -> SimplificationShot:
-    """The same of thick steel, which is declared flexible but has a negligible deflection."""
-    character, meshes = beam_arm(
-        2, length=0.2, thickness=0.08, youngs_modulus=2.1e11, density=7800.0, payload=0.2, cells=8
-    )
-    return SimplificationShot("steel arm", _with_geometry(character, meshes), _swing(), meshes)
-
-
 def mixed_arm(cells: int = 8, across: int = 2) -> SimplificationShot:
     """A plastic link, always of the same modes, on one of thick steel, whose mesh has so many cells."""
     character, meshes = beam_arm(2, length=0.3, thickness=0.014, payload=0.2, modes=8)

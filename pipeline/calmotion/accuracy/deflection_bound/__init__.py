@@ -1,1 +1,0 @@
-"""An upper bound of the deflection of a flexible body, before it is meshed."""
