@@ -14,7 +14,7 @@ from calmotion.shot.outputs import PlannedStep, ShapedTracks, Verification
 from calmotion.shot.run import OutputPaths, Source
 
 _FORCED = {
-    "bodies": "Finite elements of all flexible bodies, or of none; auto: of all",
+    "bodies": "Finite elements of all flexible bodies, or of none",
     "turning": "Gyroscopic terms of all bodies, or of none",
     "loops": "All joints that close chains, or only those that are not redundant",
     "modes": "As many modes as for a thousandth of the tolerance, or only those that the motion excites",
@@ -23,7 +23,7 @@ _FORCED = {
     "directions": "All elastic coordinates of nonlinear bodies and all pairs of them, or the smallest subspaces",
     "ranges": "The whole shot, or only its active intervals, without a check at the end",
 }
-_BY_TOLERANCE = "; auto: by the tolerance"
+_AUTO = {"bodies": "of all"}  # of the others: by the tolerance
 
 
 class AnalyseShot(Operator):
@@ -36,10 +36,11 @@ class AnalyseShot(Operator):
     provides = (ModelChoices,)
     properties = tuple(
         Property(
-            kind, str, AUTO, choices=(AUTO, ON, OFF), description=_FORCED[kind] + _BY_TOLERANCE * (kind != "bodies")
+            kind, str, AUTO, choices=(AUTO, ON, OFF),
+            description=f"{_FORCED[kind]}; auto: {_AUTO.get(kind, 'by the tolerance')}",
         )
         for kind in KINDS
-    )
+    )  # fmt: skip
 
     def execute(self, context: RunContext) -> Sequence[object]:
         from calmotion.accuracy.simplification.analysis import analyse
