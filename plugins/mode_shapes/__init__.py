@@ -22,7 +22,7 @@ class WriteModeShapes(Operator):
     provides = (ModeShapes,)
     properties = (
         Property("dpi", int, 150, minimum=30, maximum=600, description="Resolution of the pictures, dots per inch."),
-        Property("pictures", int, 8, minimum=1, maximum=30, description="Most modes in one picture."),
+        Property("pictures", int, 8, minimum=1, maximum=30, description="Largest number of modes in one picture."),
     )
 
     @classmethod

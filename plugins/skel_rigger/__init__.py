@@ -15,7 +15,7 @@ class RigSkeleton(Operator):
     """Bodies cut from the skin by its weights, the fewest hinges that follow each joint, masses of a material."""
 
     idname = "rig.skeleton"
-    label = "Make a robot of the skeleton"
+    label = "Make a robot from the skeleton"
     requires = (Source, OutputPaths)
     provides = (Rig,)
     properties = (
@@ -35,7 +35,7 @@ class RigSkeleton(Operator):
             0.05,
             minimum=1e-4,
             maximum=10.0,
-            description="Mass of a servo between two hinges, over that of the link that they turn",
+            description="Mass of a servo between two hinges, relative to the link that they rotate",
         ),
         Property("flexible", str, "none", description="Flexible links: all, none, or names separated by commas"),
     )

@@ -57,7 +57,7 @@ class ExportCurves(Operator):
     provides = (ControllerCurves,)
     properties = (
         Property("file", str, "", description="File to write"),
-        Property("rate", float, 500.0, unit="Hz", minimum=1.0, maximum=1e5, description="Rows a second"),
+        Property("rate", float, 500.0, unit="Hz", minimum=1.0, maximum=1e5, description="Rows per second"),
         Property("angles", str, "rad", choices=("rad", "deg"), description="Unit of angles; lengths are in m"),
     )
 

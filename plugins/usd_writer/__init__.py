@@ -35,7 +35,7 @@ class WriteResult(Operator):
             str,
             "none",
             choices=("none", "motors", "simulated"),
-            description="Body transforms as well: of a rigid robot with the new curves, or of the predicted motion "
+            description="Also write body transforms, of a rigid robot with the new curves, or of the predicted motion "
             "with its deformed meshes.",
         ),
     )

@@ -17,9 +17,9 @@ from calmotion.simulation.bodies import reduce_bodies
 from calmotion.simulation.prepare import Options, load_envelopes
 
 MADE = {
-    "linkage": "an arm with a four-bar, made in code",
-    "soft-linkage": "the same with thinner links, which shakes by a quarter of a metre",
-    "arm": "two plastic links, made in code",
+    "linkage": "an arm with a four-bar linkage",
+    "soft-linkage": "the same with thinner links, with a shake of 0.25 m",
+    "arm": "two plastic links",
 }
 
 

@@ -8,6 +8,8 @@ from collections.abc import Iterable, Sequence
 from dataclasses import asdict, fields
 from typing import Any
 
+from calmotion.benchmarks.common.shots import MADE
+
 
 def write_rows(path: str, kind: type[Any], rows: Iterable[Any]) -> None:
     """Write dataclasses of one kind as CSV: a column a field, a row each."""
@@ -21,6 +23,18 @@ def markdown(heads: Sequence[str], rows: Iterable[Sequence[str]], rule: str = "-
     """A Markdown table; `rule` aligns all columns but the first."""
     lines = [heads, ["---", *[rule] * (len(heads) - 1)], *rows]
     return "".join("| " + " | ".join(line) + " |\n" for line in lines)
+
+
+def shots_parser(name: str, description: str | None) -> argparse.ArgumentParser:
+    """The arguments of a benchmark that runs on shots, or on the synthetic ones of `MADE`."""
+    made = "; ".join(f"{shot}: {text}" for shot, text in MADE.items())
+    parser = argparse.ArgumentParser(prog=f"calmotion bench {name}", description=description)
+    parser.add_argument(
+        "shots", metavar="SHOT", nargs="*", default=["arm", "linkage"],
+        help=f"USD file, or a synthetic shot ({made}); default: arm linkage",
+    )  # fmt: skip
+    parser.add_argument("--json", action="store_true", help="print one JSON object on stdout, and nothing else there")
+    return parser
 
 
 def table_parser(

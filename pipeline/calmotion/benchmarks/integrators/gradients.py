@@ -8,22 +8,20 @@ continuous objective).
 
 from __future__ import annotations
 
-import argparse
 import json
 import sys
 from collections.abc import Sequence
 from dataclasses import asdict
 
-from calmotion.benchmarks.common.shots import MADE, load
+from calmotion.benchmarks.common.shots import load
+from calmotion.benchmarks.common.tables import shots_parser
 from calmotion.benchmarks.integrators.gradient_error import GradientError, errors
 
 
 def main(arguments: list[str] | None = None) -> int:
     """The command."""
-    parser = argparse.ArgumentParser(prog="calmotion bench gradients", description=__doc__)
-    parser.add_argument("shots", metavar="SHOT", nargs="*", default=["arm", "linkage"], help=f"USD file, or {MADE}")
+    parser = shots_parser("gradients", __doc__)
     parser.add_argument("--figures", metavar="DIR", help="also draw error against run time, to this folder")
-    parser.add_argument("--json", action="store_true", help="print one JSON object on stdout, and nothing else there")
     options = parser.parse_args(arguments)
     measured: list[GradientError] = []
     for name in options.shots:

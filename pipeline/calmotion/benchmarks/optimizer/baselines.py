@@ -7,14 +7,14 @@ animation and, since shapers delay the motion, against the animation with the de
 
 from __future__ import annotations
 
-import argparse
 import json
 import sys
 from dataclasses import asdict, dataclass
 
 import numpy as np
 
-from calmotion.benchmarks.common.shots import MADE, BenchShot, load
+from calmotion.benchmarks.common.shots import BenchShot, load
+from calmotion.benchmarks.common.tables import shots_parser
 from calmotion.benchmarks.optimizer.optimizer import make_problem
 from calmotion.retargeting.problem.problem import RetargetProblem
 from calmotion.retargeting.solver.damping_homotopy import damping_homotopy
@@ -94,9 +94,7 @@ def _row(
 
 def main(arguments: list[str] | None = None) -> int:
     """The command."""
-    parser = argparse.ArgumentParser(prog="calmotion bench baselines", description=__doc__)
-    parser.add_argument("shots", metavar="SHOT", nargs="*", default=["arm", "linkage"], help=f"USD file, or {MADE}")
-    parser.add_argument("--json", action="store_true", help="print one JSON object on stdout, and nothing else there")
+    parser = shots_parser("baselines", __doc__)
     options = parser.parse_args(arguments)
     found: list[Row] = []
     for name in options.shots:

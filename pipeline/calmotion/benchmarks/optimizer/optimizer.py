@@ -7,7 +7,6 @@ same shot in the same run. It then times one gradient and one Gauss-Newton produ
 
 from __future__ import annotations
 
-import argparse
 import json
 import sys
 import time
@@ -17,7 +16,8 @@ from functools import partial
 import numpy as np
 from scipy.optimize import minimize as quasi_newton
 
-from calmotion.benchmarks.common.shots import MADE, BenchShot, load
+from calmotion.benchmarks.common.shots import BenchShot, load
+from calmotion.benchmarks.common.tables import shots_parser
 from calmotion.benchmarks.common.timing import median_time
 from calmotion.retargeting.problem.offset_basis import OffsetBasis, make_basis
 from calmotion.retargeting.problem.offset_space import OffsetSpace
@@ -192,10 +192,8 @@ def costs(shot: BenchShot) -> list[Cost]:
 
 def main(arguments: list[str] | None = None) -> int:
     """The command."""
-    parser = argparse.ArgumentParser(prog="calmotion bench optimizer", description=__doc__)
-    parser.add_argument("shots", metavar="SHOT", nargs="*", default=["arm", "linkage"], help=f"USD file, or {MADE}")
+    parser = shots_parser("optimizer", __doc__)
     parser.add_argument("--lbfgs", type=int, default=400, help="most evaluations of L-BFGS")
-    parser.add_argument("--json", action="store_true", help="print one JSON object on stdout, and nothing else there")
     options = parser.parse_args(arguments)
     converged: list[Convergence] = []
     timed: list[Cost] = []
