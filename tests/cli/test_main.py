@@ -245,6 +245,24 @@ def test_options_reach_the_plugins_in_si_units(run, command):
     assert seen == [Source("a.usda", command, tolerance=0.001, step=0.002, integrator="radau", pre_roll=0.5)]
 
 
+@pytest.mark.parametrize(
+    "arguments, near",
+    [
+        (("optimize", "a.usda", "-o", "b.usda", "--integrator", "rk4"), "bdf2"),
+        (("optimise", "a.usda", "-o", "b.usda", "--integrator", "bdf"), "Did you mean bdf2?"),
+        (("simulate", "a.usda", "--integrator", "rk5"), "Did you mean rk4?"),
+        (("inspect", "a.usda", "--integrator", "generalised-alpha"), "Did you mean generalized-alpha?"),
+        (("simulate", "a.usda", "--shaper", "zdv"), "Did you mean"),
+    ],
+)
+def test_an_integrator_or_shaper_that_the_command_does_not_have_is_refused_before_reading(run, arguments, near):
+    def read(context):
+        raise AssertionError("nothing is read")
+
+    status, _, err = run(*arguments, read=read)
+    assert status == 2 and arguments[-2] in err and arguments[-1] in err and near in err
+
+
 def test_inspect_reports_bodies_motors_and_frequencies(run):
     status, out, _ = run("inspect", "shot.usda", "--json")
     report = json.loads(out)

@@ -32,3 +32,35 @@ def test_bash_takes_the_completion(capfd, tmp_path):
     asked = "COMP_WORDS=(calmotion opt); COMP_CWORD=1; COMPREPLY=(); _shtab_calmotion; echo ${COMPREPLY[@]}"
     done = subprocess.run(["bash", "-c", f"{script}\n{asked}"], capture_output=True, text=True)
     assert done.stdout.strip() == "optimize", done.stderr
+
+
+def test_without_arguments_it_prints_help(capsys):
+    assert main([]) == 2
+    printed = capsys.readouterr()
+    assert not printed.out and "change the motor curves" in printed.err
+
+
+@pytest.mark.parametrize(
+    "wrong, right",
+    [
+        (["simulate", "a.usda", "--tolerence", "1mm"], "--tolerance"),
+        (["simulate", "a.usda", "--tolerence=1mm"], "--tolerance"),
+        (["inspect", "a.usda", "--stepp", "1ms"], "--step"),
+        (["simulate", "a.usda", "--keep", "turnning"], "turning"),
+        (["simualte", "a.usda"], "simulate"),
+    ],
+)
+def test_a_misspelt_option_is_answered_with_the_nearest(wrong, right, capsys):
+    assert main(wrong) == 2
+    assert f"Did you mean {right}?" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("text", ["1", "0.001", "1e-3", "1.", "0"])
+def test_a_tolerance_needs_a_unit(text, capsys):
+    assert main(["simulate", "a.usda", "--tolerance", text]) == 2
+    assert f"{text} has no unit; write {text}m or {text}mm" in " ".join(capsys.readouterr().err.split())
+
+
+@pytest.mark.parametrize("text, meters", [("1mm", 1e-3), ("1 cm", 1e-2), ("1e-3m", 1e-3)])
+def test_a_tolerance_with_a_unit_is_in_metres(text, meters):
+    assert build_parser().parse_args(["simulate", "a.usda", "--tolerance", text]).tolerance == meters

@@ -1,6 +1,7 @@
 import io
 
-from calmotion.cli.tables import console_on, name_paths, print_accuracy
+import pytest
+from calmotion.cli.tables import console_on, length, name_paths, print_accuracy
 
 
 def test_short_paths_stay_whole():
@@ -47,3 +48,15 @@ def test_a_tolerance_that_is_not_kept_is_reported():
         stream = io.StringIO()
         print_accuracy(console_on(stream), report | {"estimated_error_m": estimated, "verified_error_m": verified})
         assert ("the tolerance of 0.1 mm is not kept" in stream.getvalue()) == told
+
+
+@pytest.mark.parametrize(
+    "meters, text",
+    [
+        (0.0, "0 mm"), (1.392e-15, "< 0.0001 mm"), (9.9e-8, "< 0.0001 mm"), (1.2e-7, "0.00012 mm"),
+        (0.0593, "59.3 mm"), (9.9994, "9999 mm"), (9.9999, "10 m"), (123.456, "123.5 m"), (None, "-"),
+        (float("inf"), "-"),
+    ],
+)  # fmt: skip
+def test_lengths_have_no_powers_of_ten(meters, text):
+    assert length(meters) == text

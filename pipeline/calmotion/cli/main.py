@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-import argparse
 import sys
 from collections.abc import Sequence
 
 from calmotion.cli.commands import bench, completion, inspect, optimize, plugins, rig, simulate
+from calmotion.cli.parser import Parser
 from calmotion.errors import ShotError
 from calmotion.version import __version__
 
 FAILED, WRONG_USAGE, INTERRUPTED = 1, 2, 130
+ALIASES = {"optimise": "optimize"}
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -22,8 +23,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Returns:
         0 done, 1 the shot cannot be processed, 2 wrong usage, 130 interrupted.
     """
+    given = sys.argv[1:] if arguments is None else list(arguments)
+    if not given:
+        build_parser().print_help(sys.stderr)
+        return WRONG_USAGE
     try:
-        args = build_parser().parse_args(arguments)
+        args = build_parser().parse_args([ALIASES.get(given[0], given[0]), *given[1:]])
     except SystemExit as stop:
         return stop.code if isinstance(stop.code, int) else WRONG_USAGE
     from calmotion.cli.output import print_error, protected_stdout
@@ -44,9 +49,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
             return FAILED
 
 
-def build_parser() -> argparse.ArgumentParser:
+def build_parser() -> Parser:
     """The parser of all commands."""
-    parser = argparse.ArgumentParser(
+    parser = Parser(
         prog="calmotion",
         description="Retargets the animation of a flexible robotic character so that it does not shake.",
         epilog="Exit status: 0 done, 1 the shot cannot be processed, 2 wrong usage, 130 interrupted.",

@@ -117,8 +117,8 @@ def simulation_options(command: argparse.ArgumentParser, integrators: str) -> No
     model.add_argument(
         "--tolerance",
         metavar="LENGTH",
-        type=_quantity("m"),
-        help="acceptable error at the targets (1mm); time step, modes and simplifications follow from it",
+        type=_quantity("m", needs_unit=True),
+        help="acceptable error at the targets, with a unit (1mm); time step, modes and simplifications follow from it",
     )
     model.add_argument("--integrator", metavar="NAME", default=None, help=integrators)
     model.add_argument(
@@ -186,10 +186,12 @@ def assignments(args: argparse.Namespace) -> dict[str, dict[str, object]]:
     return merge([*(read_assignment(text) for text in args.set), *([{"usd.write": writer}] if writer else [])])
 
 
-def _quantity(unit: str) -> Callable[[str], float]:
+def _quantity(unit: str, needs_unit: bool = False) -> Callable[[str], float]:
     def read(text: str) -> float:
         from calmotion.host import SettingError, parse_quantity
 
+        if needs_unit and not text.rstrip()[-1:].isalpha():
+            raise argparse.ArgumentTypeError(f"{text} has no unit; write {text}m or {text}mm")
         try:
             value = parse_quantity(text, unit)
         except SettingError as error:

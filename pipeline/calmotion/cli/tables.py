@@ -14,9 +14,16 @@ from calmotion.support.naming import distinct_names
 _FAR = 2.0  # an estimate of more than this many tolerances means that the tolerance is not kept
 
 
+LEAST = 1e-7  # length that is told [m]; what is below is rounding
+
+
 def length(meters: float | None) -> str:
     """A length or error as text in mm; `-` when it is not known."""
-    return "-" if meters is None or not math.isfinite(meters) else f"{1000.0 * meters:.4g} mm"
+    if meters is None or not math.isfinite(meters):
+        return "-"
+    if 0.0 < abs(meters) < LEAST:
+        return f"< {1000.0 * LEAST:g} mm"
+    return f"{1000.0 * meters:.4g} mm" if abs(meters) < 9.9995 else f"{meters:.4g} m"
 
 
 def angle(radians: float | None) -> str:

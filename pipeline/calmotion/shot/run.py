@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+INTEGRATORS = ("bdf2", "newmark", "generalized-alpha", "rk4", "radau")
+SHAPERS = ("zv", "zvd", "zv2", "zvd2", "lowpass")  # input shapers and a filter
+
 
 @dataclass(frozen=True)
 class Source:

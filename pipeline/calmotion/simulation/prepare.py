@@ -11,13 +11,14 @@ from calmotion.errors import IntegrationError, ShotError
 from calmotion.multibody.analysis.deflection import largest_deflection
 from calmotion.multibody.analysis.modes import system_modes
 from calmotion.multibody.failure import SimulationFailure
-from calmotion.multibody.integrators.integrate import INTEGRATORS, follows_roots
+from calmotion.multibody.integrators.integrate import follows_roots
 from calmotion.multibody.model.model import Model, compile_model
 from calmotion.multibody.model.topology import span_tree
 from calmotion.reduction.load_envelope import LoadEnvelope
 from calmotion.reduction.reduced_body import ReducedBody
 from calmotion.shot import Animation, Character, FEMeshes
 from calmotion.shot.character import Array
+from calmotion.shot.run import INTEGRATORS
 from calmotion.simulation.bodies import reduce_bodies
 from calmotion.simulation.cyclic import refuse_open_loops
 from calmotion.simulation.inputs.curves import needed_pre_roll, sample_tracks

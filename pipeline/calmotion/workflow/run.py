@@ -12,7 +12,7 @@ from typing import Any, TypeVar
 from calmotion.errors import ShotError
 from calmotion.host import Host, OperatorResult, Run, SettingError, Settings, merge, nearest
 from calmotion.shot.outputs import CsvFile, Figures, Recording, WrittenLayer
-from calmotion.shot.run import OutputPaths, Source
+from calmotion.shot.run import INTEGRATORS, SHAPERS, OutputPaths, Source
 from calmotion.workflow.problems import Cancelled, Problem, problems_of, value_of
 from calmotion.workflow.shot import Shot
 
@@ -131,6 +131,7 @@ def carry_out(
     known = shot.known if known is None else known
     writes = command in ("simulate", "optimize")
     kinds = [*wanted, *(_files_asked_for(host, outputs) if writes else ()), *_made_by(host, operators)]
+    _refuse_unknown_methods(source)
     _refuse_unreadable_motion(source, host)
     run = host.run(
         [*known, source, outputs], kinds, optional=optional, settings=merge([shot.settings, settings or {}]),
@@ -187,6 +188,25 @@ def _made_by(host: Host, operators: Sequence[str]) -> list[type]:
             )
         kinds += host.operators[idname].provides
     return kinds
+
+
+def _refuse_unknown_methods(source: Source) -> None:
+    """Refuse an integrator or an input shaper that the command does not have, before anything costly.
+
+    Raises:
+        SettingError: It has none of this name.
+    """
+    integrators = ("bdf2",) if source.command == "optimize" else INTEGRATORS
+    for option, found, known in (
+        ("--integrator", source.integrator, integrators), ("--shaper", source.shaper, SHAPERS),
+    ):  # fmt: skip
+        if found is not None and found not in known:
+            raise SettingError(
+                f"{source.command} supports only {', '.join(known)}",
+                path=option,
+                found=found,
+                remedy=f"{nearest(found, known)}Remove the option, or use one of these.",
+            )
 
 
 def _refuse_unreadable_motion(source: Source, host: Host) -> None:

@@ -9,7 +9,7 @@ from calmotion.benchmarks.common.tables import write_rows
 from calmotion.benchmarks.integrators import outcomes, stability, stability_map
 from calmotion.benchmarks.integrators.outcomes import FAILED, REFUSED, RUNS
 from calmotion.benchmarks.integrators.stability_map import MAPS, STEPS, Cell, all_cells, cells_of, largest_steps, within
-from calmotion.multibody.integrators.integrate import INTEGRATORS
+from calmotion.shot.run import INTEGRATORS
 
 
 def rows_of(name, *values):

@@ -20,8 +20,9 @@ from calmotion.retargeting.problem.problem import RetargetProblem
 from calmotion.retargeting.solver.damping_homotopy import damping_homotopy
 from calmotion.retargeting.solver.gauss_newton import minimize
 from calmotion.shot.character import Array
+from calmotion.shot.run import SHAPERS
 from calmotion.simulation.inputs.curves import Curves
-from calmotion.simulation.inputs.shapers import SHAPERS, delay, shaped
+from calmotion.simulation.inputs.shapers import delay, shaped
 from calmotion.simulation.prepare import Options, modes_of, prepare
 from calmotion.simulation.simulator import Simulator
 

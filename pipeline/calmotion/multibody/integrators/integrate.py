@@ -23,7 +23,6 @@ from calmotion.multibody.model.system import State, System
 from calmotion.multibody.statics.equilibrium import equilibrium
 from calmotion.shot.character import Array
 
-INTEGRATORS = (*IMPLICIT, "rk4", "radau")
 DIVERGED = 1e6  # velocity [m/s, rad/s]
 
 

@@ -12,10 +12,10 @@ from scipy.interpolate import CubicSpline
 
 from calmotion.errors import ShotError
 from calmotion.shot.character import Array
+from calmotion.shot.run import SHAPERS
 from calmotion.simulation.inputs.curves import Curves
 from calmotion.simulation.inputs.time_grid import TimeGrid
 
-SHAPERS = ("zv", "zvd", "zv2", "zvd2", "lowpass")
 CUTOFF = 0.5  # of the low-pass filter, over the lowest frequency, where nobody says
 
 
