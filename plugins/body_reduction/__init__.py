@@ -47,7 +47,7 @@ class ReduceFlexibleBodies(Operator):
             character = with_elasticity(character, context.properties.elasticity)
         loads, tolerance, source = None, None, context.get(Source)
         if animation is not None and source is not None:
-            context.progress(0.0, "compiling kernels (once)")
+            context.progress(0.0, "loading kernels (compiled in the first run)")
             options = requested_options(source, choices)
             if source.command != "inspect" and source.tolerance is not None:
                 from calmotion.accuracy.converged_reduction import converged_reduction
@@ -83,7 +83,7 @@ class FindSystemModes(Operator):
     def execute(self, context: RunContext) -> Sequence[object]:
         from calmotion.simulation.prepare import first_pose_modes
 
-        context.progress(0.0, "compiling kernels (once)")
+        context.progress(0.0, "loading kernels (compiled in the first run)")
         reduced = context.get(ReducedBodies)
         character = simplified_character(context.get(Character), context.get(ModelChoices))
         bodies = None if reduced is None else reduced.bodies

@@ -30,7 +30,8 @@ class ProgressDisplay:
             from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
             columns: list[Any] = [SpinnerColumn(), TextColumn("{task.description}"), BarColumn(bar_width=24)]
-            columns += [TimeElapsedColumn(), TextColumn("{task.fields[message]}", style="dim")]
+            columns += [TimeElapsedColumn(), TextColumn("{task.fields[left]}")]
+            columns += [TextColumn("{task.fields[message]}", style="dim")]
             self._bars = Progress(*columns, console=Console(stderr=True))
             self._bars.start()
         return self
@@ -49,9 +50,10 @@ class ProgressDisplay:
             print(line, file=sys.stderr, flush=True)
         if self._bars is None:
             return
+        left = time_left(state.time_left_s)
         if stage not in self._tasks:
-            self._tasks[stage] = self._bars.add_task(stage, total=1.0, message=message)
-        self._bars.update(self._tasks[stage], completed=fraction, message=message)
+            self._tasks[stage] = self._bars.add_task(stage, total=1.0, message=message, left=left)
+        self._bars.update(self._tasks[stage], completed=fraction, message=message, left=left)
 
     def done(self, result: OperatorResult) -> None:
         """Show the outcome of an operator, and its messages."""
@@ -67,3 +69,12 @@ class ProgressDisplay:
             self._bars.console.print(line, markup=False, highlight=False)
         else:
             print(line, file=sys.stderr, flush=True)
+
+
+def time_left(seconds: float | None) -> str:
+    """A remaining time [s] as text; empty where it is not known or below two seconds."""
+    if seconds is None or seconds < 2.0:
+        return ""
+    if seconds < 100.0:
+        return f"about {seconds:.0f} s left"
+    return f"about {seconds / 60.0:.0f} min left" if seconds < 6000.0 else f"about {seconds / 3600.0:.1f} h left"

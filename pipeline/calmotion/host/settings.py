@@ -7,6 +7,7 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 from calmotion.host.errors import SettingError
+from calmotion.support.foreign_files import remedy_for
 
 Settings = dict[str, dict[str, object]]
 """Operator idname -> property name -> string or typed value, not yet checked against the declarations."""
@@ -23,7 +24,9 @@ def read_settings_file(path: str | Path) -> Settings:
     except OSError as error:
         raise SettingError("the settings file cannot be read", path=str(path), found=error.strerror) from error
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise SettingError("the settings file is not valid TOML", path=str(path), found=error) from error
+        raise SettingError(
+            "the settings file is not valid TOML", path=str(path), found=error, remedy=remedy_for(path) or ""
+        ) from error
     return merge(_flat(tree, (), str(path)))
 
 

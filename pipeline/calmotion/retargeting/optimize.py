@@ -85,7 +85,7 @@ def optimize_shot(
     try:
         intended = intended_motion(prepared, curves.angles, curves.rates)
         posed = pose(prepared, animation, curves, intended, options)
-        progress(0.0, "compiling kernels, once")
+        progress(0.0, "loading kernels (compiled in the first run)")
         compile_kernels(
             model, Workspace.for_system(model.system), curves.angles, curves.rates, grid.h, prepared.world
         )  # fmt: skip

@@ -107,6 +107,7 @@ class RetargetSearch:
         if resumed is None:
             return False
         self.search, breaks = resumed
+        self.progress(0.1, f"resuming after {len(self.search.history)} iterations of an interrupted search")
         basis = basis_on(self.problem.grid, breaks, self.problem.space.basis.kept_ends)
         self.problem = self.problem.on_basis(basis, self.search.x)
         if np.any(self.search.x[inactive_coefficients(basis, self.inactive, len(self.problem.space.motors))]):
@@ -136,7 +137,8 @@ class RetargetSearch:
     def _on_iterate(self, search: Search) -> None:
         self.search = search
         self._keep()
-        done = min(0.9, 0.1 + 0.12 * len(search.history))
+        count = len(search.history)
+        done = 0.1 + 0.8 * count / (count + 6)  # their number is not known: each takes a share of what is left
         error = 1e3 * self.problem.error
         self.progress(done, f"optimising: weighted error {error:.3f} mm, {search.evaluations} simulations")
 

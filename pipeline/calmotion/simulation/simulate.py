@@ -76,7 +76,7 @@ def simulate_shot(
     refuse_half_turns(prepared, angles)
     try:
         reference = intended_motion(prepared, intended, intended_rates)
-        progress(0.0, "compiling kernels, once")
+        progress(0.0, "loading kernels (compiled in the first run)")
         run_forward(model, workspace, angles[:3], rates[:3], grid.h, world[:3], integrator=options.scheme)
         begin = time.perf_counter()
         steady = SteadyState(model, world, grid.h, workspace) if grid.cyclic else None

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 from calmotion.errors import ShotError, raise_all
 from calmotion.shot import InputLayer
+from calmotion.support.foreign_files import remedy_for
 from calmotion.usd import schemas
 
 if TYPE_CHECKING:
@@ -90,7 +91,7 @@ def open_layer(path: str) -> Sdf.Layer:
             "this is not a USD file, or it is damaged",
             path=path,
             found=reason or None,
-            remedy="Name a .usda, .usdc, .usd or .usdz file that opens in a USD viewer",
+            remedy=remedy_for(path) or "Name a .usda, .usdc, .usd or .usdz file that opens in a USD viewer",
         )
     return layer
 

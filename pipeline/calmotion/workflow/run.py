@@ -13,6 +13,7 @@ from calmotion.errors import ShotError
 from calmotion.host import Host, OperatorResult, Run, SettingError, Settings, merge, nearest
 from calmotion.shot.outputs import CsvFile, Figures, Recording, WrittenLayer
 from calmotion.shot.run import INTEGRATORS, SHAPERS, OutputPaths, Source
+from calmotion.support.foreign_files import remedy_for
 from calmotion.workflow.problems import Cancelled, Problem, problems_of, value_of
 from calmotion.workflow.shot import Shot
 
@@ -223,7 +224,8 @@ def _refuse_unreadable_motion(source: Source, host: Host) -> None:
             "no plugin reads this motion",
             path="--motion",
             found=source.motion,
-            remedy="Name a .bvh file, or a plugin that provides MotorTracks with --plugins",
+            remedy=remedy_for(source.motion)
+            or "Name a .bvh file, or a plugin that provides MotorTracks with --plugins",
         )
 
 

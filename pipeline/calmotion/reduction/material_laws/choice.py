@@ -91,7 +91,7 @@ def choose_law(
     linear_error = shortening + moved * softening
     strain = float(np.sqrt(deflections @ (omega_squared * deflections) / (material.youngs_modulus * model.mesh.volume)))
     stvk_error = moved * strain**2
-    reason = f"its deflection is about {_mm(deflection)}, of which {_mm(linear_error)} is nonlinear"
+    reason = f"its deflection is about {_mm(deflection)}; a linear law would have an error of about {_mm(linear_error)}"
     if linear_error <= tolerance:
         return LawChoice("linear", reason, linear_error)
     if stvk_error <= tolerance or strain <= _LARGE_STRAIN:

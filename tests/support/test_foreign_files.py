@@ -1,0 +1,36 @@
+"""A robot or a table in the place of a shot, a motion or settings is named, with what to do with it."""
+
+import pytest
+from calmotion.errors import ShotError
+from calmotion.host import SettingError
+from calmotion.host.settings import read_settings_file
+from calmotion.support.foreign_files import kind_of, remedy_for
+from calmotion.usd.stages import open_layer
+
+FILES = {
+    "robot.urdf": ('<?xml version="1.0"?>\n<!-- made by hand -->\n<robot name="arm">', "urdf"),
+    "robot.xml": ('<mujoco model="arm">', "mjcf"),
+    "indented.mjcf": ('\n  <mujoco model="arm">', "mjcf"),
+    "table.csv": ("time_s,/Robot/Tip.x\n0,1\n", "table"),
+    "shot.usda": ("time_s,/Robot/Tip.x\n0,1\n", "table"),
+}
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_a_foreign_file_is_named_in_the_remedy(name, tmp_path):
+    text, kind = FILES[name]
+    path = tmp_path / name
+    path.write_text(text)
+    assert kind_of(path) == kind
+    with pytest.raises(ShotError) as shot:
+        open_layer(str(path))
+    with pytest.raises(SettingError) as settings:
+        read_settings_file(path)
+    assert shot.value.remedy == settings.value.remedy == remedy_for(path)
+
+
+@pytest.mark.parametrize("text", ["", "#usda 1.0\n", "<html>", "x,y\n", "[fe.mesh]\n"])
+def test_other_files_have_no_such_remedy(text, tmp_path):
+    path = tmp_path / "file"
+    path.write_text(text)
+    assert remedy_for(path) is None and remedy_for(tmp_path) is None and remedy_for(tmp_path / "none") is None
