@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from calmotion.accuracy.reduced_bodies import ReducedBodies
+from calmotion.accuracy.reduced_bodies import ConvergedReduction, ReducedBodies, compiled_in
 from calmotion.host import NotAsked, Operator, Property, RunContext
 from calmotion.shot import Animation, Character, FEMeshes, ModelChoices
 from calmotion.shot.model_choice import nothing_bends, simplified_character
 from calmotion.shot.outputs import SystemModes
 from calmotion.shot.run import OutputPaths, Source
+from calmotion.simulation.compiled_shot import CompiledShot
 
 
 class ReduceFlexibleBodies(Operator):
@@ -36,31 +37,39 @@ class ReduceFlexibleBodies(Operator):
         return nothing_bends(data)
 
     def execute(self, context: RunContext) -> Sequence[object]:
-        from calmotion.multibody.model.topology import span_tree
-        from calmotion.simulation.bodies import mode_tables, reduce_bodies, with_elasticity
-        from calmotion.simulation.prepare import load_envelopes
-        from calmotion.simulation.settings import requested_options
+        from calmotion.shot.model_choice import run_settings
+        from calmotion.simulation.bodies import mode_tables, with_elasticity
+        from calmotion.simulation.body_reduction import BodyReduction, reduction_for
 
         choices, meshes, animation = context.get(ModelChoices), context.get(FEMeshes), context.get(Animation)
-        character = simplified_character(context.get(Character), choices)
+        character, source = simplified_character(context.get(Character), choices), context.get(Source)
         if context.properties.elasticity != "shot":
             character = with_elasticity(character, context.properties.elasticity)
-        loads, tolerance, source = None, None, context.get(Source)
+        reduction, tolerance = BodyReduction(character, meshes, None), None
         if animation is not None and source is not None:
             context.progress(0.0, "loading kernels (compiled in the first run)")
-            options = requested_options(source, choices)
-            if source.command != "inspect" and source.tolerance is not None:
-                from calmotion.accuracy.converged_reduction import converged_reduction
+            options = run_settings(source, choices)
+            tolerance = options.tolerance
+            reduction = reduction_for(character, animation, meshes, options, source.refines)
+        bodies = tuple(reduction.bodies(tolerance, progress=context.progress))
+        return [ReducedBodies(bodies, mode_tables(bodies), reduction)]
 
-                search = source.command == "optimize"
-                converged = converged_reduction(
-                    character, animation, meshes, options, context.progress, retargeted=search
-                )
-                error = None if search else converged.error_m
-                return [ReducedBodies(converged.bodies, mode_tables(converged.bodies), error, converged.known)]
-            loads, tolerance = load_envelopes(character, animation, meshes, options), options.tolerance
-        bodies = reduce_bodies(character, span_tree(character), meshes, context.progress, loads, tolerance)
-        return [ReducedBodies(tuple(bodies), mode_tables(bodies))]
+
+class CompileShot(Operator):
+    """Compiles the character and its bodies to one multibody system."""
+
+    idname = "dynamics.compile"
+    label = "Compile the multibody system"
+    requires = (Character, Animation)
+    uses = (ReducedBodies, ModelChoices)
+    provides = (CompiledShot,)
+
+    def execute(self, context: RunContext) -> Sequence[object]:
+        from calmotion.simulation.compiled_shot import compile_shot
+
+        reduced = context.get(ReducedBodies)
+        character = simplified_character(context.get(Character), context.get(ModelChoices))
+        return [compile_shot(character, context.get(Animation), None if reduced is None else reduced.bodies)]
 
 
 class FindSystemModes(Operator):
@@ -68,8 +77,8 @@ class FindSystemModes(Operator):
 
     idname = "dynamics.modes"
     label = "Compute the natural frequencies"
-    requires = (Character, Animation)
-    uses = (ReducedBodies, Source, OutputPaths, ModelChoices)
+    requires = (Character, CompiledShot)
+    uses = (ConvergedReduction, Source, OutputPaths, ModelChoices)
     provides = (SystemModes,)
 
     @classmethod
@@ -84,13 +93,10 @@ class FindSystemModes(Operator):
         from calmotion.simulation.prepare import first_pose_modes
 
         context.progress(0.0, "loading kernels (compiled in the first run)")
-        reduced = context.get(ReducedBodies)
-        character = simplified_character(context.get(Character), context.get(ModelChoices))
-        bodies = None if reduced is None else reduced.bodies
-        return [SystemModes(*first_pose_modes(character, context.get(Animation), bodies))]
+        return [SystemModes(*first_pose_modes(compiled_in(context.get)))]
 
 
-OPERATORS = (ReduceFlexibleBodies, FindSystemModes)
+OPERATORS = (ReduceFlexibleBodies, CompileShot, FindSystemModes)
 
 
 def register(host: Any) -> None:

@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from calmotion.accuracy.reduced_bodies import ReducedBodies
 from calmotion.host import Operator, Property, RunContext
-from calmotion.shot import Animation, Character, FEMeshes, ModelChoices
-from calmotion.shot.model_choice import nothing_bends
+from calmotion.shot import Character, FEMeshes, ModelChoices
+from calmotion.shot.model_choice import nothing_bends, run_settings, simplified_character
 from calmotion.shot.outputs import ModeShapes
 from calmotion.shot.run import OutputPaths, Source
 
@@ -18,7 +19,7 @@ class WriteModeShapes(Operator):
     idname = "modes.write"
     label = "Write the mode shapes"
     requires = (Character, FEMeshes, OutputPaths)
-    uses = (Animation, Source, ModelChoices)
+    uses = (ReducedBodies, Source, ModelChoices)
     provides = (ModeShapes,)
     properties = (
         Property("dpi", int, 150, minimum=30, maximum=600, description="Resolution of the pictures, dots per inch."),
@@ -33,18 +34,15 @@ class WriteModeShapes(Operator):
 
     def execute(self, context: RunContext) -> Sequence[object]:
         from calmotion.simulation.bodies import flexible_modes
-        from calmotion.simulation.prepare import Options, load_envelopes
 
         from .writing import write_modes
 
-        meshes, animation, needs = context.get(FEMeshes), context.get(Animation), context.get(ModelChoices)
-        character = context.get(Character) if needs is None else needs.character
-        source = context.get(Source)
-        options = Options() if source is None else Options(tolerance=source.tolerance, step=source.step)
-        loads = None if animation is None else load_envelopes(character, animation, meshes, options)
+        meshes, reduced, source = context.get(FEMeshes), context.get(ReducedBodies), context.get(Source)
+        character = simplified_character(context.get(Character), context.get(ModelChoices))
+        loads = None if reduced is None or reduced.reduction is None else reduced.reduction.loads
         written = write_modes(
             context.get(OutputPaths).modes or "",
-            flexible_modes(character, meshes, loads, options.tolerance),
+            flexible_modes(character, meshes, loads, run_settings(source).tolerance),
             total=len(meshes.meshes),
             dpi=context.properties.dpi,
             pictures=context.properties.pictures,

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from typing import Any
 
-from calmotion.accuracy.reduced_bodies import ReducedBodies
+from calmotion.accuracy.reduced_bodies import ConvergedReduction, ReducedBodies, compiled_in
 from calmotion.host import NotAsked, Operator, Property, RunContext
-from calmotion.shot import Animation, Character, FEMeshes, ModelChoices, Result
-from calmotion.shot.model_choice import AUTO, KINDS, OFF, ON, nothing_bends, simplified_character
+from calmotion.shot import Animation, Character, ModelChoices, Result
+from calmotion.shot.model_choice import AUTO, KINDS, OFF, ON, nothing_bends
 from calmotion.shot.outputs import PlannedStep, ShapedTracks, Verification
 from calmotion.shot.run import OutputPaths, Source
+from calmotion.simulation.compiled_shot import CompiledShot
 
 _FORCED = {
     "bodies": "Finite elements of all flexible bodies, or of none",
@@ -44,15 +44,46 @@ class AnalyseShot(Operator):
 
     def execute(self, context: RunContext) -> Sequence[object]:
         from calmotion.accuracy.simplification.analysis import analyse
-        from calmotion.simulation.settings import requested_options
+        from calmotion.shot.model_choice import run_settings
 
         source, paths = context.get(Source), context.get(OutputPaths)
         forced = {kind: getattr(context.properties, kind) for kind in KINDS}
         if paths is not None and paths.modes and forced["bodies"] == AUTO:
             forced["bodies"] = ON  # their mode shapes are asked for
         changes = source is None or source.command != "simulate"
-        options = requested_options(source)
+        options = run_settings(source)
         return [analyse(context.get(Character), context.get(Animation), options, forced, changes)]
+
+
+class RefineReduction(Operator):
+    """Refines the reduction of the bodies until the shot as animated keeps the tolerance."""
+
+    idname = "accuracy.refine"
+    label = "Refine the reduction"
+    requires = (ReducedBodies, CompiledShot, Source)
+    uses = (ModelChoices,)
+    provides = (ConvergedReduction,)
+
+    @classmethod
+    def poll(cls, data: Mapping[type, Any]) -> str | None:
+        source, reduced = data.get(Source), data.get(ReducedBodies)
+        if source is None or not source.refines:
+            return NotAsked("no --tolerance is given")
+        return "its plugin cannot repeat the reduction" if reduced is not None and reduced.reduction is None else None
+
+    def execute(self, context: RunContext) -> Sequence[object]:
+        from calmotion.accuracy.converged_reduction import converged_reduction
+        from calmotion.shot.model_choice import run_settings
+
+        source, reduction = context.get(Source), context.get(ReducedBodies).reduction
+        assert reduction is not None
+        options = run_settings(source, context.get(ModelChoices))
+        retargeted = source.command == "optimize"
+        converged = converged_reduction(
+            context.get(CompiledShot), reduction, options, context.progress, retargeted=retargeted
+        )
+        reduction.release()
+        return [converged]
 
 
 class PlanStep(Operator):
@@ -60,8 +91,8 @@ class PlanStep(Operator):
 
     idname = "accuracy.step"
     label = "Choose the time step"
-    requires = (Character, Animation)
-    uses = (ReducedBodies, ModelChoices, Source)
+    requires = (Character, CompiledShot)
+    uses = (ModelChoices, Source)
     provides = (PlannedStep,)
 
     @classmethod
@@ -78,14 +109,11 @@ class PlanStep(Operator):
 
     def execute(self, context: RunContext) -> Sequence[object]:
         from calmotion.accuracy.simulate_to_tolerance import planned_step
-        from calmotion.simulation.settings import requested_options
+        from calmotion.shot.model_choice import run_settings
 
         context.progress(0.0, "simulating the shot as animated")
-        reduced, choices = context.get(ReducedBodies), context.get(ModelChoices)
-        character = simplified_character(context.get(Character), choices)
-        bodies = None if reduced is None else reduced.bodies
-        options = requested_options(context.get(Source), choices)
-        return [PlannedStep(planned_step(character, context.get(Animation), bodies, options))]
+        options = run_settings(context.get(Source), context.get(ModelChoices))
+        return [PlannedStep(planned_step(context.get(CompiledShot), options))]
 
 
 class VerifyResult(Operator):
@@ -93,31 +121,28 @@ class VerifyResult(Operator):
 
     idname = "retarget.verify"
     label = "Compare with a finer run"
-    requires = (Character, Animation, Source, Result)
-    uses = (FEMeshes, ReducedBodies, ShapedTracks, ModelChoices)
+    requires = (CompiledShot, Source, Result)
+    uses = (ReducedBodies, ConvergedReduction, ShapedTracks, ModelChoices)
     provides = (Verification,)
 
     @classmethod
     def poll(cls, data: Mapping[type, Any]) -> str | None:
         source = data.get(Source)
-        return NotAsked("no --verify was asked for") if source is None or not source.verify else None
+        return NotAsked("no --verify is requested") if source is None or not source.verify else None
 
     def execute(self, context: RunContext) -> Sequence[object]:
         from calmotion.accuracy.verify import verify
-        from calmotion.simulation.settings import requested_options
+        from calmotion.shot.model_choice import run_settings
 
-        animation, shaped = context.get(Animation), context.get(ShapedTracks)
+        shot, shaped, reduced = compiled_in(context.get), context.get(ShapedTracks), context.get(ReducedBodies)
         if shaped is not None:
-            animation = replace(animation, current=shaped.tracks)
-        reduced, choices = context.get(ReducedBodies), context.get(ModelChoices)
-        character = simplified_character(context.get(Character), choices)
-        bodies = None if reduced is None else reduced.bodies
-        options = requested_options(context.get(Source), choices)
-        meshes, result = context.get(FEMeshes), context.get(Result)
-        return [Verification(*verify(character, animation, meshes, bodies, result, options, context.progress))]
+            shot = shot.with_tracks(shaped.tracks)
+        reduction = None if reduced is None else reduced.reduction
+        options = run_settings(context.get(Source), context.get(ModelChoices))
+        return [Verification(*verify(shot, reduction, context.get(Result), options, context.progress))]
 
 
-OPERATORS = (AnalyseShot, PlanStep, VerifyResult)
+OPERATORS = (AnalyseShot, RefineReduction, PlanStep, VerifyResult)
 
 
 def register(host: Any) -> None:

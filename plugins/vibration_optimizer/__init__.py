@@ -3,29 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from typing import Any
 
-from calmotion.accuracy.reduced_bodies import ReducedBodies
+from calmotion.accuracy.reduced_bodies import ConvergedReduction, compiled_in
 from calmotion.host import NotAsked, Operator, Property, RunContext
-from calmotion.shot import Animation, Character, ModelChoices, Result
-from calmotion.shot.model_choice import simplified_character, with_choices
+from calmotion.shot import ModelChoices, Result
+from calmotion.shot.model_choice import with_choices
 from calmotion.shot.outputs import ShapedTracks
 from calmotion.shot.run import OutputPaths, Source
-
-
-def _inputs(context: RunContext) -> tuple[Character, Animation, Sequence[Any] | None]:
-    """Character, animation and reduced bodies, with the simplifications of the model."""
-    reduced = context.get(ReducedBodies)
-    character = simplified_character(context.get(Character), context.get(ModelChoices))
-    return character, context.get(Animation), None if reduced is None else reduced.bodies
+from calmotion.simulation.compiled_shot import CompiledShot
 
 
 def _options(context: RunContext, **more: Any) -> Any:
     """The user's request, with what the user forced of the model."""
-    from calmotion.simulation.settings import requested_options
+    from calmotion.shot.model_choice import run_settings
 
-    return requested_options(context.get(Source), context.get(ModelChoices), **more)
+    return run_settings(context.get(Source), context.get(ModelChoices), **more)
 
 
 def _wrong_command(data: Mapping[type, Any], command: str) -> str | None:
@@ -38,8 +31,8 @@ class ShapeTracks(Operator):
 
     idname = "retarget.shape"
     label = "Filter the tracks of the motors"
-    requires = (Character, Animation, Source)
-    uses = (ReducedBodies, ModelChoices)
+    requires = (CompiledShot, Source)
+    uses = (ConvergedReduction, ModelChoices)
     provides = (ShapedTracks,)
     properties = (
         Property(
@@ -60,7 +53,7 @@ class ShapeTracks(Operator):
         from calmotion.simulation.simulate import shape_tracks
 
         kind, cutoff = context.get(Source).shaper or "", context.properties.cutoff
-        return [ShapedTracks(shape_tracks(*_inputs(context), _options(context), kind, cutoff))]
+        return [ShapedTracks(shape_tracks(compiled_in(context.get), _options(context), kind, cutoff))]
 
 
 class SimulateShot(Operator):
@@ -68,8 +61,8 @@ class SimulateShot(Operator):
 
     idname = "retarget.simulate"
     label = "Simulate the shot"
-    requires = (Character, Animation, Source)
-    uses = (ReducedBodies, ShapedTracks, ModelChoices)
+    requires = (CompiledShot, Source)
+    uses = (ConvergedReduction, ShapedTracks, ModelChoices)
     provides = (Result,)
 
     @classmethod
@@ -79,13 +72,11 @@ class SimulateShot(Operator):
     def execute(self, context: RunContext) -> Sequence[object]:
         from calmotion.accuracy.simulate_to_tolerance import simulate_to_tolerance
 
-        character, animation, bodies = _inputs(context)
-        shaped = context.get(ShapedTracks)
+        shot, shaped, converged = compiled_in(context.get), context.get(ShapedTracks), context.get(ConvergedReduction)
         if shaped is not None:
-            animation = replace(animation, current=shaped.tracks)
-        reduced = context.get(ReducedBodies)
-        error, known = (None, None) if reduced is None else (reduced.error_m, reduced.known)
-        result = simulate_to_tolerance(character, animation, bodies, _options(context), context.progress, error, known)
+            shot = shot.with_tracks(shaped.tracks)
+        error, known = (None, None) if converged is None else (converged.error_m, converged.known)
+        result = simulate_to_tolerance(shot, _options(context), context.progress, error, known)
         return [with_choices(result, context.get(ModelChoices))]
 
 
@@ -94,8 +85,8 @@ class OptimizeShot(Operator):
 
     idname = "retarget.optimize"
     label = "Optimise the motor curves"
-    requires = (Character, Animation, Source)
-    uses = (ReducedBodies, OutputPaths, ModelChoices)
+    requires = (CompiledShot, Source)
+    uses = (ConvergedReduction, OutputPaths, ModelChoices)
     provides = (Result,)
     properties = (
         Property("max_iterations", int, 30, minimum=1, description="Largest number of Gauss-Newton iterations"),
@@ -139,9 +130,9 @@ class OptimizeShot(Operator):
         )
         paths = context.get(OutputPaths)
         kept = checkpoint_path(paths.layer) if paths is not None and paths.layer else None
-        reduced = context.get(ReducedBodies)
-        known = None if reduced is None else reduced.known
-        result = optimize_to_tolerance(*_inputs(context), options, context.progress, kept, known)
+        converged = context.get(ConvergedReduction)
+        known = None if converged is None else converged.known
+        result = optimize_to_tolerance(compiled_in(context.get), options, context.progress, kept, known)
         if result.interrupted:
             context.report(
                 "warning", "interrupted: these are the best curves so far; the same command resumes from them"

@@ -7,53 +7,54 @@ import pytest
 from calmotion.accuracy import converged_reduction as module
 from calmotion.accuracy.converged_reduction import converged_reduction
 from calmotion.accuracy.integrator_choice import FAST
+from calmotion.accuracy.pod_subspace import ReferenceRun
 from calmotion.accuracy.step_error import distance, simulate_at
-from calmotion.multibody.model.topology import span_tree
+from calmotion.shot.run import RunSettings
+from calmotion.simulation import body_reduction
 from calmotion.simulation.bodies import reduce_bodies
-from calmotion.simulation.prepare import Options, load_envelopes
+from calmotion.simulation.body_reduction import reduced_shot, reduction_for
+from calmotion.simulation.compiled_shot import compile_shot
 
 STEP = 1 / 480
-BY = Options(integrator=FAST)
+BY = RunSettings(integrator=FAST)
+
+
+def refined(arm, animation, meshes, tolerance, **kwargs):
+    options = RunSettings(tolerance=tolerance, step=STEP)
+    reduction = reduction_for(arm, animation, meshes, options, repeats=True)
+    first = compile_shot(arm, animation, reduction.bodies(tolerance))
+    return converged_reduction(first, reduction, options, **kwargs)
+
+
+def count(shot):
+    return sum(len(body.stiffness) for body in shot.bodies)
 
 
 @pytest.fixture(scope="module")
 def fine(arm, animation, meshes):
-    loads = load_envelopes(arm, animation, meshes, Options())
-    bodies = reduce_bodies(arm, span_tree(arm), meshes, None, loads, 1e-6)
-    return bodies, simulate_at(arm, animation, bodies, BY, STEP).positions
+    shot = reduced_shot(arm, animation, meshes, RunSettings(tolerance=1e-6))
+    return shot, simulate_at(shot, BY, STEP).positions
 
 
 @pytest.mark.parametrize("tolerance", [1e-2, 1e-3, pytest.param(1e-4, marks=pytest.mark.long)])
 def test_the_motion_keeps_the_tolerance_against_a_far_finer_reduction(arm, animation, meshes, fine, tolerance):
-    settled = converged_reduction(arm, animation, meshes, Options(tolerance=tolerance, step=STEP))
-    bodies = settled.bodies
-    found = simulate_at(arm, animation, bodies, BY, STEP).positions
-    assert np.linalg.norm(found - fine[1], axis=2).max() < tolerance and settled.error_m <= 0.4 * tolerance
-    np.testing.assert_array_equal(settled.known.run.positions, found)
+    converged = refined(arm, animation, meshes, tolerance)
+    found = simulate_at(converged.shot, BY, STEP).positions
+    assert np.linalg.norm(found - fine[1], axis=2).max() < tolerance and converged.error_m <= 0.4 * tolerance
+    np.testing.assert_array_equal(converged.known.run.positions, found)
     if tolerance > 5e-4:
-        assert sum(len(body.stiffness) for body in bodies) < sum(len(body.stiffness) for body in fine[0])
+        assert count(converged.shot) < count(fine[0])
 
 
 def test_a_tighter_tolerance_keeps_more(arm, animation, meshes):
-    counts = [
-        sum(
-            len(body.stiffness)
-            for body in converged_reduction(arm, animation, meshes, Options(tolerance=t, step=STEP)).bodies
-        )
-        for t in (1e-2, 1e-3)
-    ]
-    assert counts[0] < counts[1]
+    loose, tight = (count(refined(arm, animation, meshes, tolerance).shot) for tolerance in (1e-2, 1e-3))
+    assert loose < tight
 
 
 def test_a_shake_that_will_be_removed_needs_less_accuracy(arm, animation, meshes):
-    def count(tolerance, **kwargs):
-        options = Options(tolerance=tolerance, step=STEP)
-        return sum(
-            len(body.stiffness) for body in converged_reduction(arm, animation, meshes, options, **kwargs).bodies
-        )
-
-    loose = count(1e-3, retargeted=True)
-    assert count(1e-2) <= loose < count(1e-3)
+    loose = count(refined(arm, animation, meshes, 1e-3, retargeted=True).shot)
+    assert count(refined(arm, animation, meshes, 1e-2).shot) <= loose
+    assert loose < count(refined(arm, animation, meshes, 1e-3).shot)
 
 
 def test_fine_reductions_see_pairs_as_for_a_tenth_of_the_tolerance(arm, animation, meshes, monkeypatch):
@@ -63,10 +64,10 @@ def test_fine_reductions_see_pairs_as_for_a_tenth_of_the_tolerance(arm, animatio
         levels.append((arguments[4], [b.flexible.pairs_share for b in character.bodies if b.flexible is not None]))
         return reduce_bodies(character, *arguments)
 
-    monkeypatch.setattr(module, "reduce_bodies", spied)
+    monkeypatch.setattr(body_reduction, "reduce_bodies", spied)
     monkeypatch.setattr(module, "SHARE", 1e-3)  # goes on to finer ones
     monkeypatch.setattr(module, "MOST", 3)
-    converged_reduction(arm, animation, meshes, Options(tolerance=1e-2, step=STEP))
+    refined(arm, animation, meshes, 1e-2)
     assert [level for level, _ in levels] == pytest.approx([1e-2, 1e-3, 1e-4, 1e-5])
     for (level, shares), seen in zip(levels, (1e-2, 1e-3, 1e-3, 1e-3), strict=True):
         np.testing.assert_allclose([level * share for share in shares], seen)
@@ -75,14 +76,14 @@ def test_fine_reductions_see_pairs_as_for_a_tenth_of_the_tolerance(arm, animatio
 def test_reductions_are_compared_by_one_integrator(arm, animation, meshes, monkeypatch):
     reference_run, runs = module.reference_run, []
 
-    def gives_way_for_the_second(character, animation, bodies, options, step):
+    def gives_way_for_the_second(shot, options, step):
         if len(runs) == 1:
             options = dataclasses.replace(options, integrator="bdf2")
-        runs.append(reference_run(character, animation, bodies, options, step).run)
-        return module.ReferenceRun(animation, runs[-1])
+        runs.append(reference_run(shot, options, step).run)
+        return ReferenceRun(animation, runs[-1])
 
     monkeypatch.setattr(module, "reference_run", gives_way_for_the_second)
     monkeypatch.setattr(module, "SHARE", 1.0)  # the second will do
-    settled = converged_reduction(arm, animation, meshes, Options(tolerance=1e-2, step=STEP))
-    assert [run.integrator for run in runs] == [FAST, "bdf2", "bdf2", "bdf2"] and settled.known.run is runs[3]
-    assert settled.error_m == distance(runs[3].positions, runs[2].positions)
+    converged = refined(arm, animation, meshes, 1e-2)
+    assert [run.integrator for run in runs] == [FAST, "bdf2", "bdf2", "bdf2"] and converged.known.run is runs[3]
+    assert converged.error_m == distance(runs[3].positions, runs[2].positions)

@@ -3,7 +3,7 @@
 import pytest
 from calmotion.accuracy.integrator_choice import FAST, by_fast_scheme
 from calmotion.errors import IntegrationError, ShotError
-from calmotion.simulation.prepare import Options
+from calmotion.shot.run import RunSettings
 
 
 class Simulation:
@@ -21,12 +21,12 @@ class Simulation:
 
 def test_the_fast_one_is_taken_where_it_does():
     run = Simulation()
-    assert by_fast_scheme(Options(), run) == FAST and run.asked == [FAST]
+    assert by_fast_scheme(RunSettings(), run) == FAST and run.asked == [FAST]
 
 
 def test_the_safe_one_follows_where_it_fails():
     run = Simulation(FAST)
-    assert by_fast_scheme(Options(), run) == "bdf2" and run.asked == [FAST, "bdf2"]
+    assert by_fast_scheme(RunSettings(), run) == "bdf2" and run.asked == [FAST, "bdf2"]
 
 
 def test_a_shot_that_no_integrator_can_simulate_is_tried_once():
@@ -37,7 +37,7 @@ def test_a_shot_that_no_integrator_can_simulate_is_tried_once():
         raise ShotError("no static equilibrium")
 
     with pytest.raises(ShotError, match="equilibrium"):
-        by_fast_scheme(Options(), simulate)
+        by_fast_scheme(RunSettings(), simulate)
     assert asked == [FAST]
 
 
@@ -45,5 +45,5 @@ def test_a_shot_that_no_integrator_can_simulate_is_tried_once():
 def test_a_requested_integrator_is_the_only_one(asked):
     run = Simulation(asked)
     with pytest.raises(ShotError, match="apart"):
-        by_fast_scheme(Options(integrator=asked), run)
+        by_fast_scheme(RunSettings(integrator=asked), run)
     assert run.asked == [asked]

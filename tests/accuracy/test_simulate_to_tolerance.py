@@ -5,16 +5,17 @@ import dataclasses
 import numpy as np
 import pytest
 from calmotion.accuracy import simulate_to_tolerance as to_tolerance
-from calmotion.accuracy.pod_subspace import ProjectedBodies
+from calmotion.accuracy.pod_subspace import ProjectedShot
 from calmotion.accuracy.simulate_to_tolerance import WHOLE, found_tracks, planned_step, simulate_to_tolerance
 from calmotion.accuracy.step_error import distance, frames_of, simulate_at
 from calmotion.accuracy.verify import verify
 from calmotion.errors import IntegrationError, ShotError
-from calmotion.multibody.model.topology import span_tree
 from calmotion.retargeting import to_tolerance as retarget
 from calmotion.retargeting.to_tolerance import optimize_to_tolerance
-from calmotion.simulation.bodies import reduce_bodies, with_elasticity
-from calmotion.simulation.prepare import Options, load_envelopes
+from calmotion.shot.run import RunSettings
+from calmotion.simulation.bodies import with_elasticity
+from calmotion.simulation.body_reduction import reduced_shot, reduction_for
+from calmotion.simulation.compiled_shot import compile_shot
 
 FINE = 1 / 7680
 
@@ -28,7 +29,7 @@ def off_by(result, character, animation, bodies):
     simulation = result.after or result.before
     if result.after is not None:
         animation = dataclasses.replace(animation, current=found_tracks(result, animation))
-    fine = simulate_at(character, animation, bodies, Options(), FINE)
+    fine = simulate_at(compile_shot(character, animation, bodies), RunSettings(), FINE)
     frames = np.searchsorted(simulation.motion.times, animation.frame_times - 1e-9)
     return np.linalg.norm(simulation.motion.target_positions[frames] - fine.positions, axis=2).max()
 
@@ -36,20 +37,20 @@ def off_by(result, character, animation, bodies):
 def test_a_simulation_keeps_its_tolerance_by_a_step_no_smaller_than_it_must(arm, animation, bodies):
     steps = []
     for tolerance in (1e-2, 1e-3, 1e-4):
-        result = simulate_to_tolerance(arm, animation, bodies, Options(tolerance=tolerance), quiet)
+        result = simulate_to_tolerance(compile_shot(arm, animation, bodies), RunSettings(tolerance=tolerance), quiet)
         off = off_by(result, arm, animation, bodies)
         assert off < tolerance and off < 1.5 * result.accuracy.step_m
         steps.append(result.step_s)
-        coarser = simulate_at(arm, animation, bodies, Options(), 4.0 * result.step_s)
-        fine = simulate_at(arm, animation, bodies, Options(), FINE)
+        coarser = simulate_at(compile_shot(arm, animation, bodies), RunSettings(), 4.0 * result.step_s)
+        fine = simulate_at(compile_shot(arm, animation, bodies), RunSettings(), FINE)
         assert np.linalg.norm(coarser.positions - fine.positions, axis=2).max() > 0.5 * tolerance
     assert steps[0] > steps[1] > steps[2]
 
 
 def test_the_step_takes_what_is_left_of_the_tolerance_and_half_of_it_in_any_case(arm, animation, bodies):
-    options = Options(tolerance=1e-3)
+    options = RunSettings(tolerance=1e-3)
     none, some, much = (
-        simulate_to_tolerance(arm, animation, bodies, options, quiet, left_out_m=left_out).accuracy
+        simulate_to_tolerance(compile_shot(arm, animation, bodies), options, quiet, left_out_m=left_out).accuracy
         for left_out in (0.0, 2e-4, 8e-4)
     )
     assert 0.5e-3 < none.step_m <= 0.8e-3 and none.estimated_m <= 0.8e-3
@@ -59,61 +60,64 @@ def test_the_step_takes_what_is_left_of_the_tolerance_and_half_of_it_in_any_case
 
 def test_frames_shorter_than_the_first_steps(arm, moves, bodies):
     fast = moves(120.0)
-    result = simulate_to_tolerance(arm, fast, bodies, Options(tolerance=1e-2), quiet)
+    result = simulate_to_tolerance(compile_shot(arm, fast, bodies), RunSettings(tolerance=1e-2), quiet)
     assert result.step_s <= 1 / 120 and off_by(result, arm, fast, bodies) < 1e-2
 
 
 def test_the_step_that_is_planned_is_the_one_that_is_taken(arm, animation, bodies, monkeypatch):
     plain = to_tolerance.simulate_at
 
-    def fails(character, animation, bodies, options, step):
+    def fails(shot, options, step):
         if options.scheme != "bdf2":
             raise IntegrationError("diverges")
-        return plain(character, animation, bodies, options, step)
+        return plain(shot, options, step)
 
-    options = Options(tolerance=1e-3)
+    options = RunSettings(tolerance=1e-3)
     for gives_way in (False, True):
         if gives_way:
             monkeypatch.setattr(to_tolerance, "simulate_at", fails)
-        row = planned_step(arm, animation, bodies, options)
-        taken = simulate_to_tolerance(arm, animation, bodies, options, quiet)
+        row = planned_step(compile_shot(arm, animation, bodies), options)
+        taken = simulate_to_tolerance(compile_shot(arm, animation, bodies), options, quiet)
         assert dataclasses.astuple(row) == dataclasses.astuple(taken.left_out[-1])
         assert row.why.endswith("BDF2") == gives_way
 
 
 def test_a_step_or_no_tolerance_leaves_the_step_as_it_is(arm, animation, bodies):
-    for options in (Options(step=1 / 240, tolerance=1e-5), Options()):
-        result = simulate_to_tolerance(arm, animation, bodies, options, quiet)
+    for options in (RunSettings(step=1 / 240, tolerance=1e-5), RunSettings()):
+        result = simulate_to_tolerance(compile_shot(arm, animation, bodies), options, quiet)
         assert result.step_s == pytest.approx(options.step or 1 / 480) and result.accuracy is None
     slow = dataclasses.replace(arm, retarget=dataclasses.replace(arm.retarget, time_step=1 / 120))
-    assert simulate_to_tolerance(slow, animation, bodies, Options(tolerance=1e-5), quiet).step_s == pytest.approx(
-        1 / 120
-    )
+    result = simulate_to_tolerance(compile_shot(slow, animation, bodies), RunSettings(tolerance=1e-5), quiet)
+    assert result.step_s == pytest.approx(1 / 120)
 
 
 def test_the_integrator_that_needs_fewest_steps_gives_way_where_it_fails(arm, animation, bodies, monkeypatch):
-    options = Options(tolerance=1e-3)
-    fast = simulate_to_tolerance(arm, animation, bodies, options, quiet)
-    asked = simulate_to_tolerance(arm, animation, bodies, dataclasses.replace(options, integrator="bdf2"), quiet)
+    options = RunSettings(tolerance=1e-3)
+    fast = simulate_to_tolerance(compile_shot(arm, animation, bodies), options, quiet)
+    asked = simulate_to_tolerance(
+        compile_shot(arm, animation, bodies), dataclasses.replace(options, integrator="bdf2"), quiet
+    )
     assert fast.left_out[-1].why.endswith("with generalised-alpha") and asked.left_out[-1].why.endswith("with BDF2")
     assert fast.step_s > 1.5 * asked.step_s
     plain = to_tolerance.simulate_shot
 
-    def comes_apart(character, animation, bodies, options, progress):
+    def comes_apart(shot, options, progress):
         if options.scheme != "bdf2":
             raise IntegrationError("its joints come apart")
-        return plain(character, animation, bodies, options, progress)
+        return plain(shot, options, progress)
 
     monkeypatch.setattr(to_tolerance, "simulate_shot", comes_apart)
-    found = simulate_to_tolerance(arm, animation, bodies, options, quiet)
+    found = simulate_to_tolerance(compile_shot(arm, animation, bodies), options, quiet)
     assert found.step_s == asked.step_s and found.left_out[-1].why == asked.left_out[-1].why
     with pytest.raises(ShotError):
-        simulate_to_tolerance(arm, animation, bodies, dataclasses.replace(options, integrator="newmark"), quiet)
+        simulate_to_tolerance(
+            compile_shot(arm, animation, bodies), dataclasses.replace(options, integrator="newmark"), quiet
+        )
 
 
 @pytest.mark.parametrize("tolerance", [1e-3, 2e-5])
 def test_an_optimisation_keeps_its_tolerance(arm, animation, bodies, tolerance):
-    result = optimize_to_tolerance(arm, animation, bodies, Options(tolerance=tolerance), quiet)
+    result = optimize_to_tolerance(compile_shot(arm, animation, bodies), RunSettings(tolerance=tolerance), quiet)
     off = off_by(result, arm, animation, bodies)
     assert off < 1.5 * result.accuracy.step_m and off < result.accuracy.asked_m == tolerance
     assert result.accuracy.estimated_m <= WHOLE * tolerance
@@ -130,7 +134,7 @@ def test_a_resumed_search_counts_all_its_work(arm, animation, bodies, monkeypatc
         return parts[-1]
 
     monkeypatch.setattr(retarget, "optimize_shot", counted)
-    result = optimize_to_tolerance(arm, animation, bodies, Options(tolerance=2e-5), quiet)
+    result = optimize_to_tolerance(compile_shot(arm, animation, bodies), RunSettings(tolerance=2e-5), quiet)
     assert len(parts) == 2 and result.step_s == parts[1].step_s < parts[0].step_s
     for name in ("forward_simulations", "linearized_sweeps", "iterations", "gradients"):
         assert getattr(result, name) == sum(getattr(part, name) for part in parts)
@@ -140,50 +144,50 @@ def test_a_resumed_search_counts_all_its_work(arm, animation, bodies, monkeypatc
 
 
 def test_an_optimisation_without_a_tolerance_reports_the_error_of_its_step(arm, animation, bodies):
-    options = Options(step=1 / 240)
-    result = optimize_to_tolerance(arm, animation, bodies, options, quiet)
+    options = RunSettings(step=1 / 240)
+    result = optimize_to_tolerance(compile_shot(arm, animation, bodies), options, quiet)
     assert result.step_s == pytest.approx(1 / 240)
     assert off_by(result, arm, animation, bodies) == pytest.approx(result.accuracy.step_m, rel=0.5)
 
 
 def test_verifying_measures_the_distance_to_a_finer_run(arm, animation, meshes, bodies):
-    options = Options(tolerance=1e-3)
-    result = simulate_to_tolerance(arm, animation, bodies, options, quiet)
-    error, step, modes = verify(arm, animation, meshes, bodies, result, options, quiet)
+    options = RunSettings(tolerance=1e-3)
+    result = simulate_to_tolerance(compile_shot(arm, animation, bodies), options, quiet)
+    shot, reduction = compile_shot(arm, animation, bodies), reduction_for(arm, animation, meshes, options)
+    error, step, modes = verify(shot, reduction, result, options, quiet)
     assert step == pytest.approx(result.step_s / 4) and modes > 6
     assert 0.3 * result.accuracy.step_m < error < 5e-3
     moved = dataclasses.replace(
         result.before.motion, target_positions=result.before.motion.target_positions + [0.02, 0.0, 0.0]
     )
     wrong = dataclasses.replace(result, before=dataclasses.replace(result.before, motion=moved))
-    assert verify(arm, animation, meshes, bodies, wrong, options, quiet)[0] == pytest.approx(0.02, abs=1.1 * error)
+    assert verify(shot, reduction, wrong, options, quiet)[0] == pytest.approx(0.02, abs=1.1 * error)
 
 
 def test_a_search_continues_where_the_pod_subspace_does_not_fit(arm, animation, meshes, monkeypatch):
-    character = with_elasticity(arm, "stvk")
-    loads = load_envelopes(character, animation, meshes, Options())
-    bodies = reduce_bodies(character, span_tree(character), meshes, None, loads, 1e-3)
+    shot = reduced_shot(with_elasticity(arm, "stvk"), animation, meshes, RunSettings(tolerance=1e-3))
     asked, parts = [], []
-    plain_hold, plain_search = ProjectedBodies.hold_for, retarget.optimize_shot
+    plain_hold, plain_search = ProjectedShot.hold_for, retarget.optimize_shot
 
-    def hold_for(self, animation, step):
-        asked.append(animation.current)
-        return plain_hold(self, animation, step) and len(asked) > 1
+    def hold_for(self, tracks, step):
+        asked.append(tracks)
+        return plain_hold(self, tracks, step) and len(asked) > 1
 
-    def search(character, animation, bodies, *more):
-        parts.append((animation.current, bodies))
-        return plain_search(character, animation, bodies, *more)
+    def search(shot, *more):
+        parts.append(shot)
+        return plain_search(shot, *more)
 
-    monkeypatch.setattr(ProjectedBodies, "hold_for", hold_for)
+    monkeypatch.setattr(ProjectedShot, "hold_for", hold_for)
     monkeypatch.setattr(retarget, "optimize_shot", search)
-    result = optimize_to_tolerance(character, animation, bodies, Options(max_iterations=15), quiet)
+    result = optimize_to_tolerance(shot, RunSettings(max_iterations=15), quiet)
     assert len(asked) == len(parts) == 2
-    (begun, few), (gone_on, _) = parts
-    assert begun is animation.current and gone_on is asked[0] is not asked[1]
-    assert sum(len(body.stiffness) for body in few) < sum(len(body.stiffness) for body in bodies)
+    begun, gone_on = parts
+    assert begun.animation.current is animation.current
+    assert gone_on.animation.current is asked[0] is not asked[1]
+    assert sum(len(body.stiffness) for body in begun.bodies) < sum(len(body.stiffness) for body in shot.bodies)
     # the frequencies are those of the links, not of the directions that they were held to
-    assert [len(table.frequencies) for table in result.modes] == [len(body.stiffness) for body in bodies[:2]]
+    assert [len(table.frequencies) for table in result.modes] == [len(body.stiffness) for body in shot.bodies[:2]]
     held = [row for row in result.left_out if "POD subspace" in row.what]
     assert len(held) == 2
-    whole = simulate_at(character, dataclasses.replace(animation, current=asked[1]), bodies, Options(), 1 / 480)
+    whole = simulate_at(shot.with_tracks(asked[1]), RunSettings(), 1 / 480)
     assert distance(whole.positions, frames_of(result, animation.frame_times).positions) < 1e-4

@@ -5,7 +5,9 @@ import pytest
 from calmotion.accuracy.step_error import StepRun, largest_step, simulate_at, step_error
 from calmotion.errors import IntegrationError, ShotError
 from calmotion.multibody.failure import SimulationFailure
-from calmotion.simulation.prepare import Options, failure_error, prepare
+from calmotion.shot.run import RunSettings
+from calmotion.simulation.compiled_shot import compile_shot
+from calmotion.simulation.prepare import failure_error, prepare
 
 
 def of_second_order(step):
@@ -63,12 +65,14 @@ def test_a_shot_that_no_step_can_simulate_is_tried_once():
 
 
 def test_only_failures_that_depend_on_the_step_may_be_tried_again(arm, animation, bodies):
-    prepared = prepare(arm, animation, bodies, Options(step=1 / 240))
+    prepared = prepare(compile_shot(arm, animation, bodies), RunSettings(step=1 / 240))
     for reason, kind in (("no static equilibrium", ShotError), ("diverged", IntegrationError)):
         assert type(failure_error(prepared, SimulationFailure(0, 0, reason))) is kind
 
 
 def test_the_estimate_is_near_the_error_against_a_far_finer_step(arm, animation, bodies):
-    runs = {h: simulate_at(arm, animation, bodies, Options(), h) for h in (1 / 480, 1 / 960, 1 / 7680)}
+    runs = {
+        h: simulate_at(compile_shot(arm, animation, bodies), RunSettings(), h) for h in (1 / 480, 1 / 960, 1 / 7680)
+    }
     error = np.linalg.norm(runs[1 / 960].positions - runs[1 / 7680].positions, axis=2).max()
     assert step_error(runs[1 / 480], runs[1 / 960]) == pytest.approx(error, rel=0.2)

@@ -18,7 +18,7 @@ from calmotion.host.discovery import find_in_folder
 from calmotion.host.registry import Host
 from calmotion.shot import Animation, Character, InputLayer, ModeTable, Provenance, Result
 from calmotion.shot.outputs import WrittenLayer
-from calmotion.shot.run import OutputPaths, Source
+from calmotion.shot.run import OutputPaths, RunSettings, Source
 from fakes import host_of, operator
 from one_hinge import ONE_HINGE
 
@@ -242,7 +242,7 @@ def test_options_reach_the_plugins_in_si_units(run, command):
 
     run(command, "a.usda", "--step", "2ms", "--tolerance", "1mm", "--integrator", "radau", "--pre-roll", "0.5",
         "--quiet", read=read)  # fmt: skip
-    assert seen == [Source("a.usda", command, tolerance=0.001, step=0.002, integrator="radau", pre_roll=0.5)]
+    assert seen == [Source("a.usda", command, RunSettings(0.001, 0.002, 0.5, "radau"))]
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 from calmotion.errors import ShotError
 from calmotion.shot import InputLayer, MotorCurve, Provenance
-from calmotion.simulation.prepare import Options
+from calmotion.shot.run import RunSettings
+from calmotion.simulation.compiled_shot import compile_shot
 from calmotion.simulation.simulate import simulate_shot
 from calmotion.testing import host_with, run_operator, small_shot
 
@@ -22,7 +23,11 @@ def shot():
     character, animation = small_shot()
     motors = (dataclasses.replace(character.motors[0], max_velocity=2.0, max_torque=8.0), character.motors[1])
     character = dataclasses.replace(character, motors=motors)
-    return character, animation, simulate_shot(character, animation, None, Options(step=1 / 120), lambda *_: None)
+    return (
+        character,
+        animation,
+        simulate_shot(compile_shot(character, animation, None), RunSettings(step=1 / 120), lambda *_: None),
+    )
 
 
 @pytest.fixture

@@ -8,7 +8,7 @@ import meshio
 import numpy as np
 import pytest
 from calmotion.shot.outputs import ModeShapes
-from calmotion.shot.run import OutputPaths, Source
+from calmotion.shot.run import OutputPaths, RunSettings, Source
 from calmotion.testing import host_with, small_shot
 
 
@@ -18,7 +18,7 @@ def run(repository_folder, tmp_path_factory):
     plugins = repository_folder / "plugins"
     host = host_with(plugins / "fe_mesher", plugins / "mode_shapes")
     character, animation = small_shot(flexible=True)
-    source = Source(path="shot.usda", command="inspect", tolerance=1e-7)
+    source = Source("shot.usda", "inspect", RunSettings(tolerance=1e-7))
     run = host.run([character, animation, source, OutputPaths(modes=str(folder))], [ModeShapes])
     outcomes = {result.idname: (result.outcome, result.error) for result in run}
     assert outcomes["modes.write"][0] == "done", outcomes

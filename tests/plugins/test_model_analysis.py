@@ -6,7 +6,7 @@ from calmotion.host import NotAsked
 from calmotion.shot import Character, FEMeshes, ModelChoices, Result
 from calmotion.shot.model_choice import ON
 from calmotion.shot.outputs import PlannedStep
-from calmotion.shot.run import OutputPaths, Source
+from calmotion.shot.run import OutputPaths, RunSettings, Source
 from calmotion.testing import host_with, run_operator, small_shot
 
 
@@ -18,7 +18,7 @@ def host(repository):
 
 
 def _source(command="simulate", **more):
-    return Source(path="shot.usda", command=command, step=1 / 120, **more)
+    return Source("shot.usda", command, RunSettings(step=1 / 120), **more)
 
 
 def _outcomes(run):
@@ -49,7 +49,7 @@ def test_stiff_bodies_are_meshed_without_being_forced(host):
 
 def test_the_step_counts_in_the_accuracy(host):
     shot = mixed_arm()
-    given = [shot.character, shot.animation, Source(path="shot.usda", command="simulate", tolerance=1e-3)]
+    given = [shot.character, shot.animation, Source("shot.usda", "simulate", RunSettings(tolerance=1e-3))]
     result = host.run(given, [Result]).finish().get(Result)
     steps = [row for row in result.left_out if row.what.startswith("time step")]
     assert len(steps) == 1 and "tolerance of 1 mm" in steps[0].why

@@ -2,7 +2,7 @@ import small_shots as shots
 from calmotion.host import Host
 from calmotion.shot import Animation, Character, Provenance, Result
 from calmotion.shot.outputs import WrittenLayer
-from calmotion.shot.run import OutputPaths, Source
+from calmotion.shot.run import OutputPaths, RunSettings, Source
 from calmotion.testing import host_with
 
 
@@ -16,10 +16,11 @@ def test_operator_is_left_out_without_a_path(repository):
 
 def test_simulation_and_writer_run_together_from_a_shot_on_disk(repository, tmp_path):
     plugins = repository / "plugins"
-    host = host_with(plugins / "usd_reader", plugins / "vibration_optimizer", plugins / "usd_writer")
+    names = ("usd_reader", "body_reduction", "vibration_optimizer", "usd_writer")
+    host = host_with(*(plugins / name for name in names))
     shot = shots.write_arm(tmp_path / "shot.usda")
     run = host.run(
-        [Source(path=str(shot), command="simulate", step=0.01), OutputPaths(layer=str(tmp_path / "out.usda"))],
+        [Source(str(shot), "simulate", RunSettings(step=0.01)), OutputPaths(layer=str(tmp_path / "out.usda"))],
         [WrittenLayer],
     )
     results = {result.idname: result.outcome for result in run}

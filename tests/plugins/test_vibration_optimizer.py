@@ -3,11 +3,12 @@ import dataclasses
 import numpy as np
 import pytest
 from calmotion import ShotError
-from calmotion.accuracy.reduced_bodies import ReducedBodies
+from calmotion.accuracy.reduced_bodies import ConvergedReduction, ReducedBodies
 from calmotion.host import NotAsked
 from calmotion.shot import Character, Result
 from calmotion.shot.outputs import ShapedTracks, SystemModes, Verification
-from calmotion.shot.run import OutputPaths, Source
+from calmotion.shot.run import OutputPaths, RunSettings, Source
+from calmotion.simulation.compiled_shot import CompiledShot, compile_shot
 from calmotion.testing import host_with, run_operator, small_shot
 
 
@@ -25,7 +26,7 @@ def with_mesher(repository):
 
 def source(command):
     # so strict that the small, stiff arm keeps its modes
-    return Source(path="shot.usda", command=command, step=0.01, tolerance=1e-7)
+    return Source("shot.usda", command, RunSettings(step=0.01, tolerance=1e-7))
 
 
 def test_rigid_shots_need_neither_reduction_nor_modes(host):
@@ -43,7 +44,7 @@ def test_one_of_simulate_and_optimize_runs(host):
 
 def test_simulation_of_a_rigid_shot_follows_the_animation(host):
     character, animation = small_shot()
-    (result,) = run_operator(host, "retarget.simulate", [character, animation, source("simulate")])
+    (result,) = run_operator(host, "retarget.simulate", [compile_shot(character, animation), source("simulate")])
     assert isinstance(result, Result) and result.after is None
     # the simulation's own error: second order in its step
     judged = result.before.motion.times >= 0.0
@@ -75,12 +76,13 @@ def test_properties_reach_the_optimiser(with_mesher):
     assert damping.shape == frequencies.shape and np.all(damping > 0.0) and damping[0] < 0.02
     assert np.all(np.diff(frequencies) >= 0.0) and frequencies[0] > 0.1
     assert len(run.get(ReducedBodies).bodies) == len(character.bodies)
+    assert run.get(ConvergedReduction).shot.model.dof >= run.get(CompiledShot).model.dof
 
 
 def test_a_result_is_verified_on_request(host, with_mesher):
     both = with_mesher
     character, animation = small_shot(flexible=True)
-    asked = Source(path="shot.usda", command="simulate", tolerance=1e-5, verify=True)
+    asked = Source("shot.usda", "simulate", RunSettings(tolerance=1e-5), verify=True)
     run = both.run([character, animation, asked], [Result, Verification])
     outcomes = {result.idname: (result.outcome, result.error) for result in run}
     assert outcomes["retarget.verify"][0] == "done", outcomes
@@ -96,22 +98,22 @@ def test_locked_motors_only_are_refused(host):
     character, animation = small_shot()
     motors = tuple(dataclasses.replace(motor, optimize=False) for motor in character.motors)
     with pytest.raises(ShotError) as error:
-        run_operator(
-            host, "retarget.optimize", [dataclasses.replace(character, motors=motors), animation, source("optimize")]
-        )
+        shot = compile_shot(dataclasses.replace(character, motors=motors), animation)
+        run_operator(host, "retarget.optimize", [shot, source("optimize")])
     assert error.value.attribute == "calm:motor:optimize"
 
 
 def test_shaped_tracks_are_simulated_on_request(host):
     character, animation = small_shot()
-    (plain,) = run_operator(host, "retarget.simulate", [character, animation, source("simulate")])
+    (plain,) = run_operator(host, "retarget.simulate", [compile_shot(character, animation), source("simulate")])
     assert isinstance(host.operators["retarget.shape"].poll({Source: source("simulate")}), NotAsked)
     late = tuple(dataclasses.replace(track, times=track.times + 0.2) for track in animation.tracks)
-    (shaped,) = run_operator(host, "retarget.simulate", [character, animation, source("simulate"), ShapedTracks(late)])
+    shot = compile_shot(character, animation)
+    (shaped,) = run_operator(host, "retarget.simulate", [shot, source("simulate"), ShapedTracks(late)])
     assert shaped.before.position_errors.max() > 10 * plain.before.position_errors.max()
     asked = dataclasses.replace(source("simulate"), shaper="zvd")
     with pytest.raises(ShotError, match="rigid robot has no frequency") as error:
-        run_operator(host, "retarget.shape", [character, animation, asked])
+        run_operator(host, "retarget.shape", [shot, asked])
     assert error.value.place == "--shaper"
 
 

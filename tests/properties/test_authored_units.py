@@ -13,8 +13,9 @@ import numpy as np
 from calmotion.benchmarks.scenes.beam_arm import beam_mesh
 from calmotion.multibody.model.topology import span_tree
 from calmotion.shot import FEMesh, FEMeshes, MeshQuality
+from calmotion.shot.run import RunSettings
 from calmotion.simulation.bodies import reduce_bodies
-from calmotion.simulation.prepare import Options
+from calmotion.simulation.compiled_shot import compile_shot
 from calmotion.simulation.simulate import simulate_shot
 from calmotion.usd import schemas
 from calmotion.usd.reading import read_shot
@@ -143,7 +144,9 @@ def performed(path):
         tuple(FEMesh(k, body.tets.points, body.tets.tets, none) for k, body in enumerate(character.bodies) if body.tets)
     )
     bodies = reduce_bodies(character, span_tree(character), meshes)
-    result = simulate_shot(character, animation, bodies, Options(step=1 / 240), lambda fraction, message: None)
+    result = simulate_shot(
+        compile_shot(character, animation, bodies), RunSettings(step=1 / 240), lambda fraction, message: None
+    )
     return character, result.before.motion
 
 

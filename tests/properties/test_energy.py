@@ -11,10 +11,12 @@ from calmotion.multibody.failure import SimulationFailure
 from calmotion.multibody.integrators.integrate import integrate
 from calmotion.multibody.integrators.workspace import Workspace
 from calmotion.multibody.model.topology import span_tree
+from calmotion.shot.run import RunSettings
 from calmotion.simulation.bodies import reduce_bodies
+from calmotion.simulation.compiled_shot import compile_shot
 from calmotion.simulation.forward import run_forward
 from calmotion.simulation.inputs.curves import sample_tracks
-from calmotion.simulation.prepare import Options, prepare
+from calmotion.simulation.prepare import prepare
 from energies import energy, work
 from hypothesis import assume, given
 from hypothesis import strategies as st
@@ -32,7 +34,7 @@ UNRESOLVED = 1e-3
 
 def prepared_for(shot, pre_roll):
     bodies = reduce_bodies(shot.character, span_tree(shot.character), shot.meshes)
-    return prepare(shot.character, shot.animation, bodies, Options(step=H, pre_roll=pre_roll))
+    return prepare(compile_shot(shot.character, shot.animation, bodies), RunSettings(step=H, pre_roll=pre_roll))
 
 
 def scale(shot, system, kinetic, total, done=0.0, share=SHAKY):

@@ -4,8 +4,9 @@ from calmotion import ShotError
 from calmotion.accuracy.simulate_to_tolerance import simulate_to_tolerance
 from calmotion.accuracy.step_error import distance, frames_of, simulate_at
 from calmotion.multibody.model.topology import span_tree
+from calmotion.shot.run import RunSettings
 from calmotion.simulation.bodies import reduce_bodies
-from calmotion.simulation.prepare import Options
+from calmotion.simulation.compiled_shot import compile_shot
 from hypothesis import assume, event, given
 from hypothesis import strategies as st
 from random_shots import linkages, shots
@@ -18,9 +19,14 @@ def test_the_tolerance_is_kept(shot):
     character, animation = shot.character, shot.animation
     bodies = reduce_bodies(character, span_tree(character), shot.meshes)
     try:
-        options = Options(tolerance=TOLERANCE)
-        result = simulate_to_tolerance(character, animation, bodies, options, lambda fraction, message: None)
-        fine, finer = (simulate_at(character, animation, bodies, Options(), h).positions for h in (FINE, 0.5 * FINE))
+        options = RunSettings(tolerance=TOLERANCE)
+        result = simulate_to_tolerance(
+            compile_shot(character, animation, bodies), options, lambda fraction, message: None
+        )
+        fine, finer = (
+            simulate_at(compile_shot(character, animation, bodies), RunSettings(), h).positions
+            for h in (FINE, 0.5 * FINE)
+        )
     except ShotError:
         event("refused")
         assume(False)

@@ -9,10 +9,11 @@ from calmotion.retargeting.checkpoint import checkpoint_path, problem_key
 from calmotion.retargeting.optimize import optimize_shot
 from calmotion.retargeting.problem import adaptive_knots
 from calmotion.retargeting.problem.problem import RetargetProblem
-from calmotion.simulation.prepare import Options
+from calmotion.shot.run import RunSettings
+from calmotion.simulation.compiled_shot import compile_shot
 from posed import ignore_progress, jerking, make_problem
 
-OPTIONS = Options(step=1 / 240)
+OPTIONS = RunSettings(step=1 / 240)
 
 
 @pytest.fixture(scope="module")
@@ -24,7 +25,7 @@ def limited(arm):
 
 @pytest.fixture(scope="module")
 def whole(limited, animation, bodies):
-    return optimize_shot(limited, animation, bodies, OPTIONS, ignore_progress)
+    return optimize_shot(compile_shot(limited, animation, bodies), OPTIONS, ignore_progress)
 
 
 class Killed(Exception):
@@ -52,9 +53,9 @@ def test_a_killed_search_ends_at_the_same_result(
     with monkeypatch.context() as patch:
         stopping(patch, evaluations, Killed())
         with pytest.raises(Killed):
-            optimize_shot(limited, animation, bodies, OPTIONS, ignore_progress, path)
+            optimize_shot(compile_shot(limited, animation, bodies), OPTIONS, ignore_progress, path)
     assert path.exists() == (evaluations > 3)
-    again = optimize_shot(limited, animation, bodies, OPTIONS, ignore_progress, path)
+    again = optimize_shot(compile_shot(limited, animation, bodies), OPTIONS, ignore_progress, path)
     assert again.objective_after == pytest.approx(whole.objective_after, rel=1e-9)
     for one, other in zip(again.curves, whole.curves, strict=True):
         assert np.abs(one.frame_values - other.frame_values).max() < 1e-9
@@ -67,12 +68,12 @@ def test_a_search_that_was_killed_on_finer_knots_resumes_with_them(
 ):  # fmt: skip
     monkeypatch.setattr(adaptive_knots, "FIRST", 0.1)
     path = tmp_path / "kept.npz"
-    direct = optimize_shot(arm, jerking(), bodies, OPTIONS, ignore_progress)
+    direct = optimize_shot(compile_shot(arm, jerking(), bodies), OPTIONS, ignore_progress)
     with monkeypatch.context() as patch:
         stopping(patch, evaluations, Killed())
         with pytest.raises(Killed):
-            optimize_shot(arm, jerking(), bodies, OPTIONS, ignore_progress, path)
-    again = optimize_shot(arm, jerking(), bodies, OPTIONS, ignore_progress, path)
+            optimize_shot(compile_shot(arm, jerking(), bodies), OPTIONS, ignore_progress, path)
+    again = optimize_shot(compile_shot(arm, jerking(), bodies), OPTIONS, ignore_progress, path)
     assert again.parameters == direct.parameters
     assert again.objective_after == pytest.approx(direct.objective_after, rel=1e-9)
     for one, other in zip(again.curves, direct.curves, strict=True):
@@ -84,17 +85,17 @@ def test_an_interrupt_keeps_the_best_so_far(limited, animation, bodies, whole, t
     path = tmp_path / "kept.npz"
     with monkeypatch.context() as patch:
         stopping(patch, 4, KeyboardInterrupt())
-        early = optimize_shot(limited, animation, bodies, OPTIONS, ignore_progress, path)
+        early = optimize_shot(compile_shot(limited, animation, bodies), OPTIONS, ignore_progress, path)
     assert early.interrupted and early.stopped == "interrupted" and not whole.interrupted
     assert early.objective_before > early.objective_after
     assert any(curve.changed for curve in early.curves)
-    late = optimize_shot(limited, animation, bodies, OPTIONS, ignore_progress, path)
+    late = optimize_shot(compile_shot(limited, animation, bodies), OPTIONS, ignore_progress, path)
     assert late.objective_after == pytest.approx(whole.objective_after, rel=1e-9) and not late.interrupted
 
 
 def test_a_checkpoint_of_another_problem_is_not_used(limited, animation, bodies, tmp_path, monkeypatch):
     path = tmp_path / "kept.npz"
-    optimize_shot(limited, animation, bodies, OPTIONS, ignore_progress, path)
+    optimize_shot(compile_shot(limited, animation, bodies), OPTIONS, ignore_progress, path)
     started = []
     find = search.minimize
 
@@ -104,11 +105,11 @@ def test_a_checkpoint_of_another_problem_is_not_used(limited, animation, bodies,
 
     monkeypatch.setattr(search, "minimize", watched)
     other = dataclasses.replace(limited, gravity=0.9 * limited.gravity)
-    optimize_shot(other, animation, bodies, OPTIONS, ignore_progress, path)
+    optimize_shot(compile_shot(other, animation, bodies), OPTIONS, ignore_progress, path)
     assert started[0] == 0
     path.write_bytes(b"torn")
     started.clear()
-    optimize_shot(limited, animation, bodies, OPTIONS, ignore_progress, path)
+    optimize_shot(compile_shot(limited, animation, bodies), OPTIONS, ignore_progress, path)
     assert started[0] == 0
 
 

@@ -7,10 +7,11 @@ from calmotion.benchmarks.optimizer.optimizer import make_problem
 from calmotion.retargeting.optimize import optimize_shot
 from calmotion.retargeting.solver.damping_homotopy import FAR, damping_homotopy
 from calmotion.retargeting.solver.gauss_newton import Search, minimize
-from calmotion.simulation.prepare import Options, modes_of, prepare
+from calmotion.shot.run import RunSettings
+from calmotion.simulation.prepare import modes_of, prepare
 from posed import ignore_progress
 
-OPTIONS = Options(step=1 / 120)
+OPTIONS = RunSettings(step=1 / 120)
 
 
 @pytest.fixture(scope="module")
@@ -24,7 +25,7 @@ def largest(simulation):
 
 @pytest.fixture(scope="module")
 def result(shot):
-    return optimize_shot(shot.character, shot.animation, shot.bodies, OPTIONS, ignore_progress)
+    return optimize_shot(shot.compiled, OPTIONS, ignore_progress)
 
 
 def test_the_hand_that_was_off_by_a_quarter_of_a_metre_follows_to_a_few_millimetres(result):
@@ -36,12 +37,12 @@ def test_the_hand_that_was_off_by_a_quarter_of_a_metre_follows_to_a_few_millimet
 
 
 def test_the_way_through_damped_problems_is_shorter(shot):
-    prepared = prepare(shot.character, shot.animation, shot.bodies, OPTIONS)
+    prepared = prepare(shot.compiled, OPTIONS)
     problem = make_problem(shot, prepared, 0.05)
     zero, free = np.zeros(problem.size), np.zeros(problem.size, bool)
     problem.value(zero)
     assert problem.error > FAR * problem.lever()
-    start = damping_homotopy(problem, zero, free, float(modes_of(prepared, shot.animation)[0][0]))
+    start = damping_homotopy(problem, zero, free, float(modes_of(prepared)[0][0]))
     near = problem.value(start.x)
     # as much work as the approach took, spent on the problem itself; a product is a fifth of a simulation
     direct = minimize(problem, Search.start(zero), free, 1e-6, max_iterations=8)
@@ -51,7 +52,7 @@ def test_the_way_through_damped_problems_is_shorter(shot):
 
 
 def test_a_problem_with_more_damping_differs_in_nothing_else(shot):
-    prepared = prepare(shot.character, shot.animation, shot.bodies, OPTIONS)
+    prepared = prepare(shot.compiled, OPTIONS)
     problem = make_problem(shot, prepared, 0.2)
     x = np.zeros(problem.size)
     value = problem.value(x)

@@ -7,10 +7,11 @@ import pytest
 from calmotion import ShotError
 from calmotion.retargeting.optimize import optimize_shot
 from calmotion.shot import Animation, FreeTrack, Track, WeightTrack
-from calmotion.simulation.prepare import Options
+from calmotion.shot.run import RunSettings
+from calmotion.simulation.compiled_shot import compile_shot
 from calmotion.simulation.simulate import simulate_shot
 
-OPTIONS = Options(step=1 / 240)
+OPTIONS = RunSettings(step=1 / 240)
 
 
 def checked(fraction, message):
@@ -19,7 +20,7 @@ def checked(fraction, message):
 
 @pytest.fixture(scope="module")
 def result(arm, animation, bodies):
-    return optimize_shot(arm, animation, bodies, OPTIONS, checked)
+    return optimize_shot(compile_shot(arm, animation, bodies), OPTIONS, checked)
 
 
 def judged(simulation):
@@ -37,7 +38,9 @@ def test_error_at_the_payload_falls_at_least_tenfold(result):
 
 def test_written_curves_simulated_again_give_the_reported_errors(result, arm, animation, bodies):
     tracks = tuple(Track(animation.frame_times, curve.frame_values) for curve in result.curves)
-    again = simulate_shot(arm, Animation(animation.frame_times, animation.tracks, tracks), bodies, OPTIONS, checked)
+    again = simulate_shot(
+        compile_shot(arm, Animation(animation.frame_times, animation.tracks, tracks), bodies), OPTIONS, checked
+    )
     assert np.abs(again.before.position_errors - result.after.position_errors).max() < 1e-9
     assert np.abs(again.before.rotation_errors - result.after.rotation_errors).max() < 1e-8
 
@@ -48,7 +51,7 @@ def test_the_largest_offset_is_that_of_the_shot_without_the_pre_roll(arm, animat
     times = animation.frame_times[first:] - animation.frame_times[first]
     tracks = tuple(Track(times, track.values[first:]) for track in animation.tracks)
     moving = Animation(times, tracks, tracks)
-    result = optimize_shot(arm, moving, bodies, dataclasses.replace(OPTIONS, max_iterations=2), checked)
+    result = optimize_shot(compile_shot(arm, moving, bodies), dataclasses.replace(OPTIONS, max_iterations=2), checked)
     assert result.pre_roll_s > 0.0 and result.performed is not None
     motion = result.performed
     for curve in result.curves:
@@ -59,22 +62,24 @@ def test_the_largest_offset_is_that_of_the_shot_without_the_pre_roll(arm, animat
 
 def test_optimising_the_result_again_gains_nothing(result, arm, animation, bodies):
     tracks = tuple(Track(animation.frame_times, curve.frame_values) for curve in result.curves)
-    again = optimize_shot(arm, Animation(animation.frame_times, animation.tracks, tracks), bodies, OPTIONS, checked)
+    again = optimize_shot(
+        compile_shot(arm, Animation(animation.frame_times, animation.tracks, tracks), bodies), OPTIONS, checked
+    )
     assert again.iterations <= 2
     assert again.objective_after <= result.objective_after * (1 + 1e-6)
 
 
 def test_the_continuous_adjoint_leads_to_the_same_curves(result, arm, animation, bodies):
-    found = optimize_shot(arm, animation, bodies, dataclasses.replace(OPTIONS, adjoint="continuous"), checked)
+    found = optimize_shot(
+        compile_shot(arm, animation, bodies), dataclasses.replace(OPTIONS, adjoint="continuous"), checked
+    )
     assert found.objective_after < 1.02 * result.objective_after
     offsets = [a.frame_values - b.frame_values for a, b in zip(found.curves, result.curves, strict=True)]
     assert 0.0 < np.abs(offsets).max() < 0.05 * max(curve.max_offset for curve in result.curves)
     motors = tuple(dataclasses.replace(motor, max_torque=50.0) for motor in arm.motors)
     with pytest.raises(ShotError, match="efforts?") as error:
-        optimize_shot(
-            dataclasses.replace(arm, motors=motors), animation, bodies,
-            dataclasses.replace(OPTIONS, adjoint="continuous"), checked,
-        )  # fmt: skip
+        limited = compile_shot(dataclasses.replace(arm, motors=motors), animation, bodies)
+        optimize_shot(limited, dataclasses.replace(OPTIONS, adjoint="continuous"), checked)
     assert error.value.attribute == "retarget.optimize.adjoint" and "discrete" in error.value.remedy
 
 
@@ -84,7 +89,7 @@ def test_joints_stay_closed(result):
 
 def test_locked_motors_keep_their_curves(arm, animation, bodies):
     motors = (dataclasses.replace(arm.motors[0], optimize=False), arm.motors[1])
-    result = optimize_shot(dataclasses.replace(arm, motors=motors), animation, bodies, OPTIONS, checked)
+    result = optimize_shot(compile_shot(dataclasses.replace(arm, motors=motors), animation, bodies), OPTIONS, checked)
     assert not result.curves[0].changed and result.curves[1].changed
     assert np.array_equal(result.after.motion.motor_values[:, 0], result.before.motion.motor_values[:, 0])
     assert any("/Arm/Shoulder" in row.what for row in result.left_out)
@@ -92,7 +97,7 @@ def test_locked_motors_keep_their_curves(arm, animation, bodies):
 
 def test_a_range_in_which_a_motor_is_locked_keeps_its_curve(arm, animation, bodies):
     lock = FreeTrack(0, np.array([0.0, 0.5, 1.0]), np.array([True, False, True]))
-    result = optimize_shot(arm, dataclasses.replace(animation, free=(lock,)), bodies, OPTIONS, checked)
+    result = optimize_shot(compile_shot(arm, dataclasses.replace(animation, free=(lock,)), bodies), OPTIONS, checked)
     before, after = result.before.motion, result.after.motion
     inside = (after.times >= 0.5) & (after.times <= 1.0)
     assert np.array_equal(after.motor_values[inside, 0], before.motor_values[inside, 0])
@@ -100,7 +105,7 @@ def test_a_range_in_which_a_motor_is_locked_keeps_its_curve(arm, animation, bodi
     assert judged(result.after)[1] < judged(result.before)[1]
     with pytest.raises(ShotError, match="every motor is locked"):
         locks = tuple(FreeTrack(k, np.array([0.0]), np.array([False])) for k in range(2))
-        optimize_shot(arm, dataclasses.replace(animation, free=locks), bodies, OPTIONS, checked)
+        optimize_shot(compile_shot(arm, dataclasses.replace(animation, free=locks), bodies), OPTIONS, checked)
 
 
 def test_without_gain_the_curves_stay_exactly_the_same(arm, animation, bodies):
@@ -109,7 +114,7 @@ def test_without_gain_the_curves_stay_exactly_the_same(arm, animation, bodies):
         WeightTrack(target, rotation, np.array([0.7, 0.75]), np.array([value, 0.0]))
         for target, rotation, value in ((0, False, 1.0), (1, False, 1.0), (1, True, 0.05))
     )
-    result = optimize_shot(arm, dataclasses.replace(animation, weights=weights), bodies, OPTIONS, checked)
+    result = optimize_shot(compile_shot(arm, dataclasses.replace(animation, weights=weights), bodies), OPTIONS, checked)
     late = animation.frame_times > 1.1
     for curve, track in zip(result.curves, animation.tracks, strict=True):
         assert curve.changed and np.array_equal(curve.frame_values[late], track.values[late])
@@ -120,7 +125,7 @@ def test_without_gain_the_curves_stay_exactly_the_same(arm, animation, bodies):
 
 def test_a_static_reference_keeps_the_sag_and_removes_the_shake(arm, animation, bodies, result):
     character = dataclasses.replace(arm, retarget=dataclasses.replace(arm.retarget, reference="static"))
-    found = optimize_shot(character, animation, bodies, OPTIONS, checked)
+    found = optimize_shot(compile_shot(character, animation, bodies), OPTIONS, checked)
     assert found.before.position_errors[0].max() < 1e-9, "at rest there is nothing to correct"
     sag = result.before.position_errors[0, 1]
     assert sag > 1e-3
@@ -132,7 +137,7 @@ def test_a_static_reference_keeps_the_sag_and_removes_the_shake(arm, animation, 
 
 def test_kept_ends_keep_the_first_and_last_pose(arm, animation, bodies):
     character = dataclasses.replace(arm, retarget=dataclasses.replace(arm.retarget, endpoints="kept"))
-    result = optimize_shot(character, animation, bodies, OPTIONS, checked)
+    result = optimize_shot(compile_shot(character, animation, bodies), OPTIONS, checked)
     for curve, track in zip(result.curves, animation.tracks, strict=True):
         assert curve.frame_values[0] == track.values[0] and curve.frame_values[-1] == track.values[-1]
     # the sag of the first pose cannot be removed then
@@ -146,6 +151,6 @@ def test_a_rigid_character_needs_no_change(arm, animation):
     rigid = dataclasses.replace(
         arm, bodies=tuple(dataclasses.replace(b, flexible=None, mass=b.mass or mass) for b in arm.bodies)
     )
-    result = simulate_shot(rigid, animation, None, OPTIONS, checked)
+    result = simulate_shot(compile_shot(rigid, animation, None), OPTIONS, checked)
     assert judged(result.before).max() < 1e-4
     assert any(row.what.endswith(": rigid") for row in result.left_out)

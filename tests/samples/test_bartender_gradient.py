@@ -2,27 +2,26 @@
 
 import numpy as np
 import pytest
-from calmotion.accuracy.reduced_bodies import ReducedBodies
 from calmotion.host import open_host
 from calmotion.retargeting.problem.offset_basis import make_basis
 from calmotion.retargeting.problem.offset_space import OffsetSpace
 from calmotion.retargeting.problem.problem import RetargetProblem
-from calmotion.shot import Animation, Character
-from calmotion.shot.run import Source
+from calmotion.shot.run import RunSettings, Source
+from calmotion.simulation.compiled_shot import CompiledShot
 from calmotion.simulation.inputs.curves import sample_curves
 from calmotion.simulation.intended_motion import rigid_motion
-from calmotion.simulation.prepare import Options, prepare
+from calmotion.simulation.prepare import prepare
 from calmotion.simulation.target_errors import Objective
 
 
 @pytest.fixture(scope="module")
 def problem(repository):
     shot = repository / "samples" / "bartender" / "bartender.usda"
-    run = open_host([]).run([Source(path=str(shot), command="optimize")], [Character, Animation, ReducedBodies])
+    run = open_host([]).run([Source(path=str(shot), command="optimize")], [CompiledShot])
     assert not run.finish().failures()
-    character, animation = run.get(Character), run.get(Animation)
-    prepared = prepare(character, animation, run.get(ReducedBodies).bodies, Options(step=1 / 120))
-    curves = sample_curves(animation.tracks, prepared.grid)
+    prepared = prepare(run.get(CompiledShot), RunSettings(step=1 / 120))
+    character = prepared.character
+    curves = sample_curves(prepared.shot.animation.tracks, prepared.grid)
     rigid = rigid_motion(prepared.model, curves.angles, curves.rates, prepared.grid.h)
     objective = Objective.over(prepared.model, rigid.reference, prepared.grid)
     basis = make_basis(prepared.grid, 0.2, False)

@@ -3,13 +3,14 @@
 import numpy as np
 from calmotion.benchmarks.common.fresh_cache import fresh_cache
 from calmotion.multibody.model.topology import span_tree
+from calmotion.shot.run import RunSettings
 from calmotion.simulation import bodies as module
 from calmotion.simulation.bodies import reduce_bodies
-from calmotion.simulation.prepare import Options, load_envelopes
+from calmotion.simulation.body_reduction import load_envelopes
 
 
 def reduced(arm, animation, meshes, tolerance, full=None):
-    loads = load_envelopes(arm, animation, meshes, Options())
+    loads = load_envelopes(arm, animation, meshes, RunSettings())
     with fresh_cache():
         return reduce_bodies(arm, span_tree(arm), meshes, None, loads, tolerance, full)
 

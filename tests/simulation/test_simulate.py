@@ -4,12 +4,15 @@ import dataclasses
 
 import pytest
 from calmotion import ShotError
-from calmotion.simulation.prepare import Options
+from calmotion.shot.run import RunSettings
+from calmotion.simulation.compiled_shot import compile_shot
 from calmotion.simulation.simulate import simulate_shot
 
 
 def gap_of(arm, animation, bodies, **options):
-    return simulate_shot(arm, animation, bodies, Options(**options), lambda *_: None).before.max_joint_gap
+    return simulate_shot(
+        compile_shot(arm, animation, bodies), RunSettings(**options), lambda *_: None
+    ).before.max_joint_gap
 
 
 def test_joints_that_drift_apart_are_a_reason_to_refuse(arm, animation, bodies):

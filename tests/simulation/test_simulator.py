@@ -7,9 +7,11 @@ import pytest
 from calmotion.benchmarks.scenes.linkage_arm import linkage_arm, performance
 from calmotion.multibody.failure import SimulationFailure
 from calmotion.multibody.model.topology import span_tree
+from calmotion.shot.run import RunSettings
 from calmotion.simulation.bodies import reduce_bodies
+from calmotion.simulation.compiled_shot import compile_shot
 from calmotion.simulation.inputs.curves import sample_curves
-from calmotion.simulation.prepare import Options, prepare
+from calmotion.simulation.prepare import prepare
 from calmotion.simulation.simulator import Simulator
 from posed import looped, make_problem
 
@@ -17,7 +19,7 @@ from posed import looped, make_problem
 @pytest.mark.parametrize("cyclic", [False, True])
 def test_derivatives_by_motors_are_transposes(arm, animation, bodies, cyclic):
     character, animation = looped(arm, animation) if cyclic else (arm, animation)
-    prepared = prepare(character, animation, bodies, Options(step=1 / 240))
+    prepared = prepare(compile_shot(character, animation, bodies), RunSettings(step=1 / 240))
     grid, curves = prepared.grid, sample_curves(animation.tracks, prepared.grid)
     simulator = Simulator(prepared.model, grid.h, prepared.world, cyclic)
     run = simulator.run(curves.angles, curves.rates)
@@ -41,7 +43,7 @@ def test_the_cycles_of_a_changed_robot_start_near_those_of_this_one(arm, animati
     from calmotion.multibody.model.model import with_damping
 
     character, animation = looped(arm, animation)
-    prepared = prepare(character, animation, bodies, Options(step=1 / 240))
+    prepared = prepare(compile_shot(character, animation, bodies), RunSettings(step=1 / 240))
     curves = sample_curves(animation.tracks, prepared.grid)
     simulator = Simulator(prepared.model, prepared.grid.h, prepared.world, True)
     one = simulator.run(curves.angles, curves.rates)
@@ -95,7 +97,7 @@ def test_a_kept_beginning_does_not_change_the_result(arm, bodies, animation, kin
 
 
 def test_a_known_motion_is_simulated_again_only_on_request(arm, bodies, animation):
-    prepared = prepare(arm, animation, bodies, Options(step=1 / 240))
+    prepared = prepare(compile_shot(arm, animation, bodies), RunSettings(step=1 / 240))
     grid, curves = prepared.grid, sample_curves(animation.tracks, prepared.grid)
     simulator = Simulator(prepared.model, grid.h, prepared.world, False)
     given = curves.angles, curves.rates

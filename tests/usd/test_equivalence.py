@@ -6,7 +6,8 @@ import dataclasses
 
 import numpy as np
 import pytest
-from calmotion.simulation.prepare import Options
+from calmotion.shot.run import RunSettings
+from calmotion.simulation.compiled_shot import compile_shot
 from calmotion.simulation.simulate import simulate_shot
 from calmotion.usd.reading import read_shot
 from calmotion.usd.writing import write_result
@@ -42,7 +43,7 @@ def y_up(stage) -> None:
 
 def motion_of(path):
     character, animation, _ = read_shot(str(path))
-    result = simulate_shot(character, animation, None, Options(step=1 / 240), lambda *_: None)
+    result = simulate_shot(compile_shot(character, animation, None), RunSettings(step=1 / 240), lambda *_: None)
     return result.before.motion
 
 

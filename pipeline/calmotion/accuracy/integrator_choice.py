@@ -7,13 +7,13 @@ from dataclasses import replace
 from typing import TypeVar
 
 from calmotion.errors import IntegrationError
-from calmotion.simulation.prepare import Options
+from calmotion.shot.run import RunSettings
 
 FAST = "generalized-alpha"
 Found = TypeVar("Found")
 
 
-def by_fast_scheme(options: Options, simulate: Callable[[Options], Found]) -> Found:
+def by_fast_scheme(options: RunSettings, simulate: Callable[[RunSettings], Found]) -> Found:
     """What a simulation finds by the integrator that needs the fewest steps, or by the safest where that fails.
 
     Generalised-alpha has a quarter of BDF2's error for the same step, and damps little that BDF2 hides. It holds joints

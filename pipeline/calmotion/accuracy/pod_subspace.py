@@ -20,10 +20,11 @@ from calmotion.accuracy.step_error import StepRun, distance, simulate_at
 from calmotion.errors import ShotError
 from calmotion.reduction.reduced_body import ReducedBody
 from calmotion.reduction.subspace import principal_subspace, projected_body
-from calmotion.shot import Animation, Character, Simplification
+from calmotion.shot import Animation, Character, Simplification, Track
 from calmotion.shot.character import FlexibleSettings
 from calmotion.shot.model_choice import OFF, ON
-from calmotion.simulation.prepare import Options
+from calmotion.shot.run import RunSettings
+from calmotion.simulation.compiled_shot import CompiledShot
 
 # Square roots of the shares of strain energy that may be missing, each tried after the last; beyond, rounding counts.
 MISSING = tuple(10.0 ** (-0.5 * k) for k in range(4, 13))
@@ -37,73 +38,73 @@ class ReferenceRun:
     run: StepRun
 
 
-class ProjectedBodies:
-    """Bodies in the fewest directions in which all that is known of a shot happens to an allowed error.
+class ProjectedShot:
+    """A shot with its bodies held to the fewest directions in which its known motions happen to an allowed error.
 
     Bodies whose coordinates are the user's choice keep them. Where fewer directions do not do, all are kept; what
-    `Options.directions` forces is done whatever the error.
+    `RunSettings.directions` forces is done whatever the error.
 
     Args:
-        character: The shot's.
-        complete: Its bodies with all coordinates, one for each body of the character; None where all are rigid.
+        complete: The shot, its bodies with all coordinates.
         options: Of all simulations.
         allowed: How far a target may be from where a known simulation has it [m].
         known: Simulations of the shot with all coordinates, at least one unless nothing is worth holding.
 
     Attributes:
-        bodies: One for each body of the character, or None.
+        shot: The shot with the projected bodies.
         error_m: How far a target is from where all coordinates have it, in what was looked at last [m].
     """
 
     def __init__(
-        self, character: Character, complete: Sequence[ReducedBody] | None, options: Options,
-        allowed: Callable[[ReferenceRun], float], known: Sequence[ReferenceRun],
+        self, complete: CompiledShot, options: RunSettings, allowed: Callable[[ReferenceRun], float],
+        known: Sequence[ReferenceRun],
     ):  # fmt: skip
-        self._character, self._complete, self._options = character, complete, options
+        self._complete, self._options = complete, options
         self._allowed, self._known = allowed, list(known)
-        self._chosen = _worth(character, complete, options)
-        self.bodies, self.error_m = complete, 0.0
+        self._chosen = _worth(complete, options)
+        self.shot, self.error_m = complete, 0.0
         if self._chosen:
             self._hold()
 
     def _hold(self) -> None:
-        assert self._complete is not None
+        complete = self._complete
         motion = {b: np.vstack([item.run.elastic[b] for item in self._known]) for b in self._chosen}
         for missing in MISSING:
-            few = list(self._complete)
+            few = list(complete.bodies)
             for b, coordinates in motion.items():
                 few[b] = projected_body(few[b], principal_subspace(few[b], coordinates, missing))
-            off = [self._off(few, item) for item in self._known]
+            shot = complete.with_bodies(few)
+            off = [self._off(shot, item) for item in self._known]
             forced = self._options.directions == OFF and all(map(np.isfinite, off))
             if forced or all(error <= self._allowed(item) for error, item in zip(off, self._known, strict=True)):
                 self.error_m = max(off)
-                self.bodies = _told(self._character, self._complete, few, self.error_m)
+                self.shot = complete.with_bodies(_told(complete.character, complete.bodies, few, self.error_m))
                 return
-        self.bodies, self.error_m = self._complete, 0.0
+        self.shot, self.error_m = complete, 0.0
 
-    def _off(self, bodies: Sequence[ReducedBody] | None, known: ReferenceRun) -> float:
-        """How far bodies are from a known simulation, by its own step and integrator, at any target and frame [m]."""
+    def _off(self, shot: CompiledShot, known: ReferenceRun) -> float:
+        """How far a shot is from a known simulation, by its own step and integrator, at any target and frame [m]."""
         options = replace(self._options, integrator=known.run.integrator or self._options.integrator)
         try:
-            run = simulate_at(self._character, known.animation, bodies, options, known.run.step)
+            run = simulate_at(shot.with_tracks(known.animation.current), options, known.run.step)
         except ShotError:  # with too few coordinates a body may not even find its equilibrium
             return np.inf
         return distance(run.positions, known.run.positions)
 
-    def hold_for(self, animation: Animation, step: float) -> bool:
+    def hold_for(self, tracks: Sequence[Track], step: float) -> bool:
         """Whether the bodies do for other curves too, by one simulation with all coordinates; if not, they do now.
 
         Args:
-            animation: With its current curves.
+            tracks: The motors' current curves.
             step: Of that simulation [s].
 
         Raises:
             ShotError: The simulation is not possible.
         """
-        if self._complete is None or self.bodies is self._complete:
+        if self.shot is self._complete:
             return True
-        more = reference_run(self._character, animation, self._complete, self._options, step)
-        off = self._off(self.bodies, more)
+        more = reference_run(self._complete.with_tracks(tracks), self._options, step)
+        off = self._off(self.shot, more)
         if off <= self._allowed(more) or self._options.directions == OFF:
             self.error_m = off
             return True
@@ -113,10 +114,10 @@ class ProjectedBodies:
 
 
 def project_to_subspace(
-    character: Character, animation: Animation, bodies: Sequence[ReducedBody] | None, options: Options, step: float,
-    allowed: Callable[[ReferenceRun], float], known: ReferenceRun | None = None,
-) -> ProjectedBodies:  # fmt: skip
-    """Bodies held to what a shot does, by its current curves; other arguments as of `ProjectedBodies`.
+    shot: CompiledShot, options: RunSettings, step: float, allowed: Callable[[ReferenceRun], float],
+    known: ReferenceRun | None = None,
+) -> ProjectedShot:  # fmt: skip
+    """A shot with its bodies held to what it does, by its current curves; other arguments as of `ProjectedShot`.
 
     Args:
         step: Of the simulation with all coordinates [s].
@@ -125,20 +126,20 @@ def project_to_subspace(
     Raises:
         ShotError: The shot cannot be simulated.
     """
-    if not _worth(character, bodies, options):
-        return ProjectedBodies(character, bodies, options, allowed, ())
-    if known is None or known.animation.current != animation.current:
-        known = reference_run(character, animation, bodies, options, step)
-    return ProjectedBodies(character, bodies, options, allowed, [known])
+    if not _worth(shot, options):
+        return ProjectedShot(shot, options, allowed, ())
+    if known is None or known.animation.current != shot.animation.current:
+        known = reference_run(shot, options, step)
+    return ProjectedShot(shot, options, allowed, [known])
 
 
-def _worth(character: Character, bodies: Sequence[ReducedBody] | None, options: Options) -> list[int]:
+def _worth(shot: CompiledShot, options: RunSettings) -> list[int]:
     """Bodies that are nonlinear, and whose coordinates are the program's choice."""
     found: list[int] = []
     if options.directions == ON:
         return found
-    for b, body in enumerate(bodies or ()):
-        own = character.bodies[b].flexible
+    for b, body in enumerate(shot.bodies):
+        own = shot.character.bodies[b].flexible
         if own is None or body.elasticity is None:
             continue
         if own.mode_count < 0 and own.max_frequency < 0.0 and own.modes_share == FlexibleSettings.modes_share:
@@ -146,14 +147,10 @@ def _worth(character: Character, bodies: Sequence[ReducedBody] | None, options: 
     return found
 
 
-def reference_run(
-    character: Character, animation: Animation, bodies: Sequence[ReducedBody] | None, options: Options, step: float
-) -> ReferenceRun:
+def reference_run(shot: CompiledShot, options: RunSettings, step: float) -> ReferenceRun:
     """The shot by its current curves, simulated with all coordinates; arguments as of `simulate_at`."""
-    return ReferenceRun(
-        animation,
-        by_fast_scheme(options, lambda options: simulate_at(character, animation, bodies, options, step)),
-    )  # fmt: skip
+    run = by_fast_scheme(options, lambda options: simulate_at(shot, options, step))
+    return ReferenceRun(shot.animation, run)
 
 
 def _told(

@@ -13,7 +13,7 @@ from functools import partial
 import numpy as np
 
 from calmotion.accuracy.integrator_choice import by_fast_scheme
-from calmotion.accuracy.pod_subspace import ProjectedBodies, ReferenceRun, project_to_subspace
+from calmotion.accuracy.pod_subspace import ProjectedShot, ReferenceRun, project_to_subspace
 from calmotion.accuracy.step_error import (
     ORDER,
     StepRun,
@@ -26,10 +26,12 @@ from calmotion.multibody.integrators.coefficients import IMPLICIT
 from calmotion.reduction.reduced_body import ReducedBody
 from calmotion.shot import Accuracy, Animation, Character, Result, Simplification, Track
 from calmotion.shot.character import Array
+from calmotion.shot.run import RunSettings
 from calmotion.simulation.bodies import mode_tables
+from calmotion.simulation.compiled_shot import CompiledShot
 from calmotion.simulation.inputs.curves import sample_tracks
 from calmotion.simulation.inputs.time_grid import MAX_STEP, make_grid
-from calmotion.simulation.prepare import Options, prepare
+from calmotion.simulation.prepare import prepare
 from calmotion.simulation.simulate import Progress, intended_motion, simulate_shot
 
 SHARE = 0.5  # of the tolerance, that the time step may take in any case
@@ -41,12 +43,11 @@ UNASKED = 0.002
 HELD = 0.1  # of the tolerance (and of how well the shake need be known), that holding bodies to directions may take
 NAMES = {"bdf2": "BDF2", "newmark": "Newmark's method", "generalized-alpha": "generalised-alpha"}
 FINDING = "finding the directions that the shot bends links in"
-Bodies = Sequence[ReducedBody] | None
 
 
 def simulate_to_tolerance(
-    character: Character, animation: Animation, bodies: Bodies, options: Options, progress: Progress,
-    left_out_m: float | None = None, known: ReferenceRun | None = None,
+    shot: CompiledShot, options: RunSettings, progress: Progress, left_out_m: float | None = None,
+    known: ReferenceRun | None = None,
 ) -> Result:  # fmt: skip
     """As `simulate_shot`, with what keeps the tolerance where one is asked for: directions of bodies, and a time step.
 
@@ -55,59 +56,57 @@ def simulate_to_tolerance(
         known: The shot, simulated with them; None: not known yet.
     """
     if options.tolerance is None:
-        return simulate_shot(character, animation, bodies, options, progress)
+        return simulate_shot(shot, options, progress)
     progress(0.0, FINDING)
-    held = project_to_tolerance(character, animation, bodies, options, known)
+    held, character = project_to_tolerance(shot, options, known), shot.character
     if not chooses_step(character, options):
-        return with_modes(simulate_shot(character, animation, held.bodies, options, progress), bodies)
+        return with_modes(simulate_shot(held.shot, options, progress), shot.bodies)
     progress(0.0, "choosing the time step")
-    left_out = (omitted_error(bodies) if left_out_m is None else left_out_m) + held.error_m
+    left_out = (omitted_error(shot.bodies) if left_out_m is None else left_out_m) + held.error_m
 
-    def simulated(options: Options) -> Result:
-        step, error = chosen_step(character, animation, held.bodies, options, left_out)
-        result = simulate_shot(character, animation, held.bodies, replace(options, step=step), progress)
-        accuracy = Accuracy(error, left_out, mesh_error(bodies), options.tolerance)
-        return with_step(with_modes(replace(result, accuracy=accuracy), bodies), character, options)
+    def simulated(options: RunSettings) -> Result:
+        step, error = chosen_step(held.shot, options, left_out)
+        result = simulate_shot(held.shot, replace(options, step=step), progress)
+        accuracy = Accuracy(error, left_out, mesh_error(shot.bodies), options.tolerance)
+        return with_step(with_modes(replace(result, accuracy=accuracy), shot.bodies), character, options)
 
     return by_fast_scheme(options, simulated)
 
 
 def project_to_tolerance(
-    character: Character, animation: Animation, bodies: Bodies, options: Options, known: ReferenceRun | None,
+    shot: CompiledShot, options: RunSettings, known: ReferenceRun | None,
     shake: Callable[[StepRun], float] = lambda run: 0.0,
-) -> ProjectedBodies:  # fmt: skip
-    """The bodies in the directions that the shot needs, by its current curves.
+) -> ProjectedShot:  # fmt: skip
+    """The shot with its bodies in the directions that it needs, by its current curves.
 
     Args:
         known: The shot, simulated with the bodies, where that was done.
         shake: How far a run is from what is intended, where that will be taken away [m].
     """
     share = UNASKED if options.tolerance is None else HELD
-    least = share * character.retarget.allowed(options.tolerance)
-    step = own_step(character, options)
-    return project_to_subspace(
-        character, animation, bodies, options, step, lambda item: max(least, share * OF_SHAKE * shake(item.run)), known
-    )
+    least = share * shot.character.retarget.allowed(options.tolerance)
+    step = own_step(shot.character, options)
+    return project_to_subspace(shot, options, step, lambda item: max(least, share * OF_SHAKE * shake(item.run)), known)
 
 
-def own_step(character: Character, options: Options) -> float:
+def own_step(character: Character, options: RunSettings) -> float:
     """The step of a simulation for which none is chosen [s]."""
     return options.step or character.retarget.time_step or MAX_STEP
 
 
-def with_modes(result: Result, bodies: Bodies) -> Result:
+def with_modes(result: Result, bodies: Sequence[ReducedBody]) -> Result:
     """The result with the frequencies of the bodies themselves, not of the directions that they were held to."""
-    return replace(result, modes=mode_tables(bodies or ()))
+    return replace(result, modes=mode_tables(bodies))
 
 
-def with_step(result: Result, character: Character, options: Options) -> Result:
+def with_step(result: Result, character: Character, options: RunSettings) -> Result:
     """The result with its time step among what was left out: finer ones, and what they would change."""
     assert result.accuracy is not None
     row = step_row(character, options, result.step_s, result.accuracy.step_m)
     return replace(result, left_out=(*result.left_out, row))
 
 
-def step_row(character: Character, options: Options, step: float, error: float | None) -> Simplification:
+def step_row(character: Character, options: RunSettings, step: float, error: float | None) -> Simplification:
     """Why steps [s] are no shorter, and their error at the targets [m]."""
     if options.step is not None:
         why = "given by --step"
@@ -120,27 +119,23 @@ def step_row(character: Character, options: Options, step: float, error: float |
     return Simplification(f"time step {1e3 * step:.3g} ms", why, error)
 
 
-def planned_step(character: Character, animation: Animation, bodies: Bodies, options: Options) -> Simplification:
+def planned_step(shot: CompiledShot, options: RunSettings) -> Simplification:
     """The step that a simulation of the shot as animated would take, and why, by simulating it."""
+    character = shot.character
     if chooses_step(character, options):
-        held = project_to_tolerance(character, animation, bodies, options, None)
-        left_out = omitted_error(bodies) + held.error_m
+        held = project_to_tolerance(shot, options, None)
+        left_out = omitted_error(shot.bodies) + held.error_m
         return by_fast_scheme(
-            options,
-            lambda options: step_row(
-                character, options, *chosen_step(character, animation, held.bodies, options, left_out)
-            ),
+            options, lambda options: step_row(character, options, *chosen_step(held.shot, options, left_out))
         )
-    trial = partial(simulate_at, character, animation, bodies, options)
-    fine = trial(options.step or character.retarget.time_step or MAX_STEP)
+    trial = partial(simulate_at, shot, options)
+    fine = trial(own_step(character, options))
     coarse = run_or_none(trial, 2.0 * fine.step)
     error = None if coarse is None or coarse.step < 1.5 * fine.step else step_error(coarse, fine)
     return step_row(character, options, fine.step, error)
 
 
-def chosen_step(
-    character: Character, animation: Animation, bodies: Bodies, options: Options, left_out: float
-) -> tuple[float, float]:
+def chosen_step(shot: CompiledShot, options: RunSettings, left_out: float) -> tuple[float, float]:
     """The step of a simulation to a tolerance, and its estimated error [s], [m]; arguments as of `simulate_shot`.
 
     It divides a frame.
@@ -151,43 +146,43 @@ def chosen_step(
     Raises:
         ShotError: Not even the last step does.
     """
-    trial = partial(simulate_at, character, animation, bodies, options)
+    trial = partial(simulate_at, shot, options)
     step, error = largest_step(trial, FIRST, LAST, lambda run: allowed_step_error(options, left_out))
     if not np.isfinite(error):
         trial(step)
-    whole = make_grid(animation.frame_times, step, 0.0).h
+    whole = make_grid(shot.animation.frame_times, step, 0.0).h
     return whole, (whole / step) ** ORDER * error
 
 
-def chooses_step(character: Character, options: Options) -> bool:
+def chooses_step(character: Character, options: RunSettings) -> bool:
     """Whether the step is to follow from the tolerance."""
     if options.tolerance is None or options.step is not None or character.retarget.time_step is not None:
         return False
     return options.scheme in IMPLICIT and not character.retarget.cyclic
 
 
-def allowed_step_error(options: Options, left_out: float) -> float:
+def allowed_step_error(options: RunSettings, left_out: float) -> float:
     """Error that the time step may cause beside what the bodies do without [m]."""
     assert options.tolerance is not None
     return max(SHARE * options.tolerance, WHOLE * options.tolerance - left_out)
 
 
-def omitted_error(bodies: Bodies) -> float:
+def omitted_error(bodies: Sequence[ReducedBody]) -> float:
     """Estimated error of what the bodies do without [m]; along a chain it adds up."""
-    return sum(row.estimated_error_m or 0.0 for body in bodies or () for row in body.left_out)
+    return sum(row.estimated_error_m or 0.0 for body in bodies for row in body.left_out)
 
 
-def mesh_error(bodies: Bodies) -> float | None:
+def mesh_error(bodies: Sequence[ReducedBody]) -> float | None:
     """That of their meshes [m]; None where nothing is flexible, or one of them is not known."""
-    errors = [body.mesh_error_m for body in bodies or () if len(body.stiffness)]
+    errors = [body.mesh_error_m for body in bodies if len(body.stiffness)]
     known = [error for error in errors if error is not None]
     return sum(known) if errors and len(known) == len(errors) else None
 
 
-def intended_positions(character: Character, animation: Animation, bodies: Bodies, options: Options) -> Array:
+def intended_positions(shot: CompiledShot, options: RunSettings) -> Array:
     """Intended positions of the targets at the frames [m], shape [f, K, 3]."""
-    prepared = prepare(character, animation, bodies, replace(options, step=FIRST))
-    intended = intended_motion(prepared, *sample_tracks(animation.tracks, prepared.grid))
+    prepared = prepare(shot, replace(options, step=FIRST))
+    intended = intended_motion(prepared, *sample_tracks(shot.animation.tracks, prepared.grid))
     return intended.reference.positions[prepared.grid.frames]
 
 

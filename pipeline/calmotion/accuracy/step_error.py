@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -10,13 +10,14 @@ import numpy as np
 from calmotion.errors import IntegrationError
 from calmotion.multibody.failure import SimulationFailure
 from calmotion.multibody.integrators.workspace import Workspace
-from calmotion.reduction.reduced_body import ReducedBody
-from calmotion.shot import Animation, Character, Result
+from calmotion.shot import Result
 from calmotion.shot.character import Array
+from calmotion.shot.run import RunSettings
+from calmotion.simulation.compiled_shot import CompiledShot
 from calmotion.simulation.cyclic import SteadyState
 from calmotion.simulation.forward import run_forward
 from calmotion.simulation.inputs.curves import sample_tracks
-from calmotion.simulation.prepare import Options, failure_error, prepare
+from calmotion.simulation.prepare import failure_error, prepare
 from calmotion.simulation.report import elastic_by_body
 
 ORDER = 2  # of BDF2; the global error goes with this power of the step
@@ -41,18 +42,16 @@ class StepRun:
     integrator: str = ""
 
 
-def simulate_at(
-    character: Character, animation: Animation, bodies: Sequence[ReducedBody] | None, options: Options, step: float
-) -> StepRun:
-    """One simulation of an animation's current curves; other arguments as of `simulate_shot`.
+def simulate_at(shot: CompiledShot, options: RunSettings, step: float) -> StepRun:
+    """One simulation of a shot's current curves by a time step [s].
 
     Raises:
         ShotError: The shot cannot be simulated by this step.
     """
-    prepared = prepare(character, animation, bodies, replace(options, step=step))
+    prepared = prepare(shot, replace(options, step=step))
     model, grid = prepared.model, prepared.grid
     workspace = Workspace.for_system(model.system)
-    angles, rates = sample_tracks(animation.current, grid)
+    angles, rates = sample_tracks(shot.animation.current, grid)
     steady = SteadyState(model, prepared.world, grid.h, workspace) if grid.cyclic else None
     try:
         run = run_forward(model, workspace, angles, rates, grid.h, prepared.world, None, options.scheme, steady)

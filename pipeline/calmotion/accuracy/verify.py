@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
-from functools import partial
 
 from calmotion.accuracy.integrator_choice import by_fast_scheme
 from calmotion.accuracy.pod_subspace import project_to_subspace
 from calmotion.accuracy.simulate_to_tolerance import found_tracks
 from calmotion.accuracy.step_error import distance, frames_of, simulate_at
-from calmotion.multibody.model.topology import span_tree
 from calmotion.reduction.reduced_body import ReducedBody
-from calmotion.shot import Animation, Character, FEMeshes, Result
-from calmotion.simulation.bodies import reduce_bodies
+from calmotion.shot import Result
+from calmotion.shot.run import RunSettings
+from calmotion.simulation.body_reduction import BodyReduction
+from calmotion.simulation.compiled_shot import CompiledShot
 from calmotion.simulation.inputs.time_grid import MAX_STEP
-from calmotion.simulation.prepare import Options, load_envelopes
 from calmotion.simulation.simulate import Progress
 
 STEP, TOLERANCE = 0.25, 0.1  # of those of the result
@@ -24,15 +22,14 @@ FINER, MOST = 0.1, 4  # a reduction that is no finer than the result's is tried 
 
 
 def verify(
-    character: Character, animation: Animation, meshes: FEMeshes | None, reduced: Sequence[ReducedBody] | None,
-    result: Result, options: Options, progress: Progress,
-) -> tuple[float, float, int]:  # fmt: skip
+    shot: CompiledShot, reduction: BodyReduction | None, result: Result, options: RunSettings, progress: Progress
+) -> tuple[float, float, int]:
     """Largest distance of any target, at any frame, to where a finer run has it.
 
     Args:
-        character, animation: The shot; its current curves are those of a result of `simulate`.
-        meshes: Of its flexible bodies.
-        reduced: The bodies of the result; None where all are rigid.
+        shot: With the bodies of the result; its current curves are those of a result of `simulate`.
+        reduction: Makes its bodies again, finer; None where all are rigid.
+        result: Of `simulate` or `optimize`.
         options: Those of the result.
 
     Returns:
@@ -42,25 +39,27 @@ def verify(
         ShotError: The finer run is not possible.
     """
     if result.after is not None:
-        animation = replace(animation, current=found_tracks(result, animation))
-    bodies = None
-    if reduced is not None and any(body.bends for body in character.bodies):
-        allowed = TOLERANCE * character.retarget.allowed(options.tolerance)
-        loads = load_envelopes(character, animation, meshes, options)
-        reduce = partial(reduce_bodies, character, span_tree(character), meshes, progress, loads)
-        bodies = reduce(tolerance=allowed)
-        for _ in range(MOST):
-            if _coordinates(bodies) > _coordinates(reduced):
-                break
-            allowed *= FINER
-            bodies = reduce(tolerance=allowed)
+        shot = shot.with_tracks(found_tracks(result, shot.animation))
+    if reduction is not None:
+        shot = shot.with_bodies(_finer(shot, reduction, options, progress))
     progress(0.5, "simulating with a finer step")
-    least = HELD * character.retarget.allowed(options.tolerance)
-    held = project_to_subspace(character, animation, bodies, options, MAX_STEP, lambda known: least)
+    least = HELD * shot.character.retarget.allowed(options.tolerance)
+    held = project_to_subspace(shot, options, MAX_STEP, lambda known: least)
     step = STEP * result.step_s
-    fine = by_fast_scheme(options, lambda options: simulate_at(character, animation, held.bodies, options, step))
-    own = frames_of(result, animation.frame_times)
-    return distance(own.positions, fine.positions), fine.step, _coordinates(bodies or ())
+    fine = by_fast_scheme(options, lambda options: simulate_at(held.shot, options, step))
+    own = frames_of(result, shot.animation.frame_times)
+    return distance(own.positions, fine.positions), fine.step, _coordinates(shot.bodies)
+
+
+def _finer(shot: CompiledShot, reduction: BodyReduction, options: RunSettings, progress: Progress) -> list[ReducedBody]:
+    """The bodies, reduced with more coordinates than the shot's."""
+    allowed = TOLERANCE * shot.character.retarget.allowed(options.tolerance)
+    for _ in range(1 + MOST):
+        bodies = reduction.bodies(allowed, progress=progress)
+        if _coordinates(bodies) > _coordinates(shot.bodies):
+            break
+        allowed *= FINER
+    return bodies
 
 
 def _coordinates(bodies: Sequence[ReducedBody]) -> int:

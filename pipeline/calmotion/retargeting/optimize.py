@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +10,6 @@ import numpy as np
 from calmotion.errors import ShotError
 from calmotion.multibody.failure import SimulationFailure
 from calmotion.multibody.integrators.workspace import Workspace
-from calmotion.reduction.reduced_body import ReducedBody
 from calmotion.retargeting.checkpoint import Checkpoint, problem_key
 from calmotion.retargeting.problem.adaptive_knots import useful_knots
 from calmotion.retargeting.problem.limit_costs import limit_costs
@@ -21,14 +19,16 @@ from calmotion.retargeting.search import RetargetSearch
 from calmotion.retargeting.simplification.pruning import UNCHANGED
 from calmotion.retargeting.simplification.report_rows import search_rows
 from calmotion.retargeting.solver.gauss_newton import Search
-from calmotion.shot import Animation, Character, MotorCurve, OptimizerStep, Result
+from calmotion.shot import Character, MotorCurve, OptimizerStep, Result
 from calmotion.shot.character import Array
+from calmotion.shot.run import RunSettings
 from calmotion.simulation.bodies import mode_tables, skins
+from calmotion.simulation.compiled_shot import CompiledShot
 from calmotion.simulation.forward import limited_values
 from calmotion.simulation.inputs.curves import sample_curves
 from calmotion.simulation.intended_motion import IntendedMotion
 from calmotion.simulation.motor_limits import Excess, excesses, motor_bounds
-from calmotion.simulation.prepare import Options, Prepared, failure_error, lowest_frequency, prepare, refuse_half_turns
+from calmotion.simulation.prepare import Prepared, failure_error, lowest_frequency, prepare, refuse_half_turns
 from calmotion.simulation.report import left_out_rows, limit_uses, performed_motion, reference_motion, simulation_of
 from calmotion.simulation.simulate import Progress, intended_motion
 from calmotion.simulation.simulator import compile_kernels
@@ -59,12 +59,7 @@ def _progress_of(search: Search) -> tuple[OptimizerStep, ...]:
 
 
 def optimize_shot(
-    character: Character,
-    animation: Animation,
-    bodies: Sequence[ReducedBody] | None,
-    options: Options,
-    progress: Progress,
-    checkpoint: Path | None = None,
+    shot: CompiledShot, options: RunSettings, progress: Progress, checkpoint: Path | None = None
 ) -> Result:
     """Retarget a shot: change its motor curves so that the flexible robot moves as it was animated to.
 
@@ -78,23 +73,23 @@ def optimize_shot(
         ShotError: The shot cannot be processed.
     """
     refuse_other_integrators(options)
-    prepared = prepare(character, animation, bodies, options)
+    prepared = prepare(shot, options)
     model, grid = prepared.model, prepared.grid
-    curves = sample_curves(animation.tracks, grid)
+    curves = sample_curves(shot.animation.tracks, grid)
     refuse_half_turns(prepared, curves.angles)
     try:
         intended = intended_motion(prepared, curves.angles, curves.rates)
-        posed = pose(prepared, animation, curves, intended, options)
+        posed = pose(prepared, curves, intended, options)
         progress(0.0, "loading kernels (compiled in the first run)")
         compile_kernels(
             model, Workspace.for_system(model.system), curves.angles, curves.rates, grid.h, prepared.world
         )  # fmt: skip
-        return _optimized(prepared, animation, posed, intended, options, progress, checkpoint)
+        return _optimized(prepared, posed, intended, options, progress, checkpoint)
     except SimulationFailure as failure:
         raise failure_error(prepared, failure) from failure
 
 
-def refuse_other_integrators(options: Options) -> None:
+def refuse_other_integrators(options: RunSettings) -> None:
     """Raise ShotError for integrators other than BDF2, the only one with derivatives."""
     if options.scheme != "bdf2":
         raise ShotError(
@@ -106,11 +101,11 @@ def refuse_other_integrators(options: Options) -> None:
 
 
 def _optimized(
-    prepared: Prepared, animation: Animation, posed: tuple[RetargetProblem, Array, bool], intended: IntendedMotion,
-    options: Options, progress: Progress, checkpoint: Path | None,
+    prepared: Prepared, posed: tuple[RetargetProblem, Array, bool], intended: IntendedMotion, options: RunSettings,
+    progress: Progress, checkpoint: Path | None,
 ) -> Result:  # fmt: skip
     """Simulate the input, search, simulate the result."""
-    character, begin = prepared.character, time.perf_counter()
+    character, animation, begin = prepared.character, prepared.shot.animation, time.perf_counter()
     problem, start, adaptive = posed
     tolerance = character.retarget.allowed(options.tolerance)
     problem.hold(0)
@@ -126,7 +121,7 @@ def _optimized(
     kept = Checkpoint(checkpoint, problem_key(problem, locked, (options, tolerance)))
     searched = RetargetSearch(
         problem, Search.start(start), (), character, animation, options, tolerance,
-        lowest_frequency(prepared, animation), adaptive, kept, progress,
+        lowest_frequency(prepared), adaptive, kept, progress,
     )  # fmt: skip
     searched.run(start)
     problem, search = searched.problem, searched.search

@@ -27,7 +27,7 @@ from calmotion.retargeting.solver.recycling import Recycled
 from calmotion.shot import Animation, Character
 from calmotion.shot.character import Array, BoolArray
 from calmotion.shot.model_choice import OFF
-from calmotion.simulation.prepare import Options
+from calmotion.shot.run import RunSettings
 from calmotion.simulation.simulate import Progress
 
 WORTH = 0.005  # share of the tolerance: a smaller predicted gain ends the search
@@ -57,7 +57,7 @@ class RetargetSearch:
     inactive: tuple[InactiveInterval, ...]
     character: Character
     animation: Animation
-    options: Options
+    options: RunSettings
     tolerance: float
     frequency: float
     adaptive: bool

@@ -8,6 +8,7 @@ from typing import Any
 
 from calmotion.shot.character import Character
 from calmotion.shot.result import Result, Simplification
+from calmotion.shot.run import RunSettings, Source
 
 # What can be forced on or off.
 KINDS = ("bodies", "turning", "loops", "modes", "directions", "elasticity", "motors", "ranges")
@@ -62,6 +63,19 @@ class ModelChoices:
     def choice(self, kind: str) -> str:
         """`auto`, `on` or `off`."""
         return self.forced.get(kind, AUTO)
+
+
+def run_settings(source: Source | None, choices: ModelChoices | None = None, **more: Any) -> RunSettings:
+    """The settings of a run.
+
+    Args:
+        source: What the user asked for; None: everything is left to the shot and to the program.
+        choices: Simplifications, some of which the user may have forced.
+        more: Other fields of the settings.
+    """
+    if choices is not None:
+        more |= {kind: choices.choice(kind) for kind in ("directions", "motors", "ranges")}
+    return replace(RunSettings() if source is None else source.settings, **more)
 
 
 def simplified_character(character: Character, choices: ModelChoices | None) -> Character:

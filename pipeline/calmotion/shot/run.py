@@ -1,8 +1,45 @@
-"""Settings of a run, as the user gave them."""
+"""What the user asked for: the command, the settings of the run, and the files to write."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+
+
+@dataclass(frozen=True)
+class RunSettings:
+    """What the user chose for simulations and searches; None leaves a choice to the shot or to the program.
+
+    Attributes:
+        tolerance: Acceptable error at the targets [m].
+        step: Time step [s].
+        pre_roll: Length of the pre-roll [s].
+        integrator: Name of the integrator.
+        knot_spacing: Distance of the knots of the offsets [s].
+        smoothness: Weight of the second derivative of the offsets.
+        max_iterations: Largest number of Gauss-Newton iterations.
+        adjoint: `discrete` or `continuous`.
+        ranges: `auto`, `on` (the whole shot is searched) or `off` (inactive intervals are not checked at the end).
+        motors: `auto`, `on` (every motor may change) or `off` (idle motors are not checked at the end).
+        directions: `auto`, `on` (bodies keep all coordinates) or `off` (the smallest POD subspaces at any error).
+    """
+
+    tolerance: float | None = None
+    step: float | None = None
+    pre_roll: float | None = None
+    integrator: str | None = None
+    knot_spacing: float | None = None
+    smoothness: float | None = None
+    max_iterations: int = 30
+    adjoint: str = "discrete"
+    ranges: str = "auto"
+    motors: str = "auto"
+    directions: str = "auto"
+
+    @property
+    def scheme(self) -> str:
+        """The integrator of a simulation for which none is chosen."""
+        return self.integrator or "bdf2"
+
 
 INTEGRATORS = ("bdf2", "newmark", "generalized-alpha", "rk4", "radau")
 SHAPERS = ("zv", "zvd", "zv2", "zvd2", "lowpass")  # input shapers and a filter
@@ -10,15 +47,12 @@ SHAPERS = ("zv", "zvd", "zv2", "zvd2", "lowpass")  # input shapers and a filter
 
 @dataclass(frozen=True)
 class Source:
-    """What the user asked for.
+    """The shot and what is to be done with it.
 
     Attributes:
         path: The shot.
         command: `inspect`, `simulate` or `optimize`.
-        tolerance: Acceptable error at the targets [m], or None for the shot's.
-        step: Time step [s], or None for automatic.
-        integrator: Name of the integrator, or None for automatic.
-        pre_roll: Length of the pre-roll [s], or None for automatic.
+        settings: Of simulations and searches.
         shaper: Input shaper or filter through which `simulate` passes the motors' tracks first, or None.
         motion: File with a motion that replaces tracks of motors, or None.
         verify: Whether the result is to be compared with a finer run.
@@ -26,13 +60,15 @@ class Source:
 
     path: str
     command: str
-    tolerance: float | None = None
-    step: float | None = None
-    integrator: str | None = None
-    pre_roll: float | None = None
+    settings: RunSettings = field(default_factory=RunSettings)
     shaper: str | None = None
     motion: str | None = None
     verify: bool = False
+
+    @property
+    def refines(self) -> bool:
+        """Whether the reduction of the bodies is refined until the motion keeps the tolerance that the user gave."""
+        return self.settings.tolerance is not None and self.command != "inspect"
 
 
 @dataclass(frozen=True)

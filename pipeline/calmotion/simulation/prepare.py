@@ -1,8 +1,7 @@
-"""A shot made ready for simulation: options, the compiled model, the time grid, and errors in the user's words."""
+"""A compiled shot on its time grid, and failures of its simulation in the user's words."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,42 +11,49 @@ from calmotion.multibody.analysis.deflection import largest_deflection
 from calmotion.multibody.analysis.modes import system_modes
 from calmotion.multibody.failure import SimulationFailure
 from calmotion.multibody.integrators.integrate import follows_roots
-from calmotion.multibody.model.model import Model, compile_model
-from calmotion.multibody.model.topology import span_tree
-from calmotion.reduction.load_envelope import LoadEnvelope
+from calmotion.multibody.model.model import Model
 from calmotion.reduction.reduced_body import ReducedBody
-from calmotion.shot import Animation, Character, FEMeshes
+from calmotion.shot import Animation, Character
 from calmotion.shot.character import Array
-from calmotion.shot.run import INTEGRATORS
-from calmotion.simulation.bodies import reduce_bodies
+from calmotion.shot.run import INTEGRATORS, RunSettings
+from calmotion.simulation.compiled_shot import CompiledShot
 from calmotion.simulation.cyclic import refuse_open_loops
 from calmotion.simulation.inputs.curves import needed_pre_roll, sample_tracks
 from calmotion.simulation.inputs.roots import root_tracks, sample_roots
 from calmotion.simulation.inputs.time_grid import TimeGrid, make_grid
-from calmotion.simulation.settings import Options
-
-__all__ = ["Options", "Prepared", "prepare"]
 
 
 @dataclass(frozen=True, eq=False)
 class Prepared:
-    """A shot compiled for simulation; `world` holds its moving roots, see `roots.sample_roots`."""
+    """A compiled shot on a time grid; `world` holds its moving roots, see `roots.sample_roots`."""
 
-    character: Character
-    bodies: Sequence[ReducedBody]
-    model: Model
+    shot: CompiledShot
     grid: TimeGrid
     world: Array
 
+    @property
+    def character(self) -> Character:
+        """The shot's character."""
+        return self.shot.character
 
-def prepare(
-    character: Character, animation: Animation, bodies: Sequence[ReducedBody] | None, options: Options
-) -> Prepared:
-    """Compile the system and the time grid.
+    @property
+    def bodies(self) -> tuple[ReducedBody, ...]:
+        """Its bodies."""
+        return self.shot.bodies
+
+    @property
+    def model(self) -> Model:
+        """Its multibody system."""
+        return self.shot.model
+
+
+def prepare(shot: CompiledShot, options: RunSettings) -> Prepared:
+    """The time grid of a shot, and its moving roots on it.
 
     Raises:
         ShotError: Something the shot asks for is not supported.
     """
+    character, animation = shot.character, shot.animation
     _refuse_unsupported(character, animation, options)
     if len(animation.frame_times) < 2:
         raise ShotError(
@@ -56,15 +62,11 @@ def prepare(
             attribute="endTimeCode",
             remedy="Author startTimeCode and endTimeCode of the stage, at least a frame apart.",
         )
-    tree = span_tree(character)
-    if bodies is None:
-        bodies = reduce_bodies(character, tree, None)
-    model = compile_model(character, tree, bodies, [frame.joint for frame in animation.moving])
     grid = grid_of(character, animation, options)
-    return Prepared(character, bodies, model, grid, sample_roots(animation.moving, grid))
+    return Prepared(shot, grid, sample_roots(animation.moving, grid))
 
 
-def grid_of(character: Character, animation: Animation, options: Options) -> TimeGrid:
+def grid_of(character: Character, animation: Animation, options: RunSettings) -> TimeGrid:
     """The time grid of a shot, with its pre-roll."""
     pre_roll = options.pre_roll
     if pre_roll is None:
@@ -76,47 +78,30 @@ def grid_of(character: Character, animation: Animation, options: Options) -> Tim
     return make_grid(animation.frame_times, step, pre_roll, character.retarget.cyclic)
 
 
-def load_envelopes(
-    character: Character, animation: Animation, meshes: FEMeshes | None, options: Options
-) -> tuple[LoadEnvelope, ...] | None:
-    """What the shot does to each body, for what the reduction chooses; None where a rigid robot cannot follow it."""
-    if len(animation.frame_times) < 2:
-        return None
-    from calmotion.simulation.rigid_run import shot_load_envelopes
-
-    try:
-        grid, tree = grid_of(character, animation, options), span_tree(character)
-        return shot_load_envelopes(character, animation, grid, tree, meshes)
-    except SimulationFailure:
-        return None  # the flexible robot will say so, with the place
-
-
-def first_pose_modes(
-    character: Character, animation: Animation, bodies: Sequence[ReducedBody] | None
-) -> tuple[Array, Array]:
+def first_pose_modes(shot: CompiledShot) -> tuple[Array, Array]:
     """Natural frequencies of the whole character in its first pose, motors held [Hz], ascending, and damping ratios.
 
     Raises:
         ShotError: It has no static equilibrium there.
     """
-    return modes_of(prepare(character, animation, bodies, Options(pre_roll=0.0)), animation)
+    return modes_of(prepare(shot, RunSettings(pre_roll=0.0)))
 
 
-def modes_of(prepared: Prepared, animation: Animation) -> tuple[Array, Array]:
+def modes_of(prepared: Prepared) -> tuple[Array, Array]:
     """The same of a shot that is prepared."""
-    angles, _ = sample_tracks(animation.tracks, prepared.grid)
+    angles, _ = sample_tracks(prepared.shot.animation.tracks, prepared.grid)
     try:
         return system_modes(prepared.model, prepared.model.joint_angles(angles[0]), prepared.world[0])
     except SimulationFailure as failure:
         raise failure_error(prepared, failure) from failure
 
 
-def lowest_frequency(prepared: Prepared, animation: Animation) -> float:
+def lowest_frequency(prepared: Prepared) -> float:
     """The lowest of them [Hz]; 0 where there is none."""
-    return float(next(iter(modes_of(prepared, animation)[0]), 0.0))
+    return float(next(iter(modes_of(prepared)[0]), 0.0))
 
 
-def _refuse_unsupported(character: Character, animation: Animation, options: Options) -> None:
+def _refuse_unsupported(character: Character, animation: Animation, options: RunSettings) -> None:
     if character.retarget.cyclic:
         refuse_open_loops(character, animation)
         if options.pre_roll:

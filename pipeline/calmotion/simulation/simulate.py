@@ -3,24 +3,25 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 
 import numpy as np
 
 from calmotion.errors import IntegrationError
 from calmotion.multibody.failure import SimulationFailure
 from calmotion.multibody.integrators.workspace import Workspace
-from calmotion.reduction.reduced_body import ReducedBody
-from calmotion.shot import Animation, Character, Result, Track
+from calmotion.shot import Result, Track
 from calmotion.shot.character import Array
+from calmotion.shot.run import RunSettings
 from calmotion.simulation.bodies import mode_tables, skins
+from calmotion.simulation.compiled_shot import CompiledShot
 from calmotion.simulation.cyclic import SteadyState
 from calmotion.simulation.forward import limited_values, run_forward
 from calmotion.simulation.inputs.curves import sample_curves, sample_tracks
 from calmotion.simulation.inputs.shapers import shaped
 from calmotion.simulation.intended_motion import IntendedMotion, rigid_motion, static_motion
 from calmotion.simulation.motor_limits import excesses, motor_bounds
-from calmotion.simulation.prepare import Options, Prepared, failure_error, modes_of, prepare, refuse_half_turns
+from calmotion.simulation.prepare import Prepared, failure_error, modes_of, prepare, refuse_half_turns
 from calmotion.simulation.report import left_out_rows, limit_uses, performed_motion, reference_motion, simulation_of
 from calmotion.simulation.target_errors import Objective
 
@@ -40,10 +41,7 @@ def intended_motion(prepared: Prepared, angles: Array, rates: Array) -> Intended
     return static_motion(prepared.model, rigid, angles, prepared.grid.times >= 0.0, prepared.world)
 
 
-def shape_tracks(
-    character: Character, animation: Animation, bodies: Sequence[ReducedBody] | None, options: Options, kind: str,
-    cutoff: float,
-) -> tuple[Track, ...]:  # fmt: skip
+def shape_tracks(shot: CompiledShot, options: RunSettings, kind: str, cutoff: float) -> tuple[Track, ...]:
     """The shot's tracks through an input shaper or a filter, sampled at the steps of its simulation.
 
     Args:
@@ -53,21 +51,15 @@ def shape_tracks(
     Raises:
         ShotError: There is no such shaper, or nothing to shape for.
     """
-    prepared = prepare(character, animation, bodies, options)
-    grid, curves = prepared.grid, sample_curves(animation.current, prepared.grid)
-    found = shaped(curves, grid, kind, *modes_of(prepared, animation), cutoff)
+    prepared = prepare(shot, options)
+    grid, curves = prepared.grid, sample_curves(shot.animation.current, prepared.grid)
+    found = shaped(curves, grid, kind, *modes_of(prepared), cutoff)
     return tuple(Track(grid.times, column) for column in found.angles.T)
 
 
-def simulate_shot(
-    character: Character,
-    animation: Animation,
-    bodies: Sequence[ReducedBody] | None,
-    options: Options,
-    progress: Progress,
-) -> Result:
+def simulate_shot(shot: CompiledShot, options: RunSettings, progress: Progress) -> Result:
     """Simulate the shot as animated, and measure it against the rigid motion of the animator's intent."""
-    prepared = prepare(character, animation, bodies, options)
+    prepared, character, animation = prepare(shot, options), shot.character, shot.animation
     model, grid, world = prepared.model, prepared.grid, prepared.world
     workspace = Workspace.for_system(model.system)
     curves = sample_curves(animation.current, grid)
@@ -119,7 +111,7 @@ def simulate_shot(
     )
 
 
-def _refuse_open_joints(prepared: Prepared, gap: float, options: Options) -> None:
+def _refuse_open_joints(prepared: Prepared, gap: float, options: RunSettings) -> None:
     """BDF2 keeps joints closed; the others hold them together in velocity, and drift where steps are coarse."""
     character = prepared.character
     if gap > CLOSED * character.retarget.allowed(options.tolerance):

@@ -9,7 +9,7 @@ from calmotion.host import OperatorResult, Settings, merge, parse_quantity
 from calmotion.shot.model_choice import KINDS, OFF, ON
 from calmotion.shot.outputs import Rig, Verification
 from calmotion.shot.result import Result
-from calmotion.shot.run import OutputPaths, Source
+from calmotion.shot.run import OutputPaths, RunSettings, Source
 from calmotion.workflow.inspection import Inspection, wanted_of
 from calmotion.workflow.results import OptimizationResult, SimulationResult
 from calmotion.workflow.run import Hooks, Progress, carry_out
@@ -218,10 +218,12 @@ def _source(
     return Source(
         path="",
         command="",
-        tolerance=_quantity(tolerance, "m"),
-        step=_quantity(step, "s"),
-        integrator=integrator,
-        pre_roll=_quantity(pre_roll, "s"),
+        settings=RunSettings(
+            tolerance=_quantity(tolerance, "m"),
+            step=_quantity(step, "s"),
+            integrator=integrator,
+            pre_roll=_quantity(pre_roll, "s"),
+        ),
         shaper=shaper,
         verify=verify,
     )

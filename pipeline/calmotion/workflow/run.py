@@ -199,7 +199,7 @@ def _refuse_unknown_methods(source: Source) -> None:
     """
     integrators = ("bdf2",) if source.command == "optimize" else INTEGRATORS
     for option, found, known in (
-        ("--integrator", source.integrator, integrators), ("--shaper", source.shaper, SHAPERS),
+        ("--integrator", source.settings.integrator, integrators), ("--shaper", source.shaper, SHAPERS),
     ):  # fmt: skip
         if found is not None and found not in known:
             raise SettingError(

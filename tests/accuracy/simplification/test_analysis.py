@@ -15,10 +15,12 @@ from calmotion.benchmarks.scenes.simplification_shots import (
 )
 from calmotion.multibody.model.topology import span_tree
 from calmotion.shot.model_choice import KINDS, OFF, ON
+from calmotion.shot.run import RunSettings
 from calmotion.simulation.bodies import reduce_bodies
-from calmotion.simulation.prepare import Options, load_envelopes
+from calmotion.simulation.body_reduction import load_envelopes
+from calmotion.simulation.compiled_shot import compile_shot
 
-FAST = Options(step=1 / 120)
+FAST = RunSettings(step=1 / 120)
 
 
 def _analyse(shot, forced=None, changes=False, options=FAST):
@@ -30,7 +32,7 @@ def _simulated(shot, character):
     if any(body.bends for body in character.bodies):
         loads = load_envelopes(character, shot.animation, shot.meshes, FAST)
         bodies = reduce_bodies(character, span_tree(character), shot.meshes, None, loads)
-    return simulate_at(character, shot.animation, bodies, FAST, 1 / 240).positions
+    return simulate_at(compile_shot(character, shot.animation, bodies), FAST, 1 / 240).positions
 
 
 def _rows(needs, kind):

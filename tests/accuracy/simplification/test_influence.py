@@ -10,14 +10,15 @@ from calmotion.benchmarks.scenes.simplification_shots import SimplificationShot,
 from calmotion.multibody.analysis.kinematics import rigid_poses, target_frames
 from calmotion.multibody.model.topology import span_tree
 from calmotion.shot import Follows
+from calmotion.shot.run import RunSettings
 from calmotion.simulation.inputs.gearing import leaders
-from calmotion.simulation.prepare import Options, grid_of
+from calmotion.simulation.prepare import grid_of
 from calmotion.simulation.rigid_run import rigid_bodies, rigid_run
 
 
 def _rigid(shot):
     tree = span_tree(shot.character)
-    grid = grid_of(shot.character, shot.animation, Options(step=1 / 60))
+    grid = grid_of(shot.character, shot.animation, RunSettings(step=1 / 60))
     return rigid_run(
         shot.character, shot.animation, grid, tree, rigid_bodies(shot.character, tree, shot.meshes)
     )  # fmt: skip

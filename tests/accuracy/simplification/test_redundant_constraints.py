@@ -8,13 +8,14 @@ from calmotion.benchmarks.scenes.linkage_arm import linkage_arm, performance
 from calmotion.benchmarks.scenes.simplification_shots import SimplificationShot, clevis_arm, plastic_arm
 from calmotion.multibody.model.topology import span_tree
 from calmotion.shot import Motor
-from calmotion.simulation.prepare import Options, grid_of
+from calmotion.shot.run import RunSettings
+from calmotion.simulation.prepare import grid_of
 from calmotion.simulation.rigid_run import rigid_bodies, rigid_run
 
 
 def _of(shot):
     tree = span_tree(shot.character)
-    grid = grid_of(shot.character, shot.animation, Options(step=1 / 60))
+    grid = grid_of(shot.character, shot.animation, RunSettings(step=1 / 60))
     model, run = rigid_run(
         shot.character, shot.animation, grid, tree, rigid_bodies(shot.character, tree, shot.meshes)
     )  # fmt: skip

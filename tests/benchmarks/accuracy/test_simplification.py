@@ -9,9 +9,9 @@ from calmotion.benchmarks.accuracy import simplification
 from calmotion.benchmarks.accuracy.simplification import Pair, pair
 from calmotion.benchmarks.scenes.simplification_shots import clevis_arm, held_arm
 from calmotion.shot.model_choice import ON
-from calmotion.simulation.prepare import Options
+from calmotion.shot.run import RunSettings
 
-FAST = Options(step=1 / 240)
+FAST = RunSettings(step=1 / 240)
 
 
 @pytest.fixture(scope="module")
@@ -34,8 +34,8 @@ def test_options_of_one_side_alone(monkeypatch):
 
     monkeypatch.setattr(simplification, "run", run)
     with pytest.raises(KeyboardInterrupt):
-        pair("knots", held_arm(), "optimize", {}, 1, None, Options(knot_spacing=0.1))
-    assert seen == [({}, Options(knot_spacing=0.1))]
+        pair("knots", held_arm(), "optimize", {}, 1, None, RunSettings(knot_spacing=0.1))
+    assert seen == [({}, RunSettings(knot_spacing=0.1))]
 
 
 def test_the_command_writes_a_table_and_one_object(loops, monkeypatch, capsys, tmp_path):

@@ -6,11 +6,14 @@ from calmotion.benchmarks.scenes.beam_arm import quintic, shot_of
 from calmotion.benchmarks.scenes.four_bar import COUPLER, CRANK, GROUND, ROCKER, corners, four_bar
 from calmotion.multibody.integrators.workspace import Workspace
 from calmotion.multibody.model.topology import span_tree
+from calmotion.shot.run import RunSettings
 from calmotion.simulation.bodies import reduce_bodies
+from calmotion.simulation.body_reduction import load_envelopes
+from calmotion.simulation.compiled_shot import compile_shot
 from calmotion.simulation.forward import run_forward
 from calmotion.simulation.inputs.curves import sample_tracks
 from calmotion.simulation.intended_motion import rigid_motion
-from calmotion.simulation.prepare import Options, load_envelopes, prepare
+from calmotion.simulation.prepare import prepare
 
 
 def test_its_corners_are_as_far_apart_as_its_bars_are_long():
@@ -23,9 +26,9 @@ def deflected(modes):
     """Largest deflection of the coupler's middle and that at rest [m], and the largest multiplier [N, N m]."""
     character, meshes = four_bar(modes=modes)
     animation = shot_of(quintic(2.0 * np.pi, 1.0, 0.25), 1.25)
-    known = load_envelopes(character, animation, meshes, Options()) if modes < 0 else None
+    known = load_envelopes(character, animation, meshes, RunSettings()) if modes < 0 else None
     bodies = reduce_bodies(character, span_tree(character), meshes, None, known)
-    prepared = prepare(character, animation, bodies, Options())
+    prepared = prepare(compile_shot(character, animation, bodies), RunSettings())
     angles, rates = sample_tracks(animation.tracks, prepared.grid)
     model, h = prepared.model, prepared.grid.h
     run = run_forward(model, Workspace.for_system(model.system), angles, rates, h)

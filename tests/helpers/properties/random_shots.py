@@ -31,8 +31,9 @@ from calmotion.shot import (
     Target,
     Track,
 )
+from calmotion.shot.run import RunSettings
 from calmotion.simulation.bodies import reduce_bodies
-from calmotion.simulation.prepare import Options
+from calmotion.simulation.compiled_shot import compile_shot
 from calmotion.simulation.simulate import simulate_shot
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
@@ -247,8 +248,8 @@ def simulated(shot: Shot, step: float = STEP, pre_roll: float | None = None) -> 
     """
     character = shot.character
     bodies = reduce_bodies(character, span_tree(character), shot.meshes)
-    options = Options(step=step, pre_roll=pre_roll)
-    return simulate_shot(character, shot.animation, bodies, options, lambda fraction, message: None)
+    options = RunSettings(step=step, pre_roll=pre_roll)
+    return simulate_shot(compile_shot(character, shot.animation, bodies), options, lambda fraction, message: None)
 
 
 @st.composite

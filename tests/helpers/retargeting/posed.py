@@ -8,10 +8,12 @@ from calmotion.retargeting.problem.offset_basis import make_basis
 from calmotion.retargeting.problem.offset_space import OffsetSpace
 from calmotion.retargeting.problem.problem import RetargetProblem
 from calmotion.shot import Animation, Track
+from calmotion.shot.run import RunSettings
+from calmotion.simulation.compiled_shot import compile_shot
 from calmotion.simulation.inputs.curves import sample_curves
 from calmotion.simulation.intended_motion import rigid_motion, static_motion
 from calmotion.simulation.motor_limits import motor_bounds
-from calmotion.simulation.prepare import Options, prepare
+from calmotion.simulation.prepare import prepare
 from calmotion.simulation.target_errors import Objective
 
 FINE_FRAMES = np.arange(181) / 120.0
@@ -22,7 +24,7 @@ def ignore_progress(fraction, message):
 
 
 def make_problem(character, bodies, animation, pre_roll=0.0, kept=False, limited=False, static=False, smoothness=1e-6):
-    prepared = prepare(character, animation, bodies, Options(step=1 / 240, pre_roll=pre_roll))
+    prepared = prepare(compile_shot(character, animation, bodies), RunSettings(step=1 / 240, pre_roll=pre_roll))
     model, grid = prepared.model, prepared.grid
     curves = sample_curves(animation.tracks, grid)
     intended = rigid_motion(model, curves.angles, curves.rates, grid.h)

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 from calmotion.shot import MotorCurve, Result, Simulation, Track
+from calmotion.shot.run import RunSettings
+from calmotion.simulation.compiled_shot import compile_shot
 from calmotion.simulation.inputs.curves import sample_curves
-from calmotion.simulation.prepare import Options, prepare
+from calmotion.simulation.prepare import prepare
 from calmotion.simulation.report import performed_motion
 from calmotion.usd.reading import read_shot
 from calmotion.usd.reading.skeletons import bound_skeletons
@@ -15,7 +17,7 @@ from pxr import Usd, UsdGeom
 
 def performed(character, animation, tracks):
     """Motion of the rigid robot with tracks."""
-    prepared = prepare(character, animation, None, Options(step=1 / 120))
+    prepared = prepare(compile_shot(character, animation, None), RunSettings(step=1 / 120))
     return performed_motion(prepared, sample_curves(tracks, prepared.grid))
 
 

@@ -10,16 +10,18 @@ from calmotion.multibody.failure import SimulationFailure
 from calmotion.multibody.kernels.markers import WORLD_MARKER
 from calmotion.multibody.model.model import rigid_model
 from calmotion.multibody.model.topology import span_tree
+from calmotion.shot.run import RunSettings
 from calmotion.simulation.bodies import reduce_bodies
+from calmotion.simulation.compiled_shot import compile_shot
 from calmotion.simulation.inputs.curves import sample_tracks
 from calmotion.simulation.intended_motion import rigid_motion
-from calmotion.simulation.prepare import Options, prepare
+from calmotion.simulation.prepare import prepare
 from scipy.spatial.transform import Rotation
 
 
 def prepared(character, meshes, animation):
     bodies = reduce_bodies(character, span_tree(character), meshes)
-    return prepare(character, animation, bodies, Options(step=1 / 96, pre_roll=0.0))
+    return prepare(compile_shot(character, animation, bodies), RunSettings(step=1 / 96, pre_roll=0.0))
 
 
 @pytest.fixture(scope="module", params=["arm", "four-bar"])

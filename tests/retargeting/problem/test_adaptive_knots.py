@@ -17,11 +17,12 @@ from calmotion.retargeting.problem.adaptive_knots import (
 from calmotion.retargeting.problem.offset_basis import basis_on, make_basis, uniform_breaks
 from calmotion.retargeting.solver.gauss_newton import Search, minimize
 from calmotion.shot import WeightTrack
+from calmotion.shot.run import RunSettings
+from calmotion.simulation.compiled_shot import compile_shot
 from calmotion.simulation.inputs.time_grid import make_grid
-from calmotion.simulation.prepare import Options
 from posed import FINE_FRAMES, ignore_progress, jerking, make_problem
 
-OPTIONS = Options(step=1 / 240)
+OPTIONS = RunSettings(step=1 / 240)
 
 
 @pytest.fixture(scope="module")
@@ -103,9 +104,13 @@ def test_knots_are_wanted_where_something_is_to_be_gained(arm, bodies):
 
 def test_knots_that_follow_the_motion_reach_what_uniform_ones_do_not(arm, bodies, monkeypatch):
     monkeypatch.setattr(adaptive_knots, "FIRST", 0.1)
-    found = optimize_shot(arm, jerking(), bodies, OPTIONS, ignore_progress)
-    uniform = optimize_shot(arm, jerking(), bodies, dataclasses.replace(OPTIONS, knot_spacing=0.1), ignore_progress)
-    every = optimize_shot(arm, jerking(), bodies, dataclasses.replace(OPTIONS, knot_spacing=1 / 60), ignore_progress)
+    found = optimize_shot(compile_shot(arm, jerking(), bodies), OPTIONS, ignore_progress)
+    uniform = optimize_shot(
+        compile_shot(arm, jerking(), bodies), dataclasses.replace(OPTIONS, knot_spacing=0.1), ignore_progress
+    )
+    every = optimize_shot(
+        compile_shot(arm, jerking(), bodies), dataclasses.replace(OPTIONS, knot_spacing=1 / 60), ignore_progress
+    )
     gained = uniform.objective_after - every.objective_after
     assert gained > 0.0 and uniform.objective_after - found.objective_after > 0.8 * gained
     assert uniform.parameters < found.parameters < 0.8 * every.parameters

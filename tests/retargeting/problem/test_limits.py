@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 from calmotion.retargeting.optimize import optimize_shot
 from calmotion.retargeting.problem.limits import MARGIN, LimitTerms
+from calmotion.shot.run import RunSettings
+from calmotion.simulation.compiled_shot import compile_shot
 from calmotion.simulation.motor_limits import motor_bounds
-from calmotion.simulation.prepare import Options
 from posed import ignore_progress
 
-OPTIONS = Options(step=1 / 240)
+OPTIONS = RunSettings(step=1 / 240)
 UNIT = {"velocity": "max_velocity", "acceleration": "max_acceleration", "effort": "max_torque"}
 
 
@@ -27,7 +28,7 @@ def with_limits(arm, **limits):
 def free(arm, animation, bodies):
     """The optimum without limits, and the largest value of each quantity of each motor in it."""
     wide = with_limits(arm, max_velocity=[1e6] * 2, max_acceleration=[1e6] * 2, max_torque=[1e6] * 2)
-    result = optimize_shot(wide, animation, bodies, OPTIONS, ignore_progress)
+    result = optimize_shot(compile_shot(wide, animation, bodies), OPTIONS, ignore_progress)
     return result, {
         name: [abs(use.after) for use in result.limits if use.quantity == name] for name in ("position", *UNIT)
     }
@@ -38,7 +39,7 @@ def free(arm, animation, bodies):
 def test_limits_that_bind_are_kept_and_cost_no_more_than_they_must(arm, animation, bodies, free, quantity, share):
     without, largest = free
     character = with_limits(arm, **{UNIT[quantity]: share * np.array(largest[quantity])})
-    result = optimize_shot(character, animation, bodies, OPTIONS, ignore_progress)
+    result = optimize_shot(compile_shot(character, animation, bodies), OPTIONS, ignore_progress)
     uses = [use for use in result.limits if use.quantity == quantity]
     assert len(uses) == 2
     for use in uses:
@@ -60,7 +61,9 @@ def test_ranges_that_the_animation_leaves_are_kept(arm, animation, bodies):
         dataclasses.replace(joint, lower=limits[k][0], upper=limits[k][1]) if k < 2 else joint
         for k, joint in enumerate(arm.joints)
     )
-    result = optimize_shot(dataclasses.replace(arm, joints=joints), animation, bodies, OPTIONS, ignore_progress)
+    result = optimize_shot(
+        compile_shot(dataclasses.replace(arm, joints=joints), animation, bodies), OPTIONS, ignore_progress
+    )
     values = result.after.motion.motor_values
     for k, (low, high) in enumerate(limits):
         assert values[:, k].min() >= low and values[:, k].max() <= high
@@ -71,15 +74,15 @@ def test_ranges_that_the_animation_leaves_are_kept(arm, animation, bodies):
 def test_all_limits_together(arm, animation, bodies, free):
     _, largest = free
     limits = {name: 0.9 * np.array(largest[quantity]) for quantity, name in UNIT.items()}
-    result = optimize_shot(with_limits(arm, **limits), animation, bodies, OPTIONS, ignore_progress)
+    result = optimize_shot(compile_shot(with_limits(arm, **limits), animation, bodies), OPTIONS, ignore_progress)
     assert all(use.excess <= 1e-6 for use in result.limits)
     assert result.objective_after < 0.2 * result.objective_before
 
 
 def test_a_limit_that_cannot_be_kept_is_reported_as_exceeded(arm, animation, bodies, free):
     """The shoulder cannot even hold the arm."""
-    result = optimize_shot(
-        with_limits(arm, max_torque=[np.inf, 0.05]), animation, bodies, dataclasses.replace(OPTIONS, max_iterations=6),
+    compiled = compile_shot(with_limits(arm, max_torque=[np.inf, 0.05]), animation, bodies)
+    result = optimize_shot(compiled, dataclasses.replace(OPTIONS, max_iterations=6),
         ignore_progress,
     )  # fmt: skip
     (use,) = [use for use in result.limits if use.quantity == "effort"]

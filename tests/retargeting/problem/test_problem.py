@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 from calmotion.benchmarks.scenes.linkage_arm import linkage_arm, performance
 from calmotion.multibody.model.topology import span_tree
+from calmotion.shot.run import RunSettings
 from calmotion.simulation.bodies import reduce_bodies, with_elasticity
-from calmotion.simulation.prepare import Options, load_envelopes
+from calmotion.simulation.body_reduction import load_envelopes
 from posed import looped, make_problem
 
 
@@ -23,7 +24,7 @@ def linkage(elasticity):
     character, meshes = linkage_arm(modes=-1 if elasticity == "auto" else 4)
     character = with_elasticity(character, elasticity)
     animation = performance(0.8)
-    loads = load_envelopes(character, animation, meshes, Options())
+    loads = load_envelopes(character, animation, meshes, RunSettings())
     return character, reduce_bodies(character, span_tree(character), meshes, None, loads), animation
 
 

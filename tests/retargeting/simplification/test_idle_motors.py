@@ -12,11 +12,13 @@ from calmotion.retargeting.optimize import optimize_shot
 from calmotion.retargeting.simplification.idle_motors import idle_motors
 from calmotion.retargeting.to_tolerance import optimize_to_tolerance
 from calmotion.shot.model_choice import ON
+from calmotion.shot.run import RunSettings
 from calmotion.simulation.bodies import reduce_bodies
-from calmotion.simulation.prepare import Options, load_envelopes
+from calmotion.simulation.body_reduction import load_envelopes
+from calmotion.simulation.compiled_shot import compile_shot
 from posed import ignore_progress
 
-FAST = Options(step=1 / 240)
+FAST = RunSettings(step=1 / 240)
 
 
 @pytest.fixture(scope="module")
@@ -36,12 +38,12 @@ def _marked(shot, forced=None):
 
 @pytest.fixture(scope="module")
 def lean(shot, bodies):
-    return optimize_shot(_marked(shot), shot.animation, bodies, FAST, ignore_progress)
+    return optimize_shot(compile_shot(_marked(shot), shot.animation, bodies), FAST, ignore_progress)
 
 
 def test_a_motor_of_the_head_is_not_optimised_and_the_loss_is_small(shot, bodies, lean):
     assert list(idle_motors(_marked(shot))) == [2, 3]
-    every = optimize_shot(_marked(shot, {"motors": ON}), shot.animation, bodies, FAST, ignore_progress)
+    every = optimize_shot(compile_shot(_marked(shot, {"motors": ON}), shot.animation, bodies), FAST, ignore_progress)
     assert [curve.changed for curve in lean.curves] == [True, True, False, False]
     assert lean.parameters < every.parameters and every.idle_gain_m is None
     unit = np.sqrt(2.0 * lean.objective_after / np.mean(lean.after.position_errors[lean.after.motion.judged] ** 2))
@@ -55,8 +57,10 @@ def test_a_motor_of_the_head_is_not_optimised_and_the_loss_is_small(shot, bodies
 
 def test_the_search_continues_on_finer_knots_where_they_promise_a_gain(shot, bodies, monkeypatch):
     monkeypatch.setattr(to_tolerance, "ENOUGH", -1.0)
-    result = optimize_to_tolerance(_marked(shot), shot.animation, bodies, FAST, ignore_progress)
+    result = optimize_to_tolerance(compile_shot(_marked(shot), shot.animation, bodies), FAST, ignore_progress)
     assert result.idle_gain_m is None
     assert not any("Nod" in row.what and "moves no target" in row.why for row in result.left_out)
-    kept = optimize_to_tolerance(_marked(shot), shot.animation, bodies, replace(FAST, motors="off"), ignore_progress)
+    kept = optimize_to_tolerance(
+        compile_shot(_marked(shot), shot.animation, bodies), replace(FAST, motors="off"), ignore_progress
+    )
     assert kept.idle_gain_m is not None and kept.parameters < result.parameters

@@ -17,11 +17,12 @@ from calmotion.retargeting.simplification.inactive_intervals import (
     inactive_intervals,
 )
 from calmotion.shot import Animation, FreeTrack, Track
-from calmotion.simulation.prepare import Options
+from calmotion.shot.run import RunSettings
+from calmotion.simulation.compiled_shot import compile_shot
 from calmotion.simulation.simulator import Simulator
 from posed import ignore_progress, jerking, looped, make_problem
 
-OPTIONS = Options(step=1 / 240)
+OPTIONS = RunSettings(step=1 / 240)
 HELD, MOVE = 1.5, 0.9
 
 
@@ -58,7 +59,9 @@ def root_mean_square(result):
 
 @pytest.fixture(scope="module")
 def everywhere(arm, bodies):
-    return optimize_shot(still(arm), pausing(), bodies, dataclasses.replace(OPTIONS, ranges="on"), ignore_progress)
+    return optimize_shot(
+        compile_shot(still(arm), pausing(), bodies), dataclasses.replace(OPTIONS, ranges="on"), ignore_progress
+    )
 
 
 def test_an_inactive_interval_before_a_move_is_skipped_without_loss(arm, bodies, everywhere, monkeypatch):
@@ -71,7 +74,7 @@ def test_an_inactive_interval_before_a_move_is_skipped_without_loss(arm, bodies,
         return motion
 
     monkeypatch.setattr(Simulator, "run", counted)
-    result = optimize_shot(still(arm), pausing(), bodies, OPTIONS, ignore_progress)
+    result = optimize_shot(compile_shot(still(arm), pausing(), bodies), OPTIONS, ignore_progress)
     tolerance = arm.retarget.allowed(None)
     assert not rows_of(everywhere)
     (row,) = rows_of(result)
@@ -99,14 +102,14 @@ def test_with_an_early_error_no_interval_is_inactive_and_the_result_is_the_same(
         animation = dataclasses.replace(animation, free=locks)
     with monkeypatch.context() as patch:
         patch.setattr(RetargetProblem, "hold", lambda self, first: (held.append(first), hold(self, first)))
-        result = optimize_shot(arm, animation, bodies, OPTIONS, ignore_progress)
+        result = optimize_shot(compile_shot(arm, animation, bodies), OPTIONS, ignore_progress)
     assert not rows_of(result) and (max(held) > 0.5 * 240) == locked
     if not locked:
         assert result.after.position_errors[0, 1] < 0.5 * result.before.position_errors[0, 1]
     with monkeypatch.context() as patch:
         patch.setattr(RetargetProblem, "hold", lambda self, first: None)
         patch.setattr(search, "inactive_intervals", lambda *a: ())
-        plain = optimize_shot(arm, animation, bodies, OPTIONS, ignore_progress)
+        plain = optimize_shot(compile_shot(arm, animation, bodies), OPTIONS, ignore_progress)
     for one, other in zip(result.curves, plain.curves, strict=True):
         assert np.array_equal(one.frame_values, other.frame_values)
     assert result.objective_after == plain.objective_after
@@ -120,7 +123,7 @@ def test_inactive_intervals_stay_inactive_on_finer_knots(arm, bodies, monkeypatc
     times = np.arange(len(slow.frame_times) + 90) / 120.0
     tracks = tuple(Track(times, np.interp(times - 0.75, k.times, k.values)) for k in slow.tracks)
     first = make_problem(arm, bodies, Animation(times, tracks, tracks)).size
-    result = optimize_shot(still(arm), Animation(times, tracks, tracks), bodies, OPTIONS, ignore_progress)
+    result = optimize_shot(compile_shot(still(arm), Animation(times, tracks, tracks), bodies), OPTIONS, ignore_progress)
     (row,) = rows_of(result)
     before, after = result.before.motion, result.after.motion
     early = after.times <= float(row.what.split()[-2])
@@ -132,13 +135,13 @@ def test_inactive_intervals_stay_inactive_on_finer_knots(arm, bodies, monkeypatc
 def test_a_range_that_would_have_gained_something_is_searched_after_all(arm, bodies, everywhere, monkeypatch):
     too_much = (InactiveInterval(0.0, HELD + 0.45, 0.0),)
     monkeypatch.setattr(search, "inactive_intervals", lambda *a: too_much)
-    result = optimize_shot(still(arm), pausing(), bodies, OPTIONS, ignore_progress)
+    result = optimize_shot(compile_shot(still(arm), pausing(), bodies), OPTIONS, ignore_progress)
     assert not rows_of(result) and result.stopped == "converged"
     assert abs(root_mean_square(result) - root_mean_square(everywhere)) < 0.02 * arm.retarget.allowed(None)
     assert result.gradients > everywhere.gradients
     # as it would stay without that
     monkeypatch.setattr(search, "MISSED", 1e9)
-    worse = optimize_shot(still(arm), pausing(), bodies, OPTIONS, ignore_progress)
+    worse = optimize_shot(compile_shot(still(arm), pausing(), bodies), OPTIONS, ignore_progress)
     (row,) = rows_of(worse)
     lost = root_mean_square(worse) - root_mean_square(result)
     assert lost > 1e-3 and 0.05 * lost < row.estimated_error_m < 2.0 * lost

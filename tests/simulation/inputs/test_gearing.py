@@ -9,9 +9,11 @@ import pytest
 from calmotion.retargeting.optimize import optimize_shot
 from calmotion.retargeting.problem.posing import pose
 from calmotion.shot import Follows, Track
+from calmotion.shot.run import RunSettings
+from calmotion.simulation.compiled_shot import compile_shot
 from calmotion.simulation.inputs.curves import sample_curves
 from calmotion.simulation.inputs.gearing import coupling_of, leaders
-from calmotion.simulation.prepare import Options, prepare
+from calmotion.simulation.prepare import prepare
 from calmotion.simulation.simulate import intended_motion
 
 RATIO = -0.6
@@ -31,10 +33,10 @@ def geared(arm, animation):
 
 
 def problem_of(character, animation, bodies):
-    options = Options(step=1 / 240, pre_roll=0.0)
-    prepared = prepare(character, animation, bodies, options)
+    options = RunSettings(step=1 / 240, pre_roll=0.0)
+    prepared = prepare(compile_shot(character, animation, bodies), options)
     curves = sample_curves(animation.tracks, prepared.grid)
-    return pose(prepared, animation, curves, intended_motion(prepared, curves.angles, curves.rates), options)[0]
+    return pose(prepared, curves, intended_motion(prepared, curves.angles, curves.rates), options)[0]
 
 
 def test_followers_have_no_unknowns(geared):
@@ -75,7 +77,7 @@ def test_a_product_is_symmetric(geared, bodies):
 
 def test_the_optimised_curves_stay_geared(geared, bodies):
     character, animation = geared
-    result = optimize_shot(character, animation, bodies, Options(step=1 / 240), lambda *_: None)
+    result = optimize_shot(compile_shot(character, animation, bodies), RunSettings(step=1 / 240), lambda *_: None)
     led, follower = result.curves[0], result.curves[1]
     assert led.changed and follower.changed
     assert np.allclose(follower.frame_values, 0.1 + RATIO * led.frame_values, atol=1e-9)

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 import small_shots as shots
 from calmotion import ShotError
-from calmotion.simulation.simulate import Options, simulate_shot
+from calmotion.simulation.compiled_shot import compile_shot
+from calmotion.simulation.simulate import RunSettings, simulate_shot
 from calmotion.usd.reading import read_shot
 from calmotion.usd.writing import WriteOptions, write_result
 from performing import curves_of, performed, tracks_of
@@ -45,7 +46,9 @@ def simulated(tmp_path_factory):
     folder = tmp_path_factory.mktemp("writing")
     shot = shots.write_arm(folder / "shot.usda")
     character, animation, provenance = read_shot(str(shot))
-    result = simulate_shot(character, animation, None, Options(step=1 / 120), lambda fraction, message: None)
+    result = simulate_shot(
+        compile_shot(character, animation, None), RunSettings(step=1 / 120), lambda fraction, message: None
+    )
     return shot, character, animation, provenance, result
 
 

@@ -14,14 +14,14 @@ from calmotion.multibody.model.topology import span_tree
 from calmotion.shot import Animation, Character, FlexibleSettings, ModelChoice, ModelChoices
 from calmotion.shot.character import with_settings
 from calmotion.shot.model_choice import AUTO, OFF, ON
-from calmotion.simulation.settings import Options
+from calmotion.shot.run import RunSettings
 from calmotion.support.naming import distinct_names
 
 FINE, NONE = 1e-3, np.inf  # shares of the tolerance for modes that are left out, where modes are forced on and off
 
 
 def analyse(
-    character: Character, animation: Animation, options: Options, forced: Mapping[str, str], changes: bool
+    character: Character, animation: Animation, options: RunSettings, forced: Mapping[str, str], changes: bool
 ) -> ModelChoices:
     """Decide what a shot needs.
 

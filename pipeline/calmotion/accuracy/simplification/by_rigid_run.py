@@ -14,17 +14,17 @@ from calmotion.multibody.model.model import Model, body_anchors, rigid_body
 from calmotion.multibody.model.topology import Tree, chain_members
 from calmotion.shot import Animation, Body, Character, MassProperties, ModelChoice
 from calmotion.shot.model_choice import AUTO, OFF, ON
+from calmotion.shot.run import RunSettings
 from calmotion.simulation.forward import ForwardRun
 from calmotion.simulation.inputs.gearing import leaders
 from calmotion.simulation.prepare import grid_of
 from calmotion.simulation.rigid_run import rigid_run
-from calmotion.simulation.settings import Options
 
 STEP = 1.0 / 100.0  # of the rigid robot's simulation [s]: loads are those of the animation, and safe bounds follow
 
 
 def decide(
-    character: Character, animation: Animation, options: Options, tree: Tree, choice: Callable[[str], str],
+    character: Character, animation: Animation, options: RunSettings, tree: Tree, choice: Callable[[str], str],
     changes: bool,
 ) -> tuple[Character, list[ModelChoice]]:  # fmt: skip
     """Decide which bodies are rigid, which joints of closed chains are needed and which motors move targets.

@@ -11,17 +11,17 @@ from typing import Any
 
 import numpy as np
 
-from calmotion.accuracy.pod_subspace import ProjectedBodies, ReferenceRun
+from calmotion.accuracy.pod_subspace import ProjectedShot, ReferenceRun
 from calmotion.accuracy.step_error import StepRun, distance, simulate_at
 from calmotion.benchmarks.common.shots import Unreduced
 from calmotion.benchmarks.common.timing import median_time
 from calmotion.errors import ShotError
-from calmotion.multibody.model.topology import span_tree
 from calmotion.reduction.reduced_body import ReducedBody
 from calmotion.shot.character import Array, with_settings
-from calmotion.simulation.bodies import reduce_bodies
+from calmotion.shot.run import RunSettings
+from calmotion.simulation.body_reduction import BodyReduction, reduction_for
+from calmotion.simulation.compiled_shot import CompiledShot, compile_shot
 from calmotion.simulation.inputs.time_grid import MAX_STEP
-from calmotion.simulation.prepare import Options, load_envelopes
 
 TOLERANCES = (1e-2, 1e-3, 1e-4, 1e-5)
 REFERENCE_STEP, SMALLEST_STEP = 1 / 3840, 1 / 30720  # of the reference: at most, and where it ends
@@ -66,25 +66,26 @@ class Bench:
 
     def __init__(self, shot: Unreduced, repeats: int = REPEATS):
         self.shot, self.repeats = shot, repeats
-        self.tree = span_tree(shot.character)
-        self.loads = load_envelopes(shot.character, shot.animation, shot.meshes, Options())
+        self._reduction = reduction_for(shot.character, shot.animation, shot.meshes, RunSettings())
         self._known: ReferenceRun | None = None
 
     def bodies(self, tolerance: float, **settings: Any) -> list[ReducedBody]:
         """The shot's bodies, reduced to a tolerance [m] with some of their `FlexibleSettings` changed."""
         character = with_settings(self.shot.character, lambda own: replace(own, **settings))
-        return reduce_bodies(character, self.tree, self.shot.meshes, None, self.loads, tolerance)
+        return BodyReduction(character, self.shot.meshes, self._reduction.loads).bodies(tolerance)
+
+    def compiled(self, bodies: Sequence[ReducedBody]) -> CompiledShot:
+        """The shot with some bodies."""
+        return compile_shot(self.shot.character, self.shot.animation, bodies)
 
     def run(self, bodies: Sequence[ReducedBody], step: float, integrator: str = "bdf2") -> StepRun:
         """One simulation of the shot as animated."""
-        options = Options(integrator=integrator)
-        return simulate_at(self.shot.character, self.shot.animation, bodies, options, step)
+        return simulate_at(self.compiled(bodies), RunSettings(integrator=integrator), step)
 
     def held(self, bodies: Sequence[ReducedBody], allowed: float) -> Sequence[ReducedBody]:
         """Bodies of the reduction `BASE` held to directions, which may change this much [m]."""
-        shot = self.shot
-        self._known = self._known or ReferenceRun(shot.animation, self.run(bodies, MAX_STEP))
-        return ProjectedBodies(shot.character, bodies, Options(), lambda item: allowed, [self._known]).bodies or bodies
+        self._known = self._known or ReferenceRun(self.shot.animation, self.run(bodies, MAX_STEP))
+        return ProjectedShot(self.compiled(bodies), RunSettings(), lambda item: allowed, [self._known]).shot.bodies
 
     def reference(self, finest: float = FINEST) -> Reference:
         """The finest run, its step extrapolated to zero, from steps as small as it takes.
@@ -100,8 +101,8 @@ class Bench:
         shot, bodies = self.shot, self.bodies(finest, pairs_share=10.0)
         known = ReferenceRun(shot.animation, self.run(bodies, MAX_STEP))
         other = self.run(self.bodies(10.0 * finest), MAX_STEP)
-        held = ProjectedBodies(shot.character, bodies, Options(), lambda item: finest, [known])
-        limit, left = self._limit(held.bodies or bodies, 10.0 * finest)
+        held = ProjectedShot(self.compiled(bodies), RunSettings(), lambda item: finest, [known])
+        limit, left = self._limit(held.shot.bodies, 10.0 * finest)
         unseen = sum(body.elasticity.strain_error_m for body in bodies if body.elasticity is not None)
         reduced = distance(other.positions, known.run.positions) + unseen
         return Reference(limit, left + reduced + held.error_m)

@@ -33,12 +33,11 @@ from calmotion.benchmarks.scenes.simplification_shots import (
     held_arm,
     plastic_arm,
 )
-from calmotion.multibody.model.topology import span_tree
 from calmotion.retargeting.to_tolerance import optimize_to_tolerance
 from calmotion.shot import Result
 from calmotion.shot.model_choice import KINDS, ON
-from calmotion.simulation.bodies import reduce_bodies
-from calmotion.simulation.prepare import Options, load_envelopes
+from calmotion.shot.run import RunSettings
+from calmotion.simulation.body_reduction import reduced_shot
 
 REPEATS = 3
 
@@ -88,7 +87,7 @@ class Outcome:
     estimated_m: float
 
 
-def run(shot: SimplificationShot, command: str, forced: Mapping[str, str], options: Options) -> Outcome:
+def run(shot: SimplificationShot, command: str, forced: Mapping[str, str], options: RunSettings) -> Outcome:
     """Analyse, reduce, and simulate or optimise a shot."""
     begin = time.perf_counter()
     optimizes = command == "optimize"
@@ -99,14 +98,11 @@ def run(shot: SimplificationShot, command: str, forced: Mapping[str, str], optio
         motors=choices.choice("motors"),
         directions=choices.choice("directions"),
     )
-    character, bodies = choices.character, None
-    if any(body.bends for body in character.bodies):
-        loads = load_envelopes(character, shot.animation, shot.meshes, options)
-        # finite elements anew each time, as for a user who comes with a new character
-        with fresh_cache():
-            bodies = reduce_bodies(character, span_tree(character), shot.meshes, None, loads)
+    # finite elements anew each time, as for a user who comes with a new character
+    with fresh_cache():
+        compiled = reduced_shot(choices.character, shot.animation, shot.meshes, replace(options, tolerance=None))
     work: Callable[..., Result] = optimize_to_tolerance if optimizes else simulate_to_tolerance
-    result = work(character, shot.animation, bodies, options, lambda fraction, message: None)
+    result = work(compiled, options, lambda fraction, message: None)
     whole = time.perf_counter() - begin
     estimated = sum(row.estimated_error_m or 0.0 for row in (*choices.left_out, *result.left_out))
     return Outcome(frames_of(result, shot.animation.frame_times), result.wall_s, whole, estimated)
@@ -114,16 +110,16 @@ def run(shot: SimplificationShot, command: str, forced: Mapping[str, str], optio
 
 def pair(
     kind: str, shot: SimplificationShot, command: str, forced: Mapping[str, str], repeats: int = REPEATS,
-    given: Options | None = None, more: Options | None = None,
+    given: RunSettings | None = None, more: RunSettings | None = None,
 ) -> Pair:  # fmt: skip
     """A shot as it is and with something forced on.
 
     Args:
         forced: Kinds that are forced, in the run that has them.
-        given: Options of both.
-        more: Options of the run that has it, where these make it.
+        given: RunSettings of both.
+        more: RunSettings of the run that has it, where these make it.
     """
-    options = given or Options()
+    options = given or RunSettings()
     lean = partial(run, shot, command, {}, options)
     full = partial(run, shot, command, forced, more or options)
     full(), lean()  # compile
@@ -136,7 +132,7 @@ def pair(
 
 def pairs(repeats: int = REPEATS) -> list[partial[Pair]]:
     """Every pair, one kind of thing each, and then everything, to be measured when called."""
-    finest, finer_steps = Options(knot_spacing=1.0 / 60.0), Options(step=1.0 / 3840.0)
+    finest, finer_steps = RunSettings(knot_spacing=1.0 / 60.0), RunSettings(step=1.0 / 3840.0)
     everything = dict.fromkeys(KINDS, ON)
     return [
         partial(pair, "turning", gantry(), "simulate", {"turning": ON}, repeats),

@@ -26,7 +26,9 @@ from calmotion.benchmarks.common.shots import Unreduced, load_unreduced
 from calmotion.benchmarks.common.tables import markdown, table_parser, write_rows
 from calmotion.retargeting.to_tolerance import optimize_to_tolerance
 from calmotion.shot import Result
-from calmotion.simulation.prepare import Options
+from calmotion.shot.run import RunSettings
+from calmotion.simulation.body_reduction import reduction_for
+from calmotion.simulation.compiled_shot import compile_shot
 
 TOLERANCES = (1e-2, 1e-3, 1e-4, 1e-5)
 FINER = 1e-2  # tolerance of the reference's reduction over the tightest that is measured
@@ -81,14 +83,14 @@ class Tolerances:
     def warm(self, tolerance: float, command: str) -> None:
         """Run once, so that what is timed afterwards neither compiles nor loads kernels."""
         with fresh_cache():
-            self._run(Options(tolerance=tolerance), command)
+            self._run(RunSettings(tolerance=tolerance), command)
 
     def kept(self, tolerance: float, command: str = "simulate") -> Kept:
         """Simulate or retarget the shot to a tolerance [m], and measure the result."""
         shot, animation = self.shot, self.shot.animation
         begin = time.perf_counter()
         with fresh_cache():
-            result, coordinates, more = self._run(Options(tolerance=tolerance), command)
+            result, coordinates, more = self._run(RunSettings(tolerance=tolerance), command)
         wall = time.perf_counter() - begin
         assert result.accuracy is not None
         if result.after is None:
@@ -105,19 +107,19 @@ class Tolerances:
             *(float(run.position_errors[run.motion.judged].max()) for run in runs),
         )  # fmt: skip
 
-    def _run(self, options: Options, command: str) -> tuple[Result, int, float]:
+    def _run(self, options: RunSettings, command: str) -> tuple[Result, int, float]:
         """The result, its elastic coordinates, and the estimated error of the model simplifications [m]."""
-        shot, animation = self.shot, self.shot.animation
-        choices = analyse(shot.character, animation, options, {}, command == "optimize")
-        character, more = choices.character, sum(row.estimated_error_m or 0.0 for row in choices.left_out)
+        shot, animation, search = self.shot, self.shot.animation, command == "optimize"
+        choices = analyse(shot.character, animation, options, {}, search)
+        more = sum(row.estimated_error_m or 0.0 for row in choices.left_out)
         quiet = lambda fraction, message: None  # noqa: E731  (a callback, twice)
-        search = command == "optimize"
-        reduction = converged_reduction(character, animation, shot.meshes, options, retargeted=search)
-        bodies, known = reduction.bodies, reduction.known
+        reduction = reduction_for(choices.character, animation, shot.meshes, options, repeats=True)
+        first = compile_shot(choices.character, animation, reduction.bodies(options.tolerance))
+        converged = converged_reduction(first, reduction, options, retargeted=search)
         if search:
-            result = optimize_to_tolerance(character, animation, bodies, options, quiet, known=known)
+            result = optimize_to_tolerance(converged.shot, options, quiet, known=converged.known)
         else:
-            result = simulate_to_tolerance(character, animation, bodies, options, quiet, reduction.error_m, known)
+            result = simulate_to_tolerance(converged.shot, options, quiet, converged.error_m, converged.known)
         return result, sum(u.shape[1] for u in result.before.motion.elastic), more
 
 

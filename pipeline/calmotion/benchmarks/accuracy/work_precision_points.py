@@ -12,10 +12,10 @@ from calmotion.accuracy.simulate_to_tolerance import chosen_step, project_to_tol
 from calmotion.benchmarks.accuracy.pareto import setting_of
 from calmotion.benchmarks.accuracy.reference_bench import BASE, TOLERANCES, Bench, Point, Reference
 from calmotion.benchmarks.common.shots import load_unreduced
-from calmotion.reduction.reduced_body import ReducedBody
-from calmotion.shot import Animation, Character
+from calmotion.shot.run import RunSettings
+from calmotion.simulation.body_reduction import reduction_for
+from calmotion.simulation.compiled_shot import CompiledShot
 from calmotion.simulation.inputs.time_grid import MAX_STEP
-from calmotion.simulation.prepare import Options
 
 STEPS = (1 / 60, 1 / 120, 1 / 240, 1 / 480, 1 / 960, 1 / 1920)
 FINER_STEPS = (1 / 3840, 1 / 7680)  # too, where directions are fine enough: the tightest tolerances ask for them
@@ -63,24 +63,22 @@ def forward_points(bench: Bench, reference: Reference) -> list[Point]:
 def chosen_points(bench: Bench, reference: Reference, tolerances: Sequence[float] = TOLERANCES) -> list[Point]:
     """The choices of the program, without a tolerance and with several."""
     shot = bench.shot
-    character, animation = shot.character, shot.animation
     default = bench.bodies(shot.character.retarget.allowed())
     points = [bench.measure(reference, "default", "default", default, MAX_STEP)]
     for tolerance in tolerances:
-        options = Options(tolerance=tolerance)
-        reduction = converged_reduction(character, animation, shot.meshes, options)
-        held = project_to_tolerance(character, animation, reduction.bodies, options, reduction.known)
-        bodies = held.bodies or reduction.bodies
-        choice = partial(_step_and_integrator, character, animation, bodies, reduction.error_m + held.error_m)
+        options = RunSettings(tolerance=tolerance)
+        reduction = reduction_for(shot.character, shot.animation, shot.meshes, options, repeats=True)
+        converged = converged_reduction(bench.compiled(reduction.bodies(tolerance)), reduction, options)
+        held = project_to_tolerance(converged.shot, options, converged.known)
+        choice = partial(_step_and_integrator, held.shot, converged.error_m + held.error_m)
         step, integrator = by_fast_scheme(options, choice)
-        points.append(bench.measure(reference, "tolerance", setting_of(tolerance), bodies, step, integrator))
+        setting = setting_of(tolerance)
+        points.append(bench.measure(reference, "tolerance", setting, held.shot.bodies, step, integrator))
     return points
 
 
-def _step_and_integrator(
-    character: Character, animation: Animation, bodies: Sequence[ReducedBody], left_out: float, options: Options
-) -> tuple[float, str]:
-    return chosen_step(character, animation, bodies, options, left_out)[0], options.scheme
+def _step_and_integrator(shot: CompiledShot, left_out: float, options: RunSettings) -> tuple[float, str]:
+    return chosen_step(shot, options, left_out)[0], options.scheme
 
 
 def element_points(bench: Bench, factors: Sequence[float] = ELEMENTS) -> list[Point]:

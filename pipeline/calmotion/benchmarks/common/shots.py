@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from calmotion.errors import ShotError
-from calmotion.multibody.model.topology import span_tree
-from calmotion.reduction.reduced_body import ReducedBody
-from calmotion.shot import Animation, Character, FEMeshes, ModelChoices
+from calmotion.shot import Animation, Character, FEMeshes
 from calmotion.shot.model_choice import ON
-from calmotion.simulation.bodies import reduce_bodies
-from calmotion.simulation.prepare import Options, load_envelopes
+from calmotion.shot.run import RunSettings
+from calmotion.simulation.body_reduction import reduced_shot
+from calmotion.simulation.compiled_shot import CompiledShot
 
 MADE = {
     "linkage": "an arm with a four-bar linkage",
@@ -28,9 +26,17 @@ class BenchShot:
     """A shot ready to be prepared."""
 
     name: str
-    character: Character
-    animation: Animation
-    bodies: Sequence[ReducedBody]
+    compiled: CompiledShot
+
+    @property
+    def character(self) -> Character:
+        """Its character."""
+        return self.compiled.character
+
+    @property
+    def animation(self) -> Animation:
+        """Its animation."""
+        return self.compiled.animation
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,24 +94,18 @@ def load(name: str) -> BenchShot:
     """
     if name in MADE:
         character, animation, meshes = _made(name)
-        loads = load_envelopes(character, animation, meshes, Options())
-        return BenchShot(
-            name, character, animation, reduce_bodies(character, span_tree(character), meshes, None, loads)
-        )
-    from calmotion.accuracy.reduced_bodies import ReducedBodies
+        return BenchShot(name, reduced_shot(character, animation, meshes, RunSettings()))
     from calmotion.host import open_host
     from calmotion.shot.run import Source
 
-    run = open_host([]).run(
-        [Source(path=name, command="optimize")], [Character, Animation, ModelChoices, ReducedBodies]
-    )
+    run = open_host([]).run([Source(path=name, command="optimize")], [CompiledShot])
     for result in run:
         if result.error is not None:
             raise result.error
-    choices, animation_found, reduced = run.get(ModelChoices), run.get(Animation), run.get(ReducedBodies)
-    if choices is None or animation_found is None or reduced is None:
+    compiled = run.get(CompiledShot)
+    if compiled is None or not any(body.bends for body in compiled.character.bodies):
         raise ShotError("has nothing flexible to retarget", path=name)
-    return BenchShot(Path(name).stem, choices.character, animation_found, reduced.bodies)
+    return BenchShot(Path(name).stem, compiled)
 
 
 def _made(name: str) -> tuple[Character, Animation, FEMeshes]:

@@ -12,7 +12,8 @@ from calmotion.benchmarks.common.timing import median_time
 from calmotion.benchmarks.optimizer.optimizer import make_problem
 from calmotion.retargeting.problem.problem import RetargetProblem
 from calmotion.shot.character import Array
-from calmotion.simulation.prepare import Options, prepare
+from calmotion.shot.run import RunSettings
+from calmotion.simulation.prepare import prepare
 
 STEPS = (1, 2, 4, 8)  # in a 240th of a second
 FINER = 4
@@ -66,7 +67,7 @@ def errors(shot: BenchShot, steps: tuple[int, ...] = STEPS) -> list[GradientErro
     """Both adjoints of one shot at all steps."""
 
     def problem_at(divided: float) -> RetargetProblem:
-        prepared = prepare(shot.character, shot.animation, shot.bodies, Options(step=COARSEST / divided))
+        prepared = prepare(shot.compiled, RunSettings(step=COARSEST / divided))
         return make_problem(shot, prepared, 0.1)
 
     rng = np.random.default_rng(1)

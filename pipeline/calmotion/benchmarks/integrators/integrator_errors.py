@@ -53,11 +53,11 @@ class Scene:
     """A shot whose bodies are reduced once, to be simulated at any step by any integrator."""
 
     def __init__(self, made: tuple[Character, FEMeshes], animation: Animation):
-        from calmotion.multibody.model.topology import span_tree
-        from calmotion.simulation.bodies import reduce_bodies
+        from calmotion.simulation.body_reduction import BodyReduction
+        from calmotion.simulation.compiled_shot import compile_shot
 
-        self.character, self.animation = made[0], animation
-        self.bodies = reduce_bodies(self.character, span_tree(self.character), made[1])
+        self.animation = animation
+        self.compiled = compile_shot(made[0], animation, BodyReduction(*made, None).bodies(None))
 
     def run(self, step: float, integrator: str, seconds: float | None = None) -> Any:
         """A `ForwardRun`, of the first seconds alone where they are given.
@@ -66,12 +66,13 @@ class Scene:
             SimulationFailure: It did not come to the end.
         """
         from calmotion.multibody.integrators.workspace import Workspace
+        from calmotion.shot.run import RunSettings
         from calmotion.simulation.forward import run_forward
         from calmotion.simulation.inputs.curves import sample_tracks
-        from calmotion.simulation.prepare import Options, prepare
+        from calmotion.simulation.prepare import prepare
 
-        options = Options(step=step, pre_roll=0.0, integrator=integrator)
-        prepared = prepare(self.character, self.animation, self.bodies, options)
+        options = RunSettings(step=step, pre_roll=0.0, integrator=integrator)
+        prepared = prepare(self.compiled, options)
         angles, rates = sample_tracks(self.animation.tracks, prepared.grid)
         last = None if seconds is None else round(seconds / prepared.grid.h) + 1
         workspace = Workspace.for_system(prepared.model.system)
@@ -175,10 +176,11 @@ def damping(counts: Sequence[int] = (10, 20, 40, 80, 160)) -> list[tuple[int, fl
     from calmotion.multibody.analysis.kinematics import rigid_state
     from calmotion.multibody.integrators.simulation import simulate
     from calmotion.multibody.integrators.workspace import Workspace
-    from calmotion.simulation.prepare import Options, prepare
+    from calmotion.shot.run import RunSettings
+    from calmotion.simulation.prepare import prepare
 
     scene = Scene(beam_arm(modes=1, elasticity="linear", damping=0.0, gravity=0.0), shot_of(quintic(0.0, 1.0), 1.0))
-    prepared = prepare(scene.character, scene.animation, scene.bodies, Options(pre_roll=0.0))
+    prepared = prepare(scene.compiled, RunSettings(pre_roll=0.0))
     model, periods, found = prepared.model, 10, []
     from calmotion.multibody.analysis.modes import system_modes
 

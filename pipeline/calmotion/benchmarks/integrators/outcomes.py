@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
@@ -16,8 +16,8 @@ from calmotion.shot import Animation, Body, Character, FEMeshes, Frame, Joint, M
 from calmotion.shot.character import Array
 
 if TYPE_CHECKING:
-    from calmotion.reduction.reduced_body import ReducedBody
-    from calmotion.simulation.prepare import Options
+    from calmotion.shot.run import RunSettings
+    from calmotion.simulation.compiled_shot import CompiledShot
 
 
 Scene = Callable[[], tuple[tuple[Character, FEMeshes], Animation]]
@@ -176,24 +176,19 @@ CASES = _cases()
 
 def run_case(case: Case) -> Outcome:
     """Run one case as `calmotion simulate` would."""
-    from calmotion.multibody.model.topology import span_tree
-    from calmotion.simulation.bodies import reduce_bodies
-    from calmotion.simulation.prepare import Options, load_envelopes
+    from calmotion.shot.run import RunSettings
+    from calmotion.simulation.body_reduction import reduced_shot
 
     (character, meshes), animation = case.scene()
-    options = Options(step=case.step, integrator=case.integrator)
+    options = RunSettings(step=case.step, integrator=case.integrator)
     try:
-        tree = span_tree(character)
-        bodies = reduce_bodies(character, tree, meshes, None, load_envelopes(character, animation, meshes, options))
+        shot = reduced_shot(character, animation, meshes, options)
     except ShotError as error:
         return Outcome(case.group, case.name, REFUSED, str(error))
-    return judged(case.group, case.name, character, animation, bodies, options)
+    return judged(case.group, case.name, shot, options)
 
 
-def judged(
-    group: str, name: str, character: Character, animation: Animation, bodies: Sequence[ReducedBody], options: Options,
-    gap: float | None = None,
-) -> Outcome:  # fmt: skip
+def judged(group: str, name: str, shot: CompiledShot, options: RunSettings, gap: float | None = None) -> Outcome:
     """Simulate a shot and return the outcome.
 
     Args:
@@ -204,14 +199,14 @@ def judged(
 
     allowed = GAP if gap is None else gap
     try:
-        result = simulate_shot(character, animation, bodies, options, lambda fraction, message: None)
+        result = simulate_shot(shot, options, lambda fraction, message: None)
     except ShotError as error:
         return Outcome(group, name, REFUSED, str(error))
     except Exception as error:  # whatever it is, it is what this looks for
         return Outcome(group, name, FAILED, f"{type(error).__name__}: {error}")
     motion, simulation = result.before.motion, result.before
     parts = (motion.positions, motion.rotations, motion.target_positions, motion.motor_efforts, *motion.elastic)
-    reach = sum(float(np.linalg.norm(joint.frame0.position)) for joint in character.joints if joint.body0 >= 0)
+    reach = sum(float(np.linalg.norm(joint.frame0.position)) for joint in shot.character.joints if joint.body0 >= 0)
     wrong = ""
     if not all(np.all(np.isfinite(part)) for part in parts):
         wrong = "not a number"
@@ -219,7 +214,7 @@ def judged(
         wrong = "the target flew away"
     elif simulation.max_joint_gap > allowed:
         wrong = f"a joint came apart by {simulation.max_joint_gap:.1e} m"
-    elif not any(len(body.stiffness) for body in bodies) and simulation.position_errors.max() > allowed:
+    elif not any(len(body.stiffness) for body in shot.bodies) and simulation.position_errors.max() > allowed:
         wrong = "a rigid character does not do what it should"
     elif np.abs(np.linalg.norm(motion.rotations, axis=2) - 1.0).max() > NORM:
         wrong = "a quaternion lost its length"

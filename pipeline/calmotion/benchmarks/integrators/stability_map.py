@@ -107,22 +107,25 @@ def within(seconds: float) -> Iterator[None]:
 
 def cells_of(name: str, rows: Rows, steps: Mapping[str, Sequence[float]] | None = None) -> list[Cell]:
     """The cells of one map; a row's bodies are reduced once."""
-    from calmotion.multibody.model.topology import span_tree
-    from calmotion.simulation.bodies import reduce_bodies
-    from calmotion.simulation.prepare import Options
+    from calmotion.shot.run import RunSettings
+    from calmotion.simulation.body_reduction import BodyReduction
+    from calmotion.simulation.compiled_shot import compile_shot
 
     found = []
     for value in rows[1]:
         (character, meshes), animation = rows[2](value)
-        bodies = reduce_bodies(character, span_tree(character), meshes)
+        whole = compile_shot(character, animation, BodyReduction(character, meshes, None).bodies(None))
         for integrator, own in (STEPS if steps is None else steps).items():
             for step in own:
                 begin, brief = time.perf_counter(), step < 0.999 * BRIEFLY
-                shot = replace(animation, frame_times=np.array([0.0, BEGINNING * step])) if brief else animation
-                options = Options(step=step, integrator=integrator, pre_roll=0.0 if brief else None)
+                shot = whole
+                if brief:
+                    beginning = replace(animation, frame_times=np.array([0.0, BEGINNING * step]))
+                    shot = replace(whole, animation=beginning)
+                options = RunSettings(step=step, integrator=integrator, pre_roll=0.0 if brief else None)
                 try:
                     with within(PATIENCE):
-                        item = judged(rows[0], f"{value:g}", character, shot, bodies, options, CLOSED)
+                        item = judged(rows[0], f"{value:g}", shot, options, CLOSED)
                     outcome, why, error = item.outcome, item.why, item.error_m
                 except _Patience as late:
                     outcome, why, error = FAILED, str(late), float("nan")

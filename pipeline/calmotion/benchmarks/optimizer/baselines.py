@@ -20,10 +20,10 @@ from calmotion.retargeting.problem.problem import RetargetProblem
 from calmotion.retargeting.solver.damping_homotopy import damping_homotopy
 from calmotion.retargeting.solver.gauss_newton import minimize
 from calmotion.shot.character import Array
-from calmotion.shot.run import SHAPERS
+from calmotion.shot.run import SHAPERS, RunSettings
 from calmotion.simulation.inputs.curves import Curves
 from calmotion.simulation.inputs.shapers import delay, shaped
-from calmotion.simulation.prepare import Options, modes_of, prepare
+from calmotion.simulation.prepare import modes_of, prepare
 from calmotion.simulation.simulator import Simulator
 
 LONGEST_DELAY = 0.6  # that is tried [s]
@@ -53,9 +53,9 @@ class Row:
 
 def compare(shot: BenchShot) -> list[Row]:
     """All methods on one shot."""
-    prepared = prepare(shot.character, shot.animation, shot.bodies, Options())
+    prepared = prepare(shot.compiled, RunSettings())
     problem = make_problem(shot, prepared, 0.05)
-    frequencies, damping = modes_of(prepared, shot.animation)
+    frequencies, damping = modes_of(prepared)
     simulator = Simulator(prepared.model, prepared.grid.h, prepared.world, prepared.grid.cyclic)
     rows = []
     for kind in ("as animated", *SHAPERS):

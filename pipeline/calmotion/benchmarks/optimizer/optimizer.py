@@ -26,9 +26,10 @@ from calmotion.retargeting.problem.problem import RetargetProblem
 from calmotion.retargeting.solver.damping_homotopy import damping_homotopy
 from calmotion.retargeting.solver.gauss_newton import Search, minimize
 from calmotion.shot.character import Array
+from calmotion.shot.run import RunSettings
 from calmotion.simulation.inputs.curves import sample_curves
 from calmotion.simulation.intended_motion import rigid_motion
-from calmotion.simulation.prepare import Options, Prepared, lowest_frequency, prepare
+from calmotion.simulation.prepare import Prepared, lowest_frequency, prepare
 from calmotion.simulation.target_errors import Objective
 
 CLOSE = 1.01  # objectives within this factor of the converged one count as reached
@@ -96,7 +97,7 @@ def _reference(shot: BenchShot, prepared: Prepared, zero: Array) -> Search:
     """A solution that is converged further than those that are compared."""
     problem, free = make_problem(shot, prepared, 0.05), np.zeros(len(zero), bool)
     problem.value(zero)
-    start = damping_homotopy(problem, zero, free, lowest_frequency(prepared, shot.animation))
+    start = damping_homotopy(problem, zero, free, lowest_frequency(prepared))
     return minimize(problem, start, free, GAIN, 60, 200)
 
 
@@ -106,7 +107,7 @@ def compare(shot: BenchShot, lbfgs: int) -> list[Convergence]:
     Args:
         lbfgs: Most evaluations of L-BFGS.
     """
-    prepared = prepare(shot.character, shot.animation, shot.bodies, Options())
+    prepared = prepare(shot.compiled, RunSettings())
     problem = make_problem(shot, prepared, 0.05)
     zero, free = np.zeros(problem.size), np.zeros(problem.size, bool)
     forward = median_time(lambda: problem.value(zero))
@@ -133,7 +134,7 @@ def compare(shot: BenchShot, lbfgs: int) -> list[Convergence]:
         trace.append((time.perf_counter() - begin, fresh.merit()))
 
     fresh.value(zero)
-    start = damping_homotopy(fresh, zero, free, lowest_frequency(prepared, shot.animation))
+    start = damping_homotopy(fresh, zero, free, lowest_frequency(prepared))
     found = minimize(fresh, start, free, 5e-6, on_iterate=on_iterate)
     rows = [row("Gauss-Newton", trace, found.x, found.evaluations, found.products)]
 
@@ -172,7 +173,7 @@ def compare(shot: BenchShot, lbfgs: int) -> list[Convergence]:
 
 def costs(shot: BenchShot) -> list[Cost]:
     """Gradient and product for 10 to 2000 unknowns: knots closer and closer, on the same simulation."""
-    prepared = prepare(shot.character, shot.animation, shot.bodies, Options())
+    prepared = prepare(shot.compiled, RunSettings())
     end, motors = float(prepared.grid.frame_times[-1]), len(shot.character.motors)
     rows: list[Cost] = []
     # every instant may carry a knot here, so that there can be more unknowns than frames times motors

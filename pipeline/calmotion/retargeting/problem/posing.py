@@ -12,11 +12,12 @@ from calmotion.retargeting.problem.offset_space import OffsetSpace
 from calmotion.retargeting.problem.problem import RetargetProblem
 from calmotion.shot import Animation
 from calmotion.shot.character import Array, BoolArray, IntArray
+from calmotion.shot.run import RunSettings
 from calmotion.simulation.inputs.curves import Curves, sample_tracks
 from calmotion.simulation.inputs.gearing import coupling_of, leaders
 from calmotion.simulation.intended_motion import IntendedMotion
 from calmotion.simulation.motor_limits import motor_bounds
-from calmotion.simulation.prepare import Options, Prepared
+from calmotion.simulation.prepare import Prepared
 from calmotion.simulation.target_errors import Objective
 
 SMOOTHNESS = 1e-10
@@ -24,13 +25,12 @@ CLOSENESS = 1e-4  # an offset of 0.1 rad has the weight of an error of 1 mm [m^2
 
 
 def pose(
-    prepared: Prepared, animation: Animation, curves: Curves, intended: IntendedMotion, options: Options
+    prepared: Prepared, curves: Curves, intended: IntendedMotion, options: RunSettings
 ) -> tuple[RetargetProblem, Array, bool]:
     """The retargeting problem of a shot, the start of its search, shape [n], and whether its knots are adaptive.
 
     Args:
-        prepared: The shot's model and time grid.
-        animation: Its curves, weights and locked intervals.
+        prepared: The shot on its time grid.
         curves: The animator's curves on the grid.
         intended: The intended motion of the targets.
         options: Of the run.
@@ -39,9 +39,10 @@ def pose(
         ShotError: No motor may change, or options contradict each other.
     """
     character, grid, settings = prepared.character, prepared.grid, prepared.character.retarget
+    animation = prepared.shot.animation
     motors = leaders(character)
     coupling = coupling_of(character, motors)
-    kept_ends, offsets = settings.endpoints == "kept", existing_offsets(prepared, animation, motors)
+    kept_ends, offsets = settings.endpoints == "kept", existing_offsets(prepared, motors)
     spacing = options.knot_spacing or settings.knot_spacing
     if spacing:
         breaks = uniform_breaks(grid, spacing)
@@ -84,8 +85,9 @@ def pose(
     return problem, np.where(fixed, 0.0, start), not spacing
 
 
-def existing_offsets(prepared: Prepared, animation: Animation, motors: IntArray) -> Array:
+def existing_offsets(prepared: Prepared, motors: IntArray) -> Array:
     """The offsets that the shot already contains, shape [T, m]; zero when it contains none."""
+    animation = prepared.shot.animation
     if animation.current is animation.tracks:
         return np.zeros((len(prepared.grid.times), len(motors)))
     intended, _ = sample_tracks([animation.tracks[k] for k in motors], prepared.grid)

@@ -10,7 +10,7 @@ from calmotion.retargeting.problem.problem import RetargetProblem
 from calmotion.retargeting.simplification.idle_motors import idle_motors
 from calmotion.retargeting.simplification.inactive_intervals import InactiveInterval, interval_rows
 from calmotion.shot import Character, MotorCurve, Simplification
-from calmotion.simulation.settings import Options
+from calmotion.shot.run import RunSettings
 
 FINER = 0.01  # share of the tolerance that finer knots must gain
 PRUNED = 0.02  # share of the tolerance that the removed offsets may cost together
@@ -18,7 +18,7 @@ PRUNED = 0.02  # share of the tolerance that the removed offsets may cost togeth
 
 def search_rows(
     problem: RetargetProblem, character: Character, curves: Sequence[MotorCurve], inactive: Sequence[InactiveInterval],
-    options: Options, idle_gain_m: float | None,
+    options: RunSettings, idle_gain_m: float | None,
 ) -> list[Simplification]:  # fmt: skip
     """The rows of a search that ended.
 
@@ -50,7 +50,7 @@ def search_rows(
     return rows
 
 
-def _knots_row(problem: RetargetProblem, character: Character, options: Options) -> Simplification:
+def _knots_row(problem: RetargetProblem, character: Character, options: RunSettings) -> Simplification:
     """The closest distance of knots, and its reason."""
     closest = float(np.diff(problem.space.basis.knots).min())
     what = f"knots at least {1e3 * closest:.3g} ms apart"

@@ -1,0 +1,98 @@
+"""The reduction of a shot's bodies under the loads of the shot."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from calmotion.multibody.failure import SimulationFailure
+from calmotion.multibody.model.topology import span_tree
+from calmotion.reduction.load_envelope import LoadEnvelope
+from calmotion.reduction.reduced_body import ReducedBody
+from calmotion.shot import Animation, Character, FEMeshes
+from calmotion.shot.character import with_settings
+from calmotion.shot.run import RunSettings
+from calmotion.simulation.bodies import reduce_bodies
+from calmotion.simulation.compiled_shot import CompiledShot, compile_shot
+from calmotion.simulation.prepare import grid_of
+from calmotion.simulation.rigid_run import shot_load_envelopes
+
+if TYPE_CHECKING:
+    from calmotion.reduction.reduce import FullBody
+
+
+class BodyReduction:
+    """The reduction of a shot's bodies, which is repeated to other tolerances from what it has.
+
+    Args:
+        character: The character.
+        meshes: Of its flexible bodies.
+        loads: Loads on each body in the shot; None where they are not known.
+        repeats: Whether to keep the full models for further reductions, until `release`.
+    """
+
+    def __init__(
+        self, character: Character, meshes: FEMeshes | None, loads: Sequence[LoadEnvelope] | None, repeats: bool = False
+    ):
+        self.character, self.meshes, self.loads = character, meshes, loads
+        self._tree = span_tree(character)
+        self._full: dict[int, FullBody] | None = {} if repeats else None
+
+    def bodies(
+        self, tolerance: float | None, pairs_share: float = 1.0, progress: Callable[[float, str], None] | None = None
+    ) -> list[ReducedBody]:
+        """Every body of the character, reduced.
+
+        Args:
+            tolerance: Acceptable error [m]; None: the shot's own, or 1 mm.
+            pairs_share: Factor of the error that pairs of coordinates outside the quadratic-strain subspace may cause.
+            progress: Called with a fraction and the body at hand.
+
+        Raises:
+            ShotError: A flexible body without a mesh, or one that cannot be reduced.
+        """
+        character = with_settings(self.character, lambda own: replace(own, pairs_share=pairs_share * own.pairs_share))
+        return reduce_bodies(character, self._tree, self.meshes, progress, self.loads, tolerance, self._full)
+
+    def release(self) -> None:
+        """Free the full models."""
+        self._full = None
+
+
+def load_envelopes(
+    character: Character, animation: Animation, meshes: FEMeshes | None, options: RunSettings
+) -> tuple[LoadEnvelope, ...] | None:
+    """Loads on each body in a shot; None where nothing bends, or a rigid robot cannot follow it.
+
+    Args:
+        character, animation: The shot.
+        meshes: Of its flexible bodies.
+        options: Of the run.
+    """
+    if len(animation.frame_times) < 2 or not any(body.bends for body in character.bodies):
+        return None
+    try:
+        grid, tree = grid_of(character, animation, options), span_tree(character)
+        return shot_load_envelopes(character, animation, grid, tree, meshes)
+    except SimulationFailure:
+        return None  # the flexible robot will say so, with the place
+
+
+def reduction_for(
+    character: Character, animation: Animation, meshes: FEMeshes | None, options: RunSettings, repeats: bool = False
+) -> BodyReduction:
+    """The reduction of a shot's bodies under its loads; arguments as of `load_envelopes` and `BodyReduction`."""
+    return BodyReduction(character, meshes, load_envelopes(character, animation, meshes, options), repeats)
+
+
+def reduced_shot(
+    character: Character, animation: Animation, meshes: FEMeshes | None, options: RunSettings
+) -> CompiledShot:
+    """A shot compiled with its bodies reduced to the tolerance of the options; arguments as of `load_envelopes`.
+
+    Raises:
+        ShotError: A flexible body without a mesh, or one that cannot be reduced.
+    """
+    bodies = reduction_for(character, animation, meshes, options).bodies(options.tolerance)
+    return compile_shot(character, animation, bodies)
