@@ -23,7 +23,7 @@ def problem(repository):
     character = prepared.character
     curves = sample_curves(prepared.shot.animation.tracks, prepared.grid)
     rigid = rigid_motion(prepared.model, curves.angles, curves.rates, prepared.grid.h)
-    objective = Objective.over(prepared.model, rigid.reference, prepared.grid)
+    objective = Objective.over(prepared.model, rigid, prepared.grid)
     basis = make_basis(prepared.grid, 0.2, False)
     motors = np.arange(len(character.motors), dtype=np.int32)
     space = OffsetSpace.uncoupled(basis, motors, len(motors), 1e-8, 1e-4)

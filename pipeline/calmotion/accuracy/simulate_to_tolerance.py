@@ -183,7 +183,7 @@ def intended_positions(shot: CompiledShot, options: RunSettings) -> Array:
     """Intended positions of the targets at the frames [m], shape [f, K, 3]."""
     prepared = prepare(shot, replace(options, step=FIRST))
     intended = intended_motion(prepared, *sample_tracks(shot.animation.tracks, prepared.grid))
-    return intended.reference.positions[prepared.grid.frames]
+    return intended.target_positions[prepared.grid.frames]
 
 
 def found_tracks(result: Result, animation: Animation) -> tuple[Track, ...]:

@@ -35,11 +35,11 @@ def problem_key(problem: RetargetProblem, fixed: BoolArray, settings: object) ->
     """Hash of all inputs of a search and of the sources of the engine."""
     digest = hashlib.sha256(f"{source_digest(*_ROOMS)} {settings!r}".encode())
     space, curves, objective = problem.space, problem.curves, problem.objective
-    reference = objective.reference
+    intended = objective.intended
     arrays: list[Any] = [np.asarray(part) for part in problem.model.system]
     arrays += [curves.angles, curves.rates, curves.accelerations]
     arrays += [space.basis.values.data, space.basis.knots, space.coupling, fixed, space.smoothness, space.closeness]
-    arrays += [objective.weights, reference.positions, reference.rotations]
+    arrays += [objective.weights, intended.target_positions, intended.target_rotations]
     if problem.world is not None:
         arrays.append(problem.world)
     if problem.limits is not None:

@@ -26,12 +26,12 @@ from calmotion.simulation.bodies import mode_tables, skins
 from calmotion.simulation.compiled_shot import CompiledShot
 from calmotion.simulation.forward import limited_values
 from calmotion.simulation.inputs.curves import sample_curves
-from calmotion.simulation.intended_motion import IntendedMotion
 from calmotion.simulation.motor_limits import Excess, excesses, motor_bounds
 from calmotion.simulation.prepare import Prepared, failure_error, lowest_frequency, prepare, refuse_half_turns
 from calmotion.simulation.report import left_out_rows, limit_uses, performed_motion, reference_motion, simulation_of
 from calmotion.simulation.simulate import Progress, intended_motion
 from calmotion.simulation.simulator import compile_kernels
+from calmotion.simulation.target_errors import IntendedMotion
 
 FIRST_PENALTY = 1e3  # of limits, over the objective of the input for each second
 
@@ -136,8 +136,8 @@ def _optimized(
     rows += search_rows(problem, character, curves, searched.inactive, options, searched.idle_gain)
     return Result(
         reference=reference_motion(prepared.model, problem.grid, intended, problem.curves.angles),
-        before=simulation_of(prepared, before, intended.reference),
-        after=simulation_of(prepared, run, intended.reference),
+        before=simulation_of(prepared, before, intended),
+        after=simulation_of(prepared, run, intended),
         skins=skins(prepared.bodies),
         modes=mode_tables(prepared.bodies),
         curves=curves,

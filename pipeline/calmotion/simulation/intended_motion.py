@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from calmotion.multibody.analysis.kinematics import rigid_poses, target_frames
@@ -13,22 +11,7 @@ from calmotion.multibody.model.system import State, allocate_state
 from calmotion.multibody.statics.equilibrium import equilibrium
 from calmotion.shot.character import Array, BoolArray
 from calmotion.simulation.simulator import Simulator
-from calmotion.simulation.target_errors import Reference
-
-
-@dataclass(frozen=True, eq=False)
-class IntendedMotion:
-    """The intended motion: body poses (by component) and targets, shapes [T, B, ...], [T, K, ...]."""
-
-    c: Array
-    q: Array
-    target_positions: Array
-    target_rotations: Array
-
-    @property
-    def reference(self) -> Reference:
-        """The targets alone."""
-        return Reference(self.target_positions, self.target_rotations)
+from calmotion.simulation.target_errors import IntendedMotion
 
 
 def rigid_motion(

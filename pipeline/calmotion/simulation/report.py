@@ -15,10 +15,10 @@ from calmotion.shot.character import Array
 from calmotion.simulation.forward import ForwardRun
 from calmotion.simulation.inputs.curves import Curves
 from calmotion.simulation.inputs.time_grid import TimeGrid
-from calmotion.simulation.intended_motion import IntendedMotion, rigid_motion
+from calmotion.simulation.intended_motion import rigid_motion
 from calmotion.simulation.motor_limits import Excess
 from calmotion.simulation.prepare import Prepared
-from calmotion.simulation.target_errors import Reference, rotation_errors
+from calmotion.simulation.target_errors import IntendedMotion, rotation_errors
 from calmotion.support.naming import distinct_names
 
 
@@ -85,11 +85,11 @@ def performed_motion(prepared: Prepared, curves: Curves) -> Motion | None:
     return reference_motion(model, grid, rigid, curves.angles)
 
 
-def simulation_of(prepared: Prepared, run: ForwardRun, reference: Reference) -> Simulation:
+def simulation_of(prepared: Prepared, run: ForwardRun, intended: IntendedMotion) -> Simulation:
     """A forward run as a value for the user, measured against the reference."""
     model, grid, character = prepared.model, prepared.grid, prepared.character
-    turned, _ = rotation_errors(reference.rotations, run.target_rotations)
-    off = run.target_positions - reference.positions
+    turned, _ = rotation_errors(intended.target_rotations, run.target_rotations)
+    off = run.target_positions - intended.target_positions
     errors, shown = np.linalg.norm(off, axis=2), _shown(grid)
     return Simulation(
         motion=_simulated_motion(model, grid, run, len(character.motors), len(character.joints)),

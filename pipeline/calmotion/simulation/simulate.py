@@ -19,11 +19,11 @@ from calmotion.simulation.cyclic import SteadyState
 from calmotion.simulation.forward import limited_values, run_forward
 from calmotion.simulation.inputs.curves import sample_curves, sample_tracks
 from calmotion.simulation.inputs.shapers import shaped
-from calmotion.simulation.intended_motion import IntendedMotion, rigid_motion, static_motion
+from calmotion.simulation.intended_motion import rigid_motion, static_motion
 from calmotion.simulation.motor_limits import excesses, motor_bounds
 from calmotion.simulation.prepare import Prepared, failure_error, modes_of, prepare, refuse_half_turns
 from calmotion.simulation.report import left_out_rows, limit_uses, performed_motion, reference_motion, simulation_of
-from calmotion.simulation.target_errors import Objective
+from calmotion.simulation.target_errors import IntendedMotion, Objective
 
 Progress = Callable[[float, str], None]
 CLOSED = 0.1  # of the error that does not matter: joints that come apart by less are closed
@@ -80,7 +80,7 @@ def simulate_shot(shot: CompiledShot, options: RunSettings, progress: Progress) 
     except SimulationFailure as failure:
         raise failure_error(prepared, failure) from failure
     _refuse_open_joints(prepared, run.trajectory.max_joint_gap, options)
-    objective = Objective.over(model, reference.reference, grid, animation.weights)
+    objective = Objective.over(model, reference, grid, animation.weights)
     bounds = motor_bounds(character)
     used = excesses(bounds, limited_values(model, bounds, curves, run), grid.judged)
     residuals, _ = objective.residuals(run.target_positions, run.target_rotations)
@@ -88,7 +88,7 @@ def simulate_shot(shot: CompiledShot, options: RunSettings, progress: Progress) 
     as_intended = animation.current is animation.tracks and character.retarget.reference == "rigid"
     return Result(
         reference=intent,
-        before=simulation_of(prepared, run, reference.reference),
+        before=simulation_of(prepared, run, reference),
         after=None,
         skins=skins(prepared.bodies),
         modes=mode_tables(prepared.bodies),

@@ -42,11 +42,18 @@ def rotation_errors(reference: Array, actual: Array) -> tuple[Array, Array]:
 
 
 @dataclass(frozen=True, eq=False)
-class Reference:
-    """The intended motion of the targets: positions [m], shape [T, K, 3], and quaternions, shape [T, K, 4], world."""
+class IntendedMotion:
+    """The intended motion of T steps: body poses by component, and targets, world axes.
 
-    positions: Array
-    rotations: Array
+    Attributes:
+        c, q: Origins [m] and quaternions of the components, shapes [T, B, 3] and [T, B, 4].
+        target_positions, target_rotations: [m] and quaternions, shapes [T, K, 3] and [T, K, 4].
+    """
+
+    c: Array
+    q: Array
+    target_positions: Array
+    target_rotations: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,17 +62,17 @@ class Objective:
 
     Attributes:
         model: The model that has the targets.
-        reference: Their intended motion.
+        intended: Their intended motion.
         weights: Square roots of weight times step, shape [T, K, 6]; zero where nothing is judged.
     """
 
     model: Model
-    reference: Reference
+    intended: IntendedMotion
     weights: Array
 
     @classmethod
     def over(
-        cls, model: Model, reference: Reference, grid: TimeGrid, changing: Sequence[WeightTrack] = ()
+        cls, model: Model, intended: IntendedMotion, grid: TimeGrid, changing: Sequence[WeightTrack] = ()
     ) -> Objective:
         """The objective with the model's weights, judged from time 0 on (the pre-roll is not).
 
@@ -77,12 +84,12 @@ class Objective:
         weights[:] = np.stack([t.position_weight, t.rotation_weight], axis=1)
         for track in changing:
             weights[:, track.target, int(track.rotation)] = np.interp(times, track.times, track.values)
-        return cls(model, reference, np.sqrt(grid.quadrature[:, None, None] * np.repeat(weights, 3, axis=2)))
+        return cls(model, intended, np.sqrt(grid.quadrature[:, None, None] * np.repeat(weights, 3, axis=2)))
 
     def residuals(self, positions: Array, rotations: Array) -> tuple[Array, Array]:
         """Weighted residuals, shape [T, K, 6], and the inverse right Jacobians of the rotation errors."""
-        turned, inverse = rotation_errors(self.reference.rotations, rotations)
-        errors = np.concatenate([positions - self.reference.positions, turned], axis=2)
+        turned, inverse = rotation_errors(self.intended.target_rotations, rotations)
+        errors = np.concatenate([positions - self.intended.target_positions, turned], axis=2)
         return self.weights * errors, inverse
 
     def jacobian(self, c: Array, q: Array, u: Array, inverse: Array) -> Array:

@@ -30,7 +30,7 @@ def make_problem(character, bodies, animation, pre_roll=0.0, kept=False, limited
     intended = rigid_motion(model, curves.angles, curves.rates, grid.h)
     if static:
         intended = static_motion(model, intended, curves.angles, grid.judged)
-    objective = Objective.over(model, intended.reference, grid, animation.weights)
+    objective = Objective.over(model, intended, grid, animation.weights)
     basis = make_basis(grid, 0.1, kept)
     limits = LimitTerms(motor_bounds(character), grid.judged, grid.h, 3.0, on=True) if limited else None
     motors = np.arange(len(character.motors), dtype=np.int32)

@@ -76,7 +76,7 @@ def compare(shot: BenchShot) -> list[Row]:
 def _row(
     shot: BenchShot, method: str, late: float, problem: RetargetProblem, curves: Curves, positions: Array
 ) -> Row:  # fmt: skip
-    grid, meant = problem.grid, problem.objective.reference.positions
+    grid, meant = problem.grid, problem.objective.intended.target_positions
     judged = np.flatnonzero(grid.judged)
 
     def errors(shift: int) -> Array:

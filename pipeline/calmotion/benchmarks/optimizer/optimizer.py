@@ -81,7 +81,7 @@ def make_problem(shot: BenchShot, prepared: Prepared, spacing: float) -> Retarge
     model, grid, world = prepared.model, prepared.grid, prepared.world
     curves = sample_curves(shot.animation.tracks, grid)
     meant = rigid_motion(model, curves.angles, curves.rates, grid.h, world, grid.cyclic)
-    objective = Objective.over(model, meant.reference, grid, shot.animation.weights)
+    objective = Objective.over(model, meant, grid, shot.animation.weights)
     basis: OffsetBasis = make_basis(grid, spacing, False)
     motors = np.array([k for k, motor in enumerate(shot.character.motors) if motor.optimize], dtype=np.int32)
     space = OffsetSpace.uncoupled(basis, motors, len(shot.character.motors), SMOOTHNESS, CLOSENESS)
@@ -89,7 +89,7 @@ def make_problem(shot: BenchShot, prepared: Prepared, spacing: float) -> Retarge
 
 
 def _largest(problem: RetargetProblem) -> float:
-    errors = problem.run.target_positions - problem.objective.reference.positions
+    errors = problem.run.target_positions - problem.objective.intended.target_positions
     return 1e3 * float(np.linalg.norm(errors, axis=2)[problem.grid.judged].max())
 
 

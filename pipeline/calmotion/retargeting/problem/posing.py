@@ -15,10 +15,9 @@ from calmotion.shot.character import Array, BoolArray, IntArray
 from calmotion.shot.run import RunSettings
 from calmotion.simulation.inputs.curves import Curves, sample_tracks
 from calmotion.simulation.inputs.gearing import coupling_of, leaders
-from calmotion.simulation.intended_motion import IntendedMotion
 from calmotion.simulation.motor_limits import motor_bounds
 from calmotion.simulation.prepare import Prepared
-from calmotion.simulation.target_errors import Objective
+from calmotion.simulation.target_errors import IntendedMotion, Objective
 
 SMOOTHNESS = 1e-10
 CLOSENESS = 1e-4  # an offset of 0.1 rad has the weight of an error of 1 mm [m^2/rad^2]
@@ -77,7 +76,7 @@ def pose(
         )
     smoothness = next(v for v in (options.smoothness, settings.smoothness, SMOOTHNESS) if v is not None)
     problem = RetargetProblem(
-        prepared.model, grid, curves, Objective.over(prepared.model, intended.reference, grid, animation.weights),
+        prepared.model, grid, curves, Objective.over(prepared.model, intended, grid, animation.weights),
         OffsetSpace(basis, motors, coupling, smoothness, CLOSENESS), prepared.world,
         LimitTerms(bounds, grid.judged, grid.h, 1.0) if bounds else None, continuous,
     )  # fmt: skip
