@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -20,6 +20,7 @@ from calmotion.simulation.forward import ForwardRun, run_forward
 from calmotion.simulation.inputs.curves import sample_tracks
 from calmotion.simulation.inputs.roots import sample_roots
 from calmotion.simulation.inputs.time_grid import TimeGrid
+from calmotion.simulation.intended_motion import rigid_motion
 
 _POWER_LEFT = 1e-3  # of a signal's power may lie above the highest frequency that matters: 3% of its amplitude
 _NOTHING = 1e-9  # of gravity, or of it over a metre: an acceleration that is rounding
@@ -59,6 +60,40 @@ def rigid_run(
     angles, rates = sample_tracks(animation.tracks, grid)
     world = sample_roots(animation.moving, grid)
     return model, run_forward(model, Workspace.for_system(model.system), angles, rates, grid.h, world)
+
+
+@dataclass(frozen=True, eq=False)
+class RigidPoses:
+    """The poses of a rigid robot in a shot.
+
+    Attributes:
+        model: The rigid robot.
+        c, q: Origins [m] and quaternions of its components, shapes [T, B, 3] and [T, B, 4].
+        joint_angles: Of its motors' joints, shape [T, J] [rad] or [m].
+        world: Moving roots, see `roots.sample_roots`.
+        h: Step [s].
+    """
+
+    model: Model
+    c: Array
+    q: Array
+    joint_angles: Array
+    world: Array
+    h: float
+
+
+def rigid_poses(
+    character: Character, animation: Animation, grid: TimeGrid, tree: Tree, bodies: Sequence[ReducedBody]
+) -> RigidPoses:
+    """The poses of a rigid robot: kinematics alone, and a simulation only where joints move freely.
+
+    Args and errors as of `rigid_run`; where motors determine the motion, masses play no part.
+    """
+    model = compile_model(character, tree, bodies, [frame.joint for frame in animation.moving])
+    angles, rates = sample_tracks(animation.tracks, grid)
+    world = sample_roots(animation.moving, grid)
+    motion = rigid_motion(model, angles, rates, grid.h, world)
+    return RigidPoses(model, motion.c, motion.q, model.joint_angles(angles), world, grid.h)
 
 
 def rigid_bodies(character: Character, tree: Tree, meshes: FEMeshes | None) -> list[ReducedBody]:

@@ -11,34 +11,33 @@ from calmotion.multibody.analysis.kinematics import rigid_poses, target_frames
 from calmotion.multibody.model.topology import span_tree
 from calmotion.shot import Follows
 from calmotion.shot.run import RunSettings
+from calmotion.simulation import rigid_run
 from calmotion.simulation.inputs.gearing import leaders
 from calmotion.simulation.prepare import grid_of
-from calmotion.simulation.rigid_run import rigid_bodies, rigid_run
+from calmotion.simulation.rigid_run import rigid_bodies
 
 
 def _rigid(shot):
     tree = span_tree(shot.character)
     grid = grid_of(shot.character, shot.animation, RunSettings(step=1 / 60))
-    return rigid_run(
-        shot.character, shot.animation, grid, tree, rigid_bodies(shot.character, tree, shot.meshes)
-    )  # fmt: skip
+    bodies = rigid_bodies(shot.character, tree, shot.meshes)
+    return rigid_run.rigid_poses(shot.character, shot.animation, grid, tree, bodies)
 
 
 def _of(shot):
-    model, run = _rigid(shot)
-    return influence(shot.character, model, run, leaders(shot.character))
+    return influence(shot.character, _rigid(shot), leaders(shot.character))
 
 
 def test_against_differences_of_poses():
     shot = arm_with_head()
-    model, run = _rigid(shot)
-    found = influence(shot.character, model, run, leaders(shot.character))
+    rigid = _rigid(shot)
+    model, found = rigid.model, influence(shot.character, rigid, leaders(shot.character))
     largest, d = np.zeros(4), 1e-6
-    for n in range(0, len(run.joint_angles), 3):
+    for n in range(0, len(rigid.joint_angles), 3):
         for k in range(4):
             places = []
             for sign in (1.0, -1.0):
-                values = model.motor_values(run.joint_angles[n : n + 1])
+                values = model.motor_values(rigid.joint_angles[n : n + 1])
                 values[0, k] += sign * d
                 poses = rigid_poses(model, model.joint_angles(values))
                 places.append(target_frames(model, *poses, np.zeros((1, len(model.tree.body), 0)))[0])

@@ -10,16 +10,14 @@ from calmotion.multibody.model.topology import span_tree
 from calmotion.shot import Motor
 from calmotion.shot.run import RunSettings
 from calmotion.simulation.prepare import grid_of
-from calmotion.simulation.rigid_run import rigid_bodies, rigid_run
+from calmotion.simulation.rigid_run import rigid_bodies, rigid_poses
 
 
 def _of(shot):
     tree = span_tree(shot.character)
     grid = grid_of(shot.character, shot.animation, RunSettings(step=1 / 60))
-    model, run = rigid_run(
-        shot.character, shot.animation, grid, tree, rigid_bodies(shot.character, tree, shot.meshes)
-    )  # fmt: skip
-    return closures_of(model, run), tree
+    bodies = rigid_bodies(shot.character, tree, shot.meshes)
+    return closures_of(rigid_poses(shot.character, shot.animation, grid, tree, bodies)), tree
 
 
 def test_trees_have_no_closed_chains():

@@ -1,4 +1,4 @@
-"""What a shot needs of its bodies, loops and motors, from their geometry and one simulation of the rigid robot."""
+"""What a shot needs of its bodies, closed chains and motors, from the poses of the rigid robot."""
 
 from __future__ import annotations
 
@@ -10,17 +10,16 @@ import numpy as np
 from calmotion.accuracy.simplification.influence import NOTHING, influence
 from calmotion.accuracy.simplification.redundant_constraints import closures_of
 from calmotion.geometry.solid import solid_of
-from calmotion.multibody.model.model import Model, body_anchors, rigid_body
+from calmotion.multibody.model.model import body_anchors, rigid_body
 from calmotion.multibody.model.topology import Tree, chain_members
 from calmotion.shot import Animation, Body, Character, MassProperties, ModelChoice
 from calmotion.shot.model_choice import AUTO, OFF, ON
 from calmotion.shot.run import RunSettings
-from calmotion.simulation.forward import ForwardRun
 from calmotion.simulation.inputs.gearing import leaders
 from calmotion.simulation.prepare import grid_of
-from calmotion.simulation.rigid_run import rigid_run
+from calmotion.simulation.rigid_run import RigidPoses, rigid_poses
 
-STEP = 1.0 / 100.0  # of the rigid robot's simulation [s]: loads are those of the animation, and safe bounds follow
+STEP = 1.0 / 100.0  # between the poses of the rigid robot [s]
 
 
 def decide(
@@ -48,11 +47,11 @@ def decide(
         return character, rows
     rigid = [rigid_body(body, own) for body, own in zip(rough.bodies, body_anchors(rough, tree), strict=True)]
     grid = grid_of(character, animation, replace(options, step=STEP))
-    model, run = rigid_run(character, animation, grid, tree, rigid)
+    poses = rigid_poses(character, animation, grid, tree, rigid)
     if changes:
-        character, more = _motors(character, model, run, choice("motors"))
+        character, more = _motors(character, poses, choice("motors"))
         rows += more
-    character, more = _loops(character, tree, model, run, choice("loops"))
+    character, more = _loops(character, tree, poses, choice("loops"))
     return character, rows + more
 
 
@@ -93,10 +92,10 @@ def _bodies(
     return replace(character, bodies=tuple(bodies)), rows
 
 
-def _motors(character: Character, model: Model, run: ForwardRun, choice: str) -> tuple[Character, list[ModelChoice]]:
+def _motors(character: Character, rigid: RigidPoses, choice: str) -> tuple[Character, list[ModelChoice]]:
     """Motors that move no target."""
     own = leaders(character)
-    reach = influence(character, model, run, own) if len(own) else np.zeros(0)
+    reach = influence(character, rigid, own) if len(own) else np.zeros(0)
     if choice == ON or not np.any(reach > NOTHING):
         return character, []
     motors, rows = list(character.motors), []
@@ -111,18 +110,16 @@ def _motors(character: Character, model: Model, run: ForwardRun, choice: str) ->
     return replace(character, motors=tuple(motors)), rows
 
 
-def _loops(
-    character: Character, tree: Tree, model: Model, run: ForwardRun, choice: str
-) -> tuple[Character, list[ModelChoice]]:
+def _loops(character: Character, tree: Tree, rigid: RigidPoses, choice: str) -> tuple[Character, list[ModelChoice]]:
     """Closed loops, and joints that could be left out of them."""
-    found = closures_of(model, run)
+    found = closures_of(rigid)
     if not found.joints:
         return character, []
     joints, rows = list(character.joints), []
     order = [*tree.joint, *tree.closing]
     for k in found.joints:
         item = joints[order[k]]
-        members = chain_members(tree.parent, model.system.side[k])
+        members = chain_members(tree.parent, rigid.model.system.side[k])
         bends = any(character.bodies[tree.body[b]].bends for b in members)
         if k in found.redundant and choice != ON and (choice == OFF or not bends):
             joints[order[k]] = replace(item, redundant=True)

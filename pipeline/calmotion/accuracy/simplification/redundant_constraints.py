@@ -8,11 +8,10 @@ import numpy as np
 
 from calmotion.multibody.integrators.workspace import Workspace
 from calmotion.multibody.kernels.sliders import has_row
-from calmotion.multibody.model.model import Model
 from calmotion.multibody.model.system import allocate_state
 from calmotion.multibody.statics.equilibrium import linearize
 from calmotion.shot.character import Array
-from calmotion.simulation.forward import ForwardRun
+from calmotion.simulation.rigid_run import RigidPoses
 
 INSTANTS = 5  # at which the robot is looked at
 RANK = 1e-8  # of the largest singular value, below which one is zero
@@ -33,25 +32,24 @@ class Closures:
     redundant: tuple[int, ...] = ()
 
 
-def closures_of(rigid: Model, run: ForwardRun) -> Closures:
+def closures_of(rigid: RigidPoses) -> Closures:
     """The closed loops of a robot in a motion.
 
     Args:
-        rigid: The rigid robot; motors count as rows.
-        run: Its motion.
+        rigid: The rigid robot in the shot; motors count as rows.
     """
-    system, total = rigid.system, len(run.joint_angles)
+    system, total = rigid.model.system, len(rigid.joint_angles)
     count = len(system.parent)
     loops = range(count, len(system.rows))
     if not loops:
         return Closures()
     at = np.unique(np.linspace(0, total - 1, min(INSTANTS, total)).astype(int))
-    rows = [_rows(rigid, run, n) for n in at]
+    rows = [_rows(rigid, n) for n in at]
     ranks = [_rank(by_joint) for by_joint in rows]  # that leaving out what is redundant does not change
     spare = min(sum(map(len, by_joint)) - rank for by_joint, rank in zip(rows, ranks, strict=True))
     redundant: list[int] = []
     for joint in reversed(loops):
-        if rigid.motor[joint] >= 0:
+        if rigid.model.motor[joint] >= 0:
             continue  # its motor's effort is of interest
         without = {joint, *redundant}
         rest = [[r for j, r in enumerate(by_joint) if j not in without] for by_joint in rows]
@@ -60,12 +58,12 @@ def closures_of(rigid: Model, run: ForwardRun) -> Closures:
     return Closures(tuple(loops), spare, tuple(sorted(redundant)))
 
 
-def _rows(rigid: Model, run: ForwardRun, n: int) -> list[Array]:
+def _rows(rigid: RigidPoses, n: int) -> list[Array]:
     """Constraint rows of every joint at an instant by all coordinates, lengths in units of the robot's size."""
-    system, states = rigid.system, run.trajectory.states
+    system = rigid.model.system
     ws, state = Workspace.for_system(system), allocate_state(system)
-    state.c[:], state.q[:], ws.work.world[:] = states.c[n], states.q[n], run.trajectory.world[n]
-    linearize(system, state, run.joint_angles[n], ws)
+    state.c[:], state.q[:], ws.work.world[:] = rigid.c[n], rigid.q[n], rigid.world[n]
+    linearize(system, state, rigid.joint_angles[n], ws)
     size = max(float(np.abs(system.position).max()), 1e-9)
     found = []
     for joint, (parent, body) in enumerate(system.side):
