@@ -8,7 +8,7 @@ from typing import Any
 from calmotion.accuracy.reduced_bodies import ConvergedReduction, ReducedBodies, compiled_in
 from calmotion.host import NotAsked, Operator, Property, RunContext
 from calmotion.shot import Animation, Character, FEMeshes, ModelChoices
-from calmotion.shot.model_choice import nothing_bends, simplified_character
+from calmotion.shot.model_choice import nothing_bends, run_settings, simplified_character
 from calmotion.shot.outputs import SystemModes
 from calmotion.shot.run import OutputPaths, Source
 from calmotion.simulation.compiled_shot import CompiledShot
@@ -37,7 +37,6 @@ class ReduceFlexibleBodies(Operator):
         return nothing_bends(data)
 
     def execute(self, context: RunContext) -> Sequence[object]:
-        from calmotion.shot.model_choice import run_settings
         from calmotion.simulation.bodies import mode_tables, with_elasticity
         from calmotion.simulation.body_reduction import BodyReduction, reduction_for
 

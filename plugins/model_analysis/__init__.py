@@ -8,7 +8,7 @@ from typing import Any
 from calmotion.accuracy.reduced_bodies import ConvergedReduction, ReducedBodies, compiled_in
 from calmotion.host import NotAsked, Operator, Property, RunContext
 from calmotion.shot import Animation, Character, ModelChoices, Result
-from calmotion.shot.model_choice import AUTO, KINDS, OFF, ON, nothing_bends
+from calmotion.shot.model_choice import AUTO, KINDS, OFF, ON, nothing_bends, run_settings
 from calmotion.shot.outputs import PlannedStep, ShapedTracks, Verification
 from calmotion.shot.run import OutputPaths, Source
 from calmotion.simulation.compiled_shot import CompiledShot
@@ -44,7 +44,6 @@ class AnalyseShot(Operator):
 
     def execute(self, context: RunContext) -> Sequence[object]:
         from calmotion.accuracy.simplification.analysis import analyse
-        from calmotion.shot.model_choice import run_settings
 
         source, paths = context.get(Source), context.get(OutputPaths)
         forced = {kind: getattr(context.properties, kind) for kind in KINDS}
@@ -73,7 +72,6 @@ class RefineReduction(Operator):
 
     def execute(self, context: RunContext) -> Sequence[object]:
         from calmotion.accuracy.converged_reduction import converged_reduction
-        from calmotion.shot.model_choice import run_settings
 
         source, reduction = context.get(Source), context.get(ReducedBodies).reduction
         assert reduction is not None
@@ -109,7 +107,6 @@ class PlanStep(Operator):
 
     def execute(self, context: RunContext) -> Sequence[object]:
         from calmotion.accuracy.simulate_to_tolerance import planned_step
-        from calmotion.shot.model_choice import run_settings
 
         context.progress(0.0, "simulating the shot as animated")
         options = run_settings(context.get(Source), context.get(ModelChoices))
@@ -132,7 +129,6 @@ class VerifyResult(Operator):
 
     def execute(self, context: RunContext) -> Sequence[object]:
         from calmotion.accuracy.verify import verify
-        from calmotion.shot.model_choice import run_settings
 
         shot, shaped, reduced = compiled_in(context.get), context.get(ShapedTracks), context.get(ReducedBodies)
         if shaped is not None:

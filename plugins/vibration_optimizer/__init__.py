@@ -8,7 +8,7 @@ from typing import Any
 from calmotion.accuracy.reduced_bodies import ConvergedReduction, compiled_in
 from calmotion.host import NotAsked, Operator, Property, RunContext
 from calmotion.shot import ModelChoices, Result
-from calmotion.shot.model_choice import with_choices
+from calmotion.shot.model_choice import run_settings, with_choices
 from calmotion.shot.outputs import ShapedTracks
 from calmotion.shot.run import OutputPaths, Source
 from calmotion.simulation.compiled_shot import CompiledShot
@@ -16,8 +16,6 @@ from calmotion.simulation.compiled_shot import CompiledShot
 
 def _options(context: RunContext, **more: Any) -> Any:
     """The user's request, with what the user forced of the model."""
-    from calmotion.shot.model_choice import run_settings
-
     return run_settings(context.get(Source), context.get(ModelChoices), **more)
 
 
