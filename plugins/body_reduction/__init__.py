@@ -55,10 +55,10 @@ class ReduceFlexibleBodies(Operator):
 
 
 class CompileShot(Operator):
-    """Compiles the character and its bodies to one multibody system."""
+    """Makes one multibody system of the character and its bodies, compiled when it is first used."""
 
     idname = "dynamics.compile"
-    label = "Compile the multibody system"
+    label = "Prepare the multibody system"
     requires = (Character, Animation)
     uses = (ReducedBodies, ModelChoices)
     provides = (CompiledShot,)
