@@ -41,7 +41,7 @@ def run_forward(
         angles, rates: Of the motors, shape [T, M] [rad, rad/s].
         h: Step [s].
         world: Moving roots, see `roots.sample_roots`.
-        integrator: One of `integrators.INTEGRATORS`.
+        integrator: One of `calmotion.shot.run.INTEGRATORS`.
         steady: Finds the motions of a shot that loops.
     """
     joint_angles, joint_rates = model.joint_angles(angles), model.joint_angles(rates)

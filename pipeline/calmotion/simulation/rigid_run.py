@@ -56,9 +56,7 @@ def rigid_run(
     Raises:
         SimulationFailure: It cannot follow the tracks.
     """
-    model = compile_model(character, tree, bodies, [frame.joint for frame in animation.moving])
-    angles, rates = sample_tracks(animation.tracks, grid)
-    world = sample_roots(animation.moving, grid)
+    model, angles, rates, world = _compiled(character, animation, grid, tree, bodies)
     return model, run_forward(model, Workspace.for_system(model.system), angles, rates, grid.h, world)
 
 
@@ -89,11 +87,17 @@ def rigid_poses(
 
     Args and errors as of `rigid_run`; where motors determine the motion, masses play no part.
     """
-    model = compile_model(character, tree, bodies, [frame.joint for frame in animation.moving])
-    angles, rates = sample_tracks(animation.tracks, grid)
-    world = sample_roots(animation.moving, grid)
+    model, angles, rates, world = _compiled(character, animation, grid, tree, bodies)
     motion = rigid_motion(model, angles, rates, grid.h, world)
     return RigidPoses(model, motion.c, motion.q, model.joint_angles(angles), world, grid.h)
+
+
+def _compiled(
+    character: Character, animation: Animation, grid: TimeGrid, tree: Tree, bodies: Sequence[ReducedBody]
+) -> tuple[Model, Array, Array, Array]:
+    """The model, the motors' angles and rates on the grid, shape [T, M], and the moving roots."""
+    model = compile_model(character, tree, bodies, [frame.joint for frame in animation.moving])
+    return model, *sample_tracks(animation.tracks, grid), sample_roots(animation.moving, grid)
 
 
 def rigid_bodies(character: Character, tree: Tree, meshes: FEMeshes | None) -> list[ReducedBody]:

@@ -45,7 +45,7 @@ def shape_tracks(shot: CompiledShot, options: RunSettings, kind: str, cutoff: fl
     """The shot's tracks through an input shaper or a filter, sampled at the steps of its simulation.
 
     Args:
-        kind: One of `shapers.SHAPERS`.
+        kind: One of `calmotion.shot.run.SHAPERS`.
         cutoff: Of the low-pass filter, over the lowest frequency.
 
     Raises:

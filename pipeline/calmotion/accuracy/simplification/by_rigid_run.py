@@ -39,11 +39,14 @@ def decide(
     Raises:
         SimulationFailure: The rigid robot cannot follow its tracks.
     """
+    poses_matter = changes or bool(tree.closing)
+    if not poses_matter and choice("bodies") == AUTO:
+        return character, []
     solids = {k: solid_of(body) for k, body in enumerate(character.bodies) if body.flexible is not None}
     known = {k: None if solid is None else solid.mass for k, solid in solids.items()}
     rough = replace(character, bodies=tuple(_with_mass(k, body, known) for k, body in enumerate(character.bodies)))
     character, rows = _bodies(character, known, choice("bodies"))
-    if not (changes or tree.closing):
+    if not poses_matter:
         return character, rows
     rigid = [rigid_body(body, own) for body, own in zip(rough.bodies, body_anchors(rough, tree), strict=True)]
     grid = grid_of(character, animation, replace(options, step=STEP))

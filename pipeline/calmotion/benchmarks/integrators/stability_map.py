@@ -49,7 +49,7 @@ class Cell:
         map: Name of the map.
         value: Of the row's quantity, in its unit.
         step_s: [s].
-        integrator: One of `dynamics.integrators.INTEGRATORS`.
+        integrator: One of `calmotion.shot.run.INTEGRATORS`.
         outcome: `runs`, `refused` or `failed`.
         why: The reason of a refusal or failure, else empty.
         error_m: Largest error of the tip against the rigid motion [m]; None where it did not come to its end, or only
