@@ -42,7 +42,7 @@ def analyse(
     rows: list[ModelChoice] = []
     if tree.closing or any(body.flexible for body in character.bodies):
         # what simulates the rigid robot takes a while to load, and a rigid shot without loops does not need it
-        from calmotion.accuracy.simplification.by_rigid_run import decide
+        from calmotion.accuracy.simplification.by_rigid_poses import decide
 
         try:
             character, rows = decide(character, animation, options, tree, choice, changes)
