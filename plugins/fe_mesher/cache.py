@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-import contextlib
 import hashlib
-import zipfile
 from collections.abc import Callable
 
 import numpy as np
-from calmotion.support.cache_folder import cache_folder
-from calmotion.support.files import remove_abandoned, replaced
-
-FOLDER = "tetrahedra"
+from calmotion.support.cache_folder import MESHES
+from calmotion.support.caches import store_arrays, stored_arrays
 
 
 def cache_key(points: np.ndarray, triangles: np.ndarray, settings: dict[str, object]) -> str:
@@ -26,11 +22,8 @@ def cache_key(points: np.ndarray, triangles: np.ndarray, settings: dict[str, obj
 
 def load(key: str, names: tuple[str, ...] = ("points", "tets")) -> tuple[np.ndarray, ...] | None:
     """The arrays stored under a key; None where there are none, or the file is damaged."""
-    try:
-        with np.load(cache_folder() / FOLDER / f"{key}.npz", allow_pickle=False) as file:
-            return tuple(file[name] for name in names)
-    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):
-        return None
+    stored = stored_arrays(MESHES, key)
+    return None if stored is None or set(names) - set(stored) else tuple(stored[name] for name in names)
 
 
 def store(
@@ -49,13 +42,9 @@ def store(
     Returns:
         The arrays that are stored under the key.
     """
-    path, names = cache_folder() / FOLDER / f"{key}.npz", tuple(arrays)
-    with contextlib.suppress(OSError):
-        for keep_existing in (True, False):  # the second time a damaged or unusable file is replaced
-            with replaced(path, keep_existing) as temporary:
-                np.savez(temporary, **arrays)  # type: ignore[arg-type]
-            remove_abandoned(path.parent)
-            stored = load(key, names)
-            if stored is not None and usable(stored):
-                return stored
+    for keep_existing in (True, False):  # the second time a damaged or unusable file is replaced
+        store_arrays(MESHES, key, arrays, keep_existing)
+        stored = load(key, tuple(arrays))
+        if stored is not None and usable(stored):
+            return stored
     return tuple(arrays.values())

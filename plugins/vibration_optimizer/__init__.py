@@ -135,6 +135,13 @@ class OptimizeShot(Operator):
             context.report(
                 "warning", "interrupted: these are the best curves so far; the same command resumes from them"
             )
+        before, after = result.objective_before, result.objective_after
+        if before is None or after is None or not after <= before:
+            reason = "the limits of the motors require it" if result.limits else f"the search ended: {result.stopped}"
+            context.report(
+                "warning",
+                f"the new curves are worse than the animated ones: objective {before} -> {after}; {reason}",
+            )
         return [with_choices(result, context.get(ModelChoices))]
 
 

@@ -13,12 +13,13 @@ from calmotion.reduction import cache as reduction_cache
 from calmotion.reduction.cache import cache_key, cached_reduction
 from calmotion.reduction.reduced_body import Elasticity, Invariants, Marker, ReducedBody
 from calmotion.shot import ElasticMaterial, FlexibleSettings, Simplification
+from calmotion.support.cache_folder import CACHES, REDUCTIONS
 
 
 @pytest.fixture(autouse=True)
 def folder(tmp_path, monkeypatch):
     monkeypatch.setenv("CALMOTION_CACHE", str(tmp_path))
-    return tmp_path / "reduced"
+    return tmp_path / "reductions"
 
 
 def a_body(seed=0, nonlinear=True):
@@ -126,16 +127,18 @@ def test_a_file_torn_at_any_place_is_computed_again(folder):
         assert same(cached_reduction("torn", never), body)  # it was written again
 
 
-def test_a_file_with_a_changed_byte_gives_the_right_body_or_is_computed_again(folder):
+def test_a_file_with_a_changed_byte_is_computed_again_with_a_notice(folder, caplog):
     body = a_body()
     cached_reduction("flipped", lambda: body)
     (path,) = folder.glob("*.npz")
     whole = path.read_bytes()
+    places = range(0, len(whole), 97)
     calls = []
-    for at in range(0, len(whole), 97):
+    for at in places:
         path.write_bytes(whole[:at] + bytes([whole[at] ^ 0x55]) + whole[at + 1 :])
         assert same(cached_reduction("flipped", lambda: calls.append(1) or body), body)
-    assert calls  # some of them did harm
+    assert len(calls) == len(places) == len(caplog.messages)
+    assert str(path) in caplog.messages[0] and "made again" in caplog.messages[0]
 
 
 def test_a_foreign_file_is_ignored(folder):
@@ -176,10 +179,10 @@ def test_the_oldest_go_when_the_limit_is_passed(folder, monkeypatch):
         size = path.stat().st_size
         os.utime(path, (1e9 + k, 1e9 + k))
     cached_reduction(0, never)  # used: it is now the newest
-    old = folder / ".calmotion-left.npz"
-    old.write_text("")
-    os.utime(old, (1e9, 1e9))
-    monkeypatch.setattr(reduction_cache, "LIMIT", int(3.5 * size))
+    abandoned = folder / ".calmotion-left.npz"
+    abandoned.write_text("")
+    os.utime(abandoned, (1e9, 1e9))
+    monkeypatch.setitem(CACHES, REDUCTIONS, ("reduced bodies", int(3.5 * size)))
     cached_reduction("new", a_body)
     kept = {path.stem for path in folder.iterdir()}
     assert kept == {cache_key(k) for k in (0, 3, "new")}
@@ -200,9 +203,9 @@ for turn in range(40):
     assert all((value[k] == 10.0 * key + k).all() for k in range(3)), key
     if turn % 7 == int(sys.argv[1]):
         # somebody is stopped in the middle of a write, by a way that leaves half a file
-        from calmotion.support.cache_folder import cache_folder
-        from calmotion.reduction.cache import FOLDER, cache_key
-        path = cache_folder() / FOLDER / (cache_key(("shared", key)) + ".npz")
+        from calmotion.support.cache_folder import REDUCTIONS, cache_folder
+        from calmotion.reduction.cache import cache_key
+        path = cache_folder() / REDUCTIONS / (cache_key(("shared", key)) + ".npz")
         path.with_suffix(".half" + sys.argv[1]).write_bytes(path.read_bytes()[:1000])
         path.with_suffix(".half" + sys.argv[1]).replace(path)
 print(made)

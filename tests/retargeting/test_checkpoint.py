@@ -1,6 +1,7 @@
 """Searches that are cut off go on as if nothing had happened, and files of other problems are not taken."""
 
 import dataclasses
+import json
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from calmotion.retargeting.problem import adaptive_knots
 from calmotion.retargeting.problem.problem import RetargetProblem
 from calmotion.shot.run import RunSettings
 from calmotion.simulation.compiled_shot import compile_shot
+from calmotion.support.verified_files import read_arrays, write_arrays
 from posed import ignore_progress, jerking, make_problem
 
 OPTIONS = RunSettings(step=1 / 240)
@@ -111,6 +113,82 @@ def test_a_checkpoint_of_another_problem_is_not_used(limited, animation, bodies,
     started.clear()
     optimize_shot(compile_shot(limited, animation, bodies), OPTIONS, ignore_progress, path)
     assert started[0] == 0
+
+
+def edited(path, **changes):
+    """Change arrays of a checkpoint, or fields of its state, as somebody does who knows the format."""
+    values = read_arrays(path)
+    state = json.loads(values["state"].tobytes())
+    for name, change in changes.items():
+        if name in values:
+            values[name] = change(values[name])
+        else:
+            state[name] = change
+    values["state"] = np.frombuffer(json.dumps(state).encode(), np.uint8)
+    write_arrays(path, values)
+
+
+FORGED = {
+    "coefficients times 1000": {"x": lambda x: 1000.0 * x},
+    "coefficients times 1000, converged": {"x": lambda x: 1000.0 * x, "reason": "converged"},
+    "a merit that is too small": {"merit": 1e-12},
+    "not a number": {"x": lambda x: np.full_like(x, np.nan), "reason": "converged"},
+    "directions that are not finite": {"Hp": lambda Hp: np.inf * Hp},
+    "directions of another size": {"p": lambda p: p[:, :-1]},
+    "fewer coefficients": {"x": lambda x: x[:-1], "p": lambda p: p[:, :-1], "Hp": lambda p: p[:, :-1]},
+    "other knots": {"breaks": lambda breaks: breaks[::-1].copy()},
+    "knots of another shot": {"breaks": lambda breaks: 2 * breaks},
+    "knots that are no numbers of frames": {"breaks": lambda breaks: breaks + 0.5},
+    "no history": {"history": lambda history: history[:, :2]},
+    "multipliers of another size": {"limit velocity": lambda y: y[:, :-1]},
+}
+
+
+@pytest.fixture(scope="module")
+def stored(limited, animation, bodies, tmp_path_factory):
+    """A checkpoint of the whole search."""
+    path = tmp_path_factory.mktemp("stored") / "kept.npz"
+    optimize_shot(compile_shot(limited, animation, bodies), OPTIONS, ignore_progress, path)
+    return path
+
+
+@pytest.mark.parametrize("how", FORGED)
+def test_a_forged_checkpoint_is_refused_with_a_warning(
+    limited, animation, bodies, whole, stored, tmp_path, caplog, how
+):  # fmt: skip
+    path = tmp_path / "kept.npz"
+    path.write_bytes(stored.read_bytes())
+    edited(path, **FORGED[how])
+    again = optimize_shot(compile_shot(limited, animation, bodies), OPTIONS, ignore_progress, path)
+    assert len(caplog.messages) == 1 and str(path) in caplog.messages[0] and "begins anew" in caplog.messages[0]
+    assert again.objective_after == pytest.approx(whole.objective_after, rel=1e-9)
+    assert again.iterations == whole.iterations
+
+
+def test_a_damaged_checkpoint_is_refused_at_any_byte(limited, animation, bodies, stored, tmp_path, caplog):
+    whole = stored.read_bytes()
+    path = tmp_path / "kept.npz"
+    problem = make_problem(limited, bodies, animation)
+    kept = checkpoint.Checkpoint(path, "key")
+    damaged = [whole[:at] + bytes([whole[at] ^ 1]) + whole[at + 1 :] for at in range(0, len(whole), 997)]
+    damaged += [b"", whole[:100], b"\x93NUMPY", b"PK", bytes(1000)]
+    for content in damaged:
+        path.write_bytes(content)
+        assert kept.load(problem.limits) is None
+    assert len(caplog.messages) == len(damaged) and all("is damaged" in message for message in caplog.messages)
+    path.unlink()
+    path.mkdir()
+    assert kept.load(problem.limits) is None
+
+
+def test_a_stored_search_that_had_converged_is_not_repeated(limited, animation, bodies, whole, stored, caplog):
+    lines = []
+    again = optimize_shot(
+        compile_shot(limited, animation, bodies), OPTIONS, lambda done, text: lines.append(text), stored
+    )  # fmt: skip
+    assert not caplog.messages and any("resuming after" in line for line in lines)
+    assert again.iterations == whole.iterations
+    assert again.objective_after == pytest.approx(whole.objective_after, rel=1e-9)
 
 
 def test_the_key_depends_on_regularisation_and_code(arm, animation, bodies, monkeypatch):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Sequence
 
-from calmotion.cli.commands import bench, completion, inspect, optimize, plugins, rig, simulate
+from calmotion.cli.commands import bench, cache, completion, inspect, optimize, plugins, rig, simulate
 from calmotion.cli.parser import Parser
 from calmotion.errors import ShotError
 from calmotion.version import __version__
@@ -58,7 +58,7 @@ def build_parser() -> Parser:
     )
     parser.add_argument("--version", action="version", version=f"calmotion {__version__}")
     commands = parser.add_subparsers(title="commands", required=True, metavar="COMMAND")
-    for command in (inspect, simulate, optimize, rig, bench, plugins, completion):
+    for command in (inspect, simulate, optimize, rig, bench, plugins, cache, completion):
         command.add_to(commands)
     parser.set_defaults(parser=parser)  # for `completion`
     return parser

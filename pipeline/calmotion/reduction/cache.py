@@ -1,16 +1,13 @@
 """Cache of reduced bodies in the cache folder of the user, by the hash of all inputs.
 
-A file is an `.npz` without pickled objects: the arrays of a value, and its structure as JSON. It is replaced
-atomically: a reader sees a whole file or none, also with several writers. A file that cannot be read is computed and
-written again.
+A file has no pickled objects: the arrays of a value, and its structure as JSON. It is verified when it is read and
+replaced atomically, see `support.caches`. What cannot be read is computed and written again.
 """
 
 from __future__ import annotations
 
-import contextlib
 import hashlib
 import json
-import os
 from collections.abc import Callable
 from dataclasses import fields, is_dataclass
 from functools import cache
@@ -22,14 +19,12 @@ import numpy as np
 
 from calmotion.reduction.reduced_body import Elasticity, Invariants, Marker, ReducedBody
 from calmotion.shot.result import Simplification
-from calmotion.support.cache_folder import cache_folder
-from calmotion.support.files import PREFIX, remove_abandoned, replaced
+from calmotion.support.cache_folder import REDUCTIONS
+from calmotion.support.caches import store_arrays, stored_arrays
 
 T = TypeVar("T")
 
-FOLDER = "reduced"
 FORMAT = 1  # to increment when the meaning of the content of a file changes
-LIMIT = 2 * 1024**3  # size of the cache in bytes
 
 # A file names the types of its values. Only these are constructed, besides arrays, numbers, strings, None and tuples.
 TYPES: dict[str, type] = {kind.__name__: kind for kind in (Elasticity, Invariants, Simplification, Marker, ReducedBody)}
@@ -50,17 +45,19 @@ def cached_reduction(key_parts: object, compute: Callable[[], T]) -> T:
         TypeError: A part of the key or of the value has another type.
     """
     key = cache_key(key_parts)
-    path = cache_folder() / FOLDER / f"{key}.npz"
-    try:
-        value: T = _load(path, key)
-    except Exception:
-        # a damaged file can cause any error: in the archive, the arrays, the structure, or a type that has changed
-        pass
-    else:
-        _mark_used(path)
-        return value
+    stored = stored_arrays(REDUCTIONS, key)
+    if stored is not None:
+        try:
+            value: T = _value_of(stored, key)
+        except (ValueError, KeyError, TypeError, AttributeError):  # of another version of the program
+            pass
+        else:
+            return value
     value = compute()
-    _store(path, key, value)
+    arrays: list[Any] = []
+    structure = json.dumps({"key": key, "value": _encode(value, arrays)}).encode()
+    named = {f"a{k}": array for k, array in enumerate(arrays)}
+    store_arrays(REDUCTIONS, key, {"structure": np.frombuffer(structure, dtype=np.uint8)} | named)
     return value
 
 
@@ -112,23 +109,11 @@ def _feed(digest: Any, value: Any) -> None:
         raise TypeError(f"a {type(value).__name__} cannot be part of a key")
 
 
-def _load(path: Path, key: str) -> Any:
-    with open(path, "rb") as file, np.load(file, allow_pickle=False) as archive:
-        head = json.loads(bytes(archive["structure"]))
-        if head["key"] != key:
-            raise ValueError("this file has another key")
-        return _decode(head["value"], archive)
-
-
-def _store(path: Path, key: str, value: Any) -> None:
-    """Store a value. A folder that cannot be written is ignored: the cache is optional."""
-    arrays: list[Any] = []
-    structure = json.dumps({"key": key, "value": _encode(value, arrays)}).encode()
-    named = {f"a{k}": array for k, array in enumerate(arrays)}
-    with contextlib.suppress(OSError):
-        with replaced(path) as temporary:
-            np.savez(temporary, structure=np.frombuffer(structure, dtype=np.uint8), **named)
-        _prune(path.parent, LIMIT)
+def _value_of(arrays: dict[str, np.ndarray], key: str) -> Any:
+    head = json.loads(bytes(arrays["structure"]))
+    if head["key"] != key:
+        raise ValueError("this file has another key")
+    return _decode(head["value"], arrays)
 
 
 def _encode(value: Any, arrays: list[Any]) -> Any:
@@ -152,43 +137,16 @@ def _encode(value: Any, arrays: list[Any]) -> Any:
     raise TypeError(f"a {type(value).__name__} cannot be stored")
 
 
-def _decode(node: Any, archive: Any) -> Any:
+def _decode(node: Any, arrays: dict[str, np.ndarray]) -> Any:
     """The value of a node of the JSON structure."""
     if "array" in node:
-        return archive[f"a{node['array']}"]
+        return arrays[f"a{node['array']}"]
     if "type" in node:
         kind = TYPES[node["type"]]
-        values = {name: _decode(value, archive) for name, value in node["fields"].items()}
+        values = {name: _decode(value, arrays) for name, value in node["fields"].items()}
         if set(values) != {field.name for field in fields(kind)}:
             raise ValueError("this file has another version")
         return kind(**values)
     if "tuple" in node:
-        return tuple(_decode(part, archive) for part in node["tuple"])
+        return tuple(_decode(part, arrays) for part in node["tuple"])
     return node["plain"]
-
-
-def _mark_used(path: Path) -> None:
-    """Make a file the newest one, which is removed last."""
-    try:
-        os.utime(path)
-    except OSError:
-        pass
-
-
-def _prune(folder: Path, limit: int) -> None:
-    """Remove the least recently used files until the rest is within the limit [bytes]; the newest stays."""
-    remove_abandoned(folder)
-    files = []
-    for path in folder.iterdir():
-        try:
-            state = path.stat()
-        except OSError:
-            continue  # another process has removed it
-        if path.suffix == ".npz" and not path.name.startswith(PREFIX):
-            files.append((state.st_mtime_ns, state.st_size, path))
-    files.sort(key=lambda entry: entry[0], reverse=True)
-    total = 0
-    for k, (_, size, path) in enumerate(files):
-        total += size
-        if k and total > limit:
-            path.unlink(missing_ok=True)

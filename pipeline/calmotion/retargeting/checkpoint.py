@@ -1,11 +1,11 @@
-"""State of a search on disk: written atomically, and read only for the same problem and the same code."""
+"""State of a search on disk: written atomically, verified, and read only for the same problem and the same code."""
 
 from __future__ import annotations
 
 import contextlib
 import hashlib
 import json
-import zipfile
+import logging
 from dataclasses import astuple, dataclass
 from pathlib import Path
 from typing import Any
@@ -17,12 +17,14 @@ from calmotion.retargeting.problem.problem import RetargetProblem
 from calmotion.retargeting.solver.gauss_newton import Iterate, Search
 from calmotion.retargeting.solver.recycling import Recycled
 from calmotion.shot.character import BoolArray, IntArray
-from calmotion.support.files import replaced
 from calmotion.support.sources import source_digest
+from calmotion.support.verified_files import DamagedFileError, read_arrays, write_arrays
 
 # The state of a search belongs to the code that computed it.
 _ROOMS = ("linear_algebra", "multibody", "retargeting", "simulation", "support")
 _OF_LIMITS = ("rho", "left", "reached", "stalled", "on")
+SAME = 1e-4  # largest relative difference of the merit when a stored point is simulated again
+LOG = logging.getLogger("calmotion")
 
 
 def checkpoint_path(layer: str) -> Path:
@@ -52,8 +54,34 @@ def problem_key(problem: RetargetProblem, fixed: BoolArray, settings: object) ->
 
 
 @dataclass(frozen=True, eq=False)
+class StoredSearch:
+    """A search as it was stored.
+
+    Attributes:
+        search: Its state.
+        breaks: Frames of its knots.
+        merit: At its point, with the multipliers of its limits.
+        limits: Multipliers and state of its limits, by name; empty without limits.
+    """
+
+    search: Search
+    breaks: IntArray
+    merit: float
+    limits: dict[str, Any]
+
+    def matches(self, merit: float) -> bool:
+        """Whether the point has the recorded merit when it is simulated again."""
+        return bool(np.isfinite(merit) and abs(merit - self.merit) <= SAME * max(abs(self.merit), abs(merit)))
+
+    def restore(self, limits: LimitTerms | None) -> None:
+        """Set the state of the limits to the stored one."""
+        for name, value in self.limits.items():
+            setattr(limits, name, value)
+
+
+@dataclass(frozen=True, eq=False)
 class Checkpoint:
-    """The state of the search of one problem in one file; without a path nothing is written.
+    """The state of the search of one problem in one verified file; without a path nothing is written.
 
     Attributes:
         path: The file.
@@ -63,8 +91,12 @@ class Checkpoint:
     path: Path | None
     key: str
 
-    def save(self, search: Search, limits: LimitTerms | None, breaks: IntArray) -> None:
-        """Write the state. If the folder cannot be written, nothing happens and the run continues."""
+    def save(self, search: Search, limits: LimitTerms | None, breaks: IntArray, merit: float) -> None:
+        """Write the state. If the folder cannot be written, nothing happens and the run continues.
+
+        Args:
+            merit: At the point of the search.
+        """
         if self.path is None:
             return
         values: dict[str, Any] = {
@@ -72,39 +104,63 @@ class Checkpoint:
             "history": np.array([astuple(iterate) for iterate in search.history], float),
         }  # fmt: skip
         state: dict[str, object] = {
-            "key": self.key, "radius": search.radius, "evaluations": search.evaluations, "gradients": search.gradients,
-            "products": search.products, "reason": search.reason,
+            "key": self.key, "merit": merit, "radius": search.radius, "evaluations": search.evaluations,
+            "gradients": search.gradients, "products": search.products, "reason": search.reason,
         }  # fmt: skip
         if limits is not None:
             state |= {name: getattr(limits, name) for name in _OF_LIMITS}
             values |= {f"limit {name}": y for name, y in limits.multipliers.items()}
         values["state"] = np.frombuffer(json.dumps(state).encode(), np.uint8)
-        with contextlib.suppress(OSError), replaced(self.path) as temporary:
-            np.savez(temporary, **values)
+        with contextlib.suppress(OSError):
+            write_arrays(self.path, values)
 
-    def load(self, limits: LimitTerms | None) -> tuple[Search, IntArray] | None:
-        """The stored search and the frames of its knots; None if the file has no state of this problem.
-
-        The stored multipliers are written into the limits.
-        """
+    def load(self, limits: LimitTerms | None) -> StoredSearch | None:
+        """The stored search; None if there is none of this problem, with a warning if the file is damaged."""
         if self.path is None:
             return None
         try:
-            with np.load(self.path, allow_pickle=False) as file:
-                values = {name: file[name] for name in file.files}
+            values = read_arrays(self.path)
+        except DamagedFileError:
+            self.refuse("is damaged")
+            return None
+        except OSError:
+            return None
+        try:
             state = json.loads(values["state"].tobytes())
             if state["key"] != self.key:
                 return None
-            rows = values["history"].tolist()
-            history = tuple(Iterate(row[0], row[1], row[2], int(row[3]), int(row[4])) for row in rows)
-            search = Search(
-                values["x"], state["radius"], Recycled(values["p"], values["Hp"]), history, state["evaluations"],
-                state["gradients"], state["products"], state["reason"],
-            )  # fmt: skip
-            if limits is not None:
-                limits.multipliers = {name: values[f"limit {name}"] for name in limits.bounds}
-                for name in _OF_LIMITS:
-                    setattr(limits, name, state[name])
-        except (OSError, ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile):
+            stored = _stored(values, state, limits)
+        except (ValueError, KeyError, TypeError, IndexError) as error:
+            self.refuse(f"is not usable ({error})")
             return None
-        return search, values["breaks"]
+        return stored
+
+    def refuse(self, reason: str) -> None:
+        """Warn that the file is not used."""
+        LOG.warning("The checkpoint %s %s; the search begins anew.", self.path, reason)
+
+
+def _stored(values: dict[str, np.ndarray], state: dict[str, Any], limits: LimitTerms | None) -> StoredSearch:
+    """The search of a file.
+
+    Raises:
+        ValueError: An array has another size, or numbers that are not finite.
+        KeyError, TypeError, IndexError: Something is missing or of another kind.
+    """
+    x, p, Hp = values["x"], values["p"], values["Hp"]
+    finite = all(np.all(np.isfinite(values[name])) for name in values if name not in ("state", "history"))
+    if not finite or not p.shape == Hp.shape == (len(p), len(x)):
+        raise ValueError("its coefficients are not finite or have a wrong size")
+    rows = values["history"].tolist()
+    history = tuple(Iterate(row[0], row[1], row[2], int(row[3]), int(row[4])) for row in rows)
+    search = Search(
+        x, state["radius"], Recycled(p, Hp), history, state["evaluations"], state["gradients"], state["products"],
+        state["reason"],
+    )  # fmt: skip
+    kept: dict[str, Any] = {}
+    if limits is not None:
+        kept = {name: state[name] for name in _OF_LIMITS}
+        kept["multipliers"] = {name: values[f"limit {name}"] for name in limits.bounds}
+        if any(kept["multipliers"][name].shape != old.shape for name, old in limits.multipliers.items()):
+            raise ValueError("the multipliers of its limits have a wrong size")
+    return StoredSearch(search, values["breaks"], float(state["merit"]), kept)

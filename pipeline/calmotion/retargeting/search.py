@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from copy import copy
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -102,15 +103,30 @@ class RetargetSearch:
         return self.locked_on(basis) | inactive_coefficients(basis, self.inactive, len(self.problem.space.motors))
 
     def _resume(self) -> bool:
-        """Resume from the checkpoint; whether there is one."""
-        resumed = self.checkpoint.load(self.problem.limits)
-        if resumed is None:
+        """Resume from the checkpoint; whether there is one whose point has the recorded merit."""
+        stored = self.checkpoint.load(self.problem.limits)
+        if stored is None:
             return False
-        self.search, breaks = resumed
+        problem, limits, x = self.problem, copy(self.problem.limits), stored.search.x
+        breaks, motors = stored.breaks, len(problem.space.motors)
+        first, last = problem.space.basis.breaks[[0, -1]]
+        if breaks.dtype.kind != "i" or np.any(np.diff(breaks) <= 0) or breaks[0] != first or breaks[-1] != last:
+            self.checkpoint.refuse("has other knots than the shot")
+            return False
+        basis = basis_on(problem.grid, breaks, problem.space.basis.kept_ends)
+        if len(x) != basis.count * motors:
+            self.checkpoint.refuse("has a wrong number of coefficients")
+            return False
+        resumed = problem.on_basis(basis, x)
+        stored.restore(resumed.limits)
+        merit = resumed.value(x)
+        if not stored.matches(merit):
+            problem.limits = limits
+            self.checkpoint.refuse(f"does not fit the shot (objective {stored.merit:.6g}, simulated {merit:.6g})")
+            return False
+        self.problem, self.search = resumed, stored.search
         self.progress(0.1, f"resuming after {len(self.search.history)} iterations of an interrupted search")
-        basis = basis_on(self.problem.grid, breaks, self.problem.space.basis.kept_ends)
-        self.problem = self.problem.on_basis(basis, self.search.x)
-        if np.any(self.search.x[inactive_coefficients(basis, self.inactive, len(self.problem.space.motors))]):
+        if np.any(x[inactive_coefficients(basis, self.inactive, motors)]):
             self.inactive = ()  # the stored search had already continued with all coefficients
         return True
 
@@ -143,7 +159,8 @@ class RetargetSearch:
         self.progress(done, f"optimising: weighted error {error:.3f} mm, {search.evaluations} simulations")
 
     def _keep(self) -> None:
-        self.checkpoint.save(self.search, self.problem.limits, self.problem.space.basis.breaks)
+        problem = self.problem
+        self.checkpoint.save(self.search, problem.limits, problem.space.basis.breaks, problem.merit())
 
     def _refine(self) -> bool:
         """Continue on finer knots if these gain enough; whether they do."""

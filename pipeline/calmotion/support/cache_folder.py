@@ -1,9 +1,17 @@
-"""Where things that can be made again are kept."""
+"""The user's caches: which there are, and their folder."""
 
 from __future__ import annotations
 
 import os
 from pathlib import Path
+
+KERNELS, MESHES, REDUCTIONS = "kernels", "meshes", "reductions"
+# Folder of each cache, its content, and its largest size [bytes].
+CACHES = {
+    KERNELS: ("compiled kernels", 500 * 10**6),
+    MESHES: ("tetrahedral meshes", 10**9),
+    REDUCTIONS: ("reduced bodies", 2 * 10**9),
+}
 
 
 def cache_folder() -> Path:

@@ -25,7 +25,9 @@ import numba  # noqa: E402
 import numpy as np  # noqa: E402
 from numba import config, njit  # noqa: E402
 
-from calmotion.support.cache_folder import cache_folder
+from calmotion.support.cache_folder import KERNELS, cache_folder
+from calmotion.support.caches import mark_used, prune
+from calmotion.support.kernel_cache import verified
 from calmotion.support.sources import digest_of, with_imports
 
 Function = TypeVar("Function", bound=Callable[..., Any])
@@ -40,8 +42,12 @@ _WITHOUT_ARRAYS: dict[str, Any] = {"_nrt": False, "no_cfunc_wrapper": True, "nog
 
 @cache
 def kernel_folder() -> Path:
-    """Folder of the compiled kernels of exactly these sources, options and versions."""
-    return cache_folder() / "kernels" / kernel_key(PACKAGE)[:16]
+    """Folder of the compiled kernels of exactly these sources, options and versions; those of old ones go."""
+    folder = cache_folder() / KERNELS / kernel_key(PACKAGE)[:16]
+    if not folder.is_dir():
+        prune(KERNELS)
+    mark_used(folder)
+    return folder
 
 
 def kernel_key(package: Path) -> str:
@@ -86,11 +92,11 @@ def allocating_kernel(function: Function) -> Function:
 
 def _compile(function: Function, **options: Any) -> Function:
     if os.environ.get("NUMBA_CACHE_DIR"):
-        return cast(Function, njit(cache=True, fastmath=FUSED, **options)(function))
+        return cast(Function, verified(njit(cache=True, fastmath=FUSED, **options)(function)))
     # numba picks the folder when a function is decorated; other users of numba keep theirs
     before = config.CACHE_DIR
     config.CACHE_DIR = str(kernel_folder())
     try:
-        return cast(Function, njit(cache=True, fastmath=FUSED, **options)(function))
+        return cast(Function, verified(njit(cache=True, fastmath=FUSED, **options)(function)))
     finally:
         config.CACHE_DIR = before

@@ -24,4 +24,4 @@ def package(host):
 @pytest.fixture(autouse=True)
 def own_cache(tmp_path, monkeypatch):
     monkeypatch.setenv("CALMOTION_CACHE", str(tmp_path / "cache"))
-    return tmp_path / "cache" / "tetrahedra"
+    return tmp_path / "cache" / "meshes"

@@ -1,0 +1,153 @@
+"""The user's caches: files that can be made again, verified when they are read, and limited in size.
+
+Each cache is a folder of the user's cache folder. An entry is what is used and removed as one: a file of arrays, or the
+folder of the kernels of one version of the sources. The least recently used entries go first.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import logging
+import os
+import shutil
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from calmotion.support.cache_folder import CACHES, cache_folder
+from calmotion.support.files import PREFIX, remove_abandoned
+from calmotion.support.verified_files import DamagedFileError, read_arrays, write_arrays
+
+LOG = logging.getLogger("calmotion")
+
+
+@dataclass(frozen=True)
+class Entry:
+    """What is used and removed as one.
+
+    Attributes:
+        path: A file or a folder.
+        size: In bytes.
+        used: When it was used last [ns since the epoch].
+    """
+
+    path: Path
+    size: int
+    used: int
+
+
+def stored_arrays(cache: str, key: str) -> dict[str, np.ndarray] | None:
+    """The arrays that are stored under a key, by name; None where there are none.
+
+    A damaged file is removed with a notice.
+
+    Args:
+        cache: A name in `CACHES`.
+        key: Hash of all inputs of the arrays.
+    """
+    path = _file(cache, key)
+    try:
+        arrays = read_arrays(path)
+    except DamagedFileError:
+        discard(path)
+        return None
+    except OSError:
+        return None
+    mark_used(path)
+    return arrays
+
+
+def store_arrays(cache: str, key: str, arrays: Mapping[str, Any], keep_existing: bool = False) -> None:
+    """Store arrays under a key, and remove what exceeds the size of the cache.
+
+    Caches are optional: a folder that cannot be written is ignored.
+
+    Args:
+        cache: A name in `CACHES`.
+        key: Hash of all inputs of the arrays.
+        arrays: By name.
+        keep_existing: Keep what another process has stored under the key.
+    """
+    path = _file(cache, key)
+    with contextlib.suppress(OSError):
+        write_arrays(path, arrays, keep_existing)
+        prune(cache)
+
+
+def discard(path: Path) -> None:
+    """Remove a damaged file or folder of a cache, with a notice."""
+    LOG.warning("A damaged file of the cache was removed; its content is made again: %s", path)
+    _remove(path)
+
+
+def mark_used(path: Path) -> None:
+    """Make an entry the newest one, which is removed last."""
+    with contextlib.suppress(OSError):
+        os.utime(path)
+
+
+def entries(cache: str) -> list[Entry]:
+    """The entries of a cache, the most recently used first.
+
+    Args:
+        cache: A name in `CACHES`.
+    """
+    found = []
+    folder = cache_folder() / cache
+    with contextlib.suppress(OSError):
+        for path in folder.iterdir():
+            if path.name.startswith(PREFIX):
+                continue
+            with contextlib.suppress(OSError):  # another process has removed it
+                found.append(Entry(path, _size(path), path.lstat().st_mtime_ns))
+    return sorted(found, key=lambda entry: entry.used, reverse=True)
+
+
+def prune(cache: str, limit: int | None = None) -> list[Entry]:
+    """Remove the least recently used entries until the rest keeps a size; the newest stays.
+
+    Args:
+        cache: A name in `CACHES`.
+        limit: Size [bytes]; None is the cache's own.
+
+    Returns:
+        What was removed.
+    """
+    limit = CACHES[cache][1] if limit is None else limit
+    with contextlib.suppress(OSError):
+        remove_abandoned(cache_folder() / cache)
+    total, removed = 0, []
+    for number, entry in enumerate(entries(cache)):
+        total += entry.size
+        if number and total > limit and _remove(entry.path):
+            removed.append(entry)
+    return removed
+
+
+def clear(cache: str) -> list[Entry]:
+    """Remove all entries of a cache; what was removed."""
+    return [entry for entry in entries(cache) if _remove(entry.path)]
+
+
+def _file(cache: str, key: str) -> Path:
+    return cache_folder() / cache / f"{key}.npz"
+
+
+def _size(path: Path) -> int:
+    """Size of a file, or of the files in a folder [bytes]."""
+    if path.is_symlink() or not path.is_dir():
+        return path.lstat().st_size
+    return sum(part.lstat().st_size for part in path.rglob("*") if not part.is_dir())
+
+
+def _remove(path: Path) -> bool:
+    """Remove a file or a folder, not what a symbolic link names; whether it is gone."""
+    if path.is_dir() and not path.is_symlink():
+        shutil.rmtree(path, ignore_errors=True)
+    else:
+        with contextlib.suppress(OSError):
+            path.unlink(missing_ok=True)
+    return not os.path.lexists(path)

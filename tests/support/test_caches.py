@@ -1,0 +1,88 @@
+"""Caches of the user: verified, limited, cleared."""
+
+import os
+
+import numpy as np
+import pytest
+from calmotion.support.cache_folder import CACHES, KERNELS, MESHES, REDUCTIONS
+from calmotion.support.caches import clear, entries, prune, store_arrays, stored_arrays
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path, monkeypatch):
+    monkeypatch.setenv("CALMOTION_CACHE", str(tmp_path))
+    return tmp_path
+
+
+def aged(path, seconds):
+    os.utime(path, (1e9 + seconds, 1e9 + seconds))
+
+
+def test_what_is_stored_comes_back_and_damage_is_removed_with_a_notice(folder, caplog):
+    assert stored_arrays(MESHES, "key") is None and not caplog.messages
+    store_arrays(MESHES, "key", {"a": np.arange(3)})
+    stored = stored_arrays(MESHES, "key")
+    assert stored is not None and np.array_equal(stored["a"], np.arange(3))
+    path = folder / MESHES / "key.npz"
+    for damaged in (b"", path.read_bytes()[:-1], b"x" * 100):
+        path.write_bytes(damaged)
+        caplog.clear()
+        assert stored_arrays(MESHES, "key") is None and not path.exists()
+        assert len(caplog.messages) == 1 and str(path) in caplog.messages[0]
+
+
+def test_a_folder_in_place_of_a_file_is_replaced(folder, caplog):
+    path = folder / MESHES / "key.npz"
+    (path / "inside").mkdir(parents=True)
+    assert stored_arrays(MESHES, "key") is None
+    store_arrays(MESHES, "key", {"a": np.zeros(1)})
+    assert stored_arrays(MESHES, "key") is not None and len(caplog.messages) == 1
+
+
+def test_an_existing_entry_is_kept_when_wanted(folder):
+    store_arrays(MESHES, "key", {"a": np.zeros(1)})
+    store_arrays(MESHES, "key", {"a": np.ones(1)}, keep_existing=True)
+    assert stored_arrays(MESHES, "key")["a"] == 0.0
+    store_arrays(MESHES, "key", {"a": np.ones(1)})
+    assert stored_arrays(MESHES, "key")["a"] == 1.0
+
+
+def test_the_least_recently_used_go_first_and_folders_count_as_one(folder):
+    for number in range(4):
+        one = folder / KERNELS / f"version{number}"
+        one.mkdir(parents=True)
+        (one / "a").write_bytes(bytes(600))
+        (one / "b").write_bytes(bytes(400))
+        aged(one, number)
+    aged(folder / KERNELS / "version0", 10)
+    assert [(entry.path.name, entry.size) for entry in entries(KERNELS)] == [
+        ("version0", 1000), ("version3", 1000), ("version2", 1000), ("version1", 1000),
+    ]  # fmt: skip
+    assert [entry.path.name for entry in prune(KERNELS, 2500)] == ["version2", "version1"]
+    assert prune(KERNELS, 2500) == []
+    assert len(prune(KERNELS, 0)) == 1 and [entry.path.name for entry in entries(KERNELS)] == ["version0"]
+    assert len(clear(KERNELS)) == 1 and entries(KERNELS) == []
+
+
+def test_a_cache_keeps_its_limit(folder, monkeypatch):
+    monkeypatch.setitem(CACHES, REDUCTIONS, ("reduced bodies", 3000))
+    for number in range(5):
+        store_arrays(REDUCTIONS, str(number), {"a": np.zeros(100)})
+        aged(folder / REDUCTIONS / f"{number}.npz", number)
+    assert sum(entry.size for entry in entries(REDUCTIONS)) <= 3000
+    assert stored_arrays(REDUCTIONS, "4") is not None and stored_arrays(REDUCTIONS, "0") is None
+
+
+def test_a_symbolic_link_is_removed_and_what_it_names_is_not(folder, tmp_path_factory):
+    precious = tmp_path_factory.mktemp("precious")
+    (precious / "file").write_text("precious")
+    (folder / MESHES).mkdir()
+    (folder / MESHES / "link.npz").symlink_to(precious / "file")
+    (folder / MESHES / "other").symlink_to(precious)
+    assert len(clear(MESHES)) == 2
+    assert (precious / "file").read_text() == "precious"
+
+
+def test_a_cache_that_does_not_exist_is_empty():
+    for cache in CACHES:
+        assert entries(cache) == prune(cache) == clear(cache) == []

@@ -1,0 +1,72 @@
+"""Files that are verified when they are read."""
+
+import os
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from calmotion.support.verified_files import (
+    DamagedFileError,
+    read_arrays,
+    read_verified,
+    sealed,
+    unsealed,
+    write_arrays,
+)
+
+
+def test_content_comes_back_and_any_change_is_seen():
+    data = sealed(b"content")
+    assert unsealed(data) == b"content" and unsealed(sealed(b"")) == b""
+    for at in range(len(data)):
+        with pytest.raises(DamagedFileError):
+            unsealed(data[:at] + bytes([data[at] ^ 1]) + data[at + 1 :])
+        with pytest.raises(DamagedFileError):
+            unsealed(data[:at])
+    for other in (b"", data + b"x", data + data, bytes(len(data))):
+        with pytest.raises(DamagedFileError):
+            unsealed(other)
+
+
+def test_arrays_come_back_bit_for_bit(tmp_path):
+    arrays = {"a": np.asfortranarray(np.random.default_rng(0).normal(size=(3, 4))), "b": np.arange(3, dtype=np.int32)}
+    write_arrays(tmp_path / "x.npz", arrays)
+    again = read_arrays(tmp_path / "x.npz")
+    assert set(again) == {"a", "b"}
+    for name, array in arrays.items():
+        assert again[name].dtype == array.dtype and again[name].tobytes("A") == array.tobytes("A")
+
+
+@pytest.mark.parametrize("content", [b"", b"no archive", b"PK\x05\x06" + bytes(18)])
+def test_whole_files_without_arrays_are_refused(tmp_path, content):
+    path = tmp_path / "x.npz"
+    path.write_bytes(sealed(content))
+    assert read_verified(path) == content
+    if content.startswith(b"PK"):
+        assert read_arrays(path) == {}
+    else:
+        with pytest.raises(DamagedFileError):
+            read_arrays(path)
+
+
+def test_pickled_objects_are_not_loaded(tmp_path):
+    np.savez(tmp_path / "objects.npz", a=np.array([{}], object))
+    (tmp_path / "x.npz").write_bytes(sealed((tmp_path / "objects.npz").read_bytes()))
+    with pytest.raises(DamagedFileError):
+        read_arrays(tmp_path / "x.npz")
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="this system has no named pipes")
+def test_a_named_pipe_stops_nobody(tmp_path):
+    os.mkfifo(tmp_path / "x.npz")
+    code = f"from calmotion.support.verified_files import read_verified; read_verified({str(tmp_path / 'x.npz')!r})"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60)
+    assert "DamagedFileError" in done.stderr
+
+
+def test_a_folder_and_a_missing_file(tmp_path):
+    with pytest.raises((DamagedFileError, PermissionError)):  # the latter on Windows
+        read_verified(tmp_path)
+    with pytest.raises(FileNotFoundError):
+        read_verified(tmp_path / "missing")
