@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import io
 import os
 import subprocess
 import sys
 import tempfile
 import textwrap
 from collections.abc import Callable
+from contextlib import redirect_stderr, redirect_stdout
 from pathlib import Path
 
 import pytest
@@ -44,6 +46,20 @@ def shared_data() -> Path:
 
 @pytest.fixture(scope="session")
 def calmotion() -> Callable[..., subprocess.CompletedProcess[str]]:
+    """Runs `calmotion` in this process, which spares its start; the status and what it printed."""
+    from calmotion.cli.main import main
+
+    def run(*arguments: object) -> subprocess.CompletedProcess[str]:
+        texts = list(map(str, arguments))
+        with redirect_stdout(io.StringIO()) as out, redirect_stderr(io.StringIO()) as err:
+            status = main(texts)
+        return subprocess.CompletedProcess(texts, status, out.getvalue(), err.getvalue())
+
+    return run
+
+
+@pytest.fixture(scope="session")
+def calmotion_process() -> Callable[..., subprocess.CompletedProcess[str]]:
     """Runs `calmotion` in a process of its own, from the checkout."""
 
     def run(*arguments: object, **options: object) -> subprocess.CompletedProcess[str]:

@@ -13,11 +13,11 @@ CUP = "/Bartender/Cup/CupTarget"
 
 
 @pytest.fixture(scope="module")
-def run(calmotion, repository, tmp_path_factory):
+def run(calmotion_process, repository, tmp_path_factory):
     """Folder and report of an optimisation of the bartender with everything that can be written."""
     folder = tmp_path_factory.mktemp("bartender")
     shot = repository / "samples" / "bartender" / "bartender.usda"
-    done = calmotion(
+    done = calmotion_process(
         "optimize",
         shot,
         "-o",
@@ -55,9 +55,9 @@ def test_report_has_the_keys_of_the_contract(run):
     assert all(set(row) == {"what", "why", "estimated_error_m"} for row in run[1]["left_out"])
 
 
-def test_root_layer_simulated_again_reproduces_the_errors_after(run, calmotion):
+def test_root_layer_simulated_again_reproduces_the_errors_after(run, calmotion_process):
     folder, report = run
-    done = calmotion("simulate", report["root_layer"], "--json")
+    done = calmotion_process("simulate", report["root_layer"], "--json")
     assert done.returncode == 0, done.stdout + done.stderr
     again = json.loads(done.stdout)
     for row in again["targets"]:
@@ -94,7 +94,7 @@ def test_table_has_the_columns_of_the_contract_and_the_reported_maximum(run):
     assert len(errors) == report["steps"]
 
 
-def test_links_of_the_character_sway_between_two_and_ten_hertz(calmotion, repository):
-    done = calmotion("inspect", repository / "samples" / "bartender" / "bartender.usda", "--json")
+def test_links_of_the_character_sway_between_two_and_ten_hertz(calmotion_process, repository):
+    done = calmotion_process("inspect", repository / "samples" / "bartender" / "bartender.usda", "--json")
     first, second = json.loads(done.stdout)["system_frequencies_hz"][:2]
     assert 2.0 < first <= second < 10.0

@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
+import ast
 import json
 import os
 import shutil
 import subprocess
 import sys
+import sysconfig
 import textwrap
+import tomllib
 import venv
+from importlib.metadata import packages_distributions
 from pathlib import Path
 
 import pytest
+from packaging.requirements import Requirement
+from packaging.utils import canonicalize_name
 
 
 def run(*command: object, folder: Path) -> str:
@@ -28,13 +34,19 @@ def run(*command: object, folder: Path) -> str:
 
 @pytest.fixture(scope="module")
 def installed(tmp_path_factory: pytest.TempPathFactory, repository: Path) -> Path:
-    """An environment that holds a wheel of this checkout and what it depends on, nothing else."""
+    """An environment that holds a wheel of this checkout and sees the dependencies that are installed here.
+
+    They are not installed anew, which takes most of a minute; `test_every_import_is_declared` tests that the wheel asks
+    for them. The checkout itself is not seen: only its environment's own files name it.
+    """
     folder = tmp_path_factory.mktemp("wheel")
     run(sys.executable, "-m", "pip", "wheel", "--quiet", "--no-deps", "-w", folder, repository, folder=folder)
     (wheel,) = folder.glob("calmotion-*.whl")
-    venv.create(folder / "environment", with_pip=True)
+    venv.create(folder / "environment", with_pip=False)
     python = folder / "environment" / "bin" / "python"
-    run(python, "-m", "pip", "install", "--quiet", wheel, folder=folder)
+    run(sys.executable, "-m", "pip", "--python", python, "install", "--quiet", "--no-deps", wheel, folder=folder)
+    (packages,) = (folder / "environment").rglob("site-packages")
+    (packages / "dependencies.pth").write_text(sysconfig.get_path("purelib") + "\n")
     return python
 
 
@@ -43,7 +55,7 @@ def test_a_wheel_in_an_empty_environment_holds_everything(installed: Path, repos
     code = "import calmotion, sys; print(calmotion.__file__); print(*sys.path, sep='\\n')"
     module, *path = run(installed, "-c", code, folder=tmp_path).splitlines()
     assert Path(module).is_relative_to(environment)
-    assert not [entry for entry in path if entry and Path(entry).resolve().is_relative_to(repository)]
+    assert [entry for entry in path if (Path(entry) / "calmotion").is_dir()] == [str(Path(module).parents[1])]
 
     command = environment / "bin" / "calmotion"
     plugins = json.loads(run(command, "plugins", "list", "--json", folder=tmp_path))["plugins"]
@@ -65,6 +77,29 @@ def test_a_wheel_in_an_empty_environment_holds_everything(installed: Path, repos
     shutil.copytree(repository / "samples" / "bartender", tmp_path / "bartender")
     motors, frames, tolerance = run(installed, "-c", textwrap.dedent(code), folder=tmp_path).split()
     assert (int(motors), int(frames)) == (5, 97) and abs(float(tolerance) - 1e-3) < 1e-9
+
+
+def imported(path: Path) -> set[str]:
+    """Names of the packages that a module imports, at its top or in a function."""
+    names = set()
+    for node in ast.walk(ast.parse(path.read_bytes())):
+        if isinstance(node, ast.Import):
+            names |= {alias.name.partition(".")[0] for alias in node.names}
+        elif isinstance(node, ast.ImportFrom) and not node.level and node.module:
+            names.add(node.module.partition(".")[0])
+    return names
+
+
+def test_every_import_is_declared(repository: Path):
+    project = tomllib.loads((repository / "pyproject.toml").read_text())["project"]
+    declared = {canonicalize_name(Requirement(text).name) for text in project["dependencies"]}
+    optional = {"bpy", "bpy_extras", "mathutils", "exudyn", "pytest", "pandas"}  # each where its users have it
+    owners = packages_distributions()
+    modules = [path for room in ("pipeline", "plugins") for path in (repository / room).rglob("*.py")]
+    assert len(modules) > 200
+    for path in modules:
+        for name in imported(path) - sys.stdlib_module_names - optional - {"calmotion"}:
+            assert declared & {canonicalize_name(owner) for owner in owners.get(name, ())}, f"{path}: {name}"
 
 
 @pytest.mark.long

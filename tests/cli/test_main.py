@@ -155,9 +155,9 @@ def test_quiet_prints_nothing(run):
     assert run("simulate", "shot.usda", "--quiet") == (0, "", "")
 
 
-def test_json_stays_alone_on_stdout_whatever_plugins_print(calmotion, make_plugin):
+def test_json_stays_alone_on_stdout_whatever_plugins_print(calmotion_process, make_plugin):
     folder = make_plugin("noisy", "import os\nprint('hello')\nos.system('echo shell')\nraise RuntimeError('broken')")
-    listed = calmotion("plugins", "list", "--json", "--plugins", folder)
+    listed = calmotion_process("plugins", "list", "--json", "--plugins", folder)
     plugins = {plugin["id"]: plugin for plugin in json.loads(listed.stdout)["plugins"]}
     assert plugins["noisy"]["state"] == "failed" and "RuntimeError: broken" in plugins["noisy"]["traceback"]
     assert plugins["table_writer"]["state"] == "registered"

@@ -63,13 +63,13 @@ def test_the_folder_is_where_the_system_keeps_such_things(tmp_path):
     assert configuration_folder({}).name == "calmotion"
 
 
-def test_the_command_line_keeps_the_choice(calmotion, tmp_path):
+def test_the_command_line_keeps_the_choice(calmotion_process, tmp_path):
     import os
 
     env = os.environ | {"CALMOTION_CONFIG": str(tmp_path), "PYTHONPATH": os.pathsep.join(["pipeline"])}
 
     def run(*arguments):
-        return calmotion(*arguments, env=env, cwd=os.path.dirname(os.path.dirname(os.path.dirname(__file__))))
+        return calmotion_process(*arguments, env=env, cwd=os.path.dirname(os.path.dirname(os.path.dirname(__file__))))
 
     assert run("plugins", "disable", "figures").returncode == 0
     assert "figures 0.1.0: disabled" in run("plugins", "list").stdout

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import json
 import math
@@ -80,7 +81,8 @@ def refused(calmotion, shot: Path) -> dict:
         return {p.name: hashlib.sha256(p.read_bytes()).hexdigest() for p in shot.parent.iterdir()}
 
     before = state()
-    done = calmotion("optimize", shot.name, "-o", "calm.usda", "--json", "--quiet", cwd=shot.parent)
+    with contextlib.chdir(shot.parent):
+        done = calmotion("optimize", shot.name, "-o", "calm.usda", "--json", "--quiet")
     assert done.returncode == 1, done.stdout + done.stderr
     assert state() == before
     assert "Traceback" not in done.stderr
@@ -121,7 +123,7 @@ def test_a_file_that_is_not_there_is_refused(calmotion, tmp_path):
 
 def test_the_message_on_the_terminal_says_the_same(calmotion, tmp_path):
     shot = shots.write_arm(tmp_path / "shot.usda", negative_mass)
-    done = calmotion("optimize", shot, "-o", tmp_path / "calm.usda", cwd=tmp_path)
+    done = calmotion("optimize", shot, "-o", tmp_path / "calm.usda")
     assert done.returncode == 1
     for text in (shots.FORE, "physics:mass", "-1"):
         assert text in done.stderr

@@ -6,7 +6,7 @@ from calmotion.benchmarks.optimizer import baselines, optimizer
 
 
 def test_gauss_newton_needs_a_fraction_of_a_quasi_newton_method(capsys):
-    assert optimizer.main(["arm", "--lbfgs", "60", "--json"]) == 0
+    assert optimizer.main(["arm", "--lbfgs", "20", "--json"]) == 0
     report = json.loads(capsys.readouterr().out)
     rows = {row["method"]: row for row in report["convergence"]}
     ours = rows["Gauss-Newton"]

@@ -32,7 +32,7 @@ def test_orders_are_five_in_the_motion_and_three_in_multipliers(flexible_tree):
 
 
 def test_it_agrees_with_an_explicit_method(flexible_tree):
-    one, other = flexible_tree(100, "radau").states, flexible_tree(1600, "rk4").states
+    one, other = flexible_tree(80, "radau").states, flexible_tree(800, "rk4").states
     for part in ("c", "u", "V"):
         size = np.abs(getattr(one, part)).max()
         assert np.abs(getattr(one, part)[-1] - getattr(other, part)[-1]).max() < 1e-7 * size
