@@ -5,6 +5,7 @@ import subprocess
 import sys
 
 import pytest
+from calmotion.support.kernel_cache import VerifiedCacheFile
 
 MODULE = """
 import numpy as np
@@ -35,20 +36,48 @@ def run(tmp_path, repository):
     return run
 
 
-def test_damaged_files_are_made_again_with_one_line_each(run, tmp_path):
+def test_a_damaged_cache_is_made_again_with_one_line_for_each_file(run, tmp_path):
     assert run() == (0, "") and run() == (1, "")
     files = sorted((tmp_path / "cache").rglob("*.nb?"))
     assert [path.suffix for path in files] == [".nbc", ".nbi"]
     for path in files:
-        whole = path.read_bytes()
-        for damaged in (b"", whole[: len(whole) // 2], whole[:40] + bytes([whole[40] ^ 0xFF]) + whole[41:]):
-            path.write_bytes(damaged)
-            hits, said = run()
-            assert hits == 0 and str(path) in said and len(said.splitlines()) == 1
-            assert run() == (1, "")
-
-
-def test_a_missing_data_file_is_made_again(run, tmp_path):
-    run()
-    next((tmp_path / "cache").rglob("*.nbc")).unlink()
+        path.write_bytes(path.read_bytes()[:-1])
+        hits, said = run()
+        assert hits == 0 and str(path) in said and len(said.splitlines()) == 1
+    files[0].unlink()
     assert run() == (0, "") and run() == (1, "")
+
+
+@pytest.fixture
+def make(tmp_path):
+    return lambda stamp=(1.0, 2): VerifiedCacheFile(str(tmp_path), "name", stamp)
+
+
+def test_data_come_back_for_their_key_and_their_source(make):
+    make().save("key", {"code": b"machine code"})
+    make().save("other", [1, 2])
+    assert make().load("key") == {"code": b"machine code"} and make().load("other") == [1, 2]
+    assert make().load("third") is None and make((1.0, 3)).load("key") is None
+    make().flush()
+    assert make().load("key") is None
+
+
+@pytest.mark.parametrize("name", ["name.nbi", "name.1.nbc"])
+def test_any_damage_to_any_file_is_seen(make, tmp_path, caplog, name):
+    make().save("key", list(range(100)))
+    whole = (tmp_path / name).read_bytes()
+    damaged = [b"", whole[:10], whole + b"x", b"x" * len(whole)]
+    damaged += [whole[:at] + bytes([whole[at] ^ 0xFF]) + whole[at + 1 :] for at in range(0, len(whole), 7)]
+    for content in damaged:
+        (tmp_path / name).write_bytes(content)
+        caplog.clear()
+        assert make().load("key") is None and len(caplog.messages) == 1
+        make().save("key", list(range(100)))
+        assert make().load("key") == list(range(100))
+
+
+def test_a_folder_that_cannot_be_written_is_no_error(tmp_path):
+    (tmp_path / "file").write_text("")
+    cache = VerifiedCacheFile(str(tmp_path / "file" / "folder"), "name", (1.0, 2))
+    cache._save_index({})
+    cache._save_data("name.1.nbc", 1)
