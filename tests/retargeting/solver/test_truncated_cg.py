@@ -53,3 +53,31 @@ def test_a_search_without_gain_takes_no_product(system):
     H, _ = system
     path = solve(H, np.zeros(8))
     assert len(path.p) == 0 and np.array_equal(path.within(np.inf)[0], np.zeros(8))
+
+
+@pytest.fixture
+def ill_conditioned():
+    """A matrix with eigenvalues from 1e-4 to 1e6, as those of stiff and of nearly idle motions."""
+    rng = np.random.default_rng(3)
+    basis = np.linalg.qr(rng.normal(size=(200, 200)))[0]
+    return basis * np.geomspace(1e-4, 1e6, 200) @ basis.T, rng.normal(size=200)
+
+
+def test_rounding_does_not_grow(ill_conditioned):
+    """Plain conjugate gradients differ by 1e-3 here."""
+    H, g = ill_conditioned
+    rng = np.random.default_rng(4)
+    one = conjugate_gradients(lambda v: H @ v, g, lambda r: r, np.inf, 1e-14, 0.0, 60)
+    nearly = g * (1.0 + 1e-14 * rng.normal(size=200))
+    other = conjugate_gradients(lambda v: H @ v, nearly, lambda r: r, np.inf, 1e-14, 0.0, 60)
+    assert len(one.p) == len(other.p) == 60
+    for k in (20, 40, 60):
+        assert np.abs(one.steps[k] - other.steps[k]).max() < 1e-9 * np.abs(one.steps[k]).max()
+
+
+def test_directions_are_conjugate(ill_conditioned):
+    H, g = ill_conditioned
+    path = conjugate_gradients(lambda v: H @ v, g, lambda r: r, np.inf, 1e-14, 0.0, 60)
+    gram = path.p @ path.Hp.T
+    scale = np.sqrt(np.diag(gram))
+    assert np.abs(gram / np.outer(scale, scale) - np.eye(60)).max() < 1e-8

