@@ -8,7 +8,7 @@ from typing import Any
 from calmotion.accuracy.reduced_bodies import ConvergedReduction, ReducedBodies, compiled_in
 from calmotion.host import NotAsked, Operator, Property, RunContext
 from calmotion.shot import Animation, Character, FEMeshes, ModelChoices
-from calmotion.shot.model_choice import nothing_bends, run_settings, simplified_character
+from calmotion.shot.model_choice import no_flexible_bodies, run_settings, simplified_character
 from calmotion.shot.outputs import SystemModes
 from calmotion.shot.run import OutputPaths, Source
 from calmotion.simulation.compiled_shot import CompiledShot
@@ -34,7 +34,7 @@ class ReduceFlexibleBodies(Operator):
 
     @classmethod
     def poll(cls, data: Mapping[type, Any]) -> str | None:
-        return nothing_bends(data)
+        return no_flexible_bodies(data)
 
     def execute(self, context: RunContext) -> Sequence[object]:
         from calmotion.simulation.bodies import mode_tables, with_elasticity
@@ -86,7 +86,7 @@ class FindSystemModes(Operator):
         if source is not None and source.command != "inspect" and paths is not None:
             if not paths.figures and not paths.rrd:
                 return NotAsked("only figures and recordings show frequencies, and none are requested")
-        return nothing_bends(data)
+        return no_flexible_bodies(data)
 
     def execute(self, context: RunContext) -> Sequence[object]:
         from calmotion.simulation.prepare import first_pose_modes

@@ -7,7 +7,7 @@ from typing import Any
 
 from calmotion.host import Operator, Property, RunContext
 from calmotion.shot import Character, FEMeshes, ModelChoices
-from calmotion.shot.model_choice import nothing_bends
+from calmotion.shot.model_choice import no_flexible_bodies
 
 
 class TetrahedralizeFlexibleBodies(Operator):
@@ -41,7 +41,7 @@ class TetrahedralizeFlexibleBodies(Operator):
     @classmethod
     def poll(cls, data: Mapping[type, Any]) -> str | None:
         """The reason to skip it: nothing is flexible."""
-        return nothing_bends(data)
+        return no_flexible_bodies(data)
 
     def execute(self, context: RunContext) -> Sequence[object]:
         """The meshes, in the order of the bodies."""
@@ -56,7 +56,7 @@ class TetrahedralizeFlexibleBodies(Operator):
             time_limit=context.properties.time_limit,
             cache=context.properties.cache,
         )
-        flexible = [index for index, body in enumerate(character.bodies) if body.bends]
+        flexible = [index for index, body in enumerate(character.bodies) if body.simulated_flexible]
         meshes = []
         for done, index in enumerate(flexible):
             body = character.bodies[index]

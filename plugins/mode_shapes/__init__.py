@@ -8,7 +8,7 @@ from typing import Any
 from calmotion.accuracy.reduced_bodies import ReducedBodies
 from calmotion.host import Operator, Property, RunContext
 from calmotion.shot import Character, FEMeshes, ModelChoices
-from calmotion.shot.model_choice import nothing_bends, run_settings, simplified_character
+from calmotion.shot.model_choice import no_flexible_bodies, run_settings, simplified_character
 from calmotion.shot.outputs import ModeShapes
 from calmotion.shot.run import OutputPaths, Source
 
@@ -30,7 +30,7 @@ class WriteModeShapes(Operator):
     def poll(cls, data: Mapping[type, Any]) -> str | None:
         paths = data.get(OutputPaths)
         missing = None if paths and paths.modes else "no mode shapes are requested (--modes)"
-        return nothing_bends(data) or missing
+        return no_flexible_bodies(data) or missing
 
     def execute(self, context: RunContext) -> Sequence[object]:
         from calmotion.simulation.bodies import flexible_modes

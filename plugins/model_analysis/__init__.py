@@ -8,7 +8,7 @@ from typing import Any
 from calmotion.accuracy.reduced_bodies import ConvergedReduction, ReducedBodies, compiled_in
 from calmotion.host import NotAsked, Operator, Property, RunContext
 from calmotion.shot import Animation, Character, ModelChoices, Result
-from calmotion.shot.model_choice import AUTO, KINDS, OFF, ON, nothing_bends, run_settings
+from calmotion.shot.model_choice import AUTO, KINDS, OFF, ON, no_flexible_bodies, run_settings
 from calmotion.shot.outputs import PlannedStep, ShapedTracks, Verification
 from calmotion.shot.run import OutputPaths, Source
 from calmotion.simulation.compiled_shot import CompiledShot
@@ -48,7 +48,7 @@ class AnalyseShot(Operator):
         source, paths = context.get(Source), context.get(OutputPaths)
         forced = {kind: getattr(context.properties, kind) for kind in KINDS}
         if paths is not None and paths.modes and forced["bodies"] == AUTO:
-            forced["bodies"] = ON  # their mode shapes are asked for
+            forced["bodies"] = ON  # their mode shapes are requested
         changes = source is None or source.command != "simulate"
         options = run_settings(source)
         return [analyse(context.get(Character), context.get(Animation), options, forced, changes)]
@@ -98,7 +98,7 @@ class PlanStep(Operator):
         source, character = data.get(Source), data.get(Character)
         if source is not None and source.command != "inspect":
             return NotAsked("other commands choose it themselves")
-        reason = nothing_bends(data)
+        reason = no_flexible_bodies(data)
         if reason is None or character is None:
             return None
         driven = {motor.joint for motor in character.motors}

@@ -119,7 +119,7 @@ def test_the_integrator_that_needs_fewest_steps_gives_way_where_it_fails(arm, an
 def test_an_optimisation_keeps_its_tolerance(arm, animation, bodies, tolerance):
     result = optimize_to_tolerance(compile_shot(arm, animation, bodies), RunSettings(tolerance=tolerance), quiet)
     off = off_by(result, arm, animation, bodies)
-    assert off < 1.5 * result.accuracy.step_m and off < result.accuracy.asked_m == tolerance
+    assert off < 1.5 * result.accuracy.step_m and off < result.accuracy.requested_m == tolerance
     assert result.accuracy.estimated_m <= WHOLE * tolerance
     assert result.objective_after < 0.1 * result.objective_before
     assert result.accuracy.left_out_m == sum(row.estimated_error_m or 0.0 for b in bodies for row in b.left_out)
@@ -167,9 +167,9 @@ def test_verifying_measures_the_distance_to_a_finer_run(arm, animation, meshes, 
 def test_a_search_continues_where_the_pod_subspace_does_not_fit(arm, animation, meshes, monkeypatch):
     shot = reduced_shot(with_elasticity(arm, "stvk"), animation, meshes, RunSettings(tolerance=1e-3))
     asked, parts = [], []
-    plain_hold, plain_search = ProjectedShot.hold_for, retarget.optimize_shot
+    plain_hold, plain_search = ProjectedShot.is_accurate_for, retarget.optimize_shot
 
-    def hold_for(self, tracks, step):
+    def is_accurate_for(self, tracks, step):
         asked.append(tracks)
         return plain_hold(self, tracks, step) and len(asked) > 1
 
@@ -177,7 +177,7 @@ def test_a_search_continues_where_the_pod_subspace_does_not_fit(arm, animation, 
         parts.append(shot)
         return plain_search(shot, *more)
 
-    monkeypatch.setattr(ProjectedShot, "hold_for", hold_for)
+    monkeypatch.setattr(ProjectedShot, "is_accurate_for", is_accurate_for)
     monkeypatch.setattr(retarget, "optimize_shot", search)
     result = optimize_to_tolerance(shot, RunSettings(max_iterations=15), quiet)
     assert len(asked) == len(parts) == 2
@@ -185,9 +185,9 @@ def test_a_search_continues_where_the_pod_subspace_does_not_fit(arm, animation, 
     assert begun.animation.current is animation.current
     assert gone_on.animation.current is asked[0] is not asked[1]
     assert sum(len(body.stiffness) for body in begun.bodies) < sum(len(body.stiffness) for body in shot.bodies)
-    # the frequencies are those of the links, not of the directions that they were held to
+    # the frequencies are those of the links, not those of their POD subspaces
     assert [len(table.frequencies) for table in result.modes] == [len(body.stiffness) for body in shot.bodies[:2]]
-    held = [row for row in result.left_out if "POD subspace" in row.what]
-    assert len(held) == 2
+    subspaces = [row for row in result.left_out if "POD subspace" in row.what]
+    assert len(subspaces) == 2
     whole = simulate_at(shot.with_tracks(asked[1]), RunSettings(), 1 / 480)
     assert distance(whole.positions, frames_of(result, animation.frame_times).positions) < 1e-4

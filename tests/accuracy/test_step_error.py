@@ -4,10 +4,8 @@ import numpy as np
 import pytest
 from calmotion.accuracy.step_error import StepRun, largest_step, simulate_at, step_error
 from calmotion.errors import IntegrationError, ShotError
-from calmotion.multibody.failure import SimulationFailure
 from calmotion.shot.run import RunSettings
 from calmotion.simulation.compiled_shot import compile_shot
-from calmotion.simulation.prepare import failure_error, prepare
 
 
 def of_second_order(step):
@@ -62,12 +60,6 @@ def test_a_shot_that_no_step_can_simulate_is_tried_once():
     with pytest.raises(ShotError, match="equilibrium"):
         largest_step(unsupported, 0.1, 1e-3, lambda run: 1.0)
     assert tried == [0.1]
-
-
-def test_only_failures_that_depend_on_the_step_may_be_tried_again(arm, animation, bodies):
-    prepared = prepare(compile_shot(arm, animation, bodies), RunSettings(step=1 / 240))
-    for reason, kind in (("no static equilibrium", ShotError), ("diverged", IntegrationError)):
-        assert type(failure_error(prepared, SimulationFailure(0, 0, reason))) is kind
 
 
 def test_the_estimate_is_near_the_error_against_a_far_finer_step(arm, animation, bodies):

@@ -1,4 +1,4 @@
-"""The analysis of needs in the pipeline: what it leaves out is not run, and everything can be forced."""
+"""The analysis in the pipeline: what it simplifies is not run, and everything can be forced."""
 
 import pytest
 from calmotion.benchmarks.scenes.simplification_shots import clevis_arm, mixed_arm
@@ -59,8 +59,8 @@ def test_the_step_counts_in_the_accuracy(host):
 def test_mode_shapes_need_finite_elements(host):
     shot = mixed_arm()
     given = [shot.character, shot.animation, _source("inspect"), OutputPaths(modes="somewhere")]
-    (needs,) = run_operator(host, "accuracy.analyse", given)
-    assert needs.character.bodies[0].bends and needs.forced == {"bodies": ON}
+    (choices,) = run_operator(host, "accuracy.analyse", given)
+    assert choices.character.bodies[0].simulated_flexible and choices.forced == {"bodies": ON}
 
 
 def test_forces_of_a_redundant_joint_are_zero_and_the_other_joints_carry_them(host):

@@ -42,20 +42,20 @@ def converged_reduction(
     Raises:
         ShotError: A body cannot be reduced, or the shot not be simulated.
     """
-    tolerance = asked = options.tolerance
-    assert asked is not None and tolerance is not None
+    tolerance = requested = options.tolerance
+    assert requested is not None and tolerance is not None
 
     def simulated(shot: CompiledShot, options: RunSettings) -> ReferenceRun:
         return reference_run(shot, options, options.step or MAX_STEP)
 
-    off, found, allowed = 0.0, simulated(shot, options), SHARE * asked
+    off, found, allowed = 0.0, simulated(shot, options), SHARE * requested
     if retargeted:
         allowed = max(allowed, OF_SHAKE * distance(found.run.positions, intended_positions(shot, options)))
     for k in range(MOST):
         progress((k + 1) / (MOST + 1), f"a reduction to {1e3 * tolerance:.2g} mm")
         tolerance *= FINER
         # what quadratic strain does not see has a bound of its own, and seeing all of it costs most of the time
-        bodies = reduction.bodies(tolerance, max(1.0, PAIRS * asked / tolerance))
+        bodies = reduction.bodies(tolerance, max(1.0, PAIRS * requested / tolerance))
         if _same(shot.bodies, bodies):
             continue
         finer = shot.with_bodies(bodies)

@@ -20,7 +20,7 @@ def by_fast_scheme(options: RunSettings, simulate: Callable[[RunSettings], Found
     together in velocity alone, so that they come apart where steps are coarse, and is not what searches differentiate.
 
     Args:
-        options: With an integrator where one was asked for: it is then the only one.
+        options: If they name an integrator, it is the only one.
         simulate: By the options that it is given.
     """
     if options.integrator is None:

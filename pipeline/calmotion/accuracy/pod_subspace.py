@@ -1,4 +1,4 @@
-"""Bodies held to the few directions that a shot moves them in.
+"""Bodies restricted to the few directions in which a shot deforms them (proper orthogonal decomposition).
 
 A reduction keeps whatever a body may do under loads of some kind. A shot does little of it: where 36 coordinates keep
 a link's motion to a hundredth of a millimetre, ten of their combinations hold all but 1e-8 of its strain energy from
@@ -32,27 +32,27 @@ MISSING = tuple(10.0 ** (-0.5 * k) for k in range(4, 13))
 
 @dataclass(frozen=True, eq=False)
 class ReferenceRun:
-    """A simulation with all coordinates: the shot, with its curves, and what came of them."""
+    """A simulation with all coordinates: the shot with its curves, and its result."""
 
     animation: Animation
     run: StepRun
 
 
 class ProjectedShot:
-    """A shot with its bodies held to the fewest directions in which its known motions happen to an allowed error.
+    """A shot with its bodies restricted to the fewest directions that give its known motions with an allowed error.
 
-    Bodies whose coordinates are the user's choice keep them. Where fewer directions do not do, all are kept; what
-    `RunSettings.directions` forces is done whatever the error.
+    Bodies whose coordinates are the user's choice keep them. Where fewer directions are not accurate, all are kept,
+    unless `RunSettings.directions` forces them.
 
     Args:
         complete: The shot, its bodies with all coordinates.
         options: Of all simulations.
-        allowed: How far a target may be from where a known simulation has it [m].
-        known: Simulations of the shot with all coordinates, at least one unless nothing is worth holding.
+        allowed: Largest distance of a target from its position in a known simulation [m].
+        known: Simulations of the shot with all coordinates, at least one unless no body can be projected.
 
     Attributes:
         shot: The shot with the projected bodies.
-        error_m: How far a target is from where all coordinates have it, in what was looked at last [m].
+        error_m: Largest distance of a target from its position with all coordinates, in the last comparison [m].
     """
 
     def __init__(
@@ -61,12 +61,12 @@ class ProjectedShot:
     ):  # fmt: skip
         self._complete, self._options = complete, options
         self._allowed, self._known = allowed, list(known)
-        self._chosen = _worth(complete, options)
+        self._chosen = _candidates(complete, options)
         self.shot, self.error_m = complete, 0.0
         if self._chosen:
-            self._hold()
+            self._project()
 
-    def _hold(self) -> None:
+    def _project(self) -> None:
         complete = self._complete
         motion = {b: np.vstack([item.run.elastic[b] for item in self._known]) for b in self._chosen}
         for missing in MISSING:
@@ -83,7 +83,7 @@ class ProjectedShot:
         self.shot, self.error_m = complete, 0.0
 
     def _off(self, shot: CompiledShot, known: ReferenceRun) -> float:
-        """How far a shot is from a known simulation, by its own step and integrator, at any target and frame [m]."""
+        """Largest distance of a target from a known simulation, with the same step and integrator [m]."""
         options = replace(self._options, integrator=known.run.integrator or self._options.integrator)
         try:
             run = simulate_at(shot.with_tracks(known.animation.current), options, known.run.step)
@@ -91,8 +91,10 @@ class ProjectedShot:
             return np.inf
         return distance(run.positions, known.run.positions)
 
-    def hold_for(self, tracks: Sequence[Track], step: float) -> bool:
-        """Whether the bodies do for other curves too, by one simulation with all coordinates; if not, they do now.
+    def is_accurate_for(self, tracks: Sequence[Track], step: float) -> bool:
+        """Whether the bodies are accurate for other curves; if not, they are projected anew.
+
+        This takes one simulation with all coordinates.
 
         Args:
             tracks: The motors' current curves.
@@ -109,7 +111,7 @@ class ProjectedShot:
             self.error_m = off
             return True
         self._known.append(more)
-        self._hold()
+        self._project()
         return False
 
 
@@ -117,23 +119,23 @@ def project_to_subspace(
     shot: CompiledShot, options: RunSettings, step: float, allowed: Callable[[ReferenceRun], float],
     known: ReferenceRun | None = None,
 ) -> ProjectedShot:  # fmt: skip
-    """A shot with its bodies held to what it does, by its current curves; other arguments as of `ProjectedShot`.
+    """A shot with its bodies projected for its current curves; other arguments as of `ProjectedShot`.
 
     Args:
         step: Of the simulation with all coordinates [s].
-        known: It, where it was done.
+        known: That simulation, if it exists already.
 
     Raises:
         ShotError: The shot cannot be simulated.
     """
-    if not _worth(shot, options):
+    if not _candidates(shot, options):
         return ProjectedShot(shot, options, allowed, ())
     if known is None or known.animation.current != shot.animation.current:
         known = reference_run(shot, options, step)
     return ProjectedShot(shot, options, allowed, [known])
 
 
-def _worth(shot: CompiledShot, options: RunSettings) -> list[int]:
+def _candidates(shot: CompiledShot, options: RunSettings) -> list[int]:
     """Bodies that are nonlinear, and whose coordinates are the program's choice."""
     found: list[int] = []
     if options.directions == ON:

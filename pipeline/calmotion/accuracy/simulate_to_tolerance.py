@@ -1,6 +1,6 @@
 """Simulate or retarget a shot to a tolerance: the time step follows from the error that it causes at the targets.
 
-Where no tolerance is asked for, the step is that of `time_grid.make_grid`; its error is estimated all the same after an
+Without a requested tolerance, the step is that of `time_grid.make_grid`; its error is estimated all the same after an
 optimisation, where one more simulation costs next to nothing.
 """
 
@@ -38,18 +38,18 @@ SHARE = 0.5  # of the tolerance, that the time step may take in any case
 WHOLE = 0.8  # of the tolerance, that it may take together with what the bodies do without
 FIRST, LAST = 1.0 / 60.0, 1.0 / 30720.0  # steps that are tried [s]
 OF_SHAKE = 0.05  # of the input's own error: how well that need be known before it is taken away
-# Where no tolerance is asked for, a simulation of what was written has all coordinates, and is to tell the same errors.
+# Without a requested tolerance, a simulation of what was written has all coordinates, and shall have the same errors.
 UNASKED = 0.002
 HELD = 0.1  # of the tolerance (and of how well the shake need be known), that holding bodies to directions may take
 NAMES = {"bdf2": "BDF2", "newmark": "Newmark's method", "generalized-alpha": "generalised-alpha"}
-FINDING = "finding the directions that the shot bends links in"
+FINDING = "choosing the subspace of the deformations in this shot"
 
 
 def simulate_to_tolerance(
     shot: CompiledShot, options: RunSettings, progress: Progress, left_out_m: float | None = None,
     known: ReferenceRun | None = None,
 ) -> Result:  # fmt: skip
-    """As `simulate_shot`, with what keeps the tolerance where one is asked for: directions of bodies, and a time step.
+    """As `simulate_shot`, with POD subspaces of the bodies and a time step that keep a requested tolerance.
 
     Args:
         left_out_m: Error of what the bodies do without where it is known better than their own estimates [m].
@@ -58,15 +58,15 @@ def simulate_to_tolerance(
     if options.tolerance is None:
         return simulate_shot(shot, options, progress)
     progress(0.0, FINDING)
-    held, character = project_to_tolerance(shot, options, known), shot.character
+    projected, character = project_to_tolerance(shot, options, known), shot.character
     if not chooses_step(character, options):
-        return with_modes(simulate_shot(held.shot, options, progress), shot.bodies)
+        return with_modes(simulate_shot(projected.shot, options, progress), shot.bodies)
     progress(0.0, "choosing the time step")
-    left_out = (omitted_error(shot.bodies) if left_out_m is None else left_out_m) + held.error_m
+    left_out = (omitted_error(shot.bodies) if left_out_m is None else left_out_m) + projected.error_m
 
     def simulated(options: RunSettings) -> Result:
-        step, error = chosen_step(held.shot, options, left_out)
-        result = simulate_shot(held.shot, replace(options, step=step), progress)
+        step, error = chosen_step(projected.shot, options, left_out)
+        result = simulate_shot(projected.shot, replace(options, step=step), progress)
         accuracy = Accuracy(error, left_out, mesh_error(shot.bodies), options.tolerance)
         return with_step(with_modes(replace(result, accuracy=accuracy), shot.bodies), character, options)
 
@@ -95,7 +95,7 @@ def own_step(character: Character, options: RunSettings) -> float:
 
 
 def with_modes(result: Result, bodies: Sequence[ReducedBody]) -> Result:
-    """The result with the frequencies of the bodies themselves, not of the directions that they were held to."""
+    """The result with the frequencies of the bodies themselves, not those of their POD subspaces."""
     return replace(result, modes=mode_tables(bodies))
 
 
@@ -123,10 +123,10 @@ def planned_step(shot: CompiledShot, options: RunSettings) -> Simplification:
     """The step that a simulation of the shot as animated would take, and why, by simulating it."""
     character = shot.character
     if chooses_step(character, options):
-        held = project_to_tolerance(shot, options, None)
-        left_out = omitted_error(shot.bodies) + held.error_m
+        projected = project_to_tolerance(shot, options, None)
+        left_out = omitted_error(shot.bodies) + projected.error_m
         return by_fast_scheme(
-            options, lambda options: step_row(character, options, *chosen_step(held.shot, options, left_out))
+            options, lambda options: step_row(character, options, *chosen_step(projected.shot, options, left_out))
         )
     trial = partial(simulate_at, shot, options)
     fine = trial(own_step(character, options))

@@ -17,7 +17,7 @@ from calmotion.simulation.inputs.time_grid import MAX_STEP
 from calmotion.simulation.simulate import Progress
 
 STEP, TOLERANCE = 0.25, 0.1  # of those of the result
-HELD = 0.01  # of its tolerance, that holding the finer run's bodies to what the shot moves may take
+PROJECTION = 0.01  # share of the tolerance for the error of the POD subspaces of the finer run
 FINER, MOST = 0.1, 4  # a reduction that is no finer than the result's is tried again with this share of its tolerance
 
 
@@ -43,10 +43,10 @@ def verify(
     if reduction is not None:
         shot = shot.with_bodies(_finer(shot, reduction, options, progress))
     progress(0.5, "simulating with a finer step")
-    least = HELD * shot.character.retarget.allowed(options.tolerance)
-    held = project_to_subspace(shot, options, MAX_STEP, lambda known: least)
+    least = PROJECTION * shot.character.retarget.allowed(options.tolerance)
+    projected = project_to_subspace(shot, options, MAX_STEP, lambda known: least)
     step = STEP * result.step_s
-    fine = by_fast_scheme(options, lambda options: simulate_at(held.shot, options, step))
+    fine = by_fast_scheme(options, lambda options: simulate_at(projected.shot, options, step))
     own = frames_of(result, shot.animation.frame_times)
     return distance(own.positions, fine.positions), fine.step, _coordinates(shot.bodies)
 

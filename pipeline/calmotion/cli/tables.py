@@ -98,11 +98,15 @@ def print_accuracy(console: Console, report: dict[str, Any]) -> None:
             f"measured simulation error {length(report['verified_error_m'])}, against a run with steps of "
             f"{1000 * report['verified_step_s']:.4g} ms and {report['verified_modes']} elastic coordinates"
         )
-    asked, measured, estimated = report["tolerance_m"], report["verified_error_m"], report["estimated_error_m"] or 0.0
+    requested, measured, estimated = (
+        report["tolerance_m"],
+        report["verified_error_m"],
+        report["estimated_error_m"] or 0.0,
+    )
     # an estimate is a sum of bounds, so only one far above the tolerance is evidence
-    if asked is not None and (estimated > _FAR * asked if measured is None else measured > asked):
+    if requested is not None and (estimated > _FAR * requested if measured is None else measured > requested):
         console.print(
-            f"the tolerance of {length(asked)} is not kept: with large deflections, or near buckling, small errors "
+            f"the tolerance of {length(requested)} is not kept: with large deflections, or near buckling, small errors "
             "grow; use a stiffer robot or a slower motion"
         )
 

@@ -64,17 +64,17 @@ def optimize_to_tolerance(
         return distance(run.positions, intended())
 
     progress(0.0, FINDING)
-    held = project_to_tolerance(shot.with_tracks(animation.tracks), options, known, shake)
+    projected = project_to_tolerance(shot.with_tracks(animation.tracks), options, known, shake)
     chooses = chooses_step(character, options)
     step = own_step(character, options)
     if chooses:
         progress(0.0, "choosing the time step")
-        enough = allowed_step_error(options, omitted_error(held.shot.bodies))
-        trial = partial(simulate_at, held.shot, options)
+        enough = allowed_step_error(options, omitted_error(projected.shot.bodies))
+        trial = partial(simulate_at, projected.shot, options)
         step, _ = largest_step(trial, FIRST, LAST, lambda run: max(enough, OF_SHAKE * shake(run)))
     result, tracks = None, animation.current
     for _ in range(MOST):
-        reduced = held.shot.with_tracks(tracks)
+        reduced = projected.shot.with_tracks(tracks)
         of_step = replace(options, step=step) if chooses else options
         latest = _searched(reduced, of_step, progress, checkpoint)
         result = with_modes(latest if result is None else _continued(result, latest), shot.bodies)
@@ -86,7 +86,7 @@ def optimize_to_tolerance(
         allowed = allowed_step_error(options, result.accuracy.left_out_m) if chooses else np.inf
         fine = result.accuracy.step_m <= allowed or step <= LAST
         ended = latest.iterations >= options.max_iterations  # a new POD subspace would allow no further iteration
-        if fine and (ended or held.hold_for(tracks, own_step(character, options))):
+        if fine and (ended or projected.is_accurate_for(tracks, own_step(character, options))):
             break
         if not fine:
             step = max(LAST, MARGIN * result.step_s * (allowed / result.accuracy.step_m) ** (1.0 / ORDER))

@@ -176,7 +176,7 @@ class Body:
     non_rotating: bool = False
 
     @property
-    def bends(self) -> bool:
+    def simulated_flexible(self) -> bool:
         """Whether it is simulated as flexible."""
         return self.flexible is not None and not self.stiff
 
@@ -297,9 +297,9 @@ class RetargetSettings:
     endpoints: str = "free"
     cyclic: bool = False
 
-    def allowed(self, asked: float | None = None) -> float:
+    def allowed(self, requested: float | None = None) -> float:
         """Acceptable error at the targets [m]: the requested one, else the shot's, else 1 mm."""
-        return asked or self.tolerance or DEFAULT_TOLERANCE
+        return requested or self.tolerance or DEFAULT_TOLERANCE
 
 
 @dataclass(frozen=True, eq=False)

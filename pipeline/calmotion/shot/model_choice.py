@@ -69,7 +69,7 @@ def run_settings(source: Source | None, choices: ModelChoices | None = None, **m
     """The settings of a run.
 
     Args:
-        source: What the user asked for; None: everything is left to the shot and to the program.
+        source: Settings of the user; None: the shot and the program choose everything.
         choices: Simplifications, some of which the user may have forced.
         more: Other fields of the settings.
     """
@@ -96,15 +96,15 @@ def with_choices(result: Result, choices: ModelChoices | None) -> Result:
     return replace(result, left_out=(*rows, *result.left_out), accuracy=accuracy)
 
 
-def nothing_bends(data: Mapping[type, Any]) -> str | None:
+def no_flexible_bodies(data: Mapping[type, Any]) -> str | None:
     """The reason why a step for flexible bodies is not needed, None where it is.
 
     Args:
         data: What is known of the run, by type.
     """
-    character, needs = data.get(Character), data.get(ModelChoices)
+    character, choices = data.get(Character), data.get(ModelChoices)
     if character is not None and not any(body.flexible for body in character.bodies):
         return "nothing is flexible: no body has CalmFlexibleBodyAPI"
-    if needs is not None and not any(body.bends for body in needs.character.bodies):
+    if choices is not None and not any(body.simulated_flexible for body in choices.character.bodies):
         return "the user forced all bodies to be rigid"
     return None

@@ -165,13 +165,13 @@ class Accuracy:
         step_m: Estimated error of the time step [m].
         left_out_m: Estimated error of the model simplifications [m].
         mesh_m: Estimated error of the finite-element meshes [m]; None where it is not known.
-        asked_m: The requested tolerance [m]; None where the shot's or the default one holds.
+        requested_m: The requested tolerance [m]; None where the shot's or the default one holds.
     """
 
     step_m: float
     left_out_m: float
     mesh_m: float | None = None
-    asked_m: float | None = None
+    requested_m: float | None = None
 
     @property
     def estimated_m(self) -> float:

@@ -1,4 +1,4 @@
-"""What the user asked for: the command, the settings of the run, and the files to write."""
+"""Input of the user: the command, the settings of the run, and the files to write."""
 
 from __future__ import annotations
 
@@ -73,7 +73,7 @@ class Source:
 
 @dataclass(frozen=True)
 class OutputPaths:
-    """Where the results go; None: not asked for."""
+    """Where the results go; None: not requested."""
 
     layer: str | None = None
     rrd: str | None = None

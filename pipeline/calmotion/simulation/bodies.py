@@ -48,12 +48,12 @@ def reduce_bodies(
     mesh_of = {} if meshes is None else {mesh.body: mesh for mesh in meshes.meshes}
     allowed = character.retarget.allowed(tolerance)
     # what bodies along a chain leave out adds up
-    flexible = sum(body.bends for body in character.bodies)
+    flexible = sum(body.simulated_flexible for body in character.bodies)
     result = []
     for index, (body, anchors) in enumerate(zip(character.bodies, body_anchors(character, tree), strict=True)):
         if progress is not None:
             progress(index / len(character.bodies), body.path)
-        if not body.bends:
+        if not body.simulated_flexible:
             result.append(rigid_body(body, anchors))
             continue
         if index not in mesh_of:
@@ -94,7 +94,11 @@ def _reduced(
 
 def _damped(character: Character, tree: Tree, bodies: Sequence[ReducedBody]) -> list[ReducedBody]:
     """The bodies, damped so that the character's modes have the ratios of their materials."""
-    materials = {k: b.flexible.material for k, b in enumerate(character.bodies) if b.flexible is not None and b.bends}
+    materials = {
+        k: b.flexible.material
+        for k, b in enumerate(character.bodies)
+        if b.flexible is not None and b.simulated_flexible
+    }
     if all(material.rayleigh is not None for material in materials.values()):
         return list(bodies)  # these do not know of modes
     from calmotion.multibody.analysis.modes import elastic_modes

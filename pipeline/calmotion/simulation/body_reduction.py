@@ -63,14 +63,14 @@ class BodyReduction:
 def load_envelopes(
     character: Character, animation: Animation, meshes: FEMeshes | None, options: RunSettings
 ) -> tuple[LoadEnvelope, ...] | None:
-    """Loads on each body in a shot; None where nothing bends, or a rigid robot cannot follow it.
+    """Loads on each body in a shot; None without flexible bodies, or where a rigid robot cannot follow it.
 
     Args:
         character, animation: The shot.
         meshes: Of its flexible bodies.
         options: Of the run.
     """
-    if len(animation.frame_times) < 2 or not any(body.bends for body in character.bodies):
+    if len(animation.frame_times) < 2 or not any(body.simulated_flexible for body in character.bodies):
         return None
     try:
         grid, tree = grid_of(character, animation, options), span_tree(character)

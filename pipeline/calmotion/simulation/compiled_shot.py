@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 class CompiledShot:
     """A shot with one set of bodies; every simulation of it starts from here, whatever its time step.
 
-    The system is compiled when it is first asked for: many runs on rigid characters never simulate.
+    The system is compiled at its first use: many runs on rigid characters never simulate.
 
     Attributes:
         character: The character, with its simplifications.
@@ -86,7 +86,7 @@ class _System:
 def compile_shot(
     character: Character, animation: Animation, bodies: Sequence[ReducedBody] | None = None
 ) -> CompiledShot:
-    """A shot with its bodies, compiled when the system is first asked for.
+    """A shot with its bodies, compiled when its system is first used.
 
     Asking for it raises ShotError where a joint or a loop is not supported, or a flexible body is not reduced.
 

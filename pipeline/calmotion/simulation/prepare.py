@@ -9,7 +9,7 @@ import numpy as np
 from calmotion.errors import IntegrationError, ShotError
 from calmotion.multibody.analysis.deflection import largest_deflection
 from calmotion.multibody.analysis.modes import system_modes
-from calmotion.multibody.failure import SimulationFailure
+from calmotion.multibody.failure import Reason, SimulationFailure
 from calmotion.multibody.integrators.integrate import follows_roots
 from calmotion.multibody.model.model import Model
 from calmotion.reduction.reduced_body import ReducedBody
@@ -166,7 +166,7 @@ def failure_error(prepared: Prepared, failure: SimulationFailure) -> ShotError:
     """A failed step in the user's words: which body, which joint, when; an `IntegrationError` where another step or
     integrator may succeed."""
     tree, character, system = prepared.model.tree, prepared.character, prepared.model.system
-    if failure.reason == "does not settle":
+    if failure.reason == Reason.NOT_PERIODIC:
         return IntegrationError(
             "no periodic motion of the robot was found",
             path=character.path,
@@ -176,7 +176,8 @@ def failure_error(prepared: Prepared, failure: SimulationFailure) -> ShotError:
             "false.",
         )
     # the static start depends neither on the step nor on the integrator
-    kind = ShotError if failure.reason == "no static equilibrium" else IntegrationError
+    static = failure.reason == Reason.NO_EQUILIBRIUM
+    kind = ShotError if static else IntegrationError
     when = failure.time_s + prepared.grid.times[0]
     what = f"{_REASONS[failure.reason]} at {when:.3f} s"
     bend = None if failure.state is None else largest_deflection(system, failure.state)
@@ -189,17 +190,40 @@ def failure_error(prepared: Prepared, failure: SimulationFailure) -> ShotError:
             remedy="Check physics:youngsModulus (in the stage's units), the loads and the speed of the motion.",
         )
     joint = character.joints[tree.joint[failure.component]]
+    body = character.bodies[tree.body[failure.component]].path
+    if static:
+        return ShotError(
+            f"the robot has no static equilibrium in the pose of its first frame: under {failure.share:.0%} of gravity "
+            f"it fails, first at the joint {joint.path}",
+            path=body,
+            remedy=_remedy_at_rest(prepared, failure.component),
+        )
     return kind(
         f"the simulation {what}, first at the joint {joint.path}",
-        path=character.bodies[tree.body[failure.component]].path,
+        path=body,
         remedy="Try a smaller --step; check the masses, the material and the motion of this joint there.",
     )
 
 
+def _remedy_at_rest(prepared: Prepared, component: int) -> str:
+    """What would hold a body that finds no static equilibrium."""
+    tree, character = prepared.model.tree, prepared.character
+    joint, body = character.joints[tree.joint[component]], character.bodies[tree.body[component]]
+    driven = any(motor.joint == tree.joint[component] for motor in character.motors)
+    ways = []
+    if not driven and joint.kind != "fixed":
+        ways.append(f"give {joint.path} a motor (a drive), or replace it by a fixed joint where it does not move")
+    if body.flexible is not None:
+        ways.append("raise physics:youngsModulus of its material (in the stage's units)")
+    ways.append("check physics:mass and physics:centerOfMass of what it carries, and the joints that close its chain")
+    text = "; or ".join(ways)
+    return f"{text[0].upper()}{text[1:]}."
+
+
 _FAR = 0.25  # deflection over length that explains a failure
 _REASONS = {
-    "singular": "meets a singular system",
-    "diverged": "diverges",
-    "refined": "can only go on with smaller steps",
-    "no static equilibrium": "finds no static equilibrium",
+    Reason.SINGULAR: "meets a singular system",
+    Reason.DIVERGED: "diverges",
+    Reason.REFINED: "can only go on with smaller steps",
+    Reason.NO_EQUILIBRIUM: "has no static equilibrium",
 }

@@ -105,7 +105,7 @@ def rigid_bodies(character: Character, tree: Tree, meshes: FEMeshes | None) -> l
     mesh_of = {} if meshes is None else {mesh.body: mesh for mesh in meshes.meshes}
     result = []
     for index, (body, anchors) in enumerate(zip(character.bodies, body_anchors(character, tree), strict=True)):
-        if body.flexible is not None and body.bends and index in mesh_of:
+        if body.flexible is not None and body.simulated_flexible and index in mesh_of:
             mesh, own = mesh_of[index], None if body.mass is None else body.mass.mass
             body = replace(body, mass=mass_of_tets(mesh.points, mesh.tets, body.flexible.material.density, own))
         result.append(rigid_body(body, anchors))

@@ -84,7 +84,7 @@ def inspect_report(run: Run) -> dict[str, Any]:
     reduced, modes, choices = run.get(ReducedBodies), run.get(SystemModes), run.get(ModelChoices)
     tables = {table.body: table for table in reduced.modes} if reduced else {}
     names = [body.path for body in character.bodies]
-    bends = [body.bends for body in (choices.character if choices else character).bodies]
+    flexible = [body.simulated_flexible for body in (choices.character if choices else character).bodies]
     return {
         "command": "inspect",
         "version": __version__,
@@ -102,7 +102,7 @@ def inspect_report(run: Run) -> dict[str, Any]:
         "duration_s": float(animation.frame_times[-1]),
         "character": character.path,
         "gravity_m_s2": character.gravity,
-        "bodies": [_body(body, tables.get(index), bends[index]) for index, body in enumerate(character.bodies)],
+        "bodies": [_body(body, tables.get(index), flexible[index]) for index, body in enumerate(character.bodies)],
         "joints": [
             {
                 "path": joint.path,
@@ -145,11 +145,11 @@ def _without(
     return [*rows, step.row] if step else rows
 
 
-def _body(body: Body, table: ModeTable | None, bends: bool) -> dict[str, Any]:
+def _body(body: Body, table: ModeTable | None, flexible: bool) -> dict[str, Any]:
     report: dict[str, Any] = {
         "path": body.path,
         "kind": "flexible" if body.flexible else "rigid",
-        "simulated": "flexible" if bends else "rigid",
+        "simulated": "flexible" if flexible else "rigid",
         # The mesh's mass is the one that is simulated, so it beats the one of the shot.
         "mass_kg": table.mass if table else body.mass.mass if body.mass else None,
     }

@@ -125,7 +125,7 @@ def _accuracy(run: Run, result: Result) -> dict[str, Any]:
     """How far the targets are from where a finer simulation has them: estimated, and measured with `--verify`."""
     accuracy, verified = result.accuracy, run.get(Verification)
     return {
-        "tolerance_m": accuracy.asked_m if accuracy else None,
+        "tolerance_m": accuracy.requested_m if accuracy else None,
         "estimated_error_m": accuracy.estimated_m if accuracy else None,
         "estimated_step_error_m": accuracy.step_m if accuracy else None,
         "estimated_mesh_error_m": accuracy.mesh_m if accuracy else None,

@@ -131,7 +131,7 @@ def carry_out(
     outputs = outputs or OutputPaths()
     known = shot.known if known is None else known
     writes = command in ("simulate", "optimize")
-    kinds = [*wanted, *(_files_asked_for(host, outputs) if writes else ()), *_made_by(host, operators)]
+    kinds = [*wanted, *(_requested_files(host, outputs) if writes else ()), *_made_by(host, operators)]
     _refuse_unknown_methods(source)
     _refuse_unreadable_motion(source, host)
     run = host.run(
@@ -229,8 +229,8 @@ def _refuse_unreadable_motion(source: Source, host: Host) -> None:
         )
 
 
-def _files_asked_for(host: Host, outputs: OutputPaths) -> list[type]:
-    """The types that the asked-for files are made as.
+def _requested_files(host: Host, outputs: OutputPaths) -> list[type]:
+    """The types that the requested files are made as.
 
     Raises:
         SettingError: No plugin writes one of them.

@@ -29,14 +29,14 @@ def _analyse(shot, forced=None, changes=False, options=FAST):
 
 def _simulated(shot, character):
     bodies = None
-    if any(body.bends for body in character.bodies):
+    if any(body.simulated_flexible for body in character.bodies):
         loads = load_envelopes(character, shot.animation, shot.meshes, FAST)
         bodies = reduce_bodies(character, span_tree(character), shot.meshes, None, loads)
     return simulate_at(compile_shot(character, shot.animation, bodies), FAST, 1 / 240).positions
 
 
-def _rows(needs, kind):
-    return [row for row in needs.rows if row.kind == kind]
+def _rows(choices, kind):
+    return [row for row in choices.rows if row.kind == kind]
 
 
 @pytest.mark.parametrize("shot", [mixed_arm(), plastic_arm()], ids=["steel and plastic", "plastic"])
@@ -44,15 +44,17 @@ def test_all_flexible_bodies_keep_their_finite_elements_unless_the_user_forces_t
     flexible = [body.flexible is not None for body in shot.character.bodies]
     for options in (FAST, replace(FAST, tolerance=1.0)):
         choices = _analyse(shot, options=options)
-        assert [body.bends for body in choices.character.bodies] == flexible and not _rows(choices, "bodies")
+        assert [body.simulated_flexible for body in choices.character.bodies] == flexible and not _rows(
+            choices, "bodies"
+        )
     kept = _analyse(shot, {"bodies": ON})
-    assert [body.bends for body in kept.character.bodies] == flexible
+    assert [body.simulated_flexible for body in kept.character.bodies] == flexible
     assert all(row.needed and row.forced for row in _rows(kept, "bodies"))
 
 
 def test_bodies_that_are_forced_to_be_rigid_have_the_mass_of_their_geometry():
     choices = _analyse(mixed_arm(), {"bodies": OFF})
-    assert not any(body.bends for body in choices.character.bodies)
+    assert not any(body.simulated_flexible for body in choices.character.bodies)
     assert choices.character.bodies[0].mass.mass == pytest.approx(7800 * 0.3 * 0.08**2)
     assert len(_rows(choices, "bodies")) == 2 and all(row.forced for row in _rows(choices, "bodies"))
 
@@ -62,14 +64,16 @@ def test_a_body_whose_mass_only_the_mesh_gives_stays_flexible():
     bodies = tuple(replace(body, tets=None) for body in shot.character.bodies)
     bare = replace(shot, character=replace(shot.character, bodies=bodies))
     forced = _analyse(bare, {"bodies": OFF})
-    assert forced.character.bodies[0].bends and "mesh" in _rows(forced, "bodies")[0].why
+    assert forced.character.bodies[0].simulated_flexible and "mesh" in _rows(forced, "bodies")[0].why
 
 
 def test_everything_can_be_forced_off_and_on():
     shot = plastic_arm()
     off, on = _analyse(shot, dict.fromkeys(KINDS, OFF)), _analyse(shot, dict.fromkeys(KINDS, ON))
-    assert not any(b.bends for b in off.character.bodies) and all(b.non_rotating for b in off.character.bodies)
-    assert on.character.bodies[0].bends and not any(b.non_rotating for b in on.character.bodies)
+    assert not any(b.simulated_flexible for b in off.character.bodies) and all(
+        b.non_rotating for b in off.character.bodies
+    )
+    assert on.character.bodies[0].simulated_flexible and not any(b.non_rotating for b in on.character.bodies)
     flexible = on.character.bodies[0].flexible
     assert flexible.elasticity == "stvk" and flexible.modes_share < 1.0 and flexible.pairs_share == 0.0
     assert off.character.bodies[0].flexible.elasticity == "linear"
@@ -79,11 +83,11 @@ def test_everything_can_be_forced_off_and_on():
 
 def test_the_second_pins_of_a_clevis_are_removed_and_the_motion_is_the_same():
     shot = clevis_arm(2)
-    needs = _analyse(shot)
-    assert [j.redundant for j in needs.character.joints] == [False, True, False, True, False, False]
+    choices = _analyse(shot)
+    assert [j.redundant for j in choices.character.joints] == [False, True, False, True, False, False]
     full = _analyse(shot, {"loops": ON}).character
     assert not any(j.redundant for j in full.joints)
-    assert distance(_simulated(shot, needs.character), _simulated(shot, full)) < 1e-9
+    assert distance(_simulated(shot, choices.character), _simulated(shot, full)) < 1e-9
 
 
 def test_joints_of_closed_chains_with_flexible_bodies_are_kept():
@@ -96,11 +100,11 @@ def test_joints_of_closed_chains_with_flexible_bodies_are_kept():
 
 def test_the_carriage_and_the_mast_of_a_gantry_do_not_rotate():
     shot = gantry(1)
-    needs = _analyse(shot)
-    non_rotating = [body.non_rotating for body in needs.character.bodies]
+    choices = _analyse(shot)
+    non_rotating = [body.non_rotating for body in choices.character.bodies]
     assert non_rotating[:2] == [True, True]
     full = _analyse(shot, {"turning": ON}).character
-    assert distance(_simulated(shot, needs.character), _simulated(shot, full)) < 1e-10
+    assert distance(_simulated(shot, choices.character), _simulated(shot, full)) < 1e-10
 
 
 def test_motors_that_move_no_target_are_idle_in_an_optimisation_alone():

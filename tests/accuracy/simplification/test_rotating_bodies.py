@@ -32,8 +32,8 @@ def test_bodies_on_a_body_that_is_simulated_as_rigid_do_not_rotate():
 def test_active_motors_and_motors_that_may_change_rotate_bodies():
     shot = plastic_arm()
     assert all(item.turns for item in _found(shot))
-    held = tuple(Track(t.times, np.full_like(t.values, 0.3)) for t in shot.animation.tracks)
-    still = replace(shot, animation=replace(shot.animation, tracks=held, current=held))
+    constant = tuple(Track(t.times, np.full_like(t.values, 0.3)) for t in shot.animation.tracks)
+    still = replace(shot, animation=replace(shot.animation, tracks=constant, current=constant))
     assert all("may rotate" in item.why or "attached" in item.why for item in _found(still))
     simulated = _found(still, changes=False)
     assert not simulated[0].turns and simulated[1].turns  # the second hangs from what bends
@@ -41,20 +41,20 @@ def test_active_motors_and_motors_that_may_change_rotate_bodies():
 
 def test_locked_and_idle_motors_do_not():
     shot = plastic_arm()
-    held = tuple(Track(t.times, np.zeros_like(t.values)) for t in shot.animation.tracks)
+    constant = tuple(Track(t.times, np.zeros_like(t.values)) for t in shot.animation.tracks)
     for change in ({"optimize": False}, {"idle": True}):
         motors = tuple(replace(m, **change) for m in shot.character.motors)
         still = replace(
             shot, character=replace(shot.character, motors=motors),
-            animation=replace(shot.animation, tracks=held, current=held),
+            animation=replace(shot.animation, tracks=constant, current=constant),
         )  # fmt: skip
         assert not _found(still)[0].turns
 
 
 def test_only_the_optimised_curve_moves():
     shot = plastic_arm()
-    held = tuple(Track(t.times, np.zeros_like(t.values)) for t in shot.animation.tracks)
-    shown = replace(shot, animation=replace(shot.animation, tracks=held))  # `current` still swings
+    constant = tuple(Track(t.times, np.zeros_like(t.values)) for t in shot.animation.tracks)
+    shown = replace(shot, animation=replace(shot.animation, tracks=constant))  # `current` still swings
     assert _found(shown, changes=False)[0].turns
 
 

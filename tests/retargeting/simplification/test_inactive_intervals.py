@@ -96,14 +96,14 @@ def test_an_inactive_interval_before_a_move_is_skipped_without_loss(arm, bodies,
 @pytest.mark.parametrize("locked", [False, True])
 def test_with_an_early_error_no_interval_is_inactive_and_the_result_is_the_same(arm, bodies, monkeypatch, locked):
     """The rigid robot does not sag, and the first pose is to be its; where it is locked it is simulated once."""
-    animation, held, hold = pausing(0.8, 0.2), [], RetargetProblem.hold
+    animation, firsts, hold = pausing(0.8, 0.2), [], RetargetProblem.hold
     if locked:
         locks = tuple(FreeTrack(k, np.array([0.0, 0.52]), np.array([False, True])) for k in range(2))
         animation = dataclasses.replace(animation, free=locks)
     with monkeypatch.context() as patch:
-        patch.setattr(RetargetProblem, "hold", lambda self, first: (held.append(first), hold(self, first)))
+        patch.setattr(RetargetProblem, "hold", lambda self, first: (firsts.append(first), hold(self, first)))
         result = optimize_shot(compile_shot(arm, animation, bodies), OPTIONS, ignore_progress)
-    assert not rows_of(result) and (max(held) > 0.5 * 240) == locked
+    assert not rows_of(result) and (max(firsts) > 0.5 * 240) == locked
     if not locked:
         assert result.after.position_errors[0, 1] < 0.5 * result.before.position_errors[0, 1]
     with monkeypatch.context() as patch:

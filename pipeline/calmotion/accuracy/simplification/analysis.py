@@ -27,7 +27,7 @@ def analyse(
 
     Args:
         options: With the tolerance.
-        forced: Kinds of `shot.needs.KINDS` that are forced `on` or `off`.
+        forced: Kinds of `shot.model_choice.KINDS` that are forced `on` or `off`.
         changes: Whether motors' curves are to be changed.
 
     Returns:
@@ -37,7 +37,7 @@ def analyse(
     forced = {kind: choice for kind, choice in forced.items() if choice != AUTO}
     choice = partial(_choice, forced)
     if len(animation.frame_times) < 2:
-        return ModelChoices(_asked(character, forced), (), forced)
+        return ModelChoices(_with_forced(character, forced), (), forced)
     tree = span_tree(character)
     rows: list[ModelChoice] = []
     if tree.closing or any(body.flexible for body in character.bodies):
@@ -47,17 +47,17 @@ def analyse(
         try:
             character, rows = decide(character, animation, options, tree, choice, changes)
         except SimulationFailure:
-            return ModelChoices(_asked(character, forced), (), forced)
+            return ModelChoices(_with_forced(character, forced), (), forced)
     found = _turning(turning_of(character, animation, tree, changes), choice("turning"))
     character, more = _straight(character, found, "turning" in forced)
-    return ModelChoices(_asked(character, forced), (*rows, *more), forced)
+    return ModelChoices(_with_forced(character, forced), (*rows, *more), forced)
 
 
 def _choice(forced: Mapping[str, str], kind: str) -> str:
     return forced.get(kind, AUTO)
 
 
-def _asked(character: Character, forced: Mapping[str, str]) -> Character:
+def _with_forced(character: Character, forced: Mapping[str, str]) -> Character:
     """The character with modes, their pairs and elastic laws as they are forced."""
 
     def settings(own: FlexibleSettings) -> FlexibleSettings:

@@ -123,8 +123,8 @@ def _loops(character: Character, tree: Tree, rigid: RigidPoses, choice: str) -> 
     for k in found.joints:
         item = joints[order[k]]
         members = chain_members(tree.parent, rigid.model.system.side[k])
-        bends = any(character.bodies[tree.body[b]].bends for b in members)
-        if k in found.redundant and choice != ON and (choice == OFF or not bends):
+        flexible = any(character.bodies[tree.body[b]].simulated_flexible for b in members)
+        if k in found.redundant and choice != ON and (choice == OFF or not flexible):
             joints[order[k]] = replace(item, redundant=True)
             why = "other joints transmit its forces, and its own are shown as zero"
             rows.append(ModelChoice("loops", f"{item.path}: joint omitted", False, why, None, choice == OFF))

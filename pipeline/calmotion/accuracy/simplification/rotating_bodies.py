@@ -46,7 +46,7 @@ def turning_of(character: Character, animation: Animation, tree: Tree, changes: 
             found[body] = Turning(True, by)
         elif parent is not None and found[parent].turns:
             found[body] = Turning(True, f"it is attached to {character.bodies[parent].path}, which rotates")
-        elif parent is not None and character.bodies[parent].bends:
+        elif parent is not None and character.bodies[parent].simulated_flexible:
             found[body] = Turning(True, f"it is attached to {character.bodies[parent].path}, which is flexible")
         else:
             found[body] = Turning(False, STILL_BY)

@@ -103,7 +103,7 @@ def load(name: str) -> BenchShot:
         if result.error is not None:
             raise result.error
     compiled = run.get(CompiledShot)
-    if compiled is None or not any(body.bends for body in compiled.character.bodies):
+    if compiled is None or not any(body.simulated_flexible for body in compiled.character.bodies):
         raise ShotError("has nothing flexible to retarget", path=name)
     return BenchShot(Path(name).stem, compiled)
 

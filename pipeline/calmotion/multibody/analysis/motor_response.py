@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from calmotion.multibody.failure import SimulationFailure
+from calmotion.multibody.failure import Reason, SimulationFailure
 from calmotion.multibody.integrators.workspace import Workspace
 from calmotion.multibody.linear_solver.closed_chains import factor_closed_chains, solve_system
 from calmotion.multibody.linear_solver.elimination import factor
@@ -54,7 +54,7 @@ def motor_responses(
         blocks.K[:] = blocks.D
         bad = factor(system, blocks, ws.matrix, scratch.solution.block)
         if bad >= 0:
-            raise SimulationFailure(float(times[n]), bad, "singular")
+            raise SimulationFailure(float(times[n]), bad, Reason.SINGULAR)
         if joints > count:
             factor_closed_chains(system, ws.matrix, scratch.border, scratch.solution)
         for m, imposed in enumerate(imposed_by):

@@ -11,7 +11,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from calmotion.multibody.failure import SimulationFailure
+from calmotion.multibody.failure import Reason, SimulationFailure
 from calmotion.multibody.integrators import radau, runge_kutta
 from calmotion.multibody.integrators.coefficients import IMPLICIT
 from calmotion.multibody.integrators.drives import hermite_drive, stage_inputs
@@ -60,7 +60,7 @@ def integrate(
         instant, component = runge_kutta.advance(system, h, states, inputs, ws, slopes, DIVERGED)
         if component >= 0:
             last = copy_of_instant(states, instant - 1)
-            raise SimulationFailure(instant * h, component, "diverged", last)
+            raise SimulationFailure(instant * h, component, Reason.DIVERGED, last)
     world = rooted(None, total)
     gap = largest_gap(system, Inputs(angles, rates, world), states, ws.work)
     if progress is not None:

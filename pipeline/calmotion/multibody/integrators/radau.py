@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from calmotion.multibody.failure import SimulationFailure
+from calmotion.multibody.failure import Reason, SimulationFailure
 from calmotion.multibody.integrators.drives import Drive, stage_inputs
 from calmotion.multibody.integrators.workspace import Workspace
 from calmotion.multibody.kernels.assembly import assemble
@@ -69,7 +69,7 @@ def integrate(system: System, start: State, drive: Drive, times: Array, ws: Work
         before = State(*[part[n - 1] for part in states])
         component = stepper.step(before, times[n] - times[n - 1], inputs[n - 1])
         if component >= 0:
-            raise SimulationFailure(float(times[n]), component, "diverged")
+            raise SimulationFailure(float(times[n]), component, Reason.DIVERGED)
         for part, value in zip(states, stepper.stages[-1], strict=True):
             part[n] = value
     return states

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from calmotion.multibody.failure import SimulationFailure
+from calmotion.multibody.failure import Reason, SimulationFailure
 from calmotion.multibody.integrators import bdf2, newton
 from calmotion.multibody.integrators.coefficients import IMPLICIT
 from calmotion.multibody.integrators.refinement import refined_step
@@ -206,7 +206,7 @@ def _march(
         last = min(done + chunk, total)
         code, done, component = _advance(system, coefficients, done, last, inputs, record, ws)
         if code != newton.CONVERGED:
-            reason = "singular" if code == newton.SINGULAR else "diverged"
+            reason = Reason.SINGULAR if code == newton.SINGULAR else Reason.DIVERGED
             exact = refined_step(system, integrator, h, done, inputs, record, ws)
             if exact is None:
                 raise SimulationFailure(done * h, component, reason, copy_of_instant(record.states, done - 1))

@@ -17,7 +17,7 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 
 from calmotion.multibody.analysis.reactions import reactions
-from calmotion.multibody.failure import SimulationFailure
+from calmotion.multibody.failure import Reason, SimulationFailure
 from calmotion.multibody.integrators.bdf2 import position_to_velocity, velocities
 from calmotion.multibody.integrators.coefficients import bdf2_integrator
 from calmotion.multibody.integrators.trajectory import Inputs, Trajectory, instant_of, instants_of
@@ -131,7 +131,7 @@ def linearize(
     if trajectory.integrator != "bdf2":
         raise ValueError("only BDF2 has derivatives")
     if trajectory.refined:
-        raise SimulationFailure(trajectory.refined[0] * trajectory.h, 0, "refined")
+        raise SimulationFailure(trajectory.refined[0] * trajectory.h, 0, Reason.REFINED)
     reused = 0 if previous is None else previous.size * bytes_of_an_instant(system)
     size = window_size(system, len(angles) - begin, spare_memory(reused) if memory is None else memory)
     steps = allocate_steps(system, size) if previous is None or previous.size != size else previous.steps
@@ -229,5 +229,5 @@ class Linearization:
             results = [part(first, min(first + share, last), self.workspace), *(other.result() for other in others)]
         for bad, instant in results:
             if bad >= 0:
-                raise SimulationFailure(instant * trajectory.h, bad, "singular")
+                raise SimulationFailure(instant * trajectory.h, bad, Reason.SINGULAR)
         self._loaded = first

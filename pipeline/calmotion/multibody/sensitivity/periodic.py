@@ -21,7 +21,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from calmotion.multibody.failure import SimulationFailure
+from calmotion.multibody.failure import Reason, SimulationFailure
 from calmotion.multibody.integrators.simulation import simulate_on
 from calmotion.multibody.integrators.trajectory import Trajectory, copy_of_instant
 from calmotion.multibody.integrators.workspace import Workspace
@@ -138,7 +138,7 @@ def find_periodic_motion(
         The cycle, and the derivative that was used last.
 
     Raises:
-        SimulationFailure: A step that cannot be solved, or no periodic motion was found ("does not settle").
+        SimulationFailure: A step that cannot be solved, or no periodic motion was found (`Reason.NOT_PERIODIC`).
     """
 
     def simulated(first: State, second: State) -> Cycle:
@@ -166,7 +166,7 @@ def find_periodic_motion(
             break
         else:
             monodromy = None
-    raise SimulationFailure(0.0, 0, "does not settle")
+    raise SimulationFailure(0.0, 0, Reason.NOT_PERIODIC)
 
 
 def _newton_step(

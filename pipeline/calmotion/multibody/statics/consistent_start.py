@@ -7,7 +7,7 @@ follows from the equations of motion with the constraints differentiated once mo
 
 from __future__ import annotations
 
-from calmotion.multibody.failure import SimulationFailure
+from calmotion.multibody.failure import Reason, SimulationFailure
 from calmotion.multibody.integrators.workspace import Workspace
 from calmotion.multibody.kernels.so3 import turn
 from calmotion.multibody.linear_solver.index1 import accelerations
@@ -33,7 +33,7 @@ def initial_acceleration(
     here = State(*[part.copy() for part in state])
     bad = accelerations(system, here, angle, rate, acceleration, 0.0, ws)
     if bad >= 0:
-        raise SimulationFailure(0.0, bad, "singular")
+        raise SimulationFailure(0.0, bad, Reason.SINGULAR)
     return ws.scratch.Vd.copy(), here.lam
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from calmotion.multibody.failure import SimulationFailure
+from calmotion.multibody.failure import Reason, SimulationFailure
 from calmotion.multibody.integrators.newton import correct, worst_component
 from calmotion.multibody.integrators.workspace import Workspace
 from calmotion.multibody.kernels.assembly import assemble
@@ -66,7 +66,7 @@ def equilibrium(system: System, start: State, angle: Array, ws: Workspace) -> tu
             if component < 0:
                 state.turn[:] = 0.0
                 return state, used
-    raise SimulationFailure(0.0, max(component, 0), "no static equilibrium", reached if share else None, share)
+    raise SimulationFailure(0.0, max(component, 0), Reason.NO_EQUILIBRIUM, reached if share else None, share)
 
 
 def _at_rest(start: State) -> State:

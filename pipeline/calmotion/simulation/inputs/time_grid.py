@@ -68,7 +68,7 @@ class TimeGrid:
 
 
 def make_grid(frame_times: Array, step: float | None, pre_roll: float, cyclic: bool = False) -> TimeGrid:
-    """The grid with the largest step that divides a frame and is no longer than asked for.
+    """The grid with the largest step that divides a frame and is no longer than requested.
 
     Args:
         frame_times: [s], uniform, shape [f].

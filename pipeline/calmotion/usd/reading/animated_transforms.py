@@ -16,18 +16,18 @@ if TYPE_CHECKING:
 _TOLERANCE = 1e-6  # relative to the size of the transform: rounding errors of single precision
 
 
-def refuse_moving(reading: Reading, held: dict[Usd.Prim, str], others: list[Usd.Prim]) -> None:
+def refuse_moving(reading: Reading, fixed: dict[Usd.Prim, str], others: list[Usd.Prim]) -> None:
     """Refuse animated bodies that a joint fixes to the world; note where other transforms are animated.
 
     Args:
         reading: The stage.
-        held: Prims of the bodies with a joint to the world, and the path of that joint.
+        fixed: Prims of the bodies with a joint to the world, and the path of that joint.
         others: Prims of the other bodies.
 
     Raises:
         ShotError: A body is animated although a joint fixes it to the world.
     """
-    for prim, joint in held.items():
+    for prim, joint in fixed.items():
         movement = moves(reading, prim)
         if movement is not None:
             mover, code = movement

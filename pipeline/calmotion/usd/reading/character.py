@@ -101,12 +101,12 @@ def read_skeleton(reading: Reading, clock: Clock, still: bool, given: Sequence[s
     joints.sort(key=lambda j: max(far.get(j.body0, 0), far.get(j.body1, 0)))  # stable: the shot's order otherwise
     order = {id(joint): k for k, joint in enumerate(joints)}
     drives = sorted((d for d in drives if id(d.joint) in order), key=lambda d: order[id(d.joint)])
-    held = {j.body1: j.path for j in joints if j.body0 == "" and j.prim is not None and not on_moving_prim(reading, j)}
+    fixed = {j.body1: j.path for j in joints if j.body0 == "" and j.prim is not None and not on_moving_prim(reading, j)}
     roots = {j.body1 for j in joints if j.body0 == ""}
     posing = any(drive.source == motors.BODIES for drive in drives)
     with reading.collecting_problems():
         others = [] if posing else [prims[b] for b in bodies if b not in roots]
-        refuse_moving(reading, {prims[b]: held[b] for b in held}, others)
+        refuse_moving(reading, {prims[b]: fixed[b] for b in fixed}, others)
     return Skeleton(bodies, {b: poses[b] for b in bodies}, joints, drives, target_prims)
 
 

@@ -20,9 +20,9 @@ from calmotion.usd.reading.joints import joint_prims
 from calmotion.usd.reading.motors.driven_motors import (
     ATTRIBUTE,
     BODIES,
+    CONSTANT,
     DRIVE,
     GIVEN,
-    HELD,
     LENGTH_ATTRIBUTE,
     Drive,
     to_si,
@@ -74,10 +74,10 @@ def read_shot(
             # predicted motions are not animation; optimised curves of bodies and skeletons are
             motions = stages.earlier_layers(composed, (stages.MOTION,))
             result = stages.open_stage(path, muted=motions) if motions else composed
-            asked = Reading(result, reading.units, clock.start)
+            of_motors = Reading(result, reading.units, clock.start)
             standing = hinge_stacks(reading, read.skeleton.drives)
-            current = motor_tracks(asked, read.skeleton.drives, clock, given, standing)
-            raise_all(asked.problems)
+            current = motor_tracks(of_motors, read.skeleton.drives, clock, given, standing)
+            raise_all(of_motors.problems)
             names = ", ".join(stages.display_name(layer, path) for layer in earlier)
             note = f"the shot carries results of Calmotion ({names}); the intended motion is the animation beneath them"
             character = dataclasses.replace(character, notes=(*character.notes, note))
@@ -149,7 +149,7 @@ def motor_tracks(
     """
     stage = reading.stage
     tracks: dict[str, Track] = {}
-    posed = [d for d in drives if d.source == BODIES or (d.source == HELD and d.held is None)]
+    posed = [d for d in drives if d.source == BODIES or (d.source == CONSTANT and d.constant is None)]
     bodies = [drive.joint for drive in posed]
     codes = pose_codes(stage, bodies, clock)
     if len(codes) == 0:
@@ -168,9 +168,9 @@ def motor_tracks(
                 tracks[path] = read_track(attribute, clock, reading, unit)
             elif drive.source == GIVEN and given is not None:
                 tracks[path] = given_track(given, drive.joint)
-            elif drive.source == HELD and drive.held is not None:
+            elif drive.source == CONSTANT and drive.constant is not None:
                 ends = np.unique([clock.start, clock.end])
-                tracks[path] = Track(clock.seconds(ends), np.full(len(ends), drive.held))
+                tracks[path] = Track(clock.seconds(ends), np.full(len(ends), drive.constant))
     for drive in drives:
         if drive.gear is not None and drive.gear.leader in tracks:
             led = tracks[drive.gear.leader]

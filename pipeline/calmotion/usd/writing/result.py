@@ -59,7 +59,7 @@ def write_result(
         Paths of the layer and of the root layer.
 
     Raises:
-        ShotError: The output is an input, cannot be written, or cannot be baked as asked.
+        ShotError: The output is an input, cannot be written, or cannot be baked.
     """
     from pxr import Sdf
 

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 ATTRIBUTE = "drive:angular:physics:targetPosition"
 LENGTH_ATTRIBUTE = "drive:linear:physics:targetPosition"
 SKEL_JOINT = "calm:motor:skelJoint"
-DRIVE, BODIES, SKELETON, HELD, GEARED, GIVEN = "drive", "bodies", "skeleton", "held", "geared", "given"
+DRIVE, BODIES, SKELETON, CONSTANT, GEARED, GIVEN = "drive", "bodies", "skeleton", "constant", "geared", "given"
 _SCHEMA = "CalmMotorAPI"
 _DRIVES = {"revolute": "angular", "prismatic": "linear"}
 _UNITS = {"angular": "degrees", "linear": "units of length"}
@@ -59,16 +59,16 @@ class Drive:
     Attributes:
         joint: The joint.
         source: Where its track is: `DRIVE` (samples or a spline of the target position), `BODIES` (transforms of the
-            bodies), `SKELETON` (a joint of a UsdSkel animation), `HELD` (nowhere: it holds a value), `GEARED` (another
-            motor's), `GIVEN` (beside the shot).
-        held: The value that it holds [rad or m]; None: that of the pose in which the bodies stand.
+            bodies), `SKELETON` (a joint of a UsdSkel animation), `CONSTANT` (nowhere: it holds a value), `GEARED`
+            (another motor's), `GIVEN` (beside the shot).
+        constant: The value that it holds [rad or m]; None: that of the pose in which the bodies stand.
         skel_joint: The joint of the skeleton.
         gear: How it follows another motor.
     """
 
     joint: JointPrim
     source: str
-    held: float | None = None
+    constant: float | None = None
     skel_joint: str = ""
     gear: Gear | None = None
 
@@ -140,7 +140,7 @@ def read_drives(
             remedy="Apply PhysicsDriveAPI:angular to the revolute joints that motors drive, and author time samples "
             f"of {ATTRIBUTE}, in degrees",
         )
-    if not still and all(drive.source in (HELD, GEARED) for drive in found):
+    if not still and all(drive.source in (CONSTANT, GEARED) for drive in found):
         raise ShotError(
             "a motor without animation, and no other motor is animated",
             path=found[0].joint.path,
@@ -191,7 +191,7 @@ def _add_geared_motors(
                 found=gear.leader,
                 remedy="Drive the leading joint with a motor, or model the gear as a closed chain of bodies and joints",
             )
-        if path in drives and drives[path].source not in (HELD, GEARED):
+        if path in drives and drives[path].source not in (CONSTANT, GEARED):
             reading.note(f"{path}: it is geared to {gear.leader}, so its own animation is not used")
         drives[path] = Drive(joints[path], GEARED, gear=gear)
 
@@ -254,20 +254,22 @@ def _drive(
         return Drive(joint, BODIES)
     if ours and not still:
         raise ShotError("a motor without animation", path=joint.path, attribute=name, remedy=_remedy(joint.kind))
-    held = number_of(prim, name) if has_drive else None
-    if held is not None:
-        if not math.isfinite(held):
-            raise ShotError("is not finite", path=joint.path, attribute=name, found=held, remedy="Correct the value")
-        reading.note(f"{joint.path}: its drive is not animated and holds {held:g} {unit}")
-        return Drive(joint, HELD, held=held * to_si(joint.kind, reading.units))
+    constant = number_of(prim, name) if has_drive else None
+    if constant is not None:
+        if not math.isfinite(constant):
+            raise ShotError(
+                "is not finite", path=joint.path, attribute=name, found=constant, remedy="Correct the value"
+            )
+        reading.note(f"{joint.path}: its drive is not animated and holds {constant:g} {unit}")
+        return Drive(joint, CONSTANT, constant=constant * to_si(joint.kind, reading.units))
     if ours or joint.path in actuated:
         what = "an actuator drives it" if joint.path in actuated else "it is a motor"
         reading.note(f"{joint.path}: {what}, nothing animates it, and it holds the pose of its bodies")
-        return Drive(joint, HELD)
+        return Drive(joint, CONSTANT)
     stiffness = prim.GetAttribute(f"drive:{drive}:physics:stiffness").Get()
     if stiffness:
         reading.note(f"{joint.path}: its drive has a stiffness but no target position and holds 0 {unit}")
-        return Drive(joint, HELD, held=0.0)
+        return Drive(joint, CONSTANT, constant=0.0)
     reading.note(f"{joint.path}: its drive has neither a target position nor a stiffness, so the joint moves freely")
     return None
 

@@ -1,0 +1,32 @@
+"""Failures of a simulation in the user's words."""
+
+import pytest
+from calmotion.errors import IntegrationError, ShotError
+from calmotion.multibody.failure import Reason, SimulationFailure
+from calmotion.shot.run import RunSettings
+from calmotion.simulation.compiled_shot import compile_shot
+from calmotion.simulation.prepare import failure_error, prepare
+
+
+@pytest.fixture(scope="module")
+def prepared(arm, animation, bodies):
+    return prepare(compile_shot(arm, animation, bodies), RunSettings(step=1 / 240))
+
+
+@pytest.mark.parametrize("reason", Reason)
+def test_only_failures_that_depend_on_the_step_may_be_tried_again(prepared, reason):
+    error = failure_error(prepared, SimulationFailure(0.0, 0, reason))
+    assert type(error) is (ShotError if reason == Reason.NO_EQUILIBRIUM else IntegrationError)
+    assert error.path and error.remedy
+
+
+def test_a_missing_equilibrium_names_the_joint_and_what_would_hold_the_body(prepared, arm):
+    tree = prepared.model.tree
+    for component in range(len(tree.joint)):
+        error = failure_error(prepared, SimulationFailure(0.0, component, Reason.NO_EQUILIBRIUM, None, 0.4))
+        joint, body = arm.joints[tree.joint[component]], arm.bodies[tree.body[component]]
+        assert joint.path in str(error) and body.path == error.path and "40% of gravity" in str(error)
+        assert "--step" not in error.remedy
+        driven = any(motor.joint == tree.joint[component] for motor in arm.motors)
+        assert ("a motor" in error.remedy) == (not driven and joint.kind != "fixed")
+        assert ("physics:youngsModulus" in error.remedy) == (body.flexible is not None)
