@@ -1,14 +1,18 @@
 """An optimisation that the user stops, or that is killed, through the command line."""
 
+import contextlib
 import json
 import os
 import random
 import signal
 import subprocess
 import sys
+import threading
 import time
 
 import pytest
+
+fcntl, termios = pytest.importorskip("fcntl"), pytest.importorskip("termios")
 
 OPTIONS = ("--step", "4ms")
 
@@ -35,17 +39,20 @@ def kept(layer):
     return layer.with_name(f".{layer.name}.checkpoint.npz")
 
 
-def test_an_interrupt_writes_the_best_so_far_and_the_same_command_resumes(repository, tmp_path):
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+def test_a_signal_writes_the_best_so_far_and_the_same_command_resumes(repository, tmp_path, number):
     layer = tmp_path / "calm.usda"
     process = started(repository, layer)
     while not kept(layer).exists() and process.poll() is None:
         time.sleep(0.01)
-    process.send_signal(signal.SIGINT)
+    process.send_signal(number)
     out, _ = process.communicate(timeout=600)
     early = json.loads(out)
     assert process.returncode == 130 and early["interrupted"] and early["stopped"] == "interrupted"
     assert layer.exists() and kept(layer).exists()
     assert early["objective_after"] < early["objective_before"]
+    if number != signal.SIGINT:
+        return
     process = started(repository, layer)
     out, _ = process.communicate(timeout=600)
     late = json.loads(out)
@@ -53,6 +60,39 @@ def test_an_interrupt_writes_the_best_so_far_and_the_same_command_resumes(reposi
     assert late["objective_after"] <= early["objective_after"]
     assert not kept(layer).exists()
     assert sorted(path.name for path in tmp_path.iterdir()) == ["calm.usda", "calm_root.usda"]
+
+
+@pytest.mark.skipif(not hasattr(os, "openpty"), reason="this system has no pseudo terminals")
+def test_a_closed_terminal_writes_the_best_so_far(repository, tmp_path):
+    layer = tmp_path / "calm.usda"
+    environment = os.environ | {"PYTHONPATH": str(repository / "pipeline")}
+    ours, theirs = os.openpty()
+    line = [arg for arg in command(repository, layer) if arg != "--json"]
+    process = subprocess.Popen(
+        line,
+        env=environment,
+        stdin=theirs,
+        stdout=theirs,
+        stderr=theirs,
+        start_new_session=True,
+        preexec_fn=lambda: fcntl.ioctl(0, termios.TIOCSCTTY, 0),
+    )
+    os.close(theirs)
+    reader = threading.Thread(target=drain, args=(ours,), daemon=True)
+    reader.start()
+    while not kept(layer).exists() and process.poll() is None:
+        time.sleep(0.01)
+    os.close(ours)
+    assert process.wait(timeout=600) == 130
+    assert layer.exists() and kept(layer).exists()
+    assert not list(tmp_path.glob(".calmotion-*"))
+
+
+def drain(descriptor):
+    """Read what a terminal shows until it is closed."""
+    with contextlib.suppress(OSError):
+        while os.read(descriptor, 4096):
+            pass
 
 
 @pytest.mark.long

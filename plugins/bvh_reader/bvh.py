@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from calmotion.errors import ShotError
 from calmotion.shot.character import Array
+from calmotion.support.files import is_special
 
 _AXES = ("Xposition", "Yposition", "Zposition", "Xrotation", "Yrotation", "Zrotation")
 
@@ -36,6 +37,8 @@ def read_bvh(path: str) -> BvhMotion:
         ShotError: It cannot be read, or is not BVH; with the line.
     """
     try:
+        if is_special(path):
+            raise OSError(0, "it is a named pipe, a socket or a device")
         with open(path, encoding="utf-8", errors="replace") as stream:
             lines = stream.read().splitlines()
     except OSError as error:

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import os
 import stat
+import subprocess
+import sys
 
 import pytest
-from calmotion.support.files import PREFIX, remove_abandoned, replaced, write_text
+from calmotion.support.files import PREFIX, _machine, remove_abandoned, replaced, write_text
 
 
 def names(folder):
@@ -43,9 +45,9 @@ def test_a_symbolic_link_is_replaced_and_what_it_names_is_not_touched(tmp_path, 
     # a link that waits under the name of the temporary file is passed over
     candidates = iter(["guessed", "another"])
     monkeypatch.setattr("tempfile._get_candidate_names", lambda: candidates)
-    (tmp_path / f"{PREFIX}guessed.csv").symlink_to(precious)
+    (tmp_path / f"{PREFIX}{_machine()}-{os.getpid()}-guessed.csv").symlink_to(precious)
     with replaced(tmp_path / "other.csv") as temporary:
-        assert temporary.name == f"{PREFIX}another.csv"
+        assert temporary.name.endswith("-another.csv")
         temporary.write_text("new")
     assert precious.read_text() == "precious" and (tmp_path / "other.csv").read_text() == "new"
 
@@ -91,6 +93,22 @@ def test_a_file_where_a_folder_should_be_is_an_error(tmp_path):
     (tmp_path / "taken").write_text("")
     with pytest.raises(OSError):
         write_text(tmp_path / "taken" / "table.csv", "new")
+
+
+def test_files_of_killed_processes_are_removed_by_the_next_that_writes_there(tmp_path):
+    code = f"""
+import os, sys
+from calmotion.support.files import replaced
+with replaced({str(tmp_path / "layer.usda")!r}):
+    os._exit(9)
+"""
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 9
+    assert len(names(tmp_path)) == 1 and names(tmp_path)[0].startswith(PREFIX)
+    with replaced(tmp_path / "layer.usda") as running:
+        with replaced(tmp_path / "table.csv"):
+            assert running.exists(), "this process runs"
+            assert len(names(tmp_path)) == 2, "that one does not"
+    assert names(tmp_path) == ["layer.usda", "table.csv"]
 
 
 def test_old_temporary_files_are_removed_and_new_ones_are_not(tmp_path):

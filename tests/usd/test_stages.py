@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import hashlib
+import os
+import subprocess
+import sys
 
 import pytest
 from calmotion import ShotError
@@ -24,6 +27,41 @@ def test_a_file_that_is_not_usd_is_refused(tmp_path, name, capfd):
         stages.open_stage(str(tmp_path / name))
     assert caught.value.path.endswith(name) and caught.value.remedy
     assert capfd.readouterr().err == ""
+
+
+SPECIAL = """
+import sys
+from calmotion import ShotError
+from calmotion.usd import stages
+for path in sys.argv[1:]:
+    try:
+        stages.open_stage(path)
+    except ShotError as error:
+        print(error.path, error.found)
+"""
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="this system has no named pipes")
+def test_a_named_pipe_is_refused_wherever_it_is_named(tmp_path):
+    pipe = tmp_path / "pipe.usda"
+    os.mkfifo(pipe)
+    contents = {
+        "sublayer.usda": "(\n subLayers = [@./pipe.usda@]\n)",
+        "reference.usda": 'def "A" (references = @./pipe.usda@</X>) {}',
+        "payload.usda": 'def "A" (payload = @./pipe.usda@) {}',
+        "variant.usda": 'def "A" (\nvariantSets = "v"\n) {\nvariantSet "v" = {\n'
+        '"x" (\nreferences = @./pipe.usda@\n) {\n}\n}\n}',
+        "deep.usda": "(\n subLayers = [@./reference.usda@]\n)",
+    }
+    for name, text in contents.items():
+        (tmp_path / name).write_text(f"#usda 1.0\n{text}\n")
+    command = [sys.executable, "-c", SPECIAL, str(pipe), *(str(tmp_path / name) for name in contents), "/dev/null"]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=60)
+    lines = [line.rsplit(" ", 1) for line in done.stdout.splitlines()]
+    named = [str(pipe), *(str(tmp_path / n) for n in ("sublayer.usda", "reference.usda", "payload.usda"))]
+    named += [str(tmp_path / "variant.usda"), str(tmp_path / "reference.usda"), "/dev/null"]
+    assert [path for path, _ in lines] == named, done.stderr
+    assert {found for _, found in lines[1:-1]} == {str(pipe)}
 
 
 @pytest.mark.parametrize(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from calmotion import ShotError
 from calmotion.usd.units import StageUnits, units_of
-from pxr import Usd, UsdGeom
+from pxr import Usd, UsdGeom, UsdPhysics
 
 
 def test_centimetres_and_grams_give_si():
@@ -28,3 +28,16 @@ def test_a_unit_of_zero_is_refused():
     UsdGeom.SetStageMetersPerUnit(stage, 0.0)
     with pytest.raises(ShotError, match="metersPerUnit"):
         units_of(stage)
+
+
+@pytest.mark.parametrize("value", [1e-300, 1e-10, 1e10, 1e300])
+@pytest.mark.parametrize(
+    ("name", "author"),
+    [("metersPerUnit", UsdGeom.SetStageMetersPerUnit), ("kilogramsPerUnit", UsdPhysics.SetStageKilogramsPerUnit)],
+)
+def test_a_unit_that_nobody_measures_in_is_refused(name, author, value):
+    stage = Usd.Stage.CreateInMemory()
+    author(stage, value)
+    with pytest.raises(ShotError, match="not one that lengths or masses are measured in") as error:
+        units_of(stage)
+    assert error.value.attribute == name and name in error.value.remedy

@@ -32,8 +32,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except SystemExit as stop:
         return stop.code if isinstance(stop.code, int) else WRONG_USAGE
     from calmotion.cli.output import print_error, protected_stdout
+    from calmotion.cli.signals import as_interrupts
 
-    with protected_stdout(args.json) as output:
+    with protected_stdout(args.json) as output, as_interrupts():
         try:
             status: int = args.command(args, output)
             return status

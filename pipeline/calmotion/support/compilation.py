@@ -61,7 +61,11 @@ def kernel_key(package: Path) -> str:
         package: The folder of the package.
     """
     kernels = [path for path in package.rglob("*.py") if _KERNEL.search(path.read_bytes())]
-    sources = with_imports([*kernels, package / "support" / "compilation.py"], package.parent)
+    support = package / "support"
+    used = {
+        path for path in with_imports(kernels, package.parent) if path.parent != support
+    }  # nothing of it is compiled
+    sources = sorted({*used, support / "compilation.py"})
     level = f"numba {numba.__version__} llvmlite {llvmlite.__version__} python {sys.version_info[:3]} opt {config.OPT}"
     return hashlib.sha256(f"{level} {digest_of(sources)}".encode()).hexdigest()
 

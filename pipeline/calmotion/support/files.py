@@ -3,22 +3,29 @@
 from __future__ import annotations
 
 import contextlib
+import hashlib
 import os
+import platform
+import re
+import stat
 import tempfile
 import time
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 PREFIX = ".calmotion-"  # of the names of temporary files
-_ABANDONED = 3600.0  # a temporary file of that age [s] was left by a process that was killed
+_ABANDONED = 3600.0  # a temporary file of another machine of that age [s] was left by a process that was killed
+_NAME = re.compile(re.escape(PREFIX) + r"([0-9a-f]{8})-(\d+)-")
 
 
 @contextlib.contextmanager
 def replaced(path: str | Path, keep_existing: bool = False) -> Iterator[Path]:
     """A temporary file that replaces `path` when the block ends without an exception.
 
-    The file is created exclusively, under a random name that starts with `PREFIX` and has the suffix of `path`, in the
-    folder of `path`, and no symbolic link is followed. Its content is flushed to the disk before it is renamed. An
+    The file is created exclusively, under a random name that starts with `PREFIX`, machine and process and has the
+    suffix of `path`, in the folder of `path`, and no symbolic link is followed. What killed processes left there is
+    removed. Its content is flushed to the disk before it is renamed. An
     exception in the block removes it. Missing folders above `path` are created. The new file has the permissions of
     any new file.
 
@@ -34,7 +41,9 @@ def replaced(path: str | Path, keep_existing: bool = False) -> Iterator[Path]:
     """
     target = Path(path)
     target.parent.mkdir(parents=True, exist_ok=True)
-    handle, name = tempfile.mkstemp(dir=target.parent, prefix=PREFIX, suffix=target.suffix)
+    remove_abandoned(target.parent)
+    prefix = f"{PREFIX}{_machine()}-{os.getpid()}-"
+    handle, name = tempfile.mkstemp(dir=target.parent, prefix=prefix, suffix=target.suffix)
     os.close(handle)
     temporary = Path(name)
     try:
@@ -61,12 +70,54 @@ def write_text(path: str | Path, text: str) -> None:
         temporary.write_text(text, encoding="utf-8", newline="")
 
 
+def is_special(path: str | os.PathLike[str]) -> bool:
+    """Whether there is a named pipe, a socket or a device, for whose content a reader would wait for ever."""
+    try:
+        mode = os.stat(path).st_mode
+    except (OSError, ValueError):
+        return False
+    return not (stat.S_ISREG(mode) or stat.S_ISDIR(mode))
+
+
 def remove_abandoned(folder: Path) -> None:
-    """Remove the temporary files that killed processes left in a folder more than an hour ago."""
+    """Remove the temporary files that killed processes left in a folder.
+
+    Those are the files of processes of this machine that do not run any more, and others that are older than an hour.
+    """
     for path in folder.glob(f"{PREFIX}*"):
         with contextlib.suppress(OSError):  # another process removed it
-            if time.time() - path.lstat().st_mtime > _ABANDONED:
+            if _is_abandoned(path):
                 path.unlink()
+
+
+def _is_abandoned(path: Path) -> bool:
+    name = _NAME.match(path.name)
+    if name is not None and name[1] == _machine():
+        return not _runs(int(name[2]))
+    return time.time() - path.lstat().st_mtime > _ABANDONED
+
+
+@cache
+def _machine() -> str:
+    """A short name of this machine, or container with its own process numbers, for folders that several share."""
+    try:
+        numbers = os.stat("/proc/self/ns/pid").st_ino
+    except OSError:  # no Linux
+        numbers = 0
+    return hashlib.sha256(f"{platform.node()} {numbers}".encode()).hexdigest()[:8]
+
+
+def _runs(process: int) -> bool:
+    """Whether a process of this machine runs; True where it cannot be told."""
+    if os.name == "nt":  # there, signal 0 ends a process
+        return True
+    try:
+        os.kill(process, 0)
+    except ProcessLookupError:
+        return False
+    except (OSError, OverflowError):
+        return True
+    return True
 
 
 def _move_unless_present(temporary: Path, target: Path) -> None:

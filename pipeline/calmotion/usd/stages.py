@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 from calmotion.errors import ShotError, raise_all
 from calmotion.shot import InputLayer
+from calmotion.support.files import is_special
 from calmotion.support.foreign_files import remedy_for
 from calmotion.usd import schemas
 
@@ -77,6 +78,7 @@ def open_layer(path: str) -> Sdf.Layer:
         raise ShotError("the file does not exist", path=path, remedy="Check the path of the shot")
     if os.path.isdir(path):
         raise ShotError("this is a folder", path=path, remedy="Name the .usda, .usdc, .usd or .usdz file of the shot")
+    refuse_special(path)
     if not os.access(path, os.R_OK):
         raise ShotError("the file cannot be read", path=path, remedy="Check its permissions")
     reason = ""
@@ -96,6 +98,46 @@ def open_layer(path: str) -> Sdf.Layer:
     return layer
 
 
+def refuse_special(path: str, named_by: str = "") -> None:
+    """Refuse a named pipe, a socket or a device in place of a layer: USD would wait for it for ever.
+
+    Args:
+        path: The file.
+        named_by: The layer that names it; empty for the shot itself.
+
+    Raises:
+        ShotError: It exists and is neither a file nor a folder.
+    """
+    if is_special(path):
+        raise ShotError(
+            "this is not a file but a named pipe, a socket or a device",
+            path=named_by or path,
+            found=path if named_by else None,
+            remedy="Name a .usda, .usdc, .usd or .usdz file",
+        )
+
+
+def _open_dependencies(root: Sdf.Layer) -> list[Sdf.Layer]:
+    """The layers that a layer names, directly or not, opened before the stage so that none is a special file."""
+    from pxr import Sdf, Tf
+
+    opened, names = [root], {root.identifier}
+    for layer in opened:
+        for asset in layer.GetCompositionAssetDependencies():
+            name = Sdf.ComputeAssetPathRelativeToLayer(layer, asset) if asset else ""
+            if not name or name in names:
+                continue
+            names.add(name)
+            refuse_special(name, layer.identifier)
+            try:
+                named = Sdf.Layer.FindOrOpen(name)
+            except Tf.ErrorException:  # the composition reports it, with the prim
+                named = None
+            if named is not None:
+                opened.append(named)
+    return opened
+
+
 def open_stage(path: str, *, muted: tuple[str, ...] = ()) -> Usd.Stage:
     """The composed stage of a shot, everything loaded and checked; registers Calmotion's schemas first.
 
@@ -111,7 +153,9 @@ def open_stage(path: str, *, muted: tuple[str, ...] = ()) -> Usd.Stage:
     schemas.register()
     layer = open_layer(path)
     with quiet():
+        kept = _open_dependencies(layer)
         stage = Usd.Stage.Open(layer, Usd.Stage.LoadAll)
+        del kept  # the stage has them now
         # USD keeps layers that were opened earlier in this process; take what is on disk now.
         for used in stage.GetUsedLayers():
             if not used.anonymous and not used.dirty:

@@ -15,6 +15,11 @@ if TYPE_CHECKING:
 Quantity = TypeVar("Quantity", float, Array)
 
 EARTH_GRAVITY = 9.81  # m/s^2
+SMALLEST, LARGEST = 1e-9, 1e9  # nanometres, and far more than kilometres or tonnes
+_USUAL = {
+    "metersPerUnit": "1 for metres, 0.01 for centimetres, 0.001 for millimetres",
+    "kilogramsPerUnit": "1 for kilograms, 0.001 for grams",
+}
 
 
 @dataclass(frozen=True)
@@ -66,7 +71,7 @@ def units_of(stage: Usd.Stage) -> StageUnits:
     """The units of a stage, with USD's fallbacks (0.01 m, 1 kg).
 
     Raises:
-        ShotError: A unit that is not positive.
+        ShotError: A unit that is not positive, or that nobody measures in.
     """
     from pxr import UsdGeom, UsdPhysics
 
@@ -79,6 +84,14 @@ def units_of(stage: Usd.Stage) -> StageUnits:
                 attribute=name,
                 found=value,
                 remedy=f"Author a positive {name} in the root layer",
+            )
+        if not SMALLEST <= value <= LARGEST:
+            raise ShotError(
+                "the unit of the stage is not one that lengths or masses are measured in",
+                path=stage.GetRootLayer().identifier,
+                attribute=name,
+                found=value,
+                remedy=f"Author {name} in the root layer: {_USUAL[name]}",
             )
     up = str(UsdGeom.GetStageUpAxis(stage))
     if up not in ("X", "Y", "Z"):

@@ -9,7 +9,7 @@ from calmotion.shot import WORLD
 from calmotion.usd.reading import read_shot
 from calmotion.usd.transforms import rotation_from_quaternion
 from pxr import Gf, UsdGeom, UsdPhysics
-from small_shots import BASE, ELBOW, FORE, LENGTH, SHOULDER, UPPER, Scale, write_arm
+from small_shots import BASE, ELBOW, FORE, LENGTH, SHOULDER, TARGET_POSITION, UPPER, Scale, write_arm
 
 
 def read(tmp_path, edit=None):
@@ -199,3 +199,57 @@ def test_values_that_make_no_joint_are_refused(tmp_path, attribute, value):
     with pytest.raises(ShotError) as caught:
         read(tmp_path, edit)
     assert (caught.value.path, caught.value.attribute) == (ELBOW, attribute)
+
+
+def generic(stage, path, free, locked=(1.0, -1.0)):
+    """Turn a hinge into a generic joint that leaves some directions free; a drive and limits keep their values."""
+    prim = stage.GetPrimAtPath(path)
+    values = {name: prim.GetAttribute(f"physics:{name}Limit").Get() for name in ("lower", "upper")}
+    samples = prim.GetAttribute(TARGET_POSITION)
+    times = {code: samples.Get(code) for code in samples.GetTimeSamples()}
+    prim.RemoveAppliedSchema("PhysicsDriveAPI:angular")
+    prim.RemoveProperty(TARGET_POSITION)
+    prim.SetTypeName("PhysicsJoint")
+    for name in ("transX", "transY", "transZ", "rotX", "rotY", "rotZ"):
+        limit = UsdPhysics.LimitAPI.Apply(prim, name)
+        low, high = locked
+        if name in free:
+            low, high = values["lower"], values["upper"]
+        limit.CreateLowAttr(low)
+        limit.CreateHighAttr(high)
+    if len(free) == 1:
+        target = UsdPhysics.DriveAPI.Apply(prim, free[0]).CreateTargetPositionAttr()
+        for code, value in times.items():
+            target.Set(value, code)
+
+
+@pytest.mark.parametrize("locked", [(1.0, -1.0), (0.0, 0.0)])
+@pytest.mark.parametrize("freedom", ["rotX", "rotY", "rotZ"])
+def test_a_generic_joint_with_one_free_rotation_is_a_hinge(tmp_path, freedom, locked):
+    def hinge(stage):
+        UsdPhysics.RevoluteJoint(stage.GetPrimAtPath(ELBOW)).GetAxisAttr().Set(freedom[-1])
+
+    expected, animation, _ = read_shot(str(write_arm(tmp_path / "hinge.usda", hinge)))
+    read_generic = read_shot(str(write_arm(tmp_path / "generic.usda", lambda s: generic(s, ELBOW, [freedom], locked))))
+    character, same, _ = read_generic
+    one, other = joint(expected, ELBOW), joint(character, ELBOW)
+    assert other.kind == "revolute" and (other.lower, other.upper) == (one.lower, one.upper)
+    for side in ("frame0", "frame1"):
+        assert np.allclose(getattr(one, side).position, getattr(other, side).position)
+        assert np.allclose(getattr(one, side).rotation, getattr(other, side).rotation)
+    for track, again in zip(animation.tracks, same.tracks, strict=True):
+        assert np.array_equal(track.values, again.values)
+    assert character.motors[1].attribute == f"drive:{freedom}:physics:targetPosition"
+    assert any(ELBOW in note and "generic joint, revolute" in note for note in character.notes)
+
+
+def test_a_generic_joint_without_freedom_is_fixed_and_with_three_rotations_spherical(tmp_path):
+    for free, kind in (([], "fixed"), (["rotX", "rotY", "rotZ"], "spherical")):
+        found = joint(read(tmp_path, lambda s, free=free: generic(s, ELBOW, free)), ELBOW)
+        assert found.kind == kind
+
+
+def test_a_generic_joint_with_other_freedoms_is_refused_with_their_names(tmp_path):
+    with pytest.raises(ShotError, match="not supported") as error:
+        read(tmp_path, lambda s: generic(s, ELBOW, ["rotX", "transZ"]))
+    assert error.value.path == ELBOW and "transZ, rotX" in str(error.value.found)

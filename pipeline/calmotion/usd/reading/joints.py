@@ -12,6 +12,7 @@ from calmotion.errors import ShotError
 from calmotion.shot import WORLD, Frame
 from calmotion.shot.character import Array
 from calmotion.usd import gf
+from calmotion.usd.reading import d6_joints
 from calmotion.usd.reading.context import Reading, prims_of
 from calmotion.usd.transforms import Pose, axis_rotation, quaternion_from_rotation, rotation_from_quaternion
 
@@ -23,6 +24,8 @@ _KINDS = {
     "PhysicsSphericalJoint": "spherical",
 }  # fmt: skip
 _WITH_AXIS = ("revolute", "prismatic")
+_DRIVES = {"revolute": "angular", "prismatic": "linear"}
+_LIMITS = ("physics:lowerLimit", "physics:upperLimit")
 UNSUPPORTED = "unsupported"
 _HALF_TURN = np.diag([1.0, -1.0, -1.0])  # about x: turns the z axis over
 
@@ -40,6 +43,8 @@ class JointPrim:
         frame0, frame1: Frames in them, m.
         lower, upper: Limits [rad or m].
         closes_chain: Whether the shot excludes this joint from the spanning tree (it closes a chain).
+        drive: Name of the PhysicsDriveAPI that drives it: `angular`, `linear`, or the free direction of a generic
+            joint; empty where nothing can.
     """
 
     prim: Any
@@ -52,6 +57,7 @@ class JointPrim:
     lower: float = -np.inf
     upper: float = np.inf
     closes_chain: bool = False
+    drive: str = ""
 
 
 def joint_prims(stage: Usd.Stage) -> list[Usd.Prim]:
@@ -92,11 +98,17 @@ def read_joint(reading: Reading, prim: Usd.Prim, poses: dict[str, Pose]) -> Join
             found=ends[0][0],
             remedy="Correct physics:body0 or physics:body1",
         )
-    kind = _KINDS.get(str(prim.GetTypeName()), UNSUPPORTED)
-    turn = axis_rotation(_axis(prim)) if kind in _WITH_AXIS else np.eye(3)
+    kind, drive, limits = _KINDS.get(str(prim.GetTypeName()), UNSUPPORTED), "", _LIMITS
+    if prim.GetTypeName() == d6_joints.TYPE:
+        simple = d6_joints.simple_joint(prim)
+        kind, drive, limits = simple.kind or UNSUPPORTED, simple.freedom, simple.limits
+        if simple.kind:
+            reading.note(f"{path}: a generic joint, {kind} by the directions that it locks")
+    axis = drive[-1:] or (_axis(prim) if kind in _WITH_AXIS else "")
+    turn = axis_rotation(axis) if axis else np.eye(3)
     meters = reading.units.length(1.0)
     to_si = np.deg2rad(1.0) if kind == "revolute" else meters
-    lower, upper = _limits(prim, to_si) if kind in _WITH_AXIS else (-np.inf, np.inf)
+    lower, upper = _limits(prim, limits, to_si) if kind in _WITH_AXIS else (-np.inf, np.inf)
     (body0, position0, rotation0), (body1, position1, rotation1) = ends
     if body1 == "":
         # The world comes first. Turning the axis over keeps the sense of angle or length, so limits and track stay.
@@ -115,6 +127,7 @@ def read_joint(reading: Reading, prim: Usd.Prim, poses: dict[str, Pose]) -> Join
         lower,
         upper,
         prim.GetAttribute("physics:excludeFromArticulation").Get() is True,
+        drive or _DRIVES.get(kind, ""),
     )
 
 
@@ -190,12 +203,12 @@ def _finite(prim: Usd.Prim, name: str, convert: Callable[[Any], Array]) -> Array
     return converted
 
 
-def _limits(prim: Usd.Prim, to_si: float) -> tuple[float, float]:
+def _limits(prim: Usd.Prim, names: tuple[str, str], to_si: float) -> tuple[float, float]:
     """Lower and upper limit [rad or m], infinite where there is none."""
     values = []
-    for name, unlimited in (("physics:lowerLimit", -np.inf), ("physics:upperLimit", np.inf)):
+    for name, unlimited in zip(names, (-np.inf, np.inf), strict=True):
         attribute = prim.GetAttribute(name)
-        value = attribute.Get() if attribute.HasAuthoredValue() else None
+        value = attribute.Get() if attribute and attribute.HasAuthoredValue() else None
         value = unlimited if value is None else float(value)
         if np.isnan(value):
             raise ShotError(
@@ -211,12 +224,15 @@ def _limits(prim: Usd.Prim, to_si: float) -> tuple[float, float]:
 def refuse_unsupported(joint: JointPrim) -> None:
     """Raise a ShotError for a joint of a kind that cannot be simulated yet."""
     if joint.kind == UNSUPPORTED:
+        found = str(joint.prim.GetTypeName())
+        if found == d6_joints.TYPE:
+            found += f" that is free in {', '.join(d6_joints.simple_joint(joint.prim).free)}"
         raise ShotError(
             "a joint of this type is not supported yet",
             path=joint.path,
-            found=joint.prim.GetTypeName(),
-            remedy="Use a revolute, prismatic, spherical or fixed PhysicsJoint, or disable it "
-            "with physics:jointEnabled = false",
+            found=found,
+            remedy="Use a revolute, prismatic, spherical or fixed joint, or a PhysicsJoint whose PhysicsLimitAPIs lock "
+            "all other directions (low above high), or disable it with physics:jointEnabled = false",
         )
 
 

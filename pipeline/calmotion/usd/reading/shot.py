@@ -18,13 +18,12 @@ from calmotion.usd.reading.character import Skeleton, build_character, read_skel
 from calmotion.usd.reading.context import Reading, is_rigid_body, prims_of
 from calmotion.usd.reading.joints import joint_prims
 from calmotion.usd.reading.motors.driven_motors import (
-    ATTRIBUTE,
     BODIES,
     CONSTANT,
     DRIVE,
     GIVEN,
-    LENGTH_ATTRIBUTE,
     Drive,
+    target_positions,
     to_si,
 )
 from calmotion.usd.reading.motors.free_ranges import free_tracks
@@ -119,9 +118,7 @@ def shot_clock(stage: Usd.Stage, given: MotorTracks | None) -> Clock:
     and skeletons; one frame where nothing is animated."""
     from pxr import UsdSkel
 
-    names = (ATTRIBUTE, LENGTH_ATTRIBUTE)
-    drives = [prim.GetAttribute(name) for prim in joint_prims(stage) for name in names]
-    codes = [code for attribute in drives if attribute for code in sample_codes(attribute)]
+    codes = [c for prim in joint_prims(stage) for drive in target_positions(prim) for c in sample_codes(drive)]
     if given is not None:
         rate, start = stage.GetTimeCodesPerSecond(), stage.GetStartTimeCode()
         codes += [start + rate * t for t in given.times[[0, -1]]]

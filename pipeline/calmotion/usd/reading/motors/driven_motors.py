@@ -24,19 +24,24 @@ from calmotion.usd.units import StageUnits
 if TYPE_CHECKING:
     from pxr import Usd
 
-ATTRIBUTE = "drive:angular:physics:targetPosition"
-LENGTH_ATTRIBUTE = "drive:linear:physics:targetPosition"
+_TARGET_POSITION = "drive:{}:physics:targetPosition"
 SKEL_JOINT = "calm:motor:skelJoint"
 DRIVE, BODIES, SKELETON, CONSTANT, GEARED, GIVEN = "drive", "bodies", "skeleton", "constant", "geared", "given"
 _SCHEMA = "CalmMotorAPI"
-_DRIVES = {"revolute": "angular", "prismatic": "linear"}
-_UNITS = {"angular": "degrees", "linear": "units of length"}
+_UNITS = {"revolute": "degrees", "prismatic": "units of length"}
 _WRITTEN_AS = {BODIES: "xformOpOrder", SKELETON: SKEL_JOINT}
 
 
-def target_attribute(kind: str) -> str:
-    """Name of the attribute with the track of a joint of a kind."""
-    return LENGTH_ATTRIBUTE if kind == "prismatic" else ATTRIBUTE
+def target_attribute(joint: JointPrim) -> str:
+    """Name of the attribute with the track of a joint that a motor can drive."""
+    return _TARGET_POSITION.format(joint.drive)
+
+
+def target_positions(prim: Usd.Prim) -> list[Any]:
+    """The target positions of all drives of a joint's prim, as attributes."""
+    applied = [name.partition(":")[2] for name in prim.GetAppliedSchemas() if name.startswith("PhysicsDriveAPI:")]
+    drives = dict.fromkeys(["angular", "linear", *applied])
+    return [attribute for drive in drives if (attribute := prim.GetAttribute(_TARGET_POSITION.format(drive)))]
 
 
 def to_si(kind: str, units: StageUnits) -> float:
@@ -44,10 +49,10 @@ def to_si(kind: str, units: StageUnits) -> float:
     return float(units.length(1.0) if kind == "prismatic" else np.deg2rad(1.0))
 
 
-def _remedy(kind: str) -> str:
-    drive = _DRIVES[kind]
+def _remedy(joint: JointPrim) -> str:
     return (
-        f"Apply PhysicsDriveAPI:{drive} and author time samples of {target_attribute(kind)}, in {_UNITS[drive]}, or "
+        f"Apply PhysicsDriveAPI:{joint.drive} and author time samples of {target_attribute(joint)}, in "
+        f"{_UNITS[joint.kind]}, or "
         "animate the transforms of the bodies that it joins, or remove what makes the joint a motor"
     )
 
@@ -74,7 +79,7 @@ class Drive:
 
     def attribute(self, stage: Usd.Stage) -> Any:
         """The target position of its drive, on a stage; invalid where the joint has no drive."""
-        return stage.GetPrimAtPath(self.joint.path).GetAttribute(target_attribute(self.joint.kind))
+        return stage.GetPrimAtPath(self.joint.path).GetAttribute(target_attribute(self.joint))
 
 
 def actuated_joints(stage: Usd.Stage) -> dict[str, str]:
@@ -117,7 +122,7 @@ def read_drives(
     actuated, drives, gears = actuated_joints(reading.stage), {}, {}
     for joint in joints:
         with reading.collecting_problems():
-            if joint.prim is None or joint.kind not in _DRIVES:
+            if joint.prim is None or joint.kind not in _UNITS:
                 _refuse_wrong_motor(joint)
                 continue
             gear = read_gear(joint, kinds, reading.units)
@@ -138,14 +143,14 @@ def read_drives(
             "no motors: none of its joints is driven",
             path=root,
             remedy="Apply PhysicsDriveAPI:angular to the revolute joints that motors drive, and author time samples "
-            f"of {ATTRIBUTE}, in degrees",
+            f"of {_TARGET_POSITION.format('angular')}, in degrees",
         )
     if not still and all(drive.source in (CONSTANT, GEARED) for drive in found):
         raise ShotError(
             "a motor without animation, and no other motor is animated",
             path=found[0].joint.path,
-            attribute=target_attribute(found[0].joint.kind),
-            remedy=_remedy(found[0].joint.kind),
+            attribute=target_attribute(found[0].joint),
+            remedy=_remedy(found[0].joint),
         )
     _refuse_duplicate_motors(found, reading)
     for drive in found:
@@ -154,7 +159,7 @@ def read_drives(
                 ShotError(
                     "the motor is inside an instance, where its curve cannot be written",
                     path=drive.joint.path,
-                    attribute=target_attribute(drive.joint.kind),
+                    attribute=target_attribute(drive.joint),
                     remedy="Set instanceable = false on the instance above it",
                 )
             )
@@ -172,7 +177,7 @@ def _refuse_duplicate_motors(drives: Sequence[Drive], reading: Reading) -> None:
                 ShotError(
                     "two motors drive the same pair of bodies",
                     path=drive.joint.path,
-                    attribute=target_attribute(drive.joint.kind),
+                    attribute=target_attribute(drive.joint),
                     found=rival.joint.path,
                     remedy="Remove one of the joints, or the drive of one of them",
                 )
@@ -207,18 +212,18 @@ def read_motor(drive: Drive, index: int, motors: dict[str, int], reading: Readin
     Raises:
         ShotError: A limit that is not positive.
     """
-    prim, kind, linear = drive.joint.prim, _DRIVES[drive.joint.kind], drive.joint.kind == "prismatic"
+    prim, linear = drive.joint.prim, drive.joint.kind == "prismatic"
     from_stage = reading.units.length if linear else np.deg2rad
     gear = drive.gear
     return Motor(
         joint=index,
         path=drive.joint.path,
-        attribute=_WRITTEN_AS.get(drive.source, target_attribute(drive.joint.kind)),
+        attribute=_WRITTEN_AS.get(drive.source, target_attribute(drive.joint)),
         source=drive.source if drive.source in _WRITTEN_AS else DRIVE,
         optimize=may_change(prim),
-        max_velocity=velocity_limit(drive.joint, kind, reading.units, reading.notes),
+        max_velocity=velocity_limit(drive.joint, reading.units, reading.notes),
         max_acceleration=float(from_stage(calmotion_limit(prim, "calm:motor:maxAcceleration"))),
-        max_torque=effort_limit(drive.joint, kind, reading.units, reading.notes),
+        max_torque=effort_limit(drive.joint, reading.units, reading.notes),
         linear=linear,
         follows=None if gear is None else Follows(motors[gear.leader], gear.ratio, gear.offset),
     )
@@ -228,8 +233,8 @@ def _drive(
     joint: JointPrim, actuated: dict[str, str], reading: Reading, posed: Sequence[str], given: Sequence[str],
     still: bool,
 ) -> Drive | None:  # fmt: skip
-    prim, name = joint.prim, target_attribute(joint.kind)
-    drive, unit = _DRIVES[joint.kind], _UNITS[_DRIVES[joint.kind]]
+    prim, name = joint.prim, target_attribute(joint)
+    drive, unit = joint.drive, _UNITS[joint.kind]
     has_drive, ours = schemas.is_applied(prim, f"PhysicsDriveAPI:{drive}"), schemas.is_applied(prim, _SCHEMA)
     if joint.path in given:
         return Drive(joint, GIVEN)
@@ -253,7 +258,7 @@ def _drive(
     if posed:
         return Drive(joint, BODIES)
     if ours and not still:
-        raise ShotError("a motor without animation", path=joint.path, attribute=name, remedy=_remedy(joint.kind))
+        raise ShotError("a motor without animation", path=joint.path, attribute=name, remedy=_remedy(joint))
     constant = number_of(prim, name) if has_drive else None
     if constant is not None:
         if not math.isfinite(constant):

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 _SCHEMA = "CalmMotorAPI"
 
 
-def effort_limit(joint: JointPrim, drive: str, units: StageUnits, notes: list[str]) -> float:
+def effort_limit(joint: JointPrim, units: StageUnits, notes: list[str]) -> float:
     """Largest torque [N m] or force [N]; the lower of Calmotion's and UsdPhysics' limit, else that of another dialect.
 
     Raises:
@@ -28,13 +28,13 @@ def effort_limit(joint: JointPrim, drive: str, units: StageUnits, notes: list[st
     """
     to_si = units.force if joint.kind == "prismatic" else units.torque
     limit = to_si(calmotion_limit(joint.prim, "calm:motor:maxTorque"))
-    force = authored(joint.prim, EFFORT_LIMIT[1], drive)
+    force = authored(joint.prim, EFFORT_LIMIT[1], joint.drive)
     if force is not None:
         limit = min(limit, to_si(positive(joint.prim, *force)))
-    return float(limit if math.isfinite(limit) else _dialect_limit(joint, EFFORT_LIMIT[2:], drive, to_si, notes))
+    return float(limit if math.isfinite(limit) else _dialect_limit(joint, EFFORT_LIMIT[2:], to_si, notes))
 
 
-def velocity_limit(joint: JointPrim, drive: str, units: StageUnits, notes: list[str]) -> float:
+def velocity_limit(joint: JointPrim, units: StageUnits, notes: list[str]) -> float:
     """Largest speed [rad/s or m/s]; Calmotion's limit, else that of another dialect.
 
     Raises:
@@ -42,13 +42,13 @@ def velocity_limit(joint: JointPrim, drive: str, units: StageUnits, notes: list[
     """
     to_si = units.length if joint.kind == "prismatic" else np.deg2rad
     limit = to_si(calmotion_limit(joint.prim, "calm:motor:maxVelocity"))
-    return float(limit if math.isfinite(limit) else _dialect_limit(joint, VELOCITY_LIMIT[1:], drive, to_si, notes))
+    return float(limit if math.isfinite(limit) else _dialect_limit(joint, VELOCITY_LIMIT[1:], to_si, notes))
 
 
 def _dialect_limit(
-    joint: JointPrim, spellings: tuple[Spelling, ...], drive: str, to_si: Callable[[float], float], notes: list[str]
+    joint: JointPrim, spellings: tuple[Spelling, ...], to_si: Callable[[float], float], notes: list[str]
 ) -> float:
-    found = first_finite(joint.prim, spellings, drive)
+    found = first_finite(joint.prim, spellings, joint.drive)
     if found is None:
         return math.inf
     name, value, spelling = found
