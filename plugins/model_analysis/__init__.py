@@ -34,24 +34,35 @@ class AnalyseShot(Operator):
     requires = (Character, Animation)
     uses = (Source, OutputPaths)
     provides = (ModelChoices,)
-    properties = tuple(
+    properties = (
+        *(
+            Property(
+                kind, str, AUTO, choices=(AUTO, ON, OFF),
+                description=f"{_FORCED[kind]}; auto: {_AUTO.get(kind, 'by the tolerance')}",
+            )
+            for kind in KINDS
+        ),
         Property(
-            kind, str, AUTO, choices=(AUTO, ON, OFF),
-            description=f"{_FORCED[kind]}; auto: {_AUTO.get(kind, 'by the tolerance')}",
-        )
-        for kind in KINDS
+            "max_hours", float, 24.0, minimum=0.0,
+            description="Largest estimated processor time of a run [h]; a shot that needs more is refused",
+        ),
     )  # fmt: skip
 
     def execute(self, context: RunContext) -> Sequence[object]:
+        from calmotion.accuracy.expected_cost import expected_cost, refuse_unaffordable
         from calmotion.accuracy.simplification.analysis import analyse
+        from calmotion.support.memory import available_memory
 
         source, paths = context.get(Source), context.get(OutputPaths)
         forced = {kind: getattr(context.properties, kind) for kind in KINDS}
         if paths is not None and paths.modes and forced["bodies"] == AUTO:
             forced["bodies"] = ON  # their mode shapes are requested
         changes = source is None or source.command != "simulate"
-        options = run_settings(source)
-        return [analyse(context.get(Character), context.get(Animation), options, forced, changes)]
+        options, character, animation = run_settings(source), context.get(Character), context.get(Animation)
+        if source is not None:
+            cost = expected_cost(character, animation, options, source.command == "optimize")
+            refuse_unaffordable(cost, character.path, context.properties.max_hours, available_memory())
+        return [analyse(character, animation, options, forced, changes)]
 
 
 class RefineReduction(Operator):

@@ -31,7 +31,7 @@ def motor_without_animation(stage: Usd.Stage) -> None:
 
 def zero_mass(stage: Usd.Stage) -> None:
     for name in ("physics:mass", "physics:diagonalInertia", "physics:centerOfMass"):
-        stage.GetPrimAtPath(shots.BASE).GetAttribute(name).Clear()
+        stage.GetPrimAtPath(shots.FORE).GetAttribute(name).Clear()
 
 
 def negative_mass(stage: Usd.Stage) -> None:
@@ -66,7 +66,7 @@ CASES = {
     no_joints: ("/Arm", ""),
     no_motors: ("/Arm", ""),
     motor_without_animation: (shots.ELBOW, shots.TARGET_POSITION),
-    zero_mass: (shots.BASE, "physics:mass"),
+    zero_mass: (shots.FORE, "physics:mass"),
     negative_mass: (shots.FORE, "physics:mass"),
     not_a_number: (shots.SHOULDER, shots.TARGET_POSITION),
     open_mesh: (f"{shots.FORE}/skin", ""),

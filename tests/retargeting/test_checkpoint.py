@@ -188,6 +188,7 @@ def test_a_stored_search_that_had_converged_is_not_repeated(limited, animation, 
     )  # fmt: skip
     assert not caplog.messages and any("resuming after" in line for line in lines)
     assert again.iterations == whole.iterations
+    assert 0 < again.resumed_iterations <= whole.iterations and whole.resumed_iterations == 0
     assert again.objective_after == pytest.approx(whole.objective_after, rel=1e-9)
 
 

@@ -18,7 +18,7 @@ def test_the_shake_of_a_real_robot_with_soft_arms_is_removed(calmotion, reposito
     stage.GetRootLayer().Save()
     done = calmotion(
         "optimize", composed, "-o", tmp_path / "calm.usda", "--json", "--step", "8.34ms",
-        "--set", "retarget.optimize.max_iterations=2", "--set", "fe.mesh.element_size=15mm",
+        "--set", "retarget.optimize.max_iterations=2", "--set", "fe.mesh.element_size=25mm",
             "--set", "fem.reduce.elasticity=linear",
     )  # fmt: skip
     assert done.returncode == 0, done.stderr

@@ -54,6 +54,11 @@ def test_results_are_arrays_by_prim_path(simulated):
     assert simulated.max_error == tip.max_error and simulated.rms_error == pytest.approx(tip.rms_error)
 
 
+def test_a_shaped_motion_is_also_compared_with_its_delay(shot_file, simulated, calmotion):
+    assert "shaper" not in simulated.report()
+    assert calmotion("simulate", shot_file, "--shaper", "zvd").returncode != 0, "a rigid robot has no frequency"
+
+
 def test_the_report_is_the_object_of_the_command_line(shot_file, simulated, calmotion):
     printed = json.loads(calmotion("simulate", shot_file, "--step", "4ms", "--json").stdout)
     report = simulated.report()

@@ -128,6 +128,10 @@ def print_run(report: dict[str, Any], stream: TextIO) -> None:
             f"iterations, {report['forward_simulations']} simulations, {report['linearized_sweeps']} linearised "
             f"sweeps, {report['wall_s']:.2f} s"
         )
+        if report["resumed_iterations"]:
+            console.print(
+                f"resumed from the checkpoint of an interrupted run, after {report['resumed_iterations']} iterations"
+            )
         if report["stopped"] not in ("converged", ""):
             gain = report["expected_further_gain_m"]
             more = "" if gain is None else f", {length(gain)} expected gain of one more iteration"
@@ -135,6 +139,11 @@ def print_run(report: dict[str, Any], stream: TextIO) -> None:
         kept = [motor["path"] for motor in report["motors"] if not motor["changed"]]
         if kept:
             console.print(f"motors without changes: {', '.join(kept)}")
+    if report.get("shaper"):
+        console.print(
+            f"{report['shaper']} delays the motion by {report['shaper_delay_s']:.3f} s; largest error from the "
+            f"intended motion with that delay: {length(report['delayed_max_error_m'])}"
+        )
     print_limits(console, report["limits"], optimized)
     sag = max((target[f"sag{suffixes[-1]}_m"] or 0.0 for target in report["targets"]), default=0.0)
     if sag > 1e-6:

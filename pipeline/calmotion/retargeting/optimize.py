@@ -160,6 +160,7 @@ def _optimized(
         interrupted=searched.interrupted,
         performed=performed_motion(prepared, problem.changed_curves),
         idle_gain_m=searched.idle_gain,
+        resumed_iterations=searched.resumed_iterations,
     )
 
 

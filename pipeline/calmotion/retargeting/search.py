@@ -51,6 +51,7 @@ class RetargetSearch:
         progress: Called after each iteration.
         idle_gain: Gain that idle motors would bring at the end [m]; None where there are none.
         interrupted: Whether the user ended it.
+        resumed_iterations: Iterations of the checkpoint from which it resumed.
     """
 
     problem: RetargetProblem
@@ -66,6 +67,7 @@ class RetargetSearch:
     progress: Progress
     idle_gain: float | None = None
     interrupted: bool = False
+    resumed_iterations: int = 0
 
     def run(self, start: Array) -> None:
         """Search from a point, or resume from the checkpoint; an interrupt (Ctrl-C) ends the search.
@@ -125,7 +127,8 @@ class RetargetSearch:
             self.checkpoint.refuse(f"does not fit the shot (objective {stored.merit:.6g}, simulated {merit:.6g})")
             return False
         self.problem, self.search = resumed, stored.search
-        self.progress(0.1, f"resuming after {len(self.search.history)} iterations of an interrupted search")
+        self.resumed_iterations = len(self.search.history)
+        self.progress(0.1, f"resuming after {self.resumed_iterations} iterations of an interrupted search")
         if np.any(x[inactive_coefficients(basis, self.inactive, motors)]):
             self.inactive = ()  # the stored search had already continued with all coefficients
         return True

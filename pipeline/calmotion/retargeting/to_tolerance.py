@@ -139,4 +139,5 @@ def _continued(first: Result, second: Result) -> Result:
         forward_simulations=first.forward_simulations + second.forward_simulations,
         iterations=first.iterations + second.iterations,
         wall_s=first.wall_s + second.wall_s,
+        resumed_iterations=first.resumed_iterations + second.resumed_iterations,
     )

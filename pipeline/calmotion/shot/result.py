@@ -207,6 +207,7 @@ class Result:
         accuracy: Of the motion that counts, `after` or else `before`; None where it was not estimated.
         idle_gain_m: By how much the root-mean-square error would fall with the motors that were left out of the search
             since they move no target [m]; None where there are none.
+        resumed_iterations: Iterations of an interrupted search from which this one resumed.
     """
 
     reference: Motion
@@ -235,3 +236,4 @@ class Result:
     performed: Motion | None = None
     accuracy: Accuracy | None = None
     idle_gain_m: float | None = None
+    resumed_iterations: int = 0

@@ -12,6 +12,7 @@ from calmotion.shot import Character, LimitUse, Result, Simplification, Simulati
 from calmotion.shot.character import Array
 from calmotion.shot.measure import measure_of
 from calmotion.shot.outputs import CsvFile, Figures, Recording, Rig, Verification, WrittenLayer
+from calmotion.shot.run import Source
 from calmotion.support.memory import peak_memory
 from calmotion.version import __version__
 
@@ -107,6 +108,9 @@ def run_report(run: Run, character: Character, result: Result, command: str, tot
         **_accuracy(run, result),
         "frequencies_hz": {character.bodies[table.body].path: table.frequencies for table in result.modes},
     }
+    source = run.get(Source)
+    if source is not None and source.shaper:
+        report |= _shaped(source.shaper, result)
     layer, recording, table, figures = run.get(WrittenLayer), run.get(Recording), run.get(CsvFile), run.get(Figures)
     report |= {
         "layer": layer.layer if layer else None,
@@ -119,6 +123,16 @@ def run_report(run: Run, character: Character, result: Result, command: str, tot
         "operators": [operator_row(row) for row in run.results],
     }
     return report
+
+
+def _shaped(shaper: str, result: Result) -> dict[str, Any]:
+    """The error that is left when the delay of an input shaper is not counted."""
+    from calmotion.simulation.inputs.shapers import best_delay
+
+    motion = result.before.motion
+    judged = motion.times >= -1e-9
+    delay, off = best_delay(motion.target_positions, result.reference.target_positions, judged, result.step_s)
+    return {"shaper": shaper, "shaper_delay_s": delay, "delayed_max_error_m": float(off.max(initial=0.0))}
 
 
 def _accuracy(run: Run, result: Result) -> dict[str, Any]:
@@ -153,6 +167,7 @@ def _optimized(character: Character, result: Result) -> dict[str, Any]:
         "forward_simulations": result.forward_simulations,
         "stopped": result.stopped,
         "interrupted": result.interrupted,
+        "resumed_iterations": result.resumed_iterations,
         "expected_further_gain_m": result.expected_gain_m,
         "gradients": result.gradients,
         "linearized_sweeps": result.linearized_sweeps,

@@ -166,7 +166,7 @@ def no_bodies(stage: Usd.Stage) -> None:
 
 def massless(stage: Usd.Stage) -> None:
     for name in ("physics:mass", "physics:diagonalInertia", "physics:centerOfMass"):
-        stage.GetPrimAtPath(BASE).GetAttribute(name).Clear()
+        stage.GetPrimAtPath(FORE).GetAttribute(name).Clear()
 
 
 def second_motor(stage: Usd.Stage) -> None:
@@ -332,8 +332,8 @@ CASES: dict[str, Case] = {
     ),
     # bodies
     "no bodies": edited(no_bodies, "shot.usda"),
-    "a body without mass": edited(massless, BASE, "physics:mass"),
-    "a mass of zero and nothing else": edited(both(massless, number(BASE, "physics:mass", 0.0)), BASE, "physics:mass"),
+    "a body without mass": edited(massless, FORE, "physics:mass"),
+    "a mass of zero and nothing else": edited(both(massless, number(FORE, "physics:mass", 0.0)), FORE, "physics:mass"),
     "a negative mass": edited(number(FORE, "physics:mass", -1.0), FORE, "physics:mass"),
     "a mass that is no number": edited(number(FORE, "physics:mass", NAN), FORE, "physics:mass"),
     "an infinite mass": edited(number(FORE, "physics:mass", INF), FORE, "physics:mass"),

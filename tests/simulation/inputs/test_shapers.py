@@ -5,7 +5,7 @@ import pytest
 from calmotion import ShotError
 from calmotion.shot import Track
 from calmotion.simulation.inputs.curves import sample_curves
-from calmotion.simulation.inputs.shapers import delay, impulses, shaped
+from calmotion.simulation.inputs.shapers import best_delay, delay, impulses, shaped
 from calmotion.simulation.inputs.time_grid import make_grid
 from scipy.signal import lsim
 
@@ -76,3 +76,16 @@ def test_what_cannot_be_shaped_is_refused(parts):
         with pytest.raises(ShotError) as error:
             shaped(*parts, kind, frequencies, RATIOS)
         assert error.value.remedy and error.value.found == kind
+
+
+@pytest.mark.parametrize("late", [0.0, 0.1, 0.31])
+def test_the_best_delay_is_the_one_by_which_a_motion_is_late(late):
+    h = 1 / 500
+    times = h * np.arange(-100, 1001)
+
+    def motion(t):
+        return np.stack([np.sin(3.0 * t), np.cos(2.0 * t), 0.2 * t], axis=-1)[:, None]
+
+    found, left = best_delay(motion(np.maximum(times - late, times[0])), motion(times), times >= 0.0, h)
+    assert found == pytest.approx(late, abs=0.003) and left.shape == (1001, 1)
+    assert left.max() < 0.01

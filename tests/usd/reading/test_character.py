@@ -115,3 +115,26 @@ def test_a_disabled_body_is_ignored(tmp_path):
     shoulder = character.joints[0]
     assert shoulder.path == SHOULDER and shoulder.body0 == WORLD
     assert np.allclose(shoulder.frame0.position, [0, 0, 1])
+
+
+def test_a_base_that_is_fixed_needs_no_mass(tmp_path):
+    def edit(stage):
+        for name in ("physics:mass", "physics:diagonalInertia", "physics:centerOfMass"):
+            stage.GetPrimAtPath(BASE).GetAttribute(name).Clear()
+
+    def loose(stage):
+        edit(stage)
+        stage.RemovePrim("/Arm/joints/stand")
+
+    for change in (edit, loose):  # the second one is fixed at its pose
+        character = read(tmp_path, change)
+        assert character.bodies[0].path == BASE and character.bodies[0].mass.mass > 0.0
+        assert any(BASE in note and "it has no mass" in note for note in character.notes)
+
+
+@pytest.mark.parametrize(("kilograms", "warned"), [(1.0, False), (1e-6, True), (1e4, True)])
+def test_a_robot_of_a_strange_weight_is_questioned(tmp_path, kilograms, warned):
+    character = read(tmp_path, lambda stage: UsdPhysics.SetStageKilogramsPerUnit(stage, kilograms))
+    said = [note for note in character.notes if "the robot weighs" in note]
+    assert bool(said) == warned
+    assert all("kilogramsPerUnit" in note and "metersPerUnit" in note for note in said)

@@ -22,11 +22,9 @@ from calmotion.retargeting.solver.gauss_newton import minimize
 from calmotion.shot.character import Array
 from calmotion.shot.run import SHAPERS, RunSettings
 from calmotion.simulation.inputs.curves import Curves
-from calmotion.simulation.inputs.shapers import delay, shaped
+from calmotion.simulation.inputs.shapers import best_delay, delay, shaped
 from calmotion.simulation.prepare import modes_of, prepare
 from calmotion.simulation.simulator import Simulator
-
-LONGEST_DELAY = 0.6  # that is tried [s]
 
 
 @dataclass(frozen=True)
@@ -76,20 +74,14 @@ def compare(shot: BenchShot) -> list[Row]:
 def _row(
     shot: BenchShot, method: str, late: float, problem: RetargetProblem, curves: Curves, positions: Array
 ) -> Row:  # fmt: skip
-    grid, meant = problem.grid, problem.objective.intended.target_positions
+    grid, intended = problem.grid, problem.objective.intended.target_positions
     judged = np.flatnonzero(grid.judged)
-
-    def errors(shift: int) -> Array:
-        distances: Array = np.linalg.norm(positions[judged] - meant[np.maximum(judged - shift, 0)], axis=2)
-        return distances
-
-    shifts = range(0, int(LONGEST_DELAY / grid.h), max(1, int(0.002 / grid.h)))
-    best = min(shifts, key=lambda shift: float(errors(shift).max()))
-    now = errors(0)
+    now = np.linalg.norm(positions[judged] - intended[judged], axis=2)
+    best, delayed = best_delay(positions, intended, grid.judged, grid.h)
     change = np.abs(curves.angles - problem.curves.angles)[judged].max()
     return Row(
         shot.name, method, late, 1e3 * float(now.max()), 1e3 * float(np.sqrt(np.mean(now**2, axis=0)).max()),
-        best * grid.h, 1e3 * float(errors(best).max()), float(np.degrees(change)),
+        best, 1e3 * float(delayed.max()), float(np.degrees(change)),
     )  # fmt: skip
 
 

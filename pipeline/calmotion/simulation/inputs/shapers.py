@@ -11,11 +11,12 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from calmotion.errors import ShotError
-from calmotion.shot.character import Array
+from calmotion.shot.character import Array, BoolArray
 from calmotion.shot.run import SHAPERS
 from calmotion.simulation.inputs.curves import Curves
 from calmotion.simulation.inputs.time_grid import TimeGrid
 
+LONGEST_DELAY = 0.6  # that is looked for [s]
 CUTOFF = 0.5  # of the low-pass filter, over the lowest frequency, where nobody says
 
 
@@ -73,3 +74,27 @@ def shaped(
             angles += amplitude * source(np.maximum(times - late, times[0]))
     spline = CubicSpline(times, angles)
     return Curves(angles, spline(times, 1), spline(times, 2))
+
+
+def best_delay(positions: Array, intended: Array, judged: BoolArray, h: float) -> tuple[float, Array]:
+    """The delay of the intended motion from which a motion differs least, and the distances that are left.
+
+    An input shaper delays the motion, and a comparison without the delay would count it as an error.
+
+    Args:
+        positions, intended: Of the targets, shape [T, K, 3] [m].
+        judged: Instants that count, shape [T].
+        h: Step [s].
+
+    Returns:
+        The delay [s], at most `LONGEST_DELAY`, in steps of two milliseconds, and the distances, shape [t, K] [m].
+    """
+    instants = np.flatnonzero(judged)
+
+    def distances(shift: int) -> Array:
+        off: Array = np.linalg.norm(positions[instants] - intended[np.maximum(instants - shift, 0)], axis=2)
+        return off
+
+    shifts = range(0, max(1, int(LONGEST_DELAY / h)), max(1, int(0.002 / h)))
+    best = min(shifts, key=lambda shift: float(distances(shift).max(initial=0.0)))
+    return best * h, distances(best)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from calmotion.errors import ShotError, raise_all
-from calmotion.shot import Body, Character, Joint, RetargetSettings
+from calmotion.shot import Body, Character, Joint, MassProperties, RetargetSettings
 from calmotion.usd.clock import Clock
 from calmotion.usd.reading import scene, targets, topology
 from calmotion.usd.reading.animated_transforms import refuse_moving
@@ -33,6 +33,8 @@ from calmotion.usd.transforms import Pose
 
 if TYPE_CHECKING:
     from pxr import Usd
+
+LIGHTEST, HEAVIEST = 1e-3, 1e3  # kg: other robots are mostly robots in other units
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,8 +120,11 @@ def build_character(reading: Reading, skeleton: Skeleton) -> Character:
     """
     numbers = {path: k for k, path in enumerate(skeleton.bodies)}
     touching = {path: [j.path for j in skeleton.joints if path in (j.body0, j.body1)] for path in skeleton.bodies}
+    fixed = {j.body1 for j in skeleton.joints if j.body0 == "" and j.kind == "fixed"}
     bodies = tuple(
-        reading.each(skeleton.bodies, lambda path: _body(reading, path, skeleton.poses[path], touching[path]))
+        reading.each(
+            skeleton.bodies, lambda path: _body(reading, path, skeleton.poses[path], touching[path], path in fixed)
+        )
     )
     joints = tuple(
         Joint(
@@ -157,6 +162,7 @@ def build_character(reading: Reading, skeleton: Skeleton) -> Character:
         outer = topology.leaves(skeleton.bodies, skeleton.joints)
         chosen = tuple(targets.outermost_target(bodies[numbers[b]], numbers[b], joints) for b in outer)
         reading.note(f"no CalmTargetAPI: the outermost point of {', '.join(outer)} is taken as target")
+    _warn_of_weight(reading, root, bodies)
     default = reading.stage.GetDefaultPrim()
     whole = default and all(b.startswith(f"{default.GetPath()}/") for b in skeleton.bodies)
     return Character(
@@ -171,7 +177,24 @@ def build_character(reading: Reading, skeleton: Skeleton) -> Character:
     )
 
 
-def _body(reading: Reading, path: str, pose: Pose, joints: list[str]) -> Body:
+def _warn_of_weight(reading: Reading, path: str, bodies: Sequence[Body]) -> None:
+    """Warn of a robot that is lighter than a gram or heavier than a tonne: its units are mostly wrong."""
+    masses = [body.mass.mass for body in bodies if body.mass is not None]
+    total = float(sum(masses))
+    if len(masses) == len(bodies) and not LIGHTEST <= total <= HEAVIEST:
+        reading.warn(
+            ShotError(
+                f"the robot weighs {total:.3g} kg",
+                path=path,
+                attribute="metersPerUnit",
+                found=f"{reading.units.meters:g} m, and kilogramsPerUnit {reading.units.kilograms:g} kg",
+                remedy="If this is not intended, correct these units of the root layer, physics:mass or "
+                "physics:density; simulations and limits depend on it",
+            )
+        )
+
+
+def _body(reading: Reading, path: str, pose: Pose, joints: list[str], fixed: bool) -> Body:
     prim = reading.stage.GetPrimAtPath(path)
     shapes = shapes_of(reading, prim, pose)
     flexible = flexible_settings(reading, prim, pose)
@@ -179,6 +202,9 @@ def _body(reading: Reading, path: str, pose: Pose, joints: list[str]) -> Body:
         properties = None  # the mesh and the density of the material decide
     else:
         properties = mass.mass_of(reading, prim, pose, shapes)
+        if properties is None and fixed:
+            properties = MassProperties(1.0, np.zeros(3), np.eye(3))
+            reading.note(f"{path}: it has no mass, and none is needed: a joint fixes it to the world")
         if properties is None:
             raise ShotError(
                 "a body without mass: neither a mass, nor a density with geometry, nor a collider is authored",
