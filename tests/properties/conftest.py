@@ -4,6 +4,7 @@ ones."""
 import os
 
 from hypothesis import HealthCheck, Phase, settings
+from hypothesis.internal.conjecture import providers
 
 SLOW = [HealthCheck.too_slow, HealthCheck.data_too_large, HealthCheck.filter_too_much]
 settings.register_profile(
@@ -14,4 +15,8 @@ settings.register_profile(
 settings.register_profile(
     "thorough", max_examples=100, deadline=None, database=None, suppress_health_check=SLOW, print_blob=True
 )
-settings.load_profile(os.environ.get("CALMOTION_HYPOTHESIS", "few"))
+PROFILE = os.environ.get("CALMOTION_HYPOTHESIS", "few")
+settings.load_profile(PROFILE)
+if PROFILE == "few":
+    # hypothesis also draws constants of all modules that are loaded, so the examples depended on the tests before
+    providers.is_local_module_file = lambda path: False
