@@ -136,7 +136,7 @@ class OptimizeShot(Operator):
                 "warning", "interrupted: these are the best curves so far; the same command resumes from them"
             )
         before, after = result.objective_before, result.objective_after
-        if before is None or after is None or not after <= before:
+        if after is None or not after <= before:
             reason = "the limits of the motors require it" if result.limits else f"the search ended: {result.stopped}"
             context.report(
                 "warning",

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from calmotion.errors import ShotError
 from calmotion.shot import Animation, Character
 from calmotion.shot.run import RunSettings
-from calmotion.simulation.inputs.time_grid import MAX_STEP, make_grid
+from calmotion.simulation.inputs.time_grid import make_grid
 
 # Measured on the five samples: 1.5 to 2.9 us for a step and a coordinate; a search costs 40 to 300 simulations.
 SECONDS = 3e-6  # for a step and a coordinate
@@ -43,7 +43,7 @@ def expected_cost(character: Character, animation: Animation, options: RunSettin
     frames = len(animation.frame_times)
     steps = 1
     if frames > 1:
-        grid = make_grid(animation.frame_times, options.step or character.retarget.time_step or MAX_STEP, 0.0)
+        grid = make_grid(animation.frame_times, options.step or character.retarget.time_step, 0.0)
         steps = grid.substeps * (frames - 1) + 1
     flexible = [body.flexible for body in character.bodies if body.flexible is not None]
     modes = [settings.mode_count if settings.mode_count > 0 else ELASTIC for settings in flexible]
@@ -66,25 +66,23 @@ def refuse_unaffordable(cost: ExpectedCost, path: str, most_hours: float, availa
     Raises:
         ShotError: With the estimate.
     """
-    size = f"{cost.frames} frames in {cost.steps} steps of {cost.coordinates} coordinates"
-    shorter = "Shorten the shot (startTimeCode, endTimeCode), process it in parts, lower framesPerSecond"
     if cost.memory > available:
-        raise ShotError(
-            f"the run needs about {cost.memory / 1e9:.1f} GB of memory, and {available / 1e9:.1f} GB are available",
-            path=path,
-            attribute="endTimeCode",
-            found=size,
-            remedy=f"{shorter}, or use a longer --step",
-        )
-    if cost.hours > most_hours:
-        raise ShotError(
-            f"the run needs about {readable_hours(cost.hours)}, more than the allowed {readable_hours(most_hours)}",
-            path=path,
-            attribute="endTimeCode",
-            found=size,
-            remedy=f"{shorter}, use a longer --step, or allow more with "
-            f"--set accuracy.analyse.max_hours={math.ceil(1.5 * cost.hours)}",
-        )
+        needs = f"{cost.memory / 1e9:.1f} GB of memory, and {available / 1e9:.1f} GB are available"
+        otherwise = "or use a longer --step"
+    elif cost.hours > most_hours:
+        needs = f"{readable_hours(cost.hours)}, more than the allowed {readable_hours(most_hours)}"
+        allowed = math.ceil(1.5 * cost.hours)
+        otherwise = f"use a longer --step, or allow more with --set accuracy.analyse.max_hours={allowed}"
+    else:
+        return
+    raise ShotError(
+        f"the run needs about {needs}",
+        path=path,
+        attribute="endTimeCode",
+        found=f"{cost.frames} frames in {cost.steps} steps of {cost.coordinates} coordinates",
+        remedy="Shorten the shot (startTimeCode, endTimeCode), process it in parts, lower framesPerSecond, "
+        + otherwise,
+    )
 
 
 def readable_hours(hours: float) -> str:

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from calmotion.support.cache_folder import CACHES, cache_folder
-from calmotion.support.files import PREFIX, remove_abandoned
+from calmotion.support.files import PREFIX
 from calmotion.support.verified_files import DamagedFileError, read_arrays, write_arrays
 
 LOG = logging.getLogger("calmotion")
@@ -117,8 +117,6 @@ def prune(cache: str, limit: int | None = None) -> list[Entry]:
         What was removed.
     """
     limit = CACHES[cache][1] if limit is None else limit
-    with contextlib.suppress(OSError):
-        remove_abandoned(cache_folder() / cache)
     total, removed = 0, []
     for number, entry in enumerate(entries(cache)):
         total += entry.size

@@ -77,22 +77,17 @@ def units_of(stage: Usd.Stage) -> StageUnits:
 
     units = StageUnits(UsdGeom.GetStageMetersPerUnit(stage), UsdPhysics.GetStageKilogramsPerUnit(stage))
     for name, value in (("metersPerUnit", units.meters), ("kilogramsPerUnit", units.kilograms)):
-        if not (math.isfinite(value) and value > 0.0):
-            raise ShotError(
-                "the unit of the stage must be positive",
-                path=stage.GetRootLayer().identifier,
-                attribute=name,
-                found=value,
-                remedy=f"Author a positive {name} in the root layer",
-            )
-        if not SMALLEST <= value <= LARGEST:
-            raise ShotError(
-                "the unit of the stage is not one that lengths or masses are measured in",
-                path=stage.GetRootLayer().identifier,
-                attribute=name,
-                found=value,
-                remedy=f"Author {name} in the root layer: {_USUAL[name]}",
-            )
+        if SMALLEST <= value <= LARGEST:
+            continue
+        positive = math.isfinite(value) and value > 0.0
+        what = "is not one that lengths or masses are measured in" if positive else "must be positive"
+        raise ShotError(
+            f"the unit of the stage {what}",
+            path=stage.GetRootLayer().identifier,
+            attribute=name,
+            found=value,
+            remedy=f"Author a positive {name} in the root layer: {_USUAL[name]}",
+        )
     up = str(UsdGeom.GetStageUpAxis(stage))
     if up not in ("X", "Y", "Z"):
         raise ShotError(

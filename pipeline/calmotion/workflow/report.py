@@ -130,8 +130,8 @@ def _shaped(shaper: str, result: Result) -> dict[str, Any]:
     from calmotion.simulation.inputs.shapers import best_delay
 
     motion = result.before.motion
-    judged = motion.times >= -1e-9
-    delay, off = best_delay(motion.target_positions, result.reference.target_positions, judged, result.step_s)
+    intended = result.reference.target_positions
+    delay, off = best_delay(motion.target_positions, intended, motion.judged, result.step_s)
     return {"shaper": shaper, "shaper_delay_s": delay, "delayed_max_error_m": float(off.max(initial=0.0))}
 
 

@@ -76,20 +76,20 @@ def shaped(
     return Curves(angles, spline(times, 1), spline(times, 2))
 
 
-def best_delay(positions: Array, intended: Array, judged: BoolArray, h: float) -> tuple[float, Array]:
+def best_delay(positions: Array, intended: Array, judged: BoolArray | slice, h: float) -> tuple[float, Array]:
     """The delay of the intended motion from which a motion differs least, and the distances that are left.
 
     An input shaper delays the motion, and a comparison without the delay would count it as an error.
 
     Args:
         positions, intended: Of the targets, shape [T, K, 3] [m].
-        judged: Instants that count, shape [T].
+        judged: Instants that count, shape [T], or a slice of them.
         h: Step [s].
 
     Returns:
         The delay [s], at most `LONGEST_DELAY`, in steps of two milliseconds, and the distances, shape [t, K] [m].
     """
-    instants = np.flatnonzero(judged)
+    instants = np.arange(len(positions))[judged]
 
     def distances(shift: int) -> Array:
         off: Array = np.linalg.norm(positions[instants] - intended[np.maximum(instants - shift, 0)], axis=2)

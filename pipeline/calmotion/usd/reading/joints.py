@@ -98,13 +98,14 @@ def read_joint(reading: Reading, prim: Usd.Prim, poses: dict[str, Pose]) -> Join
             found=ends[0][0],
             remedy="Correct physics:body0 or physics:body1",
         )
-    kind, drive, limits = _KINDS.get(str(prim.GetTypeName()), UNSUPPORTED), "", _LIMITS
+    kind, limits = _KINDS.get(str(prim.GetTypeName()), UNSUPPORTED), _LIMITS
     if prim.GetTypeName() == d6_joints.TYPE:
         simple = d6_joints.simple_joint(prim)
-        kind, drive, limits = simple.kind or UNSUPPORTED, simple.freedom, simple.limits
+        kind, drive, axis, limits = simple.kind or UNSUPPORTED, simple.freedom, simple.axis, simple.limits
         if simple.kind:
             reading.note(f"{path}: a generic joint, {kind} by the directions that it locks")
-    axis = drive[-1:] or (_axis(prim) if kind in _WITH_AXIS else "")
+    else:
+        drive, axis = _DRIVES.get(kind, ""), _axis(prim) if kind in _WITH_AXIS else ""
     turn = axis_rotation(axis) if axis else np.eye(3)
     meters = reading.units.length(1.0)
     to_si = np.deg2rad(1.0) if kind == "revolute" else meters
@@ -127,7 +128,7 @@ def read_joint(reading: Reading, prim: Usd.Prim, poses: dict[str, Pose]) -> Join
         lower,
         upper,
         prim.GetAttribute("physics:excludeFromArticulation").Get() is True,
-        drive or _DRIVES.get(kind, ""),
+        drive,
     )
 
 
