@@ -28,6 +28,7 @@ from numba import config, njit  # noqa: E402
 from calmotion.support.cache_folder import KERNELS, cache_folder
 from calmotion.support.caches import mark_used, prune
 from calmotion.support.kernel_cache import verified
+from calmotion.support.shared_code import shared
 from calmotion.support.sources import digest_of, with_imports
 
 Function = TypeVar("Function", bound=Callable[..., Any])
@@ -36,6 +37,7 @@ PACKAGE = Path(__file__).parents[1]
 # Flags for the kernels that a kernel calls: numba compiles these anew for every literal True and False they are given.
 YES, NO = cast(bool, np.bool_(True)), cast(bool, np.bool_(False))
 FUSED = {"contract"}  # a product and a sum in one rounding; nothing that would reorder or drop terms
+_COMPILERS = {"compilation.py", "references.py", "shared_code.py"}  # of this folder: they decide what is compiled
 _KERNEL = re.compile(rb"kernel\ndef ")
 _WITHOUT_ARRAYS: dict[str, Any] = {"_nrt": False, "no_cfunc_wrapper": True, "nogil": True}  # of its own making
 
@@ -53,9 +55,9 @@ def kernel_folder() -> Path:
 def kernel_key(package: Path) -> str:
     """Hash of all that ends up in machine code.
 
-    That is the sources of all kernels, of the modules that these import, since constants are compiled in, and of this
-    module with its options; the optimisation level; and the versions of numba, llvmlite and Python. numba itself tells
-    processors apart.
+    That is the sources of all kernels, of the modules that these import, since constants are compiled in, and of those
+    that compile, with their options; the optimisation level; and the versions of numba, llvmlite and Python. numba
+    itself tells processors apart.
 
     Args:
         package: The folder of the package.
@@ -65,7 +67,7 @@ def kernel_key(package: Path) -> str:
     used = {
         path for path in with_imports(kernels, package.parent) if path.parent != support
     }  # nothing of it is compiled
-    sources = sorted({*used, support / "compilation.py"})
+    sources = sorted({*used, *(path for path in support.glob("*.py") if path.name in _COMPILERS)})
     level = f"numba {numba.__version__} llvmlite {llvmlite.__version__} python {sys.version_info[:3]} opt {config.OPT}"
     return hashlib.sha256(f"{level} {digest_of(sources)}".encode()).hexdigest()
 
@@ -87,6 +89,11 @@ def inlined_kernel(function: Function) -> Function:
     that is called in turn.
     """
     return _compile(function, **_WITHOUT_ARRAYS, inline="always")
+
+
+def shared_kernel(function: Function) -> Function:
+    """A large `kernel` of a module that several others call: compiled once, and called at its address."""
+    return cast(Function, shared(_compile(function, **_WITHOUT_ARRAYS)))
 
 
 def allocating_kernel(function: Function) -> Function:

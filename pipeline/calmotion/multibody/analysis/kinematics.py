@@ -14,6 +14,7 @@ from calmotion.multibody.model.moving_markers import rooted
 from calmotion.multibody.model.system import State, System, allocate_state
 from calmotion.shot.character import Array, IntArray
 from calmotion.support.compilation import allocating_kernel, kernel
+from calmotion.support.references import by_reference
 
 
 @allocating_kernel
@@ -84,6 +85,7 @@ def rigid_state(model: Model, joint_angles: Array, world: Array | None = None) -
     return state
 
 
+@by_reference
 class TargetWork(NamedTuple):
     """The target markers as the kernels take them, and scratch: a marker, a rotation matrix, velocities of zero."""
 

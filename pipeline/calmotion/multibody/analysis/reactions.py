@@ -15,8 +15,10 @@ from calmotion.multibody.linear_solver.closed_chains import copy_rows
 from calmotion.multibody.model.system import State, System
 from calmotion.shot.character import Array
 from calmotion.support.compilation import kernel
+from calmotion.support.references import by_reference
 
 
+@by_reference
 class Reactions(NamedTuple):
     """Force and moment of each joint on the component on its side 1, at that side's frame, world axes.
 

@@ -15,7 +15,7 @@ from __future__ import annotations
 from calmotion.multibody.kernels.so3 import inverse_right_jacobian, right_jacobian, right_jacobian_derivative
 from calmotion.multibody.model.system import Instants, System
 from calmotion.shot.character import Array
-from calmotion.support.compilation import kernel
+from calmotion.support.compilation import kernel, shared_kernel
 
 
 @kernel
@@ -43,7 +43,7 @@ def rotation_rate_jacobian(h: float, turn_now: Array, turn_before: Array, T: Arr
             Hv[1 + i, 1 + k] = Wt[i, 0] * T[0, k] + Wt[i, 1] * T[1, k] + Wt[i, 2] * T[2, k]
 
 
-@kernel
+@shared_kernel
 def velocities(system: System, h: float, instants: Instants, J: Array, Vd: Array) -> None:
     """Velocities (into now.V) and accelerations (into Vd, shape [B, N]) of instant n by the backward difference."""
     before2, before, now = instants.before2, instants.before, instants.now
@@ -58,7 +58,7 @@ def velocities(system: System, h: float, instants: Instants, J: Array, Vd: Array
             Vd[b, i] = 3.0 * c2 * now.V[b, i] - c1 * before.V[b, i] + c2 * before2.V[b, i]
 
 
-@kernel
+@shared_kernel
 def position_to_velocity(system: System, h: float, instants: Instants, T: Array, Wt: Array, Hv: Array) -> None:
     """Derivative of the velocity of instant n by its position, into Hv, shape [B, 4, 4]; see `assemble`.
 

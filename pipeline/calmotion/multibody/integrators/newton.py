@@ -29,7 +29,7 @@ from calmotion.multibody.model.system import (
     System,
 )
 from calmotion.shot.character import Array
-from calmotion.support.compilation import NO, YES, inlined_kernel, kernel
+from calmotion.support.compilation import NO, YES, inlined_kernel, kernel, shared_kernel
 
 CONVERGED, SINGULAR, NOT_CONVERGED = 0, 1, 2
 LIMIT = 40
@@ -111,7 +111,7 @@ def _velocities(system: System, integrator: Integrator, instants: Instants, scra
         newmark.velocities(system, integrator, instants, scratch.memory, scratch.Vd)
 
 
-@inlined_kernel
+@shared_kernel
 def _linearize(
     system: System, integrator: Integrator, instants: Instants, angle: Array, rate: Array, ws: Workspace
 ) -> int:
@@ -128,7 +128,7 @@ def _linearize(
     return bad
 
 
-@kernel
+@shared_kernel
 def solve_correction(system: System, blocks: Blocks, matrix: StepMatrix, scratch: Scratch) -> None:
     """Newton's correction from the residual in the blocks, by the present factors, into scratch.x and scratch.lam."""
     x, lam = scratch.x, scratch.lam
@@ -155,7 +155,7 @@ def largest_entry(system: System, x: Array) -> float:
     return largest
 
 
-@inlined_kernel
+@shared_kernel
 def step(
     system: System, integrator: Integrator, instants: Instants, angle: Array, rate: Array, predicted: bool,
     ws: Workspace,

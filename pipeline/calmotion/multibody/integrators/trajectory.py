@@ -10,6 +10,7 @@ import numpy as np
 from calmotion.multibody.model.system import Instants, State
 from calmotion.shot.character import Array
 from calmotion.support.compilation import kernel
+from calmotion.support.references import by_reference
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,6 +46,7 @@ class Trajectory:
     costs: Array = field(default_factory=lambda: np.zeros((0, 3)))
 
 
+@by_reference
 class Inputs(NamedTuple):
     """What drives a simulation.
 
@@ -58,6 +60,7 @@ class Inputs(NamedTuple):
     world: Array
 
 
+@by_reference
 class Record(NamedTuple):
     """What the steps of a simulation fill.
 

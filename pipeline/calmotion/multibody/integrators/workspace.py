@@ -17,8 +17,10 @@ from calmotion.multibody.linear_solver.step_matrix import (
 )
 from calmotion.multibody.model.system import JOINT_ROWS, Blocks, State, System, allocate_blocks, allocate_state
 from calmotion.shot.character import Array
+from calmotion.support.references import by_reference
 
 
+@by_reference
 class Scratch(NamedTuple):
     """Scratch of a step, besides `Work`, `Blocks` and `StepMatrix`.
 
@@ -69,6 +71,7 @@ def allocate_scratch(system: System) -> Scratch:
     )
 
 
+@by_reference
 class Workspace(NamedTuple):
     """Everything a simulation writes to besides its trajectory; made once for a system, not shared by threads."""
 

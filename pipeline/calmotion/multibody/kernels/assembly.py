@@ -31,7 +31,7 @@ from calmotion.multibody.kernels.stvk import stvk_forces
 from calmotion.multibody.kernels.work import Work
 from calmotion.multibody.model.system import Blocks, Integrator, State, System
 from calmotion.shot.character import Array
-from calmotion.support.compilation import inlined_kernel, kernel
+from calmotion.support.compilation import inlined_kernel, kernel, shared_kernel
 
 
 @kernel
@@ -45,7 +45,7 @@ def _motion_of(system: System, b: int, state: State, Vd: Array, w: Work) -> Comp
     return ComponentMotion(w.a, state.V[b, 3:6], Vd[b, 3:6], state.u[b], state.V[b, 6:], Vd[b, 6:])
 
 
-@inlined_kernel
+@shared_kernel
 def _rotating_rows(system: System, b: int, state: State, Vd: Array, tangent: bool, w: Work, blocks: Blocks) -> None:
     """Inertia, linear elastic and gravity rows of a rotating component."""
     component, motion = component_of(system, b), _motion_of(system, b, state, Vd, w)
@@ -58,7 +58,7 @@ def _rotating_rows(system: System, b: int, state: State, Vd: Array, tangent: boo
     position_jacobian(component, motion, w, blocks.D[b], blocks.K[b])
 
 
-@inlined_kernel
+@shared_kernel
 def _nonrotating_rows(system: System, b: int, state: State, Vd: Array, tangent: bool, w: Work, blocks: Blocks) -> None:
     """The same of a non-rotating component."""
     component, motion = component_of(system, b), _motion_of(system, b, state, Vd, w)
@@ -84,7 +84,7 @@ def _follow_positions(n: int, acceleration: float, Hv: Array, D: Array, P: Array
             K[i, k] += beta * P[i, k]
 
 
-@inlined_kernel
+@shared_kernel
 def _joint_forces(system: System, joint: int, angle: float, lam: Array, w: Work, blocks: Blocks) -> None:
     """Adds the forces that a joint transmits to the rows of both components; needs `joint_kinematics` first.
 
@@ -120,7 +120,7 @@ def _joint_forces(system: System, joint: int, angle: float, lam: Array, w: Work,
         apply_wrench(n, w.wrench[0, :3], w.tau, 1.0, w.i, blocks.res[p])
 
 
-@inlined_kernel
+@shared_kernel
 def _component_stiffness(system: System, joint: int, lam: Array, w: Work, blocks: Blocks) -> None:
     """Adds the derivatives of a joint's force on the component on side 1 by both markers' motion to K and Nc."""
     b = system.side[joint, 1]
@@ -151,7 +151,7 @@ def _component_stiffness(system: System, joint: int, lam: Array, w: Work, blocks
         rotated_force(n, w.force, w.j, w.R[b], w.i.R, -1.0, blocks.Nc[joint])
 
 
-@inlined_kernel
+@shared_kernel
 def _parent_stiffness(system: System, joint: int, angle: float, w: Work, blocks: Blocks) -> None:
     """Adds the derivatives of a joint's force on the parent to K, and writes those by a slider's length."""
     p = system.side[joint, 0]
@@ -175,7 +175,7 @@ def _parent_stiffness(system: System, joint: int, angle: float, w: Work, blocks:
     add_wrench_stiffness(marker_of(system, joint, 0), w.wrench[0, :3], w.tau, 1.0, w.i, blocks.K[p])
 
 
-@inlined_kernel
+@shared_kernel
 def _joint_rows(
     system: System, integrator: Integrator, joint: int, angle: float, rate: float, state: State, Hv: Array,
     tangent: bool, w: Work, blocks: Blocks,
@@ -192,7 +192,7 @@ def _joint_rows(
         _parent_stiffness(system, joint, angle, w, blocks)
 
 
-@kernel
+@shared_kernel
 def assemble(
     system: System, integrator: Integrator, state: State, Vd: Array, angle: Array, rate: Array, Hv: Array,
     tangent: bool, w: Work, blocks: Blocks,

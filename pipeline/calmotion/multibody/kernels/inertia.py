@@ -15,10 +15,10 @@ from __future__ import annotations
 from calmotion.multibody.kernels.components import Component, ComponentMotion
 from calmotion.multibody.kernels.work import Work
 from calmotion.shot.character import Array
-from calmotion.support.compilation import kernel
+from calmotion.support.compilation import kernel, shared_kernel
 
 
-@kernel
+@shared_kernel
 def deformed_integrals(component: Component, u: Array, work: Work) -> None:
     """s, Z and B_j (shapes [3], [3, 3], [r, 3, 3]) of the deformed component into the scratch."""
     r, s0, Z0, M3, M4, S = component.r, component.s, component.Z, component.M3, component.M4, component.S
@@ -84,7 +84,7 @@ def _elastic_momentum(r: int, M3: Array, v: Array) -> tuple[float, float, float]
     return p0, p1, p2
 
 
-@kernel
+@shared_kernel
 def body_residual(component: Component, motion: ComponentMotion, work: Work, res: Array) -> None:
     """Rows of one component without its joints, into res, shape [6 + r].
 
@@ -153,7 +153,7 @@ def rigid_mass_matrix(mass: float, s: Array, Z: Array, D: Array) -> None:
             D[i, 3 + k] = D[3 + k, i]
 
 
-@kernel
+@shared_kernel
 def mass_matrix(component: Component, work: Work, D: Array) -> None:
     """D, shape [6 + r, 6 + r]: the rows by (a, alpha, v'), symmetric. Formulation, section 1."""
     r, M3, B = component.r, component.M3, work.B
@@ -171,7 +171,7 @@ def mass_matrix(component: Component, work: Work, D: Array) -> None:
         D[6 + j, 6 + j] = 1.0
 
 
-@kernel
+@shared_kernel
 def velocity_jacobian(component: Component, motion: ComponentMotion, work: Work, P: Array) -> None:
     """P, shape [6 + r, 6 + r]: the rows by (c', omega, v) at fixed acceleration; its first three columns are zero."""
     r, M3, axial, damping = component.r, component.M3, component.axial, component.damping
@@ -239,7 +239,7 @@ def velocity_jacobian(component: Component, motion: ComponentMotion, work: Work,
             P[6 + j, 6 + k] = 2.0 * rotating + damping[j, k]
 
 
-@kernel
+@shared_kernel
 def position_jacobian(component: Component, motion: ComponentMotion, work: Work, D: Array, K: Array) -> None:
     """K, shape [6 + r, 6 + r]: the rows by (R^T dc, dphi, du) at fixed c', omega, v and their rates.
 

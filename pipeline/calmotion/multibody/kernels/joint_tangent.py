@@ -15,7 +15,7 @@ from calmotion.multibody.kernels.sliders import (
 from calmotion.multibody.kernels.work import Work
 from calmotion.multibody.model.system import Blocks, Integrator, System
 from calmotion.shot.character import Array
-from calmotion.support.compilation import inlined_kernel, kernel
+from calmotion.support.compilation import inlined_kernel, kernel, shared_kernel
 
 
 @kernel
@@ -236,7 +236,7 @@ def _free_slider(system: System, joint: int, w: Work, blocks: Blocks) -> None:
     free_rows(n, w.i.R, w.length, w.moved, by_length, blocks.Hp[joint])
 
 
-@inlined_kernel
+@shared_kernel
 def joint_tangent(
     system: System, joint: int, value: float, rate: float, integrator: Integrator, Hv: Array, V: Array, w: Work,
     blocks: Blocks,

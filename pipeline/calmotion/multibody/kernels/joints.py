@@ -35,7 +35,7 @@ from calmotion.multibody.kernels.sliders import (
 from calmotion.multibody.kernels.work import Work
 from calmotion.multibody.model.system import Integrator, State, System
 from calmotion.shot.character import Array
-from calmotion.support.compilation import inlined_kernel, kernel
+from calmotion.support.compilation import kernel, shared_kernel
 
 
 @kernel
@@ -54,7 +54,7 @@ def is_hinge(system: System, joint: int) -> bool:
     return system.rows[joint] == 5 and not system.sliding[joint]
 
 
-@kernel
+@shared_kernel
 def joint_kinematics(
     system: System, joint: int, value: float, rate: float, state: State, w: Work
 ) -> tuple[float, float]:
@@ -96,7 +96,7 @@ def _rotated_back(Q: Array, angle: float, E: Array) -> None:
         E[i, 2] = Q[i, 2]
 
 
-@inlined_kernel
+@shared_kernel
 def constraint_residual(
     system: System, joint: int, angle: float, rate: float, integrator: Integrator, w: Work, gap: Array
 ) -> None:

@@ -22,9 +22,11 @@ from calmotion.multibody.kernels.components import ComponentMarker
 from calmotion.multibody.kernels.finite_rotation import interface_rotation, interface_rotation_derivative
 from calmotion.multibody.kernels.so3 import cross
 from calmotion.shot.character import Array
-from calmotion.support.compilation import kernel
+from calmotion.support.compilation import kernel, shared_kernel
+from calmotion.support.references import by_reference
 
 
+@by_reference
 class MarkerWork(NamedTuple):
     """Scratch and results of one marker; see the module for the symbols.
 
@@ -84,7 +86,7 @@ def moving_marker(frame: Array, m: MarkerWork) -> None:
             m.R[i, k] = frame[9 + 3 * i + k]
 
 
-@kernel
+@shared_kernel
 def marker_values(marker: ComponentMarker, c: Array, Rb: Array, u: Array, V: Array, m: MarkerWork) -> None:
     """Position, velocity, rotation and angular velocity of the marker, into m.
 
@@ -164,7 +166,7 @@ def _rotate_rows(rotation: Array, B: Array, Psi: Array, r: int, out: Array) -> N
             out[i, 6 + j] = b0 * Psi[0, j] + b1 * Psi[1, j] + b2 * Psi[2, j]
 
 
-@kernel
+@shared_kernel
 def marker_jacobian(marker: ComponentMarker, m: MarkerWork) -> None:
     """Jp and Jf of the marker; needs `marker_values` first."""
     r, rotation, Phi, Psi = marker.r, marker.rotation, marker.Phi, marker.Psi
@@ -183,7 +185,7 @@ def marker_jacobian(marker: ComponentMarker, m: MarkerWork) -> None:
     _rotate_rows(rotation, m.jr, Psi, r, m.Jf)
 
 
-@kernel
+@shared_kernel
 def marker_velocity_jacobian(marker: ComponentMarker, V: Array, m: MarkerWork) -> None:
     """Gp and Gf of the marker; needs `marker_values` first."""
     r, rotation, Phi, Psi = marker.r, marker.rotation, marker.Phi, marker.Psi
@@ -205,7 +207,7 @@ def marker_velocity_jacobian(marker: ComponentMarker, V: Array, m: MarkerWork) -
     _rotate_rows(rotation, m.A, Psi, r, m.Gf)
 
 
-@kernel
+@shared_kernel
 def add_wrench_stiffness(marker: ComponentMarker, f: Array, t: Array, sign: float, m: MarkerWork, K: Array) -> None:
     """K += sign * d(generalised force)/d(R^T dc, dphi, du) for a force f fixed in the world and a moment t fixed
     in marker axes; needs `marker_values` first.

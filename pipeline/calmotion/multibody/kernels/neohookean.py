@@ -19,7 +19,7 @@ import math
 from calmotion.multibody.kernels.components import ElasticLaw
 from calmotion.multibody.kernels.work import LawWork
 from calmotion.shot.character import Array
-from calmotion.support.compilation import kernel
+from calmotion.support.compilation import kernel, shared_kernel
 
 JOIN = 0.2  # volume ratio below which the logarithm is continued as a parabola; `fem.cubature` does the same
 
@@ -141,7 +141,7 @@ def _deformation(law: ElasticLaw, u: Array, v: Array, at: int, F: Array, Fd: Arr
         Fd[m] += t
 
 
-@kernel
+@shared_kernel
 def neohookean_forces(
     law: ElasticLaw, u: Array, v: Array, tangent: bool, work: LawWork, res: Array, P: Array, K: Array
 ) -> None:

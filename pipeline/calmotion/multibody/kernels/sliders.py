@@ -15,7 +15,7 @@ from __future__ import annotations
 from calmotion.multibody.kernels.markers import MarkerWork
 from calmotion.multibody.model.system import JOINT_ROWS, System
 from calmotion.shot.character import Array
-from calmotion.support.compilation import kernel
+from calmotion.support.compilation import kernel, shared_kernel
 
 LENGTH = 2
 
@@ -65,7 +65,7 @@ def _marker_axes(Rb: Array, m: MarkerWork) -> None:
             m.C[i, k] = t
 
 
-@kernel
+@shared_kernel
 def slide_jacobian(n: int, value: float, Rb: Array, m: MarkerWork) -> None:
     """Jp of the moved point, after `marker_jacobian`."""
     _marker_axes(Rb, m)
@@ -74,7 +74,7 @@ def slide_jacobian(n: int, value: float, Rb: Array, m: MarkerWork) -> None:
             m.Jp[i, a] += value * (m.C[i, 0] * m.Jf[1, a] - m.C[i, 1] * m.Jf[0, a])
 
 
-@kernel
+@shared_kernel
 def slide_velocity_jacobian(n: int, value: float, rate: float, Rb: Array, m: MarkerWork) -> None:
     """Gp of the moved point, after `marker_velocity_jacobian`."""
     _marker_axes(Rb, m)
@@ -89,7 +89,7 @@ def slide_velocity_jacobian(n: int, value: float, rate: float, Rb: Array, m: Mar
             m.Gp[i, a] += m.C[i, 0] * x0 + m.C[i, 1] * x1 + m.C[i, 2] * x2
 
 
-@kernel
+@shared_kernel
 def slide_wrench(
     n: int, value: float, f: Array, t: Array, sign: float, Rb: Array, m: MarkerWork, K: Array, moment: Array,
     on_parent: Array,
@@ -120,7 +120,7 @@ def slide_wrench(
             K[a, k] += sign * value * (m.Jf[1, a] * g0 - m.Jf[0, a] * g1)
 
 
-@kernel
+@shared_kernel
 def rotated_force(n: int, f: Array, m: MarkerWork, Rb: Array, Rm: Array, sign: float, out: Array) -> None:
     """out += sign * derivative of the generalised force of R_m f by the rotation of R_m.
 

@@ -18,7 +18,7 @@ from __future__ import annotations
 from calmotion.multibody.kernels.components import ElasticLaw
 from calmotion.multibody.kernels.work import LawWork
 from calmotion.shot.character import Array
-from calmotion.support.compilation import kernel
+from calmotion.support.compilation import kernel, shared_kernel
 
 
 @kernel
@@ -204,7 +204,7 @@ def _add_tangent(law: ElasticLaw, x: Array, stress: Array, scale: float, work: L
                 elastic[k] += factor * inner[a, k]
 
 
-@kernel
+@shared_kernel
 def stvk_forces(
     law: ElasticLaw, u: Array, v: Array, tangent: bool, work: LawWork, res: Array, P: Array, K: Array
 ) -> None:

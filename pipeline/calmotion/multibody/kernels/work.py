@@ -9,8 +9,10 @@ import numpy as np
 from calmotion.multibody.kernels.markers import WORLD_MARKER, MarkerWork, allocate_marker
 from calmotion.multibody.model.system import JOINT_ROWS, System
 from calmotion.shot.character import Array
+from calmotion.support.references import by_reference
 
 
+@by_reference
 class LawWork(NamedTuple):
     """Scratch of the elastic laws, for components of r coordinates.
 
@@ -31,6 +33,7 @@ class LawWork(NamedTuple):
     point: Array
 
 
+@by_reference
 class Work(NamedTuple):
     """Scratch of `assembly.assemble`.
 

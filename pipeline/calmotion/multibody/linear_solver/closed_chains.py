@@ -21,7 +21,7 @@ from calmotion.multibody.linear_solver.pseudo_inverse import pseudo_inverse
 from calmotion.multibody.linear_solver.step_matrix import UNKNOWNS, Border, SolutionScratch, StepMatrix
 from calmotion.multibody.model.system import JOINT_ROWS, System
 from calmotion.shot.character import Array
-from calmotion.support.compilation import inlined_kernel, kernel
+from calmotion.support.compilation import inlined_kernel, kernel, shared_kernel
 
 
 @kernel
@@ -197,7 +197,7 @@ def _scale(n: int, length: float, S: Array) -> tuple[float, float]:
     return rows, largest
 
 
-@kernel
+@shared_kernel
 def factor_closed_chains(system: System, matrix: StepMatrix, border: Border, scratch: SolutionScratch) -> None:
     """S^+ of the closed chains into matrix.inverse, after the tree has been eliminated."""
     n = UNKNOWNS * (len(system.rows) - len(system.parent))
@@ -229,7 +229,7 @@ def _unit(i: int, length: float) -> float:
     return length if 3 <= i % UNKNOWNS < JOINT_ROWS else 1.0
 
 
-@kernel
+@shared_kernel
 def solve_system(system: System, matrix: StepMatrix, x: Array, lam: Array, scratch: SolutionScratch) -> None:
     """(x, lam) <- solution of the whole linear system, closed chains included; shapes [B, N] and [J, 6]."""
     count = len(system.parent)
@@ -257,7 +257,7 @@ def solve_system(system: System, matrix: StepMatrix, x: Array, lam: Array, scrat
     solve(system, matrix, x, lam, scratch.block)
 
 
-@kernel
+@shared_kernel
 def solve_system_transposed(system: System, matrix: StepMatrix, x: Array, lam: Array, scratch: SolutionScratch) -> None:
     """(x, lam) <- solution of the transposed system; same arguments as `solve_system`."""
     count = len(system.parent)

@@ -15,7 +15,7 @@ from calmotion.multibody.kernels.sliders import has_row
 from calmotion.multibody.linear_solver.step_matrix import StepMatrix
 from calmotion.multibody.model.system import JOINT_ROWS, Blocks, System
 from calmotion.shot.character import Array, IntArray
-from calmotion.support.compilation import kernel
+from calmotion.support.compilation import kernel, shared_kernel
 
 
 @kernel
@@ -24,7 +24,7 @@ def place(i: int, r: int) -> int:
     return r + i if i < 6 else i - 6
 
 
-@kernel
+@shared_kernel
 def lu_factor(n: int, A: Array, piv: IntArray) -> bool:
     """In-place LU with partial pivoting of A[:n, :n]; False when a pivot is zero or not finite."""
     for k in range(n):
@@ -127,7 +127,7 @@ def _multiplier_rows(n: int, m: int, A: Array, piv: IntArray, Z: Array) -> None:
                 Z[p, k] = t
 
 
-@kernel
+@shared_kernel
 def factor(system: System, blocks: Blocks, matrix: StepMatrix, row: Array) -> int:
     """Eliminate all components; `blocks.K` of parents is overwritten by their Schur complements.
 
@@ -190,7 +190,7 @@ def factor(system: System, blocks: Blocks, matrix: StepMatrix, row: Array) -> in
     return -1
 
 
-@kernel
+@shared_kernel
 def solve(system: System, matrix: StepMatrix, x: Array, lam: Array, block: Array) -> None:
     """(x, lam) <- K^-1 (x, lam): x of shape [B, N], lam of shape [B, 6]; `block` is scratch, shape [N + 6]."""
     m = JOINT_ROWS
@@ -238,7 +238,7 @@ def solve(system: System, matrix: StepMatrix, x: Array, lam: Array, block: Array
             lam[b, i] = block[n + i]
 
 
-@kernel
+@shared_kernel
 def solve_transposed(system: System, matrix: StepMatrix, x: Array, lam: Array, block: Array) -> None:
     """(x, lam) <- K^-T (x, lam), same shapes as `solve`."""
     m = JOINT_ROWS

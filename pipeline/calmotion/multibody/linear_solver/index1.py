@@ -21,7 +21,7 @@ from calmotion.multibody.linear_solver.elimination import factor
 from calmotion.multibody.linear_solver.least_multipliers import least_multipliers
 from calmotion.multibody.model.system import JOINT_ROWS, Blocks, Integrator, State, System
 from calmotion.shot.character import Array
-from calmotion.support.compilation import NO, YES, inlined_kernel
+from calmotion.support.compilation import NO, YES, inlined_kernel, shared_kernel
 
 VELOCITY_ROWS = Integrator(velocity=0.0, acceleration=0.0, gamma=1.0, alpha=0.0)
 POSITION_ROWS = Integrator(velocity=0.0, acceleration=0.0, gamma=0.0, alpha=1.0)
@@ -70,7 +70,7 @@ def _acceleration_constraints(
         copy_rows(blocks.D[b], blocks.K[b])
 
 
-@inlined_kernel
+@shared_kernel
 def accelerations(
     system: System, state: State, angle: Array, rate: Array, acceleration: Array, baumgarte: float, ws: Workspace
 ) -> int:

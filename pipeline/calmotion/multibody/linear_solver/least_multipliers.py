@@ -8,10 +8,10 @@ from calmotion.multibody.kernels.sliders import has_row
 from calmotion.multibody.linear_solver.step_matrix import UNKNOWNS, Border
 from calmotion.multibody.model.system import JOINT_ROWS, System
 from calmotion.shot.character import Array
-from calmotion.support.compilation import kernel
+from calmotion.support.compilation import kernel, shared_kernel
 
 
-@kernel
+@shared_kernel
 def least_multipliers(system: System, border: Border, lam: Array) -> None:
     """Remove from all multipliers, shape [J, 6], the part that does no work in any motion: redundant constraints share
     the load so that the sum of squares is least. After `factor_closed_chains`."""

@@ -14,11 +14,13 @@ import numpy as np
 
 from calmotion.multibody.model.system import CountArray
 from calmotion.shot.character import Array
-from calmotion.support.compilation import inlined_kernel, kernel
+from calmotion.support.compilation import inlined_kernel, kernel, shared_kernel
+from calmotion.support.references import by_reference
 
 RANK = 1e-9  # pivots below this fraction of the largest count as zero
 
 
+@by_reference
 class Decomposition(NamedTuple):
     """Scratch of the decomposition of a matrix of n rows.
 
@@ -162,7 +164,7 @@ def _solve_unit_vector(n: int, rank: int, A: Array, column: int, scratch: Decomp
     _apply_right(n, rank, scratch.right, x)
 
 
-@kernel
+@shared_kernel
 def pseudo_inverse(n: int, A: Array, out: Array, null: Array, scratch: Decomposition) -> int:
     """The inverse of A[:n, :n] on its range into `out`, and its null space.
 

@@ -10,6 +10,7 @@ from calmotion.multibody.linear_solver.pseudo_inverse import Decomposition, allo
 from calmotion.multibody.model.system import JOINT_ROWS, Blocks, CountArray, System
 from calmotion.shot.character import Array, IntArray
 from calmotion.support.compilation import kernel
+from calmotion.support.references import by_reference
 
 UNKNOWNS = JOINT_ROWS + 3  # of a joint that closes a chain: its multipliers, and the rotation of its parent-side marker
 
@@ -40,6 +41,7 @@ class StepMatrix(NamedTuple):
     inverse: Array
 
 
+@by_reference
 class SolutionScratch(NamedTuple):
     """Scratch of solutions.
 
@@ -59,6 +61,7 @@ class SolutionScratch(NamedTuple):
     right_lam: Array
 
 
+@by_reference
 class Border(NamedTuple):
     """Results of `closed_chains.factor_closed_chains` besides the inverse, and scratch.
 

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calmotion.shot.character import Array, BoolArray, IntArray
+from calmotion.support.references import by_reference
 
 CountArray = NDArray[np.int64]  # the type of Python's integers in a kernel, so that it is compiled once for both
 JOINT_ROWS = 6
@@ -20,6 +21,7 @@ BACKWARD_DIFFERENCE, NEWMARK = 0, 1  # families of time-stepping formulas
 LINEAR, STVK, NEOHOOKEAN = 0, 1, 2  # elastic laws; `finite_rotation` distinguishes linear and nonlinear by zero
 
 
+@by_reference
 class System(NamedTuple):
     """Constants of the system (B components, J >= B joints, at most R elastic coordinates, N = 6 + R).
 
@@ -142,6 +144,7 @@ class Instants(NamedTuple):
     now: State
 
 
+@by_reference
 class Blocks(NamedTuple):
     """The linearised equations of one instant, component by component (see `assembly.assemble`).
 

@@ -25,7 +25,7 @@ from calmotion.multibody.integrators.workspace import Scratch, Workspace
 from calmotion.multibody.kernels.assembly import assemble
 from calmotion.multibody.linear_solver.closed_chains import copy_rows, factor_closed_chains
 from calmotion.multibody.linear_solver.elimination import factor
-from calmotion.multibody.linear_solver.step_matrix import matrix_at
+from calmotion.multibody.linear_solver.step_matrix import StepMatrix, matrix_at
 from calmotion.multibody.model.system import Blocks, Instants, Integrator, State, System
 from calmotion.multibody.sensitivity.linearized_steps import (
     LinearizedSteps,
@@ -65,6 +65,23 @@ def _velocity_map(
 
 
 @kernel
+def _keep_blocks(blocks: Blocks, matrix: StepMatrix, at: int, steps: LinearizedSteps) -> None:
+    """Copies what the sweeps read of an instant's blocks to its matrix and to entry `at` of the steps."""
+    for b in range(steps.P.shape[1]):
+        copy_rows(blocks.P[b], steps.P[at, b])
+        copy_rows(blocks.D[b], steps.D[at, b])
+    for j in range(matrix.Lc.shape[0]):
+        copy_rows(blocks.Lc[j], matrix.Lc[j])
+        copy_rows(blocks.Lp[j], matrix.Lp[j])
+        copy_rows(blocks.Hp[j], matrix.Hp[j])
+        copy_rows(blocks.Nc[j], matrix.Nc[j])
+        copy_rows(blocks.Jp[j], matrix.Jp[j])
+    copy_rows(blocks.by_angle, steps.by_angle[at])
+    copy_rows(blocks.by_rate, steps.by_rate[at])
+    copy_rows(blocks.on_parent, steps.on_parent[at])
+
+
+@kernel
 def _linearize(
     system: System, integrator: Integrator, continuous: bool, states: State, inputs: Inputs, first: int, last: int,
     ws: Workspace, steps: LinearizedSteps,
@@ -82,16 +99,12 @@ def _linearize(
             instants = instants_of(instant_of(states, 0), states, n)
             _velocity_map(system, integrator, continuous, instants, scratch, Hv)
         copy_rows(inputs.world[n], work.world)
-        # the sweeps read these in place, so they are computed there
-        here = Blocks(
-            blocks.K, steps.P[at], steps.D[at], matrix.Lc, matrix.Lp, blocks.Hc, matrix.Hp, matrix.Nc, matrix.Jp,
-            steps.by_angle[at], steps.by_rate[at], steps.on_parent[at], blocks.res, blocks.gap,
-        )  # fmt: skip
         kind = STATIC if n == 0 else integrator
-        assemble(system, kind, now, scratch.Vd, inputs.angles[n], inputs.rates[n], Hv, YES, work, here)
+        assemble(system, kind, now, scratch.Vd, inputs.angles[n], inputs.rates[n], Hv, YES, work, blocks)
         if n == 0:
-            regularize(system, here.D, here.K, here.Nc)
-        bad = factor(system, here, matrix, scratch.solution.block)
+            regularize(system, blocks.D, blocks.K, blocks.Nc)
+        _keep_blocks(blocks, matrix, at, steps)
+        bad = factor(system, blocks, matrix, scratch.solution.block)
         if bad >= 0:
             return bad, n
         if joints > count:

@@ -9,8 +9,10 @@ import numpy as np
 from calmotion.multibody.linear_solver.step_matrix import UNKNOWNS, StepMatrix, matrices_between
 from calmotion.multibody.model.system import JOINT_ROWS, System
 from calmotion.shot.character import Array
+from calmotion.support.references import by_reference
 
 
+@by_reference
 class LinearizedSteps(NamedTuple):
     """Linearised equations of consecutive instants, all arrays with a leading axis of instants.
 

@@ -13,8 +13,10 @@ from calmotion.multibody.sensitivity.linearization import Linearization
 from calmotion.multibody.sensitivity.linearized_steps import LinearizedSteps
 from calmotion.shot.character import Array
 from calmotion.support.compilation import kernel
+from calmotion.support.references import by_reference
 
 
+@by_reference
 class Window(NamedTuple):
     """Linearised equations of instants first..last-1.
 
@@ -34,6 +36,7 @@ class Window(NamedTuple):
     steps: LinearizedSteps
 
 
+@by_reference
 class SweepMemory(NamedTuple):
     """Perturbations of a motion that later steps read, or derivatives by them.
 
@@ -48,6 +51,7 @@ class SweepMemory(NamedTuple):
     turn: Array
 
 
+@by_reference
 class SweepScratch(NamedTuple):
     """Scratch of a sweep.
 

@@ -19,7 +19,7 @@ from calmotion.multibody.linear_solver.closed_chains import copy_rows, solve_sys
 from calmotion.multibody.linear_solver.step_matrix import SolutionScratch, StepMatrix
 from calmotion.multibody.model.system import System
 from calmotion.shot.character import Array
-from calmotion.support.compilation import NO, YES, kernel
+from calmotion.support.compilation import NO, YES, kernel, shared_kernel
 
 REGULARIZATION = 1e-2  # stiffness over inertia [1/s^2]
 REFINEMENTS = 8  # solutions after the first: exact to rounding for a period of six seconds, to 1e-9 for twenty
@@ -111,7 +111,7 @@ def _refine(
     copy_rows(scratch.right_lam, lam)
 
 
-@kernel
+@shared_kernel
 def solve_statics(system: System, D: Array, matrix: StepMatrix, x: Array, lam: Array, scratch: SolutionScratch) -> None:
     """`solve_system` of the static equations, by factors of the regularised ones.
 
@@ -127,7 +127,7 @@ def solve_statics(system: System, D: Array, matrix: StepMatrix, x: Array, lam: A
             solve_system(system, matrix, x, lam, scratch)
 
 
-@kernel
+@shared_kernel
 def solve_statics_transposed(
     system: System, D: Array, matrix: StepMatrix, x: Array, lam: Array, scratch: SolutionScratch
 ) -> None:
