@@ -50,7 +50,6 @@ test: $(INSTALLED_DEV)
 	check ruff $(RUN) -m ruff check .; \
 	check format $(RUN) -m ruff format --check --quiet .; \
 	check mypy $(RUN) -m mypy; \
-	check docs env NO_MKDOCS_2_WARNING=1 $(RUN) -m mkdocs build --strict --quiet; \
 	check pytest $(RUN) -m pytest -n 2 -q; \
 	echo "== summary"; printf "$$summary"; exit $$status
 

@@ -28,6 +28,14 @@ def outer(x):
     return middle(x) + inner(x, 3.0)
 
 @kernel
+def linked(x):
+    return inner(x, 2.0)
+
+@kernel
+def linking(x):
+    return linked(x) + 1.0
+
+@kernel
 def failing(x):
     return inner(x, 4.0)
 """
@@ -58,9 +66,9 @@ def run(tmp_path, repository):
     environment = os.environ | {"CALMOTION_CACHE": str(tmp_path / "cache"), "PYTHONPATH": path}
     environment.pop("NUMBA_CACHE_DIR", None)
 
-    def run():
+    def run(script=SCRIPT):
         done = subprocess.run(
-            [sys.executable, "-c", SCRIPT], env=environment, capture_output=True, text=True, timeout=120
+            [sys.executable, "-c", script], env=environment, capture_output=True, text=True, timeout=120
         )
         assert done.returncode == 0, done.stderr
         return [tuple(map(int, line.split())) for line in done.stdout.splitlines()]
@@ -83,3 +91,10 @@ def test_a_lost_file_of_a_shared_kernel_is_compiled_again_for_a_cached_caller(ru
     hits = dict(zip(("outer", "middle", "inner"), run(), strict=True))
     assert hits.pop(lost) == (0, 1)
     assert all(misses == 0 for _, misses in hits.values())
+
+
+def test_a_caller_of_a_cached_kernel_with_shared_ones_is_found_in_the_cache(run):
+    call = "import numpy as np, module; assert module.{}(np.ones(3)) == {}"
+    run(call.format("linked", 3.0))
+    run(call.format("linking", 4.0))  # has a copy of the cached one, and with it the symbol
+    run(call.format("linking", 4.0))

@@ -28,7 +28,7 @@ from numba import config, njit  # noqa: E402
 from calmotion.support.cache_folder import KERNELS, cache_folder
 from calmotion.support.caches import mark_used, prune
 from calmotion.support.kernel_cache import verified
-from calmotion.support.shared_code import shared
+from calmotion.support.shared_code import shared, with_addresses
 from calmotion.support.sources import digest_of, with_imports
 
 Function = TypeVar("Function", bound=Callable[..., Any])
@@ -102,12 +102,12 @@ def allocating_kernel(function: Function) -> Function:
 
 
 def _compile(function: Function, **options: Any) -> Function:
-    if os.environ.get("NUMBA_CACHE_DIR"):
-        return cast(Function, verified(njit(cache=True, fastmath=FUSED, **options)(function)))
     # numba picks the folder when a function is decorated; other users of numba keep theirs
     before = config.CACHE_DIR
-    config.CACHE_DIR = str(kernel_folder())
+    if not os.environ.get("NUMBA_CACHE_DIR"):
+        config.CACHE_DIR = str(kernel_folder())
     try:
-        return cast(Function, verified(njit(cache=True, fastmath=FUSED, **options)(function)))
+        dispatcher = njit(cache=True, fastmath=FUSED, **options)(function)
     finally:
         config.CACHE_DIR = before
+    return cast(Function, with_addresses(verified(dispatcher)))

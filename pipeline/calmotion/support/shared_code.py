@@ -35,6 +35,21 @@ class _Address:
         getattr(importlib.import_module(self.module), self.name).compile(self.arguments)
 
 
+def with_addresses(dispatcher: Any) -> Any:
+    """A function, compiled by numba, that passes on to its callers what it needs to be loaded.
+
+    numba does so only for what was compiled in this process, not for what was read from the cache.
+    """
+    add_overload = dispatcher.add_overload
+
+    def add(result: Any) -> None:
+        result.library._reload_init.update(result.reload_init)
+        add_overload(result)
+
+    dispatcher.add_overload = add
+    return dispatcher
+
+
 def shared(dispatcher: Any) -> Any:
     """A function of a module, compiled by numba, whose machine code all its callers share."""
     add_overload = dispatcher.add_overload

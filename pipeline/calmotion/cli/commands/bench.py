@@ -11,7 +11,8 @@ if TYPE_CHECKING:
     from calmotion.cli.output import Output
 
 BENCHMARKS = {
-    "baselines": "optimizer.baselines", "gradients": "integrators.gradients", "integrators": "integrators.integrators",
+    "baselines": "optimizer.baselines", "compilation": "speed.compilation", "gradients": "integrators.gradients",
+    "integrators": "integrators.integrators",
     "meshing": "speed.meshing", "optimizer": "optimizer.optimizer", "reading": "speed.reading",
     "reduction": "speed.reduction", "reduction-convergence": "accuracy.reduction_convergence",
     "scaling": "speed.scaling", "simplification": "accuracy.simplification", "stability": "integrators.stability",
