@@ -4,8 +4,8 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
+from calmotion.support.by_reference import by_reference
 from calmotion.support.compilation import kernel
-from calmotion.support.references import by_reference
 
 
 class Plain(NamedTuple):

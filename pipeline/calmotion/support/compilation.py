@@ -25,6 +25,7 @@ import numba  # noqa: E402
 import numpy as np  # noqa: E402
 from numba import config, njit  # noqa: E402
 
+from calmotion.support import references  # noqa: F401
 from calmotion.support.cache_folder import KERNELS, cache_folder
 from calmotion.support.caches import mark_used, prune
 from calmotion.support.kernel_cache import verified
@@ -37,7 +38,8 @@ PACKAGE = Path(__file__).parents[1]
 # Flags for the kernels that a kernel calls: numba compiles these anew for every literal True and False they are given.
 YES, NO = cast(bool, np.bool_(True)), cast(bool, np.bool_(False))
 FUSED = {"contract"}  # a product and a sum in one rounding; nothing that would reorder or drop terms
-_COMPILERS = {"compilation.py", "references.py", "shared_code.py"}  # of this folder: they decide what is compiled
+# Modules of this folder that decide what is compiled.
+_COMPILERS = {"by_reference.py", "compilation.py", "references.py", "shared_code.py"}
 _KERNEL = re.compile(rb"kernel\ndef ")
 _WITHOUT_ARRAYS: dict[str, Any] = {"_nrt": False, "no_cfunc_wrapper": True, "nogil": True}  # of its own making
 

@@ -1,24 +1,14 @@
-"""Tuples of many arrays that kernels take by reference: one pointer, instead of all that numba knows of each array.
+"""The type that numba has for tuples by reference (`by_reference`): a pointer to the block of their members.
 
-numba passes a tuple by value. That of a system holds some 30 arrays, about 250 numbers, which every call of a kernel
-copies and LLVM has to sort out again; it was most of the time that kernels took to compile. A class decorated with
-`by_reference` is handed to kernels as the address of a block of 8-byte words, in which its members lie one after the
-other:
-
-    array            address of the data, shape, strides
-    number           itself
-    other tuple      its members; or the address of its block, where it is by reference as well
-
-The block is written once, when an object first reaches a kernel. Members cannot change, as the class is a tuple, so
-loads are marked as invariant: LLVM need not repeat them after each write to an array.
+Members cannot change, as the class is a tuple, so loads are marked as invariant: LLVM need not repeat them after each
+write to an array.
 """
 
 from __future__ import annotations
 
-from functools import cache, cached_property
-from typing import Any, TypeVar
+from functools import cache
+from typing import Any
 
-import numpy as np
 from llvmlite import ir
 from numba.core import cgutils, types
 from numba.core.types.containers import BaseNamedTuple
@@ -33,7 +23,8 @@ from numba.extending import (
     unbox,
 )
 
-Class = TypeVar("Class", bound=type[Any])
+from calmotion.support.by_reference import on_each_class
+
 _WORD = ir.IntType(64)
 
 
@@ -45,36 +36,9 @@ class Reference(types.Type):
         super().__init__(f"reference to {of}({', '.join(f'{name}: {kind}' for name, kind in members)})")
 
 
-def by_reference(tuple_class: Class) -> Class:
-    """A class of `typing.NamedTuple` whose objects kernels take by reference; kernels read it and do not make it."""
-    names = {name: getattr(tuple_class, name) for name in ("__module__", "__qualname__", "__doc__")}
-    block = cached_property(_block)
-    block.__set_name__(tuple_class, "_block")
-    address = cached_property(lambda value: value._block.ctypes.data)
-    address.__set_name__(tuple_class, "_address")
-    made = type(tuple_class.__name__, (tuple_class,), {**names, "_block": block, "_address": address})
-    typeof_impl.register(made)(_type_of)
-    return made  # type: ignore[return-value]
-
-
 def _type_of(value: Any, context: Any) -> Reference:
     members = zip(value._fields, (typeof_impl(member, context) for member in value), strict=True)
     return Reference(f"{type(value).__module__}.{type(value).__qualname__}", tuple(members))
-
-
-def _block(value: Any) -> np.ndarray[Any, np.dtype[np.uint64]]:
-    """The words of a tuple's members."""
-    return np.concatenate([_words(member) for member in value]).view(np.uint64)
-
-
-def _words(member: Any) -> np.ndarray[Any, Any]:
-    if isinstance(member, np.ndarray):
-        return np.array([member.ctypes.data, *member.shape, *member.strides], np.int64).view(np.uint64)
-    if hasattr(type(member), "_address"):
-        return np.array([member._address], np.uint64)
-    if isinstance(member, tuple):
-        return _block(member)
-    return np.array([member], np.float64 if isinstance(member, float) else np.int64).view(np.uint64)
 
 
 def _count(kind: Any) -> int:
@@ -84,6 +48,9 @@ def _count(kind: Any) -> int:
     if isinstance(kind, BaseNamedTuple):
         return sum(map(_count, kind.types))
     return 1
+
+
+on_each_class(lambda made: typeof_impl.register(made)(_type_of))
 
 
 @cache

@@ -13,8 +13,8 @@ from calmotion.multibody.model.model import Model
 from calmotion.multibody.model.moving_markers import rooted
 from calmotion.multibody.model.system import State, System, allocate_state
 from calmotion.shot.character import Array, IntArray
+from calmotion.support.by_reference import by_reference
 from calmotion.support.compilation import allocating_kernel, kernel
-from calmotion.support.references import by_reference
 
 
 @allocating_kernel

@@ -14,8 +14,8 @@ from calmotion.multibody.kernels.work import Work, allocate_work
 from calmotion.multibody.linear_solver.closed_chains import copy_rows
 from calmotion.multibody.model.system import State, System
 from calmotion.shot.character import Array
+from calmotion.support.by_reference import by_reference
 from calmotion.support.compilation import kernel
-from calmotion.support.references import by_reference
 
 
 @by_reference

@@ -19,8 +19,8 @@ from calmotion.multibody.linear_solver.closed_chains import copy_rows
 from calmotion.multibody.linear_solver.index1 import accelerations
 from calmotion.multibody.model.system import State, System, allocate_state
 from calmotion.shot.character import Array
+from calmotion.support.by_reference import by_reference
 from calmotion.support.compilation import inlined_kernel, kernel
-from calmotion.support.references import by_reference
 
 STAGES = np.array([0.0, 0.5, 1.0])  # instants of a step at which it evaluates the motors
 BAUMGARTE = 10.0  # Baumgarte's coefficient [1/s]; one that grew with 1/h would take the method's order from it

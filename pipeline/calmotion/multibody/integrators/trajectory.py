@@ -9,8 +9,8 @@ import numpy as np
 
 from calmotion.multibody.model.system import Instants, State
 from calmotion.shot.character import Array
+from calmotion.support.by_reference import by_reference
 from calmotion.support.compilation import kernel
-from calmotion.support.references import by_reference
 
 
 @dataclass(frozen=True, eq=False)

@@ -17,7 +17,7 @@ from calmotion.multibody.linear_solver.step_matrix import (
 )
 from calmotion.multibody.model.system import JOINT_ROWS, Blocks, State, System, allocate_blocks, allocate_state
 from calmotion.shot.character import Array
-from calmotion.support.references import by_reference
+from calmotion.support.by_reference import by_reference
 
 
 @by_reference

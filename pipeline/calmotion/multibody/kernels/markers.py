@@ -22,8 +22,8 @@ from calmotion.multibody.kernels.components import ComponentMarker
 from calmotion.multibody.kernels.finite_rotation import interface_rotation, interface_rotation_derivative
 from calmotion.multibody.kernels.so3 import cross
 from calmotion.shot.character import Array
+from calmotion.support.by_reference import by_reference
 from calmotion.support.compilation import kernel, shared_kernel
-from calmotion.support.references import by_reference
 
 
 @by_reference

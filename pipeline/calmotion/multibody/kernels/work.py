@@ -9,7 +9,7 @@ import numpy as np
 from calmotion.multibody.kernels.markers import WORLD_MARKER, MarkerWork, allocate_marker
 from calmotion.multibody.model.system import JOINT_ROWS, System
 from calmotion.shot.character import Array
-from calmotion.support.references import by_reference
+from calmotion.support.by_reference import by_reference
 
 
 @by_reference

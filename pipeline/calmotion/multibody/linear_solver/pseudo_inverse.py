@@ -14,8 +14,8 @@ import numpy as np
 
 from calmotion.multibody.model.system import CountArray
 from calmotion.shot.character import Array
+from calmotion.support.by_reference import by_reference
 from calmotion.support.compilation import inlined_kernel, kernel, shared_kernel
-from calmotion.support.references import by_reference
 
 RANK = 1e-9  # pivots below this fraction of the largest count as zero
 

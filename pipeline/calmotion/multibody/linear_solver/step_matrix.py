@@ -9,8 +9,8 @@ import numpy as np
 from calmotion.multibody.linear_solver.pseudo_inverse import Decomposition, allocate_decomposition
 from calmotion.multibody.model.system import JOINT_ROWS, Blocks, CountArray, System
 from calmotion.shot.character import Array, IntArray
+from calmotion.support.by_reference import by_reference
 from calmotion.support.compilation import kernel
-from calmotion.support.references import by_reference
 
 UNKNOWNS = JOINT_ROWS + 3  # of a joint that closes a chain: its multipliers, and the rotation of its parent-side marker
 

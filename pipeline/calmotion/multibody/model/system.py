@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calmotion.shot.character import Array, BoolArray, IntArray
-from calmotion.support.references import by_reference
+from calmotion.support.by_reference import by_reference
 
 CountArray = NDArray[np.int64]  # the type of Python's integers in a kernel, so that it is compiled once for both
 JOINT_ROWS = 6

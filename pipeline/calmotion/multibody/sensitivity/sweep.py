@@ -12,8 +12,8 @@ from calmotion.multibody.model.system import JOINT_ROWS, System
 from calmotion.multibody.sensitivity.linearization import Linearization
 from calmotion.multibody.sensitivity.linearized_steps import LinearizedSteps
 from calmotion.shot.character import Array
+from calmotion.support.by_reference import by_reference
 from calmotion.support.compilation import kernel
-from calmotion.support.references import by_reference
 
 
 @by_reference
