@@ -1,62 +1,57 @@
+"""Tables fit their width, and keep names whole."""
+
 import io
 
 import pytest
-from calmotion.cli.tables import console_on, length, name_paths, print_accuracy
+from calmotion.cli.tables import print_table, short_paths
+from rich.console import Console
+
+HEADS = ["motor", "limits", "peak speed", "may change"]
+SHORT = [["/A/Joints/Waist", "-120° .. 120°", "219.4°/s", "yes"], ["/A/Joints/Elbow", "-", "0°/s", "no"]]
+DEEP = "/Robot/" + "link/" * 20
 
 
-def test_short_paths_stay_whole():
-    assert name_paths(["/A/b", "/A/c"]) == {"/A/b": "/A/b", "/A/c": "/A/c"}
+def printed(width, rows, heads=HEADS, texts=1):
+    stream = io.StringIO()
+    print_table(Console(file=stream, width=width), "Motors", heads, rows, texts)
+    return stream.getvalue().splitlines()
 
 
-def test_long_paths_are_shortened_to_their_last_distinct_names():
-    deep = "/Robot/" + "link/" * 20
-    names = name_paths([deep + "left/hand", deep + "right/hand", deep + "head"])
-    assert sorted(names.values()) == ["head", "left/hand", "right/hand"]
+def test_paths_get_an_ellipsis_and_stay_distinct():
+    names = short_paths([DEEP + "left/hand", DEEP + "right/hand", DEEP + "head", "/x"])
+    assert sorted(names.values()) == ["/x", "…/head", "…/left/hand", "…/right/hand"]
 
 
-def test_the_accuracy_is_reported_where_it_is_known():
-    names = ("tolerance_m", "estimated_error_m", "estimated_step_error_m", "estimated_mesh_error_m", "verified_error_m")
-    none = dict.fromkeys(names)
-    told = none | {"estimated_error_m": 3e-4, "estimated_step_error_m": 1e-4, "verified_error_m": 2e-4}
-    with_mesh = told | {"estimated_mesh_error_m": 5e-4, "verified_error_m": None}
-    for report, expected in (
-        (none, ""),
-        (
-            with_mesh,
-            "estimated simulation error 0.3 mm (0.1 mm of it by the time step); mesh error 0.5 mm\n",
-        ),
-        (
-            told | {"verified_step_s": 5e-4, "verified_modes": 44},
-            "estimated simulation error 0.3 mm (0.1 mm of it by the time step)\n"
-            "measured simulation error 0.2 mm, against a run with steps of 0.5 ms and 44 elastic coordinates\n",
-        ),
-    ):
-        stream = io.StringIO()
-        print_accuracy(console_on(stream), report)
-        assert stream.getvalue() == expected
+def test_a_table_that_fits_has_whole_paths():
+    lines = printed(80, SHORT)
+    assert lines[0] == "Motors" and len(lines) == 5
+    assert lines[3].startswith("/A/Joints/Waist  -") and lines[3].endswith("219.4°/s         yes")
 
 
-def test_a_tolerance_that_is_not_kept_is_reported():
-    report = {"tolerance_m": 1e-4, "estimated_step_error_m": 1e-5, "estimated_mesh_error_m": None}
-    report |= {"verified_step_s": 5e-4, "verified_modes": 44}
-    for estimated, verified, told in (
-        (1.5e-4, None, False),
-        (3e-4, None, True),
-        (3e-4, 9e-5, False),
-        (5e-5, 2e-4, True),
-    ):
-        stream = io.StringIO()
-        print_accuracy(console_on(stream), report | {"estimated_error_m": estimated, "verified_error_m": verified})
-        assert ("the tolerance of 0.1 mm is not kept" in stream.getvalue()) == told
+def test_heads_are_wrapped_before_names_are_shortened():
+    lines = printed(48, SHORT)
+    assert any("/A/Joints/Waist" in line for line in lines) and max(map(len, lines)) <= 48
 
 
-@pytest.mark.parametrize(
-    "meters, text",
-    [
-        (0.0, "0 mm"), (1.392e-15, "< 0.0001 mm"), (9.9e-8, "< 0.0001 mm"), (1.2e-7, "0.00012 mm"),
-        (0.0593, "59.3 mm"), (9.9994, "9999 mm"), (9.9999, "10 m"), (123.456, "123.5 m"), (None, "-"),
-        (float("inf"), "-"),
-    ],
-)  # fmt: skip
-def test_lengths_have_no_powers_of_ten(meters, text):
-    assert length(meters) == text
+@pytest.mark.parametrize("width", [42, 45])
+def test_a_narrow_table_has_short_paths_and_says_so(width):
+    lines = printed(width, SHORT)
+    assert max(map(len, lines)) <= width
+    assert sum("…/" in line for line in lines) == 2 and "(… stands for the start" in " ".join(lines)
+
+
+def test_a_table_that_does_not_fit_is_a_list_with_whole_paths():
+    rows = [[DEEP + "a" * 40, *SHORT[0][1:]], [DEEP + "b" * 40, *SHORT[1][1:]]]
+    lines = printed(40, rows)
+    assert f"  {DEEP}{'a' * 40}" in lines and "    limits -120° .. 120°; peak speed" in lines
+    assert all(len(line) <= 40 or line.strip() in (rows[0][0], rows[1][0]) for line in lines)
+
+
+def test_cells_are_wrapped_after_commas_alone():
+    rows = [["/A/b", "49.84, 49.89, 385.1, 430.1, ... Hz"]]
+    lines = printed(24, rows, ["body", "frequencies"])
+    assert [line.strip() for line in lines[3:]] == ["/A/b       49.84, 49.89,", "385.1, 430.1,", "... Hz"]
+
+
+def test_nothing_is_printed_without_rows():
+    assert printed(80, []) == []

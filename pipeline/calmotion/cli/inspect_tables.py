@@ -4,7 +4,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, TextIO
 
-from calmotion.cli.tables import angle, console_on, length, print_left_out, print_table
+from calmotion.cli.quantities import angle, counted, length
+from calmotion.cli.run_report import print_left_out, print_notes
+from calmotion.cli.sentences import unbroken
+from calmotion.cli.tables import console_on, print_table, say
 from calmotion.shot.finding import ERROR, WARNING
 
 if TYPE_CHECKING:
@@ -20,30 +23,28 @@ def print_inspection(report: dict[str, Any], stream: TextIO) -> None:
 def _print_findings(console: Console, report: dict[str, Any]) -> None:
     for finding in report["findings"]:
         place = ".".join(filter(None, (finding["path"], finding["attribute"])))
-        console.print(f"{finding['level']}: {place}", markup=False, highlight=False, soft_wrap=True)
+        say(console, f"{finding['level']}: {place}")
         for label in ("problem", "found", "remedy", "rule"):
             if finding[label]:
-                console.print(f"  {label}: {finding[label]}", markup=False, highlight=False, soft_wrap=True)
+                say(console, f"  {label}: {finding[label]}")
     levels = [finding["level"] for finding in report["findings"]]
-    counts = ", ".join(f"{levels.count(level)} {level}s" for level in (ERROR, WARNING))
-    console.print(f"{report['shot']}: {counts if levels else 'no findings'}", markup=False, soft_wrap=True)
+    counts = ", ".join(counted(levels.count(level), level) for level in (ERROR, WARNING))
+    say(console, f"{unbroken(report['shot'])}: {counts if levels else 'no findings'}")
 
 
 def _print_contents(console: Console, report: dict[str, Any]) -> None:
     units = report["units"]
-    console.print(
-        f"{report['shot']}: {report['character']}, {report['frames']} frames, {report['duration_s']:.4g} s",
-        markup=False,
-        soft_wrap=True,
-    )
+    frames = counted(report["frames"], "frame")
+    say(console, f"{unbroken(report['shot'])}: {report['character']}, {frames}, {report['duration_s']:.4g} s")
     gravity = ", ".join(f"{component:.4g}" for component in report["gravity_m_s2"])
-    console.print(
+    say(
+        console,
         f"units: {units['meters_per_unit']:g} m, {units['kilograms_per_unit']:g} kg, {units['up_axis']} up, "
         f"{units['time_codes_per_second']:g} time codes and {units['frames_per_second']:g} frames a second; "
-        f"gravity ({gravity}) m/s²"
+        f"gravity ({gravity}) m/s²",
     )
     for layer in report["earlier_layers"]:
-        console.print(f"contains an optimised layer: {layer}", soft_wrap=True)
+        say(console, f"contains an optimised layer: {unbroken(layer)}")
     bodies = [_body_row(body) for body in report["bodies"]]
     print_table(console, "Bodies", ["body", "kind", "mass", "elements", "frequencies"], bodies, texts=2)
     print_table(
@@ -69,12 +70,11 @@ def _print_contents(console: Console, report: dict[str, Any]) -> None:
     if report["system_frequencies_hz"]:
         modes = zip(report["system_frequencies_hz"], report["system_damping_ratios"], strict=True)
         shown = ", ".join(f"{frequency:.4g} Hz ({ratio:.2g})" for frequency, ratio in modes)
-        console.print(f"natural frequencies of the character in its first pose (damping ratios): {shown}, ...")
+        say(console, f"natural frequencies of the character in its first pose (damping ratios): {shown}, ...")
     print_left_out(console, report["left_out"])
     if report["mode_shapes"]:
-        console.print(f"mode shapes: {', '.join(report['mode_shapes'])}", soft_wrap=True)
-    for note in report["notes"]:
-        console.print(f"note: {note}")
+        say(console, f"mode shapes: {', '.join(map(unbroken, report['mode_shapes']))}")
+    print_notes(console, report["notes"])
 
 
 def _body_row(body: dict[str, Any]) -> list[str]:

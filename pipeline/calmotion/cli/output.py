@@ -10,6 +10,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any, TextIO
 
+from calmotion.cli.sentences import width_of, wrapped
 from calmotion.errors import ShotError, each
 from calmotion.host import Host
 from calmotion.workflow.plain import plain
@@ -102,7 +103,7 @@ def tell_failed_plugins(host: Host) -> None:
     """Report plugins that could not be loaded, each with its traceback; the run continues without them."""
     for plugin in host.failures():
         print(plugin.traceback, end="", file=sys.stderr)
-        print(f"warning: the plugin {plugin.id} is not used: {plugin.error}", file=sys.stderr, flush=True)
+        notice(f"warning: the plugin {plugin.id} is not used: {plugin.error}")
 
 
 def tell_error(error: ShotError) -> None:
@@ -111,4 +112,10 @@ def tell_error(error: ShotError) -> None:
     lines += [f"  at:    {error.place}"] if error.place else []
     lines += [f"  found: {error.found}"] if error.found is not None else []
     lines += [f"  do:    {error.remedy}"] if error.remedy else []
-    print("\n".join(lines), file=sys.stderr, flush=True)
+    for line in lines:
+        notice(line, indent=" " * 7 if line.startswith(" ") else "  ")
+
+
+def notice(text: str, indent: str = "  ") -> None:
+    """Print a sentence on stderr, wrapped on a terminal."""
+    print(wrapped(text, width_of(sys.stderr), indent), file=sys.stderr, flush=True)

@@ -7,13 +7,17 @@ from __future__ import annotations
 
 import sys
 from types import TracebackType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
+from calmotion.cli.output import notice
+from calmotion.cli.sentences import width_of, wrapped
 from calmotion.host import OperatorResult, Outcome
 from calmotion.workflow.run import Progress as Stage
 
 if TYPE_CHECKING:
-    from rich.progress import Progress, TaskID
+    from rich.progress import TaskID
+
+    from calmotion.cli.bars import Bars
 
 
 class ProgressDisplay:
@@ -21,18 +25,14 @@ class ProgressDisplay:
 
     def __init__(self, quiet: bool, machine: bool = False):
         self._quiet, self._machine = quiet, machine
-        self._bars: Progress | None = None
+        self._bars: Bars | None = None
         self._tasks: dict[str, TaskID] = {}
 
     def __enter__(self) -> ProgressDisplay:
         if not self._quiet and not self._machine and sys.stderr.isatty():
-            from rich.console import Console
-            from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+            from calmotion.cli.bars import Bars
 
-            columns: list[Any] = [SpinnerColumn(), TextColumn("{task.description}"), BarColumn(bar_width=24)]
-            columns += [TimeElapsedColumn(), TextColumn("{task.fields[left]}")]
-            columns += [TextColumn("{task.fields[message]}", style="dim")]
-            self._bars = Progress(*columns, console=Console(stderr=True))
+            self._bars = Bars()
             self._bars.start()
         return self
 
@@ -50,10 +50,11 @@ class ProgressDisplay:
             print(line, file=sys.stderr, flush=True)
         if self._bars is None:
             return
+        self._bars.message = message
         left = time_left(state.time_left_s)
         if stage not in self._tasks:
-            self._tasks[stage] = self._bars.add_task(stage, total=1.0, message=message, left=left)
-        self._bars.update(self._tasks[stage], completed=fraction, message=message, left=left)
+            self._tasks[stage] = self._bars.add_task(stage, total=1.0, left=left)
+        self._bars.update(self._tasks[stage], completed=fraction, left=left)
 
     def done(self, result: OperatorResult) -> None:
         """Show the outcome of an operator, and its messages."""
@@ -66,9 +67,9 @@ class ProgressDisplay:
 
     def _tell(self, line: str) -> None:
         if self._bars:
-            self._bars.console.print(line, markup=False, highlight=False)
+            self._bars.console.print(wrapped(line, width_of(sys.stderr)), markup=False, highlight=False, soft_wrap=True)
         else:
-            print(line, file=sys.stderr, flush=True)
+            notice(line)
 
 
 def time_left(seconds: float | None) -> str:

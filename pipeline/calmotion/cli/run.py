@@ -28,7 +28,7 @@ def run_shot(
         ShotError: When nothing could be computed.
         SettingError: When an option or setting does not fit.
     """
-    from calmotion.cli.tables import print_run
+    from calmotion.cli.run_report import print_run
 
     shot = opened_shot(args)
     with ProgressDisplay(args.quiet, args.progress) as display:

@@ -1,177 +1,130 @@
-"""Reports as tables for a person."""
+"""Tables for a person, which fit the terminal: names are shortened only as far as they stay distinct, and never cut."""
 
 from __future__ import annotations
 
-import math
+import textwrap
 from collections.abc import Sequence
-from typing import Any, TextIO
+from typing import TextIO
 
 from rich.console import Console
-from rich.table import Table
 
+from calmotion.cli.sentences import width_of, wrapped
 from calmotion.support.naming import distinct_names
 
-_FAR = 2.0  # an estimate of more than this many tolerances means that the tolerance is not kept
+_FILE_WIDTH = 200  # characters of a line in a file, where nothing needs to be folded
+_GAP = "  "
+_SHORTENED = "(… stands for the start of a prim path; --json has whole paths)"
 
 
-LEAST = 1e-7  # length that is told [m]; what is below is rounding
+def console_on(stream: TextIO) -> Console:
+    """A console on a stream; as wide as the terminal, and wide in a file."""
+    return Console(file=stream, highlight=False, markup=False, width=width_of(stream) or _FILE_WIDTH)
 
 
-def length(meters: float | None) -> str:
-    """A length or error as text in mm; `-` when it is not known."""
-    if meters is None or not math.isfinite(meters):
-        return "-"
-    if 0.0 < abs(meters) < LEAST:
-        return f"< {1000.0 * LEAST:g} mm"
-    return f"{1000.0 * meters:.4g} mm" if abs(meters) < 9.9995 else f"{meters:.4g} m"
+def say(console: Console, text: str) -> None:
+    """Print a sentence, wrapped between words."""
+    console.print(wrapped(text, console.width), soft_wrap=True)
 
 
-def angle(radians: float | None) -> str:
-    """An angle as text in degrees; `-` when there is none."""
-    return "-" if radians is None or not math.isfinite(radians) else f"{math.degrees(radians):.4g}°"
-
-
-LONG = 60  # characters of a prim path beyond which a table shows names
-
-
-def name_paths(paths: Sequence[str]) -> dict[str, str]:
-    """Prim paths as they are when all are short, else by distinct names."""
-    if max(map(len, paths), default=0) <= LONG:
-        return {path: path for path in paths}
-    return distinct_names(paths)
+def short_paths(paths: Sequence[str]) -> dict[str, str]:
+    """Each prim path with an ellipsis for its start, where it stays distinct from the others and becomes shorter."""
+    ends = {path: f"…/{name}" for path, name in distinct_names(paths).items()}
+    return {path: end if len(end) < len(path) else path for path, end in ends.items()}
 
 
 def print_table(
     console: Console, title: str, columns: Sequence[str], rows: Sequence[Sequence[str]], texts: int = 1
 ) -> None:
-    """Print a table whose first `texts` columns are text and whose others are numbers; nothing without rows."""
+    """Print a table; nothing without rows.
+
+    A table that is wider than the console gets shorter prim paths; where that does not suffice, it becomes a list.
+
+    Args:
+        console: Where it is printed.
+        title: Of the table.
+        columns: Heads of the columns.
+        rows: Cells; a cell may be wrapped after a comma, nowhere else.
+        texts: The first so many columns are text, and the others numbers.
+    """
     if not rows:
         return
-    table = Table(title=title, title_justify="left", title_style="bold")
-    for index, column in enumerate(columns):
-        # Prim paths stand alone on their line rather than being cut: a reader copies them.
-        table.add_column(column, justify="left" if index < texts else "right", overflow="fold")
-    names = name_paths([cell for row in rows for cell in row[:texts] if cell.startswith("/")])
+    console.print(wrapped(title, console.width), style="bold", soft_wrap=True)
+    names = short_paths([cell for row in rows for cell in row[:texts] if cell.startswith("/")])
+    short = [[names.get(cell, cell) for cell in row] for row in rows]
+    for cells in (rows, short):
+        widths = _widths(columns, cells, console.width)
+        if widths is not None:
+            lines = _table(columns, cells, widths, texts)
+            break
+    else:
+        cells, lines = rows, _list(columns, rows, console.width)
+    for line in lines:
+        console.print(line.rstrip(), soft_wrap=True)
+    if cells is short and any(name != path for path, name in names.items()):
+        say(console, _SHORTENED)
+
+
+def _widths(columns: Sequence[str], rows: Sequence[Sequence[str]], width: int) -> list[int] | None:
+    """The width of each column, or None where the table does not fit."""
+    widths, wishes = [], []
+    for head, *cells in zip(columns, *rows, strict=True):
+        pieces = [piece for cell in cells for piece in _pieces(cell)]
+        widths.append(max(map(len, [*head.split(), *pieces]), default=0))
+        wishes.append((max(map(len, cells)), len(head)))
+    room = width - sum(widths) - len(_GAP) * (len(columns) - 1)
+    if room < 0:
+        return None
+    for of_head in (False, True):  # whole cells first, then whole heads
+        for index, wish in enumerate(wishes):
+            grown = min(max(wish[of_head] - widths[index], 0), room)
+            widths[index] += grown
+            room -= grown
+    return widths
+
+
+def _pieces(cell: str) -> list[str]:
+    """What of a cell stays on one line."""
+    parts = cell.split(", ")
+    return [f"{part}," for part in parts[:-1]] + parts[-1:]
+
+
+def _table(columns: Sequence[str], rows: Sequence[Sequence[str]], widths: Sequence[int], texts: int) -> list[str]:
+    """The lines of a table."""
+
+    def lines_of(cells: Sequence[Sequence[str]]) -> list[str]:
+        height = max(map(len, cells))
+        full = [[*cell, *[""] * (height - len(cell))] for cell in cells]
+        return [
+            _GAP.join(aligned(column, line) for column, line in enumerate(parts)) for parts in zip(*full, strict=True)
+        ]
+
+    def aligned(column: int, text: str) -> str:
+        return text.ljust(widths[column]) if column < texts else text.rjust(widths[column])
+
+    heads = [textwrap.wrap(head, width) or [""] for head, width in zip(columns, widths, strict=True)]
+    lines = [*lines_of(heads), _GAP.join("─" * width for width in widths)]
     for row in rows:
-        table.add_row(*(names.get(cell, cell) for cell in row))
-    console.print(table)
-    if any(name != path for path, name in names.items()):
-        console.print("(names are the ends of prim paths; --json has whole paths)")
+        lines += lines_of([_folded(cell, width) for cell, width in zip(row, widths, strict=True)])
+    return lines
 
 
-def console_on(stream: TextIO) -> Console:
-    """A console on a stream; wide in a file, where nothing needs to be folded."""
-    return Console(file=stream, highlight=False, markup=False, width=None if stream.isatty() else 200)
+def _folded(cell: str, width: int) -> list[str]:
+    """The lines of a cell, broken after commas."""
+    lines = [""]
+    for piece in _pieces(cell):
+        longer = f"{lines[-1]} {piece}" if lines[-1] else piece
+        if len(longer) <= width:
+            lines[-1] = longer
+        else:
+            lines.append(piece)
+    return lines
 
 
-def print_left_out(console: Console, rows: Sequence[dict[str, Any]]) -> None:
-    """The simplifications, each with its reason and estimated error."""
-    for row in rows:
-        error = row["estimated_error_m"]
-        cost = "" if error is None else f"; estimated error {length(error)}"
-        console.print(f"simplified: {row['what']} ({row['why']}){cost}")
-
-
-def print_limits(console: Console, limits: Sequence[dict[str, Any]], optimized: bool) -> None:
-    """Limits of motors that are exceeded, or that keep the targets from their motion."""
-    rows = []
-    for row in limits:
-        if not row["exceeded"] and row["cost_m"] is None:
-            continue
-        limit, before, after = row["shown"]
-        verdict = "exceeded" if row["exceeded"] else f"costs {length(row['cost_m'])} rms"
-        values = [limit, before, after] if optimized else [limit, after]
-        rows.append([row["path"], row["quantity"], *values, f"{row['time_s']:.3f} s", verdict])
-    heads = ["limit", "before", "after"] if optimized else ["limit", "reached"]
-    print_table(console, "Active limits of motors", ["motor", "quantity", *heads, "at", ""], rows, texts=2)
-
-
-def print_accuracy(console: Console, report: dict[str, Any]) -> None:
-    """Estimated and measured error of the simulation itself."""
-    if report["estimated_error_m"] is not None:
-        error, step = length(report["estimated_error_m"]), length(report["estimated_step_error_m"])
-        mesh = report["estimated_mesh_error_m"]
-        of_mesh = "" if mesh is None else f"; mesh error {length(mesh)}"
-        console.print(f"estimated simulation error {error} ({step} of it by the time step){of_mesh}")
-    if report["verified_error_m"] is not None:
-        console.print(
-            f"measured simulation error {length(report['verified_error_m'])}, against a run with steps of "
-            f"{1000 * report['verified_step_s']:.4g} ms and {report['verified_modes']} elastic coordinates"
-        )
-    requested, measured, estimated = (
-        report["tolerance_m"],
-        report["verified_error_m"],
-        report["estimated_error_m"] or 0.0,
-    )
-    # an estimate is a sum of bounds, so only one far above the tolerance is evidence
-    if requested is not None and (estimated > _FAR * requested if measured is None else measured > requested):
-        console.print(
-            f"the tolerance of {length(requested)} is not kept: with large deflections, or near buckling, small errors "
-            "grow; use a stiffer robot or a slower motion"
-        )
-
-
-def print_run(report: dict[str, Any], stream: TextIO) -> None:
-    """The report of `simulate` or `optimize`."""
-    console = console_on(stream)
-    optimized = "objective_after" in report
-    suffixes = ["_before", "_after"] if optimized else [""]
-    heads = [f"{kind}{' ' + s[1:] if s else ''}" for kind in ("max", "rms") for s in suffixes]
-    for title, unit, shown in (("Position", "m", length), ("Rotation", "rad", angle)):
-        name = "error" if unit == "m" else "rotation_error"
-        keys = [f"{kind}_{name}{suffix}_{unit}" for kind in ("max", "rms") for suffix in suffixes]
-        rows = [[target["path"], *(shown(target[key]) for key in keys)] for target in report["targets"]]
-        print_table(console, f"{title} error of the targets", ["target", *heads], rows)
-    if optimized:
-        console.print(
-            f"objective {report['objective_before']:.6g} -> {report['objective_after']:.6g} in {report['iterations']} "
-            f"iterations, {report['forward_simulations']} simulations, {report['linearized_sweeps']} linearised "
-            f"sweeps, {report['wall_s']:.2f} s"
-        )
-        if report["resumed_iterations"]:
-            console.print(
-                f"resumed from the checkpoint of an interrupted run, after {report['resumed_iterations']} iterations"
-            )
-        if report["stopped"] not in ("converged", ""):
-            gain = report["expected_further_gain_m"]
-            more = "" if gain is None else f", {length(gain)} expected gain of one more iteration"
-            console.print(f"stopped: {report['stopped']}{more}")
-        kept = [motor["path"] for motor in report["motors"] if not motor["changed"]]
-        if kept:
-            console.print(f"motors without changes: {', '.join(kept)}")
-    if report.get("shaper"):
-        console.print(
-            f"{report['shaper']} delays the motion by {report['shaper_delay_s']:.3f} s; largest error from the "
-            f"intended motion with that delay: {length(report['delayed_max_error_m'])}"
-        )
-    print_limits(console, report["limits"], optimized)
-    sag = max((target[f"sag{suffixes[-1]}_m"] or 0.0 for target in report["targets"]), default=0.0)
-    if sag > 1e-6:
-        console.print(f"largest sag of a target at rest: {length(sag)}")
-    seams = [target[f"seam{suffixes[-1]}_m"] for target in report["targets"]]
-    if seams and seams[0] is not None:
-        console.print(f"largest distance of a target between start and end of a cycle: {length(max(seams))}")
-        growth = report["loop_growth"]
-        if growth is None or growth > 1.0:
-            factor = "without bound" if growth is None else f"by a factor of {growth:.3g}"
-            console.print(f"the cyclic motion is unstable: a disturbance grows {factor} in each cycle")
-    if report["dead_centres_s"]:
-        times = [f"{time:.3f}" for time in report["dead_centres_s"]]
-        more = f" and {len(times) - 5} more times" if len(times) > 5 else ""
-        console.print(f"closed chains pass a dead centre at {', '.join(times[:5])} s{more}")
-    if report["refined_steps"]:
-        console.print(f"{report['refined_steps']} steps were divided into smaller ones: try a smaller --step")
-    console.print(
-        f"{report['steps']} steps of {1000 * report['step_s']:.4g} ms, {report['dof']} coordinates, "
-        f"{report['modes']} of them elastic; {report['total_wall_s']:.1f} s in total"
-        + (f", peak memory {report['peak_memory_gb']:.2f} GB" if report["peak_memory_gb"] else "")
-    )
-    print_accuracy(console, report)
-    print_left_out(console, report["left_out"])
-    for note in report["notes"]:
-        console.print(f"note: {note}")
-    for name in ("layer", "root_layer", "rrd", "csv"):
-        if report[name]:
-            console.print(f"wrote {report[name]}", soft_wrap=True)
-    for figure in report["figures"]:
-        console.print(f"wrote {figure}", soft_wrap=True)
+def _list(columns: Sequence[str], rows: Sequence[Sequence[str]], width: int) -> list[str]:
+    """The lines of a list: the first cell of each row, and below it the others with their heads."""
+    lines: list[str] = []
+    for name, *values in rows:
+        lines.append(f"  {name}")
+        told = "; ".join(f"{head} {value}".strip() for head, value in zip(columns[1:], values, strict=True))
+        lines += wrapped(f"    {told}", width, "").split("\n")
+    return lines

@@ -201,7 +201,7 @@ def _omitted_modes(basis: Basis, body: Body, load_envelope: LoadEnvelope | None)
     kept = len(basis.omega_squared)
     return (
         Simplification(
-            f"{body.path}: only {kept} linear modes",
+            f"{body.path}: only {kept} linear mode{'' if kept == 1 else 's'}",
             "the loads of this shot excite the others by less than the tolerance",
             basis.cut_error_m,
         ),

@@ -18,7 +18,8 @@ from pathlib import Path
 from calmotion.accuracy.step_error import distance
 from calmotion.benchmarks.accuracy.reference_bench import FINEST, Bench
 from calmotion.benchmarks.accuracy.work_precision import SAMPLES, machine
-from calmotion.benchmarks.common.tables import markdown, table_parser, write_rows
+from calmotion.benchmarks.common.parsers import table_parser
+from calmotion.benchmarks.common.tables import markdown, write_rows
 
 TOLERANCES = (1e-3, 1e-4, 1e-5, 1e-6, FINEST)
 STEP, INTEGRATOR = 1 / 240, "generalized-alpha"
@@ -64,7 +65,7 @@ HEADS = ("shot", "reduced to", "moved", "coordinates", "simulation")
 
 def cells(rows: Sequence[ConvergenceRow]) -> list[list[str]]:
     """The table for a person, without its heads."""
-    from calmotion.cli.tables import length
+    from calmotion.cli.quantities import length
 
     return [
         [row.shot, length(row.tolerance_m), length(row.moved_m), row.coordinates, f"{row.run_s:.2f} s"] for row in rows

@@ -8,7 +8,6 @@ frame, between the two runs of a pair.
 
 from __future__ import annotations
 
-import argparse
 import json
 import sys
 import time
@@ -23,6 +22,7 @@ from calmotion.accuracy.simulate_to_tolerance import simulate_to_tolerance
 from calmotion.accuracy.step_error import StepRun, distance, frames_of
 from calmotion.benchmarks.accuracy.work_precision import machine
 from calmotion.benchmarks.common.fresh_cache import fresh_cache
+from calmotion.benchmarks.common.parsers import bench_parser
 from calmotion.benchmarks.common.tables import write_rows
 from calmotion.benchmarks.scenes.simplification_shots import (
     SimplificationShot,
@@ -151,7 +151,8 @@ def pairs(repeats: int = REPEATS) -> list[partial[Pair]]:
 
 def print_pairs(found: Sequence[Pair]) -> None:
     """The table for a person."""
-    from calmotion.cli.tables import console_on, length, print_table
+    from calmotion.cli.quantities import length
+    from calmotion.cli.tables import console_on, print_table
 
     heads = ["left out", "shot", "run", "with", "without", "ratio", "in all", "error", "estimate"]
     cells = [
@@ -166,7 +167,7 @@ def print_pairs(found: Sequence[Pair]) -> None:
 
 def main(arguments: list[str] | None = None) -> int:
     """The command."""
-    parser = argparse.ArgumentParser(prog="calmotion bench simplification", description=__doc__)
+    parser = bench_parser("simplification", __doc__)
     parser.add_argument("--json", action="store_true", help="print one JSON object on stdout, and nothing else there")
     parser.add_argument("--csv", metavar="FILE", help="also write a table")
     parser.add_argument(

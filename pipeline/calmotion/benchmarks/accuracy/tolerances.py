@@ -22,8 +22,9 @@ from calmotion.accuracy.step_error import distance, frames_of
 from calmotion.benchmarks.accuracy.reference_bench import FINEST, Bench, Reference
 from calmotion.benchmarks.accuracy.work_precision import SAMPLES, machine
 from calmotion.benchmarks.common.fresh_cache import fresh_cache
+from calmotion.benchmarks.common.parsers import table_parser
 from calmotion.benchmarks.common.shots import Unreduced, load_unreduced
-from calmotion.benchmarks.common.tables import markdown, table_parser, write_rows
+from calmotion.benchmarks.common.tables import markdown, write_rows
 from calmotion.retargeting.to_tolerance import optimize_to_tolerance
 from calmotion.shot import Result
 from calmotion.shot.run import RunSettings
@@ -139,7 +140,7 @@ HEADS = (
 
 def cells(rows: Sequence[Kept]) -> list[list[str]]:
     """The table for a person, without its heads."""
-    from calmotion.cli.tables import length
+    from calmotion.cli.quantities import length
 
     return [
         [

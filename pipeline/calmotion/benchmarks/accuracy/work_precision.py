@@ -9,7 +9,6 @@ of the simulation. The choices for each tolerance are compared with the fastest 
 
 from __future__ import annotations
 
-import argparse
 import json
 import os
 import platform
@@ -22,6 +21,7 @@ import numpy as np
 
 from calmotion.benchmarks.accuracy.pareto import over_fastest, print_over_fastest
 from calmotion.benchmarks.accuracy.reference_bench import REPEATS, TOLERANCES, Bench, Point
+from calmotion.benchmarks.common.parsers import bench_parser
 from calmotion.benchmarks.common.shots import load_unreduced
 from calmotion.benchmarks.common.tables import write_rows
 
@@ -46,7 +46,8 @@ def machine() -> dict[str, object]:
 
 def print_points(points: Sequence[Point], bar: float) -> None:
     """The table of one shot for a person."""
-    from calmotion.cli.tables import console_on, length, print_table
+    from calmotion.cli.quantities import length
+    from calmotion.cli.tables import console_on, print_table
 
     rows = [
         [p.series, p.setting, f"1/{1 / p.step_s:.0f} s", str(p.coordinates), f"{p.wall_s:.3f} s", length(p.error_m)]
@@ -59,7 +60,7 @@ def print_points(points: Sequence[Point], bar: float) -> None:
 
 def main(arguments: list[str] | None = None) -> int:
     """The command."""
-    parser = argparse.ArgumentParser(prog="calmotion bench work-precision", description=__doc__)
+    parser = bench_parser("work-precision", __doc__)
     parser.add_argument("shots", metavar="SHOT", nargs="*", default=list(SAMPLES), help="USD file (default: samples)")
     parser.add_argument("--json", action="store_true", help="print one JSON object on stdout, and nothing else there")
     parser.add_argument("--csv", metavar="FILE", help="also write a table")

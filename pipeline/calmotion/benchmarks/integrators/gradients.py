@@ -13,8 +13,8 @@ import sys
 from collections.abc import Sequence
 from dataclasses import asdict
 
+from calmotion.benchmarks.common.parsers import shots_parser
 from calmotion.benchmarks.common.shots import load
-from calmotion.benchmarks.common.tables import shots_parser
 from calmotion.benchmarks.integrators.gradient_error import GradientError, errors
 
 

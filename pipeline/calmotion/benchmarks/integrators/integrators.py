@@ -4,19 +4,19 @@
 
 - errors of positions and velocities against the step, on a flexible arm with a driven joint and on a four-bar with a
   flexible coupler, against Radau IIA at a fine step;
-- the outcome for two thin steel links in a fast motion at the working step (Seed, section 3): RK4 fails at once, even
+- the outcome for two thin steel links in a fast motion at the working step: RK4 fails at once, even
   with steps thousands of times smaller, Newmark fails later, BDF2 runs to the end;
 - the numerical damping of an undamped vibration by BDF2, for several numbers of steps in a period.
 """
 
 from __future__ import annotations
 
-import argparse
 import json
 import sys
 from collections.abc import Callable
 from dataclasses import asdict
 
+from calmotion.benchmarks.common.parsers import bench_parser
 from calmotion.benchmarks.integrators.integrator_errors import (
     Fate,
     Measured,
@@ -33,7 +33,7 @@ from calmotion.benchmarks.integrators.integrator_errors import (
 
 def main(arguments: list[str] | None = None) -> int:
     """The command."""
-    parser = argparse.ArgumentParser(prog="calmotion bench integrators", description=__doc__)
+    parser = bench_parser("integrators", __doc__)
     parser.add_argument("--json", action="store_true", help="print one JSON object on stdout, and nothing else there")
     parser.add_argument("--figures", metavar="DIR", help="also draw figures into this folder")
     options = parser.parse_args(arguments)

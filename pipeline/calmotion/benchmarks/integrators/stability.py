@@ -7,13 +7,13 @@ shot, then every cell of the maps over stiffness, speed, load and step by each i
 
 from __future__ import annotations
 
-import argparse
 import json
 import sys
 import time
 from collections.abc import Sequence
 from dataclasses import asdict
 
+from calmotion.benchmarks.common.parsers import bench_parser
 from calmotion.benchmarks.common.tables import write_rows
 from calmotion.benchmarks.integrators.outcomes import CASES, FAILED, Outcome, run_case
 
@@ -44,7 +44,7 @@ def main(arguments: list[str] | None = None) -> int:
     """The command: exit status 1 when a case or a cell fails."""
     from calmotion.benchmarks.integrators.stability_map import MAPS, Cell, all_cells, print_cells
 
-    parser = argparse.ArgumentParser(prog="calmotion bench stability", description=__doc__)
+    parser = bench_parser("stability", __doc__)
     parser.add_argument("--json", action="store_true", help="print one JSON object on stdout, and nothing else there")
     parser.add_argument("--csv", metavar="FILE", help="also write the cells of the maps as a table")
     parser.add_argument("--figures", metavar="DIR", help="also draw the maps, to this folder")

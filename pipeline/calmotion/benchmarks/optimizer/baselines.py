@@ -13,8 +13,8 @@ from dataclasses import asdict, dataclass
 
 import numpy as np
 
+from calmotion.benchmarks.common.parsers import shots_parser
 from calmotion.benchmarks.common.shots import BenchShot, load
-from calmotion.benchmarks.common.tables import shots_parser
 from calmotion.benchmarks.optimizer.optimizer import make_problem
 from calmotion.retargeting.problem.problem import RetargetProblem
 from calmotion.retargeting.solver.damping_homotopy import damping_homotopy

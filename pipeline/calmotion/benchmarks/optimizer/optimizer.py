@@ -16,8 +16,8 @@ from functools import partial
 import numpy as np
 from scipy.optimize import minimize as quasi_newton
 
+from calmotion.benchmarks.common.parsers import shots_parser
 from calmotion.benchmarks.common.shots import BenchShot, load
-from calmotion.benchmarks.common.tables import shots_parser
 from calmotion.benchmarks.common.timing import median_time
 from calmotion.retargeting.problem.offset_basis import OffsetBasis, make_basis
 from calmotion.retargeting.problem.offset_space import OffsetSpace

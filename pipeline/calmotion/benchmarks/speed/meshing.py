@@ -7,7 +7,6 @@ frequencies are relative to the mesh with the most nodes, which itself has an er
 
 from __future__ import annotations
 
-import argparse
 import sys
 import time
 from collections.abc import Callable, Sequence
@@ -18,6 +17,7 @@ from typing import Any
 
 import numpy as np
 
+from calmotion.benchmarks.common.parsers import bench_parser
 from calmotion.benchmarks.common.tables import markdown, write_rows
 from calmotion.benchmarks.scenes.links import Link, read_links
 from calmotion.errors import ShotError
@@ -177,9 +177,7 @@ def write(rows: Sequence[Row], path: str) -> None:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Command line; exit status 1 when no link could be meshed."""
-    parser = argparse.ArgumentParser(
-        prog="calmotion bench meshing", description="Time and error against element size of links."
-    )
+    parser = bench_parser("meshing", "Time and error against element size of links.")
     parser.add_argument("links", nargs="+", metavar="FILE[:PRIM]", help="links; all bodies without a prim")
     parser.add_argument(
         "--sizes", nargs="+", default=list(SIZES), help="multiples of the automatic element size, or lengths (8mm)"

@@ -7,7 +7,6 @@ them opens as payload, reference or sublayer are parts, not shots, and are skipp
 
 from __future__ import annotations
 
-import argparse
 import sys
 import tempfile
 import time
@@ -16,6 +15,7 @@ from dataclasses import astuple, dataclass, fields
 from pathlib import Path
 from typing import Any
 
+from calmotion.benchmarks.common.parsers import bench_parser
 from calmotion.errors import ShotError, each
 from calmotion.host import Host, open_host
 from calmotion.shot import Animation, Character
@@ -116,9 +116,7 @@ def table(rows: Sequence[Row]) -> str:
 
 def main(arguments: Sequence[str]) -> int:
     """The benchmark's command line."""
-    parser = argparse.ArgumentParser(
-        prog="calmotion bench reading", description="Which shots of a folder load, and why the others do not."
-    )
+    parser = bench_parser("reading", "Which shots of a folder load, and why the others do not.")
     parser.add_argument("folders", nargs="+", type=Path, metavar="FOLDER", help="folder with USD files")
     parser.add_argument("-o", "--output", type=Path, help="file for the table (Markdown)")
     args = parser.parse_args(arguments)

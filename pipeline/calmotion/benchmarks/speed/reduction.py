@@ -17,6 +17,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
+from calmotion.benchmarks.common.parsers import bench_parser
 from calmotion.linear_algebra.blas_threads import one_blas_thread
 from calmotion.shot.character import Array, ElasticMaterial, FlexibleSettings, IntArray
 from calmotion.support.memory import peak_memory
@@ -115,7 +116,7 @@ def report(shape: str, result: dict[str, Any]) -> str:
 
 def main(arguments: list[str] | None = None) -> int:
     """The command."""
-    parser = argparse.ArgumentParser(prog="calmotion bench reduction", description=__doc__)
+    parser = bench_parser("reduction", __doc__)
     parser.add_argument("--nodes", type=int, default=50000, help="approximate number of nodes of the quadratic mesh")
     parser.add_argument("--modes", type=int, default=30, help="modes of the reduced body")
     parser.add_argument("--shape", choices=[*SHAPES], help="only this shape")

@@ -11,7 +11,6 @@
 
 from __future__ import annotations
 
-import argparse
 import json
 import sys
 from collections.abc import Sequence
@@ -20,6 +19,7 @@ from typing import Any
 
 import numpy as np
 
+from calmotion.benchmarks.common.parsers import bench_parser
 from calmotion.benchmarks.common.timing import median_time
 from calmotion.benchmarks.speed.growth import STEP, Growth, branches, growths, motion, prepared, step_time
 from calmotion.linear_algebra.blas_threads import one_blas_thread
@@ -88,7 +88,7 @@ def against_splu(repeats: int = 200) -> Sparse:
 @one_blas_thread()
 def main(arguments: list[str] | None = None) -> int:
     """The command."""
-    parser = argparse.ArgumentParser(prog="calmotion bench scaling", description=__doc__)
+    parser = bench_parser("scaling", __doc__)
     parser.add_argument("--quick", action="store_true", help="fewer and smaller sizes")
     parser.add_argument("--json", action="store_true", help="print one JSON object on stdout, and nothing else there")
     parser.add_argument("--figures", metavar="DIR", help="also draw the laws of growth, to this folder")

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from calmotion.cli.output import Output
+from calmotion.cli.sentences import width_of, wrapped
 from calmotion.host import Operator, Plugin, Property, SettingError, nearest, open_host
 
 
@@ -66,7 +67,7 @@ def _operator(cls: type[Operator]) -> dict[str, Any]:
 
 def _print_plugin(plugin: Plugin, output: Output, verbose: bool) -> None:
     def tell(line: str) -> None:
-        print(line, file=output.stream)
+        print(wrapped(line, width_of(output.stream), " " * 8), file=output.stream)
 
     manifest = plugin.manifest
     version = f" {manifest.version}" if manifest else ""

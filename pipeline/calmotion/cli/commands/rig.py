@@ -40,7 +40,8 @@ def _run(args: argparse.Namespace, output: Output) -> int:
 
 
 def _print(report: dict[str, Any], stream: TextIO) -> None:
-    from calmotion.cli.tables import angle, console_on, print_table
+    from calmotion.cli.quantities import angle
+    from calmotion.cli.tables import console_on, print_table, say
 
     console = console_on(stream)
     rows = [
@@ -48,17 +49,15 @@ def _print(report: dict[str, Any], stream: TextIO) -> None:
         for j in report["joints"]
     ]
     print_table(console, "Rotating joints", ["joint", "body", "hinges", "residual angle"], rows, texts=2)
-    console.print(
+    say(
+        console,
         f"{report['robot']}: {report['bodies']} bodies, {report['motors']} motors, {report['mass_kg']:.4g} kg; "
         f"largest residual angle {angle(report['max_angle_error_rad'])}",
-        markup=False,
-        soft_wrap=True,
     )
     for target in report["targets"]:
-        console.print(f"target: {target}", markup=False, soft_wrap=True)
-    console.print(
+        say(console, f"target: {target}")
+    say(
+        console,
         f"{report['layer']} is a shot; for flexible links apply CalmFlexibleBodyAPI or run again with "
         "--set rig.skeleton.flexible=all",
-        markup=False,
-        soft_wrap=True,
     )

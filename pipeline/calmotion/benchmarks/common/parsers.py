@@ -1,0 +1,47 @@
+"""Parsers of the arguments of benchmarks."""
+
+from __future__ import annotations
+
+import argparse
+import re
+from collections.abc import Sequence
+
+from calmotion.benchmarks.common.shots import MADE
+
+
+class _Paragraphs(argparse.HelpFormatter):
+    """Wraps each paragraph and each item of a description on its own."""
+
+    def _fill_text(self, text: str, width: int, indent: str) -> str:
+        paragraphs = re.split(r"\n\s*\n|\n(?=- )", text.strip())
+        return "\n".join(super(_Paragraphs, self)._fill_text(part, width, indent) for part in paragraphs)
+
+
+def bench_parser(name: str, description: str | None) -> argparse.ArgumentParser:
+    """A parser for the arguments of a benchmark; its description may have several paragraphs."""
+    return argparse.ArgumentParser(prog=f"calmotion bench {name}", description=description, formatter_class=_Paragraphs)
+
+
+def shots_parser(name: str, description: str | None) -> argparse.ArgumentParser:
+    """The arguments of a benchmark that runs on shots, or on the synthetic ones of `MADE`."""
+    made = "; ".join(f"{shot}: {text}" for shot, text in MADE.items())
+    parser = bench_parser(name, description)
+    parser.add_argument(
+        "shots", metavar="SHOT", nargs="*", default=["arm", "linkage"],
+        help=f"USD file, or a synthetic shot ({made}); default: arm linkage",
+    )  # fmt: skip
+    parser.add_argument("--json", action="store_true", help="print one JSON object on stdout, and nothing else there")
+    return parser
+
+
+def table_parser(
+    name: str, description: str | None, shots: Sequence[str], tolerances: Sequence[float]
+) -> argparse.ArgumentParser:
+    """The arguments of a benchmark that simulates shots with several tolerances and prints a table."""
+    parser = bench_parser(name, description)
+    parser.add_argument("shots", metavar="SHOT", nargs="*", default=list(shots), help="USD file (default: samples)")
+    parser.add_argument("--tolerances", metavar="METRES", nargs="+", type=float, default=list(tolerances))
+    parser.add_argument("--json", action="store_true", help="print one JSON object on stdout, and nothing else there")
+    parser.add_argument("--csv", metavar="FILE", help="also write a table")
+    parser.add_argument("--markdown", metavar="FILE", help="also write the table as Markdown")
+    return parser

@@ -1,0 +1,138 @@
+"""The report of `simulate` and `optimize` for a person."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, TextIO
+
+from rich.console import Console
+
+from calmotion.cli.quantities import angle, length
+from calmotion.cli.sentences import unbroken
+from calmotion.cli.tables import console_on, print_table, say
+
+_FAR = 2.0  # an estimate of more than this many tolerances means that the tolerance is not kept
+
+
+def print_left_out(console: Console, rows: Sequence[dict[str, Any]]) -> None:
+    """The simplifications, each with its reason and estimated error."""
+    for row in rows:
+        error = row["estimated_error_m"]
+        cost = "" if error is None else f"; estimated error {length(error)}"
+        say(console, f"simplified: {row['what']} ({row['why']}){cost}")
+
+
+def print_notes(console: Console, notes: Sequence[str]) -> None:
+    """The notes of the reader in a file; on a terminal they were printed when the shot was read."""
+    for note in () if console.is_terminal else notes:
+        say(console, f"note: {note}")
+
+
+def print_limits(console: Console, limits: Sequence[dict[str, Any]], optimized: bool) -> None:
+    """Limits of motors that are exceeded, or that keep the targets from their motion."""
+    rows = []
+    for row in limits:
+        if not row["exceeded"] and row["cost_m"] is None:
+            continue
+        limit, before, after = row["shown"]
+        verdict = "exceeded" if row["exceeded"] else f"costs {length(row['cost_m'])} rms"
+        values = [limit, before, after] if optimized else [limit, after]
+        rows.append([row["path"], row["quantity"], *values, f"{row['time_s']:.3f} s", verdict])
+    heads = ["limit", "before", "after"] if optimized else ["limit", "reached"]
+    print_table(console, "Active limits of motors", ["motor", "quantity", *heads, "at", ""], rows, texts=2)
+
+
+def print_accuracy(console: Console, report: dict[str, Any]) -> None:
+    """Estimated and measured error of the simulation itself."""
+    if report["estimated_error_m"] is not None:
+        error, step = length(report["estimated_error_m"]), length(report["estimated_step_error_m"])
+        mesh = report["estimated_mesh_error_m"]
+        of_mesh = "" if mesh is None else f"; mesh error {length(mesh)}"
+        say(console, f"estimated simulation error {error} ({step} of it by the time step){of_mesh}")
+    if report["verified_error_m"] is not None:
+        say(
+            console,
+            f"measured simulation error {length(report['verified_error_m'])}, against a run with steps of "
+            f"{1000 * report['verified_step_s']:.4g} ms and {report['verified_modes']} elastic coordinates",
+        )
+    requested, measured, estimated = (
+        report["tolerance_m"],
+        report["verified_error_m"],
+        report["estimated_error_m"] or 0.0,
+    )
+    # an estimate is a sum of bounds, so only one far above the tolerance is evidence
+    if requested is not None and (estimated > _FAR * requested if measured is None else measured > requested):
+        say(
+            console,
+            f"the tolerance of {length(requested)} is not kept: with large deflections, or near buckling, small errors "
+            "grow; use a stiffer robot or a slower motion",
+        )
+
+
+def print_run(report: dict[str, Any], stream: TextIO) -> None:
+    """The report of `simulate` or `optimize`."""
+    console = console_on(stream)
+    optimized = "objective_after" in report
+    suffixes = ["_before", "_after"] if optimized else [""]
+    heads = [f"{kind}{' ' + s[1:] if s else ''}" for kind in ("max", "rms") for s in suffixes]
+    for title, unit, shown in (("Position", "m", length), ("Rotation", "rad", angle)):
+        name = "error" if unit == "m" else "rotation_error"
+        keys = [f"{kind}_{name}{suffix}_{unit}" for kind in ("max", "rms") for suffix in suffixes]
+        rows = [[target["path"], *(shown(target[key]) for key in keys)] for target in report["targets"]]
+        print_table(console, f"{title} error of the targets", ["target", *heads], rows)
+    if optimized:
+        say(
+            console,
+            f"objective {report['objective_before']:.6g} -> {report['objective_after']:.6g} in {report['iterations']} "
+            f"iterations, {report['forward_simulations']} simulations, {report['linearized_sweeps']} linearised "
+            f"sweeps, {report['wall_s']:.2f} s",
+        )
+        if report["resumed_iterations"]:
+            say(
+                console,
+                f"resumed from the checkpoint of an interrupted run, after {report['resumed_iterations']} iterations",
+            )
+        if report["stopped"] not in ("converged", ""):
+            gain = report["expected_further_gain_m"]
+            more = "" if gain is None else f", {length(gain)} expected gain of one more iteration"
+            say(console, f"stopped: {report['stopped']}{more}")
+        kept = [motor["path"] for motor in report["motors"] if not motor["changed"]]
+        if kept:
+            say(console, f"motors without changes: {', '.join(kept)}")
+    if report.get("shaper"):
+        say(
+            console,
+            f"{report['shaper']} delays the motion by {report['shaper_delay_s']:.3f} s; largest error from the "
+            f"intended motion with that delay: {length(report['delayed_max_error_m'])}",
+        )
+    print_limits(console, report["limits"], optimized)
+    sag = max((target[f"sag{suffixes[-1]}_m"] or 0.0 for target in report["targets"]), default=0.0)
+    if sag > 1e-6:
+        say(console, f"largest sag of a target at rest: {length(sag)}")
+    seams = [target[f"seam{suffixes[-1]}_m"] for target in report["targets"]]
+    if seams and seams[0] is not None:
+        say(console, f"largest distance of a target between start and end of a cycle: {length(max(seams))}")
+        growth = report["loop_growth"]
+        if growth is None or growth > 1.0:
+            factor = "without bound" if growth is None else f"by a factor of {growth:.3g}"
+            say(console, f"the cyclic motion is unstable: a disturbance grows {factor} in each cycle")
+    if report["dead_centres_s"]:
+        times = [f"{time:.3f}" for time in report["dead_centres_s"]]
+        more = f" and {len(times) - 5} more times" if len(times) > 5 else ""
+        say(console, f"closed chains pass a dead centre at {', '.join(times[:5])} s{more}")
+    if report["refined_steps"]:
+        say(console, f"{report['refined_steps']} steps were divided into smaller ones: try a smaller --step")
+    say(
+        console,
+        f"{report['steps']} steps of {1000 * report['step_s']:.4g} ms, {report['dof']} coordinates, "
+        f"{report['modes']} of them elastic; {report['total_wall_s']:.1f} s in total"
+        + (f", peak memory {report['peak_memory_gb']:.2f} GB" if report["peak_memory_gb"] else ""),
+    )
+    print_accuracy(console, report)
+    print_left_out(console, report["left_out"])
+    print_notes(console, report["notes"])
+    for name in ("layer", "root_layer", "rrd", "csv"):
+        if report[name]:
+            say(console, f"wrote {unbroken(report[name])}")
+    for figure in report["figures"]:
+        say(console, f"wrote {unbroken(figure)}")
