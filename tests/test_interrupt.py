@@ -62,6 +62,67 @@ def test_a_signal_writes_the_best_so_far_and_the_same_command_resumes(repository
     assert sorted(path.name for path in tmp_path.iterdir()) == ["calm.usda", "calm_root.usda"]
 
 
+INTERRUPT = "import os, signal; os.kill(os.getpid(), signal.SIGINT)"
+REGISTER = "def register(host): pass\ndef unregister(host): pass\n"
+PLUGINS = {
+    "as it imports": f"{INTERRUPT}\n{REGISTER}",
+    "as it imports, in code that is executed": f"exec({INTERRUPT!r})\n{REGISTER}",
+    "as it imports, which makes another error of it": (
+        f"try:\n    {INTERRUPT}\nexcept BaseException:\n    raise ImportError('lost') from None\n{REGISTER}"
+    ),
+    "as it registers": f"def register(host):\n    {INTERRUPT}\ndef unregister(host): pass\n",
+    "as it registers, which swallows it": (
+        f"def register(host):\n    try:\n        {INTERRUPT}\n    except BaseException:\n        pass\n"
+        "def unregister(host): pass\n"
+    ),
+}
+
+
+@pytest.mark.parametrize("when", PLUGINS)
+def test_an_interrupt_while_a_plugin_loads_ends_the_program_in_one_line(
+    calmotion_process, make_plugin, repository, tmp_path, when
+):
+    shot, layer = repository / "samples" / "bartender" / "bartender.usda", tmp_path / "calm.usda"
+    folder = make_plugin("slow", PLUGINS[when])
+    done = calmotion_process(
+        "optimize", shot, "-o", layer, "--plugins", folder,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
+    )  # fmt: skip
+    assert (done.returncode, done.stdout, done.stderr) == (130, "", "error: interrupted\n")
+    assert [path.name for path in tmp_path.iterdir()] == ["plugins"]
+
+
+OPERATOR = """
+    from calmotion.host import Operator
+    from calmotion.shot import Character, Animation, Provenance
+    from calmotion.shot.run import Source
+
+    class Read(Operator):
+        idname, label, requires, provides = "slow.read", "Read slowly", (Source,), (int,)
+        def execute(self, context):
+            try:
+                {interrupt}
+            except BaseException:
+                {then}
+            return (1,)
+
+    def register(host): host.register_operator(Read)
+    def unregister(host): host.unregister_operator(Read)
+"""
+
+
+@pytest.mark.parametrize("then", ["raise ValueError('lost') from None", "pass"])
+def test_an_interrupt_that_an_operator_swallows_ends_the_run(calmotion_process, make_plugin, repository, then):
+    folder = make_plugin("slow", OPERATOR.format(interrupt=INTERRUPT, then=then))
+    shot = repository / "samples" / "bartender" / "bartender.usda"
+    done = calmotion_process(
+        "inspect", shot, "--plugins", folder, "--run", "slow.read", "--json",
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
+    )  # fmt: skip
+    assert done.returncode == 130 and "Traceback" not in done.stderr
+    assert json.loads(done.stdout)["error"]["problem"] == "interrupted"
+
+
 @pytest.mark.skipif(not hasattr(os, "openpty"), reason="this system has no pseudo terminals")
 def test_a_closed_terminal_writes_the_best_so_far(repository, tmp_path):
     layer = tmp_path / "calm.usda"

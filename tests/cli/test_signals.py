@@ -4,9 +4,30 @@ import signal
 import threading
 
 import pytest
-from calmotion.cli.signals import as_interrupts
+from calmotion.cli.signals import as_interrupts, ignore
+from calmotion.support import interrupts
 
 NUMBERS = [signal.SIGTERM, signal.SIGHUP]
+
+
+def test_an_interrupt_in_a_callback_that_cannot_raise_is_raised_by_the_next_check(capfd):
+    class Noisy:
+        def __del__(self):
+            signal.raise_signal(signal.SIGTERM)
+
+    with pytest.raises(KeyboardInterrupt), as_interrupts():
+        noisy = Noisy()
+        del noisy
+        interrupts.check()
+    assert capfd.readouterr().err == ""
+
+
+def test_signals_are_ignored_at_the_end():
+    before = signal.getsignal(signal.SIGTERM)
+    with as_interrupts():
+        ignore()
+        signal.raise_signal(signal.SIGTERM)
+    assert signal.getsignal(signal.SIGTERM) is before
 
 
 @pytest.mark.parametrize("number", NUMBERS)

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 from calmotion.cli.commands import bench, cache, completion, inspect, optimize, plugins, rig, simulate
 from calmotion.cli.parser import Parser
+from calmotion.cli.signals import as_interrupts, ignore
 from calmotion.errors import ShotError
 from calmotion.version import __version__
 
@@ -24,6 +25,18 @@ def main(arguments: Sequence[str] | None = None) -> int:
         0 done, 1 the shot cannot be processed, 2 wrong usage, 130 interrupted.
     """
     given = sys.argv[1:] if arguments is None else list(arguments)
+    with as_interrupts():
+        try:
+            return _run(given)
+        except KeyboardInterrupt:
+            ignore()
+            from calmotion.cli.output import Output, print_error
+
+            print_error(ShotError("interrupted"), Output(sys.stdout, "--json" in given))
+            return INTERRUPTED
+
+
+def _run(given: list[str]) -> int:
     if not given:
         build_parser().print_help(sys.stderr)
         return WRONG_USAGE
@@ -31,10 +44,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         args = build_parser().parse_args([ALIASES.get(given[0], given[0]), *given[1:]])
     except SystemExit as stop:
         return stop.code if isinstance(stop.code, int) else WRONG_USAGE
-    from calmotion.cli.output import print_error, protected_stdout
-    from calmotion.cli.signals import as_interrupts
+    from calmotion.cli.output import own_messages, print_error, printable, protected_stdout
 
-    with protected_stdout(args.json) as output, as_interrupts():
+    with printable(), protected_stdout(args.json) as output, own_messages():
         try:
             status: int = args.command(args, output)
             return status
@@ -43,9 +55,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
             print_error(error, output)
             return WRONG_USAGE if isinstance(error, SettingError) else FAILED
-        except KeyboardInterrupt:
-            print_error(ShotError("interrupted"), output)
-            return INTERRUPTED
         except BrokenPipeError:
             return FAILED
 

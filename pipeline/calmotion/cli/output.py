@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 import os
 import sys
@@ -59,6 +60,58 @@ def protected_stdout(as_json: bool) -> Iterator[Output]:
             os.dup2(keeper, 1)
             os.close(keeper)
         sys.stdout = real
+
+
+@contextmanager
+def own_messages() -> Iterator[None]:
+    """Print the warnings of Calmotion as sentences on stderr, and none of libraries, upon which a user cannot act.
+
+    Where warnings are errors (`python -W error`), or an option of Python names those to show, they are left alone.
+    """
+    import logging
+    import warnings
+
+    class Notices(logging.Handler):
+        def emit(self, record: logging.LogRecord) -> None:
+            notice(f"{record.levelname.lower()}: {record.getMessage()}")
+
+    # The handler of the root takes messages that no one else takes, which Python would print on stderr.
+    handlers = ((logging.getLogger("calmotion"), Notices()), (logging.getLogger(), logging.NullHandler()))
+    with warnings.catch_warnings():
+        if not sys.warnoptions and all(action != "error" for action, *_ in warnings.filters):
+            warnings.simplefilter("ignore")
+        for logger, handler in handlers:
+            logger.addHandler(handler)
+        try:
+            yield
+        finally:
+            for logger, handler in handlers:
+                logger.removeHandler(handler)
+
+
+_PLAIN = {"…": "...", "─": "-", "━": "-", "°": " deg", "²": "^2", "³": "^3", "–": "-", "’": "'"}
+
+
+@contextmanager
+def printable() -> Iterator[None]:
+    """Let streams that cannot encode a character, such as those of the locale C, print a plain one."""
+    import codecs
+
+    def plain_text(error: UnicodeError) -> tuple[str, int]:
+        if not isinstance(error, UnicodeEncodeError):
+            raise error
+        return "".join(_PLAIN.get(letter, "?") for letter in error.object[error.start : error.end]), error.end
+
+    codecs.register_error("calmotion.plain", plain_text)
+    changed = [stream for stream in (sys.stdout, sys.stderr) if isinstance(stream, io.TextIOWrapper)]
+    before = [stream.errors for stream in changed]
+    for stream in changed:
+        stream.reconfigure(errors="calmotion.plain")
+    try:
+        yield
+    finally:
+        for stream, errors in zip(changed, before, strict=True):
+            stream.reconfigure(errors=errors or "strict")
 
 
 def _descriptor(stream: TextIO) -> int | None:

@@ -5,37 +5,62 @@ from __future__ import annotations
 import os
 import signal
 import stat
+import sys
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from typing import Any
 
-_NAMES = ("SIGTERM", "SIGHUP", "SIGBREAK")  # the last one on Windows alone
+from calmotion.support import interrupts
+
+_NAMES = ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK")  # the last one on Windows alone
+_DEFAULTS = (signal.SIG_DFL, signal.default_int_handler)
 
 
 @contextmanager
 def as_interrupts() -> Iterator[None]:
     """Raise KeyboardInterrupt on the signals that ask a process to end, so that the best result so far is written.
 
-    A signal that the caller ignores (`nohup`) or handles already is left alone.
+    A signal that the caller ignores (`nohup`) or handles already is left alone. An interrupt that Python cannot raise,
+    such as in a callback of a weak reference, is raised at the next step of the host.
     """
-    changed = []
+    before: dict[int, Any] = {}
     if threading.current_thread() is threading.main_thread():  # elsewhere Python sets no handlers
         for number in (getattr(signal, name) for name in _NAMES if hasattr(signal, name)):
-            if signal.getsignal(number) is signal.SIG_DFL:
-                signal.signal(number, _interrupt)
-                changed.append(number)
+            if signal.getsignal(number) in _DEFAULTS:
+                before[number] = signal.signal(number, _interrupt)
+    hook, sys.unraisablehook = sys.unraisablehook, _without_interrupts(sys.unraisablehook)
+    interrupts.answer()  # of an earlier run in this process
     try:
         yield
     finally:
-        for number in changed:
-            signal.signal(number, signal.SIG_DFL)
+        interrupts.answer()
+        sys.unraisablehook = hook
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+def ignore() -> None:
+    """Ignore further signals, until `as_interrupts` ends: the process is about to do so."""
+    for number in (getattr(signal, name) for name in _NAMES if hasattr(signal, name)):
+        if signal.getsignal(number) is _interrupt:
+            signal.signal(number, signal.SIG_IGN)
 
 
 def _interrupt(number: int, frame: Any) -> None:
     if number == getattr(signal, "SIGHUP", None):
         _leave_terminal()
-    raise KeyboardInterrupt
+    interrupts.request()
+
+
+def _without_interrupts(hook: Callable[[Any], Any]) -> Callable[[Any], Any]:
+    """A hook for exceptions that cannot be raised, which prints no interrupts: those are raised later."""
+
+    def unraisable(found: Any) -> None:
+        if not issubclass(found.exc_type, KeyboardInterrupt):
+            hook(found)
+
+    return unraisable
 
 
 def _leave_terminal() -> None:

@@ -19,6 +19,7 @@ from calmotion.host.plan import Plan, make_plan
 from calmotion.host.properties import PropertyValues, nearest, values_of
 from calmotion.host.run import Run
 from calmotion.host.settings import Settings
+from calmotion.support import interrupts
 from calmotion.version import __version__
 
 
@@ -121,7 +122,9 @@ class Host:
             self._call(plugin, plugin.module.register)
             plugin.state = REGISTERED
         except (Exception, SystemExit) as error:
+            interrupts.check()  # an import may make another error of it
             plugin.fail(error)
+        interrupts.check()
 
     def unload(self, plugin: Plugin) -> tuple[type[Operator], ...]:
         """Let a plugin unregister; one that raises is marked as failed.

@@ -14,6 +14,7 @@ from calmotion.host.operators import NotAsked, Operator, Record, RunContext
 from calmotion.host.plan import Plan
 from calmotion.host.polling import find_rivals, poll
 from calmotion.host.properties import PropertyValues
+from calmotion.support import interrupts
 
 if TYPE_CHECKING:
     from calmotion.shot import Simplification
@@ -98,6 +99,7 @@ class Run:
         for index, cls in enumerate(self.plan.operators):
             # rivals are refused before any work that only they would use
             self._refused |= find_rivals(self.plan.operators[index:], self.data, self.plan.contested)
+            interrupts.check()
             result = self._step(cls)
             self.results.append(result)
             yield result
@@ -143,6 +145,7 @@ class Run:
             values = _checked(cls, cls().execute(context))
             self._progress(cls.label, 1.0, "")
         except (Exception, SystemExit) as error:  # a plugin does not end the host
+            interrupts.check()  # which it may have made of an interrupt
             return self._failure(cls, error, time.perf_counter() - start, context)
         self.data.update(values)
         self._made |= dict.fromkeys(values, cls)

@@ -30,6 +30,7 @@ from calmotion.shot.character import Array, BoolArray
 from calmotion.shot.model_choice import OFF
 from calmotion.shot.run import RunSettings
 from calmotion.simulation.simulate import Progress
+from calmotion.support import interrupts
 
 WORTH = 0.005  # share of the tolerance: a smaller predicted gain ends the search
 MISSED = 0.01  # share of the tolerance that changes in the inactive intervals may gain together
@@ -89,6 +90,7 @@ class RetargetSearch:
             self.progress(0.9, "removing negligible offsets")
             self._prune(fixed)
         except KeyboardInterrupt:
+            interrupts.answer()
             self.interrupted = True
             self.progress(0.95, "interrupted: writing the best so far")
 

@@ -15,6 +15,7 @@ from calmotion.shot import InputLayer
 from calmotion.support.files import is_special
 from calmotion.support.foreign_files import remedy_for
 from calmotion.usd import schemas
+from calmotion.usd.diagnostics import one_line, quiet
 
 if TYPE_CHECKING:
     from pxr import Pcp, Sdf, Usd
@@ -22,7 +23,7 @@ if TYPE_CHECKING:
 METADATA_KEY = "calmotion"
 CURVES, MOTION, ROOT, RIG = "curves", "motion", "root", "rig"  # roles of the layers that Calmotion writes
 
-_ARCS = {"reference": "references", "payload": "payload", "sublayer": "subLayers"}
+_ARCS = {"reference": "references", "payload": "payload", "sublayer": "subLayers", "variant": "variants"}
 _REFUSED = (
     "ErrorInvalidAssetPath",
     "ErrorInvalidSublayerPath",
@@ -30,20 +31,8 @@ _REFUSED = (
     "ErrorInvalidPrimPath",
     "ErrorSublayerCycle",
     "ErrorArcCycle",
+    "ErrorVariableExpressionError",
 )
-
-
-@contextmanager
-def quiet() -> Iterator[None]:
-    """Suppress USD's messages on stderr; errors are raised as ShotErrors instead."""
-    from pxr import UsdUtils
-
-    delegate = UsdUtils.CoalescingDiagnosticDelegate()
-    try:
-        yield
-    finally:
-        delegate.TakeUncoalescedDiagnostics()
-        del delegate
 
 
 @contextmanager
@@ -87,7 +76,7 @@ def open_layer(path: str) -> Sdf.Layer:
         with quiet():
             layer = Sdf.Layer.FindOrOpen(str(path))
     except Tf.ErrorException as error:
-        reason = _last_quoted(str(error))
+        reason = one_line(_last_quoted(str(error)))
     if layer is None:
         raise ShotError(
             "this is not a USD file, or it is damaged",
@@ -123,9 +112,8 @@ def _open_dependencies(root: Sdf.Layer) -> list[Sdf.Layer]:
 
     opened, names = [root], {root.identifier}
     for layer in opened:
-        for asset in layer.GetCompositionAssetDependencies():
-            name = Sdf.ComputeAssetPathRelativeToLayer(layer, asset) if asset else ""
-            if not name or name in names:
+        for name in _named_by(layer):
+            if name in names:
                 continue
             names.add(name)
             refuse_special(name, layer.identifier)
@@ -136,6 +124,16 @@ def _open_dependencies(root: Sdf.Layer) -> list[Sdf.Layer]:
             if named is not None:
                 opened.append(named)
     return opened
+
+
+def _named_by(layer: Sdf.Layer) -> list[str]:
+    """Identifiers of what a layer names as sublayers, references and payloads."""
+    from pxr import Sdf
+
+    named = (
+        Sdf.ComputeAssetPathRelativeToLayer(layer, asset) for asset in layer.GetCompositionAssetDependencies() if asset
+    )
+    return list(dict.fromkeys(name for name in named if name))
 
 
 def open_stage(path: str, *, muted: tuple[str, ...] = ()) -> Usd.Stage:
@@ -191,11 +189,20 @@ def _refusal(error: Pcp.ErrorBase, shot: str) -> ShotError | None:
     """The ShotError for a composition error that leaves out a part of the shot; None for any other."""
     if type(error).__name__ not in _REFUSED:
         return None
-    text = str(error).strip()
+    text = one_line(str(error))
     site = re.search(r"<(/[^>]*)>\.?\s*$", text)
     prim = site.group(1) if site else str(error.rootSite.path)
     assets = re.findall(r"@([^@]*)@", text)
     arc = next((name for name in _ARCS if name in text.lower()), "reference")
+    if "Expression" in type(error).__name__:
+        place = re.search(r" at (/[^ ]*) in @", text)
+        return ShotError(
+            f"an expression in its {arc} cannot be evaluated",
+            path=place.group(1) if place else shot,
+            attribute=_ARCS[arc],
+            found=text,
+            remedy="Define its variables in expressionVariables of the shot, or correct the expression",
+        )
     if arc == "sublayer":
         return ShotError(
             "names a sublayer that cannot be opened",
@@ -218,15 +225,14 @@ def _refusal(error: Pcp.ErrorBase, shot: str) -> ShotError | None:
 
 def files_named_by(path: str) -> tuple[str, ...]:
     """The files that a layer names as sublayers, references and payloads; none for one that cannot be opened."""
-    from pxr import Sdf, Tf, UsdUtils
+    from pxr import Sdf, Tf
 
     try:
         with quiet():
             layer = Sdf.Layer.FindOrOpen(path)
-            named = [] if layer is None else [n for kind in UsdUtils.ExtractExternalReferences(path) for n in kind]
+            return () if layer is None else tuple(_named_by(layer))
     except Tf.ErrorException:
         return ()
-    return tuple(layer.ComputeAbsolutePath(name) for name in named)
 
 
 def role_of(layer: Sdf.Layer) -> str:

@@ -13,6 +13,7 @@ from calmotion.errors import ShotError
 from calmotion.host import Host, OperatorResult, Run, SettingError, Settings, merge, nearest
 from calmotion.shot.outputs import CsvFile, Figures, Recording, WrittenLayer
 from calmotion.shot.run import INTEGRATORS, SHAPERS, OutputPaths, Source
+from calmotion.support import interrupts
 from calmotion.support.foreign_files import remedy_for
 from calmotion.workflow.problems import Cancelled, Problem, problems_of, value_of
 from calmotion.workflow.shot import Shot
@@ -148,6 +149,7 @@ def carry_out(
     except _Stop:
         interrupted = cancelled = True
     except KeyboardInterrupt:
+        interrupts.answer()
         interrupted = True
     if writes:  # other commands also accept a shot in which nothing moves
         shot.keep(run.data)
@@ -160,6 +162,7 @@ def _listener(hooks: Hooks) -> Callable[[str, float, str], None]:
     began: dict[str, float] = {}
 
     def listen(stage: str, fraction: float, message: str) -> None:
+        interrupts.check()
         if hooks.cancel and hooks.cancel():
             raise _Stop
         now = time.perf_counter()

@@ -53,6 +53,12 @@ def of_text(change: Callable[[str], str], *place: str, repaired: str = "", name:
     return Case(make, place, repaired)
 
 
+def of_fore(metadata: str, *place: str, repaired: str = "") -> Case:
+    """The arm with more metadata of its outer link, as text."""
+    head = 'def Xform "fore" (\n'
+    return of_text(lambda text: text.replace(head, f"{head}{metadata}\n", 1), *place, repaired=repaired)
+
+
 def of_bytes(content: bytes, name: str, *place: str) -> Case:
     """A file of one's own."""
 
@@ -296,6 +302,10 @@ CASES: dict[str, Case] = {
     "text that stops in the middle": of_text(lambda text: text[: len(text) // 2], "shot.usda"),
     "a brace too many": of_text(lambda text: text + "}\n", "shot.usda"),
     # composition
+    "a reference by an expression without its variable": of_fore("references = @`${WHICH}`@", FORE, "WHICH"),
+    "a variant by an expression without its variable": of_fore(
+        'variants = { string v = "`${WHICH}`" }\nprepend variantSets = "v"', FORE, "WHICH"
+    ),
     "a missing sublayer": of_layer(lambda layer: layer.subLayerPaths.append("./gone.usda"), "gone.usda"),
     "a missing reference": of_layer(
         lambda layer: layer.GetPrimAtPath(FORE).referenceList.Prepend(Sdf.Reference("./gone.usda")), FORE
@@ -421,6 +431,15 @@ CASES: dict[str, Case] = {
     "a mesh file out of the folder": edited(mesh_file("../../../../../../etc/passwd"), FORE, "calm:flexible:meshFile"),
     # what can be repaired
     "names in other scripts": of_text(unicode_names, repaired="机械臂"),
+    "clips whose manifest is missing": of_fore(
+        'clips = { dictionary default = { asset[] assetPaths = [@gone.usda@]\n string primPath = "/A"\n'
+        " double2[] active = [(0, 0)]\n double2[] times = [(0, 0)]\n asset manifestAssetPath = @gone.usda@ } }",
+        repaired=f"{FORE}: USD reports: Unable to open clip layer @gone.usda@",
+    ),
+    "an applied schema without its instance": of_text(
+        lambda text: text.replace('"PhysicsRigidBodyAPI"]', '"PhysicsRigidBodyAPI", "PhysicsLimitAPI"]', 1),
+        repaired=f"{UPPER}: USD reports: API schema 'PhysicsLimitAPI'",
+    ),
     "samples at nearly the same time": edited(close_samples, repaired=SHOULDER),
     "a body that nothing holds": edited(
         lambda s: s.GetPrimAtPath("/Arm/joints/stand").GetAttribute("physics:jointEnabled").Set(False), repaired=BASE

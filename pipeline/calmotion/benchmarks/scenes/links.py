@@ -11,7 +11,8 @@ from calmotion.errors import ShotError
 from calmotion.shot import Body, ElasticMaterial, FlexibleSettings, Frame
 
 if TYPE_CHECKING:
-    from calmotion.usd.reading.context import Reading
+    from calmotion.usd.diagnostics import quiet
+from calmotion.usd.reading.context import Reading
 
 # of polyamide as printed links are; relative errors of frequencies do not depend on its stiffness and density
 POLYAMIDE = ElasticMaterial("", 1.8e9, 0.35, 1200.0)
@@ -47,7 +48,7 @@ def read_links(source: str) -> list[Link]:
 
     file, wanted = _split(source)
     stage = stages.open_stage(file)
-    with stages.quiet():
+    with quiet():
         reading = Reading(stage, units_of(stage), float(stage.GetStartTimeCode()))
         prims = [prim for prim in prims_of(stage) if is_rigid_body(prim)]
         if wanted:

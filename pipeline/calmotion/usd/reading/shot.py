@@ -13,6 +13,7 @@ from calmotion.errors import raise_all
 from calmotion.shot import Animation, Character, MotorTracks, MovingFrame, Provenance, Track
 from calmotion.usd import stages
 from calmotion.usd.clock import Clock, clock_of, still_clock
+from calmotion.usd.diagnostics import quiet, with_places
 from calmotion.usd.reading.animated_transforms import carriers, codes_of
 from calmotion.usd.reading.character import Skeleton, build_character, read_skeleton
 from calmotion.usd.reading.context import Reading, is_rigid_body, prims_of
@@ -61,11 +62,11 @@ def read_shot(
         ShotError: The shot cannot be processed; with prim path, attribute and remedy. A `ShotErrors` where several
             things are wrong.
     """
-    composed = stages.open_stage(path)
-    stages.refuse_result_layer(composed, path)
-    earlier = stages.earlier_layers(composed)
-    stage = stages.open_stage(path, muted=earlier) if earlier else composed
-    with stages.quiet():
+    with quiet() as messages:
+        composed = stages.open_stage(path)
+        stages.refuse_result_layer(composed, path)
+        earlier = stages.earlier_layers(composed)
+        stage = stages.open_stage(path, muted=earlier) if earlier else composed
         read = read_stage(stage, still, given)
         reading, clock, character, tracks = read.reading, read.clock, read.character, read.tracks
         current = tracks
@@ -80,9 +81,11 @@ def read_shot(
             names = ", ".join(stages.display_name(layer, path) for layer in earlier)
             note = f"the shot carries results of Calmotion ({names}); the intended motion is the animation beneath them"
             character = dataclasses.replace(character, notes=(*character.notes, note))
-    provenance = provenance_of(path, stage, clock, earlier)
-    weights = weight_tracks(stage, character.targets, clock)
-    free = free_tracks(stage, character.motors, clock)
+        provenance = provenance_of(path, stage, clock, earlier)
+        weights = weight_tracks(stage, character.targets, clock)
+        free = free_tracks(stage, character.motors, clock)
+    notes = (f"{place}: {message}" for place, message in with_places(messages, stage, prims_of(stage)))
+    character = dataclasses.replace(character, notes=(*character.notes, *notes))
     return character, Animation(clock.frame_times(), tracks, current, read.moving, weights, free), provenance
 
 

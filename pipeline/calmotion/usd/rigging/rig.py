@@ -15,6 +15,7 @@ from calmotion.shot.character import Array
 from calmotion.shot.outputs import Rig, RiggedJoint
 from calmotion.usd import stages
 from calmotion.usd.clock import Clock
+from calmotion.usd.diagnostics import quiet
 from calmotion.usd.layers import refuse_input_as_output, write_layer
 from calmotion.usd.reading.context import is_rigid_body, prims_of
 from calmotion.usd.reading.provenance import provenance_of
@@ -72,7 +73,7 @@ def rig_shot(path: str, output: str, options: RigOptions | None = None) -> Rig:
             found="PhysicsRigidBodyAPI",
             remedy="Name the file of the skinned character without a robot",
         )
-    with stages.quiet():
+    with quiet():
         skeleton, clock = _animated_skeleton(stage, path)
         codes = clock.merged(skeleton.codes())
         links = _links(stage, skeleton, codes, options.angle_tolerance)

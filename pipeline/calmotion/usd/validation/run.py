@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Any
 from calmotion.errors import ShotError, each
 from calmotion.shot.finding import ERROR, WARNING, Finding, Findings
 from calmotion.usd import stages
+from calmotion.usd.diagnostics import quiet, with_places
+from calmotion.usd.reading.context import prims_of
 from calmotion.usd.validation.rules import READABLE, RULES, Rule, finding_of
 
 if TYPE_CHECKING:
@@ -25,16 +27,18 @@ def validate_shot(path: str) -> Findings:
     Returns:
         Findings of Calmotion's rules and of every validator of the installed USD, errors first, else by place.
     """
-    try:
-        stage = stages.open_stage(path)
-        stages.refuse_result_layer(stage, path)
-    except ShotError as error:
-        return Findings(tuple(finding_of(one, ERROR, READABLE) for one in each(error)))
-    muted = stages.earlier_layers(stage)
-    if muted:
-        stage = stages.open_stage(path, muted=muted)
-    with stages.quiet():
-        findings = []
+    with quiet() as messages:
+        try:
+            stage = stages.open_stage(path)
+            stages.refuse_result_layer(stage, path)
+        except ShotError as error:
+            return Findings(tuple(finding_of(one, ERROR, READABLE) for one in each(error)))
+        muted = stages.earlier_layers(stage)
+        if muted:
+            stage = stages.open_stage(path, muted=muted)
+    reported = with_places(messages, stage, prims_of(stage))
+    findings = [Finding(WARNING, READABLE, place, "", message) for place, message in reported]
+    with quiet():
         for name, (rule, _) in RULES.items():
             findings += _checked(name, stage, rule)
         findings += _checked("usdValidation", stage, _usd_findings)
