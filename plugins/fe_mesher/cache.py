@@ -6,8 +6,8 @@ import hashlib
 from collections.abc import Callable
 
 import numpy as np
-from calmotion.support.cache_folder import MESHES
-from calmotion.support.caches import store_arrays, stored_arrays
+from calmotion.support.caching.cache_folder import MESHES
+from calmotion.support.caching.caches import store_arrays, stored_arrays
 
 
 def cache_key(points: np.ndarray, triangles: np.ndarray, settings: dict[str, object]) -> str:

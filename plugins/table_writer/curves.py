@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from calmotion.errors import ShotError
 from calmotion.shot import Animation, Character, Motor, Provenance, Result
-from calmotion.shot.commanded import commanded_values
+from calmotion.shot.curves import commanded_values
 from calmotion.support.files import write_text
 
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from calmotion.cli.commands.cache import readable, size
 from calmotion.cli.main import main
-from calmotion.support.caches import store_arrays
+from calmotion.support.caching.caches import store_arrays
 
 
 @pytest.fixture(autouse=True)

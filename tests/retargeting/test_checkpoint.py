@@ -12,7 +12,7 @@ from calmotion.retargeting.problem import adaptive_knots
 from calmotion.retargeting.problem.problem import RetargetProblem
 from calmotion.shot.run import RunSettings
 from calmotion.simulation.compiled_shot import compile_shot
-from calmotion.support.verified_files import read_arrays, write_arrays
+from calmotion.support.caching.verified_files import read_arrays, write_arrays
 from posed import ignore_progress, jerking, make_problem
 
 OPTIONS = RunSettings(step=1 / 240)

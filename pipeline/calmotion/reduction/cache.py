@@ -19,8 +19,8 @@ import numpy as np
 
 from calmotion.reduction.reduced_body import Elasticity, Invariants, Marker, ReducedBody
 from calmotion.shot.result import Simplification
-from calmotion.support.cache_folder import REDUCTIONS
-from calmotion.support.caches import store_arrays, stored_arrays
+from calmotion.support.caching.cache_folder import REDUCTIONS
+from calmotion.support.caching.caches import store_arrays, stored_arrays
 
 T = TypeVar("T")
 

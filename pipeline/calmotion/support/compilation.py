@@ -26,8 +26,8 @@ import numpy as np  # noqa: E402
 from numba import config, njit  # noqa: E402
 
 from calmotion.support import references  # noqa: F401
-from calmotion.support.cache_folder import KERNELS, cache_folder
-from calmotion.support.caches import mark_used, prune
+from calmotion.support.caching.cache_folder import KERNELS, cache_folder
+from calmotion.support.caching.caches import mark_used, prune
 from calmotion.support.kernel_cache import verified
 from calmotion.support.shared_code import shared, with_addresses
 from calmotion.support.sources import digest_of, with_imports
@@ -67,7 +67,7 @@ def kernel_key(package: Path) -> str:
     kernels = [path for path in package.rglob("*.py") if _KERNEL.search(path.read_bytes())]
     support = package / "support"
     used = {
-        path for path in with_imports(kernels, package.parent) if path.parent != support
+        path for path in with_imports(kernels, package.parent) if support not in path.parents
     }  # nothing of it is compiled
     sources = sorted({*used, *(path for path in support.glob("*.py") if path.name in _COMPILERS)})
     level = f"numba {numba.__version__} llvmlite {llvmlite.__version__} python {sys.version_info[:3]} opt {config.OPT}"

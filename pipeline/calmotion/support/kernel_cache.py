@@ -15,9 +15,9 @@ from typing import Any
 from numba.core.caching import IndexDataCacheFile
 from numba.core.serialize import dumps
 
-from calmotion.support.caches import discard
+from calmotion.support.caching.caches import discard
+from calmotion.support.caching.verified_files import DamagedFileError, read_verified, sealed
 from calmotion.support.files import replaced
-from calmotion.support.verified_files import DamagedFileError, read_verified, sealed
 
 
 class VerifiedCacheFile(IndexDataCacheFile):  # type: ignore[misc]

@@ -18,7 +18,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from calmotion.benchmarks.common.fresh_cache import fresh_cache
-from calmotion.support.cache_folder import KERNELS, cache_folder
+from calmotion.support.caching.cache_folder import KERNELS, cache_folder
 
 DEFAULT = "samples/bartender/bartender.usda"
 

@@ -6,11 +6,11 @@ import argparse
 from typing import TYPE_CHECKING, Any
 
 from calmotion.cli.options import Commands
-from calmotion.support.cache_folder import CACHES, cache_folder
+from calmotion.support.caching.cache_folder import CACHES, cache_folder
 
 if TYPE_CHECKING:
     from calmotion.cli.output import Output
-    from calmotion.support.caches import Entry
+    from calmotion.support.caching.caches import Entry
 
 ALL = "all"
 _UNITS = {"B": 1, "kB": 10**3, "MB": 10**6, "GB": 10**9}
@@ -65,7 +65,7 @@ def readable(count: int) -> str:
 
 
 def _info(args: argparse.Namespace, output: Output) -> int:
-    from calmotion.support.caches import entries
+    from calmotion.support.caching.caches import entries
 
     rows: list[dict[str, Any]] = []
     for name, (_, limit) in CACHES.items():
@@ -86,13 +86,13 @@ def _info(args: argparse.Namespace, output: Output) -> int:
 
 
 def _clear(args: argparse.Namespace, output: Output) -> int:
-    from calmotion.support.caches import clear
+    from calmotion.support.caching.caches import clear
 
     return _tell(args, output, {name: clear(name) for name in _chosen(args)})
 
 
 def _prune(args: argparse.Namespace, output: Output) -> int:
-    from calmotion.support.caches import prune
+    from calmotion.support.caching.caches import prune
 
     return _tell(args, output, {name: prune(name, args.size) for name in _chosen(args)})
 

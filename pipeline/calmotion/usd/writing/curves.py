@@ -36,7 +36,7 @@ def curve_values(animation: Animation, curve: MotorCurve, times: Array, cyclic: 
     """A motor's curve [rad or m] at times within the shot."""
     if times is animation.frame_times:
         return curve.frame_values
-    from calmotion.shot.commanded import optimized_curve
+    from calmotion.shot.curves import optimized_curve
 
     return optimized_curve(animation, curve, cyclic)(times, 0)
 

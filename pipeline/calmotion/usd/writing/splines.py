@@ -23,7 +23,7 @@ def hermite(animation: Animation, curve: MotorCurve, cyclic: bool) -> tuple[Arra
 
     Knots are where the animation has samples and where the offset has knots; between them both are cubics.
     """
-    from calmotion.shot.commanded import optimized_curve
+    from calmotion.shot.curves import optimized_curve
 
     track, end = animation.tracks[curve.motor], float(animation.frame_times[-1])
     whole = optimized_curve(animation, curve, cyclic)

@@ -4,8 +4,8 @@ import os
 
 import numpy as np
 import pytest
-from calmotion.support.cache_folder import CACHES, KERNELS, MESHES, REDUCTIONS
-from calmotion.support.caches import clear, entries, prune, store_arrays, stored_arrays
+from calmotion.support.caching.cache_folder import CACHES, KERNELS, MESHES, REDUCTIONS
+from calmotion.support.caching.caches import clear, entries, prune, store_arrays, stored_arrays
 
 
 @pytest.fixture(autouse=True)

@@ -17,9 +17,9 @@ from typing import Any
 
 import numpy as np
 
-from calmotion.support.cache_folder import CACHES, cache_folder
+from calmotion.support.caching.cache_folder import CACHES, cache_folder
+from calmotion.support.caching.verified_files import DamagedFileError, read_arrays, write_arrays
 from calmotion.support.files import PREFIX
-from calmotion.support.verified_files import DamagedFileError, read_arrays, write_arrays
 
 LOG = logging.getLogger("calmotion")
 

@@ -6,7 +6,7 @@ import sys
 
 import numpy as np
 import pytest
-from calmotion.support.verified_files import (
+from calmotion.support.caching.verified_files import (
     DamagedFileError,
     read_arrays,
     read_verified,
@@ -60,8 +60,8 @@ def test_pickled_objects_are_not_loaded(tmp_path):
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="this system has no named pipes")
 def test_a_named_pipe_stops_nobody(tmp_path):
     os.mkfifo(tmp_path / "x.npz")
-    code = f"from calmotion.support.verified_files import read_verified; read_verified({str(tmp_path / 'x.npz')!r})"
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60)
+    code = "import sys; from calmotion.support.caching.verified_files import read_verified; read_verified(sys.argv[1])"
+    done = subprocess.run([sys.executable, "-c", code, tmp_path / "x.npz"], capture_output=True, text=True, timeout=60)
     assert "DamagedFileError" in done.stderr
 
 
