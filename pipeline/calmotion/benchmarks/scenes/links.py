@@ -11,8 +11,7 @@ from calmotion.errors import ShotError
 from calmotion.shot import Body, ElasticMaterial, FlexibleSettings, Frame
 
 if TYPE_CHECKING:
-    from calmotion.usd.diagnostics import quiet
-from calmotion.usd.reading.context import Reading
+    from calmotion.usd.reading.context import Reading
 
 # of polyamide as printed links are; relative errors of frequencies do not depend on its stiffness and density
 POLYAMIDE = ElasticMaterial("", 1.8e9, 0.35, 1200.0)
@@ -42,6 +41,7 @@ def read_links(source: str) -> list[Link]:
         ShotError: The file cannot be read, or has no such prim.
     """
     from calmotion.usd import stages
+    from calmotion.usd.diagnostics import quiet
     from calmotion.usd.reading.bodies.shapes import shapes_of, tets_of
     from calmotion.usd.reading.context import Reading, is_rigid_body, prims_of
     from calmotion.usd.units import units_of
