@@ -78,7 +78,7 @@ class RefineReduction(Operator):
     def poll(cls, data: Mapping[type, Any]) -> str | None:
         source, reduced = data.get(Source), data.get(ReducedBodies)
         if source is None or not source.refines:
-            return NotAsked("no --tolerance is given")
+            return NotAsked("the shot is only inspected")
         return "its plugin cannot repeat the reduction" if reduced is not None and reduced.reduction is None else None
 
     def execute(self, context: RunContext) -> Sequence[object]:

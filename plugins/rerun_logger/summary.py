@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from calmotion.host import OperatorResult
 from calmotion.shot import Character, Result, Simulation
+from calmotion.shot.budget import verdict_on
 from calmotion.shot.character import Array
 from calmotion.shot.outputs import SystemModes
 from calmotion.support.naming import distinct_names
@@ -30,7 +31,7 @@ def describe(
         system: Natural modes of the whole character.
     """
     parts = [f"# {character.path}", errors_table(character, result), sizes(character, result, system)]
-    parts.append(left_out(result))
+    parts += [budget(result), left_out(result)]
     if character.notes:
         parts.append("## Notes on the shot\n" + "\n".join(f"- {note}" for note in character.notes))
     if result.steps:
@@ -82,6 +83,21 @@ def sizes(character: Character, result: Result, system: SystemModes | None) -> s
     if result.after is not None:
         lines.append(f"- {result.iterations} iterations in {result.wall_s:.2f} s, {result.parameters} parameters")
     return "## Model\n" + "\n".join(lines)
+
+
+def budget(result: Result) -> str:
+    """The error budget, and whether the simulation keeps the tolerance."""
+    verdict = verdict_on(result.budget, result.tolerance_m)
+    tolerance = f"tolerance {1e3 * result.tolerance_m:.3g} mm"
+    if verdict.error_m is None:
+        return f"## Accuracy\n{tolerance}; the error of the simulation was not estimated."
+    kept = "kept" if verdict.kept else f"not kept, mostly because of the {verdict.short}"
+    rows = [f"{tolerance}, {kept}: estimated error {1e3 * verdict.error_m:.3g} mm", ""]
+    rows += ["| source | allowed | estimated | choice |", "|---|---:|---:|---|"]
+    for entry in result.budget:
+        cost = "unknown" if entry.estimated_m is None else f"{1e3 * entry.estimated_m:.3g} mm"
+        rows.append(f"| {entry.source} | {1e3 * entry.allowed_m:.3g} mm | {cost} | {entry.choice} |")
+    return "## Accuracy\n" + "\n".join(rows)
 
 
 def left_out(result: Result) -> str:

@@ -19,6 +19,14 @@ def _options(context: RunContext, **more: Any) -> Any:
     return run_settings(context.get(Source), context.get(ModelChoices), **more)
 
 
+def _with_budget(context: RunContext, result: Result) -> Result:
+    """The result with the decisions on the model and its error budget."""
+    from calmotion.accuracy.error_budget import with_budget
+
+    shot, tolerance = compiled_in(context.get), context.get(Source).settings.tolerance
+    return with_budget(with_choices(result, context.get(ModelChoices)), shot.character, tolerance)
+
+
 def _wrong_command(data: Mapping[type, Any], command: str) -> str | None:
     source = data.get(Source)
     return None if source is None or source.command == command else f"the command is {source.command}"
@@ -75,7 +83,7 @@ class SimulateShot(Operator):
             shot = shot.with_tracks(shaped.tracks)
         error, known = (None, None) if converged is None else (converged.error_m, converged.known)
         result = simulate_to_tolerance(shot, _options(context), context.progress, error, known)
-        return [with_choices(result, context.get(ModelChoices))]
+        return [_with_budget(context, result)]
 
 
 class OptimizeShot(Operator):
@@ -142,7 +150,7 @@ class OptimizeShot(Operator):
                 "warning",
                 f"the new curves are worse than the animated ones: objective {before} -> {after}; {reason}",
             )
-        return [with_choices(result, context.get(ModelChoices))]
+        return [_with_budget(context, result)]
 
 
 OPERATORS = (ShapeTracks, SimulateShot, OptimizeShot)

@@ -13,6 +13,7 @@ from calmotion.errors import IntegrationError, ShotError
 from calmotion.retargeting import to_tolerance as retarget
 from calmotion.retargeting.to_tolerance import optimize_to_tolerance
 from calmotion.shot.run import RunSettings
+from calmotion.shot.tolerance import tolerance_of
 from calmotion.simulation.bodies import with_elasticity
 from calmotion.simulation.body_reduction import reduced_shot, reduction_for
 from calmotion.simulation.compiled_shot import compile_shot
@@ -82,13 +83,25 @@ def test_the_step_that_is_planned_is_the_one_that_is_taken(arm, animation, bodie
         assert row.why.endswith("BDF2") == gives_way
 
 
-def test_a_step_or_no_tolerance_leaves_the_step_as_it_is(arm, animation, bodies):
-    for options in (RunSettings(step=1 / 240, tolerance=1e-5), RunSettings()):
-        result = simulate_to_tolerance(compile_shot(arm, animation, bodies), options, quiet)
-        assert result.step_s == pytest.approx(options.step or 1 / 480) and result.accuracy is None
+def test_a_given_step_is_taken_and_its_error_estimated(arm, animation, bodies):
+    result = simulate_to_tolerance(
+        compile_shot(arm, animation, bodies), RunSettings(step=1 / 240, tolerance=1e-5), quiet
+    )
+    assert result.step_s == pytest.approx(1 / 240)
+    assert off_by(result, arm, animation, bodies) == pytest.approx(result.accuracy.step_m, rel=0.5)
     slow = dataclasses.replace(arm, retarget=dataclasses.replace(arm.retarget, time_step=1 / 120))
     result = simulate_to_tolerance(compile_shot(slow, animation, bodies), RunSettings(tolerance=1e-5), quiet)
     assert result.step_s == pytest.approx(1 / 120)
+
+
+def test_without_a_requested_tolerance_that_of_the_shot_is_kept(arm, animation, bodies):
+    steps = []
+    for tolerance in (None, 1e-2, 1e-4):
+        shot = dataclasses.replace(arm, retarget=dataclasses.replace(arm.retarget, tolerance=tolerance))
+        result = simulate_to_tolerance(compile_shot(shot, animation, bodies), RunSettings(), quiet)
+        assert off_by(result, arm, animation, bodies) < tolerance_of(shot)
+        steps.append(result.step_s)
+    assert steps[1] > steps[0] > steps[2]
 
 
 def test_the_integrator_that_needs_fewest_steps_gives_way_where_it_fails(arm, animation, bodies, monkeypatch):
@@ -119,7 +132,7 @@ def test_the_integrator_that_needs_fewest_steps_gives_way_where_it_fails(arm, an
 def test_an_optimisation_keeps_its_tolerance(arm, animation, bodies, tolerance):
     result = optimize_to_tolerance(compile_shot(arm, animation, bodies), RunSettings(tolerance=tolerance), quiet)
     off = off_by(result, arm, animation, bodies)
-    assert off < 1.5 * result.accuracy.step_m and off < result.accuracy.requested_m == tolerance
+    assert off < 1.5 * result.accuracy.step_m and off < tolerance
     assert result.accuracy.estimated_m <= WHOLE * tolerance
     assert result.objective_after < 0.1 * result.objective_before
     assert result.accuracy.left_out_m == sum(row.estimated_error_m or 0.0 for b in bodies for row in b.left_out)
@@ -179,7 +192,7 @@ def test_a_search_continues_where_the_pod_subspace_does_not_fit(arm, animation, 
 
     monkeypatch.setattr(ProjectedShot, "is_accurate_for", is_accurate_for)
     monkeypatch.setattr(retarget, "optimize_shot", search)
-    result = optimize_to_tolerance(shot, RunSettings(max_iterations=15), quiet)
+    result = optimize_to_tolerance(shot, RunSettings(max_iterations=15, step=1 / 480), quiet)
     assert len(asked) == len(parts) == 2
     begun, gone_on = parts
     assert begun.animation.current is animation.current

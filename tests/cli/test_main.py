@@ -6,6 +6,7 @@ import json
 import os
 import subprocess
 import sys
+from dataclasses import replace
 
 import calmotion.workflow.shot
 import numpy as np
@@ -17,6 +18,7 @@ from calmotion.errors import ShotError
 from calmotion.host.discovery import find_in_folder
 from calmotion.host.registry import Host
 from calmotion.shot import Animation, Character, InputLayer, ModeTable, Provenance, Result
+from calmotion.shot.budget import MESH, BudgetEntry
 from calmotion.shot.outputs import WrittenLayer
 from calmotion.shot.run import OutputPaths, RunSettings, Source
 from fakes import host_of, operator
@@ -26,7 +28,8 @@ LAYERS = (InputLayer("shot.usda", "0" * 64),)
 PROVENANCE = Provenance("shot.usda", LAYERS, 0.01, 1.0, "Y", 24.0, 24.0, 1.0, 25.0, "Robot")
 CONTRACT = set(
     "targets objective_before objective_after forward_simulations gradients linearized_sweeps iterations wall_s "
-    "total_wall_s simulate_wall_s steps step_s dof modes parameters layer left_out".split()
+    "total_wall_s simulate_wall_s steps step_s dof modes parameters layer left_out "
+    "tolerance_m tolerance_kept error_budget".split()
 )
 
 
@@ -132,6 +135,22 @@ def test_simulate_reports_without_before_and_after(run):
         "seam_m",
     } == set(report["targets"][0])
     assert report["newton_iterations"] == 400 and report["layer"] is None
+
+
+@pytest.mark.parametrize("command", [("simulate",), ("optimize", "-o", "calm.usda")])
+@pytest.mark.parametrize(("mesh_m", "kept"), [(1e-4, True), (2e-3, False)])
+def test_with_strict_a_tolerance_that_is_not_kept_is_a_failure_with_all_outputs(run, command, mesh_m, kept):
+    def solve(context):
+        entry = BudgetEntry(MESH, 1e-3, mesh_m, "900 elements in 1 flexible body", "")
+        return (replace(synthetic.result(command[0] == "optimize"), tolerance_m=1e-3, budget=(entry,)),)
+
+    status, out, _ = run(command[0], "shot.usda", *command[1:], "--json", "--strict", solve=solve)
+    report = json.loads(out)
+    assert status == (0 if kept else 1) and "error" not in report
+    assert report["tolerance_kept"] == kept and report["tolerance_missed_by"] == (None if kept else MESH)
+    assert report["tolerance_m"] == 1e-3 and report["error_budget"][0]["estimated_m"] == mesh_m
+    assert (report["layer"] is None) == (command[0] == "simulate")
+    assert run(command[0], "shot.usda", *command[1:], "--json", solve=solve)[0] == 0
 
 
 def test_errors_of_the_pre_roll_are_not_judged(run):

@@ -17,6 +17,7 @@ from calmotion.accuracy.simulate_to_tolerance import OF_SHAKE, intended_position
 from calmotion.accuracy.step_error import distance
 from calmotion.reduction.reduced_body import ReducedBody
 from calmotion.shot.run import RunSettings
+from calmotion.shot.tolerance import tolerance_of
 from calmotion.simulation.body_reduction import BodyReduction
 from calmotion.simulation.compiled_shot import CompiledShot
 from calmotion.simulation.inputs.time_grid import MAX_STEP
@@ -42,8 +43,7 @@ def converged_reduction(
     Raises:
         ShotError: A body cannot be reduced, or the shot not be simulated.
     """
-    tolerance = requested = options.tolerance
-    assert requested is not None and tolerance is not None
+    tolerance = requested = tolerance_of(shot.character, options.tolerance)
 
     def simulated(shot: CompiledShot, options: RunSettings) -> ReferenceRun:
         return reference_run(shot, options, options.step or MAX_STEP)

@@ -21,6 +21,7 @@ from calmotion.errors import ShotError
 from calmotion.reduction.reduced_body import ReducedBody
 from calmotion.reduction.subspace import principal_subspace, projected_body
 from calmotion.shot import Animation, Character, Simplification, Track
+from calmotion.shot.budget import SUBSPACE
 from calmotion.shot.character import FlexibleSettings
 from calmotion.shot.model_choice import OFF, ON
 from calmotion.shot.run import RunSettings
@@ -164,6 +165,6 @@ def _told(
     for b in fewer:
         count, left = len(bodies[b].stiffness), len(few[b].stiffness)
         what = f"{character.bodies[b].path}: POD subspace of {left} of {count} elastic coordinates"
-        row = Simplification(what, "the shot does not excite the others", error / len(fewer))
+        row = Simplification(what, "the shot does not excite the others", error / len(fewer), SUBSPACE)
         told[b] = replace(few[b], left_out=(*few[b].left_out, row))
     return tuple(told)

@@ -1,7 +1,6 @@
-"""Simulate or retarget a shot to a tolerance: the time step follows from the error that it causes at the targets.
+"""Simulate a shot to its tolerance: the time step follows from the error that it causes at the targets.
 
-Without a requested tolerance, the step is that of `time_grid.make_grid`; its error is estimated all the same after an
-optimisation, where one more simulation costs next to nothing.
+A step that the user or the shot gives is not changed; its error is estimated all the same, by one more simulation.
 """
 
 from __future__ import annotations
@@ -17,6 +16,7 @@ from calmotion.accuracy.pod_subspace import ProjectedShot, ReferenceRun, project
 from calmotion.accuracy.step_error import (
     ORDER,
     StepRun,
+    frames_of,
     largest_step,
     run_or_none,
     simulate_at,
@@ -25,8 +25,10 @@ from calmotion.accuracy.step_error import (
 from calmotion.multibody.integrators.coefficients import IMPLICIT
 from calmotion.reduction.reduced_body import ReducedBody
 from calmotion.shot import Accuracy, Animation, Character, Result, Simplification, Track
+from calmotion.shot.budget import STEP, SUBSPACE
 from calmotion.shot.character import Array
 from calmotion.shot.run import RunSettings
+from calmotion.shot.tolerance import tolerance_of
 from calmotion.simulation.bodies import mode_tables
 from calmotion.simulation.compiled_shot import CompiledShot
 from calmotion.simulation.inputs.curves import sample_tracks
@@ -38,8 +40,6 @@ SHARE = 0.5  # of the tolerance, that the time step may take in any case
 WHOLE = 0.8  # of the tolerance, that it may take together with what the bodies do without
 FIRST, LAST = 1.0 / 60.0, 1.0 / 30720.0  # steps that are tried [s]
 OF_SHAKE = 0.05  # of the input's own error: how well that need be known before it is taken away
-# Without a requested tolerance, a simulation of what was written has all coordinates, and shall have the same errors.
-UNASKED = 0.002
 HELD = 0.1  # of the tolerance (and of how well the shake need be known), that holding bodies to directions may take
 NAMES = {"bdf2": "BDF2", "newmark": "Newmark's method", "generalized-alpha": "generalised-alpha"}
 FINDING = "choosing the subspace of the deformations in this shot"
@@ -49,28 +49,45 @@ def simulate_to_tolerance(
     shot: CompiledShot, options: RunSettings, progress: Progress, left_out_m: float | None = None,
     known: ReferenceRun | None = None,
 ) -> Result:  # fmt: skip
-    """As `simulate_shot`, with POD subspaces of the bodies and a time step that keep a requested tolerance.
+    """As `simulate_shot`, with POD subspaces of the bodies and a time step that keep the tolerance.
 
     Args:
         left_out_m: Error of what the bodies do without where it is known better than their own estimates [m].
         known: The shot, simulated with them; None: not known yet.
     """
-    if options.tolerance is None:
-        return simulate_shot(shot, options, progress)
     progress(0.0, FINDING)
     projected, character = project_to_tolerance(shot, options, known), shot.character
-    if not chooses_step(character, options):
-        return with_modes(simulate_shot(projected.shot, options, progress), shot.bodies)
-    progress(0.0, "choosing the time step")
     left_out = (omitted_error(shot.bodies) if left_out_m is None else left_out_m) + projected.error_m
+    chooses = chooses_step(character, options)
+    if chooses:
+        progress(0.0, "choosing the time step")
 
     def simulated(options: RunSettings) -> Result:
+        if not chooses:
+            result = simulate_shot(projected.shot, options, progress)
+            return with_accuracy(with_modes(result, shot.bodies), projected.shot, options, left_out)
         step, error = chosen_step(projected.shot, options, left_out)
-        result = simulate_shot(projected.shot, replace(options, step=step), progress)
-        accuracy = Accuracy(error, left_out, mesh_error(shot.bodies), options.tolerance)
-        return with_step(with_modes(replace(result, accuracy=accuracy), shot.bodies), character, options)
+        result = with_modes(simulate_shot(projected.shot, replace(options, step=step), progress), shot.bodies)
+        return with_step(result, character, options, _accuracy(error, left_out, projected.shot))
 
-    return by_fast_scheme(options, simulated)
+    # a search by the same given step uses BDF2 as well, and what it wrote shall have the same errors
+    return by_fast_scheme(options, simulated) if chooses else simulated(options)
+
+
+def with_accuracy(result: Result, shot: CompiledShot, options: RunSettings, left_out: float) -> Result:
+    """The result with its accuracy, from a simulation of its curves with twice the step.
+
+    Args:
+        shot: With the curves of the result.
+        left_out: Error of what the bodies do without [m].
+    """
+    fine = frames_of(result, shot.animation.frame_times)
+    trial = partial(simulate_at, shot, options)
+    coarse = run_or_none(trial, 2.0 * result.step_s)
+    if coarse is None or coarse.step < 1.5 * fine.step:  # it failed, or the step cannot be longer than a frame
+        coarse, fine = fine, trial(0.5 * result.step_s)
+    accuracy = _accuracy(step_error(coarse, fine), left_out, shot)
+    return with_step(result, shot.character, options, accuracy)
 
 
 def project_to_tolerance(
@@ -83,10 +100,9 @@ def project_to_tolerance(
         known: The shot, simulated with the bodies, where that was done.
         shake: How far a run is from what is intended, where that will be taken away [m].
     """
-    share = UNASKED if options.tolerance is None else HELD
-    least = share * shot.character.retarget.allowed(options.tolerance)
+    least = HELD * tolerance_of(shot.character, options.tolerance)
     step = own_step(shot.character, options)
-    return project_to_subspace(shot, options, step, lambda item: max(least, share * OF_SHAKE * shake(item.run)), known)
+    return project_to_subspace(shot, options, step, lambda item: max(least, HELD * OF_SHAKE * shake(item.run)), known)
 
 
 def own_step(character: Character, options: RunSettings) -> float:
@@ -99,11 +115,10 @@ def with_modes(result: Result, bodies: Sequence[ReducedBody]) -> Result:
     return replace(result, modes=mode_tables(bodies))
 
 
-def with_step(result: Result, character: Character, options: RunSettings) -> Result:
-    """The result with its time step among what was left out: finer ones, and what they would change."""
-    assert result.accuracy is not None
-    row = step_row(character, options, result.step_s, result.accuracy.step_m)
-    return replace(result, left_out=(*result.left_out, row))
+def with_step(result: Result, character: Character, options: RunSettings, accuracy: Accuracy) -> Result:
+    """The result with its accuracy, and with its time step among the simplifications."""
+    row = step_row(character, options, result.step_s, accuracy.step_m)
+    return replace(result, accuracy=accuracy, left_out=(*result.left_out, row))
 
 
 def step_row(character: Character, options: RunSettings, step: float, error: float | None) -> Simplification:
@@ -113,10 +128,11 @@ def step_row(character: Character, options: RunSettings, step: float, error: flo
     elif character.retarget.time_step is not None:
         why = "given by calm:retarget:timeStep"
     elif chooses_step(character, options):
-        why = f"it keeps the tolerance of {1e3 * (options.tolerance or 0.0):g} mm with {NAMES[options.scheme]}"
+        tolerance = tolerance_of(character, options.tolerance)
+        why = f"it keeps the tolerance of {1e3 * tolerance:.4g} mm with {NAMES[options.scheme]}"
     else:
         why = "steps of 1/480 s simulate motions of 10 Hz to better than one percent"
-    return Simplification(f"time step {1e3 * step:.3g} ms", why, error)
+    return Simplification(f"time step {1e3 * step:.3g} ms", why, error, STEP)
 
 
 def planned_step(shot: CompiledShot, options: RunSettings) -> Simplification:
@@ -147,7 +163,7 @@ def chosen_step(shot: CompiledShot, options: RunSettings, left_out: float) -> tu
         ShotError: Not even the last step does.
     """
     trial = partial(simulate_at, shot, options)
-    step, error = largest_step(trial, FIRST, LAST, lambda run: allowed_step_error(options, left_out))
+    step, error = largest_step(trial, FIRST, LAST, lambda run: allowed_step_error(shot.character, options, left_out))
     if not np.isfinite(error):
         trial(step)
     whole = make_grid(shot.animation.frame_times, step, 0.0).h
@@ -155,21 +171,28 @@ def chosen_step(shot: CompiledShot, options: RunSettings, left_out: float) -> tu
 
 
 def chooses_step(character: Character, options: RunSettings) -> bool:
-    """Whether the step is to follow from the tolerance."""
-    if options.tolerance is None or options.step is not None or character.retarget.time_step is not None:
+    """Whether the step follows from the tolerance; it does not for cyclic motions, RK4 and Radau."""
+    if options.step is not None or character.retarget.time_step is not None:
         return False
     return options.scheme in IMPLICIT and not character.retarget.cyclic
 
 
-def allowed_step_error(options: RunSettings, left_out: float) -> float:
+def allowed_step_error(character: Character, options: RunSettings, left_out: float) -> float:
     """Error that the time step may cause beside what the bodies do without [m]."""
-    assert options.tolerance is not None
-    return max(SHARE * options.tolerance, WHOLE * options.tolerance - left_out)
+    tolerance = tolerance_of(character, options.tolerance)
+    return max(SHARE * tolerance, WHOLE * tolerance - left_out)
 
 
 def omitted_error(bodies: Sequence[ReducedBody]) -> float:
     """Estimated error of what the bodies do without [m]; along a chain it adds up."""
     return sum(row.estimated_error_m or 0.0 for body in bodies for row in body.left_out)
+
+
+def _accuracy(step: float, left_out: float, shot: CompiledShot) -> Accuracy:
+    """The estimates for a simulation: of its step, of what its bodies do without, and of their meshes [m]."""
+    rows = [row for body in shot.bodies for row in body.left_out]
+    subspace = sum(row.estimated_error_m or 0.0 for row in rows if row.source == SUBSPACE)
+    return Accuracy(step, left_out, mesh_error(shot.bodies), subspace)
 
 
 def mesh_error(bodies: Sequence[ReducedBody]) -> float | None:

@@ -11,6 +11,7 @@ from calmotion.accuracy.step_error import distance, frames_of, simulate_at
 from calmotion.reduction.reduced_body import ReducedBody
 from calmotion.shot import Result
 from calmotion.shot.run import RunSettings
+from calmotion.shot.tolerance import tolerance_of
 from calmotion.simulation.body_reduction import BodyReduction
 from calmotion.simulation.compiled_shot import CompiledShot
 from calmotion.simulation.inputs.time_grid import MAX_STEP
@@ -43,7 +44,7 @@ def verify(
     if reduction is not None:
         shot = shot.with_bodies(_finer(shot, reduction, options, progress))
     progress(0.5, "simulating with a finer step")
-    least = PROJECTION * shot.character.retarget.allowed(options.tolerance)
+    least = PROJECTION * tolerance_of(shot.character, options.tolerance)
     projected = project_to_subspace(shot, options, MAX_STEP, lambda known: least)
     step = STEP * result.step_s
     fine = by_fast_scheme(options, lambda options: simulate_at(projected.shot, options, step))
@@ -53,7 +54,7 @@ def verify(
 
 def _finer(shot: CompiledShot, reduction: BodyReduction, options: RunSettings, progress: Progress) -> list[ReducedBody]:
     """The bodies, reduced with more coordinates than the shot's."""
-    allowed = TOLERANCE * shot.character.retarget.allowed(options.tolerance)
+    allowed = TOLERANCE * tolerance_of(shot.character, options.tolerance)
     for _ in range(1 + MOST):
         bodies = reduction.bodies(allowed, progress=progress)
         if _coordinates(bodies) > _coordinates(shot.bodies):

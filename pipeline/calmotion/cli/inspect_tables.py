@@ -8,7 +8,7 @@ from calmotion.cli.quantities import angle, counted, length
 from calmotion.cli.run_report import print_left_out, print_notes
 from calmotion.cli.sentences import unbroken
 from calmotion.cli.tables import console_on, print_table, say
-from calmotion.shot.finding import ERROR, WARNING
+from calmotion.shot.outputs import ERROR, WARNING
 
 if TYPE_CHECKING:
     from rich.console import Console

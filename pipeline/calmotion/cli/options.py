@@ -108,6 +108,11 @@ def run_options(command: argparse.ArgumentParser) -> None:
         action="store_true",
         help="measure the error of the result against a finer simulation (takes several times as long)",
     )
+    command.add_argument(
+        "--strict",
+        action="store_true",
+        help="exit with status 1 if the simulation does not keep the tolerance; the outputs are written all the same",
+    )
 
 
 def simulation_options(command: argparse.ArgumentParser, integrators: str) -> None:
@@ -118,7 +123,8 @@ def simulation_options(command: argparse.ArgumentParser, integrators: str) -> No
         "--tolerance",
         metavar="LENGTH",
         type=_quantity("m", needs_unit=True),
-        help="acceptable error at the targets, with a unit (1mm); time step, modes and simplifications follow from it",
+        help="acceptable error at the targets, with a unit (1mm); time step, modes and simplifications follow from it "
+        "(default: that of the shot, or a thousandth of the reach of the character)",
     )
     model.add_argument("--integrator", metavar="NAME", default=None, help=integrators)
     model.add_argument(

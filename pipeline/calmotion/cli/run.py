@@ -40,7 +40,8 @@ def run_shot(
             **run_arguments(args, display),
             **options,
         )
-    conclude(result.report(), result.problems, output, None if args.quiet else print_run)
+    report = result.report()
+    conclude(report, result.problems, output, None if args.quiet else print_run)
     if result.interrupted:
         return INTERRUPTED
-    return FAILED if result.problems else 0
+    return FAILED if result.problems or (args.strict and not report["tolerance_kept"]) else 0

@@ -10,8 +10,18 @@ from rich.console import Console
 from calmotion.cli.quantities import angle, length
 from calmotion.cli.sentences import unbroken
 from calmotion.cli.tables import console_on, print_table, say
+from calmotion.shot.budget import CHOICES, MEASURED, MESH, REDUCTION, STEP, SUBSPACE
 
-_FAR = 2.0  # an estimate of more than this many tolerances means that the tolerance is not kept
+# What helps where an entry of the error budget is too large.
+_SENSITIVE = "With large deflections, or near buckling, small errors grow: use a stiffer robot or a slower motion."
+REMEDIES = {
+    MESH: "Use smaller elements: calm:flexible:elementSize of the body, or --set fe.mesh.element_size=LENGTH.",
+    STEP: f"Use a shorter --step, or none. {_SENSITIVE}",
+    REDUCTION: f"Remove calm:flexible:modeCount and calm:flexible:elasticity, or use a larger tolerance. {_SENSITIVE}",
+    SUBSPACE: f"Use --keep directions. {_SENSITIVE}",
+    CHOICES: "Use --keep all.",
+    MEASURED: _SENSITIVE,
+}
 
 
 def print_left_out(console: Console, rows: Sequence[dict[str, Any]]) -> None:
@@ -43,30 +53,34 @@ def print_limits(console: Console, limits: Sequence[dict[str, Any]], optimized: 
 
 
 def print_accuracy(console: Console, report: dict[str, Any]) -> None:
-    """Estimated and measured error of the simulation itself."""
-    if report["estimated_error_m"] is not None:
-        error, step = length(report["estimated_error_m"]), length(report["estimated_step_error_m"])
-        mesh = report["estimated_mesh_error_m"]
-        of_mesh = "" if mesh is None else f"; mesh error {length(mesh)}"
-        say(console, f"estimated simulation error {error} ({step} of it by the time step){of_mesh}")
+    """The error budget of the simulation itself, and whether it keeps the tolerance."""
+    rows = [
+        [entry["source"], length(entry["allowed_m"]), _length_or_unknown(entry["estimated_m"])]
+        for entry in report["error_budget"]
+    ]
+    print_table(console, "Error budget", ["source", "allowed", "estimated"], rows)
     if report["verified_error_m"] is not None:
         say(
             console,
             f"measured simulation error {length(report['verified_error_m'])}, against a run with steps of "
             f"{1000 * report['verified_step_s']:.4g} ms and {report['verified_modes']} elastic coordinates",
         )
-    requested, measured, estimated = (
-        report["tolerance_m"],
-        report["verified_error_m"],
-        report["estimated_error_m"] or 0.0,
-    )
-    # an estimate is a sum of bounds, so only one far above the tolerance is evidence
-    if requested is not None and (estimated > _FAR * requested if measured is None else measured > requested):
+    tolerance = length(report["tolerance_m"])
+    if report["tolerance_kept"]:
+        say(console, f"the simulation keeps the tolerance of {tolerance}: error {length(report['simulation_error_m'])}")
+    elif report["simulation_error_m"] is None:
+        say(console, f"the error of the simulation was not estimated; the tolerance is {tolerance}")
+    else:
+        source = report["tolerance_missed_by"]
         say(
             console,
-            f"the tolerance of {length(requested)} is not kept: with large deflections, or near buckling, small errors "
-            "grow; use a stiffer robot or a slower motion",
+            f"the simulation does not keep the tolerance of {tolerance}: error {length(report['simulation_error_m'])}, "
+            f"mostly of the {source}. {REMEDIES[source]}",
         )
+
+
+def _length_or_unknown(metres: float | None) -> str:
+    return "unknown" if metres is None else length(metres)
 
 
 def print_run(report: dict[str, Any], stream: TextIO) -> None:

@@ -17,6 +17,7 @@ from calmotion.reduction.inertia_integrals import inertia_integrals
 from calmotion.reduction.interfaces.interface_patches import AttachmentFrame, InterfacePatch, interface_patches
 from calmotion.reduction.load_envelope import LoadEnvelope, patch_load_envelope
 from calmotion.reduction.reduced_body import Elasticity, Marker, ReducedBody
+from calmotion.shot.budget import REDUCTION
 from calmotion.shot.character import DEFAULT_TOLERANCE, Body, ElasticMaterial, SurfaceMesh
 from calmotion.shot.meshes import FEMesh
 from calmotion.shot.result import Simplification
@@ -165,9 +166,11 @@ def _law(
     assert settings is not None
     law, what = settings.elasticity, f"{body.path}: linear elasticity"
     if law != "auto":
-        return law, (Simplification(what, "calm:flexible:elasticity is linear"),) if law == "linear" else ()
+        return law, (
+            Simplification(what, "calm:flexible:elasticity is linear", None, REDUCTION),
+        ) if law == "linear" else ()
     if load_envelope is None:
-        return "linear", (Simplification(what, "its deflection is not known without a motion"),)
+        return "linear", (Simplification(what, "its deflection is not known without a motion", None, REDUCTION),)
     from calmotion.reduction.material_laws.choice import choose_law
 
     choice = choose_law(model, support, basis, settings.material, load_envelope, tolerance, body.path)
@@ -175,7 +178,7 @@ def _law(
         return choice.law, ()
     if choice.law == "stvk":
         what = f"{body.path}: linear material, with nonlinear strain"
-    return choice.law, (Simplification(what, choice.reason, choice.error_m),)
+    return choice.law, (Simplification(what, choice.reason, choice.error_m, REDUCTION),)
 
 
 def _mesh_error(mesh: FEMesh, linear: LinearModes) -> float | None:
@@ -204,6 +207,7 @@ def _omitted_modes(basis: Basis, body: Body, load_envelope: LoadEnvelope | None)
             f"{body.path}: only {kept} linear mode{'' if kept == 1 else 's'}",
             "the loads of this shot excite the others by less than the tolerance",
             basis.cut_error_m,
+            REDUCTION,
         ),
     )
 
@@ -214,7 +218,8 @@ def _omitted_strain(law: Elasticity, body: Body) -> tuple[Simplification, ...]:
         return ()
     p, r = law.strain_projection.shape
     what = f"{body.path}: quadratic strain in {p} of {r} elastic coordinates"
-    return (Simplification(what, "the loads of this shot cause almost no rotation in the others", law.strain_error_m),)
+    why = "the loads of this shot cause almost no rotation in the others"
+    return (Simplification(what, why, law.strain_error_m, REDUCTION),)
 
 
 def _markers(

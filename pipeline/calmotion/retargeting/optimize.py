@@ -22,6 +22,7 @@ from calmotion.retargeting.solver.gauss_newton import Search
 from calmotion.shot import Character, MotorCurve, OptimizerStep, Result
 from calmotion.shot.character import Array
 from calmotion.shot.run import RunSettings
+from calmotion.shot.tolerance import tolerance_of
 from calmotion.simulation.bodies import mode_tables, skins
 from calmotion.simulation.compiled_shot import CompiledShot
 from calmotion.simulation.forward import limited_values
@@ -107,7 +108,7 @@ def _optimized(
     """Simulate the input, search, simulate the result."""
     character, animation, begin = prepared.character, prepared.shot.animation, time.perf_counter()
     problem, start, adaptive = posed
-    tolerance = character.retarget.allowed(options.tolerance)
+    tolerance = tolerance_of(character, options.tolerance)
     problem.hold(0)
     if not np.isfinite(problem.value(np.zeros(problem.size))):
         assert problem.failure is not None

@@ -26,13 +26,14 @@ from calmotion.retargeting.solver.damping_homotopy import damping_homotopy
 from calmotion.retargeting.solver.gauss_newton import Search, minimize
 from calmotion.retargeting.solver.recycling import Recycled
 from calmotion.shot import Animation, Character
+from calmotion.shot.budget import SEARCH_SHARE
 from calmotion.shot.character import Array, BoolArray
 from calmotion.shot.model_choice import OFF
 from calmotion.shot.run import RunSettings
 from calmotion.simulation.simulate import Progress
 from calmotion.support import interrupts
 
-WORTH = 0.005  # share of the tolerance: a smaller predicted gain ends the search
+WORTH = SEARCH_SHARE  # of the tolerance: a smaller predicted gain ends the search
 MISSED = 0.01  # share of the tolerance that changes in the inactive intervals may gain together
 
 

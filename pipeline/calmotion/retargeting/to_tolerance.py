@@ -13,37 +13,34 @@ from calmotion.accuracy.simulate_to_tolerance import (
     FINDING,
     FIRST,
     LAST,
-    OF_SHAKE,
     allowed_step_error,
     chooses_step,
     found_tracks,
     intended_positions,
-    mesh_error,
     omitted_error,
     own_step,
     project_to_tolerance,
+    with_accuracy,
     with_modes,
-    with_step,
 )
 from calmotion.accuracy.step_error import (
     ORDER,
     StepRun,
     distance,
-    frames_of,
     largest_step,
-    run_or_none,
     simulate_at,
-    step_error,
 )
 from calmotion.retargeting.optimize import optimize_shot, refuse_other_integrators
 from calmotion.retargeting.simplification.idle_motors import ENOUGH
-from calmotion.shot import Accuracy, OptimizerStep, Result
+from calmotion.shot import OptimizerStep, Result
 from calmotion.shot.model_choice import OFF
 from calmotion.shot.run import RunSettings
+from calmotion.shot.tolerance import tolerance_of
 from calmotion.simulation.compiled_shot import CompiledShot
 from calmotion.simulation.simulate import Progress
 
 MARGIN, MOST = 0.8, 3  # safety factor of a new step, and most searches
+FIRST_STEP = 0.2  # of the shake: the error that the step of the first search may have
 
 
 def optimize_to_tolerance(
@@ -52,7 +49,7 @@ def optimize_to_tolerance(
 ) -> Result:  # fmt: skip
     """As `optimize_shot`, with the time step and the POD subspaces of the bodies chosen by their errors.
 
-    The first search uses a step that resolves the vibration of the input to a share of its size. The remaining
+    The first search uses a step that resolves the vibration of the input to a fifth of its size. The remaining
     vibration is much smaller, so its error is known afterwards; if it exceeds the tolerance, the search continues with
     a finer step, and if the deflections have left the POD subspaces, with new ones.
     """
@@ -69,9 +66,9 @@ def optimize_to_tolerance(
     step = own_step(character, options)
     if chooses:
         progress(0.0, "choosing the time step")
-        enough = allowed_step_error(options, omitted_error(projected.shot.bodies))
+        enough = allowed_step_error(character, options, omitted_error(projected.shot.bodies))
         trial = partial(simulate_at, projected.shot, options)
-        step, _ = largest_step(trial, FIRST, LAST, lambda run: max(enough, OF_SHAKE * shake(run)))
+        step, _ = largest_step(trial, FIRST, LAST, lambda run: max(enough, FIRST_STEP * shake(run)))
     result, tracks = None, animation.current
     for _ in range(MOST):
         reduced = projected.shot.with_tracks(tracks)
@@ -81,9 +78,10 @@ def optimize_to_tolerance(
         if result.interrupted:
             break
         tracks = found_tracks(result, animation)
-        result = _estimated(result, reduced.with_tracks(tracks), options)
+        left_out = omitted_error(reduced.bodies)
+        result = with_accuracy(result, reduced.with_tracks(tracks), options, left_out)
         assert result.accuracy is not None
-        allowed = allowed_step_error(options, result.accuracy.left_out_m) if chooses else np.inf
+        allowed = allowed_step_error(character, options, left_out) if chooses else np.inf
         fine = result.accuracy.step_m <= allowed or step <= LAST
         ended = latest.iterations >= options.max_iterations  # a new POD subspace would allow no further iteration
         if fine and (ended or projected.is_accurate_for(tracks, own_step(character, options))):
@@ -97,28 +95,12 @@ def optimize_to_tolerance(
 def _searched(shot: CompiledShot, options: RunSettings, progress: Progress, checkpoint: Path | None) -> Result:
     """One search; it continues with the idle motors if these would gain too much."""
     first, character = optimize_shot(shot, options, progress, checkpoint), shot.character
-    enough = ENOUGH * character.retarget.allowed(options.tolerance)
+    enough = ENOUGH * tolerance_of(character, options.tolerance)
     if first.interrupted or first.idle_gain_m is None or first.idle_gain_m <= enough or options.motors == OFF:
         return first
     motors = tuple(replace(motor, idle=False) for motor in character.motors)
     every = shot.with_tracks(found_tracks(first, shot.animation)).with_character(replace(character, motors=motors))
     return _continued(first, optimize_shot(every, options, progress, checkpoint))
-
-
-def _estimated(result: Result, shot: CompiledShot, options: RunSettings) -> Result:
-    """The result with its accuracy, from a simulation of its curves with twice the step.
-
-    Args:
-        shot: With the curves of the result.
-    """
-    fine = frames_of(result, shot.animation.frame_times)
-    trial = partial(simulate_at, shot, options)
-    coarse = run_or_none(trial, 2.0 * result.step_s)
-    if coarse is None or coarse.step < 1.5 * fine.step:  # it failed, or the step cannot be longer than a frame
-        coarse, fine = fine, trial(0.5 * result.step_s)
-    left_out, mesh = omitted_error(shot.bodies), mesh_error(shot.bodies)
-    accuracy = Accuracy(step_error(coarse, fine), left_out, mesh, options.tolerance)
-    return with_step(replace(result, accuracy=accuracy), shot.character, options)
 
 
 def _continued(first: Result, second: Result) -> Result:

@@ -18,9 +18,9 @@ from calmotion.shot.character import (
     Target,
     TetGeometry,
 )
-from calmotion.shot.finding import Finding, Findings
 from calmotion.shot.meshes import FEMesh, FEMeshes, MeshQuality
 from calmotion.shot.model_choice import ModelChoice, ModelChoices
+from calmotion.shot.outputs import Finding, Findings
 from calmotion.shot.provenance import InputLayer, Provenance
 from calmotion.shot.result import (
     Accuracy,

@@ -297,10 +297,6 @@ class RetargetSettings:
     endpoints: str = "free"
     cyclic: bool = False
 
-    def allowed(self, requested: float | None = None) -> float:
-        """Acceptable error at the targets [m]: the requested one, else the shot's, else 1 mm."""
-        return requested or self.tolerance or DEFAULT_TOLERANCE
-
 
 @dataclass(frozen=True, eq=False)
 class Character:

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
+from calmotion.shot.budget import CHOICES
 from calmotion.shot.character import Character
 from calmotion.shot.result import Result, Simplification
 from calmotion.shot.run import RunSettings, Source
@@ -58,7 +59,7 @@ class ModelChoices:
     def left_out_but(self, *kinds: str) -> tuple[Simplification, ...]:
         """The same without some kinds."""
         rows = (row for row in self.rows if not row.needed and row.kind not in kinds)
-        return tuple(Simplification(row.what, row.why, row.estimated_error_m) for row in rows)
+        return tuple(Simplification(row.what, row.why, row.estimated_error_m, CHOICES) for row in rows)
 
     def choice(self, kind: str) -> str:
         """`auto`, `on` or `off`."""
@@ -90,7 +91,7 @@ def with_choices(result: Result, choices: ModelChoices | None) -> Result:
     accuracy = result.accuracy
     if accuracy is not None:
         error = sum(row.estimated_error_m or 0.0 for row in choices.left_out)
-        accuracy = replace(accuracy, left_out_m=accuracy.left_out_m + error)
+        accuracy = replace(accuracy, left_out_m=accuracy.left_out_m + error, choices_m=error)
     # a search reports more about its motors
     rows = choices.left_out if result.after is None else choices.left_out_but("motors")
     return replace(result, left_out=(*rows, *result.left_out), accuracy=accuracy)

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from calmotion.shot.budget import BudgetEntry
 from calmotion.shot.character import Array
 
 
@@ -105,11 +106,19 @@ class MotorCurve:
 
 @dataclass(frozen=True, eq=False)
 class Simplification:
-    """A model simplification: what was left out, why, and the estimated error at the targets (None: exact)."""
+    """A model simplification.
+
+    Attributes:
+        what: What was left out.
+        why: The reason.
+        estimated_error_m: What it costs at the targets [m]; None: nothing, or not known.
+        source: Entry of the error budget that it is part of, one of `shot.budget`, or empty.
+    """
 
     what: str
     why: str
     estimated_error_m: float | None = None
+    source: str = ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -163,15 +172,17 @@ class Accuracy:
 
     Attributes:
         step_m: Estimated error of the time step [m].
-        left_out_m: Estimated error of the model simplifications [m].
+        left_out_m: Estimated error of the model simplifications, those of `subspace_m` and `choices_m` included [m].
         mesh_m: Estimated error of the finite-element meshes [m]; None where it is not known.
-        requested_m: The requested tolerance [m]; None where the shot's or the default one holds.
+        subspace_m: Estimated error of the POD subspaces [m].
+        choices_m: Estimated error of what the analysis of the shot left out, before bodies were reduced [m].
     """
 
     step_m: float
     left_out_m: float
     mesh_m: float | None = None
-    requested_m: float | None = None
+    subspace_m: float = 0.0
+    choices_m: float = 0.0
 
     @property
     def estimated_m(self) -> float:
@@ -208,6 +219,8 @@ class Result:
         idle_gain_m: By how much the root-mean-square error would fall with the motors that were left out of the search
             since they move no target [m]; None where there are none.
         resumed_iterations: Iterations of an interrupted search from which this one resumed.
+        tolerance_m: Acceptable error at the targets [m].
+        budget: What each approximation may cost and is estimated to cost, largest first; empty where it is not known.
     """
 
     reference: Motion
@@ -237,3 +250,5 @@ class Result:
     accuracy: Accuracy | None = None
     idle_gain_m: float | None = None
     resumed_iterations: int = 0
+    tolerance_m: float = 0.0
+    budget: tuple[BudgetEntry, ...] = ()

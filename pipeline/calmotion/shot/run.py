@@ -67,8 +67,8 @@ class Source:
 
     @property
     def refines(self) -> bool:
-        """Whether the reduction of the bodies is refined until the motion keeps the tolerance that the user gave."""
-        return self.settings.tolerance is not None and self.command != "inspect"
+        """Whether the reduction of the bodies is refined until the motion keeps the tolerance."""
+        return self.command != "inspect"
 
 
 @dataclass(frozen=True)

@@ -16,6 +16,7 @@ from calmotion.reduction.reduced_body import ReducedBody
 from calmotion.shot import Body, Character, FEMeshes, ModeTable, Skin, SurfaceMesh
 from calmotion.shot.character import with_settings
 from calmotion.shot.meshes import FEMesh
+from calmotion.shot.tolerance import tolerance_of
 
 if TYPE_CHECKING:
     from calmotion.reduction.interfaces.interface_patches import AttachmentFrame
@@ -46,7 +47,7 @@ def reduce_bodies(
         ShotError: A flexible body without a mesh, or one that cannot be reduced.
     """
     mesh_of = {} if meshes is None else {mesh.body: mesh for mesh in meshes.meshes}
-    allowed = character.retarget.allowed(tolerance)
+    allowed = tolerance_of(character, tolerance)
     # what bodies along a chain leave out adds up
     flexible = sum(body.simulated_flexible for body in character.bodies)
     result = []
@@ -135,7 +136,7 @@ def flexible_modes(
 
     tree = span_tree(character)
     anchors = body_anchors(character, tree)
-    allowed = character.retarget.allowed(tolerance)
+    allowed = tolerance_of(character, tolerance)
     for mesh in meshes.meshes:
         body, own = character.bodies[mesh.body], anchors[mesh.body]
         load_envelope = None if load_envelopes is None else load_envelopes[mesh.body]

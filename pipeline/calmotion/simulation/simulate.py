@@ -13,6 +13,7 @@ from calmotion.multibody.integrators.workspace import Workspace
 from calmotion.shot import Result, Track
 from calmotion.shot.character import Array
 from calmotion.shot.run import RunSettings
+from calmotion.shot.tolerance import tolerance_of
 from calmotion.simulation.bodies import mode_tables, skins
 from calmotion.simulation.compiled_shot import CompiledShot
 from calmotion.simulation.cyclic import SteadyState
@@ -114,7 +115,7 @@ def simulate_shot(shot: CompiledShot, options: RunSettings, progress: Progress) 
 def _refuse_open_joints(prepared: Prepared, gap: float, options: RunSettings) -> None:
     """BDF2 keeps joints closed; the others hold them together in velocity, and drift where steps are coarse."""
     character = prepared.character
-    if gap > CLOSED * character.retarget.allowed(options.tolerance):
+    if gap > CLOSED * tolerance_of(character, options.tolerance):
         raise IntegrationError(
             f"its joints come apart by {1e3 * gap:.2g} mm in the simulation",
             path=character.path,

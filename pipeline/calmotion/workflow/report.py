@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
 
 from calmotion.host import OperatorResult, Run
 from calmotion.shot import Character, LimitUse, Result, Simplification, Simulation
+from calmotion.shot.budget import Verdict, verdict_on
 from calmotion.shot.character import Array
 from calmotion.shot.measure import measure_of
 from calmotion.shot.outputs import CsvFile, Figures, Recording, Rig, Verification, WrittenLayer
@@ -135,11 +137,21 @@ def _shaped(shaper: str, result: Result) -> dict[str, Any]:
     return {"shaper": shaper, "shaper_delay_s": delay, "delayed_max_error_m": float(off.max(initial=0.0))}
 
 
+def verdict_of(run: Run, result: Result) -> Verdict:
+    """Whether a result keeps its tolerance, by the measured error where it was verified."""
+    verified = run.get(Verification)
+    return verdict_on(result.budget, result.tolerance_m, verified.error_m if verified else None)
+
+
 def _accuracy(run: Run, result: Result) -> dict[str, Any]:
     """How far the targets are from where a finer simulation has them: estimated, and measured with `--verify`."""
-    accuracy, verified = result.accuracy, run.get(Verification)
+    accuracy, verified, verdict = result.accuracy, run.get(Verification), verdict_of(run, result)
     return {
-        "tolerance_m": accuracy.requested_m if accuracy else None,
+        "tolerance_m": result.tolerance_m,
+        "tolerance_kept": verdict.kept,
+        "tolerance_missed_by": verdict.short or None,
+        "simulation_error_m": verdict.error_m,
+        "error_budget": [asdict(entry) for entry in result.budget],
         "estimated_error_m": accuracy.estimated_m if accuracy else None,
         "estimated_step_error_m": accuracy.step_m if accuracy else None,
         "estimated_mesh_error_m": accuracy.mesh_m if accuracy else None,

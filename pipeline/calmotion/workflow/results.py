@@ -158,6 +158,13 @@ class SimulationResult:
         squares = [target.rms_error**2 for target in self.targets.values()]
         return float(np.sqrt(np.mean(squares))) if squares else 0.0
 
+    @property
+    def tolerance_kept(self) -> bool:
+        """Whether the error of the simulation, estimated or measured by `verify`, is within the tolerance."""
+        from calmotion.workflow.report import verdict_of
+
+        return verdict_of(self._outcome.run, self.result).kept
+
     def report(self) -> dict[str, Any]:
         """The object that `--json` prints: plain values, keys as in the USD contract."""
         from calmotion.workflow.plain import plain

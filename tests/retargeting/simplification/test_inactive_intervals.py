@@ -18,6 +18,7 @@ from calmotion.retargeting.simplification.inactive_intervals import (
 )
 from calmotion.shot import Animation, FreeTrack, Track
 from calmotion.shot.run import RunSettings
+from calmotion.shot.tolerance import tolerance_of
 from calmotion.simulation.compiled_shot import compile_shot
 from calmotion.simulation.simulator import Simulator
 from posed import ignore_progress, jerking, looped, make_problem
@@ -75,7 +76,7 @@ def test_an_inactive_interval_before_a_move_is_skipped_without_loss(arm, bodies,
 
     monkeypatch.setattr(Simulator, "run", counted)
     result = optimize_shot(compile_shot(still(arm), pausing(), bodies), OPTIONS, ignore_progress)
-    tolerance = arm.retarget.allowed(None)
+    tolerance = tolerance_of(arm)
     assert not rows_of(everywhere)
     (row,) = rows_of(result)
     assert row.what.startswith("inactive interval from 0 s to 1.") and "almost nothing" in row.why
@@ -137,7 +138,7 @@ def test_a_range_that_would_have_gained_something_is_searched_after_all(arm, bod
     monkeypatch.setattr(search, "inactive_intervals", lambda *a: too_much)
     result = optimize_shot(compile_shot(still(arm), pausing(), bodies), OPTIONS, ignore_progress)
     assert not rows_of(result) and result.stopped == "converged"
-    assert abs(root_mean_square(result) - root_mean_square(everywhere)) < 0.02 * arm.retarget.allowed(None)
+    assert abs(root_mean_square(result) - root_mean_square(everywhere)) < 0.1 * tolerance_of(arm)
     assert result.gradients > everywhere.gradients
     # as it would stay without that
     monkeypatch.setattr(search, "MISSED", 1e9)

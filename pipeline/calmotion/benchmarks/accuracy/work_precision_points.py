@@ -13,6 +13,7 @@ from calmotion.benchmarks.accuracy.pareto import setting_of
 from calmotion.benchmarks.accuracy.reference_bench import BASE, TOLERANCES, Bench, Point, Reference
 from calmotion.benchmarks.common.shots import load_unreduced
 from calmotion.shot.run import RunSettings
+from calmotion.shot.tolerance import tolerance_of
 from calmotion.simulation.body_reduction import reduction_for
 from calmotion.simulation.compiled_shot import CompiledShot
 from calmotion.simulation.inputs.time_grid import MAX_STEP
@@ -63,7 +64,7 @@ def forward_points(bench: Bench, reference: Reference) -> list[Point]:
 def chosen_points(bench: Bench, reference: Reference, tolerances: Sequence[float] = TOLERANCES) -> list[Point]:
     """The choices of the program, without a tolerance and with several."""
     shot = bench.shot
-    default = bench.bodies(shot.character.retarget.allowed())
+    default = bench.bodies(tolerance_of(shot.character))
     points = [bench.measure(reference, "default", "default", default, MAX_STEP)]
     for tolerance in tolerances:
         options = RunSettings(tolerance=tolerance)

@@ -23,8 +23,8 @@ def add_to(commands: Commands) -> None:
     run_options(command)
     simulation_options(
         command,
-        "bdf2, newmark, generalized-alpha, rk4 or radau (default: generalized-alpha if a tolerance is given, since it "
-        "needs half as many steps; otherwise bdf2)",
+        "bdf2, newmark, generalized-alpha, rk4 or radau (default: generalized-alpha, which needs half as many steps, "
+        "or bdf2 where that fails)",
     )
 
 

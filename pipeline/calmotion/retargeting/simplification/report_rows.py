@@ -11,6 +11,7 @@ from calmotion.retargeting.simplification.idle_motors import idle_motors
 from calmotion.retargeting.simplification.inactive_intervals import InactiveInterval, interval_rows
 from calmotion.shot import Character, MotorCurve, Simplification
 from calmotion.shot.run import RunSettings
+from calmotion.shot.tolerance import tolerance_of
 
 FINER = 0.01  # share of the tolerance that finer knots must gain
 PRUNED = 0.02  # share of the tolerance that the removed offsets may cost together
@@ -29,7 +30,7 @@ def search_rows(
         options: Of the run.
         idle_gain_m: Gain that idle motors would bring [m]; None where there are none.
     """
-    tolerance = character.retarget.allowed(options.tolerance)
+    tolerance = tolerance_of(character, options.tolerance)
     idle = idle_motors(character)
     rows = [*interval_rows(inactive), _knots_row(problem, character, options)]
     rows += [
@@ -58,5 +59,5 @@ def _knots_row(problem: RetargetProblem, character: Character, options: RunSetti
         return Simplification(what, "given by retarget.optimize.knot_spacing")
     if character.retarget.knot_spacing:
         return Simplification(what, "given by calm:retarget:knotSpacing")
-    tolerance = character.retarget.allowed(options.tolerance)
+    tolerance = tolerance_of(character, options.tolerance)
     return Simplification(what, f"finer knots would gain less than {FINER:.0%} of the tolerance", FINER * tolerance)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, TypeAlias
 import numpy as np
 
 from calmotion.errors import ShotError, each
-from calmotion.shot.finding import ERROR, WARNING, Finding
+from calmotion.shot.outputs import ERROR, WARNING, Finding
 from calmotion.usd import schemas
 from calmotion.usd.reading.context import is_rigid_body, prims_of
 from calmotion.usd.reading.shot import StageReading, read_stage

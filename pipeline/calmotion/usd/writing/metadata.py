@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from calmotion.shot import Character, Provenance, Result
+from calmotion.shot.budget import verdict_on
 from calmotion.usd import gf
 from calmotion.usd.stages import METADATA_KEY
 from calmotion.version import __version__
@@ -67,8 +68,12 @@ def settings_of(
         "bake": bake,
         "splines": splines,
     }
+    verdict = verdict_on(result.budget, result.tolerance_m)
+    if result.budget:
+        entries["tolerance_kept"] = verdict.kept
+        entries["error_budget_m"] = {entry.source: float(entry.estimated_m or 0.0) for entry in result.budget}
     for name, value in (
-        ("tolerance_m", retarget.tolerance),
+        ("tolerance_m", result.tolerance_m),
         ("knot_spacing_s", retarget.knot_spacing),
         ("smoothness", retarget.smoothness),
         ("samples_per_second", samples_per_second),

@@ -1,0 +1,57 @@
+"""The error budget of a result, from what was chosen for it and the errors that were estimated on the way."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from calmotion.accuracy import converged_reduction, simulate_to_tolerance
+from calmotion.shot import Character, Result
+from calmotion.shot.budget import CHOICES, MESH, REDUCTION, SEARCH, SEARCH_SHARE, STEP, SUBSPACE, BudgetEntry
+from calmotion.shot.tolerance import tolerance_of
+
+
+def with_budget(result: Result, character: Character, requested: float | None) -> Result:
+    """The result with its tolerance and its error budget.
+
+    Args:
+        requested: The user's tolerance [m], or None.
+    """
+    tolerance = tolerance_of(character, requested)
+    return replace(result, tolerance_m=tolerance, budget=_budget(result, tolerance))
+
+
+def _budget(result: Result, tolerance: float) -> tuple[BudgetEntry, ...]:
+    accuracy = result.accuracy
+    if accuracy is None:
+        return ()
+    rows = result.left_out
+
+    def entry(source: str, share: float, estimated: float | None, choice: str = "", reason: str = "") -> BudgetEntry:
+        told = [row for row in rows if row.source == source]
+        choice = choice or "; ".join(row.what for row in told)
+        reason = reason or "; ".join(dict.fromkeys(row.why for row in told))
+        return BudgetEntry(source, share * tolerance, estimated, choice or "nothing is left out", reason)
+
+    reduction = accuracy.left_out_m - accuracy.subspace_m - accuracy.choices_m
+    entries = [
+        entry(STEP, simulate_to_tolerance.SHARE, accuracy.step_m),
+        entry(REDUCTION, converged_reduction.SHARE, max(reduction, 0.0)),
+        entry(SUBSPACE, simulate_to_tolerance.HELD, accuracy.subspace_m),
+        entry(CHOICES, simulate_to_tolerance.HELD, accuracy.choices_m),
+    ]
+    if result.modes:
+        left = max(tolerance - sum(other.estimated_m or 0.0 for other in entries), 0.0)
+        entries.append(_mesh_entry(result, accuracy.mesh_m, left))
+    if result.after is not None:
+        ended = result.stopped == "converged"
+        why = "a smaller gain is not pursued" if ended else f"the search ended before: {result.stopped}"
+        entries.append(entry(SEARCH, SEARCH_SHARE, SEARCH_SHARE * tolerance if ended else None, result.stopped, why))
+    return tuple(sorted(entries, key=lambda e: -(e.estimated_m or 0.0)))
+
+
+def _mesh_entry(result: Result, estimated: float | None, left: float) -> BudgetEntry:
+    """The finite-element meshes may cost what all else leaves of the tolerance [m]."""
+    elements, count = sum(table.elements for table in result.modes), len(result.modes)
+    choice = f"{elements} elements in {count} flexible {'body' if count == 1 else 'bodies'}"
+    reason = "by the element sizes of the bodies" if estimated is not None else "the error of a given mesh is not known"
+    return BudgetEntry(MESH, left, estimated, choice, reason)
