@@ -1,8 +1,9 @@
-"""The error of a step, from two of them: on a motion that is known, and on the arm against a far finer one."""
+"""The error of a step, from two of them: on a motion that is known, and on the arm against a far finer one; joints stay
+closed."""
 
 import numpy as np
 import pytest
-from calmotion.accuracy.step_error import StepRun, largest_step, simulate_at, step_error
+from calmotion.accuracy.step_error import CLOSED_GAP, StepRun, largest_step, simulate_at, step_error, step_gaps
 from calmotion.errors import IntegrationError, ShotError
 from calmotion.shot.run import RunSettings
 from calmotion.simulation.compiled_shot import compile_shot
@@ -48,6 +49,50 @@ def test_steps_that_fail_are_too_large_and_the_last_one_ends_the_search():
         raise IntegrationError("diverges")
 
     assert largest_step(never, 0.1, 0.025, lambda run: 1.0) == (0.025, np.inf)
+
+
+def opening(gap, order=3, floor=0.0, integrator="generalized-alpha"):
+    """A target without error, and joints that open by a gap at a step of 0.1, and by a floor at any step [m]."""
+
+    def run(step):
+        opens = floor + gap * (step / 0.1) ** order
+        return StepRun(step, np.zeros((1, 1, 3)), integrator=integrator, gap=opens)
+
+    return run
+
+
+@pytest.mark.parametrize("integrator", ["bdf2", "newmark", "generalized-alpha"])
+def test_a_step_by_which_joints_come_apart_is_too_large(integrator):
+    for gap, step in ((0.9, 0.1), (1.1, 0.05), (7.9, 0.05)):
+        assert largest_step(opening(gap * CLOSED_GAP, integrator=integrator), 0.1, 1e-3, lambda run: 1.0)[0] == step
+
+
+def test_the_integrator_gives_way_where_joints_stay_open_by_half_the_step_that_the_error_allows():
+    with pytest.raises(IntegrationError, match="come apart"):
+        largest_step(opening(9.0 * CLOSED_GAP), 0.1, 1e-3, lambda run: 1.0)
+    assert largest_step(opening(9.0 * CLOSED_GAP, integrator="bdf2"), 0.1, 1e-3, lambda run: 1.0)[0] == 0.025
+
+
+def test_a_gap_that_no_step_closes_is_not_charged_to_the_step():
+    floor = 20.0 * CLOSED_GAP
+    for order in (2, 3, 5):
+        run = opening(1e-5, order, floor)
+        coarse, fine = step_gaps(run(0.1), run(0.05))
+        assert 1e-5 * 0.5**order <= fine * (1.0 + 1e-9) and coarse >= 1e-5 * (1.0 - 1e-9)
+        assert fine <= 1e-5 / 3.0 and coarse <= 1.34e-5
+    assert largest_step(opening(0.0, floor=floor), 0.1, 1e-3, lambda run: 1.0) == (0.1, 0.0)
+    assert largest_step(opening(3.0 * CLOSED_GAP, floor=floor), 0.1, 1e-3, lambda run: 1.0)[0] == 0.05
+
+
+def test_between_two_steps_only_where_joints_stay_closed_by_both():
+    allowed = 3.0 * 0.09**2  # 0.09 is as accurate
+    for gap, step in ((0.9, 0.081), (2.0, 0.05)):
+
+        def run(step, gap=gap * CLOSED_GAP):
+            opens = gap * (step / 0.1) ** 3
+            return StepRun(step, of_second_order(step).positions, integrator="generalized-alpha", gap=opens)
+
+        assert largest_step(run, 0.1, 1e-3, lambda run: allowed)[0] == pytest.approx(step, rel=1e-6)
 
 
 def test_a_shot_that_no_step_can_simulate_is_tried_once():

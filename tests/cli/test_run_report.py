@@ -1,7 +1,7 @@
 import io
 
 import pytest
-from calmotion.cli.run_report import REMEDIES, print_accuracy
+from calmotion.cli.run_report import REMEDIES, print_accuracy, print_joint_gap
 from calmotion.cli.tables import console_on
 
 
@@ -38,3 +38,10 @@ def test_a_tolerance_that_is_not_kept_is_reported_with_what_would_help(source):
 def test_without_an_estimate_nothing_is_claimed():
     text = printed(report(error_budget=[], tolerance_kept=False, simulation_error_m=None))
     assert text == "the error of the simulation was not estimated; the tolerance is 1 mm\n"
+
+
+@pytest.mark.parametrize(("gap", "told"), [(0.0, ""), (9e-7, ""), (7.1e-5, "joints come apart by up to 0.071 mm")])
+def test_joints_that_come_apart_are_reported(gap, told):
+    stream = io.StringIO()
+    print_joint_gap(console_on(stream), gap)
+    assert stream.getvalue().startswith(told) and bool(stream.getvalue()) == bool(told)

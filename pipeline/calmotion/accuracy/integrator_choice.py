@@ -9,7 +9,7 @@ from typing import TypeVar
 from calmotion.errors import IntegrationError
 from calmotion.shot.run import RunSettings
 
-FAST = "generalized-alpha"
+FAST, SAFE = "generalized-alpha", RunSettings().scheme  # the second one keeps joints closed by any step
 Found = TypeVar("Found")
 
 

@@ -1,4 +1,4 @@
-"""The error of the time step at the targets, from two simulations of the same curves by different steps."""
+"""The error of the time step at the targets and in the joints, from simulations of the same curves by two steps."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from calmotion.accuracy.integrator_choice import SAFE
 from calmotion.errors import IntegrationError
 from calmotion.multibody.failure import SimulationFailure
 from calmotion.multibody.integrators.workspace import Workspace
@@ -17,9 +18,10 @@ from calmotion.simulation.compiled_shot import CompiledShot
 from calmotion.simulation.cyclic import SteadyState
 from calmotion.simulation.forward import run_forward
 from calmotion.simulation.inputs.curves import sample_tracks
-from calmotion.simulation.prepare import failure_error, prepare
+from calmotion.simulation.prepare import failure_error, open_joints, prepare
 from calmotion.simulation.report import elastic_by_body
 
+CLOSED_GAP = 1e-6  # largest position gap of a joint that counts as none [m]
 ORDER = 2  # of BDF2; the global error goes with this power of the step
 MARGIN, WORTH = 0.9, 1.1  # of a step between two that were tried; how much longer it must be than the shorter of them
 
@@ -34,12 +36,14 @@ class StepRun:
         elastic: Elastic coordinates of each body of the character at every step, shape [T, r]; empty for a motion that
             is known at the frames alone.
         integrator: By which it was simulated; empty where that does not matter.
+        gap: Largest position gap of a joint at any step [m].
     """
 
     step: float
     positions: Array
     elastic: tuple[Array, ...] = ()
     integrator: str = ""
+    gap: float = 0.0
 
 
 def simulate_at(shot: CompiledShot, options: RunSettings, step: float) -> StepRun:
@@ -58,7 +62,8 @@ def simulate_at(shot: CompiledShot, options: RunSettings, step: float) -> StepRu
     except SimulationFailure as failure:
         raise failure_error(prepared, failure) from failure
     elastic = elastic_by_body(model, run.trajectory.states.u)
-    return StepRun(grid.h, run.target_positions[grid.frames], elastic, options.scheme)
+    gap = run.trajectory.max_joint_gap
+    return StepRun(grid.h, run.target_positions[grid.frames], elastic, options.scheme, gap)
 
 
 def frames_of(result: Result, frame_times: Array) -> StepRun:
@@ -79,10 +84,25 @@ def step_error(coarse: StepRun, fine: StepRun) -> float:
     return distance(coarse.positions, fine.positions) / ratio
 
 
+def step_gaps(coarse: StepRun, fine: StepRun) -> tuple[float, float]:
+    """The part of the largest joint gap of two runs that their steps cause [m].
+
+    The rest is that of closed chains whose joints do not fit together exactly: no step closes it.
+    """
+    ratio = (coarse.step / fine.step) ** ORDER - 1.0
+    by_fine = min(fine.gap, max(0.0, coarse.gap - fine.gap) / ratio)
+    return max(0.0, coarse.gap - (fine.gap - by_fine)), by_fine
+
+
 def largest_step(
     run: Callable[[float], StepRun], first: float, last: float, allowed: Callable[[StepRun], float]
 ) -> tuple[float, float]:
-    """The largest step whose error is allowed: by halving the first, and then between two of these by the order.
+    """The largest step whose error is allowed and which keeps joints closed: by halving the first, and then between
+    two of these by the order.
+
+    A robot whose motors determine its motion has its targets where they should be by any step, so that their error does
+    not tell that velocities and forces oscillate from step to step; the joints, which the faster integrators hold
+    together in velocity, come apart there.
 
     Args:
         run: Simulates by a step [s]; may raise IntegrationError where that is too large.
@@ -91,6 +111,10 @@ def largest_step(
 
     Returns:
         The step [s] and its estimated error [m]; where not even the last is fine enough, that and its error.
+
+    Raises:
+        IntegrationError: Joints come apart by a step half as long as the error allows: the safe integrator, which
+            keeps them closed, needs no more steps than this one then.
     """
     step, coarse = first, run_or_none(run, first)
     while True:
@@ -102,10 +126,14 @@ def largest_step(
         elif coarse is not None and coarse.step > fine.step:  # a frame may be shorter than both
             error, enough = step_error(coarse, fine), allowed(fine)
             by_coarse = (coarse.step / fine.step) ** ORDER * error
-            if by_coarse <= enough:
+            coarse_closed, fine_closed = (gap <= CLOSED_GAP for gap in step_gaps(coarse, fine))
+            if by_coarse <= enough and coarse_closed:
                 return coarse.step, by_coarse
-            if error <= enough:
-                return _between(fine.step, error, enough)
+            if error <= enough and fine_closed:
+                # between the two the gap is not known
+                return _between(fine.step, error, enough) if coarse_closed else (fine.step, error)
+            if by_coarse <= enough and fine.integrator not in ("", SAFE):
+                raise open_joints(fine.gap, fine.integrator, fine.step)
             if step <= last:
                 return fine.step, error
         elif step <= last:

@@ -52,6 +52,14 @@ def print_limits(console: Console, limits: Sequence[dict[str, Any]], optimized: 
     print_table(console, "Active limits of motors", ["motor", "quantity", *heads, "at", ""], rows, texts=2)
 
 
+def print_joint_gap(console: Console, gap: float) -> None:
+    """The largest gap of a joint [m], where joints are not closed."""
+    from calmotion.accuracy.step_error import CLOSED_GAP  # loads what has simulated before
+
+    if gap > CLOSED_GAP:
+        say(console, f"joints come apart by up to {length(gap)}")
+
+
 def print_accuracy(console: Console, report: dict[str, Any]) -> None:
     """The error budget of the simulation itself, and whether it keeps the tolerance."""
     rows = [
@@ -142,6 +150,7 @@ def print_run(report: dict[str, Any], stream: TextIO) -> None:
         f"{report['modes']} of them elastic; {report['total_wall_s']:.1f} s in total"
         + (f", peak memory {report['peak_memory_gb']:.2f} GB" if report["peak_memory_gb"] else ""),
     )
+    print_joint_gap(console, report["max_joint_gap_m"])
     print_accuracy(console, report)
     print_left_out(console, report["left_out"])
     print_notes(console, report["notes"])

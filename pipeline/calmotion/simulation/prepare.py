@@ -205,6 +205,23 @@ def failure_error(prepared: Prepared, failure: SimulationFailure) -> ShotError:
     )
 
 
+def open_joints(gap: float, integrator: str, step: float, path: str = "") -> IntegrationError:
+    """The error of a simulation whose joints come apart.
+
+    Args:
+        gap: [m].
+        step: [s].
+        path: Of the character.
+    """
+    return IntegrationError(
+        f"its joints come apart by {1e3 * gap:.2g} mm in the simulation",
+        path=path,
+        attribute="--integrator",
+        found=f"{integrator} with steps of {1e3 * step:.3g} ms",
+        remedy="Use a smaller --step, or bdf2, which keeps them closed.",
+    )
+
+
 def _remedy_at_rest(prepared: Prepared, component: int) -> str:
     """What would hold a body that finds no static equilibrium."""
     tree, character = prepared.model.tree, prepared.character

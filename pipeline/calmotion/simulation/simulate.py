@@ -7,7 +7,6 @@ from collections.abc import Callable
 
 import numpy as np
 
-from calmotion.errors import IntegrationError
 from calmotion.multibody.failure import SimulationFailure
 from calmotion.multibody.integrators.workspace import Workspace
 from calmotion.shot import Result, Track
@@ -22,7 +21,7 @@ from calmotion.simulation.inputs.curves import sample_curves, sample_tracks
 from calmotion.simulation.inputs.shapers import shaped
 from calmotion.simulation.intended_motion import rigid_motion, static_motion
 from calmotion.simulation.motor_limits import excesses, motor_bounds
-from calmotion.simulation.prepare import Prepared, failure_error, modes_of, prepare, refuse_half_turns
+from calmotion.simulation.prepare import Prepared, failure_error, modes_of, open_joints, prepare, refuse_half_turns
 from calmotion.simulation.report import left_out_rows, limit_uses, performed_motion, reference_motion, simulation_of
 from calmotion.simulation.target_errors import IntendedMotion, Objective
 
@@ -116,10 +115,4 @@ def _refuse_open_joints(prepared: Prepared, gap: float, options: RunSettings) ->
     """BDF2 keeps joints closed; the others hold them together in velocity, and drift where steps are coarse."""
     character = prepared.character
     if gap > CLOSED * tolerance_of(character, options.tolerance):
-        raise IntegrationError(
-            f"its joints come apart by {1e3 * gap:.2g} mm in the simulation",
-            path=character.path,
-            attribute="--integrator",
-            found=f"{options.scheme} with steps of {1e3 * prepared.grid.h:.3g} ms",
-            remedy="Use a smaller --step, or bdf2, which keeps them closed.",
-        )
+        raise open_joints(gap, options.scheme, prepared.grid.h, character.path)

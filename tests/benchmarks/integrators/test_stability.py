@@ -4,6 +4,7 @@ import dataclasses
 import json
 
 import pytest
+from calmotion.accuracy import step_error
 from calmotion.benchmarks.integrators import outcomes, stability
 from calmotion.benchmarks.integrators.outcomes import CASES, FAILED, REFUSED, RUNS, Case, run_case
 from calmotion.simulation import simulate as run
@@ -36,7 +37,7 @@ def test_divergence_and_nan_are_failures(monkeypatch):
     (weightless,) = (case for case in CASES if (case.group, case.name) == ("gravity", "none"))
     monkeypatch.setattr(outcomes, "REACH", 0.5)
     assert run_case(Case("a", "b", weightless.scene)).outcome == FAILED
-    monkeypatch.setattr(outcomes, "GAP", -1.0)
+    monkeypatch.setattr(step_error, "CLOSED_GAP", -1.0)
     monkeypatch.setattr(outcomes, "REACH", 5.0)
     assert "came apart" in run_case(Case("a", "b", weightless.scene)).why
 
@@ -66,6 +67,6 @@ def test_the_command_prints_one_object_and_fails_with_its_cases(capsys, monkeypa
     assert stability.main(["--json", "--only", "load a millionth"]) == 0
     (row,) = json.loads(capsys.readouterr().out)["cases"]
     assert row["outcome"] == RUNS and row["group"] == "mass ratio" and row["steps"] == 961
-    monkeypatch.setattr(outcomes, "GAP", -1.0)
+    monkeypatch.setattr(step_error, "CLOSED_GAP", -1.0)
     assert stability.main(["--only", "load a millionth"]) == 1
     assert "came apart" in capsys.readouterr().out

@@ -22,7 +22,6 @@ if TYPE_CHECKING:
 
 Scene = Callable[[], tuple[tuple[Character, FEMeshes], Animation]]
 RUNS, REFUSED, FAILED = "runs", "refused", "failed"
-GAP = 1e-6  # largest position gap of a joint that counts as none [m]
 NORM = 1e-9  # how far a quaternion's norm may be from 1
 REACH = 1.5  # times the arm's length: a target beyond it has flown away
 
@@ -193,11 +192,12 @@ def judged(group: str, name: str, shot: CompiledShot, options: RunSettings, gap:
 
     Args:
         group, name: Of the outcome.
-        gap: Largest position gap of a joint that counts as none [m]; None: `GAP`.
+        gap: Largest position gap of a joint that counts as none [m]; None: `step_error.CLOSED_GAP`.
     """
+    from calmotion.accuracy.step_error import CLOSED_GAP
     from calmotion.simulation.simulate import simulate_shot
 
-    allowed = GAP if gap is None else gap
+    allowed = CLOSED_GAP if gap is None else gap
     try:
         result = simulate_shot(shot, options, lambda fraction, message: None)
     except ShotError as error:
