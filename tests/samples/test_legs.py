@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 
+import pytest
+
 
 def test_legs_with_closed_chains_walk(calmotion, shared_data, tmp_path):
     shot = shared_data / "shots" / "dr_legs_walk.usda"
@@ -16,3 +18,45 @@ def test_legs_with_closed_chains_walk(calmotion, shared_data, tmp_path):
     assert {row["path"].rsplit("/", 1)[-1] for row in report["targets"]} == {"foot_l", "foot_r"}
     assert all(row["max_error_m"] < 1e-9 for row in report["targets"])
     assert report["newton_iterations"] < 4 * report["steps"]
+
+
+DRIVEN = """#usda 1.0
+(
+    subLayers = [@{shot}@]
+    startTimeCode = 0
+    endTimeCode = 40
+    timeCodesPerSecond = 100
+    metersPerUnit = 1
+    upAxis = "Z"
+)
+over "DR_Legs"
+{{
+    over "Joints"
+    {{
+{drives}
+    }}
+}}
+"""
+DRIVE = """        over "{joint}" (
+            prepend apiSchemas = ["PhysicsDriveAPI:angular"]
+        )
+        {{
+            float drive:angular:physics:targetPosition.timeSamples = {{
+                0: {angle},
+                40: {angle},
+            }}
+        }}"""
+
+
+@pytest.mark.parametrize("angle", [4.0, -10.0, 25.0])
+@pytest.mark.parametrize("joints", [["j8_l_i"], ["j3_r_o"], ["j4_l_i", "j9_r_i"]])
+def test_legs_with_more_motors_than_their_chains_can_follow_are_refused(
+    calmotion, shared_data, tmp_path, joints, angle
+):
+    shot, layer = shared_data / "shots" / "dr_legs_walk.usda", tmp_path / "driven.usda"
+    drives = "\n".join(DRIVE.format(joint=joint, angle=angle) for joint in joints)
+    layer.write_text(DRIVEN.format(shot=shot, drives=drives))
+    done = calmotion("simulate", layer, "--json", "--quiet")
+    error = json.loads(done.stdout)["error"]
+    assert done.returncode == 1 and "do not meet" in error["problem"] and error["path"].startswith("/DR_Legs/Joints/")
+    assert "remove the drive" in error["remedy"] and "/DR_Legs/Joints/" in error["remedy"]

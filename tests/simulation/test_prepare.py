@@ -5,7 +5,7 @@ from calmotion.errors import IntegrationError, ShotError
 from calmotion.multibody.failure import Reason, SimulationFailure
 from calmotion.shot.run import RunSettings
 from calmotion.simulation.compiled_shot import compile_shot
-from calmotion.simulation.prepare import failure_error, prepare
+from calmotion.simulation.prepare import failure_error, open_joints, prepare
 
 
 @pytest.fixture(scope="module")
@@ -16,8 +16,15 @@ def prepared(arm, animation, bodies):
 @pytest.mark.parametrize("reason", Reason)
 def test_only_failures_that_depend_on_the_step_may_be_tried_again(prepared, reason):
     error = failure_error(prepared, SimulationFailure(0.0, 0, reason))
-    assert type(error) is (ShotError if reason == Reason.NO_EQUILIBRIUM else IntegrationError)
+    static = reason in (Reason.NO_EQUILIBRIUM, Reason.OPEN)
+    assert type(error) is (ShotError if static else IntegrationError)
     assert error.path and error.remedy
+
+
+def test_joints_that_come_apart_by_any_integrator_are_not_blamed_on_it():
+    assert "bdf2" in open_joints(1e-3, "newmark", 0.01, "/Arm").remedy
+    own = open_joints(1e-3, "bdf2", 0.01, "/Arm")
+    assert "contradict" in own.remedy and "--step" not in own.remedy and "1 mm" in own.problem
 
 
 def test_a_missing_equilibrium_names_the_joint_and_what_would_hold_the_body(prepared, arm):

@@ -4,7 +4,10 @@ from __future__ import annotations
 
 from enum import StrEnum
 
+import numpy as np
+
 from calmotion.multibody.model.system import State
+from calmotion.shot.character import Array
 
 
 class Reason(StrEnum):
@@ -14,6 +17,7 @@ class Reason(StrEnum):
     DIVERGED = "diverged"
     REFINED = "refined"  # only smaller steps were possible, which have no derivatives
     NO_EQUILIBRIUM = "no static equilibrium"
+    OPEN = "joints that do not meet"
     NOT_PERIODIC = "no periodic motion"
 
 
@@ -26,8 +30,14 @@ class SimulationFailure(Exception):
         reason: Why.
         state: The last converged state, or None.
         share: Largest fraction of gravity with an equilibrium; 1 after the start.
+        gap: Of the joint that stays open the most, shape [6] [m, rad]; `component` is then its number, those that close
+            chains after those of the tree.
     """
 
-    def __init__(self, time_s: float, component: int, reason: Reason, state: State | None = None, share: float = 1.0):
+    def __init__(
+        self, time_s: float, component: int, reason: Reason, state: State | None = None, share: float = 1.0,
+        gap: Array | None = None,
+    ):  # fmt: skip
         self.time_s, self.component, self.reason, self.state, self.share = time_s, component, reason, state, share
+        self.gap = np.zeros(6) if gap is None else gap
         super().__init__(f"{reason} at t = {time_s:.4f} s, component {component}")

@@ -12,6 +12,7 @@ from calmotion.multibody.analysis.modes import system_modes
 from calmotion.multibody.failure import Reason, SimulationFailure
 from calmotion.multibody.integrators.integrate import follows_roots
 from calmotion.multibody.model.model import Model
+from calmotion.multibody.model.topology import chain_members
 from calmotion.reduction.reduced_body import ReducedBody
 from calmotion.shot import Animation, Character
 from calmotion.shot.character import Array
@@ -175,6 +176,8 @@ def failure_error(prepared: Prepared, failure: SimulationFailure) -> ShotError:
             remedy="Raise calm:damping:ratio, slow the loop down where it shakes most, or set calm:retarget:cyclic to "
             "false.",
         )
+    if failure.reason == Reason.OPEN:
+        return _chain_error(prepared, failure.component, failure.gap)
     # the static start depends neither on the step nor on the integrator
     static = failure.reason == Reason.NO_EQUILIBRIUM
     kind = ShotError if static else IntegrationError
@@ -213,12 +216,46 @@ def open_joints(gap: float, integrator: str, step: float, path: str = "") -> Int
         step: [s].
         path: Of the character.
     """
+    remedy = "Use a smaller --step, or bdf2, which keeps them closed."
+    if integrator == "bdf2":
+        remedy = (
+            "Its motors contradict each other in a closed chain, or the joints of one do not fit together: correct the "
+            "curves, remove the drive of a motor of the chain, or check localPos0 and localPos1 of its joints."
+        )
     return IntegrationError(
         f"its joints come apart by {1e3 * gap:.2g} mm in the simulation",
         path=path,
         attribute="--integrator",
         found=f"{integrator} with steps of {1e3 * step:.3g} ms",
-        remedy="Use a smaller --step, or bdf2, which keeps them closed.",
+        remedy=remedy,
+    )
+
+
+def _chain_error(prepared: Prepared, joint: int, gap: Array) -> ShotError:
+    """The error of a closed chain that does not close.
+
+    Args:
+        joint: The one that stays open the most; those that close chains come after those of the tree.
+        gap: [m, rad], shape [6].
+    """
+    tree, character, system = prepared.model.tree, prepared.character, prepared.model.system
+    order = [*tree.joint, *tree.closing]
+    chain = {order[joint]}
+    for number, closing in enumerate(tree.closing, len(tree.joint)):
+        members = chain_members(system.parent, system.side[number])
+        if number == joint or int(system.side[joint, 1]) in members:
+            chain |= {closing, *(tree.joint[b] for b in members)}
+    motors = [motor.path for motor in character.motors if motor.joint in chain]
+    far, turned = float(np.linalg.norm(gap[:3])), float(np.degrees(np.linalg.norm(gap[3:])))
+    open_by = f"{1e3 * far:.3g} mm" if far > 1e-6 else f"{turned:.3g} degrees"
+    named = [*motors[:_NAMED], f"{len(motors) - _NAMED} more"] if len(motors) > _NAMED else motors
+    remedy = "Check physics:localPos0, localRot0, localPos1 and localRot1 of the joints of this chain"
+    if motors:
+        remedy = f"Correct the angles of its motors there, or remove the drive of one of them: {', '.join(named)}"
+    return ShotError(
+        f"the joints of a closed chain do not meet in the pose of the first frame: this one stays open by {open_by}",
+        path=character.joints[order[joint]].path,
+        remedy=f"{remedy}.",
     )
 
 
@@ -237,10 +274,12 @@ def _remedy_at_rest(prepared: Prepared, component: int) -> str:
     return f"{text[0].upper()}{text[1:]}."
 
 
+_NAMED = 6  # motors in a message
 _FAR = 0.25  # deflection over length that explains a failure
 _REASONS = {
     Reason.SINGULAR: "meets a singular system",
     Reason.DIVERGED: "diverges",
     Reason.REFINED: "can only go on with smaller steps",
     Reason.NO_EQUILIBRIUM: "has no static equilibrium",
+    Reason.OPEN: "has joints that do not meet",
 }

@@ -20,6 +20,7 @@ TOLERANCE = 1e-11
 LIMIT = 400  # iterations
 LOAD_STEP_LIMIT = 30  # of a load step
 PSEUDO_TIME = (1e2, 1e4, 1e6)  # first factors of the mass matrix, 1/time^2
+OPEN = 1e-3  # joints that stay open by more do not meet [m, rad]
 FIRST_LOAD_STEP, SMALLEST_LOAD_STEP = 0.2, 1e-3  # fractions of gravity
 
 
@@ -47,9 +48,10 @@ def equilibrium(system: System, start: State, angle: Array, ws: Workspace) -> tu
         The state and the number of iterations.
 
     Raises:
-        SimulationFailure: No equilibrium was found; its state is that of the largest fraction of gravity that has one.
+        SimulationFailure: The joints of a closed chain do not meet at these angles (`Reason.OPEN`); or no equilibrium
+            was found, and the state is that of the largest fraction of gravity that has one.
     """
-    used = 0
+    used, gaps = 0, None
     reached, share, component = start, 0.0, 0
     free = bool(np.any((system.rows > 0) & (system.rows < 6)))
     for method in ("pseudo-transient", "load stepping") if free else ("newton", "load stepping", "pseudo-transient"):
@@ -57,15 +59,24 @@ def equilibrium(system: System, start: State, angle: Array, ws: Workspace) -> tu
             reached, share, component, iterations = _by_load_stepping(system, start, angle, ws)
             used += iterations
             if share == 1.0:
-                return reached, used
+                gaps = _open_rows(ws)
+                if gaps is None:
+                    return reached, used
             continue
         for inertia in (0.0,) if method == "newton" else PSEUDO_TIME[free:]:
             state = _at_rest(start)
             component, iterations = _iterate(system, state, angle, ws, inertia)
             used += iterations
             if component < 0:
-                state.turn[:] = 0.0
-                return state, used
+                gaps = _open_rows(ws)
+                if gaps is None:
+                    state.turn[:] = 0.0
+                    return state, used
+    if gaps is None:
+        gaps = _open_when_weightless(system, start, angle, ws)
+    if gaps is not None:
+        joint = int(np.argmax(np.abs(gaps).max(axis=1)))
+        raise SimulationFailure(0.0, joint, Reason.OPEN, gap=gaps[joint])
     raise SimulationFailure(0.0, max(component, 0), Reason.NO_EQUILIBRIUM, reached if share else None, share)
 
 
@@ -74,6 +85,22 @@ def _at_rest(start: State) -> State:
     state.turn[:] = 0.0
     state.V[:] = 0.0
     return state
+
+
+def _open_rows(ws: Workspace) -> Array | None:
+    """The gaps of all joints at the state that was linearised last, shape [J, 6] [m, rad]; None where joints meet.
+
+    Where motors contradict each other in a closed chain, the pseudo-inverse of its rows finds the pose of the smallest
+    gaps, and corrections vanish there as they do in an equilibrium.
+    """
+    return ws.blocks.gap.copy() if np.abs(ws.blocks.gap).max(initial=0.0) > OPEN else None
+
+
+def _open_when_weightless(system: System, start: State, angle: Array, ws: Workspace) -> Array | None:
+    """The gaps of all joints without gravity, if they do not meet: it is not the load that has no equilibrium then."""
+    weightless = system._replace(gravity=np.zeros_like(system.gravity))
+    component, iterations = _iterate(weightless, _at_rest(start), angle, ws, PSEUDO_TIME[-1])
+    return _open_rows(ws) if component < 0 or iterations == LIMIT else None  # else its system is singular
 
 
 def _by_load_stepping(system: System, start: State, angle: Array, ws: Workspace) -> tuple[State, float, int, int]:
