@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from calmotion.accuracy.reduced_bodies import ConvergedReduction, ReducedBodies, compiled_in
-from calmotion.host import NotAsked, Operator, Property, RunContext
+from calmotion.host import NotAsked, Operator, Property, RunContext, registration
 from calmotion.shot import Animation, Character, FEMeshes, ModelChoices
 from calmotion.shot.model_choice import no_flexible_bodies, run_settings, simplified_character
 from calmotion.shot.outputs import SystemModes
@@ -95,16 +95,4 @@ class FindSystemModes(Operator):
         return [SystemModes(*first_pose_modes(compiled_in(context.get)))]
 
 
-OPERATORS = (ReduceFlexibleBodies, CompileShot, FindSystemModes)
-
-
-def register(host: Any) -> None:
-    """Register the operators."""
-    for operator in OPERATORS:
-        host.register_operator(operator)
-
-
-def unregister(host: Any) -> None:
-    """Undo `register`."""
-    for operator in reversed(OPERATORS):
-        host.unregister_operator(operator)
+register, unregister = registration(ReduceFlexibleBodies, CompileShot, FindSystemModes)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from calmotion.host import NotAsked, Operator, Property, RunContext
+from calmotion.host import NotAsked, Operator, Property, RunContext, registration
 from calmotion.shot import MotorTracks
 from calmotion.shot.run import Source
 
@@ -53,11 +53,4 @@ class ReadMotion(Operator):
         return (tracks,)
 
 
-def register(host: Any) -> None:
-    """Register the operator."""
-    host.register_operator(ReadMotion)
-
-
-def unregister(host: Any) -> None:
-    """Undo `register`."""
-    host.unregister_operator(ReadMotion)
+register, unregister = registration(ReadMotion)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from calmotion.host import Operator, Property, RunContext
+from calmotion.host import Operator, Property, RunContext, registration
 from calmotion.shot import Animation, Character, Result
 from calmotion.shot.outputs import Figures, SystemModes
 from calmotion.shot.run import OutputPaths
@@ -45,11 +45,4 @@ class PlotFigures(Operator):
         return (Figures(tuple(written)),)
 
 
-def register(host: Any) -> None:
-    """Add the operator to the host."""
-    host.register_operator(PlotFigures)
-
-
-def unregister(host: Any) -> None:
-    """Remove the operator from the host."""
-    host.unregister_operator(PlotFigures)
+register, unregister = registration(PlotFigures)

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from calmotion.accuracy.reduced_bodies import ReducedBodies
-from calmotion.host import Operator, Property, RunContext
+from calmotion.host import Operator, Property, RunContext, registration
 from calmotion.shot import Character, FEMeshes, ModelChoices
 from calmotion.shot.model_choice import no_flexible_bodies, run_settings, simplified_character
 from calmotion.shot.outputs import ModeShapes
@@ -51,11 +51,4 @@ class WriteModeShapes(Operator):
         return (ModeShapes(tuple(written)),)
 
 
-def register(host: Any) -> None:
-    """Add the operator to the host."""
-    host.register_operator(WriteModeShapes)
-
-
-def unregister(host: Any) -> None:
-    """Remove the operator from the host."""
-    host.unregister_operator(WriteModeShapes)
+register, unregister = registration(WriteModeShapes)

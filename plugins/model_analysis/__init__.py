@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from calmotion.accuracy.reduced_bodies import ConvergedReduction, ReducedBodies, compiled_in
-from calmotion.host import NotAsked, Operator, Property, RunContext
+from calmotion.host import NotAsked, Operator, Property, RunContext, registration
 from calmotion.shot import Animation, Character, ModelChoices, Result
 from calmotion.shot.model_choice import AUTO, KINDS, OFF, ON, no_flexible_bodies, run_settings
 from calmotion.shot.outputs import PlannedStep, ShapedTracks, Verification
@@ -149,16 +149,4 @@ class VerifyResult(Operator):
         return [Verification(*verify(shot, reduction, context.get(Result), options, context.progress))]
 
 
-OPERATORS = (AnalyseShot, RefineReduction, PlanStep, VerifyResult)
-
-
-def register(host: Any) -> None:
-    """Register the operators."""
-    for operator in OPERATORS:
-        host.register_operator(operator)
-
-
-def unregister(host: Any) -> None:
-    """Undo `register`."""
-    for operator in reversed(OPERATORS):
-        host.unregister_operator(operator)
+register, unregister = registration(AnalyseShot, RefineReduction, PlanStep, VerifyResult)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from calmotion.host import Operator, Property, RunContext
+from calmotion.host import Operator, Property, RunContext, registration
 from calmotion.shot import Animation, Character, Result
 from calmotion.shot.outputs import Recording, SystemModes
 from calmotion.shot.run import OutputPaths
@@ -52,11 +52,4 @@ class LogRecording(Operator):
         return (Recording(path),)
 
 
-def register(host: Any) -> None:
-    """Add the operator to the host."""
-    host.register_operator(LogRecording)
-
-
-def unregister(host: Any) -> None:
-    """Take it out again."""
-    host.unregister_operator(LogRecording)
+register, unregister = registration(LogRecording)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from calmotion.host import NotAsked, Operator, Property, RunContext
+from calmotion.host import NotAsked, Operator, Property, RunContext, registration
 from calmotion.rigging.materials import MATERIALS
 from calmotion.shot.outputs import Rig
 from calmotion.shot.run import OutputPaths, Source
@@ -61,11 +61,4 @@ class RigSkeleton(Operator):
         return (rig_shot(context.get(Source).path, output, options),)
 
 
-def register(host: Any) -> None:
-    """Register the operator."""
-    host.register_operator(RigSkeleton)
-
-
-def unregister(host: Any) -> None:
-    """Undo `register`."""
-    host.unregister_operator(RigSkeleton)
+register, unregister = registration(RigSkeleton)

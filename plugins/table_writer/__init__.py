@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from calmotion.host import Host, NotAsked, Operator, Property, RunContext
+from calmotion.host import NotAsked, Operator, Property, RunContext, registration
 from calmotion.shot import Animation, Character, Provenance, Result
 from calmotion.shot.outputs import CsvFile
 from calmotion.shot.run import OutputPaths
@@ -79,16 +79,4 @@ class ExportCurves(Operator):
         return (ControllerCurves(values.file, rows),)
 
 
-OPERATORS = (WriteTable, ExportCurves)
-
-
-def register(host: Host) -> None:
-    """Register the operators."""
-    for operator in OPERATORS:
-        host.register_operator(operator)
-
-
-def unregister(host: Host) -> None:
-    """Undo `register`."""
-    for operator in reversed(OPERATORS):
-        host.unregister_operator(operator)
+register, unregister = registration(WriteTable, ExportCurves)

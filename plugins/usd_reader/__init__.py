@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
-from calmotion.host import Operator, RunContext
+from calmotion.host import Operator, RunContext, registration
 from calmotion.shot import Animation, Character, Findings, MotorTracks, Provenance
 from calmotion.shot.run import OutputPaths, Source
 
@@ -53,16 +52,4 @@ class ValidateShot(Operator):
         return (validate_shot(context.get(Source).path),)
 
 
-OPERATORS = (ReadShot, ValidateShot)
-
-
-def register(host: Any) -> None:
-    """Register the operators."""
-    for operator in OPERATORS:
-        host.register_operator(operator)
-
-
-def unregister(host: Any) -> None:
-    """Undo `register`."""
-    for operator in reversed(OPERATORS):
-        host.unregister_operator(operator)
+register, unregister = registration(ReadShot, ValidateShot)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from calmotion.host import Operator, Property, RunContext
+from calmotion.host import Operator, Property, RunContext, registration
 from calmotion.shot import Animation, Character, Provenance, Result
 from calmotion.shot.outputs import WrittenLayer
 from calmotion.shot.run import OutputPaths
@@ -64,11 +64,4 @@ class WriteResult(Operator):
         return (WrittenLayer(layer=layer, root=root),)
 
 
-def register(host: Any) -> None:
-    """Register the operator."""
-    host.register_operator(WriteResult)
-
-
-def unregister(host: Any) -> None:
-    """Undo `register`."""
-    host.unregister_operator(WriteResult)
+register, unregister = registration(WriteResult)

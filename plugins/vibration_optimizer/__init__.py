@@ -6,10 +6,11 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from calmotion.accuracy.reduced_bodies import ConvergedReduction, compiled_in
-from calmotion.host import NotAsked, Operator, Property, RunContext
+from calmotion.host import NotAsked, Operator, Property, RunContext, registration
 from calmotion.shot import ModelChoices, Result
 from calmotion.shot.model_choice import run_settings, with_choices
 from calmotion.shot.outputs import ShapedTracks
+from calmotion.shot.result import is_reached
 from calmotion.shot.run import OutputPaths, Source
 from calmotion.simulation.compiled_shot import CompiledShot
 
@@ -145,7 +146,8 @@ class OptimizeShot(Operator):
             )
         before, after = result.objective_before, result.objective_after
         if after is None or not after <= before:
-            reason = "the limits of the motors require it" if result.limits else f"the search ended: {result.stopped}"
+            ended = f"the search ended: {result.stopped}"
+            reason = "the limits of the motors require it" if any(map(is_reached, result.limits)) else ended
             context.report(
                 "warning",
                 f"the new curves are worse than the animated ones: objective {before} -> {after}; {reason}",
@@ -153,16 +155,4 @@ class OptimizeShot(Operator):
         return [_with_budget(context, result)]
 
 
-OPERATORS = (ShapeTracks, SimulateShot, OptimizeShot)
-
-
-def register(host: Any) -> None:
-    """Register the operators."""
-    for operator in OPERATORS:
-        host.register_operator(operator)
-
-
-def unregister(host: Any) -> None:
-    """Undo `register`."""
-    for operator in reversed(OPERATORS):
-        host.unregister_operator(operator)
+register, unregister = registration(ShapeTracks, SimulateShot, OptimizeShot)

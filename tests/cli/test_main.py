@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import subprocess
 import sys
 from dataclasses import replace
@@ -96,6 +97,16 @@ def test_benchmarks_take_their_own_arguments():
 
 def _environment():
     return os.environ | {"PYTHONPATH": os.pathsep.join(path for path in sys.path if path)}
+
+
+def test_a_shaper_is_printed_with_its_delay_and_the_error_without_it(run):
+    status, out, _ = run("simulate", "shot.usda", "--shaper", "zvd")
+    assert status == 0
+    line = next(line for line in out.splitlines() if line.startswith("zvd delays"))
+    assert re.fullmatch(
+        r"zvd delays the motion by 0\.\d{3} s; largest error from the intended motion with that delay: [\d.]+ mm", line
+    )
+    assert "delays the motion" not in run("simulate", "shot.usda")[1]
 
 
 def test_optimize_reports_what_the_contract_names(run, tmp_path):

@@ -2,11 +2,13 @@ import dataclasses
 
 import numpy as np
 import pytest
+import synthetic
 from calmotion import ShotError
 from calmotion.accuracy.reduced_bodies import ConvergedReduction, ReducedBodies
 from calmotion.host import NotAsked
 from calmotion.shot import Character, Result
 from calmotion.shot.outputs import ShapedTracks, SystemModes, Verification
+from calmotion.shot.result import LimitUse
 from calmotion.shot.run import OutputPaths, RunSettings, Source
 from calmotion.simulation.compiled_shot import CompiledShot, compile_shot
 from calmotion.testing import host_with, run_operator, small_shot
@@ -125,3 +127,26 @@ def test_frequencies_are_sought_only_where_something_shows_them(host):
     assert poll(asked | {OutputPaths: OutputPaths(figures="pictures")}) is None
     assert poll(asked | {OutputPaths: OutputPaths(rrd="calm.rrd")}) is None
     assert poll({Character: character, Source: source("inspect"), OutputPaths: OutputPaths()}) is None
+
+
+@pytest.mark.parametrize(
+    ("excess", "cost", "reason"),
+    [
+        (-0.4, None, "the search ended: iteration limit"),
+        (-1e-9, None, "the limits of the motors require it"),
+        (0.2, None, "the limits of the motors require it"),
+        (-0.4, 1e-3, "the limits of the motors require it"),
+    ],
+)
+def test_worse_curves_are_blamed_on_limits_only_where_one_is_reached(host, monkeypatch, excess, cost, reason):
+    made = dataclasses.replace(
+        synthetic.result(),
+        objective_after=1.0,
+        stopped="iteration limit",
+        limits=(LimitUse(0, "position", 1.0, 0.5, 1.0 + excess, 0.1, excess, cost),),
+    )
+    monkeypatch.setattr("calmotion.retargeting.to_tolerance.optimize_to_tolerance", lambda *rest: made)
+    told = []
+    monkeypatch.setattr("calmotion.host.operators.RunContext.report", lambda context, level, text: told.append(text))
+    run_operator(host, "retarget.optimize", [compile_shot(*small_shot()), source("optimize")])
+    assert len(told) == 1 and told[0].endswith(reason)

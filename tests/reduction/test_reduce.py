@@ -120,3 +120,18 @@ def test_what_a_mesh_is_off_by_is_a_part_of_the_deflection(mesh, body, attachmen
     assert 0.04 * at_rest < error < 0.06 * at_rest
     assert reduce_body(mesh, body, attachments, [], 1, loads).mesh_error_m is None
     assert reduce_body(judged, body, attachments, [], 1).mesh_error_m is None
+
+
+def sentence(reduced):
+    """What a report says about the elastic law."""
+    return [(row.what, row.why) for row in reduced.left_out if "elasticity" in row.what or "strain" in row.what]
+
+
+def test_a_report_says_why_the_elastic_law_is_linear(mesh, body, attachments):
+    what = "/Arm/link: linear elasticity"
+    assert sentence(reduce_body(mesh, body, attachments, [], 1)) == [
+        (what, "its deflection is not known without a motion")
+    ]
+    for law, said in (("linear", [(what, "calm:flexible:elasticity is linear")]), ("stvk", [])):
+        authored = replace(body, flexible=replace(body.flexible, elasticity=law))
+        assert sentence(reduce_body(mesh, authored, attachments, [], 1)) == said

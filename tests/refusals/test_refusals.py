@@ -30,8 +30,7 @@ def motor_without_animation(stage: Usd.Stage) -> None:
 
 
 def zero_mass(stage: Usd.Stage) -> None:
-    for name in ("physics:mass", "physics:diagonalInertia", "physics:centerOfMass"):
-        stage.GetPrimAtPath(shots.FORE).GetAttribute(name).Clear()
+    shots.clear_mass(stage, shots.FORE)
 
 
 def negative_mass(stage: Usd.Stage) -> None:

@@ -19,8 +19,22 @@ def checked(fraction, message):
 
 
 @pytest.fixture(scope="module")
-def result(arm, animation, bodies):
-    return optimize_shot(compile_shot(arm, animation, bodies), OPTIONS, checked)
+def progress():
+    """The fractions and messages of the search of `result`."""
+    return []
+
+
+@pytest.fixture(scope="module")
+def result(arm, animation, bodies, progress):
+    return optimize_shot(compile_shot(arm, animation, bodies), OPTIONS, lambda *state: progress.append(state))
+
+
+def test_progress_rises_steadily_with_the_search(result, progress):
+    fractions = [fraction for fraction, _ in progress]
+    assert fractions == sorted(fractions) and 0.0 <= fractions[0] and fractions[-1] <= 1.0
+    searched = [fraction for fraction, message in progress if message.startswith("optimising")]
+    assert len(searched) >= 2 and len(set(searched)) == len(searched)
+    assert all(message for _, message in progress)
 
 
 def judged(simulation):

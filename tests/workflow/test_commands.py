@@ -128,6 +128,32 @@ def test_progress_has_stage_fraction_and_time_left(shot_file):
     assert all(state.time_left_s is None or state.time_left_s >= 0.0 for state in seen)
 
 
+WRONG_MOTIONS = {
+    "robot.urdf": ('<?xml version="1.0"?><robot name="r"/>', "This is a URDF robot"),
+    "robot.xml": ('<mujoco model="m"/>', "This is an MJCF robot"),
+    "table.csv": ("time_s,/Robot/Hinge.input\n0,0\n", "a table that `--csv` wrote"),
+    "notes.txt": ("hello", "Name a .bvh file"),
+}
+
+
+@pytest.mark.parametrize("name", WRONG_MOTIONS)
+def test_a_motion_of_a_wrong_kind_is_refused_with_what_to_do(calmotion, shot_file, tmp_path, name):
+    text, remedy = WRONG_MOTIONS[name]
+    (tmp_path / name).write_text(text)
+    done = calmotion("simulate", shot_file, "--motion", tmp_path / name)
+    assert done.returncode == 2 and "no plugin reads this motion" in done.stderr
+    assert remedy in done.stderr and name in done.stderr and "done in" not in done.stderr
+
+
+@pytest.mark.parametrize("content", [None, "", "HIERARCHY\nROOT", "not a motion"])
+def test_a_damaged_motion_is_refused_by_its_name(calmotion, shot_file, tmp_path, content):
+    motion = tmp_path / "walk.bvh"
+    if content is not None:
+        motion.write_text(content)
+    done = calmotion("simulate", shot_file, "--motion", motion, "--set", "bvh.read.map=A.Zrotation=Hinge")
+    assert done.returncode in (1, 2) and "walk.bvh" in done.stderr and "Traceback" not in done.stderr
+
+
 def test_a_cancelled_run_raises(shot_file):
     stop = threading.Event()
 

@@ -2,7 +2,7 @@
 
 from calmotion.host.errors import HostError, PlanError, PluginError, SettingError
 from calmotion.host.manifest import Manifest, read_manifest
-from calmotion.host.operators import NotAsked, Operator, Record, RunContext
+from calmotion.host.operators import NotAsked, Operator, Record, RunContext, registration
 from calmotion.host.plan import Plan
 from calmotion.host.properties import Property, PropertyValues, nearest
 from calmotion.host.registry import Host, Plugin, PluginState, open_host
@@ -37,4 +37,5 @@ __all__ = [
     "read_assignment",
     "read_manifest",
     "read_settings_file",
+    "registration",
 ]

@@ -152,3 +152,19 @@ def check_operator(cls: object) -> None:
         inspect.signature(cls).bind()
     except TypeError:
         refuse("the class cannot be made without arguments")
+
+
+def registration(*operators: type[Operator]) -> tuple[Callable[[Any], None], Callable[[Any], None]]:
+    """`register` and `unregister` for these operators: `register, unregister = registration(First, Second)`."""
+
+    def register(host: Any) -> None:
+        """Register the operators."""
+        for operator in operators:
+            host.register_operator(operator)
+
+    def unregister(host: Any) -> None:
+        """Undo `register`."""
+        for operator in reversed(operators):
+            host.unregister_operator(operator)
+
+    return register, unregister

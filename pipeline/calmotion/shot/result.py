@@ -145,6 +145,14 @@ class LimitUse:
     cost_m: float | None = None
 
 
+_REACHED = 1e-3  # of the size of a limit: what is nearer touches it
+
+
+def is_reached(limit: LimitUse) -> bool:
+    """Whether a motor goes up to a limit, or the limit costs something; not whether it merely has one."""
+    return limit.cost_m is not None or limit.excess > -_REACHED
+
+
 @dataclass(frozen=True, eq=False)
 class OptimizerStep:
     """One iteration of the optimiser: objective, gradient norm (projected), products and simulations so far."""

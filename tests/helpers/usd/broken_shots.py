@@ -15,7 +15,18 @@ from pathlib import Path
 import numpy as np
 import small_shots as shots  # noqa: E402
 from pxr import Gf, Sdf, Usd, UsdGeom, UsdPhysics, Vt  # noqa: E402
-from small_shots import BASE, ELBOW, FORE, HAND, PLASTIC, SHOULDER, TARGET_POSITION, UPPER, set_float  # noqa: E402
+from small_shots import (  # noqa: E402
+    BASE,
+    ELBOW,
+    FORE,
+    HAND,
+    PLASTIC,
+    SHOULDER,
+    TARGET_POSITION,
+    UPPER,
+    clear_mass,
+    set_float,
+)  # fmt: skip
 
 Edit = Callable[[Usd.Stage], None]
 SKIN = f"{FORE}/skin"
@@ -171,8 +182,7 @@ def no_bodies(stage: Usd.Stage) -> None:
 
 
 def massless(stage: Usd.Stage) -> None:
-    for name in ("physics:mass", "physics:diagonalInertia", "physics:centerOfMass"):
-        stage.GetPrimAtPath(FORE).GetAttribute(name).Clear()
+    clear_mass(stage, FORE)
 
 
 def second_motor(stage: Usd.Stage) -> None:

@@ -120,6 +120,12 @@ def set_float(stage, path: str, name: str, value: float) -> None:
     stage.GetPrimAtPath(path).CreateAttribute(name, Sdf.ValueTypeNames.Float).Set(value)
 
 
+def clear_mass(stage, path: str) -> None:
+    """Take mass, inertia and centre of mass from a body."""
+    for name in ("physics:mass", "physics:diagonalInertia", "physics:centerOfMass"):
+        stage.GetPrimAtPath(path).RemoveProperty(name)
+
+
 def _body(stage, path: str, position, scale: Scale) -> None:
     xform = UsdGeom.Xform.Define(stage, path)
     xform.AddTranslateOp().Set(Gf.Vec3d(*(x / scale.meters for x in position)))

@@ -1,5 +1,7 @@
 """The choice of the elastic law, against simulations of the swung arm with each law."""
 
+import re
+
 import numpy as np
 import pytest
 from boxes import box_tets
@@ -84,3 +86,10 @@ def test_the_work_of_loads_is_that_of_their_sum_at_worst():
         largest = np.maximum(largest, np.abs(work))
     assert (largest <= bound * (1 + 1e-12)).all()
     assert largest == pytest.approx(bound, rel=0.35)
+
+
+def test_the_reason_has_the_deflection_the_error_and_the_strain():
+    body, number = arm(1.8e9), r"[0-9.]+(e-[0-9]+)? mm"
+    linear = rf"its deflection is about {number}; a linear law would have an error of about {number}"
+    assert re.fullmatch(linear, choose_law(*body, swing(0.2), 1e-3).reason)
+    assert re.fullmatch(rf"{linear}; its strain is [0-9.]+%", choose_law(*body, swing(1.0), 1e-3).reason)

@@ -4,7 +4,7 @@ import os
 
 import numpy as np
 import pytest
-from calmotion.support.caching.cache_folder import CACHES, KERNELS, MESHES, REDUCTIONS
+from calmotion.support.caching.cache_folder import CACHES, FORMER, KERNELS, MESHES, REDUCTIONS
 from calmotion.support.caching.caches import clear, entries, prune, store_arrays, stored_arrays
 
 
@@ -86,3 +86,29 @@ def test_a_symbolic_link_is_removed_and_what_it_names_is_not(folder, tmp_path_fa
 def test_a_cache_that_does_not_exist_is_empty():
     for cache in CACHES:
         assert entries(cache) == prune(cache) == clear(cache) == []
+
+
+@pytest.mark.parametrize("remove", [prune, clear])
+@pytest.mark.parametrize("cache", FORMER)
+def test_folders_of_earlier_versions_go(folder, cache, remove):
+    old = folder / FORMER[cache]
+    (old / "deep").mkdir(parents=True)
+    (old / "one.npz").write_bytes(b"12345")
+    (old / "deep" / "two.npz").write_bytes(b"123")
+    assert sorted(entry.size for entry in remove(cache)) == [3, 5]
+    assert not old.exists() and remove(cache) == []
+
+
+@pytest.mark.parametrize("cache", FORMER)
+def test_storing_removes_the_folder_of_an_earlier_version(folder, cache):
+    (folder / FORMER[cache]).mkdir()
+    store_arrays(cache, "key", {"a": np.zeros(1)})
+    assert sorted(path.name for path in folder.iterdir()) == [cache]
+
+
+def test_a_link_in_place_of_a_former_folder_is_not_followed(folder, tmp_path_factory):
+    other = tmp_path_factory.mktemp("other")
+    (other / "mine.npz").write_bytes(b"1")
+    (folder / FORMER[MESHES]).symlink_to(other, target_is_directory=True)
+    prune(MESHES)
+    assert (other / "mine.npz").exists()

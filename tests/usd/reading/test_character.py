@@ -7,7 +7,19 @@ import pytest
 from calmotion.shot import WORLD
 from calmotion.usd.reading import read_shot
 from pxr import Gf, UsdGeom, UsdPhysics
-from small_shots import BASE, ELBOW, FORE, SHOULDER, UPPER, Scale, box, make_flexible, make_target, write_arm
+from small_shots import (
+    BASE,
+    ELBOW,
+    FORE,
+    SHOULDER,
+    UPPER,
+    Scale,
+    box,
+    clear_mass,
+    make_flexible,
+    make_target,
+    write_arm,
+)
 
 
 def read(tmp_path, edit=None, scale=None, name="arm.usda"):
@@ -119,8 +131,7 @@ def test_a_disabled_body_is_ignored(tmp_path):
 
 def test_a_base_that_is_fixed_needs_no_mass(tmp_path):
     def edit(stage):
-        for name in ("physics:mass", "physics:diagonalInertia", "physics:centerOfMass"):
-            stage.GetPrimAtPath(BASE).GetAttribute(name).Clear()
+        clear_mass(stage, BASE)
 
     def loose(stage):
         edit(stage)

@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from calmotion.support.caching.cache_folder import CACHES, cache_folder
+from calmotion.support.caching.cache_folder import CACHES, FORMER, cache_folder
 from calmotion.support.caching.verified_files import DamagedFileError, read_arrays, write_arrays
 from calmotion.support.files import PREFIX
 
@@ -95,8 +95,11 @@ def entries(cache: str) -> list[Entry]:
     Args:
         cache: A name in `CACHES`.
     """
+    return _entries_in(cache_folder() / cache)
+
+
+def _entries_in(folder: Path) -> list[Entry]:
     found = []
-    folder = cache_folder() / cache
     with contextlib.suppress(OSError):
         for path in folder.iterdir():
             if path.name.startswith(PREFIX):
@@ -107,7 +110,9 @@ def entries(cache: str) -> list[Entry]:
 
 
 def prune(cache: str, limit: int | None = None) -> list[Entry]:
-    """Remove the least recently used entries until the rest keeps a size; the newest stays.
+    """Remove the least recently used entries until the rest keeps a size, and those of earlier versions.
+
+    The newest entry stays.
 
     Args:
         cache: A name in `CACHES`.
@@ -117,7 +122,7 @@ def prune(cache: str, limit: int | None = None) -> list[Entry]:
         What was removed.
     """
     limit = CACHES[cache][1] if limit is None else limit
-    total, removed = 0, []
+    total, removed = 0, _remove_former(cache)
     for number, entry in enumerate(entries(cache)):
         total += entry.size
         if number and total > limit and _remove(entry.path):
@@ -127,7 +132,20 @@ def prune(cache: str, limit: int | None = None) -> list[Entry]:
 
 def clear(cache: str) -> list[Entry]:
     """Remove all entries of a cache; what was removed."""
-    return [entry for entry in entries(cache) if _remove(entry.path)]
+    return _remove_former(cache) + [entry for entry in entries(cache) if _remove(entry.path)]
+
+
+def _remove_former(cache: str) -> list[Entry]:
+    """Remove the folder that an earlier version had for a cache; its entries that are gone."""
+    if cache not in FORMER:
+        return []
+    folder = cache_folder() / FORMER[cache]
+    if folder.is_symlink():  # it leads to what may not be ours
+        return []
+    removed = [entry for entry in _entries_in(folder) if _remove(entry.path)]
+    with contextlib.suppress(OSError):
+        folder.rmdir()
+    return removed
 
 
 def _file(cache: str, key: str) -> Path:

@@ -7,7 +7,7 @@ import pytest
 from calmotion import ShotError
 from calmotion.usd.reading import read_shot
 from pxr import Gf, UsdPhysics, UsdShade
-from small_shots import BASE, FORE, LENGTH, UPPER, WIDTH, set_float, write_arm
+from small_shots import BASE, FORE, LENGTH, UPPER, WIDTH, clear_mass, set_float, write_arm
 
 VOLUME = LENGTH * WIDTH**2
 CUBE = f"{UPPER}/box"
@@ -115,8 +115,7 @@ def test_an_open_mesh_takes_the_volume_of_its_hull_and_a_note(tmp_path):
     def edit(stage):
         from pxr import UsdGeom
 
-        for name in ("physics:mass", "physics:diagonalInertia", "physics:centerOfMass"):
-            stage.GetPrimAtPath(FORE).RemoveProperty(name)
+        clear_mass(stage, FORE)
         UsdPhysics.MassAPI(stage.GetPrimAtPath(FORE)).CreateDensityAttr(1000.0)
         UsdGeom.Mesh(stage.GetPrimAtPath(f"{FORE}/skin")).CreateHoleIndicesAttr([0])
 
