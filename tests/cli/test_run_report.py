@@ -22,10 +22,10 @@ def printed(values):
 def test_the_error_budget_is_a_table_and_the_verdict_a_sentence():
     text = printed(report())
     assert "time step   0.5 mm     0.3 mm" in text and "mesh        0.4 mm    unknown" in text
-    assert "the simulation keeps the tolerance of 1 mm: error 0.3 mm\n" in text
+    assert "the simulation keeps the tolerance of 1 mm: error 0.3 mm" in " ".join(text.split())
     measured = printed(report(verified_error_m=2e-4, verified_step_s=5e-4, verified_modes=44))
-    said = "measured simulation error 0.2 mm, against a run with steps of 0.5 ms and 44 elastic coordinates\n"
-    assert said in measured
+    said = "measured simulation error 0.2 mm, against a run with steps of 0.5 ms and 44 elastic coordinates"
+    assert said in " ".join(measured.split())
 
 
 @pytest.mark.parametrize("source", REMEDIES)
@@ -37,7 +37,7 @@ def test_a_tolerance_that_is_not_kept_is_reported_with_what_would_help(source):
 
 def test_without_an_estimate_nothing_is_claimed():
     text = printed(report(error_budget=[], tolerance_kept=False, simulation_error_m=None))
-    assert text == "the error of the simulation was not estimated; the tolerance is 1 mm\n"
+    assert text.split() == "the error of the simulation was not estimated; the tolerance is 1 mm".split()
 
 
 @pytest.mark.parametrize(("gap", "told"), [(0.0, ""), (9e-7, ""), (7.1e-5, "joints come apart by up to 0.071 mm")])
