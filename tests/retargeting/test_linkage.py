@@ -36,6 +36,7 @@ def test_the_hand_that_was_off_by_a_quarter_of_a_metre_follows_to_a_few_millimet
     assert result.stopped == "converged"
 
 
+@pytest.mark.long
 def test_the_way_through_damped_problems_is_shorter(shot):
     prepared = prepare(shot.compiled, OPTIONS)
     problem = make_problem(shot, prepared, 0.05)

@@ -2,9 +2,11 @@
 
 import json
 
+import pytest
 from calmotion.benchmarks.optimizer import baselines, optimizer
 
 
+@pytest.mark.long
 def test_gauss_newton_needs_a_fraction_of_a_quasi_newton_method(capsys):
     assert optimizer.main(["arm", "--lbfgs", "20", "--json"]) == 0
     report = json.loads(capsys.readouterr().out)
