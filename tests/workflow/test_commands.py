@@ -54,6 +54,35 @@ def test_results_are_arrays_by_prim_path(simulated):
     assert simulated.max_error == tip.max_error and simulated.rms_error == pytest.approx(tip.rms_error)
 
 
+@pytest.mark.parametrize(
+    ("first", "last", "angles"),
+    [
+        (6, 18, (10.0, 20.0)), (6.5, 17.25, None), (-12, 36, (0.0, 0.0)), (12, 13, (30.0, None)),
+        (-48, -24, (0.0, 0.0)), (48, 72, (0.0, 0.0)),
+    ],
+)  # fmt: skip
+def test_a_range_within_beyond_or_beside_the_samples_is_simulated(shot_file, first, last, angles):
+    shot_file.write_text(ONE_HINGE.replace("endTimeCode = 24", f"endTimeCode = {last}").replace(
+        "startTimeCode = 0", f"startTimeCode = {first}"
+    ))  # fmt: skip
+    motion = cm.simulate(cm.open_shot(shot_file), step="4ms").motion
+    assert motion.times[0] == pytest.approx(0.0, abs=1e-9)
+    assert motion.times[-1] == pytest.approx((last - first) / 24, abs=1 / 24)
+    found = np.degrees(motion.motors[HINGE].output)
+    for value, expected in zip((found[0], found[-1]), angles or (), strict=False):
+        assert expected is None or value == pytest.approx(expected, abs=1e-5)
+
+
+@pytest.mark.parametrize(("first", "last"), [(0, 0), (24, 0), (7, 7), (3, 3.5)])
+def test_a_range_without_two_frames_is_refused_with_what_to_author(shot_file, first, last):
+    shot_file.write_text(ONE_HINGE.replace("endTimeCode = 24", f"endTimeCode = {last}").replace(
+        "startTimeCode = 0", f"startTimeCode = {first}"
+    ))  # fmt: skip
+    with pytest.raises(cm.ShotError) as refused:
+        cm.simulate(cm.open_shot(shot_file), step="4ms")
+    assert refused.value.attribute == "endTimeCode" and "startTimeCode" in refused.value.remedy
+
+
 def test_a_shaped_motion_is_also_compared_with_its_delay(shot_file, simulated, calmotion):
     assert "shaper" not in simulated.report()
     assert calmotion("simulate", shot_file, "--shaper", "zvd").returncode != 0, "a rigid robot has no frequency"
