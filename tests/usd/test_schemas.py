@@ -7,6 +7,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pxr
+import pytest
 from calmotion.usd import schemas
 
 FOLDER = Path(schemas.plugin_path())
@@ -74,6 +76,9 @@ def test_the_path_is_known_without_importing_pxr(repository):
 
 
 def test_what_is_committed_is_what_usdgenschema_makes(tmp_path):
+    # the wheel of USD 26.5 has no sources of the schemas that ours inherit from
+    if next(Path(pxr.__file__).parent.rglob("schema.usda"), None) is None:
+        pytest.skip("this wheel of USD has no schema.usda, which usdGenSchema reads")
     command = [sys.executable, "-m", "pxr.Usd.usdGenSchema", str(FOLDER / "schema.usda"), str(tmp_path)]
     done = subprocess.run(command, capture_output=True, text=True, timeout=120)
     assert done.returncode == 0, done.stderr
