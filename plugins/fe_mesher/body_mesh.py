@@ -5,7 +5,16 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from calmotion.accuracy.element_size import ACCURACY, MAX_NODES, Shape, element_size, envelope, shape_of
+from calmotion.accuracy.element_size import (
+    ACCURACY,
+    MAX_NODES,
+    Shape,
+    element_size,
+    envelope,
+    expected_nodes,
+    shape_of,
+    smallest_size,
+)
 from calmotion.errors import ShotError
 from calmotion.geometry.tetrahedra import (
     connected_parts,
@@ -20,7 +29,7 @@ from . import cache
 from .accuracy import Accuracy, compared, estimate, finer, remark
 from .mesh_file import read_mesh_file
 from .repair import Solid, closed_solid, simplified
-from .tetwild import tetrahedralize
+from .tetwild import MORE_TIME, ProcessorTime, tetrahedralize
 
 # Wanted and largest allowed error. An error of half a percent of volume in thin walls is larger than that in a
 # frequency. Meshing tens of thousands of triangles takes minutes, so there the first allowed mesh is used.
@@ -34,7 +43,13 @@ _DETAIL, _DENSE_DETAIL, _DENSE = 0.1, 0.5, 15_000
 
 @dataclass(frozen=True)
 class MeshOptions:
-    """Settings of the user: element size [m] (negative: that of the shot), time limit [s], use of the cache."""
+    """Settings of the user.
+
+    Attributes:
+        element_size: [m]; negative: that of the shot.
+        time_limit: Of the processor time of the meshes of one body [s].
+        cache: Whether the cache is used.
+    """
 
     element_size: float = -1.0
     time_limit: float = 300.0
@@ -73,7 +88,8 @@ def mesh_body(index: int, body: Body, options: MeshOptions, carrier: Frame | Non
     solid = replace(solid, repairs=(*repairs, *solid.repairs))
     size = options.element_size if options.element_size > 0.0 else settings.element_size
     if size > 0.0:
-        return filled(index, body, solid, shape_of(solid.points, solid.triangles), size, options)
+        shape = shape_of(solid.points, solid.triangles)
+        return filled(index, body, solid, shape, size, ProcessorTime(options.time_limit), options.cache)
     return _accurate(index, body, solid, options, carrier)
 
 
@@ -95,6 +111,7 @@ def _authored(index: int, geometry: TetGeometry, repairs: tuple[str, ...]) -> FE
 def _accurate(index: int, body: Body, solid: Solid, options: MeshOptions, carrier: Frame | None) -> FEMesh:
     """Tetrahedra fine enough for the first frequencies; their size is stored with the meshes."""
     shape = shape_of(solid.points, solid.triangles)
+    time = ProcessorTime(options.time_limit)
     assert body.flexible is not None
     held = None if carrier is None else carrier.position.tolist()
     rule = {"accuracy": ACCURACY, "nodes": MAX_NODES, "held": held, "poisson": body.flexible.material.poissons_ratio}
@@ -103,17 +120,17 @@ def _accurate(index: int, body: Body, solid: Solid, options: MeshOptions, carrie
     stored = cache.load(key, ("size", "error", "nodes")) if options.cache else None
     if stored is not None:
         size, error, nodes = (float(value) for value in stored)
-        mesh = filled(index, body, solid, shape, size, options)
+        mesh = filled(index, body, solid, shape, size, time, options.cache)
         return _with_accuracy(mesh, Accuracy(error, int(nodes)))
     size = element_size(shape)
-    mesh = filled(index, body, solid, shape, size, options)
+    mesh = filled(index, body, solid, shape, size, time, options.cache)
     accuracy = estimate(mesh.points, mesh.tets, body, carrier)
     for _ in range(_REFINEMENTS):
         smaller = finer(size, accuracy, shape)
         if smaller is None:
             break
         size, before = smaller, accuracy
-        mesh = filled(index, body, solid, shape, size, options)
+        mesh = filled(index, body, solid, shape, size, time, options.cache)
         accuracy = compared(before, estimate(mesh.points, mesh.tets, body, carrier))
     if options.cache:
         cache.store(key, {"size": np.array(size), "error": np.array(accuracy.error), "nodes": np.array(accuracy.nodes)})
@@ -125,7 +142,9 @@ def _with_accuracy(mesh: FEMesh, accuracy: Accuracy) -> FEMesh:
     return replace(mesh, quality=replace(mesh.quality, repairs=repairs, frequency_error=accuracy.error))
 
 
-def filled(index: int, body: Body, solid: Solid, shape: Shape, size: float, options: MeshOptions) -> FEMesh:
+def filled(
+    index: int, body: Body, solid: Solid, shape: Shape, size: float, time: ProcessorTime, use_cache: bool = True
+) -> FEMesh:
     """Tetrahedra of uniform size that fill a solid.
 
     Args:
@@ -134,11 +153,13 @@ def filled(index: int, body: Body, solid: Solid, shape: Shape, size: float, opti
         solid: Closed.
         shape: Of the solid.
         size: Edge length [m].
-        options: Time limit and cache; the element size is not used.
+        time: Processor time of the body.
+        use_cache: Whether the cache folder is used.
 
     Raises:
         ShotError: The solid cannot be meshed, or the tetrahedra do not fill it.
     """
+    _refuse_too_many(shape, size, time, body.path)
     diagonal = float(np.linalg.norm(np.ptp(solid.points, axis=0)))
     dense = len(solid.triangles) > _DENSE
     volumes: list[float] = []
@@ -146,7 +167,7 @@ def filled(index: int, body: Body, solid: Solid, shape: Shape, size: float, opti
     for attempt in range(_ATTEMPTS):
         distance = envelope(size, diagonal, shape.thickness, len(solid.triangles), attempt)
         surface = simplified(solid, (_DENSE_DETAIL if dense else _DETAIL) * distance)
-        points, tets = tetrahedralize(*surface, size, distance / diagonal, body.path, options.time_limit, options.cache)
+        points, tets = tetrahedralize(*surface, size, distance / diagonal, body.path, time, use_cache)
         tets, _ = oriented_tets(points, tets, body.path)
         points, tets = without_unused_points(points, tets)
         quality = measure_quality(points, tets, surface_volume=solid.volume, repairs=solid.repairs)
@@ -168,6 +189,18 @@ def filled(index: int, body: Body, solid: Solid, shape: Shape, size: float, opti
         path=body.path, found=f"volume error {100.0 * error:.2g}%, allowed {100.0 * MAX_VOLUME_ERROR:.2g}%",
         remedy="Author a smaller calm:flexible:elementSize, repair the Mesh, or give a TetMesh or a mesh file",
     )  # fmt: skip
+
+
+def _refuse_too_many(shape: Shape, size: float, time: ProcessorTime, path: str) -> None:
+    """Refuse a mesh that would exceed the limit of processor time on any machine, before the time is spent."""
+    nodes = expected_nodes(shape, size)
+    if nodes > time.nodes:
+        least, limit = smallest_size(shape, int(time.nodes)), time.limit * nodes / time.nodes
+        raise ShotError(
+            f"its mesh would have about {nodes:.1e} nodes, too many for {time.limit:g} s of processor time",
+            path=path, attribute="calm:flexible:elementSize", found=f"{size:.3g} m",
+            remedy=f"Author at least {least:.2g} m" + MORE_TIME.format(limit),
+        )  # fmt: skip
 
 
 def solid_of(body: Body, surfaces: tuple[SurfaceMesh, ...]) -> Solid:

@@ -74,7 +74,8 @@ def closed_parts(points: np.ndarray, triangles: np.ndarray, path: str, repairs: 
                 opened.append((piece, error))
     if crumbs:
         repairs.append(f"{path}: removed {crumbs} stray scraps of surface")
-    points_of_parts = {tuple(point) for part in parts for point in part.points.tolist()}
+    # a set of a million points takes seconds: only where there are open pieces
+    points_of_parts = {tuple(point) for part in parts for point in part.points.tolist()} if opened else set()
     for piece, reason in opened:
         on_a_part = sum(tuple(point) in points_of_parts for point in piece.points.tolist()) >= 2
         if not parts or surface_area(piece.points, piece.triangles) > (_FIN if on_a_part else _SHEET) * area:

@@ -33,7 +33,7 @@ class TetrahedralizeFlexibleBodies(Operator):
             300.0,
             unit="s",
             minimum=1.0,
-            description="Largest time for the mesh of one body.",
+            description="Largest processor time for the meshes of one body.",
         ),
         Property("cache", bool, True, description="Store meshes in the cache folder and reuse them."),
     )

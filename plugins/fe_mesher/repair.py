@@ -7,15 +7,18 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from calmotion.errors import ShotError
-from calmotion.geometry.closed_surfaces import winding_number
+from calmotion.geometry.closed_surfaces import winding_number, winding_numbers
 from calmotion.shot import SurfaceMesh
 
 from .bridges import bridged
 from .closing import REMEDY, Part, closed_parts, connected_pieces
-from .uniting import NotManifold, united
+from .uniting import NotManifold, united, without_detail
 
 _INVERTED, _PLACES = 0.02, 200  # largest share of the surface that is inside out; number of sample points
 _LOOSE = 1e-2  # of the volume: loose pieces such as screws
+# Number of triangles from which a surface is decimated; distances, of the size, the largest half of the narrowest
+# envelope of a mesh; largest change of the volume
+_MANY, _TOLERANCES, _LOST = 200_000, (3e-5, 1e-4), 1e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,20 +81,38 @@ def closed_solid(surfaces: Sequence[SurfaceMesh], body: str) -> Solid:
             "its surface intersects itself, and a part of it is inside out", path=body,
             found=f"{100.0 * inverted:.2g}% of the surface", remedy="Untwist it, or author a TetMesh below the body",
         )  # fmt: skip
-    points = whole.points * scale + center
-    return Solid(points, whole.triangles.astype(np.int32), whole.volume * scale**3, tuple(repairs))
+    volume = whole.volume * scale**3
+    whole = _decimated(whole, scale, repairs)
+    return Solid(whole.points * scale + center, whole.triangles.astype(np.int32), volume, tuple(repairs))
 
 
 def simplified(solid: Solid, tolerance: float) -> tuple[np.ndarray, np.ndarray]:
     """Points and triangles of a solid without detail below a tolerance [m]; this halves the time for dense surfaces."""
-    import manifold3d
+    coarse = without_detail(Part(solid.points, solid.triangles), tolerance)
+    return coarse.points, coarse.triangles.astype(np.int32)
 
-    surface = manifold3d.Mesh64(solid.points, solid.triangles.astype(np.uint64))
-    coarse = manifold3d.Manifold(surface).simplify(tolerance)
-    if coarse.is_empty():  # not an exact manifold: the tetrahedraliser takes the original surface
-        return solid.points, solid.triangles
-    mesh = coarse.to_mesh64()
-    return np.array(mesh.vert_properties, dtype=float)[:, :3], np.array(mesh.tri_verts, dtype=np.int32)
+
+def _decimated(whole: Part, scale: float, repairs: list[str]) -> Part:
+    """A huge surface without detail far below what the mesh resolves: each later step then takes seconds.
+
+    The volume that meshes are compared with remains that of the whole surface.
+    """
+    count = len(whole.triangles)
+    coarse, used, lost = whole, 0.0, 0.0
+    for tolerance in _TOLERANCES:
+        if len(coarse.triangles) <= _MANY:
+            break
+        made = without_detail(whole, tolerance)
+        error = abs(made.volume / whole.volume - 1.0)
+        if error > _LOST:
+            break
+        coarse, used, lost = made, tolerance, error
+    if len(coarse.triangles) < count:
+        repairs.append(
+            f"decimated {count} triangles to {len(coarse.triangles)}: distance up to {1e3 * scale * used:.2g} mm, "
+            f"volume error {lost:.2g}"
+        )
+    return coarse
 
 
 def _checked(surface: SurfaceMesh, repairs: list[str]) -> SurfaceMesh:
@@ -209,7 +230,7 @@ def _inside_out(whole: Part) -> float:
     chosen = np.minimum(np.searchsorted(upto, upto[-1] * (np.arange(_PLACES) + 0.5) / _PLACES), len(x) - 1)
     weights = np.random.default_rng(2).dirichlet(np.full(3, 2.0), _PLACES)
     places = np.einsum("ij,ijk->ik", weights, x[chosen]) - 1e-6 * normal[chosen] / area[chosen, None]
-    return sum(winding_number(place, whole.points, whole.triangles) < 0.5 for place in places) / _PLACES
+    return float((winding_numbers(places, whole.points, whole.triangles) < 0.5).mean())
 
 
 def _in_one_piece(whole: Part, scale: float, repairs: list[str], body: str) -> Part:

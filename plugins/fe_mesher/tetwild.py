@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import contextlib
+import resource
+import signal
 import subprocess
 import sys
 import tempfile
+from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
 
@@ -15,15 +19,38 @@ from calmotion.geometry.tetrahedra import flat_tets
 from . import cache
 
 _REMEDY = "Simplify or repair the Mesh, author a larger calm:flexible:elementSize, or give a TetMesh or a mesh file"
+MORE_TIME = ", or allow more with --set fe.mesh.time_limit={:.0f}"
 _STOP_ENERGY = 10.0
 _TRIES = 3  # attempts at a mesh without flat elements
 # Passes that improve the elements. With tens of thousands of surface triangles, more passes do not improve the smallest
 # angles and take most of the time.
 _PASSES, _DENSE_PASSES, _DENSE = 80, 12, 15_000
+# A process that takes no processor time, such as one that is blocked, ends after this many times its limit.
+_PATIENCE = 20.0
+# Processor time of a node [s]: a quarter of that measured with 4,000 to 130,000 nodes, for faster machines
+_SECONDS = 7e-5
+
+
+@dataclass
+class ProcessorTime:
+    """Processor time of fTetWild for one body. Unlike elapsed time it does not depend on what else a machine does.
+
+    Attributes:
+        limit: Allowed [s].
+        used: So far [s].
+    """
+
+    limit: float
+    used: float = 0.0
+
+    @property
+    def nodes(self) -> float:
+        """Number of nodes of ten-node tetrahedra that the limit allows on any machine."""
+        return self.limit / _SECONDS
 
 
 def tetrahedralize(
-    points: np.ndarray, triangles: np.ndarray, element_size: float, envelope: float, path: str, time_limit: float,
+    points: np.ndarray, triangles: np.ndarray, element_size: float, envelope: float, path: str, time: ProcessorTime,
     use_cache: bool,
 ) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
     """Tetrahedra of a closed surface.
@@ -37,14 +64,14 @@ def tetrahedralize(
         element_size: Edge length [m].
         envelope: Largest distance to the surface, relative to the diagonal of the bounding box.
         path: Prim path, for errors.
-        time_limit: [s].
+        time: Of the body; increased by that of the mesh.
         use_cache: Whether the cache folder is used.
 
     Returns:
         Points [m], shape [k, 3], and tetrahedra, shape [e, 4].
 
     Raises:
-        ShotError: fTetWild crashed, exceeded the time limit, or made no tetrahedra.
+        ShotError: fTetWild crashed, exceeded the limit of processor time, or made no tetrahedra.
     """
     passes = _DENSE_PASSES if len(triangles) > _DENSE else _PASSES
     settings: dict[str, object] = {
@@ -59,7 +86,7 @@ def tetrahedralize(
     mesh = cache.load(key) if use_cache else None
     if mesh is None or flat_tets(*mesh).any():
         for _ in range(_TRIES):
-            mesh = _run(points, triangles, element_size, envelope, passes, path, time_limit)
+            mesh = _run(points, triangles, element_size, envelope, passes, path, time)
             if not flat_tets(*mesh).any():
                 break
         assert mesh is not None
@@ -70,7 +97,7 @@ def tetrahedralize(
 
 def _run(
     points: np.ndarray, triangles: np.ndarray, element_size: float, envelope: float, passes: int, path: str,
-    time_limit: float,
+    time: ProcessorTime,
 ) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
     # in units of the bounding box, about its center: the tolerances of fTetWild then fit any size
     low, high = points.min(axis=0), points.max(axis=0)
@@ -89,25 +116,54 @@ def _run(
         # -P: the folder of the plugin must not precede the libraries on the path
         worker = Path(__file__).with_name("tetwild_worker.py")
         command = [sys.executable, "-P", str(worker), str(source), str(destination)]
-        try:
-            # fTetWild writes a file into its working folder
-            done = subprocess.run(
-                command, capture_output=True, timeout=time_limit, stdin=subprocess.DEVNULL, cwd=folder
-            )
-        except subprocess.TimeoutExpired:
-            raise ShotError(
-                "tetrahedralising exceeded the time limit", path=path,
-                found=f"{len(triangles)} triangles, {time_limit:g} s",
-                remedy=_REMEDY + ", or allow more with --set fe.mesh.time_limit=",
-            ) from None  # fmt: skip
-        if done.returncode != 0 or not destination.is_file():
-            last = done.stderr.decode(errors="replace").strip().splitlines()[-1:] or ["no message"]
+        status, messages = _limited(command, folder, time, f"{len(triangles)} triangles", path)
+        if status != 0 or not destination.is_file():
+            last = messages.decode(errors="replace").strip().splitlines()[-1:] or ["no message"]
             raise ShotError(
                 "the tetrahedraliser failed",
-                path=path, found=f"exit status {done.returncode}: {last[0]}", remedy=_REMEDY,
+                path=path, found=f"exit status {status}: {last[0]}", remedy=_REMEDY,
             )  # fmt: skip
         with np.load(destination) as file:
             made, tets = file["points"] * diagonal + center, file["tets"]
+            time.used += float(file["seconds"])
     if len(tets) == 0:
         raise ShotError("the surface encloses no volume", path=path, found="no tetrahedra", remedy=_REMEDY)
     return made, tets
+
+
+def _limited(command: list[str], folder: str, time: ProcessorTime, size: str, path: str) -> tuple[int, bytes]:
+    """Exit status and standard error of a process with what is left of the processor time.
+
+    Args:
+        command: Of the process.
+        folder: Its working folder; fTetWild writes a file into it.
+        time: Of the body.
+        size: Of the surface, for errors.
+        path: Prim path of the body.
+    """
+    left = max(int(np.ceil(time.limit - time.used)), 1)
+    with subprocess.Popen(
+        command, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, cwd=folder
+    ) as process:
+        with contextlib.suppress(ProcessLookupError):  # it has ended
+            _, hard = resource.prlimit(process.pid, resource.RLIMIT_CPU)
+            allowed = left if hard == resource.RLIM_INFINITY else min(left, hard)
+            resource.prlimit(process.pid, resource.RLIMIT_CPU, (allowed, hard))
+            resource.prlimit(process.pid, resource.RLIMIT_CORE, (0, 0))  # no core file of the signal at the limit
+        try:
+            _, messages = process.communicate(timeout=_PATIENCE * left)
+        except subprocess.TimeoutExpired:
+            process.kill()
+            raise ShotError(
+                "the tetrahedraliser does not end", path=path,
+                found=f"{size}, {_PATIENCE * left:g} s without using {left} s of processor time", remedy=_REMEDY,
+            ) from None  # fmt: skip
+        except BaseException:  # an interrupt
+            process.kill()
+            raise
+        if process.returncode == -signal.SIGXCPU:
+            raise ShotError(
+                "tetrahedralising exceeded the limit of processor time", path=path,
+                found=f"{size}, {time.limit:g} s", remedy=_REMEDY + MORE_TIME.format(4.0 * time.limit),
+            )  # fmt: skip
+        return process.returncode, messages

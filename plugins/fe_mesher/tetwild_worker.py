@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib.util
 import sys
+import time
 import types
 
 import numpy as np
@@ -34,7 +35,8 @@ def main(source: str, destination: str) -> None:
             vtk_ordering=True,
             num_threads=1,
         )
-    np.savez(destination, points=points, tets=np.ascontiguousarray(tets, dtype=np.int32))
+    tets = np.ascontiguousarray(tets, dtype=np.int32)
+    np.savez(destination, points=points, tets=tets, seconds=time.process_time())
 
 
 if __name__ == "__main__":

@@ -28,6 +28,15 @@ def united(parts: Sequence[Part]) -> Part:
     return part_of(manifold3d.Manifold.batch_boolean([manifold_of(part) for part in parts], manifold3d.OpType.Add))
 
 
+def without_detail(part: Part, tolerance: float) -> Part:
+    """A closed surface without detail below a distance; the same one where manifold3d refuses it."""
+    try:
+        coarse = manifold_of(part).simplify(tolerance)
+    except NotManifold:  # closed only with directed edges counted: the tetrahedraliser takes the original surface
+        return part
+    return part if coarse.is_empty() else part_of(coarse)
+
+
 def manifold_of(part: Part) -> Any:
     """The manifold3d.Manifold of a closed surface."""
     import manifold3d

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from calmotion.geometry.closed_surfaces import boundary_walks, close, winding_number
+from calmotion.geometry.closed_surfaces import boundary_walks, close, winding_number, winding_numbers
 from calmotion.geometry.tetrahedra import boundary_triangles, surface_volume
 
 
@@ -49,3 +49,27 @@ def test_the_winding_number_distinguishes_inside_outside_and_twice_inside(box):
     assert winding_number(np.array([1.4, 0.5, 0.6]), points, triangles) == pytest.approx(0.0, abs=1e-12)
     double = np.vstack([triangles, triangles + len(points)])
     assert winding_number(np.array([0.4, 0.5, 0.6]), np.vstack([points, points + 0.1]), double) == pytest.approx(2.0)
+
+
+@pytest.mark.parametrize("bent", [0.0, 0.3])
+def test_many_winding_numbers_of_a_large_surface_are_those_of_each_place(bent):
+    """A torus with ripples, at places just below and above its surface, far from it and in its hole."""
+    u, v = np.meshgrid(np.arange(300) * 2 * np.pi / 300, np.arange(100) * 2 * np.pi / 100, indexing="ij")
+
+    def places_at(radius, u, v):
+        around = 1.0 + radius * (1.0 + bent * np.sin(20 * u) * np.cos(3 * v)) * np.cos(v)
+        return np.stack([around * np.cos(u), around * np.sin(u), radius * np.sin(v)], axis=-1).reshape(-1, 3)
+
+    k = np.arange(30_000).reshape(300, 100)
+    right, up = np.roll(k, -1, 0), np.roll(k, -1, 1)
+    both = np.roll(right, -1, 1)
+    triangles = np.concatenate([np.stack([k, right, up], -1), np.stack([up, right, both], -1)]).reshape(-1, 3)
+    points = places_at(0.2, u, v)
+    chosen = np.random.default_rng(0).uniform(0.0, 2.0 * np.pi, (2, 30))
+    places = np.vstack(
+        [places_at(radius, *chosen) for radius in (0.05, 0.199, 0.201, 0.5)] + [np.eye(3), np.zeros((1, 3))]
+    )
+    found = winding_numbers(places, points, triangles)
+    assert len(triangles) == 60_000
+    assert np.abs(found - [winding_number(place, points, triangles) for place in places]).max() < 0.02
+    assert found[:60] == pytest.approx(1.0, abs=0.03) and found[60:90] == pytest.approx(0.0, abs=0.03)

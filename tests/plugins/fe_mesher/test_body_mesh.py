@@ -1,5 +1,7 @@
 """Which of a body's surfaces count, and whether the tetrahedra fill them."""
 
+import re
+
 import numpy as np
 import pytest
 from calmotion.errors import ShotError
@@ -51,3 +53,15 @@ def test_tetrahedra_that_do_not_fill_the_surface_are_refused(host, package, monk
     with pytest.raises(ShotError, match="do not fill .* seems to intersect itself"):
         run(host, link(surface(box())))
     assert len(calls) == 3 and calls == sorted(calls, reverse=True)
+
+
+@pytest.mark.parametrize("size", [1e-4, 1e-9])
+def test_elements_that_are_too_many_for_the_limit_are_refused_before_the_mesher_runs(host, package, monkeypatch, size):
+    monkeypatch.setattr(package("body_mesh"), "tetrahedralize", lambda *arguments: pytest.fail("meshed"))
+    with pytest.raises(ShotError, match="too many") as caught:
+        run(host, link(surface(box()), element_size=size))
+    assert (caught.value.path, caught.value.attribute) == ("/Arm/link", "calm:flexible:elementSize")
+    least = float(re.search(r"at least ([0-9.e-]+) m", caught.value.remedy).group(1))
+    monkeypatch.undo()
+    shape = package("body_mesh").shape_of(np.array(box().vertices), np.array(box().faces))
+    assert package("body_mesh").expected_nodes(shape, 1.1 * least) * package("tetwild")._SECONDS < 300.0

@@ -138,3 +138,23 @@ def test_links_in_several_colours_and_with_gaps_of_a_tenth_of_a_millimetre_are_c
     made = solid(package, *(s for s in found.body.surfaces if s.visible))
     assert made.volume == pytest.approx(volume, rel=5e-3)
     assert any(re.search("joined 2 open|bridged gaps of up to 0.1 mm", repair) for repair in made.repairs)
+
+
+def test_a_huge_surface_is_decimated_within_the_reported_distance(package):
+    ball = trimesh.creation.icosphere(subdivisions=7, radius=0.05)
+    made = solid(package, surface(ball))
+    assert len(ball.faces) > 300_000 and len(made.triangles) < 200_000
+    (text,) = made.repairs
+    distance = 1e-3 * float(re.search(r"distance up to ([0-9.e-]+) mm", text).group(1))
+    centers = made.points[made.triangles].mean(axis=1)
+    flat = 0.05 - np.linalg.norm(ball.triangles_center, axis=1).min()  # depth of the input's own faces below the ball
+    assert (0.05 - np.linalg.norm(centers, axis=1)).max() <= distance + flat < 2e-4 * 0.1
+    assert np.allclose(np.linalg.norm(made.points, axis=1), 0.05, rtol=1e-6)
+    assert made.volume == pytest.approx(ball.volume, rel=1e-9)  # with which meshes are compared
+    assert trimesh.Trimesh(made.points, made.triangles).volume == pytest.approx(ball.volume, rel=1e-3)
+
+
+def test_a_surface_that_has_few_triangles_is_kept(package):
+    ball = trimesh.creation.icosphere(subdivisions=5, radius=0.05)
+    made = solid(package, surface(ball))
+    assert len(made.triangles) == len(ball.faces) and not made.repairs

@@ -9,7 +9,10 @@ from mesher_links import box
 @pytest.mark.parametrize(
     ("code", "limit", "problem"),
     [
-        ("import time; time.sleep(60)", 0.5, "exceeded the time limit"),
+        ("while True: pass", 1.0, "exceeded the limit of processor time"),
+        ("import time; time.sleep(600)", 0.1, "does not end"),
+        # a busy machine takes longer, but no more processor time
+        ("import time; time.sleep(1.5); raise SystemExit('done')", 0.1, "done"),
         ("import os; os.abort()", 60.0, "exit status -6"),
         ("raise SystemExit('no memory')", 60.0, "no memory"),
     ],
@@ -18,10 +21,28 @@ def test_a_mesher_that_crashes_or_hangs_takes_only_itself_down(package, monkeypa
     tetwild = package("tetwild")
     (tmp_path / "tetwild_worker.py").write_text(code)
     monkeypatch.setattr(tetwild, "__file__", str(tmp_path / "tetwild.py"))
+    monkeypatch.setattr(tetwild, "_PATIENCE", 5.0)
     cube = box()
     with pytest.raises(ShotError, match=problem) as caught:
-        tetwild.tetrahedralize(np.array(cube.vertices), np.array(cube.faces), 0.01, 1e-3, "/Arm/link", limit, False)
+        tetwild.tetrahedralize(
+            np.array(cube.vertices), np.array(cube.faces), 0.01, 1e-3, "/Arm/link", tetwild.ProcessorTime(limit), False
+        )
     assert caught.value.path == "/Arm/link" and "elementSize" in caught.value.remedy
+
+
+def test_the_limit_is_that_of_all_meshes_of_a_body(package):
+    tetwild, cube = package("tetwild"), box()
+    time = tetwild.ProcessorTime(60.0)
+    surface = np.array(cube.vertices), np.array(cube.faces)
+    spent = [0.0]
+    for size in (0.02, 0.019):
+        tetwild.tetrahedralize(*surface, size, 1e-3, "/Arm/link", time, False)
+        spent.append(time.used)
+    assert 0.0 < spent[1] < spent[2] < 60.0
+    time.limit = time.used  # what is left is not enough to load the libraries for a fine mesh
+    with pytest.raises(ShotError, match="processor time") as caught:
+        tetwild.tetrahedralize(*surface, 0.001, 1e-4, "/Arm/link", time, False)
+    assert "time_limit=" in caught.value.remedy and "12 triangles" in str(caught.value)
 
 
 @pytest.mark.parametrize("kept", [False, True])
@@ -38,6 +59,6 @@ def test_a_mesh_with_a_flat_element_is_made_again(package, monkeypatch, tmp_path
     cube = box()
     for _ in range(2):  # the second time from the cache
         points, _ = tetwild.tetrahedralize(
-            np.array(cube.vertices), np.array(cube.faces), 0.01, 1e-3, "/Arm/link", 60.0, True
+            np.array(cube.vertices), np.array(cube.faces), 0.01, 1e-3, "/Arm/link", tetwild.ProcessorTime(60.0), True
         )
         assert np.array_equal(points, whole[0]) and not made

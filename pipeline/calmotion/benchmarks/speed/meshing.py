@@ -61,7 +61,7 @@ def study(link: Link, sizes: Sequence[str], time_limit: float, say: Callable[[st
     Args:
         link: With surfaces.
         sizes: Multiples of the automatic size, or lengths with a unit.
-        time_limit: For one mesh [s].
+        time_limit: Processor time of one mesh [s].
         say: Told what could not be done.
 
     Raises:
@@ -70,7 +70,6 @@ def study(link: Link, sizes: Sequence[str], time_limit: float, say: Callable[[st
     from calmotion.accuracy.element_size import element_size, shape_of
 
     mesher = _mesher()
-    options = mesher.MeshOptions(cache=False, time_limit=time_limit)
     solid = mesher.solid_of(link.body, link.body.surfaces)
     shape = shape_of(solid.points, solid.triangles)
     automatic = element_size(shape)
@@ -78,7 +77,7 @@ def study(link: Link, sizes: Sequence[str], time_limit: float, say: Callable[[st
     for size in sorted((_length(text, automatic) for text in sizes), reverse=True):
         try:
             start = time.perf_counter()
-            mesh = mesher.filled(0, link.body, solid, shape, size, options)
+            mesh = mesher.filled(0, link.body, solid, shape, size, mesher.ProcessorTime(time_limit), False)
             meshed = time.perf_counter() - start
             rows.append(_row(link, size, mesh, meshed))
         except ShotError as error:
