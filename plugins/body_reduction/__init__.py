@@ -77,8 +77,9 @@ class FindSystemModes(Operator):
     idname = "dynamics.modes"
     label = "Compute the natural frequencies"
     requires = (Character, CompiledShot)
-    uses = (ConvergedReduction, Source, OutputPaths, ModelChoices)
+    uses = (ConvergedReduction, Source, OutputPaths, ModelChoices, Animation)
     provides = (SystemModes,)
+    checks = (Character, Animation, ModelChoices)
 
     @classmethod
     def poll(cls, data: Mapping[type, Any]) -> str | None:
@@ -87,6 +88,12 @@ class FindSystemModes(Operator):
             if not paths.figures and not paths.rrd:
                 return NotAsked("only figures and recordings show frequencies, and none are requested")
         return no_flexible_bodies(data)
+
+    def check(self, context: RunContext) -> None:
+        from calmotion.shot.run import RunSettings
+        from calmotion.simulation.inputs.supported import refuse_unsupported
+
+        refuse_unsupported(context.get(Character), context.get(Animation), RunSettings(pre_roll=0.0))
 
     def execute(self, context: RunContext) -> Sequence[object]:
         from calmotion.simulation.prepare import first_pose_modes

@@ -56,17 +56,50 @@ class MeshOptions:
     cache: bool = True
 
 
+@dataclass(frozen=True, eq=False)
+class Volume:
+    """A solid to be meshed, its dimensions, and the requested size of its elements [m] (not positive: automatic)."""
+
+    solid: Solid
+    shape: Shape
+    size: float
+
+
 def mesh_body(index: int, body: Body, options: MeshOptions, carrier: Frame | None = None) -> FEMesh:
-    """The tetrahedra of a flexible body: authored ones, else those of its mesh file, else of its surfaces.
+    """The tetrahedra of a flexible body; arguments and errors as of `geometry_of` and `mesh_of`."""
+    return mesh_of(index, body, geometry_of(index, body, options), options, carrier)
+
+
+def mesh_of(
+    index: int, body: Body, geometry: FEMesh | Volume, options: MeshOptions, carrier: Frame | None = None
+) -> FEMesh:
+    """The tetrahedra of a geometry.
 
     Args:
         index: Of the body in its character.
         body: With `flexible` settings.
+        geometry: See `geometry_of`.
         options: Settings of the user.
         carrier: Frame of the joint to its parent, body frame.
 
     Raises:
-        ShotError: There is no geometry, it encloses no volume, or it cannot be meshed.
+        ShotError: It cannot be meshed.
+    """
+    if isinstance(geometry, FEMesh):
+        return geometry
+    if geometry.size > 0.0:
+        time = ProcessorTime(options.time_limit)
+        return filled(index, body, geometry.solid, geometry.shape, geometry.size, time, options.cache)
+    return _accurate(index, body, geometry, options, carrier)
+
+
+def geometry_of(index: int, body: Body, options: MeshOptions) -> FEMesh | Volume:
+    """The geometry of a flexible body: authored tetrahedra, else that of its mesh file, else of its surfaces.
+
+    It is read and closed in seconds, while meshes take minutes: what is wrong with it is known before any mesh is made.
+
+    Raises:
+        ShotError: There is no geometry, it encloses no volume, or the requested elements are too small.
     """
     settings = body.flexible
     assert settings is not None
@@ -87,10 +120,10 @@ def mesh_body(index: int, body: Body, options: MeshOptions, carrier: Frame | Non
     solid = solid_of(body, surfaces)
     solid = replace(solid, repairs=(*repairs, *solid.repairs))
     size = options.element_size if options.element_size > 0.0 else settings.element_size
+    shape = shape_of(solid.points, solid.triangles)
     if size > 0.0:
-        shape = shape_of(solid.points, solid.triangles)
-        return filled(index, body, solid, shape, size, ProcessorTime(options.time_limit), options.cache)
-    return _accurate(index, body, solid, options, carrier)
+        _refuse_too_many(shape, size, ProcessorTime(options.time_limit), body.path)
+    return Volume(solid, shape, size)
 
 
 def _authored(index: int, geometry: TetGeometry, repairs: tuple[str, ...]) -> FEMesh:
@@ -108,9 +141,9 @@ def _authored(index: int, geometry: TetGeometry, repairs: tuple[str, ...]) -> FE
     return FEMesh(index, points, tets, measure_quality(points, tets, repairs=repairs))
 
 
-def _accurate(index: int, body: Body, solid: Solid, options: MeshOptions, carrier: Frame | None) -> FEMesh:
+def _accurate(index: int, body: Body, volume: Volume, options: MeshOptions, carrier: Frame | None) -> FEMesh:
     """Tetrahedra fine enough for the first frequencies; their size is stored with the meshes."""
-    shape = shape_of(solid.points, solid.triangles)
+    solid, shape = volume.solid, volume.shape
     time = ProcessorTime(options.time_limit)
     assert body.flexible is not None
     held = None if carrier is None else carrier.position.tolist()

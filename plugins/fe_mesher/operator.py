@@ -3,11 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
+from calmotion.errors import ShotError, raise_all
 from calmotion.host import Operator, Property, RunContext
 from calmotion.shot import Character, FEMeshes, ModelChoices
 from calmotion.shot.model_choice import no_flexible_bodies
+
+if TYPE_CHECKING:
+    from calmotion.shot import FEMesh
+
+    from .body_mesh import MeshOptions, Volume
 
 
 class TetrahedralizeFlexibleBodies(Operator):
@@ -47,7 +53,7 @@ class TetrahedralizeFlexibleBodies(Operator):
         """The meshes, in the order of the bodies."""
         # manifold3d takes half a second to load: only for flexible bodies
         from .accuracy import carrier_of
-        from .body_mesh import MeshOptions, mesh_body
+        from .body_mesh import MeshOptions, mesh_of
 
         choices = context.get(ModelChoices)
         character = context.get(Character) if choices is None else choices.character
@@ -57,11 +63,12 @@ class TetrahedralizeFlexibleBodies(Operator):
             cache=context.properties.cache,
         )
         flexible = [index for index, body in enumerate(character.bodies) if body.simulated_flexible]
+        geometries = _geometries(character, flexible, options)
         meshes = []
         for done, index in enumerate(flexible):
             body = character.bodies[index]
             context.progress(done / len(flexible), body.path)
-            mesh = mesh_body(index, body, options, carrier_of(character, index))
+            mesh = mesh_of(index, body, geometries[index], options, carrier_of(character, index))
             quality = mesh.quality
             context.report(
                 "info",
@@ -74,3 +81,22 @@ class TetrahedralizeFlexibleBodies(Operator):
             meshes.append(mesh)
         context.progress(1.0, "")
         return (FEMeshes(tuple(meshes)),)
+
+
+def _geometries(character: Character, flexible: Sequence[int], options: MeshOptions) -> dict[int, FEMesh | Volume]:
+    """The geometry of each flexible body, so that all that is wrong is known before the first mesh is made.
+
+    Raises:
+        ShotError: What is wrong with any of them.
+    """
+    from .body_mesh import geometry_of
+
+    geometries: dict[int, FEMesh | Volume] = {}
+    problems = []
+    for index in flexible:
+        try:
+            geometries[index] = geometry_of(index, character.bodies[index], options)
+        except ShotError as problem:
+            problems.append(problem)
+    raise_all(problems)
+    return geometries

@@ -101,8 +101,9 @@ class PlanStep(Operator):
     idname = "accuracy.step"
     label = "Choose the time step"
     requires = (Character, CompiledShot)
-    uses = (ModelChoices, Source)
+    uses = (ModelChoices, Source, Animation)
     provides = (PlannedStep,)
+    checks = (Character, Animation, Source, ModelChoices)
 
     @classmethod
     def poll(cls, data: Mapping[type, Any]) -> str | None:
@@ -115,6 +116,11 @@ class PlanStep(Operator):
         driven = {motor.joint for motor in character.motors}
         free = any(k not in driven and joint.kind != "fixed" for k, joint in enumerate(character.joints))
         return None if free else f"{reason}, and motors alone determine the motion"
+
+    def check(self, context: RunContext) -> None:
+        from calmotion.accuracy.run_checks import check_simulation
+
+        check_simulation(context.get(Character), context.get(Animation), run_settings(context.get(Source)))
 
     def execute(self, context: RunContext) -> Sequence[object]:
         from calmotion.accuracy.simulate_to_tolerance import planned_step

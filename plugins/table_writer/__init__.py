@@ -55,11 +55,18 @@ class ExportCurves(Operator):
     label = "Export the motor curves"
     requires = (Character, Animation, Provenance, Result)
     provides = (ControllerCurves,)
+    checks = (Character,)
     properties = (
         Property("file", str, "", description="File to write"),
         Property("rate", float, 500.0, unit="Hz", minimum=1.0, maximum=1e5, description="Rows per second"),
         Property("angles", str, "rad", choices=("rad", "deg"), description="Unit of angles; lengths are in m"),
     )
+
+    def check(self, context: RunContext) -> None:
+        """A file that is named and can be written, and motors."""
+        from .curves import refuse_unwritable
+
+        refuse_unwritable(context.properties.file, context.get(Character))
 
     def execute(self, context: RunContext) -> Sequence[object]:
         """Write the curves; their path."""

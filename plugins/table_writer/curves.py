@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
 from calmotion.errors import ShotError
 from calmotion.shot import Animation, Character, Motor, Provenance, Result
 from calmotion.shot.curves import commanded_values
-from calmotion.support.files import write_text
+from calmotion.support.files import try_writing, write_text
 
 
 def write_curves(
@@ -20,16 +21,9 @@ def write_curves(
     """Write the motor curves atomically; returns the number of rows.
 
     Raises:
-        ShotError: No file is named, or it cannot be written.
+        ShotError: As `refuse_unwritable`.
     """
-    if not file:
-        raise ShotError(
-            "no file is named for the curves",
-            attribute="curves.export.file",
-            remedy="Name one: --set curves.export.file=curves.csv",
-        )
-    if not character.motors:
-        raise ShotError("the shot has no motors to export", path=character.path)
+    refuse_unwritable(file, character)
     end = float(animation.frame_times[-1])
     times = np.arange(math.floor(end * rate + 1e-6) + 1) / rate
     values = commanded_values(character, animation, result, times)
@@ -39,8 +33,27 @@ def write_curves(
         ",".join([f"{time:.9g}", *(f"{value:.12g}" for value in row)])
         for time, row in zip(times, values * units, strict=True)
     ]
-    _write(file, "\n".join(lines) + "\n")
+    with _refused(file):
+        write_text(file, "\n".join(lines) + "\n")
     return len(times)
+
+
+def refuse_unwritable(file: str, character: Character) -> None:
+    """Refuse curves that cannot be written.
+
+    Raises:
+        ShotError: No file is named, it cannot be written, or there are no motors.
+    """
+    if not file:
+        raise ShotError(
+            "no file is named for the curves",
+            attribute="curves.export.file",
+            remedy="Name one: --set curves.export.file=curves.csv",
+        )
+    if not character.motors:
+        raise ShotError("the shot has no motors to export", path=character.path, remedy="Leave out --run curves.export")
+    with _refused(file):
+        try_writing(file)
 
 
 def _header(character: Character, provenance: Provenance, rate: float, degrees: bool) -> Iterator[str]:
@@ -66,9 +79,11 @@ def _limits(motor: Motor, character: Character, angle: str) -> str:
     return ", ".join(f"{name} {value:.9g} {u}" for name, value, u in shown if math.isfinite(value)) or "none"
 
 
-def _write(target: str, text: str) -> None:
+@contextmanager
+def _refused(target: str) -> Iterator[None]:
+    """Errors of the file system as those of the shot."""
     try:
-        write_text(target, text)
+        yield
     except OSError as error:
         raise ShotError(
             "the curves cannot be written",

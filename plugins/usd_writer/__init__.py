@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from calmotion.host import Operator, Property, RunContext, registration
 from calmotion.shot import Animation, Character, Provenance, Result
 from calmotion.shot.outputs import WrittenLayer
-from calmotion.shot.run import OutputPaths
+from calmotion.shot.run import OutputPaths, Source
+
+if TYPE_CHECKING:
+    from calmotion.usd.writing import WriteOptions
 
 
 class WriteResult(Operator):
@@ -17,7 +20,9 @@ class WriteResult(Operator):
     idname = "usd.write"
     label = "Write the layer"
     requires = (Character, Animation, Provenance, Result, OutputPaths)
+    uses = (Source,)
     provides = (WrittenLayer,)
+    checks = (Character, Source)
     properties = (
         Property(
             "samples_per_second",
@@ -46,22 +51,37 @@ class WriteResult(Operator):
         outputs = data.get(OutputPaths)
         return "no layer is requested (-o)" if outputs is not None and outputs.layer is None else None
 
+    def check(self, context: RunContext) -> None:
+        """Options that fit each other and the motors whose curves may change."""
+        from calmotion.usd.writing import refuse_options
+
+        source, motors = context.get(Source), context.get(Character).motors
+        searches = source is not None and source.command == "optimize"
+        may_change = [motor for motor in motors if searches and motor.optimize and motor.follows is None]
+        refuse_options(self._options(context), may_change)
+
     def execute(self, context: RunContext) -> Sequence[object]:
         """The paths of both layers."""
-        from calmotion.usd.writing import WriteOptions, write_result
+        from calmotion.usd.writing import write_result
 
-        values = context.properties
-        rate = values.samples_per_second
         layer, root = write_result(
             context.get(Character),
             context.get(Animation),
             context.get(Provenance),
             context.get(Result),
             str(context.get(OutputPaths).layer),
-            WriteOptions(samples_per_second=rate if rate > 0.0 else None, splines=values.splines, bake=values.bake),
+            self._options(context),
         )
         context.report("info", f"open {root} to see {layer} together with the shot")
         return (WrittenLayer(layer=layer, root=root),)
+
+    @staticmethod
+    def _options(context: RunContext) -> WriteOptions:
+        from calmotion.usd.writing import WriteOptions
+
+        values = context.properties
+        rate = values.samples_per_second
+        return WriteOptions(samples_per_second=rate if rate > 0.0 else None, splines=values.splines, bake=values.bake)
 
 
 register, unregister = registration(WriteResult)

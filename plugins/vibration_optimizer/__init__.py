@@ -7,8 +7,8 @@ from typing import Any
 
 from calmotion.accuracy.reduced_bodies import ConvergedReduction, compiled_in
 from calmotion.host import NotAsked, Operator, Property, RunContext, registration
-from calmotion.shot import ModelChoices, Result
-from calmotion.shot.model_choice import run_settings, with_choices
+from calmotion.shot import Animation, Character, ModelChoices, Result
+from calmotion.shot.model_choice import run_settings, simplified_character, with_choices
 from calmotion.shot.outputs import ShapedTracks
 from calmotion.shot.result import is_reached
 from calmotion.shot.run import OutputPaths, Source
@@ -26,6 +26,14 @@ def _with_budget(context: RunContext, result: Result) -> Result:
 
     shot, tolerance = compiled_in(context.get), context.get(Source).settings.tolerance
     return with_budget(with_choices(result, context.get(ModelChoices)), shot.character, tolerance)
+
+
+def _input(context: RunContext) -> tuple[Character | None, Animation | None]:
+    """The character with its simplifications and its animation; None where only a compiled shot was given."""
+    character: Character | None = context.get(Character)
+    if character is not None:
+        character = simplified_character(character, context.get(ModelChoices))
+    return character, context.get(Animation)
 
 
 def _wrong_command(data: Mapping[type, Any], command: str) -> str | None:
@@ -69,12 +77,20 @@ class SimulateShot(Operator):
     idname = "retarget.simulate"
     label = "Simulate the shot"
     requires = (CompiledShot, Source)
-    uses = (ConvergedReduction, ShapedTracks, ModelChoices)
+    uses = (ConvergedReduction, ShapedTracks, ModelChoices, Character, Animation)
     provides = (Result,)
+    checks = (Character, Animation, Source, ModelChoices)
 
     @classmethod
     def poll(cls, data: Mapping[type, Any]) -> str | None:
         return _wrong_command(data, "simulate")
+
+    def check(self, context: RunContext) -> None:
+        from calmotion.accuracy.run_checks import check_simulation
+
+        character, animation = _input(context)
+        if character is not None and animation is not None:
+            check_simulation(character, animation, _options(context))
 
     def execute(self, context: RunContext) -> Sequence[object]:
         from calmotion.accuracy.simulate_to_tolerance import simulate_to_tolerance
@@ -93,8 +109,9 @@ class OptimizeShot(Operator):
     idname = "retarget.optimize"
     label = "Optimise the motor curves"
     requires = (CompiledShot, Source)
-    uses = (ConvergedReduction, OutputPaths, ModelChoices)
+    uses = (ConvergedReduction, OutputPaths, ModelChoices, Character, Animation)
     provides = (Result,)
+    checks = (Character, Animation, Source, ModelChoices)
     properties = (
         Property("max_iterations", int, 30, minimum=1, description="Largest number of Gauss-Newton iterations"),
         Property(
@@ -123,18 +140,18 @@ class OptimizeShot(Operator):
     def poll(cls, data: Mapping[type, Any]) -> str | None:
         return _wrong_command(data, "optimize")
 
+    def check(self, context: RunContext) -> None:
+        from calmotion.retargeting.run_checks import check_search
+
+        character, animation = _input(context)
+        if character is not None and animation is not None:
+            check_search(character, animation, self._search_options(context))
+
     def execute(self, context: RunContext) -> Sequence[object]:
         from calmotion.retargeting.checkpoint import checkpoint_path
         from calmotion.retargeting.to_tolerance import optimize_to_tolerance
 
-        values = context.properties
-        options = _options(
-            context,
-            max_iterations=values.max_iterations,
-            knot_spacing=values.knot_spacing if values.knot_spacing > 0.0 else None,
-            smoothness=values.smoothness if values.smoothness >= 0.0 else None,
-            adjoint=values.adjoint,
-        )
+        options = self._search_options(context)
         paths = context.get(OutputPaths)
         kept = checkpoint_path(paths.layer) if paths is not None and paths.layer else None
         converged = context.get(ConvergedReduction)
@@ -153,6 +170,17 @@ class OptimizeShot(Operator):
                 f"the new curves are worse than the animated ones: objective {before} -> {after}; {reason}",
             )
         return [_with_budget(context, result)]
+
+    @staticmethod
+    def _search_options(context: RunContext) -> Any:
+        values = context.properties
+        return _options(
+            context,
+            max_iterations=values.max_iterations,
+            knot_spacing=values.knot_spacing if values.knot_spacing > 0.0 else None,
+            smoothness=values.smoothness if values.smoothness >= 0.0 else None,
+            adjoint=values.adjoint,
+        )
 
 
 register, unregister = registration(ShapeTracks, SimulateShot, OptimizeShot)

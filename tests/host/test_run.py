@@ -186,3 +186,86 @@ def test_an_interruption_ends_the_run_and_keeps_what_is_there():
     with pytest.raises(KeyboardInterrupt):
         run.finish()
     assert run.get(Ore) == Ore()
+
+
+def refusing(*kinds):
+    """A check that refuses and records the values that it was given."""
+
+    def check(context):
+        seen.append([context.get(kind) for kind in kinds])
+        raise ShotError("the fire is too low", attribute="heat", remedy="Raise it.")
+
+    seen = []
+    return check, seen
+
+
+def test_settings_are_refused_before_work_that_only_they_would_use():
+    check, seen = refusing(Ore)
+    burn = operator("wood.burn", requires=[Ore], provides=[Coal])
+    melt = operator("smithy.melt", requires=[Ore, Coal], provides=[Iron], checks=[Ore], check=check)
+    sell = operator("smithy.sell", requires=[Iron], provides=[Steel])
+    run = host_of(DIG, burn, melt, sell).run([], [Steel]).finish()
+    assert [(result.idname, result.outcome) for result in run.results] == [
+        ("mine.dig", Outcome.DONE),
+        ("smithy.melt", Outcome.FAILED),
+        ("wood.burn", Outcome.BLOCKED),
+        ("smithy.sell", Outcome.BLOCKED),
+    ]
+    assert seen == [[Ore()]] and [failure.error.attribute for failure in run.failures()] == ["heat"]
+
+
+def test_nothing_runs_where_a_wanted_value_is_refused():
+    check, _ = refusing(Ore)
+    write = operator("smithy.write", requires=[Iron], uses=[Ore], provides=[Steel], checks=[Ore], check=check)
+    run = host_of(DIG, MELT, write).run([], [Iron, Steel]).finish()
+    assert outcomes(run) == {
+        "mine.dig": Outcome.DONE,
+        "smithy.write": Outcome.FAILED,
+        "smithy.melt": Outcome.BLOCKED,
+    }
+
+
+def test_work_that_others_use_goes_on_where_settings_of_optional_values_are_refused():
+    check, _ = refusing(Ore)
+    burn = operator("wood.burn", requires=[Ore], provides=[Coal])
+    melt = operator("smithy.melt", requires=[Ore, Coal], provides=[Iron], checks=[Ore], check=check)
+    run = host_of(DIG, burn, melt).run([], [Coal], optional=[Iron]).finish()
+    assert outcomes(run)["wood.burn"] == Outcome.DONE and run.get(Coal) == Coal()
+
+
+def test_every_operator_that_refuses_its_settings_is_reported():
+    melt = operator("smithy.melt", requires=[Ore], provides=[Iron], checks=[Ore], check=refusing(Ore)[0])
+    burn = operator("wood.burn", requires=[Ore], provides=[Coal], checks=[Ore], check=refusing(Ore)[0])
+    run = host_of(DIG, melt, burn).run([], [Iron, Coal]).finish()
+    assert [failure.idname for failure in run.failures()] == ["smithy.melt", "wood.burn"]
+
+
+def test_settings_are_checked_once_and_only_of_operators_that_run():
+    calls = []
+    check = calls.append
+    wood = operator(
+        "wood.burn", requires=[Ore], provides=[Coal], checks=[Ore], check=check, poll=lambda data: "no wood"
+    )
+    melt = operator("smithy.melt", requires=[Ore], uses=[Coal], provides=[Iron], checks=[Ore, Coal], check=check)
+    run = host_of(DIG, wood, melt).run([], [Iron]).finish()
+    assert [context.operator.idname for context in calls] == ["smithy.melt"]
+    assert calls[0].get(Coal) is None and run.get(Iron) == Iron()
+
+
+def test_a_check_sees_only_the_values_that_it_names():
+    check, seen = refusing(Ore, Coal)
+    burn = operator("wood.burn", provides=[Coal])
+    melt = operator("smithy.melt", requires=[Ore, Coal], provides=[Iron], checks=[Ore], check=check)
+    host_of(burn, DIG, melt).run([], [Iron]).finish()
+    assert seen == [[Ore(), None]]
+
+
+def test_settings_are_not_checked_where_a_value_for_it_could_not_be_made():
+    def explode(context):
+        raise ZeroDivisionError("no fire")
+
+    check, seen = refusing(Ore)
+    burn = operator("wood.burn", requires=[Ore], provides=[Coal], execute=explode)
+    melt = operator("smithy.melt", requires=[Ore], uses=[Coal], provides=[Iron], checks=[Ore, Coal], check=check)
+    run = host_of(DIG, burn, melt).run([], [Iron]).finish()
+    assert not seen and [failure.idname for failure in run.failures()] == ["wood.burn"]

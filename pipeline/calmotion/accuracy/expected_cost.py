@@ -20,7 +20,7 @@ COPIES, COPIES_OF_SEARCH = 3, 6  # states of all instants that a simulation and 
 @dataclass(frozen=True)
 class ExpectedCost:
     """Attributes:
-    frames, steps: Of the shot.
+    frames, steps: Of the shot; the steps with those of the pre-roll that the user requests.
     coordinates: Of the robot.
     hours: Processor time [h].
     memory: In bytes.
@@ -43,8 +43,9 @@ def expected_cost(character: Character, animation: Animation, options: RunSettin
     frames = len(animation.frame_times)
     steps = 1
     if frames > 1:
-        grid = make_grid(animation.frame_times, options.step or character.retarget.time_step, 0.0)
-        steps = grid.substeps * (frames - 1) + 1
+        pre_roll = options.pre_roll or 0.0
+        grid = make_grid(animation.frame_times, options.step or character.retarget.time_step, pre_roll)
+        steps = grid.pre_steps + grid.substeps * (frames - 1) + 1
     flexible = [body.flexible for body in character.bodies if body.flexible is not None]
     modes = [settings.mode_count if settings.mode_count > 0 else ELASTIC for settings in flexible]
     coordinates = 6 * len(character.bodies) + sum(modes)
@@ -80,8 +81,8 @@ def refuse_unaffordable(cost: ExpectedCost, path: str, most_hours: float, availa
         path=path,
         attribute="endTimeCode",
         found=f"{cost.frames} frames in {cost.steps} steps of {cost.coordinates} coordinates",
-        remedy="Shorten the shot (startTimeCode, endTimeCode), process it in parts, lower framesPerSecond, "
-        + otherwise,
+        remedy="Shorten the shot (startTimeCode, endTimeCode) or its --pre-roll, process it in parts, lower "
+        "framesPerSecond, " + otherwise,
     )
 
 

@@ -84,6 +84,7 @@ class Operator:
         uses: Types that are made first where some operator provides them and its poll says yes.
         provides: Types that it makes.
         properties: What can be set.
+        checks: Types among `requires` and `uses` from which `check` refuses what `execute` would refuse.
     """
 
     idname: ClassVar[str] = ""
@@ -92,12 +93,20 @@ class Operator:
     uses: ClassVar[tuple[type, ...]] = ()
     provides: ClassVar[tuple[type, ...]] = ()
     properties: ClassVar[tuple[Property, ...]] = ()
+    checks: ClassVar[tuple[type, ...]] = ()
 
     @classmethod
     def poll(cls, data: Mapping[type, Any]) -> str | None:
         """None when it runs on this data, else the reason why it is left out, as a clause for the user (`NotAsked`
         where it need not be reported)."""
         return None
+
+    def check(self, context: RunContext) -> None:
+        """Raise ShotError for settings and input that `execute` would refuse.
+
+        Called as soon as the values of `checks` are known, before the costly steps of operators in between. The
+        context has no other values.
+        """
 
     def execute(self, context: RunContext) -> Sequence[object]:
         """Make the values it provides, in the order of `provides`."""
@@ -121,7 +130,7 @@ def check_operator(cls: object) -> None:
         refuse("idname must be lower-case names separated by dots", repr(cls.idname), "Write one like fe.mesh.")
     if not (isinstance(cls.label, str) and cls.label.strip()):
         refuse("label is empty", remedy="Say in a few words what it does.")
-    for attribute in ("requires", "uses", "provides"):
+    for attribute in ("requires", "uses", "provides", "checks"):
         kinds = getattr(cls, attribute)
         if not (isinstance(kinds, tuple) and all(isinstance(kind, type) for kind in kinds)):
             refuse(f"{attribute} must be a tuple of types", repr(kinds))
@@ -141,9 +150,15 @@ def check_operator(cls: object) -> None:
             declared.check()
         except PluginError as error:
             refuse(error.problem, error.found, error.remedy)
+    foreign = set(cls.checks) - set(cls.requires + cls.uses)
+    if foreign:
+        names = ", ".join(sorted(kind.__name__ for kind in foreign))
+        refuse("checks names a type that is in neither requires nor uses", names, "Add it to one of them.")
+    if bool(cls.checks) != (cls.check is not Operator.check):
+        refuse("checks and check belong together", remedy="Name in `checks` the types that `check` reads.")
     if cls.execute is Operator.execute:
         refuse("execute is missing")
-    for method, arguments in (("poll", [{}]), ("execute", [None, None])):
+    for method, arguments in (("poll", [{}]), ("check", [None, None]), ("execute", [None, None])):
         try:
             inspect.signature(getattr(cls, method)).bind(*arguments)
         except TypeError as error:

@@ -1,4 +1,4 @@
-"""Asking operators whether they run, and finding those that would make the same value."""
+"""Asking operators whether they run, which can check their settings, and which would make the same value."""
 
 from __future__ import annotations
 
@@ -75,3 +75,16 @@ def find_rivals(
         if len(makers) > 1:
             rivals[kind] = makers
     return rivals
+
+
+def can_check(cls: type[Operator], data: Mapping[type, Any], coming: Collection[type]) -> bool:
+    """Whether an operator that is certain to run has all values from which it checks its settings.
+
+    Args:
+        data: What is known.
+        coming: Types whose values may still come.
+    """
+    if not cls.checks or any(kind in coming for kind in cls.checks):
+        return False
+    there = all(kind in data for kind in cls.checks if kind in cls.requires)
+    return there and will_run(cls, data, coming)

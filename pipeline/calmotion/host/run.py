@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 from calmotion.host.errors import PluginError
 from calmotion.host.operators import NotAsked, Operator, Record, RunContext
 from calmotion.host.plan import Plan
-from calmotion.host.polling import find_rivals, poll
+from calmotion.host.polling import can_check, find_rivals, poll, will_run
 from calmotion.host.properties import PropertyValues
 from calmotion.support import interrupts
 
@@ -87,6 +87,8 @@ class Run:
         self._failed: set[type] = set()
         self._made: dict[type, type[Operator]] = {}
         self._refused: dict[type, tuple[type[Operator], ...]] = {}
+        self._lost: set[type] = set()  # values of operators that refuse their settings, which nothing else makes
+        self._checked: dict[type[Operator], bool] = {}
         self._properties = properties
         self._owners = owners
         self._progress = progress or (lambda stage, fraction, message: None)
@@ -100,15 +102,50 @@ class Run:
             # rivals are refused before any work that only they would use
             self._refused |= find_rivals(self.plan.operators[index:], self.data, self.plan.contested)
             interrupts.check()
-            result = self._step(cls)
-            self.results.append(result)
-            yield result
+            # settings are refused before any work that only they would use
+            for refusal in self._check(self.plan.operators[index:]):
+                self.results.append(refusal)
+                yield refusal
+            if self._checked.get(cls, True):
+                result = self._step(cls)
+                self.results.append(result)
+                yield result
 
     def finish(self) -> Run:
         """Carry out all of it; returns itself."""
         for _ in self:
             pass
         return self
+
+    def _check(self, remaining: Sequence[type[Operator]]) -> list[OperatorResult]:
+        """Let the operators that have the values for it check their settings; one failure for each that refuses."""
+        coming = {kind for cls in remaining for kind in cls.provides} - self.data.keys()
+        refusals = []
+        unknown = coming | self._failed
+        # all that refuse are found at once
+        ready = [cls for cls in remaining if cls not in self._checked and can_check(cls, self.data, unknown)]
+        for cls in [cls for cls in ready if self._is_useful(cls)]:
+            self._checked[cls] = True
+            values = {kind: self.data[kind] for kind in cls.checks if kind in self.data}
+            try:
+                cls().check(RunContext(cls, values, self._properties[cls.idname]))
+            except (Exception, SystemExit) as error:  # a plugin does not end the host
+                interrupts.check()
+                self._checked[cls] = False
+                others = [one for one in remaining if one is not cls and will_run(one, self.data, coming)]
+                self._lost |= set(cls.provides).difference(*(one.provides for one in others))
+                refusals.append(self._failure(cls, error))
+        return refusals
+
+    def _is_useful(self, cls: type[Operator]) -> bool:
+        """Whether an operator is still needed without the values that cannot be made.
+
+        None is where settings of an operator whose values must come out are refused: the run then fails in any case.
+        """
+        if self._lost.intersection(self.plan.wanted):
+            return False
+        lost = self._refused.keys() | self._lost
+        return not lost or cls in self.plan.useful(lost, self.data)
 
     def _step(self, cls: type[Operator]) -> OperatorResult:
         rivals = [kind for kind in cls.provides if cls in self._refused.get(kind, ())]
@@ -121,10 +158,11 @@ class Run:
             self._failed |= set(cls.provides if failed else ())
             names = ", ".join(kind.__name__ for kind in missing)
             return self._result(cls, Outcome.BLOCKED, reason=f"there is no {names}")
-        if self._refused and cls not in self.plan.useful(self._refused, self.data):
+        if not self._is_useful(cls):
             self._failed |= set(cls.provides)
-            names = ", ".join(kind.__name__ for kind in self._refused)
-            return self._result(cls, Outcome.BLOCKED, reason=f"more than one operator makes {names}")
+            names = ", ".join(kind.__name__ for kind in self._refused or self._lost)
+            why = "more than one operator makes" if self._refused else "there is no"
+            return self._result(cls, Outcome.BLOCKED, reason=f"{why} {names}")
         start = time.perf_counter()
         context = RunContext(
             cls,

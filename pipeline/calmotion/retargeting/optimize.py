@@ -27,8 +27,9 @@ from calmotion.simulation.bodies import mode_tables, skins
 from calmotion.simulation.compiled_shot import CompiledShot
 from calmotion.simulation.forward import limited_values
 from calmotion.simulation.inputs.curves import sample_curves
+from calmotion.simulation.inputs.supported import refuse_half_turns
 from calmotion.simulation.motor_limits import Excess, excesses, motor_bounds
-from calmotion.simulation.prepare import Prepared, failure_error, lowest_frequency, prepare, refuse_half_turns
+from calmotion.simulation.prepare import Prepared, failure_error, lowest_frequency, prepare
 from calmotion.simulation.report import left_out_rows, limit_uses, performed_motion, reference_motion, simulation_of
 from calmotion.simulation.simulate import Progress, intended_motion
 from calmotion.simulation.simulator import compile_kernels
@@ -77,7 +78,7 @@ def optimize_shot(
     prepared = prepare(shot, options)
     model, grid = prepared.model, prepared.grid
     curves = sample_curves(shot.animation.tracks, grid)
-    refuse_half_turns(prepared, curves.angles)
+    refuse_half_turns(prepared.character, grid, curves.angles)
     try:
         intended = intended_motion(prepared, curves.angles, curves.rates)
         posed = pose(prepared, curves, intended, options)

@@ -10,17 +10,16 @@ from calmotion.errors import IntegrationError, ShotError
 from calmotion.multibody.analysis.deflection import largest_deflection
 from calmotion.multibody.analysis.modes import system_modes
 from calmotion.multibody.failure import Reason, SimulationFailure
-from calmotion.multibody.integrators.integrate import follows_roots
 from calmotion.multibody.model.model import Model
 from calmotion.multibody.model.topology import chain_members
 from calmotion.reduction.reduced_body import ReducedBody
 from calmotion.shot import Animation, Character
 from calmotion.shot.character import Array
-from calmotion.shot.run import INTEGRATORS, RunSettings
+from calmotion.shot.run import RunSettings
 from calmotion.simulation.compiled_shot import CompiledShot
-from calmotion.simulation.cyclic import refuse_open_loops
 from calmotion.simulation.inputs.curves import needed_pre_roll, sample_tracks
 from calmotion.simulation.inputs.roots import root_tracks, sample_roots
+from calmotion.simulation.inputs.supported import refuse_unsupported
 from calmotion.simulation.inputs.time_grid import TimeGrid, make_grid
 
 
@@ -55,14 +54,7 @@ def prepare(shot: CompiledShot, options: RunSettings) -> Prepared:
         ShotError: Something the shot asks for is not supported.
     """
     character, animation = shot.character, shot.animation
-    _refuse_unsupported(character, animation, options)
-    if len(animation.frame_times) < 2:
-        raise ShotError(
-            "a shot of one frame has no motion",
-            path=character.path,
-            attribute="endTimeCode",
-            remedy="Author startTimeCode and endTimeCode of the stage, at least a frame apart.",
-        )
+    refuse_unsupported(character, animation, options)
     grid = grid_of(character, animation, options)
     return Prepared(shot, grid, sample_roots(animation.moving, grid))
 
@@ -100,67 +92,6 @@ def modes_of(prepared: Prepared) -> tuple[Array, Array]:
 def lowest_frequency(prepared: Prepared) -> float:
     """The lowest of them [Hz]; 0 where there is none."""
     return float(next(iter(modes_of(prepared)[0]), 0.0))
-
-
-def _refuse_unsupported(character: Character, animation: Animation, options: RunSettings) -> None:
-    if character.retarget.cyclic:
-        refuse_open_loops(character, animation)
-        if options.pre_roll:
-            raise ShotError(
-                "a shot that loops has no beginning to ease into",
-                path=character.path,
-                attribute="--pre-roll",
-                found=f"{options.pre_roll:g} s",
-                remedy="Leave it out, or set calm:retarget:cyclic to false.",
-            )
-        if options.scheme != "bdf2":
-            raise IntegrationError(
-                "only bdf2 simulates cyclic shots",
-                path=character.path,
-                attribute="--integrator",
-                found=options.scheme,
-                remedy="Leave it out, or set calm:retarget:cyclic to false.",
-            )
-    if options.scheme not in INTEGRATORS:
-        raise ShotError(
-            "there is no such integrator",
-            attribute="--integrator",
-            found=options.scheme,
-            remedy=f"Use one of {', '.join(INTEGRATORS)}.",
-        )
-    if animation.moving and not follows_roots(options.scheme):
-        raise IntegrationError(
-            "this integrator does not support roots that move",
-            path=character.joints[animation.moving[0].joint].path,
-            attribute="--integrator",
-            found=options.scheme,
-            remedy=f"Use one of {', '.join(filter(follows_roots, INTEGRATORS))}.",
-        )
-
-
-def refuse_half_turns(prepared: Prepared, angles: Array) -> None:
-    """Motors must not turn by half a turn within a step: nothing could tell which way they went.
-
-    Args:
-        angles: Of the motors, shape [T, M].
-
-    Raises:
-        ShotError: One does.
-    """
-    character, grid = prepared.character, prepared.grid
-    for k, motor in enumerate(character.motors):
-        if character.joints[motor.joint].kind != "revolute" or len(angles) < 2:
-            continue
-        turns = np.abs(np.diff(angles[:, k]))
-        n = int(np.argmax(turns))
-        if not turns[n] < np.pi:
-            raise IntegrationError(
-                f"this motor turns by {np.degrees(turns[n]):.0f} degrees within one step of {1e3 * grid.h:.3g} ms",
-                path=motor.path,
-                attribute=motor.attribute,
-                found=f"at {grid.times[n]:.3f} s",
-                remedy="Use a smaller --step, or slow it down there.",
-            )
 
 
 def failure_error(prepared: Prepared, failure: SimulationFailure) -> ShotError:

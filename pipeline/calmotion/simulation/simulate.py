@@ -19,9 +19,10 @@ from calmotion.simulation.cyclic import SteadyState
 from calmotion.simulation.forward import limited_values, run_forward
 from calmotion.simulation.inputs.curves import sample_curves, sample_tracks
 from calmotion.simulation.inputs.shapers import shaped
+from calmotion.simulation.inputs.supported import refuse_half_turns
 from calmotion.simulation.intended_motion import rigid_motion, static_motion
 from calmotion.simulation.motor_limits import excesses, motor_bounds
-from calmotion.simulation.prepare import Prepared, failure_error, modes_of, open_joints, prepare, refuse_half_turns
+from calmotion.simulation.prepare import Prepared, failure_error, modes_of, open_joints, prepare
 from calmotion.simulation.report import left_out_rows, limit_uses, performed_motion, reference_motion, simulation_of
 from calmotion.simulation.target_errors import IntendedMotion, Objective
 
@@ -65,7 +66,7 @@ def simulate_shot(shot: CompiledShot, options: RunSettings, progress: Progress) 
     curves = sample_curves(animation.current, grid)
     angles, rates = curves.angles, curves.rates
     intended, intended_rates = sample_tracks(animation.tracks, grid)
-    refuse_half_turns(prepared, angles)
+    refuse_half_turns(character, grid, angles)
     try:
         reference = intended_motion(prepared, intended, intended_rates)
         progress(0.0, "loading kernels (compiled in the first run)")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import errno
 import hashlib
 import os
 import platform
@@ -68,6 +69,20 @@ def write_text(path: str | Path, text: str) -> None:
     """
     with replaced(path) as temporary:
         temporary.write_text(text, encoding="utf-8", newline="")
+
+
+def try_writing(path: str | Path) -> None:
+    """Make the missing folders above a file, and a temporary file there, which is removed at once.
+
+    Raises:
+        OSError: The file could not be written.
+    """
+    target = Path(path)
+    if target.is_dir():
+        raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(target))
+    target.parent.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryFile(dir=target.parent, prefix=PREFIX):
+        pass
 
 
 def is_special(path: str | os.PathLike[str]) -> bool:

@@ -14,6 +14,7 @@ from calmotion.host import Host, OperatorResult, Run, SettingError, Settings, me
 from calmotion.shot.outputs import CsvFile, Figures, Recording, WrittenLayer
 from calmotion.shot.run import INTEGRATORS, SHAPERS, OutputPaths, Source
 from calmotion.support import interrupts
+from calmotion.support.files import try_writing
 from calmotion.support.foreign_files import remedy_for
 from calmotion.workflow.problems import Cancelled, Problem, problems_of, value_of
 from calmotion.workflow.shot import Shot
@@ -23,6 +24,8 @@ _FILES = (
     (WrittenLayer, "-o", "layer"), (CsvFile, "--csv", "csv"), (Recording, "--rrd", "rrd"),
     (Figures, "--figures", "figures"),
 )  # fmt: skip
+_OUTPUTS = (*((option, name) for _, option, name in _FILES), ("--modes", "modes"))
+_FOLDERS = ("figures", "modes")
 
 
 @dataclass(frozen=True)
@@ -139,8 +142,7 @@ def carry_out(
         [*known, source, outputs], kinds, optional=optional, settings=merge([shot.settings, settings or {}]),
         progress=_listener(hooks),
     )  # fmt: skip
-    if writes:
-        _prepare_folders(shot.path, outputs)
+    _prepare_folders(shot.path, outputs)
     interrupted = cancelled = False
     try:
         for result in run:
@@ -259,20 +261,26 @@ def _prepare_folders(shot: str, outputs: OutputPaths) -> None:
     """Make the folders of the outputs, so that a path that cannot be written is refused before the long work.
 
     Raises:
-        SettingError: A folder cannot be made, or an output is the shot itself.
+        SettingError: An output cannot be written, or is the shot itself or another output.
     """
-    for _, option, name in _FILES:
+    options: dict[str, str] = {}
+    for option, name in _OUTPUTS:
         path: str | None = getattr(outputs, name)
         if path is None:
             continue
+        if (other := options.setdefault(os.path.realpath(path), option)) != option:
+            raise SettingError(
+                f"this is the output of {other} as well", path=option, found=path, remedy="Choose another."
+            )
         if os.path.realpath(path) == os.path.realpath(shot):
             raise SettingError("this file is the shot, which is never overwritten", path=option, found=path)
         try:
-            (Path(path) if name == "figures" else Path(path).parent).mkdir(parents=True, exist_ok=True)
+            try_writing(Path(path) / "file" if name in _FOLDERS else path)
         except OSError as error:
             raise SettingError(
-                "the folder cannot be made", path=option, found=f"{path}: {error.strerror}", remedy="Choose another."
-            ) from error
+                "this output cannot be written", path=option, found=f"{path}: {error.strerror}",
+                remedy="Choose another.",
+            ) from error  # fmt: skip
 
 
 def again(outcome: Outcome, wanted: type[T], *values: object, settings: Settings | None = None) -> T:

@@ -30,8 +30,11 @@ class Steel:
     amount: int = 1
 
 
-def operator(idname: str, requires=(), provides=(), uses=(), poll=None, execute=None, properties=()) -> type[Operator]:
-    """An operator class; `poll(data)` and `execute(context)` are functions, by default willing and making defaults."""
+def operator(
+    idname: str, requires=(), provides=(), uses=(), poll=None, execute=None, properties=(), checks=(), check=None
+) -> type[Operator]:
+    """An operator class; `poll(data)`, `check(context)` and `execute(context)` are functions, by default willing,
+    absent and making defaults."""
 
     def run(self: Operator, context: RunContext) -> Sequence[object]:
         return execute(context) if execute else tuple(kind() for kind in provides)
@@ -48,7 +51,9 @@ def operator(idname: str, requires=(), provides=(), uses=(), poll=None, execute=
             "properties": tuple(properties),
             "poll": classmethod(lambda cls, data: poll(data) if poll else None),
             "execute": run,
-        },
+            "checks": tuple(checks),
+        }
+        | ({"check": lambda self, context: check(context)} if check else {}),
     )
 
 

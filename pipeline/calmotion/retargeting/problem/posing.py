@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from calmotion.errors import ShotError
@@ -10,12 +12,13 @@ from calmotion.retargeting.problem.limits import LimitTerms
 from calmotion.retargeting.problem.offset_basis import OffsetBasis, basis_on, uniform_breaks
 from calmotion.retargeting.problem.offset_space import OffsetSpace
 from calmotion.retargeting.problem.problem import RetargetProblem
-from calmotion.shot import Animation
+from calmotion.shot import Animation, Character
 from calmotion.shot.character import Array, BoolArray, IntArray
 from calmotion.shot.run import RunSettings
 from calmotion.simulation.inputs.curves import Curves, sample_tracks
 from calmotion.simulation.inputs.gearing import coupling_of, leaders
-from calmotion.simulation.motor_limits import motor_bounds
+from calmotion.simulation.inputs.time_grid import TimeGrid
+from calmotion.simulation.motor_limits import Bounds, motor_bounds
 from calmotion.simulation.prepare import Prepared
 from calmotion.simulation.target_errors import IntendedMotion, Objective
 
@@ -37,12 +40,57 @@ def pose(
     Raises:
         ShotError: No motor may change, or options contradict each other.
     """
-    character, grid, settings = prepared.character, prepared.grid, prepared.character.retarget
-    animation = prepared.shot.animation
-    motors = leaders(character)
+    character, grid, animation = prepared.character, prepared.grid, prepared.shot.animation
+    known = unknowns(character, animation, grid, options)
+    smoothness = next(v for v in (options.smoothness, character.retarget.smoothness, SMOOTHNESS) if v is not None)
+    problem = RetargetProblem(
+        prepared.model, grid, curves, Objective.over(prepared.model, intended, grid, animation.weights),
+        OffsetSpace(known.basis, known.motors, known.coupling, smoothness, CLOSENESS), prepared.world,
+        LimitTerms(known.bounds, grid.judged, grid.h, 1.0) if known.bounds else None, known.continuous,
+    )  # fmt: skip
+    offsets = known.offsets
+    start = fitted(known.basis, offsets).ravel() if np.any(offsets) else np.zeros(problem.size)
+    return problem, np.where(known.fixed, 0.0, start), not _spacing(character, options)
+
+
+@dataclass(frozen=True, eq=False)
+class Unknowns:
+    """What a search may change, from the shot's input alone.
+
+    Attributes:
+        basis: Of the offsets.
+        motors: Those with unknowns, shape [m].
+        coupling: Of all motors to these, shape [M, m].
+        offsets: The offsets that the shot already contains, shape [T, m].
+        fixed: Coefficients that change a curve where the shot locks it, shape [P * m].
+        bounds: Limits by the name of their quantity.
+        continuous: Whether the adjoint is continuous.
+    """
+
+    basis: OffsetBasis
+    motors: IntArray
+    coupling: Array
+    offsets: Array
+    fixed: BoolArray
+    bounds: dict[str, Bounds]
+    continuous: bool
+
+
+def _spacing(character: Character, options: RunSettings) -> float | None:
+    """Requested distance of knots [s]; None where they are adaptive."""
+    return options.knot_spacing or character.retarget.knot_spacing
+
+
+def unknowns(character: Character, animation: Animation, grid: TimeGrid, options: RunSettings) -> Unknowns:
+    """What a search may change.
+
+    Raises:
+        ShotError: No motor may change, or options contradict each other.
+    """
+    settings, motors = character.retarget, leaders(character)
     coupling = coupling_of(character, motors)
-    kept_ends, offsets = settings.endpoints == "kept", existing_offsets(prepared, motors)
-    spacing = options.knot_spacing or settings.knot_spacing
+    kept_ends, offsets = settings.endpoints == "kept", existing_offsets(animation, grid, motors)
+    spacing = _spacing(character, options)
     if spacing:
         breaks = uniform_breaks(grid, spacing)
     else:
@@ -74,23 +122,15 @@ def pose(
             found=options.adjoint,
             remedy="Use the discrete adjoint.",
         )
-    smoothness = next(v for v in (options.smoothness, settings.smoothness, SMOOTHNESS) if v is not None)
-    problem = RetargetProblem(
-        prepared.model, grid, curves, Objective.over(prepared.model, intended, grid, animation.weights),
-        OffsetSpace(basis, motors, coupling, smoothness, CLOSENESS), prepared.world,
-        LimitTerms(bounds, grid.judged, grid.h, 1.0) if bounds else None, continuous,
-    )  # fmt: skip
-    start = fitted(basis, offsets).ravel() if np.any(offsets) else np.zeros(problem.size)
-    return problem, np.where(fixed, 0.0, start), not spacing
+    return Unknowns(basis, motors, coupling, offsets, fixed, bounds, continuous)
 
 
-def existing_offsets(prepared: Prepared, motors: IntArray) -> Array:
+def existing_offsets(animation: Animation, grid: TimeGrid, motors: IntArray) -> Array:
     """The offsets that the shot already contains, shape [T, m]; zero when it contains none."""
-    animation = prepared.shot.animation
     if animation.current is animation.tracks:
-        return np.zeros((len(prepared.grid.times), len(motors)))
-    intended, _ = sample_tracks([animation.tracks[k] for k in motors], prepared.grid)
-    current, _ = sample_tracks([animation.current[k] for k in motors], prepared.grid)
+        return np.zeros((len(grid.times), len(motors)))
+    intended, _ = sample_tracks([animation.tracks[k] for k in motors], grid)
+    current, _ = sample_tracks([animation.current[k] for k in motors], grid)
     return current - intended
 
 

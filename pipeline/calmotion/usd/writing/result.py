@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from calmotion.errors import ShotError
-from calmotion.shot import Animation, Character, MotorCurve, Provenance, Result
+from calmotion.shot import Animation, Character, Motor, MotorCurve, Provenance, Result
 from calmotion.usd import stages
 from calmotion.usd.clock import Clock
 from calmotion.usd.layers import refuse_input_as_output, write_layer
@@ -64,13 +65,7 @@ def write_result(
     from pxr import Sdf
 
     options = options or WriteOptions()
-    if options.splines and options.samples_per_second is not None:
-        raise ShotError(
-            "curves can be written as splines or as samples, not as both",
-            attribute="--splines",
-            found="--samples-per-second as well",
-            remedy="Remove one of the two options",
-        )
+    refuse_options(options, ())
     refuse_inputs(provenance, output)
     role = stages.MOTION if result.after is None else stages.CURVES
     clock = Clock(
@@ -97,6 +92,32 @@ def write_result(
     written |= _bake(layer, shot, result, options)
     write_layer(layer, output, lambda temporary: _validate(temporary, written, knots))
     return output, write_root(output, provenance, role)
+
+
+def refuse_options(options: WriteOptions, motors: Sequence[Motor]) -> None:
+    """Refuse options that do not fit each other, or the motors whose curves are written.
+
+    Raises:
+        ShotError: They do not.
+    """
+    if options.splines and options.samples_per_second is not None:
+        raise ShotError(
+            "curves can be written as splines or as samples, not as both",
+            attribute="--splines",
+            found="--samples-per-second as well",
+            remedy="Remove one of the two options",
+        )
+    posed = [motor for motor in motors if motor.source == "bodies"]
+    elsewhere = posed or [motor for motor in motors if motor.source == "skeleton"]
+    if elsewhere and (options.splines or (posed and options.samples_per_second is not None)):
+        raise ShotError(
+            "this motor is animated by the transforms of its bodies or by a skeleton, where curves are samples at the "
+            "frames",
+            path=elsewhere[0].path,
+            attribute=elsewhere[0].attribute,
+            found="--splines" if options.splines else "--samples-per-second",
+            remedy="Remove the option, or animate the motor by its drive",
+        )
 
 
 def refuse_inputs(provenance: Provenance, output: str) -> None:
@@ -143,17 +164,7 @@ def _write_curves(
     curves: dict[str, tuple[MotorCurve, ...]] = {"drive": (), "bodies": (), "skeleton": ()}
     for curve in _curves_to_write(character, result, shot.provenance):
         curves[character.motors[curve.motor].source] += (curve,)
-    elsewhere = curves["bodies"] or curves["skeleton"]
-    if elsewhere and (options.splines or (curves["bodies"] and options.samples_per_second is not None)):
-        motor = character.motors[elsewhere[0].motor]
-        raise ShotError(
-            "this motor is animated by the transforms of its bodies or by a skeleton, where curves are samples at the "
-            "frames",
-            path=motor.path,
-            attribute=motor.attribute,
-            found="--splines" if options.splines else "--samples-per-second",
-            remedy="Remove the option, or animate the motor by its drive",
-        )
+    refuse_options(options, [character.motors[curve.motor] for curve in (*curves["bodies"], *curves["skeleton"])])
     ensure_drives(layer, shot.stage, [character.motors[curve.motor] for curve in curves["drive"]])
     times = sample_times(animation.frame_times, options.samples_per_second)
     # what was authored with corners keeps them: samples would be read back without

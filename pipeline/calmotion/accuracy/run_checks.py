@@ -1,0 +1,31 @@
+"""What a simulation would refuse, from the shot's input alone: before meshes and finite elements are made."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from calmotion.accuracy.simulate_to_tolerance import FIRST, LAST, chooses_step
+from calmotion.shot import Animation, Character
+from calmotion.shot.run import RunSettings
+from calmotion.simulation.inputs.curves import sample_curves
+from calmotion.simulation.inputs.supported import refuse_fast_motors, refuse_half_turns, refuse_unsupported
+from calmotion.simulation.inputs.time_grid import TimeGrid
+from calmotion.simulation.prepare import grid_of
+
+
+def check_simulation(character: Character, animation: Animation, options: RunSettings) -> TimeGrid:
+    """Refuse what a simulation of a shot would refuse; the grid of its first step otherwise.
+
+    Raises:
+        ShotError: A setting that is not supported, or a motor that turns by half a turn within the shortest step.
+    """
+    refuse_unsupported(character, animation, options)
+    chooses = chooses_step(character, options)
+    grid = grid_of(character, animation, replace(options, step=FIRST) if chooses else options)
+    for tracks in {id(tracks): tracks for tracks in (animation.tracks, animation.current)}.values():
+        curves = sample_curves(tracks, grid)
+        if chooses:  # a longer step that fails is halved
+            refuse_fast_motors(character, grid, curves.rates, LAST)
+        else:
+            refuse_half_turns(character, grid, curves.angles)
+    return grid

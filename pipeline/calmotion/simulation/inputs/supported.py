@@ -1,0 +1,106 @@
+"""Settings and motions that no simulation of a shot supports; they follow from its input alone."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from calmotion.errors import IntegrationError, ShotError
+from calmotion.multibody.integrators.integrate import follows_roots
+from calmotion.shot import Animation, Character
+from calmotion.shot.character import Array
+from calmotion.shot.run import INTEGRATORS, RunSettings
+from calmotion.simulation.cyclic import refuse_open_loops
+from calmotion.simulation.inputs.time_grid import TimeGrid
+
+
+def refuse_unsupported(character: Character, animation: Animation, options: RunSettings) -> None:
+    """Refuse settings that no simulation of a shot supports.
+
+    Raises:
+        ShotError: The integrator, the pre-roll, a cyclic shot that does not close, or a shot of one frame.
+    """
+    if character.retarget.cyclic:
+        refuse_open_loops(character, animation)
+        if options.pre_roll:
+            raise ShotError(
+                "a shot that loops has no beginning to ease into",
+                path=character.path,
+                attribute="--pre-roll",
+                found=f"{options.pre_roll:g} s",
+                remedy="Leave it out, or set calm:retarget:cyclic to false.",
+            )
+        if options.scheme != "bdf2":
+            raise IntegrationError(
+                "only bdf2 simulates cyclic shots",
+                path=character.path,
+                attribute="--integrator",
+                found=options.scheme,
+                remedy="Leave it out, or set calm:retarget:cyclic to false.",
+            )
+    if options.scheme not in INTEGRATORS:
+        raise ShotError(
+            "there is no such integrator",
+            attribute="--integrator",
+            found=options.scheme,
+            remedy=f"Use one of {', '.join(INTEGRATORS)}.",
+        )
+    if animation.moving and not follows_roots(options.scheme):
+        raise IntegrationError(
+            "this integrator does not support roots that move",
+            path=character.joints[animation.moving[0].joint].path,
+            attribute="--integrator",
+            found=options.scheme,
+            remedy=f"Use one of {', '.join(filter(follows_roots, INTEGRATORS))}.",
+        )
+    if len(animation.frame_times) < 2:
+        raise ShotError(
+            "a shot of one frame has no motion",
+            path=character.path,
+            attribute="endTimeCode",
+            remedy="Author startTimeCode and endTimeCode of the stage, at least a frame apart.",
+        )
+
+
+def refuse_half_turns(character: Character, grid: TimeGrid, angles: Array) -> None:
+    """Motors must not turn by half a turn within a step: nothing could tell which way they went.
+
+    Args:
+        character: With the motors.
+        grid: The steps.
+        angles: Of the motors, shape [T, M].
+
+    Raises:
+        ShotError: One does.
+    """
+    if len(angles) > 1:
+        _refuse_turns(character, np.abs(np.diff(angles, axis=0)), grid.times, grid.h)
+
+
+def refuse_fast_motors(character: Character, grid: TimeGrid, rates: Array, h: float) -> None:
+    """As `refuse_half_turns`, for a step that is much shorter than those of the grid.
+
+    Args:
+        character: With the motors.
+        grid: Instants of the rates.
+        rates: Of the motors, shape [T, M] [rad/s].
+        h: Step [s].
+
+    Raises:
+        ShotError: A motor turns by half a turn or more within the step.
+    """
+    _refuse_turns(character, h * np.abs(rates), grid.times, h)
+
+
+def _refuse_turns(character: Character, turns: Array, times: Array, h: float) -> None:
+    for k, motor in enumerate(character.motors):
+        if character.joints[motor.joint].kind != "revolute":
+            continue
+        n = int(np.argmax(turns[:, k]))
+        if not turns[n, k] < np.pi:
+            raise IntegrationError(
+                f"this motor turns by {np.degrees(turns[n, k]):.0f} degrees within one step of {1e3 * h:.3g} ms",
+                path=motor.path,
+                attribute=motor.attribute,
+                found=f"at {times[n]:.3f} s",
+                remedy="Use a smaller --step, or slow it down there.",
+            )
