@@ -53,12 +53,14 @@ class WriteResult(Operator):
 
     def check(self, context: RunContext) -> None:
         """Options that fit each other and the motors whose curves may change."""
-        from calmotion.usd.writing import refuse_options
+        from calmotion.usd.writing import refuse_bake, refuse_options
 
         source, motors = context.get(Source), context.get(Character).motors
         searches = source is not None and source.command == "optimize"
         may_change = [motor for motor in motors if searches and motor.optimize and motor.follows is None]
         refuse_options(self._options(context), may_change)
+        if searches:
+            refuse_bake(self._options(context), motors)
 
     def execute(self, context: RunContext) -> Sequence[object]:
         """The paths of both layers."""

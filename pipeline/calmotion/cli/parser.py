@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from typing import Any
+
+from calmotion.support.naming import nearest
 
 
 class Parser(argparse.ArgumentParser):
@@ -18,19 +20,12 @@ class Parser(argparse.ArgumentParser):
         wrong = next((text for text in rest if text.startswith("-")), None)
         if wrong is not None:
             name = wrong.partition("=")[0]
-            self.error(f"there is no option {name}.{_nearest(name, self._option_string_actions)}")
+            self.error(f"there is no option {name}. {nearest(name, self._option_string_actions)}")
         return found, rest
 
     def _check_value(self, action: argparse.Action, value: Any) -> None:
         try:
             super()._check_value(action, value)
         except argparse.ArgumentError as error:
-            near = _nearest(str(value), map(str, action.choices or ()))
-            raise argparse.ArgumentError(action, f"{error.message}.{near}" if near else error.message) from None
-
-
-def _nearest(found: str, known: Iterable[str]) -> str:
-    from difflib import get_close_matches
-
-    near = get_close_matches(found, list(known), 1, 0.6)
-    return f" Did you mean {near[0]}?" if near else ""
+            near = nearest(str(value), map(str, action.choices or ()))
+            raise argparse.ArgumentError(action, f"{error.message}. {near}" if near else error.message) from None

@@ -4,11 +4,12 @@ from calmotion.host.errors import HostError, PlanError, PluginError, SettingErro
 from calmotion.host.manifest import Manifest, read_manifest
 from calmotion.host.operators import NotAsked, Operator, Record, RunContext, registration
 from calmotion.host.plan import Plan
-from calmotion.host.properties import Property, PropertyValues, nearest
+from calmotion.host.properties import Property, PropertyValues
 from calmotion.host.registry import Host, Plugin, PluginState, open_host
 from calmotion.host.run import OperatorResult, Outcome, Run
 from calmotion.host.settings import Settings, merge, read_assignment, read_settings_file
 from calmotion.host.units import parse_quantity
+from calmotion.support.naming import nearest
 
 __all__ = [
     "Host",

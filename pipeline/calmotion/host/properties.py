@@ -8,6 +8,7 @@ from typing import Any
 
 from calmotion.host.errors import PluginError, SettingError
 from calmotion.host.units import is_unit, parse_quantity
+from calmotion.support.naming import nearest
 
 _BOOLEANS = {"true": True, "yes": True, "on": True, "1": True, "false": False, "no": False, "off": False, "0": False}
 
@@ -104,14 +105,6 @@ class Property:
                 raise PluginError(f"property {self.name} has a default of the wrong type", found=repr(self.default))
         except SettingError as error:
             raise PluginError(f"property {self.name} has a wrong default: {error}") from error
-
-
-def nearest(found: str, known: Iterable[str]) -> str:
-    """A sentence with the known name that is most like one that is not known; empty where none is like it."""
-    from difflib import get_close_matches
-
-    near = get_close_matches(found, list(known), 1, 0.6)
-    return f"Did you mean {near[0]}? " if near else ""
 
 
 class PropertyValues(Mapping[str, Any]):

@@ -16,10 +16,11 @@ from calmotion.host.errors import PluginError, SettingError
 from calmotion.host.manifest import Manifest, check_requirements, read_manifest
 from calmotion.host.operators import Operator, check_operator
 from calmotion.host.plan import Plan, make_plan
-from calmotion.host.properties import PropertyValues, nearest, values_of
+from calmotion.host.properties import PropertyValues, values_of
 from calmotion.host.run import Run
 from calmotion.host.settings import Settings
 from calmotion.support import interrupts
+from calmotion.support.naming import nearest
 from calmotion.version import __version__
 
 

@@ -1,8 +1,8 @@
-"""Short names for prim paths, for people; files keep the paths."""
+"""Names for people: short ones for prim paths (files keep the paths), and right ones that are like a wrong one."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 
 def distinct_names(paths: Sequence[str]) -> dict[str, str]:
@@ -15,3 +15,30 @@ def distinct_names(paths: Sequence[str]) -> dict[str, str]:
             count += 1
         names[path] = "/".join(segments[-count:])
     return names
+
+
+def nearest(found: str, known: Iterable[str]) -> str:
+    """A sentence with the known name that is most like one that is not known; empty where none is like it.
+
+    Paths are compared by their last parts first, since most paths of a shot begin alike.
+    """
+    names = list(known)
+    near = _nearest_path(found, names) if any("/" in name for name in names) else _like(found, names)
+    return f"Did you mean {near}? " if near else ""
+
+
+def _nearest_path(found: str, paths: Sequence[str]) -> str:
+    """The path whose last part is most like that of a path; of several, the one that is most like it as a whole."""
+    ends: dict[str, list[str]] = {}
+    for path in paths:
+        ends.setdefault(path.rsplit("/", 1)[-1], []).append(path)
+    end = _like(found.rsplit("/", 1)[-1], list(ends))
+    return _like(found, ends[end], 0.0) if end else ""
+
+
+def _like(found: str, names: Sequence[str], least: float = 0.6) -> str:
+    from difflib import get_close_matches
+
+    by_case = {name.casefold(): name for name in reversed(names)}
+    near = get_close_matches(found.casefold(), list(by_case), 1, least)
+    return by_case[near[0]] if near else ""

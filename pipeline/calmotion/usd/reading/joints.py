@@ -11,6 +11,7 @@ import numpy as np
 from calmotion.errors import ShotError
 from calmotion.shot import WORLD, Frame
 from calmotion.shot.character import Array
+from calmotion.support.naming import nearest
 from calmotion.usd import gf
 from calmotion.usd.reading import d6_joints
 from calmotion.usd.reading.context import Reading, prims_of
@@ -171,7 +172,7 @@ def _end(reading: Reading, prim: Usd.Prim, side: int, poses: dict[str, Pose]) ->
             path=prim.GetPath(),
             attribute=name,
             found=named[0],
-            remedy="Correct the target, or remove the joint",
+            remedy=f"{nearest(str(named[0]), poses)}Correct the target, or remove the joint",
         )
     body = target
     while body and str(body.GetPath()) not in poses:

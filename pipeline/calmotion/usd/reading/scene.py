@@ -10,6 +10,7 @@ import numpy as np
 from calmotion.errors import ShotError
 from calmotion.shot import RetargetSettings
 from calmotion.shot.character import Array
+from calmotion.support.naming import nearest
 from calmotion.usd import gf, schemas
 from calmotion.usd.reading.context import Reading, prims_of
 from calmotion.usd.units import EARTH_GRAVITY
@@ -109,6 +110,6 @@ def _choice(prim: Usd.Prim, name: str, allowed: tuple[str, ...]) -> str:
             path=prim.GetPath(),
             attribute=attribute,
             found=value,
-            remedy=f"Use {' or '.join(allowed)}",
+            remedy=f"{nearest(value, allowed)}Use {' or '.join(allowed)}",
         )
     return value

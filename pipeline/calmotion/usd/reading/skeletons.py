@@ -10,6 +10,7 @@ import numpy as np
 
 from calmotion.errors import ShotError
 from calmotion.shot.character import Array
+from calmotion.support.naming import nearest
 from calmotion.usd import gf
 from calmotion.usd.reading.context import prims_of
 from calmotion.usd.transforms import pose_from_matrix
@@ -155,12 +156,15 @@ def skeleton_with(skeletons: list[BoundSkeleton], token: str, path: str, attribu
     if not places:
         places = [(s, k) for s in skeletons for k, joint in enumerate(s.joints) if joint.split("/")[-1] == token]
     if len(places) != 1:
-        known = ", ".join(joint for s in skeletons for joint in s.joints)
+        joints = [joint for s in skeletons for joint in s.joints]
+        remedy = "Bind a Skeleton with an animation, or remove the attribute"
+        if joints:
+            remedy = f"{'' if places else nearest(token, joints)}Name one of {', '.join(joints)}"
         raise ShotError(
             "several joints of skeletons have this name" if places else "no skeleton of the shot has this joint",
             path=path,
             attribute=attribute,
             found=token,
-            remedy=f"Name one of {known}" if known else "Bind a Skeleton with an animation, or remove the attribute",
+            remedy=remedy,
         )
     return places[0]

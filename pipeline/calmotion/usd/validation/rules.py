@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Callable, Iterable, Iterator
 from typing import TYPE_CHECKING, TypeAlias
 
@@ -10,6 +9,7 @@ import numpy as np
 
 from calmotion.errors import ShotError, each
 from calmotion.shot.outputs import ERROR, WARNING, Finding
+from calmotion.support.naming import nearest
 from calmotion.usd import schemas
 from calmotion.usd.reading.context import is_rigid_body, prims_of
 from calmotion.usd.reading.shot import StageReading, read_stage
@@ -62,8 +62,7 @@ def unknown_attributes(stage: Usd.Stage) -> Iterator[Finding]:
                 continue
             place = str(prim.GetPath())
             if name not in owners:
-                near = difflib.get_close_matches(name, owners, 1, 0.6)
-                remedy = f"The nearest name is {near[0]}" if near else f"The names are {', '.join(sorted(owners))}"
+                remedy = nearest(name, owners) or f"The names are {', '.join(sorted(owners))}"
                 yield Finding(WARNING, SCHEMAS, place, name, "no schema of Calmotion has this attribute", "", remedy)
             elif not schemas.is_applied(prim, owners[name]):
                 yield Finding(

@@ -120,6 +120,23 @@ def refuse_options(options: WriteOptions, motors: Sequence[Motor]) -> None:
         )
 
 
+def refuse_bake(options: WriteOptions, motors: Sequence[Motor]) -> None:
+    """Refuse the predicted motion of a robot whose new curves are transforms of its bodies.
+
+    Raises:
+        ShotError: It is requested, and a motor is animated by its bodies.
+    """
+    posed = next((motor for motor in motors if motor.source == "bodies"), None)
+    if posed is not None and options.bake == "simulated":
+        raise ShotError(
+            "this motor is animated by its bodies, whose transforms the predicted motion would replace",
+            path=posed.path,
+            attribute=posed.attribute,
+            found="--bake=simulated",
+            remedy="Remove the option, and then run `calmotion simulate --bake=simulated` on the root layer",
+        )
+
+
 def refuse_inputs(provenance: Provenance, output: str) -> None:
     """Refuse an output that would overwrite a layer of the shot, with itself or with its root layer.
 
@@ -199,15 +216,8 @@ def _bake(layer: Sdf.Layer, shot: _Shot, result: Result, options: WriteOptions) 
     simulated_only = result.after is None
     if options.bake == "none" and not simulated_only:
         return {}
-    posed = next((motor for motor in shot.character.motors if motor.source == "bodies"), None)
-    if posed is not None and options.bake == "simulated" and not simulated_only:
-        raise ShotError(
-            "this motor is animated by its bodies, whose transforms the predicted motion would replace",
-            path=posed.path,
-            attribute=posed.attribute,
-            found="--bake=simulated",
-            remedy="Remove the option, and then run `calmotion simulate --bake=simulated` on the root layer",
-        )
+    if not simulated_only:
+        refuse_bake(options, shot.character.motors)
     if options.bake == "motors":
         motion = _performed(shot, result)
     else:

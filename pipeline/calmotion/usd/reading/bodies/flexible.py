@@ -10,6 +10,7 @@ import numpy as np
 
 from calmotion.errors import ShotError
 from calmotion.shot import FlexibleSettings
+from calmotion.support.naming import nearest
 from calmotion.usd import schemas
 from calmotion.usd.reading.bodies.materials import elastic_material
 from calmotion.usd.reading.context import Reading
@@ -41,7 +42,7 @@ def flexible_settings(reading: Reading, prim: Usd.Prim, pose: Pose) -> FlexibleS
             path=prim.GetPath(),
             attribute="calm:flexible:elasticity",
             found=elasticity,
-            remedy=f"Use one of {', '.join(_ELASTICITY)}",
+            remedy=f"{nearest(elasticity, _ELASTICITY)}Use one of {', '.join(_ELASTICITY)}",
         )
     mesh_file = _mesh_file(prim)
     return FlexibleSettings(

@@ -10,6 +10,7 @@ import numpy as np
 from calmotion.errors import ShotError
 from calmotion.shot import InterfaceSurface
 from calmotion.shot.character import Array, IntArray
+from calmotion.support.naming import nearest
 from calmotion.usd import gf
 from calmotion.usd.reading.bodies.polygons import triangulate
 from calmotion.usd.reading.bodies.shapes import finite_points, to_body
@@ -71,12 +72,13 @@ def _joint_of(prim: Usd.Prim, joints: Sequence[str]) -> str:
     if not named:
         matching = [path for path in joints if path.rsplit("/", 1)[-1] == prim.GetName()]
     if len(matching) != 1:
+        likely = nearest(named[0] if named else prim.GetName(), joints)
         raise ShotError(
             "this interface names no joint of its body",
             path=prim.GetPath(),
             attribute=JOINT,
             found=", ".join(named) or f"the subset's name, {prim.GetName()}",
-            remedy=f"Point {JOINT} at one of {', '.join(joints) or 'its joints (it has none)'}",
+            remedy=f"{likely}Point {JOINT} at one of {', '.join(joints) or 'its joints (it has none)'}",
         )
     return matching[0]
 

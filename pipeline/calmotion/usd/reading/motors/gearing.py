@@ -9,9 +9,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from calmotion.errors import ShotError
+from calmotion.support.naming import nearest
 from calmotion.usd.dialects import GEARS, SI, GearSpelling, number_of
 from calmotion.usd.reading.joints import JointPrim
 from calmotion.usd.units import StageUnits
+
+_LEADING = ("revolute", "prismatic")
 
 if TYPE_CHECKING:
     from pxr import Usd
@@ -51,13 +54,15 @@ def read_gear(joint: JointPrim, kinds: dict[str, str], units: StageUnits) -> Gea
         if not targets or (switch and switch.Get() is False):
             continue
         leader = str(targets[0])
-        if len(targets) > 1 or leader == joint.path or kinds.get(leader) not in ("revolute", "prismatic"):
+        if len(targets) > 1 or leader == joint.path or kinds.get(leader) not in _LEADING:
+            others = [path for path, kind in kinds.items() if kind in _LEADING and path != joint.path]
+            likely = "" if leader in kinds else nearest(leader, others)
             raise ShotError(
                 "a geared joint follows one other joint, revolute or prismatic",
                 path=joint.path,
                 attribute=spelling.leader,
                 found=", ".join(str(t) for t in targets),
-                remedy="Name that joint, or remove the relationship",
+                remedy=f"{likely}Name that joint, or remove the relationship",
             )
         return _gear(joint, spelling, leader, kinds[leader], units)
     return None

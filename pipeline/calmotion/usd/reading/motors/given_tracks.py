@@ -8,6 +8,7 @@ import numpy as np
 
 from calmotion.errors import ShotError
 from calmotion.shot import MotorTracks, Track
+from calmotion.support.naming import nearest
 from calmotion.usd.reading.joints import JointPrim, joint_prims
 
 if TYPE_CHECKING:
@@ -27,11 +28,12 @@ def given_joints(stage: Usd.Stage, given: MotorTracks | None) -> tuple[str, ...]
     for name in given.values:
         named = [path for path in paths if path == name] or [path for path in paths if path.split("/")[-1] == name]
         if len(named) != 1:
+            likely = "" if named else nearest(name, paths)
             raise ShotError(
                 "several joints have this name" if named else "no joint has this name",
                 path=given.origin,
                 found=name,
-                remedy=f"Use the path of a joint, such as {(named or paths or ['/Robot/joint'])[0]}",
+                remedy=f"{likely}Use the path of a joint, such as {(named or paths or ['/Robot/joint'])[0]}",
             )
         found += named
     return tuple(found)
