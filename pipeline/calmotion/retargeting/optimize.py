@@ -29,7 +29,7 @@ from calmotion.simulation.forward import limited_values
 from calmotion.simulation.inputs.curves import sample_curves
 from calmotion.simulation.inputs.supported import refuse_half_turns
 from calmotion.simulation.motor_limits import Excess, excesses, motor_bounds
-from calmotion.simulation.prepare import Prepared, failure_error, lowest_frequency, prepare
+from calmotion.simulation.prepare import Prepared, failure_error, lowest_frequency, prepare, refuse_open_joints
 from calmotion.simulation.report import left_out_rows, limit_uses, performed_motion, reference_motion, simulation_of
 from calmotion.simulation.simulate import Progress, intended_motion
 from calmotion.simulation.simulator import compile_kernels
@@ -114,6 +114,7 @@ def _optimized(
     if not np.isfinite(problem.value(np.zeros(problem.size))):
         assert problem.failure is not None
         raise failure_error(prepared, problem.failure)
+    refuse_open_joints(prepared, problem.run, options)
     before, before_value, used_before = problem.run, problem.objective_value(), _used(problem, character)
     if problem.limits is not None:
         problem.limits.rho = (

@@ -8,15 +8,19 @@ import numpy as np
 
 from calmotion.errors import IntegrationError, ShotError
 from calmotion.multibody.analysis.deflection import largest_deflection
+from calmotion.multibody.analysis.joint_gaps import first_open_joint
 from calmotion.multibody.analysis.modes import system_modes
 from calmotion.multibody.failure import Reason, SimulationFailure
+from calmotion.multibody.integrators.workspace import Workspace
 from calmotion.multibody.model.model import Model
 from calmotion.multibody.model.topology import chain_members
 from calmotion.reduction.reduced_body import ReducedBody
 from calmotion.shot import Animation, Character
 from calmotion.shot.character import Array
 from calmotion.shot.run import RunSettings
+from calmotion.shot.tolerance import tolerance_of
 from calmotion.simulation.compiled_shot import CompiledShot
+from calmotion.simulation.forward import ForwardRun
 from calmotion.simulation.inputs.curves import needed_pre_roll, sample_tracks
 from calmotion.simulation.inputs.roots import root_tracks, sample_roots
 from calmotion.simulation.inputs.supported import refuse_unsupported
@@ -109,6 +113,13 @@ def failure_error(prepared: Prepared, failure: SimulationFailure) -> ShotError:
         )
     if failure.reason == Reason.OPEN:
         return _chain_error(prepared, failure.component, failure.gap)
+    if not np.isfinite(failure.time_s):
+        return IntegrationError(
+            f"the simulation {_REASONS[failure.reason]}",
+            path=character.path,
+            remedy="Use a smaller --step or --integrator bdf2; check whether motors of a closed chain contradict each "
+            "other.",
+        )
     # the static start depends neither on the step nor on the integrator
     static = failure.reason == Reason.NO_EQUILIBRIUM
     kind = ShotError if static else IntegrationError
@@ -139,22 +150,57 @@ def failure_error(prepared: Prepared, failure: SimulationFailure) -> ShotError:
     )
 
 
-def open_joints(gap: float, integrator: str, step: float, path: str = "") -> IntegrationError:
+def refuse_open_joints(prepared: Prepared, run: ForwardRun, options: RunSettings) -> None:
+    """BDF2 keeps joints closed, unless motors contradict each other; other integrators hold them together in velocity,
+    and drift where steps are coarse.
+
+    Raises:
+        ShotError: Joints come apart by a tenth of the tolerance, with the first of them and the time.
+    """
+    gap, allowed = run.trajectory.max_joint_gap, CLOSED * tolerance_of(prepared.character, options.tolerance)
+    if gap <= allowed:
+        return
+    tree, system = prepared.model.tree, prepared.model.system
+    workspace = Workspace.for_system(system)
+    found = first_open_joint(system, run.trajectory, run.joint_angles, allowed, workspace)
+    if found is None:
+        raise open_joints(gap, options.scheme, prepared.grid.h, prepared.character.path)
+    time = float(prepared.grid.times[found.instant])
+    if options.scheme == "bdf2" and found.joint in _in_chains(prepared.model):
+        raise _chain_error(prepared, found.joint, found.gap, time)
+    path = prepared.character.joints[[*tree.joint, *tree.closing][found.joint]].path
+    raise open_joints(gap, options.scheme, prepared.grid.h, path, time)
+
+
+def _in_chains(model: Model) -> set[int]:
+    """Numbers of the joints of closed chains."""
+    parent, side, tree = model.system.parent, model.system.side, model.tree
+    closing = range(len(tree.joint), len(tree.joint) + len(tree.closing))
+    return set(closing).union(*(chain_members(parent, side[number]) for number in closing))
+
+
+def open_joints(
+    gap: float, integrator: str, step: float, path: str = "", time: float | None = None
+) -> IntegrationError:
     """The error of a simulation whose joints come apart.
 
     Args:
-        gap: [m].
+        gap: The largest [m].
+        integrator: Its name.
         step: [s].
-        path: Of the character.
+        path: Of the first joint that does, or of the character.
+        time: At which that begins [s]; None where it is not known.
     """
-    remedy = "Use a smaller --step, or bdf2, which keeps them closed."
+    remedy, since = "Use a smaller --step, or bdf2, which keeps them closed.", ""
+    if time is not None:
+        since = f", first this joint at {time:.3f} s"
     if integrator == "bdf2":
         remedy = (
             "Its motors contradict each other in a closed chain, or the joints of one do not fit together: correct the "
             "curves, remove the drive of a motor of the chain, or check localPos0 and localPos1 of its joints."
         )
     return IntegrationError(
-        f"its joints come apart by {1e3 * gap:.2g} mm in the simulation",
+        f"its joints come apart by {1e3 * gap:.2g} mm in the simulation{since}",
         path=path,
         attribute="--integrator",
         found=f"{integrator} with steps of {1e3 * step:.3g} ms",
@@ -162,12 +208,13 @@ def open_joints(gap: float, integrator: str, step: float, path: str = "") -> Int
     )
 
 
-def _chain_error(prepared: Prepared, joint: int, gap: Array) -> ShotError:
+def _chain_error(prepared: Prepared, joint: int, gap: Array, time: float | None = None) -> ShotError:
     """The error of a closed chain that does not close.
 
     Args:
         joint: The one that stays open the most; those that close chains come after those of the tree.
         gap: [m, rad], shape [6].
+        time: [s]; None: that of the static start.
     """
     tree, character, system = prepared.model.tree, prepared.character, prepared.model.system
     order = [*tree.joint, *tree.closing]
@@ -180,11 +227,12 @@ def _chain_error(prepared: Prepared, joint: int, gap: Array) -> ShotError:
     far, turned = float(np.linalg.norm(gap[:3])), float(np.degrees(np.linalg.norm(gap[3:])))
     open_by = f"{1e3 * far:.3g} mm" if far > 1e-6 else f"{turned:.3g} degrees"
     named = [*motors[:_NAMED], f"{len(motors) - _NAMED} more"] if len(motors) > _NAMED else motors
+    when = "in the pose of the first frame" if time is None else f"from {time:.3f} s on"
     remedy = "Check physics:localPos0, localRot0, localPos1 and localRot1 of the joints of this chain"
     if motors:
         remedy = f"Correct the angles of its motors there, or remove the drive of one of them: {', '.join(named)}"
     return ShotError(
-        f"the joints of a closed chain do not meet in the pose of the first frame: this one stays open by {open_by}",
+        f"the joints of a closed chain do not meet {when}: this one stays open by {open_by}",
         path=character.joints[order[joint]].path,
         remedy=f"{remedy}.",
     )
@@ -205,6 +253,7 @@ def _remedy_at_rest(prepared: Prepared, component: int) -> str:
     return f"{text[0].upper()}{text[1:]}."
 
 
+CLOSED = 0.1  # of the tolerance: joints that come apart by less are closed
 _NAMED = 6  # motors in a message
 _FAR = 0.25  # deflection over length that explains a failure
 _REASONS = {

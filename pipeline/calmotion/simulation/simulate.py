@@ -12,7 +12,6 @@ from calmotion.multibody.integrators.workspace import Workspace
 from calmotion.shot import Result, Track
 from calmotion.shot.character import Array
 from calmotion.shot.run import RunSettings
-from calmotion.shot.tolerance import tolerance_of
 from calmotion.simulation.bodies import mode_tables, skins
 from calmotion.simulation.compiled_shot import CompiledShot
 from calmotion.simulation.cyclic import SteadyState
@@ -22,12 +21,11 @@ from calmotion.simulation.inputs.shapers import shaped
 from calmotion.simulation.inputs.supported import refuse_half_turns
 from calmotion.simulation.intended_motion import rigid_motion, static_motion
 from calmotion.simulation.motor_limits import excesses, motor_bounds
-from calmotion.simulation.prepare import Prepared, failure_error, modes_of, open_joints, prepare
+from calmotion.simulation.prepare import Prepared, failure_error, modes_of, prepare, refuse_open_joints
 from calmotion.simulation.report import left_out_rows, limit_uses, performed_motion, reference_motion, simulation_of
 from calmotion.simulation.target_errors import IntendedMotion, Objective
 
 Progress = Callable[[float, str], None]
-CLOSED = 0.1  # of the error that does not matter: joints that come apart by less are closed
 
 
 def intended_motion(prepared: Prepared, angles: Array, rates: Array) -> IntendedMotion:
@@ -80,7 +78,7 @@ def simulate_shot(shot: CompiledShot, options: RunSettings, progress: Progress) 
         wall = time.perf_counter() - begin
     except SimulationFailure as failure:
         raise failure_error(prepared, failure) from failure
-    _refuse_open_joints(prepared, run.trajectory.max_joint_gap, options)
+    refuse_open_joints(prepared, run, options)
     objective = Objective.over(model, reference, grid, animation.weights)
     bounds = motor_bounds(character)
     used = excesses(bounds, limited_values(model, bounds, curves, run), grid.judged)
@@ -110,10 +108,3 @@ def simulate_shot(shot: CompiledShot, options: RunSettings, progress: Progress) 
         limits=limit_uses(used, used, grid),
         performed=intent if as_intended else performed_motion(prepared, curves),
     )
-
-
-def _refuse_open_joints(prepared: Prepared, gap: float, options: RunSettings) -> None:
-    """BDF2 keeps joints closed; the others hold them together in velocity, and drift where steps are coarse."""
-    character = prepared.character
-    if gap > CLOSED * tolerance_of(character, options.tolerance):
-        raise open_joints(gap, options.scheme, prepared.grid.h, character.path)

@@ -42,7 +42,10 @@ def integrate(
     knots on instants.
     """
     if integrator in IMPLICIT:
-        return simulate(system, start, angles, rates, h, workspace, progress, from_equilibrium, integrator, world)
+        try:
+            return simulate(system, start, angles, rates, h, workspace, progress, from_equilibrium, integrator, world)
+        except ZeroDivisionError:  # of a kernel, whose numbers have left all bounds: it does not tell where
+            raise SimulationFailure(float("nan"), 0, Reason.DIVERGED) from None
     if np.any(system.moving >= 0):
         raise ValueError(f"{integrator} does not support moving roots")
     begin, ws, total = time.perf_counter(), workspace, len(angles)
