@@ -12,6 +12,7 @@ from calmotion.retargeting.problem.adaptive_knots import converted, refined_brea
 from calmotion.retargeting.problem.offset_basis import OffsetBasis, basis_on
 from calmotion.retargeting.problem.posing import locked_coefficients
 from calmotion.retargeting.problem.problem import RetargetProblem
+from calmotion.retargeting.search_progress import SearchProgress
 from calmotion.retargeting.simplification.idle_motors import idle_gain, idle_motors
 from calmotion.retargeting.simplification.inactive_intervals import (
     InactiveInterval,
@@ -70,6 +71,9 @@ class RetargetSearch:
     idle_gain: float | None = None
     interrupted: bool = False
     resumed_iterations: int = 0
+
+    def __post_init__(self) -> None:
+        self._done = SearchProgress(WORTH * self.tolerance)
 
     def run(self, start: Array) -> None:
         """Search from a point, or resume from the checkpoint; an interrupt (Ctrl-C) ends the search.
@@ -154,13 +158,13 @@ class RetargetSearch:
                 if self.options.ranges == OFF or missed <= MISSED * self.tolerance:
                     return
                 self.inactive, self.search = (), _restarted(self.search, self.search.x)
+            self._done.next_pass(len(self.search.history))
             fixed = self.hold()
 
     def _on_iterate(self, search: Search) -> None:
         self.search = search
         self._keep()
-        count = len(search.history)
-        done = 0.1 + 0.8 * count / (count + 6)  # their number is not known: each takes a share of what is left
+        done = self._done.fraction([iterate.gain for iterate in search.history])
         error = 1e3 * self.problem.error
         self.progress(done, f"optimising: weighted error {error:.3f} mm, {search.evaluations} simulations")
 

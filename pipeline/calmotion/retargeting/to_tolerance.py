@@ -31,6 +31,7 @@ from calmotion.accuracy.step_error import (
     simulate_at,
 )
 from calmotion.retargeting.optimize import optimize_shot, refuse_other_integrators
+from calmotion.retargeting.search_progress import SuccessiveSearches
 from calmotion.retargeting.simplification.idle_motors import ENOUGH
 from calmotion.shot import OptimizerStep, Result
 from calmotion.shot.model_choice import OFF
@@ -69,11 +70,12 @@ def optimize_to_tolerance(
         enough = allowed_step_error(character, options, omitted_error(projected.shot.bodies))
         trial = partial(simulate_at, projected.shot, options)
         step, _ = largest_step(trial, FIRST, LAST, lambda run: max(enough, FIRST_STEP * shake(run)))
-    result, tracks = None, animation.current
+    result, tracks, searches = None, animation.current, SuccessiveSearches(progress)
     for _ in range(MOST):
         reduced = projected.shot.with_tracks(tracks)
         of_step = replace(options, step=step) if chooses else options
-        latest = _searched(reduced, of_step, progress, checkpoint)
+        latest = _searched(reduced, of_step, searches, checkpoint)
+        searches.ended()
         result = with_modes(latest if result is None else _continued(result, latest), shot.bodies)
         if result.interrupted:
             break
@@ -92,12 +94,15 @@ def optimize_to_tolerance(
     return result
 
 
-def _searched(shot: CompiledShot, options: RunSettings, progress: Progress, checkpoint: Path | None) -> Result:
+def _searched(
+    shot: CompiledShot, options: RunSettings, progress: SuccessiveSearches, checkpoint: Path | None
+) -> Result:  # fmt: skip
     """One search; it continues with the idle motors if these would gain too much."""
     first, character = optimize_shot(shot, options, progress, checkpoint), shot.character
     enough = ENOUGH * tolerance_of(character, options.tolerance)
     if first.interrupted or first.idle_gain_m is None or first.idle_gain_m <= enough or options.motors == OFF:
         return first
+    progress.ended()
     motors = tuple(replace(motor, idle=False) for motor in character.motors)
     every = shot.with_tracks(found_tracks(first, shot.animation)).with_character(replace(character, motors=motors))
     return _continued(first, optimize_shot(every, options, progress, checkpoint))
