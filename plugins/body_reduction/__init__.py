@@ -22,6 +22,7 @@ class ReduceFlexibleBodies(Operator):
     requires = (Character,)
     uses = (FEMeshes, Animation, Source, ModelChoices)
     provides = (ReducedBodies,)
+    checks = (Character, ModelChoices)
     properties = (
         Property(
             "elasticity",
@@ -35,6 +36,11 @@ class ReduceFlexibleBodies(Operator):
     @classmethod
     def poll(cls, data: Mapping[type, Any]) -> str | None:
         return no_flexible_bodies(data)
+
+    def check(self, context: RunContext) -> None:
+        from calmotion.reduction.interfaces.far_frames import refuse_far_frames
+
+        refuse_far_frames(simplified_character(context.get(Character), context.get(ModelChoices)))
 
     def execute(self, context: RunContext) -> Sequence[object]:
         from calmotion.simulation.bodies import mode_tables, with_elasticity

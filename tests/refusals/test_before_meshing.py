@@ -95,6 +95,10 @@ CASES = {
         "curves.export.file",
     ),
     "a second body without geometry": (simulate, no_geometry, {}, UPPER),
+    "a joint away from its body": (
+        simulate, lambda stage: stage.GetPrimAtPath(ELBOW).GetAttribute("physics:localPos1").Set((0.0, 0.3, 0.0)), {},
+        "interfaceRadius",
+    ),
     "elements that are too small": (simulate, no_edit, {"settings": {"fe.mesh.element_size": "0.02mm"}}, "elementSize"),
     "a pre-roll that takes too long": (simulate, no_edit, {"pre_roll": 1e7}, "endTimeCode"),
 }  # fmt: skip

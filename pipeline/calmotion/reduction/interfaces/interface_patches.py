@@ -11,6 +11,7 @@ from calmotion.errors import ShotError
 from calmotion.geometry.distances import closest_on_triangles
 from calmotion.reduction.elements.assembly import QuadraticMesh
 from calmotion.reduction.interfaces.automatic_patch import automatic_radius, end_face, nodes_of_area
+from calmotion.reduction.interfaces.far_frames import LARGEST_GAP, OUTSIDE, far_frame, inside_hull
 from calmotion.reduction.interfaces.named_patch import named_patch
 from calmotion.shot.character import Array, Frame, IntArray, InterfaceSurface
 
@@ -140,17 +141,13 @@ def _patch(
     gap = float(gaps.min())
     automatic = radius < 0.0
     if automatic:
-        largest_gap = 0.5 * size if _inside_hull(mesh, center, 0.05 * size) else 0.0
+        inside = inside_hull(mesh.nodes[mesh.surface_nodes], center, OUTSIDE * size)
+        largest_gap = LARGEST_GAP * size if inside else 0.0
         radius = automatic_radius(center, triangles, closest, gaps, room)
     else:
         largest_gap = radius
     if gap > largest_gap:
-        raise ShotError(
-            f"the attachment frame of {path} is {gap:.4g} m away from the surface of this flexible body",
-            path=body, attribute="calm:flexible:interfaceRadius",
-            found=f"frame at {np.array2string(center, precision=4)} m, radius {radius:.4g} m",
-            remedy="Move the frame of the joint onto the body, or author an interfaceRadius larger than this distance",
-        )  # fmt: skip
+        raise far_frame(path, body, gap, center, radius)
     if automatic:
         face = np.intersect1d(end_face(mesh, center, triangles, closest, gaps, room), candidates)
         if spans_a_plane(mesh.nodes[face]):
@@ -179,10 +176,3 @@ def spans_a_plane(points: Array) -> bool:
         return False
     extent = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
     return bool(extent[1] > _SPREAD * extent[0])
-
-
-def _inside_hull(mesh: QuadraticMesh, point: Array, margin: float) -> bool:
-    from scipy.spatial import ConvexHull
-
-    equations = ConvexHull(mesh.nodes[mesh.surface_nodes]).equations
-    return bool((equations[:, :3] @ point + equations[:, 3]).max() <= margin)
