@@ -1,6 +1,9 @@
-"""The shared `register` and `unregister`."""
+"""The shared `register` and `unregister`, and the form of operators."""
 
-from calmotion.host import registration
+import pytest
+from calmotion.host import PluginError, registration
+from calmotion.host.operators import check_operator
+from fakes import Coal, Iron, Ore, operator
 
 
 class Calls:
@@ -22,3 +25,21 @@ def test_operators_are_added_in_order_and_removed_in_reverse():
     register(host)
     unregister(host)
     assert host.made == [("add", int), ("add", str), ("remove", str), ("remove", int)]
+
+
+@pytest.mark.parametrize(
+    ("changes", "problem"),
+    [
+        ({"checks": [Coal], "check": print}, "neither requires nor uses"),
+        ({"checks": [Ore]}, "belong together"),
+        ({"check": print}, "belong together"),
+        ({"checks": [Ore, Ore], "check": print}, "names a type twice"),
+    ],
+)
+def test_checks_and_check_must_fit(changes, problem):
+    with pytest.raises(PluginError, match=problem):
+        check_operator(operator("smithy.melt", requires=[Ore], provides=[Iron], **changes))
+
+
+def test_a_check_of_declared_types_is_well_formed():
+    check_operator(operator("smithy.melt", requires=[Ore], uses=[Coal], provides=[Iron], checks=[Coal], check=print))
