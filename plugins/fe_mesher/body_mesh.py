@@ -6,7 +6,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from calmotion.accuracy.element_size import (
-    ACCURACY,
     MAX_NODES,
     Shape,
     element_size,
@@ -25,8 +24,7 @@ from calmotion.geometry.tetrahedra import (
 )
 from calmotion.shot import Body, FEMesh, Frame, SurfaceMesh, TetGeometry
 
-from . import cache
-from .accuracy import Accuracy, compared, estimate, finer, remark
+from .accuracy import ENOUGH, remark
 from .mesh_file import read_mesh_file
 from .repair import Solid, closed_solid, simplified
 from .tetwild import MORE_TIME, ProcessorTime, tetrahedralize
@@ -35,7 +33,6 @@ from .tetwild import MORE_TIME, ProcessorTime, tetrahedralize
 # frequency. Meshing tens of thousands of triangles takes minutes, so there the first allowed mesh is used.
 _GOOD_VOLUME, MAX_VOLUME_ERROR = 0.005, 0.01
 _ATTEMPTS = 3
-_REFINEMENTS = 1
 _WELD = 1e-6  # distance of coincident points, of the diagonal
 # detail that is removed, of the envelope, which the mesh does not resolve; number of triangles of a dense surface
 _DETAIL, _DENSE_DETAIL, _DENSE = 0.1, 0.5, 15_000
@@ -86,10 +83,11 @@ def mesh_of(
         ShotError: It cannot be meshed.
     """
     if isinstance(geometry, FEMesh):
-        return geometry
+        return _judged(geometry, body, carrier)
     if geometry.size > 0.0:
         time = ProcessorTime(options.time_limit)
-        return filled(index, body, geometry.solid, geometry.shape, geometry.size, time, options.cache)
+        mesh = filled(index, body, geometry.solid, geometry.shape, geometry.size, time, options.cache)
+        return _judged(mesh, body, carrier)
     return _accurate(index, body, geometry, options, carrier)
 
 
@@ -141,38 +139,25 @@ def _authored(index: int, geometry: TetGeometry, repairs: tuple[str, ...]) -> FE
     return FEMesh(index, points, tets, measure_quality(points, tets, repairs=repairs))
 
 
+def _judged(mesh: FEMesh, body: Body, carrier: Frame | None) -> FEMesh:
+    """A mesh whose elements are given, with its estimated error; a mesh that is too large for the estimate without."""
+    from calmotion.reduction.mesh_refinement import refined_for_frequencies
+
+    if len(mesh.points) > MAX_NODES:
+        return replace(mesh, given=True)
+    return replace(refined_for_frequencies(mesh, body, carrier, np.inf, 0), given=True)
+
+
 def _accurate(index: int, body: Body, volume: Volume, options: MeshOptions, carrier: Frame | None) -> FEMesh:
-    """Tetrahedra fine enough for the first frequencies; their size is stored with the meshes."""
+    """Tetrahedra fine enough for the first frequencies; where the shot needs more, they are refined for its loads."""
+    from calmotion.reduction.mesh_refinement import refined_for_frequencies
+
     solid, shape = volume.solid, volume.shape
     time = ProcessorTime(options.time_limit)
-    assert body.flexible is not None
-    held = None if carrier is None else carrier.position.tolist()
-    rule = {"accuracy": ACCURACY, "nodes": MAX_NODES, "held": held, "poisson": body.flexible.material.poissons_ratio}
-    rule["radius"] = body.flexible.interface_radius
-    key = cache.cache_key(solid.points, solid.triangles, rule)
-    stored = cache.load(key, ("size", "error", "nodes")) if options.cache else None
-    if stored is not None:
-        size, error, nodes = (float(value) for value in stored)
-        mesh = filled(index, body, solid, shape, size, time, options.cache)
-        return _with_accuracy(mesh, Accuracy(error, int(nodes)))
-    size = element_size(shape)
-    mesh = filled(index, body, solid, shape, size, time, options.cache)
-    accuracy = estimate(mesh.points, mesh.tets, body, carrier)
-    for _ in range(_REFINEMENTS):
-        smaller = finer(size, accuracy, shape)
-        if smaller is None:
-            break
-        size, before = smaller, accuracy
-        mesh = filled(index, body, solid, shape, size, time, options.cache)
-        accuracy = compared(before, estimate(mesh.points, mesh.tets, body, carrier))
-    if options.cache:
-        cache.store(key, {"size": np.array(size), "error": np.array(accuracy.error), "nodes": np.array(accuracy.nodes)})
-    return _with_accuracy(mesh, accuracy)
-
-
-def _with_accuracy(mesh: FEMesh, accuracy: Accuracy) -> FEMesh:
-    repairs = mesh.quality.repairs + remark(accuracy)
-    return replace(mesh, quality=replace(mesh.quality, repairs=repairs, frequency_error=accuracy.error))
+    mesh = filled(index, body, solid, shape, element_size(shape), time, options.cache)
+    mesh = refined_for_frequencies(mesh, body, carrier, ENOUGH, MAX_NODES)
+    repairs = (*mesh.quality.repairs, *remark(mesh.quality))
+    return replace(mesh, quality=replace(mesh.quality, repairs=repairs))
 
 
 def filled(

@@ -150,7 +150,9 @@ class VerifyResult(Operator):
         shot, shaped, reduced = compiled_in(context.get), context.get(ShapedTracks), context.get(ReducedBodies)
         if shaped is not None:
             shot = shot.with_tracks(shaped.tracks)
+        converged = context.get(ConvergedReduction)
         reduction = None if reduced is None else reduced.reduction
+        reduction = reduction if converged is None else converged.reduction
         options = run_settings(context.get(Source), context.get(ModelChoices))
         return [Verification(*verify(shot, reduction, context.get(Result), options, context.progress))]
 

@@ -1,4 +1,4 @@
-"""Reduced bodies fine enough for a simulation: the tolerance of the reduction falls until the motion no longer changes.
+"""Reduced bodies fine enough for a simulation: finer meshes, then finer reductions until the motion no longer changes.
 
 What a reduction leaves out is estimated for each body by itself, at rest. In a robot that shakes it also shifts
 frequencies, and a small shift makes the motions part in time; only the simulation itself tells by how much.
@@ -11,6 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from calmotion.accuracy.mesh_budget import meshes_to_tolerance
 from calmotion.accuracy.pod_subspace import ReferenceRun, reference_run
 from calmotion.accuracy.reduced_bodies import ConvergedReduction
 from calmotion.accuracy.simulate_to_tolerance import OF_SHAKE, intended_positions
@@ -31,7 +32,7 @@ def converged_reduction(
     shot: CompiledShot, reduction: BodyReduction, options: RunSettings,
     progress: Callable[[float, str], None] = lambda fraction, message: None, *, retargeted: bool = False,
 ) -> ConvergedReduction:  # fmt: skip
-    """Refine the bodies of a shot until that moves no target by more than the tolerance, in the shot as animated.
+    """Refine meshes and bodies of a shot as animated until that moves no target by more than the tolerance.
 
     Args:
         shot: With the bodies of a first reduction, to the tolerance.
@@ -44,6 +45,7 @@ def converged_reduction(
         ShotError: A body cannot be reduced, or the shot not be simulated.
     """
     tolerance = requested = tolerance_of(shot.character, options.tolerance)
+    shot, reduction = meshes_to_tolerance(shot, reduction, options, progress, retargeted=retargeted)
 
     def simulated(shot: CompiledShot, options: RunSettings) -> ReferenceRun:
         return reference_run(shot, options, options.step or MAX_STEP)
@@ -67,7 +69,8 @@ def converged_reduction(
         shot, found = finer, then
         if off <= allowed:
             break
-    return ConvergedReduction(shot, off, found)
+    reduction.release()
+    return ConvergedReduction(shot, off, found, reduction)
 
 
 def _same(one: Sequence[ReducedBody], other: Sequence[ReducedBody]) -> bool:

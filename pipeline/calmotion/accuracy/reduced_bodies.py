@@ -39,11 +39,13 @@ class ConvergedReduction:
         error_m: How far a target is from where the last coarser reduction had it [m]. That one would often do, but
             where two reductions agree by chance the finer is the safer.
         known: The shot as animated, simulated with these bodies.
+        reduction: Makes these bodies again to another tolerance, on their meshes.
     """
 
     shot: CompiledShot
     error_m: float
     known: ReferenceRun
+    reduction: BodyReduction | None = None
 
 
 def compiled_in(get: Callable[[type[Any]], Any]) -> CompiledShot:

@@ -12,6 +12,7 @@ from functools import partial
 import numpy as np
 
 from calmotion.accuracy.integrator_choice import by_fast_scheme
+from calmotion.accuracy.mesh_budget import mesh_error
 from calmotion.accuracy.pod_subspace import ProjectedShot, ReferenceRun, project_to_subspace
 from calmotion.accuracy.step_error import (
     ORDER,
@@ -36,8 +37,8 @@ from calmotion.simulation.inputs.time_grid import MAX_STEP, make_grid
 from calmotion.simulation.prepare import prepare
 from calmotion.simulation.simulate import Progress, intended_motion, simulate_shot
 
-SHARE = 0.5  # of the tolerance, that the time step may take in any case
-WHOLE = 0.8  # of the tolerance, that it may take together with what the bodies do without
+SHARE = 0.35  # of the tolerance, that the time step may take in any case
+WHOLE = 0.75  # of the tolerance, that it may take together with what the bodies do without
 FIRST, LAST = 1.0 / 60.0, 1.0 / 30720.0  # steps that are tried [s]
 OF_SHAKE = 0.05  # of the input's own error: how well that need be known before it is taken away
 HELD = 0.1  # of the tolerance (and of how well the shake need be known), that holding bodies to directions may take
@@ -68,7 +69,8 @@ def simulate_to_tolerance(
             return with_accuracy(with_modes(result, shot.bodies), projected.shot, options, left_out)
         step, error = chosen_step(projected.shot, options, left_out)
         result = with_modes(simulate_shot(projected.shot, replace(options, step=step), progress), shot.bodies)
-        return with_step(result, character, options, _accuracy(error, left_out, projected.shot))
+        run = replace(frames_of(result, shot.animation.frame_times), integrator=options.scheme)
+        return with_step(result, character, options, _accuracy(error, left_out, projected.shot, options, run))
 
     # a search by the same given step uses BDF2 as well, and what it wrote shall have the same errors
     return by_fast_scheme(options, simulated) if chooses else simulated(options)
@@ -81,12 +83,12 @@ def with_accuracy(result: Result, shot: CompiledShot, options: RunSettings, left
         shot: With the curves of the result.
         left_out: Error of what the bodies do without [m].
     """
-    fine = frames_of(result, shot.animation.frame_times)
+    fine = own = replace(frames_of(result, shot.animation.frame_times), integrator=options.scheme)
     trial = partial(simulate_at, shot, options)
     coarse = run_or_none(trial, 2.0 * result.step_s)
     if coarse is None or coarse.step < 1.5 * fine.step:  # it failed, or the step cannot be longer than a frame
         coarse, fine = fine, trial(0.5 * result.step_s)
-    accuracy = _accuracy(step_error(coarse, fine), left_out, shot)
+    accuracy = _accuracy(step_error(coarse, fine), left_out, shot, options, own)
     return with_step(result, shot.character, options, accuracy)
 
 
@@ -188,18 +190,11 @@ def omitted_error(bodies: Sequence[ReducedBody]) -> float:
     return sum(row.estimated_error_m or 0.0 for body in bodies for row in body.left_out)
 
 
-def _accuracy(step: float, left_out: float, shot: CompiledShot) -> Accuracy:
-    """The estimates for a simulation: of its step, of what its bodies do without, and of their meshes [m]."""
+def _accuracy(step: float, left_out: float, shot: CompiledShot, options: RunSettings, run: StepRun) -> Accuracy:
+    """The estimates for a run: of its step, of what its bodies do without, and of their meshes [m]."""
     rows = [row for body in shot.bodies for row in body.left_out]
     subspace = sum(row.estimated_error_m or 0.0 for row in rows if row.source == SUBSPACE)
-    return Accuracy(step, left_out, mesh_error(shot.bodies), subspace)
-
-
-def mesh_error(bodies: Sequence[ReducedBody]) -> float | None:
-    """That of their meshes [m]; None where nothing is flexible, or one of them is not known."""
-    errors = [body.mesh_error_m for body in bodies if len(body.stiffness)]
-    known = [error for error in errors if error is not None]
-    return sum(known) if errors and len(known) == len(errors) else None
+    return Accuracy(step, left_out, mesh_error(shot, options, run), subspace)
 
 
 def intended_positions(shot: CompiledShot, options: RunSettings) -> Array:

@@ -31,6 +31,12 @@ def frequency_errors(
     (omega_h^2 - omega^2) / omega^2 = |u - u_h|^2 / |u_h|^2.
     Source: Zienkiewicz and Zhu 1992 (superconvergent patch recovery); Strang and Fix 1973, 6.3, for the eigenvalue.
     """
+    frequencies, modes = clamped_modes(model, count, clamped)
+    return frequencies, 0.5 * energy_errors(model.mesh, material, modes)
+
+
+def clamped_modes(model: FEModel, count: int, clamped: Indices | None = None) -> tuple[Array, Array]:
+    """Lowest elastic frequencies [Hz], shape [count], and their modes, shape [n, 3, count]; arguments as above."""
     n = len(model.mesh.nodes)
     M = vector_mass(model.mass)
     free = np.ones(n, dtype=bool)
@@ -42,8 +48,7 @@ def frequency_errors(
     values, vectors = lowest_modes(model.stiffness[dofs][:, dofs], M[dofs][:, dofs], rigid + count, shift=shift)
     modes = np.zeros((3 * n, vectors.shape[1]))
     modes[dofs] = vectors
-    modes = modes.reshape(n, 3, -1)[:, :, rigid:]
-    return np.sqrt(np.maximum(values[rigid:], 0.0)) / (2.0 * np.pi), 0.5 * energy_errors(model.mesh, material, modes)
+    return np.sqrt(np.maximum(values[rigid:], 0.0)) / (2.0 * np.pi), modes.reshape(n, 3, -1)[:, :, rigid:]
 
 
 def energy_errors(mesh: QuadraticMesh, material: ElasticMaterial, u: Array) -> Array:
@@ -53,6 +58,14 @@ def energy_errors(mesh: QuadraticMesh, material: ElasticMaterial, u: Array) -> A
         mesh: Straight-sided.
         material: Only Poisson's ratio matters.
         u: Displacements [m], shape [n, 3, k].
+    """
+    return np.asarray(element_errors(mesh, material, u).sum(axis=0))
+
+
+def element_errors(mesh: QuadraticMesh, material: ElasticMaterial, u: Array) -> Array:
+    """The part of each element in `energy_errors`, shape [m, k]; arguments as there.
+
+    Source: Zienkiewicz and Zhu 1992.
     """
     # at the points of the degree-2 rule the strains of quadratic elements are better than elsewhere
     sampling = GradientRule(mesh, 2)
@@ -68,9 +81,9 @@ def energy_errors(mesh: QuadraticMesh, material: ElasticMaterial, u: Array) -> A
         # mu = 1: 2 e:e + lambda tr(e)^2, shear strains being doubled
         dense = 2.0 * (e[:, :, :3] ** 2).sum(axis=2) + (e[:, :, 3:] ** 2).sum(axis=2)
         dense += 2.0 * lame * e[:, :, :3].sum(axis=2) ** 2
-        return np.asarray(np.einsum("eq,eqk->k", integration.weights, dense))
+        return np.asarray(np.einsum("eq,eqk->ek", integration.weights, dense))
 
-    return energy(exact - strains) / energy(strains)
+    return np.asarray(energy(exact - strains) / energy(strains).sum(axis=0))
 
 
 def _strains(rule: GradientRule, u: Array) -> Array:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -58,7 +58,9 @@ def reduce_body(
     model, moving, basis, load_envelope = linear.model, linear.moving, linear.basis, linear.load_envelope
     left_out = _omitted_modes(basis, body, load_envelope)
     assert body.flexible is not None
-    material = body.flexible.material
+    material = _material(mesh, body.flexible.material)
+    settings = replace(body.flexible, material=material)
+    body = replace(body, flexible=settings)
     elasticity = None
     law, simplifications = _law(model, linear.support, basis, body, load_envelope, tolerance)
     left_out += simplifications
@@ -66,7 +68,7 @@ def reduce_body(
         from calmotion.reduction.material_laws.large_deflection import large_deflection
 
         basis, elasticity = large_deflection(
-            model, linear.support, basis, material, law, load_envelope, tolerance, body.flexible.pairs_share
+            model, linear.support, basis, material, law, load_envelope, tolerance, settings.pairs_share
         )
         left_out += _omitted_strain(elasticity, body)
     r = len(basis.omega_squared)
@@ -81,6 +83,7 @@ def reduce_body(
         elasticity=elasticity,
         left_out=left_out,
         mesh_error_m=_mesh_error(mesh, linear),
+        mesh_error=None if (error := mesh.quality.frequency_error) is None else 2.0 * error,
     )
     return damped(reduced, material)
 
@@ -111,7 +114,8 @@ def full_body(mesh: FEMesh, body: Body, attachments: Sequence[AttachmentFrame], 
     if settings is None:
         raise ShotError("this body is not flexible", path=body.path, remedy="Apply CalmFlexibleBodyAPI")
     _check_material(settings.material)
-    model = assemble(mesh.points, mesh.tets, settings.material, None if body.mass is None else body.mass.mass)
+    material = _material(mesh, settings.material)
+    model = assemble(mesh.points, mesh.tets, material, None if body.mass is None else body.mass.mass)
     patches = interface_patches(model.mesh, attachments, settings.interface_radius, body.path)
     root_patch = next((patch for patch in patches if root in patch.attachments), None)
     if root_patch is None:
@@ -122,6 +126,11 @@ def full_body(mesh: FEMesh, body: Body, attachments: Sequence[AttachmentFrame], 
     moving = [patch for patch in patches if patch is not root_patch]
     centers = [attachments[patch.attachments[0]].frame.position for patch in moving]
     return FullBody(model, Support(root_patch.nodes, [patch.nodes for patch in moving], centers), moving)
+
+
+def _material(mesh: FEMesh, material: ElasticMaterial) -> ElasticMaterial:
+    """The material with which the elements of a mesh are as stiff as those of a finer one."""
+    return replace(material, youngs_modulus=mesh.quality.stiffness_factor * material.youngs_modulus)
 
 
 @dataclass(frozen=True, eq=False)

@@ -96,6 +96,7 @@ class ReducedBody:
         elasticity: None for a linear body.
         left_out: Simplifications of the model of this body, with their estimated errors.
         mesh_error_m: Estimated error of its finite-element mesh in the shot [m]; None where it is not known.
+        mesh_error: Estimated relative error of its stiffness by the mesh, which makes a body too stiff; likewise.
     """
 
     invariants: Invariants
@@ -108,6 +109,7 @@ class ReducedBody:
     elasticity: Elasticity | None = None
     left_out: tuple[Simplification, ...] = ()
     mesh_error_m: float | None = None
+    mesh_error: float | None = None
 
     @property
     def frequencies(self) -> Array:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 MESH, REDUCTION, SUBSPACE = "mesh", "reduction", "POD subspace"
 CHOICES, STEP, SEARCH = "model", "time step", "search"
-MEASURED = "measured error"  # stands for all but the mesh where a result was verified
+MEASURED = "measured error"  # stands for all others where a result was verified
 SEARCH_SHARE = 0.1  # of the tolerance: a search does not pursue a smaller gain
 
 
@@ -36,7 +36,7 @@ class Verdict:
 
     Attributes:
         kept: Whether it does, as far as is known.
-        error_m: Error of the simulation: measured where it was verified, else estimated, the mesh included [m]; None
+        error_m: Error of the simulation: measured where it was verified, else estimated [m]; None
             where neither was done.
         short: Source of the entry that fell short most, or empty.
     """
@@ -52,17 +52,15 @@ def verdict_on(budget: Sequence[BudgetEntry], tolerance: float, measured: float 
     The search has no part in it: what it leaves is an error of the performance, not of its prediction.
 
     Args:
-        measured: Distance to a finer run on the same meshes [m], in place of the estimates of all but the mesh.
+        measured: Distance to a finer run on finer meshes [m], in place of all estimates.
     """
     if not budget and measured is None:
         return Verdict(False, None, "")
     counted = [entry for entry in budget if entry.source != SEARCH]
-    mesh = sum(entry.estimated_m or 0.0 for entry in counted if entry.source == MESH)
-    others = sum(entry.estimated_m or 0.0 for entry in counted if entry.source != MESH)
-    error = mesh + (others if measured is None else measured)
+    error = sum(entry.estimated_m or 0.0 for entry in counted) if measured is None else measured
     if error <= tolerance:
         return Verdict(True, error, "")
     over = {entry.source: (entry.estimated_m or 0.0) - entry.allowed_m for entry in counted}
     if measured is not None:
-        over = {MESH: over.get(MESH, -measured), MEASURED: measured - tolerance}
+        over = {MEASURED: measured - tolerance}
     return Verdict(False, error, max(over, key=lambda source: over[source], default=""))

@@ -17,6 +17,7 @@ class MeshQuality:
         volume_error: Relative difference to the volume of the (repaired) input surface; 0 for authored tetrahedra.
         repairs: What was repaired, as sentences.
         frequency_error: Estimated relative error of the first frequencies; None where it is not known.
+        stiffness_factor: Of the stiffness of a finer mesh over that of this one, by which its elements are softer.
     """
 
     min_dihedral_deg: float
@@ -24,6 +25,7 @@ class MeshQuality:
     volume_error: float
     repairs: tuple[str, ...] = ()
     frequency_error: float | None = None
+    stiffness_factor: float = 1.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,12 +37,14 @@ class FEMesh:
         points: Corner points [m], shape [n, 3], body frame.
         tets: Shape [m, 4], int32, positive volumes.
         quality: Its quality measures.
+        given: Whether the shot or the user chose its elements: nothing refines them then.
     """
 
     body: int
     points: Array
     tets: IntArray
     quality: MeshQuality
+    given: bool = False
 
 
 @dataclass(frozen=True, eq=False)

@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from calmotion.multibody.failure import SimulationFailure
+from calmotion.multibody.model.model import body_anchors
 from calmotion.multibody.model.topology import span_tree
 from calmotion.reduction.load_envelope import LoadEnvelope
 from calmotion.reduction.reduced_body import ReducedBody
 from calmotion.shot import Animation, Character, FEMeshes
 from calmotion.shot.character import with_settings
+from calmotion.shot.meshes import FEMesh
 from calmotion.shot.run import RunSettings
-from calmotion.simulation.bodies import reduce_bodies
+from calmotion.shot.tolerance import tolerance_of
+from calmotion.simulation.bodies import fem_anchors, reduce_bodies
 from calmotion.simulation.compiled_shot import CompiledShot, compile_shot
 from calmotion.simulation.prepare import grid_of
 from calmotion.simulation.rigid_run import shot_load_envelopes
@@ -54,6 +57,39 @@ class BodyReduction:
         """
         character = with_settings(self.character, lambda own: replace(own, pairs_share=pairs_share * own.pairs_share))
         return reduce_bodies(character, self._tree, self.meshes, progress, self.loads, tolerance, self._full)
+
+    def with_finer_meshes(
+        self, tolerance: float | None, wanted: Mapping[int, float], max_nodes: int,
+        progress: Callable[[float, str], None] = lambda fraction, message: None, *, by_factor: bool = True,
+    ) -> BodyReduction:  # fmt: skip
+        """The reduction on finer meshes; loads stay those of the shot.
+
+        Args:
+            tolerance: As of `bodies`.
+            wanted: Relative error of the stiffness that the mesh of a body may have, by body.
+            max_nodes: Of the quadratic tetrahedra of a body.
+            progress: Called with a fraction and the body at hand.
+            by_factor: Keep the elements and take the stiffness of finer ones; otherwise take the finer elements, also
+                where elements are the user's choice.
+
+        Raises:
+            ShotError: A body that cannot be reduced.
+        """
+        from calmotion.reduction.mesh_refinement import refined_for_loads
+
+        assert self.meshes is not None and self.loads is not None
+        anchors, meshes = body_anchors(self.character, self._tree), list[FEMesh]()
+        allowed = tolerance_of(self.character, tolerance) / len(self.meshes.meshes)
+        for done, mesh in enumerate(self.meshes.meshes):
+            body, error = self.character.bodies[mesh.body], wanted.get(mesh.body)
+            if error is not None and not (by_factor and mesh.given):
+                progress(done / len(self.meshes.meshes), f"{body.path}: a finer mesh")
+                own = anchors[mesh.body]
+                frames = fem_anchors(self.character, body, own)
+                loads = self.loads[mesh.body]
+                mesh = refined_for_loads(mesh, body, frames, own.root, loads, allowed, error, max_nodes, by_factor)
+            meshes.append(mesh)
+        return BodyReduction(self.character, FEMeshes(tuple(meshes)), self.loads, self._full is not None)
 
     def release(self) -> None:
         """Free the full models."""

@@ -1,0 +1,104 @@
+"""Refined meshes: their error against far finer meshes, and the stiffness that a coarse one takes from a fine one."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from calmotion.geometry.tetrahedra import measure_quality, tet_volumes
+from calmotion.reduction.basis.natural_modes import frequencies
+from calmotion.reduction.elements.assembly import assemble
+from calmotion.reduction.interfaces.interface_patches import AttachmentFrame
+from calmotion.reduction.load_envelope import LoadEnvelope
+from calmotion.reduction.mesh_refinement import frequency_estimate, refined_for_frequencies, refined_for_loads
+from calmotion.reduction.reduce import linear_modes, reduce_body
+from calmotion.shot import Body, FEMesh, FlexibleSettings
+
+SIZE = (0.3, 0.04, 0.04)
+
+
+def mesh_of(helpers, counts):
+    points, tets = helpers.box(counts, SIZE)
+    points = np.asarray(points) - [0.0, 0.02, 0.02]
+    return FEMesh(0, points, tets, measure_quality(points, tets))
+
+
+@pytest.fixture(scope="module")
+def frames(helpers):
+    return [
+        AttachmentFrame("/Arm/tip", helpers.frame(0.3, 0.0, 0.0), "interface"),
+        AttachmentFrame("/Arm/root", helpers.frame(0.0, 0.0, 0.0), "interface"),
+    ]
+
+
+@pytest.fixture(scope="module")
+def loads():
+    none, force = np.zeros(3), np.array([[0.0, 20.0, 30.0], [0.0, 0.0, 0.0]])
+    return LoadEnvelope(none, none, none, force, np.zeros((2, 3)))
+
+
+@pytest.fixture(scope="module")
+def beam(helpers, plastic):
+    return Body("/Arm/link", helpers.frame(0, 0, 0), None, flexible=FlexibleSettings(plastic))
+
+
+def first(mesh, beam, frames, loads):
+    return linear_modes(mesh, beam, frames, 1, loads, 1e-4).basis.omega_squared[:2]
+
+
+@pytest.fixture(scope="module")
+def finest(helpers, beam, frames, loads):
+    return first(mesh_of(helpers, (48, 8, 8)), beam, frames, loads)
+
+
+def test_the_first_frequencies_are_refined_to_the_wanted_error(helpers, beam, frames):
+    coarse, carrier = mesh_of(helpers, (4, 1, 1)), frames[1].frame
+    fine = refined_for_frequencies(coarse, beam, carrier, 0.01, 15_000)
+    assert len(fine.tets) > len(coarse.tets) and fine.quality.frequency_error <= 0.01
+    assert fine.quality.volume == pytest.approx(tet_volumes(fine.points, fine.tets).sum(), rel=1e-9)
+    reference = mesh_of(helpers, (48, 8, 8))
+    one, other = (frequency_estimate(mesh, beam, carrier).squares[0] for mesh in (fine, reference))
+    assert abs(np.sqrt(one / other) - 1.0) < 0.01
+    assert refined_for_frequencies(coarse, beam, carrier, 0.01, 0).tets is coarse.tets  # no nodes are allowed
+
+
+def test_local_refinement_needs_fewer_nodes_than_a_uniform_one(helpers, beam, frames):
+    coarse, uniform = mesh_of(helpers, (8, 2, 2)), mesh_of(helpers, (16, 4, 4))
+    target = frequency_estimate(uniform, beam, frames[1].frame)
+    fine = refined_for_frequencies(coarse, beam, frames[1].frame, 0.5 * target.error, 15_000)
+    assert frequency_estimate(fine, beam, frames[1].frame).nodes < 0.7 * target.nodes
+
+
+def test_a_coarse_mesh_takes_the_stiffness_of_a_finer_one(helpers, beam, frames, loads, finest):
+    coarse = mesh_of(helpers, (4, 1, 1))
+    as_fine = refined_for_loads(coarse, beam, frames, 1, loads, 1e-4, 2e-3, 15_000)
+    assert np.array_equal(as_fine.tets, coarse.tets) and as_fine.quality.stiffness_factor < 1.0
+    before, after = (np.abs(first(mesh, beam, frames, loads) / finest - 1.0).max() for mesh in (coarse, as_fine))
+    assert after < 0.2 * before and after < 3.0 * as_fine.quality.frequency_error
+    reduced = [reduce_body(mesh, beam, frames, [], 1, loads) for mesh in (coarse, as_fine)]
+    assert reduced[1].stiffness[0] == pytest.approx(as_fine.quality.stiffness_factor * reduced[0].stiffness[0])
+    assert reduced[1].mesh_error == 2.0 * as_fine.quality.frequency_error
+
+
+def test_finer_elements_are_taken_instead_for_a_reference(helpers, beam, frames, loads, finest):
+    coarse = mesh_of(helpers, (4, 1, 1))
+    marked = replace(coarse, quality=replace(coarse.quality, stiffness_factor=0.9))  # of an earlier refinement
+    fine = refined_for_loads(marked, beam, frames, 1, loads, 1e-4, 5e-3, 15_000, by_factor=False)
+    assert len(fine.tets) > 2 * len(coarse.tets) and fine.quality.stiffness_factor == 1.0
+    off = np.abs(first(fine, beam, frames, loads) / finest - 1.0).max()
+    assert off < max(2.0 * fine.quality.frequency_error, 5e-3)
+
+
+def test_the_volume_is_part_of_the_error(helpers, beam, frames):
+    mesh = mesh_of(helpers, (8, 2, 2))
+    smaller = replace(mesh, quality=replace(mesh.quality, volume_error=0.01))
+    judged = [refined_for_frequencies(m, beam, frames[1].frame, np.inf, 0) for m in (mesh, smaller)]
+    assert judged[1].quality.frequency_error - judged[0].quality.frequency_error == pytest.approx(0.01)
+
+
+def test_frequencies_of_the_estimate_are_those_of_the_model(helpers, beam, plastic):
+    mesh = mesh_of(helpers, (8, 2, 2))
+    model = assemble(mesh.points, mesh.tets, plastic)
+    squares = frequency_estimate(mesh, beam, None).squares
+    assert np.sqrt(squares) / (2.0 * np.pi) == pytest.approx(frequencies(model, 9)[6:], rel=1e-6)

@@ -1,0 +1,45 @@
+"""A body of scaled stiffness is the body of a material that is scaled likewise, for every elastic law."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from calmotion.geometry.tetrahedra import measure_quality
+from calmotion.reduction.interfaces.interface_patches import AttachmentFrame
+from calmotion.reduction.load_envelope import LoadEnvelope
+from calmotion.reduction.reduce import reduce_body
+from calmotion.reduction.scaled_stiffness import with_scaled_stiffness
+from calmotion.shot import Body, FEMesh, FlexibleSettings
+
+
+@pytest.mark.parametrize("law", ["linear", "stvk", "neohookean"])
+def test_the_stiffness_is_that_of_another_material(helpers, plastic, law):
+    points, tets = helpers.box((6, 1, 1), (0.3, 0.04, 0.04))
+    points = np.asarray(points) - [0.0, 0.02, 0.02]
+    mesh = FEMesh(0, points, tets, measure_quality(points, tets))
+    frames = [
+        AttachmentFrame("/Arm/tip", helpers.frame(0.3, 0.0, 0.0), "interface"),
+        AttachmentFrame("/Arm/root", helpers.frame(0.0, 0.0, 0.0), "interface"),
+    ]
+    plastic = replace(plastic, rayleigh=(0.1, 1e-4))
+    settings = FlexibleSettings(plastic, interface_radius=0.03, elasticity=law, mode_count=6)
+    softer = replace(settings, material=replace(plastic, youngs_modulus=0.9 * plastic.youngs_modulus))
+    none, force = np.zeros(3), np.array([[0.0, 0.0, 3.0], [0.0, 0.0, 0.0]])
+    loads = LoadEnvelope(none, none, none, force, np.zeros((2, 3)))
+    bodies = [Body("/Arm/link", helpers.frame(0, 0, 0), None, flexible=own) for own in (settings, softer)]
+    body, other = (reduce_body(mesh, own, frames, [], 1, loads) for own in bodies)
+    scaled = with_scaled_stiffness(body, 0.9)
+    r = len(body.stiffness)
+    count = 6  # modal derivatives of degenerate modes may come in another order
+    assert scaled.stiffness == pytest.approx(0.9 * body.stiffness)
+    assert scaled.stiffness[:count] == pytest.approx(other.stiffness[:count], rel=1e-5)
+    if law == "linear":
+        assert scaled.elasticity is None
+    elif law == "stvk":
+        assert np.array_equal(scaled.elasticity.data, 0.9 * body.elasticity.data)
+    else:
+        assert scaled.elasticity.lame == pytest.approx(other.elasticity.lame)
+        assert np.array_equal(scaled.elasticity.data[: r * r], 0.9 * body.elasticity.data[: r * r])
+        assert np.array_equal(scaled.elasticity.data[r * r :], body.elasticity.data[r * r :])
