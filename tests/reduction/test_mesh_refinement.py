@@ -77,7 +77,9 @@ def test_a_coarse_mesh_takes_the_stiffness_of_a_finer_one(helpers, beam, frames,
     before, after = (np.abs(first(mesh, beam, frames, loads) / finest - 1.0).max() for mesh in (coarse, as_fine))
     assert after < 0.2 * before and after < 3.0 * as_fine.quality.frequency_error
     reduced = [reduce_body(mesh, beam, frames, [], 1, loads) for mesh in (coarse, as_fine)]
-    assert reduced[1].stiffness[0] == pytest.approx(as_fine.quality.stiffness_factor * reduced[0].stiffness[0])
+    assert reduced[1].stiffness[0] == pytest.approx(
+        as_fine.quality.stiffness_factor * reduced[0].stiffness[0], rel=1e-4
+    )
     assert reduced[1].mesh_error == 2.0 * as_fine.quality.frequency_error
 
 

@@ -22,7 +22,7 @@ THIN = 0.25  # of the surface is on walls that are as thin as that: they bend fi
 _FORM = 2e-3  # of the diagonal; at twice that, real links lost 1% of volume and with it up to 6% of a frequency
 _WALL = 0.2  # of the thickness: the widest envelope that leaves a wall its stiffness
 _LEAST = 2e-4  # of the diagonal; below, the tetrahedraliser takes minutes for a box
-_SIMPLE = 2000  # triangles; below, the surface is that of a box or a tube: following it closely costs a second
+_SIMPLE = 600  # triangles; below, the surface is that of a box or a tube: following it closely costs a second
 
 
 @dataclass(frozen=True)

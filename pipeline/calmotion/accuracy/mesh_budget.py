@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 
-from calmotion.accuracy.element_size import MAX_NODES
 from calmotion.accuracy.step_error import StepRun, distance, simulate_at
 from calmotion.errors import ShotError
 from calmotion.reduction.scaled_stiffness import with_scaled_stiffness
@@ -20,7 +19,7 @@ from calmotion.simulation.compiled_shot import CompiledShot
 from calmotion.simulation.inputs.time_grid import MAX_STEP
 
 SHARE = 0.25  # of the tolerance, that the meshes may take
-NODES = MAX_NODES  # of a mesh that only linear modes are computed on: some seconds
+NODES = 8000  # of a mesh that only linear modes are computed on: some seconds
 _MARGIN = 0.8  # of the wanted error: estimates of two meshes differ
 _SOFTEST = 0.5  # factor of a stiffness; a mesh that is off by more is of no use
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from calmotion.accuracy.integrator_choice import by_fast_scheme
-from calmotion.accuracy.mesh_budget import NODES
 from calmotion.accuracy.pod_subspace import project_to_subspace
 from calmotion.accuracy.simulate_to_tolerance import found_tracks
 from calmotion.accuracy.step_error import distance, frames_of, simulate_at
@@ -19,7 +18,7 @@ from calmotion.simulation.inputs.time_grid import MAX_STEP
 from calmotion.simulation.simulate import Progress
 
 STEP, TOLERANCE, MESH = 0.25, 0.1, 0.25  # of those of the result, and of the error of its meshes
-MORE_NODES = 2  # of the limit for the result's meshes
+NODES = 5000  # of the finer meshes, on which nonlinear bodies are reduced
 PROJECTION = 0.01  # share of the tolerance for the error of the POD subspaces of the finer run
 FINER, MOST = 0.1, 4  # a reduction that is no finer than the result's is tried again with this share of its tolerance
 
@@ -60,9 +59,7 @@ def _finer(shot: CompiledShot, reduction: BodyReduction, options: RunSettings, p
     errors = {b: body.mesh_error for b, body in enumerate(shot.bodies) if body.mesh_error}
     wanted = {b: MESH * error for b, error in errors.items() if error is not None}
     if wanted:
-        reduction = reduction.with_finer_meshes(
-            options.tolerance, wanted, MORE_NODES * NODES, progress, by_factor=False
-        )
+        reduction = reduction.with_finer_meshes(options.tolerance, wanted, NODES, progress, by_factor=False)
     for _ in range(1 + MOST):
         bodies = reduction.bodies(allowed, progress=progress)
         if _coordinates(bodies) > _coordinates(shot.bodies):
