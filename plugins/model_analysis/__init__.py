@@ -88,11 +88,8 @@ class RefineReduction(Operator):
         assert reduction is not None
         options = run_settings(source, context.get(ModelChoices))
         retargeted = source.command == "optimize"
-        converged = converged_reduction(
-            context.get(CompiledShot), reduction, options, context.progress, retargeted=retargeted
-        )
-        reduction.release()
-        return [converged]
+        shot = context.get(CompiledShot)
+        return [converged_reduction(shot, reduction, options, context.progress, retargeted=retargeted)]
 
 
 class PlanStep(Operator):

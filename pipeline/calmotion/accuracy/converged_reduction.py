@@ -45,12 +45,16 @@ def converged_reduction(
         ShotError: A body cannot be reduced, or the shot not be simulated.
     """
     tolerance = requested = tolerance_of(shot.character, options.tolerance)
-    shot, reduction = meshes_to_tolerance(shot, reduction, options, progress, retargeted=retargeted)
 
     def simulated(shot: CompiledShot, options: RunSettings) -> ReferenceRun:
         return reference_run(shot, options, options.step or MAX_STEP)
 
-    off, found, allowed = 0.0, simulated(shot, options), SHARE * requested
+    found = None if retargeted else simulated(shot, options)
+    known = None if found is None else found.run
+    meshed, reduction = meshes_to_tolerance(shot, reduction, options, known, progress)
+    if found is None or meshed is not shot:
+        shot, found = meshed, simulated(meshed, options)
+    off, allowed = 0.0, SHARE * requested
     if retargeted:
         allowed = max(allowed, OF_SHAKE * distance(found.run.positions, intended_positions(shot, options)))
     for k in range(MOST):

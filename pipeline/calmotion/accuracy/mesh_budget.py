@@ -16,7 +16,6 @@ from calmotion.shot.run import RunSettings
 from calmotion.shot.tolerance import tolerance_of
 from calmotion.simulation.body_reduction import BodyReduction
 from calmotion.simulation.compiled_shot import CompiledShot
-from calmotion.simulation.inputs.time_grid import MAX_STEP
 
 SHARE = 0.25  # of the tolerance, that the meshes may take
 NODES = 8000  # of a mesh that only linear modes are computed on: some seconds
@@ -26,7 +25,7 @@ _SOFTEST = 0.5  # factor of a stiffness; a mesh that is off by more is of no use
 
 def meshes_to_tolerance(
     shot: CompiledShot, reduction: BodyReduction, options: RunSettings,
-    progress: Callable[[float, str], None] = lambda fraction, message: None, *, retargeted: bool = False,
+    run: StepRun | None, progress: Callable[[float, str], None] = lambda fraction, message: None,
 ) -> tuple[CompiledShot, BodyReduction]:  # fmt: skip
     """The shot and its reduction on meshes that keep their share of the tolerance, as far as the limit of nodes allows.
 
@@ -34,28 +33,27 @@ def meshes_to_tolerance(
         shot: With the bodies of a first reduction.
         reduction: Which made them.
         options: With the tolerance.
-        retargeted: The shot's shake will be removed, and with it the effect of the stiffness on its frequencies.
+        run: The shot as animated; None where its shake will be removed, and with it the effect of the stiffness on its
+            frequencies.
 
     Raises:
         ShotError: A body cannot be reduced, or the shot not be simulated.
     """
-    known = {b: body.mesh_error_m for b, body in enumerate(shot.bodies) if body.mesh_error_m}
-    bound = sum(error for error in known.values() if error is not None)
+    known = {b: body.mesh_error_m or 0.0 for b, body in enumerate(shot.bodies) if body.mesh_error_m}
+    bound = sum(known.values())
     if not bound:
         return shot, reduction
-    total = bound
-    if not retargeted:
-        run = simulate_at(shot, options, options.step or MAX_STEP)
-        total = mesh_error(shot, options, run) or bound
+    total = bound if run is None else mesh_error(shot, options, run) or bound
     allowed = SHARE * tolerance_of(shot.character, options.tolerance)
     if total <= allowed:
         return shot, reduction
-    costs = {b: total / bound * (error or 0.0) for b, error in known.items()}
+    costs = {b: total / bound * error for b, error in known.items()}
     wanted = {}
     for b, share in _shares(costs, _MARGIN * allowed).items():
         if share < costs[b]:
             wanted[b] = (shot.bodies[b].mesh_error or 0.0) * share / costs[b]
     finer = reduction.with_finer_meshes(options.tolerance, wanted, NODES, progress)
+    reduction.release()
     return shot.with_bodies(finer.bodies(options.tolerance, progress=progress)), finer
 
 

@@ -147,18 +147,8 @@ def refined_for_loads(
         parts = element_errors(linear.model.mesh, material, linear.basis.modes[:, :, :count]) @ weights
         return Estimate(float(parts.sum()), squares, weights, parts, len(linear.model.mesh.nodes))
 
-    key = (
-        "for loads",
-        mesh,
-        replace(body, surfaces=()),
-        attachments,
-        root,
-        loads,
-        tolerance,
-        wanted,
-        max_nodes,
-        by_factor,
-    )
+    given = replace(body, surfaces=())  # skins do not matter
+    key = ("for loads", mesh, given, attachments, root, loads, tolerance, wanted, max_nodes, by_factor)
     refine = with_finer_stiffness if by_factor else refined
     return cached_reduction(key, lambda: refine(mesh, estimate, wanted, max_nodes))
 

@@ -71,7 +71,7 @@ def reduce_body(
             model, linear.support, basis, material, law, load_envelope, tolerance, settings.pairs_share
         )
         left_out += _omitted_strain(elasticity, body)
-    r = len(basis.omega_squared)
+    r, mesh_error = len(basis.omega_squared), _mesh_error(mesh)
     reduced = ReducedBody(
         invariants=inertia_integrals(model.mesh.nodes, model.mass, basis.modes),
         stiffness=basis.omega_squared,
@@ -82,8 +82,8 @@ def reduce_body(
         elements=len(model.mesh.tets),
         elasticity=elasticity,
         left_out=left_out,
-        mesh_error_m=_mesh_error(mesh, linear),
-        mesh_error=None if (error := mesh.quality.frequency_error) is None else 2.0 * error,
+        mesh_error_m=_mesh_error_at_targets(mesh_error, linear),
+        mesh_error=mesh_error,
     )
     return damped(reduced, material)
 
@@ -190,14 +190,19 @@ def _law(
     return choice.law, (Simplification(what, choice.reason, choice.error_m, REDUCTION),)
 
 
-def _mesh_error(mesh: FEMesh, linear: LinearModes) -> float | None:
-    """Error of the deflection by the mesh [m]: the relative error of a stiffness is twice that of a frequency."""
+def _mesh_error(mesh: FEMesh) -> float | None:
+    """Relative error of the stiffness by the mesh: twice that of a frequency."""
     error = mesh.quality.frequency_error
+    return None if error is None else 2.0 * error
+
+
+def _mesh_error_at_targets(error: float | None, linear: LinearModes) -> float | None:
+    """Error of the deflection [m] by a relative error of the stiffness."""
     if error is None or linear.load_envelope is None:
         return None
     from calmotion.reduction.material_laws.choice import deflection_of
 
-    return 2.0 * error * deflection_of(linear.model, linear.basis, linear.load_envelope)
+    return error * deflection_of(linear.model, linear.basis, linear.load_envelope)
 
 
 def _points(mesh: QuadraticMesh, attachments: Sequence[AttachmentFrame]) -> Embedding:
