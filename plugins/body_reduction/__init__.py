@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 from calmotion.accuracy.reduced_bodies import ConvergedReduction, ReducedBodies, compiled_in
+from calmotion.errors import ShotError
 from calmotion.host import NotAsked, Operator, Property, RunContext, registration
-from calmotion.shot import Animation, Character, FEMeshes, ModelChoices
+from calmotion.shot import Animation, Character, FEMeshes, ModelChoices, Result
+from calmotion.shot.character import motors_give
 from calmotion.shot.model_choice import no_flexible_bodies, run_settings, simplified_character
 from calmotion.shot.outputs import SystemModes
 from calmotion.shot.run import OutputPaths, Source
@@ -38,11 +41,15 @@ class ReduceFlexibleBodies(Operator):
         return no_flexible_bodies(data)
 
     def check(self, context: RunContext) -> None:
-        from calmotion.reduction.interfaces.far_frames import refuse_far_frames
+        from calmotion.reduction.interfaces.named_surfaces import refuse_named_surfaces
+        from calmotion.reduction.soft_bodies import refuse_soft_bodies
 
-        refuse_far_frames(simplified_character(context.get(Character), context.get(ModelChoices)))
+        character = simplified_character(context.get(Character), context.get(ModelChoices))
+        refuse_named_surfaces(character)
+        refuse_soft_bodies(character)
 
     def execute(self, context: RunContext) -> Sequence[object]:
+        from calmotion.reduction.interfaces.contact_notes import contact_notes
         from calmotion.simulation.bodies import mode_tables, with_elasticity
         from calmotion.simulation.body_reduction import BodyReduction, reduction_for
 
@@ -50,6 +57,8 @@ class ReduceFlexibleBodies(Operator):
         character, source = simplified_character(context.get(Character), choices), context.get(Source)
         if context.properties.elasticity != "shot":
             character = with_elasticity(character, context.properties.elasticity)
+        for note in contact_notes(character, meshes) if meshes is not None else ():
+            context.report("info", note)
         reduction, tolerance = BodyReduction(character, meshes, None), None
         if animation is not None and source is not None:
             context.progress(0.0, "loading kernels (compiled in the first run)")
@@ -78,12 +87,12 @@ class CompileShot(Operator):
 
 
 class FindSystemModes(Operator):
-    """Natural modes of the whole character in its first pose."""
+    """Natural modes of the whole character: where it shakes most after a simulation, else in its first pose."""
 
     idname = "dynamics.modes"
     label = "Compute the natural frequencies"
     requires = (Character, CompiledShot)
-    uses = (ConvergedReduction, Source, OutputPaths, ModelChoices, Animation)
+    uses = (ConvergedReduction, Source, OutputPaths, ModelChoices, Animation, Result)
     provides = (SystemModes,)
     checks = (Character, Animation, ModelChoices)
 
@@ -93,7 +102,8 @@ class FindSystemModes(Operator):
         if source is not None and source.command != "inspect" and paths is not None:
             if not paths.figures and not paths.rrd:
                 return NotAsked("only figures and recordings show frequencies, and none are requested")
-        return no_flexible_bodies(data)
+        character = data.get(Character)
+        return None if character is not None and motors_give(character) else no_flexible_bodies(data)
 
     def check(self, context: RunContext) -> None:
         from calmotion.shot.run import RunSettings
@@ -102,10 +112,15 @@ class FindSystemModes(Operator):
         refuse_unsupported(context.get(Character), context.get(Animation), RunSettings(pre_roll=0.0))
 
     def execute(self, context: RunContext) -> Sequence[object]:
-        from calmotion.simulation.prepare import first_pose_modes
+        from calmotion.simulation.prepare import pose_modes
 
         context.progress(0.0, "loading kernels (compiled in the first run)")
-        return [SystemModes(*first_pose_modes(compiled_in(context.get)))]
+        shot, result = compiled_in(context.get), context.get(Result)
+        time = 0.0 if result is None else result.before.time_of_largest_error
+        if time > 0.0:
+            with contextlib.suppress(ShotError):  # such as a pose that a closed chain reaches only from another one
+                return [SystemModes(*pose_modes(shot, time), time)]
+        return [SystemModes(*pose_modes(shot))]
 
 
 register, unregister = registration(ReduceFlexibleBodies, CompileShot, FindSystemModes)

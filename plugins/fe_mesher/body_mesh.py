@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from calmotion.accuracy.element_size import (
@@ -10,32 +12,34 @@ from calmotion.accuracy.element_size import (
     Shape,
     element_size,
     envelope,
-    expected_nodes,
     shape_of,
-    smallest_size,
 )
-from calmotion.errors import ShotError
 from calmotion.geometry.tetrahedra import (
     connected_parts,
     measure_quality,
     oriented_tets,
+    refuse_bad_neighbours,
     welded_tets,
     without_unused_points,
 )
-from calmotion.shot import Body, FEMesh, Frame, SurfaceMesh, TetGeometry
+from calmotion.shot import Body, FEMesh, Frame, TetGeometry
 
-from .accuracy import ENOUGH, remark
+from .accuracy import ENOUGH, mass_note, remark
+from .filling import filled, refuse_loose_parts, refuse_too_many
 from .mesh_file import read_mesh_file
-from .repair import Solid, closed_solid, simplified
-from .tetwild import MORE_TIME, ProcessorTime, tetrahedralize
+from .repair import Solid
+from .sources.beam import equivalent_beam
+from .sources.choice import solid_of
+from .sources.hollow import hollowed
+from .tetwild import ProcessorTime
 
-# Wanted and largest allowed error. An error of half a percent of volume in thin walls is larger than that in a
-# frequency. Meshing tens of thousands of triangles takes minutes, so there the first allowed mesh is used.
-_GOOD_VOLUME, MAX_VOLUME_ERROR = 0.005, 0.01
-_ATTEMPTS = 3
+if TYPE_CHECKING:
+    from calmotion.reduction.interfaces.interface_patches import AttachmentFrame
+
+# Nodes of the first mesh at most, for some seconds; where the shot needs more, it is refined for its loads.
+_REFINED = 12_000
+_FIT = 4.0  # of the distance to the surface that the mesher is allowed: how far corners are moved to fit it
 _WELD = 1e-6  # distance of coincident points, of the diagonal
-# detail that is removed, of the envelope, which the mesh does not resolve; number of triangles of a dense surface
-_DETAIL, _DENSE_DETAIL, _DENSE = 0.1, 0.5, 15_000
 
 
 @dataclass(frozen=True)
@@ -49,7 +53,7 @@ class MeshOptions:
     """
 
     element_size: float = -1.0
-    time_limit: float = 300.0
+    time_limit: float = 60.0
     cache: bool = True
 
 
@@ -62,14 +66,18 @@ class Volume:
     size: float
 
 
-def mesh_body(index: int, body: Body, options: MeshOptions, carrier: Frame | None = None) -> FEMesh:
+def mesh_body(
+    index: int, body: Body, options: MeshOptions, frames: Sequence[Frame] = (),
+    attachments: Sequence[AttachmentFrame] = (),
+) -> FEMesh:  # fmt: skip
     """The tetrahedra of a flexible body; arguments and errors as of `geometry_of` and `mesh_of`."""
-    return mesh_of(index, body, geometry_of(index, body, options), options, carrier)
+    return mesh_of(index, body, geometry_of(index, body, options, frames), options, frames, attachments)
 
 
 def mesh_of(
-    index: int, body: Body, geometry: FEMesh | Volume, options: MeshOptions, carrier: Frame | None = None
-) -> FEMesh:
+    index: int, body: Body, geometry: FEMesh | Volume, options: MeshOptions, frames: Sequence[Frame] = (),
+    attachments: Sequence[AttachmentFrame] = (),
+) -> FEMesh:  # fmt: skip
     """The tetrahedra of a geometry.
 
     Args:
@@ -77,22 +85,29 @@ def mesh_of(
         body: With `flexible` settings.
         geometry: See `geometry_of`.
         options: Settings of the user.
-        carrier: Frame of the joint to its parent, body frame.
+        frames: Of its joints, body frame, that of the joint to its parent first.
+        attachments: Frames of its joints and targets, along whose patches a solid is cut.
 
     Raises:
         ShotError: It cannot be meshed.
     """
+    carrier = frames[0] if frames else None
     if isinstance(geometry, FEMesh):
-        return _judged(geometry, body, carrier)
-    if geometry.size > 0.0:
+        mesh = _judged(geometry, body, carrier)
+    elif geometry.size > 0.0:
         time = ProcessorTime(options.time_limit)
         mesh = filled(index, body, geometry.solid, geometry.shape, geometry.size, time, options.cache)
-        return _judged(mesh, body, carrier)
-    return _accurate(index, body, geometry, options, carrier)
+        mesh = _judged(_shaped(mesh, body, geometry, geometry.size, attachments), body, carrier)
+    else:
+        mesh = _accurate(index, body, geometry, options, carrier, attachments)
+    quality = mesh.quality
+    source = geometry.solid.source if isinstance(geometry, Volume) else quality.source
+    repairs = (*quality.repairs, *mass_note(body, quality.volume))
+    return replace(mesh, quality=replace(quality, repairs=repairs, source=source))
 
 
-def geometry_of(index: int, body: Body, options: MeshOptions) -> FEMesh | Volume:
-    """The geometry of a flexible body: authored tetrahedra, else that of its mesh file, else of its surfaces.
+def geometry_of(index: int, body: Body, options: MeshOptions, frames: Sequence[Frame] = ()) -> FEMesh | Volume:
+    """The geometry of a flexible body: authored tetrahedra, else that of its mesh file, of its surfaces, or a beam.
 
     It is read and closed in seconds, while meshes take minutes: what is wrong with it is known before any mesh is made.
 
@@ -101,7 +116,7 @@ def geometry_of(index: int, body: Body, options: MeshOptions) -> FEMesh | Volume
     """
     settings = body.flexible
     assert settings is not None
-    if body.tets is not None:
+    if body.tets is not None and settings.geometry != "beam":
         return _authored(index, body.tets, ())
     surfaces = body.surfaces
     repairs: tuple[str, ...] = ()
@@ -110,17 +125,17 @@ def geometry_of(index: int, body: Body, options: MeshOptions) -> FEMesh | Volume
         if isinstance(geometry, TetGeometry):
             return _authored(index, geometry, repairs)
         surfaces = geometry
-    if not any(len(surface.triangles) for surface in surfaces):
-        raise ShotError(
-            "this flexible body has no geometry", path=body.path, found="no TetMesh, Mesh or mesh file",
-            remedy="Add a closed Mesh below it, or name a mesh file in calm:flexible:meshFile",
-        )  # fmt: skip
-    solid = solid_of(body, surfaces)
+    if settings.geometry == "beam" or not any(len(surface.triangles) for surface in surfaces):
+        solid = equivalent_beam(body, frames)
+    else:
+        solid = solid_of(body, surfaces)
+    if settings.wall_thickness > 0.0:
+        solid = hollowed(solid, settings.wall_thickness, settings.section, body.path)
     solid = replace(solid, repairs=(*repairs, *solid.repairs))
     size = options.element_size if options.element_size > 0.0 else settings.element_size
     shape = shape_of(solid.points, solid.triangles)
     if size > 0.0:
-        _refuse_too_many(shape, size, ProcessorTime(options.time_limit), body.path)
+        refuse_too_many(shape, size, ProcessorTime(options.time_limit), body.path)
     return Volume(solid, shape, size)
 
 
@@ -135,8 +150,10 @@ def _authored(index: int, geometry: TetGeometry, repairs: tuple[str, ...]) -> FE
         points, tets, merged = welded_tets(points, tets, _WELD)
         if merged:
             repairs += (f"merged {merged} coincident points of separate parts",)
-    _refuse_loose_parts(tets, geometry.path)
-    return FEMesh(index, points, tets, measure_quality(points, tets, repairs=repairs))
+    refuse_loose_parts(tets, geometry.path)
+    refuse_bad_neighbours(tets, geometry.path)
+    quality = replace(measure_quality(points, tets, repairs=repairs), source="tetrahedra")
+    return FEMesh(index, points, tets, quality)
 
 
 def _judged(mesh: FEMesh, body: Body, carrier: Frame | None) -> FEMesh:
@@ -148,100 +165,27 @@ def _judged(mesh: FEMesh, body: Body, carrier: Frame | None) -> FEMesh:
     return replace(refined_for_frequencies(mesh, body, carrier, np.inf, 0), given=True)
 
 
-def _accurate(index: int, body: Body, volume: Volume, options: MeshOptions, carrier: Frame | None) -> FEMesh:
+def _shaped(mesh: FEMesh, body: Body, volume: Volume, size: float, attachments: Sequence[AttachmentFrame]) -> FEMesh:
+    """The mesh of a volume with elements of a size [m], which follows its surface in the mean."""
+    from calmotion.reduction.mesh_shaping import Surface, shaped
+
+    solid, shape = volume.solid, volume.shape
+    diagonal = float(np.linalg.norm(np.ptp(solid.points, axis=0)))
+    limit = _FIT * envelope(size, diagonal, shape.thickness, len(solid.triangles), 0)
+    return shaped(mesh, body, Surface(solid.points, solid.triangles, solid.volume, limit), attachments)
+
+
+def _accurate(
+    index: int, body: Body, volume: Volume, options: MeshOptions, carrier: Frame | None,
+    attachments: Sequence[AttachmentFrame],
+) -> FEMesh:  # fmt: skip
     """Tetrahedra fine enough for the first frequencies; where the shot needs more, they are refined for its loads."""
     from calmotion.reduction.mesh_refinement import refined_for_frequencies
 
-    solid, shape = volume.solid, volume.shape
+    solid, shape, size = volume.solid, volume.shape, element_size(volume.shape)
     time = ProcessorTime(options.time_limit)
-    mesh = filled(index, body, solid, shape, element_size(shape), time, options.cache)
-    mesh = refined_for_frequencies(mesh, body, carrier, ENOUGH, MAX_NODES)
+    mesh = filled(index, body, solid, shape, size, time, options.cache)
+    mesh = _shaped(mesh, body, volume, size, attachments)
+    mesh = refined_for_frequencies(mesh, body, carrier, ENOUGH, _REFINED)
     repairs = (*mesh.quality.repairs, *remark(mesh.quality))
     return replace(mesh, quality=replace(mesh.quality, repairs=repairs))
-
-
-def filled(
-    index: int, body: Body, solid: Solid, shape: Shape, size: float, time: ProcessorTime, use_cache: bool = True
-) -> FEMesh:
-    """Tetrahedra of uniform size that fill a solid.
-
-    Args:
-        index: Of the body in its character.
-        body: For errors.
-        solid: Closed.
-        shape: Of the solid.
-        size: Edge length [m].
-        time: Processor time of the body.
-        use_cache: Whether the cache folder is used.
-
-    Raises:
-        ShotError: The solid cannot be meshed, or the tetrahedra do not fill it.
-    """
-    _refuse_too_many(shape, size, time, body.path)
-    diagonal = float(np.linalg.norm(np.ptp(solid.points, axis=0)))
-    dense = len(solid.triangles) > _DENSE
-    volumes: list[float] = []
-    best: FEMesh | None = None
-    for attempt in range(_ATTEMPTS):
-        distance = envelope(size, diagonal, shape.thickness, len(solid.triangles), attempt)
-        surface = simplified(solid, (_DENSE_DETAIL if dense else _DETAIL) * distance)
-        points, tets = tetrahedralize(*surface, size, distance / diagonal, body.path, time, use_cache)
-        tets, _ = oriented_tets(points, tets, body.path)
-        points, tets = without_unused_points(points, tets)
-        quality = measure_quality(points, tets, surface_volume=solid.volume, repairs=solid.repairs)
-        if quality.volume_error <= MAX_VOLUME_ERROR:
-            if best is None or quality.volume_error < best.quality.volume_error:
-                best = FEMesh(index, points, tets, quality)
-            if quality.volume_error <= _GOOD_VOLUME or dense or attempt == 1:
-                break
-        volumes.append(quality.volume)
-        size *= 0.8 if best is None else 1.0
-    if best is not None:
-        _refuse_loose_parts(best.tets, body.path)
-        return best
-    error = abs(volumes[-1] / solid.volume - 1.0)
-    # meshes of smaller envelopes with equal volumes that differ from that of the surface: the surface is wrong
-    agree = abs(volumes[-1] - volumes[-2]) < 0.2 * error * solid.volume
-    raise ShotError(
-        "the tetrahedra do not fill the surface" + (", which seems to intersect itself" if agree else ""),
-        path=body.path, found=f"volume error {100.0 * error:.2g}%, allowed {100.0 * MAX_VOLUME_ERROR:.2g}%",
-        remedy="Author a smaller calm:flexible:elementSize, repair the Mesh, or give a TetMesh or a mesh file",
-    )  # fmt: skip
-
-
-def _refuse_too_many(shape: Shape, size: float, time: ProcessorTime, path: str) -> None:
-    """Refuse a mesh that would exceed the limit of processor time on any machine, before the time is spent."""
-    nodes = expected_nodes(shape, size)
-    if nodes > time.nodes:
-        least, limit = smallest_size(shape, int(time.nodes)), time.limit * nodes / time.nodes
-        raise ShotError(
-            f"its mesh would have about {nodes:.1e} nodes, too many for {time.limit:g} s of processor time",
-            path=path, attribute="calm:flexible:elementSize", found=f"{size:.3g} m",
-            remedy=f"Author at least {least:.2g} m" + MORE_TIME.format(limit),
-        )  # fmt: skip
-
-
-def solid_of(body: Body, surfaces: tuple[SurfaceMesh, ...]) -> Solid:
-    """The solid of the visible surfaces, or of hidden (collision) surfaces where the visible ones are not closed."""
-    visible = tuple(s for s in surfaces if s.visible) or surfaces
-    hidden = tuple(s for s in surfaces if not s.visible)
-    try:
-        return closed_solid(visible, body.path)
-    except ShotError as error:
-        if not hidden or visible is surfaces:
-            raise
-        try:
-            solid = closed_solid(hidden, body.path)
-        except ShotError:
-            raise error from None
-        note = f"meshed the collision geometry instead of the visible surfaces ({error.path}: {error.problem})"
-    return replace(solid, repairs=(note, *solid.repairs))
-
-
-def _refuse_loose_parts(tets: np.ndarray, path: str) -> None:
-    count = connected_parts(tets)
-    if count > 1:
-        raise ShotError(
-            "its tetrahedra are not connected", path=path, found=f"{count} separate parts",
-            remedy="Make the parts overlap or touch, or split them into several bodies",
-        )  # fmt: skip

@@ -31,8 +31,8 @@ def store(
 ) -> tuple[np.ndarray, ...]:
     """Store arrays; a reader gets all of them or none. A folder that cannot be written is ignored.
 
-    The tetrahedraliser makes a different mesh each time. Where two processes make one, both continue with the one that
-    is stored first, so that simulations of the same shot agree.
+    Where two processes make a mesh, both continue with the one that is stored first: where no fixed random numbers can
+    be set, the tetrahedraliser makes a different one each time.
 
     Args:
         key: Of `cache_key`.

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from calmotion.errors import ShotError
-from calmotion.geometry.closed_surfaces import boundary_walks, close
+from calmotion.geometry.closed_surfaces import Closure, boundary_walks, close
 from calmotion.geometry.orientation import closing_signs, patch_boundaries, patches_of
 from calmotion.geometry.tetrahedra import surface_area, surface_volume
 
 from .junctions import split_at_junctions
+from .sources.caps import capped
 
 REMEDY = "Close the mesh, or name a closed one in calm:flexible:meshFile, or author a TetMesh below the body"
 
@@ -18,6 +20,7 @@ REMEDY = "Close the mesh, or name a closed one in calm:flexible:meshFile, or aut
 _WELDS = (1e-6, 1e-5, 1e-4)
 _CRUMB = 1e-3  # of the area: stray triangles
 _SHEET, _FIN = 0.05, 0.3  # of the area: separate labels, sheets connected to a closed part
+_SHEETS = 0.5  # of the area: each sheet where holes of any size are capped
 _HOLE, _HOLES = 5e-3, 2e-2  # of the area of a part: one hole, all holes
 
 
@@ -28,7 +31,7 @@ class Part:
     points: np.ndarray
     triangles: np.ndarray
 
-    @property
+    @cached_property
     def volume(self) -> float:
         """Volume; negative where the part is inside out."""
         return surface_volume(self.points, self.triangles)
@@ -41,7 +44,9 @@ class _Welded:
     dropped: int
 
 
-def closed_parts(points: np.ndarray, triangles: np.ndarray, path: str, repairs: list[str]) -> list[Part]:
+def closed_parts(
+    points: np.ndarray, triangles: np.ndarray, path: str, repairs: list[str], any_hole: bool = False
+) -> list[Part]:
     """The connected parts of a surface, each closed; parts may be inside out.
 
     Args:
@@ -49,6 +54,7 @@ def closed_parts(points: np.ndarray, triangles: np.ndarray, path: str, repairs: 
         triangles: Shape [m, 3].
         path: Mesh prim or file, for errors.
         repairs: Messages are appended.
+        any_hole: Whether holes of any size are capped; sheets are left out then, as far as they are a small part.
 
     Raises:
         ShotError: The surface has large holes, or only one side.
@@ -63,22 +69,30 @@ def closed_parts(points: np.ndarray, triangles: np.ndarray, path: str, repairs: 
     parts: list[Part] = []
     opened: list[tuple[Part, ShotError]] = []
     crumbs = 0
+    caps: list[Closure] = []
     area = surface_area(welded.points, welded.triangles)
     for piece in connected_pieces(welded.points, welded.triangles):
         try:
-            parts.append(_closed(piece, path, repairs))
+            closure = _closed(piece, path, repairs, any_hole)
+            parts.append(Part(closure.points, closure.triangles))
+            caps += [closure] if len(closure.areas) else []
         except ShotError as error:
             if surface_area(piece.points, piece.triangles) < _CRUMB * area:
                 crumbs += 1
             else:
                 opened.append((piece, error))
+    if caps:
+        count = sum(len(closure.areas) for closure in caps)
+        share = 100.0 * sum(closure.areas.sum() for closure in caps) / area
+        repairs.append(f"{path}: closed {count} hole" + ("s" if count > 1 else "") + f", {share:.2g}% of the surface")
     if crumbs:
         repairs.append(f"{path}: removed {crumbs} stray scraps of surface")
     # a set of a million points takes seconds: only where there are open pieces
     points_of_parts = {tuple(point) for part in parts for point in part.points.tolist()} if opened else set()
     for piece, reason in opened:
         on_a_part = sum(tuple(point) in points_of_parts for point in piece.points.tolist()) >= 2
-        if not parts or surface_area(piece.points, piece.triangles) > (_FIN if on_a_part else _SHEET) * area:
+        largest = _SHEETS if any_hole else _FIN if on_a_part else _SHEET
+        if not parts or surface_area(piece.points, piece.triangles) > largest * area:
             raise reason
         repairs.append(f"{path}: removed an open sheet")
     return [part for part in parts if not _is_flat(part)]
@@ -154,14 +168,14 @@ def _flipped(triangles: np.ndarray, flip: np.ndarray) -> np.ndarray:
     return np.where(flip[:, None], triangles[:, ::-1], triangles)
 
 
-def _closed(piece: Part, path: str, repairs: list[str]) -> Part:
+def _closed(piece: Part, path: str, repairs: list[str], any_hole: bool) -> Closure:
     """A connected piece with its holes capped."""
     triangles = piece.triangles
     if boundary_walks(triangles):
         triangles = _oriented(piece, path, repairs)
-    closure = close(piece.points, triangles)
+    closure = (capped if any_hole else close)(piece.points, triangles)
     if len(closure.areas) == 0:
-        return Part(piece.points, triangles)
+        return Closure(piece.points, triangles, closure.areas, closure.sides)
     area = surface_area(piece.points, triangles)
     if area == 0.0:
         raise ShotError(
@@ -170,19 +184,16 @@ def _closed(piece: Part, path: str, repairs: list[str]) -> Part:
             found=f"{len(triangles)} triangles",
             remedy=REMEDY,
         )
-    closed = Part(closure.points, closure.triangles)
     # a single missing triangle is unique, however large it is
     doubtful = closure.areas[closure.sides > 3]
     large = len(doubtful) and (doubtful.max() > _HOLE * area or doubtful.sum() > _HOLES * area)
-    if large or _is_flat(closed):
+    if (large and not any_hole) or _is_flat(Part(closure.points, closure.triangles)):
         raise ShotError(
             "this is an open surface, which tetrahedra cannot fill", path=path,
             found=f"{len(closure.areas)} holes, the largest {100.0 * closure.areas.max() / area:.3g}% of the surface",
             remedy=REMEDY,
         )  # fmt: skip
-    holes = f"{len(closure.areas)} hole" + ("s" if len(closure.areas) > 1 else "")
-    repairs.append(f"{path}: closed {holes}, {100.0 * closure.areas.sum() / area:.2g}% of the surface")
-    return closed
+    return closure
 
 
 def _oriented(piece: Part, path: str, repairs: list[str]) -> np.ndarray:

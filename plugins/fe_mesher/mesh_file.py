@@ -8,9 +8,11 @@ from typing import Any
 import numpy as np
 from calmotion.errors import ShotError
 from calmotion.shot import SurfaceMesh, TetGeometry
+from calmotion.support.memory import too_large
 
 from .cells import CORNERS, TRIANGLES, tets_of, triangles_of
 
+_EXPANSION = 10.0  # memory of a mesh while it is read, by the size of a binary file
 _CURVED = 1e-3  # distance of a midpoint from the center of its edge that is reported, of the edge
 
 
@@ -34,10 +36,13 @@ def read_mesh_file(path: str, scale: float, body: str) -> tuple[TetGeometry | tu
 
     if not Path(path).is_file():
         raise refuse("the mesh file does not exist", path, "Correct the asset path")
+    if reason := too_large(path, _EXPANSION):
+        raise refuse("the mesh file is too large for the memory", f"{path}: {reason}", "Give a coarser mesh")
     try:
         mesh = _read(path)
         points = np.asarray(mesh.points, dtype=float) * scale
-        cells = [(block.type, np.asarray(block.data, dtype=np.int64)) for block in mesh.cells if len(block.data)]
+        cells = [(block.type, np.asarray(block.data, dtype=np.int64)) for block in mesh.cells]
+        cells = [(kind, data) for kind, data in cells if data.size]  # a face of no corners is none
     except (Exception, SystemExit) as error:  # meshio exits the process on an unknown format
         raise refuse("the mesh file cannot be read", f"{path}: {error}", "Use a format that meshio reads") from error
     if points.ndim != 2 or points.shape[1] != 3:

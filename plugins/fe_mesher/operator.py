@@ -11,6 +11,7 @@ from calmotion.shot import Character, FEMeshes, ModelChoices
 from calmotion.shot.model_choice import no_flexible_bodies
 
 if TYPE_CHECKING:
+    from calmotion.reduction.interfaces.interface_patches import AttachmentFrame
     from calmotion.shot import FEMesh
 
     from .body_mesh import MeshOptions, Volume
@@ -36,10 +37,10 @@ class TetrahedralizeFlexibleBodies(Operator):
         Property(
             "time_limit",
             float,
-            300.0,
+            60.0,
             unit="s",
             minimum=1.0,
-            description="Largest processor time for the meshes of one body.",
+            description="Largest processor time for the meshes of one body; then a coarser one is made.",
         ),
         Property("cache", bool, True, description="Store meshes in the cache folder and reuse them."),
     )
@@ -52,7 +53,7 @@ class TetrahedralizeFlexibleBodies(Operator):
     def execute(self, context: RunContext) -> Sequence[object]:
         """The meshes, in the order of the bodies."""
         # manifold3d takes half a second to load: only for flexible bodies
-        from .accuracy import carrier_of
+        from .accuracy import frames_of
         from .body_mesh import MeshOptions, mesh_of
 
         choices = context.get(ModelChoices)
@@ -64,15 +65,17 @@ class TetrahedralizeFlexibleBodies(Operator):
         )
         flexible = [index for index, body in enumerate(character.bodies) if body.simulated_flexible]
         geometries = _geometries(character, flexible, options)
+        attachments = _attachments(character)
         meshes = []
         for done, index in enumerate(flexible):
             body = character.bodies[index]
             context.progress(done / len(flexible), body.path)
-            mesh = mesh_of(index, body, geometries[index], options, carrier_of(character, index))
+            frames = frames_of(character, index)
+            mesh = mesh_of(index, body, geometries[index], options, frames, attachments.get(index, ()))
             quality = mesh.quality
             context.report(
                 "info",
-                f"{body.path}: {len(mesh.tets)} tetrahedra, {len(mesh.points)} points, "
+                f"{body.path}: {quality.source}, {len(mesh.tets)} tetrahedra, {len(mesh.points)} points, "
                 f"{1e6 * quality.volume:.4g} cm^3, "
                 f"volume error {quality.volume_error:.2%}, smallest dihedral angle {quality.min_dihedral_deg:.1f} deg",
             )
@@ -83,19 +86,37 @@ class TetrahedralizeFlexibleBodies(Operator):
         return (FEMeshes(tuple(meshes)),)
 
 
+def _attachments(character: Character) -> dict[int, Sequence[AttachmentFrame]]:
+    """Frames of the joints and targets of each flexible body; none where its joints are wrong, which others report."""
+    from calmotion.multibody.model.model import body_anchors
+    from calmotion.multibody.model.topology import span_tree
+    from calmotion.simulation.bodies import fem_anchors
+
+    try:
+        anchors = body_anchors(character, span_tree(character))
+    except ShotError:
+        return {}
+    return {
+        index: fem_anchors(character, body, anchors[index])
+        for index, body in enumerate(character.bodies)
+        if body.simulated_flexible
+    }
+
+
 def _geometries(character: Character, flexible: Sequence[int], options: MeshOptions) -> dict[int, FEMesh | Volume]:
     """The geometry of each flexible body, so that all that is wrong is known before the first mesh is made.
 
     Raises:
         ShotError: What is wrong with any of them.
     """
+    from .accuracy import frames_of
     from .body_mesh import geometry_of
 
     geometries: dict[int, FEMesh | Volume] = {}
     problems = []
     for index in flexible:
         try:
-            geometries[index] = geometry_of(index, character.bodies[index], options)
+            geometries[index] = geometry_of(index, character.bodies[index], options, frames_of(character, index))
         except ShotError as problem:
             problems.append(problem)
     raise_all(problems)

@@ -7,14 +7,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from calmotion.errors import ShotError
-from calmotion.geometry.closed_surfaces import winding_number, winding_numbers
+from calmotion.geometry.closed_surfaces import enclosed_volume, winding_number, winding_numbers
 from calmotion.shot import SurfaceMesh
 
-from .bridges import bridged
 from .closing import REMEDY, Part, closed_parts, connected_pieces
+from .sources.bridges import WIDE, bridged, strutted
 from .uniting import NotManifold, united, without_detail
 
-_INVERTED, _PLACES = 0.02, 200  # largest share of the surface that is inside out; number of sample points
+# largest share of the surface that is inside out, and where holes of any size are capped; number of sample points
+_INVERTED, _CROSSED, _PLACES = 0.02, 0.2, 200
 _LOOSE = 1e-2  # of the volume: loose pieces such as screws
 # Number of triangles from which a surface is decimated; distances, of the size, the largest half of the narrowest
 # envelope of a mesh; largest change of the volume
@@ -30,15 +31,17 @@ class Solid:
         triangles: Shape [m, 3], outward.
         volume: [m^3].
         repairs: Messages about repairs.
+        source: What it was made of, for the user.
     """
 
     points: np.ndarray
     triangles: np.ndarray
     volume: float
     repairs: tuple[str, ...]
+    source: str = "visual surface"
 
 
-def closed_solid(surfaces: Sequence[SurfaceMesh], body: str) -> Solid:
+def closed_solid(surfaces: Sequence[SurfaceMesh], body: str, any_hole: bool = False) -> Solid:
     """One solid from the surfaces of a body: repaired, then united.
 
     A closed shell inside another one is a cavity where it has the opposite orientation, and solid otherwise.
@@ -46,6 +49,7 @@ def closed_solid(surfaces: Sequence[SurfaceMesh], body: str) -> Solid:
     Args:
         surfaces: Surfaces of the body, body frame.
         body: Prim path of the body.
+        any_hole: Whether holes of any size are capped.
 
     Raises:
         ShotError: A surface is open or encloses no volume; the error has the path of its Mesh prim.
@@ -63,7 +67,7 @@ def closed_solid(surfaces: Sequence[SurfaceMesh], body: str) -> Solid:
     if not scale > 0.0:
         raise ShotError("its surfaces enclose no volume", path=body, found="all points coincide", remedy=REMEDY)
     kept = [replace(surface, points=(surface.points - center) / scale) for surface in kept]
-    parts = _parts(kept, repairs)
+    parts = _parts(kept, repairs, any_hole)
     if not parts:
         raise ShotError("its surfaces enclose no volume", path=body, found="no solid part", remedy=REMEDY)
     try:
@@ -72,16 +76,21 @@ def closed_solid(surfaces: Sequence[SurfaceMesh], body: str) -> Solid:
         raise ShotError(
             "its surfaces cannot be united into one solid", path=body, found=str(error), remedy=REMEDY
         ) from error
-    whole = _in_one_piece(whole, scale, repairs, body)
+    whole = _in_one_piece(whole, scale, repairs, body, any_hole)
     if not whole.volume > 0.0:
         raise ShotError("its surfaces enclose no volume", path=body, found=f"{whole.volume:.3g} m^3", remedy=REMEDY)
     inverted = _inside_out(whole)
-    if inverted > _INVERTED:
+    crossed = inverted > _INVERTED
+    if inverted > (_CROSSED if any_hole else _INVERTED):
         raise ShotError(
             "its surface intersects itself, and a part of it is inside out", path=body,
             found=f"{100.0 * inverted:.2g}% of the surface", remedy="Untwist it, or author a TetMesh below the body",
         )  # fmt: skip
-    volume = whole.volume * scale**3
+    if crossed:
+        repairs.append(
+            f"its surface intersects itself, {100.0 * inverted:.2g}% of it inside out: what it winds around is solid"
+        )
+    volume = (enclosed_volume(whole.points, whole.triangles) if crossed else whole.volume) * scale**3
     whole = _decimated(whole, scale, repairs)
     return Solid(whole.points * scale + center, whole.triangles.astype(np.int32), volume, tuple(repairs))
 
@@ -155,31 +164,42 @@ def _without_copies(surfaces: Sequence[SurfaceMesh], repairs: list[str]) -> list
     return kept
 
 
-def _parts(surfaces: list[SurfaceMesh], repairs: list[str]) -> list[Part]:
+def _parts(surfaces: list[SurfaceMesh], repairs: list[str], any_hole: bool) -> list[Part]:
     """Closed outward parts. Open surfaces are joined first: closed surfaces are often divided by color."""
     parts: list[Part] = []
     opened: list[tuple[SurfaceMesh, ShotError]] = []
     for surface in surfaces:
-        noted: list[str] = []
         try:
-            parts += _outward(closed_parts(surface.points, surface.triangles, surface.path, noted), surface.path, noted)
-            repairs += noted
+            parts += _closed_outward(surface, repairs)
         except ShotError as error:
             opened.append((surface, error))
     if not opened:
         return parts
-    if len(surfaces) == 1:
+    whole = opened[0][0]
+    if len(opened) > 1:
+        names = ", ".join(surface.path for surface, _ in opened)
+        starts = np.cumsum([0] + [len(surface.points) for surface, _ in opened[:-1]])
+        triangles = [s.triangles.astype(np.int64) + k for (s, _), k in zip(opened, starts, strict=True)]
+        points = np.vstack([surface.points for surface, _ in opened])
+        whole = replace(whole, points=points, triangles=np.vstack(triangles))
+        noted = [f"joined {len(opened)} open surfaces: {names}"]
+        try:
+            parts += _closed_outward(whole, noted)
+        except ShotError:
+            if not any_hole:
+                raise opened[0][1] from None
+        else:
+            repairs += noted
+            return parts
+    if not any_hole:
         raise opened[0][1]
-    open_ones = [surface for surface, _ in opened]
-    path = open_ones[0].path
-    noted = [f"joined {len(opened)} open surfaces: {', '.join(surface.path for surface in open_ones)}"]
-    starts = np.cumsum([0] + [len(surface.points) for surface in open_ones[:-1]])
-    triangles = np.vstack([s.triangles.astype(np.int64) + k for s, k in zip(open_ones, starts, strict=True)])
-    try:
-        points = np.vstack([surface.points for surface in open_ones])
-        parts += _outward(closed_parts(points, triangles, path, noted), path, noted)
-    except ShotError:
-        raise opened[0][1] from None
+    return parts + _closed_outward(whole, repairs, any_hole)
+
+
+def _closed_outward(surface: SurfaceMesh, repairs: list[str], any_hole: bool = False) -> list[Part]:
+    noted: list[str] = []
+    parts = closed_parts(surface.points, surface.triangles, surface.path, noted, any_hole)
+    parts = _outward(parts, surface.path, noted)
     repairs += noted
     return parts
 
@@ -233,8 +253,8 @@ def _inside_out(whole: Part) -> float:
     return float((winding_numbers(places, whole.points, whole.triangles) < 0.5).mean())
 
 
-def _in_one_piece(whole: Part, scale: float, repairs: list[str], body: str) -> Part:
-    """One connected solid: small loose solids are removed, narrow gaps between large ones are bridged."""
+def _in_one_piece(whole: Part, scale: float, repairs: list[str], body: str, any_gap: bool) -> Part:
+    """One connected solid: small loose solids are removed, narrow gaps between large ones are bridged, or any gap."""
     pieces = connected_pieces(whole.points, whole.triangles)
     solids = [piece for piece in pieces if piece.volume > 0.0]
     if len(solids) <= 1:
@@ -249,6 +269,12 @@ def _in_one_piece(whole: Part, scale: float, repairs: list[str], body: str) -> P
     if len(large) == 1:
         return _concatenated([*large, *cavities])
     joined, gap = bridged(large)
+    if joined is None and any_gap:
+        joined, gap = bridged(large, WIDE)
+    if joined is None and any_gap:
+        joined, gap = strutted(large)
+        repairs.append(f"joined {len(large)} separate solids by struts across gaps of up to {1e3 * scale * gap:.2g} mm")
+        return _concatenated([joined, *cavities])
     if joined is None:
         sizes = ", ".join(f"{1e6 * scale**3 * piece.volume:.3g}" for piece in large)
         raise ShotError(

@@ -7,28 +7,33 @@ import resource
 import signal
 import subprocess
 import sys
-import tempfile
 from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from calmotion.errors import ShotError
+from calmotion.geometry.flat_tets import unflattened
 from calmotion.geometry.tetrahedra import flat_tets
+from calmotion.support.files import temporary_folder
 
 from . import cache
 
 _REMEDY = "Simplify or repair the Mesh, author a larger calm:flexible:elementSize, or give a TetMesh or a mesh file"
 MORE_TIME = ", or allow more with --set fe.mesh.time_limit={:.0f}"
-_STOP_ENERGY = 10.0
 _TRIES = 3  # attempts at a mesh without flat elements
-# Passes that improve the elements. With tens of thousands of surface triangles, more passes do not improve the smallest
-# angles and take most of the time.
-_PASSES, _DENSE_PASSES, _DENSE = 80, 12, 15_000
+# Number of passes that improve the elements, and the energy of the worst element at which they end. On dense surfaces
+# more passes hardly improve the smallest angles and take most of the time.
+_NORMAL, _QUICK, _DENSE = (80, 10.0), (5, 30.0), 6_000
 # A process that takes no processor time, such as one that is blocked, ends after this many times its limit.
-_PATIENCE = 20.0
+_PATIENCE = 100.0
 # Processor time of a node [s]: a quarter of that measured with 4,000 to 130,000 nodes, for faster machines
 _SECONDS = 7e-5
+
+
+class OutOfTime(ShotError):
+    """A mesh exceeded the limit of processor time."""
 
 
 @dataclass
@@ -43,6 +48,10 @@ class ProcessorTime:
     limit: float
     used: float = 0.0
 
+    def part(self, share: float) -> ProcessorTime:
+        """The first part of what is left of it."""
+        return ProcessorTime(self.used + share * (self.limit - self.used), self.used)
+
     @property
     def nodes(self) -> float:
         """Number of nodes of ten-node tetrahedra that the limit allows on any machine."""
@@ -55,8 +64,9 @@ def tetrahedralize(
 ) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
     """Tetrahedra of a closed surface.
 
-    fTetWild is not deterministic: the first mesh of a surface is stored and reused. A mesh with a flat element, which
-    fTetWild sometimes makes, is made again.
+    A surface has one mesh, since fTetWild draws from a fixed sequence. A flat element, which it sometimes
+    makes, gets a volume by a small move of a corner; where that is not possible, the mesh is made again with another
+    sequence.
 
     Args:
         points: [m], shape [n, 3].
@@ -71,22 +81,26 @@ def tetrahedralize(
         Points [m], shape [k, 3], and tetrahedra, shape [e, 4].
 
     Raises:
-        ShotError: fTetWild crashed, exceeded the limit of processor time, or made no tetrahedra.
+        OutOfTime: It exceeded the limit of processor time.
+        ShotError: fTetWild crashed, or made no tetrahedra.
     """
-    passes = _DENSE_PASSES if len(triangles) > _DENSE else _PASSES
-    settings: dict[str, object] = {
+    passes, stop_energy = _QUICK if len(triangles) > _DENSE else _NORMAL
+    settings: dict[str, Any] = {
         "element_size": element_size,
         "envelope": envelope,
-        "stop_energy": _STOP_ENERGY,
+        "stop_energy": stop_energy,
         "coarsen": True,
         "passes": passes,
+        "sequence": 1,
         "pytetwild": version("pytetwild"),
     }
     key = cache.cache_key(points, triangles, settings)
     mesh = cache.load(key) if use_cache else None
     if mesh is None or flat_tets(*mesh).any():
-        for _ in range(_TRIES):
-            mesh = _run(points, triangles, element_size, envelope, passes, path, time)
+        for sequence in range(1, 1 + _TRIES):
+            settings["sequence"] = sequence
+            made, tets = _run(points, triangles, settings, path, time)
+            mesh = unflattened(made, tets), tets
             if not flat_tets(*mesh).any():
                 break
         assert mesh is not None
@@ -96,22 +110,19 @@ def tetrahedralize(
 
 
 def _run(
-    points: np.ndarray, triangles: np.ndarray, element_size: float, envelope: float, passes: int, path: str,
-    time: ProcessorTime,
-) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
+    points: np.ndarray, triangles: np.ndarray, settings: dict[str, Any], path: str, time: ProcessorTime
+) -> tuple[np.ndarray, np.ndarray]:
     # in units of the bounding box, about its center: the tolerances of fTetWild then fit any size
     low, high = points.min(axis=0), points.max(axis=0)
     center, diagonal = 0.5 * (low + high), float(np.linalg.norm(high - low))
-    with tempfile.TemporaryDirectory(prefix="calmotion-") as folder:
-        source, destination = Path(folder) / "surface.npz", Path(folder) / "tetrahedra.npz"
+    with temporary_folder() as folder:
+        source, destination = folder / "surface.npz", folder / "tetrahedra.npz"
         np.savez(
             source,
             points=np.ascontiguousarray((points - center) / diagonal, dtype=np.float64),
             triangles=np.ascontiguousarray(triangles, dtype=np.int32),
-            element_size=element_size / diagonal,
-            envelope=envelope,
-            stop_energy=_STOP_ENERGY,
-            passes=passes,
+            element_size=settings["element_size"] / diagonal,
+            **{name: settings[name] for name in ("envelope", "stop_energy", "passes", "sequence")},
         )
         # -P: the folder of the plugin must not precede the libraries on the path
         worker = Path(__file__).with_name("tetwild_worker.py")
@@ -131,7 +142,7 @@ def _run(
     return made, tets
 
 
-def _limited(command: list[str], folder: str, time: ProcessorTime, size: str, path: str) -> tuple[int, bytes]:
+def _limited(command: list[str], folder: Path, time: ProcessorTime, size: str, path: str) -> tuple[int, bytes]:
     """Exit status and standard error of a process with what is left of the processor time.
 
     Args:
@@ -162,7 +173,7 @@ def _limited(command: list[str], folder: str, time: ProcessorTime, size: str, pa
             process.kill()
             raise
         if process.returncode == -signal.SIGXCPU:
-            raise ShotError(
+            raise OutOfTime(
                 "tetrahedralising exceeded the limit of processor time", path=path,
                 found=f"{size}, {time.limit:g} s", remedy=_REMEDY + MORE_TIME.format(4.0 * time.limit),
             )  # fmt: skip

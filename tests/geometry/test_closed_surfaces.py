@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from calmotion.geometry.closed_surfaces import boundary_walks, close, winding_number, winding_numbers
+from calmotion.geometry.closed_surfaces import boundary_walks, close, enclosed_volume, winding_number, winding_numbers
 from calmotion.geometry.tetrahedra import boundary_triangles, surface_volume
 
 
@@ -73,3 +73,13 @@ def test_many_winding_numbers_of_a_large_surface_are_those_of_each_place(bent):
     assert len(triangles) == 60_000
     assert np.abs(found - [winding_number(place, points, triangles) for place in places]).max() < 0.02
     assert found[:60] == pytest.approx(1.0, abs=0.03) and found[60:90] == pytest.approx(0.0, abs=0.03)
+
+
+def test_the_volume_of_a_surface_through_itself_is_what_it_winds_around(box):
+    """Two boxes that overlap."""
+    points, triangles = box
+    both = np.vstack([points, points + [0.75, 0.5, 0.5]])
+    faces = np.vstack([triangles, triangles + len(points)])
+    side = np.ptp(points, axis=0)
+    expected = 2.0 * np.prod(side) - np.prod(np.maximum(side - [0.75, 0.5, 0.5], 0.0))
+    assert enclosed_volume(both, faces) == pytest.approx(expected, rel=5e-3)

@@ -40,6 +40,13 @@ def test_parts_that_share_no_point_are_counted(helpers):
     assert t.connected_parts(np.vstack([tets, tets + len(points)])) == 2
 
 
+def test_the_largest_part_is_that_of_the_largest_volume(helpers):
+    points, tets = helpers.box((1, 1, 1), (1, 1, 1))
+    more, smaller = helpers.box((3, 3, 3), (0.9, 0.9, 0.9))
+    both = np.vstack([more, points + 5.0]), np.vstack([smaller, tets + len(more)])
+    assert np.array_equal(t.largest_part(*both), tets + len(more))
+
+
 def test_points_in_one_place_become_one(helpers):
     points, tets = helpers.box((1, 1, 1), (1, 1, 1))
     doubled = np.vstack([points, points + [1.0 + 1e-9, 0.0, 0.0]])
@@ -74,3 +81,31 @@ def test_the_volume_error_is_relative_to_the_surface(helpers):
     points, tets = helpers.box((1, 1, 1), (1, 1, 1))
     assert t.measure_quality(points, tets, surface_volume=1.25).volume_error == pytest.approx(0.2)
     assert t.measure_quality(points, tets).volume_error == 0.0
+
+
+CORNER = np.array(
+    [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1], [0.2, 0.2, 0.2], [-1, 0, 0], [0, -1, 0], [0, 0, -1]], float
+)
+
+
+def neighbours(*tets):
+    return t.refuse_bad_neighbours(t.oriented_tets(CORNER, np.array(tets))[0], "/Body/Tets")
+
+
+def test_neighbours_on_both_sides_of_a_face_are_a_body():
+    neighbours((0, 1, 2, 3))
+    neighbours((0, 1, 2, 3), (0, 1, 2, 7))
+    neighbours((0, 1, 2, 3), (0, 1, 2, 7), (0, 1, 3, 6), (3, 2, 0, 5))
+
+
+@pytest.mark.parametrize("second", [(0, 1, 2, 3), (1, 0, 2, 3), (3, 2, 1, 0), (0, 1, 2, 4)])
+def test_tetrahedra_that_fill_the_same_place_are_refused(second):
+    with pytest.raises(ShotError, match="fill the same place") as error:
+        neighbours((0, 1, 2, 3), (0, 1, 3, 6), second)
+    assert error.value.path == "/Body/Tets" and error.value.remedy
+
+
+@pytest.mark.parametrize("second", [(0, 5, 6, 7), (0, 1, 6, 7)])
+def test_tetrahedra_that_share_no_face_are_refused(second):
+    with pytest.raises(ShotError, match="points or edges"):
+        neighbours((0, 1, 2, 3), second)

@@ -18,7 +18,7 @@ from calmotion.simulation.body_reduction import BodyReduction
 from calmotion.simulation.compiled_shot import CompiledShot
 
 SHARE = 0.25  # of the tolerance, that the meshes may take
-NODES = 8000  # of a mesh that only linear modes are computed on: some seconds
+NODES = 20_000  # of a mesh that only linear modes are computed on: some seconds
 _MARGIN = 0.8  # of the wanted error: estimates of two meshes differ
 _SOFTEST = 0.5  # factor of a stiffness; a mesh that is off by more is of no use
 

@@ -8,6 +8,18 @@ from calmotion.shot.character import Array
 from calmotion.support.compilation import kernel
 
 
+def triangle_parts(count: int) -> Array:
+    """Barycentric coordinates of the centers of count^2 equal parts of a triangle, shape [count^2, 3]."""
+    points = []
+    for i in range(count):
+        for j in range(count - i):
+            points.append((i + 1 / 3, j + 1 / 3))
+            if i + j < count - 1:
+                points.append((i + 2 / 3, j + 2 / 3))
+    first = np.array(points) / count
+    return np.column_stack([first, 1.0 - first.sum(axis=1)])
+
+
 def closest_on_triangles(point: Array, triangles: Array) -> Array:
     """Closest point of each triangle to one point.
 

@@ -36,20 +36,24 @@ def solid_of(body: Body) -> Solid | None:
     Authored tetrahedra take precedence over surfaces, as for the mesh. A `mass` of the body scales the density.
 
     Returns:
-        None where the solid is not known without meshing: the body is not flexible, its geometry is in a file, it has
-        no density, or its surfaces are not one closed outward component with cavities.
+        None where the solid is not known without meshing: the body is not flexible, its geometry is in a file, hollow
+        or not its visual surface, it has no density, or its surfaces are not one closed outward component with
+        cavities.
     """
-    if body.flexible is None or (body.flexible.mesh_file and body.tets is None):
+    settings = body.flexible
+    if settings is None or (settings.mesh_file and body.tets is None):
+        return None
+    if body.tets is None and (settings.wall_thickness > 0.0 or settings.geometry in ("collision", "beam")):
         return None
     surface = _outside(body)
-    if surface is None or not body.flexible.material.density > 0.0:
+    if surface is None or not settings.material.density > 0.0:
         return None
     points, triangles = surface
     parts = _components(triangles)
     if parts is None or not _is_one_solid(points, triangles, parts):
         return None
     mass = None if body.mass is None else body.mass.mass
-    return Solid(points, triangles, mass_of_solid(points, triangles, body.flexible.material.density, mass))
+    return Solid(points, triangles, mass_of_solid(points, triangles, settings.material.density, mass))
 
 
 def mass_of_solid(points: Array, triangles: Indices, density: float, mass: float | None = None) -> MassProperties:

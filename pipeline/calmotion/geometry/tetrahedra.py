@@ -58,6 +58,9 @@ def surface_area(points: Array, triangles: Indices) -> float:
     return float(0.5 * np.linalg.norm(np.cross(x[:, 1] - x[:, 0], x[:, 2] - x[:, 0]), axis=1).sum())
 
 
+_OUTWARD = np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])  # faces of a tetrahedron of positive volume
+
+
 def flat_tets(points: Array, tets: IntArray) -> BoolArray:
     """Whether each tetrahedron has no volume but rounding, shape [m]; points of shape [n, 3], tetrahedra [m, 4]."""
     x = points[tets]
@@ -102,6 +105,53 @@ def oriented_tets(points: Array, tets: IntArray, path: str = "") -> tuple[IntArr
     return tets, int(inverted.sum())
 
 
+def refuse_bad_neighbours(tets: IntArray, path: str) -> None:
+    """Refuse tetrahedra that lie in each other, and parts that hang together in a point or an edge alone.
+
+    Neighbours have a face in common, which each has in the other's orientation. Parts whose faces do not fit each other
+    need three points in common.
+
+    Args:
+        tets: Of positive volume, shape [m, 4].
+        path: Prim path or file for the error.
+
+    Raises:
+        ShotError: Two have a face in the same orientation, so that both fill the same place; or the body would come
+            apart at a hinge or a pivot.
+    """
+    from scipy.sparse import coo_matrix
+    from scipy.sparse.csgraph import connected_components
+
+    faces = np.asarray(tets)[:, _OUTWARD].reshape(-1, 3)
+    odd = ((faces[:, 0] > faces[:, 1]) ^ (faces[:, 0] > faces[:, 2])) ^ (faces[:, 1] > faces[:, 2])
+    corners = np.sort(faces, axis=1)
+    order = np.lexsort((odd, corners[:, 2], corners[:, 1], corners[:, 0]))
+    same = np.all(corners[order][1:] == corners[order][:-1], axis=1)
+    twice = np.flatnonzero(same & (odd[order][1:] == odd[order][:-1]))
+    if len(twice):
+        one, other = sorted(order[[twice[0], twice[0] + 1]] // 4)
+        raise ShotError(
+            "two tetrahedra fill the same place, whose mass and stiffness would count twice",
+            path=path, found=f"elements {one} and {other}", remedy="Remove one of them, or author the mesh again",
+        )  # fmt: skip
+    pairs = order[np.flatnonzero(same)] // 4, order[np.flatnonzero(same) + 1] // 4
+    count = len(tets)
+    graph = coo_matrix((np.ones(len(pairs[0])), pairs), shape=(count, count))
+    parts, label = connected_components(graph, directed=False)
+    if parts == 1:
+        return
+    corner = np.unique(tets, return_inverse=True)[1].reshape(-1)
+    uses = coo_matrix((np.ones(len(corner)), (np.repeat(label, 4), corner)), shape=(parts, int(corner.max()) + 1))
+    uses = (uses.tocsr() > 0).astype(float)
+    count, label = connected_components((uses @ uses.T) >= 3.0, directed=False)
+    if count > 1:
+        raise ShotError(
+            "its tetrahedra hang together in points or edges only, where the body would turn freely",
+            path=path, found=f"{count} parts",
+            remedy="Join the parts by common faces, or split them into several bodies",
+        )  # fmt: skip
+
+
 def without_unused_points(points: Array, tets: IntArray) -> tuple[Array, IntArray]:
     """Points that tetrahedra use, in their order, and the renumbered tetrahedra."""
     used, inverse = np.unique(tets, return_inverse=True)
@@ -135,6 +185,18 @@ def welded_tets(points: Array, tets: IntArray, tolerance: float) -> tuple[Array,
 
 def connected_parts(tets: IntArray) -> int:
     """Number of parts that share no point; 1 for a connected body."""
+    return int(_parts(tets).max()) + 1
+
+
+def largest_part(points: Array, tets: IntArray) -> IntArray:
+    """The tetrahedra of the part with the largest volume; parts share no point."""
+    part = _parts(tets)
+    volumes = np.bincount(part, np.abs(tet_volumes(points, tets)))
+    return np.asarray(tets[part == volumes.argmax()])
+
+
+def _parts(tets: IntArray) -> Indices:
+    """Part of each tetrahedron, shape [m]."""
     from scipy.sparse import coo_matrix
     from scipy.sparse.csgraph import connected_components
 
@@ -142,7 +204,8 @@ def connected_parts(tets: IntArray) -> int:
     n = int(number.max()) + 1
     rows, columns = np.repeat(number[:, 0], 3), number[:, 1:].ravel()
     graph = coo_matrix((np.ones(len(rows)), (rows, columns)), shape=(n, n))
-    return int(connected_components(graph, directed=False)[0])
+    label: Indices = connected_components(graph, directed=False)[1][number[:, 0]]
+    return np.unique(label, return_inverse=True)[1].reshape(-1)
 
 
 def measure_quality(

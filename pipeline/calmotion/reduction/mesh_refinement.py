@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -23,10 +24,14 @@ from calmotion.reduction.load_envelope import LoadEnvelope
 from calmotion.reduction.material_laws.choice import amplitudes
 from calmotion.reduction.reduce import linear_modes
 from calmotion.shot.character import Array, Body, Frame, IntArray
-from calmotion.shot.meshes import FEMesh
+from calmotion.shot.meshes import CutPatch, FEMesh
 
 MARKED = 0.8  # share of the error in the elements that are bisected: halves the error with 1.7 times the nodes
-_GAIN, _RESERVE = 1.2, 2.0  # least ratio of estimates that are compared; safety factor of the result
+_GAIN = 1.2  # least ratio of estimates that are compared
+# Error that is left by an extrapolation, measured on four beams and plates with patches, three modes each: of what was
+# extrapolated, and of the difference of the extrapolations from two coarser meshes
+_LEFT, _APART = 0.2, 1.5
+_LEAST = 0.1  # of the estimate of the finer mesh: the least error that is claimed
 _MODES, _COUNT = 12, 3  # modes of a load estimate; frequencies that a motion excites
 _ASYMPTOTIC = 0.05  # largest estimate that is in proportion to the error
 _ROUNDS = 12
@@ -51,7 +56,9 @@ class Estimate:
     nodes: int
 
 
-def refined(mesh: FEMesh, estimate: Callable[[FEMesh], Estimate], wanted: float, max_nodes: int) -> FEMesh:
+def refined(
+    mesh: FEMesh, estimate: Callable[[FEMesh], Estimate], wanted: float, max_nodes: int, extrapolates: bool = True
+) -> FEMesh:
     """The mesh, bisected until its estimated error is small enough; its quality holds the error.
 
     Args:
@@ -59,54 +66,54 @@ def refined(mesh: FEMesh, estimate: Callable[[FEMesh], Estimate], wanted: float,
         estimate: Estimates the error of a mesh.
         wanted: Relative error of the compliance that may be, with that of the volume.
         max_nodes: No mesh has many more nodes.
+        extrapolates: Whether the mesh takes the stiffness that ever finer ones would have, as far as it is known.
     """
-    finest, error, _, _ = _bisected(mesh, estimate, wanted, max_nodes)
+    finest, estimates = _bisected(mesh, estimate, wanted, max_nodes)
+    excess, error = extrapolation(estimates)
+    if not extrapolates:
+        excess, error = 0.0, min(excess + error, estimates[-1].error)
     error += _of_volume(mesh)
-    quality = replace(mesh.quality, frequency_error=0.5 * error, stiffness_factor=1.0)
+    quality = replace(mesh.quality, frequency_error=0.5 * error, stiffness_factor=1.0 - excess)
     if finest is not mesh:
         quality = replace(quality, min_dihedral_deg=min_dihedral_deg(finest.points, finest.tets))
     return replace(finest, quality=quality)
 
 
 def with_finer_stiffness(mesh: FEMesh, estimate: Callable[[FEMesh], Estimate], wanted: float, max_nodes: int) -> FEMesh:
-    """The mesh with the stiffness that a finer one has: the same elements, and one factor for the stiffness.
+    """The mesh with the stiffness that ever finer ones have: the same elements, and one factor for the stiffness.
 
-    A mesh that is too coarse makes a body too stiff, nearly in proportion in all modes that the loads excite. The finer
-    mesh is needed for a few linear modes only, where the reduction of a nonlinear body on it takes ten times as long.
-    The remaining error is that of the finer mesh, and the spread of the factor over the modes.
+    A mesh that is too coarse makes a body too stiff, nearly in proportion in all modes that the loads excite. Finer
+    meshes are needed for a few linear modes only, where the reduction of a nonlinear body on them takes ten times as
+    long. The remaining error is that of the extrapolation, and the spread of the factor over the modes.
 
     Args:
         mesh, estimate, wanted, max_nodes: As of `refined`.
     """
-    _, error, coarse, fine = _bisected(mesh, estimate, wanted, max_nodes)
-    ratios, weights = _ratios(coarse, fine)
+    _, estimates = _bisected(mesh, estimate, wanted, max_nodes)
+    excess, error = extrapolation(estimates)
+    ratios, weights = _ratios(estimates[0], estimates[-1])
     factor = float(weights @ ratios)
     error += float(weights @ np.abs(ratios - factor)) + _of_volume(mesh)
+    factor *= 1.0 - excess
     return replace(mesh, quality=replace(mesh.quality, frequency_error=0.5 * error, stiffness_factor=factor))
 
 
 def _bisected(
     mesh: FEMesh, estimate: Callable[[FEMesh], Estimate], wanted: float, max_nodes: int
-) -> tuple[FEMesh, float, Estimate, Estimate]:
-    """The refined mesh, its error without that of the volume, and the estimates of the given and of the refined mesh.
-
-    Recovered strains overestimate the error, in proportion: where refinement lowers the estimate by a factor, the error
-    is the change of the compliance over this factor minus one. Twice that is used where it is smaller.
-    The first mesh with an estimate below 5% is compared: those of coarser ones are not proportional to their errors.
-    """
-    first = base = found = estimate(mesh)
+) -> tuple[FEMesh, list[Estimate]]:
+    """The refined mesh, and the estimates of all meshes from the given one on."""
+    estimates = [estimate(mesh)]
     # elements do not repair the volume, and far below its error they gain nothing
-    by_volume, error = _of_volume(mesh), found.error
+    by_volume = _of_volume(mesh)
     wanted = max(wanted - by_volume, 0.5 * by_volume, 0.3 * wanted)
     for _ in range(_ROUNDS):
         # the last bisection may exceed the limit by its factor of about 1.7
-        if error <= wanted or found.nodes > 0.6 * max_nodes:
+        if extrapolation(estimates)[1] <= wanted or estimates[-1].nodes > 0.6 * max_nodes:
             break
-        points, tets = bisected(mesh.points, mesh.tets, _largest(found.indicators))
+        points, tets = bisected(mesh.points, mesh.tets, _largest(estimates[-1].indicators))
         mesh = replace(mesh, points=points, tets=tets)
-        base, found = found if base.error > _ASYMPTOTIC else base, estimate(mesh)
-        error = _compared(base, found)
-    return mesh, error, first, found
+        estimates.append(estimate(mesh))
+    return mesh, estimates
 
 
 def _of_volume(mesh: FEMesh) -> float:
@@ -163,7 +170,10 @@ def refined_for_frequencies(mesh: FEMesh, body: Body, carrier: Frame | None, wan
         wanted: Relative error of the first frequencies.
         max_nodes: As of `refined`.
     """
-    return refined(mesh, lambda mesh: frequency_estimate(mesh, body, carrier), 2.0 * wanted, max_nodes)
+    estimate = partial(frequency_estimate, body=body, carrier=carrier)
+    key = ("for frequencies", mesh, replace(body, surfaces=()), carrier, wanted, max_nodes)
+    # the stiffness is that for the loads of the shot, which are not known yet
+    return cached_reduction(key, lambda: refined(mesh, estimate, 2.0 * wanted, max_nodes, extrapolates=False))
 
 
 def frequency_estimate(mesh: FEMesh, body: Body, carrier: Frame | None) -> Estimate:
@@ -174,7 +184,7 @@ def frequency_estimate(mesh: FEMesh, body: Body, carrier: Frame | None) -> Estim
     """
     assert body.flexible is not None
     model = assemble(mesh.points, mesh.tets, body.flexible.material)
-    frequencies, modes = clamped_modes(model, _COUNT, _clamped_nodes(model.mesh, body, carrier))
+    frequencies, modes = clamped_modes(model, _COUNT, _clamped_nodes(model.mesh, body, carrier, mesh.patches))
     weights = (frequencies[0] / frequencies) ** 2
     errors = element_errors(model.mesh, body.flexible.material, modes)
     total = float((errors * weights).sum(axis=0).max())
@@ -182,14 +192,28 @@ def frequency_estimate(mesh: FEMesh, body: Body, carrier: Frame | None) -> Estim
     return Estimate(total, squares, weights / weights.sum(), errors @ weights, len(model.mesh.nodes))
 
 
-def _compared(coarse: Estimate, fine: Estimate) -> float:
-    """The error of the finer of two meshes: its own estimate, or by the change between them if that is smaller."""
-    ratio = coarse.error / max(fine.error, np.finfo(float).tiny)
-    if ratio < _GAIN or coarse.error > _ASYMPTOTIC:
-        return fine.error
-    ratios, weights = _ratios(coarse, fine)
-    change = float(weights @ np.abs(ratios - 1.0))
-    return min(fine.error, max(_RESERVE * change / (ratio - 1.0), 0.1 * fine.error))
+def extrapolation(estimates: Sequence[Estimate]) -> tuple[float, float]:
+    """How much too stiff the last of ever finer meshes is, relative, and the error of the stiffness without that.
+
+    Recovered strains overestimate the error, but in proportion: where refinement lowers the estimate by a factor, the
+    error of the finer mesh is the change of the stiffness over this factor minus one. Two extrapolations, from coarser
+    meshes with estimates below 5%, show how well that is known; one alone may be wrong by all of it. Estimates of
+    coarser meshes are not in proportion to their errors.
+
+    Source: Richardson's extrapolation, by the estimated error in place of the element size.
+    """
+    fine = estimates[-1]
+    usable = [e for e in estimates[:-1] if _GAIN * fine.error <= e.error <= _ASYMPTOTIC]
+    excesses = []
+    for coarse in usable[-2:]:
+        ratios, weights = _ratios(coarse, fine)
+        change = float(weights @ (1.0 - ratios))
+        excesses.append(change / (coarse.error / max(fine.error, np.finfo(float).tiny) - 1.0))
+    if not excesses or min(excesses) <= 0.0:  # a finer mesh that is not softer tells nothing
+        return 0.0, fine.error
+    excess = min(excesses[0], fine.error)
+    left = excess if len(excesses) == 1 else max(_LEFT * excess, _APART * abs(excesses[1] - excesses[0]))
+    return excess, min(max(left, _LEAST * fine.error), fine.error)
 
 
 def _ratios(coarse: Estimate, fine: Estimate) -> tuple[Array, Array]:
@@ -206,12 +230,12 @@ def _largest(indicators: Array) -> IntArray:
     return np.asarray(order[: 1 + int(np.searchsorted(summed, MARKED * summed[-1]))])
 
 
-def _clamped_nodes(mesh: QuadraticMesh, body: Body, carrier: Frame | None) -> IntArray | None:
+def _clamped_nodes(mesh: QuadraticMesh, body: Body, carrier: Frame | None, cut: Sequence[CutPatch]) -> IntArray | None:
     assert body.flexible is not None
     if carrier is None:
         return None
     try:
         attachment = AttachmentFrame(body.path, carrier, "interface")
-        return interface_patches(mesh, [attachment], body.flexible.interface_radius, body.path)[0].nodes
+        return interface_patches(mesh, [attachment], body.flexible.interface_radius, body.path, cut)[0].nodes
     except ShotError:
         return None  # the reduction reports the error with the joint

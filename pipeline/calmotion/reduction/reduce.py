@@ -116,7 +116,7 @@ def full_body(mesh: FEMesh, body: Body, attachments: Sequence[AttachmentFrame], 
     _check_material(settings.material)
     material = _material(mesh, settings.material)
     model = assemble(mesh.points, mesh.tets, material, None if body.mass is None else body.mass.mass)
-    patches = interface_patches(model.mesh, attachments, settings.interface_radius, body.path)
+    patches = interface_patches(model.mesh, attachments, settings.interface_radius, body.path, mesh.patches)
     root_patch = next((patch for patch in patches if root in patch.attachments), None)
     if root_patch is None:
         raise ShotError(

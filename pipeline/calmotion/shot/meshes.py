@@ -17,6 +17,7 @@ class MeshQuality:
         volume_error: Relative difference to the volume of the (repaired) input surface; 0 for authored tetrahedra.
         repairs: What was repaired, as sentences.
         frequency_error: Estimated relative error of the first frequencies; None where it is not known.
+        source: What the body's solid was made of, such as `visual surface`.
         stiffness_factor: Of the stiffness of a finer mesh over that of this one, by which its elements are softer.
     """
 
@@ -26,6 +27,20 @@ class MeshQuality:
     repairs: tuple[str, ...] = ()
     frequency_error: float | None = None
     stiffness_factor: float = 1.0
+    source: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class CutPatch:
+    """A part of the surface of a mesh to which a joint is attached, bounded by edges of the elements.
+
+    Attributes:
+        origin: Of the attachment frame [m], shape [3], body frame.
+        triangles: Corners [m], shape [k, 3, 3]; elements may be refined within them.
+    """
+
+    origin: Array
+    triangles: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,6 +53,7 @@ class FEMesh:
         tets: Shape [m, 4], int32, positive volumes.
         quality: Its quality measures.
         given: Whether the shot or the user chose its elements: nothing refines them then.
+        patches: Interface patches along whose rims the elements are cut.
     """
 
     body: int
@@ -45,6 +61,7 @@ class FEMesh:
     tets: IntArray
     quality: MeshQuality
     given: bool = False
+    patches: tuple[CutPatch, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from calmotion.shot import TetGeometry
+from calmotion.shot import MassProperties, TetGeometry
 from calmotion.shot.meshes import MeshQuality
 from mesher_links import box, link, run, surface
 
@@ -37,3 +37,12 @@ def test_an_error_that_remains_is_reported(package):
     quality = MeshQuality(20.0, 1.0, 0.0)
     assert remark(quality) == () == remark(replace(quality, frequency_error=enough))
     assert "3%, more than 1%" in remark(replace(quality, frequency_error=0.03))[0]
+
+
+def test_a_stated_mass_that_the_material_does_not_give_is_reported(package):
+    mass_note = package("accuracy").mass_note
+    stated = MassProperties(0.5 * 1200.0 * 8e-5, np.zeros(3), np.eye(3))
+    (note,) = mass_note(replace(link(), mass=stated), 8e-5)
+    assert "0.5 times" in note and "600 instead of 1200 kg/m^3" in note and "wallThickness" in note
+    assert mass_note(replace(link(), mass=stated), 4.0e-5) == ()
+    assert mass_note(link(), 8e-5) == ()

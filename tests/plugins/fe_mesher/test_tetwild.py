@@ -46,10 +46,10 @@ def test_the_limit_is_that_of_all_meshes_of_a_body(package):
 
 
 @pytest.mark.parametrize("kept", [False, True])
-def test_a_mesh_with_a_flat_element_is_made_again(package, monkeypatch, tmp_path, kept):
+def test_a_mesh_with_a_flat_element_that_no_move_helps_is_made_again(package, monkeypatch, tmp_path, kept):
     monkeypatch.setenv("CALMOTION_CACHE", str(tmp_path))
     tetwild = package("tetwild")
-    flat = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0]]), np.array([[0, 1, 2, 3]])
+    flat = np.array([[0.0, 0, 0], [1, 0, 0], [2, 0, 0], [3, 0, 0]]), np.array([[0, 1, 2, 3]])
     whole = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]), flat[1]
     monkeypatch.setattr(tetwild.cache, "cache_key", lambda *arguments: "key")
     if kept:  # by an earlier version
@@ -62,3 +62,22 @@ def test_a_mesh_with_a_flat_element_is_made_again(package, monkeypatch, tmp_path
             np.array(cube.vertices), np.array(cube.faces), 0.01, 1e-3, "/Arm/link", tetwild.ProcessorTime(60.0), True
         )
         assert np.array_equal(points, whole[0]) and not made
+
+
+def test_a_surface_has_one_mesh(package):
+    tetwild, cube = package("tetwild"), box()
+    meshes = [
+        tetwild.tetrahedralize(
+            np.array(cube.vertices), np.array(cube.faces), 0.01, 1e-3, "/Arm/link", tetwild.ProcessorTime(60.0), False
+        )
+        for _ in range(2)
+    ]
+    assert len(meshes[0][1]) > 20
+    assert all(np.array_equal(one, other) for one, other in zip(*meshes, strict=True))
+
+
+def test_random_numbers_of_a_file_that_is_no_library_are_left_alone(package, tmp_path):
+    worker, file = package("tetwild_worker"), tmp_path / "library.so"
+    for content in (b"", b"\x7fELF\x01\x01" + bytes(100), b"MZ" + bytes(100)):
+        file.write_bytes(content)
+        assert not worker.fix_random_numbers(str(file), 1)

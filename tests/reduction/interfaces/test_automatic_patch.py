@@ -7,6 +7,7 @@ import pytest
 from calmotion.geometry.distances import closest_on_triangles
 from calmotion.reduction.elements.assembly import quadratic_mesh
 from calmotion.reduction.interfaces.automatic_patch import automatic_radius, end_face, nodes_of_area
+from calmotion.reduction.interfaces.interface_patches import AttachmentFrame, interface_patches
 
 
 def look(mesh, center, room=np.inf):
@@ -81,3 +82,16 @@ def test_an_anchor_in_a_bore_finds_the_wall_on_every_mesh(helpers):
         ring = quadratic_mesh(points[used], np.searchsorted(used, tets).astype(np.int32))
         _, radius = look(ring, (0.0005, 0.0003, 0.01))
         assert 0.02 < radius < 0.05
+
+
+def test_an_anchor_in_the_opening_of_a_tube_takes_its_whole_end(helpers):
+    points, tets = helpers.box((20, 4, 4), (0.4, 0.04, 0.04), origin=(0, -0.02, -0.02))
+    tets = tets[np.abs(points[tets].mean(axis=1)[:, 1:]).max(axis=1) > 0.01]
+    used = np.unique(tets)
+    tube = quadratic_mesh(points[used], np.searchsorted(used, tets).astype(np.int32))
+    (patch,) = interface_patches(tube, [AttachmentFrame("/j", helpers.frame(0.0, 0.0, 0.0), "interface")], -1.0, "/b")
+    at_the_end = np.flatnonzero(np.abs(tube.nodes[:, 0]) < 1e-12)
+    assert np.array_equal(patch.nodes, at_the_end) and len(at_the_end) > 50
+    # inside of the tube it is the wall around the frame
+    (inner,) = interface_patches(tube, [AttachmentFrame("/j", helpers.frame(0.1, 0.0, 0.0), "interface")], -1.0, "/b")
+    assert np.abs(tube.nodes[inner.nodes, 0] - 0.1).max() < 0.06 and len(inner.nodes) > 6

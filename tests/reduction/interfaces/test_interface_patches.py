@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from calmotion.errors import ShotError
 from calmotion.reduction.elements.assembly import quadratic_mesh
 from calmotion.reduction.interfaces.interface_patches import AttachmentFrame, interface_patches, spans_a_plane
 
@@ -50,17 +49,35 @@ def test_a_radius_finer_than_the_mesh_takes_the_triangle_that_is_touched(beam, a
     assert len(patch.nodes) == 6 and spans_a_plane(beam.nodes[patch.nodes])
 
 
-def test_an_anchor_off_the_body_is_refused_with_its_distance(beam, attachment):
-    with pytest.raises(ShotError) as caught:
-        interface_patches(beam, [attachment("/Arm/elbow", 0.3, 0.0, 0.11)], 0.02, "/Arm/link")
-    assert caught.value.path == "/Arm/link" and caught.value.attribute == "calm:flexible:interfaceRadius"
-    assert "/Arm/elbow" in str(caught.value) and "0.1 m away" in str(caught.value)
-    assert len(interface_patches(beam, [attachment("/Arm/elbow", 0.3, 0.0, 0.11)], 0.12, "/Arm/link")) == 1
+def test_a_given_radius_that_reaches_nothing_counts_from_the_nearest_place(beam, attachment):
+    (far,) = interface_patches(beam, [attachment("/Arm/elbow", 0.3, 0.0, 0.11)], 0.02, "/Arm/link")
+    (near,) = interface_patches(beam, [attachment("/Arm/elbow", 0.3, 0.0, 0.01)], 0.02, "/Arm/link")
+    assert np.array_equal(far.nodes, near.nodes) and len(far.nodes) > 6
+    # one that reaches the body is used as it is
+    (wide,) = interface_patches(beam, [attachment("/Arm/elbow", 0.3, 0.0, 0.11)], 0.12, "/Arm/link")
+    assert len(wide.nodes) > len(near.nodes)
 
 
-def test_the_automatic_radius_does_not_reach_for_an_anchor_in_the_air(beam, attachment):
-    with pytest.raises(ShotError, match="0.09 m away"):
-        interface_patches(beam, [attachment("/j", 0.3, 0.0, 0.1)], -1.0, "/b")
+def test_an_anchor_in_the_air_holds_the_nearest_place(beam, attachment):
+    (far,) = interface_patches(beam, [attachment("/j", 0.3, 0.0, 0.1)], -1.0, "/b")
+    (near,) = interface_patches(beam, [attachment("/j", 0.3, 0.0, 0.01)], -1.0, "/b")
+    assert np.array_equal(far.nodes, near.nodes) and len(far.nodes) >= 6
+
+
+def test_two_anchors_beyond_one_end_divide_it(beam, attachment):
+    frames = [attachment("/a", -0.1, 0.02, 0.0), attachment("/b", -0.1, -0.02, 0.0)]
+    first, second = interface_patches(beam, frames, -1.0, "/b")
+    assert len(first.nodes) >= 6 and len(second.nodes) >= 6 and not np.intersect1d(first.nodes, second.nodes).size
+    assert beam.nodes[np.union1d(first.nodes, second.nodes), 0].max() < 0.1
+
+
+def test_anchors_closer_to_each_other_than_the_elements_all_get_a_patch(beam, attachment):
+    frames = [attachment(f"/{k}", 0.3, 0.0, 0.0099 + 2e-5 * k) for k in range(4)]
+    patches = interface_patches(beam, frames, -1.0, "/b")
+    assert [patch.attachments for patch in patches] == [(0,), (1,), (2,), (3,)]
+    assert all(spans_a_plane(beam.nodes[patch.nodes]) for patch in patches)
+    nodes = np.concatenate([patch.nodes for patch in patches])
+    assert len(np.unique(nodes)) == len(nodes)
 
 
 def test_the_patch_of_a_bore_is_a_band_of_its_wall(helpers, attachment):

@@ -1,14 +1,19 @@
-"""Time and error of meshes against element size, for links of real robots.
+"""What becomes of the links of real robots, and the time and error of their meshes against element size.
 
-`calmotion bench meshing FILE[:PRIM] ... [--sizes 2 1.4 1 0.7] [-o table.md|table.csv]` meshes each link
-with elements of several sizes, given in metres with a unit (`8mm`) or as multiples of the automatic size. Errors of
-frequencies are relative to the mesh with the most nodes, which itself has an error; its estimate is shown too.
+`calmotion bench meshing ROBOT ... [-o table.md|table.csv]` has a row for each link: what its solid was made of, its
+volume and mass, interface patches, unknowns, processor time, first frequencies, and why it was refused.
+`--geometry-only` ends before the mesh. `FILE:PRIM` names one link.
+
+With `--sizes 2 1.4 1 0.7` each link is meshed with elements of several sizes, given in metres with a unit (`8mm`) or as
+multiples of the automatic size. Errors of frequencies are relative to the mesh with the most nodes, which itself has an
+error; its estimate is shown too.
 """
 
 from __future__ import annotations
 
 import sys
 import time
+from argparse import Namespace
 from collections.abc import Callable, Sequence
 from dataclasses import astuple, dataclass, replace
 from importlib import import_module
@@ -20,9 +25,8 @@ import numpy as np
 from calmotion.benchmarks.common.parsers import bench_parser
 from calmotion.benchmarks.common.tables import markdown, write_rows
 from calmotion.benchmarks.scenes.links import Link, read_links
+from calmotion.benchmarks.speed.link_survey import LinkRow, summary, survey_row, survey_table
 from calmotion.errors import ShotError
-
-SIZES = ("2", "1.4", "1", "0.7")
 
 
 @dataclass(frozen=True)
@@ -166,29 +170,29 @@ def _cell(value: object) -> str:
     return str(value)
 
 
-def write(rows: Sequence[Row], path: str) -> None:
-    """The rows as CSV or Markdown, by the suffix of the file."""
+def write(rows: Sequence[Any], path: str) -> None:
+    """The rows, of one kind, as CSV or Markdown, by the suffix of the file."""
     if path.lower().endswith(".csv"):
-        write_rows(path, Row, rows)
+        write_rows(path, type(rows[0]), rows)
     else:
-        Path(path).write_text(table(rows), encoding="utf-8")
+        shown = survey_table(rows) if isinstance(rows[0], LinkRow) else table(rows)
+        Path(path).write_text(shown, encoding="utf-8")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Command line; exit status 1 when no link could be meshed."""
-    parser = bench_parser("meshing", "Time and error against element size of links.")
+    parser = bench_parser("meshing", __doc__)
     parser.add_argument("links", nargs="+", metavar="FILE[:PRIM]", help="links; all bodies without a prim")
-    parser.add_argument(
-        "--sizes", nargs="+", default=list(SIZES), help="multiples of the automatic element size, or lengths (8mm)"
-    )
-    parser.add_argument("--time-limit", type=float, default=600.0, help="longest time for one mesh [s]")
+    parser.add_argument("--sizes", nargs="+", help="multiples of the automatic element size, or lengths (8mm)")
+    parser.add_argument("--geometry-only", action="store_true", help="make solids, and no meshes")
+    parser.add_argument("--time-limit", type=float, default=60.0, help="processor time of the meshes of a link [s]")
     parser.add_argument("-o", "--output", help="file of the table, .md or .csv")
     options = parser.parse_args(arguments)
 
     def say(text: str) -> None:
         print(text, file=sys.stderr, flush=True)
 
-    rows: list[Row] = []
+    rows: list[Any] = []
     for source in options.links:
         try:
             links = read_links(source)
@@ -196,14 +200,26 @@ def main(arguments: Sequence[str] | None = None) -> int:
             say(str(error))
             continue
         for link in links:
-            try:
-                rows += study(link, options.sizes, options.time_limit, say)
-            except ShotError as error:
-                say(str(error))
-            if options.output:
+            rows += _rows(link, source, options, say)
+            if options.output and rows:
                 write(rows, options.output)  # after each link: hours of work are not lost with the last of them
-    print(table(rows), end="")
-    return 0 if rows else 1
+    if options.sizes:
+        print(table(rows), end="")
+        return 0 if rows else 1
+    print(survey_table(rows) + "\n" + summary(rows, options.geometry_only), end="")
+    return 0 if any(row.flexible or (options.geometry_only and row.source != "refused") for row in rows) else 1
+
+
+def _rows(link: Link, source: str, options: Namespace, say: Callable[[str], None]) -> list[Any]:
+    if not options.sizes:
+        robot = Path(source.rpartition(":")[0] or source).stem
+        say(f"{robot} {link.name}")
+        return [survey_row(link, robot, _mesher(), options.time_limit, options.geometry_only)]
+    try:
+        return list(study(link, options.sizes, options.time_limit, say))
+    except ShotError as error:
+        say(str(error))
+        return []
 
 
 if __name__ == "__main__":

@@ -4,29 +4,18 @@ from __future__ import annotations
 
 import numpy as np
 
-from calmotion.geometry.distances import closest_on_triangles, ray_length
+from calmotion.geometry.distances import closest_on_triangles, ray_length, triangle_parts
 from calmotion.reduction.elements.assembly import QuadraticMesh
 from calmotion.shot.character import Array, IntArray
 
 _ASIDE = 0.01  # of the body's size: distance from the attachment frame of the other measurements of the width
 _DIRECTIONS = 16  # rays across the body that measure its width
 _FLAT_COSINE = np.cos(np.radians(10.0))  # a tetrahedraliser may tilt the triangles of a plane by a few degrees
+_SECTORS, _COVERED = 16, 12  # of the angle around an opening, and how many its end face covers
 _FLAT_OFFSET = 3e-3  # and move its corners by about a thousandth of the body
 
 
-def _triangle_parts(count: int) -> Array:
-    """Barycentric coordinates of the centers of count^2 equal parts of a triangle, shape [count^2, 3]."""
-    points = []
-    for i in range(count):
-        for j in range(count - i):
-            points.append((i + 1 / 3, j + 1 / 3))
-            if i + j < count - 1:
-                points.append((i + 2 / 3, j + 2 / 3))
-    first = np.array(points) / count
-    return np.column_stack([first, 1.0 - first.sum(axis=1)])
-
-
-_PARTS = _triangle_parts(6)
+_PARTS = triangle_parts(6)
 
 
 def end_face(
@@ -36,7 +25,7 @@ def end_face(
 
     A joint in the middle of the end of a link is attached to the whole end, as a flange is, and not to the sides: this
     is the clamped beam of the text books. A face is an end face when the body behind it is deeper than the face is
-    wide, both measured from the attachment frame.
+    wide, both measured from the attachment frame. The end of a tube around the frame is one as well.
 
     Args:
         mesh: Of the body.
@@ -52,7 +41,7 @@ def end_face(
     size = float(np.linalg.norm(np.ptp(mesh.nodes, axis=0)))
     nearest = int(gaps.argmin())
     if gaps[nearest] > _FLAT_OFFSET * size:
-        return none
+        return _end_ring(mesh, center, triangles, size, room)
     normal = _touched_normal(triangles, gaps, size)
     normals = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
     normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), np.finfo(float).tiny)
@@ -70,6 +59,28 @@ def end_face(
     if extent > min(0.5 * depth, room):
         return none
     return np.unique(mesh.surface[face])
+
+
+def _end_ring(mesh: QuadraticMesh, center: Array, triangles: Array, size: float, room: float) -> IntArray:
+    """Nodes of the flat end of a tube, around an attachment frame in the middle of its opening; empty without one."""
+    none = np.zeros(0, dtype=np.int32)
+    normals = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+    area = np.linalg.norm(normals, axis=1)
+    normals /= np.maximum(area[:, None], np.finfo(float).tiny)
+    away = triangles - center
+    through = np.abs(np.einsum("kij,kj->ki", away, normals)).max(axis=1) <= _FLAT_OFFSET * size
+    if not through.any():
+        return none
+    normal = normals[through][int(area[through].argmax())]
+    ring = np.flatnonzero(through & (normals @ normal > _FLAT_COSINE))
+    middle = away[ring].mean(axis=1)
+    u, v = np.linalg.svd(normal[None])[2][1:]
+    sectors = np.floor((np.arctan2(middle @ v, middle @ u) + np.pi) / (2.0 * np.pi) * _SECTORS)
+    extent = float(np.linalg.norm(away[ring], axis=-1).max())
+    depth = _depth(triangles[ring[0]].mean(axis=0), normal, triangles, size)
+    if len(np.unique(sectors)) < _COVERED or extent > min(0.5 * depth, room):
+        return none
+    return np.unique(mesh.surface[ring])
 
 
 def automatic_radius(center: Array, triangles: Array, closest: Array, gaps: Array, room: float) -> float:

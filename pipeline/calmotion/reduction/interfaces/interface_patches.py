@@ -9,13 +9,18 @@ import numpy as np
 
 from calmotion.errors import ShotError
 from calmotion.geometry.distances import closest_on_triangles
+from calmotion.geometry.nearby_triangles import NearbyTriangles
 from calmotion.reduction.elements.assembly import QuadraticMesh
 from calmotion.reduction.interfaces.automatic_patch import automatic_radius, end_face, nodes_of_area
-from calmotion.reduction.interfaces.far_frames import LARGEST_GAP, OUTSIDE, far_frame, inside_hull
+from calmotion.reduction.interfaces.contact_place import contact_place
 from calmotion.reduction.interfaces.named_patch import named_patch
 from calmotion.shot.character import Array, Frame, IntArray, InterfaceSurface
+from calmotion.shot.meshes import CutPatch
 
 _GROWTH = 1.25
+_FEWEST = 6  # nodes of a triangle
+_TIE = 1e-3  # of a distance: places that are nearer to each other are one
+_SAME = 1e-7  # of the diagonal: distance of a node from the triangle that it is on
 _SPREAD = 0.2  # second largest over largest extent below which a patch is a line and cannot carry a moment
 
 
@@ -44,19 +49,24 @@ class InterfacePatch:
         nodes: Surface nodes, ascending.
         attachments: Indices of the attachment frames that it carries, all at one position.
         radius: Largest distance of its nodes from them, or the radius that it was made with [m].
+        center: Of the sphere with this radius that it lies in [m], shape [3]; None where it is no such part.
     """
 
     nodes: IntArray
     attachments: tuple[int, ...]
     radius: float
+    center: Array | None = None
 
 
 def interface_patches(
-    mesh: QuadraticMesh, attachments: Sequence[AttachmentFrame], radius: float, body: str
-) -> list[InterfacePatch]:
+    mesh: QuadraticMesh, attachments: Sequence[AttachmentFrame], radius: float, body: str,
+    cut: Sequence[CutPatch] = (),
+) -> list[InterfacePatch]:  # fmt: skip
     """The interface patches of a body, in the order of their first attachment frames.
 
-    Attachment frames of kind `interface` at one position share a patch, unless they name their surfaces. A node on a
+    A frame that does not touch the body holds it at its contact place (`contact_place`), one with a given radius that
+    nothing is in at the nearest place. Attachment frames of kind `interface` at one position share a patch, unless they
+    name their surfaces. A node on a
     named surface belongs to the patch of that surface; a node that two patches could take belongs to the patch of the
     nearer attachment frame.
 
@@ -65,9 +75,10 @@ def interface_patches(
         attachments: All attachment frames; those of kind `point` are ignored.
         radius: Radius of the patches [m]; negative: chosen for each attachment frame (`automatic_radius`).
         body: Prim path of the body, for errors.
+        cut: Patches along whose rims the mesh is cut; they are as they are.
 
     Raises:
-        ShotError: An attachment frame touches no surface, its patch carries no moment, or two named patches overlap.
+        ShotError: A patch carries no moment, or two named patches overlap.
     """
     size = float(np.linalg.norm(np.ptp(mesh.nodes, axis=0)))
     groups: list[list[int]] = []
@@ -85,24 +96,54 @@ def interface_patches(
                 break
         else:
             groups.append([index])
-    centers = np.array([attachments[group[0]].frame.position for group in groups]).reshape(-1, 3)
     triangles = mesh.nodes[mesh.surface[:, :3]]
     surface = mesh.surface_nodes
-    distance = np.linalg.norm(mesh.nodes[surface][None] - centers[:, None], axis=-1)
-    nearest = distance.argmin(axis=0)
     named = _named_patches(mesh, attachments, groups, body)
+    frames = [attachments[group[0]].frame for group in groups]
+    contacts = [
+        None
+        if k in named or radius >= 0.0
+        else contact_place(frame.position, frame.axis, triangles, mesh.nodes[surface])
+        for k, frame in enumerate(frames)
+    ]
+    centers = np.array([f.position if c is None else c.position for f, c in zip(frames, contacts, strict=True)])
+    centers = centers.reshape(-1, 3)
+    distance = np.linalg.norm(mesh.nodes[surface][None] - centers[:, None], axis=-1)
+    # where frames away from the body have one contact place, the surface there is divided by their own positions
+    origins = np.array([frame.position for frame in frames]).reshape(-1, 3)
+    distance += _TIE * np.linalg.norm(mesh.nodes[surface][None] - origins[:, None], axis=-1)
+    nearest = distance.argmin(axis=0)
     taken = np.isin(surface, np.concatenate([np.zeros(0, np.int32), *named.values()]))
-    patches = []
+    patches: list[InterfacePatch] = []
     for k, group in enumerate(groups):
         if k in named:
             extent = float(np.linalg.norm(mesh.nodes[named[k]] - centers[k], axis=1).max())
             patches.append(InterfacePatch(nodes=named[k], attachments=tuple(group), radius=extent))
             continue
+        free = surface[~taken]
         candidates = surface[(nearest == k) & ~taken]
-        others = np.delete(centers, k, axis=0)
-        room = float(np.linalg.norm(others - centers[k], axis=1).min()) if len(others) else np.inf
-        patches.append(_patch(mesh, triangles, candidates, attachments, group, radius, room, size, body))
+        known = next((c for c in cut if np.linalg.norm(c.origin - frames[k].position) < 1e-6 * size), None)
+        if known is not None:
+            patches.append(_cut_patch(mesh, candidates, known, group, size))
+            continue
+        others = np.linalg.norm(np.delete(centers, k, axis=0) - centers[k], axis=1)
+        room = float(others.min(initial=np.inf, where=others > _TIE * size))
+        path = attachments[group[0]].path
+        patch = _patch(mesh, triangles, candidates, free, centers[k], path, group, radius, room, body)
+        taken |= np.isin(surface, patch.nodes)
+        patches.append(patch)
     return patches
+
+
+def _cut_patch(
+    mesh: QuadraticMesh, candidates: IntArray, cut: CutPatch, group: list[int], size: float
+) -> InterfacePatch:
+    """The patch of the nodes on the triangles of a cut patch."""
+    corners = np.arange(3 * len(cut.triangles)).reshape(-1, 3)
+    near = NearbyTriangles(cut.triangles.reshape(-1, 3), corners, _SAME * size)
+    nodes = candidates[np.isfinite(near.closest(mesh.nodes[candidates])[:, 0])]
+    extent = float(np.linalg.norm(mesh.nodes[nodes] - cut.origin, axis=1).max())
+    return InterfacePatch(nodes=nodes.astype(np.int32), attachments=tuple(group), radius=extent)
 
 
 def _named_patches(
@@ -123,31 +164,36 @@ def _named_patches(
             )  # fmt: skip
         for other, taken in patches.items():
             if np.intersect1d(nodes, taken).size:
-                raise ShotError(
-                    f"this interface overlaps that of {attachments[groups[other][0]].path}",
-                    path=surface.path, attribute="indices", remedy="Leave a face between the two, or join them by one",
-                )  # fmt: skip
+                raise overlapping(surface, attachments[groups[other][0]].path)
         patches[k] = nodes
     return patches
 
 
+# parameters: they are what is known of the body and of all its attachment frames
+def overlapping(surface: InterfaceSurface, joint: str) -> ShotError:
+    """The error about a named interface that overlaps that of another joint."""
+    return ShotError(
+        f"this interface overlaps that of {joint}",
+        path=surface.path, attribute="indices", remedy="Leave a face between the two, or join them by one",
+    )  # fmt: skip
+
+
 def _patch(
-    mesh: QuadraticMesh, triangles: Array, candidates: IntArray, attachments: Sequence[AttachmentFrame],
-    group: list[int], radius: float, room: float, size: float, body: str,
+    mesh: QuadraticMesh, triangles: Array, candidates: IntArray, free: IntArray, center: Array, path: str,
+    group: list[int], radius: float, room: float, body: str,
 ) -> InterfacePatch:  # fmt: skip
-    center, path = attachments[group[0]].frame.position, attachments[group[0]].path
+    size = float(np.linalg.norm(np.ptp(mesh.nodes, axis=0)))
     closest = closest_on_triangles(center, triangles)
     gaps = np.linalg.norm(closest - center, axis=1)
     gap = float(gaps.min())
     automatic = radius < 0.0
     if automatic:
-        inside = inside_hull(mesh.nodes[mesh.surface_nodes], center, OUTSIDE * size)
-        largest_gap = LARGEST_GAP * size if inside else 0.0
         radius = automatic_radius(center, triangles, closest, gaps, room)
-    else:
-        largest_gap = radius
-    if gap > largest_gap:
-        raise far_frame(path, body, gap, center, radius)
+    elif gap > radius:  # nothing of the surface is inside: the radius counts from the nearest place
+        center = closest[int(gaps.argmin())]
+        closest = closest_on_triangles(center, triangles)
+        gaps = np.linalg.norm(closest - center, axis=1)
+        gap = float(gaps.min())
     if automatic:
         face = np.intersect1d(end_face(mesh, center, triangles, closest, gaps, room), candidates)
         if spans_a_plane(mesh.nodes[face]):
@@ -158,16 +204,27 @@ def _patch(
         # elements larger than the radius: the nearest surface triangle is the smallest patch that carries a moment
         touched = np.intersect1d(mesh.surface[gaps <= gap + 1e-9 * size].ravel(), candidates)
         nodes = np.union1d(nodes, touched)
-    while automatic and not spans_a_plane(mesh.nodes[nodes]) and radius < min(0.5 * size, room):
+    while automatic and not spans_a_plane(mesh.nodes[nodes]) and radius < size:
         radius *= _GROWTH
         nodes = nodes_of_area(mesh, candidates, center, radius)
+    if automatic and not spans_a_plane(mesh.nodes[nodes]):
+        nodes = _nearest_spanning(mesh, free, center)  # frames so near to each other that one has hardly any surface
     if not spans_a_plane(mesh.nodes[nodes]):
         raise ShotError(
             f"the surface near the attachment frame of {path} is too small to carry a joint",
             path=body, attribute="calm:flexible:interfaceRadius", found=f"{len(nodes)} nodes within {radius:.4g} m",
             remedy="Author a larger interfaceRadius or a smaller elementSize, or move the joints apart",
         )  # fmt: skip
-    return InterfacePatch(nodes=nodes.astype(np.int32), attachments=tuple(group), radius=radius)
+    return InterfacePatch(nodes=nodes.astype(np.int32), attachments=tuple(group), radius=radius, center=center)
+
+
+def _nearest_spanning(mesh: QuadraticMesh, free: IntArray, center: Array) -> IntArray:
+    """The nearest nodes that carry a moment, of those that no other patch has."""
+    order = free[np.argsort(np.linalg.norm(mesh.nodes[free] - center, axis=1), kind="stable")]
+    for count in range(_FEWEST, len(order) + 1):
+        if spans_a_plane(mesh.nodes[order[:count]]):
+            return np.sort(order[:count])
+    return order
 
 
 def spans_a_plane(points: Array) -> bool:

@@ -27,7 +27,7 @@ from calmotion.shot.character import Array, ElasticMaterial
 
 _MODES = 4  # the lowest modes, which make nearly all of a deflection
 _LARGE_STRAIN = 0.1  # below, the bound of the loads is too pessimistic to require a nonlinear material
-_UNPHYSICAL = 100.0  # deflection over the size of the body, beyond any real one
+UNPHYSICAL = 100.0  # deflection over the size of the body, beyond any real one
 
 
 @dataclass(frozen=True)
@@ -79,7 +79,7 @@ def choose_law(
     root = np.sqrt(omega_squared)
     softening = float(np.linalg.norm(change / np.outer(root, root), 2))
     size = float(np.ptp(model.mesh.nodes, axis=0).max())
-    if deflection > _UNPHYSICAL * size:
+    if deflection > UNPHYSICAL * size:
         raise ShotError(
             f"this body is too soft for this shot: the deflection of a linear body would be {deflection / size:.3g} "
             "times its size",

@@ -1,0 +1,171 @@
+"""What becomes of every link of robots: one row each, from its geometry to its first frequencies."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from dataclasses import astuple, dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from calmotion.benchmarks.common.tables import markdown
+from calmotion.benchmarks.scenes.links import Link
+from calmotion.errors import ShotError
+
+LIMIT = 20.0  # processor time of a link that is wanted [s]
+
+
+@dataclass(frozen=True)
+class LinkRow:
+    """What became of a link.
+
+    Attributes:
+        robot, link: Names.
+        source: What its solid was made of; `refused` or `none` (no geometry) where there is none.
+        triangles: Of its visual surfaces.
+        volume: Of its solid [cm^3].
+        of_hull: Volume over that of the convex hull of the visual surfaces.
+        mass: That the robot states [kg].
+        density: The mass over the volume [kg/m^3].
+        joints, off: Its joints, and those whose frames do not touch its solid.
+        farthest: Of these from the solid [mm].
+        nodes: Of the ten-node tetrahedra.
+        volume_error: Of the tetrahedra against the solid [%].
+        seconds: Processor time of solid, mesh, interface patches and refinement [s].
+        f1, f2, f3: First frequencies, held by the joint towards the world, in polyamide [Hz].
+        estimate: Error of the frequencies that is estimated [%].
+        note: Why it was refused, or why another source than the visual surface was taken.
+    """
+
+    robot: str
+    link: str
+    source: str = "refused"
+    triangles: int = 0
+    volume: float = np.nan
+    of_hull: float = np.nan
+    mass: float = np.nan
+    density: float = np.nan
+    joints: int = 0
+    off: int = 0
+    farthest: float = np.nan
+    nodes: int = 0
+    volume_error: float = np.nan
+    seconds: float = np.nan
+    f1: float = np.nan
+    f2: float = np.nan
+    f3: float = np.nan
+    estimate: float = np.nan
+    note: str = ""
+
+    @property
+    def flexible(self) -> bool:
+        """Whether it can be simulated as flexible."""
+        return self.nodes > 0
+
+
+def survey_row(link: Link, robot: str, mesher: Any, time_limit: float, geometry_only: bool = False) -> LinkRow:
+    """The row of a link; what is wrong with it is in its note.
+
+    Args:
+        link: From `read_links`.
+        robot: Its name.
+        mesher: The module `body_mesh` of the bundled mesher.
+        time_limit: Processor time of its meshes [s].
+        geometry_only: Whether its solid is made but not meshed.
+    """
+    body = replace(link.body, mass=link.mass)
+    frames = (*(() if link.carrier is None else (link.carrier,)), *link.others)
+    visual = [surface for surface in body.surfaces if surface.visible and len(surface.triangles)]
+    row = LinkRow(
+        robot=robot, link=link.name, triangles=sum(len(surface.triangles) for surface in visual), joints=len(frames),
+        mass=np.nan if link.mass is None else link.mass.mass,
+    )  # fmt: skip
+    if not body.surfaces and body.tets is None and not frames:
+        return replace(row, source="none", note="no geometry and no joints")
+    begin = _processor_time()
+    try:
+        options = mesher.MeshOptions(time_limit=time_limit, cache=False)
+        geometry = mesher.geometry_of(0, body, options, frames)
+        row = _with_solid(row, geometry, visual, frames)
+        if not geometry_only:
+            row = _with_mesh(row, mesher.mesh_of(0, body, geometry, options, frames), link, frames)
+    except ShotError as problem:
+        row = replace(row, note=str(problem), nodes=0)
+    return replace(row, seconds=_processor_time() - begin)
+
+
+def _with_solid(row: LinkRow, geometry: Any, visual: Sequence[Any], frames: Sequence[Any]) -> LinkRow:
+    from scipy.spatial import ConvexHull
+
+    from calmotion.geometry.tetrahedra import boundary_triangles
+    from calmotion.reduction.interfaces.contact_place import contact_place
+
+    solid = getattr(geometry, "solid", None)
+    points = geometry.points if solid is None else solid.points
+    triangles = boundary_triangles(geometry.tets) if solid is None else solid.triangles
+    volume = geometry.quality.volume if solid is None else solid.volume
+    hull = np.nan
+    if visual:
+        hull = float(ConvexHull(np.vstack([s.points[s.triangles.ravel()] for s in visual])).volume)
+    places = [contact_place(frame.position, frame.axis, points[triangles], points) for frame in frames]
+    off = [place.distance for place in places if place is not None]
+    return replace(
+        row, source="tetrahedra" if solid is None else solid.source, volume=1e6 * volume, of_hull=volume / hull,
+        density=row.mass / volume, off=len(off), farthest=1e3 * max(off, default=np.nan),
+        note="" if solid is None or solid.source == "visual surface" else solid.repairs[0],
+    )  # fmt: skip
+
+
+def _with_mesh(row: LinkRow, mesh: Any, link: Link, frames: Sequence[Any]) -> LinkRow:
+    from calmotion.reduction.discretization_error import clamped_modes
+    from calmotion.reduction.elements.assembly import assemble
+    from calmotion.reduction.interfaces.interface_patches import AttachmentFrame, interface_patches
+
+    settings = link.body.flexible
+    assert settings is not None
+    model = assemble(mesh.points, mesh.tets, settings.material)
+    attachments = [AttachmentFrame(f"joint {k}", frame, "interface") for k, frame in enumerate(frames)]
+    patches = interface_patches(model.mesh, attachments, settings.interface_radius, link.body.path)
+    clamped = patches[0].nodes if link.carrier is not None else None
+    f1, f2, f3 = clamped_modes(model, 3, clamped)[0]
+    error = mesh.quality.frequency_error
+    return replace(
+        row, nodes=len(model.mesh.nodes), volume_error=100.0 * mesh.quality.volume_error, f1=float(f1), f2=float(f2),
+        f3=float(f3), estimate=np.nan if error is None else 100.0 * error,
+    )  # fmt: skip
+
+
+def _processor_time() -> float:
+    """Of this process and its ended children [s]: it does not depend on what else the machine does."""
+    spent = os.times()
+    return spent.user + spent.system + spent.children_user + spent.children_system
+
+
+def survey_table(rows: Sequence[LinkRow]) -> str:
+    """The rows as a Markdown table."""
+    heads = [
+        "robot", "link", "source", "triangles", "volume cm^3", "of hull", "mass kg", "kg/m^3", "joints", "off", "mm",
+        "nodes", "volume %", "s", "f1 Hz", "f2 Hz", "f3 Hz", "estimate %", "note",
+    ]  # fmt: skip
+    return markdown(heads, ([_cell(value) for value in astuple(row)] for row in rows))
+
+
+def _cell(value: object) -> str:
+    if isinstance(value, float):
+        return "-" if np.isnan(value) else f"{value:.3g}"
+    return str(value).replace("|", "/")
+
+
+def summary(rows: Sequence[LinkRow], geometry_only: bool = False) -> str:
+    """How many links became flexible, and how many of these within the wanted time."""
+    links = [row for row in rows if row.source != "none"]
+    done = [row for row in links if row.flexible or (geometry_only and row.source != "refused")]
+    what = "have a solid" if geometry_only else "are flexible"
+    fast = sum(row.seconds <= LIMIT for row in done)
+    lines = [
+        f"{len(done)} of {len(links)} links {what} ({100.0 * len(done) / max(len(links), 1):.3g}%); "
+        f"{fast} took no more than {LIMIT:g} s of processor time ({100.0 * fast / max(len(done), 1):.3g}%)\n"
+    ]
+    lines += [f"{row.robot} {row.link}: {row.note}\n" for row in links if row not in done]
+    return "".join(lines)

@@ -1,0 +1,81 @@
+"""The boundary of tetrahedra as the best fit of a surface.
+
+Corners that lie on a curved surface make the triangles between them chords: every round part of the body is thinner
+than it should be, and softer by about twice the volume that is missing. Corners that lie somewhat outside, so that the
+triangles leave the surface to both sides alike, have an error of fourth order in the size of the triangles instead of
+second. Flat faces and edges stay where they are.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from calmotion.geometry.distances import triangle_parts
+from calmotion.geometry.nearby_triangles import NearbyTriangles
+from calmotion.geometry.tetrahedra import Indices, boundary_triangles, tet_volumes
+from calmotion.shot.character import Array, IntArray
+
+_PASSES = 2
+_HOLD = 1e-3  # weight of the movement itself: keeps corners from sliding along the surface
+_THINNEST = 0.5  # least part of its volume that a tetrahedron keeps
+
+
+_PARTS = triangle_parts(6)
+
+
+def fitted(points: Array, tets: IntArray, surface_points: Array, triangles: Indices, limit: float) -> Array:
+    """Points of the tetrahedra with the boundary moved to the best fit of a surface, by least squares of the distance.
+
+    Args:
+        points: [m], shape [n, 3].
+        tets: Shape [m, 4], positive volumes.
+        surface_points: Of the closed surface that was meshed [m], shape [k, 3].
+        triangles: Of the surface, shape [l, 3].
+        limit: Largest distance of the two [m]: where they are farther apart, as in a groove that the mesh omits, the
+            boundary is not fitted, and no corner moves farther.
+
+    Returns:
+        The points [m], shape [n, 3].
+    """
+    boundary, surface = boundary_triangles(tets), NearbyTriangles(surface_points, triangles, limit)
+    volumes, moved = tet_volumes(points, tets), points
+    for _ in range(_PASSES):
+        moved = moved + _step(moved, boundary, surface)
+    step = moved - points
+    length = np.linalg.norm(step, axis=1)
+    step *= np.minimum(1.0, limit / np.maximum(length, np.finfo(float).tiny))[:, None]
+    while True:
+        flattened = tet_volumes(points + step, tets) < _THINNEST * volumes
+        if not flattened.any():
+            return np.asarray(points + step)
+        step[tets[flattened]] = 0.0
+
+
+def _step(points: Array, boundary: IntArray, surface: NearbyTriangles) -> Array:
+    """Movement of all points that fits the boundary, to first order [m], shape [n, 3]."""
+    from scipy.sparse import coo_matrix, diags
+    from scipy.sparse.linalg import spsolve
+
+    corners = points[boundary]
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    doubled = np.linalg.norm(normal, axis=1)
+    normal /= np.maximum(doubled, np.finfo(float).tiny)[:, None]
+    at = np.einsum("pk,tkx->tpx", _PARTS, corners)
+    gap = surface.closest(at.reshape(-1, 3)).reshape(at.shape) - at
+    known = np.isfinite(gap[..., 0])
+    distance = np.where(known, np.einsum("tpx,tx->tp", np.nan_to_num(gap), normal), 0.0)
+    weight = np.where(known, 0.5 * doubled[:, None] / len(_PARTS), 0.0)
+    # the normal movement is N_k v_k . n on each triangle; normal equations for v, three entries a corner
+    shapes = np.einsum("tp,pk,pl->tkl", weight, _PARTS, _PARTS)
+    block = np.einsum("tkl,tx,ty->tkxly", shapes, normal, normal)
+    right = np.einsum("tp,tp,pk,tx->tkx", weight, distance, _PARTS, normal)
+    used, number = np.unique(boundary, return_inverse=True)
+    places = (3 * number.reshape(boundary.shape)[:, :, None] + np.arange(3)).reshape(len(boundary), 9)
+    size = 3 * len(used)
+    rows, columns = np.repeat(places, 9, axis=1).ravel(), np.tile(places, 9).ravel()
+    A = coo_matrix((block.reshape(len(boundary), -1).ravel(), (rows, columns)), shape=(size, size)).tocsc()
+    lumped = np.bincount(places.ravel(), np.repeat(doubled / 6.0, 9), size)
+    b = np.bincount(places.ravel(), right.reshape(len(boundary), 9).ravel(), size)
+    step = np.zeros_like(points)
+    step[used] = spsolve(A + diags(_HOLD * lumped), b).reshape(-1, 3)
+    return step

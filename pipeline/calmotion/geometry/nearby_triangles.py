@@ -1,0 +1,127 @@
+"""Closest points of a surface near many points, by a grid of cells that name the triangles close to them."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from calmotion.geometry.tetrahedra import Indices
+from calmotion.shot.character import Array
+from calmotion.support.compilation import kernel
+
+_CELLS = 64  # along the longest side of the surface
+
+
+class NearbyTriangles:
+    """The triangles of a surface, by cells of space.
+
+    Args:
+        points: [m], shape [n, 3].
+        triangles: Shape [m, 3].
+        reach: Triangles farther than this from a point are not found [m].
+    """
+
+    def __init__(self, points: Array, triangles: Indices, reach: float):
+        self._corners = np.ascontiguousarray(points[triangles])
+        self._reach = reach
+        low, high = points.min(axis=0) - reach, points.max(axis=0) + reach
+        self._low, self._size = low, float((high - low).max()) / _CELLS
+        self._count = np.maximum(np.ceil((high - low) / self._size).astype(np.int64), 1)
+        first = ((self._corners.min(axis=1) - reach - low) / self._size).astype(np.int64)
+        last = ((self._corners.max(axis=1) + reach - low) / self._size).astype(np.int64)
+        first, last = np.clip(first, 0, self._count - 1), np.clip(last, 0, self._count - 1)
+        self._start = np.zeros(int(np.prod(self._count)) + 1, np.int64)
+        _list(first, last, self._count, self._start, np.zeros(0, np.int32))
+        np.cumsum(self._start, out=self._start)
+        self._listed = np.zeros(self._start[-1], np.int32)
+        _list(first, last, self._count, self._start, self._listed)
+
+    def closest(self, points: Array) -> Array:
+        """Closest points of the surface [m], shape [k, 3]; NaN where it is farther than the reach."""
+        found = np.full(points.shape, np.nan)
+        cell = np.floor((points - self._low) / self._size).astype(np.int64)
+        inside = np.all((cell >= 0) & (cell < self._count), axis=1)
+        number = (cell[:, 0] * self._count[1] + cell[:, 1]) * self._count[2] + cell[:, 2]
+        number[~inside] = -1
+        near = np.ascontiguousarray(points)
+        _closest(near, number, self._start, self._listed, self._corners, self._reach, np.zeros(3), found)
+        return found
+
+
+@kernel
+def _list(first: Indices, last: Indices, count: Indices, start: Indices, listed: Indices) -> None:
+    """Count the triangles of each cell into start[cell + 1]; or, with cumulative counts, list them.
+
+    `start` is the same before and after a listing.
+    """
+    for k in range(len(first) - 1, -1, -1):
+        for x in range(first[k, 0], last[k, 0] + 1):
+            for y in range(first[k, 1], last[k, 1] + 1):
+                for z in range(first[k, 2], last[k, 2] + 1):
+                    cell = (x * count[1] + y) * count[2] + z
+                    if len(listed) == 0:
+                        start[cell + 1] += 1
+                    else:
+                        start[cell + 1] -= 1
+                        listed[start[cell + 1]] = k
+    if len(listed) > 0:
+        # each start[cell + 1] has fallen to the beginning of its cell: back by one place
+        for cell in range(len(start) - 1):
+            start[cell] = start[cell + 1]
+        start[len(start) - 1] = len(listed)
+
+
+@kernel
+def _closest(
+    points: Array, cell: Indices, start: Indices, listed: Indices, corners: Array, reach: float, p: Array,
+    found: Array,
+) -> None:  # fmt: skip
+    for k in range(len(points)):
+        if cell[k] < 0:
+            continue
+        nearest = reach * reach
+        for at in range(start[cell[k]], start[cell[k] + 1]):
+            closest_on_triangle(points[k], corners[listed[at]], p)
+            distance = 0.0
+            for i in range(3):
+                distance += (p[i] - points[k, i]) ** 2
+            if distance <= nearest:
+                nearest = distance
+                for i in range(3):
+                    found[k, i] = p[i]
+
+
+@kernel
+def closest_on_triangle(point: Array, corners: Array, out: Array) -> None:
+    """Closest point of a triangle, corners of shape [3, 3], into `out`, shape [3].
+
+    Source: Ericson, Real-Time Collision Detection, 5.1.5.
+    """
+    d1, d2, d3, d4, d5, d6 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    for i in range(3):
+        e, f = corners[1, i] - corners[0, i], corners[2, i] - corners[0, i]
+        a, b, c = point[i] - corners[0, i], point[i] - corners[1, i], point[i] - corners[2, i]
+        d1 += e * a
+        d2 += f * a
+        d3 += e * b
+        d4 += f * b
+        d5 += e * c
+        d6 += f * c
+    va, vb, vc = d3 * d6 - d5 * d4, d5 * d2 - d1 * d6, d1 * d4 - d3 * d2
+    v, w = 0.0, 0.0
+    if d1 <= 0.0 and d2 <= 0.0:
+        pass
+    elif d3 >= 0.0 and d4 <= d3:
+        v = 1.0
+    elif d6 >= 0.0 and d5 <= d6:
+        w = 1.0
+    elif vc <= 0.0 and d1 >= 0.0 and d3 <= 0.0:
+        v = d1 / (d1 - d3)
+    elif vb <= 0.0 and d2 >= 0.0 and d6 <= 0.0:
+        w = d2 / (d2 - d6)
+    elif va <= 0.0 and d4 - d3 >= 0.0 and d5 - d6 >= 0.0:
+        w = (d4 - d3) / ((d4 - d3) + (d5 - d6))
+        v = 1.0 - w
+    elif va + vb + vc > 0.0:
+        v, w = vb / (va + vb + vc), vc / (va + vb + vc)
+    for i in range(3):
+        out[i] = (1.0 - v - w) * corners[0, i] + v * corners[1, i] + w * corners[2, i]

@@ -1,0 +1,109 @@
+"""Meshes cut along the rims of their interface patches, so that patches do not depend on the elements."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from calmotion.errors import ShotError
+from calmotion.geometry.distances import triangle_parts
+from calmotion.geometry.sphere_cut import cut, inside
+from calmotion.geometry.tetrahedra import boundary_triangles, surface_area
+from calmotion.reduction.elements.assembly import quadratic_mesh
+from calmotion.reduction.elements.bisection import bisected
+from calmotion.reduction.interfaces.interface_patches import AttachmentFrame, interface_patches
+from calmotion.shot.character import Array, Body, IntArray
+
+_PARTS = triangle_parts(12)
+_EDGE = 1.0  # of the radius: longest edge at a rim, so that it has eight sides or more
+_BISECTIONS = 12
+
+
+def with_rims(
+    points: Array, tets: IntArray, body: Body, attachments: Sequence[AttachmentFrame]
+) -> tuple[Array, IntArray, tuple[tuple[Array, IntArray], ...]]:
+    """A mesh cut along the rims of the patches that are spheres about joints.
+
+    A rim is a polygon; its sphere is somewhat larger than that of the patch, so that the areas are the same.
+
+    Args:
+        points: [m], shape [n, 3].
+        tets: Shape [m, 4], positive volumes.
+        body: With `flexible` settings.
+        attachments: Frames of its joints and targets.
+
+    Returns:
+        Points and tetrahedra, and for each such patch the origin of its frame and its triangles, shape [k, 3].
+    """
+    assert body.flexible is not None
+    if not any(attachment.kind == "interface" for attachment in attachments):
+        return points, tets, ()
+    try:
+        whole = interface_patches(quadratic_mesh(points, tets), attachments, body.flexible.interface_radius, body.path)
+    except ShotError:
+        return points, tets, ()  # the reduction reports it
+    rims = []
+    for patch in whole:
+        if patch.center is None:
+            continue
+        center, radius = patch.center, patch.radius
+        points, tets = _finer_at(points, tets, center, radius)
+        radius += _excess(points, tets, center, radius)
+        points, tets = cut(points, tets, center, radius)
+        rims.append((attachments[patch.attachments[0]].frame.position, center, radius))
+    found = [(origin, _within(points, tets, center, radius)) for origin, center, radius in rims]
+    return points, tets, tuple((origin, triangles) for origin, triangles in found if len(triangles))
+
+
+def _excess(points: Array, tets: IntArray, center: Array, radius: float) -> float:
+    """What a sphere has to be larger by, so that the polygon of its rim has the area within a radius [m]."""
+    surface = boundary_triangles(tets)
+    area, smaller, larger = (_area_within(points, surface, center, part * radius) for part in (1.0, 0.9, 1.1))
+    trial, split = cut(points, tets, center, radius)
+    missing = area - surface_area(trial, _within(trial, split, center, radius))
+    slope = (larger - smaller) / (0.2 * radius)
+    return float(np.clip(missing / slope, 0.0, 0.1 * radius)) if slope > 0.0 else 0.0
+
+
+def _within(points: Array, tets: IntArray, center: Array, radius: float) -> IntArray:
+    """Triangles of the surface of a mesh that was cut that are within the sphere, shape [k, 3]."""
+    triangles = boundary_triangles(tets)
+    return np.ascontiguousarray(triangles[inside(points[triangles], center, radius)])
+
+
+def _share_within(points: Array, triangles: IntArray, center: Array, radius: float) -> Array:
+    """Share of each triangle within a sphere, shape [k]."""
+    at = np.einsum("pk,tkx->tpx", _PARTS, points[triangles])
+    return np.asarray(np.mean(np.linalg.norm(at - center, axis=-1) <= radius, axis=1))
+
+
+def _area_within(points: Array, triangles: IntArray, center: Array, radius: float) -> float:
+    """Area of a surface within a sphere [m^2]."""
+    x = points[triangles]
+    area = 0.5 * np.linalg.norm(np.cross(x[:, 1] - x[:, 0], x[:, 2] - x[:, 0]), axis=1)
+    return float(area @ _share_within(points, triangles, center, radius))
+
+
+def _finer_at(points: Array, tets: IntArray, center: Array, radius: float) -> tuple[Array, IntArray]:
+    """The mesh, bisected where edges of the surface at the sphere are long beside it."""
+    for _ in range(_BISECTIONS):
+        triangles = boundary_triangles(tets)
+        x = points[triangles]
+        edge = np.linalg.norm(x - x[:, [1, 2, 0]], axis=2).max(axis=1)
+        share = _share_within(points, triangles, center, radius)
+        long = (share > 0.0) & (share < 1.0) & (edge > _EDGE * radius)
+        if not long.any():
+            break
+        points, tets = bisected(points, tets, _behind(tets, triangles[long]))
+    return points, tets
+
+
+def _behind(tets: IntArray, triangles: IntArray) -> IntArray:
+    """The tetrahedra of which some triangles are faces."""
+    count = int(tets.max()) + 1
+    sides = np.sort(tets[:, [[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]]], axis=2).astype(np.int64)
+    own = np.sort(triangles, axis=1).astype(np.int64)
+    keys = (sides[..., 0] * count + sides[..., 1]) * count + sides[..., 2]
+    wanted = (own[:, 0] * count + own[:, 1]) * count + own[:, 2]
+    return np.flatnonzero(np.isin(keys, wanted).any(axis=1)).astype(np.int32)

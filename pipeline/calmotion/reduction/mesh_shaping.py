@@ -1,0 +1,56 @@
+"""Tetrahedra that follow the surface in the mean, cut along the rims of the interface patches."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from calmotion.geometry.boundary_fit import fitted
+from calmotion.geometry.tetrahedra import Indices, measure_quality
+from calmotion.reduction.interfaces.cut_patches import with_rims
+from calmotion.reduction.interfaces.interface_patches import AttachmentFrame
+from calmotion.shot.character import Array, Body, IntArray
+from calmotion.shot.meshes import CutPatch, FEMesh
+
+
+@dataclass(frozen=True, eq=False)
+class Surface:
+    """What a mesh was made for.
+
+    Attributes:
+        points: [m], shape [n, 3].
+        triangles: Shape [m, 3], closed, outward.
+        volume: That it winds around [m^3].
+        limit: Largest distance that a corner of the mesh may have to be moved to it [m].
+    """
+
+    points: Array
+    triangles: Indices
+    volume: float
+    limit: float
+
+
+def shaped(mesh: FEMesh, body: Body, surface: Surface, attachments: Sequence[AttachmentFrame]) -> FEMesh:
+    """The mesh, cut along the rims of its interface patches, with its boundary fitted to the surface.
+
+    Args:
+        mesh: Whose elements were made for the surface.
+        body: With `flexible` settings.
+        surface: The surface.
+        attachments: Frames of the joints and targets of the body; without any, nothing is cut.
+    """
+    points, tets, rims = with_rims(mesh.points, mesh.tets, body, attachments)
+    moved = fitted(points, tets, surface.points, surface.triangles, surface.limit)
+    cut, fit = (_with(mesh, x, tets, rims, surface.volume) for x in (points, moved))
+    # a surface that runs through itself is not what the elements fill
+    return fit if fit.quality.volume_error <= cut.quality.volume_error else cut
+
+
+def _with(mesh: FEMesh, points: Array, tets: IntArray, rims: Sequence[tuple[Array, IntArray]], volume: float) -> FEMesh:
+    """The mesh with other elements, and patches that consist of some of their triangles."""
+    found = measure_quality(points, tets, surface_volume=volume)
+    quality = replace(
+        mesh.quality, min_dihedral_deg=found.min_dihedral_deg, volume=found.volume, volume_error=found.volume_error
+    )
+    patches = tuple(CutPatch(origin, points[triangles]) for origin, triangles in rims)
+    return replace(mesh, points=points, tets=tets, quality=quality, patches=patches)

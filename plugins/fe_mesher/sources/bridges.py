@@ -1,0 +1,121 @@
+"""Bridges across gaps between solids, such as those between parts of a CAD assembly."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ..closing import Part, connected_pieces
+from ..uniting import manifold_of, part_of
+from .sampling import sampled
+
+NARROW, WIDE = 2e-3, 2e-2  # gaps across which triangles that face each other are joined, of the size of the body
+_SINK = 0.05  # overlap of a bridge with both sides, of the gap
+_SAMPLES = 4_000  # places on a solid between which a strut is sought
+_RADIUS, _SLENDER = 0.02, 0.3  # least radius of a strut, of the size and of the gap
+
+
+def bridged(solids: Sequence[Part], largest: float = NARROW) -> tuple[Part | None, float]:
+    """The union of solids across gaps, and the widest of these gaps.
+
+    Each triangle that faces another solid across a narrow gap is extruded to a prism up to that solid. Across wider
+    gaps only triangles of the smaller solid are: a large triangle of the other one would thicken it.
+
+    Args:
+        solids: Disjoint, outward, in units of the size of the body.
+        largest: Gap that is bridged, of the size of the body.
+
+    Returns:
+        None instead of the union where it is not connected.
+    """
+    import manifold3d
+
+    prisms, widest = [], 0.0
+    for k, solid in enumerate(solids):
+        x = solid.points[solid.triangles]
+        for other in [other for i, other in enumerate(solids) if i != k]:
+            if largest > NARROW and solid.volume > other.volume:
+                continue
+            for i, gap in _near(x, other.points[other.triangles], largest):
+                widest = max(widest, gap)
+                normal = np.cross(x[i, 1] - x[i, 0], x[i, 2] - x[i, 0])
+                normal /= np.linalg.norm(normal)
+                sink = _SINK * gap + 1e-7
+                prisms.append(np.vstack([x[i] - sink * normal, x[i] + (gap + sink) * normal]))
+    if not prisms:
+        return None, 0.0
+    made = [manifold3d.Manifold.hull_points(np.ascontiguousarray(prism)) for prism in prisms]
+    whole = manifold3d.Manifold.batch_boolean([*(manifold_of(s) for s in solids), *made], manifold3d.OpType.Add)
+    part = part_of(whole)
+    return (part if len(_solids(part)) == 1 else None), widest
+
+
+def strutted(solids: Sequence[Part]) -> tuple[Part, float]:
+    """The union of solids across gaps of any width, by a strut between the nearest places of each and of the largest.
+
+    Args:
+        solids: Disjoint, outward, in units of the size of the body, the largest first.
+
+    Returns:
+        The union, and the widest gap.
+    """
+    import manifold3d
+    from scipy.spatial import cKDTree
+
+    places, normals = (list(values) for values in zip(*(sampled(solid, _SAMPLES) for solid in solids), strict=True))
+    whole, widest, struts = [0], 0.0, []
+    left = list(range(1, len(solids)))
+    while left:
+        tree = cKDTree(np.vstack([places[k] for k in whole]))
+        distances, found = zip(*(tree.query(places[k]) for k in left), strict=True)
+        nearest = int(np.argmin([d.min() for d in distances]))
+        k, i = left[nearest], int(distances[nearest].argmin())
+        gap = float(distances[nearest][i])
+        widest, radius = max(widest, gap), max(_RADIUS, _SLENDER * gap)
+        near = [
+            *((places[k], normals[k], places[k][i]),),
+            *((places[j], normals[j], tree.data[found[nearest][i]]) for j in whole),
+        ]
+        corners = []
+        for points, outward, center in near:
+            inside = np.linalg.norm(points - center, axis=1) <= radius
+            corners += [points[inside], points[inside] - (_SINK * gap + 1e-4) * outward[inside]]
+        struts.append(manifold3d.Manifold.hull_points(np.ascontiguousarray(np.vstack(corners))))
+        whole.append(k)
+        left.remove(k)
+    united = manifold3d.Manifold.batch_boolean([*(manifold_of(s) for s in solids), *struts], manifold3d.OpType.Add)
+    return part_of(united), widest
+
+
+def _solids(part: Part) -> list[Part]:
+    return [piece for piece in connected_pieces(part.points, part.triangles) if piece.volume > 1e-12]
+
+
+def _near(x: np.ndarray, facing: np.ndarray, largest: float) -> list[tuple[int, float]]:
+    """Triangles with another solid within the largest gap, along the normal at their center: index and distance."""
+    from calmotion.geometry.distances import ray_length
+
+    low, high = x.min(axis=(0, 1)) - largest, x.max(axis=(0, 1)) + largest
+    facing = facing[((facing.max(axis=1) > low) & (facing.min(axis=1) < high)).all(axis=1)]
+    if len(facing) == 0:
+        return []
+    low, high = facing.min(axis=(0, 1)) - largest, facing.max(axis=(0, 1)) + largest
+    normal = np.cross(x[:, 1] - x[:, 0], x[:, 2] - x[:, 0])
+    length = np.linalg.norm(normal, axis=1)
+    inside = ((x.max(axis=1) > low) & (x.min(axis=1) < high)).all(axis=1) & (length > 0.0)
+    near = []
+    boxes_low, boxes_high = facing.min(axis=1), facing.max(axis=1)
+    for i in np.flatnonzero(inside):
+        n = normal[i] / length[i]
+        middle = x[i].mean(axis=0)
+        # only triangles whose boxes the ray can hit: testing all of them would take quadratic time
+        end = middle + largest * n
+        candidates = (
+            (boxes_high >= np.minimum(middle, end) - 1e-9) & (boxes_low <= np.maximum(middle, end) + 1e-9)
+        ).all(1)
+        if candidates.any():
+            gap = ray_length(middle - 1e-7 * n, n, facing[candidates], 0.0)
+            if gap <= largest:
+                near.append((int(i), gap))
+    return near

@@ -1,0 +1,85 @@
+"""Meshes get what the tolerance leaves them: the shares of bodies, when they are refined, and what they cost."""
+
+from dataclasses import replace
+
+import pytest
+from calmotion.accuracy import mesh_budget
+from calmotion.accuracy.mesh_budget import mesh_error, meshes_to_tolerance
+from calmotion.accuracy.step_error import distance, simulate_at
+from calmotion.reduction.scaled_stiffness import with_scaled_stiffness
+from calmotion.shot.run import RunSettings
+from calmotion.simulation.compiled_shot import compile_shot
+
+OPTIONS, STEP = RunSettings(tolerance=1e-3, integrator="bdf2"), 1 / 240
+
+
+def with_mesh_errors(bodies, *errors):
+    """Flexible bodies with relative errors of stiffness, each with a tenth of a metre of deflection."""
+    known = iter(errors)
+    flexible = [len(body.stiffness) > 0 for body in bodies]
+    values = [next(known) if bends else None for bends in flexible]
+    return [
+        replace(body, mesh_error=value, mesh_error_m=None if value is None else 0.1 * value)
+        for body, value in zip(bodies, values, strict=True)
+    ]
+
+
+class Refining:
+    """A reduction that notes which errors are wanted and gives the bodies as they are."""
+
+    def __init__(self, bodies):
+        self.given, self.wanted, self.released = bodies, None, False
+
+    def with_finer_meshes(self, tolerance, wanted, max_nodes, progress):
+        self.wanted = dict(wanted)
+        return self
+
+    def bodies(self, tolerance, progress=None):
+        return self.given
+
+    def release(self):
+        self.released = True
+
+
+def test_the_cost_is_that_of_bodies_that_are_softer_by_the_error(arm, animation, bodies):
+    shot = compile_shot(arm, animation, with_mesh_errors(bodies, 0.02, 0.01))
+    run = simulate_at(shot, OPTIONS, STEP)
+    softer = [with_scaled_stiffness(body, 1.0 - (body.mesh_error or 0.0)) for body in shot.bodies]
+    other = simulate_at(shot.with_bodies(softer), OPTIONS, STEP)
+    found = mesh_error(shot, OPTIONS, run)
+    assert found == pytest.approx(distance(run.positions, other.positions), rel=1e-9) and found > 1e-5
+    half = mesh_error(shot.with_bodies(with_mesh_errors(bodies, 0.01, 0.005)), OPTIONS, run)
+    assert half == pytest.approx(0.5 * found, rel=0.1)
+
+
+def test_what_a_given_mesh_costs_is_not_known(arm, animation, bodies):
+    shot = compile_shot(arm, animation, with_mesh_errors(bodies, 0.02, None))
+    assert mesh_error(shot, OPTIONS, simulate_at(shot, OPTIONS, STEP)) is None
+
+
+@pytest.mark.parametrize("errors", [(1e-4, 1e-4), (None, None)])
+def test_meshes_that_are_good_enough_or_given_stay_as_they_are(arm, animation, bodies, errors):
+    shot, reduction = compile_shot(arm, animation, with_mesh_errors(bodies, *errors)), Refining(bodies)
+    assert meshes_to_tolerance(shot, reduction, OPTIONS, None) == (shot, reduction)
+    assert reduction.wanted is None and not reduction.released
+
+
+def test_only_the_mesh_that_costs_most_is_refined(arm, animation, bodies):
+    errors = (1e-2, 1e-4)  # a millimetre, and a hundredth of one
+    shot = compile_shot(arm, animation, with_mesh_errors(bodies, *errors))
+    reduction = Refining(list(shot.bodies))
+    meshes_to_tolerance(shot, reduction, OPTIONS, None)
+    allowed = mesh_budget.SHARE * OPTIONS.tolerance
+    assert reduction.released and set(reduction.wanted) == {0}
+    assert 0.5 * allowed < 0.1 * reduction.wanted[0] < allowed
+
+
+def test_errors_at_the_targets_count_in_place_of_deflections_where_they_are_known(arm, animation, bodies):
+    shot = compile_shot(arm, animation, with_mesh_errors(bodies, 1e-2, 1e-2))
+    run = simulate_at(shot, OPTIONS, STEP)
+    by_deflection, by_motion = Refining(list(shot.bodies)), Refining(list(shot.bodies))
+    meshes_to_tolerance(shot, by_deflection, OPTIONS, None)
+    meshes_to_tolerance(shot, by_motion, OPTIONS, run)
+    total = mesh_error(shot, OPTIONS, run)
+    ratio = by_motion.wanted[0] / by_deflection.wanted[0]
+    assert ratio == pytest.approx(2e-3 / total, rel=1e-6)  # deflections: two bodies of a millimetre each

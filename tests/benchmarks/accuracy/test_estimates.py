@@ -1,0 +1,44 @@
+"""Random shots by error over estimate: drawn alike every time, measured against meshes of eight times the nodes."""
+
+import csv
+import json
+
+import numpy as np
+import pytest
+from calmotion.benchmarks.accuracy import estimates
+from calmotion.benchmarks.accuracy.estimates import Judged, counts, drawn
+from calmotion.errors import ShotError
+
+
+def row(number, ratio):
+    return Judged(number, 1e-3, 1e-3, 2e-4, ratio * 1e-3, 1e-5, 600, 5000)
+
+
+def test_a_shot_is_known_by_its_number():
+    one, again, other = drawn(3), drawn(3), drawn(4)
+    assert one.tolerance == again.tolerance != other.tolerance
+    assert np.array_equal(one.meshes.meshes[0].points, again.meshes.meshes[0].points)
+    assert all(mesh.quality.frequency_error <= estimates.MESH_ACCURACY for mesh in one.meshes.meshes)
+
+
+def test_every_shot_is_counted_once():
+    table = counts([0.01, 0.3, 0.4, 0.9, 1.2, 7.0])
+    assert [int(n) for _, n, _ in table] == [1, 0, 0, 2, 1, 1, 1]
+    assert table[0][0] == "0 to 0.05" and table[-1] == ["above 1.5", "1", "17%"]
+
+
+@pytest.mark.parametrize(("ratio", "status"), [(0.4, 0), (1.6, 1)])
+def test_the_command_fails_where_an_error_is_far_above_its_estimate(monkeypatch, capsys, tmp_path, ratio, status):
+    def judged(number):
+        if number == 1:
+            raise ShotError("it bends too far", path="/Arm")
+        return row(number, ratio)
+
+    monkeypatch.setattr(estimates, "judged", judged)
+    files = ["--csv", str(tmp_path / "rows.csv"), "--markdown", str(tmp_path / "table.md")]
+    assert estimates.main(["--count", "3", "--json", *files]) == status
+    out, err = capsys.readouterr()
+    assert [r["ratio"] for r in json.loads(out)["rows"]] == pytest.approx([ratio, ratio]) and "refused" in err
+    with open(tmp_path / "rows.csv", newline="") as file:
+        assert [int(r["shot"]) for r in csv.DictReader(file)] == [0, 2]
+    assert (tmp_path / "table.md").read_text().startswith("| error over estimate | shots | share |")

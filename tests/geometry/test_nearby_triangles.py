@@ -1,0 +1,25 @@
+"""The grid of triangles against the distances to all triangles."""
+
+import numpy as np
+import pytest
+from calmotion.geometry.distances import closest_on_triangles
+from calmotion.geometry.nearby_triangles import NearbyTriangles
+
+
+@pytest.mark.parametrize("scale", [1e-3, 1.0])
+def test_closest_points_are_those_of_all_triangles(scale):
+    rng = np.random.default_rng(3)
+    points = scale * rng.normal(size=(60, 3))
+    triangles = rng.integers(0, len(points), size=(200, 3))
+    triangles = triangles[(triangles[:, 0] != triangles[:, 1]) & (triangles[:, 1] != triangles[:, 2])]
+    places, reach = scale * 1.5 * rng.normal(size=(300, 3)), 0.2 * scale
+    found = NearbyTriangles(points, triangles, reach).closest(places)
+    far = 0
+    for place, closest in zip(places, found, strict=True):
+        distance = np.linalg.norm(closest_on_triangles(place, points[triangles]) - place, axis=1).min()
+        if distance > reach:
+            assert np.isnan(closest).all()
+            far += 1
+        else:
+            assert np.linalg.norm(closest - place) == pytest.approx(distance, abs=1e-12 * scale)
+    assert 0 < far < len(places)

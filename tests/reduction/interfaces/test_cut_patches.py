@@ -1,0 +1,82 @@
+"""Patches along whose rims a mesh is cut: the same part of the surface for every mesh."""
+
+import numpy as np
+import pytest
+from calmotion.geometry.tetrahedra import surface_area, tet_volumes
+from calmotion.reduction.discretization_error import clamped_modes
+from calmotion.reduction.elements.assembly import assemble, quadratic_mesh
+from calmotion.reduction.elements.bisection import bisected
+from calmotion.reduction.interfaces.cut_patches import with_rims
+from calmotion.reduction.interfaces.interface_patches import AttachmentFrame, interface_patches
+from calmotion.shot import Body, FlexibleSettings
+from calmotion.shot.meshes import CutPatch
+
+SIZE, RADIUS = (0.3, 0.02, 0.02), 0.016
+
+
+@pytest.fixture(scope="module")
+def frames(helpers):
+    return [AttachmentFrame("/Arm/root", helpers.frame(0.01, 0.01, 0.01), "interface")]
+
+
+@pytest.fixture(scope="module")
+def beam(helpers, plastic):
+    return Body("/Arm/link", helpers.frame(0, 0, 0), None, flexible=FlexibleSettings(plastic, interface_radius=RADIUS))
+
+
+def patch_of(points, tets, rims, frames):
+    mesh = quadratic_mesh(points, tets)
+    cut = [CutPatch(center, rim) for center, rim in rims]
+    (patch,) = interface_patches(mesh, frames, RADIUS, "/Arm/link", cut)
+    whole = np.isin(mesh.surface, patch.nodes).all(axis=1)
+    return mesh, patch, surface_area(mesh.nodes, mesh.surface[whole][:, :3])
+
+
+def exact_area():
+    """Of the sides and the end of the box within the sphere about a point 10 mm below the middle of its end."""
+    x = np.linspace(-RADIUS, RADIUS, 2001)
+    x = 0.5 * (x[1:] + x[:-1])
+    y, z = np.meshgrid(x, x)
+    far = np.sqrt(y**2 + z**2 + 0.01**2)
+    cell = (2.0 * RADIUS / 2000) ** 2
+    end = ((far <= RADIUS) & (np.abs(y) <= 0.01) & (np.abs(z) <= 0.01)).sum()
+    side = ((far <= RADIUS) & (np.abs(y) <= 0.01) & (z >= -0.01)).sum()
+    return cell * (end + 4 * side)
+
+
+@pytest.mark.parametrize("counts", [(12, 1, 1), (24, 2, 2)])
+def test_the_patch_has_the_area_within_the_sphere_and_keeps_it_when_elements_are_refined(helpers, beam, frames, counts):
+    points, tets = helpers.box(counts, SIZE)
+    points, tets, rims = with_rims(np.asarray(points), tets, beam, frames)
+    assert tet_volumes(points, tets).sum() == pytest.approx(np.prod(SIZE), rel=1e-9)
+    held = [(center, points[triangles]) for center, triangles in rims]
+    _, patch, area = patch_of(points, tets, held, frames)
+    assert area == pytest.approx(exact_area(), rel=0.01)
+    near = np.flatnonzero(np.linalg.norm(points[tets].mean(axis=1), axis=1) < 2 * RADIUS)
+    _, finer, same = patch_of(*bisected(points, tets, near), held, frames)
+    assert len(finer.nodes) > len(patch.nodes) and same == pytest.approx(area, rel=1e-9)
+
+
+def test_frequencies_hardly_depend_on_where_the_elements_are(helpers, beam, frames):
+    """With whole elements near the joint as a patch, these two meshes differ by more than three percent."""
+
+    def first(counts, is_cut):
+        points, tets = helpers.box(counts, SIZE)
+        rims = ()
+        if is_cut:
+            points, tets, rims = with_rims(np.asarray(points), tets, beam, frames)
+        model = assemble(points, tets, beam.flexible.material)
+        cut = [CutPatch(center, points[triangles]) for center, triangles in rims]
+        (patch,) = interface_patches(model.mesh, frames, RADIUS, "/Arm/link", cut)
+        return clamped_modes(model, 1, patch.nodes)[0][0]
+
+    counts = [(8, 1, 1), (12, 1, 1)]
+    whole, along = ([first(count, is_cut) for count in counts] for is_cut in (False, True))
+    assert abs(whole[1] / whole[0] - 1.0) > 0.02 and along[1] == pytest.approx(along[0], rel=0.006)
+
+
+def test_a_body_without_joints_is_not_cut(helpers, beam):
+    points, tets = helpers.box((4, 1, 1), SIZE)
+    target = [AttachmentFrame("/Arm/tip", helpers.frame(0.3, 0.01, 0.01), "point")]
+    found, split, rims = with_rims(np.asarray(points), tets, beam, target)
+    assert np.array_equal(found, points) and split is tets and rims == ()
