@@ -21,12 +21,15 @@ class Reason(StrEnum):
     NOT_PERIODIC = "no periodic motion"
 
 
+NOWHERE = -1  # a component that is not known
+
+
 class SimulationFailure(Exception):
     """A step that could not be solved.
 
     Attributes:
         time_s: Time of the step, from the start of the simulation [s].
-        component: The component with the largest correction.
+        component: The component with the largest correction, NOWHERE where that is not known.
         reason: Why.
         state: The last converged state, or None.
         share: Largest fraction of gravity with an equilibrium; 1 after the start.

@@ -42,6 +42,36 @@ VELOCITY_LIMIT = (
     Spelling("PhysX", "physxJoint:maxJointVelocity"),
 )
 
+# position gain and velocity gain of a drive, by dialect
+GAINS = (
+    (
+        Spelling("Calmotion", "calm:motor:positionGain"),
+        Spelling("UsdPhysics", "drive:{drive}:physics:stiffness"),
+    ),
+    (
+        Spelling("Calmotion", "calm:motor:velocityGain"),
+        Spelling("UsdPhysics", "drive:{drive}:physics:damping"),
+    ),
+)
+# of a servo; angles of Newton are degrees, those of MuJoCo radians. PhysX' jointFriction is no torque.
+ARMATURE = (
+    Spelling("Calmotion", "calm:motor:armature"),
+    Spelling("Newton", "newton:armature"),
+    Spelling("MuJoCo", "mjc:armature"),
+    Spelling("PhysX", "physxJoint:armature"),
+)
+FRICTION = (
+    Spelling("Calmotion", "calm:motor:friction"),
+    Spelling("Newton", "newton:friction"),
+    Spelling("MuJoCo", "mjc:frictionloss"),
+)
+VISCOUS_FRICTION = (
+    Spelling("Calmotion", "calm:motor:viscousFriction"),
+    Spelling("Newton", "newton:damping"),
+    Spelling("MuJoCo", "mjc:damping"),
+)
+POSITION_ACTUATOR = ("mjc:gainPrm", "mjc:biasPrm", "mjc:gear")  # of an MjcActuator, which stands beside the joint
+
 MIMIC_AXES = ("rotX", "rotY", "rotZ", "transX", "transY", "transZ", "X", "Y", "Z")
 
 

@@ -6,7 +6,15 @@ from dataclasses import dataclass
 
 import numpy as np
 from calmotion.multibody.kernels import components as component_kernels
-from calmotion.multibody.model.system import LINEAR, NEOHOOKEAN, STVK, System, allocate_state, components
+from calmotion.multibody.model.system import (
+    LINEAR,
+    NEOHOOKEAN,
+    STVK,
+    System,
+    allocate_state,
+    components,
+    coordinate_units,
+)
 from scipy.spatial.transform import Rotation
 
 POINTS = 4
@@ -119,16 +127,25 @@ def particle_system(
         for k, b in enumerate(pair):
             if b >= 0:
                 Phi[j, k, :, : elastic[b]], Psi[j, k, :, : elastic[b]] = 0.3 * rng.normal(size=(2, 3, elastic[b]))
+    mass, Z = (
+        np.array([p.masses.sum() for p in parts]),
+        np.array([np.einsum("n,na,nb->ab", p.masses, p.points, p.points) for p in parts]),
+    )
+    position = rng.normal(size=(joints, 2, 3)) * 0.2
     system = System(
         parent=np.array(parents, dtype=np.int32),
         elastic=np.array(elastic, dtype=np.int64),
+        modes=np.array(elastic, dtype=np.int64),
         side=side,
         rows=np.array(rows, dtype=np.int32),
+        servos=np.zeros(0, dtype=np.int32),
+        rotor=np.full(joints, -1, dtype=np.int32),
+        servo=np.zeros((joints, 7)),
         sliding=np.isin(np.arange(joints), sliding).astype(np.int32),
         moving=np.array([moving.index(j) if j in moving else -1 for j in range(joints)], dtype=np.int32),
-        mass=np.array([p.masses.sum() for p in parts]),
+        mass=mass,
         s=np.array([p.masses @ p.points for p in parts]),
-        Z=np.array([np.einsum("n,na,nb->ab", p.masses, p.points, p.points) for p in parts]),
+        Z=Z,
         M3=pad((size, 3), [np.einsum("n,naj->ja", p.masses, p.modes) for p in parts]),
         M4=pad((size, 3, 3), [np.einsum("n,na,nbj->jab", p.masses, p.points, p.modes) for p in parts]),
         S=pad((size, size, 3, 3), S),
@@ -136,6 +153,7 @@ def particle_system(
         axial0=pad((size, 3), [np.einsum("n,nja->ja", p.masses, moments(p)) for p in parts]),
         rotating=np.arange(count, dtype=np.int32),
         nonrotating=np.zeros(0, dtype=np.int32),
+        inertia=pad((size,), [np.ones(r) for r in elastic]),
         stiffness=pad((size,), [np.full(r, stiffness) * (1 + np.arange(r)) for r in elastic]),
         damping=pad((size, size), [0.35 * np.eye(r) + 0.05 for r in elastic]),
         law=np.zeros(count, dtype=np.int32),
@@ -146,11 +164,12 @@ def particle_system(
         points=np.zeros(count, dtype=np.int64),
         data_start=np.zeros(count, dtype=np.int64),
         data=np.zeros(0),
-        position=rng.normal(size=(joints, 2, 3)) * 0.2,
+        position=position,
         rotation=Rotation.random(2 * joints, random_state=7).as_matrix().reshape(joints, 2, 3, 3),
         Phi=Phi,
         Psi=Psi,
         gravity=np.array([0.3, -0.2, -9.81]),
+        unit=coordinate_units(mass, Z, side, position, size),
     )
     return system, parts
 

@@ -1,10 +1,15 @@
 """Trees whose motion and a random linear functional of it are differentiated by sweeps."""
 
+from dataclasses import replace
+
 import numpy as np
-from calmotion.multibody.analysis.kinematics import system_poses
+from calmotion.multibody.analysis.kinematics import set_rotors, system_poses
 from calmotion.multibody.integrators.simulation import simulate
 from calmotion.multibody.integrators.workspace import Workspace
 from calmotion.multibody.model.system import LINEAR, NEOHOOKEAN, STVK, allocate_state
+from calmotion.multibody.motors.drives import GivingMotor, add_motors
+from calmotion.shot import Motor
+from calmotion.shot.motor import Rotor
 from particles import nonlinear, particle_system, without_rotation
 from scipy.spatial.transform import Rotation
 
@@ -26,10 +31,21 @@ def moving_marker():
 MOVED = moving_marker()
 
 
+def motor_of(model, gain):
+    """A motor of a model with all that it may have: friction, gear, limits of torque and speed."""
+    if model == "drive":
+        return Motor(0, "", "", model="drive", position_gain=gain, velocity_gain=3.0)
+    rotor = Rotor(0.3, np.inf, 0.0, 0.2, 0.4, 0.5, 40.0, 0.2)
+    if model == "servo":
+        rotor = replace(rotor, gear_stiffness=5.0 * gain, gear_damping=1.0)
+    return Motor(0, "", "", model="servo", position_gain=gain, velocity_gain=3.0, rotor=rotor, max_torque=0.2 * gain)
+
+
 def rigid_start(system, angle):
     state = allocate_state(system)
     c, q = system_poses(system, angle[None], MOVED[:1] if np.any(system.moving >= 0) else None)
     state.c[:], state.q[:] = c[0], q[0]
+    set_rotors(system, state, angle)
     return state
 
 
@@ -54,7 +70,9 @@ def close(system, angle):
 class Case:
     """A tree with free hinges, and a random linear functional of its motion."""
 
-    def __init__(self, rows, laws=None, sliding=(), loops=(), moving=(), seed=0, nonrotating=(), weight=True):
+    def __init__(
+        self, rows, laws=None, sliding=(), loops=(), moving=(), seed=0, nonrotating=(), weight=True, drives=()
+    ):
         rng = np.random.default_rng(seed)
         self.system, _ = particle_system(rng, [-1, 0, 1, 0], [2, 0, 3, 2], rows, 3000.0, sliding, loops, moving)
         self.system = without_rotation(self.system, nonrotating)
@@ -62,6 +80,10 @@ class Case:
             self.system = self.system._replace(gravity=np.zeros(3))
         if laws is not None:
             self.system = nonlinear(self.system, laws, rng, stiffness=3000.0)
+        if drives:
+            # stiff and soft ones
+            motors = [GivingMotor(j, motor_of(model, 400.0 / (1 + j))) for j, model in drives.items()]
+            self.system = add_motors(self.system, motors)
         joints = len(self.system.rows)
         self.p = (0.1 if loops else 0.3) * rng.normal(size=(4, joints))
         self.dp = rng.normal(size=(4, joints))
@@ -96,6 +118,8 @@ class Case:
         return out
 
 
+DRIVES, LOOPED = dict.fromkeys((0, 1, 3), "drive"), dict.fromkeys((0, 1, 4), "drive")
+SERVOS = {0: "servo", 1: "rigid gear", 3: "drive"}
 CASES = {
     "driven": ([6, 6, 6, 6], None),
     "with a free hinge": ([6, 6, 5, 6], None),
@@ -107,4 +131,38 @@ CASES = {
     "a loop": ([6, 5, 3, 5], None, (0,), ((2, 3, 3),)),
     "hinges that nothing holds": ([6, 5, 5, 6], None, (), (), (), 0, (), False),
     "hinges that a loop alone holds": ([6, 5, 5, 5], None, (), ((2, 3, 3),), (), 0, (), False),
+    "drives": (
+        [6, 6, 5, 6],
+        [STVK, LINEAR, LINEAR, LINEAR],
+        (3,),
+        (),
+        (),
+        0,
+        (1,),
+        True,
+        DRIVES,
+    ),
+    "drives around a loop": (
+        [6, 6, 3, 5],
+        None,
+        (1,),
+        ((2, 3, 6),),
+        (),
+        0,
+        (),
+        True,
+        LOOPED,
+    ),
+    "servos": ([6, 6, 5, 6], [STVK, LINEAR, LINEAR, LINEAR], (3,), (), (), 0, (1,), True, SERVOS),
+    "servos around a loop": (
+        [6, 6, 3, 5],
+        None,
+        (1,),
+        ((2, 3, 6),),
+        (),
+        0,
+        (),
+        True,
+        LOOPED | {0: "servo", 4: "rigid gear"},
+    ),
 }

@@ -27,6 +27,14 @@ def test_a_cyclic_shot_has_no_pre_roll(arm, animation):
     assert error.value.attribute == "--pre-roll"
 
 
+def test_a_step_of_the_shot_is_in_range_as_well(arm, animation):
+    short = dataclasses.replace(arm, retarget=RetargetSettings(time_step=1e-30))
+    with pytest.raises(ShotError) as error:
+        refuse_unsupported(short, animation, RunSettings())
+    assert error.value.attribute == "calm:retarget:timeStep"
+    refuse_unsupported(short, animation, RunSettings(step=1e-3))
+
+
 def test_half_a_turn_within_a_step_is_refused_where_it_begins(arm):
     grid = make_grid(np.arange(5) * 0.1, 0.1, 0.0)
     angles = np.zeros((5, len(arm.motors)))

@@ -29,14 +29,14 @@ class Deflection(NamedTuple):
 
 
 def deflections(system: System, state: State) -> list[Deflection]:
-    """Deflection of every component that has elastic coordinates and joints beyond the one that carries it."""
+    """Deflection of every component that has modes and joints beyond the one that carries it."""
     result = []
-    for b, r in enumerate(system.elastic):
+    for b, r in enumerate(system.modes):
         markers = [(j, k) for j, pair in enumerate(system.side) for k in (0, 1) if pair[k] == b and (j, k) != (b, 1)]
         if not r or not markers:
             continue
         root = system.position[b, 1]
-        displaced = [float(np.linalg.norm(system.Phi[j, k] @ state.u[b])) for j, k in markers]
+        displaced = [float(np.linalg.norm(system.Phi[j, k, :, :r] @ state.u[b, :r])) for j, k in markers]
         worst = int(np.argmax(displaced))
         length = float(np.linalg.norm(system.position[markers[worst]] - root))
         result.append(Deflection(b, displaced[worst], length))

@@ -28,7 +28,7 @@ class OpenJoint(NamedTuple):
 
 
 def first_open_joint(
-    system: System, trajectory: Trajectory, angles: Array, allowed: float, workspace: Workspace
+    system: System, trajectory: Trajectory, angles: Array, allowed: float, workspace: Workspace, turned: float = np.inf
 ) -> OpenJoint | None:
     """The widest joint at the first instant at which one is open by more than is allowed; None where none ever is.
 
@@ -38,14 +38,15 @@ def first_open_joint(
         angles: Angle [rad] (or length [m]) of each joint, shape [T, J].
         allowed: Largest gap of positions [m].
         workspace: Scratch of this system.
+        turned: Largest gap of rotations [rad]; where it is finite, all instants are looked at.
     """
     counted = trajectory.costs[:, 2] if len(trajectory.costs) else np.full(len(angles), np.inf)
-    for instant in np.flatnonzero(counted > allowed):
+    for instant in np.flatnonzero((counted > allowed) | np.isfinite(turned)):
         workspace.work.world[:] = trajectory.world[instant]
         linearize(system, copy_of_instant(trajectory.states, int(instant)), angles[instant], workspace)
         gaps = workspace.blocks.gap
-        far = np.linalg.norm(gaps[:, :3], axis=1)
-        if np.any(far > allowed):
-            joint = int(np.argmax(far))
+        far = np.maximum(np.linalg.norm(gaps[:, :3], axis=1) / allowed, np.linalg.norm(gaps[:, 3:], axis=1) / turned)
+        joint = int(np.argmax(far))
+        if far[joint] > 1.0:
             return OpenJoint(int(instant), joint, gaps[joint].copy())
     return None

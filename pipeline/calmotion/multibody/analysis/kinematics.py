@@ -82,7 +82,14 @@ def rigid_state(model: Model, joint_angles: Array, world: Array | None = None) -
     state = allocate_state(model.system)
     c, q = rigid_poses(model, joint_angles[None], None if world is None else world[None])
     state.c[:], state.q[:] = c[0], q[0]
+    set_rotors(model.system, state, joint_angles)
     return state
+
+
+def set_rotors(system: System, state: State, joint_angles: Array) -> None:
+    """Turn the rotors of servos to the angles (or lengths) of their joints, shape [B] or [J]."""
+    for joint in system.servos[system.servos < len(joint_angles)]:
+        state.u[system.side[joint, 1], system.rotor[joint]] = joint_angles[joint]
 
 
 @by_reference

@@ -13,6 +13,7 @@ from calmotion.multibody.kernels.so3 import matrix_of
 from calmotion.multibody.kernels.work import Work, allocate_work
 from calmotion.multibody.linear_solver.closed_chains import copy_rows
 from calmotion.multibody.model.system import State, System
+from calmotion.multibody.motors.servos import rotor_effort
 from calmotion.shot.character import Array
 from calmotion.support.by_reference import by_reference
 from calmotion.support.compilation import kernel
@@ -25,7 +26,8 @@ class Reactions(NamedTuple):
     Attributes:
         forces: [N], shape [T, J, 3].
         moments: [N m], shape [T, J, 3].
-        efforts: Along the joint's axis, positive as its value: moments [N m], or forces [N] of a slider, shape [T, J].
+        efforts: Along the joint's axis, positive as its value: moments [N m], or forces [N] of a slider, shape [T, J];
+            that of a servo's motor on its rotor.
         axes: Of the frame on the joint's side 0, as columns, world, shape [T, J, 3, 3].
     """
 
@@ -58,6 +60,8 @@ def _reactions(system: System, states: State, inputs: Inputs, work: Work, out: R
             t = 0.0
             for i in range(3):
                 t += axes[i, 2] * source[n, joint, i]
+            if system.rotor[joint] >= 0:
+                t = rotor_effort(system, joint, inputs.angles[n, joint], inputs.rates[n, joint], instant_of(states, n))
             efforts[n, joint] = t
             for i in range(3):
                 for k in range(3):

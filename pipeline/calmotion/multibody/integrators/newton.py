@@ -33,9 +33,11 @@ from calmotion.support.compilation import NO, YES, inlined_kernel, kernel, share
 
 CONVERGED, SINGULAR, NOT_CONVERGED = 0, 1, 2
 LIMIT = 40
-QUADRATIC = 1e-8  # a correction by a fresh tangent below this leaves an error of about its square [m, rad]
-LEFT = 1e-13  # acceptable error where factors were kept [m, rad]
+# Sizes of corrections are in `System.unit`.
+QUADRATIC = 1e-8  # a correction by a fresh tangent below this leaves an error of about its square
+LEFT = 1e-13  # acceptable error where factors were kept
 FLOOR = 1e-12  # corrections below this are rounding
+ROUNDING = 2.0**-46  # of the distance from the origin, that corrections cannot be smaller than
 SLOW = 0.1  # shrinking of the corrections by less than this asks for a new tangent
 SMALLEST = 1.0 / 256.0  # part of a correction below which the step is given up
 HUGE = 1e6
@@ -65,12 +67,12 @@ def correct(system: System, before: State, now: State, R: Array, x: Array, lam: 
 
 @kernel
 def worst_component(system: System, x: Array) -> int:
-    """Component with the largest (or a non-finite) correction."""
+    """Component with the largest (or a non-finite) correction, in `System.unit`."""
     worst = 0
     big = -1.0
     for b in range(len(system.parent)):
         for i in range(6 + system.elastic[b]):
-            t = abs(x[b, i])
+            t = abs(x[b, i]) / system.unit[b, i]
             if not np.isfinite(t):
                 return b
             if t > big:
@@ -143,16 +145,26 @@ def solve_correction(system: System, blocks: Blocks, matrix: StepMatrix, scratch
 
 @kernel
 def largest_entry(system: System, x: Array) -> float:
-    """Largest entry of a correction, NaN where one is not a number."""
+    """Largest entry of a correction in `System.unit`, NaN where one is not a number."""
     largest = 0.0
     for b in range(len(system.parent)):
         for i in range(6 + system.elastic[b]):
-            t: float = abs(x[b, i])
+            t: float = abs(x[b, i]) / system.unit[b, i]
             if not (t <= largest):
                 largest = t
                 if np.isnan(t):
                     return t
     return largest
+
+
+@kernel
+def rounding_floor(system: System, state: State) -> float:
+    """Size of corrections, in `System.unit`, that is rounding at this state."""
+    far = 0.0
+    for b in range(len(system.parent)):
+        for i in range(3):
+            far = max(far, abs(state.c[b, i]) / system.unit[b, i])
+    return max(FLOOR, ROUNDING * far)
 
 
 @shared_kernel
@@ -179,6 +191,7 @@ def step(
     taken_fresh = False  # whether the correction taken last came from a tangent at its own state
     part, last = 1.0, np.inf  # how much of it was taken, and its size
     factorisations = 0
+    floor = rounding_floor(system, before)
     for iteration in range(LIMIT):
         _velocities(system, integrator, instants, scratch)
         if fresh:
@@ -193,8 +206,8 @@ def step(
         if fresh:
             if not (size < HUGE):
                 return NOT_CONVERGED, factorisations, iteration + 1, worst_component(system, x)
-        elif size <= (1.0 - 0.25 * part) * last or size < FLOOR:
-            if part < 1.0 or (size > SLOW * last and size > FLOOR):
+        elif size <= (1.0 - 0.25 * part) * last or size < floor:
+            if part < 1.0 or (size > SLOW * last and size > floor):
                 fresh, part = True, 1.0
                 continue
         else:
@@ -215,7 +228,7 @@ def step(
         copy_rows(x, scratch.taken)
         copy_rows(lam, scratch.taken_lam)
         correct(system, before, now, work.R, x, lam, part, scratch.T)
-        enough = size < QUADRATIC if fresh else (size < FLOOR or ratio * size < (1.0 - ratio) * LEFT)
+        enough = size < QUADRATIC if fresh else (size < floor or ratio * size < (1.0 - ratio) * LEFT)
         if enough:
             _finish(system, integrator, instants, scratch)
             return CONVERGED, factorisations, iteration + 1, -1

@@ -40,7 +40,7 @@ BUTCHER = np.array(
     ]
 )
 DIFFERENCES = np.linalg.inv(BUTCHER)
-TOLERANCE = 1e-12  # of a Newton correction [m, rad]
+TOLERANCE = 1e-12  # of a Newton correction, in `System.unit`
 LIMIT = 30
 RANK = 1e-11  # singular values below this part of the largest count as zero
 
@@ -175,6 +175,8 @@ class _Stepper:
     def step(self, before: State, h: float, inputs: Array) -> int:
         """Fill the stages; -1, or the component where Newton's method fails."""
         x, m, s = self.offset[-1], len(self.rows), len(NODES)
+        units = np.tile(self._flat(self.system.unit), s)
+        levers = np.tile(np.where(self.rows[:, 1] < 3, 1.0, self.system.unit[0, 0]), s)
         for node, stage in zip(NODES, self.stages, strict=True):
             stage.c[:] = before.c + node * h * before.V[:, :3]
             stage.u[:] = before.u + node * h * before.V[:, 6:]
@@ -204,11 +206,13 @@ class _Stepper:
                 A[:, : s * x] *= h * h
                 A[s * x :] /= h
                 right[s * x :] /= h
+                A[:, s * x :] *= levers
                 solution = np.linalg.lstsq(A, right, rcond=RANK)[0]
                 solution[: s * x] *= h * h
+                solution[s * x :] *= levers
             else:
                 solution = np.linalg.solve(A, right)
-            size = np.abs(solution[: s * x]).max()
+            size = np.abs(solution[: s * x] / units).max()
             if not np.isfinite(size) or size > 1e3:
                 break
             for i, stage in enumerate(self.stages):

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from calmotion.multibody.failure import Reason, SimulationFailure
+from calmotion.multibody.failure import NOWHERE, Reason, SimulationFailure
 from calmotion.multibody.integrators import bdf2, newton
 from calmotion.multibody.integrators.coefficients import IMPLICIT
 from calmotion.multibody.integrators.refinement import refined_step
@@ -204,10 +204,18 @@ def _march(
     chunk = total if progress is None else max(1, total // 50)
     while done < total:
         last = min(done + chunk, total)
-        code, done, component = _advance(system, coefficients, done, last, inputs, record, ws)
+        try:
+            code, done, component = _advance(system, coefficients, done, last, inputs, record, ws)
+        except ZeroDivisionError:  # of a kernel, whose numbers have left all bounds
+            done += int(np.argmin(record.costs[done:last, 0] > 0.0))  # steps that are done have counted their solutions
+            state = copy_of_instant(record.states, done - 1)
+            raise SimulationFailure(done * h, NOWHERE, Reason.DIVERGED, state) from None
         if code != newton.CONVERGED:
             reason = Reason.SINGULAR if code == newton.SINGULAR else Reason.DIVERGED
-            exact = refined_step(system, integrator, h, done, inputs, record, ws)
+            try:
+                exact = refined_step(system, integrator, h, done, inputs, record, ws)
+            except ZeroDivisionError:
+                exact = None
             if exact is None:
                 raise SimulationFailure(done * h, component, reason, copy_of_instant(record.states, done - 1))
             if not exact:

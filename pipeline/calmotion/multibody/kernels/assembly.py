@@ -30,6 +30,7 @@ from calmotion.multibody.kernels.so3 import matrix_of
 from calmotion.multibody.kernels.stvk import stvk_forces
 from calmotion.multibody.kernels.work import Work
 from calmotion.multibody.model.system import Blocks, Integrator, State, System
+from calmotion.multibody.motors.servos import servo_rows
 from calmotion.shot.character import Array
 from calmotion.support.compilation import inlined_kernel, kernel, shared_kernel
 
@@ -190,6 +191,10 @@ def _joint_rows(
     _component_stiffness(system, joint, state.lam[joint], w, blocks)
     if system.side[joint, 0] >= 0:
         _parent_stiffness(system, joint, angle, w, blocks)
+    if system.rotor[joint] >= 0:
+        blocks.by_angle[joint] = 0.0  # the command acts on the rotor alone
+        blocks.by_rate[joint] = 0.0
+        blocks.on_parent[joint] = 0.0
 
 
 @shared_kernel
@@ -221,6 +226,8 @@ def assemble(
     for b in system.neohookean:
         law, u, v = law_of(system, b), state.u[b], state.V[b, 6:]
         neohookean_forces(law, u, v, tangent, w.law, blocks.res[b], blocks.P[b], blocks.K[b])
+    for joint in system.servos:
+        servo_rows(system, joint, angle[joint], rate[joint], integrator.gamma, state, tangent, blocks)
     if tangent:
         acceleration = integrator.acceleration
         for b in range(count):

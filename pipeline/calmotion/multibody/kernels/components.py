@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+from calmotion.multibody.kernels.finite_rotation import LINEAR_BODY
 from calmotion.multibody.model.system import System
 from calmotion.shot.character import Array
 from calmotion.support.compilation import kernel
@@ -15,7 +16,7 @@ class Component(NamedTuple):
     Attributes:
         r: Number of elastic coordinates.
         mass, s, Z, M3, M4, S, axial, axial0: Inertia integrals, see `System`.
-        stiffness, damping: Of the elastic coordinates, shapes [R] and [R, R].
+        inertia, stiffness, damping: Of the elastic coordinates, shapes [R], [R] and [R, R].
     """
 
     r: int
@@ -27,6 +28,7 @@ class Component(NamedTuple):
     S: Array
     axial: Array
     axial0: Array
+    inertia: Array
     stiffness: Array
     damping: Array
 
@@ -52,7 +54,7 @@ class ElasticLaw(NamedTuple):
     """Elastic law of one nonlinear component.
 
     Attributes:
-        r: Number of elastic coordinates.
+        r: Number of coordinates that deform it.
         points: Number of cubature points, or dimension of the subspace of a STVK body's quadratic strain.
         retardation: Retardation time of Kelvin-Voigt damping [s].
         lame: Lame's constants [Pa], shape [2], where the law is NEOHOOKEAN.
@@ -91,7 +93,7 @@ def component_of(system: System, b: int) -> Component:
     """Component b of a system."""
     return Component(
         system.elastic[b], system.mass[b], system.s[b], system.Z[b], system.M3[b], system.M4[b], system.S[b],
-        system.axial[b], system.axial0[b], system.stiffness[b], system.damping[b],
+        system.axial[b], system.axial0[b], system.inertia[b], system.stiffness[b], system.damping[b],
     )  # fmt: skip
 
 
@@ -99,15 +101,19 @@ def component_of(system: System, b: int) -> Component:
 def law_of(system: System, b: int) -> ElasticLaw:
     """Elastic law of component b."""
     return ElasticLaw(
-        system.elastic[b], system.points[b], system.retardation[b], system.lame[b], system.data_start[b], system.data
+        system.modes[b], system.points[b], system.retardation[b], system.lame[b], system.data_start[b], system.data
     )
 
 
 @kernel
 def marker_of(system: System, joint: int, side: int) -> ComponentMarker:
-    """Marker of a joint on its side 0 or 1, which is a component."""
+    """Marker of a joint on its side 0 or 1, which is a component.
+
+    Modes do not move the marker by which a component hangs in the tree; deflections of drives turn it as exp.
+    """
     b = system.side[joint, side]
+    law = LINEAR_BODY if side == 1 and joint < len(system.parent) else system.law[b]
     return ComponentMarker(
-        system.elastic[b], system.law[b], system.position[joint, side], system.rotation[joint, side],
+        system.elastic[b], law, system.position[joint, side], system.rotation[joint, side],
         system.Phi[joint, side], system.Psi[joint, side],
     )  # fmt: skip

@@ -5,7 +5,7 @@ b_k = axial(M4_k) and a = R^T (c'' - g), in body axes, the rows are
 
     translation  m a + alpha x s + M3^T v'
     rotation     s x a + J alpha + sum_k v'_k b_k
-    elastic j    M3_j . a + b_j . alpha + v'_j + k_j u_j + d_j v_j
+    elastic j    M3_j . a + b_j . alpha + m_j v'_j + k_j u_j + d_j v_j
 
 which is `inertia` for omega = 0, its J(u) and b_k(u) taken at u = 0. Where the frame cannot rotate, these two affect
 only the reaction moment, and the motion is exact. Where the frame rotates a little, by the deflection of the component
@@ -27,7 +27,8 @@ from calmotion.support.compilation import kernel
 def nonrotating_residual(component: Component, motion: ComponentMotion, work: Work, res: Array) -> None:
     """Rows of one component without its joints, into res, shape [6 + r]; leaves s in work.s."""
     r, mass, s0, Z0 = component.r, component.mass, component.s, component.Z
-    M3, axial0, stiffness, damping = component.M3, component.axial0, component.stiffness, component.damping
+    M3, axial0, inertia = component.M3, component.axial0, component.inertia
+    stiffness, damping = component.stiffness, component.damping
     a, al, u, v, vd, s = motion.a, motion.al, motion.u, motion.v, motion.vd, work.s
     trace = Z0[0, 0] + Z0[1, 1] + Z0[2, 2]
     for i in range(3):
@@ -48,7 +49,7 @@ def nonrotating_residual(component: Component, motion: ComponentMotion, work: Wo
         res[i] += al[k] * s[m] - al[m] * s[k]
         res[3 + i] += s[k] * a[m] - s[m] * a[k]
     for j in range(r):
-        t = vd[j] + stiffness[j] * u[j]
+        t = inertia[j] * vd[j] + stiffness[j] * u[j]
         for i in range(3):
             t += M3[j, i] * a[i] + axial0[j, i] * al[i]
         for k in range(r):
@@ -69,7 +70,7 @@ def nonrotating_mass_matrix(component: Component, work: Work, D: Array) -> None:
             D[3 + i, 6 + j] = axial0[j, i]
         for k in range(r):
             D[6 + j, 6 + k] = 0.0
-        D[6 + j, 6 + j] = 1.0
+        D[6 + j, 6 + j] = component.inertia[j]
 
 
 @kernel

@@ -5,9 +5,10 @@ b_j = axial(B_j) = int rho y x phi_j, W = [alpha]x + [omega]x^2, and a = R^T (c'
 
     translation  m a + W s + 2 omega x (M3^T v) + M3^T v'
     rotation     s x a + axial(Z W^T) + 2 sum_k v_k (tr(B_k) - B_k^T) omega + sum_k v'_k b_k
-    elastic j    M3_j . a + tr(W B_j) + 2 omega . sum_k v_k axial(S_kj) + v'_j + k_j u_j + d_j v_j
+    elastic j    M3_j . a + tr(W B_j) + 2 omega . sum_k v_k axial(S_kj) + m_j v'_j + k_j u_j + d_j v_j
 
-which is formulation, section 1 (Seed (4)-(10), (19)-(22), with the rows of c and omega that the seed omits).
+with m_j = 1, or 0 for the deflection of a drive: formulation, section 1 (Seed (4)-(10), (19)-(22), with the rows of c
+and omega that the seed omits).
 """
 
 from __future__ import annotations
@@ -91,7 +92,7 @@ def body_residual(component: Component, motion: ComponentMotion, work: Work, res
     Needs `deformed_integrals` first; leaves [alpha]x + [omega]x^2 in work.W.
     """
     r, mass, M3, axial = component.r, component.mass, component.M3, component.axial
-    stiffness, damping = component.stiffness, component.damping
+    inertia, stiffness, damping = component.inertia, component.stiffness, component.damping
     a, om, al, u, v, vd = motion.a, motion.om, motion.al, motion.u, motion.v, motion.vd
     s, Z, B, W, tmp = work.s, work.Z, work.B, work.W, work.tmp
     _gradient_of_acceleration(al, om, W)
@@ -119,7 +120,7 @@ def body_residual(component: Component, motion: ComponentMotion, work: Work, res
                 t -= B[j, n, i] * om[n]
             res[3 + i] += 2.0 * v[j] * t + vd[j] * (B[j, k, m] - B[j, m, k])
     for j in range(r):
-        t = vd[j] + stiffness[j] * u[j]
+        t = inertia[j] * vd[j] + stiffness[j] * u[j]
         for i in range(3):
             t += M3[j, i] * a[i]
             for k in range(3):
@@ -168,7 +169,7 @@ def mass_matrix(component: Component, work: Work, D: Array) -> None:
             D[3 + i, 6 + j] = b
         for k in range(r):
             D[6 + j, 6 + k] = 0.0
-        D[6 + j, 6 + j] = 1.0
+        D[6 + j, 6 + j] = component.inertia[j]
 
 
 @shared_kernel

@@ -61,7 +61,8 @@ def joint_kinematics(
     """Values of both markers of a joint at its motor's value and rate, and Q = R_i^T R_j into w.Q.
 
     Returns:
-        The joint's value and rate: its motor's, or the length of a free slider, whose rate its rows do not need.
+        The joint's value and rate: its motor's, or the length of a free slider, whose rate its rows do not need. The
+        marker behind a rotor turns with it, and has none.
     """
     p = system.side[joint, 0]
     b = system.side[joint, 1]
@@ -73,6 +74,8 @@ def joint_kinematics(
     else:
         marker_values(marker_of(system, joint, 0), c[p], w.R[p], u[p], V[p], w.i)
     marker_values(marker_of(system, joint, 1), c[b], w.R[b], u[b], V[b], w.j)
+    if system.rotor[joint] >= 0:
+        value, rate = 0.0, 0.0
     if slides_freely(system, joint):
         value, rate = free_length(w.i, w.j), 0.0
     if system.sliding[joint]:

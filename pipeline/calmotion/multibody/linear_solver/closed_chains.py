@@ -13,8 +13,6 @@ least norm. The transposed system uses the same matrices.
 
 from __future__ import annotations
 
-import numpy as np
-
 from calmotion.multibody.kernels.sliders import has_row
 from calmotion.multibody.linear_solver.elimination import solve, solve_transposed
 from calmotion.multibody.linear_solver.pseudo_inverse import pseudo_inverse
@@ -154,19 +152,6 @@ def _schur_complement(system: System, matrix: StepMatrix, border: Border, scratc
                 border.free[column, b, i] = -scratch.lam[b, i]
 
 
-@kernel
-def _mechanism_length(system: System) -> float:
-    """Largest distance of a joint's marker from its component's origin [m]; 1 where all are zero."""
-    length = 0.0
-    for joint in range(len(system.rows)):
-        for k in range(2):
-            t = 0.0
-            for i in range(3):
-                t += system.position[joint, k, i] ** 2
-            length = max(length, t)
-    return np.sqrt(length) if length > 0.0 else 1.0
-
-
 @inlined_kernel
 def _scale(n: int, length: float, S: Array) -> tuple[float, float]:
     """Scale S so that redundant constraints show in its rank; returns the scales of constraint rows and of forces.
@@ -176,7 +161,7 @@ def _scale(n: int, length: float, S: Array) -> tuple[float, float]:
     rows large against those of s.
     """
     largest = 0.0
-    rows = 1.0
+    rows = length
     for i in range(n):
         for k in range(n):
             if i % UNKNOWNS < JOINT_ROWS and k % UNKNOWNS < JOINT_ROWS:
@@ -202,7 +187,7 @@ def factor_closed_chains(system: System, matrix: StepMatrix, border: Border, scr
     """S^+ of the closed chains into matrix.inverse, after the tree has been eliminated."""
     n = UNKNOWNS * (len(system.rows) - len(system.parent))
     _schur_complement(system, matrix, border, scratch)
-    length = _mechanism_length(system)
+    length = system.unit[0, 0]
     rows, largest = _scale(n, length, border.S)
     inverse = matrix.inverse
     rank = pseudo_inverse(n, border.S, inverse, border.null, border.decomposition)

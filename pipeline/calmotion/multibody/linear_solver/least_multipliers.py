@@ -14,7 +14,9 @@ from calmotion.support.compilation import kernel, shared_kernel
 @shared_kernel
 def least_multipliers(system: System, border: Border, lam: Array) -> None:
     """Remove from all multipliers, shape [J, 6], the part that does no work in any motion: redundant constraints share
-    the load so that the sum of squares is least. After `factor_closed_chains`."""
+    the load so that the sum of squares is least, of moments over the length in `System.unit`. After
+    `factor_closed_chains`."""
+    per_length = 1.0 / system.unit[0, 0]
     joints, count = len(system.rows), len(system.parent)
     n = UNKNOWNS * (joints - count)
     few = n - border.rank[0]
@@ -35,26 +37,32 @@ def least_multipliers(system: System, border: Border, lam: Array) -> None:
                 sets[s, joint, i] = t
         for _ in range(2):
             for other in range(s):
-                _remove(joints, sets[other], sets[s])
+                _remove(joints, per_length, sets[other], sets[s])
         size = 0.0
         for joint in range(joints):
             for i in range(JOINT_ROWS):
-                size += sets[s, joint, i] ** 2
+                size += _weight(i, per_length) * sets[s, joint, i] ** 2
         scale = 1.0 / np.sqrt(size) if size > 0.0 else 0.0
         for joint in range(joints):
             for i in range(JOINT_ROWS):
                 sets[s, joint, i] *= scale
     for s in range(few):
-        _remove(joints, sets[s], lam)
+        _remove(joints, per_length, sets[s], lam)
 
 
 @kernel
-def _remove(joints: int, unit: Array, lam: Array) -> None:
+def _weight(i: int, per_length: float) -> float:
+    """Weight of the square of a force or moment."""
+    return 1.0 if i < 3 else per_length * per_length
+
+
+@kernel
+def _remove(joints: int, per_length: float, unit: Array, lam: Array) -> None:
     """lam -= (unit . lam) unit."""
     t = 0.0
     for joint in range(joints):
         for i in range(JOINT_ROWS):
-            t += unit[joint, i] * lam[joint, i]
+            t += _weight(i, per_length) * unit[joint, i] * lam[joint, i]
     for joint in range(joints):
         for i in range(JOINT_ROWS):
             lam[joint, i] -= t * unit[joint, i]

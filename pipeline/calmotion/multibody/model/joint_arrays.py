@@ -107,7 +107,8 @@ def joint_arrays(
         rows[k] = _ROWS[joint.kind] if motor[k] < 0 else 6
         rest[k] = _rest_value(character, bodies_of, position[k], rotation[k], joint.kind == "prismatic")
     arrays = {
-        "side": side, "rows": rows, "sliding": sliding, "moving": moved, "position": position, "rotation": rotation,
+        "side": side, "rows": rows, "servos": np.zeros(0, np.int32), "rotor": np.full(count, -1, np.int32),
+        "servo": np.zeros((count, 7)), "sliding": sliding, "moving": moved, "position": position, "rotation": rotation,
         "Phi": Phi, "Psi": Psi,
     }  # fmt: skip
     return JointArrays(arrays, motor, sign, rest)

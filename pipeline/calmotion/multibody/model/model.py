@@ -9,10 +9,12 @@ from typing import Any
 import numpy as np
 
 from calmotion.multibody.model.joint_arrays import BodyAnchors, body_anchors, joint_arrays, rotation_matrix
-from calmotion.multibody.model.system import LINEAR, NEOHOOKEAN, STVK, System, components
+from calmotion.multibody.model.system import LINEAR, NEOHOOKEAN, STVK, System, components, coordinate_units
 from calmotion.multibody.model.topology import Tree, span_tree
+from calmotion.multibody.motors.drives import add_motors, giving_motors
 from calmotion.reduction.reduced_body import Marker, ReducedBody, rigid_invariants
 from calmotion.shot.character import Array, Body, BoolArray, Character, IntArray
+from calmotion.shot.motor import PRESCRIBED, Motor
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,6 +42,7 @@ class Model:
         sign: +1, or -1 where the joint's angle runs against the tree, shape [J].
         targets: The target markers.
         rest_angles: Angle [rad] (or length [m]) of each joint in the pose the shot was authored in, shape [J].
+        delays: Of the motors' commands [s]; empty where there are none.
     """
 
     system: System
@@ -48,6 +51,7 @@ class Model:
     sign: Array
     targets: Targets
     rest_angles: Array
+    delays: tuple[float, ...] = ()
 
     def joint_angles(self, motor_values: Array) -> Array:
         """Angles (or lengths) of the joints, shape [..., J], from values of the motors, shape [..., M]."""
@@ -111,13 +115,27 @@ def compile_model(character: Character, tree: Tree, bodies: Sequence[ReducedBody
     joints = joint_arrays(character, tree, bodies, anchors, r_max, moving)
     nonrotating = np.array([character.bodies[b].non_rotating for b in tree.body], bool)
     system = System(
-        parent=np.array(tree.parent, np.int32), elastic=elastic, mass=mass, s=s, Z=Z, M3=M3, M4=M4, S=S, axial=axial,
-        axial0=axial0, rotating=components(~nonrotating), nonrotating=components(nonrotating),
-        stiffness=stiffness, damping=damping, gravity=np.asarray(character.gravity, dtype=float),
+        parent=np.array(tree.parent, np.int32), elastic=elastic, modes=elastic.copy(), mass=mass, s=s, Z=Z, M3=M3,
+        M4=M4, S=S, axial=axial, axial0=axial0, rotating=components(~nonrotating), nonrotating=components(nonrotating),
+        inertia=np.where(np.arange(r_max) < elastic[:, None], 1.0, 0.0), stiffness=stiffness, damping=damping,
+        gravity=np.asarray(character.gravity, dtype=float),
+        unit=coordinate_units(mass, Z, joints.arrays["side"], joints.arrays["position"], r_max),
         **_elastic_laws([bodies[b] for b in tree.body]), **joints.arrays,
     )  # fmt: skip
     targets = _targets(character, tree, bodies, anchors, r_max)
-    return Model(system, tree, joints.motor, joints.sign, targets, joints.rest)
+    return with_drives(Model(system, tree, joints.motor, joints.sign, targets, joints.rest), character.motors)
+
+
+def with_drives(model: Model, motors: Sequence[Motor]) -> Model:
+    """The model with the coordinates of its motors that give, see `drives`; itself where motors are ideal."""
+    found = giving_motors(model.system, model.motor, motors)
+    if not found:
+        return model
+    system, t = add_motors(model.system, found), model.targets
+    more = [(0, 0), (0, 0), (0, system.size - model.system.size)]
+    targets = replace(t, Phi=np.pad(t.Phi, more), Psi=np.pad(t.Psi, more))
+    delays = tuple(0.0 if motor.model == PRESCRIBED else motor.delay for motor in motors)
+    return replace(model, system=system, targets=targets, delays=delays)
 
 
 def _elastic_laws(bodies: Sequence[ReducedBody]) -> dict[str, Any]:
@@ -171,11 +189,15 @@ def _targets(
 
 
 def rigid_model(model: Model) -> Model:
-    """The same character with every body rigid."""
+    """The same character with every body rigid, and every motor ideal."""
     system = model.system
     none = 0
     rigid = system._replace(
         elastic=np.zeros_like(system.elastic),
+        servos=system.servos[:none],
+        rotor=np.full_like(system.rotor, -1),
+        modes=np.zeros_like(system.modes),
+        inertia=np.ascontiguousarray(system.inertia[:, :none]),
         M3=np.ascontiguousarray(system.M3[:, :none]),
         M4=np.ascontiguousarray(system.M4[:, :none]),
         S=np.ascontiguousarray(system.S[:, :none, :none]),
@@ -189,6 +211,7 @@ def rigid_model(model: Model) -> Model:
         data=np.zeros(0),
         Phi=np.ascontiguousarray(system.Phi[..., :none]),
         Psi=np.ascontiguousarray(system.Psi[..., :none]),
+        unit=np.ascontiguousarray(system.unit[:, : 6 + none]),
     )
     t = model.targets
     targets = Targets(

@@ -18,6 +18,8 @@ from calmotion.support.by_reference import by_reference
 CountArray = NDArray[np.int64]  # the type of Python's integers in a kernel, so that it is compiled once for both
 JOINT_ROWS = 6
 BACKWARD_DIFFERENCE, NEWMARK = 0, 1  # families of time-stepping formulas
+# columns of `System.servo`
+POSITION_GAIN, VELOCITY_GAIN, FRICTION, FRICTION_SPEED, LARGEST_EFFORT, INVERSE_SPEED, KNEE = range(7)
 LINEAR, STVK, NEOHOOKEAN = 0, 1, 2  # elastic laws; `finite_rotation` distinguishes linear and nonlinear by zero
 
 
@@ -27,16 +29,25 @@ class System(NamedTuple):
 
     Attributes:
         parent: Parent of each component, shape [B], -1 for the world.
-        elastic: Number of elastic coordinates, shape [B].
+        elastic: Number of elastic coordinates, shape [B]: modes, then those of motors that give
+            (`motors.drives`).
+        modes: Number of those that deform the component, shape [B].
         side: Components on the two sides of each joint, shape [J, 2].
         rows: Number of constraint rows of each joint: 6 (weld, motor), 5 (free hinge or slider), 3 (ball) or 0
             (floating), shape [J].
+        servos: Numbers of the joints that have a rotor.
+        rotor: Elastic coordinate of the component on side 1 that is a joint's rotor, -1 for none, shape [J].
+        servo: Of each rotor's motor, shape [J, 7]: gains [N m/rad], [N m s/rad], Coulomb friction [N m] and the speed
+            by which it is smoothed [rad/s], largest effort [N m], inverse of the no-load speed [s/rad], and the share
+            of it up to which the largest effort is there.
         sliding: Whether a joint has a length along its axis instead of an angle, shape [J].
         moving: Row of `work.Work.world` that moves the world-side marker of a joint, -1 for none, shape [J].
         mass, s, Z, M3, M4, S: Inertia integrals, see `reduced_body.Invariants`.
         axial: axial(S[j, k]) = int rho phi_j x phi_k, shape [B, R, R, 3].
         axial0: axial(M4[j]) = int rho X x phi_j, shape [B, R, 3].
         rotating, nonrotating: Components with the inertia of `inertia`, and those with that of `constant_inertia`.
+        inertia: Of each elastic coordinate by itself, shape [B, R]: 1 for modes, 0 for deflections of drives and
+            gears, the armature of a rotor.
         stiffness: Diagonal, shape [B, R]; zero for a nonlinear body.
         damping: Symmetric, shape [B, R, R]; of a nonlinear body, the mass-proportional part.
         law: Elastic law: LINEAR, STVK, NEOHOOKEAN, shape [B].
@@ -48,12 +59,19 @@ class System(NamedTuple):
             each body start.
         position, rotation, Phi, Psi: Joint markers, shapes [J, 2, 3], [J, 2, 3, 3], [J, 2, 3, R] twice.
         gravity: [m/s^2], shape [3].
+        unit: What a change of each coordinate is compared with, shape [B, N]: a length of the mechanism for
+            translations [m], 1 rad for rotations, and for an elastic coordinate what moves the component's mass by that
+            length; decisions then do not depend on units. See `coordinate_units`.
     """
 
     parent: IntArray
     elastic: CountArray
+    modes: CountArray
     side: IntArray
     rows: IntArray
+    servos: IntArray
+    rotor: IntArray
+    servo: Array
     sliding: IntArray
     moving: IntArray
     mass: Array
@@ -66,6 +84,7 @@ class System(NamedTuple):
     axial0: Array
     rotating: IntArray
     nonrotating: IntArray
+    inertia: Array
     stiffness: Array
     damping: Array
     law: IntArray
@@ -81,6 +100,7 @@ class System(NamedTuple):
     Phi: Array
     Psi: Array
     gravity: Array
+    unit: Array
 
     @property
     def size(self) -> int:
@@ -162,6 +182,7 @@ class Blocks(NamedTuple):
         Jp: Rotation of the parent-side marker by the parent's coordinates, shape [J, 3, N].
         by_angle, by_rate: The joint's rows by the motor's angle (or length) and rate, shape [J, 6].
         on_parent: The parent's rows by the motor's length, shape [J, N]; zero where it is an angle.
+        on_rotor: The row of a joint's rotor by the command and its rate, shape [J, 2].
         res: Residual of its rows, shape [B, N].
         gap: Residual of the joint's constraint rows, shape [J, 6].
     """
@@ -178,8 +199,28 @@ class Blocks(NamedTuple):
     by_angle: Array
     by_rate: Array
     on_parent: Array
+    on_rotor: Array
     res: Array
     gap: Array
+
+
+def coordinate_units(mass: Array, Z: Array, side: IntArray, position: Array, elastic: int) -> Array:
+    """`System.unit`; its length is the largest lever of a joint or radius of gyration.
+
+    Places in the world do not count: a mechanism is not larger for being far from the origin.
+
+    Args:
+        mass, Z, side, position: As of `System`.
+        elastic: Number of elastic coordinates, R.
+    """
+    levers = np.linalg.norm(position, axis=2)[side >= 0]
+    gyration = np.sqrt(np.trace(Z, axis1=1, axis2=2) / np.maximum(mass, np.finfo(float).tiny))
+    length = float(max(levers.max(initial=0.0), gyration.max(initial=0.0))) or 1.0
+    unit = np.ones((len(mass), 6 + elastic))
+    unit[:, :3] = length
+    # modes are orthonormal by mass
+    unit[:, 6:] = length * np.sqrt(np.where(mass > 0.0, mass, 1.0))[:, None]
+    return unit
 
 
 def components(chosen: BoolArray) -> IntArray:
@@ -217,5 +258,5 @@ def allocate_blocks(system: System, instants: int | None = None) -> Blocks:
     return Blocks(
         zeros(*square), zeros(*square), zeros(*square), zeros(*tall), zeros(*tall), zeros(*wide), zeros(*wide),
         zeros(joints, size, 3), zeros(joints, 3, size), zeros(*row), zeros(*row), zeros(joints, size),
-        zeros(count, size), zeros(*row),
+        zeros(joints, 2), zeros(count, size), zeros(*row),
     )  # fmt: skip

@@ -79,6 +79,7 @@ def _keep_blocks(blocks: Blocks, matrix: StepMatrix, at: int, steps: LinearizedS
     copy_rows(blocks.by_angle, steps.by_angle[at])
     copy_rows(blocks.by_rate, steps.by_rate[at])
     copy_rows(blocks.on_parent, steps.on_parent[at])
+    copy_rows(blocks.on_rotor, steps.on_rotor[at])
 
 
 @kernel

@@ -19,7 +19,7 @@ class LinearizedSteps(NamedTuple):
     Attributes:
         P, D: See `Blocks`.
         matrix: The eliminated step matrices.
-        by_angle, by_rate, on_parent: See `Blocks`.
+        by_angle, by_rate, on_parent, on_rotor: See `Blocks`.
         R: Rotation matrices of the components, shape [B, 3, 3].
         Hv: Derivative of velocities by positions, shape [B, 4, 4], see `assembly.assemble`.
     """
@@ -30,6 +30,7 @@ class LinearizedSteps(NamedTuple):
     by_angle: Array
     by_rate: Array
     on_parent: Array
+    on_rotor: Array
     R: Array
     Hv: Array
 
@@ -62,6 +63,7 @@ def allocate_steps(system: System, instants: int) -> LinearizedSteps:
         by_angle=zeros(joints, m),
         by_rate=zeros(joints, m),
         on_parent=zeros(joints, size),
+        on_rotor=zeros(joints, 2),
         R=zeros(count, 3, 3),
         Hv=zeros(count, 4, 4),
     )
@@ -76,6 +78,7 @@ def steps_between(steps: LinearizedSteps, instants: slice) -> LinearizedSteps:
         by_angle=steps.by_angle[instants],
         by_rate=steps.by_rate[instants],
         on_parent=steps.on_parent[instants],
+        on_rotor=steps.on_rotor[instants],
         R=steps.R[instants],
         Hv=steps.Hv[instants],
     )
@@ -84,5 +87,5 @@ def steps_between(steps: LinearizedSteps, instants: slice) -> LinearizedSteps:
 def bytes_of_an_instant(system: System) -> int:
     """Memory of the linearised equations of one instant [bytes]."""
     steps = allocate_steps(system, 1)
-    others = (steps.P, steps.D, steps.by_angle, steps.by_rate, steps.on_parent, steps.R, steps.Hv)
+    others = (steps.P, steps.D, steps.by_angle, steps.by_rate, steps.on_parent, steps.on_rotor, steps.R, steps.Hv)
     return sum(array.nbytes for array in (*steps.matrix, *others))

@@ -36,8 +36,8 @@ from calmotion.multibody.sensitivity.perturbation import (
 )
 from calmotion.shot.character import Array
 
-CONVERGED = 1e-12  # distance of end and start of a periodic motion [m, rad]
-ROUNDING = 1e-8  # acceptable distance where rounding prevents convergence [m, rad]
+CONVERGED = 1e-12  # distance of end and start of a periodic motion, in `System.unit`
+ROUNDING = 1e-8  # acceptable distance where rounding prevents convergence, likewise
 LIMIT = 30  # iterations
 SLOW = 0.3  # ratio of successive distances above which the derivative is computed anew
 SMALLEST_STEP = 1.0 / 64.0  # fraction of a Newton step that is tried
@@ -115,7 +115,7 @@ class Cycle:
     Attributes:
         trajectory: Instants 0 and 1, and the steps.
         difference: Of its end and its start.
-        distance: Largest entry of the difference, velocities divided by `FREQUENCY` [m, rad].
+        distance: Largest entry of the difference in `System.unit`, velocities divided by `FREQUENCY`.
     """
 
     trajectory: Trajectory
@@ -144,7 +144,7 @@ def find_periodic_motion(
     def simulated(first: State, second: State) -> Cycle:
         trajectory = simulate_on(system, first, second, angles, rates, h, ws, world)
         difference = end_difference(system, trajectory.states)
-        distance = float(np.max(np.abs(difference.scaled(1.0 / FREQUENCY).vector)))
+        distance = float(np.max(np.abs(difference.scaled(1.0 / FREQUENCY).over(system.unit).vector)))
         return Cycle(trajectory, difference, distance)
 
     cycle = simulated(*start)

@@ -56,6 +56,11 @@ class Perturbation:
         """Velocities times a factor [s], which makes them comparable with positions."""
         return Perturbation(self.shift, self.rotation, self.elastic, factor * self.velocity, self.turn)
 
+    def over(self, unit: Array) -> Perturbation:
+        """Each entry over the unit of its coordinate, shape [B, N]."""
+        shift, elastic = self.shift / unit[:, :3], self.elastic / unit[:, 6:]
+        return Perturbation(shift, self.rotation, elastic, self.velocity / unit, self.turn)
+
 
 def tangent_from(
     lin: Linearization, start: Perturbation, d_angle: Array, d_rate: Array, efforts: bool = False

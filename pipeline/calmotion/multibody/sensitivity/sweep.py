@@ -101,12 +101,13 @@ def window_of(lin: Linearization, first: int, last: int, efforts: bool) -> Windo
 
 @kernel
 def effort_tangent(system: System, j: int, axes: Array, lam_of: Array, Jp: Array, x: Array, lam: Array) -> float:
-    """Change of a driven joint's effort by the coordinates x and the multipliers lam; 0 for other joints.
+    """Change of a driven joint's effort by the coordinates x and the multipliers lam; 0 for other joints, and
+    for servos, whose own limits keep it.
 
     Args:
         axes, lam_of: Axes of the joints' parent-side markers, shape [J, 3, 3], and multipliers of the motion.
     """
-    if system.rows[j] < JOINT_ROWS:
+    if system.rows[j] < JOINT_ROWS or system.rotor[j] >= 0:
         return 0.0
     if not system.sliding[j]:
         moment: float = lam[j, 5]
@@ -126,7 +127,7 @@ def effort_adjoint(
     system: System, j: int, axes: Array, lam_of: Array, Jp: Array, bar: float, x: Array, lam: Array
 ) -> None:
     """Transpose of `effort_tangent`: adds to x and lam."""
-    if system.rows[j] < JOINT_ROWS:
+    if system.rows[j] < JOINT_ROWS or system.rotor[j] >= 0:
         return
     if not system.sliding[j]:
         lam[j, 5] += bar
@@ -172,6 +173,10 @@ def motor_gradient(
         if p >= 0 and system.sliding[j]:
             for i in range(6 + system.elastic[p]):
                 ga -= steps.on_parent[at, j, i] * x[p, i]
+        if system.rotor[j] >= 0:
+            moved = x[system.side[j, 1], 6 + system.rotor[j]]
+            ga -= steps.on_rotor[at, j, 0] * moved
+            gr -= steps.on_rotor[at, j, 1] * moved
         g_angle[j] = weight * ga
         g_rate[j] = weight * gr
 

@@ -92,6 +92,9 @@ def _joint_right_hand_sides(
         if p >= 0 and system.sliding[j]:
             for i in range(6 + system.elastic[p]):
                 x[p, i] -= steps.on_parent[at, j, i] * d_angle[n, j]
+        if system.rotor[j] >= 0:
+            by = steps.on_rotor[at, j]
+            x[b, 6 + system.rotor[j]] -= by[0] * d_angle[n, j] + by[1] * d_rate[n, j]
 
 
 @inlined_kernel

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from calmotion.multibody.failure import Reason, SimulationFailure
-from calmotion.multibody.integrators.newton import correct, worst_component
+from calmotion.multibody.integrators.newton import correct, largest_entry, rounding_floor, worst_component
 from calmotion.multibody.integrators.workspace import Workspace
 from calmotion.multibody.kernels.assembly import assemble
 from calmotion.multibody.linear_solver.closed_chains import factor_closed_chains, solve_system
@@ -16,11 +16,11 @@ from calmotion.multibody.statics.regularized_statics import regularize
 from calmotion.shot.character import Array
 
 STATIC = Integrator(velocity=0.0, acceleration=0.0, gamma=0.0, alpha=1.0)
-TOLERANCE = 1e-11
+TOLERANCE = 3e-11  # of a correction, in `System.unit`
 LIMIT = 400  # iterations
 LOAD_STEP_LIMIT = 30  # of a load step
 PSEUDO_TIME = (1e2, 1e4, 1e6)  # first factors of the mass matrix, 1/time^2
-OPEN = 1e-3  # joints that stay open by more do not meet [m, rad]
+OPEN = 2e-3  # joints that stay open by more do not meet: share of a length of the mechanism [rad]
 FIRST_LOAD_STEP, SMALLEST_LOAD_STEP = 0.2, 1e-3  # fractions of gravity
 
 
@@ -59,7 +59,7 @@ def equilibrium(system: System, start: State, angle: Array, ws: Workspace) -> tu
             reached, share, component, iterations = _by_load_stepping(system, start, angle, ws)
             used += iterations
             if share == 1.0:
-                gaps = _open_rows(ws)
+                gaps = _open_rows(system, ws)
                 if gaps is None:
                     return reached, used
             continue
@@ -68,12 +68,12 @@ def equilibrium(system: System, start: State, angle: Array, ws: Workspace) -> tu
             component, iterations = _iterate(system, state, angle, ws, inertia)
             used += iterations
             if component < 0:
-                gaps = _open_rows(ws)
+                gaps = _open_rows(system, ws)
                 if gaps is None:
                     state.turn[:] = 0.0
                     return state, used
     if gaps is None:
-        gaps = _open_when_weightless(system, start, angle, ws)
+        gaps = open_without_gravity(system, start, angle, ws)
     if gaps is not None:
         joint = int(np.argmax(np.abs(gaps).max(axis=1)))
         raise SimulationFailure(0.0, joint, Reason.OPEN, gap=gaps[joint])
@@ -87,20 +87,23 @@ def _at_rest(start: State) -> State:
     return state
 
 
-def _open_rows(ws: Workspace) -> Array | None:
+def _open_rows(system: System, ws: Workspace) -> Array | None:
     """The gaps of all joints at the state that was linearised last, shape [J, 6] [m, rad]; None where joints meet.
 
     Where motors contradict each other in a closed chain, the pseudo-inverse of its rows finds the pose of the smallest
     gaps, and corrections vanish there as they do in an equilibrium.
     """
-    return ws.blocks.gap.copy() if np.abs(ws.blocks.gap).max(initial=0.0) > OPEN else None
+    gaps = np.abs(ws.blocks.gap)
+    gaps[:, :3] /= system.unit[0, 0]
+    return ws.blocks.gap.copy() if gaps.max(initial=0.0) > OPEN else None
 
 
-def _open_when_weightless(system: System, start: State, angle: Array, ws: Workspace) -> Array | None:
-    """The gaps of all joints without gravity, if they do not meet: it is not the load that has no equilibrium then."""
+def open_without_gravity(system: System, start: State, angle: Array, ws: Workspace) -> Array | None:
+    """The gaps of all joints in the equilibrium without gravity near a state, shape [J, 6] [m, rad]; None if they meet,
+    or if there is none: it is not the load that has no equilibrium where they do not meet."""
     weightless = system._replace(gravity=np.zeros_like(system.gravity))
     component, iterations = _iterate(weightless, _at_rest(start), angle, ws, PSEUDO_TIME[-1])
-    return _open_rows(ws) if component < 0 or iterations == LIMIT else None  # else its system is singular
+    return _open_rows(system, ws) if component < 0 or iterations == LIMIT else None  # else its system is singular
 
 
 def _by_load_stepping(system: System, start: State, angle: Array, ws: Workspace) -> tuple[State, float, int, int]:
@@ -142,7 +145,7 @@ def _iterate(
         if chains_closed:
             factor_closed_chains(system, ws.matrix, border, solution)
         solve_system(system, ws.matrix, x, lam, solution)
-        size = float(np.max(np.abs(x)))
+        size = float(largest_entry(system, x))
         if not np.isfinite(size):
             return worst_component(system, x), iteration + 1
         # a step keeps each component's rotation moderate, so that the linearisation is valid
@@ -152,7 +155,7 @@ def _iterate(
         before.q[:] = state.q
         state.turn[:] = 0.0
         correct(system, before, state, ws.work.R, x, lam, 1.0, ws.scratch.T)
-        if size < TOLERANCE and inertia == 0.0:
+        if size < max(TOLERANCE, rounding_floor(system, state)) and inertia == 0.0:
             if chains_closed:
                 least_multipliers(system, border, state.lam)
             return -1, iteration + 1

@@ -9,16 +9,29 @@ from calmotion.multibody.integrators.integrate import follows_roots
 from calmotion.shot import Animation, Character
 from calmotion.shot.character import Array
 from calmotion.shot.run import INTEGRATORS, RunSettings
+from calmotion.shot.tolerance import reach
 from calmotion.simulation.cyclic import refuse_open_loops
 from calmotion.simulation.inputs.time_grid import TimeGrid
+
+ROUNDING = 1e-9  # of the reach: no simulation has smaller errors
+FINEST = 1e-9  # shortest step [s]
 
 
 def refuse_unsupported(character: Character, animation: Animation, options: RunSettings) -> None:
     """Refuse settings that no simulation of a shot supports.
 
     Raises:
-        ShotError: The integrator, the pre-roll, a cyclic shot that does not close, or a shot of one frame.
+        ShotError: The tolerance, step, integrator or pre-roll, a cyclic shot that does not close, or one of one frame.
     """
+    _refuse_tolerance(character, options)
+    own = "calm:retarget:timeStep" if options.step is None else "--step"
+    step = character.retarget.time_step if options.step is None else options.step
+    for name, value, least in ((own, step, FINEST), ("--pre-roll", options.pre_roll, 0.0)):
+        if value is not None and not least <= value < np.inf:
+            raise ShotError(
+                "this time is out of range", path=character.path, attribute=name, found=f"{value:g} s",
+                remedy=f"Use {least:g} s or more, or leave it out.",
+            )  # fmt: skip
     if character.retarget.cyclic:
         refuse_open_loops(character, animation)
         if options.pre_roll:
@@ -59,6 +72,29 @@ def refuse_unsupported(character: Character, animation: Animation, options: RunS
             attribute="endTimeCode",
             remedy="Author startTimeCode and endTimeCode of the stage, at least a frame apart.",
         )
+
+
+def _refuse_tolerance(character: Character, options: RunSettings) -> None:
+    """A tolerance must be above the rounding of positions, and within the character.
+
+    Raises:
+        ShotError: It is not.
+    """
+    tolerance = options.tolerance if options.tolerance is not None else character.retarget.tolerance
+    if tolerance is None:
+        return
+    far = reach(character) or np.inf
+    least = ROUNDING * far if np.isfinite(far) else 0.0
+    if least <= tolerance <= far and tolerance > 0.0:
+        return
+    fine = not tolerance > least
+    raise ShotError(
+        "the tolerance is finer than a simulation can be" if fine else "the tolerance is larger than the character",
+        path=character.path,
+        attribute="calm:retarget:tolerance" if options.tolerance is None else "--tolerance",
+        found=f"{tolerance:.4g} m, where the character reaches {far:.4g} m",
+        remedy=f"Use {least:.1g} m or more." if fine else "Use a length that matters in the picture, such as 1mm.",
+    )
 
 
 def refuse_half_turns(character: Character, grid: TimeGrid, angles: Array) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -18,6 +18,8 @@ from calmotion.usd.reading.joints import JointPrim, refuse_unsupported
 from calmotion.usd.reading.motors.free_ranges import may_change
 from calmotion.usd.reading.motors.gearing import Gear, read_gear, resolve
 from calmotion.usd.reading.motors.motor_limits import calmotion_limit, effort_limit, velocity_limit
+from calmotion.usd.reading.motors.motor_models import motor_model, read_gains
+from calmotion.usd.reading.motors.rotors import read_delay, read_rotor
 from calmotion.usd.reading.motors.tracks import sample_codes
 from calmotion.usd.units import StageUnits
 
@@ -69,6 +71,7 @@ class Drive:
         constant: The value that it holds [rad or m]; None: that of the pose in which the bodies stand.
         skel_joint: The joint of the skeleton.
         gear: How it follows another motor.
+        actuator: Path of the actuator of a MuJoCo conversion that drives it, or empty.
     """
 
     joint: JointPrim
@@ -76,6 +79,7 @@ class Drive:
     constant: float | None = None
     skel_joint: str = ""
     gear: Gear | None = None
+    actuator: str = ""
 
     def attribute(self, stage: Usd.Stage) -> Any:
         """The target position of its drive, on a stage; invalid where the joint has no drive."""
@@ -130,7 +134,7 @@ def read_drives(
                 gears[joint.path] = gear
             drive = _drive(joint, actuated, reading, posed, given, still or gear is not None)
             if drive is not None:
-                drives[joint.path] = drive
+                drives[joint.path] = replace(drive, actuator=actuated.get(joint.path, ""))
     with reading.collecting_problems():
         _add_geared_motors(drives, resolve(gears), {joint.path: joint for joint in joints}, reading)
     found = [drives[joint.path] for joint in joints if joint.path in drives]
@@ -210,11 +214,12 @@ def read_motor(drive: Drive, index: int, motors: dict[str, int], reading: Readin
         motors: Index of each motor, by the path of its joint.
 
     Raises:
-        ShotError: A limit that is not positive.
+        ShotError: A limit that is not positive; a model or gains that cannot be used.
     """
     prim, linear = drive.joint.prim, drive.joint.kind == "prismatic"
     from_stage = reading.units.length if linear else np.deg2rad
-    gear = drive.gear
+    gear, model = drive.gear, motor_model(prim)
+    gains = read_gains(drive.joint, reading.stage, drive.actuator, reading.units, model)
     return Motor(
         joint=index,
         path=drive.joint.path,
@@ -226,6 +231,12 @@ def read_motor(drive: Drive, index: int, motors: dict[str, int], reading: Readin
         max_torque=effort_limit(drive.joint, reading.units, reading.notes),
         linear=linear,
         follows=None if gear is None else Follows(motors[gear.leader], gear.ratio, gear.offset),
+        model=model,
+        position_gain=gains.position,
+        velocity_gain=gains.velocity,
+        gains_from=gains.source,
+        rotor=read_rotor(drive.joint, reading.units, model, reading.notes),
+        delay=read_delay(prim, model),
     )
 
 
@@ -282,7 +293,7 @@ def _drive(
 def _refuse_wrong_motor(joint: JointPrim) -> None:
     if joint.prim is not None and schemas.is_applied(joint.prim, _SCHEMA):
         raise ShotError(
-            f"a {joint.kind} joint cannot be a motor",
+            f"a joint of this type ({joint.kind}) cannot be a motor",
             path=joint.path,
             found=joint.prim.GetTypeName(),
             remedy="Remove CalmMotorAPI, or make it a PhysicsRevoluteJoint or PhysicsPrismaticJoint",

@@ -4,10 +4,24 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from calmotion.accuracy.simplification.analysis import analyse
 from calmotion.accuracy.simulate_to_tolerance import simulate_to_tolerance
 from calmotion.errors import IntegrationError, ShotError
 from calmotion.retargeting.optimize import optimize_shot
-from calmotion.shot import WORLD, Animation, Body, Character, Frame, Joint, MassProperties, Motor, Target, Track
+from calmotion.shot import (
+    WORLD,
+    Animation,
+    Body,
+    Character,
+    ElasticMaterial,
+    FlexibleSettings,
+    Frame,
+    Joint,
+    MassProperties,
+    Motor,
+    Target,
+    Track,
+)
 from calmotion.shot.run import RunSettings
 from calmotion.simulation.compiled_shot import compile_shot
 from calmotion.simulation.simulate import simulate_shot
@@ -93,3 +107,52 @@ def test_numbers_beyond_all_bounds_are_no_traceback():
     with pytest.raises(IntegrationError) as error:
         simulate_shot(shot_of((0, 3), tracks), replace(OPTIONS, integrator="generalized-alpha"), ignore_progress)
     assert error.value.path and error.value.remedy
+    time = float(error.value.problem.partition(" at ")[2].split(" s")[0])
+    assert 0.5 < time < 0.75
+
+
+def flexible(character, *links):
+    """The linkage with flexible links, as far as the analysis sees them."""
+    settings = FlexibleSettings(ElasticMaterial("/Bar/Steel", 2e11, 0.3, 8000.0))
+    bodies = tuple(replace(body, flexible=settings if k in links else None) for k, body in enumerate(character.bodies))
+    return replace(character, bodies=bodies)
+
+
+def analysed(character, tracks, **options):
+    return analyse(character, Animation(FRAMES, tracks, tracks), RunSettings(tolerance=1e-3, **options), {}, False)
+
+
+@pytest.mark.parametrize("links", [(), (1,)])
+@pytest.mark.parametrize(
+    ("driven", "begin", "by"), [((0, 3), 0.5, 0.3), ((0, 1), 0.25, -0.2), ((0, 3), 0.5, 2.5), ((0, 1, 2, 3), 0.5, 0.3)]
+)
+def test_the_analysis_refuses_them_before_anything_is_meshed(driven, begin, by, links):
+    tracks = (*[drift(2.0, 0.0)] * (len(driven) - 1), drift(begin, by))
+    with pytest.raises(ShotError) as error:
+        analysed(flexible(four_bar(driven), *links), tracks)
+    assert error.value.path in NAMES
+    assert all(NAMES[k] in error.value.remedy for k in driven), error.value.message()
+    time = float(error.value.problem.split(" s on")[0].rpartition(" ")[2])
+    assert begin < time < begin + 0.15
+
+
+@pytest.mark.parametrize("by", [6e-4, 0.02, 1.0, 3.0])
+def test_the_analysis_refuses_them_in_the_first_pose(by):
+    tracks = (drift(2.0, 0.0), Track(FRAMES, np.full(len(FRAMES), by)))
+    with pytest.raises(ShotError, match="stays open by") as error:
+        analysed(four_bar((0, 3)), tracks)
+    assert error.value.path in NAMES and NAMES[0] in error.value.remedy and NAMES[3] in error.value.remedy
+
+
+def test_the_analysis_leaves_small_gaps_to_bodies_that_give_way():
+    tracks = (drift(2.0, 0.0), drift(0.5, 6e-4))
+    with pytest.raises(ShotError, match="from 0.5"):
+        analysed(four_bar((0, 3)), tracks)
+    assert analysed(flexible(four_bar((0, 3)), 1), tracks).rows
+    with pytest.raises(ShotError, match="from 0.5"):
+        analysed(flexible(four_bar((0, 3)), 1), (drift(2.0, 0.0), drift(0.5, 6e-3)))
+
+
+def test_a_crank_that_turns_through_is_analysed():
+    whole = Track(FRAMES, np.linspace(0.0, 0.9, len(FRAMES)) ** 2)
+    assert analysed(four_bar((0,)), (whole,)).rows

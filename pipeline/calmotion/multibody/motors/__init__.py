@@ -1,0 +1,1 @@
+"""Motors that give: drives, and servos with their rotors."""

@@ -1,0 +1,132 @@
+"""Motors: how a joint is driven, and the units in which its values are displayed (degrees, millimetres)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+PRESCRIBED, DRIVE, SERVO = "prescribed", "drive", "servo"  # models of motors
+FRICTION_SPEED = float(np.radians(5.0))  # within which Coulomb friction changes its sign, where none is given [rad/s]
+
+
+@dataclass(frozen=True)
+class Rotor:
+    """What a servo has between its controller and the joint, seen at the joint; metres on a slider.
+
+    Attributes:
+        armature: Inertia of the rotor [kg m^2].
+        gear_stiffness, gear_damping: Of the gear [N m/rad], [N m s/rad]; an infinite stiffness: a rigid gear.
+        viscous_friction: [N m s/rad].
+        friction: Coulomb friction [N m].
+        friction_speed: Speed by which it is smoothed [rad/s].
+        no_load_speed: At which the motor has no torque left [rad/s].
+        knee: Share of it up to which the largest torque is there.
+    """
+
+    armature: float = 0.0
+    gear_stiffness: float = np.inf
+    gear_damping: float = 0.0
+    viscous_friction: float = 0.0
+    friction: float = 0.0
+    friction_speed: float = FRICTION_SPEED
+    no_load_speed: float = np.inf
+    knee: float = 0.0
+
+
+@dataclass(frozen=True)
+class Follows:
+    """How one motor is geared to another: value = offset + ratio * value of the leader.
+
+    Attributes:
+        leader: Index of the motor that leads, which follows none itself.
+        ratio: [-], or [m/rad] and [rad/m] between an angle and a length.
+        offset: [rad or m].
+    """
+
+    leader: int
+    ratio: float
+    offset: float
+
+
+@dataclass(frozen=True, eq=False)
+class Motor:
+    """A driven joint.
+
+    Attributes:
+        joint: Index of the joint.
+        path: Prim path of the joint.
+        attribute: Name of the attribute that holds its track.
+        source: Where the track is: `drive` (the target position of its drive), `bodies` (the transforms of the bodies
+            that it joins), or `skeleton` (a joint of a UsdSkel animation).
+        optimize: Whether its curve may be changed.
+        max_velocity, max_acceleration, max_torque: [rad/s], [rad/s^2], [N m]; infinite when there are none.
+        linear: Whether it sets a length along the joint's axis instead of an angle: metres then stand for radians,
+            and newtons for newton metres.
+        follows: The motor that it is geared to, or None; it then has no curve of its own.
+        idle: Whether its curve stays as it is although it may change, since it moves no target.
+        model: PRESCRIBED: the joint follows the curve exactly; DRIVE: the curve is a command, towards which a spring
+            and a damper pull the joint; SERVO: they turn a rotor, which moves the joint through a gear.
+        position_gain: Stiffness of the drive [N m/rad].
+        velocity_gain: Its damping [N m s/rad].
+        gains_from: Where these were read, also where the model does not use them.
+        rotor: Of a SERVO.
+        delay: Time after which the command acts [s]; not of a PRESCRIBED motor.
+    """
+
+    joint: int
+    path: str
+    attribute: str
+    source: str = "drive"
+    optimize: bool = True
+    max_velocity: float = np.inf
+    max_acceleration: float = np.inf
+    max_torque: float = np.inf
+    linear: bool = False
+    follows: Follows | None = None
+    idle: bool = False
+    model: str = PRESCRIBED
+    position_gain: float = 0.0
+    velocity_gain: float = 0.0
+    gains_from: str = ""
+    rotor: Rotor = Rotor()
+    delay: float = 0.0
+
+
+class Measure(NamedTuple):
+    """Words and units for one kind of motor.
+
+    Attributes:
+        name, effort: Name of the value, and of the effort.
+        unit, effort_unit, si: Unit that is shown, unit of the effort, unit of the value in SI.
+        factor: From SI to the unit that is shown.
+    """
+
+    name: str
+    effort: str
+    unit: str
+    effort_unit: str
+    si: str
+    factor: float
+
+    def unit_of(self, quantity: str) -> str:
+        """SI unit of a limited quantity: `position`, `velocity`, `acceleration` or `effort`."""
+        return {"velocity": f"{self.si}/s", "acceleration": f"{self.si}/s^2", "effort": self.effort_unit}.get(
+            quantity, self.si
+        )
+
+    def shown(self, quantity: str, value: float) -> str:
+        """A value of such a quantity, in SI, as text with the unit that is shown."""
+        if quantity == "effort":
+            return f"{value:.4g} {self.effort_unit}"
+        return f"{self.factor * value:.4g} {self.unit_of(quantity).replace(self.si, self.unit, 1)}"
+
+
+ANGLE = Measure("angle", "torque", "deg", "N m", "rad", float(np.degrees(1.0)))
+LENGTH = Measure("length", "force", "mm", "N", "m", 1e3)
+
+
+def measure_of(motor: Motor) -> Measure:
+    """The measure of a motor."""
+    return LENGTH if motor.linear else ANGLE

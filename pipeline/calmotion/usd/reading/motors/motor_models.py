@@ -1,0 +1,164 @@
+"""The model of a motor, and the gains of its drive in any supported dialect."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from calmotion.errors import ShotError
+from calmotion.shot.motor import DRIVE, PRESCRIBED, SERVO
+from calmotion.support.naming import nearest
+from calmotion.usd import schemas
+from calmotion.usd.dialects import GAINS, POSITION_ACTUATOR, authored
+from calmotion.usd.reading.joints import JointPrim
+from calmotion.usd.units import StageUnits
+
+if TYPE_CHECKING:
+    from pxr import Usd
+
+_SCHEMA, MODEL = "CalmMotorAPI", "calm:motor:model"
+AUTO = "auto"
+_MODELS = (AUTO, PRESCRIBED, DRIVE, SERVO)
+_POSITION, _VELOCITY = GAINS
+
+
+@dataclass(frozen=True)
+class Gains:
+    """Gains of a drive, SI; zero where none are authored.
+
+    Attributes:
+        position: [N m/rad] or [N/m].
+        velocity: [N m s/rad] or [N s/m].
+        source: Names of the attributes that they were read from, with their dialect; empty where there are none.
+    """
+
+    position: float = 0.0
+    velocity: float = 0.0
+    source: str = ""
+
+
+def motor_model(prim: Usd.Prim) -> str:
+    """How the motor moves its joint: PRESCRIBED, DRIVE or SERVO.
+
+    Raises:
+        ShotError: A model that does not exist.
+    """
+    model = str(schemas.value(prim, _SCHEMA, MODEL) or AUTO)
+    if model in _MODELS:
+        return PRESCRIBED if model == AUTO else model
+    raise ShotError(
+        "names a model of motors that does not exist",
+        path=prim.GetPath(),
+        attribute=MODEL,
+        found=model,
+        remedy=f"{nearest(model, _MODELS)}Use one of {', '.join(_MODELS)}",
+    )
+
+
+def read_gains(joint: JointPrim, stage: Usd.Stage, actuator: str, units: StageUnits, model: str) -> Gains:
+    """The gains that pull a joint towards the motor's command; those of the first dialect that has a position gain.
+
+    Args:
+        stage: The shot.
+        actuator: Path of the actuator of a MuJoCo conversion that drives the joint, or empty.
+        model: Of the motor: one that gives must have gains.
+
+    Raises:
+        ShotError: A gain that is negative or not finite, or a motor that gives without a gain.
+    """
+    used = model != PRESCRIBED
+    found = _dialect_gains(joint, units, used) or _actuator_gains(joint, stage, actuator, units) or Gains()
+    if used:
+        _refuse_weightless(joint, found, model)
+    return found
+
+
+def _dialect_gains(joint: JointPrim, units: StageUnits, used: bool) -> Gains | None:
+    """Gains that are authored on the joint itself; wrong ones are refused where they are used."""
+    to_si = _per_length(units) if joint.kind == "prismatic" else _per_degree(units)
+    for position, velocity in zip(_POSITION, _VELOCITY, strict=True):
+        stiffness, damping = (authored(joint.prim, spelling, joint.drive) for spelling in (position, velocity))
+        if stiffness is None:
+            continue
+        found = [item for item in (stiffness, damping) if item is not None]
+        for name, value in found if used else ():
+            _refuse_wrong_gain(joint.prim, name, value)
+        if not all(math.isfinite(value) and value >= 0.0 for _, value in found) or not stiffness[1]:
+            continue  # it pulls nowhere
+        values = [to_si(value) for _, value in found]
+        names = " and ".join(name for name, _ in found)
+        accelerations = _sets_accelerations(joint) and position.dialect == "UsdPhysics"
+        kind = ", of accelerations" if accelerations else ""
+        return Gains(values[0], values[-1] if damping is not None else 0.0, f"{names} ({position.dialect}{kind})")
+    return None
+
+
+def _sets_accelerations(joint: JointPrim) -> bool:
+    """Whether the UsdPhysics drive's gains are those of accelerations, which depend on what it carries."""
+    attribute = joint.prim.GetAttribute(f"drive:{joint.drive}:physics:type")
+    return bool(attribute) and attribute.Get() == "acceleration"
+
+
+def _actuator_gains(joint: JointPrim, stage: Usd.Stage, actuator: str, units: StageUnits) -> Gains | None:
+    """Gains of a position actuator of a MuJoCo conversion, which acts on the joint itself: kp (ctrl - g q) - kv g q'
+    with the gear ratio g, in radians."""
+    prim = stage.GetPrimAtPath(actuator) if actuator else None
+    targets = prim.GetRelationship("mjc:target").GetTargets() if prim else []
+    if prim is None or joint.prim.GetPath() not in targets:
+        return None
+    gain, bias, gear = (_numbers(prim, name) for name in POSITION_ACTUATOR)
+    kp, ratio = gain[0] if gain else 0.0, gear[0] if gear else 1.0
+    if not kp > 0.0 or len(bias) < 3 or bias[1] != -kp or not math.isfinite(kp * bias[2]):
+        return None  # not one that holds positions
+    to_si = _per_length(units) if joint.kind == "prismatic" else units.torque
+    names = f"{POSITION_ACTUATOR[0]} and {POSITION_ACTUATOR[1]} of {actuator} (MuJoCo)"
+    return Gains(to_si(ratio**2 * kp), to_si(ratio**2 * max(-bias[2], 0.0)), names)
+
+
+def _numbers(prim: Usd.Prim, name: str) -> list[float]:
+    attribute = prim.GetAttribute(name)
+    value: Any = attribute.Get() if attribute else None
+    return [] if value is None else [float(v) for v in value]
+
+
+def _per_degree(units: StageUnits) -> Callable[[float], float]:
+    return lambda value: float(units.torque(value) / np.deg2rad(1.0))
+
+
+def _per_length(units: StageUnits) -> Callable[[float], float]:
+    return lambda value: float(units.force(value) / units.length(1.0))
+
+
+def _refuse_wrong_gain(prim: Usd.Prim, name: str, value: float) -> None:
+    if math.isfinite(value) and value >= 0.0:
+        return
+    raise ShotError(
+        "a gain must be finite and not negative",
+        path=prim.GetPath(),
+        attribute=name,
+        found=value,
+        remedy="Correct the gain, or remove the attribute",
+    )
+
+
+def _refuse_weightless(joint: JointPrim, gains: Gains, model: str) -> None:
+    if ", of accelerations" in gains.source:
+        raise ShotError(
+            "the gains of this drive are those of accelerations, which give no forces",
+            path=joint.path,
+            attribute=f"drive:{joint.drive}:physics:type",
+            found="acceleration",
+            remedy=f"Set it to force, author calm:motor:positionGain, or set {MODEL} to {PRESCRIBED}",
+        )
+    if not gains.position > 0.0:
+        raise ShotError(
+            f"a motor of the model {model} needs a position gain",
+            path=joint.path,
+            attribute="calm:motor:positionGain",
+            found="none",
+            remedy=f"Author it, or drive:{joint.drive}:physics:stiffness, or set {MODEL} to {PRESCRIBED}",
+        )

@@ -1,0 +1,129 @@
+"""Models of motors, and the gains of drives in the dialects, in SI."""
+
+import pytest
+from calmotion import ShotError
+from calmotion.usd.reading import read_shot
+from pxr import Sdf, UsdPhysics, Vt
+from small_shots import ELBOW, Scale, set_float, write_arm
+
+MODEL = "calm:motor:model"
+
+
+def read(tmp_path, edit=None, scale=None):
+    return read_shot(str(write_arm(tmp_path / "arm.usda", edit, scale)))[0].motors
+
+
+def model(stage, name):
+    prim = stage.GetPrimAtPath(ELBOW)
+    prim.AddAppliedSchema("CalmMotorAPI")
+    prim.CreateAttribute(MODEL, Sdf.ValueTypeNames.Token).Set(name)
+
+
+def physics_gains(stage, stiffness, damping=None, kind=None):
+    drive = UsdPhysics.DriveAPI(stage.GetPrimAtPath(ELBOW), "angular")
+    drive.CreateStiffnessAttr(stiffness)
+    if damping is not None:
+        drive.CreateDampingAttr(damping)
+    if kind is not None:
+        drive.CreateTypeAttr(kind)
+
+
+def test_motors_are_ideal_unless_a_model_is_authored_and_keep_the_gains_that_were_found(tmp_path):
+    shoulder, elbow = read(tmp_path, lambda stage: physics_gains(stage, 2.0, 0.5))
+    assert shoulder.model == elbow.model == "prescribed" and shoulder.position_gain == 0.0
+    per_degree = 57.29577951308232
+    assert (elbow.position_gain, elbow.velocity_gain) == pytest.approx((2.0 * per_degree, 0.5 * per_degree))
+    assert elbow.gains_from == "drive:angular:physics:stiffness and drive:angular:physics:damping (UsdPhysics)"
+
+
+def test_gains_of_calmotion_beat_those_of_other_dialects_in_stage_units(tmp_path):
+    def edit(stage):
+        model(stage, "drive")
+        physics_gains(stage, 2.0)
+        set_float(stage, ELBOW, "calm:motor:positionGain", 3e7)  # 3 N m in g cm^2/s^2, per degree
+        set_float(stage, ELBOW, "calm:motor:velocityGain", 1e6)
+
+    elbow = read(tmp_path, edit, Scale(0.01, 0.001))[1]
+    assert elbow.model == "drive"
+    assert (elbow.position_gain, elbow.velocity_gain) == pytest.approx((171.887338539, 5.72957795131))
+    assert "Calmotion" in elbow.gains_from
+
+
+def actuator(stage, kp=100.0, bias=(0.0, -100.0, -7.0), gear=None, to=ELBOW):
+    prim = stage.DefinePrim("/Act", "MjcActuator")
+    prim.CreateRelationship("mjc:target").SetTargets([to])
+    prim.CreateAttribute("mjc:gainPrm", Sdf.ValueTypeNames.DoubleArray).Set(Vt.DoubleArray([kp, 0.0]))
+    prim.CreateAttribute("mjc:biasPrm", Sdf.ValueTypeNames.DoubleArray).Set(Vt.DoubleArray(bias))
+    if gear:
+        prim.CreateAttribute("mjc:gear", Sdf.ValueTypeNames.DoubleArray).Set(Vt.DoubleArray([gear, 0.0]))
+
+
+def test_position_actuators_of_mujoco_give_gains_in_radians_with_their_gear(tmp_path):
+    elbow = read(tmp_path, actuator)[1]
+    assert (elbow.position_gain, elbow.velocity_gain) == (100.0, 7.0) and "/Act (MuJoCo)" in elbow.gains_from
+    elbow = read(tmp_path, lambda stage: actuator(stage, gear=3.0))[1]
+    assert (elbow.position_gain, elbow.velocity_gain) == (900.0, 63.0)
+    motor = read(tmp_path, lambda stage: actuator(stage, bias=(0.0, 0.0, 0.0)))[1]
+    assert motor.position_gain == 0.0, "a torque motor holds no position"
+
+
+def servo(stage, **values):
+    model(stage, "servo")
+    for name, value in ({"positionGain": 1.0} | values).items():
+        set_float(stage, ELBOW, f"calm:motor:{name}", value)
+
+
+def test_servos_are_read_in_si_from_grams_and_centimetres(tmp_path):
+    values = {
+        "armature": 2e5, "gearStiffness": 5e7, "gearDamping": 1e4, "friction": 3e6, "viscousFriction": 2e4,
+        "frictionSpeed": 2.0, "noLoadSpeed": 360.0, "torqueSpeedKnee": 0.25, "delay": 0.012,
+    }  # fmt: skip
+    elbow = read(tmp_path, lambda stage: servo(stage, **values), Scale(0.01, 0.001))[1]
+    per_degree, turn = 57.29577951308232, 6.283185307179586
+    own = elbow.rotor
+    assert (own.armature, own.friction, own.knee, elbow.delay) == pytest.approx((0.02, 0.3, 0.25, 0.012))
+    assert (own.gear_stiffness, own.gear_damping) == pytest.approx((5 * per_degree, 1e-3 * per_degree))
+    assert own.viscous_friction == pytest.approx(2e-3 * per_degree)
+    assert (own.friction_speed, own.no_load_speed) == pytest.approx((turn / 180, turn))
+
+
+def test_rotors_of_other_dialects_have_degrees_or_radians_as_these_do(tmp_path):
+    def edit(stage):
+        servo(stage)
+        for name, value in (("newton:armature", 0.01), ("newton:damping", 0.02), ("mjc:frictionloss", 0.3)):
+            set_float(stage, ELBOW, name, value)
+
+    own = read(tmp_path, edit)[1].rotor
+    assert (own.armature, own.viscous_friction, own.friction) == pytest.approx((0.01, 0.02 * 57.29577951, 0.3))
+    assert own.gear_stiffness == float("inf")
+    own = read(tmp_path, lambda stage: (servo(stage), set_float(stage, ELBOW, "mjc:damping", 0.02)))[1].rotor
+    assert own.viscous_friction == pytest.approx(0.02)
+
+
+@pytest.mark.parametrize(
+    ("edit", "attribute", "what"),
+    [
+        (lambda s: model(s, "drive"), "calm:motor:positionGain", "needs a position gain"),
+        (lambda s: model(s, "servo"), "calm:motor:positionGain", "model servo needs a position gain"),
+        (lambda s: servo(s, armature=-1.0), "calm:motor:armature", "not negative"),
+        (lambda s: servo(s, torqueSpeedKnee=1.0), "calm:motor:torqueSpeedKnee", "below 1"),
+        (lambda s: servo(s, gearStiffness=0.0), "calm:motor:gearStiffness", "must be positive"),
+        (lambda s: servo(s, delay=float("inf")), "calm:motor:delay", "finite"),
+        (lambda s: model(s, "drives"), MODEL, "Did you mean drive"),
+        (lambda s: (model(s, "drive"), physics_gains(s, 2.0, -1.0)), "drive:angular:physics:damping", "not negative"),
+        (
+            lambda s: (model(s, "drive"), physics_gains(s, 2.0, 1.0, "acceleration")),
+            "drive:angular:physics:type",
+            "accelerations",
+        ),
+    ],
+    ids=["no gain", "servo", "armature", "knee", "gear", "delay", "misspelt", "negative", "acceleration"],
+)
+def test_models_and_gains_that_cannot_be_used_are_refused(tmp_path, edit, attribute, what):
+    with pytest.raises(ShotError, match=what) as caught:
+        read(tmp_path, edit)
+    assert (caught.value.path, caught.value.attribute) == (ELBOW, attribute)
+
+
+def test_gains_that_no_model_uses_are_not_refused(tmp_path):
+    assert read(tmp_path, lambda stage: physics_gains(stage, -2.0))[1].position_gain == 0.0
