@@ -165,6 +165,41 @@ def test_a_forged_checkpoint_is_refused_with_a_warning(
     assert again.iterations == whole.iterations
 
 
+KINDS = {
+    "complex coefficients": {"x": lambda x: x.astype(complex)},
+    "coefficients of single precision": {"x": lambda x: x.astype(np.float32)},
+    "coefficients of two axes": {"x": lambda x: x[:, None]},
+    "coefficients of text": {"x": lambda x: x.astype(str)},
+    "one coefficient": {"x": lambda x: x[0]},
+    "directions of one axis": {"p": lambda p: p.ravel(), "Hp": lambda Hp: Hp.ravel()},
+    "no knots": {"breaks": lambda breaks: breaks[:0]},
+    "knots of two axes": {"breaks": lambda breaks: breaks[None]},
+    "a history of text": {"history": lambda history: history.astype(str)},
+    "multipliers of text": {"limit velocity": lambda y: y.astype(str)},
+    "a radius of text": {"radius": "wide"},
+    "a negative radius": {"radius": -1.0},
+    "a radius that is no number": {"radius": float("nan")},
+    "a merit of text": {"merit": "good"},
+    "half an evaluation": {"evaluations": 0.5},
+    "fewer gradients than none": {"gradients": -1},
+    "a reason that is a number": {"reason": 3},
+    "a penalty that is no number": {"rho": None},
+    "a switch of text": {"on": "yes"},
+}
+
+
+@pytest.mark.parametrize("how", KINDS)
+def test_numbers_of_other_kinds_never_reach_a_kernel(limited, animation, bodies, stored, tmp_path, caplog, how):
+    path = tmp_path / "kept.npz"
+    path.write_bytes(stored.read_bytes())
+    key = json.loads(read_arrays(path)["state"].tobytes())["key"]
+    problem = make_problem(limited, bodies, animation, limited=True)
+    kept = checkpoint.Checkpoint(path, key)
+    assert kept.load(problem.limits) is not None
+    edited(path, **KINDS[how])
+    assert kept.load(problem.limits) is None and len(caplog.messages) == 1 and "not usable" in caplog.messages[0]
+
+
 def test_a_damaged_checkpoint_is_refused_at_any_byte(limited, animation, bodies, stored, tmp_path, caplog):
     whole = stored.read_bytes()
     path = tmp_path / "kept.npz"

@@ -38,7 +38,7 @@ def problem_key(problem: RetargetProblem, fixed: BoolArray, settings: object) ->
     digest = hashlib.sha256(f"{source_digest(*_ROOMS)} {settings!r}".encode())
     space, curves, objective = problem.space, problem.curves, problem.objective
     intended = objective.intended
-    arrays: list[Any] = [np.asarray(part) for part in problem.model.system]
+    arrays: list[Any] = [np.asarray(part) for robot in problem.robots for part in (*robot.model.system, robot.weight)]
     arrays += [curves.angles, curves.rates, curves.accelerations]
     arrays += [space.basis.values.data, space.basis.knots, space.coupling, fixed, space.smoothness, space.closeness]
     arrays += [objective.weights, intended.target_positions, intended.target_rotations]
@@ -130,7 +130,7 @@ class Checkpoint:
             if state["key"] != self.key:
                 return None
             stored = _stored(values, state, limits)
-        except (ValueError, KeyError, TypeError, IndexError) as error:
+        except (ValueError, KeyError, TypeError, IndexError, OverflowError) as error:
             self.refuse(f"is not usable ({error})")
             return None
         return stored
@@ -140,14 +140,44 @@ class Checkpoint:
         LOG.warning("The checkpoint %s %s; the search begins anew.", self.path, reason)
 
 
+def _check_kinds(values: dict[str, np.ndarray], state: dict[str, Any], limits: LimitTerms | None) -> None:
+    """Numbers of a file must be of the kinds that a search computes with: kernels take no others.
+
+    Raises:
+        ValueError: An array or a number is of another kind.
+        KeyError, TypeError: It is missing.
+    """
+    arrays = {"x": 1, "p": 2, "Hp": 2, "history": 2 if values["history"].size else values["history"].ndim}
+    arrays |= {name: values[name].ndim for name in values if name.startswith("limit ")}
+    for name, axes in arrays.items():
+        if values[name].dtype != np.float64 or values[name].ndim != axes:
+            raise ValueError(f"{name} is no array of numbers with {axes} axes")
+    breaks = values["breaks"]
+    if breaks.dtype.kind != "i" or breaks.ndim != 1 or len(breaks) < 2:
+        raise ValueError("its knots are no frames")
+    counts = ["evaluations", "gradients", "products", *(["stalled"] if limits is not None else [])]
+    numbers = ["radius", *(["rho", "left", "reached"] if limits is not None else [])]
+    for name in counts:
+        if type(state[name]) is not int or state[name] < 0:
+            raise ValueError(f"{name} is no count")
+    for name in numbers:
+        if type(state[name]) not in (int, float) or not state[name] >= 0.0:
+            raise ValueError(f"{name} is no size")
+    if type(state["merit"]) not in (int, float):
+        raise ValueError("merit is no number")
+    if type(state["reason"]) is not str or (limits is not None and type(state["on"]) is not bool):
+        raise ValueError("its state is of another kind")
+
+
 def _stored(values: dict[str, np.ndarray], state: dict[str, Any], limits: LimitTerms | None) -> StoredSearch:
     """The search of a file.
 
     Raises:
         ValueError: An array has another size, or numbers that are not finite.
-        KeyError, TypeError, IndexError: Something is missing or of another kind.
+        KeyError, TypeError, IndexError, OverflowError: Something is missing or of another kind.
     """
     x, p, Hp = values["x"], values["p"], values["Hp"]
+    _check_kinds(values, state, limits)
     finite = all(np.all(np.isfinite(values[name])) for name in values if name not in ("state", "history"))
     if not finite or not p.shape == Hp.shape == (len(p), len(x)):
         raise ValueError("its coefficients are not finite or have a wrong size")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -15,25 +16,29 @@ from calmotion.retargeting.problem.adaptive_knots import useful_knots
 from calmotion.retargeting.problem.limit_costs import limit_costs
 from calmotion.retargeting.problem.posing import locked_coefficients, pose
 from calmotion.retargeting.problem.problem import RetargetProblem
+from calmotion.retargeting.problem.robot import Robot
+from calmotion.retargeting.robust.scenarios import shot_of
 from calmotion.retargeting.search import RetargetSearch
 from calmotion.retargeting.simplification.pruning import UNCHANGED
 from calmotion.retargeting.simplification.report_rows import search_rows
 from calmotion.retargeting.solver.gauss_newton import Search
 from calmotion.shot import Character, MotorCurve, OptimizerStep, Result
 from calmotion.shot.character import Array
+from calmotion.shot.robust.robots import Scenario
 from calmotion.shot.run import RunSettings
 from calmotion.shot.tolerance import tolerance_of
 from calmotion.simulation.bodies import mode_tables, skins
 from calmotion.simulation.compiled_shot import CompiledShot
 from calmotion.simulation.forward import limited_values
 from calmotion.simulation.inputs.curves import sample_curves
+from calmotion.simulation.inputs.open_chains import refuse_open_joints
 from calmotion.simulation.inputs.supported import refuse_half_turns
 from calmotion.simulation.motor_limits import Excess, excesses, motor_bounds
-from calmotion.simulation.prepare import Prepared, failure_error, lowest_frequency, prepare, refuse_open_joints
+from calmotion.simulation.prepare import Prepared, failure_error, lowest_frequency, prepare
 from calmotion.simulation.report import left_out_rows, limit_uses, performed_motion, reference_motion, simulation_of
 from calmotion.simulation.simulate import Progress, intended_motion
-from calmotion.simulation.simulator import compile_kernels
-from calmotion.simulation.target_errors import IntendedMotion
+from calmotion.simulation.simulator import Simulator, compile_kernels
+from calmotion.simulation.target_errors import IntendedMotion, Objective
 
 FIRST_PENALTY = 1e3  # of limits, over the objective of the input for each second
 
@@ -61,8 +66,9 @@ def _progress_of(search: Search) -> tuple[OptimizerStep, ...]:
 
 
 def optimize_shot(
-    shot: CompiledShot, options: RunSettings, progress: Progress, checkpoint: Path | None = None
-) -> Result:
+    shot: CompiledShot, options: RunSettings, progress: Progress, checkpoint: Path | None = None,
+    scenarios: Sequence[Scenario] = (),
+) -> Result:  # fmt: skip
     """Retarget a shot: change its motor curves so that the flexible robot moves as it was animated to.
 
     An interrupt (Ctrl-C) ends the search; the result then has the best curves so far.
@@ -70,6 +76,7 @@ def optimize_shot(
     Args:
         checkpoint: File that stores the search after each iteration, and from which a search resumes if the file
             exists; None stores nothing.
+        scenarios: Robots for all of which the curves are optimised, the nominal one first; none: that one alone.
 
     Raises:
         ShotError: The shot cannot be processed.
@@ -81,14 +88,27 @@ def optimize_shot(
     refuse_half_turns(prepared.character, grid, curves.angles)
     try:
         intended = intended_motion(prepared, curves.angles, curves.rates)
-        posed = pose(prepared, curves, intended, options)
+        problem, start, adaptive = pose(prepared, curves, intended, options)
+        if scenarios:
+            problem = problem.for_robots([_robot(prepared, problem, scenario, options) for scenario in scenarios])
         progress(0.0, "loading kernels (compiled in the first run)")
         compile_kernels(
             model, Workspace.for_system(model.system), curves.angles, curves.rates, grid.h, prepared.world
         )  # fmt: skip
-        return _optimized(prepared, posed, intended, options, progress, checkpoint)
+        return _optimized(prepared, (problem, start, adaptive), intended, options, progress, checkpoint)
     except SimulationFailure as failure:
         raise failure_error(prepared, failure) from failure
+
+
+def _robot(prepared: Prepared, problem: RetargetProblem, scenario: Scenario, options: RunSettings) -> Robot:
+    """The robot of a scenario, with its own static sag where that is what is intended."""
+    if not scenario.factors:
+        return Robot(problem.robots[0].simulator, problem.objective, scenario.weight)
+    other = prepare(shot_of(prepared.shot, scenario), options)
+    intended = intended_motion(other, problem.curves.angles, problem.curves.rates)
+    objective = Objective.over(other.model, intended, other.grid, prepared.shot.animation.weights)
+    simulator = Simulator(other.model, other.grid.h, other.world, other.grid.cyclic)
+    return Robot(simulator, objective, scenario.weight)
 
 
 def refuse_other_integrators(options: RunSettings) -> None:
@@ -114,7 +134,7 @@ def _optimized(
     if not np.isfinite(problem.value(np.zeros(problem.size))):
         assert problem.failure is not None
         raise failure_error(prepared, problem.failure)
-    refuse_open_joints(prepared, problem.run, options)
+    refuse_open_joints(character, prepared.model, prepared.grid, problem.run, options)
     before, before_value, used_before = problem.run, problem.objective_value(), _used(problem, character)
     if problem.limits is not None:
         problem.limits.rho = (

@@ -5,15 +5,20 @@ from __future__ import annotations
 from calmotion.accuracy.run_checks import check_simulation
 from calmotion.retargeting.optimize import refuse_other_integrators
 from calmotion.retargeting.problem.posing import unknowns
+from calmotion.retargeting.robust.retarget import uncertainties_of
 from calmotion.shot import Animation, Character
 from calmotion.shot.run import RunSettings
+from calmotion.simulation.compiled_shot import compile_shot
 
 
 def check_search(character: Character, animation: Animation, options: RunSettings) -> None:
     """Refuse what a search would refuse.
 
     Raises:
-        ShotError: A setting that is not supported, options that contradict each other, or no motor that may change.
+        ShotError: A setting that is not supported, options that contradict each other, no motor that may change, or a
+            robot of which nothing is uncertain, to be robust against.
     """
     refuse_other_integrators(options)
+    if options.robust is not None:
+        uncertainties_of(compile_shot(character, animation))
     unknowns(character, animation, check_simulation(character, animation, options), options)

@@ -31,6 +31,7 @@ from calmotion.accuracy.step_error import (
     simulate_at,
 )
 from calmotion.retargeting.optimize import optimize_shot, refuse_other_integrators
+from calmotion.retargeting.robust.retarget import retarget_robustly
 from calmotion.retargeting.search_progress import SuccessiveSearches
 from calmotion.retargeting.simplification.idle_motors import ENOUGH
 from calmotion.shot import OptimizerStep, Result
@@ -91,7 +92,15 @@ def optimize_to_tolerance(
         if not fine:
             step = max(LAST, MARGIN * result.step_s * (allowed / result.accuracy.step_m) ** (1.0 / ORDER))
     assert result is not None
-    return result
+    if options.robust is None or result.interrupted:
+        return result
+    searches.ended()
+    of_step = replace(options, step=result.step_s if chooses else options.step)
+    robust = retarget_robustly(projected.shot.with_tracks(animation.tracks), of_step, result, _continued, searches)
+    if robust.interrupted:
+        return robust
+    reduced = projected.shot.with_tracks(found_tracks(robust, animation))
+    return with_accuracy(with_modes(robust, shot.bodies), reduced, options, omitted_error(reduced.bodies))
 
 
 def _searched(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from copy import copy
 from dataclasses import replace
 
@@ -10,16 +10,25 @@ import numpy as np
 
 from calmotion.multibody.analysis.rigid_response import RigidResponse
 from calmotion.multibody.failure import SimulationFailure
-from calmotion.multibody.model.model import Model, with_damping
+from calmotion.multibody.model.model import Model
 from calmotion.retargeting.problem.limits import LimitTerms
 from calmotion.retargeting.problem.offset_basis import OffsetBasis
 from calmotion.retargeting.problem.offset_space import OffsetSpace
-from calmotion.retargeting.problem.rigid_approximation import limit_metrics, rigid_gradient, rigid_response
+from calmotion.retargeting.problem.parallel import in_parallel
+from calmotion.retargeting.problem.rigid_approximation import (
+    EFFORT,
+    effort_of,
+    limit_metrics,
+    rigid_gradient,
+    rigid_response,
+)
+from calmotion.retargeting.problem.robot import Robot
 from calmotion.retargeting.solver.preconditioner import RigidPreconditioner
 from calmotion.shot.character import Array, BoolArray, IntArray
 from calmotion.simulation.forward import ForwardRun, limited_values
 from calmotion.simulation.inputs.curves import Curves
 from calmotion.simulation.inputs.time_grid import TimeGrid
+from calmotion.simulation.motor_limits import QUANTITIES
 from calmotion.simulation.simulator import Simulator
 from calmotion.simulation.target_errors import Objective
 
@@ -44,11 +53,9 @@ class RetargetProblem:
     ):  # fmt: skip
         self.grid, self.objective, self.space = grid, objective, space
         self.curves, self.world, self.limits = curves, world, limits
-        self._simulator = Simulator(model, grid.h, world, grid.cyclic)
-        self._run: ForwardRun | None = None
+        self.robots: tuple[Robot, ...] = (Robot(Simulator(model, grid.h, world, grid.cyclic), objective),)
         self.failure: SimulationFailure | None = None  # of the last point that could not be simulated
         self._continuous = continuous
-        self._residuals = self._inverse = self._jacobian = np.zeros(0)
         self._limited: dict[str, Array] | None = None
         self.x = self._linearized_x = np.zeros(0)  # points evaluated and linearised last
         self._preconditioner: RigidPreconditioner | None = None
@@ -56,13 +63,31 @@ class RetargetProblem:
         # twice the objective of an error of one metre at every instant
         self._unit = max(float(np.sum(objective.weights**2)) / max(1, 3 * len(model.targets.component)), 1e-300)
 
+    def for_robots(self, robots: Sequence[Robot]) -> RetargetProblem:
+        """The same problem for several robots that perform the same curves, the nominal one first: the sum of their
+        weighted objectives, and limits of effort that each of them keeps."""
+        other = copy(self)
+        other.robots, other._limited = tuple(robots), None
+        other.x = other._linearized_x = np.zeros(0)
+        if self.limits is not None and EFFORT in self.limits.bounds:
+            bound, limits = self.limits.bounds[EFFORT], self.limits
+            bounds = limits.bounds | {effort_of(k): bound for k in range(len(robots))}
+            other.limits = LimitTerms(bounds, limits.judged, limits.h, limits.rho)
+        return other
+
+    def _copy(self) -> RetargetProblem:
+        """A copy whose points are evaluated without changing what is known of this one's."""
+        other = copy(self)
+        other.robots = tuple(copy(robot) for robot in self.robots)
+        return other
+
     def on_basis(self, basis: OffsetBasis, x: Array) -> RetargetProblem:
         """The same problem, evaluated and linearised where this one was, over other splines.
 
         Args:
             x: The same point in coefficients of the new basis.
         """
-        other = copy(self)
+        other = self._copy()
         other.space, other._preconditioner = self.space.on_basis(basis), None
         other.x = x
         other._linearized_x = np.zeros(0)
@@ -74,7 +99,7 @@ class RetargetProblem:
         Args:
             motors, coupling: As of `OffsetSpace`.
         """
-        other = copy(self)
+        other = self._copy()
         other.space = replace(self.space, motors=motors, coupling=coupling)
         other.limits, other._response, other._preconditioner = None, None, None
         other.x = np.zeros(other.space.size)
@@ -87,24 +112,24 @@ class RetargetProblem:
 
     @property
     def model(self) -> Model:
-        """The robot."""
-        return self._simulator.model
+        """The nominal robot."""
+        return self.robots[0].model
 
     @property
     def run(self) -> ForwardRun:
-        """The simulation of the point evaluated last."""
-        assert self._run is not None
-        return self._run
+        """The simulation of the point evaluated last, of the nominal robot."""
+        return self.robots[0].run
 
     @property
     def error(self) -> float:
         """Root-mean-square error of the point evaluated last, weighted [m]."""
-        return float(np.sqrt(np.sum(self._residuals**2) / self._unit))
+        return float(np.sqrt(np.sum(self.residuals**2) / self._unit))
 
     @property
     def residuals(self) -> Array:
-        """Weighted residuals of the point evaluated last, shape [T, K, 6]."""
-        return self._residuals
+        """Weighted residuals of the point evaluated last, robot after robot, shape [S T, K, 6]."""
+        robots = self.robots
+        return robots[0].residuals if len(robots) == 1 else np.concatenate([robot.residuals for robot in robots])
 
     @property
     def _acting(self) -> LimitTerms | None:
@@ -121,29 +146,33 @@ class RetargetProblem:
         """Values of the limited quantities at the point evaluated last, shape [T, M] each."""
         if self._limited is None:
             bounds = {} if self.limits is None else self.limits.bounds
-            self._limited = limited_values(self.model, bounds, self.changed_curves, self.run)
+            own = [name for name in bounds if name in QUANTITIES]
+            self._limited = limited_values(self.model, own, self.changed_curves, self.run)
+            if EFFORT in bounds:
+                for k, robot in enumerate(self.robots[1:], 1):
+                    found = limited_values(robot.model, (EFFORT,), self.changed_curves, robot.run)
+                    self._limited[effort_of(k)] = found[EFFORT]
         return self._limited
 
     def hold(self, first: int) -> None:
         """Keep the motor curves before an instant fixed from now on: see `Simulator.hold`."""
-        self._simulator.hold(first)
+        for robot in self.robots:
+            robot.simulator.hold(first)
 
     def forget(self) -> None:
         """The next point is simulated from the start of the shot."""
-        self._simulator.forget()
+        for robot in self.robots:
+            robot.simulator.forget()
 
     def value(self, x: Array) -> float:
         """The merit: the objective and the terms of the limits; infinite if the simulation fails."""
         values, rates = self.space.offsets(x)
         angles, rates = self.curves.angles + values, self.curves.rates + rates
         try:
-            self._run = self._simulator.run(angles, rates)
+            in_parallel(lambda robot: robot.perform(angles, rates), self.robots)
         except SimulationFailure as failure:
             self.failure = failure
             return np.inf
-        self._residuals, self._inverse = self.objective.residuals(
-            self._run.target_positions, self._run.target_rotations
-        )
         self.x = x.copy()
         self._limited = None
         return self.merit()
@@ -160,34 +189,27 @@ class RetargetProblem:
 
     def objective_value(self) -> float:
         """The objective at the point evaluated last, without the terms of the limits."""
-        return 0.5 * float(np.sum(self._residuals**2)) + 0.5 * float(self.x @ self.penalty_gradient(self.x))
+        return 0.5 * float(np.sum(self.residuals**2)) + 0.5 * float(self.x @ self.penalty_gradient(self.x))
 
     def linearize(self) -> Array:
         """Linearise at the point evaluated last, and the gradient there."""
-        self._simulator.linearize(self.run)
+        in_parallel(Robot.linearize, self.robots)
         self._linearized_x = self.x
-        self._differentiate()
         return self.gradient()
 
     def linearized_at(self, x: Array) -> bool:
         """Whether this is the point evaluated last, and linearised."""
         return np.array_equal(x, self.x) and np.array_equal(x, self._linearized_x)
 
-    def _differentiate(self) -> None:
-        states = self.run.trajectory.states
-        self._jacobian = self.objective.jacobian(states.c, states.q, states.u, self._inverse)
-
     def gradient(self) -> Array:
         """Gradient of the merit where it was linearised; the limits may have changed since."""
         if self._continuous:
             return self.continuous_gradient()
-        return self.vjp(self._residuals, self._limit_pulls()) + self.penalty_gradient(self.x)
+        return self.vjp(self.residuals, self._limit_pulls()) + self.penalty_gradient(self.x)
 
     def continuous_gradient(self) -> Array:
         """The same by the continuous adjoint, which has its own linearisation and does not support limits of effort."""
-        self._differentiate()
-        density = self.objective.scatter(self._jacobian, self._residuals)
-        pulls = self._simulator.continuous_adjoint(self.run, density)
+        pulls = _summed(in_parallel(Robot.continuous_adjoint, self.robots))
         return self._to_unknowns(*pulls, self._limit_pulls()) + self.penalty_gradient(self.x)
 
     def _limit_pulls(self) -> dict[str, Array]:
@@ -196,8 +218,12 @@ class RetargetProblem:
 
     def vjp(self, residuals: Array, limited: dict[str, Array]) -> Array:
         """The transpose of `jvp`: weighted residuals and limited quantities to the unknowns."""
-        pulls = self._simulator.adjoint(self.objective.scatter(self._jacobian, residuals), limited.get("effort"))
-        return self._to_unknowns(*pulls, limited)
+        parts = np.split(residuals, len(self.robots))
+
+        def pulled(k: int) -> tuple[Array, Array]:
+            return self.robots[k].adjoint(parts[k], limited.get(effort_of(k)))
+
+        return self._to_unknowns(*_summed(in_parallel(pulled, range(len(parts)))), limited)
 
     def _to_unknowns(self, by_value: Array, by_rate: Array, limited: dict[str, Array]) -> Array:
         """Derivatives by the motors' values and rates, and by limited curves, shape [T, M], gathered by unknown."""
@@ -211,11 +237,12 @@ class RetargetProblem:
     def jvp(self, direction: Array) -> tuple[Array, dict[str, Array]]:
         """Change of the weighted residuals along a direction, shape [T, K, 6], and of the limited quantities."""
         bounds, space = {} if self._acting is None else self._acting.bounds, self.space
-        motion, effort = self._simulator.tangent(*space.offsets(direction), "effort" in bounds)
+        offsets = space.offsets(direction)
+        found = in_parallel(lambda robot: robot.tangent(*offsets, EFFORT in bounds), self.robots)
         changes = {name: space.spread(spline, direction) for name, spline in space.splines.items() if name in bounds}
-        if "effort" in bounds:
-            changes["effort"] = effort
-        return self.objective.gather(self._jacobian, motion), changes
+        if EFFORT in bounds:
+            changes |= {effort_of(k): effort for k, (_, effort) in enumerate(found)}
+        return found[0][0] if len(found) == 1 else np.concatenate([residuals for residuals, _ in found]), changes
 
     def penalty_gradient(self, x: Array) -> Array:
         """Matrix of the regulariser times x."""
@@ -248,8 +275,8 @@ class RetargetProblem:
     def damped(self, ratio: float, frequency: float) -> RetargetProblem:
         """The same problem without limits on a robot with more damping, see `model.with_damping`."""
         other = copy(self)
-        other._simulator = self._simulator.of(with_damping(self.model, ratio, frequency))
-        other._run, other._limited, other.limits = None, None, None
+        other.robots = tuple(robot.damped(ratio, frequency) for robot in self.robots)
+        other._limited, other.limits = None, None
         return other
 
     def lever(self) -> float:
@@ -259,7 +286,8 @@ class RetargetProblem:
 
     def rigid_gradient(self) -> Array:
         """Gradient of the errors at the point evaluated last if the robot were rigid: each is answered as it occurs."""
-        return rigid_gradient(self._rigid(), self.space, self.objective.weights, self._residuals)
+        residuals = sum(np.sqrt(robot.weight) * robot.residuals for robot in self.robots)
+        return rigid_gradient(self._rigid(), self.space, self.objective.weights, np.asarray(residuals))
 
     def _rigid(self) -> RigidResponse:
         if self._response is None:
@@ -278,3 +306,10 @@ class RetargetProblem:
     def tighten(self) -> bool:
         """Switch the limits on if they are violated, or update their multipliers; whether the merit changed."""
         return self.limits is not None and self.limits.tighten(self.limited)
+
+
+def _summed(pulls: Sequence[tuple[Array, Array]]) -> tuple[Array, Array]:
+    """The sums of derivatives by values and by rates."""
+    if len(pulls) == 1:
+        return pulls[0]
+    return np.sum([by_value for by_value, _ in pulls], axis=0), np.sum([by_rate for _, by_rate in pulls], axis=0)

@@ -14,7 +14,13 @@ from calmotion.simulation.inputs.curves import Curves
 from calmotion.simulation.inputs.time_grid import TimeGrid
 from calmotion.simulation.intended_motion import rigid_motion
 
+EFFORT = "effort"
 STRIDE = 8  # instants from one rigid response to the next
+
+
+def effort_of(robot: int) -> str:
+    """The name of the efforts of one of the robots of a problem."""
+    return f"{EFFORT} of robot {robot}" if robot else EFFORT
 
 
 def rigid_response(model: Model, grid: TimeGrid, curves: Curves, world: Array | None, coupling: Array) -> RigidResponse:
@@ -60,7 +66,7 @@ def limit_metrics(inertia: Array, space: OffsetSpace, curvatures: dict[str, Arra
     for name, weight in curvatures.items():
         if not np.any(weight):
             continue
-        if name == "effort":
+        if name.startswith(EFFORT):
             metrics.append((space.basis.accelerations, np.einsum("nma,nm,nmb->nab", inertia, weight, inertia)))
         else:
             product = np.einsum("ma,nm,mb->nab", space.coupling, weight, space.coupling)

@@ -1,0 +1,1 @@
+"""Retargeting for a set of robots instead of one."""

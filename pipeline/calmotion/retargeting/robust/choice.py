@@ -1,0 +1,100 @@
+"""The robots for which curves are optimised: they differ from the model in the ways that move the targets most."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.polynomial.hermite_e import hermegauss
+
+from calmotion.errors import ShotError
+from calmotion.retargeting.robust.measure import deviations_on
+from calmotion.retargeting.robust.scenarios import Parameter, scenario_at
+from calmotion.shot import Track
+from calmotion.shot.character import Array
+from calmotion.shot.robust.robots import Scenario
+from calmotion.shot.robust.settings import WORST
+from calmotion.shot.run import RunSettings
+from calmotion.simulation.compiled_shot import CompiledShot
+
+LEAST = 0.05  # weight of the nominal robot in a mean, where the rule would give it less
+
+
+def chosen_scenarios(
+    shot: CompiledShot, options: RunSettings, tracks: Sequence[Track], parameters: Sequence[Parameter], count: int,
+    kind: str,
+) -> tuple[Scenario, ...]:  # fmt: skip
+    """The nominal robot, and pairs of others along the directions in which the parameters move the targets most.
+
+    The motion of the targets is differentiated by each parameter, by central differences over a standard deviation; the
+    eigenvectors of the Gram matrix of these derivatives are the directions. Pairs are shared among them in proportion
+    to the motion that they cause, and stand at the nodes of the Gauss-Hermite rule.
+
+    Args:
+        shot: The shot.
+        options: With the time step.
+        tracks: Curves about which the derivatives are taken.
+        parameters: What is uncertain.
+        count: Number of robots.
+        kind: `mean`: weights of the Gauss-Hermite rules; `worst`: equal ones, for which others follow.
+
+    Raises:
+        ShotError: One of the robots that differ by a standard deviation cannot be simulated.
+    """
+    directions, sizes = _directions(shot, options, tracks, parameters)
+    pairs = _shared((count - 1) // 2, sizes)
+    points, weights = [np.zeros(len(parameters))], [1.0]
+    for direction, number in zip(directions, pairs, strict=True):
+        nodes, shares = hermegauss(2 * number + 1)
+        for node, share in zip(nodes, shares / np.sqrt(2.0 * np.pi), strict=True):
+            if abs(node) > 1e-12:
+                points.append(node * direction)
+                weights.append(float(share))
+    weights[0] = max(1.0 - sum(weights[1:]), LEAST)
+    given = np.ones(len(points)) if kind == WORST else np.array(weights)
+    return tuple(
+        scenario_at(parameters, x, float(weight)) for x, weight in zip(points, given / given.sum(), strict=True)
+    )
+
+
+def _directions(
+    shot: CompiledShot, options: RunSettings, tracks: Sequence[Track], parameters: Sequence[Parameter]
+) -> tuple[Array, Array]:
+    """Orthonormal directions, shape [d, d], and how far a standard deviation along each moves the targets [m],
+    largest first."""
+    units = np.eye(len(parameters))
+    moved = [sign * x for x in units for sign in (1.0, -1.0)]
+    scenarios = [scenario_at(parameters, x) for x in moved]
+    runs = [robot[""] for robot in deviations_on(shot, options, {"": tracks}, scenarios, _flat)]
+    for scenario, run in zip(scenarios, runs, strict=True):
+        if not len(run):
+            raise ShotError(
+                f"a robot with {_described(scenario)} cannot be simulated",
+                path=shot.character.path,
+                attribute="calm:retarget:uncertainty",
+                remedy="Set a smaller uncertainty: the model is near buckling, or near another limit of what stands.",
+            )
+    derivatives = np.array([0.5 * (up - down) for up, down in zip(runs[::2], runs[1::2], strict=True)])
+    values, vectors = np.linalg.eigh(derivatives @ derivatives.T)
+    order = np.argsort(-values)
+    sizes = np.sqrt(np.maximum(values[order], 0.0) / max(derivatives.shape[1], 1))
+    # a direction has no sign of its own: one that does not depend on rounding
+    axes = vectors[:, order].T
+    signs = np.sign(axes[np.arange(len(axes)), np.argmax(np.abs(axes), axis=1)])
+    return np.asarray(signs[:, None] * axes), np.asarray(sizes)
+
+
+def _flat(deviations: Array | None) -> Array:
+    return np.zeros(0) if deviations is None else deviations.ravel()
+
+
+def _shared(pairs: int, sizes: Array) -> list[int]:
+    """Numbers of pairs for each direction, in proportion to their sizes (by the rule of D'Hondt)."""
+    shares = np.zeros(len(sizes), int)
+    for _ in range(pairs):
+        shares[int(np.argmax(sizes / (shares + 1)))] += 1
+    return shares.tolist()
+
+
+def _described(scenario: Scenario) -> str:
+    return ", ".join(f"{name} times {factor:.3g}" for name, factor in scenario.factors.items() if factor != 1.0)

@@ -1,0 +1,131 @@
+"""Curves for a set of robots: the sum of their objectives, or the largest of their errors."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from calmotion.accuracy.simulate_to_tolerance import found_tracks
+from calmotion.errors import ShotError
+from calmotion.retargeting.optimize import optimize_shot
+from calmotion.retargeting.robust.choice import chosen_scenarios
+from calmotion.retargeting.robust.measure import errors_on
+from calmotion.retargeting.robust.scenarios import Parameter, random_scenarios, uncertain_parameters
+from calmotion.shot import Result
+from calmotion.shot.character import Array
+from calmotion.shot.robust.robots import Robustness, Scenario
+from calmotion.shot.robust.settings import WORST
+from calmotion.shot.run import RunSettings
+from calmotion.simulation.compiled_shot import CompiledShot
+from calmotion.simulation.simulate import Progress
+from calmotion.support import interrupts
+
+ROUNDS = 6  # most searches with other weights
+FALLING = 0.98  # of the largest error: a smaller gain ends them
+_SEARCHED = 0.6  # share of the searches in the progress
+LEAST = 1e-3  # smallest weight of a robot, over the mean
+Continued = Callable[[Result, Result], Result]
+
+
+def retarget_robustly(
+    shot: CompiledShot, options: RunSettings, nominal: Result, continued: Continued, progress: Progress
+) -> Result:
+    """Continue a search for the nominal robot with a set of robots, and measure all curves on robots drawn at random.
+
+    An interrupt (Ctrl-C) ends both; the result then has the best curves so far.
+
+    For the largest error, the weights of the robots with large errors are raised until the largest stops falling.
+
+    Args:
+        shot: The shot as animated.
+        options: Of the search, with its time step and `robust`.
+        nominal: The result for the nominal robot.
+        continued: The result of a second search with the work of the first one.
+        progress: Called with a fraction and a message.
+
+    Raises:
+        ShotError: Nothing is uncertain, or a robot cannot be simulated.
+    """
+    robust = options.robust
+    assert robust is not None
+    parameters, animation, best = uncertainties_of(shot), shot.animation, nominal
+    rounds = ROUNDS if robust.kind == WORST else 1
+    try:
+        tracks = found_tracks(nominal, animation)
+        used = scenarios = chosen_scenarios(shot, options, tracks, parameters, robust.scenarios, robust.kind)
+        least = np.inf
+        for number in range(rounds):
+            begun = shot.with_tracks(found_tracks(best, animation))
+            latest = optimize_shot(begun, options, _part(progress, number, rounds), None, scenarios)
+            if latest.interrupted:
+                return continued(best, latest)
+            errors = errors_on(shot, options, {"": found_tracks(latest, animation)}, scenarios)[""].max(axis=1)
+            if errors.max() > FALLING * least:
+                break
+            best, used, least = continued(best, latest), scenarios, float(errors.max())
+            scenarios = _reweighted(scenarios, errors)
+        draws = random_scenarios(parameters, robust.draws)
+        return replace(best, robustness=_robustness(shot, options, nominal, best, used, draws, progress))
+    except KeyboardInterrupt:
+        interrupts.answer()
+        return replace(best, interrupted=True, stopped="interrupted")
+
+
+def uncertainties_of(shot: CompiledShot) -> tuple[Parameter, ...]:
+    """The uncertain parameters of a shot.
+
+    Raises:
+        ShotError: There are none.
+    """
+    parameters = uncertain_parameters(shot)
+    if not parameters:
+        given = shot.character.retarget.uncertainty
+        raise ShotError(
+            "no parameter of the robot is uncertain, so there are no robots to be robust against",
+            path=shot.character.path,
+            attribute="calm:retarget:uncertainty:modulus, :damping and :payload",
+            found=f"{given.modulus:g}, {given.damping:g} and {given.payload:g}",
+            remedy="Set one of them above zero that the robot has: a flexible body has a modulus and a damping, a "
+            "rigid body at the end of a chain is payload; or leave out --robust.",
+        )
+    return parameters
+
+
+def _reweighted(scenarios: Sequence[Scenario], errors: Array) -> tuple[Scenario, ...]:
+    """The robots with weights that are raised where errors are large."""
+    weights = np.array([scenario.weight for scenario in scenarios]) * (errors / errors.mean()) ** 2
+    weights = np.maximum(weights / weights.sum(), LEAST / len(scenarios))
+    weights /= weights.sum()
+    return tuple(replace(s, weight=float(weight)) for s, weight in zip(scenarios, weights, strict=True))
+
+
+def _robustness(
+    shot: CompiledShot, options: RunSettings, nominal: Result, robust: Result, scenarios: tuple[Scenario, ...],
+    draws: tuple[Scenario, ...], progress: Progress,
+) -> Robustness:  # fmt: skip
+    """All curves on the nominal robot and on random ones, `draws`."""
+    assert options.robust is not None
+    animation = shot.animation
+    curves = {
+        "before": animation.tracks,
+        "nominal": found_tracks(nominal, animation),
+        "robust": found_tracks(robust, animation),
+    }
+    on_nominal = errors_on(shot, options, curves, scenarios[:1])
+
+    def measured(fraction: float, message: str) -> None:
+        progress(_SEARCHED + (1.0 - _SEARCHED) * fraction, message)
+
+    drawn = errors_on(shot, options, curves, draws, measured)
+    return Robustness(options.robust.kind, scenarios, {name: rows[0] for name, rows in on_nominal.items()}, drawn)
+
+
+def _part(progress: Progress, number: int, rounds: int) -> Progress:
+    """Progress of one of several searches."""
+
+    def part(fraction: float, message: str) -> None:
+        progress(_SEARCHED * (number + fraction) / rounds, message)
+
+    return part

@@ -1,0 +1,1 @@
+"""Robots that differ from the model: what is not known of them, and how motor curves do on them."""

@@ -1,0 +1,38 @@
+"""What is not known exactly of a robot, and what the user asks for because of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+MEAN, WORST = "mean", "worst"
+
+
+@dataclass(frozen=True)
+class Uncertainty:
+    """Relative standard deviations s of the parameters of a robot: a parameter is multiplied by (1 + s)^x, where x has
+    a standard normal distribution, so that factors and their inverses are equally likely.
+
+    Attributes:
+        modulus: Of Young's modulus of each material.
+        damping: Of the damping of each material.
+        payload: Of the masses of the rigid bodies at the ends of the chains, all by the same factor.
+    """
+
+    modulus: float = 0.1
+    damping: float = 1.0
+    payload: float = 0.1
+
+
+@dataclass(frozen=True)
+class RobustSettings:
+    """Optimisation for a set of robots.
+
+    Attributes:
+        kind: `mean`: the mean of the objective over the robots; `worst`: the robot with the largest error counts most.
+        scenarios: Number of robots, the nominal one among them.
+        draws: Number of random robots on which the curves are measured afterwards.
+    """
+
+    kind: str = WORST
+    scenarios: int = 7
+    draws: int = 200

@@ -1,0 +1,55 @@
+"""The robots for which curves are optimised."""
+
+import numpy as np
+import pytest
+from calmotion.retargeting.robust.choice import _directions, _shared, chosen_scenarios
+from calmotion.retargeting.robust.scenarios import uncertain_parameters
+from calmotion.shot.run import RunSettings
+from calmotion.simulation.compiled_shot import compile_shot
+
+OPTIONS = RunSettings(step=1 / 120)
+
+
+@pytest.fixture(scope="module")
+def shot(arm, animation, bodies):
+    return compile_shot(arm, animation, bodies)
+
+
+def chosen(shot, count, kind):
+    return chosen_scenarios(shot, OPTIONS, shot.animation.tracks, uncertain_parameters(shot), count, kind)
+
+
+def test_pairs_are_shared_in_proportion():
+    assert _shared(3, np.array([1.0, 0.4, 0.1])) == [2, 1, 0]
+    assert _shared(1, np.array([1.0, 0.4, 0.1])) == [1, 0, 0]
+    assert _shared(4, np.array([1.0, 1.0])) == [2, 2]
+
+
+def test_the_first_direction_moves_the_targets_most(shot):
+    directions, sizes = _directions(shot, OPTIONS, shot.animation.tracks, uncertain_parameters(shot))
+    assert np.allclose(directions @ directions.T, np.eye(len(directions)))
+    assert np.all(np.diff(sizes) <= 0.0)
+    # damping hardly moves a target, even when it is twice or half
+    assert abs(directions[0, 1]) < 0.3
+
+
+def test_the_nominal_robot_is_first_and_others_are_opposite_pairs(shot):
+    found = chosen(shot, 5, "worst")
+    assert len(found) == 5 and not found[0].factors
+    assert [s.weight for s in found] == pytest.approx([0.2] * 5)
+    logs = np.array([np.log(list(s.factors.values())) for s in found[1:]])
+    assert np.allclose(logs.sum(axis=0), 0.0)
+
+
+def test_a_mean_over_the_robots_is_that_of_their_distribution(shot):
+    parameters = uncertain_parameters(shot)
+    found = chosen(shot, 3, "mean")
+    direction = np.log(list(found[1].factors.values())) / [p.spread for p in parameters]
+    direction /= np.linalg.norm(direction)
+    values = [
+        float(direction @ (np.log(list(s.factors.values())) / [p.spread for p in parameters])) if s.factors else 0.0
+        for s in found
+    ]
+    weights = [s.weight for s in found]
+    assert sum(weights) == pytest.approx(1.0)
+    assert sum(w * v**2 for w, v in zip(weights, values, strict=True)) == pytest.approx(1.0)
