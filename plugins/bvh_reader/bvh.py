@@ -8,8 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from calmotion.errors import ShotError
 from calmotion.shot.character import Array
-from calmotion.support.files import is_special
+from calmotion.support.files import refuse_special
+from calmotion.support.memory import too_large
 
+_EXPANSION = 12.0  # memory of the lines and numbers of a file, by its size
 _AXES = ("Xposition", "Yposition", "Zposition", "Xrotation", "Yrotation", "Zrotation")
 
 
@@ -37,8 +39,9 @@ def read_bvh(path: str) -> BvhMotion:
         ShotError: It cannot be read, or is not BVH; with the line.
     """
     try:
-        if is_special(path):
-            raise OSError(0, "it is a named pipe, a socket or a device")
+        refuse_special(path)
+        if reason := too_large(path, _EXPANSION):
+            raise OSError(0, f"it is too large for the memory: {reason}")
         with open(path, encoding="utf-8", errors="replace") as stream:
             lines = stream.read().splitlines()
     except OSError as error:

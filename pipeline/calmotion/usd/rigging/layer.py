@@ -15,6 +15,7 @@ from calmotion.shot.character import Array, IntArray
 from calmotion.usd import gf
 from calmotion.usd.reading.bodies.moments import surface_moments
 from calmotion.usd.reading.skeletons import BoundSkeleton
+from calmotion.usd.rigging.materials import author_material
 from calmotion.usd.stages import RIG
 from calmotion.usd.transforms import Pose, pose_from_matrix, quaternion_from_rotation
 from calmotion.usd.units import units_of
@@ -110,19 +111,8 @@ class RobotLayer:
             self._author_target(k)
 
     def _author_material(self) -> None:
-        from pxr import Sdf, UsdPhysics, UsdShade
-
-        self._solid = UsdShade.Material.Define(self._stage, f"{self.robot}/materials/{self._material_name}")
-        prim, units, given = self._solid.GetPrim(), self._units, self._material
-        UsdPhysics.MaterialAPI.Apply(prim).CreateDensityAttr(given.density / units.density(1.0))
-        prim.AddAppliedSchema("PhysicsVolumeDeformableMaterialAPI")
-        prim.AddAppliedSchema("CalmDampingAPI")
-        for name, value in (
-            ("physics:youngsModulus", given.youngs_modulus / units.pressure(1.0)),
-            ("physics:poissonsRatio", given.poissons_ratio),
-            ("calm:damping:ratio", given.damping_ratio),
-        ):
-            prim.CreateAttribute(name, Sdf.ValueTypeNames.Float, custom=False).Set(value)
+        path = f"{self.robot}/materials/{self._material_name}"
+        self._solid = author_material(self._stage, path, self._material, self._units)
 
     def _mass_of(self, k: int) -> MassProperties | None:
         """Mass properties of a link in its own frame, stage units; None for one without geometry."""

@@ -1,0 +1,110 @@
+"""`calmotion export`: the motor curves as commands for a controller, with what playing them costs."""
+
+from __future__ import annotations
+
+import argparse
+from typing import TYPE_CHECKING, Any, TextIO
+
+from calmotion.cli.options import Commands, assignments, file_argument, opened_shot, quantity, shot_command
+
+if TYPE_CHECKING:
+    from calmotion.cli.output import Output
+
+
+def add_to(commands: Commands) -> None:
+    """Add the command."""
+    command = shot_command(
+        commands, "export", _run, "write the motor curves for a controller, and measure what playing them costs"
+    )
+    command.add_argument(
+        "--to", metavar="FORMAT", required=True, help="format of a plugin: ros2, mcap, csv, ticks (servos), ..."
+    )
+    command.add_argument("--rate", metavar="HZ", type=_rate, default=100.0, help="commands a second (default: 100)")
+    file_argument(
+        command, "-o", "--output", metavar="FILE", help="file to write (default: named after the shot, in this folder)"
+    )
+    command.add_argument(
+        "--start-delay", metavar="TIME", type=quantity("s"), default=0.0,
+        help="how late the controller starts, in s or with a unit (5ms); it counts as loss",
+    )  # fmt: skip
+    command.add_argument(
+        "--tolerance", metavar="LENGTH", type=quantity("m", needs_unit=True),
+        help="acceptable loss at the targets, with a unit (1mm; default: the tolerance of the shot)",
+    )  # fmt: skip
+    command.add_argument(
+        "--no-search", action="store_true", help="do not look for the lowest rate that keeps the tolerance"
+    )
+    file_argument(
+        command, "--motion", metavar="FILE",
+        help="file with a motion for the motors, such as a BVH file (with --set bvh.read.map=...)",
+    )  # fmt: skip
+    command.add_argument(
+        "--strict", action="store_true", help="exit with status 1 if the commands do not keep the tolerance"
+    )
+
+
+def _rate(text: str) -> float:
+    from calmotion.host import SettingError, parse_quantity
+
+    try:
+        return parse_quantity(text, "Hz")
+    except SettingError as error:
+        raise argparse.ArgumentTypeError(str(error)) from None
+
+
+def _run(args: argparse.Namespace, output: Output) -> int:
+    from calmotion.cli.output import FAILED, conclude
+    from calmotion.cli.progress import ProgressDisplay
+    from calmotion.workflow.export import export, with_shot
+
+    args.shot = with_shot(args.shot)
+    shot = opened_shot(args)
+    with ProgressDisplay(args.quiet, args.progress, args.log) as display:
+        made = export(
+            shot, args.output, to=args.to, rate=args.rate, start_delay=args.start_delay, tolerance=args.tolerance,
+            search=not args.no_search, operators=args.run, settings=assignments(args), progress=display,
+            on_operator=display.done,
+        )  # fmt: skip
+    conclude(made.report(), (), output, None if args.quiet else _print)
+    return FAILED if args.strict and not made.tolerance_kept else 0
+
+
+def _print(report: dict[str, Any], stream: TextIO) -> None:
+    from calmotion.cli.quantities import length
+    from calmotion.cli.tables import console_on, print_table, say
+
+    console = console_on(stream)
+    heads = ["target", "rate", "rounding", "start delay", "in all"]
+    rows = [
+        [row["path"], *(length(row[key]) for key in ("rate_loss_m", "rounding_loss_m", "start_loss_m", "loss_m"))]
+        for row in report["targets"]
+    ]
+    print_table(console, "What playing the commands costs at the targets, at most", heads, rows)
+    ways = {"hold": "is held", "linear": "is followed along lines", "cubic": "is followed along cubics"}
+    way = ways.get(report["interpolation"], "is followed along quintics")
+    say(
+        console,
+        f"{report['commands']} commands at {report['rate_hz']:g} Hz for {len(report['motors'])} motors; each {way}; "
+        f"{report['simulations']} simulations with steps of {1e3 * report['step_s']:.3g} ms",
+    )
+    slowest = max((row["delay_cost_m_per_s"] for row in report["targets"]), default=0.0)
+    say(console, f"each millisecond by which the controller starts late costs up to {length(1e-3 * slowest)}")
+    tolerance, kept = length(report["tolerance_m"]), report["tolerance_kept"]
+    say(
+        console,
+        f"the commands {'keep' if kept else 'do not keep'} the tolerance of {tolerance}: they cost "
+        f"{length(report['max_loss_m'])}",
+    )
+    if report["searched"]:
+        lowest = report["lowest_rate_hz"]
+        say(
+            console,
+            f"lowest rate that keeps it: {lowest} Hz"
+            if lowest
+            else "no rate keeps it: see the columns of rounding "
+            "and start delay; servos with more ticks, smaller steps or an earlier start would help",
+        )
+    for note in report["notes"]:
+        say(console, f"note: {note}")
+    for file in report["files"]:
+        say(console, f"wrote {file}")

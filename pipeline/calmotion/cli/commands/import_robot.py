@@ -1,0 +1,92 @@
+"""`calmotion import`: a shot from a robot's URDF or MJCF file."""
+
+from __future__ import annotations
+
+import argparse
+from typing import TYPE_CHECKING, Any, TextIO
+
+from calmotion.cli.options import Commands, file_argument, plugin_option
+
+if TYPE_CHECKING:
+    from calmotion.cli.output import Output
+
+
+def add_to(commands: Commands) -> None:
+    """Add the command."""
+    text = "make a shot from a URDF or MJCF robot, with a motion, flexible links and targets"
+    command = commands.add_parser("import", help=text, description=text[0].upper() + text[1:] + ".")
+    command.set_defaults(command=_run)
+    file_argument(command, "robot", metavar="ROBOT", help=".urdf file, or .xml file of MuJoCo")
+    file_argument(command, "-o", "--output", metavar="LAYER", required=True, help="USD layer to write")
+    file_argument(
+        command, "--motion", metavar="FILE",
+        help="motion of the joints: CSV (time_s, and a column for each joint in rad or m), NPZ, or BVH",
+    )  # fmt: skip
+    for flag, metavar, help_text in (
+        ("--flexible", "PATTERN=MATERIAL[,WALL]", 'links that bend: "*forearm*=abs,3mm"; see `calmotion materials`'),
+        ("--target", "PATTERN", "links or frames whose motion counts (default: the outermost points of the robot)"),
+        ("--package", "NAME=FOLDER", "folder of a ROS package that package:// names"),
+    ):
+        command.add_argument(flag, metavar=metavar, action="append", default=[], help=f"{help_text}; may be repeated")
+    command.add_argument(
+        "--solid", metavar="MATERIAL", help="material from whose density links without inertia get their mass"
+    )
+    file_argument(
+        command, "--materials", metavar="FILE", action="append", default=[],
+        help="TOML file with more materials; may be repeated",
+    )  # fmt: skip
+    file_argument(
+        command, "--converters", metavar="DIR",
+        help="environment with urdf-usd-converter and mujoco-usd-converter (default: one that is made once)",
+    )  # fmt: skip
+    plugin_option(command)
+    command.add_argument(
+        "--set", metavar="NAME=VALUE", action="append", default=[],
+        help="set a property of an operator, such as motion.read.angles=deg",
+    )  # fmt: skip
+    command.add_argument("--json", action="store_true", help="print one JSON object on stdout, and nothing else there")
+    command.add_argument("--quiet", action="store_true", help="print nothing but errors (and the object of --json)")
+
+
+def _run(args: argparse.Namespace, output: Output) -> int:
+    from calmotion.cli.options import assignments
+    from calmotion.cli.output import conclude, notice
+    from calmotion.host import SettingError
+    from calmotion.workflow.importing.robot import import_robot
+
+    packages = dict(text.partition("=")[::2] for text in args.package)
+    for name, folder in packages.items():
+        if not name or not folder:
+            raise SettingError(
+                "a package is named as NAME=FOLDER", path="--package", found=f"{name}{folder}",
+                remedy="Write for example my_robot=/home/me/my_robot.",
+            )  # fmt: skip
+    made = import_robot(
+        args.robot, layer=args.output, motion=args.motion, flexible=args.flexible, targets=args.target,
+        solid=args.solid, packages=packages, material_files=args.materials, converters=args.converters,
+        plugins=args.plugins, settings=assignments(args), tell=(lambda text: None) if args.quiet else notice,
+    )  # fmt: skip
+    conclude(made.report(), (), output, None if args.quiet else _print)
+    return 0
+
+
+def _print(report: dict[str, Any], stream: TextIO) -> None:
+    from calmotion.cli.quantities import counted
+    from calmotion.cli.tables import console_on, say
+
+    console = console_on(stream)
+    say(
+        console,
+        f"{report['robot']}: {counted(report['bodies'], 'body').replace('bodys', 'bodies')}, "
+        f"{len(report['flexible'])} of them flexible, {counted(len(report['motors']), 'motor')}, "
+        f"{counted(len(report['targets']), 'target')}, {report['mass_kg']:.4g} kg",
+    )
+    if report["frames"] > 1:
+        say(console, f"motion: {report['frames']} frames, {report['duration_s']:.4g} s")
+    for path in report["flexible"]:
+        say(console, f"flexible: {path}")
+    for path in report["targets"]:
+        say(console, f"target: {path}")
+    for note in report["notes"]:
+        say(console, f"note: {note}")
+    say(console, f"wrote {report['layer']}, and {report['folder']} with the converted robot")

@@ -1,0 +1,69 @@
+"""`calmotion materials`: the table of materials for flexible links."""
+
+from __future__ import annotations
+
+import argparse
+from dataclasses import asdict
+from typing import TYPE_CHECKING, Any
+
+from calmotion.cli.options import Commands, file_argument
+
+if TYPE_CHECKING:
+    from calmotion.cli.output import Output
+
+
+def add_to(commands: Commands) -> None:
+    """Add the command."""
+    text = "list materials for flexible links, with modulus, density, damping and their sources"
+    command = commands.add_parser("materials", help=text, description=text[0].upper() + text[1:] + ".")
+    command.set_defaults(command=_run)
+    command.add_argument("name", nargs="?", metavar="NAME", help="show only this material, with its source")
+    file_argument(
+        command, "--materials", metavar="FILE", action="append", default=[],
+        help="TOML file with more materials; may be repeated",
+    )  # fmt: skip
+    command.add_argument("--json", action="store_true", help="print one JSON object on stdout, and nothing else there")
+    command.add_argument("--toml", action="store_true", help="print TOML, to be changed and used with --materials")
+
+
+def _run(args: argparse.Namespace, output: Output) -> int:
+    from calmotion.rigging.materials import material_named
+    from calmotion.workflow.materials import known_materials
+
+    known = known_materials(args.materials)
+    if args.name:
+        known = dict([material_named(args.name, known)])
+    rows = {name: asdict(material) for name, material in known.items()}
+    if args.json:
+        output.object({"command": "materials", "materials": rows})
+    elif args.toml:
+        print("\n".join(_as_toml(name, row) for name, row in rows.items()), file=output.stream, end="")
+    else:
+        _print(rows, bool(args.name), output)
+    return 0
+
+
+def _as_toml(name: str, row: dict[str, Any]) -> str:
+    import json
+
+    values = row | {"youngs_modulus": row["youngs_modulus"] / 1e9, "aliases": list(row["aliases"])}
+    return f"[{name}]\n" + "".join(
+        f"{key} = {json.dumps(value, ensure_ascii=False)}\n" for key, value in values.items()
+    )
+
+
+def _print(rows: dict[str, dict[str, Any]], sources: bool, output: Output) -> None:
+    from calmotion.cli.tables import console_on, print_table, say
+
+    console = console_on(output.stream)
+    cells = [
+        [
+            ", ".join([name, *row["aliases"]]), row["title"], row["group"], f"{row['youngs_modulus'] / 1e9:.4g}",
+            f"{row['poissons_ratio']:.3g}", f"{row['density']:.4g}", f"{row['damping_ratio']:.3g}",
+        ]
+        for name, row in rows.items()
+    ]  # fmt: skip
+    heads = ["name", "material", "kind", "modulus GPa", "Poisson's ratio", "density kg/m³", "damping ratio"]
+    print_table(console, "Materials", heads, cells, texts=3)
+    for row in rows.values() if sources else ():
+        say(console, f"source: {row['source']}")

@@ -1,0 +1,1 @@
+"""Commands that are played on the simulated robot: what they cost at the targets, and the lowest rate that does."""

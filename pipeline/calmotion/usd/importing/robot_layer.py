@@ -1,0 +1,312 @@
+"""The layer over a converted robot: its motors with their motion, flexible links, masses and targets."""
+
+from __future__ import annotations
+
+import fnmatch
+import os
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from calmotion.errors import ShotError, raise_all
+from calmotion.rigging.materials import Material
+from calmotion.shot import MotorTracks
+from calmotion.support.naming import nearest
+from calmotion.usd import stages
+from calmotion.usd.diagnostics import quiet
+from calmotion.usd.dialects import GEARS
+from calmotion.usd.reading.context import is_rigid_body, prims_of
+from calmotion.usd.reading.joints import joint_prims
+from calmotion.usd.reading.motors.driven_motors import actuated_joints
+from calmotion.usd.rigging.materials import author_material
+from calmotion.usd.units import StageUnits, units_of
+
+if TYPE_CHECKING:
+    from pxr import Sdf, Usd
+
+_DRIVES = {"PhysicsRevoluteJoint": "angular", "PhysicsPrismaticJoint": "linear"}
+_FRAME_MASS, _FRAME_INERTIA = 1e-6, 1e-10  # of links without mass [kg], [kg m^2]
+_SMALLEST_MOMENT, _RAISED = 1e-6, 1e-2  # of the largest moment of inertia of a link
+_THICKNESS = "calm:flexible:wallThickness"
+
+
+@dataclass(frozen=True)
+class FlexibleLinks:
+    """Links that bend.
+
+    Attributes:
+        pattern: Of their names, with `*` and `?`.
+        name: Of the material.
+        material: The material.
+        thickness: Of their walls [m]; None for solid links.
+    """
+
+    pattern: str
+    name: str
+    material: Material
+    thickness: float | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class RobotOptions:
+    """What becomes of a converted robot.
+
+    Attributes:
+        flexible: Which links bend.
+        targets: Patterns of names of links or frames that are targets.
+        efforts: Largest effort by name of a joint [N m or N].
+        without_mass: Names of links with geometry and without inertia.
+        massless: Names of links whose mass is 0.
+        solid: Material from which links without inertia get their mass, or None.
+        motion: Of its joints, or None.
+        frames_per_second: Of the shot.
+    """
+
+    flexible: tuple[FlexibleLinks, ...] = ()
+    targets: tuple[str, ...] = ()
+    efforts: Mapping[str, float] = field(default_factory=dict)
+    without_mass: tuple[str, ...] = ()
+    massless: tuple[str, ...] = ()
+    solid: Material | None = None
+    motion: MotorTracks | None = None
+    frames_per_second: float = 60.0
+
+
+def robot_layer(converted: str, asset: str, options: RobotOptions) -> tuple[Sdf.Layer, tuple[str, ...]]:
+    """The layer over a converted robot, and notes for the user.
+
+    Args:
+        converted: The USD file of the robot.
+        asset: The same as the layer names it, relative to where the layer will be.
+        options: What to author.
+
+    Raises:
+        ShotError: A name that nothing has, or a link without mass.
+    """
+    from pxr import Sdf, Usd
+
+    robot = stages.open_stage(converted)
+    layer = Sdf.Layer.CreateAnonymous(".usda")
+    layer.subLayerPaths = [os.path.abspath(converted)]
+    with quiet():
+        author = _Author(Usd.Stage.Open(layer), robot, options)
+        author.metadata()
+        problems: list[ShotError] = []
+        for step in (author.masses, author.motors, author.links, author.targets):
+            try:
+                step()
+            except ShotError as error:
+                problems.append(error)
+        raise_all(problems)
+        notes = tuple(author.notes)
+        # otherwise the stage would look for the robot where it will be
+        del author, step
+        layer.subLayerPaths = [asset]
+    return layer, notes
+
+
+def named(prim: Usd.Prim) -> str:
+    """The name of a prim as its author wrote it, where USD allows no such name."""
+    return str(prim.GetDisplayName() or prim.GetName())
+
+
+class _Author:
+    """Authors over a robot.
+
+    Args:
+        stage: Where it is authored; the robot is a sublayer of its root layer.
+        robot: The robot alone.
+        options: What to author.
+    """
+
+    def __init__(self, stage: Usd.Stage, robot: Usd.Stage, options: RobotOptions) -> None:
+        self._stage, self._robot, self._options = stage, robot, options
+        self._units: StageUnits = units_of(robot)
+        self._bodies = [prim for prim in prims_of(stage) if is_rigid_body(prim)]
+        self.notes: list[str] = []
+
+    def metadata(self) -> None:
+        """Units, axes, default prim and clock: a layer does not inherit them from its sublayers."""
+        from pxr import UsdGeom, UsdPhysics
+
+        root, options = self._stage.GetRootLayer(), self._options
+        default = self._robot.GetDefaultPrim()
+        root.defaultPrim = default.GetName() if default else ""
+        UsdGeom.SetStageMetersPerUnit(self._stage, UsdGeom.GetStageMetersPerUnit(self._robot))
+        UsdGeom.SetStageUpAxis(self._stage, UsdGeom.GetStageUpAxis(self._robot))
+        UsdPhysics.SetStageKilogramsPerUnit(self._stage, UsdPhysics.GetStageKilogramsPerUnit(self._robot))
+        root.timeCodesPerSecond = root.framesPerSecond = options.frames_per_second
+        if options.motion is not None:
+            root.startTimeCode = 0.0
+            frames = float(options.motion.times[-1]) * options.frames_per_second
+            root.endTimeCode = float(np.floor(frames + 1e-6))
+
+    def masses(self) -> None:
+        """Densities of the links that have no inertia, and a milligram for those that have no mass."""
+        from pxr import Gf, UsdPhysics
+
+        frames = [prim for prim in self._bodies if named(prim) in self._options.massless]
+        for prim in frames:
+            api = UsdPhysics.MassAPI.Apply(prim)
+            api.CreateMassAttr(_FRAME_MASS / self._units.mass(1.0))
+            api.CreateDiagonalInertiaAttr(Gf.Vec3f(_FRAME_INERTIA / self._units.inertia(1.0)))
+        if frames:
+            names = ", ".join(map(named, frames))
+            self.notes.append(f"links of mass 0 are frames, and get {1e6 * _FRAME_MASS:g} mg each: {names}")
+        self._raise_moments()
+        without = [prim for prim in self._bodies if named(prim) in self._options.without_mass]
+        if not without:
+            return
+        names = ", ".join(map(named, without))
+        solid = self._options.solid
+        if solid is None:
+            raise ShotError(
+                "links have geometry and no inertia", path=str(without[0].GetPath()), attribute="inertial", found=names,
+                remedy="Write their <inertial>, or name the material that they are made of: --solid abs",
+            )  # fmt: skip
+        for prim in without:
+            api = UsdPhysics.MassAPI.Apply(prim)
+            api.CreateDensityAttr(solid.density / self._units.density(1.0))
+        self.notes.append(f"links without inertia have that of their geometry as solid parts: {names}")
+
+    def _raise_moments(self) -> None:
+        """Dummy links often have inertias that no body has, with all products as large as the moments."""
+        from pxr import Gf
+
+        raised, missing = [], []
+        for prim in self._bodies:
+            attribute = prim.GetAttribute("physics:diagonalInertia")
+            moments = np.array(attribute.Get() if attribute and attribute.HasAuthoredValue() else (1.0, 1.0, 1.0))
+            if moments.max() <= 0.0:
+                attribute.Block()  # the reader takes that of the geometry, or of a ball
+                missing.append(named(prim))
+            elif moments.min() <= _SMALLEST_MOMENT * moments.max():
+                attribute.Set(Gf.Vec3f(*np.maximum(moments, _RAISED * moments.max()).tolist()))
+                raised.append(named(prim))
+        if missing:
+            self.notes.append(f"links with an inertia of 0 have that of their geometry or a ball: {', '.join(missing)}")
+        if raised:
+            self.notes.append(
+                f"moments of inertia that are 0 are raised to {_RAISED:g} of the largest: {', '.join(raised)}"
+            )
+
+    def motors(self) -> None:
+        """Drives: of the joints that actuators drive, or of all where there are none; and of those in the motion."""
+        from pxr import Sdf, UsdPhysics
+
+        joints = [prim for prim in joint_prims(self._stage) if prim.GetTypeName() in _DRIVES]
+        moved = self._moved(joints)
+        actuated = actuated_joints(self._stage)
+        for prim in joints:
+            path = str(prim.GetPath())
+            geared = any(prim.GetRelationship(spelling.leader).HasAuthoredTargets() for spelling in GEARS)
+            closing = prim.GetAttribute("physics:excludeFromArticulation").Get()
+            if path not in moved and (geared or closing or (actuated and path not in actuated)):
+                continue
+            drive = _DRIVES[prim.GetTypeName()]
+            api = UsdPhysics.DriveAPI.Apply(prim, drive)
+            effort = self._options.efforts.get(named(prim))
+            if effort is not None:
+                unit = self._units.torque(1.0) if drive == "angular" else self._units.force(1.0)
+                api.CreateMaxForceAttr(effort / unit)
+            attribute = api.CreateTargetPositionAttr()
+            if path in moved:
+                scale = np.degrees(1.0) if drive == "angular" else 1.0 / self._units.length(1.0)
+                codes = moved[path].times * self._options.frames_per_second
+                values = moved[path].values[next(iter(moved[path].values))] * scale
+                spec = self._stage.GetRootLayer().GetAttributeAtPath(attribute.GetPath())
+                assert spec.typeName == Sdf.ValueTypeNames.Float
+                for code, value in zip(codes, values, strict=True):
+                    attribute.Set(float(value), float(round(code, 6)))
+            else:
+                attribute.Set(self._rest(prim))
+
+    def _rest(self, prim: Usd.Prim) -> float:
+        """The value nearest to 0 within the limits of a joint."""
+        low, high = (prim.GetAttribute(f"physics:{end}Limit").Get() for end in ("lower", "upper"))
+        low, high = (-np.inf if low is None else low), (np.inf if high is None else high)
+        return float(min(max(0.0, low), high)) if low <= high else 0.0
+
+    def _moved(self, joints: Sequence[Usd.Prim]) -> dict[str, MotorTracks]:
+        """The joints of the motion by path, each with its track alone."""
+        motion = self._options.motion
+        if motion is None:
+            return {}
+        found, problems = {}, []
+        for name, values in motion.values.items():
+            prims = [prim for prim in joints if name in (named(prim), prim.GetName(), str(prim.GetPath()))]
+            if len(prims) != 1:
+                names = sorted({named(prim) for prim in joints})
+                problems.append(
+                    ShotError(
+                        "several joints have this name" if prims else "no joint of the robot has this name",
+                        path=motion.origin, found=name,
+                        remedy=f"{nearest(name, names)}Its joints are {', '.join(names)}",
+                    )
+                )  # fmt: skip
+            else:
+                found[str(prims[0].GetPath())] = MotorTracks(motion.origin, motion.times, {name: values})
+        raise_all(problems)
+        return found
+
+    def links(self) -> None:
+        """Flexible links with their materials."""
+        from pxr import Sdf, UsdShade
+
+        root = self._stage.GetDefaultPrim()
+        flexible: set[str] = set()
+        for given in self._options.flexible:
+            path = f"{root.GetPath()}/CalmMaterials/{given.name}"
+            bodies = self._matching(given.pattern, self._bodies, "--flexible")
+            shader = author_material(self._stage, path, given.material, self._units)
+            for prim in bodies:
+                if str(prim.GetPath()) in flexible:
+                    raise ShotError(
+                        "two patterns of flexible links name this one", path=str(prim.GetPath()),
+                        attribute="--flexible", found=given.pattern, remedy="Make one of them narrower",
+                    )  # fmt: skip
+                flexible.add(str(prim.GetPath()))
+                prim.AddAppliedSchema("CalmFlexibleBodyAPI")
+                UsdShade.MaterialBindingAPI.Apply(prim).Bind(shader, materialPurpose="physics")
+                if given.thickness is not None:
+                    thickness = prim.CreateAttribute(
+                        _THICKNESS, Sdf.ValueTypeNames.Float, False, Sdf.VariabilityUniform
+                    )
+                    thickness.Set(given.thickness / self._units.length(1.0))
+
+    def targets(self) -> None:
+        """Targets at links, or at frames that links carry."""
+        from pxr import UsdGeom
+
+        carried = [
+            prim
+            for body in self._bodies
+            for prim in _below(body)
+            if prim.IsA(UsdGeom.Xformable) and not prim.IsA(UsdGeom.Gprim) and not prim.IsInstance()
+        ]
+        for pattern in self._options.targets:
+            for prim in self._matching(pattern, carried, "--target"):
+                if is_rigid_body(prim):
+                    prim = UsdGeom.Xform.Define(self._stage, prim.GetPath().AppendChild("CalmTarget")).GetPrim()
+                prim.AddAppliedSchema("CalmTargetAPI")
+
+    def _matching(self, pattern: str, prims: Iterable[Usd.Prim], option: str) -> list[Usd.Prim]:
+        candidates = list(prims)
+        found = [prim for prim in candidates if fnmatch.fnmatchcase(named(prim).lower(), pattern.lower())]
+        if not found:
+            names = sorted({named(prim) for prim in self._bodies})
+            raise ShotError(
+                "no link of the robot has such a name", attribute=option, found=pattern,
+                remedy=f"{nearest(pattern.strip('*'), names)}Its links are {', '.join(names)}",
+            )  # fmt: skip
+        return found
+
+
+def _below(body: Usd.Prim) -> Iterable[Usd.Prim]:
+    """A body and what it carries, without the bodies below it."""
+    yield body
+    for child in body.GetChildren():
+        if not is_rigid_body(child):
+            yield from _below(child)

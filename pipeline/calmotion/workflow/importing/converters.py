@@ -1,0 +1,152 @@
+"""The converters of URDF and MJCF, in an environment of their own: they bring a build of USD of their own."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+
+from calmotion.errors import ShotError
+from calmotion.support.caching.cache_folder import cache_folder
+from calmotion.workflow.importing.descriptions import URDF, Description
+
+PACKAGES = ("urdf-usd-converter>=0.3.4,<0.4", "mujoco-usd-converter>=0.8,<0.9")
+VARIABLE = "CALMOTION_CONVERTERS"  # names an environment that has them
+_MODULES = ("urdf_usd_converter", "mujoco_usd_converter")
+_PYTHONS = ((3, 10), (3, 12))  # oldest and newest version that they support
+_READY = "ready"
+_BAD_WORDS = ("Failed to", "Cannot", "not found")  # of warnings after which a part of the robot is missing
+
+
+def environment_folder() -> Path:
+    """Where the environment is that `converter_python` makes."""
+    return cache_folder() / "converters"
+
+
+def converter_python(named: str | None, tell: Callable[[str], None]) -> str:
+    """A Python that has both converters.
+
+    Args:
+        named: An environment, or its Python, that has them; None: that of `CALMOTION_CONVERTERS`, else our own,
+            which is made if it is not there.
+        tell: Told before the environment is made, which takes about a minute.
+
+    Raises:
+        ShotError: The environment has no converters, or cannot be made.
+    """
+    named = named or os.environ.get(VARIABLE)
+    if named:
+        python = _python_of(Path(named))
+        if _lacks(python):
+            raise ShotError(
+                "this environment does not have the converters", path=named, found=_lacks(python),
+                remedy=f"Install {' and '.join(PACKAGES)} there, or leave out --converters",
+            )  # fmt: skip
+        return str(python)
+    folder = environment_folder()
+    if not (folder / _READY).is_file():
+        tell(f"making an environment for the converters of URDF and MJCF in {folder} (once, about a minute)")
+        _make(folder)
+    return str(_python_of(folder))
+
+
+def convert(description: Description, output: str, python: str) -> tuple[str, tuple[str, ...]]:
+    """Convert a robot to USD.
+
+    Args:
+        description: The robot.
+        output: Folder to write, which must not exist.
+        python: As `converter_python` gives it.
+
+    Returns:
+        The USD file in the folder, and the warnings of the converter.
+
+    Raises:
+        ShotError: The robot cannot be converted.
+    """
+    module = _MODULES[description.kind != URDF]
+    packages = [word for name, folder in description.packages.items() for word in ("--package", f"{name}={folder}")]
+    # in isolation, so that neither the variables of this environment nor its packages reach it
+    command = [python, "-I", "-m", module, os.path.abspath(description.path), output, *packages]
+    done = subprocess.run(command, capture_output=True, text=True, env=_plain_environment())
+    lines = [line.strip() for line in (done.stdout + done.stderr).splitlines() if line.strip()]
+    files = [path for path in Path(output).glob("*.usd*") if path.is_file()] if os.path.isdir(output) else []
+    if done.returncode or len(files) != 1:
+        raise ShotError(
+            "the converter refuses the robot", path=description.path, found=_last_words(lines),
+            remedy=f"Correct the file; `{module}` of the converters' environment shows the whole message",
+        )  # fmt: skip
+    warnings = [line.partition("] ")[2].partition("] ")[2] or line for line in lines if "Warning" in line]
+    lost = [line for line in warnings if line.startswith(_BAD_WORDS)]
+    if lost:
+        raise ShotError(
+            "a part of the robot cannot be converted", path=description.path, found="; ".join(lost[:3]),
+            remedy="Correct the file: meshes are .stl, .obj or .dae, and their names relative to it",
+        )  # fmt: skip
+    return str(files[0]), tuple(warnings)
+
+
+def _make(folder: Path) -> None:
+    python = _supported_python()
+    if python is None:
+        versions = "{}.{} to {}.{}".format(*_PYTHONS[0], *_PYTHONS[1])
+        raise ShotError(
+            f"the converters need Python {versions}, and there is none", found=sys.version.split()[0],
+            remedy=f"Install one, and {' and '.join(PACKAGES)} into an environment of it; name that with --converters",
+        )  # fmt: skip
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    shutil.rmtree(folder, ignore_errors=True)
+    for command in (
+        [python, "-m", "venv", str(folder)],
+        [str(_python_of(folder)), "-I", "-m", "pip", "install", "--quiet", *PACKAGES],
+    ):
+        done = subprocess.run(command, capture_output=True, text=True)
+        if done.returncode:
+            errors = [line for line in done.stderr.splitlines() if "ERROR" in line or "rror:" in line]
+            raise ShotError(
+                "the environment of the converters cannot be made", path=str(folder), found=_last_words(errors),
+                remedy=f"Install {' and '.join(PACKAGES)} into an environment of your own; name it with --converters",
+            )  # fmt: skip
+    (folder / _READY).write_text("\n".join(PACKAGES), encoding="utf-8")
+
+
+def _supported_python() -> str | None:
+    if _PYTHONS[0] <= sys.version_info[:2] <= _PYTHONS[1]:
+        return sys.executable
+    names = [f"python3.{minor}" for minor in range(_PYTHONS[1][1], _PYTHONS[0][1] - 1, -1)]
+    return next((found for name in names if (found := shutil.which(name))), None)
+
+
+def _python_of(named: Path) -> Path:
+    if named.is_dir():
+        return named / ("Scripts/python.exe" if os.name == "nt" else "bin/python")
+    return named
+
+
+def _lacks(python: Path) -> str:
+    """What keeps a Python from converting; empty where nothing does."""
+    if not python.is_file():
+        return f"no {python}"
+    code = f"import {', '.join(_MODULES)}"
+    done = subprocess.run([str(python), "-I", "-c", code], capture_output=True, text=True, env=_plain_environment())
+    return "" if done.returncode == 0 else _last_words(done.stderr.splitlines()) or "it fails"
+
+
+def _plain_environment() -> dict[str, str]:
+    """The environment without what names plugins of our USD."""
+    return {name: value for name, value in os.environ.items() if not name.startswith(("PXR_", "PYTHON"))}
+
+
+def _last_words(lines: list[str]) -> str | None:
+    return lines[-1].strip()[:300] if lines else None
+
+
+def temporary_folder(beside: str) -> str:
+    """A new folder beside a file, for a conversion that is moved to its place at the end."""
+    folder = os.path.dirname(os.path.abspath(beside))
+    os.makedirs(folder, exist_ok=True)
+    return tempfile.mkdtemp(prefix=".calmotion-import-", dir=folder)

@@ -1,0 +1,185 @@
+"""URDF and MJCF files before they are converted: what a converter would leave out silently is refused here."""
+
+from __future__ import annotations
+
+import os
+import xml.etree.ElementTree as xml
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from calmotion.errors import ShotError, raise_all
+from calmotion.support.files import refuse_special
+from calmotion.support.naming import nearest
+
+URDF, MJCF = "urdf", "mjcf"
+_JOINTS = ("revolute", "continuous", "prismatic", "fixed")
+_SHOWN = 4  # missing files in a message
+
+
+@dataclass(frozen=True)
+class Description:
+    """A robot's file.
+
+    Attributes:
+        path: The file.
+        kind: `URDF` or `MJCF`.
+        packages: Folders of the ROS packages that it names.
+        efforts: Largest effort of each joint of a URDF, where it is positive [N m or N].
+        without_mass: Links of a URDF with geometry and without inertia.
+        massless: Links of a URDF whose mass is 0, and those with neither inertia nor geometry: frames.
+    """
+
+    path: str
+    kind: str
+    packages: Mapping[str, str] = field(default_factory=dict)
+    efforts: Mapping[str, float] = field(default_factory=dict)
+    without_mass: tuple[str, ...] = ()
+    massless: tuple[str, ...] = ()
+
+
+def read_description(path: str, packages: Mapping[str, str]) -> Description:
+    """Read and check the file of a robot.
+
+    Args:
+        path: A .urdf or .xml file.
+        packages: Folders of ROS packages by name; others are looked for above the file.
+
+    Raises:
+        ShotError: It is neither URDF nor MJCF, is a xacro, or a mesh is missing.
+    """
+    root = _root(path)
+    if root.tag == "mujoco":
+        return Description(path, MJCF)
+    if root.tag != "robot":
+        raise ShotError(
+            "this is neither a URDF nor an MJCF robot", path=path, found=f"<{root.tag}>",
+            remedy="Name a .urdf file, or an .xml file of MuJoCo; a USD file needs no import",
+        )  # fmt: skip
+    macros = next((node.tag for node in root.iter() if "xacro" in str(node.tag) or "${" in str(node.attrib)), None)
+    if macros is not None:
+        raise ShotError(
+            "this is a xacro, from which a URDF is made first", path=path, found=macros,
+            remedy=f"Run `xacro {os.path.basename(path)} > robot.urdf`, and import robot.urdf",
+        )  # fmt: skip
+    _refuse_other_joints(root, path)
+    found = _packages(root, path, packages)
+    _refuse_missing_meshes(root, path, found)
+    links = root.findall("link")
+    shaped = {link for link in links if link.find("visual") is not None or link.find("collision") is not None}
+    without = {link for link in links if link.find("inertial") is None}
+    weightless = {link for link in links if _number(link.find("inertial/mass"), "value", 1.0) == 0.0}
+    return Description(
+        path, URDF, found, _efforts(root), _names(without & shaped), _names(weightless | (without - shaped))
+    )
+
+
+def _refuse_other_joints(root: xml.Element, path: str) -> None:
+    """Refuse joints that no motor of Calmotion can be, and which a converter drops."""
+    problems = [
+        ShotError(
+            f"a {joint.get('type')} joint is not supported", path=path, attribute=joint.get("name", "joint"),
+            found=joint.get("type"), remedy=f"Write one of {', '.join(_JOINTS)}; a base that stands is fixed",
+        )
+        for joint in root.findall("joint")
+        if joint.get("type") not in _JOINTS
+    ]  # fmt: skip
+    raise_all(problems)
+
+
+def _root(path: str) -> xml.Element:
+    try:
+        refuse_special(path)
+        return xml.parse(path).getroot()  # nosec B314  # expat limits the expansion of entities
+    except OSError as error:
+        raise ShotError(
+            "the robot cannot be read", path=path, found=error.strerror, remedy="Check the path of the file"
+        ) from error
+    except (xml.ParseError, UnicodeDecodeError, ValueError) as error:
+        raise ShotError(
+            "the robot is no XML file, or it is damaged", path=path, found=error,
+            remedy="Declare the prefix, as in <robot xmlns:drake=...>, or remove its elements"
+            if "unbound prefix" in str(error) else "Name a .urdf file, or an .xml file of MuJoCo",
+        ) from error  # fmt: skip
+
+
+def _meshes(root: xml.Element) -> Iterator[tuple[str, str]]:
+    """Link and file name of each mesh."""
+    for link in root.findall("link"):
+        for mesh in link.iter("mesh"):
+            yield link.get("name", ""), mesh.get("filename", "")
+
+
+def _packages(root: xml.Element, path: str, given: Mapping[str, str]) -> dict[str, str]:
+    """The packages that meshes name, each with its folder.
+
+    Raises:
+        ShotError: One is given that is no folder, or one is not found.
+    """
+    named = {name.removeprefix("package://").split("/", 1)[0] for _, name in _meshes(root) if "package://" in name}
+    problems, found = [], {}
+    for name in sorted(named):
+        folder = given.get(name) or _above(name, path)
+        if folder is None or not os.path.isdir(folder):
+            near = nearest(name, given)
+            problems.append(
+                ShotError(
+                    "the folder of a ROS package is not known" if folder is None else "this is no folder",
+                    path=path, attribute=f"package://{name}", found=folder,
+                    remedy=f"{near}Name it: --package {name}=FOLDER",
+                )
+            )  # fmt: skip
+        else:
+            found[name] = os.path.abspath(folder)
+    raise_all(problems)
+    return found
+
+
+def _above(name: str, path: str) -> str | None:
+    """A folder of that name that contains the file, or stands beside a folder that does."""
+    for folder in Path(path).resolve().parents:
+        if folder.name == name:
+            return str(folder)
+        if (folder / name).is_dir():
+            return str(folder / name)
+    return None
+
+
+def mesh_file(name: str, path: str, packages: Mapping[str, str]) -> str:
+    """The file that a mesh of a URDF names."""
+    if name.startswith("package://"):
+        package, _, rest = name.removeprefix("package://").partition("/")
+        return os.path.join(packages[package], rest)
+    return os.path.join(os.path.dirname(os.path.abspath(path)), name.removeprefix("file://"))
+
+
+def _refuse_missing_meshes(root: xml.Element, path: str, packages: Mapping[str, str]) -> None:
+    missing = [(link, name) for link, name in _meshes(root) if not os.path.isfile(mesh_file(name, path, packages))]
+    if missing:
+        shown = "; ".join(f"{name} of {link}" for link, name in missing[:_SHOWN])
+        more = f"; {len(missing) - _SHOWN} more" if len(missing) > _SHOWN else ""
+        raise ShotError(
+            "meshes of the robot are missing", path=path, attribute="mesh", found=shown + more,
+            remedy="Put the files there, or name the folder of their package: --package NAME=FOLDER",
+        )  # fmt: skip
+
+
+def _efforts(root: xml.Element) -> dict[str, float]:
+    efforts = {}
+    for joint in root.findall("joint"):
+        effort = _number(joint.find("limit"), "effort", 0.0)
+        if 0.0 < effort < float("inf"):
+            efforts[joint.get("name", "")] = effort
+    return efforts
+
+
+def _names(links: Iterable[xml.Element]) -> tuple[str, ...]:
+    return tuple(sorted(link.get("name", "") for link in links))
+
+
+def _number(node: xml.Element | None, name: str, default: float) -> float:
+    """The value of an attribute; the default where there is none, or no number."""
+    try:
+        return default if node is None else float(node.get(name, default))
+    except ValueError:
+        return default

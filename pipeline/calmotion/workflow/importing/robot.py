@@ -1,0 +1,238 @@
+"""`calmotion import`: a robot's URDF or MJCF file becomes a shot."""
+
+from __future__ import annotations
+
+import os
+import shutil
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path as FilePath
+from typing import Any
+
+import numpy as np
+
+from calmotion.errors import ShotError
+from calmotion.host import Host, SettingError, open_host, parse_quantity
+from calmotion.rigging.materials import Material, material_named
+from calmotion.shot import Animation, Character, MotorTracks
+from calmotion.shot.run import Source
+from calmotion.support.files import try_writing
+from calmotion.usd.importing.robot_layer import FlexibleLinks, RobotOptions, robot_layer
+from calmotion.usd.layers import EXTENSIONS, write_layer
+from calmotion.usd.reading.shot import read_shot
+from calmotion.version import __version__
+from calmotion.workflow.importing.converters import convert, converter_python, temporary_folder
+from calmotion.workflow.importing.descriptions import Description, read_description
+from calmotion.workflow.materials import known_materials
+from calmotion.workflow.problems import problems_of, value_of
+from calmotion.workflow.shot import Given, Path, read_settings
+
+FRAMES_PER_SECOND = 60.0
+_UNIFORM = (10.0, 240.0)  # rates of motions that become the rate of the frames [Hz]
+_MARKER = "made_by_calmotion_import"
+
+
+@dataclass(frozen=True, eq=False)
+class ImportedRobot:
+    """A robot that was imported.
+
+    Attributes:
+        layer: The shot, which opens the converted robot and adds motors, motion, flexible links and targets.
+        folder: Folder beside it with the converted robot.
+        character: What was read of it again.
+        animation: Its motion; of one frame where none was given.
+        notes: What the user should know, as sentences.
+    """
+
+    layer: str
+    folder: str
+    character: Character
+    animation: Animation
+    notes: tuple[str, ...]
+
+    def report(self) -> dict[str, Any]:
+        """The object that `--json` prints."""
+        from calmotion.workflow.plain import plain
+
+        character, frames = self.character, self.animation.frame_times
+        report: dict[str, Any] = plain(
+            {
+                "command": "import",
+                "version": __version__,
+                "layer": self.layer,
+                "folder": self.folder,
+                "robot": character.path,
+                "bodies": len(character.bodies),
+                "flexible": [body.path for body in character.bodies if body.flexible is not None],
+                "mass_kg": sum(body.mass.mass for body in character.bodies if body.mass is not None),
+                "joints": len(character.joints),
+                "motors": [motor.path for motor in character.motors],
+                "targets": [target.path for target in character.targets],
+                "frames": len(frames),
+                "duration_s": float(frames[-1]),
+                "notes": self.notes,
+            }
+        )
+        return report
+
+
+# parameters: one for each option of the command, all but the robot by keyword
+def import_robot(
+    robot: Path,
+    *,
+    layer: Path,
+    motion: Path | None = None,
+    flexible: Sequence[str] = (),
+    targets: Sequence[str] = (),
+    solid: str | None = None,
+    packages: Mapping[str, Path] | None = None,
+    material_files: Sequence[Path] = (),
+    converters: Path | None = None,
+    plugins: Sequence[Path] = (),
+    settings: Given = None,
+    tell: Callable[[str], None] = lambda text: None,
+) -> ImportedRobot:
+    """Make a shot of a robot's URDF or MJCF file.
+
+    Args:
+        robot: A .urdf file, or an .xml file of MuJoCo.
+        layer: USD layer to write; the converted robot goes into a folder beside it.
+        motion: CSV, NPZ or BVH file with a motion of its joints.
+        flexible: Links that bend, as `PATTERN=MATERIAL` or `PATTERN=MATERIAL,THICKNESS` (`"*forearm*=abs,3mm"`).
+        targets: Patterns of names of links or frames that are targets; none: the outermost points of the robot.
+        solid: Material from whose density links without inertia get their mass.
+        packages: Folders of ROS packages by name.
+        material_files: TOML files with more materials.
+        converters: Environment that has the converters; None: one of our own is made.
+        plugins: Folders with more plugins.
+        settings: Settings of operators, such as those that read the motion.
+        tell: Told what takes long.
+
+    Raises:
+        ShotError: The robot cannot be imported; with what to change.
+        SettingError: An argument does not fit.
+    """
+    target = os.fspath(layer)
+    _refuse_wrong_output(target)
+    known = known_materials(material_files)
+    links = tuple(flexible_links(text, known) for text in flexible)
+    named = {name: os.fspath(folder) for name, folder in (packages or {}).items()}
+    description = read_description(os.fspath(robot), named)
+    tracks = _motion(open_host([os.fspath(p) for p in plugins]), motion, settings) if motion is not None else None
+    options = RobotOptions(
+        links, tuple(targets), description.efforts, description.without_mass, description.massless,
+        None if solid is None else material_named(solid, known)[1], tracks, frames_per_second(tracks),
+    )  # fmt: skip
+    python = converter_python(None if converters is None else os.fspath(converters), tell)
+    return _Import(description, target, options).made(python)
+
+
+def flexible_links(text: str, known: Mapping[str, Material]) -> FlexibleLinks:
+    """Links that bend, from `PATTERN=MATERIAL` or `PATTERN=MATERIAL,THICKNESS`.
+
+    Raises:
+        SettingError: The text has another form.
+        ShotError: There is no such material.
+    """
+    pattern, equals, rest = text.partition("=")
+    material, _, thickness = rest.partition(",")
+    if not equals or not pattern.strip() or not material.strip():
+        raise SettingError(
+            "flexible links are named as PATTERN=MATERIAL or PATTERN=MATERIAL,THICKNESS", path="--flexible", found=text,
+            remedy='Write for example "*forearm*=abs,3mm"; `calmotion materials` lists the materials.',
+        )  # fmt: skip
+    wall = parse_quantity(thickness.strip(), "m") if thickness.strip() else None
+    if wall is not None and not 0.0 < wall < 1.0:
+        raise SettingError("a wall is thicker than nothing and thinner than 1 m", path="--flexible", found=text)
+    name, found = material_named(material, known)
+    return FlexibleLinks(pattern.strip(), name, found, wall)
+
+
+def frames_per_second(motion: MotorTracks | None) -> float:
+    """Frames a second of a shot with a motion: those of the motion where they are even, else 60."""
+    if motion is None or len(motion.times) < 2:
+        return FRAMES_PER_SECOND
+    steps = np.diff(motion.times)
+    rate = 1.0 / float(np.mean(steps))
+    # printed times are rounded
+    if np.ptp(steps) > 2e-3 * np.mean(steps) + 2e-6 or not _UNIFORM[0] <= rate <= _UNIFORM[1]:
+        return FRAMES_PER_SECOND
+    return float(round(rate)) if abs(rate - round(rate)) < 1e-3 * rate else rate
+
+
+def _motion(host: Host, path: Path, settings: Given) -> MotorTracks:
+    run = host.run([Source("", "import", motion=os.fspath(path))], [MotorTracks], settings=read_settings(settings))
+    run.finish()
+    problems = problems_of(run, [MotorTracks])
+    if run.get(MotorTracks) is None and not run.failures():
+        raise SettingError(
+            "no plugin reads this motion", path="--motion", found=path, remedy="Name a .csv, .npz or .bvh file."
+        )
+    return value_of(run, MotorTracks, problems)
+
+
+class _Import:
+    """Writes one shot: everything is made in a temporary folder beside it, and moved to its place at the end."""
+
+    def __init__(self, description: Description, layer: str, options: RobotOptions) -> None:
+        self._description, self._layer, self._options = description, layer, options
+        self._folder = f"{os.path.splitext(layer)[0]}_robot"
+
+    def made(self, python: str) -> ImportedRobot:
+        self._refuse_foreign_folder()
+        work = temporary_folder(self._layer)
+        try:
+            parts = os.path.join(work, os.path.basename(self._folder))
+            converted, warnings = convert(self._description, parts, python)
+            FilePath(parts, _MARKER).touch()
+            asset = f"./{os.path.basename(parts)}/{os.path.basename(converted)}"
+            layer, notes = robot_layer(converted, asset, self._options)
+            layer.documentation = f"The robot of {os.path.basename(self._description.path)}, imported by Calmotion."
+            draft = os.path.join(work, os.path.basename(self._layer))
+            read: list[tuple[Character, Animation]] = []
+            write_layer(layer, draft, lambda path: read.append(read_shot(path, still=True)[:2]))
+            self._move(parts, draft)
+        finally:
+            shutil.rmtree(work, ignore_errors=True)
+        character, animation = read[0]
+        told = [f"converter: {text}" for text in warnings]
+        return ImportedRobot(self._layer, self._folder, character, animation, (*notes, *told, *character.notes))
+
+    def _move(self, parts: str, draft: str) -> None:
+        former = None
+        if os.path.isdir(self._folder):
+            former = os.path.join(os.path.dirname(draft), "former")
+            os.rename(self._folder, former)
+        try:
+            os.rename(parts, self._folder)
+            os.replace(draft, self._layer)
+        except OSError as error:
+            if former is not None and not os.path.isdir(self._folder):
+                os.rename(former, self._folder)
+            raise ShotError(
+                "the robot cannot be written", path=self._layer, found=error.strerror, remedy="Choose another output."
+            ) from error
+
+    def _refuse_foreign_folder(self) -> None:
+        if os.path.lexists(self._folder) and not os.path.isfile(os.path.join(self._folder, _MARKER)):
+            raise ShotError(
+                "the folder of the converted robot is there already, and was not made by an import",
+                path=self._folder,
+                remedy="Choose another output, or move the folder.",
+            )
+
+
+def _refuse_wrong_output(layer: str) -> None:
+    if os.path.splitext(layer)[1].lower() not in EXTENSIONS:
+        raise SettingError(
+            "the output is not named like a USD layer",
+            path="-o",
+            found=layer,
+            remedy="Name a .usda, .usdc or .usd file.",
+        )
+    try:
+        try_writing(layer)
+    except OSError as error:
+        raise SettingError(
+            "this output cannot be written", path="-o", found=f"{layer}: {error.strerror}", remedy="Choose another."
+        ) from error

@@ -1,0 +1,52 @@
+"""Joint trajectories from tables: `--motion FILE.csv` or `--motion FILE.npz`."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from calmotion.host import NotAsked, Operator, Property, RunContext, registration
+from calmotion.shot import MotorTracks
+from calmotion.shot.run import Source
+
+SUFFIXES = (".csv", ".npz")
+
+
+class ReadTable(Operator):
+    """Columns of a table as tracks of motors: time_s, and a column for each joint in rad or m."""
+
+    idname = "motion.read"
+    label = "Read the motion"
+    requires = (Source,)
+    provides = (MotorTracks,)
+    properties = (
+        Property("angles", str, "auto", choices=("auto", "rad", "deg"),
+                 description="Unit of angles; auto: as a header of the table says, else rad"),
+        Property("rate", float, 0.0, unit="Hz", minimum=0.0, maximum=1e5,
+                 description="Rows a second of a table without time_s"),
+        Property("joints", str, "",
+                 description="Joints of the columns, in their order, of a table without names: pan, lift, -, elbow (- "
+                 "leaves a column out)"),
+    )  # fmt: skip
+
+    @classmethod
+    def poll(cls, data: Mapping[type, Any]) -> str | None:
+        """Only for files that are named `.csv` or `.npz`."""
+        motion = data[Source].motion
+        if motion is None:
+            return NotAsked("no motion is given (--motion)")
+        return None if motion.lower().endswith(SUFFIXES) else NotAsked("the motion is not a table")
+
+    def execute(self, context: RunContext) -> Sequence[object]:
+        """The tracks."""
+        from .tables import read_motion
+
+        path, values = context.get(Source).motion, context.properties
+        assert path is not None  # poll
+        names = [name.strip() for name in values.joints.split(",")] if values.joints else []
+        tracks = read_motion(path, angles=values.angles, rate=values.rate, names=names)
+        context.report("info", f"{path}: {len(tracks.values)} joints, {tracks.times[-1]:.4g} s")
+        return (tracks,)
+
+
+register, unregister = registration(ReadTable)

@@ -1,0 +1,157 @@
+"""Tables of motions: CSV with a head, NPZ of NumPy."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Sequence
+
+import numpy as np
+from calmotion.errors import ShotError
+from calmotion.shot import MotorTracks
+from calmotion.shot.character import Array
+from calmotion.support.files import refuse_special
+
+TIME = "time_s"
+_OUTPUTS = (".x", ".y", ".z", ".error", ".rotation_error", ".input", ".output", ".effort")
+_REMEDY = (
+    "Write a column time_s in seconds, and one for each joint, named after it, in rad (or with a comment "
+    "'# units: angle deg') or m"
+)
+_WITHOUT = "--set motion.read.rate=60Hz --set motion.read.joints=NAME,NAME,..."
+
+
+def read_motion(path: str, *, angles: str, rate: float, names: Sequence[str]) -> MotorTracks:
+    """The tracks of a table.
+
+    Args:
+        path: A .csv or .npz file.
+        angles: `rad`, `deg`, or `auto`: as the table says.
+        rate: Rows a second of a table without times [Hz]; 0 where it has them.
+        names: Joints of the columns of a table without names; `-` leaves one out.
+
+    Raises:
+        ShotError: The file cannot be read, or does not hold a motion.
+    """
+    try:
+        refuse_special(path)
+        columns, degrees = (_npz if path.lower().endswith(".npz") else _csv)(path, names)
+    except (OSError, UnicodeDecodeError) as error:
+        found = error.strerror if isinstance(error, OSError) else error
+        raise ShotError("the motion cannot be read", path=path, found=found, remedy="Name another file") from error
+    times = columns.pop(TIME, None)
+    if times is None:
+        if not rate > 0.0:
+            remedy = f"{_REMEDY}; or use {_WITHOUT}"
+            raise ShotError("the motion has no times", path=path, attribute=TIME, remedy=remedy)
+        times = np.arange(len(next(iter(columns.values()), np.zeros(0)))) / rate
+    _refuse_bad(path, times, columns)
+    scale = np.radians(1.0) if angles == "deg" or (angles == "auto" and degrees) else 1.0
+    return MotorTracks(path, times - times[0], {name: scale * values for name, values in columns.items()})
+
+
+def _csv(path: str, names: Sequence[str]) -> tuple[dict[str, Array], bool]:
+    """Columns by name, and whether angles are in degrees."""
+    with open(path, encoding="utf-8-sig", newline="") as stream:
+        lines = [(n, line) for n, line in enumerate(stream.read().splitlines(), 1) if line.strip()]
+    degrees = any(line.startswith("#") and "angle deg" in line for _, line in lines)
+    lines = [(n, line) for n, line in lines if not line.startswith("#")]
+    if not lines:
+        raise ShotError("the motion is empty", path=path, remedy=_REMEDY)
+    rows = list(csv.reader(line for _, line in lines))
+    head = [cell.strip() for cell in rows[0]]
+    if _is_number(head[0]):
+        if not names:
+            raise ShotError(
+                "the table has no names of joints", path=path, attribute="line 1", found=",".join(head[:4]),
+                remedy=f"{_REMEDY}; or use {_WITHOUT}",
+            )  # fmt: skip
+        head = list(names)
+    else:
+        rows, lines = rows[1:], lines[1:]
+    if any(name.endswith(_OUTPUTS) for name in head):
+        raise ShotError(
+            "this is a table that --csv wrote", path=path, found=head[1] if len(head) > 1 else head[0],
+            remedy="It is a result, for plots and spreadsheets; name a table of joint angles",
+        )  # fmt: skip
+    repeated = next((name for k, name in enumerate(head) if name != "-" and name in head[:k]), None)
+    if repeated is not None:
+        raise ShotError("two columns have the same name", path=path, found=repeated, remedy="Rename one of them")
+    values = np.zeros((len(rows), len(head)))
+    for k, ((number, line), row) in enumerate(zip(lines, rows, strict=True)):
+        try:
+            values[k] = [float(cell) for cell in row]
+        except ValueError:
+            raise ShotError(
+                f"a row that does not hold {len(head)} numbers", path=path, attribute=f"line {number}", found=line[:60],
+                remedy="Correct the row",
+            ) from None  # fmt: skip
+    return {name: values[:, k] for k, name in enumerate(head) if name != "-"}, degrees
+
+
+def _npz(path: str, names: Sequence[str]) -> tuple[dict[str, Array], bool]:
+    """The same of an NPZ file: an array for each joint, or `positions` with `joint_names`; `time_s` or `fps`."""
+    import zipfile
+
+    try:
+        with np.load(path, allow_pickle=False) as content:
+            arrays = {name: np.asarray(content[name]) for name in content.files}
+    except (ValueError, zipfile.BadZipFile, EOFError) as error:
+        raise ShotError("this is not an NPZ file of plain arrays", path=path, found=error, remedy=_REMEDY) from error
+    columns: dict[str, Array] = {}
+    unit = str(arrays.pop("units", ""))
+    fps = float(arrays.pop("fps")) if "fps" in arrays and np.ndim(arrays["fps"]) == 0 else 0.0
+    if "positions" in arrays:
+        positions = np.asarray(arrays["positions"], np.float64)
+        own = [str(name) for name in np.atleast_1d(arrays["joint_names"])] if "joint_names" in arrays else list(names)
+        if positions.ndim != 2 or positions.shape[1] != len(own):
+            raise ShotError(
+                "positions must have a column for each name in joint_names", path=path, attribute="positions",
+                found=f"shape {positions.shape} and {len(own)} names", remedy="Write both, or use " + _WITHOUT,
+            )  # fmt: skip
+        columns = {name: positions[:, k] for k, name in enumerate(own) if name != "-"}
+        columns |= {TIME: np.asarray(arrays[TIME], np.float64)} if TIME in arrays else {}
+    else:
+        for name, array in arrays.items():
+            if array.ndim != 1 or not np.issubdtype(array.dtype, np.number):
+                raise ShotError(
+                    "must be one number for each time", path=path, attribute=name,
+                    found=f"shape {array.shape} of {array.dtype}", remedy=_REMEDY,
+                )  # fmt: skip
+            columns[name] = np.asarray(array, np.float64)
+    if TIME not in columns and fps > 0.0 and columns:
+        columns[TIME] = np.arange(len(next(iter(columns.values())))) / fps
+    return columns, "deg" in unit
+
+
+def _refuse_bad(path: str, times: Array, columns: dict[str, Array]) -> None:
+    if not columns:
+        raise ShotError("the motion has no joints", path=path, remedy=_REMEDY)
+    for name, values in ((TIME, times), *columns.items()):
+        if len(values) != len(times):
+            raise ShotError(
+                "has another number of values than time_s", path=path, attribute=name,
+                found=f"{len(values)} and {len(times)}", remedy="Correct the table",
+            )  # fmt: skip
+        bad = np.flatnonzero(~np.isfinite(values))
+        if len(bad):
+            raise ShotError(
+                "is not finite", path=path, attribute=name, found=f"{values[bad[0]]} in row {bad[0] + 1}",
+                remedy="Correct or remove the row",
+            )  # fmt: skip
+    if len(times) < 2:
+        raise ShotError("a motion needs two rows at least", path=path, found=f"{len(times)} rows", remedy=_REMEDY)
+    back = np.flatnonzero(np.diff(times) <= 0.0)
+    if len(back):
+        raise ShotError(
+            "times must increase", path=path, attribute=TIME,
+            found=f"{times[back[0]]:g} and then {times[back[0] + 1]:g} in row {back[0] + 2}",
+            remedy="Sort the rows, and remove those that come twice",
+        )  # fmt: skip
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True

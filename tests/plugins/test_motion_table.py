@@ -1,0 +1,105 @@
+"""Motions from CSV and NPZ tables."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from calmotion.errors import ShotError
+from calmotion.shot import MotorTracks
+from calmotion.shot.run import Source
+from calmotion.testing import host_with, run_operator
+
+TIMES = np.array([2.0, 2.5, 3.0])
+PAN, LIFT = np.array([0.0, 0.1, 0.3]), np.array([1.0, 0.5, 0.2])
+
+
+@pytest.fixture
+def read(repository, tmp_path):
+    def run(name, content, **settings):
+        file = tmp_path / name
+        if isinstance(content, dict):
+            np.savez(file, **content)
+        elif content is not None:
+            file.write_text(content)
+        host = host_with(repository / "plugins" / "motion_table")
+        (found,) = run_operator(
+            host, "motion.read", [Source("", "import", motion=str(file))], {"motion.read": settings}
+        )
+        assert isinstance(found, MotorTracks)
+        return found
+
+    return run
+
+
+def table(head="time_s,pan,lift", times=TIMES, scale=1.0):
+    rows = np.stack([*([] if times is None else [times]), scale * PAN, scale * LIFT], axis=1)
+    return "\n".join([*([head] if head else []), *(",".join(f"{value:.9g}" for value in row) for row in rows)]) + "\n"
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "settings"),
+    [
+        ("a.csv", table(), {}),
+        ("a.csv", "\ufeff# a comment\n# units: angle deg\n" + table(scale=180.0 / np.pi), {}),
+        ("a.csv", table(scale=180.0 / np.pi), {"angles": "deg"}),
+        ("a.csv", "# units: angle deg\n" + table(), {"angles": "rad"}),
+        ("a.csv", table("pan,lift", None), {"rate": 2.0}),
+        ("a.csv", table(None, None), {"rate": 2.0, "joints": "pan, lift"}),
+        ("a.npz", {"time_s": TIMES, "pan": PAN, "lift": LIFT}, {}),
+        ("a.npz", {"fps": 2.0, "joint_names": ["pan", "lift"], "positions": np.stack([PAN, LIFT], axis=1)}, {}),
+        ("a.NPZ", {"fps": 2.0, "units": "deg", "pan": np.degrees(PAN), "lift": np.degrees(LIFT)}, {}),
+        ("a.npz", {"time_s": TIMES, "positions": np.stack([PAN, LIFT], axis=1)}, {"joints": "pan,lift"}),
+    ],
+)  # fmt: skip
+def test_forms_of_a_motion(read, tmp_path, name, content, settings):
+    if name == "a.NPZ":
+        np.savez(tmp_path / "b.npz", **content)
+        (tmp_path / "b.npz").rename(tmp_path / name)
+        content = None
+    found = read(name, content, **settings)
+    np.testing.assert_allclose(found.times, TIMES - TIMES[0], atol=1e-9)
+    assert list(found.values) == ["pan", "lift"]
+    np.testing.assert_allclose(found.values["pan"], PAN, atol=1e-9)
+    np.testing.assert_allclose(found.values["lift"], LIFT, atol=1e-8)
+
+
+def test_columns_may_be_left_out(read):
+    assert list(read("a.csv", table(None, None), rate=2.0, joints="-,lift").values) == ["lift"]
+
+
+REFUSED = {
+    "no file": (None, "cannot be read"),
+    "an empty table": ("# nothing\n", "empty"),
+    "no names": (table(None), "no names of joints"),
+    "no times": (table("pan,lift", None), "no times"),
+    "no joints": ("time_s\n0\n1\n", "no joints"),
+    "a text": (table().replace("0.5", "half", 1), "line 3"),
+    "a short row": (table() + "4,1\n", "line 5"),
+    "a number that is none": (table().replace("0.1", "nan"), "not finite"),
+    "times that go back": (table(times=TIMES[::-1]), "times must increase"),
+    "one row": ("time_s,pan\n0,1\n", "two rows"),
+    "a column twice": (table("time_s,pan,pan"), "same name"),
+    "a table of results": (table("time_s,/R/j.input,/R/j.output"), "--csv wrote"),
+}
+
+
+@pytest.mark.parametrize("name", REFUSED)
+def test_what_is_no_motion_is_refused(read, name):
+    content, problem = REFUSED[name]
+    with pytest.raises(ShotError) as refused:
+        read("a.csv", content)
+    assert problem in refused.value.message() and "a.csv" in refused.value.message() and refused.value.remedy
+
+
+@pytest.mark.parametrize(
+    "content", [{"time_s": TIMES, "pan": PAN[:2]}, {"time_s": TIMES, "positions": np.zeros((3, 2)), "joint_names": "a"},
+                {"time_s": TIMES, "names": np.array(["a", "b", "c"])}, {"time_s": TIMES}]
+)  # fmt: skip
+def test_arrays_that_do_not_fit_are_refused(read, content):
+    with pytest.raises(ShotError, match="a.npz"):
+        read("a.npz", content)
+
+
+def test_a_file_that_is_no_npz_is_refused(read, tmp_path):
+    with pytest.raises(ShotError, match="not an NPZ file"):
+        read("a.npz", "hello")

@@ -1,0 +1,104 @@
+"""Imported robots against MuJoCo's inverse dynamics and forward kinematics of their original files.
+
+Torques agree to 1e-4 of the largest, bodies to a micrometre. MuJoCo runs in the environment of the converters.
+"""
+
+from __future__ import annotations
+
+import os
+import subprocess
+from pathlib import Path
+
+import calmotion as cm
+import numpy as np
+import pytest
+from calmotion.shot.curves import commanded_curves
+from calmotion.workflow.importing.converters import VARIABLE, converter_python, environment_folder
+
+PROGRAM = Path(__file__).resolve().parents[1] / "helpers" / "reference" / "mujoco_inverse.py"
+RATE, EVERY = 1920, 16  # steps a second of the simulation, and how many of them are compared
+SHARED = ("sources/so101/so101_new_calib.urdf", "sources/so101/so101_new_calib.xml", "sources/xarm7/xarm7_nohand.xml")
+# of the package example-robot-data, whose folder `robots` is named by CALMOTION_ROBOTS
+OTHERS = (
+    "ur_description/urdf/ur5_robot.urdf", "kinova_description/robots/kinova.urdf", "z1_description/urdf/z1.urdf",
+    "panda_description/urdf/panda.urdf",
+)  # fmt: skip
+INERTIA = '<inertial><mass value="{0}"/><origin xyz="0.2 0.01 0"/><inertia ixx="{1}" iyy="{2}" izz="{2}" ixy="0.0003" '
+INERTIA += 'ixz="0" iyz="0"/></inertial>'
+TWO_LINKS = f"""<robot name="arm"><link name="base"/><link name="upper">{INERTIA.format(1.0, 0.002, 0.02)}</link>
+<link name="fore">{INERTIA.format(0.5, 0.001, 0.01)}</link>
+<joint name="a" type="revolute"><parent link="base"/><child link="upper"/><origin rpy="0.3 0.1 0" xyz="0.1 0 0.5"/>
+<axis xyz="0 0.6 0.8"/><limit lower="-2" upper="2" effort="0" velocity="3"/></joint>
+<joint name="b" type="continuous"><parent link="upper"/><child link="fore"/><origin xyz="0.4 0 0"/><axis xyz="0 1 0"/>
+</joint></robot>"""
+
+pytestmark = pytest.mark.skipif(
+    not os.environ.get(VARIABLE) and not (environment_folder() / "ready").is_file(),
+    reason=f"the converters are not here: name their environment with {VARIABLE}, or run calmotion import once",
+)
+
+
+def performed(robot: Path, folder: Path) -> cm.SimulationResult:
+    """A robot that performs a smooth motion of all joints that lead, from rest to rest within a second."""
+    made = cm.import_robot(robot, layer=folder / "robot.usda", solid="abs")
+    character = made.character
+    joints = [character.joints[motor.joint] for motor in character.motors if motor.follows is None]
+    times = np.arange(61) / 60.0
+    columns = []
+    for k, joint in enumerate(joints):
+        low, high = max(joint.lower, -1.5), min(joint.upper, 1.5)
+        swing = 0.5 * (1.0 - np.cos(2.0 * np.pi * times)) * np.sin(2.0 * np.pi * times * (0.5 + 0.1 * k))
+        columns.append(0.5 * (low + high) + 0.35 * (high - low) * swing)
+    np.savez(folder / "wave.npz", time_s=times, **{j.name: c for j, c in zip(joints, columns, strict=True)})
+    cm.import_robot(robot, layer=folder / "robot.usda", solid="abs", motion=folder / "wave.npz")
+    shot = cm.open_shot(folder / "robot.usda")
+    return cm.simulate(shot, step=1.0 / RATE, integrator="bdf2", pre_roll=0.0)
+
+
+def compare(robot: Path, folder: Path) -> tuple[float, float]:
+    """Largest error of a torque over the largest torque, and of the position of a body [m]."""
+    result = performed(robot, folder)
+    character, animation = result.shot.character, result.shot.animation
+    rows = slice(EVERY // 2, None, EVERY)
+    curve = commanded_curves(character, animation, None)
+    given = {name: curve(result.times[rows], order) for order, name in enumerate("qva")}
+    names = np.array([character.joints[motor.joint].name for motor in character.motors])
+    np.savez(folder / "in.npz", names=names, **given)
+    python = converter_python(None, print)
+    arguments = [str(robot), str(folder / "in.npz"), str(folder / "out.npz")]
+    done = subprocess.run([python, "-I", str(PROGRAM), *arguments], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    expected = np.load(folder / "out.npz")
+    torques = np.stack([motor.effort[rows] for motor in result.motors.values()], axis=1)
+    motion = result.result.before.motion
+    places = motion.positions[motion.judged][rows]
+    far = [
+        np.linalg.norm(places[:, b] - expected[f"position/{name}"], axis=1).max()
+        for b, body in enumerate(character.bodies)
+        if f"position/{(name := body.path.rsplit('/', 1)[-1])}" in expected
+    ]
+    assert len(far) > len(character.bodies) // 2
+    return float(np.abs(torques - expected["torques"]).max() / np.abs(expected["torques"]).max()), float(max(far))
+
+
+def test_two_links_of_a_urdf_need_the_torques_that_mujoco_finds(tmp_path):
+    (tmp_path / "arm.urdf").write_text(TWO_LINKS)
+    torque, far = compare(tmp_path / "arm.urdf", tmp_path)
+    assert torque < 1e-4 and far < 1e-6
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("name", SHARED)
+def test_robots_need_the_torques_that_mujoco_finds(shared_data, tmp_path, name):
+    torque, far = compare(shared_data / name, tmp_path)
+    assert torque < 1e-4 and far < 1e-6
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("name", OTHERS)
+def test_robots_of_a_package_need_the_torques_that_mujoco_finds(tmp_path, name):
+    folder = os.environ.get("CALMOTION_ROBOTS")
+    if not folder:
+        pytest.skip("name the folder `robots` of example-robot-data with CALMOTION_ROBOTS")
+    torque, far = compare(Path(folder) / name, tmp_path)
+    assert torque < 1e-4 and far < 1e-6

@@ -1,0 +1,118 @@
+"""The layer over a converted robot, read again."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from calmotion.errors import ShotError
+from calmotion.rigging.materials import MATERIALS
+from calmotion.shot import MotorTracks
+from calmotion.usd.importing.robot_layer import FlexibleLinks, RobotOptions, robot_layer
+from calmotion.usd.reading.shot import read_shot
+from converted_arm import CONVERTED, ELBOW, FORE, MIMIC, PAN, UPPER
+
+ABS = MATERIALS["abs"]
+TIMES = np.arange(5) / 20.0
+
+
+@pytest.fixture
+def make(tmp_path):
+    def run(edit=lambda text: text, **options):
+        (tmp_path / "converted.usda").write_text(edit(CONVERTED))
+        options = {"solid": MATERIALS["pla"], "without_mass": ("fore.arm",)} | options
+        layer, notes = robot_layer(str(tmp_path / "converted.usda"), "./converted.usda", RobotOptions(**options))
+        layer.Export(str(tmp_path / "robot.usda"))
+        character, animation, _ = read_shot(str(tmp_path / "robot.usda"), still=True)
+        return character, animation, notes
+
+    return run
+
+
+def test_joints_get_motors_that_hold_the_pose_nearest_to_zero(make):
+    character, animation, _ = make(efforts={"shoulder-pan": 20.0})
+    assert [motor.path for motor in character.motors] == [PAN, ELBOW, MIMIC]
+    assert animation.tracks[0].values[0] == pytest.approx(np.radians(10.0))
+    assert animation.tracks[1].values[0] == 0.0
+    assert character.motors[0].max_torque == 20.0 and np.isinf(character.motors[1].max_torque)
+    assert character.motors[2].follows is not None
+    assert [joint.name for joint in character.joints] == ["shoulder-pan", "elbow", "finger"]
+
+
+def test_a_motion_becomes_samples_of_the_drives(make):
+    values = {"shoulder-pan": 0.5 + TIMES, "elbow": -TIMES}
+    motion = MotorTracks("wave.csv", TIMES, values)
+    character, animation, _ = make(motion=motion, frames_per_second=20.0)
+    np.testing.assert_allclose(animation.frame_times, TIMES)
+    for track, expected in zip(animation.tracks, values.values(), strict=False):
+        np.testing.assert_allclose(track.values, expected, atol=1e-6)
+
+
+def test_only_joints_with_actuators_get_motors_where_there_are_actuators(make):
+    actuator = 'def MjcActuator "a"\n{\nrel mjc:target = </arm/Physics/elbow>\n}\ndef Scope "Physics"'
+    character, _, _ = make(lambda text: text.replace('def Scope "Physics"', actuator))
+    assert [motor.path for motor in character.motors] == [ELBOW, MIMIC]
+
+
+def test_links_bend_by_name_and_material(make):
+    links = (FlexibleLinks("*UPPER*", "abs", ABS), FlexibleLinks("fore*", "abs", ABS, 0.003))
+    character, _, notes = make(flexible=links)
+    bodies = {body.path: body for body in character.bodies}
+    material = bodies[UPPER].flexible.material
+    assert material.youngs_modulus == pytest.approx(2.1e9) and material.damping_ratio == pytest.approx(0.02)
+    assert material.path == "/arm/CalmMaterials/abs" and bodies[FORE].flexible is not None
+    assert bodies[UPPER].mass is not None, "the mass of the file stays"
+    assert bodies[FORE].flexible.wall_thickness == pytest.approx(0.003) and bodies[UPPER].flexible.wall_thickness == -1
+
+
+def test_links_without_inertia_have_that_of_their_geometry(make):
+    character, _, notes = make()
+    fore = next(body for body in character.bodies if body.path == FORE)
+    assert fore.mass.mass == pytest.approx(1240.0 * 0.1**3, rel=1e-5) and any("fore.arm" in note for note in notes)
+    with pytest.raises(ShotError) as refused:
+        make(solid=None)
+    assert refused.value.found == "fore.arm" and "--solid" in refused.value.remedy
+
+
+def test_links_of_no_mass_are_frames_of_almost_none(make):
+    character, _, notes = make(
+        lambda text: text.replace("physics:mass = 0.1", "physics:mass = 0"), massless=("finger",)
+    )
+    finger = next(body for body in character.bodies if body.path.endswith("/finger"))
+    assert finger.mass.mass == pytest.approx(1e-6) and any("finger" in note for note in notes)
+
+
+def test_an_inertia_that_no_body_has_is_raised(make):
+    wrong = CONVERTED.replace("(0.001, 0.001, 0.001)", "(-4e-22, 2e-23, 0.003)")
+    character, _, notes = make(lambda text: wrong)
+    finger = next(body for body in character.bodies if body.path.endswith("/finger"))
+    np.testing.assert_allclose(np.linalg.eigvalsh(finger.mass.inertia), [3e-5, 3e-5, 3e-3], rtol=1e-5)
+    assert any("moments of inertia" in note and "finger" in note for note in notes)
+
+
+def test_an_inertia_of_nothing_is_that_of_a_ball(make):
+    character, _, notes = make(lambda text: CONVERTED.replace("(0.001, 0.001, 0.001)", "(-5e-20, -5e-20, 0)"))
+    finger = next(body for body in character.bodies if body.path.endswith("/finger"))
+    radius = (0.1 / (1000.0 * 4.0 / 3.0 * np.pi)) ** (1 / 3)
+    np.testing.assert_allclose(finger.mass.inertia, 0.4 * 0.1 * radius**2 * np.eye(3), rtol=1e-4, atol=1e-9)
+    assert any("finger" in note for note in notes)
+
+
+def test_targets_are_links_and_frames(make):
+    character, _, _ = make(targets=("tool0", "upper-arm"))
+    assert [target.path for target in character.targets] == [f"{FORE}/tool0", f"{UPPER}/CalmTarget"]
+    np.testing.assert_allclose(character.targets[0].frame.position, [0.3, 0.0, 0.0])
+
+
+@pytest.mark.parametrize(
+    ("options", "problem", "remedy"),
+    [
+        ({"flexible": (FlexibleLinks("upperarm", "abs", ABS),)}, "no link", "Did you mean upper-arm?"),
+        ({"targets": ("tool1",)}, "no link", "fore.arm"),
+        ({"motion": MotorTracks("a.csv", TIMES, {"shoulder_pan": TIMES})}, "no joint", "Did you mean shoulder-pan?"),
+        ({"flexible": (FlexibleLinks("*", "abs", ABS),) * 2}, "two patterns", "narrower"),
+    ],
+)  # fmt: skip
+def test_names_that_nothing_has_are_refused(make, options, problem, remedy):
+    with pytest.raises(ShotError) as refused:
+        make(**options)
+    assert problem in refused.value.problem and remedy in refused.value.remedy

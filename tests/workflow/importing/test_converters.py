@@ -1,0 +1,108 @@
+"""The environment of the converters, and what they say, with scripts in their place."""
+
+from __future__ import annotations
+
+import os
+import stat
+import sys
+
+import pytest
+from calmotion.errors import ShotError
+from calmotion.workflow.importing import converters
+from calmotion.workflow.importing.converters import convert, converter_python
+from calmotion.workflow.importing.descriptions import Description
+
+if os.name == "nt":
+    pytest.skip("scripts stand in for the converters", allow_module_level=True)
+
+WRITE = "import os; os.mkdir(arguments[4]); open(arguments[4] + '/r.usda', 'w').write(' '.join(arguments))"
+
+
+@pytest.fixture
+def script(tmp_path):
+    """A Python of another environment: it runs these lines with its arguments."""
+
+    def make(lines, name="python"):
+        file = tmp_path / "env" / "bin" / name
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.write_text(f"#!{sys.executable}\nimport os, sys\narguments = sys.argv[1:]\n{lines}\n")
+        file.chmod(file.stat().st_mode | stat.S_IXUSR)
+        return file
+
+    return make
+
+
+@pytest.mark.parametrize(("kind", "module"), [("urdf", "urdf_usd_converter"), ("mjcf", "mujoco_usd_converter")])
+def test_each_kind_has_its_converter_and_packages_are_named(script, tmp_path, kind, module):
+    python = script(WRITE)
+    robot = Description(str(tmp_path / "r.xml"), kind, {"a": "/b"} if kind == "urdf" else {})
+    written, warnings = convert(robot, str(tmp_path / "out"), str(python))
+    said = open(written).read()
+    assert said.startswith(f"-I -m {module}") and ("--package a=/b" in said) == (kind == "urdf") and warnings == ()
+
+
+def test_warnings_are_told_and_lost_parts_refused(script, tmp_path):
+    robot = Description("r.urdf", "urdf")
+    harmless = script(f"{WRITE}\nprint('[Warning] [some.module.function] keys are not supported')")
+    assert convert(robot, str(tmp_path / "out"), str(harmless))[1] == ("keys are not supported",)
+    lossy = script(f"{WRITE}\nprint('[Warning] [some.module.function] Failed to convert mesh: m.dae', file=sys.stderr)")
+    with pytest.raises(ShotError, match="Failed to convert mesh"):
+        convert(robot, str(tmp_path / "out2"), str(lossy))
+
+
+@pytest.mark.parametrize("lines", ["print('Error: bad joint'); sys.exit(1)", "print('Error: bad joint')"])
+def test_what_a_converter_refuses_is_refused_in_its_words(script, tmp_path, lines):
+    with pytest.raises(ShotError, match="bad joint") as refused:
+        convert(Description("r.urdf", "urdf"), str(tmp_path / "out"), str(script(lines)))
+    assert refused.value.path == "r.urdf"
+
+
+def test_a_named_environment_must_have_the_converters(script, tmp_path, monkeypatch):
+    python = script("sys.exit(0)")
+    assert converter_python(str(tmp_path / "env"), print) == converter_python(str(python), print) == str(python)
+    monkeypatch.setenv(converters.VARIABLE, str(tmp_path / "env"))
+    assert converter_python(None, print) == str(python)
+    script("sys.exit('No module named urdf_usd_converter')")
+    with pytest.raises(ShotError, match="No module named urdf_usd_converter"):
+        converter_python(None, print)
+
+
+def test_an_environment_is_made_once_with_a_message(script, tmp_path, monkeypatch):
+    monkeypatch.delenv(converters.VARIABLE, raising=False)
+    monkeypatch.setenv("CALMOTION_CACHE", str(tmp_path / "cache"))
+    ran, told = [], []
+
+    def run(command, **options):
+        ran.append(command[1:])
+        if "venv" in command:
+            os.makedirs(command[-1])
+        return converters.subprocess.CompletedProcess(command, 0, "", "")
+
+    monkeypatch.setattr(converters.subprocess, "run", run)
+    first = converter_python(None, told.append)
+    assert converter_python(None, told.append) == first and first.startswith(str(tmp_path / "cache"))
+    assert [command[:2] for command in ran] == [["-m", "venv"], ["-I", "-m"]] and len(told) == 1
+    assert set(converters.PACKAGES) <= set(ran[1])
+
+
+def test_an_environment_that_cannot_be_made_is_no_environment(tmp_path, monkeypatch):
+    monkeypatch.delenv(converters.VARIABLE, raising=False)
+    monkeypatch.setenv("CALMOTION_CACHE", str(tmp_path / "cache"))
+
+    def fail(command, **options):
+        return converters.subprocess.CompletedProcess(command, int("pip" in command), "", "ERROR: no network")
+
+    monkeypatch.setattr(converters.subprocess, "run", fail)
+    for _ in range(2):
+        with pytest.raises(ShotError, match="no network") as refused:
+            converter_python(None, lambda text: None)
+        assert "--converters" in refused.value.remedy
+
+
+def test_without_a_supported_python_it_says_which(monkeypatch, tmp_path):
+    monkeypatch.delenv(converters.VARIABLE, raising=False)
+    monkeypatch.setenv("CALMOTION_CACHE", str(tmp_path / "cache"))
+    monkeypatch.setattr(converters, "_PYTHONS", ((3, 8), (3, 9)))
+    monkeypatch.setattr(converters.shutil, "which", lambda name: None)
+    with pytest.raises(ShotError, match="Python 3.8 to 3.9"):
+        converter_python(None, lambda text: None)

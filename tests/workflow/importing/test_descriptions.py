@@ -1,0 +1,89 @@
+"""URDF and MJCF files before they are converted."""
+
+from __future__ import annotations
+
+import pytest
+from calmotion.errors import ShotError
+from calmotion.workflow.importing.descriptions import read_description
+
+BOX = '<geometry><box size="1 1 1"/></geometry>'
+MASS = '<inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>'
+JOINT = (
+    '<joint name="j" type="revolute"><parent link="a"/><child link="b"/><limit lower="-1" upper="1" effort="7" '
+    'velocity="2"/></joint>'
+)
+
+
+def urdf(mesh=BOX, inertial=MASS, joint=JOINT):
+    link = f'<link name="b"><visual>{mesh}</visual>{inertial}</link>'
+    return f'<robot name="r"><link name="a"/>{link}{joint}</robot>'
+
+
+@pytest.fixture
+def read(tmp_path):
+    def run(text, packages=None, folder="my_robot/urdf"):
+        file = tmp_path / folder / "robot.urdf"
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.write_text(text)
+        return read_description(str(file), packages or {})
+
+    return run
+
+
+def mesh(name):
+    return f'<geometry><mesh filename="{name}"/></geometry>'
+
+
+def test_efforts_and_links_without_inertia_are_found(read):
+    found = read(urdf(inertial=""))
+    assert found.kind == "urdf" and found.efforts == {"j": 7.0} and found.without_mass == ("b",)
+    assert read(urdf(joint=JOINT.replace('"7"', '"0"'))).efforts == {}
+    assert read(urdf(inertial=MASS.replace('value="1"', 'value="0.0"'))).massless == ("a", "b")
+    assert found.massless == ("a",), "a frame"
+    assert read('<mujoco model="m"><worldbody/></mujoco>').kind == "mjcf"
+
+
+@pytest.mark.parametrize("name", ["package://my_robot/meshes/b.stl", "../meshes/b.stl", "file://../meshes/b.stl"])
+def test_meshes_are_found_beside_the_file_and_in_its_package(read, tmp_path, name):
+    (tmp_path / "my_robot" / "meshes").mkdir(parents=True)
+    (tmp_path / "my_robot" / "meshes" / "b.stl").touch()
+    packages = read(urdf(mesh(name))).packages
+    assert packages == ({"my_robot": str(tmp_path / "my_robot")} if "package" in name else {})
+
+
+def test_a_package_stands_beside_a_folder_above_or_is_named(read, tmp_path):
+    (tmp_path / "parts").mkdir()
+    (tmp_path / "parts" / "b.stl").touch()
+    text = urdf(mesh("package://parts/b.stl"))
+    assert read(text).packages == {"parts": str(tmp_path / "parts")}
+    text = text.replace("parts", "others")
+    assert read(text, {"others": str(tmp_path / "parts")}).packages == {"others": str(tmp_path / "parts")}
+    with pytest.raises(ShotError) as refused:
+        read(text)
+    assert "--package others=FOLDER" in refused.value.remedy
+    with pytest.raises(ShotError, match="no folder"):
+        read(text, {"others": str(tmp_path / "none")})
+
+
+REFUSED = {
+    "a mesh that is missing": (urdf(mesh("b.stl")), "b.stl of b"),
+    "a xacro": (urdf().replace("<robot", '<robot xmlns:xacro="http://www.ros.org/wiki/xacro"').replace(
+        '<link name="a"/>', '<xacro:arm/><link name="a"/>'), "xacro"),
+    "a floating joint": (urdf(joint=JOINT.replace("revolute", "floating")), "floating joint is not supported"),
+    "another file": ("<svg/>", "neither a URDF nor an MJCF"),
+    "no XML": ("hello", "no XML file"),
+    "a prefix that is not declared": (urdf().replace('<link name="a"/>', "<drake:joint/>"), "Declare the prefix"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", REFUSED)
+def test_what_cannot_be_converted_is_refused(read, name):
+    text, problem = REFUSED[name]
+    with pytest.raises(ShotError) as refused:
+        read(text)
+    assert problem in refused.value.message() and refused.value.remedy
+
+
+def test_a_file_that_is_missing_is_refused(tmp_path):
+    with pytest.raises(ShotError, match="cannot be read"):
+        read_description(str(tmp_path / "none.urdf"), {})
