@@ -1,5 +1,10 @@
-"""Puts the bundled plugins and the USD schemas into the wheel as package data."""
+"""Puts the bundled plugins and the USD schemas into the wheel as package data.
 
+With `CALMOTION_WHEEL_KERNELS=FOLDER` (`make wheel`) the compiled kernels of that folder as well; the wheel is then for
+one platform and version of Python.
+"""
+
+import os
 from pathlib import Path
 from typing import Any
 
@@ -19,4 +24,7 @@ class BundledFiles(BuildHookInterface):
         for manifest in sorted(Path(self.root, "plugins").glob("*/plugin.toml")):
             name = manifest.parent.name
             included[f"plugins/{name}"] = f"{TARGET}/plugins/{name}"
+        if kernels := os.environ.get("CALMOTION_WHEEL_KERNELS"):
+            included[kernels] = f"{TARGET}/kernels"
+            build_data["pure_python"], build_data["infer_tag"] = False, True
         build_data["force_include"].update(included)

@@ -21,7 +21,12 @@ from packaging.utils import canonicalize_name
 
 
 def run(*command: object, folder: Path) -> str:
-    """Run a command in a folder without what would let it see the checkout or earlier runs; its stdout."""
+    """As `run_process`; its stdout."""
+    return run_process(*command, folder=folder).stdout
+
+
+def run_process(*command: object, folder: Path) -> subprocess.CompletedProcess[str]:
+    """Run a command in a folder without what would let it see the checkout or earlier runs."""
     hidden = ("PYTHONPATH", "PYTHONHOME", "VIRTUAL_ENV", "CALMOTION_PLUGINS")
     environment = {key: value for key, value in os.environ.items() if key not in hidden}
     environment["CALMOTION_CACHE"] = str(folder / "cache")
@@ -29,7 +34,7 @@ def run(*command: object, folder: Path) -> str:
         list(map(str, command)), cwd=folder, env=environment, capture_output=True, text=True, timeout=1800
     )
     assert done.returncode == 0, f"{command}\n{done.stdout}\n{done.stderr}"
-    return done.stdout
+    return done
 
 
 @pytest.fixture(scope="module")
@@ -42,6 +47,11 @@ def installed(tmp_path_factory: pytest.TempPathFactory, repository: Path) -> Pat
     folder = tmp_path_factory.mktemp("wheel")
     run(sys.executable, "-m", "pip", "wheel", "--quiet", "--no-deps", "-w", folder, repository, folder=folder)
     (wheel,) = folder.glob("calmotion-*.whl")
+    return environment_with(wheel, folder)
+
+
+def environment_with(wheel: Path, folder: Path) -> Path:
+    """The Python of a new environment in a folder with a wheel, and with the dependencies that are installed here."""
     venv.create(folder / "environment", with_pip=False)
     python = folder / "environment" / "bin" / "python"
     run(sys.executable, "-m", "pip", "--python", python, "install", "--quiet", "--no-deps", wheel, folder=folder)
@@ -93,13 +103,67 @@ def imported(path: Path) -> set[str]:
 def test_every_import_is_declared(repository: Path):
     project = tomllib.loads((repository / "pyproject.toml").read_text())["project"]
     declared = {canonicalize_name(Requirement(text).name) for text in project["dependencies"]}
-    optional = {"bpy", "bpy_extras", "mathutils", "exudyn", "pytest", "pandas"}  # each where its users have it
+    # each where its users have it
+    optional = {
+        "bpy",
+        "bpy_extras",
+        "mathutils",
+        "exudyn",
+        "mcap_ros2",
+        "pytest",
+        "pandas",
+    }  # each where its users have it
     owners = packages_distributions()
     modules = [path for room in ("pipeline", "plugins") for path in (repository / room).rglob("*.py")]
     assert len(modules) > 200
     for path in modules:
         for name in imported(path) - sys.stdlib_module_names - optional - {"calmotion"}:
             assert declared & {canonicalize_name(owner) for owner in owners.get(name, [name])}, f"{path}: {name}"
+
+
+COUNTING = """
+import sys
+import calmotion.support.compilation  # before numba, whose options it sets
+from numba.core import event
+
+class Compilations(event.Listener):
+    def on_start(self, happened):
+        print("compiled", happened.data["dispatcher"].py_func.__qualname__, file=sys.stderr)
+
+    def on_end(self, happened):
+        pass
+
+event.register("numba:compile", Compilations())
+from calmotion.cli.main import main
+sys.exit(main(sys.argv[1:]))
+"""
+
+
+@pytest.mark.long
+def test_a_platform_wheel_compiles_nothing(repository: Path, tmp_path: Path):
+    shutil.copytree(repository / "samples" / "bartender", tmp_path / "bartender")
+    kernels, python = os.environ.get("CALMOTION_WHEEL_KERNELS") or tmp_path / "kernels", sys.executable
+    cpu = {"NUMBA_CPU_NAME": "x86-64-v3", "NUMBA_CPU_FEATURES": "+avx,+avx2,+bmi,+bmi2,+f16c,+fma,+lzcnt,+movbe"}
+    building = (
+        os.environ | cpu | {"CALMOTION_CACHE": str(tmp_path / "build"), "PYTHONPATH": str(repository / "pipeline")}
+    )
+    if not Path(kernels).is_dir():
+        script = repository / ".ci" / "wheel_kernels.py"
+        subprocess.run([python, script, kernels], env=building, check=True, capture_output=True, timeout=3000)
+    building["CALMOTION_WHEEL_KERNELS"] = str(kernels)
+    command = [python, "-m", "pip", "wheel", "--quiet", "--no-deps", "-w", tmp_path, repository]
+    subprocess.run(command, env=building, check=True, capture_output=True, timeout=600)
+    (wheel,) = tmp_path.glob("calmotion-*.whl")
+    assert not wheel.name.endswith("-none-any.whl")
+    installed = environment_with(wheel, tmp_path)
+    for arguments in (
+        ["optimize", "bartender/bartender.usda", "-o", "calm.usda", "--json"],
+        ["simulate", "bartender/bartender.usda", "--json"],
+    ):
+        (tmp_path / "count.py").write_text(COUNTING)
+        done = run_process(installed, "count.py", *arguments, folder=tmp_path)
+        assert [line for line in done.stderr.splitlines() if line.startswith("compiled")] == []
+        assert "error" not in json.loads(done.stdout)
 
 
 @pytest.mark.long

@@ -6,9 +6,18 @@ import os
 import stat
 import subprocess
 import sys
+import tempfile
 
 import pytest
-from calmotion.support.files import PREFIX, _machine, remove_abandoned, replaced, write_text
+from calmotion.support.files import (
+    PREFIX,
+    _machine,
+    remove_abandoned,
+    replaced,
+    temporary_folder,
+    try_writing,
+    write_text,
+)
 
 
 def names(folder):
@@ -111,6 +120,33 @@ with replaced({str(tmp_path / "layer.usda")!r}):
     assert names(tmp_path) == ["layer.usda", "table.csv"]
 
 
+def test_folders_of_killed_processes_are_removed_by_the_next_that_makes_one(tmp_path, monkeypatch):
+    code = """
+import os
+from calmotion.support.files import temporary_folder
+with temporary_folder() as folder:
+    (folder / "surface.npz").write_text("much")
+    os._exit(9)
+"""
+    environment = os.environ | {"TMPDIR": str(tmp_path)}
+    assert subprocess.run([sys.executable, "-c", code], check=False, env=environment).returncode == 9
+    assert len(names(tmp_path)) == 1
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    with temporary_folder() as folder:
+        assert names(tmp_path) == [folder.name] and folder.name.startswith(PREFIX)
+        if os.name == "posix":
+            assert folder.stat().st_mode & 0o077 == 0
+    assert names(tmp_path) == []
+
+
+def test_temporary_files_of_other_users_are_left_alone(tmp_path, monkeypatch):
+    (tmp_path / f"{PREFIX}{_machine()}-999999999-x").mkdir()
+    user = os.getuid()
+    monkeypatch.setattr(os, "getuid", lambda: user + 1)
+    remove_abandoned(tmp_path)
+    assert len(names(tmp_path)) == 1
+
+
 def test_old_temporary_files_are_removed_and_new_ones_are_not(tmp_path):
     for name, age in ((f"{PREFIX}old.npz", 7200.0), (f"{PREFIX}new.npz", 60.0), ("old.npz", 7200.0)):
         (tmp_path / name).write_text("")
@@ -118,3 +154,14 @@ def test_old_temporary_files_are_removed_and_new_ones_are_not(tmp_path):
         os.utime(tmp_path / name, (then, then))
     remove_abandoned(tmp_path)
     assert names(tmp_path) == [f"{PREFIX}new.npz", "old.npz"]
+
+
+@pytest.mark.parametrize("make", [lambda path: os.mkfifo(path), lambda path: path.symlink_to("/dev/null")])
+def test_what_is_no_file_is_not_replaced(tmp_path, make):
+    path = tmp_path / "table.csv"
+    make(path)
+    before = os.lstat(path)
+    for write in (try_writing, lambda path: write_text(path, "new")):
+        with pytest.raises(OSError, match="Not a file"):
+            write(path)
+    assert os.lstat(path) == before and names(tmp_path) == ["table.csv"]

@@ -4,7 +4,7 @@ import pytest
 from calmotion.errors import ShotError
 from calmotion.host import SettingError
 from calmotion.host.settings import read_settings_file
-from calmotion.support.foreign_files import kind_of, remedy_for
+from calmotion.support.foreign_files import forbidden_place, kind_of, remedy_for
 from calmotion.usd.stages import open_layer
 
 FILES = {
@@ -34,3 +34,24 @@ def test_other_files_have_no_such_remedy(text, tmp_path):
     path = tmp_path / "file"
     path.write_text(text)
     assert remedy_for(path) is None and remedy_for(tmp_path) is None and remedy_for(tmp_path / "none") is None
+
+
+FORBIDDEN = ("http://host/a.usda", "HTTPS://host/a.usda", "file:///a.usda", "//host/share/a.usda", "\\\\host\\a.usda",
+             "/dev/zero", "/proc/self/mem", "/sys/a", "/dev/../dev/null", "smb:a", "/tmp/../dev/null")  # fmt: skip
+
+
+@pytest.mark.parametrize("path", FORBIDDEN)
+def test_the_network_and_devices_are_forbidden_places(path):
+    assert forbidden_place(path)
+
+
+@pytest.mark.parametrize(
+    "path", ["a.usda", "./dev/a.usda", "/home/dev/a.usda", "C:/a.usda", "asset:a", "/dev/shm/a.usda"]
+)
+def test_files_are_allowed_places(path):
+    assert forbidden_place(path) is None
+
+
+def test_a_link_counts_as_what_it_leads_to(tmp_path):
+    (tmp_path / "a.usda").symlink_to("/dev/zero")
+    assert forbidden_place(str(tmp_path / "a.usda"))

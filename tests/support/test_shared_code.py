@@ -98,3 +98,17 @@ def test_a_caller_of_a_cached_kernel_with_shared_ones_is_found_in_the_cache(run)
     run(call.format("linked", 3.0))
     run(call.format("linking", 4.0))  # has a copy of the cached one, and with it the symbol
     run(call.format("linking", 4.0))
+
+
+def test_kernels_that_kernels_call_get_an_entrance_for_python_when_it_calls_them(run):
+    script = """
+import numpy as np, module
+x = np.array([1.0, 2.0, 3.0])
+assert module.outer(x) == 56.0
+assert module.middle(x) == 20.0 and module.inner(x, 2.0) == 14.0
+assert module.linking(x) == 15.0 and module.linked(x) == 14.0 and module.outer(x) == 56.0
+for function in (module.outer, module.middle, module.inner, module.linking, module.linked):
+    print(sum(function.stats.cache_hits.values()), sum(function.stats.cache_misses.values()))
+"""
+    assert run(script) == [(0, 1), (0, 2), (0, 2), (0, 1), (0, 2)]
+    assert all(misses == 0 for _, misses in run(script))

@@ -16,19 +16,16 @@ from functools import cache
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
-# Compiling is most of a first run. At level 1 it takes two thirds of the time, and the kernels, whose loops are short,
-# run no slower. numba reads the level once, so it must be set before its first import; a user's own choice stays.
-os.environ.setdefault("NUMBA_OPT", "1")
-
-import llvmlite  # noqa: E402
-import numba  # noqa: E402
-import numpy as np  # noqa: E402
-from numba import config, njit  # noqa: E402
+import llvmlite
+import numba
+import numpy as np
+from numba import config, njit
 
 from calmotion.support import references  # noqa: F401
 from calmotion.support.caching.cache_folder import KERNELS, cache_folder
 from calmotion.support.caching.caches import mark_used, prune
 from calmotion.support.kernel_cache import verified
+from calmotion.support.kernel_compiler import KernelCompiler, with_entrance_for_python
 from calmotion.support.shared_code import shared, with_addresses
 from calmotion.support.sources import digest_of, with_imports
 
@@ -39,7 +36,7 @@ PACKAGE = Path(__file__).parents[1]
 YES, NO = cast(bool, np.bool_(True)), cast(bool, np.bool_(False))
 FUSED = {"contract"}  # a product and a sum in one rounding; nothing that would reorder or drop terms
 # Modules of this folder that decide what is compiled.
-_COMPILERS = {"by_reference.py", "compilation.py", "references.py", "shared_code.py"}
+_COMPILERS = {"by_reference.py", "compilation.py", "kernel_compiler.py", "references.py", "shared_code.py"}
 _KERNEL = re.compile(rb"kernel\ndef ")
 _WITHOUT_ARRAYS: dict[str, Any] = {"_nrt": False, "no_cfunc_wrapper": True, "nogil": True}  # of its own making
 
@@ -70,7 +67,7 @@ def kernel_key(package: Path) -> str:
         path for path in with_imports(kernels, package.parent) if support not in path.parents
     }  # nothing of it is compiled
     sources = sorted({*used, *(path for path in support.glob("*.py") if path.name in _COMPILERS)})
-    level = f"numba {numba.__version__} llvmlite {llvmlite.__version__} python {sys.version_info[:3]} opt {config.OPT}"
+    level = f"numba {numba.__version__} llvmlite {llvmlite.__version__} python {sys.version_info[:2]} opt {config.OPT}"
     return hashlib.sha256(f"{level} {digest_of(sources)}".encode()).hexdigest()
 
 
@@ -109,7 +106,7 @@ def _compile(function: Function, **options: Any) -> Function:
     if not os.environ.get("NUMBA_CACHE_DIR"):
         config.CACHE_DIR = str(kernel_folder())
     try:
-        dispatcher = njit(cache=True, fastmath=FUSED, **options)(function)
+        dispatcher = njit(cache=True, fastmath=FUSED, pipeline_class=KernelCompiler, **options)(function)
     finally:
         config.CACHE_DIR = before
-    return cast(Function, with_addresses(verified(dispatcher)))
+    return cast(Function, with_addresses(with_entrance_for_python(verified(dispatcher))))

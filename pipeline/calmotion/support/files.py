@@ -8,6 +8,7 @@ import hashlib
 import os
 import platform
 import re
+import shutil
 import stat
 import tempfile
 import time
@@ -21,7 +22,7 @@ _NAME = re.compile(re.escape(PREFIX) + r"([0-9a-f]{8})-(\d+)-")
 
 
 @contextlib.contextmanager
-def replaced(path: str | Path, keep_existing: bool = False) -> Iterator[Path]:
+def replaced(path: str | Path, keep_existing: bool = False, flush: bool = True) -> Iterator[Path]:
     """A temporary file that replaces `path` when the block ends without an exception.
 
     The file is created exclusively, under a random name that starts with `PREFIX`, machine and process and has the
@@ -31,34 +32,65 @@ def replaced(path: str | Path, keep_existing: bool = False) -> Iterator[Path]:
     any new file.
 
     Args:
-        path: The file to replace; a symbolic link is replaced itself.
+        path: The file to replace; a symbolic link to a file is replaced itself.
         keep_existing: Keep a file that is already at `path`, and drop the new one.
+        flush: Whether the file must survive a power cut; not for a cache whose files are verified when they are read.
 
     Yields:
         The path of the temporary file, which is empty.
 
     Raises:
-        OSError: The file cannot be written; what was at `path` is still there.
+        OSError: The file cannot be written, or is no file; what was at `path` is still there.
     """
     target = Path(path)
+    refuse_special(target)
     target.parent.mkdir(parents=True, exist_ok=True)
     remove_abandoned(target.parent)
-    prefix = f"{PREFIX}{_machine()}-{os.getpid()}-"
-    handle, name = tempfile.mkstemp(dir=target.parent, prefix=prefix, suffix=target.suffix)
-    os.close(handle)
-    temporary = Path(name)
-    try:
+    with new_file(target) as temporary:
         yield temporary
-        _flush(temporary)
+        if flush:
+            _flush(temporary)
         _make_public(temporary)
         if keep_existing:
             _move_unless_present(temporary, target)
         else:
             os.replace(temporary, target)
+    if flush:
+        with contextlib.suppress(OSError):  # the file is in its place; some file systems cannot flush a folder
+            _flush(target.parent)
+
+
+@contextlib.contextmanager
+def new_file(target: Path) -> Iterator[Path]:
+    """An empty temporary file in the folder of `target` that only this user can read, removed when the block ends.
+
+    Raises:
+        OSError: It cannot be made.
+    """
+    handle, name = tempfile.mkstemp(dir=target.parent, prefix=_own_prefix(), suffix=target.suffix)
+    os.close(handle)
+    temporary = Path(name)
+    try:
+        yield temporary
     finally:
         temporary.unlink(missing_ok=True)
-    with contextlib.suppress(OSError):  # the file is in its place; some file systems cannot flush a folder
-        _flush(target.parent)
+
+
+@contextlib.contextmanager
+def temporary_folder() -> Iterator[Path]:
+    """A folder among the temporary files of the system, which goes when the block ends.
+
+    What killed processes of this user left there is removed first.
+
+    Yields:
+        The folder, which only this user can read.
+
+    Raises:
+        OSError: It cannot be made.
+    """
+    remove_abandoned(Path(tempfile.gettempdir()))
+    with tempfile.TemporaryDirectory(prefix=_own_prefix(), ignore_cleanup_errors=True) as folder:
+        yield Path(folder)
 
 
 def write_text(path: str | Path, text: str) -> None:
@@ -80,6 +112,7 @@ def try_writing(path: str | Path) -> None:
     target = Path(path)
     if target.is_dir():
         raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(target))
+    refuse_special(target)
     target.parent.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryFile(dir=target.parent, prefix=PREFIX):
         pass
@@ -94,18 +127,40 @@ def is_special(path: str | os.PathLike[str]) -> bool:
     return not (stat.S_ISREG(mode) or stat.S_ISDIR(mode))
 
 
+def refuse_special(path: str | os.PathLike[str]) -> None:
+    """Refuse what is no file, also where a link leads to it: who reads a pipe waits for ever, and a device that is
+    replaced is gone for all programs.
+
+    Raises:
+        OSError: It is a named pipe, a socket or a device.
+    """
+    if is_special(path):
+        raise OSError(errno.EINVAL, "Not a file but a named pipe, a socket or a device", str(path))
+
+
 def remove_abandoned(folder: Path) -> None:
-    """Remove the temporary files that killed processes left in a folder.
+    """Remove the temporary files and folders that killed processes of this user left in a folder.
 
     Those are the files of processes of this machine that do not run any more, and others that are older than an hour.
     """
     for path in folder.glob(f"{PREFIX}*"):
         with contextlib.suppress(OSError):  # another process removed it
-            if _is_abandoned(path):
+            if not _is_abandoned(path):
+                continue
+            if path.is_dir() and not path.is_symlink():
+                shutil.rmtree(path, ignore_errors=True)
+            else:
                 path.unlink()
 
 
+def _own_prefix() -> str:
+    """What the names of temporary files of this process begin with."""
+    return f"{PREFIX}{_machine()}-{os.getpid()}-"
+
+
 def _is_abandoned(path: Path) -> bool:
+    if hasattr(os, "getuid") and path.lstat().st_uid != os.getuid():  # in a folder that several users share
+        return False
     name = _NAME.match(path.name)
     if name is not None and name[1] == _machine():
         return not _runs(int(name[2]))

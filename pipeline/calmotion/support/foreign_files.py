@@ -1,4 +1,5 @@
-"""Files of other kinds in the place of a shot, a motion or settings: what they are and what to do with them."""
+"""Files that others name: those of other kinds in the place of a shot, a motion or settings, and places that are never
+opened because a shot names them."""
 
 from __future__ import annotations
 
@@ -8,17 +9,46 @@ _HEAD = 4096  # bytes that tell the kind of a file
 _KINDS = {
     "urdf": (
         "a URDF robot",
-        "Convert it to USD, for example with urdf-usd-converter or in Isaac Sim, and animate it there",
+        "Make a shot of it: `calmotion import ROBOT.urdf --motion FILE -o robot.usda`",
     ),
     "mjcf": (
         "an MJCF robot",
-        "Convert it to USD, for example with mujoco-usd-converter or in Isaac Sim, and animate it there",
+        "Make a shot of it: `calmotion import ROBOT.xml --motion FILE -o robot.usda`",
     ),
     "table": (
         "a table that `--csv` wrote",
         "It is a result, for plots and spreadsheets; name the USD file of the shot, or the layer that `-o` wrote",
     ),
 }
+
+
+# Schemes by which a program would fetch a file or talk to a machine. Others belong to asset resolvers that the user has
+# installed.
+_SCHEMES = ("http", "https", "ftp", "ftps", "sftp", "ssh", "scp", "smb", "cifs", "nfs", "dav", "davs", "webdav", "file",
+            "data", "ldap", "telnet", "git", "ws", "wss")  # fmt: skip
+_SYSTEM = ("/dev", "/proc", "/sys")  # devices and processes
+_SHARED = "/dev/shm/"  # nosec B108  # memory that is used like a disk
+
+
+def forbidden_place(path: str) -> str | None:
+    """What is wrong with a place that a shot names; None for one that may be opened.
+
+    Args:
+        path: As it is authored, or resolved; a symbolic link counts as what it leads to.
+    """
+    text = path.strip().replace("\\", "/")
+    scheme, colon, rest = text.partition(":")
+    if colon and scheme.lower() in _SCHEMES:
+        return "a file on the network or by its address is not opened"
+    if text.startswith("//"):
+        return "a file of another machine is not opened"
+    real = os.path.realpath(text) if os.path.isabs(text) else text
+    for place in (os.path.normpath(text), real):
+        if not place.startswith(_SHARED) and any(
+            place == folder or place.startswith(f"{folder}/") for folder in _SYSTEM
+        ):
+            return "devices and files of the system are not opened"
+    return None
 
 
 def kind_of(path: str | os.PathLike[str]) -> str | None:

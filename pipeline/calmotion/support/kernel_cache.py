@@ -2,7 +2,7 @@
 
 numba believes what lies in its cache: a file that a power cut has emptied or changed ends every later run with an error
 inside numba or LLVM, or in wrong machine code. Here such a file is removed with a notice, and its function compiled
-again.
+again. Files are signed with the key of the user, so that those of others are never unpickled.
 """
 
 from __future__ import annotations
@@ -15,19 +15,46 @@ from typing import Any
 from numba.core.caching import IndexDataCacheFile
 from numba.core.serialize import dumps
 
+from calmotion.support.caching.bundled_kernels import FOLDER, BundledKernels
 from calmotion.support.caching.caches import discard
-from calmotion.support.caching.verified_files import DamagedFileError, read_verified, sealed
+from calmotion.support.caching.signing import signing_key
+from calmotion.support.caching.verified_files import DamagedFileError, ForeignFileError, read_verified, sealed
 from calmotion.support.files import replaced
+from calmotion.support.kernel_compiler import is_called_by_kernel
+
+_FOR_KERNELS = "without an entrance for Python"
 
 
 class VerifiedCacheFile(IndexDataCacheFile):  # type: ignore[misc]
-    """The index and the data of one function, by the same names as numba's."""
+    """The index and the data of one function, by the same names as numba's.
+
+    Machine code for kernels lacks the entrance for Python, and so is kept under a key of its own.
+    """
+
+    def __init__(self, *args: Any, bundled: BundledKernels | None = None, **kwargs: Any):
+        super().__init__(*args, **kwargs)
+        self._bundled = bundled
+
+    def load(self, key: Any) -> Any:
+        """What was saved for a key, or came with the installation; otherwise None."""
+        found = super().load(key)
+        if found is None and is_called_by_kernel():
+            found = super().load((key, _FOR_KERNELS))
+        if found is None and self._bundled is not None:
+            found = self._bundled.load(key)
+            if found is None and is_called_by_kernel():
+                found = self._bundled.load(key, _FOR_KERNELS)
+        return found
+
+    def save(self, key: Any, data: Any) -> None:
+        """Save data for a key."""
+        super().save((key, _FOR_KERNELS) if is_called_by_kernel() else key, data)
 
     def _load_index(self) -> dict[Any, str]:
         content = _content(Path(self._index_path))
         if content is None:
             return {}
-        version, stamp, overloads = pickle.loads(content)
+        version, stamp, overloads = pickle.loads(content)  # nosec B301  # signed
         return overloads if (version, stamp) == (self._version, self._source_stamp) else {}
 
     def _save_index(self, overloads: dict[Any, str]) -> None:
@@ -37,7 +64,7 @@ class VerifiedCacheFile(IndexDataCacheFile):  # type: ignore[misc]
         content = _content(Path(self._data_path(name)))
         if content is None:
             raise FileNotFoundError(name)  # numba then compiles the function
-        return pickle.loads(content)
+        return pickle.loads(content)  # nosec B301  # signed
 
     def _save_data(self, name: str, data: Any) -> None:
         _write(Path(self._data_path(name)), data)
@@ -45,17 +72,21 @@ class VerifiedCacheFile(IndexDataCacheFile):  # type: ignore[misc]
 
 def verified(dispatcher: Any) -> Any:
     """A function that numba compiles and caches, with verified files."""
-    cache = dispatcher._cache
+    cache, package = dispatcher._cache, dispatcher.py_func.__module__.rpartition(".")[0]
+    bundled = FOLDER / Path(cache.cache_path).parent.name  # the key of the sources
     cache._cache_file = VerifiedCacheFile(
         cache_path=cache.cache_path, filename_base=cache._impl.filename_base,
         source_stamp=cache._impl.locator.get_source_stamp(),
+        bundled=BundledKernels(bundled / package, cache._impl.filename_base) if bundled.is_dir() else None,
     )  # fmt: skip
     return dispatcher
 
 
 def _content(path: Path) -> bytes | None:
     try:
-        return read_verified(path)
+        return read_verified(path, signing_key())
+    except ForeignFileError:  # it is compiled and written again
+        pass
     except DamagedFileError:
         discard(path)
     except FileNotFoundError:
@@ -65,5 +96,5 @@ def _content(path: Path) -> bytes | None:
 
 def _write(path: Path, value: Any) -> None:
     """Write a file; a full disk or a folder that cannot be written only means that it is compiled again."""
-    with contextlib.suppress(OSError), replaced(path) as temporary:
-        temporary.write_bytes(sealed(dumps(value)))
+    with contextlib.suppress(OSError), replaced(path, flush=False) as temporary:
+        temporary.write_bytes(sealed(dumps(value), signing_key()))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from pathlib import Path
 
@@ -23,10 +24,38 @@ def peak_memory() -> float:
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * unit / 1e9
 
 
+def resident_memory() -> int | None:
+    """Memory of this process [bytes]; None where the system does not tell."""
+    pages = _read("/proc/self/statm").split()[1:2]
+    if not pages:
+        return None
+    import resource
+
+    return int(pages[0]) * resource.getpagesize()
+
+
 def available_memory() -> float:
     """Memory that this process can still take without swapping [bytes]: what the machine has free, and what a container
     and the limit of the address space leave; infinite where the system does not tell."""
     return min(_free_memory(), *(_group_memory(limit, use) for limit, use in _GROUPS), _address_space())
+
+
+def too_large(path: str, factor: float) -> str:
+    """Why a file is not read: its content would not fit into the free memory; empty where it does or there is none.
+
+    Args:
+        path: The file.
+        factor: Memory that its content takes, by the size of the file.
+    """
+    try:
+        size = float(os.path.getsize(path))
+    except (OSError, ValueError):
+        return ""
+    free = available_memory()
+    needed = factor * size
+    return (
+        f"{size / 1e9:.2f} GB, for which {needed / 1e9:.1f} of {free / 1e9:.1f} GB are needed" if needed > free else ""
+    )
 
 
 def _free_memory() -> float:

@@ -22,9 +22,14 @@ def nearest(found: str, known: Iterable[str]) -> str:
 
     Paths are compared by their last parts first, since most paths of a shot begin alike.
     """
-    names = list(known)
-    near = _nearest_path(found, names) if any("/" in name for name in names) else _like(found, names)
+    near = nearest_name(found, known)
     return f"Did you mean {near}? " if near else ""
+
+
+def nearest_name(found: str, known: Iterable[str]) -> str:
+    """The known name that is most like one that is not known; empty where none is like it."""
+    names = list(known)
+    return _nearest_path(found, names) if any("/" in name for name in names) else _like(found, names)
 
 
 def _nearest_path(found: str, paths: Sequence[str]) -> str:

@@ -17,6 +17,8 @@ from typing import Any
 import llvmlite.binding
 from numba.core import cgutils, imputils
 
+from calmotion.support.kernel_compiler import called_by_kernel
+
 
 @dataclass(frozen=True)
 class _Address:
@@ -32,7 +34,8 @@ class _Address:
         return f"{self.module}.{self.name}.{types}"
 
     def __call__(self) -> None:
-        getattr(importlib.import_module(self.module), self.name).compile(self.arguments)
+        with called_by_kernel():
+            getattr(importlib.import_module(self.module), self.name).compile(self.arguments)
 
 
 def with_addresses(dispatcher: Any) -> Any:

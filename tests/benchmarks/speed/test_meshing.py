@@ -54,3 +54,30 @@ def test_links_that_cannot_be_meshed_are_reported_and_the_others_are_measured(sh
 def test_sizes_are_multiples_of_the_automatic_one_or_lengths():
     assert meshing._length("1.4", 0.01) == pytest.approx(0.014)
     assert meshing._length("8mm", 0.01) == pytest.approx(0.008)
+
+
+def test_the_survey_has_a_row_for_each_link_and_says_what_became_of_it(shot, tmp_path, capsys, monkeypatch):
+    monkeypatch.setenv("CALMOTION_CACHE", str(tmp_path / "cache"))
+    file = tmp_path / "links.csv"
+    assert meshing.main([f"{shot}:fore", "-o", str(file)]) == 0
+    with open(file, newline="") as text:
+        (row,) = csv.DictReader(text)
+    assert (row["link"], row["source"], row["note"]) == ("fore", "visual surface", "")
+    assert float(row["volume"]) == pytest.approx(1e6 * LENGTH * WIDTH**2, rel=1e-6)
+    assert float(row["of_hull"]) == pytest.approx(1.0) and int(row["off"]) == 0 and int(row["joints"]) >= 1
+    assert float(row["density"]) == pytest.approx(1e6 * float(row["mass"]) / float(row["volume"]))
+    beam = 3.516 / (2.0 * np.pi) * np.sqrt(1.8e9 * WIDTH**2 / 12.0 / 1200.0) / LENGTH**2
+    assert float(row["f1"]) == pytest.approx(beam, rel=0.03)
+    assert int(row["nodes"]) > 100 and float(row["seconds"]) > 0.0 and float(row["estimate"]) < 5.0
+    printed = capsys.readouterr().out
+    assert "1 of 1 links are flexible (100%)" in printed and "| fore | visual surface |" in printed
+
+
+def test_a_link_that_is_refused_says_why(shot, capsys, monkeypatch):
+    def refuse(*arguments):
+        raise ShotError("encloses no volume", path=FORE, remedy="Close it")
+
+    monkeypatch.setattr(meshing._mesher(), "geometry_of", refuse)
+    assert meshing.main([f"{shot}:fore", "--geometry-only"]) == 1
+    printed = capsys.readouterr().out
+    assert "0 of 1 links have a solid" in printed and "encloses no volume" in printed and "Close it" in printed

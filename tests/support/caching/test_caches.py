@@ -4,8 +4,10 @@ import os
 
 import numpy as np
 import pytest
+from calmotion.support.caching import caches
 from calmotion.support.caching.cache_folder import CACHES, FORMER, KERNELS, MESHES, REDUCTIONS
 from calmotion.support.caching.caches import clear, entries, prune, store_arrays, stored_arrays
+from calmotion.support.files import PREFIX, _machine
 
 
 @pytest.fixture(autouse=True)
@@ -112,3 +114,11 @@ def test_a_link_in_place_of_a_former_folder_is_not_followed(folder, tmp_path_fac
     (folder / FORMER[MESHES]).symlink_to(other, target_is_directory=True)
     prune(MESHES)
     assert (other / "mine.npz").exists()
+
+
+def test_what_a_killed_process_left_is_removed_by_one_that_only_reads(folder):
+    store_arrays(MESHES, "0" * 64, {"points": np.ones(3)})
+    left = folder / MESHES / f"{PREFIX}{_machine()}-999999999-x.npz"
+    left.write_bytes(b"half")
+    caches._tidy.cache_clear()  # as in a new process
+    assert stored_arrays(MESHES, "0" * 64) is not None and not left.exists()

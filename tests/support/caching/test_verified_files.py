@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from calmotion.support.caching.verified_files import (
     DamagedFileError,
+    ForeignFileError,
     read_arrays,
     read_verified,
     sealed,
@@ -57,6 +58,32 @@ def test_pickled_objects_are_not_loaded(tmp_path):
         read_arrays(tmp_path / "x.npz")
 
 
+@pytest.mark.parametrize("bomb", ["compressed", "shape"])
+def test_arrays_that_are_larger_than_their_file_are_refused(tmp_path, bomb):
+    if bomb == "compressed":
+        np.savez_compressed(tmp_path / "bomb.npz", a=np.zeros(10**6))
+        content = (tmp_path / "bomb.npz").read_bytes()
+    else:
+        np.savez(tmp_path / "bomb.npz", a=np.zeros(1000))
+        content = (tmp_path / "bomb.npz").read_bytes().replace(b"(1000,), }     ", b"(10000000000,)}")
+    (tmp_path / "x.npz").write_bytes(sealed(content))
+    with pytest.raises(DamagedFileError):
+        read_arrays(tmp_path / "x.npz")
+
+
+def test_another_key_or_version_is_told_from_damage():
+    data = sealed(b"content", b"key")
+    assert unsealed(data, b"key") == b"content"
+    for key in (b"", b"another"):
+        with pytest.raises(ForeignFileError):
+            unsealed(data, key)
+    with pytest.raises(ForeignFileError):
+        unsealed(b"content" + bytes(40) + b"calmotion-1\n")
+    for at in range(len(data)):
+        with pytest.raises(DamagedFileError):
+            unsealed(data[:at] + bytes([data[at] ^ 1]) + data[at + 1 :], b"key")
+
+
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="this system has no named pipes")
 def test_a_named_pipe_stops_nobody(tmp_path):
     os.mkfifo(tmp_path / "x.npz")
@@ -70,3 +97,20 @@ def test_a_folder_and_a_missing_file(tmp_path):
         read_verified(tmp_path)
     with pytest.raises(FileNotFoundError):
         read_verified(tmp_path / "missing")
+
+
+def test_a_file_that_would_fill_the_memory_is_not_read(tmp_path):
+    with open(tmp_path / "x.npz", "wb") as file:
+        file.truncate(2**40)  # a hole, which takes no room on the disk
+    with pytest.raises(DamagedFileError, match="larger"):
+        read_verified(tmp_path / "x.npz")
+
+
+def test_an_encrypted_archive_is_refused(tmp_path):
+    write_arrays(tmp_path / "x.npz", {"a": np.zeros(3)})
+    content = bytearray(unsealed((tmp_path / "x.npz").read_bytes()))
+    for head, flags in ((b"PK\x03\x04", 6), (b"PK\x01\x02", 8)):
+        content[content.index(head) + flags] |= 1
+    (tmp_path / "x.npz").write_bytes(sealed(bytes(content)))
+    with pytest.raises(DamagedFileError):
+        read_arrays(tmp_path / "x.npz")

@@ -94,7 +94,7 @@ def within(seconds: float) -> Iterator[None]:
         return
 
     def stop(number: int, frame: Any) -> None:
-        raise _Patience(f"took longer than {seconds:g} s")
+        raise _Patience(_late(seconds))
 
     before = signal.signal(signal.SIGALRM, stop)
     signal.setitimer(signal.ITIMER_REAL, seconds)
@@ -103,6 +103,10 @@ def within(seconds: float) -> Iterator[None]:
     finally:
         signal.setitimer(signal.ITIMER_REAL, 0.0)
         signal.signal(signal.SIGALRM, before)
+
+
+def _late(seconds: float) -> str:
+    return f"took longer than {seconds:g} s"
 
 
 def cells_of(name: str, rows: Rows, steps: Mapping[str, Sequence[float]] | None = None) -> list[Cell]:
@@ -129,6 +133,8 @@ def cells_of(name: str, rows: Rows, steps: Mapping[str, Sequence[float]] | None 
                     outcome, why, error = item.outcome, item.why, item.error_m
                 except _Patience as late:
                     outcome, why, error = FAILED, str(late), float("nan")
+                if outcome == FAILED and time.perf_counter() - begin >= PATIENCE:
+                    why = _late(PATIENCE)  # an interrupted library may raise an error of its own
                 found.append(
                     Cell(
                         name, value, step, integrator, outcome, why, None if brief or not np.isfinite(error) else error,

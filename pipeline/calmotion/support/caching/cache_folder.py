@@ -1,8 +1,10 @@
-"""The user's caches: which there are, and their folder."""
+"""The user's caches, which there are and their folder, and the folder of the user's choices."""
 
 from __future__ import annotations
 
 import os
+import sys
+from collections.abc import Mapping
 from pathlib import Path
 
 KERNELS, MESHES, REDUCTIONS = "kernels", "meshes", "reductions"
@@ -15,6 +17,8 @@ CACHES = {
 # Folders of earlier versions, which nothing reads any more; they go when the cache that replaces them is pruned.
 FORMER = {MESHES: "tetrahedra", REDUCTIONS: "reduced"}
 
+CONFIGURATION_VARIABLE = "CALMOTION_CONFIG"
+
 
 def cache_folder() -> Path:
     """The user's cache folder of calmotion: `$CALMOTION_CACHE`, else `calmotion` in the system's cache folder."""
@@ -23,3 +27,15 @@ def cache_folder() -> Path:
         return Path(chosen)
     base = os.environ.get("XDG_CACHE_HOME") or os.environ.get("LOCALAPPDATA") or Path.home() / ".cache"
     return Path(base) / "calmotion"
+
+
+def configuration_folder(environment: Mapping[str, str] | None = None) -> Path:
+    """The folder of the user's choices: the one that the environment names, else where the system keeps such things."""
+    variables = os.environ if environment is None else environment
+    if variables.get(CONFIGURATION_VARIABLE):
+        return Path(variables[CONFIGURATION_VARIABLE]).expanduser()
+    if sys.platform == "win32" and variables.get("APPDATA"):
+        return Path(variables["APPDATA"]) / "calmotion"
+    if sys.platform == "darwin":
+        return Path.home() / "Library" / "Application Support" / "calmotion"
+    return Path(variables.get("XDG_CONFIG_HOME") or Path.home() / ".config") / "calmotion"

@@ -7,6 +7,7 @@ folder of the kernels of one version of the sources. The least recently used ent
 from __future__ import annotations
 
 import contextlib
+import functools
 import logging
 import os
 import shutil
@@ -18,8 +19,9 @@ from typing import Any
 import numpy as np
 
 from calmotion.support.caching.cache_folder import CACHES, FORMER, cache_folder
-from calmotion.support.caching.verified_files import DamagedFileError, read_arrays, write_arrays
-from calmotion.support.files import PREFIX
+from calmotion.support.caching.signing import signing_key
+from calmotion.support.caching.verified_files import DamagedFileError, ForeignFileError, read_arrays, write_arrays
+from calmotion.support.files import PREFIX, remove_abandoned
 
 LOG = logging.getLogger("calmotion")
 
@@ -42,15 +44,19 @@ class Entry:
 def stored_arrays(cache: str, key: str) -> dict[str, np.ndarray] | None:
     """The arrays that are stored under a key, by name; None where there are none.
 
-    A damaged file is removed with a notice.
+    A damaged file is removed with a notice, one of another key or version without.
 
     Args:
         cache: A name in `CACHES`.
         key: Hash of all inputs of the arrays.
     """
     path = _file(cache, key)
+    _tidy(path.parent)
     try:
-        arrays = read_arrays(path)
+        arrays = read_arrays(path, signing_key())
+    except ForeignFileError:
+        _remove(path)
+        return None
     except DamagedFileError:
         discard(path)
         return None
@@ -73,7 +79,7 @@ def store_arrays(cache: str, key: str, arrays: Mapping[str, Any], keep_existing:
     """
     path = _file(cache, key)
     with contextlib.suppress(OSError):
-        write_arrays(path, arrays, keep_existing)
+        write_arrays(path, arrays, keep_existing, signing_key())
         prune(cache)
 
 
@@ -133,6 +139,13 @@ def prune(cache: str, limit: int | None = None) -> list[Entry]:
 def clear(cache: str) -> list[Entry]:
     """Remove all entries of a cache; what was removed."""
     return _remove_former(cache) + [entry for entry in entries(cache) if _remove(entry.path)]
+
+
+@functools.cache
+def _tidy(folder: Path) -> None:
+    """Remove what killed processes left in a folder that this one may only read; once in a process."""
+    with contextlib.suppress(OSError):
+        remove_abandoned(folder)
 
 
 def _remove_former(cache: str) -> list[Entry]:

@@ -1,0 +1,126 @@
+"""Audits of a simulation: energy against the work of the motors, momentum against the impulse of forces.
+
+All quantities follow from inertia integrals, elastic laws and multipliers, none from the equations of a step.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from calmotion.multibody.analysis.reactions import reactions
+from calmotion.multibody.kernels import inertia
+from calmotion.multibody.kernels.components import component_of
+from calmotion.multibody.kernels.so3 import matrix_of
+from calmotion.multibody.kernels.work import Work, allocate_work
+from calmotion.multibody.model.system import LINEAR, STVK, State, System
+from calmotion.shot.character import WORLD, Array, IntArray
+from calmotion.simulation.forward import ForwardRun
+
+INSTANTS = 200  # at which an audit looks
+
+
+@dataclass(frozen=True)
+class Audit:
+    """Largest errors of a run.
+
+    Attributes:
+        energy: Of energy less work [J], relative to the largest of kinetic energy and the range of the work.
+        gained: The same, for energy that appears; damping and BDF2 only lose some.
+        momentum: Of the linear momentum less the impulse [N s], relative to the largest impulse of the joints alone.
+    """
+
+    energy: float
+    gained: float
+    momentum: float
+
+
+def audit(system: System, run: ForwardRun) -> Audit:
+    """The audit of a run of a system that is not driven by a moving root."""
+    count = len(run.trajectory.states.c)
+    chosen = np.unique(np.linspace(0, count - 1, min(count, INSTANTS)).astype(int))
+    kinetic, total = energy(system, run.trajectory.states, chosen)
+    done = work(system, run)
+    error = total - total[0] - done[chosen]
+    scale = max(float(kinetic.max()), float(np.ptp(done)), np.finfo(float).tiny)
+    momentum = linear_momentum(system, run.trajectory.states, chosen)
+    of_joints, of_gravity = impulses(system, run)
+    size = max(float(np.abs(of_joints).max()), np.finfo(float).tiny)
+    lost = momentum - momentum[0] - (of_joints + of_gravity)[chosen]
+    return Audit(float(np.abs(error).max()) / scale, float(error.max()) / scale, float(np.abs(lost).max()) / size)
+
+
+def energy(system: System, states: State, instants: IntArray | None = None) -> tuple[Array, Array]:
+    """Kinetic energy and all of it [J], shape [T] each; laws linear or St. Venant-Kirchhoff.
+
+    Args:
+        instants: Indices of the states; None: all.
+    """
+    chosen = np.arange(len(states.c)) if instants is None else instants
+    kinetic, stored = np.zeros(len(chosen)), np.zeros(len(chosen))
+    scratch = allocate_work(system)
+    for b in range(len(system.elastic)):
+        for k, n in enumerate(chosen):
+            R, D, V = _moving(system, states, b, int(n), scratch)
+            kinetic[k] += 0.5 * V @ D @ V
+            u = states.u[n, b, : system.elastic[b]]
+            stored[k] += _strain_energy(system, b, u) - system.gravity @ (
+                system.mass[b] * states.c[n, b] + R @ scratch.s
+            )
+    return kinetic, kinetic + stored
+
+
+def linear_momentum(system: System, states: State, instants: IntArray) -> Array:
+    """Linear momentum of all bodies at some instants [N s], world axes, shape [K, 3]."""
+    momentum, scratch = np.zeros((len(instants), 3)), allocate_work(system)
+    for b in range(len(system.elastic)):
+        for k, n in enumerate(instants):
+            R, D, V = _moving(system, states, b, int(n), scratch)
+            momentum[k] += R @ (D @ V)[:3]
+    return momentum
+
+
+def impulses(system: System, run: ForwardRun) -> tuple[Array, Array]:
+    """Impulses of the joints to the world, and of gravity, since the first instant [N s], shape [T, 3] each."""
+    forces = reactions(system, run.trajectory, run.joint_angles, run.joint_rates).forces
+    grounded = [joint for joint in range(len(system.rows)) if system.side[joint, 0] == WORLD]
+    weight = np.broadcast_to(system.mass.sum() * system.gravity, (len(forces), 3))
+    return _integral(forces[:, grounded].sum(axis=1), run.trajectory.h), _integral(weight, run.trajectory.h)
+
+
+def work(system: System, run: ForwardRun) -> Array:
+    """Work of the motors since the first instant [J], shape [T]."""
+    efforts = reactions(system, run.trajectory, run.joint_angles, run.joint_rates).efforts
+    return _integral(np.sum(efforts * run.joint_rates, axis=1), run.trajectory.h)
+
+
+def _integral(values: Array, h: float) -> Array:
+    """Integral by the trapezoidal rule from the first instant."""
+    steps = 0.5 * h * (values[1:] + values[:-1])
+    return np.concatenate([np.zeros((1, *values.shape[1:])), np.cumsum(steps, axis=0)])
+
+
+def _moving(system: System, states: State, b: int, n: int, scratch: Work) -> tuple[Array, Array, Array]:
+    """Rotation matrix, mass matrix and velocities in body axes of a body at an instant."""
+    r = system.elastic[b]
+    R, D, V = np.zeros((3, 3)), np.zeros((6 + r, 6 + r)), states.V[n, b, : 6 + r].copy()
+    component = component_of.py_func(system, b)  # type: ignore[attr-defined]
+    inertia.deformed_integrals(component, states.u[n, b], scratch)
+    inertia.mass_matrix(component, scratch, D)
+    matrix_of(states.q[n, b], R)
+    V[:3] = R.T @ V[:3]
+    return R, D, V
+
+
+def _strain_energy(system: System, b: int, u: Array) -> float:
+    if system.law[b] == LINEAR:
+        return 0.5 * float(system.stiffness[b, : len(u)] @ u**2)
+    if system.law[b] != STVK:
+        raise ValueError("only linear and St. Venant-Kirchhoff bodies have an audit")
+    r, p, start = len(u), int(system.points[b]), system.data_start[b]
+    size = r + p * (p + 1) // 2
+    A = system.data[start:][: size * size].reshape(size, size)
+    w = u if p == r else system.data[start + size * size :][: p * r].reshape(p, r) @ u
+    z = np.concatenate([u, np.outer(w, w)[np.triu_indices(p)]])
+    return 0.5 * float(z @ A @ z)

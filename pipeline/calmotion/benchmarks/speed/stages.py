@@ -1,0 +1,128 @@
+"""Where the time of a run goes: `calmotion bench speed [SHOT ...]` optimises shots and prints a table.
+
+Each shot is optimised as by `calmotion optimize`, with the caches as they are. Times are processor times of this
+process and those that it started, as other work on the machine changes them least; compiling is counted by itself.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import tempfile
+import time
+from collections import defaultdict
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+from calmotion.benchmarks.common.tables import markdown
+from calmotion.errors import ShotError
+from calmotion.host import OperatorResult
+from calmotion.shot.run import OutputPaths
+from calmotion.workflow.commands import optimize
+
+import_module("calmotion.support")  # sets options of numba that it reads once
+event: Any = import_module("numba.core.event")
+SHOTS = [f"samples/{name}/{name}.usda" for name in ("bartender", "dancer", "rapper", "drummer", "boxer")]
+STAGES = ("read", "analyse", "mesh", "reduce", "search", "write", "compile")
+# what is named nowhere here is `other`
+OPERATORS = {
+    "bvh.read": "read", "motion.read": "read", "usd.read": "read", "accuracy.analyse": "analyse", "fe.mesh": "mesh",
+    "fem.reduce": "reduce", "accuracy.refine": "reduce", "dynamics.compile": "reduce", "retarget.optimize": "search",
+    "usd.write": "write",
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Stages:
+    """Processor time of a run by what it did [s].
+
+    Attributes:
+        shot: Name of the shot.
+        used: Time of each stage, without compiling.
+        wall_s: The whole run by the clock.
+        simulations: Simulated and linearised sweeps of the search.
+    """
+
+    shot: str
+    used: Mapping[str, float]
+    wall_s: float
+    simulations: int
+
+
+def measure(path: str) -> Stages:
+    """Optimise a shot.
+
+    Raises:
+        ShotError: It cannot be processed.
+    """
+    compiling = _Compiling()
+    used: defaultdict[str, float] = defaultdict(float)
+    state = {"cpu": _cpu(), "compile": 0.0}
+
+    def done(result: OperatorResult) -> None:
+        now, compiled = _cpu(), compiling.seconds
+        used[OPERATORS.get(result.idname, "other")] += now - state["cpu"] - (compiled - state["compile"])
+        state.update({"cpu": now, "compile": compiled})
+
+    begin = time.perf_counter()
+    event.register("numba:compile", compiling)
+    try:
+        with tempfile.TemporaryDirectory() as folder:
+            found = optimize(path, outputs=OutputPaths(layer=str(Path(folder) / "layer.usda")), on_operator=done).result
+    finally:
+        event.unregister("numba:compile", compiling)
+    used["compile"] = compiling.seconds
+    sweeps = found.forward_simulations + found.linearized_sweeps
+    return Stages(Path(path).stem, dict(used), time.perf_counter() - begin, sweeps)
+
+
+class _Compiling(event.Listener):  # type: ignore[misc]
+    """Processor time in which numba compiles, kernels within kernels counted once [s]."""
+
+    def __init__(self) -> None:
+        self.seconds, self._depth, self._begin = 0.0, 0, 0.0
+
+    def on_start(self, happened: Any) -> None:
+        """Called by numba when it begins to compile a function."""
+        if not self._depth:
+            self._begin = _cpu()
+        self._depth += 1
+
+    def on_end(self, happened: Any) -> None:
+        """Called by numba when it has compiled it."""
+        self._depth -= 1
+        if not self._depth:
+            self.seconds += _cpu() - self._begin
+
+
+def _cpu() -> float:
+    times = os.times()
+    return times.user + times.system + times.children_user + times.children_system
+
+
+def table(runs: Sequence[Stages]) -> str:
+    """The runs as Markdown."""
+    heads = ["shot", *STAGES, "other", "processor time [s]", "by the clock [s]", "sweeps"]
+    rows = []
+    for run in runs:
+        times = [run.used.get(stage, 0.0) for stage in (*STAGES, "other")]
+        numbers = [*times, sum(times), run.wall_s]
+        rows.append([run.shot, *(f"{value:.2f}" for value in numbers), str(run.simulations)])
+    return markdown(heads, rows, "---:")
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Measure shots and print the table."""
+    parser = argparse.ArgumentParser(prog="calmotion bench speed", description="Where the time of a run goes.")
+    parser.add_argument("shots", nargs="*", default=SHOTS, help="shots that are optimised (default: the samples)")
+    runs = []
+    try:
+        for path in parser.parse_args(argv).shots:
+            runs.append(measure(path))
+    except ShotError as error:
+        parser.exit(1, f"error: {error}\n")
+    print(table(runs))
+    return 0

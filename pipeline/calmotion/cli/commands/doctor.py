@@ -1,0 +1,45 @@
+"""`calmotion doctor`: what is wrong with this installation and this machine, and what to do."""
+
+from __future__ import annotations
+
+import argparse
+from typing import TYPE_CHECKING
+
+from calmotion.cli.options import Commands
+
+if TYPE_CHECKING:
+    from calmotion.cli.output import Output
+
+
+def add_to(commands: Commands) -> None:
+    """Add the command."""
+    text = "check versions, caches, processor, memory, disk and viewers, and say what to do"
+    command = commands.add_parser(
+        "doctor", help=text, description=f"{text[0].upper()}{text[1:]}. Exit status 1 if something is wrong."
+    )
+    command.add_argument("--json", action="store_true", help="print one JSON object on stdout")
+    command.set_defaults(command=_run)
+
+
+def _run(args: argparse.Namespace, output: Output) -> int:
+    from dataclasses import asdict
+
+    from calmotion.cli.diagnostics.machine import NOTE, OK, WRONG, examine
+
+    findings = examine()
+    wrong = sum(one.state == WRONG for one in findings)
+    if output.json:
+        output.object({"findings": [asdict(one) for one in findings], "wrong": wrong})
+        return int(wrong > 0)
+    from calmotion.cli.tables import console_on, say
+
+    console = console_on(output.stream)
+    width = max(len(one.name) for one in findings)
+    for one in findings:
+        mark = {OK: "  ", NOTE: "! ", WRONG: "X "}[one.state]
+        say(console, f"{mark}{one.name:{width}}  {one.found}")
+        if one.remedy:
+            say(console, f"  {'':{width}}  do: {one.remedy}")
+    notes = sum(one.state == NOTE for one in findings)
+    say(console, f"{wrong} wrong (X), {notes} to note (!)" if wrong or notes else "all is well")
+    return int(wrong > 0)

@@ -1,0 +1,74 @@
+"""Value clips of a layer: the files that they name, which USD opens while it composes a stage."""
+
+from __future__ import annotations
+
+import glob
+import math
+import os
+import re
+from collections.abc import Iterable, Iterator, Mapping
+from typing import TYPE_CHECKING, Any
+
+from calmotion.errors import ShotError
+
+if TYPE_CHECKING:
+    from pxr import Sdf
+
+MOST_CLIPS = 100_000  # of one template: USD looks for each of them
+CLIPS = "clips"  # metadata of a prim
+
+
+def clip_assets(layer: Sdf.Layer) -> list[str]:
+    """Asset paths of the clips and manifests that the prims of a layer name, and of the files that templates match.
+
+    Raises:
+        ShotError: A template asks for more clips than anybody has.
+    """
+    found: list[str] = []
+    for prim in _prims(layer.pseudoRoot):
+        sets = prim.GetInfo(CLIPS) if prim.HasInfo(CLIPS) else {}
+        for one in sets.values() if isinstance(sets, Mapping) else ():
+            if isinstance(one, Mapping):
+                found += _named(one)
+                found += _matched(one, layer, str(prim.path))
+    return [name for name in dict.fromkeys(found) if name]
+
+
+def _prims(prim: Sdf.PrimSpec) -> Iterator[Sdf.PrimSpec]:
+    """All prims below one, those in variants as well."""
+    waiting = [prim]
+    while waiting:
+        one = waiting.pop()
+        yield one
+        waiting += list(one.nameChildren)
+        for variants in () if one.path.IsAbsoluteRootPath() else one.variantSets.values():
+            waiting += [variant.primSpec for variant in variants.variants.values()]
+
+
+def _named(clips: Mapping[str, Any]) -> list[str]:
+    assets = clips.get("assetPaths")
+    listed = list(assets) if isinstance(assets, Iterable) else []
+    return [asset.path for asset in (*listed, clips.get("manifestAssetPath")) if hasattr(asset, "path")]
+
+
+def _matched(clips: Mapping[str, Any], layer: Sdf.Layer, path: str) -> list[str]:
+    """The files in the place of a template, such as `./clip.###.usd`."""
+    template = clips.get("templateAssetPath")
+    if not isinstance(template, str) or not template:
+        return []
+    given = [clips.get(f"template{name}") for name in ("StartTime", "EndTime", "Stride")]
+    numbers = [float(number) for number in given if isinstance(number, (int, float))]
+    if len(numbers) == len(given):
+        start, end, stride = numbers
+        count = (end - start) / stride if stride > 0.0 else math.inf
+        if not count <= MOST_CLIPS:
+            raise ShotError(
+                "its template of value clips asks for too many files",
+                path=path,
+                attribute=CLIPS,
+                found=f"from {start:g} to {end:g} in steps of {stride:g}",
+                remedy=f"Correct templateStartTime, templateEndTime and templateStride (at most {MOST_CLIPS:,} clips)",
+            )
+    pattern = re.sub("#+", "*", glob.escape(template))
+    folder = os.path.dirname(layer.realPath)
+    return [os.path.join(folder, name) for name in glob.glob(pattern, root_dir=folder or None)]

@@ -1,0 +1,270 @@
+"""What is fuzzed: each target reads bytes like a file of somebody else, and raises only errors that users see.
+
+An input is either the file itself, or drives random edits of a valid one (`Bytes`), so that coverage guides both.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+import random
+import sys
+import tempfile
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+from types import ModuleType
+
+HERE = Path(__file__).resolve().parent
+sys.path[:0] = [str(HERE.parent / "helpers" / "usd"), str(HERE.parents[1] / "pipeline")]
+
+FOLDER = Path(tempfile.mkdtemp(prefix="fuzz-"))
+
+
+class Bytes(random.Random):
+    """Random numbers that are the bytes of an input; zeros after its end."""
+
+    def __init__(self, data: bytes) -> None:
+        super().__init__()
+        self._stream = io.BytesIO(data)
+
+    def getrandbits(self, count: int) -> int:
+        """The next bytes as a number."""
+        size = (count + 7) // 8
+        return int.from_bytes(self._stream.read(size).ljust(size, b"\0"), "little") & ((1 << count) - 1)
+
+    def random(self) -> float:
+        """The next two bytes as a fraction."""
+        return self.getrandbits(16) / 65536.0
+
+
+def _file(name: str, data: bytes) -> Path:
+    path = FOLDER / name
+    path.write_bytes(data)
+    return path
+
+
+@cache
+def _shot(kind: str) -> str:
+    import posed_shots
+    import small_shots
+
+    def flexible(stage: object) -> None:
+        small_shots.make_flexible(stage)
+        small_shots.make_target(stage)
+
+    edits = {"drives": None, "flexible": flexible, "posed": posed_shots.posed, "skeletal": posed_shots.skeletal}
+    return small_shots.write_arm(FOLDER / f"{kind}-base.usda", edits[kind]).read_text()
+
+
+def _read(path: Path) -> None:
+    import numpy as np
+    from calmotion.errors import ShotError
+    from calmotion.usd.reading import read_shot
+
+    try:
+        character, animation, _ = read_shot(str(path))
+    except ShotError as error:
+        assert error.problem
+        return
+    values = [t.values for t in (*animation.tracks, *animation.current)] + [character.gravity, animation.frame_times]
+    assert all(np.all(np.isfinite(value)) for value in values)
+    assert all(np.all(np.diff(track.times) > 0.0) for track in animation.tracks)
+    assert all(body.mass is None or body.mass.mass > 0.0 for body in character.bodies)
+
+
+def shot(data: bytes) -> None:
+    """A shot with edits of its prims, attributes and relationships."""
+    import mutations
+    from pxr import Sdf
+
+    rng = Bytes(data)
+    layer = Sdf.Layer.CreateAnonymous(".usda")
+    layer.ImportFromString(_shot(rng.choice(("drives", "flexible", "posed", "skeletal"))))
+    for _ in range(1 + rng.randrange(6)):
+        try:
+            rng.choice(mutations.MUTATIONS)(layer, rng)
+        except Exception:  # USD refuses some edits by itself
+            continue
+    path = FOLDER / "shot.usda"
+    layer.Export(str(path))
+    _read(path)
+
+
+def splines(data: bytes) -> None:
+    """A motor with a spline of any knots, loops and extrapolation."""
+    import mutations
+    import small_shots
+    from pxr import Gf, Sdf, Ts, Usd
+
+    rng = Bytes(data)
+    layer = Sdf.Layer.CreateAnonymous(".usda")
+    layer.ImportFromString(_shot("drives"))
+    spline = Ts.Spline("float")
+    try:
+        for _ in range(rng.randrange(12)):
+            time = rng.choice((rng.randrange(30), rng.randrange(2**16) / 2048.0, rng.choice(mutations.NUMBERS)))
+            knot = Ts.Knot(
+                typeName="float", time=time, value=rng.choice((rng.randrange(90), rng.choice(mutations.NUMBERS))),
+                nextInterp=rng.choice((Ts.InterpHeld, Ts.InterpLinear, Ts.InterpCurve, Ts.InterpValueBlock)),
+            )  # fmt: skip
+            knot.SetPreTanWidth(rng.randrange(9) / 2.0)
+            knot.SetPostTanWidth(rng.randrange(9) / 2.0)
+            knot.SetPreTanSlope(rng.choice(mutations.NUMBERS))
+            knot.SetPostTanSlope(rng.choice(mutations.NUMBERS))
+            spline.SetKnot(knot)
+        if rng.randrange(2):
+            loop = Ts.LoopParams()
+            loop.protoStart, loop.protoEnd = float(rng.randrange(20)), float(rng.randrange(30))
+            loop.numPreLoops, loop.numPostLoops = rng.randrange(4), rng.choice((0, 1, 3, 10**6))
+            spline.SetInnerLoopParams(loop)
+        stage = Usd.Stage.Open(layer)
+        stage.GetPrimAtPath(small_shots.ELBOW).GetAttribute(small_shots.TARGET_POSITION).SetSpline(spline)
+    except Exception:  # USD refuses some by itself
+        return
+    assert Gf is not None
+    layer.Export(str(FOLDER / "spline.usda"))
+    _read(FOLDER / "spline.usda")
+
+
+def _plugin(name: str, module: str) -> ModuleType:
+    """A module of a bundled plugin, whose folder is not a package on the path."""
+    import importlib
+
+    sys.path.insert(0, str(HERE.parents[1] / "plugins"))
+    try:
+        return importlib.import_module(f"{name}.{module}")
+    finally:
+        del sys.path[0]
+
+
+def meshes(data: bytes) -> None:
+    """A mesh file of a format that the first byte names."""
+    import warnings
+
+    from calmotion.errors import ShotError
+
+    reader = _plugin("fe_mesher", "mesh_file")
+    suffixes = (".stl", ".obj", ".msh", ".vtk", ".vtu", ".ply", ".off", ".inp", ".bdf", ".mesh")
+    path = _file(f"mesh{suffixes[data[0] % len(suffixes)] if data else '.obj'}", data[1:])
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        try:
+            reader.read_mesh_file(str(path), 1.0, "/Arm/link")
+        except ShotError as error:
+            assert error.problem
+
+
+def bvh(data: bytes) -> None:
+    """A BVH file."""
+    from calmotion.errors import ShotError
+
+    try:
+        _plugin("bvh_reader", "bvh").read_bvh(str(_file("motion.bvh", data)))
+    except ShotError as error:
+        assert error.problem
+
+
+def manifests(data: bytes) -> None:
+    """The manifest of a plugin."""
+    from calmotion.host import PluginError
+    from calmotion.host.manifest import check_requirements, read_manifest
+
+    folder = FOLDER / "anvil"
+    folder.mkdir(exist_ok=True)
+    (folder / "plugin.toml").write_bytes(data)
+    try:
+        check_requirements(read_manifest(folder), "0.1.0")
+    except PluginError as error:
+        assert error.problem
+
+
+def settings(data: bytes) -> None:
+    """A settings file, and the same text as an assignment."""
+    from calmotion.host import SettingError, parse_quantity
+    from calmotion.host.settings import read_assignment, read_settings_file
+
+    text = data.decode("utf-8", "replace")
+    for read, given in (
+        (read_settings_file, _file("settings.toml", data)), (read_assignment, text),
+        (lambda given: parse_quantity(given, "m"), text),
+    ):  # fmt: skip
+        try:
+            read(given)
+        except SettingError as error:
+            assert error.problem
+
+
+def caches(data: bytes) -> None:
+    """A file of arrays: damaged, or whole with any content."""
+    from calmotion.reduction.cache import _value_of
+    from calmotion.support.caching.verified_files import DamagedFileError, read_arrays, sealed
+
+    for content in (data, sealed(data)):
+        try:
+            arrays = read_arrays(_file("cache.npz", content))
+        except DamagedFileError:
+            continue
+        try:
+            _value_of(arrays, "key")
+        except (ValueError, KeyError, TypeError, AttributeError):  # which the cache takes for another version
+            continue
+
+
+def checkpoints(data: bytes) -> None:
+    """A whole checkpoint whose state and arrays are anything."""
+    import numpy as np
+    from calmotion.retargeting.checkpoint import Checkpoint
+    from calmotion.support.caching.verified_files import write_arrays
+
+    rng, path = Bytes(data), FOLDER / "checkpoint.npz"
+    numbers = (0.0, 1.0, float("nan"), float("inf"), -1e300, "x", None, [], {}, True, 10**400)
+    names = ("x", "p", "Hp", "breaks", "history", "state")
+    arrays = {
+        name: np.asarray([rng.choice(numbers[:5]) for _ in range(rng.randrange(6))]).reshape(
+            rng.choice(((-1,), (1, -1), (-1, 1)))
+        )
+        for name in names
+        if rng.randrange(8)
+    }
+    state = {
+        name: rng.choice(numbers) for name in ("merit", "radius", "evaluations", "gradients", "products", "reason")
+    }
+    text = json.dumps(rng.choice((state | {"key": "key"}, state, [], 1, "x"))).encode()
+    arrays["state"] = np.frombuffer(data if not rng.randrange(4) else text, np.uint8)
+    write_arrays(path, arrays)
+    stored = Checkpoint(path, "key").load(None)
+    if stored is not None:
+        assert np.all(np.isfinite(stored.search.x)) and isinstance(stored.matches(1.0), bool)
+        assert stored.search.radius >= 0.0 and min(stored.search.evaluations, stored.search.products) >= 0
+
+
+TARGETS: dict[str, Callable[[bytes], None]] = {
+    one.__name__: one
+    for one in (shot, splines, meshes, bvh, manifests, settings, caches, checkpoints)
+}  # fmt: skip
+
+_TETRAHEDRON = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n"
+SEEDS: dict[str, tuple[bytes, ...]] = {
+    "shot": (b"\0" * 40, bytes(range(80))),
+    "splines": (bytes(range(1, 120)), b"\5" * 90),
+    "meshes": (
+        b"\1" + _TETRAHEDRON.encode(),
+        b"\0solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\n"
+        b"endsolid\n",
+        b"\2$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n4\n1 0 0 0\n2 1 0 0\n3 0 1 0\n4 0 0 1\n$EndNodes\n$Elements\n"
+        b"1\n1 4 2 0 1 1 2 3 4\n$EndElements\n",
+        b"\7*NODE\n1, 0, 0, 0\n2, 1, 0, 0\n3, 0, 1, 0\n4, 0, 0, 1\n*ELEMENT, TYPE=C3D4\n1, 1, 2, 3, 4\n",
+    ),
+    "bvh": (
+        b"HIERARCHY\nROOT Hips\n{\nOFFSET 0 0 0\nCHANNELS 3 Xrotation Yrotation Zrotation\n}\nMOTION\nFrames: 2\n"
+        b"Frame Time: 0.04\n1 2 3\n4 5 6\n",
+    ),
+    "manifests": (
+        b'id = "anvil"\nversion = "0.1.0"\nname = "Anvil"\ntagline = "Hits"\nmaintainer = "Smith"\nlicense = "MIT"\n'
+        b'tags = ["iron"]\ncalmotion = ">=0.1"\nrequires = ["numpy>=2"]\n',
+    ),
+    "settings": (b'[fe.mesh]\nelement_size = "5mm"\n', b"a.b=5mm", b"5mm"),
+    "caches": (b"PK\5\6" + bytes(18),),
+    "checkpoints": (bytes(range(100)), b"\1" * 60),
+}  # fmt: skip

@@ -1,0 +1,48 @@
+"""Inputs that fuzzing has found, and the seeds, never raise again; every target reads its seeds and damaged ones."""
+
+from __future__ import annotations
+
+import random
+import sys
+from pathlib import Path
+
+import pytest
+
+HERE = Path(__file__).resolve().parent
+sys.path.insert(0, str(HERE))
+
+import guided  # noqa: E402
+import targets  # noqa: E402
+
+FOUND = sorted(path for path in guided.CASES.rglob("*") if path.is_file())
+
+
+@pytest.mark.parametrize("path", FOUND, ids=lambda path: f"{path.parent.name}-{path.name}")
+def test_a_found_case_is_read_or_refused(path):
+    targets.TARGETS[path.parent.name](path.read_bytes())
+
+
+@pytest.mark.parametrize("name", targets.TARGETS)
+def test_seeds_and_damaged_seeds_are_read_or_refused(name):
+    rng = random.Random(0)
+    for seed in targets.SEEDS[name]:
+        targets.TARGETS[name](seed)
+        for _ in range(6 if name in ("shot", "splines") else 30):
+            targets.TARGETS[name](guided.mutated(seed, rng))
+
+
+def test_a_failure_is_kept_and_raised(tmp_path, monkeypatch):
+    monkeypatch.setattr(guided, "CASES", tmp_path)
+
+    def broken(data):
+        raise IndexError("x")
+
+    with pytest.raises(IndexError):
+        guided.kept("shot", broken)(b"input")
+    (kept,) = tmp_path.rglob("*/*")
+    assert kept.read_bytes() == b"input" and kept.parent.name == "shot"
+
+
+def test_bytes_drive_random_choices():
+    rng = targets.Bytes(b"\x05\x00\xff\xff")
+    assert rng.getrandbits(8) == 5 and rng.getrandbits(8) == 0 and rng.random() > 0.999 and rng.random() == 0.0

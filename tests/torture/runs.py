@@ -1,0 +1,199 @@
+"""Runs of the program: forked from a process that has imported it, or started anew; what ended them is recorded.
+
+A fork spares the seconds of imports, so that a thousand runs take less than an hour. Faults are installed in the child.
+"""
+
+from __future__ import annotations
+
+import fcntl
+import importlib
+import os
+import random
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass
+
+from workspace import REPOSITORY, Workspace
+
+_PROGRAM = (
+    "calmotion.cli.main", "calmotion.simulation.simulate", "calmotion.usd.reading", "calmotion.workflow.commands",
+    "matplotlib.figure", "numba", "pxr.Usd", "pxr.UsdPhysics", "rerun", "scipy.sparse.linalg",
+)  # fmt: skip
+_PIPE = 2**20  # size of a pipe [bytes]
+LIMIT = 300.0  # a run that takes longer [s] is stuck
+
+
+@dataclass(frozen=True)
+class Ending:
+    """How a run ended.
+
+    Attributes:
+        status: Exit status; minus the number of the signal that ended it; None when it was stuck.
+        out, err: What it printed.
+        seconds: Its duration.
+    """
+
+    status: int | None
+    out: str
+    err: str
+    seconds: float
+
+    @property
+    def stage(self) -> str:
+        """The stage that it was in at its end."""
+        lines = [line.split("\t") for line in self.err.splitlines() if line.startswith("progress\t")]
+        return lines[-1][1] if lines and len(lines[-1]) > 1 else "before the first stage"
+
+    @property
+    def text(self) -> str:
+        """What it printed on stderr besides the progress."""
+        return "\n".join(line for line in self.err.splitlines() if not line.startswith("progress\t"))
+
+
+def load_program() -> None:
+    """Import what a run imports, but nothing that starts threads."""
+    sys.path.insert(0, str(REPOSITORY / "pipeline"))
+    for name in _PROGRAM:
+        importlib.import_module(name)
+
+
+@dataclass
+class Started:
+    """A run that goes on.
+
+    Attributes:
+        pid: Its process.
+        begin: When it began.
+        pipes: Where its output is read: a file would be short where files are, and be filled by a full disk.
+    """
+
+    pid: int
+    begin: float
+    pipes: tuple[int, int]
+
+    def send(self, number: int) -> None:
+        """Send it a signal, if it still runs."""
+        try:
+            os.kill(self.pid, number)
+        except ProcessLookupError:
+            pass
+
+    def wait(self, limit: float = LIMIT) -> Ending:
+        """Wait for its end, and end it when it is stuck."""
+        status: int | None = None
+        while True:
+            pid, code = os.waitpid(self.pid, os.WNOHANG)
+            if pid:
+                status = os.waitstatus_to_exitcode(code)
+                break
+            if time.monotonic() - self.begin > limit:
+                os.kill(self.pid, signal.SIGKILL)
+                os.waitpid(self.pid, 0)
+                break
+            time.sleep(0.005)
+        seconds = time.monotonic() - self.begin
+        out, err = map(_drained, self.pipes)
+        return Ending(status, out, err, seconds)
+
+
+def _drained(pipe: int) -> str:
+    """What is in a pipe, which is closed."""
+    parts = []
+    os.set_blocking(pipe, False)
+    with suppress(BlockingIOError):
+        while part := os.read(pipe, _PIPE):
+            parts.append(part)
+    os.close(pipe)
+    return b"".join(parts).decode(errors="replace")
+
+
+def _pipe() -> tuple[int, int]:
+    """The ends of a pipe that takes all that a run prints without being read."""
+    ends = os.pipe()
+    fcntl.fcntl(ends[1], fcntl.F_SETPIPE_SZ, _PIPE)
+    return ends
+
+
+def start(
+    space: Workspace, arguments: list[str], fault: Callable[[], None] | None = None, cold: bool = False
+) -> Started:
+    """Start a run.
+
+    Args:
+        space: Where it runs.
+        arguments: Its command line.
+        fault: Called in the child before the program.
+        cold: A new process in place of a fork; it takes no fault.
+    """
+    pipes = _pipe(), _pipe()
+    written = pipes[0][1], pipes[1][1]
+    begin = time.monotonic()
+    if cold:
+        environment = os.environ | space.environment() | {"PYTHONPATH": str(REPOSITORY / "pipeline")}
+        process = subprocess.Popen(
+            [sys.executable, "-m", "calmotion", *arguments], env=environment, stdout=written[0], stderr=written[1],
+            stdin=subprocess.DEVNULL, cwd=space.root, preexec_fn=_default_signals, start_new_session=True,
+        )  # fmt: skip
+        process.returncode = 0  # it is awaited by its number
+        pid = process.pid
+    else:
+        pid = os.fork()
+        if pid == 0:
+            _child(space, arguments, fault, written)
+    for end in written:
+        os.close(end)
+    return Started(pid, begin, (pipes[0][0], pipes[1][0]))
+
+
+def run(space: Workspace, figures: bool = False, fault: Callable[[], None] | None = None, cold: bool = False) -> Ending:
+    """Run the program to its end."""
+    return start(space, space.arguments(figures), fault, cold).wait()
+
+
+def _default_signals() -> None:
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT):
+        signal.signal(number, signal.SIG_DFL)
+
+
+def _child(space: Workspace, arguments: list[str], fault: Callable[[], None] | None, written: tuple[int, int]) -> None:
+    """Become the program; never returns."""
+    status = 70
+    try:
+        os.setsid()
+        os.chdir(space.root)
+        for descriptor, end in zip((1, 2), written, strict=True):
+            os.dup2(end, descriptor)
+        sys.stdout, sys.stderr = (os.fdopen(os.dup(number), "w", buffering=1) for number in (1, 2))
+        sys.__stdout__, sys.__stderr__ = sys.stdout, sys.stderr
+        _default_signals()
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+        sys.argv = ["calmotion", *arguments]
+        random.seed()
+        from calmotion.__main__ import main
+
+        if fault is not None:
+            fault()
+        status = main()
+    except SystemExit as stop:
+        status = stop.code if isinstance(stop.code, int) else 1
+    except KeyboardInterrupt:
+        status = 130
+    except BaseException:
+        import traceback
+
+        traceback.print_exc()
+        status = 1
+    finally:
+        import atexit
+
+        atexit._run_exitfuncs()
+        for stream in (sys.stdout, sys.stderr):
+            try:
+                stream.flush()
+            except (OSError, ValueError):
+                pass
+        os._exit(status)

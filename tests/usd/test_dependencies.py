@@ -1,0 +1,67 @@
+"""Files that a shot names in places that are never opened."""
+
+import pytest
+import small_shots
+from calmotion import ShotError
+from calmotion.usd.reading import read_shot
+from pxr import Sdf, Vt
+
+PLACES = ("http://host/robot.usda", "file:///robot.usda", "//host/share/robot.usda", "/dev/zero", "/proc/self/mem")
+
+
+def sublayer(layer, prim, place):
+    layer.subLayerPaths.append(place)
+
+
+def reference(layer, prim, place):
+    prim.referenceList.prependedItems.append(Sdf.Reference(place))
+
+
+def payload(layer, prim, place):
+    prim.payloadList.prependedItems.append(Sdf.Payload(place))
+
+
+def clips(layer, prim, place):
+    values = {
+        "assetPaths": Sdf.AssetPathArray([Sdf.AssetPath(place)]), "primPath": small_shots.FORE,
+        "active": Vt.Vec2dArray([(0.0, 0.0)]), "times": Vt.Vec2dArray([(0.0, 0.0), (24.0, 24.0)]),
+    }  # fmt: skip
+    prim.SetInfo("clips", {"default": values})
+
+
+def mesh_file(layer, prim, place):
+    Sdf.AttributeSpec(prim, "calm:flexible:meshFile", Sdf.ValueTypeNames.Asset).default = Sdf.AssetPath(place)
+
+
+@pytest.mark.parametrize("name", [sublayer, reference, payload, clips, mesh_file])
+def test_places_of_the_network_and_of_devices_are_refused(tmp_path, name):
+    path = small_shots.write_arm(tmp_path / "arm.usda", small_shots.make_flexible)
+    for place in PLACES:
+        layer = Sdf.Layer.OpenAsAnonymous(str(path))
+        name(layer, layer.GetPrimAtPath(small_shots.FORE), place)
+        broken = tmp_path / "broken.usda"
+        layer.Export(str(broken))
+        with pytest.raises(ShotError) as caught:
+            read_shot(str(broken))
+        assert "not opened" in caught.value.problem and place in str(caught.value.found) and caught.value.remedy
+
+
+def test_a_clip_inside_a_variant_is_refused(tmp_path):
+    path = small_shots.write_arm(tmp_path / "arm.usda")
+    layer = Sdf.Layer.OpenAsAnonymous(str(path))
+    choices = Sdf.VariantSetSpec(layer.GetPrimAtPath(small_shots.FORE), "level")
+    clips(layer, Sdf.VariantSpec(choices, "high").primSpec, "/dev/zero")
+    layer.Export(str(tmp_path / "broken.usda"))
+    with pytest.raises(ShotError, match="not opened"):
+        read_shot(str(tmp_path / "broken.usda"))
+
+
+def test_a_clip_that_is_no_usd_file_is_an_error_with_a_remedy(tmp_path):
+    path = small_shots.write_arm(tmp_path / "arm.usda")
+    (tmp_path / "clip.txt").write_text("no layer")
+    layer = Sdf.Layer.OpenAsAnonymous(str(path))
+    clips(layer, layer.GetPrimAtPath(small_shots.FORE), "./clip.txt")
+    layer.Export(str(tmp_path / "broken.usda"))
+    with pytest.raises(ShotError) as caught:
+        read_shot(str(tmp_path / "broken.usda"))
+    assert caught.value.remedy and "clip.txt" in str(caught.value.found)
