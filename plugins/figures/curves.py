@@ -6,16 +6,17 @@ from collections.abc import Sequence
 
 import numpy as np
 from calmotion.shot import Character, Result, Simulation
-from calmotion.shot.measure import measure_of
+from calmotion.shot.motor import measure_of
 from calmotion.views.playback import sample_motion
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import MaxNLocator
+from matplotlib.ticker import FuncFormatter, MaxNLocator
 
 from .style import AFTER, BEFORE, INTENDED, LIMIT, SMALL, TEXT, new_figure, tidy
 
 MOST_TARGETS = 8
 WIDTH = 9.0
+DECADES_DOWN = 1e-4  # of the largest error: lower end of a logarithmic axis, at least
 
 
 def runs_of(result: Result) -> list[tuple[Simulation, str, str, str]]:
@@ -46,7 +47,7 @@ def plot_errors(character: Character, result: Result) -> Figure:
             text = f"{name}: largest {values.max():.2f} {unit}, rms {np.sqrt(np.mean(values**2)):.2f} {unit}"
             axes.plot(simulation.motion.times[rows], values, line, color=color, linewidth=1.5, label=text)
         tidy(axes, "rotation error [deg]" if rotation else "position error [mm]", character.targets[k].path)
-        axes.set_ylim(bottom=0.0)
+        scale_errors(axes, result.after is not None)
         axes.margins(x=0.0)
         axes.legend(fontsize=SMALL, loc="upper right", framealpha=0.85, edgecolor="none")
     all_axes[-1].set_xlabel("time [s]", fontsize=SMALL)
@@ -54,6 +55,21 @@ def plot_errors(character: Character, result: Result) -> Figure:
         note = f"The {len(shown)} of {len(character.targets)} targets with the largest errors"
         figure.supxlabel(note, fontsize=SMALL, color=TEXT)
     return figure
+
+
+def scale_errors(axes: Axes, optimized: bool) -> None:
+    """From zero on, or logarithmic where small errors are beside large ones."""
+    values = np.concatenate([np.asarray(line.get_ydata(), dtype=float) for line in axes.get_lines()])
+    largest = float(values.max(initial=0.0))
+    if not optimized or largest <= 0.0:
+        axes.set_ylim(bottom=0.0)
+        return
+    axes.set_yscale("log")
+    # a curve that passes through zero would reach down without end
+    axes.set_ylim(
+        max(0.5 * float(np.percentile(values, 2.0)), DECADES_DOWN * largest), 12.0 * largest
+    )  # room for the legend
+    axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
 
 
 def plot_motors(character: Character, result: Result, motors: Sequence[int]) -> Figure:
@@ -102,9 +118,11 @@ def draw_limits(axes: Axes, limits: np.ndarray, unit: str) -> None:
 
 
 def plot_convergence(result: Result) -> Figure:
-    """Objective and gradient of each iteration over the number of simulations."""
+    """Objective and gradient at each iterate over the work that led to it, from the motion as animated on."""
     figure = new_figure(WIDTH, 3.2)
-    work = [step.forward_simulations + step.linearized_sweeps for step in result.steps]
+    # A step counts the sweeps of its own linear solve as well, which come after its objective is known.
+    sweeps = [0, *(step.linearized_sweeps for step in result.steps[:-1])]
+    work = [step.forward_simulations + before for step, before in zip(result.steps, sweeps, strict=True)]
     panels = (
         ("objective", "objective [m² s]", AFTER),
         ("gradient_norm", "norm of the projected gradient [m² s/rad]", INTENDED),
@@ -112,6 +130,7 @@ def plot_convergence(result: Result) -> Figure:
     for axes, (name, title, color) in zip(figure.subplots(1, 2), panels, strict=True):
         axes.semilogy(work, [getattr(step, name) for step in result.steps], color=color, marker="o", markersize=4)
         tidy(axes, "", title)
+        axes.set_xlim(left=0.0)
         axes.set_xlabel("simulations and linearised sweeps (one dot for each iteration)", fontsize=SMALL)
         axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     return figure

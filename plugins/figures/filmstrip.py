@@ -8,12 +8,12 @@ from calmotion.shot import Animation, Character, Motion, Result, Simulation
 from calmotion.shot.character import Array
 from calmotion.support.naming import distinct_names
 from calmotion.views.playback import sample_motion
+from calmotion.views.rendering import Camera, View, draw_over_ghost, fit_camera, floor_below, pose, prepare
 from calmotion.views.viewpoint import choose_viewpoint
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from .magnifier import choose_magnifier, draw_magnifier
-from .scene import Camera, View, draw_over_ghost, fit_camera, pose, prepare
 from .style import AFTER, BEFORE, INTENDED, NORMAL, SMALL, TEXT, new_figure
 
 PANEL = 340  # pixels across a panel, before it is drawn into the figure
@@ -57,6 +57,7 @@ def draw_filmstrip(character: Character, animation: Animation, result: Result, c
     probe = fit_camera(view, cloud, PANEL, PANEL, 0.0).project(cloud)[:, :2]
     aspect = float(np.clip(np.ptp(probe[:, 1]) / max(np.ptp(probe[:, 0]), 1e-9), 0.35, 1.8))
     camera = fit_camera(view, cloud, SMOOTH * PANEL, round(SMOOTH * PANEL * aspect))
+    floor = floor_below(model, reference)
     targets = farthest_targets(result.before, times)
     paths = [target.path for target in character.targets]
     names = distinct_names(paths)
@@ -65,13 +66,13 @@ def draw_filmstrip(character: Character, animation: Animation, result: Result, c
     grid = figure.subplots(len(runs), len(times), squeeze=False)
     for row, (run, color, name), motion in zip(grid, runs, motions, strict=True):
         for column, axes in enumerate(row):
-            panel = View(model, motion, reference, column, camera, SMOOTH)
+            panel = View(model, motion, reference, column, camera, SMOOTH, floor=floor)
             picture = draw_over_ghost(panel)
             axes.imshow(picture, extent=(0, camera.size[0], camera.size[1], 0), interpolation="antialiased")
-            draw_trails(axes, character, result.reference, times[column], camera, INTENDED, 1.0)
-            draw_trails(axes, character, run.motion, times[column], camera, color, 1.4)
+            trails = draw_trails(axes, character, result.reference, times[column], camera, INTENDED, 1.0)
+            trails += draw_trails(axes, character, run.motion, times[column], camera, color, 1.4)
             if magnifier.useful:
-                draw_magnifier(axes, magnifier, panel, int(targets[column]), color, picture)
+                draw_magnifier(axes, magnifier, panel, int(targets[column]), color, trails)
             axes.set_axis_off()
             axes.set_xlim(0, camera.size[0])
             axes.set_ylim(camera.size[1], 0)
@@ -105,11 +106,14 @@ def error_at(run: Simulation, target: int, time: float) -> float:
 
 def draw_trails(
     axes: Axes, character: Character, motion: Motion, time: float, camera: Camera, color: str, width: float
-) -> None:
-    """The path of each target up to a time [s]."""
+) -> list[Array]:
+    """The path of each target up to a time [s]; its pixels, shape [n, 2] for each target."""
     start = max(time - TRAIL_S, 0.0)
     trail = sample_motion(motion, np.linspace(start, time, 60))
+    drawn = []
     for k in range(len(character.targets)):
-        pixels = camera.project(trail.target_positions[:, k])
+        pixels = camera.project(trail.target_positions[:, k])[:, :2]
         axes.plot(pixels[:, 0], pixels[:, 1], color=color, linewidth=width, solid_capstyle="round")
         axes.plot(pixels[-1:, 0], pixels[-1:, 1], "o", color=color, markersize=2.5)
+        drawn.append(pixels)
+    return drawn

@@ -2,21 +2,27 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from calmotion.geometry.tetrahedra import Indices
 from calmotion.shot import Motion
 from calmotion.shot.character import Array
+from calmotion.views.raster import rasterize
+from calmotion.views.rendering import Camera, Mask, View, draw_over_ghost, pose
 from matplotlib.axes import Axes
 from matplotlib.patches import Rectangle
 
-from .scene import Camera, Pixels, View, draw_over_ghost
 from .style import INTENDED
 
 LARGEST = 4.0  # largest factor
 SMALLEST = 1.5  # smallest useful factor
 INSET = 0.36  # of the shorter side of a panel
+PLACES = 13  # of an inset along each side of a panel
+TITLE = 0.04  # of the height: distance of an inset from the title above
+EDGE = 6.0  # between a line and an inset [pixels of the camera]
+LINE = 2.0  # cost of a covered point of a line, in rows of covered pixels
 DISTANCE = 0.40  # of the inset: largest distance of the target from its center
 
 
@@ -48,8 +54,10 @@ def choose_magnifier(reference: Motion, motions: list[Motion], targets: Indices,
     return Magnifier(float(np.floor(2.0 * min(fits, LARGEST)) / 2.0))
 
 
-def draw_magnifier(axes: Axes, magnifier: Magnifier, view: View, target: int, color: str, drawn: Pixels) -> None:
-    """Draw the inset in the emptiest corner of a panel.
+def draw_magnifier(
+    axes: Axes, magnifier: Magnifier, view: View, target: int, color: str, trails: Sequence[Array]
+) -> None:
+    """Draw the inset where a panel is emptiest.
 
     Args:
         axes: The panel, in pixels of the camera.
@@ -57,7 +65,7 @@ def draw_magnifier(axes: Axes, magnifier: Magnifier, view: View, target: int, co
         view: Of the panel.
         target: Index of the target whose surroundings are enlarged.
         color: Of the frame and of the point of the target.
-        drawn: The picture of the panel.
+        trails: Pixels of the lines that the inset must not cover, shape [n, 2] each.
     """
     camera, row = view.camera, view.row
     side = inset_side(camera)
@@ -65,7 +73,7 @@ def draw_magnifier(axes: Axes, magnifier: Magnifier, view: View, target: int, co
     shift = 0.5 * side - magnifier.factor * (place - camera.center)
     enlarged = Camera(camera.eye, camera.axes, magnifier.factor * camera.scale, shift, (side, side))
     picture = draw_over_ghost(replace(view, camera=enlarged))
-    left, top = emptiest_corner(drawn, side // view.smooth, place / view.smooth) * view.smooth
+    left, top = emptiest_place(occupied(view), side, [place[None], *trails])
     axes.imshow(picture, extent=(left, left + side, top + side, top), interpolation="antialiased", zorder=3)
     frame = Rectangle((left, top), side, side, fill=False, edgecolor=color, linewidth=1.0, zorder=4, clip_on=False)
     axes.add_patch(frame)
@@ -74,15 +82,38 @@ def draw_magnifier(axes: Axes, magnifier: Magnifier, view: View, target: int, co
         axes.plot(left + spot[0], top + spot[1], "o", color=tint, markersize=3.0, zorder=5)
 
 
-def emptiest_corner(drawn: Pixels, side: int, keep: Array) -> Array:
-    """Left and top of a square of `side` pixels in a corner of a picture: not over `keep`, with the least ink."""
-    height, width = drawn.shape[:2]
-    ink = np.any(drawn < 255, axis=2)
-    corners = [(left, top) for top in (height - side, 0) for left in (0, width - side)]
+def occupied(view: View) -> Mask:
+    """Pixels of the camera that the character or its intended pose covers, shape [height, width]."""
+    motions = (view.motion, view.reference)
+    filled = [
+        rasterize(view.camera.project(pose(view.model, motion, view.row)[0]), *view.camera.size).filled
+        for motion in motions
+    ]
+    return np.asarray(filled[0] | filled[1])
 
-    def cost(corner: tuple[int, int]) -> float:
-        left, top = corner
-        covers = left <= keep[0] <= left + side and top <= keep[1] <= top + side
-        return float(ink[top : top + side, left : left + side].sum()) + (1e9 if covers else 0.0)
 
-    return np.array(min(corners, key=cost))
+def emptiest_place(covered: Mask, side: int, lines: Sequence[Array]) -> tuple[int, int]:
+    """Left and top of a square of `side` pixels that covers no line if it can, and the least of the character.
+
+    Args:
+        covered: Where the character is, shape [height, width].
+        side: [pixels].
+        lines: Pixels of lines, shape [n, 2] each.
+    """
+    height, width = covered.shape
+    sums = np.zeros((height + 1, width + 1))
+    sums[1:, 1:] = covered.cumsum(axis=0).cumsum(axis=1)
+    points = np.concatenate([line.reshape(-1, 2) for line in lines])
+    below = round(TITLE * height)
+    lefts = np.unique(np.linspace(0, max(width - side, 0), PLACES).astype(int))
+    tops = np.unique(np.linspace(min(below, max(height - side, 0)), max(height - side, 0), PLACES).astype(int))
+
+    def cost(place: tuple[int, int]) -> float:
+        left, top = place
+        right, bottom = min(left + side, width), min(top + side, height)
+        ink = sums[bottom, right] - sums[top, right] - sums[bottom, left] + sums[top, left]
+        inside = np.all((points > [left - EDGE, top - EDGE]) & (points < [right + EDGE, bottom + EDGE]), axis=1)
+        corner = min(left, width - right) / width + min(top, height - bottom) / height
+        return float(ink + LINE * inside.sum() * side + 0.02 * side * side * corner)
+
+    return min(((int(left), int(top)) for top in tops[::-1] for left in lefts[::-1]), key=cost)

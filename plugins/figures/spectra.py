@@ -37,7 +37,7 @@ def plot_spectra(character: Character, result: Result, modes: SystemModes | None
     for axes in all_axes:
         axes.set_xlim(0.0, end)
         for n, frequency in enumerate(marked):
-            label = "modes in the first pose" if n == 0 else None
+            label = mode_label(modes) if n == 0 else None
             axes.axvline(frequency, color=LIMIT, linewidth=1.0, linestyle=":", label=label)
         for group in grouped(marked, NEAR * end):
             axes.annotate(
@@ -48,6 +48,13 @@ def plot_spectra(character: Character, result: Result, modes: SystemModes | None
         axes.legend(fontsize=SMALL, loc="upper right", framealpha=0.85, edgecolor="none")
     all_axes[-1].set_xlabel("frequency [Hz]", fontsize=SMALL)
     return figure
+
+
+def mode_label(modes: SystemModes | None) -> str:
+    """Which pose the frequencies are those of."""
+    if modes is None or modes.time_s <= 0.0:
+        return "modes in the first pose"
+    return f"modes in the pose at {modes.time_s:.2f} s (largest error)"
 
 
 def grouped(values: list[float], gap: float) -> list[list[float]]:

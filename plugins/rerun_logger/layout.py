@@ -2,37 +2,22 @@
 
 from __future__ import annotations
 
-import colorsys
-from dataclasses import dataclass
-
+import numpy as np
 import rerun.blueprint as rrb
 from calmotion.shot import Animation, Character, Motor, Result
-from calmotion.shot.measure import measure_of
+from calmotion.shot.motor import measure_of
 from calmotion.views.playback import sample_motion
-from calmotion.views.viewpoint import choose_viewpoint
+from calmotion.views.viewpoint import choose_viewpoint, eye_that_sees, moving_cloud
+
+from .colors import BACKGROUND, Style
 
 INPUT, OPTIMIZED, REFERENCE = "input", "optimized", "reference"
 TIME = "time"  # the timeline of the shot
-BACKGROUND = (236, 238, 241)
+SCENERY = "scenery"
 MOTOR_TABS = 16
-# Half the vertical opening angle of rerun's eye is about 27 degrees; the radius is that of a whole box's diagonal.
-DISTANCE = 1.4
-
-
-@dataclass(frozen=True)
-class Style:
-    """Color (8 bits, safe for color-blind viewers: Okabe and Ito), line width in points, and name of a motion."""
-
-    color: tuple[int, int, int]
-    width: float
-    label: str
-
-    def shade(self, index: int, count: int) -> tuple[int, int, int]:
-        """A darker or lighter relative of the color, for one of several curves."""
-        hue, light, strength = colorsys.rgb_to_hls(*(c / 255.0 for c in self.color))
-        spread = 0.0 if count < 2 else 0.36 * (index / (count - 1) - 0.5)
-        red, green, blue = colorsys.hls_to_rgb(hue, min(max(light - spread, 0.18), 0.78), strength)
-        return round(255 * red), round(255 * green), round(255 * blue)
+# Of rerun's eye, and of the narrowest 3D view of a usual window, with a margin for titles and buttons.
+HALF_ANGLE = np.radians(24.0)
+ASPECT = 1.05
 
 
 STYLES = {
@@ -46,8 +31,8 @@ def make_blueprint(character: Character, animation: Animation, result: Result, s
     """The views that fit what the result holds; `scale` is the deviation of the strongest color [m]."""
     optimized = result.after is not None
     eye = choose_eye(character, animation, result)
-    legend = f"intended motion: green; others coloured by error, red at {1e3 * scale:.3g} mm"
-    views = [spatial_view(f"Input, simulated ({legend})", INPUT, eye)]
+    legend = f"green: intended; orange: {1e3 * scale:.3g} mm off"
+    views = [spatial_view(f"As animated ({legend})", INPUT, eye)]
     if optimized:
         views.append(spatial_view(f"Optimised ({legend})", OPTIMIZED, eye))
     tabs = [plot("Position error [mm]", "errors/position_mm")]
@@ -78,22 +63,21 @@ def make_blueprint(character: Character, animation: Animation, result: Result, s
 
 
 def choose_eye(character: Character, animation: Animation, result: Result) -> rrb.EyeControls3D:
-    """A camera that sees the whole motion."""
-    motion = sample_motion(result.before.motion, animation.frame_times)
-    view = choose_viewpoint(character, result.skins, motion)
-    return rrb.EyeControls3D(
-        kind=rrb.Eye3DKind.Orbital,
-        position=view.center + DISTANCE * view.radius * view.toward_eye,
-        look_target=view.center,
-        eye_up=view.up,
-    )
+    """A camera that sees all motions from beginning to end."""
+    times = animation.frame_times
+    runs = [result.reference, *(run.motion for run in (result.before, result.after) if run is not None)]
+    motions = [sample_motion(motion, times) for motion in runs]
+    view = choose_viewpoint(character, result.skins, motions[1])
+    cloud = np.concatenate([moving_cloud(character, result.skins, motion) for motion in motions])
+    eye, look = eye_that_sees(view, cloud, HALF_ANGLE, ASPECT)
+    return rrb.EyeControls3D(kind=rrb.Eye3DKind.Orbital, position=eye, look_target=look, eye_up=view.up)
 
 
 def spatial_view(name: str, root: str, eye: rrb.EyeControls3D) -> rrb.Spatial3DView:
     """One motion over the intended motion."""
     return rrb.Spatial3DView(
         origin="/",
-        contents=[f"/{root}/**", f"/{REFERENCE}/**", f"/trails/{root}/**", f"/trails/{REFERENCE}/**"],
+        contents=[f"/{root}/**", f"/{REFERENCE}/**", f"/trails/{root}/**", f"/trails/{REFERENCE}/**", f"/{SCENERY}/**"],
         name=name,
         eye_controls=eye,
         background=rrb.Background(color=BACKGROUND, kind=rrb.BackgroundKind.SolidColor),

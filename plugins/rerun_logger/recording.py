@@ -5,6 +5,7 @@ Only rerun's viewer binds sockets or reports on its use. It is never started her
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
@@ -14,18 +15,20 @@ from calmotion.errors import ShotError
 from calmotion.host import OperatorResult
 from calmotion.shot import Animation, Character, Motion, Result, Simulation
 from calmotion.shot.character import Array
-from calmotion.shot.measure import measure_of
+from calmotion.shot.motor import measure_of
 from calmotion.shot.outputs import SystemModes
 from calmotion.support.files import replaced
 from calmotion.support.naming import distinct_names
 from calmotion.views.playback import sample_motion
 from calmotion.views.spectrum import error_spectrum, highest_frequency
 
-from .bodies import log_bodies
+from .bodies import log_bodies, log_scenery
 from .deviation import largest_deviation
 from .layout import INPUT, OPTIMIZED, REFERENCE, STYLES, TIME, make_blueprint, motor_plots
 from .summary import describe
+from .trails import log_trails
 
+_END, _FOOTER = b"RRF2FOOT", 32  # mark at the end of a whole recording, and where it is looked for [bytes]
 ITERATION = "iteration"
 Progress = Callable[[float, str], None]
 
@@ -60,7 +63,8 @@ def write_recording(
         ShotError: When the file cannot be written.
     """
     target = Path(path)
-    recording = rr.RecordingStream("calmotion", recording_id=f"{target.stem}{character.path}")
+    # The viewer keeps one layout, with its camera, for all recordings of an application: each shot is one.
+    recording = rr.RecordingStream(f"calmotion {target.stem}", recording_id=f"{target.stem}{character.path}")
     motions = {INPUT: result.before.motion, REFERENCE: result.reference}
     if result.after is not None:
         motions[OPTIMIZED] = result.after.motion
@@ -68,18 +72,35 @@ def write_recording(
     scale = largest_deviation(character, result, at_frames[INPUT], at_frames[REFERENCE])
     try:
         with replaced(target) as temporary:
-            recording.save(str(temporary), default_blueprint=make_blueprint(character, animation, result, scale))
+            recording.save(str(temporary))
+            # active: also where the viewer remembers the layout of an earlier recording of this shot
+            blueprint = make_blueprint(character, animation, result, scale)
+            recording.send_blueprint(blueprint, make_active=True, make_default=True)
             summary = rr.TextDocument(describe(character, result, operators, system), media_type="text/markdown")
             recording.log("summary", summary, static=True)
             log_all(recording, character, at_frames, result, scale, samples_per_plot, progress)
             recording.flush()
             recording.disconnect()
-    except OSError as error:
+            _refuse_cut(temporary)
+    except (OSError, RuntimeError) as error:  # the second one is that of rerun's thread, such as on a full disk
         raise ShotError(
-            f"the recording cannot be written: {error}", path=path, remedy="Choose another --rrd."
-        ) from error
+            "the recording cannot be written", path=path, found=str(error) or None,
+            remedy="Check the free space of the disk, or choose another --rrd.",
+        ) from error  # fmt: skip
     finally:
         recording.disconnect()
+
+
+def _refuse_cut(file: Path) -> None:
+    """Refuse a recording without its end, of which rerun only prints a message.
+
+    Raises:
+        OSError: It has none.
+    """
+    with file.open("rb") as opened:
+        opened.seek(-min(_FOOTER, file.stat().st_size), os.SEEK_END)
+        if _END not in opened.read():
+            raise OSError("its end could not be written")
 
 
 def log_all(
@@ -94,8 +115,9 @@ def log_all(
     """Everything, in the order of the entity tree."""
     for count, (root, motion) in enumerate(at_frames.items()):
         progress(count / (len(at_frames) + 1), f"{root} in 3D")
-        log_bodies(recording, root, character, result, motion, at_frames[REFERENCE], scale)
-        log_trails(recording, root, character, motion)
+        log_bodies(recording, root, character, result, at_frames, scale)
+        log_trails(recording, root, character, whole_motion(result, root), motion.times)
+    log_scenery(recording, character)
     progress(len(at_frames) / (len(at_frames) + 1), "curves")
     log_errors(recording, character, INPUT, result.before, samples_per_plot)
     log_motors(recording, character, INPUT, result.before, samples_per_plot)
@@ -109,17 +131,13 @@ def log_all(
     log_progress(recording, result)
 
 
-def log_trails(recording: rr.RecordingStream, root: str, character: Character, motion: Motion) -> None:
-    """The path of each target through the shot, and its place now."""
-    style = STYLES[root]
-    frames = rr.TimeColumn(TIME, duration=motion.times)
-    for k, target in enumerate(character.targets):
-        path = motion.target_positions[:, k].astype(np.float32)
-        trail = rr.LineStrips3D([path], colors=[style.color], radii=[rr.Radius.ui_points(style.width)])
-        recording.log(f"trails/{root}{target.path}", trail, static=True)
-        dot = f"trails/{root}{target.path}/now"
-        recording.log(dot, rr.Points3D.from_fields(colors=[style.color], radii=[rr.Radius.ui_points(4.0)]), static=True)
-        recording.send_columns(dot, [frames], rr.Points3D.columns(positions=path))
+def whole_motion(result: Result, root: str) -> Motion:
+    """The motion of all time steps under one root."""
+    if root == REFERENCE:
+        return result.reference
+    run = result.before if root == INPUT else result.after
+    assert run is not None
+    return run.motion
 
 
 def thinned(simulation: Simulation, samples: int) -> slice:

@@ -73,7 +73,8 @@ def sizes(character: Character, result: Result, system: SystemModes | None) -> s
     ]
     if system is not None:
         frequencies = ", ".join(f"{f:.1f}" for f in system.frequencies[:SHOWN_MODES])
-        lines.append(f"- modes of the whole character in its first pose: {frequencies} Hz")
+        pose = f"pose at {system.time_s:.2f} s (largest error)" if system.time_s > 0.0 else "first pose"
+        lines.append(f"- modes of the whole character in its {pose}: {frequencies} Hz")
     names = distinct_names([body.path for body in character.bodies])
     for table in result.modes:
         shown = ", ".join(f"{f:.1f}" for f in table.frequencies[:6])

@@ -1,4 +1,4 @@
-"""What the boxer adds to the figure: two gloves, and a corner of the ring. Metres, x forward, z up."""
+"""What the boxer adds to the figure: two gloves, a corner of the ring, and a bag. Metres, x forward, z up."""
 
 from __future__ import annotations
 
@@ -53,13 +53,40 @@ def laces() -> tuple[JointSpec, ...]:
     return tuple(JointSpec(f"{side}Lace", f"{side}Hand", f"{side}Glove", zero, zero) for side in SIDES)
 
 
+BAG = (0.845, 0.0, 0.93)  # its leather begins where the knuckles of a straight punch stop
+BAG_RADIUS, BAG_HEIGHT = 0.135, 0.56
+
+
+def bag() -> tuple[Part, ...]:
+    """A heavy bag in front of the boxer, on a chain from above. The punches stop at it; it has no physics."""
+    half, top = 0.5 * BAG_HEIGHT, BAG[2] + 0.5 * BAG_HEIGHT
+    leather = lathe(
+        [(0.03, -half), (BAG_RADIUS - 0.02, -half + 0.006), (BAG_RADIUS, -half + 0.035), (BAG_RADIUS, half - 0.035),
+         (BAG_RADIUS - 0.02, half - 0.006), (0.03, half)],
+        sides=40,
+    )  # fmt: skip
+    band = cylinder(BAG_RADIUS + 0.003, 0.035, sides=40, bevel=0.004)
+    hook = lathe([(BAG_RADIUS - 0.03, 0.0), (0.012, 0.13), (0.010, 0.16)], sides=24)
+    chain = cylinder(0.008, 0.50, sides=12)
+    return (
+        Part("Bag", leather.moved(BAG), "Leather"),
+        *(
+            Part(f"Band{k}", band.moved((BAG[0], BAG[1], BAG[2] + z)), "Apron")
+            for k, z in enumerate((-half + 0.09, half - 0.09))
+        ),
+        Part("Hook", hook.moved((BAG[0], BAG[1], top - 0.002)), "Apron"),
+        Part("Chain", chain.moved((BAG[0], BAG[1], top + 0.38)), "Post"),
+    )
+
+
 def scenery() -> tuple[Part, ...]:
-    """A small ring: canvas, posts with pads, three ropes a side. Not a body, no physics."""
-    half, corners = 0.95, [(x, y) for x in (-1.0, 1.0) for y in (-1.0, 1.0)]
+    """A ring that is open towards the spectator: canvas, three posts with pads, three ropes on two sides, and the bag.
+    Not a body, no physics."""
+    half, corners = 0.95, [(-1.0, -1.0), (-1.0, 1.0), (1.0, 1.0)]
     square = 1.12 * math.sqrt(2.0)  # four points of a circle are a square with this diagonal, not this side
     canvas = skin([Section(-0.03, square, square), Section(0.0, square, square)], sides=4)
     apron = skin([Section(-0.14, square - 0.02, square - 0.02), Section(-0.03, square - 0.02, square - 0.02)], sides=4)
-    parts = [Part("Canvas", canvas, "Canvas"), Part("Apron", apron, "Apron")]
+    parts = [Part("Canvas", canvas, "Canvas"), Part("Apron", apron, "Apron"), *bag()]
     for k, (x, y) in enumerate(corners):
         place = (half * x, half * y, 0.0)
         parts += [
@@ -67,10 +94,9 @@ def scenery() -> tuple[Part, ...]:
             Part(f"Pad{k}", cylinder(0.050, 0.46, sides=20, bevel=0.012).moved((place[0], place[1], 0.50)), "Pad"),
         ]
     for level, z in enumerate((0.32, 0.50, 0.68)):
-        for side, sign in (("Far", -1.0), ("Near", 1.0)):
-            along_x, along_y = (cylinder(0.010, 2.0 * half, axis=axis, sides=12) for axis in "xy")
-            parts += [
-                Part(f"{side}RopeX{level}", along_x.moved((0.0, sign * half, z)), "Rope"),
-                Part(f"{side}RopeY{level}", along_y.moved((sign * half, 0.0, z)), "Rope"),
-            ]
+        along_x, along_y = (cylinder(0.010, 2.0 * half, axis=axis, sides=12) for axis in "xy")
+        parts += [
+            Part(f"SideRope{level}", along_x.moved((0.0, half, z)), "Rope"),
+            Part(f"BackRope{level}", along_y.moved((-half, 0.0, z)), "Rope"),
+        ]
     return tuple(parts)

@@ -131,14 +131,15 @@ def test_a_robot_performs_a_motion_capture(calmotion, tmp_path):
     done = calmotion(
         "optimize", shot, "-o", tmp_path / "calm.usda", "--json", "--motion", tmp_path / "wave.bvh",
         "--set", "bvh.read.map=Arm.Zrotation=shoulder", "--set", "retarget.optimize.max_iterations=2",
-        "--step", "10ms", "--run", "curves.export", "--set", f"curves.export.file={tmp_path / 'curves.csv'}",
+        "--step", "10ms", "--csv", tmp_path / "table.csv",
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
     report = json.loads(done.stdout)
     assert report["max_error_after_m"] < report["max_error_before_m"]
-    table = np.genfromtxt(tmp_path / "curves.csv", delimiter=",", comments="#", skip_header=6)
-    shoulder = np.interp(TIMES[TIMES <= table[-1, 0]], table[:, 0], table[:, 1])
-    assert np.abs(shoulder - np.radians(20.0 * np.sin(TIMES[: len(shoulder)]))).max() < 0.05
+    table = np.genfromtxt(tmp_path / "table.csv", delimiter=",", names=True, deletechars="", replace_space=" ")
+    times = TIMES[TIMES <= table["time_s"][-1]]
+    shoulder = np.interp(times, table["time_s"], table[f"{shots.SHOULDER}.output"])
+    assert np.abs(shoulder - np.radians(20.0 * np.sin(times))).max() < 0.05
 
 
 def test_a_motion_that_no_plugin_reads_is_refused_before_the_work(calmotion, tmp_path):

@@ -15,6 +15,7 @@ from calmotion.host import PluginError
 from calmotion.shot.outputs import SystemModes
 from calmotion.shot.run import OutputPaths
 from calmotion.testing import check_plugin, host_with, run_operator
+from calmotion.views.rendering import fit_camera
 from calmotion.views.spectrum import error_spectrum
 from calmotion.views.viewpoint import choose_viewpoint
 
@@ -123,56 +124,6 @@ def test_the_instants_are_the_worst_of_each_part_of_the_shot(figures):
     assert times.tolist() == [animation.frame_times[part[np.argmax(errors[part])]] for part in parts]
 
 
-def test_the_renderer_shows_the_nearer_triangle_and_not_the_back_of_one(figures):
-    def triangle(depth, mirrored=False):
-        corners = [(1.0, 1.0, depth), (1.0, 15.0, depth), (15.0, 15.0, depth)]
-        return corners[::-1] if mirrored else corners
-
-    hits = figures.raster.rasterize(np.array([triangle(5.0), triangle(2.0), triangle(1.0, True)]), 16, 16)
-    assert set(np.unique(hits.triangle)) == {-1, 1}
-    assert (hits.triangle == 1).sum() == pytest.approx(0.5 * 14 * 14, rel=0.1)
-    np.testing.assert_allclose(hits.depth[hits.triangle == 1], 2.0)
-    assert np.all(np.isinf(hits.depth[hits.triangle < 0]))
-    rows, columns = np.nonzero(hits.triangle == 1)
-    middle = hits.shares[rows, columns] @ np.array([(1.0, 1.0), (1.0, 15.0), (15.0, 15.0)])
-    np.testing.assert_allclose(middle, np.column_stack([columns, rows]) + 0.5, atol=1e-9)
-
-
-def test_triangles_that_share_an_edge_leave_no_gap_and_those_outside_are_clipped(figures):
-    a, b, c, d = (-30.0, -30.0, 1.0), (-30.0, 50.0, 1.0), (50.0, 50.0, 1.0), (50.0, -30.0, 1.0)
-    far = np.array([(100.0, 100.0, 1.0), (100.0, 120.0, 1.0), (120.0, 120.0, 1.0)])
-    hits = figures.raster.rasterize(np.array([[a, b, c], [a, c, d], far]), 20, 16)
-    assert hits.triangle.shape == (16, 20) and set(np.unique(hits.triangle)) == {0, 1}
-
-
-def test_the_camera_shows_the_whole_motion_and_up_is_up(figures):
-    character, result = synthetic.character(), synthetic.result()
-    motion = result.before.motion
-    view = choose_viewpoint(character, result.skins, motion)
-    cloud = motion.target_positions[:, 0]
-    camera = figures.scene.fit_camera(view, cloud, 300, 200)
-    pixels = camera.project(cloud)
-    assert np.all(pixels[:, :2] >= 0.0) and np.all(pixels[:, :2] <= [300, 200])
-    low, high = camera.project(np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 0.1]]))
-    assert high[1] < low[1]
-    # Seen from its side of the world, what is nearer has the smaller depth.
-    assert camera.project(camera.eye + camera.axes[2])[2] == pytest.approx(1.0)
-
-
-def test_the_bent_link_is_drawn_where_the_simulation_puts_it(figures):
-    character, result = synthetic.character(), synthetic.result()
-    model = figures.scene.prepare(character, result.skins)
-    row = int(np.argmax(result.before.motion.elastic[1][:, 0]))
-    corners, normals, owners = figures.scene.pose(model, result.before.motion, row)
-    link = corners[owners == 1].reshape(-1, 3)
-    far = np.linalg.norm(link, axis=1) > 0.9 * synthetic.LENGTH
-    np.testing.assert_allclose(
-        np.unique(link[far].round(9), axis=0).mean(axis=0), result.before.motion.target_positions[row, 0], atol=1e-6
-    )
-    assert len(model.parts) == 3  # the guide is not shown
-    np.testing.assert_allclose(np.linalg.norm(normals, axis=-1), 1.0)
-
-
 def test_it_is_skipped_when_no_figures_are_requested():
     values = [synthetic.character(), synthetic.animation(), synthetic.result(), OutputPaths()]
     with pytest.raises(PluginError, match="--figures"):
@@ -189,7 +140,7 @@ def test_the_magnifier_keeps_the_straying_target_in_sight(figures):
     character, result = synthetic.character(), synthetic.result()
     motion, reference = result.before.motion, result.reference
     view = choose_viewpoint(character, result.skins, motion)
-    camera = figures.scene.fit_camera(view, motion.target_positions[:, 0], 600, 400)
+    camera = fit_camera(view, motion.target_positions[:, 0], 600, 400)
     magnifier = figures.magnifier.choose_magnifier(reference, [motion], np.zeros(len(motion.times), int), camera)
     assert magnifier.useful
     gap = camera.project(motion.target_positions[:, 0])[:, :2] - camera.project(reference.target_positions[:, 0])[:, :2]
@@ -208,9 +159,37 @@ def test_the_box_shows_the_target_that_is_farthest_off_at_that_instant(figures):
     assert len(figures.filmstrip.farthest_targets(nothing, np.array([0.25]))) == 0
 
 
-def test_the_magnifier_stands_in_the_emptiest_corner_and_not_over_the_target(figures):
-    drawn = np.full((100, 200, 3), 255, dtype=np.uint8)
-    drawn[60:, :60] = 0
-    drawn[:40, :40] = 0
-    assert figures.magnifier.emptiest_corner(drawn, 40, np.array([190.0, 90.0])).tolist() == [160, 0]
-    assert figures.magnifier.emptiest_corner(drawn, 40, np.array([190.0, 5.0])).tolist() == [160, 60]
+def test_the_magnifier_covers_no_line_and_the_least_of_the_character(figures):
+    covered = np.zeros((100, 200), dtype=bool)
+    covered[60:, :60] = covered[:40, :40] = True
+    place = figures.magnifier.emptiest_place
+    assert place(covered, 40, [np.array([[190.0, 90.0]])]) == (160, 4), "a little below the title"
+    assert place(covered, 40, [np.array([[190.0, 5.0]])]) == (160, 60)
+    trail = np.column_stack([np.full(50, 180.0), np.linspace(0.0, 100.0, 50)])
+    left, top = place(covered, 40, [trail])
+    assert left + 40 < 180 - 5 and not covered[top : top + 40, left : left + 40].any()
+
+
+def test_errors_after_are_readable_beside_those_before(figures):
+    result = synthetic.result()
+    axes = figures.curves.plot_errors(synthetic.character(), result).axes[0]
+    low, high = axes.get_ylim()
+    largest = [1e3 * run.position_errors.max() for run in (result.before, result.after)]
+    share = np.log(np.array(largest) / low) / np.log(high / low)
+    assert axes.get_yscale() == "log" and share[0] < 1.0 and share[1] > 0.3
+    alone = figures.curves.plot_errors(synthetic.character(), synthetic.result(optimized=False)).axes[0]
+    assert alone.get_yscale() == "linear" and alone.get_ylim()[0] == 0.0
+
+
+def test_convergence_begins_with_the_motion_as_animated(figures):
+    result = synthetic.result()
+    axes = figures.curves.plot_convergence(result).axes[0]
+    work, objective = axes.get_lines()[0].get_data()
+    assert list(work) == [1, 2, 23, 44], "simulations, and the sweeps that came before each iterate"
+    assert list(objective) == [step.objective for step in result.steps] and axes.get_xlim()[0] == 0.0
+
+
+def test_spectra_name_the_pose_of_the_modes(figures):
+    modes = SystemModes(np.array([4.0]), np.array([0.01]), 0.25)
+    (axes,) = figures.spectra.plot_spectra(synthetic.character(), synthetic.result(), modes).axes
+    assert "modes in the pose at 0.25 s (largest error)" in lines_of(axes)

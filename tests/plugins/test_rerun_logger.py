@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import rerun as rr
 import synthetic
 from calmotion.errors import ShotError
 from calmotion.host import PluginError
@@ -165,10 +166,42 @@ def test_progress_is_a_series_over_iterations(columns):
     np.testing.assert_allclose(np.ravel(values), [-2.0, -3.0, -4.0, -5.0])
 
 
-def test_trails_run_through_the_places_of_the_target(columns):
-    strip = np.array(columns["/trails/reference/Robot/Tip/Target", "LineStrips3D:strips"][1][0][0])
-    assert strip.shape == (synthetic.FRAMES, 3)
-    np.testing.assert_allclose(np.linalg.norm(strip, axis=1), synthetic.LENGTH, rtol=1e-4)
+def test_trails_end_at_the_target_and_show_its_last_moments_smoothly(columns):
+    frames, result = synthetic.animation().frame_times, synthetic.result()
+    times, trails = columns["/trails/input/Robot/Tip/Target", "LineStrips3D:strips"]
+    np.testing.assert_allclose(times, frames, atol=2e-9)
+    motion = result.before.motion
+    places = np.stack([np.interp(frames, motion.times, x) for x in motion.target_positions[:, 0].T], axis=1)
+    np.testing.assert_allclose([trail[-1][-1] for trail in trails], places, atol=1e-6)
+    whole = np.array(trails[-1])
+    np.testing.assert_allclose(whole[1:, 0], whole[:-1, -1], err_msg="pieces join")
+    start = sample_motion(motion, frames[-1:] - 0.8).target_positions[0, 0]
+    np.testing.assert_allclose(whole[0, 0], start, atol=1e-6)
+    assert len({tuple(point) for piece in whole for point in piece}) > 2 * 0.8 * synthetic.FRAME_RATE
+    colors = columns["/trails/input/Robot/Tip/Target", "LineStrips3D:colors"][1][0]
+    fade = [abs((c >> 24) - 213) + abs((c >> 16 & 255) - 94) + abs(c >> 8 & 255) for c in colors]
+    assert fade == sorted(fade, reverse=True) and fade[-1] < 3
+
+
+def test_the_ghost_lies_inside_the_body_where_nothing_is_off(columns):
+    (own,), (ghost,) = (
+        np.array(columns[f"/{root}/Robot/Tip/Ball", "Mesh3D:vertex_positions"][1]) for root in ("input", "reference")
+    )
+    assert 0.0 < np.abs(own).max() - np.abs(ghost).max() < 0.1 * np.abs(own).max()
+    assert np.all(np.abs(ghost) <= np.abs(own) + 1e-9)
+
+
+def test_curves_can_be_read_on_dark_and_light_themes():
+    host = host_with(PLUGIN)
+    package = host.operators["rerun.log"].__module__
+    __import__(f"{package}.layout")
+    module = sys.modules[package]
+    for style in module.layout.STYLES.values():
+        for count in (1, 2, 5, 24):
+            shades = [style.shade(k, count) for k in range(count)]
+            assert len(set(shades)) == count
+            for shade in shades:
+                assert min(module.colors.contrast(shade, other) for other in ((255, 255, 255), (13, 16, 17))) >= 3.0
 
 
 def test_the_summary_lists_simplifications_and_errors(columns):
@@ -223,6 +256,34 @@ def test_a_folder_that_cannot_be_written_is_reported_and_nothing_is_left(tmp_pat
     assert [path.name for path in tmp_path.iterdir()] == ["file"]
 
 
+def test_a_full_disk_is_reported_and_leaves_the_old_recording(tmp_path, monkeypatch):
+    path = tmp_path / "out.rrd"
+    path.write_bytes(b"old")
+
+    def full(stream):
+        raise RuntimeError("File-writer thread shut down prematurely")  # what rerun's thread then raises
+
+    monkeypatch.setattr("rerun.RecordingStream.flush", full)
+    with pytest.raises(ShotError, match="cannot be written"):
+        write(path, synthetic.result())
+    assert path.read_bytes() == b"old" and [p.name for p in tmp_path.iterdir()] == ["out.rrd"]
+
+
+def test_a_recording_without_its_end_is_refused(tmp_path, monkeypatch):
+    path = tmp_path / "out.rrd"
+
+    def cut(stream):  # as by a disk that becomes full after the last flush, of which rerun only prints a message
+        disconnect(stream)
+        for temporary in tmp_path.glob(".calmotion-*"):
+            os.truncate(temporary, temporary.stat().st_size - 40)
+
+    disconnect = rr.RecordingStream.disconnect
+    monkeypatch.setattr("rerun.RecordingStream.disconnect", cut)
+    with pytest.raises(ShotError, match="cannot be written"):
+        write(path, synthetic.result())
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_a_failure_half_way_leaves_the_old_recording(tmp_path):
     path = tmp_path / "out.rrd"
     path.write_bytes(b"old")
@@ -268,3 +329,16 @@ def test_the_summary_lists_operators_that_ran_and_that_were_skipped(tmp_path):
     )
     assert "| `usd.read` | usd_reader | done | 1.25 s |  |" in text
     assert "| `fe.mesh` | fe_mesher | left out |  | no body is flexible |" in text
+
+
+def test_each_shot_has_a_layout_of_its_own(tmp_path):
+    from rerun.chunk import RrdReader
+
+    names = set()
+    for name in ("first", "second"):
+        write(tmp_path / f"{name}.rrd", synthetic.result())
+        reader = RrdReader(str(tmp_path / f"{name}.rrd"))
+        (layout,), (recording,) = reader.blueprints(), reader.recordings()
+        assert layout.application_id == recording.application_id
+        names.add(layout.application_id)
+    assert len(names) == 2, "the viewer keeps one camera for each application"

@@ -7,7 +7,7 @@ import dataclasses
 import numpy as np
 import pytest
 import synthetic
-from calmotion.views.viewpoint import choose_viewpoint
+from calmotion.views.viewpoint import choose_viewpoint, eye_that_sees, moving_cloud
 
 
 def test_the_sphere_contains_every_target_but_not_the_hidden_guide():
@@ -32,3 +32,22 @@ def test_without_gravity_or_targets_there_is_still_a_view():
     character = dataclasses.replace(synthetic.character(), gravity=np.zeros(3), targets=())
     view = choose_viewpoint(character, result.skins, motion)
     assert np.all(np.isfinite(view.toward_eye)) and np.linalg.norm(view.toward_eye) == pytest.approx(1.0)
+
+
+def test_the_eye_is_as_near_as_the_whole_motion_allows():
+    character, result = synthetic.character(), synthetic.result()
+    motion = result.before.motion
+    view = choose_viewpoint(character, result.skins, motion)
+    cloud = moving_cloud(character, result.skins, motion)
+    assert np.linalg.norm(cloud, axis=1).max() > synthetic.LENGTH
+    half, aspect = np.radians(24.0), 1.3
+    eye, look = eye_that_sees(view, cloud, half, aspect)
+    forward = (look - eye) / np.linalg.norm(look - eye)
+    np.testing.assert_allclose(forward, -view.toward_eye, atol=1e-9)
+    right = np.cross(forward, view.up) / np.linalg.norm(np.cross(forward, view.up))
+    offset = cloud - eye
+    depth = offset @ forward
+    assert depth.min() > 0.0
+    across = np.abs(offset @ right) / depth / (aspect * np.tan(half))
+    upright = np.abs(offset @ np.cross(right, forward)) / depth / np.tan(half)
+    assert max(across.max(), upright.max()) == pytest.approx(1.0), "inside the picture, and reaching its edge"

@@ -1,1 +1,1 @@
-"""Common parts of pictures and recordings: playback of a computed motion, viewpoint, shading, spectrum."""
+"""Common parts of pictures, videos and recordings: playback, viewpoint, shading, renderer, spectrum."""

@@ -69,3 +69,42 @@ def choose_viewpoint(character: Character, skins: tuple[Skin | None, ...], motio
     ahead = ahead / np.linalg.norm(ahead)
     level = np.cos(SIDE) * ahead - np.sin(SIDE) * np.cross(up, ahead)
     return Viewpoint(0.5 * (low + high), radius, np.cos(ELEVATION) * level + np.sin(ELEVATION) * up, up)
+
+
+def moving_cloud(character: Character, skins: tuple[Skin | None, ...], motion: Motion, rows: int = 40) -> Array:
+    """Points of all visible surfaces and targets at instants of a motion, shape [n, 3]."""
+    clouds = [motion.target_positions.reshape(-1, 3)]
+    for row in np.unique(np.linspace(0, len(motion.times) - 1, rows).astype(int)):
+        for index, body in enumerate(character.bodies):
+            points = world_points(body, index, skins[index], motion, row)
+            clouds += [p for p, surface in zip(points, body.surfaces, strict=True) if surface.visible]
+    return np.concatenate(clouds)
+
+
+def eye_that_sees(view: Viewpoint, cloud: Array, half_angle: float, aspect: float) -> tuple[Array, Array]:
+    """The nearest eye in the direction of a viewpoint whose picture contains all points, and where it looks.
+
+    Args:
+        view: For its directions.
+        cloud: World points [m], shape [n, 3].
+        half_angle: Half the vertical opening angle of the eye [rad].
+        aspect: Width over height of the picture.
+
+    Returns:
+        The eye and a point in the middle of the picture, at the middle distance of the points [m], shape [3] each.
+    """
+    forward = -view.toward_eye
+    right = np.cross(forward, view.up)
+    right = right / np.linalg.norm(right)
+    axes = np.stack([right, np.cross(right, forward), forward])
+    local = cloud @ axes.T
+    depth = local[:, 2]
+    slopes = np.tan(half_angle) * np.array([aspect, 1.0])
+    # Each side of the picture is a plane through the eye: a - slope * (depth - z) <= e <= a + slope * (depth - z).
+    low = (local[:, :2] - slopes * depth[:, None]).max(axis=0)
+    high = (local[:, :2] + slopes * depth[:, None]).min(axis=0)
+    z = float(np.min((high - low) / (2.0 * slopes)))
+    z = min(z, float(depth.min()) - 1e-3 * view.radius)
+    eye = np.append(0.5 * (low + high), z)
+    look = np.append(eye[:2], 0.5 * (depth.min() + depth.max()))
+    return eye @ axes, look @ axes

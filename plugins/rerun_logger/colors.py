@@ -1,0 +1,71 @@
+"""Colors of a recording: curves that can be read on the dark and on the light theme, and lines that fade."""
+
+from __future__ import annotations
+
+import colorsys
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from calmotion.shot.character import Array
+
+Color = tuple[int, int, int]
+
+BACKGROUND: Color = (236, 238, 241)  # of the 3D views, on every theme
+# Between these a color has a contrast of 3 or more both with white and with the dark theme's background.
+DARKEST, BRIGHTEST = 0.13, 0.29  # relative luminance
+SPREAD = 40.0 / 360.0  # of the hues of several curves
+
+
+@dataclass(frozen=True)
+class Style:
+    """Color (8 bits, safe for color-blind viewers: Okabe and Ito), line width in points, and name of a motion."""
+
+    color: Color
+    width: float
+    label: str
+
+    def shade(self, index: int, count: int) -> Color:
+        """A relative of the color, for one of several curves: another hue nearby, darker and brighter in turn."""
+        if count < 2:
+            return self.color
+        hue, _, strength = colorsys.rgb_to_hls(*(c / 255.0 for c in self.color))
+        hue += SPREAD * (index / (count - 1) - 0.5)
+        wanted = (DARKEST, BRIGHTEST)[index % 2]
+        low, high = 0.0, 1.0
+        for _ in range(20):  # luminance grows with lightness
+            middle = 0.5 * (low + high)
+            low, high = (middle, high) if luminance(_rgb(hue, middle, strength)) < wanted else (low, middle)
+        red, green, blue = _rgb(hue, 0.5 * (low + high), strength)
+        return round(red), round(green), round(blue)
+
+
+def _rgb(hue: float, light: float, strength: float) -> tuple[float, float, float]:
+    red, green, blue = colorsys.hls_to_rgb(hue % 1.0, light, strength)
+    return 255.0 * red, 255.0 * green, 255.0 * blue
+
+
+def luminance(color: Sequence[float]) -> float:
+    """Relative luminance of an sRGB color of 8 bits.
+
+    Source: Web Content Accessibility Guidelines 2.2, relative luminance.
+    """
+    share = np.array(color[:3], dtype=float) / 255.0
+    linear = np.where(share <= 0.04045, share / 12.92, ((share + 0.055) / 1.055) ** 2.4)
+    return float(linear @ (0.2126, 0.7152, 0.0722))
+
+
+def contrast(first: Sequence[float], second: Sequence[float]) -> float:
+    """Contrast of two colors, 1 to 21.
+
+    Source: Web Content Accessibility Guidelines 2.2, contrast ratio.
+    """
+    dark, bright = sorted((luminance(first), luminance(second)))
+    return (bright + 0.05) / (dark + 0.05)
+
+
+def fading(color: Color, count: int) -> Array:
+    """Colors from nearly the background's to the full color, shape [count, 3], 8 bits."""
+    shares = (np.arange(1, count + 1) / count) ** 1.3
+    mixed = np.array(BACKGROUND) + shares[:, None] * (np.array(color, dtype=float) - BACKGROUND)
+    return np.asarray(mixed.round(), dtype=np.uint8)

@@ -1,0 +1,120 @@
+"""Writing of videos, one frame in memory at a time.
+
+Pillow writes animated WebP, which browsers play. It comes under a permissive licence and in a wheel. MP4 needs ffmpeg,
+whose wheels are all GPL, so it is run as a program of its own where the user has installed one.
+"""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+from calmotion.errors import ShotError
+from calmotion.support.files import replaced
+from PIL import Image
+
+WEBP, MP4 = ".webp", ".mp4"
+METHOD = 4  # effort of WebP's encoder, 0 to 6
+BETWEEN_KEYS = (40, 80)  # frames: all others hold differences alone
+Draw = Callable[[int], Image.Image]
+
+
+def refuse_unknown_kind(path: str) -> None:
+    """Refuse a file that cannot be written, before any work.
+
+    Raises:
+        ShotError: The name ends neither in .webp nor in .mp4, or ffmpeg is missing.
+    """
+    suffix = Path(path).suffix.lower()
+    if suffix not in (WEBP, MP4):
+        raise ShotError(
+            "this kind of video is not supported", path="--video", found=path, remedy=f"Name a {WEBP} or {MP4} file."
+        )
+    if suffix == MP4 and shutil.which("ffmpeg") is None:
+        raise ShotError(
+            "an .mp4 file needs the program ffmpeg, which is not on the PATH", path="--video", found=path,
+            remedy=f"Install ffmpeg, or name a {WEBP} file, which needs nothing and plays in browsers.",
+        )  # fmt: skip
+
+
+def encode(path: str, draw: Draw, count: int, rate: float, quality: int) -> None:
+    """Write a video atomically.
+
+    Args:
+        path: A .webp or .mp4 file.
+        draw: Draws a frame by its number; frames are drawn in order, each once.
+        count: Number of frames.
+        rate: Frames per second.
+        quality: Of WebP, 1 to 100.
+
+    Raises:
+        ShotError: It cannot be written.
+    """
+    refuse_unknown_kind(path)
+    write = _write_webp if Path(path).suffix.lower() == WEBP else _write_mp4
+    try:
+        with replaced(path) as temporary:
+            write(temporary, draw, count, rate, quality)
+    except OSError as error:
+        raise ShotError(f"the video cannot be written: {error}", path=path, remedy="Choose another --video.") from error
+
+
+class _Following:
+    """The frames after the first, as Pillow asks for them: a picture with frames that are drawn when it is sought."""
+
+    mode = "RGB"
+
+    def __init__(self, draw: Draw, count: int):
+        self._draw, self.n_frames = draw, count
+        self._frame: Image.Image | None = None
+
+    def seek(self, frame: int) -> None:
+        """Draw a frame; the one before is dropped."""
+        self._frame = self._draw(frame + 1)
+
+    def getim(self) -> Any:
+        """Pixels of the frame."""
+        assert self._frame is not None
+        return self._frame.getim()
+
+
+def _write_webp(path: Path, draw: Draw, count: int, rate: float, quality: int) -> None:
+    following: list[Any] = [_Following(draw, count - 1)] if count > 1 else []
+    near, far = BETWEEN_KEYS
+    draw(0).save(
+        path, format="WEBP", save_all=True, append_images=following, duration=round(1000.0 / rate), loop=0,
+        quality=quality, method=METHOD, kmin=near, kmax=far,
+    )  # fmt: skip
+
+
+def _write_mp4(path: Path, draw: Draw, count: int, rate: float, quality: int) -> None:
+    frames = (draw(k) for k in range(count))
+    first = next(frames)
+    width, height = (side - side % 2 for side in first.size)  # yuv420p halves both
+    command = [
+        "ffmpeg", "-loglevel", "error", "-y", "-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{width}x{height}",
+        "-r", f"{rate:g}", "-i", "-", "-pix_fmt", "yuv420p", "-movflags", "+faststart", "-fflags", "+bitexact",
+        "-flags:v", "+bitexact", "-threads", "1", "-f", "mp4", str(path),
+    ]  # fmt: skip
+    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE) as process:
+        assert process.stdin is not None and process.stderr is not None
+        try:
+            for frame in _both(first, frames):
+                process.stdin.write(frame.crop((0, 0, width, height)).tobytes())
+            process.stdin.close()
+        except BrokenPipeError:
+            pass  # what ffmpeg says is the reason
+        except BaseException:
+            process.kill()
+            raise
+        said = process.stderr.read().decode(errors="replace").strip()
+    if process.returncode:
+        raise OSError(f"ffmpeg failed: {said.splitlines()[-1] if said else process.returncode}")
+
+
+def _both(first: Image.Image, frames: Iterator[Image.Image]) -> Iterator[Image.Image]:
+    yield first
+    yield from frames

@@ -1,0 +1,165 @@
+"""A video of a result: its frames, composed of pictures, numbers and the error curve."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from calmotion.shot import Animation, Character, Result, Simulation
+from calmotion.support.naming import distinct_names
+from PIL import Image, ImageDraw
+
+from .chart import FAINT, GRID, INK, Chart, Color, Curve, draw_chart, font
+from .encoding import encode
+from .stage import Stage, draw_panel, set_stage
+from .timeline import AFTER_WORST, BEFORE_WORST, Moment, largest_errors, moments, worst_moment
+
+# Okabe and Ito's colors, as in the figures and recordings.
+BEFORE, AFTER, INTENDED = (213, 94, 0), (0, 114, 178), (0, 158, 115)
+HEIGHTS = (0.55, 1.15)  # of a panel, as shares of its width
+CHART = 0.13  # height of the chart, as a share of the width of the video
+LEAST_CHART = 100  # [pixels]
+Progress = Callable[[float, str], None]
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Width [pixels], frames per second, speed of the slow motion, and quality (1 to 100) of a video."""
+
+    width: int = 1120
+    rate: float = 25.0
+    slow: float = 0.2
+    quality: int = 80
+
+
+@dataclass(frozen=True, eq=False)
+class Film:
+    """What all frames share.
+
+    Attributes:
+        stage: Cameras and surfaces.
+        runs: Each motion with its color and name.
+        chart: The error curves.
+        target: Name of the target of the near view.
+        width: Of the video [pixels].
+    """
+
+    stage: Stage
+    runs: tuple[tuple[Simulation, Color, str], ...]
+    chart: Chart | None
+    target: str
+    width: int
+
+    @property
+    def text(self) -> int:
+        """Size of large letters [pixels]."""
+        return max(round(self.width / 56), 12)
+
+
+def write_video(
+    path: str,
+    character: Character,
+    animation: Animation,
+    result: Result,
+    settings: Settings,
+    progress: Progress = lambda fraction, message: None,
+) -> None:
+    """Write a video of a result; the same result gives the same frames.
+
+    Args:
+        path: A .webp or .mp4 file.
+        character: The character.
+        animation: For the times of its frames.
+        result: Of `simulate` (one panel) or of `optimize` (two).
+        settings: Size, rate and speed.
+        progress: Called with a fraction in 0..1 and a message.
+
+    Raises:
+        ShotError: The file cannot be written.
+    """
+    film, frames = plan(character, animation, result, settings)
+
+    def draw(number: int) -> Image.Image:
+        progress(number / len(frames), f"frame {number + 1} of {len(frames)}")
+        return draw_frame(film, frames[number])
+
+    encode(path, draw, len(frames), settings.rate, settings.quality)
+
+
+def plan(character: Character, animation: Animation, result: Result, settings: Settings) -> tuple[Film, list[Moment]]:
+    """What the video shows: the shared parts of its frames, and their moments."""
+    worst = worst_moment(result)
+    span = (float(animation.frame_times[0]), float(animation.frame_times[-1]))
+    runs: list[tuple[Simulation, Color, str]] = [(result.before, BEFORE, "as animated")]
+    if result.after is not None:
+        runs.append((result.after, AFTER, "optimised"))
+    width = settings.width - settings.width % 2
+    panel = width // len(runs)
+    shape = HEIGHTS if len(runs) > 1 else (HEIGHTS[0] / 2, HEIGHTS[1] / 2)
+    stage = set_stage(character, animation, result, worst, panel, shape)
+    slow = None
+    if worst.target >= 0 and settings.slow < 1.0:
+        slow = (max(worst.time - BEFORE_WORST, span[0]), min(worst.time + AFTER_WORST, span[1]))
+    curves = [
+        Curve(run.motion.times[run.motion.judged], 1e3 * largest_errors(run), color, name) for run, color, name in runs
+    ]
+    paths = [target.path for target in character.targets]
+    title = "error [mm]" if len(paths) == 1 else f"largest error of the {len(paths)} targets [mm]"
+    size = (width, max(round(CHART * width), LEAST_CHART))
+    chart = Chart(curves, span, size, slow, title, INTENDED) if paths else None
+    name = distinct_names(paths)[paths[worst.target]] if worst.target >= 0 else ""
+    return Film(stage, tuple(runs), chart, name, width), moments(*span, worst, settings.rate, settings.slow)
+
+
+def draw_frame(film: Film, moment: Moment) -> Image.Image:
+    """One frame: a panel for each motion with its error above, and the curve below."""
+    panels = [draw_panel(film.stage, run, moment, color, INTENDED) for run, color, _ in film.runs]
+    head = round(3.4 * film.text)
+    chart = draw_chart(film.chart, moment.time) if film.chart else None
+    height = head + panels[0].height + (chart.height if chart else 0)
+    frame = Image.new("RGB", (film.width, height + height % 2), "white")
+    for k, panel in enumerate(panels):
+        frame.paste(panel, (k * panel.width, head))
+    if chart:
+        frame.paste(chart, (0, head + panels[0].height))
+    draw = ImageDraw.Draw(frame)
+    for k in range(1, len(panels)):
+        x = k * panels[0].width
+        draw.line((x, round(0.6 * film.text), x, head + panels[0].height), fill=GRID, width=max(film.width // 700, 1))
+    for k, (run, color, name) in enumerate(film.runs):
+        write_head(draw, film, k * panels[0].width, run, moment, color, name)
+    write_time(draw, film, moment, head + panels[0].height)
+    return frame
+
+
+def write_head(
+    draw: ImageDraw.ImageDraw, film: Film, left: int, run: Simulation, moment: Moment, color: Color, name: str
+) -> None:
+    """Name of the motion, and its error at this moment."""
+    x, y = left + film.text, 0.55 * film.text
+    draw.text((x, y), name, font=font(round(1.25 * film.text), bold=True), fill=color)
+    errors = run.position_errors
+    if not errors.shape[1]:
+        return
+    column = errors[:, film.stage.target] if moment.near > 0.0 else errors.max(axis=1)
+    value = 1e3 * float(np.interp(moment.time, run.motion.times, column))
+    label = film.target if moment.near > 0.0 else "error"
+    number = f"{value:.1f} mm" if value >= 0.95 else f"{value:.2f} mm"
+    right = left + film.width // len(film.runs) - film.text
+    draw.text((right, y), number, font=font(round(1.25 * film.text), bold=True), fill=color, anchor="ra")
+    draw.text((right, y + 1.6 * film.text), label, font=font(round(0.8 * film.text)), fill=FAINT, anchor="ra")
+
+
+def write_time(draw: ImageDraw.ImageDraw, film: Film, moment: Moment, bottom: int) -> None:
+    """Time of the shot and its speed, at the lower edge of the panels."""
+    letters = font(round(0.85 * film.text))
+    base = bottom - 0.5 * film.text
+    speed = ""
+    if moment.near > 0.0:
+        speed = f"  slow motion {moment.speed:g}×" if moment.speed else ""
+    halo = max(round(film.text / 8), 1)
+    draw.text(
+        (film.text, base), f"{moment.time:.2f} s{speed}", font=letters, fill=INK, anchor="ls",
+        stroke_width=halo, stroke_fill="white",
+    )  # fmt: skip

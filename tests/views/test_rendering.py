@@ -1,0 +1,112 @@
+"""Pictures of a character: camera, poses, scenery, shadow, and the outline of the intended motion."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+import synthetic
+from calmotion.shot import SurfaceMesh
+from calmotion.views.rendering import (
+    View,
+    draw,
+    draw_over_ghost,
+    fit_camera,
+    floor_below,
+    lay_ghost,
+    pose,
+    prepare,
+    visible_surfaces,
+)
+from calmotion.views.viewpoint import choose_viewpoint
+
+
+def test_the_camera_shows_the_whole_motion_and_up_is_up():
+    character, result = synthetic.character(), synthetic.result()
+    motion = result.before.motion
+    view = choose_viewpoint(character, result.skins, motion)
+    cloud = motion.target_positions[:, 0]
+    camera = fit_camera(view, cloud, 300, 200)
+    pixels = camera.project(cloud)
+    assert np.all(pixels[:, :2] >= 0.0) and np.all(pixels[:, :2] <= [300, 200])
+    low, high = camera.project(np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 0.1]]))
+    assert high[1] < low[1]
+    # Seen from its side of the world, what is nearer has the smaller depth.
+    assert camera.project(camera.eye + camera.axes[2])[2] == pytest.approx(1.0)
+
+
+def test_the_bent_link_is_drawn_where_the_simulation_puts_it():
+    character, result = synthetic.character(), synthetic.result()
+    model = prepare(character, result.skins)
+    row = int(np.argmax(result.before.motion.elastic[1][:, 0]))
+    corners, normals, owners = pose(model, result.before.motion, row)
+    link = corners[owners == 1].reshape(-1, 3)
+    far = np.linalg.norm(link, axis=1) > 0.9 * synthetic.LENGTH
+    np.testing.assert_allclose(
+        np.unique(link[far].round(9), axis=0).mean(axis=0), result.before.motion.target_positions[row, 0], atol=1e-6
+    )
+    assert len(model.parts) == 3  # the guide is not shown
+    np.testing.assert_allclose(np.linalg.norm(normals, axis=-1), 1.0)
+
+
+@pytest.fixture(scope="module")
+def seen():
+    """The synthetic character with a red wall before its link, and its camera."""
+    character, result = synthetic.character(), synthetic.result()
+    view = choose_viewpoint(character, result.skins, result.before.motion)
+    camera = fit_camera(view, result.before.motion.target_positions[:, 0], 120, 90, 0.3)
+    right, down, forward = camera.axes
+    at = result.before.motion.target_positions[-1, 0] - 0.05 * forward
+    points = np.array([at + 0.04 * (x * right + y * down) for x, y in ((-1, -1), (-1, 1), (1, 1), (1, -1))])
+    wall = SurfaceMesh("/Wall", points, np.array([(0, 1, 2), (0, 2, 3)], dtype=np.int32), (1.0, 0.0, 0.0))
+    return dataclasses.replace(character, scenery=(wall,)), result, camera
+
+
+def test_scenery_is_drawn_and_hides_what_is_behind_it(seen):
+    character, result, camera = seen
+    model, row = prepare(character, result.skins), len(result.before.motion.times) - 1
+    _, _, surface = draw(View(model, result.before.motion, result.before.motion, row, camera, 1))
+    x, y = camera.project(result.before.motion.target_positions[row, 0])[:2].astype(int)
+    assert surface[y, x] == len(model.parts), "the wall stands before the target"
+    bare = prepare(dataclasses.replace(character, scenery=()), result.skins)
+    _, _, surface = draw(View(bare, result.before.motion, result.before.motion, row, camera, 1))
+    assert 0 <= surface[y, x] < len(bare.parts)
+
+
+def test_a_motion_that_is_the_intended_one_has_no_outline(seen):
+    character, result, camera = seen
+    model = prepare(dataclasses.replace(character, scenery=()), result.skins)
+    view = View(model, result.before.motion, result.before.motion, 60, camera, 1)
+    green = draw_over_ghost(view).astype(int)
+    assert not np.any(green[..., 1] > green[..., 0] + 30)
+    shaken = dataclasses.replace(view, reference=result.reference, camera=dataclasses.replace(camera, scale=6e2))
+    assert result.before.position_errors[60, 0] > 5e-3
+    place = camera.project(result.reference.target_positions[60, 0])[:2]
+    center = np.array(camera.size) / 2 - 6e2 / camera.scale * (place - camera.center)
+    near = draw_over_ghost(dataclasses.replace(shaken, camera=dataclasses.replace(shaken.camera, center=center)))
+    assert np.any(near[..., 1].astype(int) > near[..., 0].astype(int) + 30)
+
+
+def test_the_outline_is_drawn_where_the_poses_differ_alone():
+    front, ghost = np.full((20, 40), -1, dtype=np.int32), np.full((20, 40), -1, dtype=np.int32)
+    front[5:15, 5:15] = ghost[5:15, 5:15] = 0
+    ghost[5:15, 25:35] = 1
+    mixed = lay_ghost(np.ones((20, 40, 3)), front, ghost, 2, (0.0, 1.0, 0.0), 1)
+    assert np.all(mixed[:, :20] == 1.0)
+    assert np.all(mixed[6:14, 26:34, 0] < 1.0) and mixed[5, 30, 0] < mixed[10, 30, 0]
+    hidden = lay_ghost(np.ones((20, 40, 3)), front, np.where(ghost == 1, 2, ghost), 2, (0.0, 1.0, 0.0), 1)
+    assert np.all(hidden == 1.0), "scenery has no outline"
+
+
+def test_the_shadow_falls_on_the_floor_and_on_what_lies_there(seen):
+    character, result, camera = seen
+    model = prepare(dataclasses.replace(character, scenery=()), result.skins)
+    floor = floor_below(model, result.reference)
+    assert floor == pytest.approx(min(float(pose(model, result.reference, 0)[0][..., 2].min()), 0.0))
+    view = View(model, result.before.motion, result.reference, 60, camera, 1)
+    plain, hits, _ = draw(view)
+    dark = draw(dataclasses.replace(view, floor=floor - 0.05))[0]
+    darker = dark.sum(axis=-1) < plain.sum(axis=-1) - 1e-6
+    assert darker.any() and not np.any(darker & hits.filled)
+    assert visible_surfaces(hits, np.zeros(10_000, dtype=np.int32)).max() == 0
