@@ -3,7 +3,10 @@
 # make test-lowest    the tests with the lowest supported versions of the dependencies (needs Python 3.11)
 # make test-portable  the tests as on other processors, with meshes made anew and other numbers of threads
 # make docs     the documentation, in build/docs
-# make fuzz     ten minutes of random damage to shots and manifests
+# make fuzz     ten minutes of damage to each of shots, meshes, motions, manifests, settings and caches
+# make torture  hours of kills, full disks, damaged caches and other faults (RUNS=20 SEED=1 for a short one)
+# make audit    known weaknesses of the dependencies (needs the network)
+# make wheel    a wheel with compiled kernels for this platform and version of Python, in dist
 # make samples  build the sample characters again (make pictures optimises and draws them)
 # make blender  the extension of Blender as a zip (make blender-test tests it; needs Python 3.11)
 # make clean    remove what was built, and the environment
@@ -29,11 +32,11 @@ TESTS ?= tests
 # Two processes test at a time; threads of linear algebra that wait for each other would make that several times slower.
 test: export OPENBLAS_NUM_THREADS := 1
 
-.PHONY: help demo test test-lowest test-portable docs fuzz samples pictures blender blender-test clean
+.PHONY: help demo wheel test test-lowest test-portable docs fuzz torture audit samples pictures blender blender-test clean
 .DELETE_ON_ERROR:
 
 help:
-	@sed -n 's/^# \{0,1\}//p' Makefile | sed -n '1,11p'
+	@sed -n 's/^# \{0,1\}//p' Makefile | sed -n '1,13p'
 
 demo: $(INSTALLED)
 	@mkdir -p build
@@ -50,8 +53,16 @@ test: $(INSTALLED_DEV)
 	check ruff $(RUN) -m ruff check .; \
 	check format $(RUN) -m ruff format --check --quiet .; \
 	check mypy $(RUN) -m mypy; \
+	check bandit $(RUN) -m bandit -q -ll -r pipeline plugins; \
 	check pytest $(RUN) -m pytest -n 2 -q; \
 	echo "== summary"; printf "$$summary"; exit $$status
+
+# The processors of the last ten years; others compile the kernels as they do without this wheel.
+WHEEL_CPU := NUMBA_CPU_NAME=x86-64-v3 NUMBA_CPU_FEATURES=+avx,+avx2,+bmi,+bmi2,+cx16,+f16c,+fma,+lzcnt,+movbe,+popcnt,+sse3,+sse4.1,+sse4.2,+ssse3,+xsave
+wheel: $(INSTALLED)
+	@rm -rf build/wheel && mkdir -p build/wheel dist
+	env CALMOTION_CACHE=$(CURDIR)/build/wheel/cache $(WHEEL_CPU) $(RUN) .ci/wheel_kernels.py build/wheel/kernels
+	env CALMOTION_WHEEL_KERNELS=$(CURDIR)/build/wheel/kernels $(RUN) -m pip wheel --quiet --no-deps -w dist .
 
 docs: $(INSTALLED_DEV)
 	NO_MKDOCS_2_WARNING=1 $(RUN) -m mkdocs build --strict --quiet
@@ -85,8 +96,23 @@ test-portable: $(INSTALLED_DEV)
 		NPY_DISABLE_CPU_FEATURES=X86_V3; \
 	echo "== summary"; printf "$$summary"; exit $$status
 
+FUZZED := shot splines meshes bvh manifests settings caches checkpoints
 fuzz: $(INSTALLED_DEV)
 	CALMOTION_FUZZ=$${CALMOTION_FUZZ:-600} $(RUN) -m pytest -q -x tests/fuzz
+	@$(RUN) -m pip install --quiet --editable '.[fuzz]' || echo "Atheris has no wheel for this Python; inputs are random"
+	@status=0; for target in $(FUZZED); do \
+		echo "== $$target"; $(RUN) tests/fuzz/guided.py $$target $${CALMOTION_FUZZ:-600} || status=1; \
+	done; exit $$status
+
+# A thousand kills, and other faults in proportion; the counts go into docs/reliability.md.
+SEED ?= 0
+RUNS ?= 1000
+torture: $(INSTALLED_DEV)
+	$(RUN) tests/torture/campaign.py --runs $(RUNS) --seed $(SEED) $(if $(filter 1000,$(RUNS)),--write)
+
+audit: $(INSTALLED_DEV)
+	@$(RUN) -m pip install --quiet --editable '.[audit]'
+	$(RUN) -m pip_audit --skip-editable
 
 blender: $(MADE)
 	@mkdir -p dist

@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import os
 import re
+import shlex
 import subprocess
 import sys
 from pathlib import Path
@@ -44,6 +45,29 @@ def test_every_operator_on_a_page_exists(page):
     operators = {*re.findall(r'^    idname = "([\w.]+)"', sources, re.MULTILINE), "speed_watch.report"}
     named = re.findall(r"(?:--set |--run |--)([a-z_]+\.[a-z_]+)(?=[.\s`-])", page.read_text())
     assert set(named) - {"operator.property"} <= operators
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(REPOSITORY)))
+def test_every_calmotion_command_on_a_page_is_accepted(page, capsys):
+    from calmotion.cli.main import build_parser
+
+    parser = build_parser()
+    for line in re.findall(r"^ {4}(calmotion [a-z].+)$", page.read_text(), re.MULTILINE):
+        if "  " in line:  # a table of commands, in columns
+            continue
+        try:
+            parser.parse_args(shlex.split(line)[1:])
+        except SystemExit as stop:
+            assert stop.code == 0, f"{line}: {capsys.readouterr().err}"
+
+
+def test_every_message_of_the_troubleshooting_page_is_one_of_the_program():
+    page = (REPOSITORY / "docs" / "troubleshooting.md").read_text()
+    messages = [row.split("|")[1].strip() for row in re.findall(r"^\| [^-].*$", page, re.MULTILINE)]
+    messages = [message for message in messages if message != "message"]
+    sources = [*PACKAGE.rglob("*.py"), *REPOSITORY.glob("plugins/*/*.py")]
+    text = re.sub(r'"\s*\n\s*f?"', "", "".join(path.read_text() for path in sources))
+    assert len(messages) > 15 and [message for message in messages if message not in text] == []
 
 
 def test_every_symbol_of_the_formulation_is_in_the_module_that_is_named():
@@ -92,6 +116,12 @@ def test_the_documentation_builds_without_a_warning(tmp_path):
         cwd=REPOSITORY, env=os.environ | {"NO_MKDOCS_2_WARNING": "1"}, capture_output=True, text=True,
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
+    schemas = (tmp_path / "reference" / "schemas" / "index.html").read_text()
+    assert (
+        "calm:target:rotationWeight" in schemas
+        and "usage: calmotion optimize" in (tmp_path / "reference" / "commands" / "index.html").read_text()
+    )
+    assert "open_shot" in (tmp_path / "reference" / "python" / "index.html").read_text()
     formulas = (tmp_path / "formulation" / "index.html").read_text()
     assert formulas.count("<math") > 50 and "arithmatex" not in formulas
     pages = "".join(path.read_text() for path in tmp_path.rglob("*.html"))

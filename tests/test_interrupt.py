@@ -123,6 +123,12 @@ def test_an_interrupt_that_an_operator_swallows_ends_the_run(calmotion_process, 
     assert json.loads(done.stdout)["error"]["problem"] == "interrupted"
 
 
+def take_terminal():
+    """Makes the terminal that of the new session; `nohup` would leave its signal ignored."""
+    signal.signal(signal.SIGHUP, signal.SIG_DFL)
+    fcntl.ioctl(0, termios.TIOCSCTTY, 0)
+
+
 @pytest.mark.skipif(not hasattr(os, "openpty"), reason="this system has no pseudo terminals")
 def test_a_closed_terminal_writes_the_best_so_far(repository, tmp_path):
     layer = tmp_path / "calm.usda"
@@ -136,7 +142,7 @@ def test_a_closed_terminal_writes_the_best_so_far(repository, tmp_path):
         stdout=theirs,
         stderr=theirs,
         start_new_session=True,
-        preexec_fn=lambda: fcntl.ioctl(0, termios.TIOCSCTTY, 0),
+        preexec_fn=take_terminal,
     )
     os.close(theirs)
     reader = threading.Thread(target=drain, args=(ours,), daemon=True)

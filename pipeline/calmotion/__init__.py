@@ -18,6 +18,8 @@ if TYPE_CHECKING:
     from calmotion.host.errors import SettingError
     from calmotion.shot.run import OutputPaths
     from calmotion.workflow.commands import inspect, optimize, rig, simulate, verify
+    from calmotion.workflow.export import Export, export
+    from calmotion.workflow.importing.robot import ImportedRobot, import_robot
     from calmotion.workflow.inspection import Inspection
     from calmotion.workflow.problems import Cancelled, RunError
     from calmotion.workflow.results import MotorMotion, OptimizationResult, RobotMotion, SimulationResult, TargetMotion
@@ -26,6 +28,8 @@ if TYPE_CHECKING:
 
 __all__ = [
     "Cancelled",
+    "Export",
+    "ImportedRobot",
     "Inspection",
     "MotorMotion",
     "OptimizationResult",
@@ -39,6 +43,8 @@ __all__ = [
     "SimulationResult",
     "TargetMotion",
     "__version__",
+    "export",
+    "import_robot",
     "inspect",
     "open_shot",
     "optimize",
@@ -51,6 +57,8 @@ _HOMES = {
     "host.errors": ("SettingError",),
     "shot.run": ("OutputPaths",),
     "workflow.commands": ("inspect", "optimize", "rig", "simulate", "verify"),
+    "workflow.export": ("Export", "export"),
+    "workflow.importing.robot": ("ImportedRobot", "import_robot"),
     "workflow.inspection": ("Inspection",),
     "workflow.problems": ("Cancelled", "RunError"),
     "workflow.results": ("MotorMotion", "OptimizationResult", "RobotMotion", "SimulationResult", "TargetMotion"),

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import errno
+import os
+import re
 from collections.abc import Sequence
 
 
@@ -48,6 +51,40 @@ class ShotError(Exception):
             "found": "" if self.found is None else str(self.found),
             "remedy": self.remedy,
         }
+
+
+# Parts of messages with which libraries say that memory or threads ran out, under exceptions of other kinds.
+_EXHAUSTED = ("can't start new thread", "cannot allocate memory", "failed to map segment", "std::bad_alloc")
+
+
+def failure_of_machine(error: BaseException) -> ShotError | None:
+    """The error that a user sees where memory or files of the machine failed; None for any other exception."""
+    if isinstance(error, ShotError):
+        return None
+    text = str(error)
+    number = _error_number(error)
+    if number == errno.ENOMEM or isinstance(error, MemoryError) or any(part in text.lower() for part in _EXHAUSTED):
+        return ShotError(
+            "there is not enough memory",
+            found=text or None,
+            remedy="End other programs, raise the limit of memory, or choose a larger tolerance or element size",
+        )
+    if number is not None:
+        return ShotError(
+            "a file cannot be read or written",
+            path=str(getattr(error, "filename", None) or ""),
+            found=os.strerror(number),
+            remedy="Check free space, permissions and the folder",
+        )
+    return None
+
+
+def _error_number(error: BaseException) -> int | None:
+    """The system's number of an error; that of an exception of a Rust library stands in its text."""
+    if isinstance(error, OSError):
+        return error.errno
+    found = re.search(r"\(os error (\d+)\)", str(error))
+    return int(found[1]) if found else None
 
 
 class IntegrationError(ShotError):

@@ -5,7 +5,30 @@ from __future__ import annotations
 
 import bpy
 
-MATERIALS = ("nylon", "pla", "abs", "pom", "polycarbonate", "aluminium")  # those of `calmotion rig`
+MATERIALS = (  # those of `calmotion rig`
+    "abs",
+    "asa",
+    "pla",
+    "petg",
+    "nylon",
+    "pa6",
+    "onyx",
+    "polycarbonate",
+    "pom",
+    "pmma",
+    "polypropylene",
+    "hdpe",
+    "peek",
+    "epoxy",
+    "aluminium",
+    "magnesium",
+    "titanium",
+    "steel",
+    "stainless_steel",
+    "brass",
+    "carbon_fibre",
+    "glass_fibre",
+)
 
 
 class CalmotionSettings(bpy.types.PropertyGroup):

@@ -9,7 +9,8 @@ from calmotion.accuracy.reduced_bodies import ConvergedReduction, ReducedBodies,
 from calmotion.host import NotAsked, Operator, Property, RunContext, registration
 from calmotion.shot import Animation, Character, ModelChoices, Result
 from calmotion.shot.model_choice import AUTO, KINDS, OFF, ON, no_flexible_bodies, run_settings
-from calmotion.shot.outputs import PlannedStep, ShapedTracks, Verification
+from calmotion.shot.motor import PRESCRIBED
+from calmotion.shot.outputs import MotorEffects, PlannedStep, ShapedTracks, Verification
 from calmotion.shot.run import OutputPaths, Source
 from calmotion.simulation.compiled_shot import CompiledShot
 
@@ -110,7 +111,7 @@ class PlanStep(Operator):
         reason = no_flexible_bodies(data)
         if reason is None or character is None:
             return None
-        driven = {motor.joint for motor in character.motors}
+        driven = {motor.joint for motor in character.motors if motor.model == PRESCRIBED}
         free = any(k not in driven and joint.kind != "fixed" for k, joint in enumerate(character.joints))
         return None if free else f"{reason}, and motors alone determine the motion"
 
@@ -125,6 +126,47 @@ class PlanStep(Operator):
         context.progress(0.0, "simulating the shot as animated")
         options = run_settings(context.get(Source), context.get(ModelChoices))
         return [PlannedStep(planned_step(context.get(CompiledShot), options))]
+
+
+class EstimateMotorEffects(Operator):
+    """How far the motors would move the targets if they gave by the gains in the shot."""
+
+    idname = "accuracy.motors"
+    label = "Simulate the gains of the motors"
+    requires = (Character, CompiledShot)
+    uses = (ModelChoices, Source, Animation)
+    provides = (MotorEffects,)
+    checks = (Character, Animation, Source, ModelChoices)
+
+    @classmethod
+    def poll(cls, data: Mapping[type, Any]) -> str | None:
+        source, character = data.get(Source), data.get(Character)
+        if source is not None and source.command != "inspect":
+            return NotAsked("other commands simulate the motors as their models say")
+        if source is not None and source.settings.ideal_motors:
+            return NotAsked("--motors ideal is requested")
+        if character is not None and not any(motor.position_gain > 0.0 for motor in character.motors):
+            return NotAsked("no motor has gains")
+        animation = data.get(Animation)
+        if animation is not None and len(animation.frame_times) < 2:
+            return NotAsked("the shot has a single frame")
+        return None
+
+    def check(self, context: RunContext) -> None:
+        from calmotion.accuracy.run_checks import check_simulation
+
+        check_simulation(context.get(Character), context.get(Animation), run_settings(context.get(Source)))
+
+    def execute(self, context: RunContext) -> Sequence[object]:
+        from calmotion.accuracy.motor_effects import effects_of_gains
+
+        context.progress(0.0, "simulating rigid links on motors that give")
+        options = run_settings(context.get(Source), context.get(ModelChoices))
+        found = effects_of_gains(context.get(CompiledShot), options)
+        if found is None:
+            context.report("warning", "by the gains that the shot carries its motors could not hold the robot")
+            return []
+        return [found]
 
 
 class VerifyResult(Operator):
@@ -154,4 +196,4 @@ class VerifyResult(Operator):
         return [Verification(*verify(shot, reduction, context.get(Result), options, context.progress))]
 
 
-register, unregister = registration(AnalyseShot, RefineReduction, PlanStep, VerifyResult)
+register, unregister = registration(AnalyseShot, RefineReduction, PlanStep, EstimateMotorEffects, VerifyResult)

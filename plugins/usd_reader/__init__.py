@@ -21,6 +21,7 @@ class ReadShot(Operator):
     def execute(self, context: RunContext) -> Sequence[object]:
         """The character, its animation and its provenance."""
         # pxr loads in a third of a second: only when a shot is read
+        from calmotion.shot.character import with_ideal_motors
         from calmotion.usd.reading import read_shot
         from calmotion.usd.writing import refuse_inputs
 
@@ -32,6 +33,8 @@ class ReadShot(Operator):
         outputs = context.get(OutputPaths)
         if outputs is not None and outputs.layer:
             refuse_inputs(provenance, outputs.layer)
+        if source.settings.ideal_motors:
+            character = with_ideal_motors(character)
         for note in character.notes:
             context.report("info", note)
         return character, animation, provenance

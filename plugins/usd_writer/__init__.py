@@ -13,6 +13,8 @@ from calmotion.shot.run import OutputPaths, Source
 if TYPE_CHECKING:
     from calmotion.usd.writing import WriteOptions
 
+_PLACES = {"bodies": "the transforms of its bodies", "skeleton": "its skeleton"}  # of curves that no drive holds
+
 
 class WriteResult(Operator):
     """Writes one layer of overs, and a root layer that opens it with the shot."""
@@ -22,7 +24,7 @@ class WriteResult(Operator):
     requires = (Character, Animation, Provenance, Result, OutputPaths)
     uses = (Source,)
     provides = (WrittenLayer,)
-    checks = (Character, Source)
+    checks = (Character, Animation, Source)
     properties = (
         Property(
             "samples_per_second",
@@ -53,26 +55,29 @@ class WriteResult(Operator):
 
     def check(self, context: RunContext) -> None:
         """Options that fit each other and the motors whose curves may change."""
-        from calmotion.usd.writing import refuse_bake, refuse_options
+        from calmotion.usd.writing import motors_that_may_change, refuse_bake, refuse_options
 
-        source, motors = context.get(Source), context.get(Character).motors
+        source, character, animation = context.get(Source), context.get(Character), context.get(Animation)
         searches = source is not None and source.command == "optimize"
-        may_change = [motor for motor in motors if searches and motor.optimize and motor.follows is None]
-        refuse_options(self._options(context), may_change)
+        seconds = float(animation.frame_times[-1]) if len(animation.frame_times) else 0.0
+        refuse_options(self._options(context), motors_that_may_change(character) if searches else (), seconds)
         if searches:
-            refuse_bake(self._options(context), motors)
+            refuse_bake(self._options(context), character.motors)
 
     def execute(self, context: RunContext) -> Sequence[object]:
         """The paths of both layers."""
-        from calmotion.usd.writing import write_result
+        from calmotion.usd.writing import motors_that_may_change, sampled_at_frames, write_result
 
+        options, result = self._options(context), context.get(Result)
+        for motor in sampled_at_frames(options, motors_that_may_change(context.get(Character)) if result.after else ()):
+            context.report("info", f"{motor.path}: its curve is samples at the frames, of {_PLACES[motor.source]}")
         layer, root = write_result(
             context.get(Character),
             context.get(Animation),
             context.get(Provenance),
-            context.get(Result),
+            result,
             str(context.get(OutputPaths).layer),
-            self._options(context),
+            options,
         )
         context.report("info", f"open {root} to see {layer} together with the shot")
         return (WrittenLayer(layer=layer, root=root),)

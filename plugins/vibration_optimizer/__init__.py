@@ -11,6 +11,7 @@ from calmotion.shot import Animation, Character, ModelChoices, Result
 from calmotion.shot.model_choice import run_settings, simplified_character, with_choices
 from calmotion.shot.outputs import ShapedTracks
 from calmotion.shot.result import is_reached
+from calmotion.shot.robust.settings import RobustSettings
 from calmotion.shot.run import OutputPaths, Source
 from calmotion.simulation.compiled_shot import CompiledShot
 
@@ -21,10 +22,13 @@ def _options(context: RunContext, **more: Any) -> Any:
 
 
 def _with_budget(context: RunContext, result: Result) -> Result:
-    """The result with the decisions on the model and its error budget."""
+    """The result with the decisions on the model, its error budget, and the parts of motors and links in its error."""
     from calmotion.accuracy.error_budget import with_budget
+    from calmotion.accuracy.motor_effects import with_error_shares
 
     shot, tolerance = compiled_in(context.get), context.get(Source).settings.tolerance
+    if not result.interrupted:
+        result = with_error_shares(shot, result, _options(context), context.progress)
     return with_budget(with_choices(result, context.get(ModelChoices)), shot.character, tolerance)
 
 
@@ -38,7 +42,7 @@ def _input(context: RunContext) -> tuple[Character | None, Animation | None]:
 
 def _wrong_command(data: Mapping[type, Any], command: str) -> str | None:
     source = data.get(Source)
-    return None if source is None or source.command == command else f"the command is {source.command}"
+    return None if source is None or source.command == command else NotAsked(f"the command is {source.command}")
 
 
 class ShapeTracks(Operator):
@@ -134,6 +138,21 @@ class OptimizeShot(Operator):
             choices=("discrete", "continuous"),
             description="Source of the gradients; the continuous adjoint is not exact and has no limits of effort",
         ),
+        Property(
+            "robust",
+            str,
+            "off",
+            choices=("off", "mean", "worst"),
+            description="Optimise for a set of robots around the model: their mean, or the one with the largest error",
+        ),
+        Property(
+            "scenarios",
+            int,
+            7,
+            minimum=3,
+            description="Number of these robots; with 1 + 2 n for n uncertain parameters they have their covariance",
+        ),
+        Property("draws", int, 200, minimum=20, description="Random robots on which the curves are measured"),
     )
 
     @classmethod
@@ -180,6 +199,7 @@ class OptimizeShot(Operator):
             knot_spacing=values.knot_spacing if values.knot_spacing > 0.0 else None,
             smoothness=values.smoothness if values.smoothness >= 0.0 else None,
             adjoint=values.adjoint,
+            robust=None if values.robust == "off" else RobustSettings(values.robust, values.scenarios, values.draws),
         )
 
 

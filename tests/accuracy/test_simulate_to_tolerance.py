@@ -9,7 +9,6 @@ from calmotion.accuracy import simulate_to_tolerance as to_tolerance
 from calmotion.accuracy.pod_subspace import ProjectedShot
 from calmotion.accuracy.simulate_to_tolerance import WHOLE, found_tracks, planned_step, simulate_to_tolerance
 from calmotion.accuracy.step_error import CLOSED_GAP, distance, frames_of, simulate_at
-from calmotion.accuracy.verify import verify
 from calmotion.errors import IntegrationError, ShotError
 from calmotion.retargeting import to_tolerance as retarget
 from calmotion.retargeting.to_tolerance import optimize_to_tolerance
@@ -17,7 +16,7 @@ from calmotion.shot import Animation, Track
 from calmotion.shot.run import RunSettings
 from calmotion.shot.tolerance import tolerance_of
 from calmotion.simulation.bodies import with_elasticity
-from calmotion.simulation.body_reduction import reduced_shot, reduction_for
+from calmotion.simulation.body_reduction import reduced_shot
 from calmotion.simulation.compiled_shot import compile_shot
 
 FINE = 1 / 7680
@@ -48,6 +47,16 @@ def test_a_simulation_keeps_its_tolerance_by_a_step_no_smaller_than_it_must(arm,
         fine = simulate_at(compile_shot(arm, animation, bodies), RunSettings(), FINE)
         assert np.linalg.norm(coarser.positions - fine.positions, axis=2).max() > 0.5 * tolerance
     assert steps[0] > steps[1] > steps[2]
+
+
+@pytest.mark.parametrize("options", [RunSettings(tolerance=1e-2), RunSettings(step=1 / 120)])
+def test_efforts_are_stated_with_their_error(arm, animation, bodies, options):
+    shot = compile_shot(arm, animation, bodies)
+    result, fine = simulate_to_tolerance(shot, options, quiet), simulate_at(shot, RunSettings(), FINE)
+    efforts = frames_of(result, animation.frame_times).efforts
+    off, largest = np.abs(efforts - fine.efforts).max(axis=0), np.abs(efforts).max(axis=0)
+    assert np.all(off < 1.5 * result.accuracy.efforts)
+    assert np.all(result.accuracy.efforts < 0.5 * largest)
 
 
 def test_the_step_takes_what_is_left_of_the_tolerance_and_half_of_it_in_any_case(arm, animation, bodies):
@@ -183,20 +192,6 @@ def test_an_optimisation_without_a_tolerance_reports_the_error_of_its_step(arm, 
     result = optimize_to_tolerance(compile_shot(arm, animation, bodies), options, quiet)
     assert result.step_s == pytest.approx(1 / 240)
     assert off_by(result, arm, animation, bodies) == pytest.approx(result.accuracy.step_m, rel=0.5)
-
-
-def test_verifying_measures_the_distance_to_a_finer_run(arm, animation, meshes, bodies):
-    options = RunSettings(tolerance=1e-3)
-    result = simulate_to_tolerance(compile_shot(arm, animation, bodies), options, quiet)
-    shot, reduction = compile_shot(arm, animation, bodies), reduction_for(arm, animation, meshes, options)
-    error, step, modes = verify(shot, reduction, result, options, quiet)
-    assert step == pytest.approx(result.step_s / 4) and modes > 6
-    assert 0.3 * result.accuracy.step_m < error < 5e-3
-    moved = dataclasses.replace(
-        result.before.motion, target_positions=result.before.motion.target_positions + [0.02, 0.0, 0.0]
-    )
-    wrong = dataclasses.replace(result, before=dataclasses.replace(result.before, motion=moved))
-    assert verify(shot, reduction, wrong, options, quiet)[0] == pytest.approx(0.02, abs=1.1 * error)
 
 
 def test_a_search_continues_where_the_pod_subspace_does_not_fit(arm, animation, meshes, monkeypatch):

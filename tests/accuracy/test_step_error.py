@@ -3,7 +3,15 @@ closed."""
 
 import numpy as np
 import pytest
-from calmotion.accuracy.step_error import CLOSED_GAP, StepRun, largest_step, simulate_at, step_error, step_gaps
+from calmotion.accuracy.step_error import (
+    CLOSED_GAP,
+    StepRun,
+    effort_errors,
+    largest_step,
+    simulate_at,
+    step_error,
+    step_gaps,
+)
 from calmotion.errors import IntegrationError, ShotError
 from calmotion.shot.run import RunSettings
 from calmotion.simulation.compiled_shot import compile_shot
@@ -24,6 +32,13 @@ def test_the_largest_step_that_is_allowed_is_chosen(allowed):
     step, error = largest_step(of_second_order, 0.1, 1e-3, lambda run: allowed)
     best = min(0.1, np.sqrt(allowed / 3.0))
     assert 0.85 * best < step <= best * (1.0 + 1e-9) and error == pytest.approx(3.0 * step**2, rel=1e-9)
+
+
+def test_the_error_of_efforts_goes_with_the_step():
+    fine, coarse = (StepRun(h, np.zeros((1, 1, 3)), efforts=np.array([[100.0 + 50.0 * h, 7.0]])) for h in (0.1, 0.2))
+    assert effort_errors(fine, coarse) == pytest.approx([5.0, 0.0])
+    assert effort_errors(coarse, fine) == pytest.approx([10.0, 0.0])
+    assert effort_errors(fine, fine) is None and effort_errors(fine, of_second_order(0.2)) is None
 
 
 def test_steps_are_those_that_were_taken():

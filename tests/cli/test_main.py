@@ -177,6 +177,11 @@ def test_the_table_for_a_person_shows_errors_before_and_after(run):
     assert status == 0 and "/Robot/Tip/Target" in out and "wrote build/calm.usda" in out
     assert "mm" in out and "simplified: modes above 40 Hz" in out
     assert "retarget solve: done" in err
+    assert out.startswith("The largest error falls from ") and "iterations" not in out
+    order = [out.index(part) for part in ("largest error", "/Robot/Tip/Target", "wrote ", "next: ", "simplified: ")]
+    assert order == sorted(order), "the answer first, the simplifications last"
+    _, long, _ = run("optimize", "shot.usda", "-o", "build/calm.usda", "--verbose")
+    assert "iterations" in long and len(long) > len(out)
 
 
 def test_quiet_prints_nothing(run):
@@ -247,6 +252,8 @@ def test_an_interruption_has_its_status_and_keeps_what_is_there(run):
         ["simulate", "shot.usda", "--settings", "no_such_file.toml"],
         ["simulate", "shot.usda", "--figures", "figures"],
         ["optimize", "shot.usda", "-o", "shot.usda"],
+        ["optimize", "shot.usda", "-o", "calm.usda", "--robust", "best"],
+        ["optimize", "shot.usda", "-o", "calm.usda", "--robust", "--scenarios", "4"],
     ],
 )
 def test_wrong_usage_has_its_status(run, arguments):

@@ -1,7 +1,14 @@
 import io
 
 import pytest
-from calmotion.cli.run_report import REMEDIES, print_accuracy, print_joint_gap
+from calmotion.cli.run_report import (
+    REMEDIES,
+    print_budget,
+    print_efforts,
+    print_joint_gap,
+    print_robustness,
+    print_verdict,
+)
 from calmotion.cli.tables import console_on
 
 
@@ -10,22 +17,24 @@ def report(**values):
     budget = [{"source": "mesh", "allowed_m": 4e-4, "estimated_m": None}]
     budget = [{"source": "time step", "allowed_m": 5e-4, "estimated_m": 3e-4}, *budget]
     known = {"error_budget": budget, "tolerance_m": 1e-3, "tolerance_kept": True, "tolerance_missed_by": None}
-    return known | {"simulation_error_m": 3e-4, "verified_error_m": None} | values
+    return known | {"simulation_error_m": 3e-4, "verified_error_m": None, "targets": []} | values
 
 
 def printed(values):
     stream = io.StringIO()
-    print_accuracy(console_on(stream), values)
+    print_verdict(console_on(stream), values)
+    print_budget(console_on(stream), values)
     return stream.getvalue()
 
 
 def test_the_error_budget_is_a_table_and_the_verdict_a_sentence():
     text = printed(report())
     assert "time step   0.5 mm     0.3 mm" in text and "mesh        0.4 mm    unknown" in text
-    assert "the simulation keeps the tolerance of 1 mm: error 0.3 mm" in " ".join(text.split())
-    measured = printed(report(verified_error_m=2e-4, verified_step_s=5e-4, verified_modes=44))
+    assert "The simulation keeps the tolerance of 1 mm: error 0.3 mm." in " ".join(text.split())
+    verified = {"verified_step_s": 5e-4, "verified_modes": 44, "verified_mesh_error_m": 5e-5}
+    measured = printed(report(verified_error_m=2e-4, **verified))
     said = "measured simulation error 0.2 mm, against a run with steps of 0.5 ms and 44 elastic coordinates"
-    assert said in " ".join(measured.split())
+    assert f"{said}, whose meshes may be off by 0.05 mm" in " ".join(measured.split())
 
 
 @pytest.mark.parametrize("source", REMEDIES)
@@ -37,7 +46,7 @@ def test_a_tolerance_that_is_not_kept_is_reported_with_what_would_help(source):
 
 def test_without_an_estimate_nothing_is_claimed():
     text = printed(report(error_budget=[], tolerance_kept=False, simulation_error_m=None))
-    assert text.split() == "the error of the simulation was not estimated; the tolerance is 1 mm".split()
+    assert text.split() == "The error of the simulation was not estimated; the tolerance is 1 mm.".split()
 
 
 @pytest.mark.parametrize(("gap", "told"), [(0.0, ""), (9e-7, ""), (7.1e-5, "joints come apart by up to 0.071 mm")])
@@ -45,3 +54,45 @@ def test_joints_that_come_apart_are_reported(gap, told):
     stream = io.StringIO()
     print_joint_gap(console_on(stream), gap)
     assert stream.getvalue().startswith(told) and bool(stream.getvalue()) == bool(told)
+
+
+def test_the_answer_comes_first():
+    targets = [
+        {"path": "/Cup", "max_error_before_m": 0.06, "max_error_after_m": 1e-3},
+        {"path": "/Elbow", "max_error_before_m": 0.01, "max_error_after_m": 5e-3},
+    ]
+    text = printed(report(targets=targets, objective_after=1.0))
+    assert text.startswith("The largest error falls from 60 mm to 5 mm (at /Elbow).")
+    targets[0]["max_error_after_m"] = 0.07
+    assert "does not fall from 60 mm to 70 mm" in printed(report(targets=targets, objective_after=1.0))
+    alone = printed(report(targets=[{"path": "/Cup", "max_error_m": 0.06}]))
+    assert alone.startswith("As animated, the largest error is 60 mm (at /Cup).")
+
+
+def test_curves_on_random_robots_are_a_table():
+    errors = {"nominal_max_error_m": 1e-3, "median_max_error_m": 2e-3, "p95_max_error_m": 4e-3}
+    rows = {name: errors | {"worst_max_error_m": worst} for name, worst in (("before", None), ("nominal", 9e-3))}
+    target = {"path": "/Arm/Tip", "robustness": rows | {"robust": errors | {"worst_max_error_m": 5e-3}}}
+    stream = io.StringIO()
+    print_robustness(console_on(stream), {"scenarios": [], "draws": 200, "targets": [target]})
+    text = stream.getvalue()
+    assert "Largest error on 200 random robots" in text and "failed" in text
+    assert [line.split()[-2:] for line in text.splitlines()[-2:]] == [["9", "mm"], ["5", "mm"]]
+    stream = io.StringIO()
+    print_robustness(console_on(stream), {"targets": []})
+    assert stream.getvalue() == ""
+
+
+def test_a_motor_that_hardly_works_does_not_decide_how_well_efforts_are_known():
+    def row(path, largest, error):
+        return {"path": path, "largest": largest, "estimated_error": error, "unit": "N m"}
+
+    rows = [row("/Shoulder", 20.0, 0.2), row("/WristRoll", 0.004, 0.002)]
+    stream = io.StringIO()
+    print_efforts(console_on(stream), rows, True)
+    assert stream.getvalue() == ""
+    print_efforts(console_on(stream), rows, False)
+    assert "known to 1.0%" in stream.getvalue()
+    stream = io.StringIO()
+    print_efforts(console_on(stream), [*rows, row("/Elbow", 5.0, 1.0)], True)
+    assert "/Elbow by 1 N m of at most 5 N m" in " ".join(stream.getvalue().split())

@@ -10,6 +10,15 @@ from calmotion.support import interrupts
 NUMBERS = [signal.SIGTERM, signal.SIGHUP]
 
 
+@pytest.fixture(autouse=True)
+def default_handlers():
+    """The handlers of a process that nobody started with `nohup`, which leaves SIGHUP ignored in all its children."""
+    before = {number: signal.signal(number, signal.SIG_DFL) for number in NUMBERS}
+    yield
+    for number, handler in before.items():
+        signal.signal(number, handler)
+
+
 def test_an_interrupt_in_a_callback_that_cannot_raise_is_raised_by_the_next_check(capfd):
     class Noisy:
         def __del__(self):

@@ -2,13 +2,27 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 from broken_shots import half_turns
-from calmotion import optimize, simulate
+from calmotion import export, optimize, simulate
 from calmotion.errors import ShotError, each
 from calmotion.host import Outcome
 from calmotion.shot.run import OutputPaths
-from small_shots import ELBOW, FORE, FRAMES, SHOULDER, TARGET_POSITION, UPPER, make_flexible, write_arm
+from pxr import Gf, UsdGeom, UsdPhysics
+from small_shots import (
+    BASE,
+    ELBOW,
+    FORE,
+    FRAMES,
+    LENGTH,
+    PLASTIC,
+    SHOULDER,
+    TARGET_POSITION,
+    UPPER,
+    make_flexible,
+    write_arm,
+)
 
 
 def motor_settings(**values):
@@ -62,8 +76,73 @@ def no_geometry(stage):
     stage.RemovePrim(f"{UPPER}/box")
 
 
+def closed_chain(gap):
+    """A rod from the tip to the world: one motor would do, and two contradict each other, at once by a gap [m]."""
+
+    def edit(stage):
+        tip, foot = np.array([0.4 + 0.4 * np.cos(np.radians(10)), 0, 1 - 0.4 * np.sin(np.radians(10))]), [0.9, 0, 0.6]
+        xform = UsdGeom.Xform.Define(stage, "/Arm/rod")
+        xform.AddTranslateOp().Set(Gf.Vec3d(*tip))
+        xform.AddRotateYOp().Set(float(np.degrees(np.arctan2(tip[2] - foot[2], foot[0] - tip[0]))))
+        rod = xform.GetPrim()
+        UsdPhysics.RigidBodyAPI.Apply(rod)
+        UsdPhysics.MassAPI.Apply(rod).CreateMassAttr(0.2)
+        UsdPhysics.MassAPI(rod).CreateDiagonalInertiaAttr(Gf.Vec3f(1e-3))
+        for name, other, there, here in (
+            ("tip", FORE, (LENGTH, 0, 0), 0.0),
+            ("foot", BASE, (foot[0], 0, foot[2] - 1), 1.0),
+        ):
+            joint = UsdPhysics.RevoluteJoint.Define(stage, f"/Arm/joints/{name}")
+            joint.CreateBody0Rel().SetTargets([other])
+            joint.CreateBody1Rel().SetTargets(["/Arm/rod"])
+            joint.CreateAxisAttr("Y")
+            joint.CreateLocalPos0Attr(Gf.Vec3f(*there))
+            joint.CreateLocalPos1Attr(Gf.Vec3f(here * (float(np.linalg.norm(tip - foot)) + gap), 0, 0))
+
+    return edit
+
+
+def soft(modulus):
+    """A link whose own weight would flatten it."""
+    return lambda stage: stage.GetPrimAtPath(PLASTIC).GetAttribute("physics:youngsModulus").Set(modulus)
+
+
+def interfaces(one, other, flat=False):
+    """Named interfaces of the elbow and of a weight at the tip, by their faces; the first one without area if flat."""
+
+    def edit(stage):
+        tip = UsdGeom.Xform.Define(stage, "/Arm/weight").GetPrim()
+        UsdPhysics.RigidBodyAPI.Apply(tip)
+        UsdPhysics.MassAPI.Apply(tip).CreateMassAttr(0.2)
+        UsdPhysics.MassAPI(tip).CreateDiagonalInertiaAttr(Gf.Vec3f(1e-3))
+        weld = UsdPhysics.FixedJoint.Define(stage, "/Arm/joints/weld")
+        weld.CreateBody0Rel().SetTargets([FORE])
+        weld.CreateBody1Rel().SetTargets(["/Arm/weight"])
+        weld.CreateLocalPos0Attr(Gf.Vec3f(LENGTH, 0, 0))
+        for name, joint, faces in (("elbow", ELBOW, one), ("other", "/Arm/joints/weld", other)):
+            subset = UsdGeom.Subset.Define(stage, f"{FORE}/skin/{name}")
+            subset.CreateElementTypeAttr("face")
+            subset.CreateFamilyNameAttr("calmInterface")
+            subset.CreateIndicesAttr(faces)
+            subset.GetPrim().CreateRelationship("calm:interface:joint").SetTargets([joint])
+        if flat:
+            points = stage.GetPrimAtPath(f"{FORE}/skin").GetAttribute("points")
+            corners = np.array(points.Get())
+            corners[:4, 1] = 0.0
+            points.Set(corners)
+
+    return edit
+
+
 def no_edit(stage):
     pass
+
+
+def exporting(to):
+    def command(shot, outputs, file=None, **options):
+        export(shot, file or f"{outputs.layer}.{to}", to=to, **options)
+
+    return command
 
 
 CASES = {
@@ -86,20 +165,32 @@ CASES = {
     "another integrator": (optimize, no_edit, {"integrator": "rk4"}, "--integrator"),
     "a shaper that is none": (simulate, no_edit, {"shaper": "zdv"}, "--shaper"),
     "a shot of one frame": (simulate, one_frame, {}, "endTimeCode"),
+    "no tolerance at all": (simulate, no_edit, {"tolerance": 0.0}, "--tolerance"),
+    "a tolerance that is no number": (simulate, no_edit, {"tolerance": float("nan")}, "--tolerance"),
+    "a tolerance below rounding": (optimize, no_edit, {"tolerance": 1e-300}, "--tolerance"),
+    "a tolerance beyond the character": (optimize, no_edit, {"tolerance": 1.0}, "--tolerance"),
+    "a tolerance of a shot beyond the character": (
+        simulate, shot_settings(tolerance=1e6), {}, "calm:retarget:tolerance"
+    ),
+    "a step of zero": (simulate, no_edit, {"step": 0.0}, "--step"),
+    "a negative step": (optimize, no_edit, {"step": -1e-3}, "--step"),
+    "a negative pre-roll": (simulate, no_edit, {"pre_roll": -1.0}, "--pre-roll"),
+    "more samples than can be read": (
+        optimize, no_edit, {"settings": {"usd.write": {"samples_per_second": 1e12}}}, "--samples-per-second"
+    ),
     "splines and samples": (
         optimize, no_edit, {"settings": {"usd.write": {"splines": True, "samples_per_second": 100.0}}}, "--splines"
     ),
-    "a table of curves without a file": (optimize, no_edit, {"operators": ["curves.export"]}, "curves.export.file"),
-    "a table of curves on a folder": (
-        simulate, no_edit, {"operators": ["curves.export"], "settings": {"curves.export.file": "."}},
-        "curves.export.file",
-    ),
+    "commands on a folder": (exporting("csv"), no_edit, {"file": "."}, "."),
+    "ticks without servos": (exporting("ticks"), no_edit, {}, "export.ticks.motors"),
     "a second body without geometry": (simulate, no_geometry, {}, UPPER),
-    "a joint away from its body": (
-        simulate, lambda stage: stage.GetPrimAtPath(ELBOW).GetAttribute("physics:localPos1").Set((0.0, 0.3, 0.0)), {},
-        "interfaceRadius",
-    ),
+    "a modulus in GPa": (simulate, soft(2.0), {}, "physics:youngsModulus"),
+    "a modulus in MPa": (optimize, soft(2e3), {}, "physics:youngsModulus"),
+    "two interfaces on one face": (simulate, interfaces([0, 1], [1]), {}, "other"),
+    "an interface without area": (simulate, interfaces([0], [1], flat=True), {}, "elbow"),
     "elements that are too small": (simulate, no_edit, {"settings": {"fe.mesh.element_size": "0.02mm"}}, "elementSize"),
+    "motors that contradict each other later": (simulate, closed_chain(0.0), {"pre_roll": 0.0}, "/Arm/joints/"),
+    "motors that contradict each other at once": (optimize, closed_chain(0.03), {"pre_roll": 0.0}, "/Arm/joints/"),
     "a pre-roll that takes too long": (simulate, no_edit, {"pre_roll": 1e7}, "endTimeCode"),
 }  # fmt: skip
 

@@ -5,7 +5,8 @@ from calmotion.errors import IntegrationError, ShotError
 from calmotion.multibody.failure import Reason, SimulationFailure
 from calmotion.shot.run import RunSettings
 from calmotion.simulation.compiled_shot import compile_shot
-from calmotion.simulation.prepare import failure_error, open_joints, prepare
+from calmotion.simulation.inputs.open_chains import open_joints
+from calmotion.simulation.prepare import failure_error, prepare
 
 
 @pytest.fixture(scope="module")

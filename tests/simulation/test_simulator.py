@@ -4,9 +4,11 @@ import dataclasses
 
 import numpy as np
 import pytest
+from arms import chain, compiled
 from calmotion.benchmarks.scenes.linkage_arm import linkage_arm, performance
 from calmotion.multibody.failure import SimulationFailure
 from calmotion.multibody.model.topology import span_tree
+from calmotion.shot.motor import Rotor
 from calmotion.shot.run import RunSettings
 from calmotion.simulation.bodies import reduce_bodies
 from calmotion.simulation.compiled_shot import compile_shot
@@ -37,6 +39,27 @@ def test_derivatives_by_motors_are_transposes(arm, animation, bodies, cyclic):
     assert abs(forward - backward) < 1e-10 * np.linalg.norm(efforts) * np.linalg.norm(effort)
     floquet_multiplier = simulator.run(curves.angles, curves.rates).floquet_multiplier
     assert (floquet_multiplier > 0.0) == cyclic and floquet_multiplier < 1.0
+
+
+def test_derivatives_of_servos_with_delayed_commands_match_differences():
+    rotor, h = Rotor(0.05, 2e3, 2.0, 0.1, 0.2), 1 / 200
+    character = chain(2, driven=(0, 1), length=0.3)
+    gains = {"model": "servo", "position_gain": 150.0, "velocity_gain": 4.0, "rotor": rotor, "max_torque": 14.0}
+    motors = [dataclasses.replace(m, **gains, delay=d) for m, d in zip(character.motors, (0.0, 0.0123), strict=True)]
+    simulator = Simulator(compiled(dataclasses.replace(character, motors=tuple(motors))), h, None, False)
+    times = h * np.arange(60)[:, None]
+    w = np.array([[9.0, 14.0]])
+    values, rates = 0.3 * np.sin(w * times) ** 2, 0.3 * w * np.sin(2 * w * times)
+    by = np.cos(w * times), -w * np.sin(w * times)
+    simulator.linearize(simulator.run(values, rates))
+    motion, _ = simulator.tangent(*by, False)
+
+    def moved(e):
+        return simulator.run(values + e * by[0], rates + e * by[1]).trajectory.states.u
+
+    found, e = motion[..., 6:], 1e-4
+    expected = (8.0 * (moved(e) - moved(-e)) - (moved(2 * e) - moved(-2 * e))) / (12 * e)
+    assert np.abs(found - expected).max() < 1e-7 * np.abs(expected).max()
 
 
 def test_the_cycles_of_a_changed_robot_start_near_those_of_this_one(arm, animation, bodies):

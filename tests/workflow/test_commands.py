@@ -160,8 +160,7 @@ def test_progress_has_stage_fraction_and_time_left(shot_file):
 WRONG_MOTIONS = {
     "robot.urdf": ('<?xml version="1.0"?><robot name="r"/>', "This is a URDF robot"),
     "robot.xml": ('<mujoco model="m"/>', "This is an MJCF robot"),
-    "table.csv": ("time_s,/Robot/Hinge.input\n0,0\n", "a table that `--csv` wrote"),
-    "notes.txt": ("hello", "Name a .bvh file"),
+    "notes.txt": ("hello", "Name a .csv, .npz or .bvh file"),
 }
 
 
@@ -172,6 +171,14 @@ def test_a_motion_of_a_wrong_kind_is_refused_with_what_to_do(calmotion, shot_fil
     done = calmotion("simulate", shot_file, "--motion", tmp_path / name)
     assert done.returncode == 2 and "no plugin reads this motion" in done.stderr
     assert remedy in done.stderr and name in done.stderr and "done in" not in done.stderr
+
+
+def test_a_table_of_joint_angles_moves_the_robot(calmotion, shot_file, tmp_path):
+    (tmp_path / "wave.csv").write_text("time_s,Hinge\n0,0\n0.5,0.4\n1,0.1\n")
+    done = calmotion("simulate", shot_file, "--motion", tmp_path / "wave.csv", "--csv", tmp_path / "out.csv")
+    assert done.returncode == 0, done.stderr
+    rows = np.genfromtxt(tmp_path / "out.csv", delimiter=",", names=True, deletechars="")
+    assert np.interp(0.5, rows["time_s"], rows[f"{HINGE}.output"]) == pytest.approx(0.4, abs=1e-6)
 
 
 @pytest.mark.parametrize("content", [None, "", "HIERARCHY\nROOT", "not a motion"])
@@ -212,3 +219,38 @@ def test_wrong_arguments_are_setting_errors(shot_file, given, problem):
 def test_keep_wins_over_leave_out():
     assert _forced([], []) == {}
     assert _forced(["modes"], ["all"]) == {"accuracy.analyse": dict.fromkeys(KINDS, OFF) | {"modes": ON}}
+
+
+def test_motors_that_give_are_simulated_unless_ideal_ones_are_asked_for(tmp_path):
+    """A drive of half a newton metre per degree; inspect knows what it does before."""
+    text = ONE_HINGE.replace('"PhysicsDriveAPI:angular"', '"PhysicsDriveAPI:angular", "CalmMotorAPI"')
+    at = text.index("float drive:angular:physics:targetPosition")
+    gains = (
+        'uniform token calm:motor:model = "{}"\n'
+        "float calm:motor:positionGain = 0.5\n"
+        "float calm:motor:velocityGain = 0.02\n"
+    )
+    for model in ("drive", "prescribed"):
+        (tmp_path / f"{model}.usda").write_text(text[:at] + gains.format(model) + text[at:])
+    gives = cm.simulate(tmp_path / "drive.usda", step="4ms")
+    assert gives.max_error > 5e-4
+    (shares,) = gives.report()["error_shares"]
+    assert shares["path"] == TIP and shares["motors_m"] == pytest.approx(gives.max_error, rel=0.01)
+    ideal = cm.simulate(tmp_path / "drive.usda", step="4ms", motors="ideal")
+    assert ideal.max_error < 1e-6 and ideal.report()["error_shares"] == []
+    report = cm.inspect(tmp_path / "prescribed.usda", step="4ms").report()
+    (effect,) = report["effects_of_gains"]
+    assert effect["max_error_m"] == pytest.approx(gives.max_error, rel=0.05)
+    (motor,) = report["motors"]
+    assert motor["model"] == "prescribed" and motor["position_gain_n_m_rad"] == pytest.approx(np.degrees(0.5))
+    with pytest.raises(cm.SettingError, match="motors is 'perfect'"):
+        cm.simulate(tmp_path / "drive.usda", motors="perfect")
+
+
+def test_inspecting_a_robot_with_gains_and_without_animation_is_no_problem(tmp_path):
+    samples = ".timeSamples = { 0: 0, 6: 10, 12: 30, 18: 20, 24: 0 }"
+    still = ONE_HINGE.replace(samples, " = 0\n        float drive:angular:physics:stiffness = 5")
+    (tmp_path / "still.usda").write_text(still.replace("endTimeCode = 24", "endTimeCode = 0"))
+    inspection = cm.inspect(tmp_path / "still.usda")
+    assert inspection.problems == () and inspection.report()["effects_of_gains"] == []
+    assert inspection.report()["motors"][0]["gains_from"] == "drive:angular:physics:stiffness (UsdPhysics)"

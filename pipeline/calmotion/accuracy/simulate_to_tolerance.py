@@ -17,6 +17,7 @@ from calmotion.accuracy.pod_subspace import ProjectedShot, ReferenceRun, project
 from calmotion.accuracy.step_error import (
     ORDER,
     StepRun,
+    effort_errors,
     frames_of,
     largest_step,
     run_or_none,
@@ -67,10 +68,12 @@ def simulate_to_tolerance(
         if not chooses:
             result = simulate_shot(projected.shot, options, progress)
             return with_accuracy(with_modes(result, shot.bodies), projected.shot, options, left_out)
-        step, error = chosen_step(projected.shot, options, left_out)
+        trials: list[StepRun] = []
+        step, error = chosen_step(projected.shot, options, left_out, trials)
         result = with_modes(simulate_shot(projected.shot, replace(options, step=step), progress), shot.bodies)
         run = replace(frames_of(result, shot.animation.frame_times), integrator=options.scheme)
-        return with_step(result, character, options, _accuracy(error, left_out, projected.shot, options, run))
+        accuracy = _accuracy(error, left_out, projected.shot, options, run)
+        return with_step(result, character, options, replace(accuracy, efforts=_effort_errors(run, trials)))
 
     # a search by the same given step uses BDF2 as well, and what it wrote shall have the same errors
     return by_fast_scheme(options, simulated) if chooses else simulated(options)
@@ -89,6 +92,7 @@ def with_accuracy(result: Result, shot: CompiledShot, options: RunSettings, left
     if coarse is None or coarse.step < 1.5 * fine.step:  # it failed, or the step cannot be longer than a frame
         coarse, fine = fine, trial(0.5 * result.step_s)
     accuracy = _accuracy(step_error(coarse, fine), left_out, shot, options, own)
+    accuracy = replace(accuracy, efforts=effort_errors(own, fine if coarse is own else coarse))
     return with_step(result, shot.character, options, accuracy)
 
 
@@ -153,18 +157,34 @@ def planned_step(shot: CompiledShot, options: RunSettings) -> Simplification:
     return step_row(character, options, fine.step, error)
 
 
-def chosen_step(shot: CompiledShot, options: RunSettings, left_out: float) -> tuple[float, float]:
+def _effort_errors(run: StepRun, trials: Sequence[StepRun]) -> Array | None:
+    """`effort_errors` by that of some other runs whose step differs most."""
+    others = [other for other in trials if other.efforts is not None and other.integrator == run.integrator]
+    other = max(others, key=lambda other: abs(np.log(other.step / run.step)), default=None)
+    return None if other is None else effort_errors(run, other)
+
+
+def chosen_step(
+    shot: CompiledShot, options: RunSettings, left_out: float, trials: list[StepRun] | None = None
+) -> tuple[float, float]:
     """The step of a simulation to a tolerance, and its estimated error [s], [m]; arguments as of `simulate_shot`.
 
     It divides a frame.
 
     Args:
         left_out: Error of what the bodies do without [m].
+        trials: Filled with the runs by which it was chosen.
 
     Raises:
         ShotError: Not even the last step does.
     """
-    trial = partial(simulate_at, shot, options)
+
+    def trial(step: float) -> StepRun:
+        run = simulate_at(shot, options, step)
+        if trials is not None:
+            trials[:] = [*trials[-1:], run]  # of each only what two frames hold
+        return run
+
     step, error = largest_step(trial, FIRST, LAST, lambda run: allowed_step_error(shot.character, options, left_out))
     if not np.isfinite(error):
         trial(step)

@@ -9,16 +9,19 @@ import numpy as np
 
 from calmotion.accuracy.integrator_choice import SAFE
 from calmotion.errors import IntegrationError
+from calmotion.multibody.analysis.reactions import reactions
 from calmotion.multibody.failure import SimulationFailure
 from calmotion.multibody.integrators.workspace import Workspace
+from calmotion.multibody.model.system import State
 from calmotion.shot import Result
 from calmotion.shot.character import Array
 from calmotion.shot.run import RunSettings
 from calmotion.simulation.compiled_shot import CompiledShot
 from calmotion.simulation.cyclic import SteadyState
-from calmotion.simulation.forward import run_forward
+from calmotion.simulation.forward import ForwardRun, run_forward
 from calmotion.simulation.inputs.curves import sample_tracks
-from calmotion.simulation.prepare import failure_error, open_joints, prepare
+from calmotion.simulation.inputs.open_chains import open_joints
+from calmotion.simulation.prepare import Prepared, failure_error, prepare
 from calmotion.simulation.report import elastic_by_body
 
 CLOSED_GAP = 1e-6  # largest position gap of a joint that counts as none [m]
@@ -37,6 +40,7 @@ class StepRun:
             is known at the frames alone.
         integrator: By which it was simulated; empty where that does not matter.
         gap: Largest position gap of a joint at any step [m].
+        efforts: Of the motors [N m] or [N], shape [f, M]; None where they are not known.
     """
 
     step: float
@@ -44,6 +48,7 @@ class StepRun:
     elastic: tuple[Array, ...] = ()
     integrator: str = ""
     gap: float = 0.0
+    efforts: Array | None = None
 
 
 def simulate_at(shot: CompiledShot, options: RunSettings, step: float) -> StepRun:
@@ -62,15 +67,28 @@ def simulate_at(shot: CompiledShot, options: RunSettings, step: float) -> StepRu
     except SimulationFailure as failure:
         raise failure_error(prepared, failure) from failure
     elastic = elastic_by_body(model, run.trajectory.states.u)
-    gap = run.trajectory.max_joint_gap
-    return StepRun(grid.h, run.target_positions[grid.frames], elastic, options.scheme, gap)
+    gap, efforts = run.trajectory.max_joint_gap, _efforts(prepared, run)
+    return StepRun(grid.h, run.target_positions[grid.frames], elastic, options.scheme, gap, efforts)
+
+
+def _efforts(prepared: Prepared, run: ForwardRun) -> Array:
+    """Efforts of the motors at the frames [N m] or [N], shape [f, M]."""
+    model, frames, whole = prepared.model, prepared.grid.frames, run.trajectory
+    states = State(*[part[frames] for part in whole.states])
+    at_frames = replace(whole, states=states, world=whole.world[frames])
+    found = reactions(model.system, at_frames, run.joint_angles[frames], run.joint_rates[frames])
+    efforts = np.zeros((len(frames), len(prepared.character.motors)))
+    driven = model.motor >= 0
+    efforts[:, model.motor[driven]] = found.efforts[:, driven] * model.sign[driven]
+    return efforts
 
 
 def frames_of(result: Result, frame_times: Array) -> StepRun:
     """The motion of a result that counts, at the frames [s]."""
     motion = (result.after or result.before).motion
     # times are sums of steps, so a frame may come out a rounding later
-    return StepRun(result.step_s, motion.target_positions[np.searchsorted(motion.times, frame_times - 1e-9)])
+    rows = np.searchsorted(motion.times, frame_times - 1e-9)
+    return StepRun(result.step_s, motion.target_positions[rows], efforts=motion.motor_efforts[rows])
 
 
 def distance(one: Array, other: Array) -> float:
@@ -82,6 +100,18 @@ def step_error(coarse: StepRun, fine: StepRun) -> float:
     """Error of the finer of two runs at any target [m], by Richardson's extrapolation."""
     ratio = (coarse.step / fine.step) ** ORDER - 1.0
     return distance(coarse.positions, fine.positions) / ratio
+
+
+def effort_errors(run: StepRun, other: StepRun) -> Array | None:
+    """Error of each motor's effort by the step of a run [N m] or [N], shape [M], from a run by another step.
+
+    The error is taken to go with the step itself: multipliers converge more slowly than positions, and may oscillate
+    from step to step.
+    """
+    if run.efforts is None or other.efforts is None or not 0.0 < other.step != run.step:
+        return None
+    apart = np.max(np.abs(run.efforts - other.efforts), axis=0, initial=0.0)
+    return np.asarray(apart / abs(other.step / run.step - 1.0))
 
 
 def step_gaps(coarse: StepRun, fine: StepRun) -> tuple[float, float]:

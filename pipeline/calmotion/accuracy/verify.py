@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from calmotion.accuracy.integrator_choice import by_fast_scheme
+from calmotion.accuracy.mesh_budget import mesh_error
 from calmotion.accuracy.pod_subspace import project_to_subspace
 from calmotion.accuracy.simulate_to_tolerance import found_tracks
 from calmotion.accuracy.step_error import distance, frames_of, simulate_at
@@ -19,13 +20,14 @@ from calmotion.simulation.simulate import Progress
 
 STEP, TOLERANCE, MESH = 0.25, 0.1, 0.25  # of those of the result, and of the error of its meshes
 NODES = 5000  # of the finer meshes, on which nonlinear bodies are reduced
+LINEAR_NODES = 30_000  # of those whose linear modes their stiffness is taken from
 PROJECTION = 0.01  # share of the tolerance for the error of the POD subspaces of the finer run
 FINER, MOST = 0.1, 4  # a reduction that is no finer than the result's is tried again with this share of its tolerance
 
 
 def verify(
     shot: CompiledShot, reduction: BodyReduction | None, result: Result, options: RunSettings, progress: Progress
-) -> tuple[float, float, int]:
+) -> tuple[float, float, int, float]:
     """Largest distance of any target, at any frame, to where a finer run has it.
 
     Args:
@@ -35,7 +37,8 @@ def verify(
         options: Those of the result.
 
     Returns:
-        The distance [m], the step of the finer run [s] and its elastic coordinates.
+        The distance [m], the step of the finer run [s], its elastic coordinates, and the estimated error of its own
+        meshes at the targets [m], by which the distance may be too small: 0 where that is not known.
 
     Raises:
         ShotError: The finer run is not possible.
@@ -50,7 +53,8 @@ def verify(
     step = STEP * result.step_s
     fine = by_fast_scheme(options, lambda options: simulate_at(projected.shot, options, step))
     own = frames_of(result, shot.animation.frame_times)
-    return distance(own.positions, fine.positions), fine.step, _coordinates(shot.bodies)
+    meshes = mesh_error(projected.shot, options, fine) or 0.0
+    return distance(own.positions, fine.positions), fine.step, _coordinates(shot.bodies), meshes
 
 
 def _finer(shot: CompiledShot, reduction: BodyReduction, options: RunSettings, progress: Progress) -> list[ReducedBody]:
@@ -60,6 +64,8 @@ def _finer(shot: CompiledShot, reduction: BodyReduction, options: RunSettings, p
     wanted = {b: MESH * error for b, error in errors.items() if error is not None}
     if wanted:
         reduction = reduction.with_finer_meshes(options.tolerance, wanted, NODES, progress, by_factor=False)
+        # the stiffness is that of meshes finer still, or the run would know it less well than the result
+        reduction = reduction.with_finer_meshes(options.tolerance, wanted, LINEAR_NODES, progress)
     for _ in range(1 + MOST):
         bodies = reduction.bodies(allowed, progress=progress)
         if _coordinates(bodies) > _coordinates(shot.bodies):

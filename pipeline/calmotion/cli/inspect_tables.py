@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from operator import itemgetter
 from typing import TYPE_CHECKING, Any, TextIO
 
 from calmotion.cli.quantities import angle, counted, length
 from calmotion.cli.run_report import print_left_out, print_notes
 from calmotion.cli.sentences import unbroken
 from calmotion.cli.tables import console_on, print_table, say
+from calmotion.shot.motor import PRESCRIBED
 from calmotion.shot.outputs import ERROR, WARNING
 
 if TYPE_CHECKING:
@@ -47,6 +49,11 @@ def _print_contents(console: Console, report: dict[str, Any]) -> None:
         say(console, f"contains an optimised layer: {unbroken(layer)}")
     bodies = [_body_row(body) for body in report["bodies"]]
     print_table(console, "Bodies", ["body", "kind", "mass", "elements", "frequencies"], bodies, texts=2)
+    solids = [_solid_row(body) for body in report["bodies"] if "solid" in body]
+    print_table(console, "Solids of flexible bodies", ["body", "made of", "volume", "frequency error"], solids, texts=2)
+    for body in report["bodies"]:
+        for note in body.get("solid_notes", ()):
+            say(console, f"{unbroken(body['path'])}: {note}")
     print_table(
         console,
         "Joints",
@@ -71,10 +78,57 @@ def _print_contents(console: Console, report: dict[str, Any]) -> None:
         modes = zip(report["system_frequencies_hz"], report["system_damping_ratios"], strict=True)
         shown = ", ".join(f"{frequency:.4g} Hz ({ratio:.2g})" for frequency, ratio in modes)
         say(console, f"natural frequencies of the character in its first pose (damping ratios): {shown}, ...")
+    _print_gains(console, report)
     print_left_out(console, report["left_out"])
     if report["mode_shapes"]:
         say(console, f"mode shapes: {', '.join(map(unbroken, report['mode_shapes']))}")
     print_notes(console, report["notes"])
+
+
+def _print_gains(console: Console, report: dict[str, Any]) -> None:
+    """Gains of the motors, and what they would do to the animation."""
+    rows = [_gain_row(motor) for motor in report["motors"] if motor["gains_from"]]
+    if rows:
+        heads = ["motor", "model", "read from", "position gain", "velocity gain"]
+        print_table(console, "Gains of motors", heads, rows, texts=3)
+    servos = [_servo_row(motor) for motor in report["motors"] if motor["rotor"]]
+    if servos:
+        heads = ["servo", "armature", "gear", "friction", "no-load speed", "delay"]
+        print_table(console, "Servos", heads, servos)
+    effects = report["effects_of_gains"]
+    if effects:
+        ideal = all(motor["model"] == PRESCRIBED for motor in report["motors"])
+        lag = max(effects, key=itemgetter("max_error_m"))
+        rest = max(row["sag_m"] for row in effects)
+        remedy = "; set calm:motor:model to drive to simulate them" if ideal else ""
+        say(
+            console,
+            f"with these gains {lag['path']} would be off by up to {length(lag['max_error_m'])}, a target at rest by "
+            f"{length(rest)}, on rigid links; {'no motor gives' if ideal else 'motors give'} in this shot{remedy}",
+        )
+
+
+def _gain_row(motor: dict[str, Any]) -> list[str]:
+    newtons, unit = ("n", "m") if "min_m" in motor else ("n_m", "rad")
+    shown = "N/m" if unit == "m" else "N m/rad"
+    position, velocity = motor[f"position_gain_{newtons}_{unit}"], motor[f"velocity_gain_{newtons}_s_{unit}"]
+    per = "N s/m" if unit == "m" else "N m s/rad"
+    return [motor["path"], motor["model"], motor["gains_from"], f"{position:.4g} {shown}", f"{velocity:.4g} {per}"]
+
+
+def _servo_row(motor: dict[str, Any]) -> list[str]:
+    rotor, linear = motor["rotor"], "min_m" in motor
+    newtons, unit, effort = ("n", "m", "N") if linear else ("n_m", "rad", "N m")
+    inertia = f"{rotor['armature_kg']:.4g} kg" if linear else f"{rotor['armature_kg_m2']:.4g} kg m²"
+    gear, speed = rotor[f"gear_stiffness_{newtons}_{unit}"], rotor[f"no_load_speed_{unit}_s"]  # None: infinite
+    return [
+        motor["path"],
+        inertia,
+        "rigid" if gear is None else f"{gear:.4g} {effort}/{unit}",
+        f"{rotor[f'friction_{newtons}']:.4g} {effort}",
+        "-" if speed is None else f"{(length if linear else angle)(speed)}/s",
+        f"{1e3 * motor['delay_s']:.4g} ms",
+    ]
 
 
 def _body_row(body: dict[str, Any]) -> list[str]:
@@ -87,6 +141,14 @@ def _body_row(body: dict[str, Any]) -> list[str]:
         str(body.get("elements", "-")),
         f"{shown} Hz" if shown else "-",
     ]
+
+
+def _solid_row(body: dict[str, Any]) -> list[str]:
+    error = body["frequency_error"]
+    return [
+        body["path"], body["solid"], f"{1e6 * body['volume_m3']:.4g} cm³",
+        "-" if error is None else f"{100.0 * error:.2g}%",
+    ]  # fmt: skip
 
 
 def _motor_row(motor: dict[str, Any]) -> list[str]:

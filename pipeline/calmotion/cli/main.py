@@ -5,10 +5,23 @@ from __future__ import annotations
 import sys
 from collections.abc import Sequence
 
-from calmotion.cli.commands import bench, cache, completion, inspect, optimize, plugins, rig, simulate
-from calmotion.cli.parser import Parser
+from calmotion.cli.commands import (
+    bench,
+    cache,
+    completion,
+    doctor,
+    export,
+    import_robot,
+    inspect,
+    materials,
+    optimize,
+    plugins,
+    rig,
+    simulate,
+)
+from calmotion.cli.parser import Parser, add_examples, overview
 from calmotion.cli.signals import as_interrupts, ignore
-from calmotion.errors import ShotError
+from calmotion.errors import ShotError, failure_of_machine
 from calmotion.version import __version__
 
 FAILED, WRONG_USAGE, INTERRUPTED = 1, 2, 130
@@ -57,6 +70,11 @@ def _run(given: list[str]) -> int:
             return WRONG_USAGE if isinstance(error, SettingError) else FAILED
         except BrokenPipeError:
             return FAILED
+        except Exception as error:
+            from calmotion.cli.diagnostics.crash_report import crash
+
+            print_error(failure_of_machine(error) or crash(error, given), output)
+            return FAILED
 
 
 def build_parser() -> Parser:
@@ -68,8 +86,24 @@ def build_parser() -> Parser:
     )
     parser.add_argument("--version", action="version", version=f"calmotion {__version__}")
     commands = parser.add_subparsers(title="commands", required=True, metavar="COMMAND")
-    for command in (inspect, simulate, optimize, rig, bench, plugins, cache, completion):
+    for command in (
+        inspect,
+        simulate,
+        optimize,
+        export,
+        import_robot,
+        rig,
+        materials,
+        bench,
+        plugins,
+        cache,
+        doctor,
+        completion,
+    ):
         command.add_to(commands)
+    for name, command_parser in commands.choices.items():
+        add_examples(name, command_parser)
+    parser.overview = overview({action.dest: action.help or "" for action in commands._choices_actions})
     parser.set_defaults(parser=parser)  # for `completion`
     return parser
 

@@ -42,13 +42,17 @@ def shot_command(commands: Commands, name: str, function: Command, text: str) ->
     command.add_argument("--json", action="store_true", help="print one JSON object on stdout, and nothing else there")
     command.add_argument("--quiet", action="store_true", help="print nothing but errors (and the object of --json)")
     command.add_argument("--progress", action="store_true", help="print machine-readable progress to stderr")
+    file_argument(
+        command, "--log", metavar="FILE",
+        help="add JSON lines to this file: time, stage, fraction, message and memory of the run",
+    )  # fmt: skip
     plugin_option(command)
     command.add_argument(
         "--run",
         metavar="OPERATOR",
         action="append",
         default=[],
-        help="also run this operator of a plugin, such as curves.export; may be repeated",
+        help="also run this operator of a plugin, such as speed_watch.report; may be repeated",
     )
     file_argument(command, "--settings", metavar="FILE", help="TOML file with a table for each operator")
     command.add_argument(
@@ -99,10 +103,14 @@ def run_options(command: argparse.ArgumentParser) -> None:
     file_argument(outputs, "--csv", metavar="FILE", help="write a table of targets and motors, one row for each step")
     file_argument(outputs, "--rrd", metavar="FILE", help="write a recording for the rerun viewer")
     file_argument(outputs, "--figures", metavar="DIR", help="draw figures into this folder")
+    file_argument(outputs, "--video", metavar="FILE", help="write a video (.webp, or .mp4 where ffmpeg is installed)")
     file_argument(
         command, "--motion", metavar="FILE",
         help="file with a motion for the motors, such as a BVH file (with --set bvh.read.map=...)",
     )  # fmt: skip
+    command.add_argument(
+        "--verbose", action="store_true", help="also print the search, the steps, the error budget and all notes"
+    )
     command.add_argument(
         "--verify",
         action="store_true",
@@ -118,11 +126,13 @@ def run_options(command: argparse.ArgumentParser) -> None:
 def simulation_options(command: argparse.ArgumentParser, integrators: str) -> None:
     """Add the options of the simulation and of the simplification of the model."""
     model = command.add_argument_group("simulation")
-    model.add_argument("--step", metavar="TIME", type=_quantity("s"), help="time step, in s or with a unit (2ms)")
+    model.add_argument(
+        "--step", metavar="TIME", type=quantity("s", positive=True), help="time step, in s or with a unit (2ms)"
+    )
     model.add_argument(
         "--tolerance",
         metavar="LENGTH",
-        type=_quantity("m", needs_unit=True),
+        type=quantity("m", needs_unit=True, positive=True),
         help="acceptable error at the targets, with a unit (1mm); time step, modes and simplifications follow from it "
         "(default: that of the shot, or a thousandth of the reach of the character)",
     )
@@ -130,9 +140,13 @@ def simulation_options(command: argparse.ArgumentParser, integrators: str) -> No
     model.add_argument(
         "--pre-roll",
         metavar="TIME",
-        type=_quantity("s"),
+        type=quantity("s"),
         help="time before the first frame in which the robot eases into the motion (default: automatic)",
     )
+    model.add_argument(
+        "--motors", choices=("authored", "ideal"), default="authored",
+        help="ideal: joints follow their curves exactly, whatever calm:motor:model says (default: authored)",
+    )  # fmt: skip
     meanings = "; ".join(f"{kind}: {meaning}" for kind, meaning in MEANINGS.items())
     group = command.add_argument_group(
         "model simplification", f"By default the tolerance decides. Kinds: {meanings}; all: all of these."
@@ -175,7 +189,7 @@ def run_arguments(args: argparse.Namespace, display: ProgressDisplay) -> dict[st
 
 def simulation_arguments(args: argparse.Namespace) -> dict[str, Any]:
     """The keyword arguments of the workflow's functions that `simulation_options` added."""
-    names = ("tolerance", "step", "integrator", "pre_roll", "keep", "leave_out")
+    names = ("tolerance", "step", "integrator", "pre_roll", "motors", "keep", "leave_out")
     return {name: getattr(args, name) for name in names}
 
 
@@ -189,10 +203,14 @@ def assignments(args: argparse.Namespace) -> dict[str, dict[str, object]]:
 
     names = {"bake": None, "samples_per_second": None, "splines": False}
     writer = {name: value for name, empty in names.items() if (value := getattr(args, name, empty)) != empty}
-    return merge([*(read_assignment(text) for text in args.set), *([{"usd.write": writer}] if writer else [])])
+    search = {name: value for name in ("robust", "scenarios") if (value := getattr(args, name, None)) is not None}
+    own = {"usd.write": writer, "retarget.optimize": search}
+    return merge([*(read_assignment(text) for text in args.set), {name: v for name, v in own.items() if v}])
 
 
-def _quantity(unit: str, needs_unit: bool = False) -> Callable[[str], float]:
+def quantity(unit: str, needs_unit: bool = False, positive: bool = False) -> Callable[[str], float]:
+    """The type of an argument that is a quantity in a unit, not negative."""
+
     def read(text: str) -> float:
         from calmotion.host import SettingError, parse_quantity
 
@@ -202,8 +220,9 @@ def _quantity(unit: str, needs_unit: bool = False) -> Callable[[str], float]:
             value = parse_quantity(text, unit)
         except SettingError as error:
             raise argparse.ArgumentTypeError(str(error)) from None
-        if not 0.0 <= value < float("inf"):
-            raise argparse.ArgumentTypeError(f"{text} is out of range; it must be finite and not negative")
+        if not 0.0 <= value < float("inf") or (positive and not value):
+            least = "above zero" if positive else "not negative"
+            raise argparse.ArgumentTypeError(f"{text} is out of range; it must be finite and {least}")
         return value
 
     return read

@@ -77,6 +77,7 @@ def own_messages() -> Iterator[None]:
 
     # The handler of the root takes messages that no one else takes, which Python would print on stderr.
     handlers = ((logging.getLogger("calmotion"), Notices()), (logging.getLogger(), logging.NullHandler()))
+    os.environ.setdefault("RUST_LOG", "off")  # rerun would print messages of its own besides its exceptions
     with warnings.catch_warnings():
         if not sys.warnoptions and all(action != "error" for action, *_ in warnings.filters):
             warnings.simplefilter("ignore")
@@ -140,6 +141,10 @@ def conclude(
         output: Where the report is printed.
         show: Prints the report for a person; None prints nothing.
     """
+    if any(problem.traceback for problem in problems):
+        from calmotion.cli.diagnostics.crash_report import reported
+
+        problems = [reported(problem) for problem in problems]
     if output.json:
         errors = [problem.as_dict() for problem in problems]
         output.object({**report, **({"error": errors[0], "errors": errors} if errors else {})})

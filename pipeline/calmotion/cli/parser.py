@@ -1,16 +1,166 @@
-"""The parser of arguments: a wrong option or command is answered with the nearest right one."""
+"""The parser of arguments, and its help: one screen by task, and examples for each command.
+
+A wrong option or command is answered with the nearest right one.
+"""
 
 from __future__ import annotations
 
 import argparse
-from collections.abc import Sequence
-from typing import Any
+import textwrap
+from collections.abc import Mapping, Sequence
+from typing import Any, NoReturn
 
-from calmotion.support.naming import nearest
+from calmotion.support.naming import nearest, nearest_name
+
+# Commands that are named nowhere here stand in the last group.
+TASKS = (
+    ("Prepare a shot", ("import", "rig", "motors", "materials", "inspect")),
+    ("Remove the shake", ("simulate", "optimize", "watch", "calibrate")),
+    ("Play it on the robot", ("export",)),
+    ("Measure, extend, set up", ("bench", "plugins", "warmup", "doctor", "log", "cache", "completion")),
+)
+EXAMPLES: dict[str, tuple[tuple[str, str], ...]] = {
+    "inspect": (
+        ("calmotion inspect shot.usda", "bodies, motors, targets, frequencies"),
+        ("calmotion inspect shot.usda --strict", "check before publishing"),
+        ("calmotion inspect shot.usda --modes build/modes", "how the links vibrate"),
+    ),
+    "simulate": (
+        ("calmotion simulate shot.usda", "how much does it shake as animated?"),
+        ("calmotion simulate shot.usda --rrd shake.rrd", "look at it: rerun shake.rrd"),
+        ("calmotion simulate shot.usda --shaper zvd", "what would an input shaper give?"),
+    ),
+    "optimize": (
+        ("calmotion optimize shot.usda -o calm.usda", "the usual case"),
+        ("calmotion optimize shot.usda -o calm.usda --tolerance 0.5mm", "finer"),
+        ("calmotion optimize shot.usda -o calm.usda --video calm.webp", "show others what changed"),
+        ("calmotion optimize shot.usda -o calm.usda --bake simulated", "for viewers without physics"),
+    ),
+    "watch": (
+        ("calmotion watch shot.usda", "how much does it shake, after each save?"),
+        ("calmotion watch shot.usda --optimize -o calm.usda", "and its cure"),
+    ),
+    "export": (
+        ("calmotion export calm_root.usda --to csv --rate 200Hz", "a table for any controller"),
+        ("calmotion export calm_root.usda --to ros2 -o trajectory.yaml", "a ROS 2 JointTrajectory"),
+    ),
+    "import": (
+        ("calmotion import arm.urdf --motion wave.csv -o shot.usda", "a shot of a robot and a motion"),
+        ("calmotion import arm.urdf -o shot.usda --flexible '*forearm*=abs,3mm'", "with a link that bends"),
+    ),
+    "materials": (("calmotion materials abs", "one material, with its source"),),
+    "rig": (("calmotion rig skinned.usda -o robot.usda", "a robot from a UsdSkel character"),),
+    "bench": (("calmotion bench work-precision", "error against run time of every setting"),),
+    "doctor": (("calmotion doctor", "is everything in its place?"),),
+    "cache": (("calmotion cache info", "how large are the caches?"),),
+    "completion": (("calmotion completion bash", "source it in your shell"),),
+}
+START = (
+    ("calmotion inspect shot.usda", "what is in the shot?"),
+    ("calmotion optimize shot.usda -o calm.usda", "remove the shake"),
+)
+WIDTH = 79
+_EXAMPLES = "examples:\n"
+
+
+def overview(commands: Mapping[str, str]) -> str:
+    """The help of the program.
+
+    Args:
+        commands: What each command does, in the order in which they are listed.
+    """
+    lines = [
+        "usage: calmotion COMMAND [options]",
+        "",
+        "Robots shake when they perform fast animation. Calmotion simulates the robot of",
+        "a USD shot with its flexible links, and changes the motor curves so that it",
+        "performs the intended motion without the shake.",
+    ]
+    column = max(map(len, commands), default=0) + 4
+    listed = {name for _, names in TASKS for name in names}
+    for number, (title, names) in enumerate(TASKS):
+        group = [name for name in names if name in commands]
+        if number == len(TASKS) - 1:
+            group += [name for name in commands if name not in listed]
+        lines += ["", f"{title}:"] if group else []
+        lines += [line for name in group for line in entry(name, commands[name], column)]
+    lines += ["", "Start with:", *example_lines(START), ""]
+    lines += [
+        "calmotion COMMAND --help lists the options of a command, with examples.",
+        "calmotion --version prints the version.",
+        "Exit status: 0 done, 1 the shot cannot be processed, 2 wrong usage,",
+        "130 interrupted.",
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def entry(name: str, text: str, column: int) -> list[str]:
+    """A command and what it does, wrapped."""
+    indent = " " * column
+    return textwrap.wrap(text, WIDTH, initial_indent=f"  {name}".ljust(column), subsequent_indent=indent)
+
+
+def example_lines(examples: Sequence[tuple[str, str]]) -> list[str]:
+    """Commands with what they are for, in two columns where they fit."""
+    column = max(len(command) for command, _ in examples) + 4
+    lines = []
+    for command, purpose in examples:
+        line = f"  {command}".ljust(column) + f"# {purpose}"
+        lines += [line] if len(line) <= WIDTH else [f"  # {purpose}", f"  {command}"]
+    return lines
+
+
+def add_examples(name: str, command: argparse.ArgumentParser) -> None:
+    """Put examples below the options of a command, and what it needs at least into its usage."""
+    examples = EXAMPLES.get(name)
+    if examples:
+        command.formatter_class = _WithExamples
+        command.epilog = _EXAMPLES + "\n".join(example_lines(examples))
+    if command.usage is None and not any(isinstance(a, argparse._SubParsersAction) for a in command._actions):
+        command.usage = " ".join(["%(prog)s", *(needed(action) for action in command._actions if is_needed(action))])
+        command.usage += " [options]"
+
+
+def is_needed(action: argparse.Action) -> bool:
+    """Whether a command does not run without an argument."""
+    return action.required and action.help != argparse.SUPPRESS
+
+
+def needed(action: argparse.Action) -> str:
+    """An argument as it is typed."""
+    value = action.metavar if isinstance(action.metavar, str) else action.dest.upper()
+    return f"{action.option_strings[0]} {value}" if action.option_strings else value
+
+
+class _WithExamples(argparse.HelpFormatter):
+    """Help whose examples keep their lines; descriptions are wrapped."""
+
+    def _fill_text(self, text: str, width: int, indent: str) -> str:
+        return text if text.startswith(_EXAMPLES) else super()._fill_text(text, width, indent)
 
 
 class Parser(argparse.ArgumentParser):
-    """Parser of a command, which refuses its own wrong options."""
+    """Parser of a command, which refuses its own wrong options.
+
+    Attributes:
+        overview: The whole help, where it is not that of argparse.
+    """
+
+    overview = ""
+
+    def format_help(self) -> str:
+        """The help."""
+        return self.overview or super().format_help()
+
+    def error(self, message: str) -> NoReturn:
+        """End with what is wrong and where help is; the list of all options would hide it."""
+        if self.overview:
+            self.exit(2, f"error: {message}\n{self.prog} --help lists the commands.\n")
+        inner = [action for action in self._actions if isinstance(action, argparse._SubParsersAction)]
+        more = (
+            f"has more: its commands are {', '.join(inner[0].choices)}" if inner else "lists the options, with examples"
+        )
+        self.exit(2, f"{self.format_usage()}error: {message}\n{self.prog} --help {more}.\n")
 
     def parse_known_args(  # type: ignore[override]
         self, args: Sequence[str] | None = None, namespace: Any = None
@@ -20,7 +170,8 @@ class Parser(argparse.ArgumentParser):
         wrong = next((text for text in rest if text.startswith("-")), None)
         if wrong is not None:
             name = wrong.partition("=")[0]
-            self.error(f"there is no option {name}. {nearest(name, self._option_string_actions)}")
+            near = nearest_name(name.lstrip("-"), [option.lstrip("-") for option in self._option_string_actions])
+            self.error(f"there is no option {name}." + (f" Did you mean --{near}?" if near else ""))
         return found, rest
 
     def _check_value(self, action: argparse.Action, value: Any) -> None:

@@ -18,13 +18,28 @@ if TYPE_CHECKING:
     from rich.progress import TaskID
 
     from calmotion.cli.bars import Bars
+    from calmotion.cli.diagnostics.run_log import RunLog
 
 
 class ProgressDisplay:
-    """Shows stages as they come; use as a context, call as the workflow's progress callback."""
+    """Shows stages as they come; use as a context, call as the workflow's progress callback.
 
-    def __init__(self, quiet: bool, machine: bool = False):
+    Args:
+        quiet: Show nothing.
+        machine: Show lines for a program.
+        log: File of the log; None for none.
+
+    Raises:
+        SettingError: The log cannot be written.
+    """
+
+    def __init__(self, quiet: bool, machine: bool = False, log: str | None = None):
         self._quiet, self._machine = quiet, machine
+        self._log: RunLog | None = None
+        if log is not None:
+            from calmotion.cli.diagnostics.run_log import RunLog
+
+            self._log = RunLog(log)
         self._bars: Bars | None = None
         self._tasks: dict[str, TaskID] = {}
 
@@ -41,10 +56,14 @@ class ProgressDisplay:
     ) -> None:
         if self._bars:
             self._bars.stop()
+        if self._log:
+            self._log.end("done" if kind is None else kind.__name__)
 
     def __call__(self, state: Stage) -> None:
         """Show how far a stage is."""
         stage, fraction, message = state.stage, state.fraction, state.message
+        if self._log:
+            self._log.progress(state)
         if self._machine:
             line = "\t".join(("progress", stage, f"{fraction:.4f}", message)).replace("\n", " ")
             print(line, file=sys.stderr, flush=True)
@@ -58,6 +77,8 @@ class ProgressDisplay:
 
     def done(self, result: OperatorResult) -> None:
         """Show the outcome of an operator, and its messages."""
+        if self._log:
+            self._log.operator(result)
         if self._quiet:
             return
         if self._bars is None and result.outcome in (Outcome.DONE, Outcome.FAILED):

@@ -1,16 +1,23 @@
-"""What `simulate` and `optimize` have in common: arguments of the workflow, and the report."""
+"""What `simulate`, `optimize` and `watch` have in common: arguments of the workflow, and the report."""
 
 from __future__ import annotations
 
 import argparse
+import time
 from collections.abc import Callable
-from typing import Any
+from functools import partial
+from typing import TYPE_CHECKING, Any
 
-from calmotion.cli.options import opened_shot, run_arguments, simulation_arguments
+from calmotion.cli.options import assignments, opened_shot, run_arguments, simulation_arguments
 from calmotion.cli.output import FAILED, INTERRUPTED, Output, conclude
 from calmotion.cli.progress import ProgressDisplay
 from calmotion.shot.run import OutputPaths
+from calmotion.support import interrupts
 from calmotion.workflow.results import SimulationResult
+
+if TYPE_CHECKING:
+    from calmotion.workflow.shot import Shot
+    from calmotion.workflow.watch import Watch
 
 
 def run_shot(
@@ -31,17 +38,85 @@ def run_shot(
     from calmotion.cli.run_report import print_run
 
     shot = opened_shot(args)
-    with ProgressDisplay(args.quiet, args.progress) as display:
+    with ProgressDisplay(args.quiet, args.progress, args.log) as display:
         result = function(
             shot,
             verify=args.verify,
-            outputs=OutputPaths(layer=args.output, rrd=args.rrd, csv=args.csv, figures=args.figures),
+            outputs=OutputPaths(layer=args.output, rrd=args.rrd, csv=args.csv, figures=args.figures, video=args.video),
             **simulation_arguments(args),
             **run_arguments(args, display),
             **options,
         )
     report = result.report()
-    conclude(report, result.problems, output, None if args.quiet else print_run)
+    conclude(report, result.problems, output, None if args.quiet else partial(print_run, verbose=args.verbose))
     if result.interrupted:
         return INTERRUPTED
     return FAILED if result.problems or (args.strict and not report["tolerance_kept"]) else 0
+
+
+def watch_shot(args: argparse.Namespace, output: Output) -> int:
+    """Simulate or optimise a shot whenever it is saved, and print a line for each run; the exit status.
+
+    Raises:
+        SettingError: An option or setting does not fit.
+    """
+    from calmotion.cli.output import notice, print_error
+    from calmotion.errors import ShotError
+    from calmotion.host import SettingError
+    from calmotion.workflow.commands import optimize, simulate
+    from calmotion.workflow.watch import Watch
+
+    if args.optimize and not args.output:
+        raise SettingError("optimize writes a layer", path="-o", remedy="Name it with -o LAYER.")
+    paths = OutputPaths(layer=args.output, rrd=args.rrd, csv=args.csv, figures=args.figures, video=args.video)
+
+    def run(shot: Shot) -> SimulationResult:
+        function = optimize if args.optimize else simulate
+        options = {"operators": args.run, "settings": assignments(args), **simulation_arguments(args)}
+        return function(shot, verify=args.verify, outputs=paths, **options)
+
+    watch, done = Watch(opened_shot(args), run), 0
+    if not args.quiet:
+        notice(f"watching {args.shot}; Ctrl-C ends it")
+    while args.runs is None or done < args.runs:
+        try:
+            if done:
+                watch.wait()
+        except KeyboardInterrupt:
+            interrupts.answer()
+            return 0
+        begin = time.perf_counter()
+        try:
+            result = watch.run()
+        except ShotError as error:  # the next save may repair it
+            print_error(error, output)
+        else:
+            _tell(result, watch, time.perf_counter() - begin, args, output)
+            if result.interrupted:
+                return INTERRUPTED
+        done += 1
+    return 0
+
+
+def _tell(result: SimulationResult, watch: Watch, seconds: float, args: argparse.Namespace, output: Output) -> None:
+    """Print one line for a run."""
+    from calmotion.cli.quantities import length
+    from calmotion.workflow.watch import largest_error
+
+    report: dict[str, Any] = result.report()
+    if output.json:
+        output.object(report | {"reused": watch.reused, "seconds": seconds})
+        return
+    if args.quiet:
+        return
+    path, error, moment = largest_error(result)
+    verdict = "tolerance kept" if report["tolerance_kept"] else "tolerance missed"
+    what = "optimised" if args.optimize else "simulated"
+    reused = f"; reused {', '.join(watch.reused)}" if watch.reused else ""
+    print(
+        f"{time.strftime('%H:%M:%S')} {what} in {seconds:.2f} s: largest error {length(error)} of {path} at "
+        f"{moment:.2f} s, {verdict}{reused}",
+        file=output.stream, flush=True,
+    )  # fmt: skip
+    for problem in result.problems:
+        print(f"  {problem.error}", file=output.stream, flush=True)

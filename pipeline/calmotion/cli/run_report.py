@@ -22,6 +22,8 @@ REMEDIES = {
     CHOICES: "Use --keep all.",
     MEASURED: _SENSITIVE,
 }
+COARSE_EFFORT = 0.05  # of the largest effort of a motor, from which on its error is told
+IDLE_EFFORT = 0.01  # of that of the strongest motor
 
 
 def print_left_out(console: Console, rows: Sequence[dict[str, Any]]) -> None:
@@ -52,6 +54,13 @@ def print_limits(console: Console, limits: Sequence[dict[str, Any]], optimized: 
     print_table(console, "Active limits of motors", ["motor", "quantity", *heads, "at", ""], rows, texts=2)
 
 
+def print_shares(console: Console, shares: Sequence[dict[str, Any]]) -> None:
+    """The parts of motors that give and of flexible links in the error of the input."""
+    rows = [[row["path"], length(row["motors_m"]), length(row["links_m"])] for row in shares]
+    title = "Causes of the input's error (max)"
+    print_table(console, title, ["target", "motors alone", "links alone"], rows)
+
+
 def print_joint_gap(console: Console, gap: float) -> None:
     """The largest gap of a joint [m], where joints are not closed."""
     from calmotion.accuracy.step_error import CLOSED_GAP  # loads what has simulated before
@@ -60,8 +69,61 @@ def print_joint_gap(console: Console, gap: float) -> None:
         say(console, f"joints come apart by up to {length(gap)}")
 
 
-def print_accuracy(console: Console, report: dict[str, Any]) -> None:
-    """The error budget of the simulation itself, and whether it keeps the tolerance."""
+def print_efforts(console: Console, efforts: Sequence[dict[str, Any]], coarse: bool) -> None:
+    """How well the efforts of the motors are known: that of the least known one, over its largest value.
+
+    A motor that hardly works among the others, such as one that turns a cup, does not count.
+
+    Args:
+        coarse: Whether to print it where it is not known well, or where it is.
+    """
+    known = [row for row in efforts if row["estimated_error"] is not None and row["largest"] > 0.0]
+    strongest = {
+        unit: max(row["largest"] for row in known if row["unit"] == unit) for unit in {r["unit"] for r in known}
+    }
+    known = [row for row in known if row["largest"] > IDLE_EFFORT * strongest[row["unit"]]]
+    if not known:
+        return
+    worst = max(known, key=lambda row: row["estimated_error"] / row["largest"])
+    share, unit = worst["estimated_error"] / worst["largest"], worst["unit"]
+    if coarse and share >= COARSE_EFFORT:
+        say(
+            console,
+            f"the efforts of motors depend on the time step: {worst['path']} by {worst['estimated_error']:.3g} {unit} "
+            f"of at most {worst['largest']:.3g} {unit}. Use a shorter --step where they matter.",
+        )
+    elif not coarse and share < COARSE_EFFORT:
+        say(console, f"the efforts of motors are known to {max(100.0 * share, 0.1):.1f}% of their largest values")
+
+
+def print_verdict(console: Console, report: dict[str, Any]) -> None:
+    """Before and after, and whether the simulation keeps the tolerance."""
+    worst = max(report["targets"], key=lambda target: target[f"max_error{_last(report)}_m"], default=None)
+    if worst is not None and "objective_after" in report:
+        before = max(target["max_error_before_m"] for target in report["targets"])
+        after = worst["max_error_after_m"]
+        change = "falls" if after < before else "does not fall"
+        say(console, f"The largest error {change} from {length(before)} to {length(after)} (at {worst['path']}).")
+    elif worst is not None:
+        say(console, f"As animated, the largest error is {length(worst['max_error_m'])} (at {worst['path']}).")
+    tolerance = length(report["tolerance_m"])
+    if report["tolerance_kept"]:
+        error = length(report["simulation_error_m"])
+        say(console, f"The simulation keeps the tolerance of {tolerance}: error {error}.")
+    elif report["simulation_error_m"] is None:
+        say(console, f"The error of the simulation was not estimated; the tolerance is {tolerance}.")
+    else:
+        source = report["tolerance_missed_by"]
+        error = length(report["simulation_error_m"])
+        say(
+            console,
+            f"The simulation does not keep the tolerance of {tolerance}: error {error}, mostly of the {source}. "
+            f"{REMEDIES[source]}",
+        )
+
+
+def print_budget(console: Console, report: dict[str, Any]) -> None:
+    """The error budget of the simulation itself, and its measured error."""
     rows = [
         [entry["source"], length(entry["allowed_m"]), _length_or_unknown(entry["estimated_m"])]
         for entry in report["error_budget"]
@@ -71,67 +133,110 @@ def print_accuracy(console: Console, report: dict[str, Any]) -> None:
         say(
             console,
             f"measured simulation error {length(report['verified_error_m'])}, against a run with steps of "
-            f"{1000 * report['verified_step_s']:.4g} ms and {report['verified_modes']} elastic coordinates",
+            f"{1000 * report['verified_step_s']:.4g} ms and {report['verified_modes']} elastic coordinates, "
+            f"whose meshes may be off by {length(report['verified_mesh_error_m'])}",
         )
-    tolerance = length(report["tolerance_m"])
-    if report["tolerance_kept"]:
-        say(console, f"the simulation keeps the tolerance of {tolerance}: error {length(report['simulation_error_m'])}")
-    elif report["simulation_error_m"] is None:
-        say(console, f"the error of the simulation was not estimated; the tolerance is {tolerance}")
-    else:
-        source = report["tolerance_missed_by"]
-        say(
-            console,
-            f"the simulation does not keep the tolerance of {tolerance}: error {length(report['simulation_error_m'])}, "
-            f"mostly of the {source}. {REMEDIES[source]}",
-        )
+
+
+def _last(report: dict[str, Any]) -> str:
+    """Suffix of the numbers of the motion that results."""
+    return "_after" if "objective_after" in report else ""
 
 
 def _length_or_unknown(metres: float | None) -> str:
     return "unknown" if metres is None else length(metres)
 
 
-def print_run(report: dict[str, Any], stream: TextIO) -> None:
-    """The report of `simulate` or `optimize`."""
+def print_robustness(console: Console, report: dict[str, Any]) -> None:
+    """The curves on robots that differ from the model."""
+    if "scenarios" not in report:
+        return
+    heads, rows = ("nominal", "median", "p95", "worst"), []
+    names = {"before": "as animated", "nominal": "optimised for the model", "robust": "robust"}
+    for target in report["targets"]:
+        for name, shown in names.items():
+            values = [target["robustness"][name][f"{head}_max_error_m"] for head in heads]
+            rows.append([target["path"], shown, *(_length_or_failed(value) for value in values)])
+    title = f"Largest error on {report['draws']} random robots"
+    print_table(console, title, ["target", "curves", "model", "median", "95%", "worst"], rows, texts=2)
+
+
+def _length_or_failed(metres: float | None) -> str:
+    return "failed" if metres is None else length(metres)
+
+
+def print_run(report: dict[str, Any], stream: TextIO, verbose: bool = False) -> None:
+    """The report of `simulate` or `optimize`: the answer, the files, what needs attention, and the simplifications.
+
+    Args:
+        report: The report.
+        stream: Where it is printed.
+        verbose: Whether the search, the steps, the error budget and the notes are printed as well.
+    """
     console = console_on(stream)
-    optimized = "objective_after" in report
-    suffixes = ["_before", "_after"] if optimized else [""]
+    print_verdict(console, report)
+    print_errors(console, report)
+    print_robustness(console, report)
+    print_files(console, report)
+    print_warnings(console, report)
+    if verbose or not report["tolerance_kept"] or report["verified_error_m"] is not None:
+        print_budget(console, report)
+    if verbose:
+        print_work(console, report)
+        print_notes(console, report["notes"])
+    print_left_out(console, report["left_out"])
+
+
+def print_errors(console: Console, report: dict[str, Any]) -> None:
+    """Errors of each target, before and after where the shot was optimised."""
+    suffixes = ["_before", "_after"] if _last(report) else [""]
     heads = [f"{kind}{' ' + s[1:] if s else ''}" for kind in ("max", "rms") for s in suffixes]
     for title, unit, shown in (("Position", "m", length), ("Rotation", "rad", angle)):
         name = "error" if unit == "m" else "rotation_error"
         keys = [f"{kind}_{name}{suffix}_{unit}" for kind in ("max", "rms") for suffix in suffixes]
         rows = [[target["path"], *(shown(target[key]) for key in keys)] for target in report["targets"]]
         print_table(console, f"{title} error of the targets", ["target", *heads], rows)
-    if optimized:
+
+
+def print_files(console: Console, report: dict[str, Any]) -> None:
+    """What was written, and what to do with it."""
+    for name in ("layer", "root_layer", "rrd", "video", "csv"):
+        if report[name]:
+            say(console, f"wrote {unbroken(report[name])}")
+    for figure in report["figures"]:
+        say(console, f"wrote {unbroken(figure)}")
+    if report["root_layer"]:
+        say(console, f"next: open {unbroken(report['root_layer'])}, which shows the shot with the new curves")
+    if report["rrd"]:
+        say(console, f"next: rerun {unbroken(report['rrd'])}")
+    if not any(report[name] for name in ("layer", "rrd", "video")):
+        say(console, "next: --rrd FILE records the motion for the rerun viewer, --video FILE makes a video of it")
+
+
+def print_warnings(console: Console, report: dict[str, Any]) -> None:
+    """What may be otherwise than the user expects."""
+    suffix = _last(report)
+    if suffix and report["resumed_iterations"]:
         say(
             console,
-            f"objective {report['objective_before']:.6g} -> {report['objective_after']:.6g} in {report['iterations']} "
-            f"iterations, {report['forward_simulations']} simulations, {report['linearized_sweeps']} linearised "
-            f"sweeps, {report['wall_s']:.2f} s",
+            f"resumed from the checkpoint of an interrupted run, after {report['resumed_iterations']} iterations",
         )
-        if report["resumed_iterations"]:
-            say(
-                console,
-                f"resumed from the checkpoint of an interrupted run, after {report['resumed_iterations']} iterations",
-            )
-        if report["stopped"] not in ("converged", ""):
-            gain = report["expected_further_gain_m"]
-            more = "" if gain is None else f", {length(gain)} expected gain of one more iteration"
-            say(console, f"stopped: {report['stopped']}{more}")
-        kept = [motor["path"] for motor in report["motors"] if not motor["changed"]]
-        if kept:
-            say(console, f"motors without changes: {', '.join(kept)}")
+    if suffix and report["stopped"] not in ("converged", ""):
+        gain = report["expected_further_gain_m"]
+        more = "" if gain is None else f", {length(gain)} expected gain of one more iteration"
+        say(console, f"stopped: {report['stopped']}{more}")
     if report.get("shaper"):
         say(
             console,
             f"{report['shaper']} delays the motion by {report['shaper_delay_s']:.3f} s; largest error from the "
             f"intended motion with that delay: {length(report['delayed_max_error_m'])}",
         )
-    print_limits(console, report["limits"], optimized)
-    sag = max((target[f"sag{suffixes[-1]}_m"] or 0.0 for target in report["targets"]), default=0.0)
+    print_shares(console, report["error_shares"])
+    print_limits(console, report["limits"], bool(suffix))
+    sag = max((target[f"sag{suffix}_m"] or 0.0 for target in report["targets"]), default=0.0)
     if sag > 1e-6:
         say(console, f"largest sag of a target at rest: {length(sag)}")
-    seams = [target[f"seam{suffixes[-1]}_m"] for target in report["targets"]]
+    seams = [target[f"seam{suffix}_m"] for target in report["targets"]]
     if seams and seams[0] is not None:
         say(console, f"largest distance of a target between start and end of a cycle: {length(max(seams))}")
         growth = report["loop_growth"]
@@ -144,18 +249,26 @@ def print_run(report: dict[str, Any], stream: TextIO) -> None:
         say(console, f"closed chains pass a dead centre at {', '.join(times[:5])} s{more}")
     if report["refined_steps"]:
         say(console, f"{report['refined_steps']} steps were divided into smaller ones: try a smaller --step")
+    print_joint_gap(console, report["max_joint_gap_m"])
+    print_efforts(console, report["efforts"], True)
+
+
+def print_work(console: Console, report: dict[str, Any]) -> None:
+    """The search and the steps: what the run cost."""
+    if _last(report):
+        say(
+            console,
+            f"objective {report['objective_before']:.6g} -> {report['objective_after']:.6g} in {report['iterations']} "
+            f"iterations, {report['forward_simulations']} simulations, {report['linearized_sweeps']} linearised "
+            f"sweeps, {report['wall_s']:.2f} s",
+        )
+        kept = [motor["path"] for motor in report["motors"] if not motor["changed"]]
+        if kept:
+            say(console, f"motors without changes: {', '.join(kept)}")
     say(
         console,
         f"{report['steps']} steps of {1000 * report['step_s']:.4g} ms, {report['dof']} coordinates, "
         f"{report['modes']} of them elastic; {report['total_wall_s']:.1f} s in total"
         + (f", peak memory {report['peak_memory_gb']:.2f} GB" if report["peak_memory_gb"] else ""),
     )
-    print_joint_gap(console, report["max_joint_gap_m"])
-    print_accuracy(console, report)
-    print_left_out(console, report["left_out"])
-    print_notes(console, report["notes"])
-    for name in ("layer", "root_layer", "rrd", "csv"):
-        if report[name]:
-            say(console, f"wrote {unbroken(report[name])}")
-    for figure in report["figures"]:
-        say(console, f"wrote {unbroken(figure)}")
+    print_efforts(console, report["efforts"], False)

@@ -6,7 +6,7 @@ from calmotion.host.operators import NotAsked, Operator, Record, RunContext, reg
 from calmotion.host.plan import Plan
 from calmotion.host.properties import Property, PropertyValues
 from calmotion.host.registry import Host, Plugin, PluginState, open_host
-from calmotion.host.run import OperatorResult, Outcome, Run
+from calmotion.host.run import OperatorResult, Outcome, Reuse, Run
 from calmotion.host.settings import Settings, merge, read_assignment, read_settings_file
 from calmotion.host.units import parse_quantity
 from calmotion.support.naming import nearest
@@ -27,6 +27,7 @@ __all__ = [
     "Property",
     "PropertyValues",
     "Record",
+    "Reuse",
     "Run",
     "RunContext",
     "SettingError",

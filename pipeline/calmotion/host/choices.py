@@ -2,29 +2,15 @@
 
 from __future__ import annotations
 
-import os
-import sys
-import tomllib
 from collections.abc import Mapping
 from pathlib import Path
 
 from calmotion.host.errors import SettingError
+from calmotion.support.caching.cache_folder import CONFIGURATION_VARIABLE, configuration_folder
 from calmotion.support.files import write_text
+from calmotion.support.reading import read_toml
 
-FOLDER_VARIABLE = "CALMOTION_CONFIG"
 FILE_NAME = "plugins.toml"
-
-
-def configuration_folder(environment: Mapping[str, str] | None = None) -> Path:
-    """The folder of the user's choices: the one that the environment names, else where the system keeps such things."""
-    variables = os.environ if environment is None else environment
-    if variables.get(FOLDER_VARIABLE):
-        return Path(variables[FOLDER_VARIABLE]).expanduser()
-    if sys.platform == "win32" and variables.get("APPDATA"):
-        return Path(variables["APPDATA"]) / "calmotion"
-    if sys.platform == "darwin":
-        return Path.home() / "Library" / "Application Support" / "calmotion"
-    return Path(variables.get("XDG_CONFIG_HOME") or Path.home() / ".config") / "calmotion"
 
 
 def disabled_plugins(environment: Mapping[str, str] | None = None) -> frozenset[str]:
@@ -35,10 +21,10 @@ def disabled_plugins(environment: Mapping[str, str] | None = None) -> frozenset[
     """
     file = configuration_folder(environment) / FILE_NAME
     try:
-        ids = tomllib.loads(file.read_text(encoding="utf-8")).get("disabled", [])
+        ids = read_toml(file).get("disabled", [])
     except (FileNotFoundError, NotADirectoryError):
         return frozenset()
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+    except (OSError, ValueError) as error:
         raise SettingError(
             "the list of disabled plugins cannot be read",
             path=str(file),
@@ -74,6 +60,6 @@ def choose(plugin_id: str, enabled: bool, environment: Mapping[str, str] | None 
             "the list of disabled plugins cannot be saved",
             path=str(file),
             found=error.strerror,
-            remedy=f"Make the folder writable, or name another one with {FOLDER_VARIABLE}.",
+            remedy=f"Make the folder writable, or name another one with {CONFIGURATION_VARIABLE}.",
         ) from error
     return file

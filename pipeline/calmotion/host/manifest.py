@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import re
-import tomllib
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from calmotion.host.errors import PluginError
+from calmotion.support.reading import read_toml
 
 FILE_NAME = "plugin.toml"
 _TEXTS = ("id", "version", "name", "tagline", "maintainer", "license", "calmotion")
@@ -48,10 +48,10 @@ def read_manifest(folder: Path) -> Manifest:
     """
     file = folder / FILE_NAME
     try:
-        fields = tomllib.loads(file.read_text(encoding="utf-8"))
+        fields = read_toml(file)
     except OSError as error:
         raise PluginError("the manifest cannot be read", path=str(file), found=error.strerror) from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+    except ValueError as error:
         raise PluginError("the manifest is not valid TOML", path=str(file), found=error) from error
     _check_fields(fields, file)
     lists: dict[str, Any] = {key: tuple(fields[key]) for key in _LISTS}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -10,6 +11,7 @@ from calmotion.host.errors import PluginError, SettingError
 from calmotion.host.units import is_unit, parse_quantity
 from calmotion.support.naming import nearest
 
+_WORDS = {float: "a number", int: "a whole number", bool: "true or false", str: "a text"}
 _BOOLEANS = {"true": True, "yes": True, "on": True, "1": True, "false": False, "no": False, "off": False, "0": False}
 
 
@@ -58,11 +60,11 @@ class Property:
         number = isinstance(value, (int, float)) and not isinstance(value, bool)
         if self.kind is float and number:
             return float(value)  # type: ignore[arg-type]
-        if self.kind is int and number and value == int(value):  # type: ignore[call-overload]
+        if self.kind is int and number and math.isfinite(value) and value == int(value):  # type: ignore[arg-type, call-overload]
             return int(value)  # type: ignore[call-overload]
         if self.kind in (bool, str) and isinstance(value, self.kind):
             return value
-        raise SettingError("the value has the wrong type", found=repr(value), remedy=f"Write a {self.kind.__name__}.")
+        raise SettingError("the value has the wrong type", found=repr(value), remedy=f"Write {_WORDS[self.kind]}.")
 
     def _check_range(self, value: Any) -> None:
         if self.choices and value not in self.choices:
@@ -75,7 +77,7 @@ class Property:
             return
         low = self.minimum is not None and not value >= self.minimum
         high = self.maximum is not None and not value <= self.maximum
-        if low or high or value != value:
+        if low or high or not math.isfinite(value):
             bound = self.minimum if low or value != value else self.maximum
             near = "" if bound is None else f"The nearest allowed one is {bound:g}{f' {self.unit}' * bool(self.unit)}. "
             raise SettingError(

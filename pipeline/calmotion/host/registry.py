@@ -17,7 +17,7 @@ from calmotion.host.manifest import Manifest, check_requirements, read_manifest
 from calmotion.host.operators import Operator, check_operator
 from calmotion.host.plan import Plan, make_plan
 from calmotion.host.properties import PropertyValues, values_of
-from calmotion.host.run import Run
+from calmotion.host.run import Reuse, Run
 from calmotion.host.settings import Settings
 from calmotion.support import interrupts
 from calmotion.support.naming import nearest
@@ -228,6 +228,7 @@ class Host:
         optional: Iterable[type] = (),
         settings: Settings | None = None,
         progress: Callable[[str, float, str], None] | None = None,
+        reuse: Reuse | None = None,
     ) -> Run:
         """Prepare a run; iterate over what is returned to carry it out.
 
@@ -237,6 +238,8 @@ class Host:
             optional: Types that are made where some operator can.
             settings: Values of properties.
             progress: Called with the operator's label, a fraction in 0..1 and a message.
+            reuse: Called with an operator and the values so far before it runs: what it would make, where that is
+                known from an earlier run, otherwise None.
 
         Raises:
             PlanError: When the operators cannot make what is wanted, or need each other in a circle.
@@ -245,7 +248,7 @@ class Host:
         data: Mapping[type, Any] = {type(value): value for value in given}
         owners = {cls.idname: plugin.id for plugin in self.plugins for cls in plugin.operators}
         plan = self.plan(data, wanted, optional)
-        return Run(plan, data, self.properties(settings or {}), owners, progress)
+        return Run(plan, data, self.properties(settings or {}), owners, progress, reuse)
 
 
 def open_host(folders: Iterable[str | Path] = (), environment: Mapping[str, str] | None = None) -> Host:

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
 T = TypeVar("T")
 Progress = Callable[[str, float, str], None]
+Reuse = Callable[[type[Operator], Mapping[type, Any]], "Sequence[object] | None"]
 
 
 class Outcome(StrEnum):
@@ -80,6 +81,7 @@ class Run:
         properties: Mapping[str, PropertyValues],
         owners: Mapping[str, str],
         progress: Progress | None = None,
+        reuse: Reuse | None = None,
     ):
         self.plan = plan
         self.data: dict[type, Any] = dict(data)
@@ -92,6 +94,7 @@ class Run:
         self._properties = properties
         self._owners = owners
         self._progress = progress or (lambda stage, fraction, message: None)
+        self._reuse = reuse or (lambda cls, data: None)
 
     def get(self, kind: type[T]) -> T | None:
         """The value of a type, None while there is none."""
@@ -180,7 +183,8 @@ class Run:
                     made = (self._made[kind],) if kind in self._made else ()
                     raise self._rivalry(kind, (*made, cls))
             self._progress(cls.label, 0.0, "")
-            values = _checked(cls, cls().execute(context))
+            found = self._reuse(cls, self.data)
+            values = _checked(cls, cls().execute(context) if found is None else found)
             self._progress(cls.label, 1.0, "")
         except (Exception, SystemExit) as error:  # a plugin does not end the host
             interrupts.check()  # which it may have made of an interrupt

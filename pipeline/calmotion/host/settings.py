@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 from calmotion.host.errors import SettingError
 from calmotion.support.foreign_files import remedy_for
+from calmotion.support.reading import read_toml
 
 Settings = dict[str, dict[str, object]]
 """Operator idname -> property name -> string or typed value, not yet checked against the declarations."""
@@ -20,10 +20,10 @@ def read_settings_file(path: str | Path) -> Settings:
         SettingError: When the file cannot be read or holds a value outside a table.
     """
     try:
-        tree = tomllib.loads(Path(path).read_text(encoding="utf-8"))
+        tree = read_toml(path)
     except OSError as error:
         raise SettingError("the settings file cannot be read", path=str(path), found=error.strerror) from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+    except ValueError as error:
         raise SettingError(
             "the settings file is not valid TOML", path=str(path), found=error, remedy=remedy_for(path) or ""
         ) from error

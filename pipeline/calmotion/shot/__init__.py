@@ -7,12 +7,10 @@ from calmotion.shot.character import (
     Character,
     ElasticMaterial,
     FlexibleSettings,
-    Follows,
     Frame,
     InterfaceSurface,
     Joint,
     MassProperties,
-    Motor,
     RetargetSettings,
     SurfaceMesh,
     Target,
@@ -20,6 +18,7 @@ from calmotion.shot.character import (
 )
 from calmotion.shot.meshes import FEMesh, FEMeshes, MeshQuality
 from calmotion.shot.model_choice import ModelChoice, ModelChoices
+from calmotion.shot.motor import Follows, Motor
 from calmotion.shot.outputs import Finding, Findings
 from calmotion.shot.provenance import InputLayer, Provenance
 from calmotion.shot.result import (

@@ -52,7 +52,7 @@ def verdict_on(budget: Sequence[BudgetEntry], tolerance: float, measured: float 
     The search has no part in it: what it leaves is an error of the performance, not of its prediction.
 
     Args:
-        measured: Distance to a finer run on finer meshes [m], in place of all estimates.
+        measured: Distance to a finer run on finer meshes, and the error of these [m], in place of all estimates.
     """
     if not budget and measured is None:
         return Verdict(False, None, "")

@@ -12,6 +12,9 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from calmotion.shot.motor import PRESCRIBED, Motor
+from calmotion.shot.robust.settings import Uncertainty
+
 Array = NDArray[np.float64]
 IntArray = NDArray[np.int32]
 BoolArray = NDArray[np.bool_]
@@ -30,6 +33,12 @@ class Frame:
 
     position: Array
     rotation: Array
+
+    @property
+    def axis(self) -> Array:
+        """Its z axis, in the axes of the carrying body, shape [3]."""
+        w, x, y, z = self.rotation
+        return np.array([2.0 * (x * z + w * y), 2.0 * (y * z - w * x), 1.0 - 2.0 * (x * x + y * y)])
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,6 +90,9 @@ class FlexibleSettings:
         mesh_file: External mesh file, resolved; empty when the geometry is in the shot.
         mesh_scale: Metres per unit of that file.
         elasticity: `auto`, `linear`, `stvk` or `neohookean`.
+        geometry: What the solid is made of: `auto`, `visual` or `collision` surfaces, or an equivalent `beam`.
+        wall_thickness: Of a hollow part whose geometry is its outer surface [m]; -1: it is solid.
+        section: Of a hollow part: `closed` all around (as `auto`), or a `tube` whose ends are open.
         modes_share: Of the tolerance, that modes which are left out may take when they are chosen automatically.
         pairs_share: Of the tolerance, that quadratic strains of pairs of coordinates which are left out may take; 0
             leaves none out.
@@ -94,6 +106,9 @@ class FlexibleSettings:
     mesh_file: str = ""
     mesh_scale: float = 1.0
     elasticity: str = "auto"
+    geometry: str = "auto"
+    wall_thickness: float = -1.0
+    section: str = "auto"
     modes_share: float = 1.0
     pairs_share: float = 1.0
 
@@ -194,6 +209,7 @@ class Joint:
         lower, upper: Limits [rad or m], infinite when there are none.
         closes_chain: Whether the shot excludes this joint from the spanning tree, so that it closes a chain.
         redundant: Whether it is left out of the dynamics, since other joints impose the same constraints.
+        name: As its author wrote it, where USD allows no such name of a prim; else the last part of its path.
     """
 
     path: str
@@ -206,52 +222,7 @@ class Joint:
     upper: float = np.inf
     closes_chain: bool = False
     redundant: bool = False
-
-
-@dataclass(frozen=True)
-class Follows:
-    """How one motor is geared to another: value = offset + ratio * value of the leader.
-
-    Attributes:
-        leader: Index of the motor that leads, which follows none itself.
-        ratio: [-], or [m/rad] and [rad/m] between an angle and a length.
-        offset: [rad or m].
-    """
-
-    leader: int
-    ratio: float
-    offset: float
-
-
-@dataclass(frozen=True, eq=False)
-class Motor:
-    """A driven joint.
-
-    Attributes:
-        joint: Index of the joint.
-        path: Prim path of the joint.
-        attribute: Name of the attribute that holds its track.
-        source: Where the track is: `drive` (the target position of its drive), `bodies` (the transforms of the bodies
-            that it joins), or `skeleton` (a joint of a UsdSkel animation).
-        optimize: Whether its curve may be changed.
-        max_velocity, max_acceleration, max_torque: [rad/s], [rad/s^2], [N m]; infinite when there are none.
-        linear: Whether it sets a length along the joint's axis instead of an angle: metres then stand for radians,
-            and newtons for newton metres.
-        follows: The motor that it is geared to, or None; it then has no curve of its own.
-        idle: Whether its curve stays as it is although it may change, since it moves no target.
-    """
-
-    joint: int
-    path: str
-    attribute: str
-    source: str = "drive"
-    optimize: bool = True
-    max_velocity: float = np.inf
-    max_acceleration: float = np.inf
-    max_torque: float = np.inf
-    linear: bool = False
-    follows: Follows | None = None
-    idle: bool = False
+    name: str = ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -287,6 +258,7 @@ class RetargetSettings:
         reference: `rigid` or `static`.
         endpoints: `free` or `kept`.
         cyclic: Whether the shot is cyclic.
+        uncertainty: What is not known exactly of the robot.
     """
 
     tolerance: float | None = None
@@ -296,6 +268,7 @@ class RetargetSettings:
     reference: str = "rigid"
     endpoints: str = "free"
     cyclic: bool = False
+    uncertainty: Uncertainty = Uncertainty()
 
 
 @dataclass(frozen=True, eq=False)
@@ -306,6 +279,7 @@ class Character:
         path: Prim path of its root.
         gravity: [m/s^2], shape [3], world.
         notes: Assumptions of the reader where the shot does not say, as sentences for the user.
+        scenery: Still geometry near the robot that is drawn and has no part in the physics; world axes [m].
     """
 
     path: str
@@ -316,6 +290,19 @@ class Character:
     gravity: Array
     retarget: RetargetSettings = field(default_factory=RetargetSettings)
     notes: tuple[str, ...] = ()
+    scenery: tuple[SurfaceMesh, ...] = ()
+
+
+def motors_give(character: Character) -> bool:
+    """Whether a joint does not follow the curve of its motor exactly."""
+    return any(motor.model != PRESCRIBED for motor in character.motors)
+
+
+def with_ideal_motors(character: Character) -> Character:
+    """The character whose joints follow the curves of their motors exactly; itself where they do already."""
+    if not motors_give(character):
+        return character
+    return replace(character, motors=tuple(replace(motor, model=PRESCRIBED) for motor in character.motors))
 
 
 def with_settings(character: Character, change: Callable[[FlexibleSettings], FlexibleSettings]) -> Character:

@@ -129,16 +129,23 @@ def optimized_curve(animation: Animation, curve: MotorCurve, cyclic: bool) -> Sa
     return lambda times, order: base(times, order) + offset(times, order)
 
 
-def commanded_values(character: Character, animation: Animation, result: Result, times: Array) -> Array:
-    """Values of all motors [rad or m], shape [n, M]: the optimised curves, else what the shot carries.
+def commanded_curves(
+    character: Character, animation: Animation, result: Result | None
+) -> Callable[[Array, int], Array]:
+    """The curves of all motors: the optimised ones of a result, else what the shot carries.
 
-    Args:
-        times: [s] after the first frame, within the shot, shape [n].
+    Returns:
+        A function of times within the shot [s], shape [n], and the order of the derivative; it gives the values
+        [rad or m], shape [n, M], or their derivatives.
     """
     end, cyclic = float(animation.frame_times[-1]), character.retarget.cyclic
-    if result.curves:
+    if result is not None and result.curves:
         curves = [optimized_curve(animation, curve, cyclic) for curve in result.curves]
     else:
         curves = [curve_of(track, end, cyclic) for track in animation.current]
-    columns = [curve(np.asarray(times, np.float64), 0) for curve in curves]
-    return np.stack(columns, axis=1) if columns else np.zeros((len(times), 0))
+
+    def sample(times: Array, order: int) -> Array:
+        columns = [curve(np.asarray(times, np.float64), order) for curve in curves]
+        return np.stack(columns, axis=1) if columns else np.zeros((len(times), 0))
+
+    return sample

@@ -75,6 +75,13 @@ class Figures:
 
 
 @dataclass(frozen=True)
+class Video:
+    """Path of a video."""
+
+    path: str
+
+
+@dataclass(frozen=True)
 class ModeShapes:
     """Paths of the files that show the modes of the flexible bodies."""
 
@@ -96,11 +103,18 @@ class Verification:
         error_m: Largest distance between a target in both runs, over all frames [m].
         step_s: Step of the finer run [s].
         modes: Its elastic coordinates.
+        mesh_m: Estimated error of its meshes at the targets [m], by which the distance may be too small.
     """
 
     error_m: float
     step_s: float
     modes: int
+    mesh_m: float = 0.0
+
+    @property
+    def bound_m(self) -> float:
+        """What the error of the run is at most, as far as is known [m]."""
+        return self.error_m + self.mesh_m
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,16 +125,33 @@ class PlannedStep:
 
 
 @dataclass(frozen=True, eq=False)
+class MotorEffects:
+    """What motors would do to the animation if they gave by their gains, on rigid links.
+
+    Attributes:
+        motors: Paths of the motors that have gains.
+        lag: Largest error of each target [m], shape [K].
+        droop: Its error at rest at the start [m], shape [K].
+    """
+
+    motors: tuple[str, ...]
+    lag: Array
+    droop: Array
+
+
+@dataclass(frozen=True, eq=False)
 class SystemModes:
-    """Natural modes of the whole character in its first pose, motors held.
+    """Natural modes of the whole character in one pose of the shot, motors held.
 
     Attributes:
         frequencies: [Hz], ascending.
         damping: Their ratios of critical.
+        time_s: When the shot has this pose [s].
     """
 
     frequencies: Array
     damping: Array
+    time_s: float = 0.0
 
 
 @dataclass(frozen=True)

@@ -8,6 +8,7 @@ import numpy as np
 
 from calmotion.shot.budget import BudgetEntry
 from calmotion.shot.character import Array
+from calmotion.shot.robust.robots import Robustness
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,6 +76,14 @@ class Simulation:
     dead_centres: Array = field(default_factory=lambda: np.zeros(0))
     seam: Array = field(default_factory=lambda: np.zeros(0))
     floquet_multiplier: float = 0.0
+
+    @property
+    def time_of_largest_error(self) -> float:
+        """When any target is farthest from its place, from the first frame on [s]; 0 without targets."""
+        errors = self.position_errors[self.motion.judged]
+        if not errors.size:
+            return 0.0
+        return float(self.motion.times[self.motion.judged][int(np.argmax(errors.max(axis=1)))])
 
 
 @dataclass(frozen=True, eq=False)
@@ -174,7 +183,7 @@ class ModeTable:
     mass: float
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Accuracy:
     """Estimated distance of the simulated targets from those of a finer simulation.
 
@@ -184,6 +193,7 @@ class Accuracy:
         mesh_m: Estimated error of the finite-element meshes [m]; None where it is not known.
         subspace_m: Estimated error of the POD subspaces [m].
         choices_m: Estimated error of what the analysis of the shot left out, before bodies were reduced [m].
+        efforts: Estimated error of each motor's effort by the time step [N m] or [N], shape [M]; None: not known.
     """
 
     step_m: float
@@ -191,11 +201,25 @@ class Accuracy:
     mesh_m: float | None = None
     subspace_m: float = 0.0
     choices_m: float = 0.0
+    efforts: Array | None = None
 
     @property
     def estimated_m(self) -> float:
         """Sum of `step_m` and `left_out_m` [m], without the mesh error: the tolerance does not refine the mesh."""
         return self.step_m + self.left_out_m
+
+
+@dataclass(frozen=True, eq=False)
+class ErrorShares:
+    """Largest error of each target in the input, shape [K] [m], where only one cause of it is left.
+
+    Attributes:
+        motors_m: With rigid links: that of motors that give.
+        links_m: With ideal motors: that of flexible links.
+    """
+
+    motors_m: Array
+    links_m: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -229,6 +253,8 @@ class Result:
         resumed_iterations: Iterations of an interrupted search from which this one resumed.
         tolerance_m: Acceptable error at the targets [m].
         budget: What each approximation may cost and is estimated to cost, largest first; empty where it is not known.
+        error_shares: What motors and links have in the error of the input; None where motors are ideal.
+        robustness: The curves on robots that differ from the model; None where they were optimised for one robot.
     """
 
     reference: Motion
@@ -260,3 +286,5 @@ class Result:
     resumed_iterations: int = 0
     tolerance_m: float = 0.0
     budget: tuple[BudgetEntry, ...] = ()
+    error_shares: ErrorShares | None = None
+    robustness: Robustness | None = None

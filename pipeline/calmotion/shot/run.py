@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+from calmotion.shot.robust.settings import RobustSettings
+
 
 @dataclass(frozen=True)
 class RunSettings:
@@ -20,7 +22,9 @@ class RunSettings:
         adjoint: `discrete` or `continuous`.
         ranges: `auto`, `on` (the whole shot is searched) or `off` (inactive intervals are not checked at the end).
         motors: `auto`, `on` (every motor may change) or `off` (idle motors are not checked at the end).
+        ideal_motors: Whether joints follow their curves exactly, whatever the models of their motors say.
         directions: `auto`, `on` (bodies keep all coordinates) or `off` (the smallest POD subspaces at any error).
+        robust: Settings of an optimisation for a set of robots; None: for the nominal robot alone.
     """
 
     tolerance: float | None = None
@@ -33,7 +37,9 @@ class RunSettings:
     adjoint: str = "discrete"
     ranges: str = "auto"
     motors: str = "auto"
+    ideal_motors: bool = False
     directions: str = "auto"
+    robust: RobustSettings | None = None
 
     @property
     def scheme(self) -> str:
@@ -79,4 +85,5 @@ class OutputPaths:
     rrd: str | None = None
     csv: str | None = None
     figures: str | None = None
+    video: str | None = None
     modes: str | None = None

@@ -14,7 +14,7 @@ from calmotion.multibody.model.topology import Tree, span_tree
 from calmotion.reduction.load_envelope import LoadEnvelope
 from calmotion.reduction.reduced_body import ReducedBody
 from calmotion.shot import Body, Character, FEMeshes, ModeTable, Skin, SurfaceMesh
-from calmotion.shot.character import with_settings
+from calmotion.shot.character import with_ideal_motors, with_settings
 from calmotion.shot.meshes import FEMesh
 from calmotion.shot.tolerance import tolerance_of
 
@@ -105,7 +105,8 @@ def _damped(character: Character, tree: Tree, bodies: Sequence[ReducedBody]) -> 
     from calmotion.multibody.analysis.modes import elastic_modes
     from calmotion.reduction.damping import damped
 
-    omega, shapes = elastic_modes(compile_model(character, tree, bodies))
+    # ratios are those of the structure, its motors held
+    omega, shapes = elastic_modes(compile_model(with_ideal_motors(character), tree, bodies))
     result = list(bodies)
     for b, shape in zip(tree.body, shapes, strict=True):
         if b in materials:

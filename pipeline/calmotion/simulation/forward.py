@@ -14,13 +14,17 @@ from calmotion.multibody.model.model import Model, start_angles
 from calmotion.shot.character import Array
 from calmotion.simulation.cyclic import SteadyState
 from calmotion.simulation.inputs.curves import Curves
+from calmotion.simulation.inputs.delays import CommandDelay
 
 
 @dataclass(frozen=True, eq=False)
 class ForwardRun:
     """One forward simulation and what the targets do in it.
 
-    `floquet_multiplier` is the largest of the periodic motion, 0 for a shot that plays once.
+    Attributes:
+        joint_angles, joint_rates: What the joints' motors follow, shape [T, J]: commands that are delayed.
+        commands: The motors' curves, shape [T, M] [rad].
+        floquet_multiplier: Largest of the periodic motion, 0 for a shot that plays once.
     """
 
     trajectory: Trajectory
@@ -28,6 +32,7 @@ class ForwardRun:
     joint_rates: Array
     target_positions: Array
     target_rotations: Array
+    commands: Array
     floquet_multiplier: float = 0.0
 
 
@@ -44,7 +49,7 @@ def run_forward(
         integrator: One of `calmotion.shot.run.INTEGRATORS`.
         steady: Finds the motions of a shot that loops.
     """
-    joint_angles, joint_rates = model.joint_angles(angles), model.joint_angles(rates)
+    joint_angles, joint_rates = followed(model, angles, rates, h, steady is not None)
     if steady is not None:
         trajectory = steady.find(joint_angles, joint_rates)
     else:
@@ -55,7 +60,13 @@ def run_forward(
     states = trajectory.states
     positions, rotations = target_frames(model, states.c, states.q, states.u)
     floquet_multiplier = 0.0 if steady is None else steady.floquet_multiplier
-    return ForwardRun(trajectory, joint_angles, joint_rates, positions, rotations, floquet_multiplier)
+    return ForwardRun(trajectory, joint_angles, joint_rates, positions, rotations, angles, floquet_multiplier)
+
+
+def followed(model: Model, angles: Array, rates: Array, h: float, cyclic: bool) -> tuple[Array, Array]:
+    """Angles and rates that the joints' motors follow, shape [T, J], for curves of shape [T, M]."""
+    late = CommandDelay(model.delays, h, cyclic).apply(angles, rates)
+    return model.joint_angles(late[0]), model.joint_angles(late[1])
 
 
 def limited_values(model: Model, names: Collection[str], curves: Curves, run: ForwardRun) -> dict[str, Array]:

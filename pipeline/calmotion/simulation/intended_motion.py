@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from calmotion.multibody.analysis.kinematics import rigid_poses, target_frames
+from calmotion.multibody.analysis.kinematics import rigid_poses, set_rotors, target_frames
+from calmotion.multibody.failure import SimulationFailure
 from calmotion.multibody.integrators.workspace import Workspace
 from calmotion.multibody.model.model import Model, moves_freely, rigid_model
 from calmotion.multibody.model.system import State, allocate_state
@@ -17,10 +18,18 @@ from calmotion.simulation.target_errors import IntendedMotion
 def rigid_motion(
     model: Model, angles: Array, rates: Array, h: float, world: Array | None = None, cyclic: bool = False
 ) -> IntendedMotion:
-    """The animation on a rigid robot: kinematics alone, or a rigid simulation where joints move freely."""
+    """The animation on a rigid robot: kinematics alone, or a rigid simulation where joints move freely.
+
+    Raises:
+        SimulationFailure: The rigid robot cannot follow its motors.
+    """
     rigid = rigid_model(model)
     if np.any(moves_freely(rigid)):
-        run = Simulator(rigid, h, world, cyclic).run(angles, rates)
+        try:
+            run = Simulator(rigid, h, world, cyclic).run(angles, rates)
+        except SimulationFailure as failure:
+            failure.state = None  # of the rigid robot, in which nobody looks for a deflection
+            raise
         states = run.trajectory.states
         return IntendedMotion(states.c, states.q, run.target_positions, run.target_rotations)
     c, q = rigid_poses(rigid, model.joint_angles(angles), world)
@@ -52,6 +61,7 @@ def static_motion(
         if state is None:
             state = allocate_state(model.system)
             state.c[:], state.q[:] = rigid.c[n], rigid.q[n]
+            set_rotors(model.system, state, joint_angles[n])
         if world is not None and world.shape[1]:
             ws.work.world[:] = world[n]
             ws.work.world[:, 3:9] = 0.0

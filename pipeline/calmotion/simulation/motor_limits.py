@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from calmotion.shot.character import Array, BoolArray, Character
+from calmotion.shot.motor import SERVO
 
 QUANTITIES = ("position", "velocity", "acceleration", "effort")
 
@@ -47,7 +48,8 @@ def motor_bounds(character: Character, movable: BoolArray | None = None) -> dict
     for name, values in (
         ("velocity", [m.max_velocity for m in character.motors]),
         ("acceleration", [m.max_acceleration for m in character.motors]),
-        ("effort", [m.max_torque for m in character.motors]),
+        # a servo's motor cannot exceed its own
+        ("effort", [np.inf if m.model == SERVO else m.max_torque for m in character.motors]),
     ):
         upper = np.array(values, float)
         add(name, -upper, upper)

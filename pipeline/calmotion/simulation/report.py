@@ -30,9 +30,9 @@ def by_body(model: Model, values: Array, axis: int = 1) -> Array:
 
 
 def elastic_by_body(model: Model, u: Array) -> tuple[Array, ...]:
-    """Elastic coordinates of each body of the character, shape [T, r], from those of the components, [T, B, r]."""
+    """Modes' coordinates of each body of the character, shape [T, r], from those of the components, [T, B, r]."""
     component = {body: k for k, body in enumerate(model.tree.body)}
-    return tuple(u[:, component[b], : model.system.elastic[component[b]]].copy() for b in range(len(component)))
+    return tuple(u[:, component[b], : model.system.modes[component[b]]].copy() for b in range(len(component)))
 
 
 def _simulated_motion(model: Model, grid: TimeGrid, run: ForwardRun, motors: int, joints: int) -> Motion:
@@ -40,15 +40,14 @@ def _simulated_motion(model: Model, grid: TimeGrid, run: ForwardRun, motors: int
     shown = _shown(grid)
     elastic = elastic_by_body(model, states.u[shown])
     found = reactions(model.system, run.trajectory, run.joint_angles, run.joint_rates)
-    values, efforts = np.zeros((len(states.c), motors)), np.zeros((len(states.c), motors))
+    efforts = np.zeros((len(states.c), motors))
     for k, motor in enumerate(model.motor):
         if motor >= 0:
-            values[:, motor] = run.joint_angles[:, k] * model.sign[k]
             efforts[:, motor] = found.efforts[:, k] * model.sign[k]
     forces, moments = (_by_joint(model, joints, part[shown]) for part in (found.forces, found.moments))
     return Motion(
-        grid.times[shown], by_body(model, states.c[shown]), by_body(model, states.q[shown]), elastic, values[shown],
-        efforts[shown], run.target_positions[shown], run.target_rotations[shown], forces, moments,
+        grid.times[shown], by_body(model, states.c[shown]), by_body(model, states.q[shown]), elastic,
+        run.commands[shown], efforts[shown], run.target_positions[shown], run.target_rotations[shown], forces, moments,
     )  # fmt: skip
 
 

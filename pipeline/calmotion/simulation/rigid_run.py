@@ -8,19 +8,21 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from calmotion.geometry.mesh_mass import mass_of_tets
+from calmotion.multibody.analysis import kinematics
 from calmotion.multibody.analysis.reactions import reactions
+from calmotion.multibody.failure import SimulationFailure
 from calmotion.multibody.integrators.workspace import Workspace
-from calmotion.multibody.model.model import Model, body_anchors, compile_model, rigid_body
+from calmotion.multibody.model.model import Model, body_anchors, compile_model, moves_freely, rigid_body
 from calmotion.multibody.model.topology import Tree, chain_members
 from calmotion.reduction.load_envelope import LoadEnvelope
 from calmotion.reduction.reduced_body import ReducedBody
 from calmotion.shot import Animation, Character, FEMeshes
-from calmotion.shot.character import Array
+from calmotion.shot.character import Array, with_ideal_motors
 from calmotion.simulation.forward import ForwardRun, run_forward
 from calmotion.simulation.inputs.curves import sample_tracks
+from calmotion.simulation.inputs.open_chains import refuse_open_chains, refuse_open_failure
 from calmotion.simulation.inputs.roots import sample_roots
 from calmotion.simulation.inputs.time_grid import TimeGrid
-from calmotion.simulation.intended_motion import rigid_motion
 
 _POWER_LEFT = 1e-3  # of a signal's power may lie above the highest frequency that matters: 3% of its amplitude
 _NOTHING = 1e-9  # of gravity, or of it over a metre: an acceleration that is rounding
@@ -81,15 +83,34 @@ class RigidPoses:
 
 
 def rigid_poses(
-    character: Character, animation: Animation, grid: TimeGrid, tree: Tree, bodies: Sequence[ReducedBody]
-) -> RigidPoses:
-    """The poses of a rigid robot: kinematics alone, and a simulation only where joints move freely.
+    character: Character, animation: Animation, grid: TimeGrid, tree: Tree, bodies: Sequence[ReducedBody],
+    tolerance: float | None = None,
+) -> RigidPoses:  # fmt: skip
+    """The poses of a rigid robot with ideal motors: kinematics alone, and a simulation only where joints move freely or
+    close chains.
 
-    Args and errors as of `rigid_run`; where motors determine the motion, masses play no part.
+    Where motors determine the motion, masses play no part.
+
+    Args:
+        character, animation, grid, tree, bodies: As of `rigid_run`.
+        tolerance: At the targets [m]; None: that of the shot.
+
+    Raises:
+        SimulationFailure: It cannot follow the tracks.
+        ShotError: Motors contradict each other in a closed chain.
     """
-    model, angles, rates, world = _compiled(character, animation, grid, tree, bodies)
-    motion = rigid_motion(model, angles, rates, grid.h, world)
-    return RigidPoses(model, motion.c, motion.q, model.joint_angles(angles), world, grid.h)
+    model, angles, rates, world = _compiled(with_ideal_motors(character), animation, grid, tree, bodies)
+    joint_angles = model.joint_angles(angles)
+    if not tree.closing and not np.any(moves_freely(model)):
+        c, q = kinematics.rigid_poses(model, joint_angles, world)
+        return RigidPoses(model, c, q, joint_angles, world, grid.h)
+    try:
+        run = run_forward(model, Workspace.for_system(model.system), angles, rates, grid.h, world)
+    except SimulationFailure as failure:
+        refuse_open_failure(character, model, grid, joint_angles, world, failure)
+        raise
+    refuse_open_chains(character, model, grid, run, tolerance)
+    return RigidPoses(model, run.trajectory.states.c, run.trajectory.states.q, joint_angles, world, grid.h)
 
 
 def _compiled(

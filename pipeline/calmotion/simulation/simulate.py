@@ -17,11 +17,12 @@ from calmotion.simulation.compiled_shot import CompiledShot
 from calmotion.simulation.cyclic import SteadyState
 from calmotion.simulation.forward import limited_values, run_forward
 from calmotion.simulation.inputs.curves import sample_curves, sample_tracks
+from calmotion.simulation.inputs.open_chains import refuse_open_joints
 from calmotion.simulation.inputs.shapers import shaped
 from calmotion.simulation.inputs.supported import refuse_half_turns
 from calmotion.simulation.intended_motion import rigid_motion, static_motion
 from calmotion.simulation.motor_limits import excesses, motor_bounds
-from calmotion.simulation.prepare import Prepared, failure_error, modes_of, prepare, refuse_open_joints
+from calmotion.simulation.prepare import Prepared, failure_error, modes_of, prepare
 from calmotion.simulation.report import left_out_rows, limit_uses, performed_motion, reference_motion, simulation_of
 from calmotion.simulation.target_errors import IntendedMotion, Objective
 
@@ -78,7 +79,7 @@ def simulate_shot(shot: CompiledShot, options: RunSettings, progress: Progress) 
         wall = time.perf_counter() - begin
     except SimulationFailure as failure:
         raise failure_error(prepared, failure) from failure
-    refuse_open_joints(prepared, run, options)
+    refuse_open_joints(character, model, grid, run, options)
     objective = Objective.over(model, reference, grid, animation.weights)
     bounds = motor_bounds(character)
     used = excesses(bounds, limited_values(model, bounds, curves, run), grid.judged)

@@ -15,7 +15,8 @@ from calmotion.multibody.sensitivity.periodic import Monodromy, periodic_adjoint
 from calmotion.multibody.sensitivity.tangent import tangent
 from calmotion.shot.character import Array
 from calmotion.simulation.cyclic import SteadyState
-from calmotion.simulation.forward import ForwardRun, run_forward
+from calmotion.simulation.forward import ForwardRun, followed, run_forward
+from calmotion.simulation.inputs.delays import CommandDelay
 
 
 def compile_kernels(
@@ -85,7 +86,7 @@ class Simulator:
 
     def _gone_on(self, known: ForwardRun, angles: Array, rates: Array) -> ForwardRun:
         """The motion that goes on from a known one; that one itself where nothing is different."""
-        joint_angles, joint_rates = self.model.joint_angles(angles), self.model.joint_angles(rates)
+        joint_angles, joint_rates = followed(self.model, angles, rates, self.h, False)
         same = np.all(joint_angles == known.joint_angles, axis=1) & np.all(joint_rates == known.joint_rates, axis=1)
         if np.all(same):
             return known
@@ -99,7 +100,7 @@ class Simulator:
         positions, rotations = target_frames(self.model, states.c[first:], states.q[first:], states.u[first:])
         return ForwardRun(
             trajectory, joint_angles, joint_rates, np.concatenate([known.target_positions[:first], positions]),
-            np.concatenate([known.target_rotations[:first], rotations]),
+            np.concatenate([known.target_rotations[:first], rotations]), angles,
         )  # fmt: skip
 
     def linearize(self, run: ForwardRun) -> None:
@@ -125,7 +126,7 @@ class Simulator:
         """Change of the components' coordinates, shape [T, B, N], and where wanted of the motors' efforts, [T, M], with
         the motors' values and rates, shape [T, M]."""
         assert self._linearization is not None
-        given = self.model.joint_angles(values), self.model.joint_angles(rates), efforts
+        given = *followed(self.model, values, rates, self.h, self._steady is not None), efforts
         if self._monodromy is None:
             motion, effort = tangent(self._linearization, *given)
         else:
@@ -140,10 +141,15 @@ class Simulator:
             found = adjoint(self._linearization, *given)
         else:
             found = periodic_adjoint(self._linearization, self._monodromy, *given)
-        return self.model.motor_values(found[0]), self.model.motor_values(found[1])
+        return self._on_curves(*found)
 
     def continuous_adjoint(self, run: ForwardRun, gradient: Array) -> tuple[Array, Array]:
         """The same by the continuous adjoint, with a linearisation of its own, of a shot that plays once."""
         self._for_continuous = self._linearized(run, self._for_continuous, 0, continuous=True)
-        found = continuous_adjoint(self._for_continuous, gradient)
-        return self.model.motor_values(found[0]), self.model.motor_values(found[1])
+        return self._on_curves(*continuous_adjoint(self._for_continuous, gradient))
+
+    def _on_curves(self, by_angle: Array, by_rate: Array) -> tuple[Array, Array]:
+        """Derivatives by the motors' curves, shape [T, M], from those by what the joints follow, [T, J]."""
+        by_value, by_change = self.model.motor_values(by_angle), self.model.motor_values(by_rate)
+        delay = CommandDelay(self.model.delays, self.h, self._steady is not None)
+        return delay.transposed(by_value, by_change)

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 
 MOST_FRAMES = 10_000_000  # a day at 120 frames a second
 SHORTEST = 1e-6  # [s]
+ROUNDING = 1e-3  # of a frame, that time codes may be rounded to
 _COARSEST = 10.0  # time codes per second; below this a time code is not a frame
 
 
@@ -127,6 +128,15 @@ def clock_of(stage: Usd.Stage, sample_codes: Array) -> Clock:
             attribute="endTimeCode",
             found=f"startTimeCode {start:g}, endTimeCode {end:g} at {rate:g} a second, {frames:g} frames a second",
             remedy="Author the range and the rates of the shot in the root layer",
+        )
+    apart = np.spacing(max(abs(clock.start), abs(clock.end))) / rate  # of two time codes that can be told apart [s]
+    if not apart * frames < ROUNDING:
+        raise ShotError(
+            "the time codes of its frames cannot be told apart: they are too large",
+            path=root.identifier,
+            attribute="endTimeCode",
+            found=f"startTimeCode {start:g}, endTimeCode {end:g}",
+            remedy="Move the animation to smaller time codes, or reference it with a time offset",
         )
     if not seconds > SHORTEST:
         raise ShotError(

@@ -27,6 +27,12 @@ def refuse_input_as_output(output: str, inputs: Iterable[str]) -> None:
             path=output,
             remedy="Give it the extension .usda, .usdc or .usd",
         )
+    if any(ord(letter) < 32 or ord(letter) == 127 for letter in output):
+        raise ShotError(
+            "the name of the output has a control character, which USD does not support",
+            path=repr(output)[1:-1],
+            remedy="Remove line ends and tabs from it",
+        )
     if os.path.isdir(output):
         raise ShotError("the output is a folder", path=output, remedy="Name a file")
     for name in inputs:

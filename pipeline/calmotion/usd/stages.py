@@ -12,9 +12,10 @@ from typing import TYPE_CHECKING
 
 from calmotion.errors import ShotError, raise_all
 from calmotion.shot import InputLayer
-from calmotion.support.files import is_special
 from calmotion.support.foreign_files import remedy_for
+from calmotion.support.naming import nearest_name
 from calmotion.usd import schemas
+from calmotion.usd.dependencies import open_dependencies, refuse_special
 from calmotion.usd.diagnostics import one_line, quiet
 
 if TYPE_CHECKING:
@@ -55,6 +56,18 @@ def refused_by_usd(stage: Usd.Stage) -> Iterator[None]:
         ) from error
 
 
+def _nearest_file(path: str) -> str:
+    """A sentence with the file or folder that is most like the first part of a path that does not exist, or empty."""
+    parent = Path(path)
+    while not parent.parent.is_dir() and parent != parent.parent:
+        parent = parent.parent
+    try:
+        near = nearest_name(parent.name, os.listdir(parent.parent))
+    except OSError:
+        return ""
+    return f"Did you mean {parent.with_name(near)}? " if near else ""
+
+
 def open_layer(path: str) -> Sdf.Layer:
     """The root layer of a shot.
 
@@ -64,7 +77,9 @@ def open_layer(path: str) -> Sdf.Layer:
     from pxr import Sdf, Tf
 
     if not os.path.exists(path):
-        raise ShotError("the file does not exist", path=path, remedy="Check the path of the shot")
+        raise ShotError(
+            "the file does not exist", path=path or "SHOT", remedy=f"{_nearest_file(path)}Check the path of the shot"
+        )
     if os.path.isdir(path):
         raise ShotError("this is a folder", path=path, remedy="Name the .usda, .usdc, .usd or .usdz file of the shot")
     refuse_special(path)
@@ -76,7 +91,7 @@ def open_layer(path: str) -> Sdf.Layer:
         with quiet():
             layer = Sdf.Layer.FindOrOpen(str(path))
     except Tf.ErrorException as error:
-        reason = one_line(_last_quoted(str(error)))
+        reason = one_line(_message(str(error)))
     if layer is None:
         raise ShotError(
             "this is not a USD file, or it is damaged",
@@ -85,55 +100,6 @@ def open_layer(path: str) -> Sdf.Layer:
             remedy=remedy_for(path) or "Name a .usda, .usdc, .usd or .usdz file that opens in a USD viewer",
         )
     return layer
-
-
-def refuse_special(path: str, named_by: str = "") -> None:
-    """Refuse a named pipe, a socket or a device in place of a layer: USD would wait for it for ever.
-
-    Args:
-        path: The file.
-        named_by: The layer that names it; empty for the shot itself.
-
-    Raises:
-        ShotError: It exists and is neither a file nor a folder.
-    """
-    if is_special(path):
-        raise ShotError(
-            "this is not a file but a named pipe, a socket or a device",
-            path=named_by or path,
-            found=path if named_by else None,
-            remedy="Name a .usda, .usdc, .usd or .usdz file",
-        )
-
-
-def _open_dependencies(root: Sdf.Layer) -> list[Sdf.Layer]:
-    """The layers that a layer names, directly or not, opened before the stage so that none is a special file."""
-    from pxr import Sdf, Tf
-
-    opened, names = [root], {root.identifier}
-    for layer in opened:
-        for name in _named_by(layer):
-            if name in names:
-                continue
-            names.add(name)
-            refuse_special(name, layer.identifier)
-            try:
-                named = Sdf.Layer.FindOrOpen(name)
-            except Tf.ErrorException:  # the composition reports it, with the prim
-                named = None
-            if named is not None:
-                opened.append(named)
-    return opened
-
-
-def _named_by(layer: Sdf.Layer) -> list[str]:
-    """Identifiers of what a layer names as sublayers, references and payloads."""
-    from pxr import Sdf
-
-    named = (
-        Sdf.ComputeAssetPathRelativeToLayer(layer, asset) for asset in layer.GetCompositionAssetDependencies() if asset
-    )
-    return list(dict.fromkeys(name for name in named if name))
 
 
 def open_stage(path: str, *, muted: tuple[str, ...] = ()) -> Usd.Stage:
@@ -146,13 +112,19 @@ def open_stage(path: str, *, muted: tuple[str, ...] = ()) -> Usd.Stage:
     Raises:
         ShotError: See `open_layer`; or a sublayer, reference or payload is missing.
     """
-    from pxr import Usd
+    from pxr import Tf, Usd
 
     schemas.register()
     layer = open_layer(path)
     with quiet():
-        kept = _open_dependencies(layer)
-        stage = Usd.Stage.Open(layer, Usd.Stage.LoadAll)
+        kept = open_dependencies(layer)
+        try:
+            stage = Usd.Stage.Open(layer, Usd.Stage.LoadAll)
+        except Tf.ErrorException as error:
+            raise ShotError(
+                "USD cannot compose the shot", path=path, found=one_line(_message(str(error))) or None,
+                remedy="Correct the file that it names; usdview shows where",
+            ) from error  # fmt: skip
         del kept  # the stage has them now
         # USD keeps layers that were opened earlier in this process; take what is on disk now.
         for used in stage.GetUsedLayers():
@@ -180,9 +152,10 @@ def _merged(errors: list[ShotError]) -> list[ShotError]:
     return merged
 
 
-def _last_quoted(text: str) -> str:
-    quoted = re.findall(r"'([^']*)'", text)
-    return quoted[-1] if quoted else ""
+def _message(text: str) -> str:
+    """What USD says, without where in its sources: the last of several errors, whose text may hold quotes itself."""
+    messages = re.findall(r" at line \d+ in file \S+ : '(.*?)'\s*(?=\n\tError|$)", text, re.DOTALL)
+    return messages[-1].strip() if messages else ""
 
 
 def _refusal(error: Pcp.ErrorBase, shot: str) -> ShotError | None:
@@ -221,18 +194,6 @@ def _refusal(error: Pcp.ErrorBase, shot: str) -> ShotError | None:
         remedy = f"Put the file there, or correct or remove the {arc}"
         found = f"@{assets[0]}@, introduced by {assets[1]}" if len(assets) > 1 else text
     return ShotError(problem, path=prim, attribute=_ARCS[arc], found=found, remedy=remedy)
-
-
-def files_named_by(path: str) -> tuple[str, ...]:
-    """The files that a layer names as sublayers, references and payloads; none for one that cannot be opened."""
-    from pxr import Sdf, Tf
-
-    try:
-        with quiet():
-            layer = Sdf.Layer.FindOrOpen(path)
-            return () if layer is None else tuple(_named_by(layer))
-    except Tf.ErrorException:
-        return ()
 
 
 def role_of(layer: Sdf.Layer) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Sequence
 
-from calmotion.host import OperatorResult, Settings, merge, parse_quantity
+from calmotion.host import OperatorResult, SettingError, Settings, merge, parse_quantity
 from calmotion.shot.model_choice import KINDS, OFF, ON
 from calmotion.shot.outputs import Rig, Verification
 from calmotion.shot.result import Result
@@ -15,6 +15,7 @@ from calmotion.workflow.results import OptimizationResult, SimulationResult
 from calmotion.workflow.run import Hooks, Progress, carry_out
 from calmotion.workflow.shot import Given, Path, Shot, read_settings
 
+AUTHORED, IDEAL = "authored", "ideal"  # motors
 ProgressCallback = Callable[[Progress], None]
 OperatorCallback = Callable[[OperatorResult], None]
 
@@ -27,6 +28,7 @@ def simulate(
     step: float | str | None = None,
     integrator: str | None = None,
     pre_roll: float | str | None = None,
+    motors: str = AUTHORED,
     shaper: str | None = None,
     keep: Sequence[str] = (),
     leave_out: Sequence[str] = (),
@@ -46,6 +48,7 @@ def simulate(
         step: Time step, [s] or text with a unit; None: from the tolerance.
         integrator: `bdf2`, `newmark`, `generalized-alpha`, `rk4` or `radau`; None: automatic.
         pre_roll: Time that eases into the motion, [s] or text with a unit; None: automatic.
+        motors: `authored`: as the models of the motors say; `ideal`: joints follow their curves exactly.
         shaper: Input shaper (`zv`, `zvd`, `zv2`, `zvd2`) or `lowpass` filter for the motors' tracks, to compare with.
         keep, leave_out: Kinds of simplification that are forbidden or forced (`bodies`, `turning`, `loops`, `modes`,
             `directions`, `elasticity`, `motors`, `ranges`, or `all`); the others follow from the tolerance.
@@ -62,7 +65,7 @@ def simulate(
         SettingError: An argument does not fit.
         Cancelled: `cancel` stopped the run.
     """
-    source = _source(tolerance, step, integrator, pre_roll, shaper=shaper, verify=verify)
+    source = _source(tolerance, step, integrator, pre_roll, motors, shaper=shaper, verify=verify)
     return SimulationResult(
         carry_out(
             _opened(shot), "simulate", wanted=_wanted(verify), operators=operators, source=source, outputs=outputs,
@@ -79,6 +82,7 @@ def optimize(
     tolerance: float | str | None = None,
     step: float | str | None = None,
     pre_roll: float | str | None = None,
+    motors: str = AUTHORED,
     integrator: str | None = None,
     adjoint: str | None = None,
     keep: Sequence[str] = (),
@@ -98,8 +102,8 @@ def optimize(
 
     Args:
         shot: The shot, or its USD file.
-        tolerance, step, pre_roll, keep, leave_out, verify, outputs, operators, settings, progress, on_operator, cancel:
-            As of `simulate`.
+        tolerance, step, pre_roll, motors, keep, leave_out, verify, outputs, operators, settings, progress,
+            on_operator, cancel: As of `simulate`.
         integrator: `bdf2`, the only one for the optimiser.
         adjoint: `discrete` (None; exact gradients) or `continuous` (to compare with).
 
@@ -108,7 +112,7 @@ def optimize(
         SettingError: An argument does not fit.
         Cancelled: `cancel` stopped the run before it had curves.
     """
-    source = _source(tolerance, step, integrator, pre_roll, verify=verify)
+    source = _source(tolerance, step, integrator, pre_roll, motors, verify=verify)
     chosen: Settings = {"retarget.optimize": {"adjoint": adjoint}} if adjoint is not None else {}
     outcome = carry_out(
         _opened(shot), "optimize", wanted=_wanted(verify), operators=operators, source=source, outputs=outputs,
@@ -140,6 +144,7 @@ def inspect(
     step: float | str | None = None,
     integrator: str | None = None,
     pre_roll: float | str | None = None,
+    motors: str = AUTHORED,
     keep: Sequence[str] = (),
     leave_out: Sequence[str] = (),
     strict: bool = False,
@@ -153,8 +158,8 @@ def inspect(
 
     Args:
         shot: The shot, or its USD file.
-        tolerance, step, integrator, pre_roll, keep, leave_out, operators, settings, progress, on_operator: As of
-            `simulate`.
+        tolerance, step, integrator, pre_roll, motors, keep, leave_out, operators, settings, progress,
+            on_operator: As of `simulate`.
         strict: Check the shot instead, with USD's validators as well, and list all findings; nothing costly runs.
         modes: Folder for the mode shapes of the flexible bodies.
 
@@ -165,7 +170,7 @@ def inspect(
     return Inspection(
         carry_out(
             _opened(shot), "check" if strict else "inspect", wanted=kinds, optional=optional, operators=operators,
-            source=_source(tolerance, step, integrator, pre_roll), known=(),
+            source=_source(tolerance, step, integrator, pre_roll, motors), known=(),
             outputs=OutputPaths(modes=None if modes is None else os.fspath(modes)),
             settings=merge([_forced(keep, leave_out), read_settings(settings)]), hooks=Hooks(progress, on_operator),
         )
@@ -212,9 +217,11 @@ def _wanted(verify: bool) -> tuple[type, ...]:
 
 def _source(
     tolerance: float | str | None, step: float | str | None, integrator: str | None, pre_roll: float | str | None,
-    shaper: str | None = None, verify: bool = False,
+    motors: str, shaper: str | None = None, verify: bool = False,
 ) -> Source:  # fmt: skip
     """The settings of the user, in SI units."""
+    if motors not in (AUTHORED, IDEAL):
+        raise SettingError(f"motors is {motors!r}; it must be {AUTHORED!r} or {IDEAL!r}")
     return Source(
         path="",
         command="",
@@ -223,6 +230,7 @@ def _source(
             step=_quantity(step, "s"),
             integrator=integrator,
             pre_roll=_quantity(pre_roll, "s"),
+            ideal_motors=motors == IDEAL,
         ),
         shaper=shaper,
         verify=verify,

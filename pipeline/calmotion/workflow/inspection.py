@@ -14,6 +14,8 @@ from calmotion.shot import (
     Animation,
     Body,
     Character,
+    FEMesh,
+    FEMeshes,
     Findings,
     ModelChoices,
     ModeTable,
@@ -22,8 +24,8 @@ from calmotion.shot import (
     Simplification,
     Track,
 )
-from calmotion.shot.measure import measure_of
-from calmotion.shot.outputs import ModeShapes, PlannedStep, SystemModes
+from calmotion.shot.motor import SERVO, measure_of
+from calmotion.shot.outputs import ModeShapes, MotorEffects, PlannedStep, SystemModes
 from calmotion.version import __version__
 from calmotion.workflow.problems import Problem
 from calmotion.workflow.report import left_out_row, operator_row
@@ -41,7 +43,7 @@ def wanted_of(strict: bool, modes: bool) -> tuple[tuple[type, ...], tuple[type, 
         modes: Whether mode shapes are requested.
     """
     wanted: tuple[type, ...] = (Findings,) if strict else _CONTENTS
-    optional = _CONTENTS if strict else (ModelChoices, ReducedBodies, SystemModes, PlannedStep)
+    optional = _CONTENTS if strict else (ModelChoices, ReducedBodies, SystemModes, PlannedStep, MotorEffects)
     return (*wanted, *((ModeShapes,) if modes else ())), optional
 
 
@@ -84,6 +86,7 @@ def inspect_report(run: Run) -> dict[str, Any]:
     reduced, modes, choices = run.get(ReducedBodies), run.get(SystemModes), run.get(ModelChoices)
     tables = {table.body: table for table in reduced.modes} if reduced else {}
     names = [body.path for body in character.bodies]
+    meshes = {mesh.body: mesh for mesh in made.meshes} if (made := run.get(FEMeshes)) else {}
     flexible = [body.simulated_flexible for body in (choices.character if choices else character).bodies]
     return {
         "command": "inspect",
@@ -102,7 +105,10 @@ def inspect_report(run: Run) -> dict[str, Any]:
         "duration_s": float(animation.frame_times[-1]),
         "character": character.path,
         "gravity_m_s2": character.gravity,
-        "bodies": [_body(body, tables.get(index), flexible[index]) for index, body in enumerate(character.bodies)],
+        "bodies": [
+            _body(body, tables.get(index), meshes.get(index), flexible[index])
+            for index, body in enumerate(character.bodies)
+        ],
         "joints": [
             {
                 "path": joint.path,
@@ -126,6 +132,7 @@ def inspect_report(run: Run) -> dict[str, Any]:
             }
             for target in character.targets
         ],
+        "effects_of_gains": _effects(character, run.get(MotorEffects)),
         "system_frequencies_hz": modes.frequencies[:SHOWN_MODES].tolist() if modes else [],
         "system_damping_ratios": modes.damping[:SHOWN_MODES].tolist() if modes else [],
         "mode_shapes": list(shapes.paths) if (shapes := run.get(ModeShapes)) else [],
@@ -145,7 +152,7 @@ def _without(
     return [*rows, step.row] if step else rows
 
 
-def _body(body: Body, table: ModeTable | None, flexible: bool) -> dict[str, Any]:
+def _body(body: Body, table: ModeTable | None, mesh: FEMesh | None, flexible: bool) -> dict[str, Any]:
     report: dict[str, Any] = {
         "path": body.path,
         "kind": "flexible" if body.flexible else "rigid",
@@ -163,12 +170,21 @@ def _body(body: Body, table: ModeTable | None, flexible: bool) -> dict[str, Any]
         }
     if table:
         report |= {"frequencies_hz": table.frequencies, "nodes": table.nodes, "elements": table.elements}
+    if mesh:
+        quality = mesh.quality
+        report |= {
+            "solid": quality.source,
+            "volume_m3": quality.volume,
+            "volume_error": quality.volume_error,
+            "frequency_error": quality.frequency_error,
+            "solid_notes": list(quality.repairs),
+        }
     return report
 
 
 def _motor(motor: Motor, track: Track, character: Character) -> dict[str, Any]:
     joint = character.joints[motor.joint]
-    unit = measure_of(motor).si
+    unit, newtons = measure_of(motor).si, "n" if motor.linear else "n_m"
     speeds = np.abs(np.diff(track.values) / np.diff(track.times))
     return {
         "path": motor.path,
@@ -183,4 +199,35 @@ def _motor(motor: Motor, track: Track, character: Character) -> dict[str, Any]:
         f"max_velocity_{unit}_s": motor.max_velocity,
         f"max_acceleration_{unit}_s2": motor.max_acceleration,
         "max_force_n" if motor.linear else "max_torque_n_m": motor.max_torque,
+        "model": motor.model,
+        f"position_gain_{newtons}_{unit}": motor.position_gain,
+        f"velocity_gain_{newtons}_s_{unit}": motor.velocity_gain,
+        "gains_from": motor.gains_from,
+        "delay_s": motor.delay,
+        "rotor": None if motor.model != SERVO else _rotor(motor, newtons, unit),
     }
+
+
+def _rotor(motor: Motor, newtons: str, unit: str) -> dict[str, float]:
+    """The rotor of a servo; infinite where there is no limit."""
+    own = motor.rotor
+    return {
+        "armature_kg" if motor.linear else "armature_kg_m2": own.armature,
+        f"gear_stiffness_{newtons}_{unit}": own.gear_stiffness,
+        f"gear_damping_{newtons}_s_{unit}": own.gear_damping,
+        f"viscous_friction_{newtons}_s_{unit}": own.viscous_friction,
+        f"friction_{newtons}": own.friction,
+        f"friction_speed_{unit}_s": own.friction_speed,
+        f"no_load_speed_{unit}_s": own.no_load_speed,
+        "torque_speed_knee": own.knee,
+    }
+
+
+def _effects(character: Character, effects: MotorEffects | None) -> list[dict[str, Any]]:
+    """What the gains of the motors would do to the animation at each target; empty where that is not known."""
+    if effects is None:
+        return []
+    return [
+        {"path": target.path, "max_error_m": float(lag), "sag_m": float(droop)}
+        for target, lag, droop in zip(character.targets, effects.lag, effects.droop, strict=True)
+    ]

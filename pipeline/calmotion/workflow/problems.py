@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TypeVar
 
-from calmotion.errors import ShotError, ShotErrors, each
+from calmotion.errors import ShotError, ShotErrors, each, failure_of_machine
 from calmotion.host import HostError, OperatorResult, Run
 
 T = TypeVar("T")
@@ -81,9 +81,12 @@ def value_of(run: Run, kind: type[T], problems: Sequence[Problem] = ()) -> T:
 
 def _problems(result: OperatorResult) -> list[Problem]:
     error = result.error
-    # A ShotError is the user's to solve; anything else is the plugin's, and its author needs the traceback.
+    # The user can solve a ShotError and what the machine lacks; anything else is the plugin's, with the traceback.
     if isinstance(error, ShotError):
         return [Problem(one, result.idname, result.plugin) for one in each(error)]
+    failure = None if error is None else failure_of_machine(error)
+    if failure is not None:
+        return [Problem(failure, result.idname, result.plugin)]
     raised = HostError(
         f"the operator {result.idname} of the plugin {result.plugin} raised {type(error).__name__}",
         found=str(error) or None,

@@ -12,8 +12,9 @@ from calmotion.host import OperatorResult, Run
 from calmotion.shot import Character, LimitUse, Result, Simplification, Simulation
 from calmotion.shot.budget import Verdict, verdict_on
 from calmotion.shot.character import Array
-from calmotion.shot.measure import measure_of
-from calmotion.shot.outputs import CsvFile, Figures, Recording, Rig, Verification, WrittenLayer
+from calmotion.shot.motor import measure_of
+from calmotion.shot.outputs import CsvFile, Figures, Recording, Rig, Verification, Video, WrittenLayer
+from calmotion.shot.robust.robots import CURVES
 from calmotion.shot.run import Source
 from calmotion.support.memory import peak_memory
 from calmotion.version import __version__
@@ -74,6 +75,22 @@ def limit_row(character: Character, limit: LimitUse) -> dict[str, Any]:
     }
 
 
+def effort_rows(character: Character, result: Result) -> list[dict[str, Any]]:
+    """The largest effort of each motor during the shot, and its estimated error by the time step."""
+    motion = (result.after or result.before).motion
+    largest = np.max(np.abs(motion.motor_efforts[motion.judged]), axis=0, initial=0.0)
+    errors = None if result.accuracy is None else result.accuracy.efforts
+    return [
+        {
+            "path": motor.path,
+            "unit": measure_of(motor).effort_unit,
+            "largest": float(largest[k]),
+            "estimated_error": None if errors is None else float(errors[k]),
+        }
+        for k, motor in enumerate(character.motors)
+    ]
+
+
 def operator_row(result: OperatorResult) -> dict[str, Any]:
     """The outcome of an operator."""
     return {
@@ -108,6 +125,8 @@ def run_report(run: Run, character: Character, result: Result, command: str, tot
         "loop_growth": final.floquet_multiplier,
         "dead_centres_s": final.dead_centres.tolist(),
         **_accuracy(run, result),
+        "error_shares": _error_shares(character, result),
+        "efforts": effort_rows(character, result),
         "frequencies_hz": {character.bodies[table.body].path: table.frequencies for table in result.modes},
     }
     source = run.get(Source)
@@ -120,11 +139,23 @@ def run_report(run: Run, character: Character, result: Result, command: str, tot
         "rrd": recording.path if recording else None,
         "csv": table.path if table else None,
         "figures": figures.paths if figures else [],
+        "video": video.path if (video := run.get(Video)) else None,
         "left_out": [left_out_row(row) for row in (*run.left_out(), *result.left_out)],
         "notes": list(character.notes),
         "operators": [operator_row(row) for row in run.results],
     }
     return report
+
+
+def _error_shares(character: Character, result: Result) -> list[dict[str, Any]]:
+    """The largest error of each target in the input where only motors, or only links, are left to cause it."""
+    shares = result.error_shares
+    if shares is None:
+        return []
+    return [
+        {"path": target.path, "motors_m": float(motors), "links_m": float(links)}
+        for target, motors, links in zip(character.targets, shares.motors_m, shares.links_m, strict=True)
+    ]
 
 
 def _shaped(shaper: str, result: Result) -> dict[str, Any]:
@@ -140,7 +171,7 @@ def _shaped(shaper: str, result: Result) -> dict[str, Any]:
 def verdict_of(run: Run, result: Result) -> Verdict:
     """Whether a result keeps its tolerance, by the measured error where it was verified."""
     verified = run.get(Verification)
-    return verdict_on(result.budget, result.tolerance_m, verified.error_m if verified else None)
+    return verdict_on(result.budget, result.tolerance_m, verified.bound_m if verified else None)
 
 
 def _accuracy(run: Run, result: Result) -> dict[str, Any]:
@@ -156,6 +187,7 @@ def _accuracy(run: Run, result: Result) -> dict[str, Any]:
         "estimated_step_error_m": accuracy.step_m if accuracy else None,
         "estimated_mesh_error_m": accuracy.mesh_m if accuracy else None,
         "verified_error_m": verified.error_m if verified else None,
+        "verified_mesh_error_m": verified.mesh_m if verified else None,
         "verified_step_s": verified.step_s if verified else None,
         "verified_modes": verified.modes if verified else None,
     }
@@ -171,7 +203,10 @@ def _optimized(character: Character, result: Result) -> dict[str, Any]:
     before = target_errors(character, result.before, "_before")
     after = target_errors(character, result.after, "_after")
     return {
-        "targets": [one | other for one, other in zip(before, after, strict=True)],
+        "targets": [
+            one | other | robustness_row(result, k) for k, (one, other) in enumerate(zip(before, after, strict=True))
+        ],
+        **_scenarios(result),
         **_overall(before, "_before"),
         **_overall(after, "_after"),
         "objective_before": result.objective_before,
@@ -194,6 +229,35 @@ def _optimized(character: Character, result: Result) -> dict[str, Any]:
             }
             for curve in result.curves
         ],
+    }
+
+
+def robustness_row(result: Result, target: int) -> dict[str, Any]:
+    """The errors of a target on robots that differ from the model, for each set of curves; empty without `--robust`."""
+    found = result.robustness
+    if found is None:
+        return {}
+    rows = {}
+    for name in CURVES:
+        drawn = found.drawn[name][:, target]
+        rows[name] = {
+            "nominal_max_error_m": float(found.nominal[name][target]),
+            "median_max_error_m": float(np.median(drawn)),
+            "p95_max_error_m": float(np.quantile(drawn, 0.95, method="higher")),
+            "worst_max_error_m": float(drawn.max()),
+        }
+    return {"robustness": rows}
+
+
+def _scenarios(result: Result) -> dict[str, Any]:
+    found = result.robustness
+    if found is None:
+        return {}
+    return {
+        "robust": found.kind,
+        "scenarios": [{"parameters": dict(s.factors), "weight": s.weight} for s in found.scenarios],
+        "draws": len(found.drawn["robust"]),
+        "failed_draws": {name: int(np.sum(~np.isfinite(found.drawn[name]).all(axis=1))) for name in CURVES},
     }
 
 

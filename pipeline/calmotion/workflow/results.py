@@ -10,17 +10,16 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from calmotion.errors import ShotError
 from calmotion.shot import Character, Result, Simulation
 from calmotion.shot.character import Array
-from calmotion.shot.outputs import CsvFile, Figures, Recording, Verification, WrittenLayer
+from calmotion.shot.outputs import CsvFile, Figures, Recording, Verification, Video, WrittenLayer
 from calmotion.shot.run import OutputPaths
 from calmotion.shot.table import columns
 from calmotion.workflow.run import Outcome, again
 
 if TYPE_CHECKING:
     from calmotion.workflow.problems import Problem
-    from calmotion.workflow.shot import Path, Shot
+    from calmotion.workflow.shot import Given, Path, Shot
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,6 +115,11 @@ class SimulationResult:
     def shot(self) -> Shot:
         """The shot."""
         return self._outcome.shot
+
+    @property
+    def outcome(self) -> Outcome:
+        """The run that made it."""
+        return self._outcome
 
     @property
     def interrupted(self) -> bool:
@@ -215,6 +219,14 @@ class SimulationResult:
         """
         return again(self._outcome, Figures, OutputPaths(figures=os.fspath(folder))).paths
 
+    def film(self, path: Path) -> str:
+        """Write a video (.webp, or .mp4 where ffmpeg is installed); returns the path.
+
+        Raises:
+            RunError: It cannot be written.
+        """
+        return again(self._outcome, Video, OutputPaths(video=os.fspath(path))).path
+
     def write(
         self,
         layer: Path,
@@ -240,23 +252,33 @@ class SimulationResult:
         outputs = OutputPaths(layer=os.fspath(layer))
         return again(self._outcome, WrittenLayer, outputs, settings={"usd.write": options})
 
-    def export(self, path: Path, *, rate: float = 500.0, degrees: bool = False) -> str:
-        """Write the motors' curves for a controller, one row for each instant; returns the path.
+    def export(
+        self, path: Path, *, to: str = "csv", rate: float = 500.0, degrees: bool = False, settings: Given = None
+    ) -> str:
+        """Write the motors' curves for a controller; returns the path. `calmotion.export` also measures what playing
+        them costs.
 
         Args:
-            path: CSV file.
-            rate: Rows a second [Hz].
-            degrees: Angles in degrees, not radians.
+            path: File to write.
+            to: Name of the format.
+            rate: Commands a second [Hz].
+            degrees: Angles of a table in degrees, not radians.
+            settings: Settings of operators, such as those of the format.
 
         Raises:
-            ShotError: It cannot be written, or no plugin exports curves.
+            RunError: It cannot be written.
+            SettingError: There is no such format.
         """
-        operator = self.shot.host.operators.get("curves.export")
-        if operator is None:
-            raise ShotError("no plugin exports curves", remedy="Enable the plugin with curves.export")
-        options: dict[str, object] = {"file": os.fspath(path), "rate": rate, "angles": "deg" if degrees else "rad"}
-        again(self._outcome, operator.provides[0], settings={"curves.export": options})
-        return os.fspath(path)
+        from calmotion.control.commands import ExportRequest
+        from calmotion.host import merge
+        from calmotion.workflow.controller_files import curves_of, format_named, write_commands
+        from calmotion.workflow.shot import read_settings
+
+        format_named(self.shot.host, to)
+        chosen = merge([{"export.csv": {"angles": "deg"}} if degrees else {}, read_settings(settings)])
+        curves = curves_of(self._outcome, self.result)
+        written = write_commands(self._outcome, curves, ExportRequest(to, rate, os.fspath(path)), chosen)
+        return written.files[0]
 
     def verify(self) -> Verification:
         """Measure the error of the result against a finer run of the same curves: takes several times as long.

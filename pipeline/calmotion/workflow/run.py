@@ -11,7 +11,8 @@ from typing import Any, TypeVar
 
 from calmotion.errors import ShotError
 from calmotion.host import Host, OperatorResult, Run, SettingError, Settings, merge, nearest
-from calmotion.shot.outputs import CsvFile, Figures, Recording, WrittenLayer
+from calmotion.shot import Provenance
+from calmotion.shot.outputs import CsvFile, Figures, Recording, Video, WrittenLayer
 from calmotion.shot.run import INTEGRATORS, SHAPERS, OutputPaths, Source
 from calmotion.support import interrupts
 from calmotion.support.files import try_writing
@@ -22,7 +23,7 @@ from calmotion.workflow.shot import Shot
 T = TypeVar("T")
 _FILES = (
     (WrittenLayer, "-o", "layer"), (CsvFile, "--csv", "csv"), (Recording, "--rrd", "rrd"),
-    (Figures, "--figures", "figures"),
+    (Figures, "--figures", "figures"), (Video, "--video", "video"),
 )  # fmt: skip
 _OUTPUTS = (*((option, name) for _, option, name in _FILES), ("--modes", "modes"))
 _FOLDERS = ("figures", "modes")
@@ -140,12 +141,16 @@ def carry_out(
     _refuse_unreadable_motion(source, host)
     run = host.run(
         [*known, source, outputs], kinds, optional=optional, settings=merge([shot.settings, settings or {}]),
-        progress=_listener(hooks),
+        progress=_listener(hooks), reuse=shot.reuse,
     )  # fmt: skip
     _prepare_folders(shot.path, outputs)
     interrupted = cancelled = False
+    unread = True
     try:
         for result in run:
+            if unread and (provenance := run.get(Provenance)) is not None:
+                unread = False
+                _refuse_inputs(shot.path, provenance, outputs)
             if hooks.on_operator:
                 hooks.on_operator(result)
     except _Stop:
@@ -230,7 +235,7 @@ def _refuse_unreadable_motion(source: Source, host: Host) -> None:
             path="--motion",
             found=source.motion,
             remedy=remedy_for(source.motion)
-            or "Name a .bvh file, or a plugin that provides MotorTracks with --plugins",
+            or "Name a .csv, .npz or .bvh file, or a plugin that provides MotorTracks with --plugins",
         )
 
 
@@ -273,7 +278,9 @@ def _prepare_folders(shot: str, outputs: OutputPaths) -> None:
                 f"this is the output of {other} as well", path=option, found=path, remedy="Choose another."
             )
         if os.path.realpath(path) == os.path.realpath(shot):
-            raise SettingError("this file is the shot, which is never overwritten", path=option, found=path)
+            raise SettingError(
+                "this file is the shot, which is never overwritten", path=option, found=path, remedy="Choose another."
+            )
         try:
             try_writing(Path(path) / "file" if name in _FOLDERS else path)
         except OSError as error:
@@ -281,6 +288,24 @@ def _prepare_folders(shot: str, outputs: OutputPaths) -> None:
                 "this output cannot be written", path=option, found=f"{path}: {error.strerror}",
                 remedy="Choose another.",
             ) from error  # fmt: skip
+
+
+def _refuse_inputs(shot: str, provenance: Provenance, outputs: OutputPaths) -> None:
+    """Refuse outputs that are layers of the shot, as soon as these are known.
+
+    Raises:
+        SettingError: One is.
+    """
+    folder = os.path.dirname(os.path.realpath(shot))
+    inputs = [os.path.join(folder, layer.path) for layer in provenance.layers]
+    for option, name in _OUTPUTS:
+        path: str | None = getattr(outputs, name)
+        for layer in inputs:
+            if path is not None and os.path.exists(path) and os.path.exists(layer) and os.path.samefile(path, layer):
+                raise SettingError(
+                    "this file is a layer of the shot, which is never overwritten", path=option, found=path,
+                    remedy="Choose another.",
+                )  # fmt: skip
 
 
 def again(outcome: Outcome, wanted: type[T], *values: object, settings: Settings | None = None) -> T:

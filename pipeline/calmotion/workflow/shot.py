@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from functools import cached_property
 from typing import TypeVar
 
-from calmotion.host import Host, Settings, merge, open_host, read_assignment, read_settings_file
+from calmotion.host import Host, Reuse, Settings, merge, open_host, read_assignment, read_settings_file
 from calmotion.shot import Animation, Character, Provenance
 from calmotion.shot.run import OutputPaths, Source
 from calmotion.workflow.problems import problems_of, value_of
@@ -40,6 +40,7 @@ class Shot:
         self.settings = read_settings(settings)
         self.host: Host = open_host([os.fspath(folder) for folder in plugins])
         self._read: dict[type, object] = {}
+        self.reuse: Reuse | None = None  # values of an earlier run for the next ones, see `watch.Watch`
 
     def __repr__(self) -> str:
         return f"Shot({self.path!r})"
@@ -52,6 +53,12 @@ class Shot:
     def keep(self, data: Mapping[type, object]) -> None:
         """Keep what a run has read of it, so that the next one need not."""
         self._read |= {kind: data[kind] for kind in _READ if kind in data}
+
+    def forget(self) -> None:
+        """Forget what was read: the file has changed."""
+        self._read = {}
+        for name in ("character", "animation", "provenance"):
+            self.__dict__.pop(name, None)
 
     def read(self) -> Shot:
         """Read the file, if that has not happened; returns itself.

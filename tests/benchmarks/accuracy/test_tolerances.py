@@ -21,13 +21,13 @@ def shot():
 def rows(shot):
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(reference_bench, "REFERENCE_STEP", 1 / 1920)
-        return [Tolerances(shot).kept(tolerance, "optimize") for tolerance in (1e-2, 1e-3)]
+        return [Tolerances(shot, nodes=1.0).kept(tolerance, "optimize") for tolerance in (1e-2, 1e-3)]
 
 
 def test_simulations_keep_their_tolerance(shot):
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(reference_bench, "REFERENCE_STEP", 1 / 1920)
-        measured = Tolerances(shot)
+        measured = Tolerances(shot, nodes=1.0)
         measured.warm(1e-2, "simulate")
         found = [measured.kept(tolerance) for tolerance in (1e-2, 1e-3, 1e-4)]
     assert all(row.kept and row.reference_m < 0.1 * row.tolerance_m for row in found)

@@ -5,7 +5,7 @@ FLOORS = (
     ("errors", "version"),
     ("support",),
     ("shot",),
-    ("geometry", "linear_algebra", "views"),
+    ("geometry", "linear_algebra", "views", "control"),
     ("reduction", "rigging"),
     ("multibody", "usd"),
     ("simulation",),

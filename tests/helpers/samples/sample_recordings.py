@@ -44,9 +44,9 @@ def check_recording(recording, table, shot, root):
         if target.rotation_weight > 0.0:
             turns = np.degrees(table[f"{target.path}.rotation_error"])
             agree(columns, f"/errors/rotation_deg/{root}{target.path}", times, turns)
-        (trail,) = columns[f"/trails/{root}{target.path}", "LineStrips3D:strips"][1][0]
+        trails = columns[f"/trails/{root}{target.path}", "LineStrips3D:strips"][1]
         places = np.stack([np.interp(frames, times, table[f"{target.path}.{axis}"]) for axis in "xyz"], axis=1)
-        np.testing.assert_allclose(np.array(trail), places, atol=1e-5)
+        np.testing.assert_allclose(np.array([trail[-1][-1] for trail in trails]), places, atol=1e-5)
     for motor in character.motors:
         values, efforts = table[f"{motor.path}.output"], table[f"{motor.path}.effort"]
         agree(columns, f"/motors{motor.path}/angle_deg/{root}", times, np.degrees(values))
@@ -58,5 +58,5 @@ def check_recording(recording, table, shot, root):
     # bodies, their meshes and curves stand under their prims' paths, and nothing else does
     roots = {entity.split("/")[1] for entity, _ in columns if not entity.startswith("/__")}
     usual = {"input", "reference", "trails", "errors", "spectra", "motors", "reactions", "summary"}
-    assert roots - {"optimized", "changes_deg", "optimizer"} == usual
+    assert roots - {"optimized", "changes_deg", "optimizer", "scenery"} == usual
     return columns

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from calmotion.benchmarks.speed.reading import LOADS, REFUSED, RIGGED, shots_in, study
+from calmotion.benchmarks.speed.reading import LOADS, REFUSED, RIGGED, study
+from calmotion.benchmarks.speed.robot_files import shots_in
 from calmotion.usd.reading import read_shot
 from calmotion.usd.rigging import RigOptions, rig_shot
 from performing import followed

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from calmotion import ShotError
+from calmotion.shot.robust.settings import Uncertainty
 from calmotion.usd.reading import read_shot
 from pxr import Gf, Sdf, UsdGeom, UsdPhysics
 from small_shots import FORE, Scale, set_float, write_arm
@@ -75,6 +76,15 @@ def test_authored_settings_are_read_in_si(tmp_path):
     assert (found.reference, found.endpoints, found.cyclic) == ("static", "kept", True)
 
 
+def test_what_is_uncertain_of_the_robot_is_read(tmp_path):
+    assert read(tmp_path).retarget.uncertainty == Uncertainty()
+
+    def edit(stage):
+        retarget(stage, "/Arm", **{"uncertainty:modulus": 0.25, "uncertainty:payload": 0.0})
+
+    assert read(tmp_path, edit).retarget.uncertainty == Uncertainty(modulus=0.25, payload=0.0)
+
+
 def test_the_settings_are_those_above_the_character_not_those_below(tmp_path):
     character = read(tmp_path, lambda stage: retarget(stage, FORE, tolerance=0.1))
     assert character.retarget.tolerance is None
@@ -84,6 +94,7 @@ def test_the_settings_are_those_above_the_character_not_those_below(tmp_path):
 @pytest.mark.parametrize(
     ("name", "value"),
     [("tolerance", 0.0), ("timeStep", -2.0), ("knotSpacing", float("nan")), ("smoothness", -3.0),
+     ("uncertainty:payload", -0.5), ("uncertainty:modulus", float("inf")),
      ("reference", "soft"), ("endpoints", "fixed")],
 )  # fmt: skip
 def test_settings_out_of_range_are_refused(tmp_path, name, value):

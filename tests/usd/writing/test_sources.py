@@ -14,7 +14,7 @@ from calmotion.usd.writing import WriteOptions, write_result
 from performing import result_with, tracks_of, worst_gap
 from posed_shots import ANIMATION, ARM, FOREARM, posed, posed_by_pivots, skeletal
 from pxr import Sdf, Usd, UsdSkel, UsdUtils
-from small_shots import ELBOW, FORE, FRAMES, SHOULDER, TARGET_POSITION, UPPER, write_arm
+from small_shots import ELBOW, FORE, FRAMES, SHOULDER, TARGET_POSITION, UPPER, angles, write_arm
 
 MOTOR = {"shoulder": 0, "elbow": 1}
 
@@ -145,6 +145,30 @@ def test_what_such_curves_cannot_be_written_as_is_refused(tmp_path, edit, option
         written(tmp_path, edit, {1: 0.1}, **options)
     assert caught.value.found == found and caught.value.path in (SHOULDER, ELBOW) and caught.value.remedy
     assert sorted(path.name for path in tmp_path.iterdir()) == ["arm.usda"]
+
+
+def half_posed(stage):
+    """The shoulder by the transforms of its bodies, the elbow by its drive."""
+    posed(stage)
+    for frame in range(FRAMES + 1):
+        stage.GetPrimAtPath(ELBOW).GetAttribute(TARGET_POSITION).Set(float(angles(frame)[1]), frame)
+
+
+@pytest.mark.parametrize("options", [{"splines": True}, {"samples_per_second": 96.0}])
+@pytest.mark.parametrize("bumps", [{0: 0.1}, {0: 0.1, 1: 0.1}])
+def test_options_of_drives_are_for_the_motors_that_have_one(tmp_path, options, bumps):
+    _, result, layer, _, (_, again, _) = written(tmp_path, half_posed, bumps, **options)
+    assert [track.values.size for track in again.current][0] == FRAMES + 1
+    for track, curve in zip(again.current, result.curves, strict=True):
+        at_frames = np.interp(np.arange(FRAMES + 1) / 24.0, track.times, track.values)
+        assert np.abs(at_frames - curve.frame_values).max() < 1e-6
+    curves = Sdf.Layer.FindOrOpen(layer)
+    drive = curves.GetAttributeAtPath(f"{ELBOW}.{TARGET_POSITION}")
+    assert (drive is not None) == (1 in bumps)
+    if drive is not None and "splines" in options:
+        assert drive.HasSpline()
+    elif drive is not None:
+        assert len(drive.GetInfo("timeSamples")) == 4 * FRAMES + 1
 
 
 def test_a_motor_of_an_actuator_gets_the_drive_that_its_curve_needs(tmp_path):

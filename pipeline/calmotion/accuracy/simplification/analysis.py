@@ -33,6 +33,9 @@ def analyse(
     Returns:
         The decisions, and the character marked with them. A shot whose rigid robot cannot follow its tracks keeps
         everything: the flexible one will say why.
+
+    Raises:
+        ShotError: Motors contradict each other in a closed chain.
     """
     forced = {kind: choice for kind, choice in forced.items() if choice != AUTO}
     choice = partial(_choice, forced)

@@ -38,6 +38,7 @@ def decide(
 
     Raises:
         SimulationFailure: The rigid robot cannot follow its tracks.
+        ShotError: Motors contradict each other in a closed chain.
     """
     poses_matter = changes or bool(tree.closing)
     if not poses_matter and choice("bodies") == AUTO:
@@ -50,7 +51,7 @@ def decide(
         return character, rows
     rigid = [rigid_body(body, own) for body, own in zip(rough.bodies, body_anchors(rough, tree), strict=True)]
     grid = grid_of(character, animation, replace(options, step=STEP))
-    poses = rigid_poses(character, animation, grid, tree, rigid)
+    poses = rigid_poses(character, animation, grid, tree, rigid, options.tolerance)
     if changes:
         character, more = _motors(character, poses, choice("motors"))
         rows += more

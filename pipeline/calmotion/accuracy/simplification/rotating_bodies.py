@@ -13,6 +13,7 @@ import numpy as np
 
 from calmotion.multibody.model.topology import Tree
 from calmotion.shot import Animation, Character
+from calmotion.shot.motor import PRESCRIBED
 
 STILL_BY = "it does not rotate: attached by fixed and prismatic joints and idle motors"
 STILL = 1e-9  # changes of an angle [rad] that are rounding
@@ -64,6 +65,8 @@ def _turned_by(character: Character, animation: Animation, joint: int, changes: 
     motor = next((k for k, motor in enumerate(character.motors) if motor.joint == joint), None)
     if motor is None:
         return f"{item.path} moves freely"
+    if character.motors[motor].model != PRESCRIBED:
+        return f"the motor of {item.path} gives way"
     leader = character.motors[motor] if (follows := character.motors[motor].follows) is None else (
         character.motors[follows.leader]
     )  # fmt: skip

@@ -11,8 +11,10 @@ from typing import Any
 
 import numpy as np
 
+from calmotion.accuracy.mesh_budget import mesh_error
 from calmotion.accuracy.pod_subspace import ProjectedShot, ReferenceRun
 from calmotion.accuracy.step_error import StepRun, distance, simulate_at
+from calmotion.benchmarks.common.finer_meshes import with_more_nodes
 from calmotion.benchmarks.common.shots import Unreduced
 from calmotion.benchmarks.common.timing import median_time
 from calmotion.errors import ShotError
@@ -62,11 +64,19 @@ class Reference:
 
 
 class Bench:
-    """One shot, its reductions kept."""
+    """One shot, its reductions kept.
 
-    def __init__(self, shot: Unreduced, repeats: int = REPEATS):
-        self.shot, self.repeats = shot, repeats
-        self._reduction = reduction_for(shot.character, shot.animation, shot.meshes, RunSettings())
+    Args:
+        repeats: Runs of which the median time counts.
+        nodes: Nodes of its meshes over those of the shot's.
+    """
+
+    def __init__(self, shot: Unreduced, repeats: int = REPEATS, nodes: float = 1.0):
+        self.repeats = repeats
+        own = reduction_for(shot.character, shot.animation, shot.meshes, RunSettings())
+        self._reduction = with_more_nodes(own, nodes)
+        self.shot = replace(shot, meshes=self._reduction.meshes or shot.meshes)
+        self._finer = nodes > 1.0
         self._known: ReferenceRun | None = None
 
     def bodies(self, tolerance: float, **settings: Any) -> list[ReducedBody]:
@@ -90,10 +100,10 @@ class Bench:
     def reference(self, finest: float = FINEST) -> Reference:
         """The finest run, its step extrapolated to zero, from steps as small as it takes.
 
-        Its bar is what is left of the step's error, which falls by eight where that is halved, what ten times the
-        tolerance of the reduction changes, what quadratic strain does not see, as estimated (what a reduction to ten
-        times the tolerance would; to see more takes most of the time), and what holding its bodies to the directions
-        that the shot needs does.
+        Its bar is what is left of the step's error, which falls by eight where that is halved, what its meshes are
+        estimated to cost where they are finer than the shot's, what ten times the tolerance of the reduction changes,
+        what quadratic strain does not see, as estimated (what a reduction to ten times the tolerance would; to see more
+        takes most of the time), and what holding its bodies to the directions that the shot needs does.
 
         Args:
             finest: Tolerance of the reduction [m].
@@ -105,7 +115,8 @@ class Bench:
         limit, left = self._limit(held.shot.bodies, 10.0 * finest)
         unseen = sum(body.elasticity.strain_error_m for body in bodies if body.elasticity is not None)
         reduced = distance(other.positions, known.run.positions) + unseen
-        return Reference(limit, left + reduced + held.error_m)
+        meshes = (mesh_error(self.compiled(bodies), RunSettings(), known.run) or 0.0) if self._finer else 0.0
+        return Reference(limit, left + reduced + held.error_m + meshes)
 
     def _limit(self, bodies: Sequence[ReducedBody], allowed: float) -> tuple[Array, float]:
         """Positions of the targets as the step goes to zero [m], and what is left of its error there [m]."""

@@ -1,9 +1,9 @@
 """Measured errors of shots that are simulated or optimised with `--tolerance`, against a finer simulation.
 
 `calmotion bench tolerances [SHOT ...] [--csv FILE]` simulates each shot as animated with each tolerance, with the
-choices of the program, and measures the result against a simulation without simplifications, with a much smaller step
-and many more coordinates. With `--optimize` it optimises each shot, and simulates the optimised curves again. The error
-is the largest distance of any target, at any frame, between the two.
+choices of the program, and measures the result against a simulation without simplifications, with a much smaller step,
+many more coordinates, and meshes of eight times the nodes. With `--optimize` it optimises each shot, and simulates the
+optimised curves again. The error is the largest distance of any target, at any frame, between the two.
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ from calmotion.accuracy.simulate_to_tolerance import found_tracks, simulate_to_t
 from calmotion.accuracy.step_error import distance, frames_of
 from calmotion.benchmarks.accuracy.reference_bench import FINEST, Bench, Reference
 from calmotion.benchmarks.accuracy.work_precision import SAMPLES, machine
+from calmotion.benchmarks.common.finer_meshes import TIMES
 from calmotion.benchmarks.common.fresh_cache import fresh_cache
 from calmotion.benchmarks.common.parsers import table_parser
 from calmotion.benchmarks.common.shots import Unreduced, load_unreduced
@@ -75,10 +76,11 @@ class Tolerances:
     Args:
         shot: The shot.
         finest: Tolerance of the reference's reduction [m], far below those that are measured.
+        nodes: Nodes of the reference's meshes over those of the shot's.
     """
 
-    def __init__(self, shot: Unreduced, finest: float = FINEST):
-        self.shot, self.finest = shot, finest
+    def __init__(self, shot: Unreduced, finest: float = FINEST, nodes: float = TIMES):
+        self.shot, self.finest, self.nodes = shot, finest, nodes
         self._reference: Reference | None = None
 
     def warm(self, tolerance: float, command: str) -> None:
@@ -95,16 +97,17 @@ class Tolerances:
         wall = time.perf_counter() - begin
         assert result.accuracy is not None
         if result.after is None:
-            self._reference = self._reference or Bench(shot).reference(self.finest)
+            self._reference = self._reference or Bench(shot, nodes=self.nodes).reference(self.finest)
             reference = self._reference
         else:
             found = replace(animation, current=found_tracks(result, animation))
-            reference = Bench(replace(shot, animation=found)).reference(self.finest)
+            reference = Bench(replace(shot, animation=found), nodes=self.nodes).reference(self.finest)
+        estimated = result.accuracy.estimated_m + (result.accuracy.mesh_m or 0.0)
         runs = (result.before, result.after or result.before)
         return Kept(
             shot.name, command, tolerance,
             distance(frames_of(result, animation.frame_times).positions, reference.positions), reference.bar_m,
-            result.accuracy.estimated_m + more, result.step_s, coordinates, wall, result.wall_s,
+            estimated + more, result.step_s, coordinates, wall, result.wall_s,
             *(float(run.position_errors[run.motion.judged].max()) for run in runs),
         )  # fmt: skip
 
@@ -163,11 +166,15 @@ def print_rows(rows: Sequence[Kept]) -> None:
 def main(arguments: list[str] | None = None) -> int:
     """The command: exit status 1 when a tolerance is not kept."""
     parser = table_parser("tolerances", __doc__, SAMPLES, TOLERANCES)
+    parser.add_argument(
+        "--nodes", type=float, default=TIMES, metavar="N",
+        help=f"nodes of the reference's meshes over those of the shot's (default: {TIMES:g})",
+    )  # fmt: skip
     parser.add_argument("--optimize", action="store_true", help="optimise the shots, which takes much longer")
     options = parser.parse_args(arguments)
     rows: list[Kept] = []
     for path in options.shots:
-        shot = Tolerances(load_unreduced(path), FINER * min(options.tolerances))
+        shot = Tolerances(load_unreduced(path), FINER * min(options.tolerances), options.nodes)
         own, command = [], "optimize" if options.optimize else "simulate"
         shot.warm(max(options.tolerances), command)
         for tolerance in options.tolerances:

@@ -47,7 +47,7 @@ def beam_mesh(length: float, thickness: float, cells: int, across: int = 2) -> t
 def beam_arm(
     links: int = 1, length: float = 0.6, thickness: float = 0.02, youngs_modulus: float = 1.8e9,
     density: float = 1200.0, payload: float = 0.2, damping: float = 0.01, gravity: float = 9.81,
-    elasticity: str = "auto", modes: int = -1, cells: int = 12,
+    elasticity: str = "auto", modes: int = -1, cells: int = 12, across: int = 2,
 ) -> tuple[Character, FEMeshes]:  # fmt: skip
     """An arm along x of flexible links, each on a motor that lifts it, with a rigid load welded to the end.
 
@@ -61,7 +61,7 @@ def beam_arm(
         damping: Ratio of critical.
         gravity: Down the z axis [m/s^2].
         elasticity, modes: See `FlexibleSettings`.
-        cells: Elements along a link.
+        cells, across: Elements along a link, and across it.
     """
     material = ElasticMaterial("/Arm/Plastic", youngs_modulus, 0.35, density, damping)
     settings = FlexibleSettings(material, mode_count=modes, elasticity=elasticity)
@@ -76,7 +76,7 @@ def beam_arm(
     joints.append(Joint("/Arm/Weld", "fixed", links - 1, links, _at(length), _at(0.0)))
     motors = tuple(Motor(k, joints[k].path, "drive:angular:physics:targetPosition") for k in range(links))
     target = Target("/Arm/Load", links, _at(0.0))
-    points, tets = beam_mesh(length, thickness, cells)
+    points, tets = beam_mesh(length, thickness, cells, across)
     meshes = FEMeshes(tuple(FEMesh(k, points, tets, MeshQuality(0.0, 0.0, 0.0)) for k in range(links)))
     down = np.array([0.0, 0.0, -gravity])
     return Character("/Arm", tuple(bodies), tuple(joints), motors, (target,), down), meshes

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from calmotion.errors import ShotError
-from calmotion.shot import Body, ElasticMaterial, FlexibleSettings, Frame
+from calmotion.shot import Body, ElasticMaterial, FlexibleSettings, Frame, MassProperties
 
 if TYPE_CHECKING:
     from calmotion.usd.reading.context import Reading
@@ -25,11 +25,15 @@ class Link:
         name: Of its prim.
         body: With surfaces or tetrahedra, and flexible settings.
         carrier: Where the joint towards the world takes hold of it, body frame; None without one.
+        others: Where the other joints take hold of it, body frame.
+        mass: What the robot states or its geometry and densities give; None where nothing does.
     """
 
     name: str
     body: Body
     carrier: Frame | None
+    others: tuple[Frame, ...] = ()
+    mass: MassProperties | None = None
 
 
 def read_links(source: str) -> list[Link]:
@@ -42,6 +46,7 @@ def read_links(source: str) -> list[Link]:
     """
     from calmotion.usd import stages
     from calmotion.usd.diagnostics import quiet
+    from calmotion.usd.reading.bodies.mass import mass_of
     from calmotion.usd.reading.bodies.shapes import shapes_of, tets_of
     from calmotion.usd.reading.context import Reading, is_rigid_body, prims_of
     from calmotion.usd.units import units_of
@@ -60,19 +65,22 @@ def read_links(source: str) -> list[Link]:
                 "has no such link", path=file, found=wanted or "no prim with PhysicsRigidBodyAPI",
                 remedy="Name a prim of the file, as in robot.usda:left_elbow_link",
             )  # fmt: skip
-        carriers = _carriers(reading, stage)
+        carriers, others = _frames(reading, stage)
         links = []
         for prim in prims:
             pose = reading.pose(prim)
+            shapes = shapes_of(reading, prim, pose)
             body = Body(
                 path=str(prim.GetPath()),
                 rest=pose.frame(reading.units.length(1.0)),
                 mass=None,
-                surfaces=tuple(shape.surface for shape in shapes_of(reading, prim, pose)),
+                surfaces=tuple(shape.surface for shape in shapes),
                 tets=tets_of(reading, prim, pose),
                 flexible=FlexibleSettings(POLYAMIDE, mode_count=12),
             )
-            links.append(Link(prim.GetName(), body, carriers.get(body.path)))
+            joints = tuple(others.get(body.path, ()))
+            mass = mass_of(reading, prim, pose, shapes)
+            links.append(Link(prim.GetName(), body, carriers.get(body.path), joints, mass))
     return links
 
 
@@ -82,18 +90,26 @@ def _split(source: str) -> tuple[str, str]:
     return (file, prim) if colon and len(file) > 1 else (source, "")
 
 
-def _carriers(reading: Reading, stage: Any) -> dict[str, Frame]:
-    """The frame of the first joint that has a body as its second one."""
+def _frames(reading: Reading, stage: Any) -> tuple[dict[str, Frame], dict[str, list[Frame]]]:
+    """The frame of the first joint that has a body as its second one, and those of all its other joints."""
     from calmotion.usd.reading.context import is_rigid_body, prims_of
     from calmotion.usd.reading.joints import joint_prims, read_joint
 
     poses = {str(prim.GetPath()): reading.pose(prim) for prim in prims_of(stage) if is_rigid_body(prim)}
-    frames: dict[str, Frame] = {}
+    carriers: dict[str, Frame] = {}
+    others: dict[str, list[Frame]] = {}
     for prim in joint_prims(stage):
         try:
             joint = read_joint(reading, prim, poses)
         except ShotError:
             continue  # what is wrong with a joint does not matter to the mesh of another link
-        if joint is not None and joint.body1 and np.isfinite(joint.frame1.position).all():
-            frames.setdefault(joint.body1, joint.frame1)
-    return frames
+        if joint is None:
+            continue
+        for body, frame, carries in ((joint.body1, joint.frame1, True), (joint.body0, joint.frame0, False)):
+            if not body or not np.isfinite(frame.position).all():
+                continue
+            if carries and body not in carriers:
+                carriers[body] = frame
+            else:
+                others.setdefault(body, []).append(frame)
+    return carriers, others

@@ -11,11 +11,13 @@ if TYPE_CHECKING:
     from calmotion.cli.output import Output
 
 BENCHMARKS = {
-    "baselines": "optimizer.baselines", "compilation": "speed.compilation", "gradients": "integrators.gradients",
+    "baselines": "optimizer.baselines", "compilation": "speed.compilation", "estimates": "accuracy.estimates",
+    "extremes": "integrators.extremes", "gradients": "integrators.gradients",
     "integrators": "integrators.integrators",
     "meshing": "speed.meshing", "optimizer": "optimizer.optimizer", "reading": "speed.reading",
     "reduction": "speed.reduction", "reduction-convergence": "accuracy.reduction_convergence",
-    "scaling": "speed.scaling", "simplification": "accuracy.simplification", "stability": "integrators.stability",
+    "scaling": "speed.scaling", "simplification": "accuracy.simplification", "speed": "speed.stages",
+    "stability": "integrators.stability",
     "tolerances": "accuracy.tolerances", "work-precision": "accuracy.work_precision",
 }  # fmt: skip
 

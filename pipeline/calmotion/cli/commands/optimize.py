@@ -17,6 +17,25 @@ def add_to(commands: Commands) -> None:
     file_argument(command, "-o", "--output", metavar="LAYER", required=True, help="USD layer to write")
     run_options(command)
     simulation_options(command, "optimize supports only bdf2")
+    group = command.add_argument_group(
+        "robust curves", "Robots differ from their model: calm:retarget:uncertainty:modulus, :damping and :payload."
+    )
+    group.add_argument(
+        "--robust",
+        nargs="?",
+        const="worst",
+        choices=("worst", "mean"),
+        help="optimise for a set of robots around the model: the one with the largest error (worst, the default), or "
+        "their mean; the curves are then measured on 200 random robots",
+    )
+    group.add_argument("--scenarios", metavar="N", type=_count, help="number of robots in the set (default: 7)")
+
+
+def _count(text: str) -> int:
+    count = int(text) if text.isdigit() else 0
+    if count < 3 or count % 2 == 0:
+        raise argparse.ArgumentTypeError(f"{text} is not an odd number above 2: the nominal robot and pairs around it")
+    return count
 
 
 def _run(args: argparse.Namespace, output: Output) -> int:

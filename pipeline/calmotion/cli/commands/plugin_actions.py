@@ -86,7 +86,7 @@ def _print_plugin(plugin: Plugin, output: Output, verbose: bool) -> None:
 
 
 def _default(declared: Property) -> str:
-    limits = "|".join(declared.choices) or declared.range_text()
+    limits = " | ".join(declared.choices) or declared.range_text()
     text = f"{declared.default!r}" + (f" {declared.unit}" if declared.unit else "")
     return f"{text} ({limits})" if limits else text
 

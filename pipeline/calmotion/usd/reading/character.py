@@ -3,19 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from calmotion.errors import ShotError, raise_all
 from calmotion.shot import Body, Character, Joint, MassProperties, RetargetSettings
+from calmotion.shot.tolerance import reach
 from calmotion.usd.clock import Clock
 from calmotion.usd.reading import scene, targets, topology
 from calmotion.usd.reading.animated_transforms import refuse_moving
 from calmotion.usd.reading.bodies import mass
 from calmotion.usd.reading.bodies.flexible import flexible_settings
 from calmotion.usd.reading.bodies.interfaces import interfaces_of
+from calmotion.usd.reading.bodies.scenery import scenery_of
 from calmotion.usd.reading.bodies.shapes import shapes_of, tets_of
 from calmotion.usd.reading.context import Reading, grouped, is_rigid_body, prims_of
 from calmotion.usd.reading.joints import (
@@ -34,7 +36,9 @@ from calmotion.usd.transforms import Pose
 if TYPE_CHECKING:
     from pxr import Usd
 
-LIGHTEST, HEAVIEST = 1e-3, 1e3  # kg: other robots are mostly robots in other units
+# Other robots are mostly robots in other units.
+LIGHTEST, HEAVIEST = 1e-3, 1e3  # [kg]
+SMALLEST, LARGEST = 1e-3, 1e2  # [m]
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,6 +141,7 @@ def build_character(reading: Reading, skeleton: Skeleton) -> Character:
             j.lower,
             j.upper,
             j.closes_chain,
+            name=(j.prim.GetDisplayName() if j.prim else "") or j.path.rsplit("/", 1)[-1],
         )
         for j in skeleton.joints
     )
@@ -162,10 +167,9 @@ def build_character(reading: Reading, skeleton: Skeleton) -> Character:
         outer = topology.leaves(skeleton.bodies, skeleton.joints)
         chosen = tuple(targets.outermost_target(bodies[numbers[b]], numbers[b], joints) for b in outer)
         reading.note(f"no CalmTargetAPI: the outermost point of {', '.join(outer)} is taken as target")
-    _warn_of_weight(reading, root, bodies)
     default = reading.stage.GetDefaultPrim()
     whole = default and all(b.startswith(f"{default.GetPath()}/") for b in skeleton.bodies)
-    return Character(
+    character = Character(
         path=str(default.GetPath()) if whole else root,
         bodies=bodies,
         joints=joints,
@@ -173,8 +177,11 @@ def build_character(reading: Reading, skeleton: Skeleton) -> Character:
         targets=chosen,
         gravity=gravity,
         retarget=settings,
-        notes=grouped(reading.notes),
+        scenery=scenery_of(reading, bodies),
     )
+    _warn_of_weight(reading, root, bodies)
+    _warn_of_size(reading, root, reach(character))
+    return replace(character, notes=grouped(reading.notes))
 
 
 def _warn_of_weight(reading: Reading, path: str, bodies: Sequence[Body]) -> None:
@@ -190,6 +197,20 @@ def _warn_of_weight(reading: Reading, path: str, bodies: Sequence[Body]) -> None
                 found=f"{reading.units.meters:g} m, and kilogramsPerUnit {reading.units.kilograms:g} kg",
                 remedy="If this is not intended, correct these units of the root layer, physics:mass or "
                 "physics:density; simulations and limits depend on it",
+            )
+        )
+
+
+def _warn_of_size(reading: Reading, path: str, far: float) -> None:
+    """Warn of a robot that reaches less than a millimetre or more than a hundred metres: its unit is mostly wrong."""
+    if far > 0.0 and not SMALLEST <= far <= LARGEST:
+        reading.warn(
+            ShotError(
+                f"the robot reaches {far:.3g} m",
+                path=path,
+                attribute="metersPerUnit",
+                found=f"{reading.units.meters:g} m",
+                remedy="If this is not intended, correct the unit; gravity and stiffness depend on it",
             )
         )
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import fields
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -10,6 +11,7 @@ import numpy as np
 from calmotion.errors import ShotError
 from calmotion.shot import RetargetSettings
 from calmotion.shot.character import Array
+from calmotion.shot.robust.settings import Uncertainty
 from calmotion.support.naming import nearest
 from calmotion.usd import gf, schemas
 from calmotion.usd.reading.context import Reading, prims_of
@@ -82,6 +84,7 @@ def retarget_settings(reading: Reading, root: str) -> RetargetSettings:
         reference=_choice(prim, "reference", ("rigid", "static")),
         endpoints=_choice(prim, "endpoints", ("free", "kept")),
         cyclic=bool(schemas.value(prim, _SCHEMA, "calm:retarget:cyclic")),
+        uncertainty=_uncertainty(prim),
     )
 
 
@@ -99,6 +102,12 @@ def _positive(prim: Usd.Prim, name: str, *, zero: bool = False) -> float | None:
             remedy="Correct the value, or remove the attribute",
         )
     return float(value)
+
+
+def _uncertainty(prim: Usd.Prim) -> Uncertainty:
+    """The relative standard deviations of the robot's parameters."""
+    given = {field.name: _positive(prim, f"uncertainty:{field.name}", zero=True) for field in fields(Uncertainty)}
+    return Uncertainty(**{name: value for name, value in given.items() if value is not None})
 
 
 def _choice(prim: Usd.Prim, name: str, allowed: tuple[str, ...]) -> str:

@@ -12,6 +12,7 @@ from calmotion.shot import Animation, Character, Motor, MotorCurve, Provenance, 
 from calmotion.usd import stages
 from calmotion.usd.clock import Clock
 from calmotion.usd.layers import refuse_input_as_output, write_layer
+from calmotion.usd.reading.motors.tracks import MOST as MAX_SAMPLES
 from calmotion.usd.writing import bake, metadata, motions
 from calmotion.usd.writing.curves import author_curves, ensure_drives, sample_times
 from calmotion.usd.writing.root import keeps_earlier_curves, root_path, write_root
@@ -65,7 +66,7 @@ def write_result(
     from pxr import Sdf
 
     options = options or WriteOptions()
-    refuse_options(options, ())
+    refuse_options(options, motors_that_may_change(character) if result.after else ())
     refuse_inputs(provenance, output)
     role = stages.MOTION if result.after is None else stages.CURVES
     clock = Clock(
@@ -94,8 +95,13 @@ def write_result(
     return output, write_root(output, provenance, role)
 
 
-def refuse_options(options: WriteOptions, motors: Sequence[Motor]) -> None:
-    """Refuse options that do not fit each other, or the motors whose curves are written.
+def refuse_options(options: WriteOptions, motors: Sequence[Motor], seconds: float = 0.0) -> None:
+    """Refuse options that do not fit each other, or none of the motors whose curves may be written.
+
+    Args:
+        options: How curves are written.
+        motors: Those whose curves may be.
+        seconds: Length of the shot [s].
 
     Raises:
         ShotError: They do not.
@@ -107,9 +113,16 @@ def refuse_options(options: WriteOptions, motors: Sequence[Motor]) -> None:
             found="--samples-per-second as well",
             remedy="Remove one of the two options",
         )
-    posed = [motor for motor in motors if motor.source == "bodies"]
-    elsewhere = posed or [motor for motor in motors if motor.source == "skeleton"]
-    if elsewhere and (options.splines or (posed and options.samples_per_second is not None)):
+    if motors and seconds * (options.samples_per_second or 0.0) > MAX_SAMPLES:
+        raise ShotError(
+            f"a curve would have more than {MAX_SAMPLES:,} samples",
+            path=motors[0].path,
+            attribute="--samples-per-second",
+            found=f"{options.samples_per_second:g} in each of {seconds:g} s",
+            remedy=f"Use {MAX_SAMPLES / seconds:.3g} or less",
+        )
+    elsewhere = sampled_at_frames(options, motors)
+    if elsewhere and len(elsewhere) == len(motors):
         raise ShotError(
             "this motor is animated by the transforms of its bodies or by a skeleton, where curves are samples at the "
             "frames",
@@ -118,6 +131,19 @@ def refuse_options(options: WriteOptions, motors: Sequence[Motor]) -> None:
             found="--splines" if options.splines else "--samples-per-second",
             remedy="Remove the option, or animate the motor by its drive",
         )
+
+
+def motors_that_may_change(character: Character) -> list[Motor]:
+    """Motors whose curves a search may change; those that are geared to others follow by themselves."""
+    return [motor for motor in character.motors if motor.optimize and motor.follows is None]
+
+
+def sampled_at_frames(options: WriteOptions, motors: Sequence[Motor]) -> list[Motor]:
+    """Motors whose curves remain samples at the frames although the options ask for others: transforms of bodies, and
+    for splines also those of a skeleton."""
+    sources = {"bodies"} if options.splines or options.samples_per_second is not None else set()
+    sources |= {"skeleton"} if options.splines else set()
+    return [motor for motor in motors if motor.source in sources]
 
 
 def refuse_bake(options: WriteOptions, motors: Sequence[Motor]) -> None:
@@ -181,7 +207,6 @@ def _write_curves(
     curves: dict[str, tuple[MotorCurve, ...]] = {"drive": (), "bodies": (), "skeleton": ()}
     for curve in _curves_to_write(character, result, shot.provenance):
         curves[character.motors[curve.motor].source] += (curve,)
-    refuse_options(options, [character.motors[curve.motor] for curve in (*curves["bodies"], *curves["skeleton"])])
     ensure_drives(layer, shot.stage, [character.motors[curve.motor] for curve in curves["drive"]])
     times = sample_times(animation.frame_times, options.samples_per_second)
     # what was authored with corners keeps them: samples would be read back without

@@ -81,7 +81,8 @@ def test_a_missing_mesh_file_is_refused(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("name", "value"), [("elementSize", 0.0), ("interfaceRadius", -3.0), ("maxFrequency", float("nan"))]
+    ("name", "value"),
+    [("elementSize", 0.0), ("interfaceRadius", -3.0), ("maxFrequency", float("nan")), ("wallThickness", 0.0)],
 )
 def test_settings_out_of_range_are_refused(tmp_path, name, value):
     def edit(stage):
@@ -100,3 +101,32 @@ def test_an_unknown_elasticity_is_refused_with_the_choices(tmp_path):
 
     with pytest.raises(ShotError, match="neohookean"):
         fore(tmp_path, edit)
+
+
+def test_the_source_of_the_geometry_is_read_and_a_wrong_one_refused(tmp_path):
+    def asks(source):
+        def edit(stage):
+            make_flexible(stage)
+            stage.GetPrimAtPath(FORE).CreateAttribute("calm:flexible:geometry", Sdf.ValueTypeNames.Token).Set(source)
+
+        return edit
+
+    assert fore(tmp_path, make_flexible)[0].flexible.geometry == "auto"
+    assert fore(tmp_path, asks("collision"))[0].flexible.geometry == "collision"
+    with pytest.raises(ShotError, match="source of geometry") as caught:
+        fore(tmp_path, asks("colision"))
+    assert caught.value.attribute == "calm:flexible:geometry" and "collision" in caught.value.remedy
+
+
+def test_the_wall_of_a_hollow_part_is_a_length_of_the_stage(tmp_path):
+    scale = Scale(meters=0.01)
+
+    def edit(stage):
+        make_flexible(stage, scale=scale)
+        set_float(stage, FORE, "calm:flexible:wallThickness", 0.3)
+        stage.GetPrimAtPath(FORE).CreateAttribute("calm:flexible:section", Sdf.ValueTypeNames.Token).Set("tube")
+
+    settings = fore(tmp_path, edit, scale)[0].flexible
+    assert settings.wall_thickness == pytest.approx(0.003) and settings.section == "tube"
+    plain = fore(tmp_path, make_flexible)[0].flexible
+    assert plain.wall_thickness == -1.0 and plain.section == "auto"

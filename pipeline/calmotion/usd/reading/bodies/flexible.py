@@ -12,6 +12,7 @@ from calmotion.errors import ShotError
 from calmotion.shot import FlexibleSettings
 from calmotion.support.naming import nearest
 from calmotion.usd import schemas
+from calmotion.usd.dependencies import refuse_place
 from calmotion.usd.reading.bodies.materials import elastic_material
 from calmotion.usd.reading.context import Reading
 from calmotion.usd.transforms import Pose
@@ -21,6 +22,8 @@ if TYPE_CHECKING:
 
 _SCHEMA = "CalmFlexibleBodyAPI"
 _ELASTICITY = ("auto", "linear", "stvk", "neohookean")
+_GEOMETRY = ("auto", "visual", "collision", "beam")
+_SECTION = ("auto", "closed", "tube")
 
 
 def flexible_settings(reading: Reading, prim: Usd.Prim, pose: Pose) -> FlexibleSettings | None:
@@ -35,15 +38,6 @@ def flexible_settings(reading: Reading, prim: Usd.Prim, pose: Pose) -> FlexibleS
         return None
     if not schemas.value(prim, _SCHEMA, "calm:flexible:enabled"):
         return None
-    elasticity = str(schemas.value(prim, _SCHEMA, "calm:flexible:elasticity"))
-    if elasticity not in _ELASTICITY:
-        raise ShotError(
-            "names an elasticity model that does not exist",
-            path=prim.GetPath(),
-            attribute="calm:flexible:elasticity",
-            found=elasticity,
-            remedy=f"{nearest(elasticity, _ELASTICITY)}Use one of {', '.join(_ELASTICITY)}",
-        )
     mesh_file = _mesh_file(prim)
     return FlexibleSettings(
         material=elastic_material(reading, prim),
@@ -53,8 +47,24 @@ def flexible_settings(reading: Reading, prim: Usd.Prim, pose: Pose) -> FlexibleS
         interface_radius=_length(reading, prim, "calm:flexible:interfaceRadius"),
         mesh_file=mesh_file,
         mesh_scale=_mesh_scale(reading, prim, pose) if mesh_file else 1.0,
-        elasticity=elasticity,
+        elasticity=_token(prim, "calm:flexible:elasticity", _ELASTICITY, "an elasticity model"),
+        wall_thickness=_length(reading, prim, "calm:flexible:wallThickness"),
+        section=_token(prim, "calm:flexible:section", _SECTION, "a section"),
+        geometry=_token(prim, "calm:flexible:geometry", _GEOMETRY, "a source of geometry"),
     )
+
+
+def _token(prim: Usd.Prim, name: str, allowed: tuple[str, ...], what: str) -> str:
+    value = str(schemas.value(prim, _SCHEMA, name))
+    if value not in allowed:
+        raise ShotError(
+            f"names {what} that does not exist",
+            path=prim.GetPath(),
+            attribute=name,
+            found=value,
+            remedy=f"{nearest(value, allowed)}Use one of {', '.join(allowed)}",
+        )
+    return value
 
 
 def _automatic(prim: Usd.Prim, name: str) -> float:
@@ -84,6 +94,8 @@ def _mesh_file(prim: Usd.Prim) -> str:
     asset = schemas.value(prim, _SCHEMA, name)
     if asset is None or not asset.path:
         return ""
+    for path in filter(None, (asset.path, asset.resolvedPath)):
+        refuse_place(path, str(prim.GetPath()), name)
     if asset.resolvedPath and os.path.exists(asset.resolvedPath):
         return str(asset.resolvedPath)
     raise ShotError(

@@ -78,7 +78,7 @@ def shapes_of(reading: Reading, body_prim: Usd.Prim, pose: Pose) -> list[Shape]:
             path=str(prim.GetPath()),
             points=placed,
             triangles=triangles,
-            color=_color(prim, reading.start),
+            color=color_of(prim, reading.start),
             visible=_is_visible(prim, reading.start, purposes) and not _is_copy(placed, triangles, shapes),
             displaced=len(placed) if writable else 0,
         )
@@ -222,7 +222,7 @@ def _is_copy(points: Array, triangles: IntArray, earlier: list[Shape]) -> bool:
     return False
 
 
-def _color(prim: Usd.Prim, time: float) -> tuple[float, float, float] | None:
+def color_of(prim: Usd.Prim, time: float) -> tuple[float, float, float] | None:
     """The display colour, else the diffuse colour of a preview surface; linear RGB."""
     from pxr import UsdGeom, UsdShade
 

@@ -1,0 +1,142 @@
+"""Pages of the reference that are made of the sources: schemas, commands, Python interface."""
+
+from __future__ import annotations
+
+import inspect
+import os
+import re
+import sys
+from pathlib import Path
+from typing import Any
+
+from mkdocs.structure.files import File, Files
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+def on_files(files: Files, config: Any) -> Files:
+    """Add the generated pages."""
+    sys.path.insert(0, str(ROOT / "pipeline"))
+    pages = {"schemas": schemas(), "commands": commands(), "python": python_interface()}
+    for name, content in pages.items():
+        files.append(File.generated(config, f"reference/{name}.md", content=content))
+    for video in sorted(ROOT.glob("samples/*/*.webp")):
+        files.append(File.generated(config, f"images/{video.name}", abs_src_path=str(video)))
+    return files
+
+
+def schemas() -> str:
+    """The attributes of the schemas, from the file that USD generates them of."""
+    from pxr import Sdf
+
+    layer = Sdf.Layer.FindOrOpen(str(ROOT / "usd_schemas" / "calmotion" / "schema.usda"))
+    lines = ["# Schemas", "", (ROOT / "docs" / "reference" / "schemas_head.txt").read_text().strip(), ""]
+    for prim in layer.rootPrims:
+        if not prim.name.startswith("Calm"):
+            continue
+        lines += [f"## {prim.name}", "", plain(prim.documentation), ""]
+        lines += ["| attribute | type | default | meaning |", "| --- | --- | --- | --- |"]
+        for attribute in prim.attributes:
+            lines.append(schema_row(attribute))
+        for relationship in prim.relationships:
+            lines.append(f"| `{relationship.name}` | relationship | | {cell(relationship.documentation)} |")
+        lines.append("")
+    return "\n".join(lines)
+
+
+def schema_row(attribute: Any) -> str:
+    """One attribute of a schema."""
+    default = attribute.default
+    if isinstance(default, float):
+        default = f"{default:.6g}"
+    shown = "" if default is None else f"`{default}`"
+    meaning = cell(attribute.documentation)
+    tokens = attribute.GetInfo("allowedTokens") if attribute.HasInfo("allowedTokens") else ()
+    if tokens:
+        meaning += " One of " + ", ".join(f"`{token}`" for token in tokens) + "."
+    return f"| `{attribute.name}` | {attribute.typeName} | {shown} | {meaning} |"
+
+
+def plain(text: str) -> str:
+    """A text of several lines on one."""
+    return " ".join(text.split())
+
+
+def cell(text: str) -> str:
+    """The same for a cell of a table."""
+    return plain(text).replace("|", "\\|")
+
+
+def commands() -> str:
+    """The help of each command, as it is printed."""
+    from calmotion.cli.main import build_parser
+
+    before = os.environ.get("COLUMNS")
+    os.environ["COLUMNS"] = "100"
+    try:
+        parser = build_parser()
+        lines = ["# Commands", "", "What `calmotion --help` and `calmotion COMMAND --help` print.", ""]
+        lines += ["```text", parser.format_help().rstrip(), "```", ""]
+        for name, command in subcommands(parser):
+            lines += [f"## calmotion {name}", "", "```text", command.format_help().rstrip(), "```", ""]
+            for action, inner in subcommands(command):
+                lines += [f"### calmotion {name} {action}", "", "```text", inner.format_help().rstrip(), "```", ""]
+    finally:
+        if before is None:
+            del os.environ["COLUMNS"]
+        else:
+            os.environ["COLUMNS"] = before
+    return "\n".join(lines)
+
+
+def subcommands(parser: Any) -> list[tuple[str, Any]]:
+    """The commands of a parser by name."""
+    return [
+        (name, command)
+        for action in parser._actions
+        if type(action).__name__ == "_SubParsersAction"
+        for name, command in action.choices.items()
+    ]
+
+
+def python_interface() -> str:
+    """Signatures and docstrings of what `calmotion` exports."""
+    import calmotion
+
+    lines = [
+        "# Python interface",
+        "",
+        "`import calmotion as cm`. The [tutorial](../tutorial_python.md) shows it at work.",
+        "",
+    ]
+    exported = [(name, getattr(calmotion, name)) for name in calmotion.__all__ if not name.startswith("_")]
+    for title, kind in (("Functions", inspect.isfunction), ("Classes", inspect.isclass)):
+        lines += [f"## {title}", ""]
+        for name, thing in exported:
+            if kind(thing):
+                lines += entry(name, thing, 3)
+    return "\n".join(lines)
+
+
+def entry(name: str, thing: Any, level: int) -> list[str]:
+    """A function or class with its docstring; of a class its public methods and properties as well."""
+    if isinstance(thing, property):
+        lines = [f"{'#' * level} {name}", "", "Property.", ""]
+    else:
+        lines = [f"{'#' * level} {name}", "", "```python", f"{name}{signature(thing)}", "```", ""]
+    text = inspect.getdoc(thing) or ""
+    lines += ["```text", text, "```", ""] if text else []
+    if inspect.isclass(thing):
+        for member, value in vars(thing).items():
+            public = not member.startswith("_") and (inspect.isfunction(value) or isinstance(value, property))
+            if public:
+                lines += entry(f"{name}.{member}", value, level + 1)
+    return lines
+
+
+def signature(thing: Any) -> str:
+    """Arguments without the quotes of annotations that are not evaluated."""
+    try:
+        return re.sub(r"'([^']*)'", r"\1", str(inspect.signature(thing)))
+    except (TypeError, ValueError):
+        return "(...)"

@@ -1,0 +1,30 @@
+"""What the machine lacks is an error for the user, not a fault of the program."""
+
+import errno
+
+import pytest
+from calmotion.errors import ShotError, failure_of_machine
+
+
+@pytest.mark.parametrize(
+    ("error", "problem"),
+    [
+        (MemoryError(), "not enough memory"),
+        (OSError(errno.ENOMEM, "Cannot allocate memory"), "not enough memory"),
+        (RuntimeError("can't start new thread"), "not enough memory"),
+        (ImportError("x.so: failed to map segment from shared object"), "not enough memory"),
+        (RuntimeError("Failed to write: No space left on device (os error 28)"), "a file cannot be"),
+        (OSError(errno.ENOSPC, "No space left on device", "calm.usda"), "a file cannot be"),
+        (PermissionError(errno.EACCES, "Permission denied", "calm.usda"), "a file cannot be"),
+    ],
+)
+def test_a_failure_of_the_machine_has_a_problem_and_a_remedy(error, problem):
+    found = failure_of_machine(error)
+    assert problem in found.problem and found.remedy
+    if isinstance(error, OSError) and error.filename:
+        assert found.path == "calm.usda" and found.found == error.strerror
+
+
+@pytest.mark.parametrize("error", [ValueError("x"), OSError("without a number"), ShotError("a shot"), ImportError("x")])
+def test_other_exceptions_are_none(error):
+    assert failure_of_machine(error) is None

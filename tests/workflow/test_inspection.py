@@ -1,0 +1,33 @@
+"""What an inspection says of a body."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from calmotion.cli.inspect_tables import _solid_row
+from calmotion.shot import Body, ElasticMaterial, FEMesh, FlexibleSettings, Frame
+from calmotion.shot.meshes import MeshQuality
+from calmotion.workflow.inspection import _body
+
+BODY = Body(
+    "/Arm/fore", Frame(np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0])), None,
+    flexible=FlexibleSettings(ElasticMaterial("/Looks/Plastic", 1.8e9, 0.35, 1200.0)),
+)  # fmt: skip
+QUALITY = MeshQuality(12.0, 8e-5, 2e-3, ("meshed the wrapped visual surface",), 0.013, 1.0, "wrapped visual surface")
+
+
+def test_a_meshed_body_says_what_its_solid_is_made_of_and_how_good_its_mesh_is():
+    report = _body(BODY, None, FEMesh(0, np.zeros((4, 3)), np.zeros((1, 4), np.int32), QUALITY), True)
+    assert report["solid"] == "wrapped visual surface" and report["solid_notes"] == list(QUALITY.repairs)
+    assert (report["volume_m3"], report["volume_error"], report["frequency_error"]) == (8e-5, 2e-3, 0.013)
+    assert _solid_row(report) == ["/Arm/fore", "wrapped visual surface", "80 cm³", "1.3%"]
+    unknown = replace(QUALITY, frequency_error=None)
+    mesh = FEMesh(0, np.zeros((4, 3)), np.zeros((1, 4), np.int32), unknown)
+    assert _solid_row(_body(BODY, None, mesh, True))[3] == "-"
+
+
+@pytest.mark.parametrize("body", [BODY, replace(BODY, flexible=None)])
+def test_a_body_without_a_mesh_has_no_solid(body):
+    assert "solid" not in _body(body, None, None, False)
