@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from calmotion.host.errors import SettingError
     from calmotion.shot.run import OutputPaths
     from calmotion.workflow.commands import inspect, optimize, rig, simulate, verify
-    from calmotion.workflow.export import Export, export
+    from calmotion.workflow.exporting.export import Export, export
     from calmotion.workflow.importing.robot import ImportedRobot, import_robot
     from calmotion.workflow.inspection import Inspection
     from calmotion.workflow.problems import Cancelled, RunError
@@ -57,7 +57,7 @@ _HOMES = {
     "host.errors": ("SettingError",),
     "shot.run": ("OutputPaths",),
     "workflow.commands": ("inspect", "optimize", "rig", "simulate", "verify"),
-    "workflow.export": ("Export", "export"),
+    "workflow.exporting.export": ("Export", "export"),
     "workflow.importing.robot": ("ImportedRobot", "import_robot"),
     "workflow.inspection": ("Inspection",),
     "workflow.problems": ("Cancelled", "RunError"),

@@ -7,7 +7,7 @@ from typing import ClassVar
 
 from calmotion.control.commands import CUBIC, HOLD, LINEAR, QUINTIC, Commands, MotorCurves
 from calmotion.host import Property, PropertyValues, registration
-from calmotion.workflow.command_format import CommandFormat
+from calmotion.workflow.exporting.command_format import CommandFormat
 
 
 class Ros2Trajectory(CommandFormat):

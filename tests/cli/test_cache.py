@@ -5,7 +5,7 @@ import json
 
 import numpy as np
 import pytest
-from calmotion.cli.commands.cache import readable, size
+from calmotion.cli.commands.setup.cache import readable, size
 from calmotion.cli.main import main
 from calmotion.support.caching.caches import store_arrays
 

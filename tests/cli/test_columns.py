@@ -3,7 +3,7 @@
 import json
 
 import pytest
-from calmotion.cli.commands.bench import BENCHMARKS
+from calmotion.cli.commands.setup.bench import BENCHMARKS
 from calmotion.support.naming import distinct_names
 from one_hinge import ONE_HINGE
 

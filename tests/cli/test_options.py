@@ -3,7 +3,7 @@
 import subprocess
 
 import pytest
-from calmotion.cli.commands.completion import SHELLS
+from calmotion.cli.commands.setup.completion import SHELLS
 from calmotion.cli.main import build_parser, main
 from calmotion.cli.options import KINDS, assignments
 from calmotion.shot import model_choice

@@ -5,20 +5,9 @@ from __future__ import annotations
 import sys
 from collections.abc import Sequence
 
-from calmotion.cli.commands import (
-    bench,
-    cache,
-    completion,
-    doctor,
-    export,
-    import_robot,
-    inspect,
-    materials,
-    optimize,
-    plugins,
-    rig,
-    simulate,
-)
+from calmotion.cli.commands.robots import import_robot, materials, rig
+from calmotion.cli.commands.setup import bench, cache, completion, doctor, plugins
+from calmotion.cli.commands.shots import export, inspect, optimize, simulate
 from calmotion.cli.parser import Parser, add_examples, overview
 from calmotion.cli.signals import as_interrupts, ignore
 from calmotion.errors import ShotError, failure_of_machine

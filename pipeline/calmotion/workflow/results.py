@@ -271,7 +271,7 @@ class SimulationResult:
         """
         from calmotion.control.commands import ExportRequest
         from calmotion.host import merge
-        from calmotion.workflow.controller_files import curves_of, format_named, write_commands
+        from calmotion.workflow.exporting.controller_files import curves_of, format_named, write_commands
         from calmotion.workflow.shot import read_settings
 
         format_named(self.shot.host, to)

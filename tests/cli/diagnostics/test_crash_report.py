@@ -65,7 +65,7 @@ def test_the_command_line_tells_in_one_line_where_the_report_lies(tmp_path, monk
     done = calmotion("cache", "info")
     (report,) = (tmp_path / "crashes").iterdir()
     assert done.returncode == 1 and str(report) in done.stderr and "Traceback" not in done.stderr
-    assert "IndexError" in report.read_text() and "calmotion/cli/commands/cache.py" in report.read_text()
+    assert "IndexError" in report.read_text() and "calmotion/cli/commands/setup/cache.py" in report.read_text()
 
 
 def test_a_fault_of_a_bundled_operator_is_reported_and_that_of_another_plugin_is_shown(tmp_path, monkeypatch):

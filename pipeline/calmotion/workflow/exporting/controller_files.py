@@ -13,7 +13,7 @@ from calmotion.shot import Animation, Character, Provenance, Result
 from calmotion.shot.curves import commanded_curves
 from calmotion.support.files import try_writing
 from calmotion.support.naming import distinct_names
-from calmotion.workflow.command_format import CommandFormat
+from calmotion.workflow.exporting.command_format import CommandFormat
 from calmotion.workflow.run import Outcome, again
 
 

@@ -40,7 +40,7 @@ def add_to(commands: Commands) -> None:
 
 def _action(name: str) -> Command:
     def act(args: argparse.Namespace, output: Output) -> int:
-        from calmotion.cli.commands import plugin_actions
+        from calmotion.cli.commands.setup import plugin_actions
 
         status: int = getattr(plugin_actions, name)(args, output)
         return status

@@ -55,7 +55,7 @@ def _rate(text: str) -> float:
 def _run(args: argparse.Namespace, output: Output) -> int:
     from calmotion.cli.output import FAILED, conclude
     from calmotion.cli.progress import ProgressDisplay
-    from calmotion.workflow.export import export, with_shot
+    from calmotion.workflow.exporting.export import export, with_shot
 
     args.shot = with_shot(args.shot)
     shot = opened_shot(args)

@@ -25,7 +25,7 @@ from calmotion.simulation.compiled_shot import CompiledShot
 from calmotion.simulation.playing.lowest_rate import lowest_rate
 from calmotion.simulation.playing.playback import Loss, Playback
 from calmotion.version import __version__
-from calmotion.workflow.controller_files import curves_of, format_named, write_commands
+from calmotion.workflow.exporting.controller_files import curves_of, format_named, write_commands
 from calmotion.workflow.results import SimulationResult
 from calmotion.workflow.run import Hooks, Outcome, Progress, carry_out
 from calmotion.workflow.shot import Given, Path, Shot, read_settings

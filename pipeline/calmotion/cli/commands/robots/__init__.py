@@ -1,0 +1,1 @@
+"""Commands that make shots: robots from files and characters, materials."""

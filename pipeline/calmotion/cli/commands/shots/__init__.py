@@ -1,0 +1,1 @@
+"""Commands on a shot: inspect, simulate, optimise, export."""

@@ -1,0 +1,1 @@
+"""Commands for controllers: written by formats that are plugins, read back and simulated."""
