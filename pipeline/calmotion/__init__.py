@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from calmotion.workflow.exporting.export import Export, export
     from calmotion.workflow.importing.robot import ImportedRobot, import_robot
     from calmotion.workflow.inspection import Inspection
+    from calmotion.workflow.installation.warmup import Warmup, warmup
     from calmotion.workflow.problems import Cancelled, RunError
     from calmotion.workflow.results import MotorMotion, OptimizationResult, RobotMotion, SimulationResult, TargetMotion
     from calmotion.workflow.run import Progress
@@ -42,6 +43,7 @@ __all__ = [
     "ShotError",
     "SimulationResult",
     "TargetMotion",
+    "Warmup",
     "__version__",
     "export",
     "import_robot",
@@ -51,6 +53,7 @@ __all__ = [
     "rig",
     "simulate",
     "verify",
+    "warmup",
 ]
 
 _HOMES = {
@@ -60,6 +63,7 @@ _HOMES = {
     "workflow.exporting.export": ("Export", "export"),
     "workflow.importing.robot": ("ImportedRobot", "import_robot"),
     "workflow.inspection": ("Inspection",),
+    "workflow.installation.warmup": ("Warmup", "warmup"),
     "workflow.problems": ("Cancelled", "RunError"),
     "workflow.results": ("MotorMotion", "OptimizationResult", "RobotMotion", "SimulationResult", "TargetMotion"),
     "workflow.run": ("Progress",),

@@ -6,7 +6,7 @@ import sys
 from collections.abc import Sequence
 
 from calmotion.cli.commands.robots import import_robot, materials, rig
-from calmotion.cli.commands.setup import bench, cache, completion, doctor, plugins
+from calmotion.cli.commands.setup import bench, cache, completion, doctor, plugins, warmup
 from calmotion.cli.commands.shots import export, inspect, optimize, simulate
 from calmotion.cli.parser import Parser, add_examples, overview
 from calmotion.cli.signals import as_interrupts, ignore
@@ -85,6 +85,7 @@ def build_parser() -> Parser:
         materials,
         bench,
         plugins,
+        warmup,
         cache,
         doctor,
         completion,

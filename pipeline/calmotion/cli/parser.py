@@ -51,6 +51,7 @@ EXAMPLES: dict[str, tuple[tuple[str, str], ...]] = {
     "materials": (("calmotion materials abs", "one material, with its source"),),
     "rig": (("calmotion rig skinned.usda -o robot.usda", "a robot from a UsdSkel character"),),
     "bench": (("calmotion bench work-precision", "error against run time of every setting"),),
+    "warmup": (("calmotion warmup", "after an installation or an update"),),
     "doctor": (("calmotion doctor", "is everything in its place?"),),
     "cache": (("calmotion cache info", "how large are the caches?"),),
     "completion": (("calmotion completion bash", "source it in your shell"),),

@@ -1,0 +1,40 @@
+"""Compiling ahead of the first shot."""
+
+import json
+import os
+
+import calmotion as cm
+import pytest
+from calmotion.errors import ShotError
+from calmotion.workflow.installation import warmup as module
+
+
+def test_a_warm_installation_compiles_nothing_again_and_counts_its_kernels(calmotion):
+    first = cm.warmup()
+    assert first.kernels > 100 and first.wall_s > 0.0
+    done = calmotion("warmup", "--json")
+    again = json.loads(done.stdout)
+    assert done.returncode == 0 and again["compiled"] == 0 and again["kernels"] == first.kernels
+    assert again["folder"] == first.folder
+
+
+def test_the_report_says_that_there_is_nothing_to_compile(calmotion):
+    assert calmotion("warmup").stdout.startswith("nothing to compile in ")
+
+
+def test_kernels_that_cannot_be_kept_are_an_error(tmp_path, monkeypatch):
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "nothing is written here"))  # kernels are loaded already
+    with pytest.raises(ShotError, match="cannot be kept") as error:
+        module.warmup()
+    assert "CALMOTION_CACHE" in str(error.value)
+
+
+@pytest.mark.long
+def test_a_search_compiles_nothing_after_it(calmotion_process, repository, tmp_path):
+    environment = {"CALMOTION_CACHE": str(tmp_path / "cache")}
+    made = json.loads(calmotion_process("warmup", "--json", env=os.environ | environment).stdout)
+    assert made["compiled"] == made["kernels"] > 100
+    shot = repository / "samples" / "bartender" / "bartender.usda"
+    calmotion_process("optimize", shot, "-o", tmp_path / "calm.usda", env=os.environ | environment)
+    after = sum(1 for _ in (tmp_path / "cache").rglob("*.nbc"))
+    assert after == made["kernels"]
