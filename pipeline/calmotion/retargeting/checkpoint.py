@@ -101,6 +101,7 @@ class Checkpoint:
             return
         values: dict[str, Any] = {
             "x": search.x, "breaks": breaks, "p": search.recycled.p, "Hp": search.recycled.Hp,
+            "sharpened": search.sharpened,
             "history": np.array([astuple(iterate) for iterate in search.history], float),
         }  # fmt: skip
         state: dict[str, object] = {
@@ -147,7 +148,8 @@ def _check_kinds(values: dict[str, np.ndarray], state: dict[str, Any], limits: L
         ValueError: An array or a number is of another kind.
         KeyError, TypeError: It is missing.
     """
-    arrays = {"x": 1, "p": 2, "Hp": 2, "history": 2 if values["history"].size else values["history"].ndim}
+    arrays = {"x": 1, "sharpened": 1, "p": 2, "Hp": 2}
+    arrays["history"] = 2 if values["history"].size else values["history"].ndim
     arrays |= {name: values[name].ndim for name in values if name.startswith("limit ")}
     for name, axes in arrays.items():
         if values[name].dtype != np.float64 or values[name].ndim != axes:
@@ -156,15 +158,18 @@ def _check_kinds(values: dict[str, np.ndarray], state: dict[str, Any], limits: L
     if breaks.dtype.kind != "i" or breaks.ndim != 1 or len(breaks) < 2:
         raise ValueError("its knots are no frames")
     counts = ["evaluations", "gradients", "products", *(["stalled"] if limits is not None else [])]
-    numbers = ["radius", *(["rho", "left", "reached"] if limits is not None else [])]
+    sizes = ["radius", *(["rho", "left"] if limits is not None else [])]
+    # limits that are kept are exceeded by less than 0
+    numbers = ["merit", *(["reached"] if limits is not None else [])]
     for name in counts:
         if type(state[name]) is not int or state[name] < 0:
             raise ValueError(f"{name} is no count")
-    for name in numbers:
+    for name in sizes:
         if type(state[name]) not in (int, float) or not state[name] >= 0.0:
             raise ValueError(f"{name} is no size")
-    if type(state["merit"]) not in (int, float):
-        raise ValueError("merit is no number")
+    for name in numbers:
+        if type(state[name]) not in (int, float) or np.isnan(state[name]):
+            raise ValueError(f"{name} is no number")
     if type(state["reason"]) is not str or (limits is not None and type(state["on"]) is not bool):
         raise ValueError("its state is of another kind")
 
@@ -184,8 +189,8 @@ def _stored(values: dict[str, np.ndarray], state: dict[str, Any], limits: LimitT
     rows = values["history"].tolist()
     history = tuple(Iterate(row[0], row[1], row[2], int(row[3]), int(row[4])) for row in rows)
     search = Search(
-        x, state["radius"], Recycled(p, Hp), history, state["evaluations"], state["gradients"], state["products"],
-        state["reason"],
+        x, state["radius"], Recycled(p, Hp), values["sharpened"], history, state["evaluations"], state["gradients"],
+        state["products"], state["reason"],
     )  # fmt: skip
     kept: dict[str, Any] = {}
     if limits is not None:

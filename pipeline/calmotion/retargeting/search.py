@@ -35,7 +35,7 @@ from calmotion.simulation.simulate import Progress
 from calmotion.support import interrupts
 
 WORTH = SEARCH_SHARE  # of the tolerance: a smaller predicted gain ends the search
-MISSED = 0.01  # share of the tolerance that changes in the inactive intervals may gain together
+MISSED = 0.5 * WORTH  # share of the tolerance that changes in the inactive intervals may gain together
 
 
 @dataclass(eq=False)

@@ -9,11 +9,12 @@ from calmotion.multibody.integrators.simulation import simulate_from
 from calmotion.multibody.integrators.workspace import Workspace
 from calmotion.multibody.model.model import Model
 from calmotion.multibody.sensitivity.adjoint import adjoint
+from calmotion.multibody.sensitivity.block_tangent import block_tangent, can_be_blocked
 from calmotion.multibody.sensitivity.continuous_adjoint import continuous_adjoint
 from calmotion.multibody.sensitivity.linearization import Linearization, linearize
 from calmotion.multibody.sensitivity.periodic import Monodromy, periodic_adjoint, periodic_tangent
 from calmotion.multibody.sensitivity.tangent import tangent
-from calmotion.shot.character import Array
+from calmotion.shot.character import Array, IntArray
 from calmotion.simulation.cyclic import SteadyState
 from calmotion.simulation.forward import ForwardRun, followed, run_forward
 from calmotion.simulation.inputs.delays import CommandDelay
@@ -142,6 +143,38 @@ class Simulator:
         else:
             found = periodic_adjoint(self._linearization, self._monodromy, *given)
         return self._on_curves(*found)
+
+    def can_be_blocked(self) -> bool:
+        """Whether it is linearised so that `responses` works."""
+        return self._linearization is not None and self._monodromy is None and can_be_blocked(self._linearization)
+
+    def responses(
+        self, values: Array, rates: Array, coupling: Array, component: IntArray, jacobian: Array
+    ) -> tuple[int, Array]:
+        """Changes of quantities by many curves at once.
+
+        Args:
+            values, rates: Curves, shape [T, F].
+            coupling: Of each motor with each of m unknowns, shape [M, m]: each curve is tried with each of these.
+            component, jacobian: The quantities, as of `block_tangent`.
+
+        Returns:
+            The first instant at which anything changes, and the changes from there on, shape [T - first, r, F m].
+        """
+        assert self._linearization is not None
+        columns = [self._joint_columns(*curve, coupling) for curve in zip(values.T, rates.T, strict=True)]
+        angles, speeds = (np.concatenate([column[k] for column in columns], axis=2) for k in (0, 1))
+        acts = np.any(angles, axis=(1, 2)) | np.any(speeds, axis=(1, 2))
+        first = max(self._linearization.windows()[0][0], int(np.argmax(acts)))
+        found = block_tangent(self._linearization, first, angles[first:], speeds[first:], component, jacobian)
+        return first, found
+
+    def _joint_columns(self, values: Array, rates: Array, coupling: Array) -> tuple[Array, Array]:
+        """What the joints follow by one curve of shape [T] with each unknown, shape [T, J, m]."""
+        motors = np.ones((1, len(coupling)))
+        late = CommandDelay(self.model.delays, self.h, False).apply(values[:, None] * motors, rates[:, None] * motors)
+        angles, speeds = (self.model.joint_angles(part[:, None] * coupling.T) for part in late)
+        return angles.transpose(0, 2, 1), speeds.transpose(0, 2, 1)
 
     def continuous_adjoint(self, run: ForwardRun, gradient: Array) -> tuple[Array, Array]:
         """The same by the continuous adjoint, with a linearisation of its own, of a shot that plays once."""

@@ -10,6 +10,8 @@ class Problem:
     """A nonlinear least-squares problem with a known Jacobian: r = A x + 0.1 (B x)^2 - b."""
 
     limits_act = False
+    patience = None
+    sharpened_at = np.zeros(0)
 
     def __init__(self, seed=0, rows=12, columns=5, quadratic=0.1):
         rng = np.random.default_rng(seed)
@@ -124,3 +126,45 @@ def test_products_of_one_system_precondition_the_next():
     assert np.allclose(dense, dense.T, atol=1e-8 * np.abs(dense).max()) and np.linalg.eigvalsh(dense).min() > 0.0
     second = conjugate_gradients(lambda d: (H + 1e-3 * np.eye(30)) @ d, g, inverse, np.inf, 1e-6, 0.0, 40)
     assert len(second.p) < 0.7 * len(first.p)
+
+
+class Sharpened(Problem):
+    """A problem whose first preconditioner is poor, and that can be preconditioned with its matrix at a point."""
+
+    def __init__(self, pays_from, rows=60, columns=40):
+        super().__init__(7, rows, columns, 0.02)
+        self.b *= 3.0
+        self.A *= np.geomspace(1.0, 30.0, columns)
+        self.pays_from, self.inverse, self.sharpened_at, self.products = pays_from, None, np.zeros(0), 0
+
+    @property
+    def patience(self):
+        return None if np.array_equal(self.sharpened_at, self.x) else self.pays_from
+
+    def sharpen(self):
+        self.inverse, self.sharpened_at = np.linalg.inv(self.J.T @ self.J), self.x
+
+    def product(self, direction):
+        self.products += 1
+        return super().product(direction)
+
+    def precondition(self, fixed):
+        return (lambda r: r) if self.inverse is None else (lambda r: self.inverse @ r)
+
+
+def test_a_better_preconditioner_is_made_where_systems_take_long():
+    fixed, start = np.zeros(40, bool), Search.start(np.zeros(40))
+    plain, sharpened = Sharpened(None), Sharpened(8)
+    before, after = (minimize(problem, start, fixed, 1e-9) for problem in (plain, sharpened))
+    assert after.reason == before.reason == "converged"
+    assert np.allclose(after.x, before.x, atol=1e-4) and after.products < 0.7 * before.products
+    assert len(before.sharpened) == 0 and np.array_equal(after.sharpened, sharpened.sharpened_at)
+
+
+def test_a_sharpened_search_resumes_with_the_same_result():
+    fixed, kept = np.zeros(40, bool), []
+    whole = minimize(Sharpened(8), Search.start(np.zeros(40)), fixed, 1e-9, on_iterate=kept.append)
+    assert any(len(search.sharpened) for search in kept)
+    for search in kept:
+        again = minimize(Sharpened(8), search, fixed, 1e-9)
+        assert np.array_equal(again.x, whole.x) and len(again.history) == len(whole.history)

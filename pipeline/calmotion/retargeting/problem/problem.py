@@ -15,6 +15,7 @@ from calmotion.retargeting.problem.limits import LimitTerms
 from calmotion.retargeting.problem.offset_basis import OffsetBasis
 from calmotion.retargeting.problem.offset_space import OffsetSpace
 from calmotion.retargeting.problem.parallel import in_parallel
+from calmotion.retargeting.problem.response_gram import products_worth, response_gram
 from calmotion.retargeting.problem.rigid_approximation import (
     EFFORT,
     effort_of,
@@ -23,6 +24,7 @@ from calmotion.retargeting.problem.rigid_approximation import (
     rigid_response,
 )
 from calmotion.retargeting.problem.robot import Robot
+from calmotion.retargeting.solver.dense_preconditioner import DensePreconditioner
 from calmotion.retargeting.solver.preconditioner import RigidPreconditioner
 from calmotion.shot.character import Array, BoolArray, IntArray
 from calmotion.simulation.forward import ForwardRun, limited_values
@@ -58,7 +60,9 @@ class RetargetProblem:
         self._continuous = continuous
         self._limited: dict[str, Array] | None = None
         self.x = self._linearized_x = np.zeros(0)  # points evaluated and linearised last
-        self._preconditioner: RigidPreconditioner | None = None
+        self._preconditioner: RigidPreconditioner | DensePreconditioner | None = None
+        self._sharpened_x = np.zeros(0)  # point of the preconditioner's responses; empty for that of the rigid robot
+        self._held = 0  # instant before which curves are fixed
         self._response: RigidResponse | None = None
         # twice the objective of an error of one metre at every instant
         self._unit = max(float(np.sum(objective.weights**2)) / max(1, 3 * len(model.targets.component)), 1e-300)
@@ -88,7 +92,7 @@ class RetargetProblem:
             x: The same point in coefficients of the new basis.
         """
         other = self._copy()
-        other.space, other._preconditioner = self.space.on_basis(basis), None
+        other.space, other._preconditioner, other._sharpened_x = self.space.on_basis(basis), None, np.zeros(0)
         other.x = x
         other._linearized_x = np.zeros(0)
         return other
@@ -102,6 +106,7 @@ class RetargetProblem:
         other = self._copy()
         other.space = replace(self.space, motors=motors, coupling=coupling)
         other.limits, other._response, other._preconditioner = None, None, None
+        other._sharpened_x = np.zeros(0)
         other.x = np.zeros(other.space.size)
         return other
 
@@ -158,6 +163,10 @@ class RetargetProblem:
         """Keep the motor curves before an instant fixed from now on: see `Simulator.hold`."""
         for robot in self.robots:
             robot.simulator.hold(first)
+        if first < self._held and len(self._sharpened_x):
+            # responses from a later instant on say nothing of the coefficients that are free from now on
+            self._preconditioner, self._sharpened_x = None, np.zeros(0)
+        self._held = first
 
     def forget(self) -> None:
         """The next point is simulated from the start of the shot."""
@@ -256,7 +265,7 @@ class RetargetProblem:
         return self.vjp(residuals, changes) + self.penalty_gradient(direction)
 
     def precondition(self, fixed: BoolArray, values: dict[str, Array] | None = None) -> Callable[[Array], Array]:
-        """The rigid robot's Gauss-Newton matrix, inverted over the entries that are not fixed.
+        """The rigid robot's Gauss-Newton matrix, or that of `sharpen`, inverted over the entries that are not fixed.
 
         Args:
             values: Limited quantities, which say which limits act; None: at the point evaluated last.
@@ -271,6 +280,24 @@ class RetargetProblem:
             curvatures = {name: acting.curvature(name, v) for name, v in (values or self.limited).items()}
         self._preconditioner.factor(fixed, limit_metrics(response.inertia, self.space, curvatures))
         return self._preconditioner.solve
+
+    @property
+    def patience(self) -> int | None:
+        """Number of products of one system from which `sharpen` pays; None where it is of no use here."""
+        if np.array_equal(self._sharpened_x, self.x):
+            return None
+        return products_worth(self.robots, self.space)
+
+    @property
+    def sharpened_at(self) -> Array:
+        """The point at which `sharpen` was called last; empty if it was not."""
+        return self._sharpened_x
+
+    def sharpen(self) -> None:
+        """Precondition with the Gauss-Newton matrix of the flexible robots where they are linearised, from now on."""
+        gram = response_gram(self.robots, self.space)
+        self._preconditioner = DensePreconditioner(gram, self.space.penalty, self.space.basis.wraps)
+        self._sharpened_x = self.x
 
     def damped(self, ratio: float, frequency: float) -> RetargetProblem:
         """The same problem without limits on a robot with more damping, see `model.with_damping`."""

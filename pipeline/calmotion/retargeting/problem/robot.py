@@ -36,6 +36,11 @@ class Robot:
         assert self._run is not None
         return self._run
 
+    @property
+    def jacobian(self) -> Array:
+        """Weighted residuals by their component's coordinates where it was linearised last, shape [T, K, 6, N]."""
+        return self._jacobian
+
     def perform(self, angles: Array, rates: Array) -> None:
         """Simulate motor curves of shape [T, M]; `residuals` are then the weighted errors, shape [T, K, 6].
 

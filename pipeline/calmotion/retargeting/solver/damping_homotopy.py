@@ -44,4 +44,4 @@ def damping_homotopy(problem: RetargetProblem, start: Array, fixed: BoolArray, f
         reached, before = problem.value(x), problem.value(start)
         evaluations += 2
         x = x if reached < before else start
-    return Search(x, np.inf, Recycled.none(len(x)), (), evaluations, gradients, products)
+    return Search(x, np.inf, Recycled.none(len(x)), evaluations=evaluations, gradients=gradients, products=products)

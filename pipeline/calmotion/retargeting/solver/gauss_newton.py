@@ -38,6 +38,17 @@ class LeastSquares(LimitedProblem, Protocol):
     def merit(self) -> float:
         """The merit at the point evaluated last, as it is now."""
 
+    @property
+    def patience(self) -> int | None:
+        """Number of products of one system from which `sharpen` pays; None where it is of no use here."""
+
+    def sharpen(self) -> None:
+        """Make the preconditioner better, where the problem is linearised."""
+
+    @property
+    def sharpened_at(self) -> Array:
+        """The point at which `sharpen` was called last; empty if it was not."""
+
     def gain(self, decrease: float, value: float) -> float:
         """Decrease of the root-mean-square error that corresponds to a decrease of the merit [m]."""
 
@@ -71,6 +82,8 @@ class Search:
         radius: Of the trust region.
         recycled: Search directions of earlier linear systems.
         history: Iterates so far, first the start.
+        sharpened: Point of the problem's preconditioner (`LeastSquares.sharpen`), shape [n]; empty for the first one,
+            and of another size where the unknowns have changed since.
         evaluations, gradients, products: Counts.
         reason: Why it ended; empty while it runs.
     """
@@ -78,6 +91,7 @@ class Search:
     x: Array
     radius: float
     recycled: Recycled
+    sharpened: Array = field(default_factory=lambda: np.zeros(0))
     history: tuple[Iterate, ...] = ()
     evaluations: int = 0
     gradients: int = 0
@@ -134,11 +148,17 @@ def minimize(
     """
     calls = _Counter(problem, search.evaluations, search.gradients, search.products, fixed)
     x, radius, recycled, history = search.x, search.radius, search.recycled, list(search.history)
+    eager = len(search.sharpened) > 0
+    if len(search.sharpened) == len(x) and not np.array_equal(search.sharpened, problem.sharpened_at):
+        calls.value(search.sharpened)  # a resumed search
+        calls.gradient()
+        problem.sharpen()
     value = calls.value(x)
 
     def here(reason: str = "") -> Search:
         return Search(
-            x, radius, recycled, tuple(history), calls.evaluations, calls.gradients, calls.products, reason
+            x, radius, recycled, problem.sharpened_at, tuple(history), calls.evaluations, calls.gradients,
+            calls.products, reason,
         )  # fmt: skip
 
     while True:
@@ -149,12 +169,13 @@ def minimize(
         norm = float(np.linalg.norm(gradient))
         enough = problem.merit_of_gain(gain)
         if problem.limits_act:
+            if (patience := problem.patience) is not None and _last_products(history) > patience:
+                problem.sharpen()
             limited = limited_step(problem, fixed, SHARE, enough, max_products)
             calls.products += limited.products
             value, predicted = problem.merit(), limited.predicted(1.0)
         else:
-            inverse = recycled.inverse(problem.precondition(fixed))
-            path = conjugate_gradients(calls.product, gradient, inverse, radius, SHARE, enough, max_products)
+            path = _path(problem, calls, gradient, recycled, radius, enough, max_products, eager)
             recycled = recycled.followed_by(path.p, path.Hp, PAIRS)
             _, predicted, _ = path.within(radius)
         expected = problem.gain(predicted, value)
@@ -177,6 +198,34 @@ def minimize(
         x, value, radius = better
         if on_iterate is not None:
             on_iterate(here())
+
+
+def _last_products(history: list[Iterate]) -> int:
+    """Products of the last linear system."""
+    counts = [0, *(iterate.products for iterate in history)]
+    return counts[-1] - counts[-2] if history else 0
+
+
+def _path(
+    problem: LeastSquares, calls: _Counter, gradient: Array, recycled: Recycled, radius: float, enough: float,
+    max_products: int, eager: bool,
+) -> Path:  # fmt: skip
+    """Conjugate gradients; if they take long, again with a better preconditioner.
+
+    Args:
+        eager: Whether the first preconditioner has failed already.
+    """
+    patience = problem.patience
+    if eager and patience is not None and not len(problem.sharpened_at):
+        problem.sharpen()
+        patience = None
+    for limit in (max_products if patience is None else min(patience, max_products), max_products):
+        inverse = recycled.inverse(problem.precondition(calls.fixed))
+        path = conjugate_gradients(calls.product, gradient, inverse, radius, SHARE, enough, limit)
+        if len(path.p) < limit or limit == max_products:
+            break
+        problem.sharpen()
+    return path
 
 
 def _limited_step(calls: _Counter, x: Array, value: float, limited: LimitedStep) -> tuple[Array, float, float] | None:

@@ -1,0 +1,74 @@
+"""The Gauss-Newton matrix of flexible robots from their responses to all unknowns: a preconditioner for later ones.
+
+The rigid robot's matrix knows neither the vibration that an offset leaves nor what it does where many motors move few
+targets; there a system takes a hundred products. The responses to all unknowns, many at once, cost as much as some
+twenty products, and their matrix serves for many iterations: it hardly changes with the curves.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from calmotion.multibody.sensitivity.linearization import spare_memory
+from calmotion.retargeting.problem.offset_space import OffsetSpace
+from calmotion.retargeting.problem.parallel import in_parallel
+from calmotion.retargeting.problem.robot import Robot
+from calmotion.shot.character import Array, IntArray
+
+COST = 1 / 64  # of a response, in products: half of the instants, at a sixteenth of the time of a sweep
+LEAST = 8  # products: the matrix is not made for less
+_BLOCK = 64  # responses at once
+_LARGEST = 6000  # unknowns: the factor takes seconds
+_SHARE = 0.5  # of the memory for a linearisation
+
+
+def products_worth(robots: Sequence[Robot], space: OffsetSpace) -> int | None:
+    """Number of products that the matrix costs; None where it cannot be made, or not be stored."""
+    rows = sum(len(robot.residuals) * len(_rows(robot)[0]) for robot in robots[:1])
+    memory = 8.0 * space.size * (rows + 3 * space.size)
+    blocked = all(robot.simulator.can_be_blocked() for robot in robots)
+    if not blocked or space.size > _LARGEST or memory > _SHARE * spare_memory():
+        return None
+    return max(LEAST, round(COST * space.size))
+
+
+def response_gram(robots: Sequence[Robot], space: OffsetSpace) -> Array:
+    """Matrix of the squared weighted residuals of all robots, linearised where they are, shape [n, n].
+
+    Args:
+        robots: Whose linearisations can be blocked.
+        space: The n unknowns.
+    """
+    gram = np.zeros((space.size, space.size))
+    for robot in robots:
+        responses = _responses(robot, space)
+        gram += responses.T @ responses
+    return gram
+
+
+def _responses(robot: Robot, space: OffsetSpace) -> Array:
+    """Changes of the weighted residuals that are not always zero, by all unknowns, shape [T r, n]."""
+    component, jacobian = _rows(robot)
+    motors, basis = len(space.motors), space.basis
+    values, rates = basis.values.tocsc(), basis.rates.tocsc()
+    made = np.zeros((len(jacobian), len(component), space.size))
+    step = max(1, _BLOCK // max(motors, 1))
+
+    def fill(start: int) -> None:
+        functions = slice(start, min(start + step, basis.count))
+        curves = values[:, functions].toarray(), rates[:, functions].toarray()
+        first, found = robot.simulator.responses(*curves, space.coupling, component, jacobian)
+        made[first:, :, functions.start * motors : functions.stop * motors] = found
+
+    in_parallel(fill, range(0, basis.count, step))
+    return made.reshape(-1, space.size)
+
+
+def _rows(robot: Robot) -> tuple[IntArray, Array]:
+    """The component and the derivatives of each residual that is not always zero, shapes [r] and [T, r, N]."""
+    jacobian = robot.jacobian
+    target, row = np.nonzero(np.any(jacobian, axis=(0, 3)))
+    component = np.asarray(robot.model.targets.component)[target].astype(np.int32)
+    return component, np.ascontiguousarray(jacobian[:, target, row])

@@ -1,0 +1,60 @@
+"""A dense approximation of the Gauss-Newton matrix as a preconditioner."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.linalg import cho_factor, cho_solve
+from scipy.sparse import csr_matrix, identity, kron
+
+from calmotion.retargeting.solver.preconditioner import BandedGram
+from calmotion.shot.character import Array, BoolArray
+
+_LEAST = 1e-12  # of the largest diagonal entry, added to all: the factor exists for directions that move no target
+
+
+class DensePreconditioner:
+    """Cholesky factor of a matrix over all unknowns, plus the terms of the limits.
+
+    Args:
+        gram: Matrix of the squared residuals, shape [P * m, P * m].
+        penalty: Matrix of the regulariser for one motor, shape [P, P].
+        wraps: Whether the functions are periodic.
+    """
+
+    def __init__(self, gram: Array, penalty: csr_matrix, wraps: bool):
+        motors = len(gram) // penalty.shape[0]
+        self._shape = penalty.shape[0], motors, wraps
+        self._matrix = gram + kron(penalty, identity(motors)).toarray()
+
+    def factor(self, fixed: BoolArray, terms: list[tuple[csr_matrix, Array]] | None = None) -> None:
+        """Factorise with the unknowns where `fixed` (shape [P * m], bool) is true excluded.
+
+        Args:
+            terms: As of `RigidPreconditioner.factor`.
+        """
+        matrix = self._matrix.copy()
+        if terms:
+            gram = BandedGram(*self._shape)
+            for basis, metric in terms:
+                gram.add(basis, metric)
+            _add_banded(gram, matrix)
+        matrix[fixed, :] = 0.0
+        matrix[:, fixed] = 0.0
+        diagonal = np.einsum("ii->i", matrix)
+        diagonal += _LEAST * float(np.max(diagonal))
+        diagonal[fixed] = 1.0
+        self._factor = cho_factor(matrix, lower=True, overwrite_a=True, check_finite=False)
+
+    def solve(self, x: Array) -> Array:
+        """The factor's inverse applied to a vector of shape [P * m]."""
+        return np.asarray(cho_solve(self._factor, x, check_finite=False))
+
+
+def _add_banded(gram: BandedGram, matrix: Array) -> None:
+    """Add a banded matrix to a dense one, both triangles."""
+    order, banded = gram.order, gram.banded()
+    for d, band in enumerate(banded):
+        rows, columns = order[d:], order[: len(order) - d]
+        matrix[rows, columns] += band[: len(columns)]
+        if d:
+            matrix[columns, rows] += band[: len(columns)]
