@@ -18,7 +18,7 @@ from calmotion.retargeting.problem.robot import Robot
 from calmotion.shot.character import Array, IntArray
 
 COST = 1 / 64  # of a response, in products: half of the instants, at a sixteenth of the time of a sweep
-LEAST = 8  # products: the matrix is not made for less
+LEAST = 24  # products: the matrix is not made for less; few robots need its kernels, which take seconds to compile
 _BLOCK = 64  # responses at once
 _LARGEST = 6000  # unknowns: the factor takes seconds
 _SHARE = 0.5  # of the memory for a linearisation
