@@ -24,7 +24,7 @@ class WriteResult(Operator):
     requires = (Character, Animation, Provenance, Result, OutputPaths)
     uses = (Source,)
     provides = (WrittenLayer,)
-    checks = (Character, Animation, Source)
+    checks = (Character, Animation, Source, OutputPaths)
     properties = (
         Property(
             "samples_per_second",
@@ -55,8 +55,11 @@ class WriteResult(Operator):
 
     def check(self, context: RunContext) -> None:
         """Options that fit each other and the motors whose curves may change."""
-        from calmotion.usd.writing import motors_that_may_change, refuse_bake, refuse_options
+        from calmotion.usd.writing import motors_that_may_change, refuse_bake, refuse_foreign_root, refuse_options
 
+        paths = context.get(OutputPaths)
+        if paths is not None and paths.layer is not None:
+            refuse_foreign_root(paths.layer)
         source, character, animation = context.get(Source), context.get(Character), context.get(Animation)
         searches = source is not None and source.command == "optimize"
         seconds = float(animation.frame_times[-1]) if len(animation.frame_times) else 0.0

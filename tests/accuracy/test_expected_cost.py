@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from calmotion.accuracy.expected_cost import ExpectedCost, expected_cost, readable_hours, refuse_unaffordable
 from calmotion.errors import ShotError
+from calmotion.shot.robust.settings import RobustSettings
 from calmotion.shot.run import RunSettings
 
 
@@ -45,5 +46,33 @@ def test_the_arm_is_affordable_and_a_year_of_it_is_not(arm, animation):
 
 def test_hours_are_readable():
     assert [readable_hours(hours) for hours in (0.001, 0.5, 3.2, 47.0, 100.0)] == [
-        "a minute", "30 minutes", "3 hours", "47 hours", "4 days",
+        "less than a minute", "30 minutes", "3 hours", "47 hours", "4 days",
     ]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("options", "cause", "remedy"),
+    [
+        (RunSettings(step=1e-9), "--step", "Use a longer --step"),
+        (RunSettings(pre_roll=1e6), "--pre-roll", "Use a shorter --pre-roll"),
+        (RunSettings(), "endTimeCode", "Shorten the shot"),
+    ],
+)
+def test_the_option_that_costs_so_much_is_named(arm, animation, options, cause, remedy):
+    with pytest.raises(ShotError) as error:
+        refuse_unaffordable(expected_cost(arm, animation, options, False), arm.path, 24.0, 1e3)
+    assert error.value.attribute == cause and error.value.remedy.startswith(remedy)
+
+
+def test_a_time_step_of_the_shot_is_named_as_such(arm, animation):
+    fine = dataclasses.replace(arm, retarget=dataclasses.replace(arm.retarget, time_step=1e-8))
+    with pytest.raises(ShotError) as error:
+        refuse_unaffordable(expected_cost(fine, animation, RunSettings(), False), arm.path, 24.0, 1e3)
+    assert error.value.attribute == "calm:retarget:timeStep"
+
+
+def test_a_search_for_many_robots_costs_as_many_searches(arm, animation):
+    one = expected_cost(arm, animation, RunSettings(), True)
+    many = expected_cost(arm, animation, RunSettings(robust=RobustSettings("worst", 99_999, 200)), True)
+    assert many.hours > 9e4 * one.hours and many.memory > 1e4 * one.memory
+    assert readable_hours(1e-9) == "less than a minute"

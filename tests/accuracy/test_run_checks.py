@@ -24,3 +24,14 @@ def test_a_motor_that_turns_too_fast_for_the_shortest_step_is_refused(arm, anima
     fast = dataclasses.replace(animation, tracks=(jump, animation.tracks[1]), current=animation.tracks)
     with pytest.raises(ShotError, match="/Arm/Shoulder"):
         check_simulation(arm, fast, options)
+
+
+@pytest.mark.parametrize("step", [5.0, 1e6])
+def test_a_step_that_is_longer_than_the_shot_is_refused(arm, animation, step):
+    with pytest.raises(ShotError, match="longer than the shot") as error:
+        check_simulation(arm, animation, RunSettings(step=step))
+    assert error.value.attribute == "--step" and "5ms" in error.value.remedy
+    authored = dataclasses.replace(arm, retarget=dataclasses.replace(arm.retarget, time_step=step))
+    with pytest.raises(ShotError) as error:
+        check_simulation(authored, animation, RunSettings())
+    assert error.value.attribute == "calm:retarget:timeStep"

@@ -64,3 +64,30 @@ def test_a_tolerance_needs_a_unit(text, capsys):
 @pytest.mark.parametrize("text, meters", [("1mm", 1e-3), ("1 cm", 1e-2), ("1e-3m", 1e-3)])
 def test_a_tolerance_with_a_unit_is_in_metres(text, meters):
     assert build_parser().parse_args(["simulate", "a.usda", "--tolerance", text]).tolerance == meters
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [("1mm1", "is not a number"), ("", "is not a number"), ("mm", "is not a number"), ("1MM", "Did you mean mm?")],
+)
+def test_what_is_no_length_is_not_said_to_lack_a_unit(text, told, capsys):
+    assert main(["simulate", "a.usda", "--tolerance", text]) == 2
+    said = " ".join(capsys.readouterr().err.split())
+    assert told in said and "has no unit" not in said
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        (["export", "a.usda", "--to", "csv", "--rate", "0"], "0 is not 1 to 100000 commands a second"),
+        (["export", "a.usda", "--to", "csv", "--rate", "1e12"], "1e12 is not 1 to 100000 commands a second"),
+        (["export", "a.usda", "--to", "csv", "--tolerance", "0mm"], "above zero"),
+        (["watch", "a.usda", "--runs", "0"], "0 is not a number of runs"),
+        (["watch", "a.usda", "--runs", "1.5"], "1.5 is not a number of runs"),
+        (["simulate", "my", "shot.usda"], "no argument takes shot.usda"),
+        (["doctor", "x"], "no argument takes x"),
+    ],
+)
+def test_numbers_and_arguments_that_do_not_fit_are_refused_at_once(arguments, told, capsys):
+    assert main(arguments) == 2
+    assert told in " ".join(capsys.readouterr().err.split())

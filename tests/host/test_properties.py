@@ -20,7 +20,18 @@ def test_the_default_is_allowed_outside_the_range():
 
 @pytest.mark.parametrize(
     ("declared", "value"),
-    [(SIZE, "-2"), (SIZE, "11"), (SIZE, 0), (COUNT, "2.5"), (COUNT, True), (FAST, "maybe"), (FAST, 1), (KIND, "c")],
+    [
+        (SIZE, "-2"),
+        (SIZE, "11m"),
+        (SIZE, "5"),
+        (SIZE, "0.005"),
+        (SIZE, 0),
+        (COUNT, "2.5"),
+        (COUNT, True),
+        (FAST, "maybe"),
+        (FAST, 1),
+        (KIND, "c"),
+    ],
 )
 def test_a_wrong_value_is_refused_and_the_property_named(declared, value):
     with pytest.raises(SettingError) as refused:
@@ -53,7 +64,8 @@ def test_a_declaration_that_cannot_be_right_is_refused(wrong):
 @pytest.mark.parametrize(
     ("declared", "value", "near"),
     [
-        (SIZE, "11", "10 m"),
+        (SIZE, "11m", "10 m"),
+        (SIZE, "5", "5m or 5mm"),
         (SIZE, "-2", "1e-06 m"),
         (COUNT, 0, "1"),
         (Property("kind", str, "linear", choices=("linear", "stvk")), "linaer", "linear"),

@@ -1,7 +1,7 @@
 import math
 
 import pytest
-from calmotion.host import SettingError, parse_quantity
+from calmotion.host import SettingError, has_no_unit, parse_quantity
 
 
 @pytest.mark.parametrize(
@@ -35,3 +35,17 @@ def test_a_unit_of_another_kind_is_refused_with_the_ones_that_fit(text, unit):
     with pytest.raises(SettingError) as refused:
         parse_quantity(text, unit)
     assert ("mm" in refused.value.remedy) == (unit == "m")
+
+
+@pytest.mark.parametrize(("text", "unit", "meant"), [("1MM", "m", "mm"), ("5MS", "s", "ms"), ("2khz", "Hz", "kHz")])
+def test_a_unit_that_is_misspelt_gets_the_nearest(text, unit, meant):
+    with pytest.raises(SettingError) as refused:
+        parse_quantity(text, unit)
+    assert refused.value.remedy.startswith(f"Did you mean {meant}? ")
+
+
+@pytest.mark.parametrize(
+    ("text", "bare"), [("5", True), (" 1e-3 ", True), ("5mm", False), ("1mm1", False), ("", False)]
+)
+def test_a_number_without_a_unit_is_told_from_what_is_no_number(text, bare):
+    assert has_no_unit(text) == bare

@@ -241,3 +241,44 @@ def test_the_key_depends_on_regularisation_and_code(arm, animation, bodies, monk
 def test_the_file_lies_hidden_beside_the_layer():
     path = checkpoint_path("/shots/arm_calm.usda")
     assert path.parent.name == "shots" and path.name.startswith(".") and "arm_calm.usda" in path.name
+
+
+@pytest.fixture(scope="module")
+def begun(arm, animation, bodies, tmp_path_factory):
+    """A search without limits, its result, and its checkpoint as if it had only begun: its point is the input."""
+    path, shot = tmp_path_factory.mktemp("begun") / "kept.npz", compile_shot(arm, animation, bodies)
+    whole = optimize_shot(shot, OPTIONS, ignore_progress, path)
+    edited(path, x=np.zeros_like, history=lambda history: history[:1], merit=whole.steps[0].objective)
+    return shot, whole, path.read_bytes()
+
+
+NO_PAIRS = {"p": lambda p: p[:0], "Hp": lambda Hp: Hp[:0]}
+CLAIMS = {
+    "converged at the input": NO_PAIRS | {"reason": "converged"},
+    "a reason that does not exist": NO_PAIRS | {"reason": "all is well"},
+    "a trust region of nothing": NO_PAIRS | {"reason": "", "radius": 1e-30},
+    "a trust region of nothing, and an end": NO_PAIRS | {"reason": "no further decrease", "radius": 0.0},
+    "directions of another problem": {"reason": "", "Hp": lambda Hp: 1e9 * Hp},
+    "directions without curvature": {"reason": "", "Hp": np.zeros_like},
+    "directions of negative curvature": {"reason": "converged", "Hp": lambda Hp: -Hp},
+}
+
+
+@pytest.mark.parametrize("claim", CLAIMS)
+def test_what_a_file_says_of_the_end_of_its_search_is_not_believed(begun, tmp_path, claim):
+    """The point of the file and its merit are right; it is only not where the search would have ended."""
+    shot, whole, content = begun
+    path = tmp_path / "kept.npz"
+    path.write_bytes(content)
+    edited(path, **CLAIMS[claim])
+    again = optimize_shot(shot, OPTIONS, ignore_progress, path)
+    assert again.stopped in ("converged", "no further decrease")
+    assert again.objective_after == pytest.approx(whole.objective_after, rel=1e-2)
+    assert again.objective_after < 0.1 * again.objective_before
+
+
+def test_a_folder_in_place_of_the_file_stays_and_is_no_error(tmp_path):
+    checkpoint.remove_checkpoint(tmp_path / "none.npz")
+    (tmp_path / "kept.npz").mkdir()
+    checkpoint.remove_checkpoint(tmp_path / "kept.npz")
+    assert (tmp_path / "kept.npz").is_dir()

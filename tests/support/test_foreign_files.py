@@ -13,6 +13,7 @@ FILES = {
     "indented.mjcf": ('\n  <mujoco model="arm">', "mjcf"),
     "table.csv": ("time_s,/Robot/Tip.x\n0,1\n", "table"),
     "shot.usda": ("time_s,/Robot/Tip.x\n0,1\n", "table"),
+    "dance.bvh": ("HIERARCHY\nROOT hips\n", "bvh"),
 }
 
 
@@ -29,7 +30,7 @@ def test_a_foreign_file_is_named_in_the_remedy(name, tmp_path):
     assert shot.value.remedy == settings.value.remedy == remedy_for(path)
 
 
-@pytest.mark.parametrize("text", ["", "#usda 1.0\n", "<html>", "x,y\n", "[fe.mesh]\n"])
+@pytest.mark.parametrize("text", ["", "<html>", "x,y\n", "[fe.mesh]\n"])
 def test_other_files_have_no_such_remedy(text, tmp_path):
     path = tmp_path / "file"
     path.write_text(text)
@@ -55,3 +56,22 @@ def test_files_are_allowed_places(path):
 def test_a_link_counts_as_what_it_leads_to(tmp_path):
     (tmp_path / "a.usda").symlink_to("/dev/zero")
     assert forbidden_place(str(tmp_path / "a.usda"))
+
+
+@pytest.mark.parametrize(
+    ("name", "content"), [("a.usda", b"#usda 1.0\n"), ("a.usd", b"PXR-USDC\0\0"), ("a.usdz", b"PK\3\4")]
+)
+def test_a_shot_is_named_everywhere_but_in_the_place_of_a_shot(tmp_path, name, content):
+    (tmp_path / name).write_bytes(content)
+    assert "This is a USD file" in (remedy_for(tmp_path / name) or "")
+    assert remedy_for(tmp_path / name, "usd") is None
+
+
+def test_a_shot_in_the_place_of_a_robot_or_of_settings_needs_no_import(tmp_path):
+    from calmotion.workflow.importing.descriptions import read_description
+
+    (tmp_path / "shot.usda").write_text('#usda 1.0\ndef Xform "Robot" {}\n')
+    with pytest.raises(ShotError, match="It needs no import"):
+        read_description(str(tmp_path / "shot.usda"), {})
+    with pytest.raises(SettingError, match="It needs no import"):
+        read_settings_file(tmp_path / "shot.usda")

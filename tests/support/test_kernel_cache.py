@@ -84,3 +84,11 @@ def test_a_folder_that_cannot_be_written_is_no_error(tmp_path):
     cache = VerifiedCacheFile(str(tmp_path / "file" / "folder"), "name", (1.0, 2))
     cache._save_index({})
     cache._save_data("name.1.nbc", 1)
+
+
+def test_a_link_to_itself_in_the_place_of_a_file_stops_nobody(run, tmp_path):
+    assert run() == (0, "")
+    for path in (tmp_path / "cache").rglob("*.nb?"):
+        path.unlink()
+        path.symlink_to(path.name)
+    assert run()[0] == 0 and run()[0] == 1

@@ -131,3 +131,11 @@ def test_layer_data_of_other_programs_is_ignored(data):
     layer = Sdf.Layer.CreateAnonymous()
     layer.customLayerData = data
     assert stages.role_of(layer) == ""
+
+
+@pytest.mark.parametrize("leads_to", ["gone.usda", "shot.usda", "/nowhere/at/all.usda"])
+def test_a_link_to_nothing_is_named_as_such(tmp_path, leads_to):
+    os.symlink(leads_to, tmp_path / "shot.usda")
+    with pytest.raises(ShotError, match="a symbolic link to a file that does not exist") as caught:
+        stages.open_stage(str(tmp_path / "shot.usda"))
+    assert caught.value.found == leads_to and "Did you mean" not in caught.value.remedy

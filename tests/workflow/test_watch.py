@@ -144,3 +144,8 @@ def test_the_command_prints_one_line_for_each_run(shot_file, capsys):
     assert "Ctrl-C" in said.err
     assert main(["watch", str(shot_file), "--optimize"]) == 2
     assert "-o" in capsys.readouterr().err
+
+
+def test_the_exit_status_is_that_of_the_last_run(shot_file, tmp_path):
+    assert main(["watch", str(shot_file), "--runs", "1", "--step", STEP, "--quiet"]) == 0
+    assert main(["watch", str(tmp_path / "none.usda"), "--runs", "1", "--quiet"]) == 1

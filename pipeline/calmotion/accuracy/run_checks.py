@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from calmotion.accuracy.simulate_to_tolerance import FIRST, LAST, chooses_step
+from calmotion.errors import ShotError
 from calmotion.shot import Animation, Character
 from calmotion.shot.run import RunSettings
 from calmotion.simulation.inputs.curves import sample_curves
@@ -20,6 +21,7 @@ def check_simulation(character: Character, animation: Animation, options: RunSet
         ShotError: A setting that is not supported, or a motor that turns by half a turn within the shortest step.
     """
     refuse_unsupported(character, animation, options)
+    _refuse_long_step(character, animation, options)
     chooses = chooses_step(character, options)
     grid = grid_of(character, animation, replace(options, step=FIRST) if chooses else options)
     for tracks in {id(tracks): tracks for tracks in (animation.tracks, animation.current)}.values():
@@ -29,3 +31,21 @@ def check_simulation(character: Character, animation: Animation, options: RunSet
         else:
             refuse_half_turns(character, grid, curves.angles)
     return grid
+
+
+def _refuse_long_step(character: Character, animation: Animation, options: RunSettings) -> None:
+    """Refuse a step that is longer than the shot: it was mostly meant in milliseconds.
+
+    Raises:
+        ShotError: It is.
+    """
+    step = character.retarget.time_step if options.step is None else options.step
+    end = float(animation.frame_times[-1])
+    if step is not None and step > end:
+        raise ShotError(
+            "the time step is longer than the shot",
+            path=character.path,
+            attribute="calm:retarget:timeStep" if options.step is None else "--step",
+            found=f"{step:g} s, where the shot lasts {end:g} s",
+            remedy="Use milliseconds, such as 5ms, or leave it out.",
+        )

@@ -129,10 +129,11 @@ def with_step(result: Result, character: Character, options: RunSettings, accura
 
 def step_row(character: Character, options: RunSettings, step: float, error: float | None) -> Simplification:
     """Why steps [s] are no shorter, and their error at the targets [m]."""
-    if options.step is not None:
-        why = "given by --step"
-    elif character.retarget.time_step is not None:
-        why = "given by calm:retarget:timeStep"
+    given = options.step if options.step is not None else character.retarget.time_step
+    name = "--step" if options.step is not None else "calm:retarget:timeStep"
+    if given is not None:
+        divides = "" if abs(step - given) < 1e-3 * given else f" ({1e3 * given:.4g} ms): frames are divided into steps"
+        why = f"given by {name}{divides}"
     elif chooses_step(character, options):
         tolerance = tolerance_of(character, options.tolerance)
         why = f"it keeps the tolerance of {1e3 * tolerance:.4g} mm with {NAMES[options.scheme]}"

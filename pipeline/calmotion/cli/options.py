@@ -212,14 +212,15 @@ def quantity(unit: str, needs_unit: bool = False, positive: bool = False) -> Cal
     """The type of an argument that is a quantity in a unit, not negative."""
 
     def read(text: str) -> float:
-        from calmotion.host import SettingError, parse_quantity
+        from calmotion.host import SettingError, has_no_unit, parse_quantity
 
-        if needs_unit and not text.rstrip()[-1:].isalpha():
-            raise argparse.ArgumentTypeError(f"{text} has no unit; write {text}m or {text}mm")
         try:
             value = parse_quantity(text, unit)
+            bare = needs_unit and has_no_unit(text)
         except SettingError as error:
             raise argparse.ArgumentTypeError(str(error)) from None
+        if bare:
+            raise argparse.ArgumentTypeError(f"{text} has no unit; write {text}{unit} or {text}m{unit}")
         if not 0.0 <= value < float("inf") or (positive and not value):
             least = "above zero" if positive else "not negative"
             raise argparse.ArgumentTypeError(f"{text} is out of range; it must be finite and {least}")

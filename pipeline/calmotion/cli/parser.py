@@ -173,6 +173,8 @@ class Parser(argparse.ArgumentParser):
             name = wrong.partition("=")[0]
             near = nearest_name(name.lstrip("-"), [option.lstrip("-") for option in self._option_string_actions])
             self.error(f"there is no option {name}." + (f" Did you mean --{near}?" if near else ""))
+        if rest and not self.overview:
+            self.error(f"no argument takes {' '.join(rest)}; a name with spaces is written in quotation marks")
         return found, rest
 
     def _check_value(self, action: argparse.Action, value: Any) -> None:

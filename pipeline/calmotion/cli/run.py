@@ -55,7 +55,7 @@ def run_shot(
 
 
 def watch_shot(args: argparse.Namespace, output: Output) -> int:
-    """Simulate or optimise a shot whenever it is saved, and print a line for each run; the exit status.
+    """Simulate or optimise a shot whenever it is saved, and print a line for each run; the exit status of the last.
 
     Raises:
         SettingError: An option or setting does not fit.
@@ -75,7 +75,7 @@ def watch_shot(args: argparse.Namespace, output: Output) -> int:
         options = {"operators": args.run, "settings": assignments(args), **simulation_arguments(args)}
         return function(shot, verify=args.verify, outputs=paths, **options)
 
-    watch, done = Watch(opened_shot(args), run), 0
+    watch, done, status = Watch(opened_shot(args), run), 0, 0
     if not args.quiet:
         notice(f"watching {args.shot}; Ctrl-C ends it")
     while args.runs is None or done < args.runs:
@@ -90,12 +90,14 @@ def watch_shot(args: argparse.Namespace, output: Output) -> int:
             result = watch.run()
         except ShotError as error:  # the next save may repair it
             print_error(error, output)
+            status = FAILED
         else:
+            status = FAILED if result.problems else 0
             _tell(result, watch, time.perf_counter() - begin, args, output)
             if result.interrupted:
                 return INTERRUPTED
         done += 1
-    return 0
+    return status
 
 
 def _tell(result: SimulationResult, watch: Watch, seconds: float, args: argparse.Namespace, output: Output) -> None:

@@ -11,6 +11,7 @@ from calmotion.shot.character import Array
 from calmotion.shot.motor import Motor
 
 HOLD, LINEAR, CUBIC, QUINTIC = "hold", "linear", "cubic", "quintic"
+LOWEST_RATE, HIGHEST_RATE = 1.0, 1e5  # commands a second [Hz]
 INTERPOLATIONS = (HOLD, LINEAR, CUBIC, QUINTIC)
 # A held value is a step, which no motor can follow: it gets there at constant speed within this time, or within a
 # period where that is shorter [s]. Steps of splines are played within the same time.

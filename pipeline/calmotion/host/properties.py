@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from calmotion.host.errors import PluginError, SettingError
-from calmotion.host.units import is_unit, parse_quantity
+from calmotion.host.units import has_no_unit, is_unit, parse_quantity
 from calmotion.support.naming import nearest
 
 _WORDS = {float: "a number", int: "a whole number", bool: "true or false", str: "a text"}
@@ -54,7 +54,14 @@ class Property:
             if text.strip().lower() not in _BOOLEANS:
                 raise SettingError("this is neither true nor false", found=repr(text), remedy="Write true or false.")
             return _BOOLEANS[text.strip().lower()]
-        return self._convert(parse_quantity(text, self.unit))
+        value = self._convert(parse_quantity(text, self.unit))
+        # a bare length is mostly in millimetres, or in the unit of the stage; -1 and the like have no unit
+        if self.unit == "m" and has_no_unit(text) and value > 0.0:
+            number = text.strip()
+            raise SettingError(
+                "this length has no unit", found=repr(text), remedy=f"Write {number}m or {number}mm, whichever it is."
+            )
+        return value
 
     def _convert(self, value: object) -> Any:
         number = isinstance(value, (int, float)) and not isinstance(value, bool)

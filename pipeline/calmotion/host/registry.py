@@ -110,6 +110,7 @@ class Host:
                     )
         except PluginError as error:
             plugin.fail(error)
+            plugin.traceback = ""  # the error names the file and the field
         self.plugins.append(plugin)
         return plugin
 

@@ -7,6 +7,7 @@ import re
 from decimal import Decimal
 
 from calmotion.host.errors import SettingError
+from calmotion.support.naming import nearest
 
 # Unit -> (base unit, size in base units). Decimals, so that `5mm` is exactly the float 0.005.
 _UNITS = {
@@ -33,6 +34,12 @@ def is_unit(unit: str) -> bool:
     return unit in _UNITS
 
 
+def has_no_unit(text: str) -> bool:
+    """Whether a text is a number without a unit."""
+    match = _QUANTITY.fullmatch(text)
+    return match is not None and not match[2]
+
+
 def parse_quantity(text: str, unit: str = "") -> float:
     """The number that `text` means.
 
@@ -50,9 +57,10 @@ def parse_quantity(text: str, unit: str = "") -> float:
     base, size = _UNITS[unit]
     alike = ", ".join(name for name, (kind, _) in _UNITS.items() if kind == base and name)
     remedy = f"Write a number, or one with a unit ({alike})." if alike else "Write a number without a unit."
+    likely = match and nearest(match[2], [name for name, (kind, _) in _UNITS.items() if kind == base and name])
     if not match:
         raise SettingError("this is not a number", found=repr(text), remedy=remedy)
     number, written = match.groups()
     if written not in _UNITS or (written and _UNITS[written][0] != base):
-        raise SettingError("this unit does not fit", found=repr(text), remedy=remedy)
+        raise SettingError("this unit does not fit", found=repr(text), remedy=f"{likely}{remedy}")
     return float(Decimal(number) * _UNITS[written or unit][1] / size)

@@ -33,6 +33,12 @@ def checkpoint_path(layer: str) -> Path:
     return path.with_name(f".{path.name}.checkpoint.npz")
 
 
+def remove_checkpoint(path: Path) -> None:
+    """Remove the file after the search; a folder in its place, or a file that cannot be removed, is left alone."""
+    with contextlib.suppress(OSError):
+        path.unlink(missing_ok=True)
+
+
 def problem_key(problem: RetargetProblem, fixed: BoolArray, settings: object) -> str:
     """Hash of all inputs of a search and of the sources of the engine."""
     digest = hashlib.sha256(f"{source_digest(*_ROOMS)} {settings!r}".encode())
@@ -186,6 +192,8 @@ def _stored(values: dict[str, np.ndarray], state: dict[str, Any], limits: LimitT
     finite = all(np.all(np.isfinite(values[name])) for name in values if name not in ("state", "history"))
     if not finite or not p.shape == Hp.shape == (len(p), len(x)):
         raise ValueError("its coefficients are not finite or have a wrong size")
+    if not np.all(np.einsum("kn,kn->k", p, Hp) > 0.0):  # those of conjugate gradients have
+        raise ValueError("its directions have no curvature")
     rows = values["history"].tolist()
     history = tuple(Iterate(row[0], row[1], row[2], int(row[3]), int(row[4])) for row in rows)
     search = Search(

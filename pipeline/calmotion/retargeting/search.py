@@ -72,6 +72,8 @@ class RetargetSearch:
     interrupted: bool = False
     resumed_iterations: int = 0
 
+    _unconfirmed: bool = False  # whether the state is that of a file
+
     def __post_init__(self) -> None:
         self._done = SearchProgress(WORTH * self.tolerance)
 
@@ -133,7 +135,7 @@ class RetargetSearch:
             problem.limits = limits
             self.checkpoint.refuse(f"does not fit the shot (objective {stored.merit:.6g}, simulated {merit:.6g})")
             return False
-        self.problem, self.search = resumed, stored.search
+        self.problem, self.search, self._unconfirmed = resumed, stored.search, True
         self.resumed_iterations = len(self.search.history)
         self.progress(0.1, f"resuming after {self.resumed_iterations} iterations of an interrupted search")
         if np.any(x[inactive_coefficients(basis, self.inactive, motors)]):
@@ -144,11 +146,10 @@ class RetargetSearch:
         """Minimise and refine the knots; then include the inactive intervals if they would gain too much."""
         while True:
             if not self.search.reason:
-                self.search = minimize(
-                    self.problem, self.search, fixed, WORTH * self.tolerance, self.options.max_iterations,
-                    on_iterate=self._on_iterate,
-                )  # fmt: skip
+                self.search = self._minimized(self.search, fixed)
                 self._keep()
+            if self._unconfirmed:
+                self._confirm(fixed)
             if self.search.reason == "iteration limit":
                 return
             if not (self.adaptive and self._refine()):
@@ -160,6 +161,30 @@ class RetargetSearch:
                 self.inactive, self.search = (), _restarted(self.search, self.search.x)
             self._done.next_pass(len(self.search.history))
             fixed = self.hold()
+
+    def _minimized(self, search: Search, fixed: BoolArray) -> Search:
+        return minimize(
+            self.problem,
+            search,
+            fixed,
+            WORTH * self.tolerance,
+            self.options.max_iterations,
+            on_iterate=self._on_iterate,
+        )
+
+    def _confirm(self, fixed: BoolArray) -> None:
+        """Look for the minimum once more where the state was read from a file: its trust region, its directions and the
+        reason of its end are not known to be right, although its point is."""
+        self._unconfirmed, ended = False, self.search
+        if len(ended.history) >= self.options.max_iterations:
+            return
+        found = self._minimized(_restarted(ended, ended.x), fixed)
+        if np.array_equal(found.x, ended.x):  # it was the minimum
+            self.search = replace(ended, reason=found.reason, evaluations=found.evaluations, gradients=found.gradients,
+                                  products=found.products)  # fmt: skip
+        else:
+            self.search = found
+        self._keep()
 
     def _on_iterate(self, search: Search) -> None:
         self.search = search

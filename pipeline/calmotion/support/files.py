@@ -77,10 +77,11 @@ def new_file(target: Path) -> Iterator[Path]:
 
 
 @contextlib.contextmanager
-def temporary_folder() -> Iterator[Path]:
-    """A folder among the temporary files of the system, which goes when the block ends.
+def temporary_folder(parent: Path | None = None) -> Iterator[Path]:
+    """A folder that goes when the block ends; what killed processes of this user left beside it is removed first.
 
-    What killed processes of this user left there is removed first.
+    Args:
+        parent: Where it is made; None: among the temporary files of the system.
 
     Yields:
         The folder, which only this user can read.
@@ -88,8 +89,9 @@ def temporary_folder() -> Iterator[Path]:
     Raises:
         OSError: It cannot be made.
     """
-    remove_abandoned(Path(tempfile.gettempdir()))
-    with tempfile.TemporaryDirectory(prefix=_own_prefix(), ignore_cleanup_errors=True) as folder:
+    parent = parent or Path(tempfile.gettempdir())
+    remove_abandoned(parent)
+    with tempfile.TemporaryDirectory(prefix=_own_prefix(), dir=parent, ignore_cleanup_errors=True) as folder:
         yield Path(folder)
 
 

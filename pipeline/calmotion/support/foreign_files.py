@@ -19,8 +19,16 @@ _KINDS = {
         "a table that `--csv` wrote",
         "It is a result, for plots and spreadsheets; name the USD file of the shot, or the layer that `-o` wrote",
     ),
+    "usd": (
+        "a USD file",
+        "It needs no import, and holds neither a motion nor settings: name it as the shot, as in `calmotion inspect "
+        "FILE`",
+    ),
+    "bvh": (
+        "a BVH motion",
+        "Name it with --motion, beside the shot of a robot; `--set bvh.read.map=...` tells which channels are motors",
+    ),
 }
-
 
 # Schemes by which a program would fetch a file or talk to a machine. Others belong to asset resolvers that the user has
 # installed.
@@ -52,7 +60,7 @@ def forbidden_place(path: str) -> str | None:
 
 
 def kind_of(path: str | os.PathLike[str]) -> str | None:
-    """`urdf`, `mjcf`, `table` (written by `--csv`), or None for anything else."""
+    """`urdf`, `mjcf`, `table` (written by `--csv`), `usd`, `bvh`, or None for anything else."""
     if not os.path.isfile(path):
         return None
     try:
@@ -62,12 +70,17 @@ def kind_of(path: str | os.PathLike[str]) -> str | None:
         return None
     if head.removeprefix(b"\xef\xbb\xbf").startswith(b"time_s,"):
         return "table"
+    if head.startswith((b"#usda", b"PXR-USDC")) or (head.startswith(b"PK") and str(path).lower().endswith(".usdz")):
+        return "usd"
+    if head.lstrip().upper().startswith(b"HIERARCHY"):
+        return "bvh"
     if head.lstrip(b"\xef\xbb\xbf \t\r\n").startswith(b"<"):
         return "mjcf" if b"<mujoco" in head else "urdf" if b"<robot" in head else None
     return None
 
 
-def remedy_for(path: str | os.PathLike[str]) -> str | None:
-    """What to do with a file in the wrong place, as a sentence; None where its kind is not known."""
+def remedy_for(path: str | os.PathLike[str], place: str = "") -> str | None:
+    """What to do with a file in the wrong place, as a sentence; None where its kind is not known, or that of the
+    place."""
     kind = kind_of(path)
-    return None if kind is None else f"This is {_KINDS[kind][0]}. {_KINDS[kind][1]}"
+    return None if kind is None or kind == place else f"This is {_KINDS[kind][0]}. {_KINDS[kind][1]}"

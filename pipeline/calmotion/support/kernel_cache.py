@@ -89,7 +89,7 @@ def _content(path: Path) -> bytes | None:
         pass
     except DamagedFileError:
         discard(path)
-    except FileNotFoundError:
+    except OSError:  # there is none, or it cannot be read
         pass
     return None
 

@@ -65,7 +65,7 @@ def _nearest_file(path: str) -> str:
         near = nearest_name(parent.name, os.listdir(parent.parent))
     except OSError:
         return ""
-    return f"Did you mean {parent.with_name(near)}? " if near else ""
+    return f"Did you mean {parent.with_name(near)}? " if near and near != parent.name else ""
 
 
 def open_layer(path: str) -> Sdf.Layer:
@@ -76,6 +76,11 @@ def open_layer(path: str) -> Sdf.Layer:
     """
     from pxr import Sdf, Tf
 
+    if os.path.islink(path) and not os.path.exists(path):
+        raise ShotError(
+            "this is a symbolic link to a file that does not exist", path=path, found=os.readlink(path),
+            remedy="Correct the link, or name the file itself",
+        )  # fmt: skip
     if not os.path.exists(path):
         raise ShotError(
             "the file does not exist", path=path or "SHOT", remedy=f"{_nearest_file(path)}Check the path of the shot"
@@ -97,7 +102,7 @@ def open_layer(path: str) -> Sdf.Layer:
             "this is not a USD file, or it is damaged",
             path=path,
             found=reason or None,
-            remedy=remedy_for(path) or "Name a .usda, .usdc, .usd or .usdz file that opens in a USD viewer",
+            remedy=remedy_for(path, "usd") or "Name a .usda, .usdc, .usd or .usdz file that opens in a USD viewer",
         )
     return layer
 

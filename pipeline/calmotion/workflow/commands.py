@@ -121,9 +121,9 @@ def optimize(
     )  # fmt: skip
     result = OptimizationResult(outcome)
     if outputs is not None and outputs.layer and not outcome.problems and not result.interrupted:
-        from calmotion.retargeting.checkpoint import checkpoint_path
+        from calmotion.retargeting.checkpoint import checkpoint_path, remove_checkpoint
 
-        checkpoint_path(outputs.layer).unlink(missing_ok=True)
+        remove_checkpoint(checkpoint_path(outputs.layer))
     return result
 
 

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import os
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Any, TypeVar
 
 from calmotion.errors import ShotError
@@ -15,8 +13,8 @@ from calmotion.shot import Provenance
 from calmotion.shot.outputs import CsvFile, Figures, Recording, Video, WrittenLayer
 from calmotion.shot.run import INTEGRATORS, SHAPERS, OutputPaths, Source
 from calmotion.support import interrupts
-from calmotion.support.files import try_writing
 from calmotion.support.foreign_files import remedy_for
+from calmotion.workflow.outputs import files_of, prepare_outputs, refuse_layers
 from calmotion.workflow.problems import Cancelled, Problem, problems_of, value_of
 from calmotion.workflow.shot import Shot
 
@@ -25,8 +23,6 @@ _FILES = (
     (WrittenLayer, "-o", "layer"), (CsvFile, "--csv", "csv"), (Recording, "--rrd", "rrd"),
     (Figures, "--figures", "figures"), (Video, "--video", "video"),
 )  # fmt: skip
-_OUTPUTS = (*((option, name) for _, option, name in _FILES), ("--modes", "modes"))
-_FOLDERS = ("figures", "modes")
 
 
 @dataclass(frozen=True)
@@ -143,14 +139,14 @@ def carry_out(
         [*known, source, outputs], kinds, optional=optional, settings=merge([shot.settings, settings or {}]),
         progress=_listener(hooks), reuse=shot.reuse,
     )  # fmt: skip
-    _prepare_folders(shot.path, outputs)
+    prepare_outputs(shot.inputs, outputs)
     interrupted = cancelled = False
     unread = True
     try:
         for result in run:
             if unread and (provenance := run.get(Provenance)) is not None:
                 unread = False
-                _refuse_inputs(shot.path, provenance, outputs)
+                refuse_layers(shot.path, provenance, files_of(outputs))
             if hooks.on_operator:
                 hooks.on_operator(result)
     except _Stop:
@@ -234,7 +230,7 @@ def _refuse_unreadable_motion(source: Source, host: Host) -> None:
             "no plugin reads this motion",
             path="--motion",
             found=source.motion,
-            remedy=remedy_for(source.motion)
+            remedy=remedy_for(source.motion, "bvh")
             or "Name a .csv, .npz or .bvh file, or a plugin that provides MotorTracks with --plugins",
         )
 
@@ -260,52 +256,6 @@ def _requested_files(host: Host, outputs: OutputPaths) -> list[type]:
             )
         kinds.append(kind)
     return kinds
-
-
-def _prepare_folders(shot: str, outputs: OutputPaths) -> None:
-    """Make the folders of the outputs, so that a path that cannot be written is refused before the long work.
-
-    Raises:
-        SettingError: An output cannot be written, or is the shot itself or another output.
-    """
-    options: dict[str, str] = {}
-    for option, name in _OUTPUTS:
-        path: str | None = getattr(outputs, name)
-        if path is None:
-            continue
-        if (other := options.setdefault(os.path.realpath(path), option)) != option:
-            raise SettingError(
-                f"this is the output of {other} as well", path=option, found=path, remedy="Choose another."
-            )
-        if os.path.realpath(path) == os.path.realpath(shot):
-            raise SettingError(
-                "this file is the shot, which is never overwritten", path=option, found=path, remedy="Choose another."
-            )
-        try:
-            try_writing(Path(path) / "file" if name in _FOLDERS else path)
-        except OSError as error:
-            raise SettingError(
-                "this output cannot be written", path=option, found=f"{path}: {error.strerror}",
-                remedy="Choose another.",
-            ) from error  # fmt: skip
-
-
-def _refuse_inputs(shot: str, provenance: Provenance, outputs: OutputPaths) -> None:
-    """Refuse outputs that are layers of the shot, as soon as these are known.
-
-    Raises:
-        SettingError: One is.
-    """
-    folder = os.path.dirname(os.path.realpath(shot))
-    inputs = [os.path.join(folder, layer.path) for layer in provenance.layers]
-    for option, name in _OUTPUTS:
-        path: str | None = getattr(outputs, name)
-        for layer in inputs:
-            if path is not None and os.path.exists(path) and os.path.exists(layer) and os.path.samefile(path, layer):
-                raise SettingError(
-                    "this file is a layer of the shot, which is never overwritten", path=option, found=path,
-                    remedy="Choose another.",
-                )  # fmt: skip
 
 
 def again(outcome: Outcome, wanted: type[T], *values: object, settings: Settings | None = None) -> T:

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import json
 import os
+import subprocess
+import sys
 from pathlib import Path
 
 import calmotion as cm
 import numpy as np
 import pytest
 from calmotion.workflow.importing import robot as importing
-from calmotion.workflow.importing.converters import VARIABLE, environment_folder
+from calmotion.workflow.importing.converters import VARIABLE, environment_folder, temporary_folder
 from calmotion.workflow.importing.robot import flexible_links, frames_per_second
 from converted_arm import CONVERTED, ELBOW, PAN
 
@@ -127,3 +129,29 @@ def test_the_real_converter_makes_a_shot(robot, tmp_path):
     assert character.motors[0].max_velocity == pytest.approx(3.0, rel=1e-6)
     assert character.joints[0].lower == pytest.approx(-2.0, rel=1e-6)
     assert len(character.targets) == 1 and made.animation.frame_times[-1] == pytest.approx(0.06)
+
+
+@pytest.mark.parametrize("text", ["*fore*=abs,3", "*fore*=abs, 0.5"])
+def test_a_wall_needs_a_unit(text):
+    from calmotion.host import SettingError
+    from calmotion.rigging.materials import MATERIALS
+
+    with pytest.raises(SettingError, match="no unit") as error:
+        flexible_links(text, MATERIALS)
+    number = text.rpartition(",")[2].strip()
+    assert f"{number}mm" in error.value.remedy
+
+
+def test_what_a_killed_import_left_is_removed_by_the_next(robot, tmp_path):
+    code = f"""
+import os
+from calmotion.workflow.importing import robot
+robot.convert = lambda *arguments: os._exit(9)
+robot.converter_python = lambda named, tell: "python"
+robot.import_robot({str(robot)!r}, layer={str(tmp_path / "out" / "shot.usda")!r})
+"""
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 9
+    assert len(list((tmp_path / "out").iterdir())) == 1
+    with temporary_folder(str(tmp_path / "out" / "shot.usda")) as folder:
+        assert [path.name for path in (tmp_path / "out").iterdir()] == [Path(folder).name]
+    assert list((tmp_path / "out").iterdir()) == []

@@ -14,7 +14,20 @@ from calmotion.support.memory import peak_memory, resident_memory
 from calmotion.version import __version__
 from calmotion.workflow.run import Progress
 
+_HEAD = b'{"time": "'  # of every line
 _INTERVAL = 0.1  # least time between two lines of progress of a stage [s]
+
+
+def _is_log(path: str) -> bool:
+    """Whether lines may be added to a file: it does not exist, is empty, or was written by a log before.
+
+    Raises:
+        OSError: It cannot be read.
+    """
+    if not os.path.isfile(path):
+        return True
+    with open(path, "rb") as file:
+        return file.read(len(_HEAD)) in (b"", _HEAD)
 
 
 class RunLog:
@@ -36,6 +49,8 @@ class RunLog:
         try:
             if is_special(path):
                 raise OSError(0, "it is not a regular file")
+            if not _is_log(path):
+                raise OSError(0, "it is a file of another kind, which is never changed")
             self._file = open(path, "a", encoding="utf-8")  # closed by `end`
         except OSError as error:
             raise SettingError(

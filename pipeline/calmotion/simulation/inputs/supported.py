@@ -70,7 +70,8 @@ def refuse_unsupported(character: Character, animation: Animation, options: RunS
             "a shot of one frame has no motion",
             path=character.path,
             attribute="endTimeCode",
-            remedy="Author startTimeCode and endTimeCode of the stage, at least a frame apart.",
+            remedy="Author startTimeCode and endTimeCode of the stage at least a frame apart, or correct "
+            "framesPerSecond.",
         )
 
 
@@ -138,5 +139,6 @@ def _refuse_turns(character: Character, turns: Array, times: Array, h: float) ->
                 path=motor.path,
                 attribute=motor.attribute,
                 found=f"at {times[n]:.3f} s",
-                remedy="Use a smaller --step, or slow it down there.",
+                remedy="Use a smaller --step, slow it down there, or check the unit of its samples (degrees) and "
+                "timeCodesPerSecond.",
             )

@@ -49,6 +49,29 @@ def write_root(layer: str, provenance: Provenance, role: str) -> str:
     return output
 
 
+def refuse_foreign_root(layer: str) -> None:
+    """Refuse a layer whose root layer would take the place of a file that Calmotion did not write.
+
+    Args:
+        layer: The layer of overs, not yet written.
+
+    Raises:
+        ShotError: There is such a file.
+    """
+    path = root_path(layer)
+    if not os.path.isfile(path):
+        return
+    try:
+        role = stages.role_of(stages.open_layer(path))
+    except ShotError:
+        role = ""
+    if role != stages.ROOT:
+        raise ShotError(
+            f"the root layer of {layer} would replace this file, which Calmotion did not write", path=path,
+            remedy="Choose another -o, or move the file",
+        )  # fmt: skip
+
+
 def shot_layers(shot: str, replaced: tuple[str, ...]) -> list[str]:
     """The layers to put below a new result: the shot, or the layers of an earlier root layer but for `replaced`."""
     layer = stages.open_layer(shot)

@@ -15,7 +15,7 @@ import numpy as np
 
 from calmotion.accuracy.reduced_bodies import ConvergedReduction, compiled_in
 from calmotion.control.commands import Commands, ExportRequest, WrittenCommands
-from calmotion.host import SettingError, Settings, parse_quantity
+from calmotion.host import Settings
 from calmotion.shot import Animation, Character, Provenance
 from calmotion.shot.character import Array
 from calmotion.shot.result import Result
@@ -26,6 +26,8 @@ from calmotion.simulation.playing.lowest_rate import lowest_rate
 from calmotion.simulation.playing.playback import Loss, Playback
 from calmotion.version import __version__
 from calmotion.workflow.exporting.controller_files import curves_of, format_named, write_commands
+from calmotion.workflow.exporting.given import GivenExport, given_export, refuse_beyond_shot
+from calmotion.workflow.outputs import refuse_layers, refuse_overwriting
 from calmotion.workflow.results import SimulationResult
 from calmotion.workflow.run import Hooks, Outcome, Progress, carry_out
 from calmotion.workflow.shot import Given, Path, Shot, read_settings
@@ -171,7 +173,7 @@ def export(
         SettingError: An argument does not fit.
     """
     begin = time.perf_counter()
-    given = _Given(to, _positive(rate), _length_of_time(start_delay), _tolerance(tolerance))
+    given = given_export(to, rate, start_delay, tolerance)
     chosen, hooks = read_settings(settings), Hooks(progress, on_operator, cancel)
     if isinstance(shot, SimulationResult):
         opened, result, outcome = shot.shot, shot.result, shot.outcome
@@ -181,6 +183,9 @@ def export(
         cls = format_named(opened.host, to)
         outcome = carry_out(opened, "simulate", wanted=_READ, operators=operators, settings=chosen, hooks=hooks)
     target = os.fspath(file) if file is not None else f"{FilePath(opened.path).stem}{cls.suffix}"
+    refuse_overwriting(opened.inputs, {"-o": target})
+    refuse_layers(opened.path, outcome.require(Provenance), {"-o": target})
+    refuse_beyond_shot(outcome.require(Character), outcome.require(Animation), given)
     exporter = _Exporter(outcome, result, given, chosen, hooks)
     # what is wrong with the format's settings is refused here, before the first mesh
     written = exporter.written(given.rate, target)
@@ -201,16 +206,6 @@ def with_shot(path: str) -> str:
     return path
 
 
-@dataclass(frozen=True)
-class _Given:
-    """What the user gave: format, rate [Hz], delay [s], tolerance [m]."""
-
-    format: str
-    rate: float
-    delay: float
-    tolerance: float | None
-
-
 class _Exporter:
     """Writes and plays the commands of one shot.
 
@@ -223,7 +218,7 @@ class _Exporter:
     """
 
     def __init__(
-        self, outcome: Outcome, result: Result | None, given: _Given, settings: Settings, hooks: Hooks
+        self, outcome: Outcome, result: Result | None, given: GivenExport, settings: Settings, hooks: Hooks
     ) -> None:
         self._outcome, self._given, self._settings, self._hooks = outcome, given, settings, hooks
         self._curves = curves_of(outcome, result)
@@ -299,7 +294,7 @@ class _Exporter:
             self._hooks.progress(Progress("Play the commands", fraction, message))
 
 
-def _compiled(shot: Shot, given: _Given, settings: Settings, hooks: Hooks) -> Outcome:
+def _compiled(shot: Shot, given: GivenExport, settings: Settings, hooks: Hooks) -> Outcome:
     """A run that compiles a shot as `simulate` does."""
     source = Source("", "", RunSettings(tolerance=given.tolerance))
     outcome = carry_out(
@@ -308,22 +303,3 @@ def _compiled(shot: Shot, given: _Given, settings: Settings, hooks: Hooks) -> Ou
     )  # fmt: skip
     outcome.require(CompiledShot)
     return outcome
-
-
-def _positive(rate: float) -> float:
-    if not 1.0 <= rate <= 1e5:
-        raise SettingError(
-            "the rate must be 1 to 100000 commands a second", path="--rate", found=rate, remedy="Use another rate."
-        )
-    return float(rate)
-
-
-def _length_of_time(given: float | str) -> float:
-    value = parse_quantity(given, "s") if isinstance(given, str) else float(given)
-    if not 0.0 <= value < float("inf"):
-        raise SettingError("the start delay must not be negative", path="--start-delay", found=given, remedy="Use 5ms.")
-    return value
-
-
-def _tolerance(given: float | str | None) -> float | None:
-    return parse_quantity(given, "m") if isinstance(given, str) else given

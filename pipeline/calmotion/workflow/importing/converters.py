@@ -6,11 +6,12 @@ import os
 import shutil
 import subprocess
 import sys
-import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 from calmotion.errors import ShotError
+from calmotion.support import files
 from calmotion.support.caching.cache_folder import cache_folder
 from calmotion.workflow.importing.descriptions import URDF, Description
 
@@ -145,8 +146,11 @@ def _last_words(lines: list[str]) -> str | None:
     return lines[-1].strip()[:300] if lines else None
 
 
-def temporary_folder(beside: str) -> str:
-    """A new folder beside a file, for a conversion that is moved to its place at the end."""
-    folder = os.path.dirname(os.path.abspath(beside))
-    os.makedirs(folder, exist_ok=True)
-    return tempfile.mkdtemp(prefix=".calmotion-import-", dir=folder)
+@contextmanager
+def temporary_folder(beside: str) -> Iterator[str]:
+    """A new folder beside a file, for a conversion that is moved to its place at the end; it goes when the block ends.
+    What killed processes left there is removed first."""
+    parent = Path(os.path.abspath(beside)).parent
+    parent.mkdir(parents=True, exist_ok=True)
+    with files.temporary_folder(parent) as folder:
+        yield str(folder)

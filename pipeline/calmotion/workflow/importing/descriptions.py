@@ -10,6 +10,7 @@ from pathlib import Path
 
 from calmotion.errors import ShotError, raise_all
 from calmotion.support.files import refuse_special
+from calmotion.support.foreign_files import remedy_for
 from calmotion.support.naming import nearest
 
 URDF, MJCF = "urdf", "mjcf"
@@ -99,7 +100,8 @@ def _root(path: str) -> xml.Element:
         raise ShotError(
             "the robot is no XML file, or it is damaged", path=path, found=error,
             remedy="Declare the prefix, as in <robot xmlns:drake=...>, or remove its elements"
-            if "unbound prefix" in str(error) else "Name a .urdf file, or an .xml file of MuJoCo",
+            if "unbound prefix" in str(error)
+            else remedy_for(path) or "Name a .urdf file, or an .xml file of MuJoCo",
         ) from error  # fmt: skip
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import shutil
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path as FilePath
@@ -12,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from calmotion.errors import ShotError
-from calmotion.host import Host, SettingError, open_host, parse_quantity
+from calmotion.host import Host, SettingError, has_no_unit, open_host, parse_quantity
 from calmotion.rigging.materials import Material, material_named
 from calmotion.shot import Animation, Character, MotorTracks
 from calmotion.shot.run import Source
@@ -142,6 +141,11 @@ def flexible_links(text: str, known: Mapping[str, Material]) -> FlexibleLinks:
             remedy='Write for example "*forearm*=abs,3mm"; `calmotion materials` lists the materials.',
         )  # fmt: skip
     wall = parse_quantity(thickness.strip(), "m") if thickness.strip() else None
+    if has_no_unit(thickness):
+        number = thickness.strip()
+        raise SettingError(
+            "this thickness has no unit", path="--flexible", found=text, remedy=f"Write {number}mm or {number}m."
+        )
     if wall is not None and not 0.0 < wall < 1.0:
         raise SettingError("a wall is thicker than nothing and thinner than 1 m", path="--flexible", found=text)
     name, found = material_named(material, known)
@@ -180,8 +184,7 @@ class _Import:
 
     def made(self, python: str) -> ImportedRobot:
         self._refuse_foreign_folder()
-        work = temporary_folder(self._layer)
-        try:
+        with temporary_folder(self._layer) as work:
             parts = os.path.join(work, os.path.basename(self._folder))
             converted, warnings = convert(self._description, parts, python)
             FilePath(parts, _MARKER).touch()
@@ -192,8 +195,6 @@ class _Import:
             read: list[tuple[Character, Animation]] = []
             write_layer(layer, draft, lambda path: read.append(read_shot(path, still=True)[:2]))
             self._move(parts, draft)
-        finally:
-            shutil.rmtree(work, ignore_errors=True)
         character, animation = read[0]
         told = [f"converter: {text}" for text in warnings]
         return ImportedRobot(self._layer, self._folder, character, animation, (*notes, *told, *character.notes))

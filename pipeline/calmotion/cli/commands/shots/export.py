@@ -28,7 +28,7 @@ def add_to(commands: Commands) -> None:
         help="how late the controller starts, in s or with a unit (5ms); it counts as loss",
     )  # fmt: skip
     command.add_argument(
-        "--tolerance", metavar="LENGTH", type=quantity("m", needs_unit=True),
+        "--tolerance", metavar="LENGTH", type=quantity("m", needs_unit=True, positive=True),
         help="acceptable loss at the targets, with a unit (1mm; default: the tolerance of the shot)",
     )  # fmt: skip
     command.add_argument(
@@ -44,12 +44,12 @@ def add_to(commands: Commands) -> None:
 
 
 def _rate(text: str) -> float:
-    from calmotion.host import SettingError, parse_quantity
+    from calmotion.control.commands import HIGHEST_RATE, LOWEST_RATE
 
-    try:
-        return parse_quantity(text, "Hz")
-    except SettingError as error:
-        raise argparse.ArgumentTypeError(str(error)) from None
+    value = quantity("Hz")(text)
+    if not LOWEST_RATE <= value <= HIGHEST_RATE:
+        raise argparse.ArgumentTypeError(f"{text} is not {LOWEST_RATE:g} to {HIGHEST_RATE:g} commands a second")
+    return value
 
 
 def _run(args: argparse.Namespace, output: Output) -> int:

@@ -31,9 +31,15 @@ def add_to(commands: Commands) -> None:
     command.add_argument(
         "--optimize", action="store_true", help="optimise instead of simulating; a search begins with the last curves"
     )
-    command.add_argument("--runs", type=int, metavar="N", help="end after this many runs (default: until Ctrl-C)")
+    command.add_argument("--runs", type=_count, metavar="N", help="end after this many runs (default: until Ctrl-C)")
     run_options(command)
     simulation_options(command, "as of simulate or optimize")
+
+
+def _count(text: str) -> int:
+    if not text.isdecimal() or int(text) < 1:
+        raise argparse.ArgumentTypeError(f"{text} is not a number of runs, 1 or more")
+    return int(text)
 
 
 def _run(args: argparse.Namespace, output: Output) -> int:

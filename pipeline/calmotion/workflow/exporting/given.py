@@ -1,0 +1,64 @@
+"""What the user of an export gave: format, rate, delay and tolerance, refused where no controller or shot has them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from calmotion.control.commands import HIGHEST_RATE, LOWEST_RATE
+from calmotion.errors import ShotError
+from calmotion.host import SettingError, parse_quantity
+from calmotion.shot import Animation, Character
+from calmotion.shot.run import RunSettings
+from calmotion.simulation.inputs.supported import refuse_unsupported
+
+
+@dataclass(frozen=True)
+class GivenExport:
+    """What the user gave: format, rate [Hz], delay [s], tolerance [m]."""
+
+    format: str
+    rate: float
+    delay: float
+    tolerance: float | None
+
+
+def given_export(to: str, rate: float, start_delay: float | str, tolerance: float | str | None) -> GivenExport:
+    """The arguments of an export in SI units.
+
+    Args:
+        to: Name of the format.
+        rate: Commands a second [Hz].
+        start_delay: [s], or text with a unit.
+        tolerance: [m], or text with a unit; None: the shot's own.
+
+    Raises:
+        SettingError: One does not fit.
+    """
+    if not LOWEST_RATE <= rate <= HIGHEST_RATE:
+        raise SettingError(
+            f"the rate must be {LOWEST_RATE:g} to {HIGHEST_RATE:g} commands a second", path="--rate", found=rate,
+            remedy="Use another rate.",
+        )  # fmt: skip
+    delay = parse_quantity(start_delay, "s") if isinstance(start_delay, str) else float(start_delay)
+    if not 0.0 <= delay < float("inf"):
+        raise SettingError(
+            "the start delay must not be negative", path="--start-delay", found=start_delay, remedy="Use 5ms."
+        )
+    error = parse_quantity(tolerance, "m") if isinstance(tolerance, str) else tolerance
+    return GivenExport(to, float(rate), delay, error)
+
+
+def refuse_beyond_shot(character: Character, animation: Animation, given: GivenExport) -> None:
+    """Refuse a tolerance that no simulation of the shot supports, and a start after its end.
+
+    Raises:
+        ShotError: Either.
+    """
+    refuse_unsupported(character, animation, RunSettings(tolerance=given.tolerance))
+    end = float(animation.frame_times[-1])
+    if given.delay > end:
+        raise ShotError(
+            "the controller would start after the end of the shot", path=character.path, attribute="--start-delay",
+            found=f"{given.delay:g} s, where the shot lasts {end:g} s",
+            remedy="Use a delay that a controller has, such as 5ms.",
+        )  # fmt: skip

@@ -1,0 +1,101 @@
+"""Files that a run writes: never over what it reads, and refused before the long work where they cannot be written."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from pathlib import Path
+
+from calmotion.host import SettingError
+from calmotion.shot import Provenance
+from calmotion.shot.run import OutputPaths
+from calmotion.support.files import try_writing
+
+_NAMES = (("-o", "layer"), ("--csv", "csv"), ("--rrd", "rrd"), ("--figures", "figures"), ("--video", "video"),
+          ("--modes", "modes"))  # fmt: skip
+_FOLDERS = ("--figures", "--modes")
+_ROOT = "-o, its root layer"
+
+
+def files_of(outputs: OutputPaths) -> dict[str, str]:
+    """The file or folder of each output that is requested, by its option."""
+    paths = ((option, getattr(outputs, name)) for option, name in _NAMES)
+    return {option: path for option, path in paths if path is not None}
+
+
+def prepare_outputs(inputs: Mapping[str, str], outputs: OutputPaths) -> None:
+    """Make the folders of the outputs, so that a path that cannot be written is refused before the long work.
+
+    Args:
+        inputs: Files that the user names to be read, by what they are.
+        outputs: What is requested.
+
+    Raises:
+        SettingError: An output cannot be written, or is an input or another output.
+    """
+    files = files_of(outputs)
+    refuse_overwriting(inputs, files)
+    for option, path in files.items():
+        try:
+            try_writing(Path(path) / "file" if option in _FOLDERS else path)
+        except OSError as error:
+            raise SettingError(
+                "this output cannot be written", path=option, found=f"{path}: {error.strerror}",
+                remedy="Choose another.",
+            ) from error  # fmt: skip
+
+
+def refuse_overwriting(inputs: Mapping[str, str], files: Mapping[str, str]) -> None:
+    """Refuse outputs that are inputs, or each other.
+
+    Args:
+        inputs: Files that are read, by what they are: `the shot`.
+        files: Files that are written, by their options.
+
+    Raises:
+        SettingError: One is.
+    """
+    from calmotion.usd.writing.root import root_path
+
+    options: dict[str, str] = {}
+    if "-o" in files:
+        options[os.path.realpath(root_path(files["-o"]))] = _ROOT
+    for option, path in files.items():
+        if (other := options.setdefault(os.path.realpath(path), option)) != option:
+            raise SettingError(
+                f"this is the output of {other} as well", path=option, found=path, remedy="Choose another."
+            )
+        for what, name in inputs.items():
+            if _is_same(path, name):
+                raise SettingError(
+                    f"this file is read as {what}, and what is read is never overwritten", path=option, found=path,
+                    remedy="Choose another.",
+                )  # fmt: skip
+
+
+def refuse_layers(shot: str, provenance: Provenance, files: Mapping[str, str]) -> None:
+    """Refuse outputs that are layers of the shot, as soon as these are known.
+
+    Args:
+        shot: Its file.
+        provenance: With its layers.
+        files: Files that are written, by their options.
+
+    Raises:
+        SettingError: One is.
+    """
+    folder = os.path.dirname(os.path.realpath(shot))
+    layers = [os.path.join(folder, layer.path) for layer in provenance.layers]
+    for option, path in files.items():
+        if any(os.path.exists(layer) and _is_same(path, layer) for layer in layers):
+            raise SettingError(
+                "this file is a layer of the shot, which is never overwritten", path=option, found=path,
+                remedy="Choose another.",
+            )  # fmt: skip
+
+
+def _is_same(one: str, other: str) -> bool:
+    """Whether two names are one file, also through links."""
+    if os.path.realpath(one) == os.path.realpath(other):
+        return True
+    return os.path.exists(one) and os.path.exists(other) and os.path.samefile(one, other)
