@@ -67,6 +67,14 @@ def test_a_log_that_cannot_be_written_is_refused_before_the_run(tmp_path, calmot
     assert done.returncode == 2 and "--log" in done.stderr
 
 
+@pytest.mark.parametrize("content", ["#usda 1.0\n", "time_s,/Arm/Elbow\n0,1\n", "{\n", "[fe.mesh]\n", "1\n"])
+def test_a_file_that_is_no_log_is_never_changed(tmp_path, content):
+    (tmp_path / "file").write_text(content)
+    with pytest.raises(SettingError, match="another kind"):
+        RunLog(str(tmp_path / "file"))
+    assert (tmp_path / "file").read_text() == content
+
+
 def test_a_full_disk_ends_the_log_and_not_the_run():
     if not os.path.exists("/dev/full"):
         pytest.skip("this system has no /dev/full")

@@ -14,12 +14,12 @@ from calmotion.support.memory import peak_memory, resident_memory
 from calmotion.version import __version__
 from calmotion.workflow.run import Progress
 
-_HEAD = b'{"time": "'  # of every line
+_LONGEST = 65536  # bytes of a line
 _INTERVAL = 0.1  # least time between two lines of progress of a stage [s]
 
 
 def _is_log(path: str) -> bool:
-    """Whether lines may be added to a file: it does not exist, is empty, or was written by a log before.
+    """Whether lines may be added to a file: it does not exist, is empty, or has JSON lines already.
 
     Raises:
         OSError: It cannot be read.
@@ -27,7 +27,11 @@ def _is_log(path: str) -> bool:
     if not os.path.isfile(path):
         return True
     with open(path, "rb") as file:
-        return file.read(len(_HEAD)) in (b"", _HEAD)
+        line = file.readline(_LONGEST)
+    try:
+        return not line or isinstance(json.loads(line), dict)
+    except ValueError:
+        return False
 
 
 class RunLog:
