@@ -93,14 +93,15 @@ def _print_gains(console: Console, report: dict[str, Any]) -> None:
         print_table(console, "Gains of motors", heads, rows, texts=3)
     servos = [_servo_row(motor) for motor in report["motors"] if motor["rotor"]]
     if servos:
-        heads = ["servo", "armature", "gear", "friction", "no-load speed", "delay"]
-        print_table(console, "Servos", heads, servos)
+        heads = ["servo", "type", "armature", "gear", "friction", "viscous", "no-load speed", "delay", "backlash"]
+        print_table(console, "Servos", heads, servos, texts=2)
     effects = report["effects_of_gains"]
     if effects:
         ideal = all(motor["model"] == PRESCRIBED for motor in report["motors"])
         lag = max(effects, key=itemgetter("max_error_m"))
         rest = max(row["sag_m"] for row in effects)
-        remedy = "; set calm:motor:model to drive to simulate them" if ideal else ""
+        model = "servo" if any(motor["type"] for motor in report["motors"]) else "drive"
+        remedy = f"; set calm:motor:model to {model} to simulate them" if ideal else ""
         say(
             console,
             f"with these gains {lag['path']} would be off by up to {length(lag['max_error_m'])}, a target at rest by "
@@ -123,11 +124,14 @@ def _servo_row(motor: dict[str, Any]) -> list[str]:
     gear, speed = rotor[f"gear_stiffness_{newtons}_{unit}"], rotor[f"no_load_speed_{unit}_s"]  # None: infinite
     return [
         motor["path"],
+        motor["type"] or "-",
         inertia,
         "rigid" if gear is None else f"{gear:.4g} {effort}/{unit}",
         f"{rotor[f'friction_{newtons}']:.4g} {effort}",
+        f"{rotor[f'viscous_friction_{newtons}_s_{unit}']:.4g} {effort} s/{unit}",
         "-" if speed is None else f"{(length if linear else angle)(speed)}/s",
         f"{1e3 * motor['delay_s']:.4g} ms",
+        (length if linear else angle)(motor[f"backlash_{unit}"]) if motor[f"backlash_{unit}"] else "-",
     ]
 
 

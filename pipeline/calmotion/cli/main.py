@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Sequence
 
-from calmotion.cli.commands.robots import import_robot, materials, rig
+from calmotion.cli.commands.robots import import_robot, materials, motors, rig
 from calmotion.cli.commands.setup import bench, cache, completion, doctor, plugins, warmup
 from calmotion.cli.commands.shots import export, inspect, optimize, simulate
 from calmotion.cli.parser import Parser, add_examples, overview
@@ -82,6 +82,7 @@ def build_parser() -> Parser:
         export,
         import_robot,
         rig,
+        motors,
         materials,
         bench,
         plugins,

@@ -48,6 +48,7 @@ EXAMPLES: dict[str, tuple[tuple[str, str], ...]] = {
         ("calmotion import arm.urdf --motion wave.csv -o shot.usda", "a shot of a robot and a motion"),
         ("calmotion import arm.urdf -o shot.usda --flexible '*forearm*=abs,3mm'", "with a link that bends"),
     ),
+    "motors": (("calmotion motors xm430-w350", "one motor, each value with its source"),),
     "materials": (("calmotion materials abs", "one material, with its source"),),
     "rig": (("calmotion rig skinned.usda -o robot.usda", "a robot from a UsdSkel character"),),
     "bench": (("calmotion bench work-precision", "error against run time of every setting"),),

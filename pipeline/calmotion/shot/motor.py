@@ -72,7 +72,9 @@ class Motor:
         velocity_gain: Its damping [N m s/rad].
         gains_from: Where these were read, also where the model does not use them.
         rotor: Of a SERVO.
-        delay: Time after which the command acts [s]; not of a PRESCRIBED motor.
+        delay: Time after which the command acts [s]; not of a PRESCRIBED motor, which does not use it.
+        backlash: Play between the motor and the joint, from one end to the other [rad]; it is not simulated.
+        kind: Name of the real motor that it is, or empty; its rotor is then known, whatever the model.
     """
 
     joint: int
@@ -92,6 +94,8 @@ class Motor:
     gains_from: str = ""
     rotor: Rotor = Rotor()
     delay: float = 0.0
+    backlash: float = 0.0
+    kind: str = ""
 
 
 class Measure(NamedTuple):

@@ -203,8 +203,10 @@ def _motor(motor: Motor, track: Track, character: Character) -> dict[str, Any]:
         f"position_gain_{newtons}_{unit}": motor.position_gain,
         f"velocity_gain_{newtons}_s_{unit}": motor.velocity_gain,
         "gains_from": motor.gains_from,
+        "type": motor.kind,
         "delay_s": motor.delay,
-        "rotor": None if motor.model != SERVO else _rotor(motor, newtons, unit),
+        f"backlash_{unit}": motor.backlash,
+        "rotor": _rotor(motor, newtons, unit) if motor.model == SERVO or motor.kind else None,
     }
 
 

@@ -19,7 +19,9 @@ from calmotion.usd.reading.motors.free_ranges import may_change
 from calmotion.usd.reading.motors.gearing import Gear, read_gear, resolve
 from calmotion.usd.reading.motors.motor_limits import calmotion_limit, effort_limit, velocity_limit
 from calmotion.usd.reading.motors.motor_models import motor_model, read_gains
-from calmotion.usd.reading.motors.rotors import read_delay, read_rotor
+from calmotion.usd.reading.motors.named_types import named_type
+from calmotion.usd.reading.motors.newton_actuators import ACTUATOR, TARGETS, newton_actuator
+from calmotion.usd.reading.motors.rotors import read_backlash, read_delay, read_rotor
 from calmotion.usd.reading.motors.tracks import sample_codes
 from calmotion.usd.units import StageUnits
 
@@ -31,6 +33,7 @@ SKEL_JOINT = "calm:motor:skelJoint"
 DRIVE, BODIES, SKELETON, CONSTANT, GEARED, GIVEN = "drive", "bodies", "skeleton", "constant", "geared", "given"
 _SCHEMA = "CalmMotorAPI"
 _UNITS = {"revolute": "degrees", "prismatic": "units of length"}
+_ACTUATORS = {"MjcActuator": "mjc:target", ACTUATOR: TARGETS}
 _WRITTEN_AS = {BODIES: "xformOpOrder", SKELETON: SKEL_JOINT}
 
 
@@ -71,7 +74,7 @@ class Drive:
         constant: The value that it holds [rad or m]; None: that of the pose in which the bodies stand.
         skel_joint: The joint of the skeleton.
         gear: How it follows another motor.
-        actuator: Path of the actuator of a MuJoCo conversion that drives it, or empty.
+        actuator: Path of the actuator that drives it, of a MuJoCo conversion or of Newton, or empty.
     """
 
     joint: JointPrim
@@ -87,13 +90,14 @@ class Drive:
 
 
 def actuated_joints(stage: Usd.Stage) -> dict[str, str]:
-    """Joints that an actuator of a MuJoCo conversion drives, itself or by a tendon, with the actuator's path (usd-core
-    does not know these types)."""
+    """Joints that an actuator of Newton drives, or one of a MuJoCo conversion, itself or by a tendon, with the
+    actuator's path (usd-core does not know these types)."""
     found = {}
     for prim in prims_of(stage):
-        if prim.GetTypeName() != "MjcActuator":
+        name = _ACTUATORS.get(str(prim.GetTypeName()))
+        if name is None:
             continue
-        relationship = prim.GetRelationship("mjc:target")
+        relationship = prim.GetRelationship(name)
         for target in relationship.GetTargets() if relationship else []:
             named = stage.GetPrimAtPath(target)
             path = named.GetRelationship("mjc:path") if named else None
@@ -218,25 +222,29 @@ def read_motor(drive: Drive, index: int, motors: dict[str, int], reading: Readin
     """
     prim, linear = drive.joint.prim, drive.joint.kind == "prismatic"
     from_stage = reading.units.length if linear else np.deg2rad
-    gear, model = drive.gear, motor_model(prim)
-    gains = read_gains(drive.joint, reading.stage, drive.actuator, reading.units, model)
+    gear, model, kind = drive.gear, motor_model(prim), named_type(drive.joint)
+    newton = newton_actuator(reading.stage, drive.actuator)
+    mujoco = reading.stage.GetPrimAtPath(drive.actuator) if drive.actuator and newton is None else None
+    gains = read_gains(drive.joint, mujoco, newton, reading.units, model, kind)
     return Motor(
         joint=index,
         path=drive.joint.path,
         attribute=_WRITTEN_AS.get(drive.source, target_attribute(drive.joint)),
         source=drive.source if drive.source in _WRITTEN_AS else DRIVE,
         optimize=may_change(prim),
-        max_velocity=velocity_limit(drive.joint, reading.units, reading.notes),
+        max_velocity=velocity_limit(drive.joint, reading.units, reading.notes, kind),
         max_acceleration=float(from_stage(calmotion_limit(prim, "calm:motor:maxAcceleration"))),
-        max_torque=effort_limit(drive.joint, reading.units, reading.notes),
+        max_torque=effort_limit(drive.joint, reading.units, reading.notes, kind, newton),
         linear=linear,
         follows=None if gear is None else Follows(motors[gear.leader], gear.ratio, gear.offset),
         model=model,
         position_gain=gains.position,
         velocity_gain=gains.velocity,
         gains_from=gains.source,
-        rotor=read_rotor(drive.joint, reading.units, model, reading.notes),
-        delay=read_delay(prim, model),
+        rotor=read_rotor(drive.joint, reading.units, model, kind, newton, reading.notes),
+        delay=read_delay(drive.joint, model, kind, newton),
+        backlash=read_backlash(drive.joint, reading.units, kind),
+        kind=kind.name,
     )
 
 

@@ -8,10 +8,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from calmotion.control.motor_types import MotorType
 from calmotion.errors import ShotError
 from calmotion.usd import schemas
 from calmotion.usd.dialects import EFFORT_LIMIT, VELOCITY_LIMIT, Spelling, authored, first_finite
 from calmotion.usd.reading.joints import JointPrim
+from calmotion.usd.reading.motors.newton_actuators import NewtonActuator
 from calmotion.usd.units import StageUnits
 
 if TYPE_CHECKING:
@@ -20,28 +22,45 @@ if TYPE_CHECKING:
 _SCHEMA = "CalmMotorAPI"
 
 
-def effort_limit(joint: JointPrim, units: StageUnits, notes: list[str]) -> float:
+def effort_limit(
+    joint: JointPrim, units: StageUnits, notes: list[str], kind: MotorType, newton: NewtonActuator | None
+) -> float:
     """Largest torque [N m] or force [N]; the lower of Calmotion's and UsdPhysics' limit, else that of another dialect.
+
+    Args:
+        kind: The named motor, whose limit stands for one of Calmotion that is not authored.
+        newton: The joint's actuator.
 
     Raises:
         ShotError: A limit that is not positive.
     """
     to_si = units.force if joint.kind == "prismatic" else units.torque
-    limit = to_si(calmotion_limit(joint.prim, "calm:motor:maxTorque"))
+    own = authored(joint.prim, EFFORT_LIMIT[0], joint.drive)
+    limit = kind.get("max_torque", math.inf) if own is None else to_si(positive(joint.prim, *own))
     force = authored(joint.prim, EFFORT_LIMIT[1], joint.drive)
     if force is not None:
         limit = min(limit, to_si(positive(joint.prim, *force)))
-    return float(limit if math.isfinite(limit) else _dialect_limit(joint, EFFORT_LIMIT[2:], to_si, notes))
+    if not math.isfinite(limit):
+        limit = _dialect_limit(joint, EFFORT_LIMIT[2:], to_si, notes)
+    if not math.isfinite(limit) and newton is not None and 0.0 < newton.effort < math.inf:
+        notes.append(f"{joint.path}: its limit is taken from {newton.path} (Newton)")
+        limit = to_si(newton.effort)
+    return float(limit)
 
 
-def velocity_limit(joint: JointPrim, units: StageUnits, notes: list[str]) -> float:
+def velocity_limit(joint: JointPrim, units: StageUnits, notes: list[str], kind: MotorType) -> float:
     """Largest speed [rad/s or m/s]; Calmotion's limit, else that of another dialect.
+
+    Args:
+        kind: The named motor, whose largest or no-load speed stands for a limit of Calmotion that is not authored.
 
     Raises:
         ShotError: A limit that is not positive.
     """
     to_si = units.length if joint.kind == "prismatic" else np.deg2rad
-    limit = to_si(calmotion_limit(joint.prim, "calm:motor:maxVelocity"))
+    own = authored(joint.prim, VELOCITY_LIMIT[0], joint.drive)
+    named = min(kind.get("max_speed", math.inf), kind.get("no_load_speed", math.inf))
+    limit = named if own is None else to_si(positive(joint.prim, *own))
     return float(limit if math.isfinite(limit) else _dialect_limit(joint, VELOCITY_LIMIT[1:], to_si, notes))
 
 

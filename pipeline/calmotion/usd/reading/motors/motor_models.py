@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from calmotion.control.motor_types import MotorType
 from calmotion.errors import ShotError
 from calmotion.shot.motor import DRIVE, PRESCRIBED, SERVO
 from calmotion.support.naming import nearest
 from calmotion.usd import schemas
-from calmotion.usd.dialects import GAINS, POSITION_ACTUATOR, authored
+from calmotion.usd.dialects import GAINS, POSITION_ACTUATOR, Spelling, authored
 from calmotion.usd.reading.joints import JointPrim
+from calmotion.usd.reading.motors.named_types import TYPE
+from calmotion.usd.reading.motors.newton_actuators import NewtonActuator
 from calmotion.usd.units import StageUnits
 
 if TYPE_CHECKING:
@@ -59,28 +62,55 @@ def motor_model(prim: Usd.Prim) -> str:
     )
 
 
-def read_gains(joint: JointPrim, stage: Usd.Stage, actuator: str, units: StageUnits, model: str) -> Gains:
-    """The gains that pull a joint towards the motor's command; those of the first dialect that has a position gain.
+def read_gains(
+    joint: JointPrim, actuator: Usd.Prim | None, newton: NewtonActuator | None, units: StageUnits, model: str,
+    kind: MotorType,
+) -> Gains:  # fmt: skip
+    """The gains that pull a joint towards the motor's command; those of the first source that has a position gain:
+    Calmotion, the named motor, UsdPhysics, an actuator of MuJoCo or of Newton.
 
     Args:
-        stage: The shot.
-        actuator: Path of the actuator of a MuJoCo conversion that drives the joint, or empty.
+        actuator: The actuator of a MuJoCo conversion that drives the joint.
+        newton: The actuator of Newton that does.
         model: Of the motor: one that gives must have gains.
+        kind: The named motor; its velocity gain goes with a position gain of Calmotion's, too.
 
     Raises:
         ShotError: A gain that is negative or not finite, or a motor that gives without a gain.
     """
     used = model != PRESCRIBED
-    found = _dialect_gains(joint, units, used) or _actuator_gains(joint, stage, actuator, units) or Gains()
+    own, *others = zip(_POSITION, _VELOCITY, strict=True)
+    found = (
+        _dialect_gains(joint, units, used, [own], kind.get("velocity_gain", 0.0))
+        or _gains_of(kind)
+        or _dialect_gains(joint, units, used, others, 0.0)
+        or _actuator_gains(joint, actuator, units)
+        or _newton_gains(joint, newton, units)
+        or Gains()
+    )
     if used:
         _refuse_weightless(joint, found, model)
     return found
 
 
-def _dialect_gains(joint: JointPrim, units: StageUnits, used: bool) -> Gains | None:
-    """Gains that are authored on the joint itself; wrong ones are refused where they are used."""
+def _gains_of(kind: MotorType) -> Gains | None:
+    """Those of a named motor."""
+    if "position_gain" not in kind.values:
+        return None
+    source = f"{TYPE} {kind.name} ({kind.sources['position_gain']})"
+    return Gains(kind.values["position_gain"], kind.get("velocity_gain", 0.0), source)
+
+
+def _dialect_gains(
+    joint: JointPrim, units: StageUnits, used: bool, dialects: Sequence[tuple[Spelling, Spelling]], damping_else: float
+) -> Gains | None:
+    """Gains that are authored on the joint itself; wrong ones are refused where they are used.
+
+    Args:
+        damping_else: Velocity gain where none is authored, SI.
+    """
     to_si = _per_length(units) if joint.kind == "prismatic" else _per_degree(units)
-    for position, velocity in zip(_POSITION, _VELOCITY, strict=True):
+    for position, velocity in dialects:
         stiffness, damping = (authored(joint.prim, spelling, joint.drive) for spelling in (position, velocity))
         if stiffness is None:
             continue
@@ -93,7 +123,9 @@ def _dialect_gains(joint: JointPrim, units: StageUnits, used: bool) -> Gains | N
         names = " and ".join(name for name, _ in found)
         accelerations = _sets_accelerations(joint) and position.dialect == "UsdPhysics"
         kind = ", of accelerations" if accelerations else ""
-        return Gains(values[0], values[-1] if damping is not None else 0.0, f"{names} ({position.dialect}{kind})")
+        return Gains(
+            values[0], values[-1] if damping is not None else damping_else, f"{names} ({position.dialect}{kind})"
+        )
     return None
 
 
@@ -103,19 +135,26 @@ def _sets_accelerations(joint: JointPrim) -> bool:
     return bool(attribute) and attribute.Get() == "acceleration"
 
 
-def _actuator_gains(joint: JointPrim, stage: Usd.Stage, actuator: str, units: StageUnits) -> Gains | None:
+def _newton_gains(joint: JointPrim, newton: NewtonActuator | None, units: StageUnits) -> Gains | None:
+    """Gains of an actuator of Newton, in radians."""
+    if newton is None or not newton.kp > 0.0:
+        return None
+    to_si = _per_length(units) if joint.kind == "prismatic" else units.torque
+    return Gains(to_si(newton.kp), to_si(newton.kd), f"newton:kp and newton:kd of {newton.path} (Newton)")
+
+
+def _actuator_gains(joint: JointPrim, prim: Usd.Prim | None, units: StageUnits) -> Gains | None:
     """Gains of a position actuator of a MuJoCo conversion, which acts on the joint itself: kp (ctrl - g q) - kv g q'
     with the gear ratio g, in radians."""
-    prim = stage.GetPrimAtPath(actuator) if actuator else None
-    targets = prim.GetRelationship("mjc:target").GetTargets() if prim else []
-    if prim is None or joint.prim.GetPath() not in targets:
+    relationship = prim.GetRelationship("mjc:target") if prim else None
+    if prim is None or not relationship or joint.prim.GetPath() not in relationship.GetTargets():
         return None
     gain, bias, gear = (_numbers(prim, name) for name in POSITION_ACTUATOR)
     kp, ratio = gain[0] if gain else 0.0, gear[0] if gear else 1.0
     if not kp > 0.0 or len(bias) < 3 or bias[1] != -kp or not math.isfinite(kp * bias[2]):
         return None  # not one that holds positions
     to_si = _per_length(units) if joint.kind == "prismatic" else units.torque
-    names = f"{POSITION_ACTUATOR[0]} and {POSITION_ACTUATOR[1]} of {actuator} (MuJoCo)"
+    names = f"{POSITION_ACTUATOR[0]} and {POSITION_ACTUATOR[1]} of {prim.GetPath()} (MuJoCo)"
     return Gains(to_si(ratio**2 * kp), to_si(ratio**2 * max(-bias[2], 0.0)), names)
 
 
@@ -160,5 +199,6 @@ def _refuse_weightless(joint: JointPrim, gains: Gains, model: str) -> None:
             path=joint.path,
             attribute="calm:motor:positionGain",
             found="none",
-            remedy=f"Author it, or drive:{joint.drive}:physics:stiffness, or set {MODEL} to {PRESCRIBED}",
+            remedy=f"Author it, or drive:{joint.drive}:physics:stiffness, name a motor whose gain is known ({TYPE}), "
+            f"or set {MODEL} to {PRESCRIBED}",
         )

@@ -1,17 +1,24 @@
-"""What a servo has between its controller and the joint: rotor, gear, friction, limits of speed, delay."""
+"""What a servo has between its controller and the joint: rotor, gear, friction, limits of speed, delay, backlash.
+
+Each value is the one that is authored in Calmotion's attribute, else that of the named motor, else that of another
+dialect.
+"""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from calmotion.control.motor_types import MotorType
 from calmotion.errors import ShotError
 from calmotion.shot.motor import PRESCRIBED, SERVO, Rotor
 from calmotion.usd.dialects import ARMATURE, FRICTION, VISCOUS_FRICTION, Spelling, authored
 from calmotion.usd.reading.joints import JointPrim
+from calmotion.usd.reading.motors.newton_actuators import NewtonActuator
 from calmotion.usd.units import StageUnits
 
 if TYPE_CHECKING:
@@ -19,58 +26,133 @@ if TYPE_CHECKING:
 
 _NAME = "calm:motor:{}"
 _CALMOTION = "Calmotion"
+_COEFFICIENT = "physxJoint:jointFriction"
+
+ToSI = Callable[[float], float]
 
 
-def read_delay(prim: Usd.Prim, model: str) -> float:
-    """Delay of the motor's command [s]; none of an ideal motor.
+@dataclass(frozen=True)
+class _Values:
+    """Values of one joint, by Calmotion's attributes and the named motor."""
+
+    joint: JointPrim
+    kind: MotorType
+    notes: list[str]
+
+    def own(self, name: str, quantity: str, to_si: ToSI, fallback: float, positive: bool = False) -> float:
+        """The value of an attribute of CalmMotorAPI, SI."""
+        found = _own(self.joint.prim, name, positive)
+        return self.kind.get(quantity, fallback) if found is None else float(to_si(found))
+
+    def of_dialects(
+        self, spellings: tuple[Spelling, ...], quantity: str, own_units: Mapping[str, ToSI], to_si: ToSI
+    ) -> float:
+        """The value of the first dialect that has one, SI; zero where none has.
+
+        Args:
+            own_units: Conversions of the dialects that differ from `to_si`.
+        """
+        for spelling in spellings:
+            if spelling.dialect != _CALMOTION and quantity in self.kind.values:
+                break
+            found = authored(self.joint.prim, spelling, self.joint.drive)
+            if found is None:
+                continue
+            name, value = found
+            if not (math.isfinite(value) and value >= 0.0):
+                raise _wrong(self.joint.prim, name, value, "must be finite and not negative")
+            if spelling.dialect != _CALMOTION:
+                self.notes.append(f"{self.joint.path}: its servo has {name} ({spelling.dialect})")
+            return float(own_units.get(spelling.dialect, to_si)(value))
+        return self.kind.get(quantity, 0.0)
+
+
+def read_delay(joint: JointPrim, model: str, kind: MotorType, newton: NewtonActuator | None) -> float:
+    """Delay of the motor's command [s]; an ideal motor does not use it.
+
+    Raises:
+        ShotError: It is negative or not finite, and used.
+    """
+    try:
+        own = _own(joint.prim, "delay", False)
+    except ShotError:
+        if model != PRESCRIBED:
+            raise
+        own = 0.0
+    other = newton.delay if newton is not None else 0.0
+    return kind.get("delay", other) if own is None else own
+
+
+def read_backlash(joint: JointPrim, units: StageUnits, kind: MotorType) -> float:
+    """Play between the motor and the joint, from one end to the other [rad] or [m].
 
     Raises:
         ShotError: It is negative or not finite.
     """
-    return 0.0 if model == PRESCRIBED else _own(prim, "delay", 0.0)
+    found = _own(joint.prim, "backlash", False)
+    length = units.length if joint.kind == "prismatic" else np.deg2rad
+    return kind.get("backlash", 0.0) if found is None else float(length(found))
 
 
-def read_rotor(joint: JointPrim, units: StageUnits, model: str, notes: list[str]) -> Rotor:
-    """The rotor of a servo, SI; that of other motors is empty.
+def read_rotor(
+    joint: JointPrim, units: StageUnits, model: str, kind: MotorType, newton: NewtonActuator | None, notes: list[str]
+) -> Rotor:
+    """The rotor of a servo, SI, also of a motor whose type is named; that of other motors is empty.
 
     Raises:
         ShotError: A value out of its range.
     """
-    if model != SERVO:
+    if model != SERVO and not kind.values:
         return Rotor()
     prim, linear = joint.prim, joint.kind == "prismatic"
     length = units.length if linear else np.deg2rad
     force, inertia = (units.force, units.mass) if linear else (units.torque, units.inertia)
+    at, empty = _Values(joint, kind, notes), Rotor()
 
     def per_length(value: float) -> float:
-        return float(force(value) / length(1.0))
+        return float(force(value) / length(1.0)) if math.isfinite(value) else math.inf
 
-    empty = Rotor()
-    armature = _of_dialects(joint, ARMATURE, {_CALMOTION: inertia}, inertia, notes)
-    if not armature:
+    def same(value: float) -> float:
+        return value
+
+    armature = at.of_dialects(ARMATURE, "armature", {_CALMOTION: inertia}, inertia)
+    if not armature and model == SERVO:
         notes.append(f"{joint.path}: a servo without calm:motor:armature has a rotor without inertia")
-    gear, knee = _own(prim, "gearStiffness", math.inf, positive=True), _own(prim, "torqueSpeedKnee", empty.knee)
+    speed, knee = empty.no_load_speed, empty.knee
+    if newton is not None:
+        speed, knee = float(units.length(newton.velocity) if linear else newton.velocity), newton.knee
+        notes.extend(f"{joint.path}: {what} of {newton.path} is not simulated" for what in newton.unread)
+    knee = at.own("torqueSpeedKnee", "torque_speed_knee", same, knee)
     if not knee < 1.0:
         raise _wrong(prim, "torqueSpeedKnee", knee, "must be a share of the no-load speed below 1")
-    speed = _own(prim, "frictionSpeed", math.nan, positive=True)
+    found = authored(prim, Spelling("PhysX", _COEFFICIENT), joint.drive)
+    friction = at.of_dialects(FRICTION, "friction", {}, force)
+    if found is not None and found[1] and not friction:
+        notes.append(f"{joint.path}: {_COEFFICIENT} is a coefficient, not a torque: author {_name('friction')} instead")
     viscous = {_CALMOTION: per_length, "Newton": per_length}  # MuJoCo has radians
     return Rotor(
         armature=armature,
-        gear_stiffness=per_length(gear) if math.isfinite(gear) else math.inf,
-        gear_damping=per_length(_own(prim, "gearDamping", 0.0)),
-        viscous_friction=_of_dialects(joint, VISCOUS_FRICTION, viscous, per_length if linear else force, notes),
-        friction=_of_dialects(joint, FRICTION, {}, force, notes),
-        friction_speed=empty.friction_speed if math.isnan(speed) else float(length(speed)),
-        no_load_speed=float(length(_own(prim, "noLoadSpeed", math.inf, positive=True))),
+        gear_stiffness=at.own("gearStiffness", "gear_stiffness", per_length, math.inf, positive=True),
+        gear_damping=at.own("gearDamping", "gear_damping", per_length, 0.0),
+        viscous_friction=at.of_dialects(
+            VISCOUS_FRICTION, "viscous_friction", viscous, per_length if linear else force
+        ),
+        friction=friction,
+        friction_speed=at.own("frictionSpeed", "friction_speed", length, empty.friction_speed, positive=True),
+        no_load_speed=at.own("noLoadSpeed", "no_load_speed", length, speed, positive=True),
         knee=knee,
-    )
+    )  # fmt: skip
 
 
-def _own(prim: Usd.Prim, name: str, fallback: float, positive: bool = False) -> float:
-    """The value of an attribute of CalmMotorAPI, in stage units."""
-    found = authored(prim, Spelling(_CALMOTION, _NAME.format(name)), "")
+def _name(name: str) -> str:
+    return _NAME.format(name)
+
+
+def _own(prim: Usd.Prim, name: str, positive: bool) -> float | None:
+    """The value of an attribute of CalmMotorAPI, in stage units; None where none is authored."""
+    found = authored(prim, Spelling(_CALMOTION, _name(name)), "")
     if found is None:
-        return fallback
+        return None
     value = found[1]
     if positive and not value > 0.0:
         raise _wrong(prim, name, value, "must be positive")
@@ -79,33 +161,11 @@ def _own(prim: Usd.Prim, name: str, fallback: float, positive: bool = False) -> 
     return value
 
 
-def _of_dialects(
-    joint: JointPrim, spellings: tuple[Spelling, ...], own_units: Mapping[str, Callable[[float], float]],
-    to_si: Callable[[float], float], notes: list[str],
-) -> float:  # fmt: skip
-    """The value of the first dialect that has one, SI; zero where none has.
-
-    Args:
-        own_units: Conversions of the dialects that differ from `to_si`.
-    """
-    for spelling in spellings:
-        found = authored(joint.prim, spelling, joint.drive)
-        if found is None:
-            continue
-        name, value = found
-        if not (math.isfinite(value) and value >= 0.0):
-            raise _wrong(joint.prim, name, value, "must be finite and not negative")
-        if spelling.dialect != _CALMOTION:
-            notes.append(f"{joint.path}: its servo has {name} ({spelling.dialect})")
-        return float(own_units.get(spelling.dialect, to_si)(value))
-    return 0.0
-
-
 def _wrong(prim: Usd.Prim, name: str, value: float, what: str) -> ShotError:
     return ShotError(
         f"a value of a servo {what}",
         path=prim.GetPath(),
-        attribute=name if ":" in name else _NAME.format(name),
+        attribute=name if ":" in name else _name(name),
         found=value,
         remedy="Correct the value, or remove the attribute",
     )

@@ -1,0 +1,120 @@
+"""`calmotion motors`: the table of real motors."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+from calmotion.cli.options import Commands, file_argument
+
+if TYPE_CHECKING:
+    from calmotion.cli.output import Output
+    from calmotion.control.motor_types import MotorType
+
+
+def add_to(commands: Commands) -> None:
+    """Add the command."""
+    text = "list real motors that a joint can name (calm:motor:type), with torque, speed and their sources"
+    command = commands.add_parser("motors", help=text, description=text[0].upper() + text[1:] + ".")
+    command.set_defaults(command=_run)
+    command.add_argument("name", nargs="?", metavar="NAME", help="show only this motor, each value with its source")
+    file_argument(
+        command, "--motors", metavar="FILE", action="append", default=[],
+        help="TOML file with more motors, to check it; shots use those of motors.toml in the configuration folder",
+    )  # fmt: skip
+    command.add_argument("--json", action="store_true", help="print one JSON object on stdout, and nothing else there")
+    command.add_argument("--toml", action="store_true", help="print TOML, to be changed and saved as motors.toml")
+
+
+def _run(args: argparse.Namespace, output: Output) -> int:
+    from calmotion.control.motor_types import likely_motor_types, motor_type_named, motor_types
+    from calmotion.errors import ShotError
+
+    known: Mapping[str, MotorType] = motor_types(args.motors)
+    if args.name:
+        found = motor_type_named(args.name, known)
+        if found is None:
+            remedy = likely_motor_types(args.name, known)
+            raise ShotError("there is no such motor", found=args.name, remedy=remedy)
+        known = {found.name: found}
+    if args.json:
+        output.object({"command": "motors", "motors": {name: _row(motor) for name, motor in known.items()}})
+    elif args.toml:
+        print("\n".join(map(_as_toml, known.values())), file=output.stream, end="")
+    elif args.name:
+        _print_one(next(iter(known.values())), output)
+    else:
+        _print(known, output)
+    return 0
+
+
+def _row(motor: MotorType) -> dict[str, Any]:
+    """A motor for programs: values in SI, with their units and sources."""
+    from calmotion.control.motor_types import QUANTITIES
+
+    units = {
+        name: QUANTITIES[name].linear_si if motor.linear else QUANTITIES[name].si for name in motor.values
+    }  # fmt: skip
+    return {
+        "title": motor.title,
+        "group": motor.group,
+        "aliases": list(motor.aliases),
+        "linear": motor.linear,
+        "values": {
+            name: {"value": value, "unit": units[name], "source": motor.sources[name]}
+            for name, value in motor.values.items()
+        },
+    }
+
+
+def _as_toml(motor: MotorType) -> str:
+    def text(value: Any) -> str:
+        return json.dumps(value, ensure_ascii=False)
+
+    lines = [f"[{motor.name}]", f"title = {text(motor.title)}", f"group = {text(motor.group)}"]
+    lines += [f"aliases = {text(list(motor.aliases))}"] if motor.aliases else []
+    lines += ["linear = true"] if motor.linear else []
+    lines += [f"{name} = {float(f'{motor.in_table(name):.12g}')!r}" for name in motor.values]
+    lines += [f"[{motor.name}.sources]", *(f"{name} = {text(motor.sources[name])}" for name in motor.values)]
+    return "\n".join(lines) + "\n"
+
+
+def _cell(motor: MotorType, name: str) -> str:
+    return f"{motor.in_table(name):.4g} {motor.unit(name)}".strip() if name in motor.values else "-"
+
+
+def _print(known: Mapping[str, MotorType], output: Output) -> None:
+    from calmotion.cli.tables import console_on, print_table, say
+
+    console, shown = console_on(output.stream), ("max_torque", "no_load_speed", "position_gain", "gear_stiffness")
+    cells = [
+        [
+            name, motor.title, motor.group, _cell(motor, shown[0]),
+            _cell(motor, shown[1] if shown[1] in motor.values else "max_speed"),
+            *(_cell(motor, quantity) for quantity in shown[2:]),
+        ]
+        for name, motor in known.items()
+    ]  # fmt: skip
+    heads = ["name", "motor", "kind", "largest torque", "speed", "position gain", "gear"]
+    print_table(console, "Motors", heads, cells, texts=3)
+    say(console, "calmotion motors NAME shows all values of a motor with their sources")
+
+
+def _print_one(motor: MotorType, output: Output) -> None:
+    from calmotion.cli.tables import console_on, print_table, say
+    from calmotion.control.motor_types import QUANTITIES
+
+    console = console_on(output.stream)
+    names = ", ".join([motor.name, *motor.aliases])
+    sources = list(dict.fromkeys(motor.sources.values()))
+    rows = [
+        [QUANTITIES[name].title, f"[{sources.index(motor.sources[name]) + 1}]", _cell(motor, name)]
+        for name in motor.values
+    ]
+    print_table(console, f"{names}: {motor.title}", ["quantity", "source", "value"], rows, texts=2)
+    for number, source in enumerate(sources):
+        say(console, f"[{number + 1}] {source}")
+    unknown = [quantity.title for name, quantity in QUANTITIES.items() if name not in motor.values]
+    say(console, f"not known: {', '.join(unknown)}")
