@@ -158,7 +158,7 @@ class EstimateMotorEffects(Operator):
         check_simulation(context.get(Character), context.get(Animation), run_settings(context.get(Source)))
 
     def execute(self, context: RunContext) -> Sequence[object]:
-        from calmotion.accuracy.motor_effects import effects_of_gains
+        from calmotion.accuracy.motors.motor_effects import effects_of_gains
 
         context.progress(0.0, "simulating rigid links on motors that give")
         options = run_settings(context.get(Source), context.get(ModelChoices))

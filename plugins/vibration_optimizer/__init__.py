@@ -24,11 +24,13 @@ def _options(context: RunContext, **more: Any) -> Any:
 def _with_budget(context: RunContext, result: Result) -> Result:
     """The result with the decisions on the model, its error budget, and the parts of motors and links in its error."""
     from calmotion.accuracy.error_budget import with_budget
-    from calmotion.accuracy.motor_effects import with_error_shares
+    from calmotion.accuracy.motors.backlash import with_lost_motion
+    from calmotion.accuracy.motors.motor_effects import with_error_shares
 
     shot, tolerance = compiled_in(context.get), context.get(Source).settings.tolerance
     if not result.interrupted:
         result = with_error_shares(shot, result, _options(context), context.progress)
+        result = with_lost_motion(shot, result, _options(context))
     return with_budget(with_choices(result, context.get(ModelChoices)), shot.character, tolerance)
 
 

@@ -61,6 +61,30 @@ def print_shares(console: Console, shares: Sequence[dict[str, Any]]) -> None:
     print_table(console, title, ["target", "motors alone", "links alone"], rows)
 
 
+def print_lost_motion(console: Console, lost: dict[str, Any] | None, suffix: str) -> None:
+    """What the play of gears would do at the target that it moves farthest.
+
+    Args:
+        suffix: Of the keys of the result's own values.
+    """
+    if not lost or not lost["targets"]:
+        return
+    worst = max(lost["targets"], key=lambda row: row[f"max_error{suffix}_m"])
+    turned = [motor for motor in lost["motors"] if motor[f"reversals{suffix}"]]
+    count = sum(motor[f"reversals{suffix}"] for motor in turned)
+    before = f" (as animated {length(worst['max_error_before_m'])})" if suffix else ""
+    say(
+        console,
+        f"backlash is not simulated: the torques of {len(turned)} of {len(lost['motors'])} motors change their sign "
+        f"{count} times; the play would move {worst['path']} by up to {length(worst[f'max_error{suffix}_m'])}{before}"
+        if turned
+        else "backlash costs nothing: the torques of the motors keep their signs",
+    )
+    unfollowed = ", ".join(motor["path"] for motor in lost["motors"] if not motor["followed"])
+    if unfollowed:
+        say(console, f"without the play of {unfollowed}, which the closed chains of a rigid robot cannot follow")
+
+
 def print_joint_gap(console: Console, gap: float) -> None:
     """The largest gap of a joint [m], where joints are not closed."""
     from calmotion.accuracy.step_error import CLOSED_GAP  # loads what has simulated before
@@ -232,6 +256,7 @@ def print_warnings(console: Console, report: dict[str, Any]) -> None:
             f"intended motion with that delay: {length(report['delayed_max_error_m'])}",
         )
     print_shares(console, report["error_shares"])
+    print_lost_motion(console, report["lost_motion"], suffix)
     print_limits(console, report["limits"], bool(suffix))
     sag = max((target[f"sag{suffix}_m"] or 0.0 for target in report["targets"]), default=0.0)
     if sag > 1e-6:

@@ -223,6 +223,24 @@ class ErrorShares:
 
 
 @dataclass(frozen=True, eq=False)
+class LostMotion:
+    """What the play of gears would do to a simulated motion, see `accuracy.motors.backlash`.
+
+    Attributes:
+        motors: Indices of the motors that have play.
+        reversals: For each of them, when the torque of its gear changes its sign [s].
+        largest_m, time_s: Largest way of each target across the play [m], shape [K], and when [s].
+        unknown: Those of the motors whose play is not part of it, since a rigid robot cannot follow it.
+    """
+
+    motors: tuple[int, ...]
+    reversals: tuple[Array, ...]
+    largest_m: Array
+    time_s: Array
+    unknown: tuple[int, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
 class Result:
     """What a run computed. `simulate` fills `before` alone; `optimize` also `after` and what follows it.
 
@@ -254,6 +272,7 @@ class Result:
         tolerance_m: Acceptable error at the targets [m].
         budget: What each approximation may cost and is estimated to cost, largest first; empty where it is not known.
         error_shares: What motors and links have in the error of the input; None where motors are ideal.
+        lost_motion: What the play of gears would do to the input, and to the curves found; empty without play.
         robustness: The curves on robots that differ from the model; None where they were optimised for one robot.
     """
 
@@ -287,4 +306,5 @@ class Result:
     tolerance_m: float = 0.0
     budget: tuple[BudgetEntry, ...] = ()
     error_shares: ErrorShares | None = None
+    lost_motion: tuple[LostMotion, ...] = ()
     robustness: Robustness | None = None

@@ -126,6 +126,7 @@ def run_report(run: Run, character: Character, result: Result, command: str, tot
         "dead_centres_s": final.dead_centres.tolist(),
         **_accuracy(run, result),
         "error_shares": _error_shares(character, result),
+        "lost_motion": lost_motion(character, result),
         "efforts": effort_rows(character, result),
         "frequencies_hz": {character.bodies[table.body].path: table.frequencies for table in result.modes},
     }
@@ -156,6 +157,27 @@ def _error_shares(character: Character, result: Result) -> list[dict[str, Any]]:
         {"path": target.path, "motors_m": float(motors), "links_m": float(links)}
         for target, motors, links in zip(character.targets, shares.motors_m, shares.links_m, strict=True)
     ]
+
+
+def lost_motion(character: Character, result: Result) -> dict[str, Any] | None:
+    """What the play of gears would do at the targets, and how often each gear changes its side; None without play."""
+    if not result.lost_motion:
+        return None
+    found = dict(zip(("_before", "_after") if result.after else ("",), result.lost_motion, strict=True))
+    last = result.lost_motion[-1]
+    motors = [
+        {"path": (motor := character.motors[k]).path, f"backlash_{measure_of(motor).si}": motor.backlash}
+        | {f"reversals{suffix}": len(lost.reversals[row]) for suffix, lost in found.items()}
+        | {"reversal_times_s": last.reversals[row].tolist(), "followed": k not in last.unknown}
+        for row, k in enumerate(last.motors)
+    ]
+    targets = [
+        {"path": target.path}
+        | {f"max_error{suffix}_m": float(lost.largest_m[k]) for suffix, lost in found.items()}
+        | {"time_s": float(last.time_s[k])}
+        for k, target in enumerate(character.targets)
+    ]
+    return {"motors": motors, "targets": targets}
 
 
 def _shaped(shaper: str, result: Result) -> dict[str, Any]:

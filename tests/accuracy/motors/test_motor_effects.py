@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from arms import chain
-from calmotion.accuracy.motor_effects import effects_of_gains, with_error_shares
+from calmotion.accuracy.motors.motor_effects import effects_of_gains, with_error_shares
 from calmotion.retargeting.optimize import optimize_shot
 from calmotion.shot import Animation, Track
 from calmotion.shot.character import motors_give, with_ideal_motors

@@ -1,0 +1,1 @@
+"""Motors that give: what they do to the targets, and what the play of their gears would."""
