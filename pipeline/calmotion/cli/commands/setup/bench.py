@@ -14,7 +14,7 @@ BENCHMARKS = {
     "baselines": "optimizer.baselines", "compilation": "speed.compilation", "estimates": "accuracy.estimates",
     "extremes": "integrators.extremes", "gradients": "integrators.gradients",
     "integrators": "integrators.integrators",
-    "meshing": "speed.meshing", "optimizer": "optimizer.optimizer", "reading": "speed.reading",
+    "meshing": "speed.meshing", "motor-cost": "motors.cost", "optimizer": "optimizer.optimizer", "reading": "speed.reading",
     "reduction": "speed.reduction", "reduction-convergence": "accuracy.reduction_convergence",
     "scaling": "speed.scaling", "simplification": "accuracy.simplification", "speed": "speed.stages",
     "stability": "integrators.stability",
