@@ -11,7 +11,7 @@ from __future__ import annotations
 import json
 import sys
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 
 import numpy as np
@@ -25,7 +25,7 @@ from calmotion.multibody.model.model import Model, rigid_model, start_angles, wi
 from calmotion.multibody.sensitivity.adjoint import adjoint
 from calmotion.multibody.sensitivity.linearization import linearize
 from calmotion.multibody.sensitivity.tangent import tangent
-from calmotion.shot.character import Character
+from calmotion.shot.character import Array, Character
 from calmotion.shot.motor import DRIVE, PRESCRIBED, SERVO, Motor, Rotor
 from calmotion.shot.run import RunSettings
 from calmotion.simulation.compiled_shot import CompiledShot, compile_shot
@@ -92,7 +92,7 @@ def compare(name: str, shot: CompiledShot, rigid: bool, repeats: int) -> list[Ro
     for action in sweeps.values():
         action()
     steps = len(angles) - 1
-    taken = _in_turns({f"{kind}": forward[kind] for kind in MODELS}, repeats)
+    taken = _in_turns(forward, repeats)
     swept = _in_turns(sweeps, repeats)
     return [
         Row(
@@ -103,9 +103,7 @@ def compare(name: str, shot: CompiledShot, rigid: bool, repeats: int) -> list[Ro
     ]  # fmt: skip
 
 
-def _actions(
-    model: Model, angles: np.ndarray, rates: np.ndarray, h: float
-) -> tuple[Callable[[], int], Callable[[], None]]:
+def _actions(model: Model, angles: Array, rates: Array, h: float) -> tuple[Callable[[], int], Callable[[], None]]:
     """A simulation, which returns its Newton iterations, and the sweeps of its linearisation."""
     joint_angles, joint_rates = model.joint_angles(angles), model.joint_angles(rates)
     workspace, system = Workspace.for_system(model.system), model.system
@@ -126,7 +124,7 @@ def _actions(
     return run, sweep
 
 
-def _in_turns(actions: dict[str, Callable[[], object]], repeats: int) -> dict[str, float]:
+def _in_turns(actions: Mapping[str, Callable[[], object]], repeats: int) -> dict[str, float]:
     """Median processor time of each action [s]; they take turns."""
     times: dict[str, list[float]] = {name: [] for name in actions}
     for _ in range(repeats):

@@ -1,0 +1,185 @@
+"""What commands that are optimised with the model of the motors bring, confirmed by MuJoCo.
+
+`calmotion bench motor-commands SHOT ...` takes robots of rigid bodies whose motors have gains or are named. It
+simulates the animation as the command (that is what an optimisation for ideal motors finds on rigid links), finds
+commands with the model of the motors, and plays both on the motors in Calmotion and in a lumped model in MuJoCo.
+Errors are the largest distances of the targets from the intended motion.
+
+`samples/real/compose.py` makes such shots of a KUKA iiwa and of the upper body of a Unitree G1:
+
+python samples/real/compose.py samples/real/iiwa_reach.usda KUKA.usda build/iiwa.usda
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from calmotion.accuracy.motors.motor_effects import with_gains_used
+from calmotion.benchmarks.common.parsers import bench_parser
+from calmotion.benchmarks.motors.lumped import STEP, LumpedMotion, simulate_lumped
+from calmotion.errors import ShotError
+from calmotion.retargeting.optimize import optimize_shot
+from calmotion.shot import Animation, Character, Result, Track
+from calmotion.shot.character import Array
+from calmotion.shot.run import RunSettings
+from calmotion.simulation.compiled_shot import CompiledShot, compile_shot
+
+ALLOWED = 0.1  # of the error of commands for ideal motors
+_STEP = 1.0 / 480.0  # of Calmotion [s]
+
+
+@dataclass(frozen=True)
+class Row:
+    """One robot.
+
+    Attributes:
+        shot: Name.
+        motors: Number of motors that give.
+        ideal_mm, optimised_mm: Largest error of the animation as the command, and of the optimised commands [mm].
+        share: The second over the first.
+        mujoco_ideal_mm, mujoco_optimised_mm, mujoco_share: The same in MuJoCo.
+        apart: Largest difference of the two programs at the joints, for the optimised commands, over their motion.
+    """
+
+    shot: str
+    motors: int
+    ideal_mm: float
+    optimised_mm: float
+    share: float
+    mujoco_ideal_mm: float
+    mujoco_optimised_mm: float
+    mujoco_share: float
+    apart: float
+
+
+def giving_shot(path: str, seconds: float | None) -> CompiledShot:
+    """The shot with rigid bodies and with the gains of its motors in use.
+
+    Args:
+        seconds: How much of its beginning is taken; None: all.
+
+    Raises:
+        ShotError: It cannot be read, a body has no mass of its own, or no motor has gains.
+    """
+    from calmotion.usd.reading import read_shot
+
+    character, animation, _ = read_shot(path)
+    character = with_gains_used(with_rigid_bodies(character))
+    if seconds is not None:
+        animation = beginning(animation, seconds)
+    return compile_shot(character, animation)
+
+
+def with_rigid_bodies(character: Character) -> Character:
+    """The character with the masses that its bodies have as rigid ones."""
+    for body in character.bodies:
+        if body.mass is None:
+            raise ShotError(
+                "a flexible link without a mass of its own",
+                path=body.path,
+                attribute="physics:mass",
+                remedy="Author the mass that it has as a rigid body",
+            )
+    return replace(character, bodies=tuple(replace(body, flexible=None) for body in character.bodies))
+
+
+def beginning(animation: Animation, seconds: float) -> Animation:
+    """The frames up to a time [s]."""
+
+    def cut(track: Track) -> Track:
+        kept = track.times <= seconds + 1e-9
+        return replace(track, times=track.times[kept], values=track.values[kept])
+
+    frames = animation.frame_times[animation.frame_times <= seconds + 1e-9]
+    tracks = tuple(map(cut, animation.tracks))
+    return replace(animation, frame_times=frames, tracks=tracks, current=tracks)
+
+
+def compare(
+    name: str, shot: CompiledShot, step: float = _STEP, mujoco_step: float = STEP, pre_roll: float | None = None
+) -> Row:
+    """Both commands on the motors of a shot, in both programs.
+
+    Args:
+        step, mujoco_step: Of Calmotion and of MuJoCo [s].
+        pre_roll: See `RunSettings`.
+
+    Raises:
+        ShotError: The robot cannot be simulated, or has no place in the lumped model.
+    """
+    options = RunSettings(step=step, tolerance=1e-5, pre_roll=pre_roll)
+    result = optimize_shot(shot, options, lambda fraction, message: None)
+    assert result.after is not None
+    ours = [_largest(result, run.motion.target_positions) for run in (result.before, result.after)]
+    lumped = [
+        _played(shot, run.motion.times, run.motion.motor_values, mujoco_step) for run in (result.before, result.after)
+    ]
+    theirs = [_largest(result, motion.target_positions) for motion in lumped]
+    apart = _apart(result.after.motion.target_positions, lumped[1].target_positions)
+    return Row(
+        name, len(shot.character.motors), 1e3 * ours[0], 1e3 * ours[1], ours[1] / ours[0], 1e3 * theirs[0],
+        1e3 * theirs[1], theirs[1] / theirs[0], apart,
+    )  # fmt: skip
+
+
+def _played(shot: CompiledShot, times: Array, values: Array, step: float) -> LumpedMotion:
+    return simulate_lumped(shot.character, times, values, step)
+
+
+def _largest(result: Result, positions: Array) -> float:
+    judged = result.reference.judged
+    off = np.linalg.norm(positions - result.reference.target_positions, axis=2)[judged]
+    return float(off.max())
+
+
+def _apart(ours: Array, theirs: Array) -> float:
+    size = float(np.ptp(theirs, axis=0).max())
+    return float(np.linalg.norm(ours - theirs, axis=2).max()) / size
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """The command."""
+    parser = bench_parser("motor-commands", __doc__)
+    parser.add_argument(
+        "shots", metavar="SHOT", nargs="+", help="USD file of a robot in a tree whose motors have gains"
+    )
+    parser.add_argument("--seconds", metavar="S", type=float, help="take only the beginning of each shot")
+    parser.add_argument(
+        "--pre-roll", metavar="S", type=float, help="length of the pre-roll of a shot that starts in motion"
+    )
+    parser.add_argument("--json", action="store_true", help="print one JSON object on stdout, and nothing else there")
+    options = parser.parse_args(arguments)
+    rows = [
+        compare(Path(path).stem, giving_shot(path, options.seconds), pre_roll=options.pre_roll)
+        for path in options.shots
+    ]
+    if options.json:
+        print(json.dumps([asdict(row) for row in rows]))
+    else:
+        _print(rows)
+    return int(any(max(row.share, row.mujoco_share) > ALLOWED for row in rows))
+
+
+def _print(rows: Sequence[Row]) -> None:
+    from calmotion.cli.tables import console_on, print_table
+
+    heads = ["robot", "motors", "for ideal motors", "with their model", "share", "in MuJoCo", "", "share", "apart"]
+    shown = [
+        [
+            row.shot, str(row.motors), f"{row.ideal_mm:.2f} mm", f"{row.optimised_mm:.3f} mm", f"{row.share:.4f}",
+            f"{row.mujoco_ideal_mm:.2f} mm", f"{row.mujoco_optimised_mm:.3f} mm", f"{row.mujoco_share:.4f}",
+            f"{row.apart:.1e}",
+        ]
+        for row in rows
+    ]  # fmt: skip
+    print_table(console_on(sys.stdout), "Largest error of commands", heads, shown)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
