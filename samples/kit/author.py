@@ -95,6 +95,11 @@ def create(prim: Usd.Prim, name: str, value: float) -> None:
     prim.CreateAttribute(name, Sdf.ValueTypeNames.Float, False, variability).Set(value)
 
 
+def create_token(prim: Usd.Prim, name: str, value: str) -> None:
+    """A schema's uniform token, by name."""
+    prim.CreateAttribute(name, Sdf.ValueTypeNames.Token, False, Sdf.VariabilityUniform).Set(value)
+
+
 def author_part(stage: Usd.Stage, path: str, part: Part, looks: Mapping[str, Look], scope: str) -> UsdGeom.Mesh:
     """A mesh with its display color and its look."""
     mesh = UsdGeom.Mesh.Define(stage, path)
@@ -187,6 +192,12 @@ def author_joint(stage: Usd.Stage, root: str, scope: str, joint: JointSpec) -> N
     prim.CreateUpperLimitAttr(joint.drive.upper)
     drive = UsdPhysics.DriveAPI.Apply(prim.GetPrim(), UsdPhysics.Tokens.angular)
     drive.CreateTypeAttr(UsdPhysics.Tokens.force)
+    if joint.drive.motor:
+        prim.GetPrim().AddAppliedSchema("CalmMotorAPI")
+        create_token(prim.GetPrim(), "calm:motor:type", joint.drive.motor)
+        create_token(prim.GetPrim(), "calm:motor:model", "servo")
+        create(prim.GetPrim(), "calm:motor:maxAcceleration", joint.drive.max_acceleration)
+        return
     drive.CreateMaxForceAttr(joint.drive.max_torque * scale**2)
     drive.CreateStiffnessAttr(50.0 * scale**2)
     drive.CreateDampingAttr(0.5 * scale**2)

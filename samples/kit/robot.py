@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
@@ -47,15 +48,19 @@ class BodySpec:
 
 @dataclass(frozen=True)
 class DriveSpec:
-    """A servo: track [deg] at the frames, limits [deg], [deg/s], [deg/s^2], [N m]."""
+    """A servo: track [deg] at the frames, limits [deg], [deg/s], [deg/s^2], [N m].
+
+    One that is named (see `calmotion motors`) gives as that motor does, and has its limits of speed and torque.
+    """
 
     axis: str
     track: tuple[float, ...]
     lower: float
     upper: float
-    max_velocity: float
-    max_acceleration: float
-    max_torque: float
+    max_velocity: float = math.inf
+    max_acceleration: float = math.inf
+    max_torque: float = math.inf
+    motor: str = ""
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""Servos with rigid gears against MuJoCo's position actuators with armature, on an arm of two links.
+"""Servos and drives against MuJoCo's position actuators, on an arm of two links and on a KUKA iiwa.
 
 MuJoCo is in the optional extra `bench`; its step goes to zero at first order.
 """
@@ -7,11 +7,18 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from arms import chain, compiled
+from arms import chain, compiled, frame
+from calmotion.accuracy.motors.motor_effects import with_gains_used
+from calmotion.benchmarks.motors.lumped import simulate_lumped
 from calmotion.multibody.analysis.kinematics import rigid_state
 from calmotion.multibody.integrators.simulation import simulate
 from calmotion.multibody.integrators.workspace import Workspace
+from calmotion.shot import Animation, Target, Track
 from calmotion.shot.motor import Rotor
+from calmotion.shot.run import RunSettings
+from calmotion.simulation.compiled_shot import compile_shot
+from calmotion.simulation.simulate import simulate_shot
+from calmotion.usd.reading import read_shot
 
 K, D, ARMATURE, LENGTH, MASS, END = 60.0, 2.0, 0.03, 0.4, 1.0, 0.8
 LINK = f'<inertial pos="{LENGTH} 0 0" mass="{MASS}" diaginertia="1e-9 1e-9 1e-9"/>'
@@ -60,3 +67,23 @@ def test_arm_moves_as_by_position_actuators_of_mujoco():
     start, workspace = rigid_state(model, angles[0]), Workspace.for_system(model.system)
     states = simulate(model.system, start, angles, rates, h, workspace).states
     assert np.abs(states.u[:, :, 0] - expected).max() < 1e-4 * np.ptp(expected)
+
+
+def test_kuka_on_the_actuators_of_its_own_file_moves_as_in_mujoco(shared_data):
+    """Seven motors whose gains (kp 2000, kv 200) the converter wrote; every joint turns at once."""
+    pytest.importorskip("mujoco")
+    robot = shared_data / "converted" / "kuka_iiwa_14" / "iiwa14.usda"
+    character, _, _ = read_shot(str(robot), still=True)
+    character = with_gains_used(character)
+    assert {(m.model, m.position_gain, m.velocity_gain) for m in character.motors} == {("drive", 2000.0, 200.0)}
+    tip = Target("/Tool", character.joints[character.motors[-1].joint].body1, frame(z=0.12))
+    character = replace(character, targets=(tip,))
+    frames = np.arange(31) / 30.0
+    wave = np.sin(np.pi * frames) ** 4
+    tracks = tuple(Track(frames, (0.5 + 0.1 * k) * (-1) ** k * wave) for k in range(7))
+    shot = compile_shot(character, Animation(frames, tracks, tracks))
+    ours = simulate_shot(shot, RunSettings(step=5e-4), lambda fraction, message: None).before
+    theirs = simulate_lumped(character, ours.motion.times, ours.motion.motor_values, 2.5e-5)
+    off = np.linalg.norm(ours.motion.target_positions - theirs.target_positions, axis=2)
+    assert ours.position_errors.max() > 0.03, "the drives lag"
+    assert off.max() < 1e-4 * np.ptp(theirs.target_positions, axis=0).max()

@@ -12,6 +12,7 @@ KINDS = {
     "rapper": ("Z", 0.01, "drive", 24.0),
     "drummer": ("Z", 1.0, "skeleton", 24.0),
     "boxer": ("Z", 1.0, "drive", 24.0),
+    "lamp": ("Z", 1.0, "drive", 24.0),
 }
 """Up axis, metres per unit, what animates the motors, and frames per second."""
 
