@@ -160,7 +160,7 @@ class EstimateMotorEffects(Operator):
     def execute(self, context: RunContext) -> Sequence[object]:
         from calmotion.accuracy.motors.motor_effects import effects_of_gains
 
-        context.progress(0.0, "simulating rigid links on motors that give")
+        context.progress(0.0, "simulating the robot on motors that give")
         options = run_settings(context.get(Source), context.get(ModelChoices))
         found = effects_of_gains(context.get(CompiledShot), options)
         if found is None:

@@ -98,14 +98,14 @@ def _print_gains(console: Console, report: dict[str, Any]) -> None:
     effects = report["effects_of_gains"]
     if effects:
         ideal = all(motor["model"] == PRESCRIBED for motor in report["motors"])
-        lag = max(effects, key=itemgetter("max_error_m"))
-        rest = max(row["sag_m"] for row in effects)
+        lag, rest = (max(effects, key=itemgetter(key)) for key in ("max_error_m", "sag_m"))
         model = "servo" if any(motor["type"] for motor in report["motors"]) else "drive"
         remedy = f"; set calm:motor:model to {model} to simulate them" if ideal else ""
         say(
             console,
-            f"with these gains {lag['path']} would be off by up to {length(lag['max_error_m'])}, a target at rest by "
-            f"{length(rest)}, on rigid links; {'no motor gives' if ideal else 'motors give'} in this shot{remedy}",
+            f"with these gains {lag['path']} would be off by up to {length(lag['max_error_m'])} (with ideal motors "
+            f"{length(lag['ideal_max_error_m'])}), {rest['path']} at rest by {length(rest['sag_m'])} "
+            f"({length(rest['ideal_sag_m'])}); {'no motor gives' if ideal else 'motors give'} in this shot{remedy}",
         )
 
 

@@ -126,17 +126,20 @@ class PlannedStep:
 
 @dataclass(frozen=True, eq=False)
 class MotorEffects:
-    """What motors would do to the animation if they gave by their gains, on rigid links.
+    """What the animation does if motors give by their gains, and if they are ideal; links are flexible in both.
 
     Attributes:
         motors: Paths of the motors that have gains.
         lag: Largest error of each target [m], shape [K].
         droop: Its error at rest at the start [m], shape [K].
+        ideal_lag, ideal_droop: The same with ideal motors.
     """
 
     motors: tuple[str, ...]
     lag: Array
     droop: Array
+    ideal_lag: Array
+    ideal_droop: Array
 
 
 @dataclass(frozen=True, eq=False)

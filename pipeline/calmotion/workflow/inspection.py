@@ -230,6 +230,12 @@ def _effects(character: Character, effects: MotorEffects | None) -> list[dict[st
     if effects is None:
         return []
     return [
-        {"path": target.path, "max_error_m": float(lag), "sag_m": float(droop)}
-        for target, lag, droop in zip(character.targets, effects.lag, effects.droop, strict=True)
+        {
+            "path": target.path,
+            "max_error_m": float(effects.lag[k]),
+            "sag_m": float(effects.droop[k]),
+            "ideal_max_error_m": float(effects.ideal_lag[k]),
+            "ideal_sag_m": float(effects.ideal_droop[k]),
+        }
+        for k, target in enumerate(character.targets)
     ]

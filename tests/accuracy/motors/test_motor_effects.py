@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from arms import chain
 from calmotion.accuracy.motors.motor_effects import effects_of_gains, with_error_shares
+from calmotion.benchmarks.common.shots import load
 from calmotion.retargeting.optimize import optimize_shot
 from calmotion.shot import Animation, Track
 from calmotion.shot.character import motors_give, with_ideal_motors
@@ -36,6 +37,11 @@ def shot(character, cyclic=False):
     return compile_shot(character, Animation(FRAMES, tracks, tracks))
 
 
+@pytest.fixture(scope="module")
+def flexible_arm():
+    return load("arm").compiled
+
+
 def errors(simulation):
     """Of the instants that count, shape [T, K]."""
     return simulation.position_errors[simulation.motion.judged]
@@ -51,9 +57,27 @@ def test_gains_that_are_not_used_tell_what_they_would_do_as_the_simulation_with_
     simulated = simulate_shot(shot(with_gains("drive")), OPTIONS, quiet).before
     assert found.motors == ("/C/J0", "/C/J1")
     assert found.lag == pytest.approx(errors(simulated).max(axis=0), rel=1e-9)
+    assert found.ideal_lag == pytest.approx([0.0], abs=1e-6) and found.ideal_droop == pytest.approx([0.0], abs=1e-9)
     # weights of 1 kg at 0.3 m and 0.6 m: moments m g (0.9, 0.3), and the tip moves by 0.6 and 0.3 m per angle
     droop = 9.81 / K * np.hypot(0.9 * 0.6 + 0.3 * 0.3, 0.0)
     assert found.droop == pytest.approx([droop], rel=0.02) and found.droop == pytest.approx(simulated.sag, rel=1e-9)
+
+
+@pytest.mark.parametrize("gain", [30.0, 150.0, 600.0])
+def test_on_flexible_links_the_effect_of_gains_is_that_of_a_finer_simulation_with_drives(flexible_arm, gain):
+    """Drives shift the frequencies of the links, so that their errors do not add up."""
+    motors = tuple(replace(m, position_gain=gain, velocity_gain=gain / 50.0) for m in flexible_arm.character.motors)
+    given = compile_shot(replace(flexible_arm.character, motors=motors), flexible_arm.animation, flexible_arm.bodies)
+    found = effects_of_gains(given, RunSettings())
+    drives = replace(given.character, motors=tuple(replace(m, model="drive") for m in motors))
+    for character, lag, droop in (
+        (drives, found.lag, found.droop),
+        (given.character, found.ideal_lag, found.ideal_droop),
+    ):
+        shot = compile_shot(character, flexible_arm.animation, flexible_arm.bodies)
+        finer = simulate_shot(shot, RunSettings(step=1 / 1920), quiet).before
+        assert lag == pytest.approx(errors(finer).max(axis=0), rel=0.05)
+        assert droop == pytest.approx(finer.sag, rel=1e-3)
 
 
 def test_motors_cause_all_of_the_error_of_rigid_links_and_ideal_ones_none():

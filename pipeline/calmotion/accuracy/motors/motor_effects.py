@@ -8,6 +8,7 @@ import numpy as np
 
 from calmotion.accuracy.integrator_choice import by_fast_scheme
 from calmotion.accuracy.simulate_to_tolerance import own_step
+from calmotion.errors import ShotError
 from calmotion.multibody.failure import SimulationFailure
 from calmotion.multibody.integrators.workspace import Workspace
 from calmotion.multibody.model.model import Model, rigid_model, with_drives
@@ -17,7 +18,7 @@ from calmotion.shot.motor import DRIVE, PRESCRIBED, SERVO
 from calmotion.shot.outputs import MotorEffects
 from calmotion.shot.result import ErrorShares
 from calmotion.shot.run import RunSettings
-from calmotion.simulation.compiled_shot import CompiledShot
+from calmotion.simulation.compiled_shot import CompiledShot, compile_shot
 from calmotion.simulation.cyclic import SteadyState
 from calmotion.simulation.forward import run_forward
 from calmotion.simulation.inputs.curves import sample_tracks
@@ -35,8 +36,8 @@ def with_gains_used(character: Character) -> Character:
 
 
 def effects_of_gains(shot: CompiledShot, options: RunSettings) -> MotorEffects | None:
-    """What the gains that a shot carries would do to its animation on rigid links; None where it has none, or where
-    the robot would not follow it.
+    """What the gains that a shot carries would do to its animation; None where it has none, or where the robot would
+    not follow it.
 
     Args:
         shot: Its motors may be ideal.
@@ -50,14 +51,23 @@ def effects_of_gains(shot: CompiledShot, options: RunSettings) -> MotorEffects |
         return None
     options = replace(options, step=own_step(character, options), integrator="bdf2")
     prepared = prepare(shot, options)
-    model = with_drives(rigid_model(shot.model), character.motors)
+    found = []
     try:
-        errors = _errors(prepared, model, options)
+        for model in (_giving_model(shot, character), _with_ideal_motors(shot)):
+            errors = _errors(prepared, model, options)
+            lag = errors[prepared.grid.judged].max(axis=0, initial=0.0)
+            found += [lag, np.zeros_like(lag) if prepared.grid.cyclic else errors[0]]
     except SimulationFailure:
         return None
-    lag = errors[prepared.grid.judged].max(axis=0, initial=0.0)
-    droop = np.zeros_like(lag) if prepared.grid.cyclic else errors[0]
-    return MotorEffects(tuple(m.path for m in character.motors if m.model != PRESCRIBED), lag, droop)
+    return MotorEffects(tuple(m.path for m in character.motors if m.model != PRESCRIBED), *found)
+
+
+def _giving_model(shot: CompiledShot, character: Character) -> Model:
+    """The robot on motors that give; on rigid links where one of its motors could not stand on a flexible one."""
+    try:
+        return compile_shot(character, shot.animation, shot.bodies).model
+    except ShotError:
+        return with_drives(rigid_model(shot.model), character.motors)
 
 
 def with_error_shares(shot: CompiledShot, result: Result, options: RunSettings, progress: Progress) -> Result:
@@ -88,8 +98,6 @@ def with_error_shares(shot: CompiledShot, result: Result, options: RunSettings, 
 
 
 def _with_ideal_motors(shot: CompiledShot) -> Model:
-    from calmotion.simulation.compiled_shot import compile_shot
-
     return compile_shot(with_ideal_motors(shot.character), shot.animation, shot.bodies).model
 
 
