@@ -17,6 +17,7 @@ from calmotion.version import __version__
 if TYPE_CHECKING:
     from calmotion.host.errors import SettingError
     from calmotion.shot.run import OutputPaths
+    from calmotion.workflow.calibration.calibrate import CalibratedShot, calibrate
     from calmotion.workflow.commands import inspect, optimize, rig, simulate, verify
     from calmotion.workflow.exporting.export import Export, export
     from calmotion.workflow.importing.robot import ImportedRobot, import_robot
@@ -28,6 +29,7 @@ if TYPE_CHECKING:
     from calmotion.workflow.shot import Shot, open_shot
 
 __all__ = [
+    "CalibratedShot",
     "Cancelled",
     "Export",
     "ImportedRobot",
@@ -45,6 +47,7 @@ __all__ = [
     "TargetMotion",
     "Warmup",
     "__version__",
+    "calibrate",
     "export",
     "import_robot",
     "inspect",
@@ -59,6 +62,7 @@ __all__ = [
 _HOMES = {
     "host.errors": ("SettingError",),
     "shot.run": ("OutputPaths",),
+    "workflow.calibration.calibrate": ("CalibratedShot", "calibrate"),
     "workflow.commands": ("inspect", "optimize", "rig", "simulate", "verify"),
     "workflow.exporting.export": ("Export", "export"),
     "workflow.importing.robot": ("ImportedRobot", "import_robot"),

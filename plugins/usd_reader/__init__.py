@@ -28,7 +28,7 @@ class ReadShot(Operator):
         source = context.get(Source)
         # `inspect` accepts a robot without animation
         character, animation, provenance = read_shot(
-            source.path, still=source.command == "inspect", given=context.get(MotorTracks)
+            source.path, still=source.command == "inspect", given=context.get(MotorTracks), measured=source.measured
         )
         outputs = context.get(OutputPaths)
         if outputs is not None and outputs.layer:

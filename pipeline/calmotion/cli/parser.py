@@ -36,6 +36,11 @@ EXAMPLES: dict[str, tuple[tuple[str, str], ...]] = {
         ("calmotion optimize shot.usda -o calm.usda --video calm.webp", "show others what changed"),
         ("calmotion optimize shot.usda -o calm.usda --bake simulated", "for viewers without physics"),
     ),
+    "calibrate": (
+        ("calmotion calibrate shot.usda --recording take.csv -o robot.usda", "markers, encoders"),
+        ("calmotion calibrate shot.usda --recording accel.csv@/Arm/Hand/sensor -o robot.usda", "a printer's log"),
+        ("calmotion calibrate shot.usda --recording a.csv --parameters modulus damping", "these alone"),
+    ),
     "watch": (
         ("calmotion watch shot.usda", "how much does it shake, after each save?"),
         ("calmotion watch shot.usda --optimize -o calm.usda", "and its cure"),

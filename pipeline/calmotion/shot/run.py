@@ -62,6 +62,7 @@ class Source:
         shaper: Input shaper or filter through which `simulate` passes the motors' tracks first, or None.
         motion: File with a motion that replaces tracks of motors, or None.
         verify: Whether the result is to be compared with a finer run.
+        measured: Prims at which sensors measured, which are targets as well.
     """
 
     path: str
@@ -70,6 +71,7 @@ class Source:
     shaper: str | None = None
     motion: str | None = None
     verify: bool = False
+    measured: tuple[str, ...] = ()
 
     @property
     def refines(self) -> bool:

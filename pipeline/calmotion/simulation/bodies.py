@@ -14,7 +14,7 @@ from calmotion.multibody.model.topology import Tree, span_tree
 from calmotion.reduction.load_envelope import LoadEnvelope
 from calmotion.reduction.reduced_body import ReducedBody
 from calmotion.shot import Body, Character, FEMeshes, ModeTable, Skin, SurfaceMesh
-from calmotion.shot.character import with_ideal_motors, with_settings
+from calmotion.shot.character import ElasticMaterial, with_ideal_motors, with_settings
 from calmotion.shot.meshes import FEMesh
 from calmotion.shot.tolerance import tolerance_of
 
@@ -95,13 +95,16 @@ def _reduced(
 
 def _damped(character: Character, tree: Tree, bodies: Sequence[ReducedBody]) -> list[ReducedBody]:
     """The bodies, damped so that the character's modes have the ratios of their materials."""
-    materials = {
-        k: b.flexible.material
-        for k, b in enumerate(character.bodies)
-        if b.flexible is not None and b.simulated_flexible
-    }
-    if all(material.rayleigh is not None for material in materials.values()):
+    if all(material.rayleigh is not None for material in _materials(character).values()):
         return list(bodies)  # these do not know of modes
+    return with_material_damping(character, tree, bodies)
+
+
+def with_material_damping(character: Character, tree: Tree, bodies: Sequence[ReducedBody]) -> list[ReducedBody]:
+    """Reduced bodies with any damping, damped as the materials of a character say."""
+    materials = _materials(character)
+    if not materials:
+        return list(bodies)
     from calmotion.multibody.analysis.modes import elastic_modes
     from calmotion.reduction.damping import damped
 
@@ -112,6 +115,15 @@ def _damped(character: Character, tree: Tree, bodies: Sequence[ReducedBody]) -> 
         if b in materials:
             result[b] = damped(bodies[b], materials[b], omega, shape)
     return result
+
+
+def _materials(character: Character) -> dict[int, ElasticMaterial]:
+    """Of the bodies that are simulated as flexible, by their index."""
+    return {
+        k: b.flexible.material
+        for k, b in enumerate(character.bodies)
+        if b.flexible is not None and b.simulated_flexible
+    }
 
 
 def fem_anchors(character: Character, body: Body, anchors: BodyAnchors) -> list[AttachmentFrame]:

@@ -22,7 +22,9 @@ if TYPE_CHECKING:
     from pxr import Pcp, Sdf, Usd
 
 METADATA_KEY = "calmotion"
-CURVES, MOTION, ROOT, RIG = "curves", "motion", "root", "rig"  # roles of the layers that Calmotion writes
+# roles of the layers that Calmotion writes
+CURVES, MOTION, ROOT, RIG, CALIBRATION = "curves", "motion", "root", "rig", "calibration"
+RESULTS = (CURVES, MOTION, CALIBRATION)  # which a root layer opens with their shot
 
 _ARCS = {"reference": "references", "payload": "payload", "sublayer": "subLayers", "variant": "variants"}
 _REFUSED = (
@@ -202,7 +204,7 @@ def _refusal(error: Pcp.ErrorBase, shot: str) -> ShotError | None:
 
 
 def role_of(layer: Sdf.Layer) -> str:
-    """The role of a layer that Calmotion wrote (`curves`, `motion`, `root` or `rig`); empty for any other layer."""
+    """The role of a layer that Calmotion wrote, such as `curves`; empty for any other layer."""
     origin = layer.customLayerData.get(METADATA_KEY)
     return str(origin.get("role", "")) if isinstance(origin, dict) else ""
 
@@ -218,7 +220,7 @@ def earlier_layers(stage: Usd.Stage, roles: tuple[str, ...] = (CURVES, MOTION)) 
 
 def refuse_result_layer(stage: Usd.Stage, path: str) -> None:
     """Refuse a layer of results that was given instead of the root layer, which sublayers it and the shot."""
-    if role_of(stage.GetRootLayer()) in (CURVES, MOTION):
+    if role_of(stage.GetRootLayer()) in RESULTS:
         raise ShotError(
             "this layer was written by Calmotion and holds only results, not the shot",
             path=path,

@@ -11,6 +11,7 @@ FLOORS = (
     ("simulation",),
     ("accuracy",),
     ("retargeting",),
+    ("identification",),
     ("host",),
     ("workflow", "testing"),
     ("cli", "pytest_plugin"),

@@ -106,6 +106,32 @@ def add_motors(system: System, motors: Sequence[GivingMotor]) -> System:
     return wide
 
 
+def joint_values(
+    system: System, motor: IntArray, motors: Sequence[Motor], u: Array, joint_angles: Array
+) -> Array:  # fmt: skip
+    """Where the joints stand, which is not what their motors follow where these give.
+
+    Args:
+        system: With the coordinates of its motors.
+        motor: Motor that drives each joint, -1 for none, shape [J].
+        u: Elastic coordinates of the components, shape [T, B, R].
+        joint_angles: What the joints' motors follow, shape [T, J].
+
+    Returns:
+        Angles [rad] or lengths [m] of the driven joints, shape [T, J]; of others `joint_angles`.
+    """
+    values, placed = joint_angles.copy(), system.modes.copy()
+    for joint, item in giving_motors(system, motor, motors):
+        b = system.side[joint, 1]
+        own = [u[:, b, placed[b] + k] for k in range(len(_coordinates(item)))]
+        placed[b] += len(own)
+        if item.model == SERVO:
+            values[:, joint] = own[0] - (own[1] if len(own) > 1 else 0.0)
+        else:
+            values[:, joint] -= own[0]
+    return values
+
+
 def _coordinates(motor: Motor) -> list[_Coordinate]:
     """Those of one motor, the rotor first."""
     if motor.model != SERVO:

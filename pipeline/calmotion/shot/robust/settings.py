@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from calmotion.shot.calibration.known_factors import KnownFactors
+
 MEAN, WORST = "mean", "worst"
 
 
@@ -16,11 +18,13 @@ class Uncertainty:
         modulus: Of Young's modulus of each material.
         damping: Of the damping of each material.
         payload: Of the masses of the rigid bodies at the ends of the chains, all by the same factor.
+        calibrated: Of the parameters that a calibration tells, which count instead.
     """
 
     modulus: float = 0.1
     damping: float = 1.0
     payload: float = 0.1
+    calibrated: KnownFactors = KnownFactors()
 
 
 @dataclass(frozen=True)

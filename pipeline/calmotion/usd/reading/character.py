@@ -60,13 +60,16 @@ class Skeleton:
     targets: list[tuple[Any, str]]
 
 
-def read_skeleton(reading: Reading, clock: Clock, still: bool, given: Sequence[str] = ()) -> Skeleton:
+def read_skeleton(
+    reading: Reading, clock: Clock, still: bool, given: Sequence[str] = (), measured: Sequence[str] = ()
+) -> Skeleton:
     """Find the bodies, joints and motors of the character; bodies without connection to a motor or target are skipped.
 
     Args:
         clock: The clock of the shot.
         still: Whether a character without animation is accepted.
         given: Joints whose tracks are given beside the shot.
+        measured: Prims at which sensors measured.
 
     Raises:
         ShotError: No bodies, no joints or no motors. Problems of single prims are added to the reading.
@@ -96,7 +99,7 @@ def read_skeleton(reading: Reading, clock: Clock, still: bool, given: Sequence[s
     joints = [joint for joint in reading.each(joints_of_stage, lambda prim: read_joint(reading, prim, poses)) if joint]
     root = topology.common_path(list(prims))
     drives = motors.read_drives(reading, joints, root, posed_joints(reading, joints, clock), given, still)
-    target_prims = targets.target_prims(reading)
+    target_prims = targets.target_prims(reading, measured)
     bodies = _moving_bodies(reading, list(prims), joints, drives, [body for _, body in target_prims])
     kept = set(bodies)
     joints = [j for j in joints if (j.body0 or j.body1) in kept]

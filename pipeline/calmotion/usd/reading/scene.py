@@ -14,6 +14,7 @@ from calmotion.shot.character import Array
 from calmotion.shot.robust.settings import Uncertainty
 from calmotion.support.naming import nearest
 from calmotion.usd import gf, schemas
+from calmotion.usd.reading.calibration import known_factors
 from calmotion.usd.reading.context import Reading, prims_of
 from calmotion.usd.units import EARTH_GRAVITY
 
@@ -106,8 +107,10 @@ def _positive(prim: Usd.Prim, name: str, *, zero: bool = False) -> float | None:
 
 def _uncertainty(prim: Usd.Prim) -> Uncertainty:
     """The relative standard deviations of the robot's parameters."""
-    given = {field.name: _positive(prim, f"uncertainty:{field.name}", zero=True) for field in fields(Uncertainty)}
-    return Uncertainty(**{name: value for name, value in given.items() if value is not None})
+    names = [field.name for field in fields(Uncertainty) if field.name != "calibrated"]
+    given = {name: _positive(prim, f"uncertainty:{name}", zero=True) for name in names}
+    known = {name: value for name, value in given.items() if value is not None}
+    return Uncertainty(**known, calibrated=known_factors(prim.GetStage()))
 
 
 def _choice(prim: Usd.Prim, name: str, allowed: tuple[str, ...]) -> str:

@@ -43,7 +43,7 @@ if TYPE_CHECKING:
 
 
 def read_shot(
-    path: str, *, still: bool = False, given: MotorTracks | None = None
+    path: str, *, still: bool = False, given: MotorTracks | None = None, measured: Sequence[str] = ()
 ) -> tuple[Character, Animation, Provenance]:
     """Read a shot.
 
@@ -54,6 +54,7 @@ def read_shot(
         path: A .usda, .usdc, .usd or .usdz file.
         still: Whether a character that nothing animates is read as well; its animation is then one frame.
         given: Tracks given in addition to the shot, which replace those of the motors that they name.
+        measured: Prims at which sensors measured: they are targets as well.
 
     Returns:
         The character, its animation, and what a writer must know.
@@ -67,7 +68,7 @@ def read_shot(
         stages.refuse_result_layer(composed, path)
         earlier = stages.earlier_layers(composed)
         stage = stages.open_stage(path, muted=earlier) if earlier else composed
-        read = read_stage(stage, still, given)
+        read = read_stage(stage, still, given, measured)
         reading, clock, character, tracks = read.reading, read.clock, read.character, read.tracks
         current = tracks
         if earlier:
@@ -101,7 +102,9 @@ class StageReading:
     moving: tuple[MovingFrame, ...]
 
 
-def read_stage(stage: Usd.Stage, still: bool = False, given: MotorTracks | None = None) -> StageReading:
+def read_stage(
+    stage: Usd.Stage, still: bool = False, given: MotorTracks | None = None, measured: Sequence[str] = ()
+) -> StageReading:
     """Read a composed stage; arguments and errors as for `read_shot`."""
     with stages.refused_by_usd(stage):
         raise_all(list(wrong_types(stage)))
@@ -109,7 +112,7 @@ def read_stage(stage: Usd.Stage, still: bool = False, given: MotorTracks | None 
         units = units_of(stage)
         clock = shot_clock(stage, given)
         reading = Reading(stage, units, clock.start)
-        skeleton = read_skeleton(reading, clock, still, given_joints(stage, given))
+        skeleton = read_skeleton(reading, clock, still, given_joints(stage, given), measured)
         tracks = motor_tracks(reading, skeleton.drives, clock, given)
         moving = moving_frames(reading, skeleton.joints, skeleton.poses, clock)
         _note_dense_samples(tracks, clock, reading)

@@ -10,6 +10,7 @@ import numpy as np
 
 from calmotion.errors import ShotError
 from calmotion.shot import Body, Frame, Joint, Target, WeightTrack
+from calmotion.support.naming import nearest
 from calmotion.usd import schemas
 from calmotion.usd.clock import Clock
 from calmotion.usd.reading.context import Reading, is_rigid_body, prims_of
@@ -23,23 +24,60 @@ WEIGHTS = ("calm:target:positionWeight", "calm:target:rotationWeight")
 _UPRIGHT = np.array([1.0, 0.0, 0.0, 0.0])
 
 
-def target_prims(reading: Reading) -> list[tuple[Any, str]]:
+def target_prims(reading: Reading, measured: Sequence[str] = ()) -> list[tuple[Any, str]]:
     """The prims with CalmTargetAPI, each with the path of the body that carries it; one that none carries, or that has
-    no transform, is kept as a problem of the reading."""
+    no transform, is kept as a problem of the reading.
+
+    Args:
+        reading: The stage.
+        measured: Paths of prims at which sensors measured: they are targets as well.
+    """
     found = []
     for prim in prims_of(reading.stage):
         if schemas.is_applied(prim, _SCHEMA):
             with reading.collecting_problems():
                 found.append((prim, _carrier(prim)))
+    known = {str(prim.GetPath()) for prim, _ in found}
+    for path in measured:
+        if path not in known:
+            with reading.collecting_problems():
+                prim = _measured_prim(reading, path)
+                found.append((prim, _carrier(prim, "a sensor")))
     return found
 
 
-def _carrier(prim: Usd.Prim) -> str:
+def _measured_prim(reading: Reading, path: str) -> Usd.Prim:
+    prim = reading.stage.GetPrimAtPath(path) if _is_prim_path(path) else None
+    if not prim:
+        near = nearest(path, [str(other.GetPath()) for other in prims_of(reading.stage)])
+        raise ShotError(
+            "a recording names a prim that the shot does not have",
+            path=path,
+            remedy=f"{near}Correct the column of the recording, or its row in the map",
+        )
+    return prim
+
+
+def _is_prim_path(path: str) -> bool:
+    """Whether a text is the path of a prim."""
+    from pxr import Sdf
+
+    return bool(Sdf.Path.IsValidPathString(path)[0]) and Sdf.Path(path).IsAbsoluteRootOrPrimPath()
+
+
+def _carrier(prim: Usd.Prim, what: str = "a target") -> str:
     from pxr import UsdGeom
 
     body = prim
     while body and not is_rigid_body(body):
         body = body.GetParent()
+    if not body and what != "a target":
+        raise ShotError(
+            f"{what} must be on a body",
+            path=prim.GetPath(),
+            found="a prim that no body carries",
+            remedy="Name a prim with PhysicsRigidBodyAPI or one below it, or correct the recording's column",
+        )
     if not body:
         raise ShotError(
             "a target must be carried by a body",
@@ -50,7 +88,7 @@ def _carrier(prim: Usd.Prim) -> str:
         )
     if not prim.IsA(UsdGeom.Xformable):
         raise ShotError(
-            "a target needs a transform",
+            f"{what} needs a transform",
             path=prim.GetPath(),
             found=prim.GetTypeName() or "a prim without a type",
             remedy="Make it an Xform",

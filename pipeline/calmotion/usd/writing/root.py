@@ -21,12 +21,13 @@ def write_root(layer: str, provenance: Provenance, role: str) -> str:
     """Write the root layer that sublayers [the new layer, the shot].
 
     Where the shot is itself a root layer of an earlier result, what that one opened takes its place, without what
-    the new layer replaces: a new motion replaces earlier motions, new curves replace both.
+    the new layer replaces: a new motion replaces earlier motions, new curves replace both. A calibration replaces
+    nothing: it lies on the shot that it began from.
 
     Args:
         layer: The layer of overs, already written.
         provenance: The shot.
-        role: The role of that layer, `stages.CURVES` or `stages.MOTION`.
+        role: The role of that layer, `stages.CURVES`, `stages.MOTION` or `stages.CALIBRATION`.
 
     Returns:
         The path of the root layer.
@@ -41,7 +42,7 @@ def write_root(layer: str, provenance: Provenance, role: str) -> str:
     author_stage_metadata(root, provenance)
     author_origin(root, stages.ROOT, provenance)
     folder = os.path.dirname(os.path.realpath(output))
-    replaced = (stages.MOTION,) if role == stages.MOTION else (stages.CURVES, stages.MOTION)
+    replaced = {stages.MOTION: (stages.MOTION,), stages.CALIBRATION: ()}.get(role, (stages.CURVES, stages.MOTION))
     below = [relative_asset(path, folder) for path in shot_layers(provenance.shot, replaced)]
     root.subLayerPaths = [relative_asset(os.path.realpath(layer), folder), *below]
     root.documentation = f"Opens {os.path.basename(layer)} over its shot."

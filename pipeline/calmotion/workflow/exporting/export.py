@@ -199,7 +199,7 @@ def with_shot(path: str) -> str:
     from calmotion.usd import stages
     from calmotion.usd.writing.root import root_path
 
-    if os.path.isfile(path) and stages.role_of(stages.open_layer(path)) in (stages.CURVES, stages.MOTION):
+    if os.path.isfile(path) and stages.role_of(stages.open_layer(path)) in stages.RESULTS:
         root = root_path(path)
         if os.path.isfile(root):
             return root

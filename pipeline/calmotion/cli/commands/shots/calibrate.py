@@ -1,0 +1,135 @@
+"""`calmotion calibrate`: the parameters of the robot from recordings of its performance."""
+
+from __future__ import annotations
+
+import argparse
+from typing import TYPE_CHECKING, Any, TextIO
+
+from calmotion.cli.options import Commands, assignments, file_argument, opened_shot, quantity, shot_command
+
+if TYPE_CHECKING:
+    from calmotion.cli.output import Output
+
+
+def add_to(commands: Commands) -> None:
+    """Add the command."""
+    command = shot_command(
+        commands, "calibrate", _run, "estimate the parameters of the robot from recordings of its performance"
+    )
+    file_argument(
+        command, "--recording", metavar="FILE", action="append", required=True,
+        help="what was recorded: a table with columns named after prims or with a TOML map beside it, or an "
+        "accelerometer log of a 3D printer as FILE@/PRIM; may be repeated",
+    )  # fmt: skip
+    file_argument(command, "-o", "--output", metavar="LAYER", help="USD layer to write")
+    command.add_argument(
+        "--parameters", metavar="KIND", nargs="+",
+        help="what to estimate: modulus, damping, density, mass, centre, position_gain, velocity_gain, gear_stiffness, "
+        "armature, friction, viscous_friction, delay, encoder_offset, each also as KIND:PATTERN for some prim paths "
+        "(default: all but density, centre and encoder_offset)",
+    )  # fmt: skip
+    command.add_argument(
+        "--prior", metavar="KIND=VALUE", action="append", default=[], type=_prior,
+        help="standard deviation of what is known before, relative (modulus=0.3) or in SI (delay=0.005, bias=0.3, "
+        "place=0.002, clock_drift=1e-4); may be repeated",
+    )  # fmt: skip
+    command.add_argument(
+        "--no-validation", action="store_true", help="fit all samples; by default every fifth part is held out"
+    )
+    command.add_argument(
+        "--step", metavar="TIME", type=quantity("s", positive=True),
+        help="first time step, in s or with a unit (2ms); it is halved until the estimates do not depend on it",
+    )  # fmt: skip
+    command.add_argument(
+        "--tolerance", metavar="LENGTH", type=quantity("m", needs_unit=True, positive=True),
+        help="acceptable error of the model at the targets, with a unit (1mm; default: the tolerance of the shot)",
+    )  # fmt: skip
+    command.add_argument(
+        "--integrator", metavar="NAME", help="bdf2, newmark or generalized-alpha (default: the last one)"
+    )
+    file_argument(command, "--figures", metavar="DIR", help="draw measured and simulated signals into this folder")
+    file_argument(
+        command, "--motion", metavar="FILE",
+        help="file with a motion for the motors, such as a BVH file (with --set bvh.read.map=...)",
+    )  # fmt: skip
+
+
+def _prior(text: str) -> tuple[str, float]:
+    kind, _, value = text.partition("=")
+    try:
+        return kind, float(value)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text} is not KIND=VALUE, such as modulus=0.3") from None
+
+
+def _run(args: argparse.Namespace, output: Output) -> int:
+    from calmotion.cli.output import conclude
+    from calmotion.cli.progress import ProgressDisplay
+    from calmotion.identification.parameters import DEFAULT
+    from calmotion.workflow.calibration.calibrate import calibrate
+    from calmotion.workflow.exporting.export import with_shot
+
+    args.shot = with_shot(args.shot)
+    shot = opened_shot(args)
+    with ProgressDisplay(args.quiet, args.progress, args.log) as display:
+        made = calibrate(
+            shot, args.recording, layer=args.output, parameters=args.parameters or DEFAULT, priors=dict(args.prior),
+            validate=not args.no_validation, tolerance=args.tolerance, step=args.step, integrator=args.integrator,
+            figures=args.figures, operators=args.run, settings=assignments(args), progress=display,
+            on_operator=display.done,
+        )  # fmt: skip
+    conclude(made.report(), (), output, None if args.quiet else _print)
+    return 0
+
+
+def _print(report: dict[str, Any], stream: TextIO) -> None:
+    from calmotion.cli.tables import console_on, print_table, say
+
+    console = console_on(stream)
+    for of_robot, title in ((True, "Parameters of the robot"), (False, "Parameters of the measurement")):
+        rows = [
+            [
+                row["kind"], row["name"].partition(" ")[2], _value(row["prior"]["value"], row["unit"]),
+                _value(row["value"], row["unit"]), _deviation(row), "yes" if row["identifiable"] else "no",
+            ]
+            for row in report["parameters"]
+            if row["of_robot"] == of_robot
+        ]  # fmt: skip
+        print_table(
+            console, title, ["parameter", "of", "in the shot", "estimated", "standard deviation", "identifiable"], rows,
+            texts=2,
+        )  # fmt: skip
+    rows = [
+        [
+            row["name"], str(row["samples"]), _value(row["noise"], row["unit"]), f"{row['rms_before']:.3g}",
+            f"{row['rms']:.3g}", "-" if row["validation_rms"] is None else f"{row['validation_rms']:.3g}",
+        ]
+        for row in report["channels"]
+    ]  # fmt: skip
+    print_table(
+        console, "Difference between recordings and robot, root mean square",
+        ["channel", "values", "noise", "as in the shot", "fitted", "held out"], rows,
+    )  # fmt: skip
+    for row in report["parameters"]:
+        if row["advice"]:
+            say(console, f"{row['name']} is not identifiable from these recordings: {row['advice']}")
+    for note in report["notes"]:
+        say(console, f"note: {note}")
+    say(
+        console,
+        f"{report['simulations']} simulations in {report['wall_s']:.3g} s; steps of {1e3 * report['step_s']:.3g} ms, "
+        f"whose error is {report['step_shift']:.2g} standard deviations of the estimates",
+    )
+    for file in (report["layer"], report["root"], *report["figures"]):
+        if file:
+            say(console, f"wrote {file}")
+
+
+def _value(value: float, unit: str) -> str:
+    return f"{value:.5g} {unit}".rstrip()
+
+
+def _deviation(row: dict[str, Any]) -> str:
+    share = abs(row["standard_deviation"] / row["value"]) if row["value"] else float("inf")
+    relative = f" ({100.0 * share:.2g}%)" if row["prior"]["value"] and share < 10.0 else ""
+    return f"{row['standard_deviation']:.2g} {row['unit']}".rstrip() + relative

@@ -1,0 +1,150 @@
+"""Levenberg-Marquardt with a normal prior, bounds, and a loss that outliers cannot dominate.
+
+    min_z  sum_i rho(r_i(z)) + 1/2 z^T z
+
+where rho is Huber's loss: quadratic up to `HUBER`, linear beyond. Each iteration weighs a residual r beyond it by
+HUBER / |r| (iteratively reweighted least squares). Entries of z at a bound that would leave it are held there.
+
+Source: Nocedal, Wright, Numerical Optimization, 2006, section 10.3; Huber, Robust Statistics, 1981.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from calmotion.shot.character import Array
+
+HUBER = 3.0  # standard deviations: few residuals of a normal distribution are larger
+ENOUGH = 1e-3  # change of z, in standard deviations of its posterior, at which a search ends
+MOST = 30  # iterations
+FIRST, LARGEST = 1e-3, 1e8  # damping, relative to the diagonal of the Gauss-Newton matrix
+
+
+class Problem(Protocol):
+    """Residuals over their standard deviations, shape [N], and their derivative by z, shape [N, n]."""
+
+    def residuals(self, z: Array) -> Array | None:
+        """At z; None where there is no value."""
+
+    def linearized(self, z: Array) -> tuple[Array, Array]:
+        """With their derivative."""
+
+
+@dataclass(frozen=True, eq=False)
+class Solution:
+    """A minimum.
+
+    Attributes:
+        z: Where, shape [n].
+        residuals: There, shape [N].
+        jacobian: Derivative of the residuals, shape [N, n].
+        cost: Loss and prior.
+        iterations: Number of linearisations.
+        converged: Whether the last step was small, rather than that the iterations ended.
+    """
+
+    z: Array
+    residuals: Array
+    jacobian: Array
+    cost: float
+    iterations: int
+    converged: bool
+
+
+def weights_of(residuals: Array) -> Array:
+    """Weights of the residuals, 1 or less, shape [N]."""
+    size = np.abs(residuals)
+    return np.where(size > HUBER, HUBER / np.maximum(size, HUBER), 1.0)
+
+
+def loss_of(residuals: Array) -> float:
+    """Sum of Huber's loss."""
+    size = np.abs(residuals)
+    return float(np.where(size > HUBER, HUBER * (size - 0.5 * HUBER), 0.5 * size**2).sum())
+
+
+def minimize(problem: Problem, start: Array, lower: Array, most: int = MOST) -> Solution:
+    """The minimum that is reached from a start.
+
+    Args:
+        problem: Its residuals.
+        start: Shape [n]; the residuals have a value there.
+        lower: Least value of each entry, shape [n].
+        most: Largest number of iterations.
+
+    Raises:
+        ValueError: The residuals have no value at the start.
+    """
+    z = np.maximum(start, lower)
+    damping = FIRST
+    for iteration in range(1, most + 1):
+        r, J = problem.linearized(z)
+        cost = loss_of(r) + 0.5 * float(z @ z)
+        w = weights_of(r)
+        H = J.T @ (w[:, None] * J) + np.eye(len(z))
+        gradient = J.T @ (w * r) + z
+        free = ~((z <= lower) & (gradient > 0.0))
+        small = not np.any(free)
+        while not small:
+            step = np.zeros_like(z)
+            own = H[np.ix_(free, free)]
+            step[free] = -np.linalg.solve(own + damping * np.diag(np.diag(own)), gradient[free])
+            then = np.maximum(z + step, lower)
+            taken = then - z
+            small = float(np.sqrt(taken @ H @ taken)) < ENOUGH
+            if small:
+                break
+            tried = problem.residuals(then)
+            after = np.inf if tried is None else loss_of(tried) + 0.5 * float(then @ then)
+            if after <= cost:
+                expected = -(gradient @ taken + 0.5 * taken @ H @ taken)
+                gain = (cost - after) / expected if expected > 0.0 else 1.0
+                damping = max(damping * (0.1 if gain > 0.75 else 1.0 if gain > 0.25 else 4.0), 1e-12)
+                z = then
+                break
+            damping = max(10.0 * damping, FIRST)
+            if damping > LARGEST:
+                return Solution(z, r, J, cost, iteration, False)
+        if small:
+            return Solution(z, r, J, cost, iteration, True)
+    r, J = problem.linearized(z)
+    return Solution(z, r, J, loss_of(r) + 0.5 * float(z @ z), most, False)
+
+
+def chord(problem: Problem, known: Solution, most: int = 4) -> Solution:
+    """The minimum of a problem near that of another one, with the derivatives of the other one.
+
+    Args:
+        problem: Its residuals.
+        known: The other minimum, which is returned where the problem has no value near it.
+        most: Largest number of steps.
+    """
+    z, J, r = known.z, known.jacobian, problem.residuals(known.z)
+    for _ in range(most):
+        if r is None:
+            return known
+        w = weights_of(r)
+        H = J.T @ (w[:, None] * J) + np.eye(len(z))
+        step = -np.linalg.solve(H, J.T @ (w * r) + z)
+        if float(np.sqrt(step @ H @ step)) < 10.0 * ENOUGH:
+            break
+        z = z + step
+        r = problem.residuals(z)
+    if r is None:
+        return known
+    return Solution(z, r, J, loss_of(r) + 0.5 * float(z @ z), known.iterations, known.converged)
+
+
+def posterior(jacobian: Array, residuals: Array, counts: Array) -> Array:
+    """Covariance (J^T W J + E)^-1 of z about a minimum, shape [n, n].
+
+    Args:
+        jacobian, residuals: There.
+        counts: How many successive residuals count as one, shape [N].
+    """
+    w = weights_of(residuals) / counts
+    H = jacobian.T @ (w[:, None] * jacobian) + np.eye(jacobian.shape[1])
+    return np.asarray(np.linalg.inv(H))

@@ -1,0 +1,160 @@
+"""The residuals of recordings as functions of a robot's parameters, by simulations in parallel.
+
+The derivative by a parameter of the robot is a central difference of two simulations, each a hundredth of the prior's
+standard deviation away; that by a parameter of the measurement is exact.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from calmotion.errors import ShotError
+from calmotion.identification.measurement import Measurement
+from calmotion.identification.parameters import Parameter
+from calmotion.identification.robots import robot_at
+from calmotion.identification.signals import Signals, signals_of
+from calmotion.multibody.failure import SimulationFailure
+from calmotion.retargeting.problem.parallel import in_parallel
+from calmotion.shot.character import Array
+from calmotion.shot.run import RunSettings
+from calmotion.simulation.compiled_shot import CompiledShot
+from calmotion.support import interrupts
+
+DIFFERENCE = 0.01  # of the prior's standard deviation
+
+
+@dataclass(frozen=True, eq=False)
+class Differences:
+    """Signals at x + `DIFFERENCE` and x - `DIFFERENCE` of each parameter; the first and the nominal ones where x is a
+    least value.
+
+    Attributes:
+        ahead, behind: One each for each parameter of the robot.
+        widths: Distance between them in x.
+    """
+
+    ahead: tuple[Signals, ...]
+    behind: tuple[Signals, ...]
+    widths: Array
+
+
+class Calibrated:
+    """A robot and its recordings, as a `least_squares.Problem`: z has the robot's parameters, then the measurement's.
+
+    Args:
+        shot: The compiled shot.
+        parameters: Of the robot.
+        measurement: Its sensors.
+        options: With step and integrator.
+        after: How long the robot is simulated after the end of the shot [s].
+        tell: Called with each simulation.
+    """
+
+    def __init__(
+        self, shot: CompiledShot, parameters: Sequence[Parameter], measurement: Measurement, options: RunSettings,
+        after: float, tell: Callable[[], None] = lambda: None,
+    ):  # fmt: skip
+        self.shot, self.parameters, self.measurement = shot, tuple(parameters), measurement
+        self.options, self.after, self.tell = options, after, tell
+        self._last: tuple[Array, Signals] | None = None
+        self.differences: Differences | None = None
+        self.simulations = 0
+
+    @property
+    def lower(self) -> Array:
+        """Least values of z."""
+        return np.array([p.least for p in (*self.parameters, *self.measurement.parameters)])
+
+    def with_measurement(self, measurement: Measurement) -> Calibrated:
+        """The same with other noise of the sensors; what was simulated is kept."""
+        other = Calibrated(self.shot, self.parameters, measurement, self.options, self.after, self.tell)
+        other._last, other.differences, other.simulations = self._last, self.differences, self.simulations
+        return other
+
+    def with_options(self, options: RunSettings) -> Calibrated:
+        """The same with another step; the differences are kept."""
+        other = Calibrated(self.shot, self.parameters, self.measurement, options, self.after, self.tell)
+        other.differences, other.simulations = self.differences, self.simulations
+        return other
+
+    def signals(self, z: Array) -> Signals:
+        """Of the robot at z.
+
+        Raises:
+            ShotError: It cannot be simulated.
+            SimulationFailure: A step fails.
+        """
+        x = z[: len(self.parameters)]
+        if self._last is None or not np.array_equal(self._last[0], x):
+            self._last = x.copy(), self._simulated(x)
+        return self._last[1]
+
+    def residuals(self, z: Array) -> Array | None:
+        """(measured - predicted) / sigma, shape [N]; None where the robot cannot be simulated."""
+        try:
+            signals = self.signals(z)
+        except (ShotError, SimulationFailure):
+            return None
+        return self.measurement.residuals(signals, z[len(self.parameters) :])
+
+    def linearized(self, z: Array) -> tuple[Array, Array]:
+        """The residuals and their derivative, shape [N, n].
+
+        Raises:
+            ShotError: The robot cannot be simulated there.
+            SimulationFailure: A step fails.
+        """
+        n, measurement = len(self.parameters), self.measurement
+        x, y = z[:n], z[n:]
+        here = self.signals(z)
+        widths, points = np.zeros(n), []
+        for k, parameter in enumerate(self.parameters):
+            unit = DIFFERENCE * np.eye(n)[k]
+            points.append(x + unit)
+            if x[k] - DIFFERENCE >= parameter.least:
+                points.append(x - unit)
+        found = iter(in_parallel(self._simulated, points))
+        ahead, behind = [], []
+        for k, parameter in enumerate(self.parameters):
+            ahead.append(next(found))
+            central = x[k] - DIFFERENCE >= parameter.least
+            behind.append(next(found) if central else here)
+            widths[k] = (2.0 if central else 1.0) * DIFFERENCE
+        self.differences = Differences(tuple(ahead), tuple(behind), widths)
+        columns = []
+        for up, down, width in zip(ahead, behind, widths, strict=True):
+            change = [
+                (measurement.predicted(up, sensor, y) - measurement.predicted(down, sensor, y)) / width
+                for sensor in measurement.sensors
+            ]
+            columns.append(-measurement.weighted(change))
+        by_measurement = -measurement.weighted(
+            [measurement.derivatives(here, sensor, y) for sensor in measurement.sensors]
+        )
+        by_robot = np.stack(columns, axis=1) if columns else np.zeros((len(by_measurement), 0))
+        return measurement.residuals(here, y), np.concatenate([by_robot, by_measurement], axis=1)
+
+    def _simulated(self, x: Array) -> Signals:
+        interrupts.check()
+        self.simulations += 1
+        self.tell()
+        return signals_of(robot_at(self.shot, self.parameters, x), self.options, self.after)
+
+
+class Measured:
+    """The parameters of the measurement alone, for one motion: nothing is simulated."""
+
+    def __init__(self, measurement: Measurement, signals: Signals):
+        self._measurement, self._signals = measurement, signals
+
+    def residuals(self, z: Array) -> Array | None:
+        """(measured - predicted) / sigma, shape [N]."""
+        return self._measurement.residuals(self._signals, z)
+
+    def linearized(self, z: Array) -> tuple[Array, Array]:
+        """With their derivative, shape [N, m]."""
+        change = [self._measurement.derivatives(self._signals, sensor, z) for sensor in self._measurement.sensors]
+        return self._measurement.residuals(self._signals, z), -self._measurement.weighted(change)

@@ -1,0 +1,195 @@
+"""The search for a robot's parameters: a start, the noise of the sensors, and a time step that does not matter."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from calmotion.errors import ShotError
+from calmotion.identification.least_squares import Solution, chord, loss_of, minimize, posterior
+from calmotion.identification.measurement import Measurement, Sensor
+from calmotion.identification.noise import correlation_time, least_sigma, spread_of
+from calmotion.identification.problem import Calibrated, Measured
+from calmotion.multibody.failure import SimulationFailure
+from calmotion.retargeting.problem.parallel import in_parallel
+from calmotion.shot.calibration.estimates import GEAR_STIFFNESS, MODULUS, POSITION_GAIN
+from calmotion.shot.character import Array
+
+STIFF = (MODULUS, POSITION_GAIN, GEAR_STIFFNESS)  # what decides about frequencies
+TRIED = np.linspace(-2.4, 2.4, 17)  # of all of them at once, in standard deviations of their priors
+BEST = 2  # of these, from which a search begins
+ROUNDS, STEADY = 5, 0.05  # of the noise, and its relative change at which they end
+HALVINGS, SHIFT = 4, 0.2  # of the step, and the change of an estimate at which they end, over its standard deviation
+ORDER = 2  # of the integrators
+
+
+@dataclass(frozen=True, eq=False)
+class Found:
+    """Where a search ended.
+
+    Attributes:
+        z: Parameters of the robot and of the measurement, in standard deviations of their priors.
+        problem: With the last step and the noise of the sensors.
+        solution: The last minimum, before what is left of the error of the step is taken off.
+        covariance: Of z.
+        iterations: In all.
+        shift: Largest change by the last halving of the step, over its standard deviation.
+    """
+
+    z: Array
+    problem: Calibrated
+    solution: Solution
+    covariance: Array
+    iterations: int
+    shift: float
+
+
+def search(problem: Calibrated, tell: Callable[[float, str], None], halvings: int = HALVINGS) -> Found:
+    """The parameters at which the robot moves as recorded.
+
+    Raises:
+        ShotError: No robot near the shot can be simulated.
+    """
+    starts = _starts(problem, tell)
+    tell(0.3, "fitting the parameters")
+    rough = [_from(problem, start, 8) for start in starts]
+    best, z, iterations = min(rough, key=lambda item: item[0])[1:]
+    solution: Solution | None = None
+    sigmas = np.zeros(0)
+    for _ in range(ROUNDS):
+        solution = minimize(best, z, best.lower)
+        z, iterations = solution.z, iterations + solution.iterations
+        known, sigmas = sigmas, np.array([s.sigma for s in best.measurement.sensors])
+        best = best.with_measurement(renoised(best, z))
+        now = np.array([s.sigma for s in best.measurement.sensors])
+        if len(known) and np.all(np.abs(now / sigmas - 1.0) < STEADY):
+            break
+    assert solution is not None
+    tell(0.8, "halving the time step")
+    return _converged(best, solution, iterations, halvings)
+
+
+def _converged(problem: Calibrated, solution: Solution, iterations: int, halvings: int) -> Found:
+    """The minimum for ever smaller steps, extrapolated to a step of zero.
+
+    Derivatives are those of the first step: a minimum with another step is near, and its residuals alone decide where.
+    """
+    z, covariance = solution.z, covariance_of(problem, solution)
+    deviations = np.sqrt(np.diag(covariance))
+    earlier, limit, shift = z, z, 0.0
+    for k in range(halvings):
+        problem = problem.with_options(replace(problem.options, step=0.5 * step_of(problem)))
+        solution = chord(problem, solution)
+        iterations += 1
+        change = solution.z - earlier
+        then = np.maximum(solution.z + change / (2**ORDER - 1), problem.lower)
+        # the first extrapolation is compared with what it extrapolates, the next ones with the one before
+        off = change / (2**ORDER - 1) if k == 0 else then - limit
+        shift, earlier, limit = float(np.max(np.abs(off) / deviations, initial=0.0)), solution.z, then
+        if shift <= SHIFT:
+            break
+    return Found(limit, problem, solution, covariance_of(problem, solution), iterations, shift)
+
+
+def step_of(problem: Calibrated) -> float:
+    """The step of its simulations [s]."""
+    assert problem.options.step is not None
+    return problem.options.step
+
+
+def covariance_of(problem: Calibrated, solution: Solution) -> Array:
+    """Of z about a solution; residuals that are correlated in time count as fewer."""
+    y = solution.z[len(problem.parameters) :]
+    signals, counts = problem.signals(solution.z), []
+    for sensor in problem.measurement.sensors:
+        off = sensor.channel.values - problem.measurement.predicted(signals, sensor, y)
+        count = correlation_time(np.where(sensor.fitted, off, np.nan)[sensor.used])
+        counts.append(np.full(int(sensor.fitted.sum()), count))
+    return posterior(solution.jacobian, solution.residuals, np.concatenate(counts))
+
+
+def renoised(problem: Calibrated, z: Array) -> Measurement:
+    """The measurement with the noise of its sensors as the residuals have it, where it is not given."""
+    measurement, y = problem.measurement, z[len(problem.parameters) :]
+    signals = problem.signals(z)
+
+    def of(sensor: Sensor) -> Sensor:
+        if sensor.channel.sigma is not None:
+            return replace(sensor, sigma=sensor.channel.sigma)
+        off = sensor.channel.values - measurement.predicted(signals, sensor, y)
+        return replace(sensor, sigma=max(spread_of(off[sensor.fitted]), least_sigma(sensor.channel.values)))
+
+    return measurement.with_sensors([of(sensor) for sensor in measurement.sensors])
+
+
+def profiled(problem: Calibrated, z: Array) -> tuple[Array, float]:
+    """z with the best parameters of the measurement for its robot, and the loss with the prior."""
+    n = len(problem.parameters)
+    solution = minimize(Measured(problem.measurement, problem.signals(z)), z[n:], problem.lower[n:])
+    return np.concatenate([z[:n], solution.z]), solution.cost + 0.5 * float(z[:n] @ z[:n])
+
+
+def _from(problem: Calibrated, start: Array, most: int) -> tuple[float, Calibrated, Array, int]:
+    """A search from a start, with noise as large as what the start leaves: far residuals then keep their weight."""
+    free, z, iterations = _without_given_noise(problem), start, 0
+    for _ in range(2):
+        wide = free.with_measurement(renoised(free, z))
+        found = minimize(wide, z, wide.lower, most)
+        free, z, iterations = wide, found.z, iterations + found.iterations
+    # compared with the noise that the sensors have
+    free = free.with_measurement(renoised(free, z))
+    r = problem.with_measurement(problem.measurement).residuals(z)
+    sensors = [
+        replace(own, sigma=own.sigma if own.channel.sigma is not None else sensor.sigma)
+        for own, sensor in zip(problem.measurement.sensors, free.measurement.sensors, strict=True)
+    ]
+    cost = np.inf if r is None else loss_of(r)
+    return cost, free.with_measurement(free.measurement.with_sensors(sensors)), z, iterations
+
+
+def _without_given_noise(problem: Calibrated) -> Calibrated:
+    """The problem with sensors whose noise is not known."""
+    sensors = [replace(s, channel=replace(s.channel, sigma=None)) for s in problem.measurement.sensors]
+    return problem.with_measurement(problem.measurement.with_sensors(sensors))
+
+
+def _starts(problem: Calibrated, tell: Callable[[float, str], None]) -> list[Array]:
+    """The best of robots that are stiffer and softer than the shot's: a search finds only frequencies that it can tell
+    apart from their neighbours by less than half an oscillation over the recording."""
+    m = len(problem.measurement.parameters)
+    stiff = np.array([p.kind in STIFF for p in problem.parameters], float)
+    tell(0.1, "looking for the stiffness")
+    points = [np.concatenate([v * stiff, np.zeros(m)]) for v in (TRIED if stiff.any() else (0.0,))]
+
+    def tried(z: Array) -> tuple[float, Array, Calibrated] | None:
+        own = problem.with_measurement(problem.measurement)
+        try:
+            own.signals(z)
+        except (ShotError, SimulationFailure):
+            return None
+        own = own.with_measurement(_common_noise(own))
+        z, cost = profiled(own, z)
+        return cost, z, own
+
+    found = [item for item in in_parallel(tried, points) if item is not None]
+    problem.simulations += len(points)
+    if not found:
+        raise ShotError(
+            "neither the robot nor a stiffer or softer one can be simulated", path=problem.shot.character.path,
+            remedy="Run `calmotion simulate` on the shot, which says why",
+        )  # fmt: skip
+    found.sort(key=lambda item: item[0])
+    return [z for _, z, _ in found[:BEST]]
+
+
+def _common_noise(problem: Calibrated) -> Measurement:
+    """The sensors with noise as large as a tenth of what they measured: the same for all robots, so that their losses
+    compare."""
+
+    def of(sensor: Sensor) -> Sensor:
+        values = np.where(sensor.fitted, sensor.channel.values, np.nan)
+        return replace(sensor, sigma=max(0.1 * float(np.nanmean(np.nanstd(values, axis=0))), sensor.sigma))
+
+    return problem.measurement.with_sensors([of(sensor) for sensor in problem.measurement.sensors])

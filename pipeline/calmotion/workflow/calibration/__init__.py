@@ -1,0 +1,1 @@
+"""Calibration of a robot: recordings, and the parameters that they tell."""

@@ -1,0 +1,182 @@
+"""Calibrate the robot of a shot: the command as a function."""
+
+from __future__ import annotations
+
+import copy
+import os
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from calmotion.accuracy.reduced_bodies import ConvergedReduction, compiled_in
+from calmotion.host import Settings, merge, parse_quantity
+from calmotion.identification.calibrate import CalibrationSettings, calibrate_shot
+from calmotion.identification.measurement import refuse_unknown_channels
+from calmotion.identification.parameters import DEFAULT, refuse_unknown
+from calmotion.identification.signals import refuse_cyclic
+from calmotion.shot import Animation, Character, Provenance
+from calmotion.shot.calibration.estimates import Calibration, Estimate
+from calmotion.shot.outputs import CalibrationFigures, WrittenLayer
+from calmotion.shot.run import OutputPaths, RunSettings, Source
+from calmotion.simulation.compiled_shot import CompiledShot
+from calmotion.workflow.calibration.recordings import measured_prims, read_recordings
+from calmotion.workflow.run import Hooks, Outcome, Progress, again, carry_out
+from calmotion.workflow.shot import Given, Path, Shot, read_settings
+
+_READ = (Character, Animation, Provenance)
+
+
+@dataclass(frozen=True, eq=False)
+class CalibratedShot:
+    """A calibrated robot.
+
+    Attributes:
+        calibration: The estimates, and how well the model predicts each channel.
+        layer: The written layers, or None.
+        figures: Paths of the figures.
+        total_wall_s: Time of all of it [s].
+    """
+
+    calibration: Calibration
+    layer: WrittenLayer | None
+    figures: tuple[str, ...]
+    total_wall_s: float
+    _outcome: Outcome = field(repr=False)
+
+    @property
+    def parameters(self) -> Mapping[str, Estimate]:
+        """The estimates by name, such as `modulus /Arm/Nylon`."""
+        return {item.name: item for item in self.calibration.estimates}
+
+    def write(self, layer: Path) -> WrittenLayer:
+        """Write the estimates as a layer of overs, and beside it a root layer that opens it with the shot.
+
+        Raises:
+            ShotError: It cannot be written.
+        """
+        return _written(self._outcome, self.calibration, os.fspath(layer))
+
+    def draw(self, folder: Path) -> tuple[str, ...]:
+        """Draw measured and simulated signals before and after, residuals and intervals; returns the paths.
+
+        Raises:
+            RunError: They cannot be written.
+        """
+        return _drawn(self._outcome, self.calibration, os.fspath(folder), {})
+
+    def report(self) -> dict[str, Any]:
+        """The object that `--json` prints."""
+        from calmotion.workflow.calibration.report import calibration_report
+
+        return calibration_report(self.calibration, self.layer, self.figures, self.total_wall_s)
+
+
+# parameters: one for each option of the command, all but the shot and the recordings by keyword
+def calibrate(
+    shot: Shot | Path,
+    recordings: Sequence[Path] | Path,
+    *,
+    layer: Path | None = None,
+    parameters: Sequence[str] = DEFAULT,
+    priors: Mapping[str, float] | None = None,
+    validate: bool = True,
+    tolerance: float | str | None = None,
+    step: float | str | None = None,
+    integrator: str | None = None,
+    figures: Path | None = None,
+    operators: Sequence[str] = (),
+    settings: Given = None,
+    progress: Callable[[Progress], None] | None = None,
+    on_operator: Callable[[Any], None] | None = None,
+    cancel: Callable[[], bool] | None = None,
+) -> CalibratedShot:
+    """Estimate the parameters of a robot from recordings of its performance, with their standard deviations.
+
+    Args:
+        shot: The shot that was performed, or its USD file; with a layer of results, the curves of that layer.
+        recordings: Files, each as FILE or FILE@/PRIM, the prim where the sensor of a file sits that does not name it.
+        layer: USD layer to write.
+        parameters: What to estimate: kinds, each by itself or as `KIND:PATTERN` for some prim paths.
+        priors: Standard deviations of what is known before, by kind; relative ones, or SI of those about zero.
+        validate: Hold out a fifth of the recordings, and compare it with the result.
+        tolerance: Acceptable error of the model at the targets, [m] or text with a unit; None: the shot's own.
+        step: First time step, [s] or text with a unit; it is halved until the estimates no longer depend on it.
+        integrator: Of the simulations; None: automatic.
+        figures: Folder for figures.
+        operators, settings, progress, on_operator, cancel: As of `simulate`.
+
+    Raises:
+        ShotError: The shot cannot be processed, or a recording does not fit it.
+        SettingError: An argument does not fit.
+    """
+    begin = time.perf_counter()
+    chosen, hooks = read_settings(settings), Hooks(progress, on_operator, cancel)
+    refuse_unknown(parameters, priors or {})
+    files = [recordings] if isinstance(recordings, (str, os.PathLike)) else recordings
+    names = [os.fspath(file) for file in files]
+    opened = _with_sensors(shot)
+    read = read_recordings(opened.host, names, merge([opened.settings, chosen]))
+    options = RunSettings(tolerance=_quantity(tolerance, "m"), step=_quantity(step, "s"), integrator=integrator)
+    source = Source("", "", options, measured=measured_prims(read))
+    outputs = OutputPaths(figures=None if figures is None else os.fspath(figures))
+    if layer is not None:
+        from calmotion.workflow.exporting.controller_files import refuse_unwritable
+
+        refuse_unwritable(os.fspath(layer))
+    first = carry_out(
+        opened, "simulate", wanted=_READ, operators=operators, source=source, settings=chosen, hooks=hooks
+    )
+    character = first.require(Character)
+    refuse_cyclic(character.retarget.cyclic, character.path)
+    refuse_unknown_channels(character, read)
+    if layer is not None:
+        from calmotion.usd.writing.result import refuse_inputs
+
+        refuse_inputs(first.require(Provenance), os.fspath(layer))
+    outcome = carry_out(
+        opened, "simulate", wanted=(*_READ, CompiledShot), optional=(ConvergedReduction,), source=source,
+        settings=chosen, hooks=hooks,
+    )  # fmt: skip
+    outcome.require(CompiledShot)
+
+    def tell(fraction: float, message: str) -> None:
+        if cancel is not None and cancel():
+            from calmotion.workflow.problems import Cancelled
+
+            raise Cancelled(f"{opened.path}: cancelled")
+        if progress is not None:
+            progress(Progress("Estimate the parameters", fraction, message))
+
+    calibration = calibrate_shot(
+        compiled_in(outcome.run.get), read, CalibrationSettings(tuple(parameters), dict(priors or {}), validate),
+        options, tell,
+    )  # fmt: skip
+    written = None if layer is None else _written(outcome, calibration, os.fspath(layer))
+    drawn = () if outputs.figures is None else _drawn(outcome, calibration, outputs.figures, chosen)
+    return CalibratedShot(calibration, written, drawn, time.perf_counter() - begin, outcome)
+
+
+def _with_sensors(shot: Shot | Path) -> Shot:
+    """The shot, to be read again: the prims of sensors are targets of this reading alone."""
+    if not isinstance(shot, Shot):
+        from calmotion.workflow.exporting.export import with_shot
+
+        return Shot(with_shot(os.fspath(shot)))
+    opened = copy.copy(shot)
+    opened.forget()
+    return opened
+
+
+def _written(outcome: Outcome, calibration: Calibration, layer: str) -> WrittenLayer:
+    from calmotion.usd.writing.calibration import write_calibration
+
+    return WrittenLayer(*write_calibration(outcome.require(Character), outcome.require(Provenance), calibration, layer))
+
+
+def _drawn(outcome: Outcome, calibration: Calibration, folder: str, settings: Settings) -> tuple[str, ...]:
+    return again(outcome, CalibrationFigures, calibration, OutputPaths(figures=folder), settings=settings).paths
+
+
+def _quantity(value: float | str | None, unit: str) -> float | None:
+    return parse_quantity(value, unit) if isinstance(value, str) else value

@@ -1,0 +1,67 @@
+"""Readers of recordings: tables of any columns, and accelerometer logs of 3D printers."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+from calmotion.host import Property, PropertyValues, registration
+from calmotion.shot.calibration.recording import Recording, RecordingRequest
+from calmotion.workflow.calibration.recording_reader import RecordingReader, first_line
+
+PRINTER_HEAD = "#time,accel_x,accel_y,accel_z"
+
+
+class ReadRecordedTable(RecordingReader):
+    """A CSV table: its header names prims, or a TOML map beside it says what its columns are."""
+
+    idname = "recording.table"
+    label = "Read the recording"
+    suffixes: ClassVar[tuple[str, ...]] = (".csv", ".tsv", ".txt")
+    properties: ClassVar[tuple[Property, ...]] = (
+        Property("map", str, "", description="TOML map of the columns; without it FILE.toml beside the recording"),
+    )
+
+    @classmethod
+    def reads(cls, request: RecordingRequest) -> bool:
+        """Tables that are no accelerometer log."""
+        return super().reads(request) and not _of_printer(request)
+
+    def read(self, request: RecordingRequest, properties: PropertyValues) -> Recording:
+        """The recording."""
+        from .tables import read_table
+
+        return read_table(request, properties.map)
+
+
+class ReadPrinterAccelerometer(RecordingReader):
+    """The log of an accelerometer as Klipper writes it (`#time,accel_x,accel_y,accel_z`, mm/s^2)."""
+
+    idname = "recording.accelerometer"
+    label = "Read the accelerometer"
+    suffixes: ClassVar[tuple[str, ...]] = (".csv",)
+    properties: ClassVar[tuple[Property, ...]] = (
+        Property("prim", str, "", description="Prim at which the accelerometer sits, in whose axes it measures"),
+        Property(
+            "axes", str, "x, y, z",
+            description="Axes of the accelerometer that lie along x, y and z of the prim, such as y, -x, z",
+        ),
+        Property("unit", str, "mm/s^2", choices=("mm/s^2", "m/s^2", "g"), description="Unit of the log"),
+    )  # fmt: skip
+
+    @classmethod
+    def reads(cls, request: RecordingRequest) -> bool:
+        """Tables with the head that printers write."""
+        return super().reads(request) and _of_printer(request)
+
+    def read(self, request: RecordingRequest, properties: PropertyValues) -> Recording:
+        """The recording."""
+        from .printers import read_log
+
+        return read_log(request, properties.prim, properties.axes, properties.unit)
+
+
+def _of_printer(request: RecordingRequest) -> bool:
+    return first_line(request.file).replace(" ", "").lower().startswith(PRINTER_HEAD)
+
+
+register, unregister = registration(ReadRecordedTable, ReadPrinterAccelerometer)

@@ -1,0 +1,199 @@
+"""Tables of recordings: named after prims, or with a TOML map of their columns."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from calmotion.errors import ShotError, raise_all
+from calmotion.shot.calibration.recording import (
+    ACCELEROMETER,
+    ANGLE,
+    COMPONENTS,
+    EFFORT,
+    MARKER,
+    Channel,
+    Recording,
+    RecordingRequest,
+)
+from calmotion.shot.character import Array
+from calmotion.support.naming import nearest
+from calmotion.support.reading import read_toml
+from calmotion.workflow.calibration.recording_reader import hash_of
+
+from .columns import UNITS, column_of, increasing, read_columns, unit_of
+
+TIME = "time_s"
+SUFFIXES: Mapping[str, tuple[str, int]] = {
+    ".x": (MARKER, 0), ".y": (MARKER, 1), ".z": (MARKER, 2), ".ax": (ACCELEROMETER, 0), ".ay": (ACCELEROMETER, 1),
+    ".az": (ACCELEROMETER, 2), ".angle": (ANGLE, 0), ".effort": (EFFORT, 0),
+}  # fmt: skip
+NOT_MEASURED = (".error", ".rotation_error", ".input", ".output")  # other columns of tables that --csv wrote
+REACTIONS = (".force", ".moment")
+FITTING = {
+    MARKER: ("m", "cm", "mm", "in"), ACCELEROMETER: ("m/s^2", "mm/s^2", "g"),
+    ANGLE: ("rad", "deg", "turn", "m", "cm", "mm"), EFFORT: ("N m", "N mm", "N"),
+}  # fmt: skip
+TIMES = ("s", "ms", "us", "ns")
+DEFAULT_UNIT = {MARKER: "m", ACCELEROMETER: "m/s^2", ANGLE: "rad", EFFORT: "N m"}
+KNOWN = ("prim", "kind", "columns", "unit", "noise")
+EXAMPLE = (
+    "Write a table [[channel]] with prim = \"/Arm/Hand/cup\", kind = \"marker\", columns = [\"x\", \"y\", \"-z\"] and "
+    "unit = \"mm\""
+)  # fmt: skip
+
+
+def read_table(request: RecordingRequest, map_file: str) -> Recording:
+    """A recording from a table.
+
+    Args:
+        request: Its file.
+        map_file: TOML map of the columns; empty: FILE.toml beside it, or none.
+
+    Raises:
+        ShotError: The table or the map cannot be read, or do not fit.
+    """
+    file = request.file
+    columns, degrees = read_columns(file)
+    beside = f"{os.path.splitext(file)[0]}.toml"
+    given = map_file or (beside if os.path.isfile(beside) else "")
+    channels, notes = _mapped(file, columns, given) if given else _named(file, columns, degrees)
+    if not channels:
+        raise ShotError(
+            "the recording has no channel", path=file, found=", ".join(list(columns)[:12]),
+            remedy=f"Name columns after prims, such as /Arm/Hand/cup.x or /Arm/Elbow.angle, or write {beside}",
+        )  # fmt: skip
+    return Recording(file, hash_of(file), tuple(channels), tuple(notes))
+
+
+def _named(file: str, columns: Mapping[str, Array], degrees: bool) -> tuple[list[Channel], list[str]]:
+    """Channels of a table whose columns are named after prims."""
+    if TIME not in columns:
+        raise ShotError(
+            "the recording has no column of times", path=file, attribute=TIME, found=", ".join(list(columns)[:12]),
+            remedy=f"Name it {TIME}, in seconds, or write a map: {os.path.splitext(os.path.basename(file))[0]}.toml",
+        )  # fmt: skip
+    groups: dict[tuple[str, str], dict[int, Array]] = {}
+    skipped, wrong = [], []
+    for name, values in columns.items():
+        path, dot, suffix = name.rpartition(".")
+        if name == TIME:
+            continue
+        if f"{dot}{suffix}" in NOT_MEASURED or path.endswith(REACTIONS):
+            skipped.append(name)
+        elif f"{dot}{suffix}" not in SUFFIXES or not path.startswith("/"):
+            wrong.append(name)
+        else:
+            kind, component = SUFFIXES[f"{dot}{suffix}"]
+            scale = UNITS["deg"] if kind == ANGLE and degrees else 1.0
+            groups.setdefault((kind, path), {})[component] = scale * values
+    raise_all(
+        [
+            ShotError(
+                "this is no column of a recording", path=file, attribute=name,
+                remedy=f"Name it PRIM.x, .y, .z, .ax, .ay, .az, .angle or .effort, or write a map. {EXAMPLE}",
+            )
+            for name in wrong
+        ]
+    )  # fmt: skip
+    keep = increasing(columns[TIME], file, TIME)
+    channels = []
+    for (kind, path), parts in groups.items():
+        values = np.full((len(keep), COMPONENTS[kind]), np.nan)
+        for component, column in parts.items():
+            values[:, component] = column
+        channels += _channel(kind, path, columns[TIME], values, keep, None)
+    notes = _notes(file, keep)
+    if skipped:
+        notes.append(f"{file}: {len(skipped)} columns are not measurements, such as {skipped[0]}; they are not read")
+    return channels, notes
+
+
+def _mapped(file: str, columns: Mapping[str, Array], map_file: str) -> tuple[list[Channel], list[str]]:
+    """Channels of a table by its map."""
+    try:
+        content = read_toml(map_file)
+    except (OSError, ValueError) as error:
+        found = error.strerror if isinstance(error, OSError) else error
+        raise ShotError(
+            "the map of the recording cannot be read", path=map_file, found=found, remedy=EXAMPLE
+        ) from error
+    times, name = _times(columns, content, file, map_file)
+    keep = increasing(times, file, name)
+    tables = content.get("channel", [])
+    if not isinstance(tables, list) or not tables or not all(isinstance(table, dict) for table in tables):
+        raise ShotError("the map has no channels", path=map_file, attribute="channel", remedy=EXAMPLE)
+    channels: list[Channel] = []
+    for number, table in enumerate(tables):
+        place = f"channel[{number}]"
+        for key in table:
+            if key not in KNOWN:
+                raise ShotError(
+                    "a channel has no such entry", path=map_file, attribute=f"{place}.{key}",
+                    remedy=f"{nearest(key, KNOWN)}Use {', '.join(KNOWN)}",
+                )  # fmt: skip
+        kind, path, given = table.get("kind"), table.get("prim"), table.get("columns")
+        if kind not in COMPONENTS:
+            raise ShotError(
+                "there is no such kind of channel", path=map_file, attribute=f"{place}.kind", found=kind,
+                remedy=f"{nearest(str(kind), COMPONENTS)}Use {', '.join(COMPONENTS)}",
+            )  # fmt: skip
+        if not isinstance(path, str) or not path.startswith("/"):
+            raise ShotError("must be a prim path", path=map_file, attribute=f"{place}.prim", found=path, remedy=EXAMPLE)
+        given = [given] if isinstance(given, str) else given
+        if not isinstance(given, list) or len(given) != COMPONENTS[kind]:
+            raise ShotError(
+                f"a channel of this kind has {COMPONENTS[kind]} columns", path=map_file, attribute=f"{place}.columns",
+                found=given, remedy=EXAMPLE,
+            )  # fmt: skip
+        unit = unit_of(str(table.get("unit", DEFAULT_UNIT[kind])), FITTING[kind], map_file, f"{place}.unit")
+        values = unit * np.stack([column_of(columns, str(column), file) for column in given], axis=1)
+        channels += _channel(kind, path, times, values, keep, _noise(table, unit, map_file, place))
+    return channels, _notes(file, keep)
+
+
+def _times(columns: Mapping[str, Array], content: Mapping[str, Any], file: str, map_file: str) -> tuple[Array, str]:
+    """Times [s], from a column or from a rate, and the name of where they stand."""
+    table = content.get("time", {"column": TIME})
+    if not isinstance(table, dict):
+        raise ShotError(
+            "must be a table", path=map_file, attribute="time", found=table,
+            remedy='Write [time] with column = "t" and unit = "ms", or with rate = 1000.0 (samples a second)',
+        )  # fmt: skip
+    if "rate" in table:
+        rate = table["rate"]
+        if isinstance(rate, bool) or not isinstance(rate, (int, float)) or not rate > 0.0:
+            raise ShotError(
+                "must be a number of samples a second", path=map_file, attribute="time.rate", found=rate,
+                remedy="Write it in Hz, such as 1000.0",
+            )  # fmt: skip
+        return np.arange(len(next(iter(columns.values())))) / float(rate), "time.rate"
+    name = str(table.get("column", TIME))
+    return unit_of(str(table.get("unit", "s")), TIMES, map_file, "time.unit") * column_of(columns, name, file), name
+
+
+def _noise(table: Mapping[str, Any], unit: float, map_file: str, place: str) -> float | None:
+    noise = table.get("noise")
+    if noise is None:
+        return None
+    if isinstance(noise, bool) or not isinstance(noise, (int, float)) or not 0.0 < noise < np.inf:
+        raise ShotError(
+            "must be the standard deviation of the noise, in the unit of the channel", path=map_file,
+            attribute=f"{place}.noise", found=noise, remedy="Write a positive number, or leave it out",
+        )  # fmt: skip
+    return unit * float(noise)
+
+
+def _channel(
+    kind: str, path: str, times: Array, values: Array, keep: np.ndarray, sigma: float | None
+) -> list[Channel]:  # fmt: skip
+    """The channel of the rows that hold a sample of it; none where there is no sample."""
+    rows = keep & np.isfinite(values).any(axis=1)
+    return [Channel(kind, path, times[rows], values[rows], sigma)] if rows.any() else []
+
+
+def _notes(file: str, keep: np.ndarray) -> list[str]:
+    doubled = int((~keep).sum())
+    return [f"{file}: {doubled} rows have the time of the row before them; they are not read"] if doubled else []
