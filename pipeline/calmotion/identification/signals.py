@@ -82,13 +82,12 @@ class Signals:
         if kind == MARKER:
             return self.positions[:, index]
         if kind == ACCELEROMETER:
-            return np.asarray(self.specific_forces[:, index])
+            return self.specific_forces[:, index]
         if kind == ANGLE:  # what the encoder reads
-            return self.angles[:, index, None] + self.offsets[index]
+            return np.asarray(self.angles[:, index, None] + self.offsets[index], np.float64)
         if kind == EFFORT:
             return self.efforts[:, index, None]
-        axes: Array = self.rotations[:, index].reshape(-1, 9)
-        return axes
+        return self.rotations[:, index].reshape(-1, 9)
 
 
 def signals_of(robot: Robot, options: RunSettings, after: float = 0.0) -> Signals:

@@ -14,7 +14,7 @@ from calmotion.shot.character import Array
 from calmotion.shot.robust.settings import Uncertainty
 from calmotion.support.naming import nearest
 from calmotion.usd import gf, schemas
-from calmotion.usd.reading.calibration import known_factors
+from calmotion.usd.calibrations import known_factors
 from calmotion.usd.reading.context import Reading, prims_of
 from calmotion.usd.units import EARTH_GRAVITY
 
