@@ -20,6 +20,7 @@ from calmotion.testing import check_plugin
         "mode_shapes",
         "model_analysis",
         "motion_table",
+        "recording_readers",
         "rerun_logger",
         "skel_rigger",
         "table_writer",

@@ -34,7 +34,7 @@ class Advice:
     @property
     def sentence(self) -> str:
         """What to measure."""
-        return f"{WORDS[self.kind]} {self.path} would"
+        return f"{WORDS[self.kind]} {self.path}, on the clock of the commands, would"
 
 
 def advised(problem: Calibrated, information: Array, z: Array) -> dict[int, Advice]:

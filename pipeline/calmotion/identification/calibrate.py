@@ -84,7 +84,8 @@ def calibrate_shot(
         settings = replace(settings, after=0.0)
     options, nominal = _simulable(shot, options, settings.after)
     progress(0.02, "finding the clocks of the recordings")
-    clocks = [clock_of(recording, shot.character, nominal) for recording in recordings]
+    known = CLOCK_OFFSET in settings.priors  # then time 0 is the first frame, within this standard deviation
+    clocks = [0.0 if known else clock_of(recording, shot.character, nominal) for recording in recordings]
     first, last = (0.0 if nominal.times[0] < 0.0 else -np.inf), float(nominal.times[-1])
     measurement = Measurement(
         tuple(recording.file for recording in recordings),

@@ -19,9 +19,11 @@ from calmotion.shot.character import Array
 
 STIFF = (MODULUS, POSITION_GAIN, GEAR_STIFFNESS)  # what decides about frequencies
 TRIED = np.linspace(-2.4, 2.4, 17)  # of all of them at once, in standard deviations of their priors
-BEST = 2  # of these, from which a search begins
+BEST = 3  # of these, from which searches begin until one explains the recordings
+FIRST_ITERATIONS, EXPLAINED = 6, 2.0  # of such a search, and its loss over that of noise alone
 ROUNDS, STEADY = 5, 0.05  # of the noise, and its relative change at which they end
-HALVINGS, SHIFT = 4, 0.2  # of the step, and the change of an estimate at which they end, over its standard deviation
+HALVINGS, SHIFT = 5, 0.2  # of the step, and the change of an estimate at which they end, over its standard deviation
+FAR = 1.0  # such a change from which derivatives are computed anew
 ORDER = 2  # of the integrators
 
 
@@ -54,19 +56,20 @@ def search(problem: Calibrated, tell: Callable[[float, str], None], halvings: in
     """
     starts = _starts(problem, tell)
     tell(0.3, "fitting the parameters")
-    rough = [_from(problem, start, 8) for start in starts]
+    rough: list[tuple[float, Calibrated, Array, int]] = []
+    for start in starts:
+        rough.append(_from(problem, start, FIRST_ITERATIONS))
+        count = sum(int(sensor.fitted.sum()) for sensor in problem.measurement.sensors)
+        if rough[-1][0] < EXPLAINED * 0.5 * count:
+            break
     best, z, iterations = min(rough, key=lambda item: item[0])[1:]
-    solution: Solution | None = None
-    sigmas = np.zeros(0)
     for _ in range(ROUNDS):
         solution = minimize(best, z, best.lower)
         z, iterations = solution.z, iterations + solution.iterations
-        known, sigmas = sigmas, np.array([s.sigma for s in best.measurement.sensors])
+        used = np.array([s.sigma for s in best.measurement.sensors])
         best = best.with_measurement(renoised(best, z))
-        now = np.array([s.sigma for s in best.measurement.sensors])
-        if len(known) and np.all(np.abs(now / sigmas - 1.0) < STEADY):
+        if np.all(np.abs(np.array([s.sigma for s in best.measurement.sensors]) / used - 1.0) < STEADY):
             break
-    assert solution is not None
     tell(0.8, "halving the time step")
     return _converged(best, solution, iterations, halvings)
 
@@ -76,18 +79,23 @@ def _converged(problem: Calibrated, solution: Solution, iterations: int, halving
 
     Derivatives are those of the first step: a minimum with another step is near, and its residuals alone decide where.
     """
-    z, covariance = solution.z, covariance_of(problem, solution)
-    deviations = np.sqrt(np.diag(covariance))
-    earlier, limit, shift = z, z, 0.0
-    for k in range(halvings):
+    deviations = np.sqrt(np.diag(covariance_of(problem, solution)))
+    earlier, limit, shift, extrapolated = solution.z, solution.z, 0.0, False
+    for _ in range(halvings):
         problem = problem.with_options(replace(problem.options, step=0.5 * step_of(problem)))
         solution = chord(problem, solution)
         iterations += 1
         change = solution.z - earlier
         then = np.maximum(solution.z + change / (2**ORDER - 1), problem.lower)
         # the first extrapolation is compared with what it extrapolates, the next ones with the one before
-        off = change / (2**ORDER - 1) if k == 0 else then - limit
-        shift, earlier, limit = float(np.max(np.abs(off) / deviations, initial=0.0)), solution.z, then
+        off = then - limit if extrapolated else change / (2**ORDER - 1)
+        shift = float(np.max(np.abs(off) / deviations, initial=0.0))
+        if shift > FAR:  # derivatives there are others
+            solution = minimize(problem, solution.z, problem.lower, FIRST_ITERATIONS)
+            deviations = np.sqrt(np.diag(covariance_of(problem, solution)))
+            earlier, limit, extrapolated, iterations = solution.z, solution.z, False, iterations + solution.iterations
+            continue
+        earlier, limit, extrapolated = solution.z, then, True
         if shift <= SHIFT:
             break
     return Found(limit, problem, solution, covariance_of(problem, solution), iterations, shift)

@@ -17,6 +17,7 @@ from calmotion.identification.parameters import DEFAULT, refuse_unknown
 from calmotion.identification.signals import refuse_cyclic
 from calmotion.shot import Animation, Character, Provenance
 from calmotion.shot.calibration.estimates import Calibration, Estimate
+from calmotion.shot.calibration.recording import Recording
 from calmotion.shot.outputs import CalibrationFigures, WrittenLayer
 from calmotion.shot.run import OutputPaths, RunSettings, Source
 from calmotion.simulation.compiled_shot import CompiledShot
@@ -118,27 +119,8 @@ def calibrate(
     opened = _with_sensors(shot)
     read = read_recordings(opened.host, names, merge([opened.settings, chosen]))
     options = RunSettings(tolerance=_quantity(tolerance, "m"), step=_quantity(step, "s"), integrator=integrator)
-    source = Source("", "", options, measured=measured_prims(read))
-    outputs = OutputPaths(figures=None if figures is None else os.fspath(figures))
-    if layer is not None:
-        from calmotion.workflow.exporting.controller_files import refuse_unwritable
-
-        refuse_unwritable(os.fspath(layer))
-    first = carry_out(
-        opened, "simulate", wanted=_READ, operators=operators, source=source, settings=chosen, hooks=hooks
-    )
-    character = first.require(Character)
-    refuse_cyclic(character.retarget.cyclic, character.path)
-    refuse_unknown_channels(character, read)
-    if layer is not None:
-        from calmotion.usd.writing.result import refuse_inputs
-
-        refuse_inputs(first.require(Provenance), os.fspath(layer))
-    outcome = carry_out(
-        opened, "simulate", wanted=(*_READ, CompiledShot), optional=(ConvergedReduction,), source=source,
-        settings=chosen, hooks=hooks,
-    )  # fmt: skip
-    outcome.require(CompiledShot)
+    target = None if layer is None else os.fspath(layer)
+    outcome = _compiled(opened, read, options, target, operators, chosen, hooks)
 
     def tell(fraction: float, message: str) -> None:
         if cancel is not None and cancel():
@@ -152,9 +134,37 @@ def calibrate(
         compiled_in(outcome.run.get), read, CalibrationSettings(tuple(parameters), dict(priors or {}), validate),
         options, tell,
     )  # fmt: skip
-    written = None if layer is None else _written(outcome, calibration, os.fspath(layer))
-    drawn = () if outputs.figures is None else _drawn(outcome, calibration, outputs.figures, chosen)
+    written = None if target is None else _written(outcome, calibration, target)
+    drawn = () if figures is None else _drawn(outcome, calibration, os.fspath(figures), chosen)
     return CalibratedShot(calibration, written, drawn, time.perf_counter() - begin, outcome)
+
+
+def _compiled(
+    opened: Shot, recordings: Sequence[Recording], options: RunSettings, layer: str | None, operators: Sequence[str],
+    settings: Settings, hooks: Hooks,
+) -> Outcome:  # fmt: skip
+    """A run that compiles the shot, after everything was refused that does not fit."""
+    source = Source("", "", options, measured=measured_prims(recordings))
+    if layer is not None:
+        from calmotion.workflow.exporting.controller_files import refuse_unwritable
+
+        refuse_unwritable(layer)
+    first = carry_out(
+        opened, "simulate", wanted=_READ, operators=operators, source=source, settings=settings, hooks=hooks
+    )
+    character = first.require(Character)
+    refuse_cyclic(character.retarget.cyclic, character.path)
+    refuse_unknown_channels(character, recordings)
+    if layer is not None:
+        from calmotion.usd.writing.result import refuse_inputs
+
+        refuse_inputs(first.require(Provenance), layer)
+    outcome = carry_out(
+        opened, "simulate", wanted=(*_READ, CompiledShot), optional=(ConvergedReduction,), source=source,
+        settings=settings, hooks=hooks,
+    )  # fmt: skip
+    outcome.require(CompiledShot)
+    return outcome
 
 
 def _with_sensors(shot: Shot | Path) -> Shot:

@@ -11,7 +11,8 @@ if TYPE_CHECKING:
     from calmotion.cli.output import Output
 
 BENCHMARKS = {
-    "baselines": "optimizer.baselines", "compilation": "speed.compilation", "estimates": "accuracy.estimates",
+    "baselines": "optimizer.baselines", "calibration": "accuracy.calibration",
+    "compilation": "speed.compilation", "estimates": "accuracy.estimates",
     "extremes": "integrators.extremes", "gradients": "integrators.gradients",
     "integrators": "integrators.integrators",
     "meshing": "speed.meshing", "motor-commands": "motors.commands",

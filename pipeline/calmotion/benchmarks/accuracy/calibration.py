@@ -1,0 +1,165 @@
+"""How honest calibrations are: random arms with known parameters, recorded with noise and calibrated.
+
+`calmotion bench calibration [--trials N] [--first K] [--finer-mesh] [--csv FILE]` draws arms of one or two flexible
+links with a load, half of them with a motor that gives. The parameters of the real arm differ from the model by a
+standard deviation of their priors. It is simulated by another integrator (Radau, order 5) and, with `--finer-mesh`,
+with another mesh and more modes. A marker, an accelerometer and the encoders record it, each with its own clock, noise,
+bias, gaps and outliers. The table has, for each kind of parameter, how often the 95% interval covers the truth, the
+median error, the median standard deviation, and in how many trials it was identifiable. Trial number K is the same on
+every machine.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import numpy as np
+
+from calmotion.benchmarks.common.parsers import bench_parser
+from calmotion.benchmarks.common.tables import markdown, write_rows
+from calmotion.benchmarks.scenes.recorded_arm import recorded_arm
+from calmotion.errors import ShotError
+from calmotion.identification.calibrate import CalibrationSettings, calibrate_shot
+from calmotion.shot.run import RunSettings
+
+WITHIN = 1.96  # standard deviations of a 95% interval
+HEADS = (
+    "parameter", "number", "in the 95% interval", "median error", "largest", "median standard deviation",
+    "identifiable",
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Recovered:
+    """A parameter of one trial; errors and deviations relative to the truth, those of a delay in seconds.
+
+    Attributes:
+        trial: Its number.
+        kind: Of the parameter.
+        error: Estimate minus truth.
+        deviation: Standard deviation of the estimate.
+        pull: Error over deviation; of logarithms where the parameter is logarithmic.
+        identifiable: Whether it was called identifiable.
+        converged: Whether the search converged.
+        simulations: Of the trial.
+        wall_s: Time of the trial [s].
+    """
+
+    trial: int
+    kind: str
+    error: float
+    deviation: float
+    pull: float
+    identifiable: bool
+    converged: bool
+    simulations: int
+    wall_s: float
+
+
+def tried(number: int, finer: bool = False) -> list[Recovered]:
+    """One trial.
+
+    Raises:
+        ShotError: The arm cannot be simulated.
+    """
+    arm = recorded_arm(number, finer)
+    found = calibrate_shot(arm.shot, arm.recordings, CalibrationSettings(), RunSettings(step=1.0 / 480.0))
+    rows = []
+    for item in found.estimates:
+        if item.name not in arm.truth:
+            continue
+        truth = arm.truth[item.name]
+        if item.logarithmic:
+            pull = np.log(item.value / truth) / (item.standard_deviation / item.value)
+            error, deviation = item.value / truth - 1.0, item.standard_deviation / item.value
+        else:
+            error, deviation = item.value - truth, item.standard_deviation
+            pull = error / deviation
+        rows.append(
+            Recovered(
+                number,
+                item.kind,
+                float(error),
+                float(deviation),
+                float(pull),
+                item.identifiable,
+                found.converged,
+                found.simulations,
+                found.wall_s,
+            )  # fmt: skip
+        )
+    return rows
+
+
+def table_of(rows: Sequence[Recovered]) -> list[list[str]]:
+    """Rows of the table."""
+    out = []
+    for kind in dict.fromkeys(row.kind for row in rows):
+        own = [row for row in rows if row.kind == kind]
+        inside = sum(abs(row.pull) <= WITHIN for row in own)
+        errors = np.abs([row.error for row in own])
+        told = [row for row in own if row.identifiable]
+        out.append(
+            [
+                kind,
+                str(len(own)),
+                f"{100.0 * inside / len(own):.0f}%",
+                _shown(kind, float(np.median(errors))),
+                _shown(kind, float(errors.max())),
+                _shown(kind, float(np.median([row.deviation for row in own]))),
+                str(len(told)),
+            ]  # fmt: skip
+        )
+    return out
+
+
+def _shown(kind: str, value: float) -> str:
+    return f"{1e3 * value:.2g} ms" if kind == "delay" else f"{100.0 * value:.2g}%"
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """The command: exit status 1 where fewer than 85% of the intervals cover the truth."""
+    parser = bench_parser("calibration", __doc__)
+    parser.add_argument("--trials", type=int, default=20, help="number of trials (default: 20)")
+    parser.add_argument("--first", type=int, default=0, metavar="K", help="number of the first trial (default: 0)")
+    parser.add_argument("--finer-mesh", action="store_true", help="the real arm has a finer mesh and more modes")
+    parser.add_argument("--json", action="store_true", help="print one JSON object on stdout, and nothing else there")
+    parser.add_argument("--csv", metavar="FILE", help="also write a row for each parameter of each trial")
+    parser.add_argument("--markdown", metavar="FILE", help="also write the table as Markdown")
+    options = parser.parse_args(arguments)
+    rows: list[Recovered] = []
+    for number in range(options.first, options.first + options.trials):
+        try:
+            own = tried(number, options.finer_mesh)
+        except ShotError as problem:
+            print(f"trial {number} is refused: {problem.problem}", file=sys.stderr, flush=True)
+            continue
+        rows += own
+        print(
+            f"trial {number}, {own[0].wall_s:.1f} s: "
+            + ", ".join(f"{row.kind} {100.0 * row.error:+.2g}% ({row.pull:+.1f} sd)" for row in own),
+            file=sys.stderr, flush=True,
+        )  # fmt: skip
+        if options.csv:
+            write_rows(options.csv, Recovered, rows)
+    if not rows:
+        return 1
+    table = table_of(rows)
+    if options.markdown:
+        Path(options.markdown).write_text(markdown(HEADS, table), encoding="utf-8")
+    if options.json:
+        print(json.dumps({"rows": [asdict(row) for row in rows]}))
+    else:
+        from calmotion.cli.tables import console_on, print_table
+
+        print_table(console_on(sys.stdout), "Parameters of random arms, recovered from recordings", HEADS, table)
+    inside = np.mean([abs(row.pull) <= WITHIN for row in rows])
+    return int(inside < 0.85)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

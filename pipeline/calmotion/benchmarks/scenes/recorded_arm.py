@@ -1,0 +1,114 @@
+"""Random arms whose parameters are not those of their model, and what sensors record of them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from calmotion.benchmarks.scenes.beam_arm import beam_arm, beam_mesh, quintic, shot_of
+from calmotion.identification.parameters import Parameter, robot_parameters
+from calmotion.identification.robots import robot_with
+from calmotion.identification.signals import Signals, signals_of
+from calmotion.multibody.model.topology import span_tree
+from calmotion.shot import FEMesh, FEMeshes, MeshQuality
+from calmotion.shot.calibration.recording import ACCELEROMETER, ANGLE, MARKER, Channel, Recording
+from calmotion.shot.character import Array
+from calmotion.shot.motor import DRIVE
+from calmotion.shot.run import RunSettings
+from calmotion.simulation.bodies import reduce_bodies
+from calmotion.simulation.compiled_shot import CompiledShot, compile_shot
+
+REFERENCE = RunSettings(step=1.0 / 480.0, integrator="radau")  # of the real robot: order 5
+RATES = {MARKER: 120.0, ACCELEROMETER: 800.0, ANGLE: 200.0}  # of the sensors [Hz]
+NOISE = {MARKER: 3e-4, ACCELEROMETER: 0.1, ANGLE: 3e-4}  # [m], [m/s^2], [rad]
+BIAS, PLACE, DRIFT = 0.2, 1e-3, 3e-5  # standard deviations of what sensors have of their own
+MISSING, OUTLIERS = 0.01, 0.003  # shares of the samples
+AFTER = 0.6  # what is recorded after the end of the shot [s]
+
+
+@dataclass(frozen=True, eq=False)
+class RecordedArm:
+    """An arm, its recordings, and the truth.
+
+    Attributes:
+        shot: The model.
+        recordings: Of the real arm.
+        truth: Values of its parameters, by name.
+    """
+
+    shot: CompiledShot
+    recordings: tuple[Recording, ...]
+    truth: Mapping[str, float]
+
+
+def recorded_arm(number: int, finer: bool = False) -> RecordedArm:
+    """The arm of a number: the same on every machine.
+
+    Args:
+        number: Seed of everything that is random.
+        finer: Whether the real arm has a finer mesh and more modes than the model.
+    """
+    rng = np.random.default_rng(number)
+    links, length, slenderness = int(rng.integers(1, 3)), rng.uniform(0.25, 0.4), rng.uniform(16.0, 24.0)
+    size = {
+        "links": links, "length": length, "thickness": length / slenderness, "payload": rng.uniform(0.1, 0.3),
+        "youngs_modulus": 10.0 ** rng.uniform(9.2, 9.7), "damping": rng.uniform(0.01, 0.03), "elasticity": "linear",
+    }  # fmt: skip
+    turn, seconds = rng.uniform(0.4, 0.9), rng.uniform(0.2, 0.35)
+    away, back = quintic(turn, seconds, 0.1), quintic(-turn, rng.uniform(0.2, 0.35), 0.4 + seconds)
+    animation = shot_of(lambda t: away(t) + back(t), 1.5, motors=links)
+    gives = rng.uniform() < 0.5
+    model, real = (_arm(size, animation, gives, fine) for fine in (False, finer))
+    parameters = robot_parameters(model)
+    x = np.clip(rng.standard_normal(len(parameters)), -2.0, 2.0)
+    values = {p.name: p.value(max(float(v), p.least)) for p, v in zip(parameters, x, strict=True)}
+    truth = {(p.kind, p.path, p.axis): values[p.name] for p in parameters}
+    signals = signals_of(robot_with(real, truth), REFERENCE, AFTER)
+    recordings = _recorded(model, signals, rng, parameters)
+    return RecordedArm(model, recordings, values)
+
+
+def _arm(size: Mapping[str, object], animation: object, gives: bool, fine: bool) -> CompiledShot:
+    character, meshes = beam_arm(**size, modes=10 if fine else 6)  # type: ignore[arg-type]
+    if fine:
+        points, tets = beam_mesh(float(size["length"]), float(size["thickness"]), 20, 3)  # type: ignore[arg-type]
+        meshes = FEMeshes(tuple(FEMesh(m.body, points, tets, MeshQuality(0.0, 0.0, 0.0)) for m in meshes.meshes))
+    if gives:
+        last = replace(character.motors[-1], model=DRIVE, position_gain=150.0, velocity_gain=1.5)
+        character = replace(character, motors=(*character.motors[:-1], last))
+    bodies = reduce_bodies(character, span_tree(character), meshes)
+    return compile_shot(character, animation, bodies)  # type: ignore[arg-type]
+
+
+def _recorded(
+    shot: CompiledShot, signals: Signals, rng: np.random.Generator, parameters: tuple[Parameter, ...]
+) -> tuple[Recording, ...]:
+    """A camera system, an accelerometer and the encoders, each on its own clock."""
+    load, end = shot.character.targets[0].path, float(signals.times[-1])
+    motors = [motor.path for motor in shot.character.motors]
+    found = []
+    for kind, paths in ((MARKER, [load]), (ACCELEROMETER, [load]), (ANGLE, motors)):
+        start, drift = rng.uniform(-3.0, 3.0), DRIFT * rng.standard_normal()
+        own = np.arange(-0.3, end - 0.05, 1.0 / RATES[kind])  # of the robot's clock
+        channels = []
+        for index, path in enumerate(paths):
+            values = signals.at(kind, index, own)
+            if kind == MARKER:
+                values = values + signals.axes_at(index, own) @ (PLACE * rng.standard_normal(3))
+            if kind == ACCELEROMETER:
+                values = values + BIAS * rng.standard_normal(3)
+            values = _disturbed(values, NOISE[kind], rng)
+            channels.append(Channel(kind, path, start + own / (1.0 + drift), values))
+        found.append(Recording(f"{kind}.csv", f"{kind}", tuple(channels)))
+    return tuple(found)
+
+
+def _disturbed(values: Array, noise: float, rng: np.random.Generator) -> Array:
+    """With noise, gaps and outliers."""
+    values = values + noise * rng.standard_normal(values.shape)
+    lost, wrong = rng.uniform(size=len(values)) < MISSING, rng.uniform(size=len(values)) < OUTLIERS
+    values[wrong] += 30.0 * noise * rng.standard_normal((int(wrong.sum()), values.shape[1]))
+    values[lost] = np.nan
+    return np.asarray(values)
