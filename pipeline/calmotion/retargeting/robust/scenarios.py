@@ -15,10 +15,14 @@ from calmotion.reduction.reduced_body import Invariants, ReducedBody
 from calmotion.reduction.scaled_stiffness import with_scaled_stiffness
 from calmotion.shot import Character
 from calmotion.shot.character import Array, ElasticMaterial
+from calmotion.shot.motor import PRESCRIBED, Motor
 from calmotion.shot.robust.robots import Scenario
-from calmotion.simulation.compiled_shot import CompiledShot
+from calmotion.simulation.compiled_shot import CompiledShot, compile_shot
 
-MODULUS, DAMPING, PAYLOAD = "modulus", "damping", "payload"
+MODULUS, DAMPING, MASS, PAYLOAD = "modulus", "damping", "mass", "payload"
+OF_MOTOR, OF_ROTOR = ("position_gain", "velocity_gain", "delay"), (
+    "gear_stiffness", "armature", "friction", "viscous_friction",
+)  # fmt: skip
 _SEED = 20190704  # of the draws, which are the same in every run
 
 
@@ -27,12 +31,15 @@ class Parameter:
     """A parameter that is not known exactly.
 
     Attributes:
-        name: `modulus PATH` and `damping PATH` of a material, or `payload`.
-        spread: Standard deviation of the logarithm of its factor.
+        name: `modulus PATH` or `damping PATH` of a material, `mass PATH` of a body, `payload`, or a value of a motor,
+            such as `position_gain PATH`.
+        spread: Standard deviation of the logarithm of its factor, by what this parameter alone tells.
+        others: Logarithms of the factors of other parameters that go with one such deviation.
     """
 
     name: str
     spread: float
+    others: tuple[tuple[str, float], ...] = ()
 
 
 def uncertain_parameters(shot: CompiledShot) -> tuple[Parameter, ...]:
@@ -44,9 +51,33 @@ def uncertain_parameters(shot: CompiledShot) -> tuple[Parameter, ...]:
             path = body.flexible.material.path
             found[f"{MODULUS} {path}"] = float(np.log1p(given.modulus))
             found[f"{DAMPING} {path}"] = float(np.log1p(given.damping))
-    if payload_bodies(shot):
+    known = _calibrated(shot)
+    names = {p.name for p in known}
+    if any(f"{MASS} {character.bodies[k].path}" not in names for k in payload_bodies(shot)):
         found[PAYLOAD] = float(np.log1p(given.payload))
-    return tuple(Parameter(name, spread) for name, spread in found.items() if spread > 0.0)
+    free = (Parameter(name, spread) for name, spread in found.items() if spread > 0.0 and name not in names)
+    return (*free, *known)
+
+
+def _calibrated(shot: CompiledShot) -> tuple[Parameter, ...]:
+    """Independent parameters whose factors together have the covariance that a calibration tells."""
+    character = shot.character
+    given = character.retarget.uncertainty.calibrated
+    flexible = [b for b in character.bodies if b.flexible is not None and b.simulated_flexible]
+    paths = {
+        **dict.fromkeys((MODULUS, DAMPING), [b.flexible.material.path for b in flexible if b.flexible]),
+        MASS: [b.path for b in character.bodies if not b.simulated_flexible],
+        **dict.fromkeys((*OF_MOTOR, *OF_ROTOR), [m.path for m in character.motors if m.model != PRESCRIBED]),
+    }
+    own = [k for k, name in enumerate(given.names) if name.partition(" ")[2] in paths.get(name.partition(" ")[0], ())]
+    if not own:
+        return ()
+    root = np.linalg.cholesky(np.array(given.covariance)[np.ix_(own, own)])
+    names = [given.names[k] for k in own]
+    return tuple(
+        Parameter(name, float(root[i, i]), tuple((names[j], float(root[j, i])) for j in range(i + 1, len(own))))
+        for i, name in enumerate(names)
+    )
 
 
 def payload_bodies(shot: CompiledShot) -> tuple[int, ...]:
@@ -67,17 +98,35 @@ def scenario_at(parameters: Sequence[Parameter], x: Array, weight: float = 1.0) 
     """The robot whose parameters are x standard deviations off; the nominal one at zero."""
     if not np.any(x):
         return Scenario({}, weight)
-    return Scenario({p.name: float(np.exp(p.spread * v)) for p, v in zip(parameters, x, strict=True)}, weight)
+    logs: dict[str, float] = {}
+    for p, v in zip(parameters, x, strict=True):
+        for name, spread in ((p.name, p.spread), *p.others):
+            logs[name] = logs.get(name, 0.0) + spread * float(v)
+    return Scenario({name: float(np.exp(log)) for name, log in logs.items()}, weight)
 
 
 def shot_of(shot: CompiledShot, scenario: Scenario) -> CompiledShot:
     """The shot on the robot of a scenario; the shot itself where that is the nominal one."""
     if not scenario.factors:
         return shot
-    ends = set(payload_bodies(shot))
-    return shot.with_bodies(
-        [_scaled(body, shot.character, k, k in ends, scenario.factors) for k, body in enumerate(shot.bodies)]
-    )
+    ends, character = set(payload_bodies(shot)), shot.character
+    bodies = [_scaled(body, character, k, k in ends, scenario.factors) for k, body in enumerate(shot.bodies)]
+    motors = tuple(_other_motor(motor, scenario.factors) for motor in character.motors)
+    if motors == character.motors:
+        return shot.with_bodies(bodies)
+    return compile_shot(replace(character, motors=motors), shot.animation, bodies)
+
+
+def _other_motor(motor: Motor, factors: Mapping[str, float]) -> Motor:
+    """A motor with other gains, rotor or delay; itself where nothing is other."""
+    own = {
+        name: factors[f"{name} {motor.path}"] for name in (*OF_MOTOR, *OF_ROTOR) if f"{name} {motor.path}" in factors
+    }
+    if not own:
+        return motor
+    rotor = {name: own[name] * getattr(motor.rotor, name) for name in OF_ROTOR if name in own}
+    of_motor = {name: own[name] * getattr(motor, name) for name in OF_MOTOR if name in own}
+    return replace(motor, rotor=replace(motor.rotor, **rotor), **of_motor)
 
 
 def _scaled(
@@ -89,7 +138,8 @@ def _scaled(
         material = own.flexible.material
         modulus, damping = (factors.get(f"{kind} {material.path}", 1.0) for kind in (MODULUS, DAMPING))
         return scaled_body(body, material, modulus, damping)
-    return replace(body, invariants=_heavier(body.invariants, factors.get(PAYLOAD, 1.0))) if end else body
+    factor = factors.get(f"{MASS} {own.path}", factors.get(PAYLOAD, 1.0) if end else 1.0)
+    return body if factor == 1.0 else replace(body, invariants=_heavier(body.invariants, factor))
 
 
 def scaled_body(body: ReducedBody, material: ElasticMaterial, modulus: float, damping: float) -> ReducedBody:

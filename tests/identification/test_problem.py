@@ -1,0 +1,48 @@
+"""The derivatives of recordings by the parameters of the robot, against extrapolated differences."""
+
+import numpy as np
+import pytest
+from calmotion.identification.measurement import Measurement, measurement_parameters, sensors_of
+from calmotion.identification.parameters import robot_parameters
+from calmotion.identification.problem import DIFFERENCE, Calibrated
+from calmotion.shot.run import RunSettings
+from recorded import CLOCKS
+
+
+@pytest.fixture(scope="module")
+def problem(recorded_shot, recordings):
+    shot, clocks = recorded_shot, list(CLOCKS.values())
+    measurement = Measurement(
+        tuple(r.file for r in recordings), sensors_of(shot.character, recordings, clocks, -0.5, 1.75),
+        measurement_parameters(recordings, clocks),
+    )  # fmt: skip
+    options = RunSettings(step=1 / 240, integrator="generalized-alpha")
+    return Calibrated(shot, robot_parameters(shot), measurement, options, 0.5)
+
+
+def test_differences_are_derivatives(problem):
+    count = len(problem.parameters)
+    z = np.full(count + len(problem.measurement.parameters), 0.1)
+    residuals, jacobian = problem.linearized(z)
+    assert problem.residuals(z) == pytest.approx(residuals, abs=1e-12)
+    for k in range(count):
+
+        def difference(h, k=k):
+            unit = h * np.eye(len(z))[k]
+            return (problem.residuals(z + unit) - problem.residuals(z - unit)) / (2.0 * h)
+
+        wide, narrow = difference(4.0 * DIFFERENCE), difference(2.0 * DIFFERENCE)
+        exact = narrow + (narrow - wide) / 3.0  # Richardson: the error is of fourth order
+        assert np.linalg.norm(jacobian[:, k] - exact) < 2e-3 * np.linalg.norm(exact)
+
+
+def test_simulations_are_not_repeated_where_only_the_measurement_changes(problem):
+    z = np.zeros(len(problem.parameters) + len(problem.measurement.parameters))
+    problem.residuals(z)
+    before = problem.simulations
+    other = z.copy()
+    other[-1] = 1.0
+    problem.residuals(other)
+    assert problem.simulations == before
+    assert problem.with_measurement(problem.measurement).residuals(z) is not None
+    assert problem.simulations == before

@@ -1,0 +1,140 @@
+"""Readers of recordings."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from calmotion.errors import ShotError
+from calmotion.host import SettingError
+from calmotion.shot.calibration.recording import Recording, RecordingRequest
+from calmotion.testing import host_with
+from calmotion.workflow.calibration.recordings import measured_prims, read_recordings, requested
+
+HEAD = "time_s,/Arm/Hand.x,/Arm/Hand.y,/Arm/Hand.z,/Arm/Hand.ax,/Arm/Hand.ay,/Arm/Hand.az,/Arm/Elbow.angle"
+LOG = "#time,accel_x,accel_y,accel_z\n10.00,100,200,9810\n10.01,110,,9800\n10.02,120,220,9790\n"
+
+
+@pytest.fixture
+def read(repository, tmp_path):
+    def run(content, name="a.csv", beside=None, prim="", **settings):
+        file = tmp_path / name
+        file.write_text(content)
+        if beside is not None:
+            file.with_suffix(".toml").write_text(beside)
+        host = host_with(repository / "plugins" / "recording_readers")
+        (found,) = read_recordings(host, [f"{file}@{prim}" if prim else str(file)], settings)
+        assert isinstance(found, Recording)
+        return found
+
+    return run
+
+
+def test_columns_are_named_after_prims_and_empty_cells_are_missing(read):
+    found = read(f"# a comment\n{HEAD}\n0.0,1,2,3,,,,0.5\n0.01,,,,4,5,6,\n0.02,1.5,2,,4,5,7,0.6\n")
+    marker, sensor, angle = found.channels
+    assert [(c.kind, c.path) for c in found.channels] == [
+        ("marker", "/Arm/Hand"), ("accelerometer", "/Arm/Hand"), ("angle", "/Arm/Elbow"),
+    ]  # fmt: skip
+    assert marker.times.tolist() == [0.0, 0.02] and marker.values[0].tolist() == [1.0, 2.0, 3.0]
+    assert np.isnan(marker.values[1, 2]) and sensor.times.tolist() == [0.01, 0.02]
+    assert angle.values[:, 0].tolist() == [0.5, 0.6] and len(found.sha256) == 64
+    assert measured_prims([found]) == ("/Arm/Hand",)
+
+
+def test_degrees_tables_of_results_and_doubled_rows(read):
+    text = (
+        "# units: angle deg\ntime_s,/A.angle,/A.output,/A.error,/J.force.x\n0,90,1,2,3\n0.1,180,1,2,3\n0.1,180,1,2,3\n"
+    )
+    found = read(text)
+    (angle,) = found.channels
+    assert angle.values[:, 0] == pytest.approx(np.radians([90.0, 180.0]))
+    assert len(found.notes) == 2 and "time of the row before" in found.notes[0] and "not measurements" in found.notes[1]
+
+
+def test_a_map_gives_prims_kinds_units_signs_and_noise(read):
+    beside = """
+[time]
+column = "t"
+unit = "ms"
+[[channel]]
+prim = "/Arm/Hand"
+kind = "marker"
+columns = ["X", "Z", "-Y"]
+unit = "mm"
+noise = 0.5
+[[channel]]
+prim = "/Arm/Elbow"
+kind = "angle"
+columns = "q"
+unit = "deg"
+"""
+    marker, angle = read("t;X;Y;Z;q\n0;1;2;3;90\n10;4;5;6;0\n", beside=beside).channels
+    assert marker.times.tolist() == [0.0, 0.01] and marker.sigma == pytest.approx(5e-4)
+    assert marker.values == pytest.approx(1e-3 * np.array([[1.0, 3.0, -2.0], [4.0, 6.0, -5.0]]))
+    assert angle.values[:, 0] == pytest.approx([np.pi / 2, 0.0]) and angle.sigma is None
+
+
+def test_a_rate_replaces_times(read):
+    beside = '[time]\nrate = 100.0\n[[channel]]\nprim = "/A"\nkind = "effort"\ncolumns = ["tau"]\nunit = "N mm"\n'
+    (effort,) = read("tau\n1000\n2000\n", beside=beside).channels
+    assert effort.times.tolist() == [0.0, 0.01] and effort.values[:, 0].tolist() == [1.0, 2.0]
+
+
+def test_the_log_of_a_printer_is_in_millimetres_and_its_axes_are_chosen(read):
+    (sensor,) = read(LOG, prim="/Arm/Hand/sensor").channels
+    assert sensor.path == "/Arm/Hand/sensor" and sensor.kind == "accelerometer"
+    assert sensor.values[0] == pytest.approx([0.1, 0.2, 9.81]) and np.isnan(sensor.values[1, 1])
+    settings = {"recording.accelerometer": {"prim": "/A", "axes": "y, -x, z", "unit": "m/s^2"}}
+    (sensor,) = read(LOG, **settings).channels
+    assert sensor.path == "/A" and sensor.values[0].tolist() == [200.0, -100.0, 9810.0]
+    (sensor,) = read(LOG, beside='prim = "/B"\naxes = "z, x, y"\nnoise = 80\n').channels
+    assert sensor.path == "/B" and sensor.sigma == pytest.approx(0.08) and sensor.values[0, 0] == pytest.approx(9.81)
+
+
+@pytest.mark.parametrize(
+    ("content", "match"),
+    [
+        ("", "empty"), ("time_s,/A.x\n0,a\n", "line 2"), ("time_s,/A.x\n0,1,2\n", "line 2"),
+        ("t,/A.x\n0,1\n", "time_s"),
+        ("time_s,/A.q\n0,1\n", "no column of a recording"), ("time_s,/A.x,/A.x\n0,1,1\n", "same name"),
+        ("time_s,/A.x\n1,1\n0,1\n", "must not go back"), ("time_s,/A.x\n,1\n", "no time"),
+        ("0,1\n1,2\n", "does not name its columns"), ("time_s,/A.error\n0,1\n", "no channel"),
+        (LOG, "where the accelerometer"),
+    ],
+)  # fmt: skip
+def test_wrong_tables_are_refused_with_their_place(read, content, match):
+    with pytest.raises(ShotError, match=match):
+        read(content)
+
+
+@pytest.mark.parametrize(
+    ("beside", "match"),
+    [
+        ("x = [", "cannot be read"), ("", "no channels"), ('[[channel]]\nkind = "marke"\n', "marker"),
+        ('[[channel]]\nkind = "angle"\nprim = "A"\n', "prim path"),
+        ('[[channel]]\nkind = "marker"\nprim = "/A"\ncolumns = ["a"]\n', "3 columns"),
+        ('[[channel]]\nkind = "angle"\nprim = "/A"\ncolumns = ["b"]\n', "no such column"),
+        ('[[channel]]\nkind = "angle"\nprim = "/A"\ncolumns = ["a"]\nunit = "N"\n', "unit does not fit"),
+        ('[[channel]]\nkind = "angle"\nprim = "/A"\ncolumns = ["a"]\nnoise = -1\n', "noise"),
+        ('[[channel]]\nkind = "angle"\nprim = "/A"\ncolum = ["a"]\n', "columns"), ("[time]\nrate = 0\n", "rate"),
+    ],
+)  # fmt: skip
+def test_wrong_maps_are_refused_with_their_place(read, beside, match):
+    with pytest.raises(ShotError, match=match):
+        read("time_s,a\n0,1\n1,2\n", beside=beside)
+
+
+def test_files_without_a_reader_and_missing_ones_are_wrong_arguments(read, repository, tmp_path):
+    host = host_with(repository / "plugins" / "recording_readers")
+    other = tmp_path / "a.xyz"
+    other.write_text("?")
+    for names, match in (
+        ([str(tmp_path / "none.csv")], "does not exist"), ([str(other)], "no plugin reads"), ([], "no recording"),
+    ):  # fmt: skip
+        with pytest.raises(SettingError, match=match):
+            read_recordings(host, names, {})
+
+
+def test_a_prim_may_follow_the_file():
+    assert requested("a@b.csv") == RecordingRequest("a@b.csv", "")
+    assert requested("a@b.csv@/Arm/Hand") == RecordingRequest("a@b.csv", "/Arm/Hand")
