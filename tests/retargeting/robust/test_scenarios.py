@@ -13,6 +13,8 @@ from calmotion.retargeting.robust.scenarios import (
     shot_of,
     uncertain_parameters,
 )
+from calmotion.shot.calibration.known_factors import KnownFactors
+from calmotion.shot.motor import DRIVE
 from calmotion.shot.robust.robots import Scenario
 from calmotion.shot.robust.settings import Uncertainty
 from calmotion.simulation.compiled_shot import compile_shot
@@ -92,3 +94,35 @@ def test_random_robots_have_the_given_spread_and_are_the_same_in_every_run(shot)
     for p in parameters:
         logarithms = np.log([s.factors[p.name] for s in drawn])
         assert abs(logarithms.mean()) < 0.1 * p.spread and logarithms.std() == pytest.approx(p.spread, rel=0.05)
+
+
+def calibrated(shot, names, covariance):
+    known = KnownFactors(names, tuple(map(tuple, covariance)))
+    given = dataclasses.replace(shot.character.retarget.uncertainty, calibrated=known)
+    retarget = dataclasses.replace(shot.character.retarget, uncertainty=given)
+    return shot.with_character(dataclasses.replace(shot.character, retarget=retarget))
+
+
+def test_robots_of_a_calibrated_shot_have_its_covariance(shot):
+    names = ("modulus /Arm/Nylon", "mass /Arm/Hand", "modulus /Arm/Other")
+    covariance = np.array([[4e-4, 3e-4, 0.0], [3e-4, 2.5e-4, 0.0], [0.0, 0.0, 1.0]])
+    parameters = uncertain_parameters(calibrated(shot, names, covariance.tolist()))
+    # what the calibration does not tell is as the shot says; the mass of the hand is no longer a payload's
+    assert [p.name for p in parameters] == ["damping /Arm/Nylon", "modulus /Arm/Nylon", "mass /Arm/Hand"]
+    drawn = random_scenarios(parameters, 4000)
+    logs = np.array([[np.log(s.factors[name]) for name in names[:2]] for s in drawn])
+    assert np.cov(logs.T) == pytest.approx(covariance[:2, :2], rel=0.1)
+
+
+def test_a_robot_of_a_calibrated_shot_has_other_masses_and_gains(shot):
+    first, second = shot.character.motors
+    driven = dataclasses.replace(first, model=DRIVE, position_gain=100.0, velocity_gain=2.0, delay=0.01)
+    character = dataclasses.replace(shot.character, motors=(driven, second))
+    gives = compile_shot(character, shot.animation, shot.bodies)
+    factors = {f"position_gain {first.path}": 0.9, f"delay {first.path}": 1.5, "mass /Arm/Hand": 1.2, "payload": 3.0}
+    other = shot_of(gives, Scenario(factors))
+    motor = other.character.motors[0]
+    assert (motor.position_gain, motor.velocity_gain) == (pytest.approx(90.0), 2.0)
+    assert other.model.delays[0] == pytest.approx(0.015)
+    hand = next(k for k, body in enumerate(shot.character.bodies) if body.path == "/Arm/Hand")
+    assert other.bodies[hand].invariants.mass == pytest.approx(1.2 * shot.bodies[hand].invariants.mass)

@@ -75,7 +75,7 @@ def retarget_settings(reading: Reading, root: str) -> RetargetSettings:
         if not (prim and prim.GetPath().HasPrefix(other.GetPath())):
             reading.note(f"{other.GetPath()}: {_SCHEMA} is neither on the root of the character nor above it; ignored")
     if not prim:
-        return RetargetSettings()
+        return RetargetSettings(uncertainty=Uncertainty(calibrated=known_factors(reading.stage)))
     tolerance = _positive(prim, "tolerance")
     return RetargetSettings(
         tolerance=None if tolerance is None else reading.units.length(tolerance),
