@@ -18,7 +18,7 @@ import numpy as np
 from calmotion.shot.character import Array
 
 HUBER = 3.0  # standard deviations: few residuals of a normal distribution are larger
-ENOUGH = 1e-3  # change of z, in standard deviations of its posterior, at which a search ends
+ENOUGH = 1e-2  # change of z, in standard deviations of its posterior, at which a search ends
 MOST = 30  # iterations
 FIRST, LARGEST = 1e-3, 1e8  # damping, relative to the diagonal of the Gauss-Newton matrix
 
@@ -129,7 +129,7 @@ def chord(problem: Problem, known: Solution, most: int = 4) -> Solution:
         w = weights_of(r)
         H = J.T @ (w[:, None] * J) + np.eye(len(z))
         step = -np.linalg.solve(H, J.T @ (w * r) + z)
-        if float(np.sqrt(step @ H @ step)) < 10.0 * ENOUGH:
+        if float(np.sqrt(step @ H @ step)) < ENOUGH:
             break
         z = z + step
         r = problem.residuals(z)
