@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import ClassVar
 
 from calmotion.host import Property, PropertyValues, registration
-from calmotion.shot.calibration.recording import Recording, RecordingRequest
+from calmotion.shot.calibration.recording import RecordingRequest, SensorRecording
 from calmotion.workflow.calibration.recording_reader import RecordingReader, first_line
 
 PRINTER_HEAD = "#time,accel_x,accel_y,accel_z"
@@ -26,7 +26,7 @@ class ReadRecordedTable(RecordingReader):
         """Tables that are no accelerometer log."""
         return super().reads(request) and not _of_printer(request)
 
-    def read(self, request: RecordingRequest, properties: PropertyValues) -> Recording:
+    def read(self, request: RecordingRequest, properties: PropertyValues) -> SensorRecording:
         """The recording."""
         from .tables import read_table
 
@@ -53,7 +53,7 @@ class ReadPrinterAccelerometer(RecordingReader):
         """Tables with the head that printers write."""
         return super().reads(request) and _of_printer(request)
 
-    def read(self, request: RecordingRequest, properties: PropertyValues) -> Recording:
+    def read(self, request: RecordingRequest, properties: PropertyValues) -> SensorRecording:
         """The recording."""
         from .printers import read_log
 

@@ -6,7 +6,7 @@ import os
 
 import numpy as np
 from calmotion.errors import ShotError
-from calmotion.shot.calibration.recording import ACCELEROMETER, Channel, Recording, RecordingRequest
+from calmotion.shot.calibration.recording import ACCELEROMETER, Channel, RecordingRequest, SensorRecording
 from calmotion.support.reading import read_toml
 from calmotion.workflow.calibration.recording_reader import hash_of
 
@@ -16,7 +16,7 @@ AXES = ("x", "y", "z")
 _KNOWN = ("prim", "axes", "unit", "noise")
 
 
-def read_log(request: RecordingRequest, prim: str, axes: str, unit: str) -> Recording:
+def read_log(request: RecordingRequest, prim: str, axes: str, unit: str) -> SensorRecording:
     """A recording from the log of an accelerometer.
 
     FILE.toml beside the log may have `prim`, `axes`, `unit` and `noise`; they are stronger than the arguments, and the
@@ -68,7 +68,7 @@ def read_log(request: RecordingRequest, prim: str, axes: str, unit: str) -> Reco
         )  # fmt: skip
     sigma = scale * float(noise) if isinstance(noise, (int, float)) else None
     channel = Channel(ACCELEROMETER, path, columns["time"][keep], values[keep], sigma)
-    return Recording(file, hash_of(file), (channel,))
+    return SensorRecording(file, hash_of(file), (channel,))
 
 
 def _columns(axes: str, file: str) -> list[str]:

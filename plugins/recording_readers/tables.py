@@ -15,8 +15,8 @@ from calmotion.shot.calibration.recording import (
     EFFORT,
     MARKER,
     Channel,
-    Recording,
     RecordingRequest,
+    SensorRecording,
 )
 from calmotion.shot.character import Array
 from calmotion.support.naming import nearest
@@ -45,7 +45,7 @@ EXAMPLE = (
 )  # fmt: skip
 
 
-def read_table(request: RecordingRequest, map_file: str) -> Recording:
+def read_table(request: RecordingRequest, map_file: str) -> SensorRecording:
     """A recording from a table.
 
     Args:
@@ -65,7 +65,7 @@ def read_table(request: RecordingRequest, map_file: str) -> Recording:
             "the recording has no channel", path=file, found=", ".join(list(columns)[:12]),
             remedy=f"Name columns after prims, such as /Arm/Hand/cup.x or /Arm/Elbow.angle, or write {beside}",
         )  # fmt: skip
-    return Recording(file, hash_of(file), tuple(channels), tuple(notes))
+    return SensorRecording(file, hash_of(file), tuple(channels), tuple(notes))
 
 
 def _named(file: str, columns: Mapping[str, Array], degrees: bool) -> tuple[list[Channel], list[str]]:

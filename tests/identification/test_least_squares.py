@@ -50,9 +50,7 @@ def test_a_linear_problem_has_the_minimum_and_covariance_of_its_normal_equations
     assert found.converged and found.z == pytest.approx(np.linalg.solve(H, A.T @ b), abs=2e-3)
     assert np.allclose(posterior(A, np.zeros(30), np.ones(30)), np.linalg.inv(H))
     # residuals of which four count as one tell a quarter
-    assert np.allclose(
-        posterior(A, np.zeros(30), np.full(30, 4.0)), np.linalg.inv(A.T @ A / 4.0 + np.eye(2))
-    )
+    assert np.allclose(posterior(A, np.zeros(30), np.full(30, 4.0)), np.linalg.inv(A.T @ A / 4.0 + np.eye(2)))
 
 
 def test_a_nonlinear_problem_is_solved_also_where_steps_fail():

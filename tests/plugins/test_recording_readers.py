@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from calmotion.errors import ShotError
 from calmotion.host import SettingError
-from calmotion.shot.calibration.recording import Recording, RecordingRequest
+from calmotion.shot.calibration.recording import RecordingRequest, SensorRecording
 from calmotion.testing import host_with
 from calmotion.workflow.calibration.recordings import measured_prims, read_recordings, requested
 
@@ -23,7 +23,7 @@ def read(repository, tmp_path):
             file.with_suffix(".toml").write_text(beside)
         host = host_with(repository / "plugins" / "recording_readers")
         (found,) = read_recordings(host, [f"{file}@{prim}" if prim else str(file)], settings)
-        assert isinstance(found, Recording)
+        assert isinstance(found, SensorRecording)
         return found
 
     return run

@@ -27,7 +27,7 @@ from calmotion.shot.calibration.estimates import (
     ChannelFit,
     Estimate,
 )
-from calmotion.shot.calibration.recording import UNITS, Recording
+from calmotion.shot.calibration.recording import UNITS, SensorRecording
 from calmotion.shot.character import Array
 from calmotion.shot.run import RunSettings
 from calmotion.simulation.compiled_shot import CompiledShot
@@ -59,7 +59,7 @@ class CalibrationSettings:
 
 
 def calibrate_shot(
-    shot: CompiledShot, recordings: Sequence[Recording], settings: CalibrationSettings, options: RunSettings,
+    shot: CompiledShot, recordings: Sequence[SensorRecording], settings: CalibrationSettings, options: RunSettings,
     progress: Callable[[float, str], None] = lambda fraction, message: None,
 ) -> Calibration:  # fmt: skip
     """Estimate the parameters of a robot.
@@ -186,7 +186,7 @@ def _estimates(found: Found) -> tuple[Estimate, ...]:
 
 
 def _fits(
-    found: Found, nominal: Signals, of_nominal: Array, recordings: Sequence[Recording]
+    found: Found, nominal: Signals, of_nominal: Array, recordings: Sequence[SensorRecording]
 ) -> tuple[tuple[ChannelFit, ...], tuple[ChannelCurves, ...]]:
     problem = found.problem
     measurement, y = problem.measurement, found.z[len(problem.parameters) :]

@@ -7,7 +7,7 @@ import numpy as np
 from calmotion.identification.noise import noise_of
 from calmotion.identification.signals import Signals
 from calmotion.shot import Character
-from calmotion.shot.calibration.recording import ANGLE, EFFORT, Recording
+from calmotion.shot.calibration.recording import ANGLE, EFFORT, SensorRecording
 from calmotion.shot.character import Array
 
 STEP = 0.01  # between clocks that are tried first [s]
@@ -15,7 +15,7 @@ SAMPLES = 600  # of a channel that are compared, at most
 COVERED = 0.5  # share of the motion that a recording must hold
 
 
-def clock_of(recording: Recording, character: Character, signals: Signals) -> float:
+def clock_of(recording: SensorRecording, character: Character, signals: Signals) -> float:
     """The clock [s] at which what was recorded is most like what a simulated robot shows.
 
     All shifts at which half of the motion is recorded are tried, then finer ones about the best. Constants are taken
@@ -41,7 +41,7 @@ def clock_of(recording: Recording, character: Character, signals: Signals) -> fl
 _Compared = tuple[str, int, Array, Array, float]
 
 
-def _compared(recording: Recording, character: Character) -> list[_Compared]:
+def _compared(recording: SensorRecording, character: Character) -> list[_Compared]:
     """Kind, index, times, values and scale of each channel, with few samples."""
     targets = {target.path: k for k, target in enumerate(character.targets)}
     motors = {motor.path: k for k, motor in enumerate(character.motors)}

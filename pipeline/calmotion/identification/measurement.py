@@ -18,7 +18,7 @@ from calmotion.identification.parameters import PRIORS, Parameter
 from calmotion.identification.signals import Signals
 from calmotion.shot import Character
 from calmotion.shot.calibration.estimates import BIAS, CLOCK_DRIFT, CLOCK_OFFSET, PLACE
-from calmotion.shot.calibration.recording import ACCELEROMETER, ANGLE, EFFORT, MARKER, Channel, Recording
+from calmotion.shot.calibration.recording import ACCELEROMETER, ANGLE, EFFORT, MARKER, Channel, SensorRecording
 from calmotion.shot.character import Array, BoolArray
 from calmotion.support.naming import nearest
 
@@ -61,7 +61,7 @@ class Sensor:
 
 
 def sensors_of(
-    character: Character, recordings: Sequence[Recording], clocks: Sequence[float], begin: float, end: float,
+    character: Character, recordings: Sequence[SensorRecording], clocks: Sequence[float], begin: float, end: float,
     validate: bool = True,
 ) -> tuple[Sensor, ...]:  # fmt: skip
     """The sensors of recordings.
@@ -102,7 +102,7 @@ def sensors_of(
 
 
 def measurement_parameters(
-    recordings: Sequence[Recording], clocks: Sequence[float], priors: Mapping[str, float] | None = None
+    recordings: Sequence[SensorRecording], clocks: Sequence[float], priors: Mapping[str, float] | None = None
 ) -> tuple[Parameter, ...]:
     """Clocks of the recordings, biases of accelerometers and places of markers; those with the prior None are left
     out."""
@@ -119,7 +119,7 @@ def measurement_parameters(
     return tuple({p.name: p for p in found}.values())
 
 
-def refuse_unknown_channels(character: Character, recordings: Sequence[Recording]) -> None:
+def refuse_unknown_channels(character: Character, recordings: Sequence[SensorRecording]) -> None:
     """Refuse channels of prims that the robot does not have.
 
     Raises:

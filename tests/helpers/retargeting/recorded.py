@@ -8,7 +8,7 @@ from calmotion.benchmarks.scenes.beam_arm import beam_arm, quintic, shot_of
 from calmotion.identification.robots import robot_with
 from calmotion.identification.signals import signals_of
 from calmotion.multibody.model.topology import span_tree
-from calmotion.shot.calibration.recording import ACCELEROMETER, ANGLE, EFFORT, MARKER, Channel, Recording
+from calmotion.shot.calibration.recording import ACCELEROMETER, ANGLE, EFFORT, MARKER, Channel, SensorRecording
 from calmotion.shot.run import RunSettings
 from calmotion.simulation.bodies import reduce_bodies
 from calmotion.simulation.compiled_shot import compile_shot
@@ -44,7 +44,7 @@ def recordings_of(shot, truth=TRUTH, seed=0):
             values = values + noise * rng.standard_normal(values.shape)
             values[rng.uniform(size=len(own)) < 0.02] = np.nan
             made.append(Channel(kind, path, own + CLOCKS[file], values))
-        return Recording(file, file, tuple(made))
+        return SensorRecording(file, file, tuple(made))
 
     return [
         recording("camera.csv", 120.0, [(MARKER, LOAD, 3e-4)]),

@@ -13,7 +13,7 @@ from calmotion.identification.robots import robot_with
 from calmotion.identification.signals import Signals, signals_of
 from calmotion.multibody.model.topology import span_tree
 from calmotion.shot import FEMesh, FEMeshes, MeshQuality
-from calmotion.shot.calibration.recording import ACCELEROMETER, ANGLE, MARKER, Channel, Recording
+from calmotion.shot.calibration.recording import ACCELEROMETER, ANGLE, MARKER, Channel, SensorRecording
 from calmotion.shot.character import Array
 from calmotion.shot.motor import DRIVE
 from calmotion.shot.run import RunSettings
@@ -39,7 +39,7 @@ class RecordedArm:
     """
 
     shot: CompiledShot
-    recordings: tuple[Recording, ...]
+    recordings: tuple[SensorRecording, ...]
     truth: Mapping[str, float]
 
 
@@ -84,7 +84,7 @@ def _arm(size: Mapping[str, object], animation: object, gives: bool, fine: bool)
 
 def _recorded(
     shot: CompiledShot, signals: Signals, rng: np.random.Generator, parameters: tuple[Parameter, ...]
-) -> tuple[Recording, ...]:
+) -> tuple[SensorRecording, ...]:
     """A camera system, an accelerometer and the encoders, each on its own clock."""
     load, end = shot.character.targets[0].path, float(signals.times[-1])
     motors = [motor.path for motor in shot.character.motors]
@@ -101,7 +101,7 @@ def _recorded(
                 values = values + BIAS * rng.standard_normal(3)
             values = _disturbed(values, NOISE[kind], rng)
             channels.append(Channel(kind, path, start + own / (1.0 + drift), values))
-        found.append(Recording(f"{kind}.csv", f"{kind}", tuple(channels)))
+        found.append(SensorRecording(f"{kind}.csv", f"{kind}", tuple(channels)))
     return tuple(found)
 
 

@@ -39,7 +39,7 @@ class Channel:
 
 
 @dataclass(frozen=True, eq=False)
-class Recording:
+class SensorRecording:
     """What one device recorded, on one clock.
 
     Attributes:

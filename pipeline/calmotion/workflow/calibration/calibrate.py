@@ -17,7 +17,7 @@ from calmotion.identification.parameters import DEFAULT, refuse_unknown
 from calmotion.identification.signals import refuse_cyclic
 from calmotion.shot import Animation, Character, Provenance
 from calmotion.shot.calibration.estimates import Calibration, Estimate
-from calmotion.shot.calibration.recording import Recording
+from calmotion.shot.calibration.recording import SensorRecording
 from calmotion.shot.outputs import CalibrationFigures, WrittenLayer
 from calmotion.shot.run import OutputPaths, RunSettings, Source
 from calmotion.simulation.compiled_shot import CompiledShot
@@ -140,8 +140,8 @@ def calibrate(
 
 
 def _compiled(
-    opened: Shot, recordings: Sequence[Recording], options: RunSettings, layer: str | None, operators: Sequence[str],
-    settings: Settings, hooks: Hooks,
+    opened: Shot, recordings: Sequence[SensorRecording], options: RunSettings, layer: str | None,
+    operators: Sequence[str], settings: Settings, hooks: Hooks,
 ) -> Outcome:  # fmt: skip
     """A run that compiles the shot, after everything was refused that does not fit."""
     source = Source("", "", options, measured=measured_prims(recordings))

@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 
 from calmotion.errors import ShotError
 from calmotion.host import NotAsked, Operator, PropertyValues, RunContext
-from calmotion.shot.calibration.recording import Recording, RecordingRequest
+from calmotion.shot.calibration.recording import RecordingRequest, SensorRecording
 from calmotion.support.files import refuse_special
 
 
@@ -21,7 +21,7 @@ class RecordingReader(Operator):
 
     suffixes: ClassVar[tuple[str, ...]] = ()
     requires = (RecordingRequest,)
-    provides = (Recording,)
+    provides = (SensorRecording,)
 
     @classmethod
     def reads(cls, request: RecordingRequest) -> bool:
@@ -48,7 +48,7 @@ class RecordingReader(Operator):
             context.report("info", note)
         return (recording,)
 
-    def read(self, request: RecordingRequest, properties: PropertyValues) -> Recording:
+    def read(self, request: RecordingRequest, properties: PropertyValues) -> SensorRecording:
         """The recording in a file.
 
         Raises:

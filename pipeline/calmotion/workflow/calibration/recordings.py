@@ -6,7 +6,7 @@ import os
 from collections.abc import Sequence
 
 from calmotion.host import Host, SettingError, Settings
-from calmotion.shot.calibration.recording import ACCELEROMETER, MARKER, Recording, RecordingRequest
+from calmotion.shot.calibration.recording import ACCELEROMETER, MARKER, RecordingRequest, SensorRecording
 from calmotion.workflow.calibration.recording_reader import RecordingReader
 from calmotion.workflow.problems import value_of
 
@@ -21,10 +21,10 @@ def requested(text: str) -> RecordingRequest:
 
 def readers(host: Host) -> list[type[RecordingReader]]:
     """The readers that plugins add."""
-    return [cls for cls in host.providers(Recording) if issubclass(cls, RecordingReader)]
+    return [cls for cls in host.providers(SensorRecording) if issubclass(cls, RecordingReader)]
 
 
-def read_recordings(host: Host, names: Sequence[str], settings: Settings) -> tuple[Recording, ...]:
+def read_recordings(host: Host, names: Sequence[str], settings: Settings) -> tuple[SensorRecording, ...]:
     """Read recordings.
 
     Args:
@@ -56,12 +56,12 @@ def read_recordings(host: Host, names: Sequence[str], settings: Settings) -> tup
             raise SettingError(
                 "the recording does not exist", path="--recording", found=request.file, remedy="Check the path."
             )
-        run = host.run([request], [Recording], settings=settings).finish()
-        found.append(value_of(run, Recording))
+        run = host.run([request], [SensorRecording], settings=settings).finish()
+        found.append(value_of(run, SensorRecording))
     return tuple(found)
 
 
-def measured_prims(recordings: Sequence[Recording]) -> tuple[str, ...]:
+def measured_prims(recordings: Sequence[SensorRecording]) -> tuple[str, ...]:
     """Prims at which sensors sit, each once."""
     channels = [channel for recording in recordings for channel in recording.channels]
     return tuple(dict.fromkeys(c.path for c in channels if c.kind in (MARKER, ACCELEROMETER)))
