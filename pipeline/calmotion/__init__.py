@@ -18,22 +18,28 @@ if TYPE_CHECKING:
     from calmotion.host.errors import SettingError
     from calmotion.shot.run import OutputPaths
     from calmotion.workflow.calibration.calibrate import CalibratedShot, calibrate
+    from calmotion.workflow.batch.report import BatchResult, JobResult
+    from calmotion.workflow.batch.run import batch
     from calmotion.workflow.commands import inspect, optimize, rig, simulate, verify
     from calmotion.workflow.exporting.export import Export, export
     from calmotion.workflow.importing.robot import ImportedRobot, import_robot
     from calmotion.workflow.inspection import Inspection
     from calmotion.workflow.installation.warmup import Warmup, warmup
     from calmotion.workflow.problems import Cancelled, RunError
+    from calmotion.workflow.publishing.gate import publishing_problems
+    from calmotion.workflow.publishing.manifest import write_manifest
     from calmotion.workflow.results import MotorMotion, OptimizationResult, RobotMotion, SimulationResult, TargetMotion
     from calmotion.workflow.run import Progress
     from calmotion.workflow.shot import Shot, open_shot
 
 __all__ = [
     "CalibratedShot",
+    "BatchResult",
     "Cancelled",
     "Export",
     "ImportedRobot",
     "Inspection",
+    "JobResult",
     "MotorMotion",
     "OptimizationResult",
     "OutputPaths",
@@ -48,27 +54,34 @@ __all__ = [
     "Warmup",
     "__version__",
     "calibrate",
+    "batch",
     "export",
     "import_robot",
     "inspect",
     "open_shot",
     "optimize",
+    "publishing_problems",
     "rig",
     "simulate",
     "verify",
     "warmup",
+    "write_manifest",
 ]
 
 _HOMES = {
     "host.errors": ("SettingError",),
     "shot.run": ("OutputPaths",),
     "workflow.calibration.calibrate": ("CalibratedShot", "calibrate"),
+    "workflow.batch.report": ("BatchResult", "JobResult"),
+    "workflow.batch.run": ("batch",),
     "workflow.commands": ("inspect", "optimize", "rig", "simulate", "verify"),
     "workflow.exporting.export": ("Export", "export"),
     "workflow.importing.robot": ("ImportedRobot", "import_robot"),
     "workflow.inspection": ("Inspection",),
     "workflow.installation.warmup": ("Warmup", "warmup"),
     "workflow.problems": ("Cancelled", "RunError"),
+    "workflow.publishing.gate": ("publishing_problems",),
+    "workflow.publishing.manifest": ("write_manifest",),
     "workflow.results": ("MotorMotion", "OptimizationResult", "RobotMotion", "SimulationResult", "TargetMotion"),
     "workflow.run": ("Progress",),
     "workflow.shot": ("Shot", "open_shot"),

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from calmotion.cli.commands.robots import import_robot, materials, motors, rig
 from calmotion.cli.commands.setup import bench, cache, completion, doctor, plugins, warmup
 from calmotion.cli.commands.shots import calibrate, export, inspect, optimize, simulate
+from calmotion.cli.commands.shows import batch
 from calmotion.cli.parser import Parser, add_examples, overview
 from calmotion.cli.signals import as_interrupts, ignore
 from calmotion.errors import ShotError, failure_of_machine
@@ -80,6 +81,7 @@ def build_parser() -> Parser:
         simulate,
         optimize,
         calibrate,
+        batch,
         export,
         import_robot,
         rig,

@@ -105,6 +105,10 @@ def run_options(command: argparse.ArgumentParser) -> None:
     file_argument(outputs, "--figures", metavar="DIR", help="draw figures into this folder")
     file_argument(outputs, "--video", metavar="FILE", help="write a video (.webp, or .mp4 where ffmpeg is installed)")
     file_argument(
+        outputs, "--manifest", metavar="FILE",
+        help="write a manifest (JSON): inputs and outputs with hashes, versions, settings, verdict",
+    )  # fmt: skip
+    file_argument(
         command, "--motion", metavar="FILE",
         help="file with a motion for the motors, such as a BVH file (with --set bvh.read.map=...)",
     )  # fmt: skip

@@ -16,6 +16,7 @@ from calmotion.support.naming import nearest, nearest_name
 TASKS = (
     ("Prepare a shot", ("import", "rig", "motors", "materials", "inspect")),
     ("Remove the shake", ("simulate", "optimize", "watch", "calibrate")),
+    ("Work on a show", ("batch", "sequence", "submit")),
     ("Play it on the robot", ("export",)),
     ("Measure, extend, set up", ("bench", "plugins", "warmup", "doctor", "log", "cache", "completion")),
 )
@@ -44,6 +45,10 @@ EXAMPLES: dict[str, tuple[tuple[str, str], ...]] = {
     "watch": (
         ("calmotion watch shot.usda", "how much does it shake, after each save?"),
         ("calmotion watch shot.usda --optimize -o calm.usda", "and its cure"),
+    ),
+    "batch": (
+        ("calmotion batch shots/*.usda -o calm --workers 2", "two shots at a time, on this machine"),
+        ("calmotion batch shots/*.usda -o calm --on dask://host:8786", "on the workers of a Dask scheduler"),
     ),
     "export": (
         ("calmotion export calm_root.usda --to csv --rate 200Hz", "a table for any controller"),

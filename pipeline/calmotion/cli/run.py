@@ -48,10 +48,20 @@ def run_shot(
             **options,
         )
     report = result.report()
+    report["manifest"] = _write_manifest(result, args)
     conclude(report, result.problems, output, None if args.quiet else partial(print_run, verbose=args.verbose))
     if result.interrupted:
         return INTERRUPTED
     return FAILED if result.problems or (args.strict and not report["tolerance_kept"]) else 0
+
+
+def _write_manifest(result: SimulationResult, args: argparse.Namespace) -> str | None:
+    """The manifest that is requested, of a run that made all it was asked for."""
+    if not args.manifest or result.problems or result.interrupted:
+        return None
+    from calmotion.workflow.publishing.manifest import write_manifest
+
+    return write_manifest(result, args.manifest)
 
 
 def watch_shot(args: argparse.Namespace, output: Output) -> int:
@@ -88,6 +98,7 @@ def watch_shot(args: argparse.Namespace, output: Output) -> int:
         begin = time.perf_counter()
         try:
             result = watch.run()
+            _write_manifest(result, args)
         except ShotError as error:  # the next save may repair it
             print_error(error, output)
             status = FAILED

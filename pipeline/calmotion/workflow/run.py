@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import Any, TypeVar
 
 from calmotion.errors import ShotError
@@ -72,6 +73,7 @@ class Outcome:
         interrupted: Whether the user interrupted it, or the caller cancelled it.
         cancelled: Whether the caller did.
         total_wall_s: Time of all of it [s].
+        settings: Settings of operators that were given.
     """
 
     shot: Shot
@@ -80,6 +82,7 @@ class Outcome:
     interrupted: bool
     cancelled: bool
     total_wall_s: float
+    settings: Settings = field(default_factory=dict)
 
     def require(self, kind: type[T]) -> T:
         """The value of a type.
@@ -135,9 +138,10 @@ def carry_out(
     kinds = [*wanted, *(_requested_files(host, outputs) if writes else ()), *_made_by(host, operators)]
     _refuse_unknown_methods(source)
     _refuse_unreadable_motion(source, host)
+    given = merge([shot.settings, settings or {}])
     run = host.run(
-        [*known, source, outputs], kinds, optional=optional, settings=merge([shot.settings, settings or {}]),
-        progress=_listener(hooks), reuse=shot.reuse,
+        [*known, source, outputs], kinds, optional=optional, settings=given, progress=_listener(hooks),
+        reuse=shot.reuse,
     )  # fmt: skip
     prepare_outputs(shot.inputs, outputs)
     interrupted = cancelled = False
@@ -157,7 +161,7 @@ def carry_out(
     if writes:  # other commands also accept a shot in which nothing moves
         shot.keep(run.data)
     problems = [Problem(ShotError("interrupted"))] if interrupted else problems_of(run, kinds)
-    return Outcome(shot, run, tuple(problems), interrupted, cancelled, time.perf_counter() - start)
+    return Outcome(shot, run, tuple(problems), interrupted, cancelled, time.perf_counter() - start, given)
 
 
 def _listener(hooks: Hooks) -> Callable[[str, float, str], None]:

@@ -17,6 +17,11 @@ CACHES = {
 # Folders of earlier versions, which nothing reads any more; they go when the cache that replaces them is pruned.
 FORMER = {MESHES: "tetrahedra", REDUCTIONS: "reduced"}
 
+# A folder of meshes and reduced bodies that several machines share. Compiled kernels stay in each one's own: they fit
+# one processor, and are unpickled.
+SHARED_VARIABLE = "CALMOTION_SHARED_CACHE"
+SHARED = (MESHES, REDUCTIONS)
+
 CONFIGURATION_VARIABLE = "CALMOTION_CONFIG"
 
 
@@ -27,6 +32,16 @@ def cache_folder() -> Path:
         return Path(chosen)
     base = os.environ.get("XDG_CACHE_HOME") or os.environ.get("LOCALAPPDATA") or Path.home() / ".cache"
     return Path(base) / "calmotion"
+
+
+def folder_of(cache: str) -> Path:
+    """The folder of a cache: the shared one where the environment names one and the cache may be shared.
+
+    Args:
+        cache: A name in `CACHES`.
+    """
+    shared = os.environ.get(SHARED_VARIABLE) if cache in SHARED else None
+    return (Path(shared).expanduser() if shared else cache_folder()) / cache
 
 
 def configuration_folder(environment: Mapping[str, str] | None = None) -> Path:

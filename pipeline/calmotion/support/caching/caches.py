@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from calmotion.support.caching.cache_folder import CACHES, FORMER, cache_folder
+from calmotion.support.caching.cache_folder import CACHES, FORMER, cache_folder, folder_of
 from calmotion.support.caching.signing import signing_key
 from calmotion.support.caching.verified_files import DamagedFileError, ForeignFileError, read_arrays, write_arrays
 from calmotion.support.files import PREFIX, remove_abandoned
@@ -101,7 +101,7 @@ def entries(cache: str) -> list[Entry]:
     Args:
         cache: A name in `CACHES`.
     """
-    return _entries_in(cache_folder() / cache)
+    return _entries_in(folder_of(cache))
 
 
 def _entries_in(folder: Path) -> list[Entry]:
@@ -162,7 +162,7 @@ def _remove_former(cache: str) -> list[Entry]:
 
 
 def _file(cache: str, key: str) -> Path:
-    return cache_folder() / cache / f"{key}.npz"
+    return folder_of(cache) / f"{key}.npz"
 
 
 def _size(path: Path) -> int:

@@ -1,0 +1,1 @@
+"""Commands on many shots: batches, render farms, repertoires."""

@@ -1,0 +1,85 @@
+"""`calmotion batch`: many shots as independent jobs."""
+
+from __future__ import annotations
+
+import argparse
+from typing import TYPE_CHECKING, Any, TextIO
+
+from calmotion.cli.commands.shows.forwarding import command_of, extras_of, forwarded, forwarded_options
+from calmotion.cli.options import Commands, file_argument
+
+if TYPE_CHECKING:
+    from calmotion.cli.output import Output
+
+
+def add_to(commands: Commands) -> None:
+    """Add the command."""
+    text = "optimise or simulate many shots, here, on a Dask cluster or on Slurm"
+    command = commands.add_parser("batch", help=text, description=text[0].upper() + text[1:] + ".")
+    command.set_defaults(command=_run)
+    file_argument(command, "shots", metavar="SHOTS", nargs="+", help="USD files")
+    file_argument(
+        command, "-o", "--output", metavar="DIR", required=True,
+        help="folder for layers, manifests, logs and the report; the same command goes on after an interruption",
+    )  # fmt: skip
+    command.add_argument("--json", action="store_true", help="print one JSON object on stdout, and nothing else there")
+    command.add_argument("--quiet", action="store_true", help="print nothing but errors (and the object of --json)")
+    command.add_argument("--progress", action="store_true", help="print machine-readable progress to stderr")
+    group = command.add_argument_group("workers")
+    group.add_argument(
+        "--on", metavar="WHERE", default="local",
+        help="local (default), dask://HOST:PORT, or slurm, also with its parameters: 'slurm?slurm_partition=cpu'",
+    )  # fmt: skip
+    group.add_argument(
+        "--workers", metavar="N", type=_count, help="most jobs at once (default: one for each processor; elsewhere all)"
+    )
+    file_argument(
+        group, "--shared-cache", metavar="DIR",
+        help="folder of meshes and reduced bodies that the workers share; compiled kernels are each worker's own",
+    )  # fmt: skip
+    forwarded_options(command)
+
+
+def _count(text: str) -> int:
+    if not text.isdigit() or not int(text):
+        raise argparse.ArgumentTypeError(f"{text} is not a number of workers")
+    return int(text)
+
+
+def _run(args: argparse.Namespace, output: Output) -> int:
+    from calmotion.cli.output import FAILED, INTERRUPTED, conclude
+    from calmotion.cli.progress import ProgressDisplay
+    from calmotion.workflow.batch.run import batch
+
+    with ProgressDisplay(args.quiet, args.progress) as display:
+        result = batch(
+            args.shots, args.output, command=command_of(args), arguments=forwarded(args), extras=extras_of(args),
+            on=args.on, workers=args.workers, shared_cache=args.shared_cache, progress=display,
+        )  # fmt: skip
+    conclude(result.report(), [], output, None if args.quiet else _print)
+    if result.interrupted:
+        return INTERRUPTED
+    return 0 if result.successful else FAILED
+
+
+def _print(report: dict[str, Any], stream: TextIO) -> None:
+    from calmotion.cli.quantities import length
+
+    counts = ", ".join(f"{count} {name}" for name, count in report["outcomes"].items())
+    print(f"{len(report['jobs'])} shots in {report['wall_s']:.1f} s: {counts}", file=stream)
+    for job in report["jobs"]:
+        line = f"  {job['name']}: {job['outcome']}"
+        before, after = job.get("max_error_before_m", job.get("max_error_m")), job.get("max_error_after_m")
+        if before is not None:
+            line += f", largest error {length(before)}" + ("" if after is None else f" to {length(after)}")
+        if job["tolerance_kept"] is False:
+            line += ", tolerance missed"
+        if job["attempts"] > 1:
+            line += f", {job['attempts']} attempts"
+        print(line, file=stream)
+        if job["problem"]:
+            problem = job["problem"]
+            place = ".".join(filter(None, (problem.get("path"), problem.get("attribute"))))
+            print(f"    {place + ': ' if place else ''}{problem['problem']}", file=stream)
+            print(f"    log: {job['log']}", file=stream)
+    print(f"report: {report['folder']}/batch.md", file=stream)

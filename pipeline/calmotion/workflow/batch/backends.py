@@ -1,0 +1,265 @@
+"""Where the jobs of a batch run, each behind the interface of `concurrent.futures.Executor`."""
+
+from __future__ import annotations
+
+import os
+import queue
+import threading
+import time
+from abc import ABC, abstractmethod
+from concurrent.futures import Executor, Future, ThreadPoolExecutor
+from typing import Any
+from urllib.parse import parse_qsl
+
+from calmotion.errors import ShotError
+from calmotion.host import SettingError
+from calmotion.version import __version__
+from calmotion.workflow.batch.attempt import attempt, kill_running
+
+LOCAL, DASK, SLURM = "local", "dask", "slurm"
+_PATIENCE = 60.0  # for a scheduler that was there before [s]
+_POLL = 1.0  # between two looks at jobs of Slurm [s]
+
+
+class Backend(ABC):
+    """Where jobs run.
+
+    Attributes:
+        limit: Most jobs that are submitted at once; None: all.
+    """
+
+    limit: int | None = None
+
+    @abstractmethod
+    def submit(self, fields: dict[str, Any], avoid: str) -> Future[dict[str, Any]]:
+        """Run `attempt` somewhere.
+
+        Args:
+            fields: Of the job.
+            avoid: The worker on which an attempt died (`worker` of what an attempt returned), or empty.
+        """
+
+    def revive(self) -> bool:
+        """Open it again after futures were lost with it; whether that was possible."""
+        return True
+
+    @abstractmethod
+    def close(self) -> None:
+        """Give up what still runs, as far as that is possible."""
+
+
+class LocalBackend(Backend):
+    """Processes of this machine, with a share of its processors each.
+
+    Args:
+        workers: How many run at once.
+    """
+
+    def __init__(self, workers: int):
+        cores = sorted(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else []
+        self.limit = workers
+        self._executor = ThreadPoolExecutor(workers, thread_name_prefix="calmotion-batch")
+        self._shares: queue.SimpleQueue[tuple[int, ...]] = queue.SimpleQueue()
+        for k in range(workers):
+            self._shares.put(tuple(cores[k::workers]) if 1 < workers <= len(cores) else ())
+
+    def submit(self, fields: dict[str, Any], avoid: str) -> Future[dict[str, Any]]:
+        return self._executor.submit(self._in_share, fields)
+
+    def _in_share(self, fields: dict[str, Any]) -> dict[str, Any]:
+        cores = self._shares.get()
+        try:
+            return attempt(fields, cores)
+        finally:
+            self._shares.put(cores)
+
+    def close(self) -> None:
+        self._executor.shutdown(wait=False, cancel_futures=True)
+        kill_running()
+        self._executor.shutdown(wait=True)
+
+
+class DaskBackend(Backend):
+    """The workers of a Dask scheduler.
+
+    Args:
+        address: `HOST:PORT`.
+        workers: Most jobs at once; None: as many as the workers have threads.
+
+    Raises:
+        ShotError: `distributed` is not installed, or the scheduler does not answer, has no workers, or has workers
+            with another version of Calmotion.
+    """
+
+    def __init__(self, address: str, workers: int | None):
+        self.limit, self._address = workers, address
+        self._client = self._connected(10.0)
+        versions = self._client.run(_version)
+        wrong = {name: found for name, found in versions.items() if found != __version__}
+        if wrong or not versions:
+            self._client.close()
+            name, found = next(iter(wrong.items()), ("", "none"))
+            raise ShotError(
+                "a worker has another version of Calmotion" if wrong else "the scheduler has no worker",
+                path=name or f"dask://{address}",
+                found=found,
+                remedy=f"Install Calmotion {__version__} there" if wrong else f"Start one: dask worker {address}",
+            )
+
+    def submit(self, fields: dict[str, Any], avoid: str) -> Future[dict[str, Any]]:
+        others = [name for name in self._client.scheduler_info(n_workers=-1)["workers"] if name != avoid]
+        where = {"workers": others, "allow_other_workers": True} if avoid and others else {}
+        executor: Executor = self._client.get_executor(pure=False, retries=0, **where)
+        return executor.submit(_on_dask, fields)
+
+    def revive(self) -> bool:
+        end = time.monotonic() + _PATIENCE
+        if self._client.status == "running":  # a worker was lost, not the scheduler
+            return True
+        self._client.close(timeout=1)
+        while time.monotonic() < end:
+            try:
+                self._client = self._connected(5.0)
+            except ShotError:
+                time.sleep(1.0)
+            else:
+                return True
+        return False
+
+    def close(self) -> None:
+        self._client.close(timeout=5)
+
+    def _connected(self, seconds: float) -> Any:
+        try:
+            from distributed import Client
+        except ImportError as error:
+            raise _missing("dask", "distributed") from error
+        try:
+            client: Any = Client
+            return client(f"tcp://{self._address}", timeout=seconds, set_as_default=False)
+        except (OSError, TimeoutError, ValueError) as error:
+            raise ShotError(
+                "the Dask scheduler does not answer", path=f"dask://{self._address}", found=str(error) or None,
+                remedy="Start it (dask scheduler) and name its address",
+            ) from error  # fmt: skip
+
+
+class SlurmBackend(Backend):
+    """Jobs of Slurm, by `submitit`.
+
+    Args:
+        folder: Of the files of submitit, which all nodes see.
+        parameters: Of `submitit.AutoExecutor.update_parameters`; `cluster` names another of its clusters.
+        workers: Most jobs at once; None: all.
+
+    Raises:
+        ShotError: `submitit` is not installed, or there is no Slurm here.
+        SettingError: A parameter does not fit.
+    """
+
+    def __init__(self, folder: str, parameters: dict[str, str], workers: int | None):
+        try:
+            import submitit
+        except ImportError as error:
+            raise _missing(SLURM, "submitit") from error
+        self.limit = workers
+        values: dict[str, Any] = {key: int(v) if v.isdigit() else v for key, v in parameters.items()}
+        cluster = str(values.pop("cluster", SLURM))
+        try:
+            executor = submitit.AutoExecutor(folder=folder, cluster=cluster)
+            executor.update_parameters(**{"timeout_min": 24 * 60, "name": "calmotion", **values})
+        except RuntimeError as error:
+            raise ShotError(
+                "jobs cannot be submitted to Slurm here", path=cluster, found=error, remedy="Run it where sbatch is"
+            ) from error
+        except (NameError, TypeError, ValueError) as error:
+            raise SettingError("Slurm does not take this parameter", path="--on", found=error) from error
+        self._executor = SubmititExecutor(executor)
+
+    def submit(self, fields: dict[str, Any], avoid: str) -> Future[dict[str, Any]]:
+        return self._executor.submit(attempt, fields)
+
+    def close(self) -> None:
+        self._executor.shutdown(wait=False, cancel_futures=True)
+
+
+class SubmititExecutor(Executor):
+    """`submitit` behind the interface of `concurrent.futures`.
+
+    Args:
+        executor: A `submitit.Executor`.
+    """
+
+    def __init__(self, executor: Any):
+        self._executor, self._closed = executor, threading.Event()
+        self._jobs: dict[Future[Any], Any] = {}
+        self._thread = threading.Thread(target=self._watch, daemon=True)
+        self._thread.start()
+
+    def submit(self, function: Any, /, *args: Any, **kwargs: Any) -> Future[Any]:
+        """Submit a call."""
+        future: Future[Any] = Future()
+        future.set_running_or_notify_cancel()
+        self._jobs[future] = self._executor.submit(function, *args, **kwargs)
+        return future
+
+    def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
+        """End; with `cancel_futures` jobs that run are cancelled too."""
+        if cancel_futures:
+            for job in list(self._jobs.values()):
+                job.cancel(check=False)
+        elif wait:
+            while self._jobs:
+                time.sleep(_POLL)
+        self._closed.set()
+
+    def _watch(self) -> None:
+        while not self._closed.wait(_POLL):
+            for future, job in list(self._jobs.items()):
+                if job.done():
+                    try:
+                        future.set_result(job.result())
+                    except Exception as error:  # of the job, or of a node that is gone
+                        future.set_exception(error)
+                    del self._jobs[future]
+
+
+def backend_for(on: str, workers: int | None, folder: str) -> Backend:
+    """The backend that a text names.
+
+    Args:
+        on: `local`, `dask://HOST:PORT` or `slurm`, also with parameters (`slurm?slurm_partition=cpu`).
+        workers: Most jobs at once; None: one for each processor (local), or as many as there is room for.
+        folder: Of the batch's logs.
+
+    Raises:
+        SettingError: There is no such backend.
+        ShotError: It is not there.
+    """
+    kind, _, rest = on.partition("://")
+    if on == LOCAL:
+        cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+        return LocalBackend(workers or cores)
+    if kind == DASK and rest:
+        return DaskBackend(rest, workers)
+    name, _, parameters = on.partition("?")
+    if name == SLURM:
+        return SlurmBackend(os.path.join(folder, SLURM), dict(parse_qsl(parameters)), workers)
+    raise SettingError(
+        "a batch cannot run there", path="--on", found=on, remedy="Use local, dask://HOST:PORT, or slurm"
+    )
+
+
+def _version() -> str:
+    return __version__
+
+
+def _on_dask(fields: dict[str, Any]) -> dict[str, Any]:
+    """`attempt` on a worker of Dask, with its address."""
+    from distributed import get_worker
+
+    return attempt(fields) | {"worker": get_worker().address}
+
+
+def _missing(extra: str, package: str) -> ShotError:
+    return ShotError(f"{package} is not installed", path=package, remedy=f"pip install 'calmotion[{extra}]'")

@@ -1,0 +1,1 @@
+"""Manifests of results, and what must hold before a result is published."""

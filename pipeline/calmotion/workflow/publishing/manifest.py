@@ -1,0 +1,205 @@
+"""The manifest of a result: its inputs and outputs with hashes, versions, settings and the verdict, as JSON.
+
+Paths are relative to the folder of the manifest, so that a folder of results can be moved with its inputs.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import platform
+from collections.abc import Iterator, Mapping
+from dataclasses import asdict
+from datetime import UTC, datetime
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from calmotion.errors import ShotError
+from calmotion.support.files import is_special, write_text
+from calmotion.version import __version__
+
+if TYPE_CHECKING:
+    from calmotion.workflow.results import SimulationResult
+
+FORMAT = 1
+PACKAGES = ("numpy", "scipy", "numba", "llvmlite", "usd-core", "scikit-fem", "pytetwild")
+LAYER, ROOT = "layer", "root layer"  # roles of outputs
+_KEYS = {"format": int, "command": str, "shot": str, "inputs": list, "outputs": list, "verdict": dict, "versions": dict}
+
+
+def manifest_of(result: SimulationResult, folder: str | os.PathLike[str]) -> dict[str, Any]:
+    """The manifest of a result whose files are written.
+
+    Args:
+        result: Of `simulate` or `optimize`.
+        folder: Of the manifest.
+    """
+    from calmotion.shot import Provenance
+    from calmotion.shot.run import Source
+    from calmotion.workflow.plain import plain
+
+    outcome = result.outcome
+    source, provenance = outcome.require(Source), outcome.require(Provenance)
+    return {
+        "format": FORMAT,
+        "calmotion": __version__,
+        "command": source.command,
+        "created": datetime.now(UTC).isoformat(timespec="seconds"),
+        "shot": _named(provenance.shot, folder),
+        "request": {
+            **{name: value for name, value in asdict(source.settings).items() if value is not None},
+            "shaper": source.shaper,
+            "verify": source.verify,
+            "operators": plain(outcome.settings),
+        },
+        "inputs": [_row(path, folder, role, digest) for path, role, digest in _inputs(result)],
+        "outputs": [_row(path, folder, role, None) for path, role in _outputs(result)],
+        "versions": {"python": platform.python_version(), "platform": platform.platform(), **_versions()},
+        "verdict": _verdict(result),
+    }
+
+
+def write_manifest(result: SimulationResult, path: str | os.PathLike[str]) -> str:
+    """Write the manifest of a result; returns the path.
+
+    Raises:
+        ShotError: It cannot be written.
+    """
+    content = json.dumps(manifest_of(result, Path(path).parent), indent=2, allow_nan=False) + "\n"
+    try:
+        write_text(Path(path), content)
+    except OSError as error:
+        raise ShotError(
+            "the manifest cannot be written", path=str(path), found=error.strerror, remedy="Choose another file"
+        ) from error
+    return os.fspath(path)
+
+
+def read_manifest(path: str | os.PathLike[str]) -> dict[str, Any]:
+    """A manifest that `write_manifest` wrote.
+
+    Raises:
+        ShotError: The file cannot be read, or is no manifest.
+    """
+    try:
+        if is_special(path):
+            raise OSError(0, "it is not a regular file")
+        found: Any = json.loads(Path(path).read_text(encoding="utf-8"))
+    except (OSError, ValueError, RecursionError) as error:
+        raise ShotError(
+            "the manifest cannot be read", path=str(path), found=getattr(error, "strerror", None) or error,
+            remedy="Write the result again with --manifest",
+        ) from error  # fmt: skip
+    wrong = [key for key, kind in _KEYS.items() if not isinstance(found, dict) or not isinstance(found.get(key), kind)]
+    rows = [] if wrong else [*found["inputs"], *found["outputs"]]
+    if wrong or found["format"] != FORMAT or not all(_is_row(row) for row in rows):
+        raise ShotError(
+            "this is no manifest of a result", path=str(path), found=f"no {wrong[0]}" if wrong else None,
+            remedy="Name a file that --manifest wrote",
+        )  # fmt: skip
+    manifest: dict[str, Any] = found
+    return manifest
+
+
+def changed_files(manifest: Mapping[str, Any], folder: str | os.PathLike[str]) -> list[ShotError]:
+    """The files of a manifest that are missing or differ from what they were, one error each.
+
+    Args:
+        manifest: See `read_manifest`.
+        folder: Of the manifest.
+    """
+    found = []
+    for kind, remedy in (
+        ("inputs", "Run the shot again: the result is of another state of its inputs"),
+        ("outputs", "Run the shot again, or restore the file"),
+    ):
+        for row in manifest[kind]:
+            path = Path(folder) / row["path"]
+            digest = sha256_of(path)
+            if digest == row["sha256"]:
+                continue
+            problem = "is missing" if digest is None else "has changed since the result was made"
+            found.append(
+                ShotError(f"this {row['role']} {problem}", path=str(path), found=digest, remedy=remedy)
+            )  # fmt: skip
+    return found
+
+
+def sha256_of(path: str | os.PathLike[str]) -> str | None:
+    """SHA-256 of a file; None where there is none that can be read."""
+    try:
+        if is_special(path):
+            return None
+        with open(path, "rb") as file:
+            return hashlib.file_digest(file, "sha256").hexdigest()
+    except OSError:
+        return None
+
+
+def _is_row(row: object) -> bool:
+    return isinstance(row, dict) and all(isinstance(row.get(key), str) for key in ("path", "sha256", "role"))
+
+
+def _row(path: str, folder: str | os.PathLike[str], role: str, digest: str | None) -> dict[str, str]:
+    return {"path": _named(path, folder), "role": role, "sha256": digest or sha256_of(path) or ""}
+
+
+def _named(path: str, folder: str | os.PathLike[str]) -> str:
+    """A path relative to a folder, with slashes; as it is where it lies on another drive."""
+    try:
+        return Path(os.path.relpath(os.path.realpath(path), os.path.realpath(folder))).as_posix()
+    except ValueError:
+        return Path(os.path.realpath(path)).as_posix()
+
+
+def _inputs(result: SimulationResult) -> Iterator[tuple[str, str, str | None]]:
+    """Path, role and hash of each file that the result depends on; layers were hashed when they were read."""
+    from calmotion.shot import Character, Provenance
+
+    provenance, character = result.outcome.require(Provenance), result.outcome.require(Character)
+    folder = os.path.dirname(os.path.realpath(provenance.shot))
+    for number, layer in enumerate(provenance.layers):
+        yield os.path.join(folder, layer.path), "layer of the shot" if number else "shot", layer.sha256
+    if result.shot.motion:
+        yield result.shot.motion, "motion", None
+    for body in character.bodies:
+        if body.flexible is not None and body.flexible.mesh_file:
+            yield body.flexible.mesh_file, "mesh", None
+
+
+def _outputs(result: SimulationResult) -> Iterator[tuple[str, str]]:
+    from calmotion.shot.outputs import CsvFile, Figures, Recording, Video, WrittenLayer
+
+    get = result.outcome.run.get
+    if (layer := get(WrittenLayer)) is not None:
+        yield layer.layer, LAYER
+        yield layer.root, ROOT
+    for file, role in ((get(CsvFile), "table"), (get(Recording), "recording"), (get(Video), "video")):
+        if file is not None:
+            yield file.path, role
+    if (figures := get(Figures)) is not None:
+        for path in figures.paths:
+            yield path, "figure"
+
+
+def _versions() -> dict[str, str]:
+    found = {"calmotion": __version__}
+    for package in PACKAGES:
+        try:
+            found[package] = version(package)
+        except PackageNotFoundError:
+            continue
+    return found
+
+
+def _verdict(result: SimulationResult) -> dict[str, Any]:
+    report = result.report()
+    keys = ("tolerance_m", "tolerance_kept", "objective_before", "objective_after", "stopped", "interrupted", "targets")
+    limits = [row for row in report["limits"] if row["exceeded"]]
+    return {
+        **{key: report[key] for key in keys if key in report},
+        "largest_error_m": result.max_error,
+        "exceeded_limits": [{"path": row["path"], "quantity": row["quantity"]} for row in limits],
+    }

@@ -1,0 +1,65 @@
+"""One attempt at a job: its outcome, and a process that does not outlive its worker."""
+
+import json
+import os
+import subprocess
+import sys
+
+import pytest
+from calmotion.workflow.batch import child
+from calmotion.workflow.batch.attempt import DIED, DONE, FAILED, _judged, _locked
+from calmotion.workflow.batch.jobs import jobs_for
+
+
+@pytest.fixture
+def job(tmp_path):
+    (job,) = jobs_for([tmp_path / "shot.usda"], tmp_path, "simulate")
+    os.makedirs(os.path.dirname(job.log))
+    return job
+
+
+ERROR = {"problem": "no bodies", "path": "/Robot", "attribute": "", "found": "", "remedy": "Add one"}
+
+
+@pytest.mark.parametrize(
+    ("status", "printed", "outcome", "problem"),
+    [
+        (0, {"targets": []}, DONE, None),
+        (1, {"error": ERROR, "errors": [ERROR]}, FAILED, "no bodies"),
+        (2, {"error": ERROR, "errors": [ERROR]}, FAILED, "no bodies"),
+        (1, {"tolerance_kept": False}, FAILED, "the simulation does not keep the tolerance"),
+        (-9, None, DIED, "the process ended by signal 9"),
+        (137, None, DIED, "the process ended with status 137"),
+        (130, {"interrupted": True}, DIED, "the process was asked to end"),
+        (0, None, DIED, "the process ended with status 0"),
+    ],
+)
+def test_a_process_that_refuses_has_failed_and_one_that_ends_otherwise_has_died(job, status, printed, outcome, problem):
+    found = _judged(job, status, "" if printed is None else json.dumps(printed))
+    assert found["outcome"] == outcome
+    assert (found["problem"] or {}).get("problem") == problem
+    assert found["report"] == (printed if outcome != DIED else None)
+
+
+def test_a_process_ends_with_the_worker_that_holds_its_input():
+    code = f"import time\nfrom {child.__name__} import *\nfrom {child.__name__} import _end_with_worker\n"
+    code += "threading.Thread(target=_end_with_worker, args=(0,), daemon=True).start()\nprint('on', flush=True)\n"
+    process = subprocess.Popen(
+        [sys.executable, "-c", f"{code}time.sleep(60)"], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    )
+    assert process.stdout.readline() == "on\n" and process.poll() is None
+    process.stdin.close()
+    assert process.wait(timeout=30) == child.ORPHANED
+    process.stdout.close()
+
+
+def test_a_job_is_locked_while_a_process_runs_it_also_when_its_worker_is_killed(tmp_path):
+    fcntl = pytest.importorskip("fcntl")
+    path = str(tmp_path / "lock")
+    with _locked(path) as descriptor:
+        process = subprocess.Popen([sys.executable, "-c", "input()"], stdin=subprocess.PIPE, pass_fds=(descriptor,))
+    with open(path) as file, pytest.raises(BlockingIOError):  # the worker has let go of it
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    process.communicate(b"\n", timeout=30)
+    with open(path) as file:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
