@@ -17,9 +17,9 @@ from calmotion.version import __version__
 if TYPE_CHECKING:
     from calmotion.host.errors import SettingError
     from calmotion.shot.run import OutputPaths
-    from calmotion.workflow.calibration.calibrate import CalibratedShot, calibrate
     from calmotion.workflow.batch.report import BatchResult, JobResult
     from calmotion.workflow.batch.run import batch
+    from calmotion.workflow.calibration.calibrate import CalibratedShot, calibrate
     from calmotion.workflow.commands import inspect, optimize, rig, simulate, verify
     from calmotion.workflow.exporting.export import Export, export
     from calmotion.workflow.importing.robot import ImportedRobot, import_robot

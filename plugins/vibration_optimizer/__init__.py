@@ -154,6 +154,14 @@ class OptimizeShot(Operator):
             minimum=3,
             description="Number of these robots; with 1 + 2 n for n uncertain parameters they have their covariance",
         ),
+        Property(
+            "window",
+            float,
+            -1.0,
+            unit="s",
+            description="Length of the windows in which a long shot is searched; -1: 20 s where it is longer than "
+            "60 s; 0: one search",
+        ),
         Property("draws", int, 200, minimum=20, description="Random robots on which the curves are measured"),
     )
 
@@ -171,13 +179,15 @@ class OptimizeShot(Operator):
     def execute(self, context: RunContext) -> Sequence[object]:
         from calmotion.retargeting.checkpoint import checkpoint_path
         from calmotion.retargeting.to_tolerance import optimize_to_tolerance
+        from calmotion.retargeting.windows.store import windows_path
 
         options = self._search_options(context)
         paths = context.get(OutputPaths)
-        kept = checkpoint_path(paths.layer) if paths is not None and paths.layer else None
+        layer = paths.layer if paths is not None else None
+        kept, stored = (checkpoint_path(layer), windows_path(layer)) if layer else (None, None)
         converged = context.get(ConvergedReduction)
         known = None if converged is None else converged.known
-        result = optimize_to_tolerance(compiled_in(context.get), options, context.progress, kept, known)
+        result = optimize_to_tolerance(compiled_in(context.get), options, context.progress, kept, known, stored)
         if result.interrupted:
             context.report(
                 "warning", "interrupted: these are the best curves so far; the same command resumes from them"
@@ -201,6 +211,7 @@ class OptimizeShot(Operator):
             knot_spacing=values.knot_spacing if values.knot_spacing > 0.0 else None,
             smoothness=values.smoothness if values.smoothness >= 0.0 else None,
             adjoint=values.adjoint,
+            window=values.window if values.window >= 0.0 else None,
             robust=None if values.robust == "off" else RobustSettings(values.robust, values.scenarios, values.draws),
         )
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from calmotion.errors import ShotError
 from calmotion.shot import Animation, Character
-from calmotion.shot.run import RunSettings
+from calmotion.shot.run import LONG_SHOT, WINDOW, WINDOW_OVERLAP, RunSettings
 from calmotion.simulation.inputs.time_grid import MAX_STEP, make_grid
 
 # Measured on the five samples: 1.5 to 2.9 us for a step and a coordinate; a search costs 40 to 300 simulations.
@@ -66,13 +66,24 @@ def expected_cost(character: Character, animation: Animation, options: RunSettin
     coordinates = 6 * len(character.bodies) + sum(modes)
     # arrays have a row for each body, as wide as the largest; see `multibody.model.system.State`
     numbers = len(character.bodies) * (16 + 2 * max(modes, default=0)) + 6 * len(character.joints)
-    copies = COPIES_OF_SEARCH if searches else COPIES
-    runs = SEARCH if searches else 1.0
+    share = _share_in_window(animation, options, character.retarget.cyclic) if searches else 0.0
+    copies = COPIES_OF_SEARCH if share == 1.0 else COPIES + COPIES_OF_SEARCH * share
+    again = 1.0 if share in (0.0, 1.0) else 1.0 + WINDOW_OVERLAP  # what overlaps is searched twice
+    runs = SEARCH * again if searches else 1.0
     if searches and options.robust is not None:
         runs = SEARCH * options.robust.scenarios + options.robust.draws
         copies += options.robust.scenarios
     hours = SECONDS * steps * coordinates * runs / 3600.0
     return ExpectedCost(frames, steps, coordinates, hours, 8.0 * copies * numbers * steps, cause)
+
+
+def _share_in_window(animation: Animation, options: RunSettings, cyclic: bool) -> float:
+    """The share of a shot that a search has at once: all of it, unless it is long."""
+    length, window = float(animation.frame_times[-1]), options.window
+    one = cyclic or options.robust is not None or options.adjoint != "discrete"
+    if one or window == 0.0 or (window is None and length <= LONG_SHOT):
+        return 1.0
+    return min(1.0, (1.0 + WINDOW_OVERLAP) * (window or WINDOW) / length)
 
 
 def refuse_unaffordable(cost: ExpectedCost, path: str, most_hours: float, available: float) -> None:

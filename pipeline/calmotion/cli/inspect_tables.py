@@ -78,11 +78,21 @@ def _print_contents(console: Console, report: dict[str, Any]) -> None:
         modes = zip(report["system_frequencies_hz"], report["system_damping_ratios"], strict=True)
         shown = ", ".join(f"{frequency:.4g} Hz ({ratio:.2g})" for frequency, ratio in modes)
         say(console, f"natural frequencies of the character in its first pose (damping ratios): {shown}, ...")
+    say(console, _expected(report["expected"]))
     _print_gains(console, report)
     print_left_out(console, report["left_out"])
     if report["mode_shapes"]:
         say(console, f"mode shapes: {', '.join(map(unbroken, report['mode_shapes']))}")
     print_notes(console, report["notes"])
+
+
+def _expected(row: dict[str, Any]) -> str:
+    """What `optimize` is expected to take, as a sentence."""
+    time = f"{60.0 * row['hours']:.3g} min" if row["hours"] < 2.0 else f"{row['hours']:.3g} h"
+    windows = ""
+    if row["windows"] > 1:
+        windows = f", in {row['windows']} windows of {row['window_s']:.3g} s that overlap by {row['overlap_s']:.3g} s"
+    return f"optimize is expected to take {time} of processor time and {row['memory_gb']:.2g} GB of memory{windows}"
 
 
 def _print_gains(console: Console, report: dict[str, Any]) -> None:

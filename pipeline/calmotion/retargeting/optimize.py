@@ -12,17 +12,16 @@ from calmotion.errors import ShotError
 from calmotion.multibody.failure import SimulationFailure
 from calmotion.multibody.integrators.workspace import Workspace
 from calmotion.retargeting.checkpoint import Checkpoint, problem_key
-from calmotion.retargeting.problem.adaptive_knots import useful_knots
+from calmotion.retargeting.found_curves import found_curves
 from calmotion.retargeting.problem.limit_costs import limit_costs
 from calmotion.retargeting.problem.posing import locked_coefficients, pose
 from calmotion.retargeting.problem.problem import RetargetProblem
 from calmotion.retargeting.problem.robot import Robot
 from calmotion.retargeting.robust.scenarios import shot_of
 from calmotion.retargeting.search import RetargetSearch
-from calmotion.retargeting.simplification.pruning import UNCHANGED
 from calmotion.retargeting.simplification.report_rows import search_rows
 from calmotion.retargeting.solver.gauss_newton import Search
-from calmotion.shot import Character, MotorCurve, OptimizerStep, Result
+from calmotion.shot import Character, OptimizerStep, Result
 from calmotion.shot.character import Array
 from calmotion.shot.robust.robots import Scenario
 from calmotion.shot.run import RunSettings
@@ -41,24 +40,6 @@ from calmotion.simulation.simulator import Simulator, compile_kernels
 from calmotion.simulation.target_errors import IntendedMotion, Objective
 
 FIRST_PENALTY = 1e3  # of limits, over the objective of the input for each second
-
-
-def _curves(problem: RetargetProblem, motors: int, x: Array) -> tuple[tuple[MotorCurve, ...], Array]:
-    """The curves of all motors, and the coefficients with negligible offsets set to exactly zero."""
-    basis, grid = problem.space.basis, problem.grid
-    coefficients = x.reshape(basis.count, len(problem.space.motors)).copy()
-    coefficients[:, np.max(np.abs(basis.values @ coefficients), axis=0) <= UNCHANGED] = 0.0
-    by_motor = coefficients @ problem.space.coupling.T
-    offsets = np.abs(basis.values @ by_motor)
-    changes, largest = np.any(offsets > 0.0, axis=0), np.max(offsets[grid.judged], axis=0)
-    curves = []
-    for motor in range(motors):
-        values, changed = problem.curves.angles[grid.frames, motor], bool(changes[motor])
-        if changed:
-            values = values + basis.at_frames @ by_motor[:, motor]
-        knots = useful_knots(basis, by_motor[:, motor]) if changed else basis.knots[[0, -1]]
-        curves.append(MotorCurve(motor, changed, knots, values, float(largest[motor])))
-    return tuple(curves), coefficients.ravel()
 
 
 def _progress_of(search: Search) -> tuple[OptimizerStep, ...]:
@@ -149,7 +130,7 @@ def _optimized(
     searched.run(start)
     problem, search = searched.problem, searched.search
     fixed = searched.hold()
-    curves, x = _curves(problem, len(character.motors), search.x)
+    curves, x = found_curves(problem, len(character.motors), search.x)
     problem.forget()
     problem.value(x)
     run, after_value, used = problem.run, problem.objective_value(), _used(problem, character)

@@ -6,6 +6,7 @@ from calmotion.accuracy.run_checks import check_simulation
 from calmotion.retargeting.optimize import refuse_other_integrators
 from calmotion.retargeting.problem.posing import unknowns
 from calmotion.retargeting.robust.retarget import uncertainties_of
+from calmotion.retargeting.windows.plan import window_length
 from calmotion.shot import Animation, Character
 from calmotion.shot.run import RunSettings
 from calmotion.simulation.compiled_shot import compile_shot
@@ -19,6 +20,7 @@ def check_search(character: Character, animation: Animation, options: RunSetting
             robot of which nothing is uncertain, to be robust against.
     """
     refuse_other_integrators(options)
+    window_length(character, animation, options)
     if options.robust is not None:
         uncertainties_of(compile_shot(character, animation))
     unknowns(character, animation, check_simulation(character, animation, options), options)

@@ -34,6 +34,8 @@ from calmotion.retargeting.optimize import optimize_shot, refuse_other_integrato
 from calmotion.retargeting.robust.retarget import retarget_robustly
 from calmotion.retargeting.search_progress import SuccessiveSearches
 from calmotion.retargeting.simplification.idle_motors import ENOUGH
+from calmotion.retargeting.windows.optimize import optimize_windows
+from calmotion.retargeting.windows.plan import window_length
 from calmotion.shot import OptimizerStep, Result
 from calmotion.shot.model_choice import OFF
 from calmotion.shot.run import RunSettings
@@ -47,13 +49,16 @@ FIRST_STEP = 0.2  # of the shake: the error that the step of the first search ma
 
 def optimize_to_tolerance(
     shot: CompiledShot, options: RunSettings, progress: Progress, checkpoint: Path | None = None,
-    known: ReferenceRun | None = None,
+    known: ReferenceRun | None = None, stored: Path | None = None,
 ) -> Result:  # fmt: skip
     """As `optimize_shot`, with the time step and the POD subspaces of the bodies chosen by their errors.
 
     The first search uses a step that resolves the vibration of the input to a fifth of its size. The remaining
     vibration is much smaller, so its error is known afterwards; if it exceeds the tolerance, the search continues with
     a finer step, and if the deflections have left the POD subspaces, with new ones.
+
+    Args:
+        stored: File of the windows of a long shot that are done, see `windows`.
     """
     refuse_other_integrators(options)
     character, animation = shot.character, shot.animation
@@ -75,7 +80,7 @@ def optimize_to_tolerance(
     for _ in range(MOST):
         reduced = projected.shot.with_tracks(tracks)
         of_step = replace(options, step=step) if chooses else options
-        latest = _searched(reduced, of_step, searches, checkpoint)
+        latest = _searched(reduced, of_step, searches, checkpoint, stored)
         searches.ended()
         result = with_modes(latest if result is None else _continued(result, latest), shot.bodies)
         if result.interrupted:
@@ -104,17 +109,30 @@ def optimize_to_tolerance(
 
 
 def _searched(
-    shot: CompiledShot, options: RunSettings, progress: SuccessiveSearches, checkpoint: Path | None
+    shot: CompiledShot, options: RunSettings, progress: SuccessiveSearches, checkpoint: Path | None,
+    stored: Path | None,
 ) -> Result:  # fmt: skip
     """One search; it continues with the idle motors if these would gain too much."""
-    first, character = optimize_shot(shot, options, progress, checkpoint), shot.character
+    character = shot.character
+    first = _search(shot, options, progress, checkpoint, stored)
     enough = ENOUGH * tolerance_of(character, options.tolerance)
     if first.interrupted or first.idle_gain_m is None or first.idle_gain_m <= enough or options.motors == OFF:
         return first
     progress.ended()
     motors = tuple(replace(motor, idle=False) for motor in character.motors)
     every = shot.with_tracks(found_tracks(first, shot.animation)).with_character(replace(character, motors=motors))
-    return _continued(first, optimize_shot(every, options, progress, checkpoint))
+    return _continued(first, _search(every, options, progress, checkpoint, stored))
+
+
+def _search(
+    shot: CompiledShot, options: RunSettings, progress: SuccessiveSearches, checkpoint: Path | None,
+    stored: Path | None,
+) -> Result:  # fmt: skip
+    """One search over the shot, or in windows where it is long."""
+    length = window_length(shot.character, shot.animation, options)
+    if length is None:
+        return optimize_shot(shot, options, progress, checkpoint)
+    return optimize_windows(shot, options, length, progress, checkpoint, stored)
 
 
 def _continued(first: Result, second: Result) -> Result:

@@ -32,6 +32,7 @@ from calmotion.shot.result import (
     Simplification,
     Simulation,
     Skin,
+    WindowRow,
 )
 
 __all__ = [
@@ -75,4 +76,5 @@ __all__ = [
     "TetGeometry",
     "Track",
     "WeightTrack",
+    "WindowRow",
 ]

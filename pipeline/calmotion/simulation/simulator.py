@@ -94,6 +94,13 @@ class Simulator:
         first = int(np.argmin(same))
         if first < 2 or first - 1 in known.trajectory.refined:
             return run_forward(self.model, self._workspace, angles, rates, self.h, self.world)
+        return self._from(known, first, angles, (joint_angles, joint_rates))
+
+    def _from(
+        self, known: ForwardRun, first: int, angles: Array, followed_by_joints: tuple[Array, Array]
+    ) -> ForwardRun:
+        """The motion whose instants before `first` are those of a known one."""
+        joint_angles, joint_rates = followed_by_joints
         trajectory = simulate_from(
             self.model.system, known.trajectory, first, joint_angles, joint_rates, self._workspace
         )  # fmt: skip

@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 
 from calmotion.accuracy.reduced_bodies import ReducedBodies
-from calmotion.host import HostError, Run
+from calmotion.errors import ShotError
+from calmotion.host import HostError, Run, Settings, parse_quantity
 from calmotion.shot import (
     Animation,
     Body,
@@ -26,6 +27,7 @@ from calmotion.shot import (
 )
 from calmotion.shot.motor import SERVO, measure_of
 from calmotion.shot.outputs import ModeShapes, MotorEffects, PlannedStep, SystemModes
+from calmotion.shot.run import WINDOW_OVERLAP, RunSettings
 from calmotion.version import __version__
 from calmotion.workflow.problems import Problem
 from calmotion.workflow.report import left_out_row, operator_row
@@ -56,7 +58,7 @@ class Inspection:
     """
 
     def __init__(self, outcome: Outcome):
-        self._run, self._path = outcome.run, outcome.shot.path
+        self._run, self._path, self._settings = outcome.run, outcome.shot.path, outcome.settings
         self.interrupted = outcome.interrupted
         self.problems: tuple[Problem, ...] = outcome.problems
         if self.findings is not None:
@@ -72,7 +74,7 @@ class Inspection:
         """The object that `--json` prints; empty where the shot could not be read."""
         from calmotion.workflow.plain import plain
 
-        report = inspect_report(self._run) if all(self._run.get(kind) for kind in _CONTENTS) else {}
+        report = inspect_report(self._run, self._settings) if all(self._run.get(kind) for kind in _CONTENTS) else {}
         if self.findings is not None:
             rows = [dataclasses.asdict(finding) for finding in self.findings.items]
             report |= {"shot": self._path, "findings": rows}
@@ -80,8 +82,13 @@ class Inspection:
         return made
 
 
-def inspect_report(run: Run) -> dict[str, Any]:
-    """The object of `inspect --json`; SI units and radians, as the names of the keys say."""
+def inspect_report(run: Run, settings: Settings | None = None) -> dict[str, Any]:
+    """The object of `inspect --json`; SI units and radians, as the names of the keys say.
+
+    Args:
+        run: The run.
+        settings: Settings of operators that were given to it.
+    """
     character, animation, provenance = run.data[Character], run.data[Animation], run.data[Provenance]
     reduced, modes, choices = run.get(ReducedBodies), run.get(SystemModes), run.get(ModelChoices)
     tables = {table.body: table for table in reduced.modes} if reduced else {}
@@ -133,6 +140,7 @@ def inspect_report(run: Run) -> dict[str, Any]:
             for target in character.targets
         ],
         "effects_of_gains": _effects(character, run.get(MotorEffects)),
+        "expected": _expected(character, animation, modes, settings),
         "system_frequencies_hz": modes.frequencies[:SHOWN_MODES].tolist() if modes else [],
         "system_damping_ratios": modes.damping[:SHOWN_MODES].tolist() if modes else [],
         "mode_shapes": list(shapes.paths) if (shapes := run.get(ModeShapes)) else [],
@@ -141,6 +149,33 @@ def inspect_report(run: Run) -> dict[str, Any]:
         "left_out": [left_out_row(row) for row in (*run.left_out(), *_without(choices, reduced, run.get(PlannedStep)))],
         "operators": [operator_row(row) for row in run.results],
     }
+
+
+def _expected(
+    character: Character, animation: Animation, modes: SystemModes | None, settings: Settings | None
+) -> dict[str, Any]:  # fmt: skip
+    """What `optimize` is expected to take: windows, memory and time; of the order of the real ones."""
+    from calmotion.accuracy.expected_cost import expected_cost
+    from calmotion.retargeting.windows.plan import overlap_time, plan_windows, window_length
+
+    options, given = RunSettings(), (settings or {}).get("retarget.optimize", {}).get("window")
+    if given is not None:
+        window = parse_quantity(given, "s") if isinstance(given, str) else float(str(given))
+        options = RunSettings(window=window if window >= 0.0 else None)
+    cost = expected_cost(character, animation, options, True)
+    row: dict[str, Any] = {
+        "duration_s": float(animation.frame_times[-1]), "steps": cost.steps, "memory_gb": cost.memory / 1e9,
+        "hours": cost.hours, "windows": 1, "window_s": None, "overlap_s": None,
+    }  # fmt: skip
+    try:
+        length = window_length(character, animation, options)
+    except ShotError:  # `optimize` says what is wrong
+        length = None
+    if length is None:
+        return row
+    overlap = overlap_time(modes.frequencies, modes.damping, length) if modes else WINDOW_OVERLAP * length
+    count = len(plan_windows(animation.frame_times, length, overlap))
+    return row | {"windows": count, "window_s": length, "overlap_s": overlap}
 
 
 def _without(

@@ -128,6 +128,7 @@ def run_report(run: Run, character: Character, result: Result, command: str, tot
         "error_shares": _error_shares(character, result),
         "lost_motion": lost_motion(character, result),
         "efforts": effort_rows(character, result),
+        "windows": [asdict(row) for row in result.windows],
         "frequencies_hz": {character.bodies[table.body].path: table.frequencies for table in result.modes},
     }
     source = run.get(Source)

@@ -136,6 +136,8 @@ def _periodic(knots: Array) -> tuple[BSpline, Array, Array]:
 def _ends(merge: Array, kept_ends: bool, grid: TimeGrid) -> Array:
     """Combinations of open B-splines that satisfy the end conditions, as columns."""
     count = len(merge)
+    if grid.joined or grid.continues:
+        return _ends_of_window(merge, kept_ends, grid)
     if kept_ends:
         order = 3 if grid.cyclic else 2
         return merge[:, order:-order]
@@ -148,4 +150,18 @@ def _ends(merge: Array, kept_ends: bool, grid: TimeGrid) -> Array:
     if grid.pre_steps == 0:
         merge = merge[:, 2:]
         merge[:2, 0] = 1.0
+    return merge
+
+
+def _ends_of_window(merge: Array, kept_ends: bool, grid: TimeGrid) -> Array:
+    """The same for a window of a longer shot: value, slope and curvature of the offset vanish where windows meet."""
+    if grid.joined or kept_ends:
+        merge = merge[:, 3 if grid.joined else 2 :]
+    elif grid.pre_steps == 0:
+        merge = merge[:, 2:]
+        merge[:2, 0] = 1.0
+    if grid.continues or kept_ends:
+        return merge[:, : -3 if grid.continues else -2]
+    merge = merge[:, :-2]
+    merge[-2:, -1] = 1.0
     return merge

@@ -14,6 +14,20 @@ from calmotion.simulation.inputs.curves import Curves
 
 
 @dataclass(frozen=True, eq=False)
+class BaseOffsets:
+    """Offsets that the curves of a problem already contain, and that its regulariser counts with the unknown ones.
+
+    Attributes:
+        values, accelerations: Shape [T, M].
+        h: Step [s].
+    """
+
+    values: Array
+    accelerations: Array
+    h: float
+
+
+@dataclass(frozen=True, eq=False)
 class OffsetSpace:
     """Coefficients x ordered by basis function, then motor, P functions and m motors; offsets of all M motors.
 
@@ -23,6 +37,7 @@ class OffsetSpace:
         coupling: By how much each motor changes with each of `motors`, shape [M, m].
         smoothness: Weight of the curvature penalty int |offset''|^2 / 2 of each motor.
         closeness: Weight of int |offset|^2 / 2 for each motor.
+        base: Further offsets that both penalties count; None where there are none.
     """
 
     basis: OffsetBasis
@@ -30,6 +45,7 @@ class OffsetSpace:
     coupling: Array
     smoothness: float
     closeness: float
+    base: BaseOffsets | None = None
 
     @staticmethod
     def uncoupled(basis: OffsetBasis, motors: IntArray, every: int, smoothness: float, closeness: float) -> OffsetSpace:
@@ -73,6 +89,33 @@ class OffsetSpace:
         values, rates, accelerations = (self.spread(spline, x) for spline in self.splines.values())
         return Curves(curves.angles + values, curves.rates + rates, curves.accelerations + accelerations)
 
-    def penalty_gradient(self, x: Array) -> Array:
-        """Matrix of the regulariser times x: the gradient of smoothness and closeness."""
+    @cached_property
+    def pull(self) -> Array:
+        """Gradient of the regulariser where the unknowns are zero, shape [n]."""
+        if self.base is None:
+            return np.zeros(self.size)
+        weighted = (
+            self.base.h * self.closeness * self.base.values,
+            self.base.h * self.smoothness * self.base.accelerations,
+        )
+        return self.gather(self.basis.values, weighted[0]) + self.gather(self.basis.accelerations, weighted[1])
+
+    @cached_property
+    def base_penalty(self) -> float:
+        """The regulariser where the unknowns are zero."""
+        if self.base is None:
+            return 0.0
+        sums = [float(np.sum(part**2)) for part in (self.base.values, self.base.accelerations)]
+        return 0.5 * self.base.h * (self.closeness * sums[0] + self.smoothness * sums[1])
+
+    def penalty_product(self, x: Array) -> Array:
+        """Matrix of the regulariser times x."""
         return np.asarray(self.penalty @ x.reshape(self.basis.count, len(self.motors))).ravel()
+
+    def penalty_gradient(self, x: Array) -> Array:
+        """The gradient of smoothness and closeness."""
+        return self.penalty_product(x) + self.pull
+
+    def penalty_value(self, x: Array) -> float:
+        """Smoothness and closeness."""
+        return self.base_penalty + float(x @ (0.5 * self.penalty_product(x) + self.pull))

@@ -50,7 +50,7 @@ def pose(
     )  # fmt: skip
     offsets = known.offsets
     start = fitted(known.basis, offsets).ravel() if np.any(offsets) else np.zeros(problem.size)
-    return problem, np.where(known.fixed, 0.0, start), not _spacing(character, options)
+    return problem, np.where(known.fixed, 0.0, start), not knot_spacing(character, options)
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,7 +76,7 @@ class Unknowns:
     continuous: bool
 
 
-def _spacing(character: Character, options: RunSettings) -> float | None:
+def knot_spacing(character: Character, options: RunSettings) -> float | None:
     """Requested distance of knots [s]; None where they are adaptive."""
     return options.knot_spacing or character.retarget.knot_spacing
 
@@ -90,7 +90,7 @@ def unknowns(character: Character, animation: Animation, grid: TimeGrid, options
     settings, motors = character.retarget, leaders(character)
     coupling = coupling_of(character, motors)
     kept_ends, offsets = settings.endpoints == "kept", existing_offsets(animation, grid, motors)
-    spacing = _spacing(character, options)
+    spacing = knot_spacing(character, options)
     if spacing:
         breaks = uniform_breaks(grid, spacing)
     else:

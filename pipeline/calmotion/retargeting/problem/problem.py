@@ -198,7 +198,7 @@ class RetargetProblem:
 
     def objective_value(self) -> float:
         """The objective at the point evaluated last, without the terms of the limits."""
-        return 0.5 * float(np.sum(self.residuals**2)) + 0.5 * float(self.x @ self.penalty_gradient(self.x))
+        return 0.5 * float(np.sum(self.residuals**2)) + self.penalty_value(self.x)
 
     def linearize(self) -> Array:
         """Linearise at the point evaluated last, and the gradient there."""
@@ -254,15 +254,23 @@ class RetargetProblem:
         return found[0][0] if len(found) == 1 else np.concatenate([residuals for residuals, _ in found]), changes
 
     def penalty_gradient(self, x: Array) -> Array:
-        """Matrix of the regulariser times x."""
+        """Gradient of the regulariser."""
         return self.space.penalty_gradient(x)
+
+    def penalty_product(self, x: Array) -> Array:
+        """Matrix of the regulariser times x."""
+        return self.space.penalty_product(x)
+
+    def penalty_value(self, x: Array) -> float:
+        """The regulariser."""
+        return self.space.penalty_value(x)
 
     def product(self, direction: Array) -> Array:
         """Gauss-Newton matrix times a direction: one tangent and one adjoint sweep."""
         residuals, changes = self.jvp(direction)
         if self.limits is not None:
             changes = {name: self.limits.curvature(name, self.limited[name]) * v for name, v in changes.items()}
-        return self.vjp(residuals, changes) + self.penalty_gradient(direction)
+        return self.vjp(residuals, changes) + self.penalty_product(direction)
 
     def precondition(self, fixed: BoolArray, values: dict[str, Array] | None = None) -> Callable[[Array], Array]:
         """The rigid robot's Gauss-Newton matrix, or that of `sharpen`, inverted over the entries that are not fixed.

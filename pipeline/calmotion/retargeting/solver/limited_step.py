@@ -80,7 +80,13 @@ class LimitedProblem(Protocol):
         """The transpose of `jvp`, shape [n]."""
 
     def penalty_gradient(self, x: Array) -> Array:
+        """Gradient of the regulariser, shape [n]."""
+
+    def penalty_product(self, x: Array) -> Array:
         """Matrix of the regulariser times x, shape [n]."""
+
+    def penalty_value(self, x: Array) -> float:
+        """The regulariser."""
 
     def precondition(self, fixed: BoolArray, values: Values | None = None) -> Callable[[Array], Array]:
         """An approximate inverse of the Gauss-Newton matrix; values of the limited quantities say which limits act."""
@@ -117,8 +123,7 @@ class LimitedModel:
 
     def objective(self, point: ModelPoint) -> float:
         """The objective, without the terms of the limits."""
-        x = self.problem.x + point.step
-        return 0.5 * float(np.sum(point.residuals**2)) + 0.5 * float(x @ self.problem.penalty_gradient(x))
+        return 0.5 * float(np.sum(point.residuals**2)) + self.problem.penalty_value(self.problem.x + point.step)
 
     def merit(self, point: ModelPoint) -> float:
         """The objective and the terms of the limits."""
@@ -191,7 +196,7 @@ def _newton_direction(
         residuals, values = problem.jvp(d)
         changes.append((residuals, values))
         weighted = {name: weights[name] * v for name, v in values.items()}
-        return np.where(fixed, 0.0, problem.vjp(residuals, weighted) + problem.penalty_gradient(d))
+        return np.where(fixed, 0.0, problem.vjp(residuals, weighted) + problem.penalty_product(d))
 
     inverse = problem.precondition(fixed, point.values)
     path = conjugate_gradients(product, gradient, inverse, np.inf, share, enough, max_products)

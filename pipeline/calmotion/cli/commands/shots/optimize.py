@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING
 
-from calmotion.cli.options import Commands, file_argument, run_options, shot_command, simulation_options
+from calmotion.cli.options import Commands, file_argument, quantity, run_options, shot_command, simulation_options
 
 if TYPE_CHECKING:
     from calmotion.cli.output import Output
@@ -17,6 +17,13 @@ def add_to(commands: Commands) -> None:
     file_argument(command, "-o", "--output", metavar="LAYER", required=True, help="USD layer to write")
     run_options(command)
     simulation_options(command, "optimize supports only bdf2")
+    command.add_argument(
+        "--window",
+        metavar="TIME",
+        type=quantity("s"),
+        help="length of the windows in which a long shot is searched, each going on from the one before (default: 20 s "
+        "where the shot is longer than 60 s; 0: one search)",
+    )
     group = command.add_argument_group(
         "robust curves", "Robots differ from their model: calm:retarget:uncertainty:modulus, :damping and :payload."
     )

@@ -1,0 +1,29 @@
+"""The motor curves of a point of a search."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from calmotion.retargeting.problem.adaptive_knots import useful_knots
+from calmotion.retargeting.problem.problem import RetargetProblem
+from calmotion.retargeting.simplification.pruning import UNCHANGED
+from calmotion.shot import MotorCurve
+from calmotion.shot.character import Array
+
+
+def found_curves(problem: RetargetProblem, motors: int, x: Array) -> tuple[tuple[MotorCurve, ...], Array]:
+    """The curves of all motors, and the coefficients with negligible offsets set to exactly zero."""
+    basis, grid = problem.space.basis, problem.grid
+    coefficients = x.reshape(basis.count, len(problem.space.motors)).copy()
+    coefficients[:, np.max(np.abs(basis.values @ coefficients), axis=0) <= UNCHANGED] = 0.0
+    by_motor = coefficients @ problem.space.coupling.T
+    offsets = np.abs(basis.values @ by_motor)
+    changes, largest = np.any(offsets > 0.0, axis=0), np.max(offsets[grid.judged], axis=0)
+    curves = []
+    for motor in range(motors):
+        values, changed = problem.curves.angles[grid.frames, motor], bool(changes[motor])
+        if changed:
+            values = values + basis.at_frames @ by_motor[:, motor]
+        knots = useful_knots(basis, by_motor[:, motor]) if changed else basis.knots[[0, -1]]
+        curves.append(MotorCurve(motor, changed, knots, values, float(largest[motor])))
+    return tuple(curves), coefficients.ravel()

@@ -1,0 +1,188 @@
+"""Parts of a shot in time: grid, curves and intended motion within some frames; simulations that are joined again."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+from calmotion.multibody.integrators.workspace import Workspace
+from calmotion.retargeting.windows.continued import Beginning, ContinuedSimulator
+from calmotion.shot import Animation, FreeTrack, Motion, Simulation
+from calmotion.shot.character import Array
+from calmotion.simulation.forward import ForwardRun, run_forward
+from calmotion.simulation.inputs.curves import Curves
+from calmotion.simulation.inputs.time_grid import TimeGrid, over_grid
+from calmotion.simulation.prepare import Prepared
+from calmotion.simulation.report import simulation_of
+from calmotion.simulation.target_errors import IntendedMotion
+
+
+@dataclass(frozen=True, eq=False)
+class Part:
+    """The part of a shot between two frames, with the instants before it that must be known.
+
+    Attributes:
+        prepared: The part as a shot of its own, times from its first frame on.
+        rows: Its instants among those of the shot.
+        first: Its first frame.
+    """
+
+    prepared: Prepared
+    rows: slice
+    first: int
+
+    @property
+    def known(self) -> int:
+        """How many of its instants are known: none of the first part."""
+        grid = self.prepared.grid
+        return grid.pre_steps + 1 if grid.joined else 0
+
+    def curves_of(self, curves: Curves) -> Curves:
+        """The part of curves of the whole shot."""
+        return Curves(*(part[self.rows] for part in (curves.angles, curves.rates, curves.accelerations)))
+
+    def intended_of(self, intended: IntendedMotion) -> IntendedMotion:
+        """The part of an intended motion of the whole shot."""
+        parts = (intended.c, intended.q, intended.target_positions, intended.target_rotations)
+        return IntendedMotion(*(part[self.rows] for part in parts))
+
+
+def part_of(whole: Prepared, first: int, last: int, known: int) -> Part:
+    """The part between two frames of a shot.
+
+    Args:
+        first, last: Frames.
+        known: Number of known instants up to the first frame, where the part does not begin the shot.
+    """
+    grid = whole.grid
+    joined = first > 0
+    pre = known - 1 if joined else grid.pre_steps
+    start = grid.pre_steps + grid.substeps * first - pre
+    stop = grid.pre_steps + grid.substeps * last + 1
+    times = grid.frame_times[: last - first + 1]
+    own = TimeGrid(times, grid.substeps, pre, grid.h, joined=joined, continues=last < len(grid.frame_times) - 1)
+    animation = _later(whole.shot.animation, float(grid.frame_times[first]), times)
+    shot = replace(whole.shot, animation=animation)
+    rows = slice(start, stop)
+    return Part(Prepared(shot, own, whole.world[rows]), rows, first)
+
+
+def _later(animation: Animation, start: float, frame_times: Array) -> Animation:
+    """An animation from a time on, for what a search reads of it besides its curves."""
+    if start == 0.0:
+        return replace(animation, frame_times=frame_times)
+    tracks = tuple(
+        replace(track, times=track.times - start, corners=track.corners - start) for track in animation.tracks
+    )
+    weights = tuple(replace(weight, times=weight.times - start) for weight in animation.weights)
+    free = tuple(FreeTrack(track.motor, track.times - start, track.free) for track in animation.free)
+    moving = tuple(replace(frame, times=frame.times - start) for frame in animation.moving)
+    return Animation(frame_times, tracks, tracks, moving, weights, free)
+
+
+def offset_curves(offsets: Array, grid: TimeGrid) -> Curves:
+    """Offsets of all motors at all instants of a shot.
+
+    Args:
+        offsets: At the frames, shape [f, M]: splines whose knots lie on frames, which the frames hold exactly.
+        grid: Of the shot.
+    """
+    if not offsets.shape[1] or not np.any(offsets):
+        return Curves(*[np.zeros((len(grid.times), offsets.shape[1]))] * 3)
+    spline = CubicSpline(grid.frame_times, offsets, bc_type="not-a-knot")
+    end = grid.end
+
+    def sample(times: Array, order: int) -> Array:
+        return np.asarray(spline(np.clip(times, 0.0, end), order))
+
+    return Curves(*over_grid(grid, sample))
+
+
+def added(curves: Curves, offsets: Curves) -> Curves:
+    """Curves with offsets."""
+    return Curves(
+        curves.angles + offsets.angles, curves.rates + offsets.rates, curves.accelerations + offsets.accelerations
+    )
+
+
+def performed(part: Part, curves: Curves, beginning: Beginning | None) -> ForwardRun:
+    """A simulation of a part.
+
+    Args:
+        curves: Of its motors at its instants.
+        beginning: The known states; None for the part that begins the shot.
+    """
+    prepared = part.prepared
+    if beginning is None:
+        workspace = Workspace.for_system(prepared.model.system)
+        return run_forward(prepared.model, workspace, curves.angles, curves.rates, prepared.grid.h, prepared.world)
+    simulator = ContinuedSimulator(prepared.model, prepared.grid.h, prepared.world, beginning)
+    return simulator.run(curves.angles, curves.rates)
+
+
+@dataclass(frozen=True, eq=False)
+class Piece:
+    """A simulated part, without its known instants; `time` is that of its first frame [s]."""
+
+    simulation: Simulation
+    time: float
+
+
+def piece_of(part: Part, run: ForwardRun, intended: IntendedMotion) -> Piece:
+    """A run of a part as a value for the user."""
+    whole, rows = simulation_of(part.prepared, run, part.intended_of(intended)), slice(part.known, None)
+    known = part.prepared.grid.times[part.known] if part.known else -np.inf
+    motion = _sliced(whole.motion, rows)
+    simulation = replace(
+        whole, motion=motion, position_errors=whole.position_errors[rows], rotation_errors=whole.rotation_errors[rows],
+        dead_centres=whole.dead_centres[whole.dead_centres >= known],
+    )  # fmt: skip
+    return Piece(simulation, float(part.first * (part.prepared.grid.frame_times[1])))
+
+
+def _sliced(motion: Motion, rows: slice) -> Motion:
+    def cut(part: Array | None) -> Array | None:
+        return None if part is None else part[rows].copy()
+
+    return Motion(
+        motion.times[rows], motion.positions[rows].copy(), motion.rotations[rows].copy(),
+        tuple(part[rows].copy() for part in motion.elastic), motion.motor_values[rows].copy(),
+        motion.motor_efforts[rows].copy(), motion.target_positions[rows].copy(), motion.target_rotations[rows].copy(),
+        cut(motion.joint_forces), cut(motion.joint_moments),
+    )  # fmt: skip
+
+
+def joined(pieces: Sequence[Piece], times: Array) -> Simulation:
+    """Successive pieces as one simulation.
+
+    Args:
+        times: Of all instants [s], shape [T].
+    """
+    parts = [piece.simulation for piece in pieces]
+    motions = [part.motion for part in parts]
+
+    def whole(name: str) -> Array:
+        return np.concatenate([getattr(motion, name) for motion in motions])
+
+    first = motions[0]
+    motion = Motion(
+        times, whole("positions"), whole("rotations"),
+        tuple(np.concatenate([m.elastic[b] for m in motions]) for b in range(len(first.elastic))),
+        whole("motor_values"), whole("motor_efforts"), whole("target_positions"), whole("target_rotations"),
+        None if first.joint_forces is None else whole("joint_forces"),
+        None if first.joint_moments is None else whole("joint_moments"),
+    )  # fmt: skip
+    return Simulation(
+        motion=motion,
+        position_errors=np.concatenate([part.position_errors for part in parts]),
+        rotation_errors=np.concatenate([part.rotation_errors for part in parts]),
+        newton_iterations=sum(part.newton_iterations for part in parts),
+        max_joint_gap=max(part.max_joint_gap for part in parts),
+        wall_s=sum(part.wall_s for part in parts),
+        sag=parts[0].sag,
+        refined_steps=sum(part.refined_steps for part in parts),
+        dead_centres=np.concatenate([piece.simulation.dead_centres + piece.time for piece in pieces]),
+    )

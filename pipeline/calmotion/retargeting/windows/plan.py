@@ -1,0 +1,112 @@
+"""The windows of a long shot: their lengths, and by how much they overlap.
+
+What a command does dies away like exp(-zeta omega t). A search over a window therefore ends later than the part of it
+that is kept, by the time in which the slowest mode falls to a tenth. It may be less, half a window: the searches that
+follow damp what is left much faster than the robot does (measured: a factor of five in half a second at 4 Hz and 1.2%).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from calmotion.errors import ShotError
+from calmotion.shot import Animation, Character
+from calmotion.shot.character import Array
+from calmotion.shot.run import LONG_SHOT, WINDOW, WINDOW_OVERLAP, RunSettings
+
+FALL = 10.0  # factor by which the slowest mode falls in an overlap
+LEAST = 1.0  # overlap [s]
+FEWEST = 12  # frames of a window
+
+
+@dataclass(frozen=True)
+class Window:
+    """A part of a shot, by its frames.
+
+    Attributes:
+        first, kept, last: The window begins at `first` and ends at `last`; what lies after `kept` is searched again by
+            the next window.
+        frames: Number of frames of the shot.
+    """
+
+    first: int
+    kept: int
+    last: int
+    frames: int
+
+    @property
+    def is_last(self) -> bool:
+        """Whether the shot ends with it."""
+        return self.last == self.frames - 1
+
+
+def window_length(character: Character, animation: Animation, options: RunSettings) -> float | None:
+    """Length of the windows of a shot [s]; None where one search covers it.
+
+    Raises:
+        ShotError: Windows are requested where there can be none.
+    """
+    length, wanted = float(animation.frame_times[-1]), options.window
+    cyclic, robust = character.retarget.cyclic, options.robust is not None
+    if wanted is None:
+        one = cyclic or robust or options.adjoint == "continuous"
+        return WINDOW if length > LONG_SHOT and not one else None
+    if wanted == 0.0:
+        return None
+    if options.adjoint == "continuous":
+        raise ShotError(
+            "windows do not support the continuous adjoint", path=character.path, attribute="retarget.optimize.adjoint",
+            found=options.adjoint, remedy="Use the discrete adjoint, or remove --window",
+        )  # fmt: skip
+    if cyclic or robust:
+        raise ShotError(
+            "windows do not support " + ("cyclic shots" if cyclic else "robust curves"),
+            path=character.path,
+            attribute="calm:retarget:cyclic" if cyclic else "--robust",
+            found=True if cyclic else options.robust.kind if options.robust else None,
+            remedy="Remove --window",
+        )
+    frame = float(animation.frame_times[1] - animation.frame_times[0])
+    if wanted < FEWEST * frame:
+        raise ShotError(
+            "the windows are too short", path=character.path, attribute="--window", found=f"{wanted:g} s",
+            remedy=f"Use {FEWEST * frame:.3g} s or more: {FEWEST} frames",
+        )  # fmt: skip
+    return wanted if wanted < length else None
+
+
+def overlap_time(frequencies: Array, damping: Array, length: float) -> float:
+    """By how much windows overlap [s].
+
+    Args:
+        frequencies, damping: Of the modes [Hz], and their damping ratios.
+        length: Of the windows [s].
+    """
+    rates = 2.0 * np.pi * np.asarray(frequencies) * np.asarray(damping)  # amplitudes fall like exp(-rate t)
+    slowest = float(np.min(rates[rates > 0.0], initial=math.inf))
+    most = max(LEAST, WINDOW_OVERLAP * length)
+    return min(max(LEAST, math.log(FALL) / slowest if math.isfinite(slowest) else LEAST), most)
+
+
+def plan_windows(frame_times: Array, length: float, overlap: float) -> tuple[Window, ...]:
+    """The windows of a shot; the last one takes what would be too short for one of its own.
+
+    Args:
+        frame_times: [s], uniform, shape [f].
+        length: Of the kept parts [s].
+        overlap: [s].
+    """
+    frames, frame = len(frame_times), float(frame_times[1] - frame_times[0])
+    stride, more = max(FEWEST, round(length / frame)), max(FEWEST // 2, math.ceil(overlap / frame - 1e-9))
+    starts = list(range(0, frames - 1, stride))
+    while len(starts) > 1 and frames - 1 - starts[-1] < max(more, stride // 2):
+        starts.pop()
+    windows = []
+    for first, following in zip(starts, [*starts[1:], frames - 1], strict=True):
+        # a tail that would leave a few frames for nobody reaches the end
+        last = frames - 1 if following + more + FEWEST // 2 >= frames - 1 else following + more
+        windows.append(Window(first, following, last, frames))
+    return tuple(windows)

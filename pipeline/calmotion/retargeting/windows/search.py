@@ -1,0 +1,146 @@
+"""The search of one window: offsets that go on from what is there, over its frames."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from calmotion.retargeting.checkpoint import Checkpoint, problem_key
+from calmotion.retargeting.found_curves import found_curves
+from calmotion.retargeting.problem.adaptive_knots import first_breaks
+from calmotion.retargeting.problem.limits import LimitTerms
+from calmotion.retargeting.problem.offset_basis import basis_on, uniform_breaks
+from calmotion.retargeting.problem.offset_space import BaseOffsets, OffsetSpace
+from calmotion.retargeting.problem.posing import CLOSENESS, SMOOTHNESS, knot_spacing, locked_coefficients
+from calmotion.retargeting.problem.problem import RetargetProblem
+from calmotion.retargeting.problem.robot import Robot
+from calmotion.retargeting.search import RetargetSearch
+from calmotion.retargeting.solver.gauss_newton import Search
+from calmotion.retargeting.windows.continued import Beginning, ContinuedSimulator
+from calmotion.retargeting.windows.parts import Part, added
+from calmotion.shot.character import Array, BoolArray
+from calmotion.shot.run import RunSettings
+from calmotion.simulation.inputs.curves import Curves
+from calmotion.simulation.inputs.gearing import coupling_of, leaders
+from calmotion.simulation.motor_limits import motor_bounds
+from calmotion.simulation.simulate import Progress
+from calmotion.simulation.target_errors import IntendedMotion, Objective
+
+FIRST_PENALTY = 1e3  # of limits, over the objective of the input for each second
+
+
+@dataclass(frozen=True, eq=False)
+class Setting:
+    """What all windows of a shot have in common.
+
+    Attributes:
+        options: Of the run.
+        tolerance: Acceptable error [m].
+        frequency: Lowest frequency of the character [Hz].
+        checkpoint: File of the search that runs; None for none.
+    """
+
+    options: RunSettings
+    tolerance: float
+    frequency: float
+    checkpoint: Path | None
+
+
+@dataclass(frozen=True, eq=False)
+class Found:
+    """What the search of a window found.
+
+    Attributes:
+        offsets: Change of the motors at its frames, shape [f, M].
+        search: Its state at the end.
+        parameters: Number of its unknowns.
+        interrupted: Whether the user ended it.
+        idle_gain: Gain that idle motors would bring [m]; None where there are none.
+        resumed_iterations: Iterations of the checkpoint from which it resumed.
+    """
+
+    offsets: Array
+    search: Search
+    parameters: int
+    interrupted: bool
+    idle_gain: float | None
+    resumed_iterations: int
+
+
+def search_window(
+    part: Part, curves: Curves, base: Curves, intended: IntendedMotion, beginning: Beginning | None, setting: Setting,
+    progress: Progress,
+) -> Found | None:  # fmt: skip
+    """Search a window; None where nothing in it may change.
+
+    Args:
+        part: From its first frame to its last one.
+        curves: The animator's, of the whole shot.
+        base: Offsets that are there, of the whole shot.
+        intended: Of the whole shot.
+        beginning: The states from which it goes on; None for the window that begins the shot.
+        setting: Of the shot.
+        progress: Called with its fraction.
+
+    Raises:
+        SimulationFailure: It cannot be simulated with the offsets that are there.
+    """
+    prepared = part.prepared
+    problem, locked = _posed(part, curves, base, intended, beginning, setting)
+    if problem is None:
+        return None
+    problem.hold(0)
+    start = np.zeros(problem.size)
+    if not np.isfinite(problem.value(start)):
+        assert problem.failure is not None
+        raise problem.failure
+    if problem.limits is not None:
+        value = max(problem.objective_value(), problem.merit_of_gain(1e-3 * setting.tolerance))
+        problem.limits.rho = FIRST_PENALTY * value / problem.grid.end
+    options, animation, character = setting.options, prepared.shot.animation, prepared.character
+    known = problem_key(problem, locked, (options, setting.tolerance, "window", part.first, problem.grid.continues))
+    searched = RetargetSearch(
+        problem, Search.start(start), (), character, animation, options, setting.tolerance, setting.frequency,
+        not knot_spacing(character, options), Checkpoint(setting.checkpoint, known), progress,
+    )  # fmt: skip
+    searched.run(start)
+    final = searched.problem
+    x = found_curves(final, len(character.motors), searched.search.x)[1]
+    basis = final.space.basis
+    coefficients = x.reshape(basis.count, len(final.space.motors)) @ final.space.coupling.T
+    return Found(
+        np.asarray(basis.at_frames @ coefficients), searched.search, final.size, searched.interrupted,
+        searched.idle_gain, searched.resumed_iterations,
+    )  # fmt: skip
+
+
+def _posed(
+    part: Part, curves: Curves, base: Curves, intended: IntendedMotion, beginning: Beginning | None, setting: Setting
+) -> tuple[RetargetProblem | None, BoolArray]:  # fmt: skip
+    """The problem of a window, and its coefficients that the shot locks."""
+    prepared, options = part.prepared, setting.options
+    character, grid, model = prepared.character, prepared.grid, prepared.model
+    settings, motors = character.retarget, leaders(character)
+    spacing = knot_spacing(character, options)
+    breaks = uniform_breaks(grid, spacing) if spacing else first_breaks(grid)
+    basis = basis_on(grid, breaks, settings.endpoints == "kept")
+    locked = locked_coefficients(prepared.shot.animation, basis, motors, grid.end)
+    if not len(motors) or not basis.count or np.all(locked):
+        return None, locked
+    coupling = coupling_of(character, motors)
+    bounds = motor_bounds(character, np.any(coupling, axis=1))
+    smoothness = next(v for v in (options.smoothness, settings.smoothness, SMOOTHNESS) if v is not None)
+    own = part.curves_of(base)
+    there = BaseOffsets(own.angles, own.accelerations, grid.h) if np.any(own.angles) else None
+    objective = Objective.over(model, part.intended_of(intended), grid, prepared.shot.animation.weights)
+    problem = RetargetProblem(
+        model, grid, added(part.curves_of(curves), own), objective,
+        OffsetSpace(basis, motors, coupling, smoothness, CLOSENESS, there), prepared.world,
+        LimitTerms(bounds, grid.judged, grid.h, 1.0) if bounds else None,
+    )  # fmt: skip
+    if beginning is not None:
+        simulator = ContinuedSimulator(model, grid.h, prepared.world, beginning)
+        problem.robots = (Robot(simulator, objective),)
+    return problem, locked
