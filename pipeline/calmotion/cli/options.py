@@ -42,6 +42,9 @@ def shot_command(commands: Commands, name: str, function: Command, text: str) ->
     command.add_argument("--json", action="store_true", help="print one JSON object on stdout, and nothing else there")
     command.add_argument("--quiet", action="store_true", help="print nothing but errors (and the object of --json)")
     command.add_argument("--progress", action="store_true", help="print machine-readable progress to stderr")
+    command.add_argument(
+        "--openjd", action="store_true", help="print progress to stdout in the words of Open Job Description"
+    )
     file_argument(
         command, "--log", metavar="FILE",
         help="add JSON lines to this file: time, stage, fraction, message and memory of the run",

@@ -28,13 +28,15 @@ class ProgressDisplay:
         quiet: Show nothing.
         machine: Show lines for a program.
         log: File of the log; None for none.
+        openjd: Print lines of Open Job Description to stdout.
 
     Raises:
         SettingError: The log cannot be written.
     """
 
-    def __init__(self, quiet: bool, machine: bool = False, log: str | None = None):
+    def __init__(self, quiet: bool, machine: bool = False, log: str | None = None, openjd: bool = False):
         self._quiet, self._machine = quiet, machine
+        self._farm = FarmProgress() if openjd else None
         self._log: RunLog | None = None
         if log is not None:
             from calmotion.cli.diagnostics.run_log import RunLog
@@ -56,12 +58,16 @@ class ProgressDisplay:
     ) -> None:
         if self._bars:
             self._bars.stop()
+        if self._farm:
+            self._farm.end(error)
         if self._log:
             self._log.end("done" if kind is None else kind.__name__)
 
     def __call__(self, state: Stage) -> None:
         """Show how far a stage is."""
         stage, fraction, message = state.stage, state.fraction, state.message
+        if self._farm:
+            self._farm.show(state)
         if self._log:
             self._log.progress(state)
         if self._machine:
@@ -91,6 +97,40 @@ class ProgressDisplay:
             self._bars.console.print(wrapped(line, width_of(sys.stderr)), markup=False, highlight=False, soft_wrap=True)
         else:
             notice(line)
+
+
+class FarmProgress:
+    """Progress in the words of Open Job Description, on stdout.
+
+    How many stages there are is not known: each takes half of what is left, so that the percentage never falls.
+    """
+
+    def __init__(self) -> None:
+        self._before, self._shown, self._told = 0.0, 0.0, ""
+
+    def show(self, state: Stage) -> None:
+        """How far a stage is."""
+        percent = 100.0 * (self._before + 0.5 * (1.0 - self._before) * state.fraction)
+        if state.fraction >= 1.0:
+            self._before += 0.5 * (1.0 - self._before)
+        if percent >= self._shown + 1.0:
+            self._shown = percent
+            self._say("progress", f"{percent:.1f}")
+        told = f"{state.stage}: {state.message}" if state.message else state.stage
+        if told != self._told:
+            self._told = told
+            self._say("status", told)
+
+    def end(self, error: BaseException | None) -> None:
+        """The command ends."""
+        if error is None:
+            self._say("progress", "100.0")
+        else:
+            self._say("fail", str(error) or type(error).__name__)
+
+    @staticmethod
+    def _say(word: str, text: str) -> None:
+        print(f"openjd_{word}: {' '.join(text.split())}", file=sys.stdout, flush=True)
 
 
 def time_left(seconds: float | None) -> str:

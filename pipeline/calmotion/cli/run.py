@@ -38,7 +38,7 @@ def run_shot(
     from calmotion.cli.run_report import print_run
 
     shot = opened_shot(args)
-    with ProgressDisplay(args.quiet, args.progress, args.log) as display:
+    with ProgressDisplay(args.quiet, args.progress, args.log, args.openjd) as display:
         result = function(
             shot,
             verify=args.verify,

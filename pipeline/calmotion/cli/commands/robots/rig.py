@@ -33,7 +33,7 @@ def _run(args: argparse.Namespace, output: Output) -> int:
     from calmotion.workflow.report import rig_report
 
     shot = opened_shot(args)
-    with ProgressDisplay(args.quiet, args.progress, args.log) as display:
+    with ProgressDisplay(args.quiet, args.progress, args.log, args.openjd) as display:
         made = rig(shot, args.output, **run_arguments(args, display))
     conclude(rig_report(made), (), output, None if args.quiet else _print)
     return 0

@@ -20,7 +20,7 @@ BENCHMARKS = {
     "reduction": "speed.reduction", "reduction-convergence": "accuracy.reduction_convergence",
     "scaling": "speed.scaling", "simplification": "accuracy.simplification", "speed": "speed.stages",
     "stability": "integrators.stability",
-    "tolerances": "accuracy.tolerances", "work-precision": "accuracy.work_precision",
+    "tolerances": "accuracy.tolerances", "windows": "speed.windows", "work-precision": "accuracy.work_precision",
 }  # fmt: skip
 
 

@@ -59,7 +59,7 @@ def _run(args: argparse.Namespace, output: Output) -> int:
 
     args.shot = with_shot(args.shot)
     shot = opened_shot(args)
-    with ProgressDisplay(args.quiet, args.progress, args.log) as display:
+    with ProgressDisplay(args.quiet, args.progress, args.log, args.openjd) as display:
         made = export(
             shot, args.output, to=args.to, rate=args.rate, start_delay=args.start_delay, tolerance=args.tolerance,
             search=not args.no_search, operators=args.run, settings=assignments(args), progress=display,

@@ -42,7 +42,7 @@ def _run(args: argparse.Namespace, output: Output) -> int:
     from calmotion.workflow.commands import inspect
 
     shot = opened_shot(args)
-    with ProgressDisplay(args.quiet, args.progress, args.log) as display:
+    with ProgressDisplay(args.quiet, args.progress, args.log, args.openjd) as display:
         inspection = inspect(
             shot,
             strict=args.strict,
