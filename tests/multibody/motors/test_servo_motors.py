@@ -4,9 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from arms import chain, compiled
+from arms import chain, compiled, frame
 from calmotion.multibody.analysis.modes import system_modes
 from calmotion.multibody.motors.servos import motor_effort
+from calmotion.shot import Body, Character, Joint, MassProperties, Motor
 from calmotion.shot.motor import Rotor
 from motor_runs import pitch, run, smooth
 from scipy.integrate import solve_ivp
@@ -35,6 +36,26 @@ def test_two_mass_joint_has_its_closed_form_resonance_and_antiresonance():
     assert 2 * np.pi * free[-1] == pytest.approx(np.sqrt(k * (1 / INERTIA + 1 / inertia)), rel=1e-6)
     assert free[0] < 1e-2
     assert 2 * np.pi * held[0] == pytest.approx(np.sqrt(k / INERTIA), rel=1e-6)
+
+
+def test_two_masses_on_a_slider_have_their_closed_form_frequencies_and_sag():
+    k, gear, mass, inertia, d = 900.0, 5e3, 2.0, 0.7, 4.0
+    up = np.array([1.0, 0.0, 0.0, 0.0])
+    bodies = (Body("/C/A", frame(), MassProperties(mass, np.array([0.1, 0.0, 0.0]), 0.01 * np.eye(3))),)
+    joints = (Joint("/C/J", "prismatic", -1, 0, frame(rotation=up), frame(rotation=up)),)
+    motors = (Motor(0, "/C/J", "linear", linear=True),)
+    lift = Character("/C", bodies, joints, motors, (), np.array([0.0, 0.0, -G]))
+    model = servo(lift, k, d, armature=inertia, gear_stiffness=gear)
+    # M x'' + K x = 0 of the rotor and of the carriage
+    matrix = np.array([[k + gear, -gear], [-gear, gear]]) / np.array([[inertia], [mass]])
+    frequencies, _ = system_modes(model, np.zeros(1))
+    assert 2 * np.pi * frequencies == pytest.approx(np.sqrt(np.sort(np.linalg.eigvals(matrix).real)), rel=1e-3)
+    free, _ = system_modes(servo(lift, 1e-7, 0.0, armature=inertia, gear_stiffness=gear), np.zeros(1))
+    assert 2 * np.pi * free[-1] == pytest.approx(np.sqrt(gear * (1 / mass + 1 / inertia)), rel=1e-6)
+    still = np.zeros((3, 1))
+    found, loads = run(model, still, still, 1e-2)
+    assert found.states.c[0, 0, 2] == pytest.approx(-mass * G * (1 / k + 1 / gear), rel=1e-9)
+    assert loads.efforts[0] == pytest.approx([mass * G], rel=1e-9)
 
 
 def slope_of(k, d, limit, rotor):

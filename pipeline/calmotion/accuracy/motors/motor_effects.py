@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -49,16 +50,23 @@ def effects_of_gains(shot: CompiledShot, options: RunSettings) -> MotorEffects |
     character = with_gains_used(shot.character)
     if not motors_give(character):
         return None
-    options = replace(options, step=own_step(character, options), integrator="bdf2")
+    options = replace(options, step=own_step(character, options))
     prepared = prepare(shot, options)
+
+    def simulated(model: Model, options: RunSettings) -> Array:
+        try:
+            return _errors(prepared, model, options)
+        except SimulationFailure as failure:
+            raise failure_error(prepared, failure) from failure
+
     found = []
-    try:
-        for model in (_giving_model(shot, character), _with_ideal_motors(shot)):
-            errors = _errors(prepared, model, options)
-            lag = errors[prepared.grid.judged].max(axis=0, initial=0.0)
-            found += [lag, np.zeros_like(lag) if prepared.grid.cyclic else errors[0]]
-    except SimulationFailure:
-        return None
+    for model in (_giving_model(shot, character), _with_ideal_motors(shot)):
+        try:
+            errors = by_fast_scheme(options, partial(simulated, model))
+        except ShotError:
+            return None
+        lag = errors[prepared.grid.judged].max(axis=0, initial=0.0)
+        found += [lag, np.zeros_like(lag) if prepared.grid.cyclic else errors[0]]
     return MotorEffects(tuple(m.path for m in character.motors if m.model != PRESCRIBED), *found)
 
 
