@@ -93,9 +93,12 @@ def _number(path: str, lines: list[str], index: int, label: str) -> float:
     try:
         if not text.lower().startswith(label.lower()):
             raise ValueError
-        return float(text[len(label) :])
+        value = float(text[len(label) :])
+        if not np.isfinite(value):
+            raise ValueError
     except ValueError:
         raise _wrong(path, index + 1, f"expected `{label}` and a number", text or "nothing") from None
+    return value
 
 
 def _row(path: str, number: int, line: str, count: int) -> list[float]:

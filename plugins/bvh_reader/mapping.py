@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from calmotion.errors import ShotError
-from calmotion.host import SettingError, nearest, parse_quantity
+from calmotion.host import SettingError, has_no_unit, nearest, parse_quantity
 from calmotion.shot import MotorTracks
 from calmotion.shot.character import Array
 
@@ -56,6 +56,10 @@ def _entry(text: str, motion: BvhMotion) -> Entry:
         offset = parse_quantity(match["offset"] or "0", "rad" if turns else "m")
     except (ValueError, ShotError) as error:
         raise _wrong("this is not an entry of a mapping", text, str(error)) from None
+    if offset and has_no_unit(match["offset"]):
+        units = ("deg", "rad") if turns else ("mm", "m")
+        written = " or ".join(f"{match['offset']}{unit}" for unit in units)
+        raise _wrong("the offset has no unit", text, f"Write {written}, whichever it is")
     return Entry(channel, motor, factor, offset)
 
 

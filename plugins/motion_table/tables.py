@@ -10,6 +10,7 @@ from calmotion.errors import ShotError
 from calmotion.shot import MotorTracks
 from calmotion.shot.character import Array
 from calmotion.support.files import refuse_special
+from calmotion.support.memory import available_memory, too_large
 
 TIME = "time_s"
 _OUTPUTS = (".x", ".y", ".z", ".error", ".rotation_error", ".input", ".output", ".effort")
@@ -17,6 +18,7 @@ _REMEDY = (
     "Write a column time_s in seconds, and one for each joint, named after it, in rad (or with a comment "
     "'# units: angle deg') or m"
 )
+_EXPANSION = 12.0  # memory of the lines and numbers of a file, by its size
 _WITHOUT = "--set motion.read.rate=60Hz --set motion.read.joints=NAME,NAME,..."
 
 
@@ -34,10 +36,13 @@ def read_motion(path: str, *, angles: str, rate: float, names: Sequence[str]) ->
     """
     try:
         refuse_special(path)
+        if reason := too_large(path, _EXPANSION):
+            raise OSError(0, f"it is too large for the memory: {reason}")
         columns, degrees = (_npz if path.lower().endswith(".npz") else _csv)(path, names)
     except (OSError, UnicodeDecodeError) as error:
         found = error.strerror if isinstance(error, OSError) else error
-        raise ShotError("the motion cannot be read", path=path, found=found, remedy="Name another file") from error
+        remedy = "Name another file" if isinstance(error, OSError) else "Save the table as UTF-8"
+        raise ShotError("the motion cannot be read", path=path, found=found, remedy=remedy) from error
     times = columns.pop(TIME, None)
     if times is None:
         if not rate > 0.0:
@@ -57,8 +62,16 @@ def _csv(path: str, names: Sequence[str]) -> tuple[dict[str, Array], bool]:
     lines = [(n, line) for n, line in lines if not line.startswith("#")]
     if not lines:
         raise ShotError("the motion is empty", path=path, remedy=_REMEDY)
-    rows = list(csv.reader(line for _, line in lines))
+    try:
+        rows = list(csv.reader((line for _, line in lines), strict=True))
+    except csv.Error as error:
+        raise ShotError("this is no table", path=path, found=error, remedy=_REMEDY) from None
     head = [cell.strip() for cell in rows[0]]
+    if len(head) == 1 and any(sign in head[0] for sign in ";\t"):
+        raise ShotError(
+            "the columns are not separated by commas", path=path, attribute=f"line {lines[0][0]}", found=head[0][:60],
+            remedy="Save the table with commas between columns, and points in numbers",
+        )  # fmt: skip
     if _is_number(head[0]):
         if not names:
             raise ShotError(
@@ -73,9 +86,7 @@ def _csv(path: str, names: Sequence[str]) -> tuple[dict[str, Array], bool]:
             "this is a table that --csv wrote", path=path, found=head[1] if len(head) > 1 else head[0],
             remedy="It is a result, for plots and spreadsheets; name a table of joint angles",
         )  # fmt: skip
-    repeated = next((name for k, name in enumerate(head) if name != "-" and name in head[:k]), None)
-    if repeated is not None:
-        raise ShotError("two columns have the same name", path=path, found=repeated, remedy="Rename one of them")
+    _refuse_repeated(path, head)
     values = np.zeros((len(rows), len(head)))
     for k, ((number, line), row) in enumerate(zip(lines, rows, strict=True)):
         try:
@@ -90,37 +101,65 @@ def _csv(path: str, names: Sequence[str]) -> tuple[dict[str, Array], bool]:
 
 def _npz(path: str, names: Sequence[str]) -> tuple[dict[str, Array], bool]:
     """The same of an NPZ file: an array for each joint, or `positions` with `joint_names`; `time_s` or `fps`."""
-    import zipfile
-
-    try:
-        with np.load(path, allow_pickle=False) as content:
-            arrays = {name: np.asarray(content[name]) for name in content.files}
-    except (ValueError, zipfile.BadZipFile, EOFError) as error:
-        raise ShotError("this is not an NPZ file of plain arrays", path=path, found=error, remedy=_REMEDY) from error
+    arrays = _arrays(path)
     columns: dict[str, Array] = {}
     unit = str(arrays.pop("units", ""))
-    fps = float(arrays.pop("fps")) if "fps" in arrays and np.ndim(arrays["fps"]) == 0 else 0.0
+    fps = float(_numbers(path, "fps", arrays.pop("fps"), 0)) if "fps" in arrays else 0.0
     if "positions" in arrays:
-        positions = np.asarray(arrays["positions"], np.float64)
+        positions = _numbers(path, "positions", arrays["positions"], 2)
         own = [str(name) for name in np.atleast_1d(arrays["joint_names"])] if "joint_names" in arrays else list(names)
-        if positions.ndim != 2 or positions.shape[1] != len(own):
+        if positions.shape[1] != len(own):
             raise ShotError(
                 "positions must have a column for each name in joint_names", path=path, attribute="positions",
                 found=f"shape {positions.shape} and {len(own)} names", remedy="Write both, or use " + _WITHOUT,
             )  # fmt: skip
+        _refuse_repeated(path, own)
         columns = {name: positions[:, k] for k, name in enumerate(own) if name != "-"}
-        columns |= {TIME: np.asarray(arrays[TIME], np.float64)} if TIME in arrays else {}
+        columns |= {TIME: _numbers(path, TIME, arrays[TIME], 1)} if TIME in arrays else {}
     else:
-        for name, array in arrays.items():
-            if array.ndim != 1 or not np.issubdtype(array.dtype, np.number):
-                raise ShotError(
-                    "must be one number for each time", path=path, attribute=name,
-                    found=f"shape {array.shape} of {array.dtype}", remedy=_REMEDY,
-                )  # fmt: skip
-            columns[name] = np.asarray(array, np.float64)
+        columns = {name: _numbers(path, name, array, 1) for name, array in arrays.items()}
     if TIME not in columns and fps > 0.0 and columns:
         columns[TIME] = np.arange(len(next(iter(columns.values())))) / fps
     return columns, "deg" in unit
+
+
+def _refuse_repeated(path: str, names: Sequence[str]) -> None:
+    repeated = next((name for k, name in enumerate(names) if name != "-" and name in names[:k]), None)
+    if repeated is not None:
+        raise ShotError("two columns have the same name", path=path, found=repeated, remedy="Rename one of them")
+
+
+def _arrays(path: str) -> dict[str, np.ndarray]:
+    """The arrays of an NPZ file by name, where they fit into the memory.
+
+    Raises:
+        ShotError: It is no such file, or too large.
+    """
+    import zipfile
+
+    try:
+        with np.load(path, allow_pickle=False) as content:
+            needed, free = float(sum(member.file_size for member in content.zip.infolist())), available_memory()
+            if needed > free:
+                raise ValueError(f"its arrays take {needed / 1e9:.1f} GB, and {free / 1e9:.1f} GB are free")
+            return {name: np.asarray(content[name]) for name in content.files}
+    except (ValueError, zipfile.BadZipFile, EOFError, KeyError, AttributeError, MemoryError) as error:
+        raise ShotError("this is not an NPZ file of plain arrays", path=path, found=error, remedy=_REMEDY) from error
+
+
+def _numbers(path: str, name: str, array: np.ndarray, axes: int) -> Array:
+    """An array as real numbers.
+
+    Raises:
+        ShotError: It has another number of axes, or holds anything else.
+    """
+    if array.ndim != axes or array.dtype.kind not in "iuf":
+        wanted = ("one number", "one number for each time", "a number for each time and joint")[axes]
+        raise ShotError(
+            f"must be {wanted}", path=path, attribute=name, found=f"shape {array.shape} of {array.dtype}",
+            remedy=_REMEDY,
+        )  # fmt: skip
+    return np.asarray(array, np.float64)
 
 
 def _refuse_bad(path: str, times: Array, columns: dict[str, Array]) -> None:

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import zipfile
+
 import numpy as np
 import pytest
 from calmotion.errors import ShotError
 from calmotion.shot import MotorTracks
 from calmotion.shot.run import Source
+from calmotion.support import memory
 from calmotion.testing import host_with, run_operator
 
 TIMES = np.array([2.0, 2.5, 3.0])
@@ -79,6 +82,10 @@ REFUSED = {
     "times that go back": (table(times=TIMES[::-1]), "times must increase"),
     "one row": ("time_s,pan\n0,1\n", "two rows"),
     "a column twice": (table("time_s,pan,pan"), "same name"),
+    "semicolons": ("time_s;pan\n0;1\n1;2\n", "not separated by commas"),
+    "tabulators": ("time_s\tpan\n0\t1\n", "not separated by commas"),
+    "a cell without end": ("time_s,pan\n0," + "1" * 200_000 + "\n1,0\n", "no table"),
+    "a quotation mark without end": ('time_s,"pan\n0,1\n1,2\n', "no table"),
     "a table of results": (table("time_s,/R/j.input,/R/j.output"), "--csv wrote"),
 }
 
@@ -93,7 +100,13 @@ def test_what_is_no_motion_is_refused(read, name):
 
 @pytest.mark.parametrize(
     "content", [{"time_s": TIMES, "pan": PAN[:2]}, {"time_s": TIMES, "positions": np.zeros((3, 2)), "joint_names": "a"},
-                {"time_s": TIMES, "names": np.array(["a", "b", "c"])}, {"time_s": TIMES}]
+                {"time_s": TIMES, "names": np.array(["a", "b", "c"])}, {"time_s": TIMES},
+                {"fps": "abc", "pan": PAN}, {"fps": 2.0, "positions": np.zeros((2, 2)), "joint_names": ["pan", "pan"]},
+                {"fps": np.nan, "pan": PAN}, {"fps": np.ones(2), "pan": PAN},
+                {"fps": 24.0, "positions": np.array([["a"], ["b"]]), "joint_names": ["pan"]},
+                {"time_s": ["a", "b"], "positions": np.zeros((2, 1)), "joint_names": ["pan"]},
+                {"time_s": 3.0, "positions": np.zeros((2, 1)), "joint_names": ["pan"]},
+                {"time_s": TIMES, "pan": PAN + 1j}, {"time_s": TIMES, "pan": PAN > 0.0}]
 )  # fmt: skip
 def test_arrays_that_do_not_fit_are_refused(read, content):
     with pytest.raises(ShotError, match="a.npz"):
@@ -103,3 +116,20 @@ def test_arrays_that_do_not_fit_are_refused(read, content):
 def test_a_file_that_is_no_npz_is_refused(read, tmp_path):
     with pytest.raises(ShotError, match="not an NPZ file"):
         read("a.npz", "hello")
+
+
+def archive(path, shape, content=b""):
+    """An NPZ file whose array claims a shape."""
+    head = f"{{'descr': '<f8', 'fortran_order': False, 'shape': ({shape},), }}".encode().ljust(117) + b"\n"
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as file:
+        file.writestr("pan.npy", b"\x93NUMPY\x01\x00" + len(head).to_bytes(2, "little") + head + content)
+
+
+def test_arrays_that_would_fill_the_memory_are_not_made(read, tmp_path, monkeypatch):
+    archive(tmp_path / "claims.npz", 10**11)
+    with pytest.raises(ShotError, match="not an NPZ file"):
+        read("claims.npz", None)
+    archive(tmp_path / "holds.npz", 10**6, bytes(8 * 10**6))
+    monkeypatch.setattr(memory, "_free_memory", lambda: 1e6)
+    with pytest.raises(ShotError, match="GB are free"):
+        read("holds.npz", None, rate=24.0)

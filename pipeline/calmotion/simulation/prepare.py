@@ -137,8 +137,8 @@ def failure_error(prepared: Prepared, failure: SimulationFailure) -> ShotError:
     body = character.bodies[tree.body[failure.component]].path
     if static:
         return ShotError(
-            f"the robot has no static equilibrium in the pose of its first frame: under {failure.share:.0%} of gravity "
-            f"it fails, first at the joint {joint.path}",
+            "the robot has no static equilibrium in the pose of its first frame: "
+            f"{_weight_at_failure(failure)}, first at the joint {joint.path}",
             path=body,
             remedy=_remedy_at_rest(prepared, failure.component),
         )
@@ -149,6 +149,13 @@ def failure_error(prepared: Prepared, failure: SimulationFailure) -> ShotError:
         remedy="Try a smaller --step; check the masses, the material and the motion of this joint there"
         + (", and whether the closed chains can reach the poses that their motors ask for." if closed else "."),
     )
+
+
+def _weight_at_failure(failure: SimulationFailure) -> str:
+    """The share of gravity that a robot without static equilibrium bears, as a clause."""
+    if failure.share < 0.005:
+        return "nothing holds it, so that it gives way under the smallest load"
+    return f"under {failure.share:.0%} of gravity it fails"
 
 
 def _remedy_at_rest(prepared: Prepared, component: int) -> str:

@@ -139,6 +139,6 @@ def _refuse_turns(character: Character, turns: Array, times: Array, h: float) ->
                 path=motor.path,
                 attribute=motor.attribute,
                 found=f"at {times[n]:.3f} s",
-                remedy="Use a smaller --step, slow it down there, or check the unit of its samples (degrees) and "
-                "timeCodesPerSecond.",
+                remedy="Use a smaller --step, slow it down there, or check timeCodesPerSecond and the unit of its "
+                "samples: degrees in a shot, rad in a table of --motion.",
             )

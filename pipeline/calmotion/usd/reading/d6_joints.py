@@ -1,7 +1,7 @@
 """Generic (D6) joints of UsdPhysics that are in fact fixed, revolute, prismatic or spherical.
 
 A `PhysicsJoint` moves along and about all axes of its frames, except where a PhysicsLimitAPI locks it: its lower limit
-exceeds the upper one, or both are zero.
+exceeds the upper one, or both are nothing that can be seen.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from pxr import Usd
 
 TYPE = "PhysicsJoint"
+NO_ROTATION, NO_TRANSLATION = 1e-2, 1e-5  # play of a locked direction [deg], [stage length]
 _TRANSLATIONS, _ROTATIONS = ("transX", "transY", "transZ"), ("rotX", "rotY", "rotZ")
 
 
@@ -53,10 +54,11 @@ def simple_joint(prim: Usd.Prim) -> SimpleJoint:
 
 
 def _is_locked(prim: Usd.Prim, name: str) -> bool:
+    least = NO_ROTATION if name in _ROTATIONS else NO_TRANSLATION
     low, high = (_number(prim, f"limit:{name}:physics:{end}") for end in ("low", "high"))
     if low is None or high is None:
         return False
-    return low > high or low == high == 0.0
+    return low > high or max(abs(low), abs(high)) <= least
 
 
 def _number(prim: Usd.Prim, name: str) -> float | None:

@@ -18,20 +18,13 @@ from calmotion.usd.reading.animated_transforms import carriers, codes_of
 from calmotion.usd.reading.character import Skeleton, build_character, read_skeleton
 from calmotion.usd.reading.context import Reading, is_rigid_body, prims_of
 from calmotion.usd.reading.joints import joint_prims
-from calmotion.usd.reading.motors.driven_motors import (
-    BODIES,
-    CONSTANT,
-    DRIVE,
-    GIVEN,
-    Drive,
-    target_positions,
-    to_si,
-)
+from calmotion.usd.reading.motors.driven_motors import BODIES, CONSTANT, DRIVE, GIVEN, Drive, to_si
 from calmotion.usd.reading.motors.free_ranges import free_tracks
 from calmotion.usd.reading.motors.given_tracks import given_joints, given_track
 from calmotion.usd.reading.motors.posed_motors import joint_motions, pose_codes, posed_track
 from calmotion.usd.reading.motors.skeletal_motors import HingeStack, hinge_stacks, performed_on, skeletal_tracks
 from calmotion.usd.reading.motors.tracks import read_track, sample_codes
+from calmotion.usd.reading.motors.unused_animation import target_positions
 from calmotion.usd.reading.provenance import provenance_of
 from calmotion.usd.reading.roots import moving_frames
 from calmotion.usd.reading.targets import weight_tracks

@@ -23,6 +23,7 @@ from calmotion.usd.reading.motors.named_types import named_type
 from calmotion.usd.reading.motors.newton_actuators import ACTUATOR, TARGETS, newton_actuator
 from calmotion.usd.reading.motors.rotors import read_backlash, read_delay, read_rotor
 from calmotion.usd.reading.motors.tracks import sample_codes
+from calmotion.usd.reading.motors.unused_animation import refuse_unused_animation
 from calmotion.usd.units import StageUnits
 
 if TYPE_CHECKING:
@@ -40,13 +41,6 @@ _WRITTEN_AS = {BODIES: "xformOpOrder", SKELETON: SKEL_JOINT}
 def target_attribute(joint: JointPrim) -> str:
     """Name of the attribute with the track of a joint that a motor can drive."""
     return _TARGET_POSITION.format(joint.drive)
-
-
-def target_positions(prim: Usd.Prim) -> list[Any]:
-    """The target positions of all drives of a joint's prim, as attributes."""
-    applied = [name.partition(":")[2] for name in prim.GetAppliedSchemas() if name.startswith("PhysicsDriveAPI:")]
-    drives = dict.fromkeys(["angular", "linear", *applied])
-    return [attribute for drive in drives if (attribute := prim.GetAttribute(_TARGET_POSITION.format(drive)))]
 
 
 def to_si(kind: str, units: StageUnits) -> float:
@@ -141,6 +135,8 @@ def read_drives(
                 drives[joint.path] = replace(drive, actuator=actuated.get(joint.path, ""))
     with reading.collecting_problems():
         _add_geared_motors(drives, resolve(gears), {joint.path: joint for joint in joints}, reading)
+    with reading.collecting_problems():
+        refuse_unused_animation(reading, joints, drives, given)
     found = [drives[joint.path] for joint in joints if joint.path in drives]
     if reading.problems:
         return found

@@ -1,0 +1,67 @@
+"""Animated drives that move nothing: they are refused, since their animation would be lost without a word."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from typing import Any
+
+from calmotion.errors import ShotError
+from calmotion.usd.reading import d6_joints
+from calmotion.usd.reading.context import Reading
+from calmotion.usd.reading.joints import UNSUPPORTED, JointPrim, joint_prims
+from calmotion.usd.reading.motors.tracks import sample_codes
+
+_TARGET_POSITION = "drive:{}:physics:targetPosition"
+
+
+def target_positions(prim: Any) -> list[Any]:
+    """The target positions of all drives of a joint's prim, as attributes."""
+    applied = [name.partition(":")[2] for name in prim.GetAppliedSchemas() if name.startswith("PhysicsDriveAPI:")]
+    drives = dict.fromkeys(["angular", "linear", *applied])
+    return [attribute for drive in drives if (attribute := prim.GetAttribute(_TARGET_POSITION.format(drive)))]
+
+
+def refuse_unused_animation(
+    reading: Reading, joints: Sequence[JointPrim], driven: Collection[str], given: Collection[str]
+) -> None:
+    """Refuse a drive that is animated in a direction in which its joint does not move, and, where nothing is driven,
+    one whose joint connects no body.
+
+    Args:
+        joints: Those that connect bodies.
+        driven: Paths of those that are motors.
+        given: Paths of those whose tracks are given beside the shot.
+
+    Raises:
+        ShotError: There is one.
+    """
+    by_path = {joint.path: joint for joint in joints}
+    for prim in joint_prims(reading.stage):
+        path = str(prim.GetPath())
+        animated = [attribute for attribute in target_positions(prim) if len(sample_codes(attribute))]
+        joint = by_path.get(path)
+        if not animated or path in given or (joint is not None and joint.kind == UNSUPPORTED):
+            continue
+        names = [attribute.GetName() for attribute in animated]
+        if joint is None:
+            if not driven:
+                raise ShotError(
+                    "this joint is animated, but connects no body", path=path, attribute="physics:body1",
+                    remedy="Name the bodies that it joins in physics:body0 and physics:body1, and apply "
+                    "PhysicsRigidBodyAPI to them",
+                )  # fmt: skip
+        elif not joint.drive or _TARGET_POSITION.format(joint.drive) not in names:
+            raise ShotError(
+                "the drive is animated in a direction in which its joint does not move", path=path, attribute=names[0],
+                found=f"a {joint.kind} joint", remedy=_remedy(joint, names[0]),
+            )  # fmt: skip
+
+
+def _remedy(joint: JointPrim, name: str) -> str:
+    direction = name.split(":")[1]
+    if joint.prim.GetTypeName() == d6_joints.TYPE:
+        wanted = f"Lock all directions but {direction} by PhysicsLimitAPIs (low above high)"
+        return f"{wanted}, or animate {_TARGET_POSITION.format(joint.drive)}" if joint.drive else wanted
+    if joint.drive:
+        return f"Animate {_TARGET_POSITION.format(joint.drive)}, with PhysicsDriveAPI:{joint.drive}"
+    return "Make it a PhysicsRevoluteJoint or a PhysicsPrismaticJoint, or remove the animation"
