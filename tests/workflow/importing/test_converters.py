@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import stat
 import sys
+from pathlib import Path
 
 import pytest
 from calmotion.errors import ShotError
@@ -74,6 +75,7 @@ def test_an_environment_is_made_once_with_a_message(script, tmp_path, monkeypatc
 
     def run(command, **options):
         ran.append(command[1:])
+        assert "venv" in command or Path(command[0]).is_relative_to(tmp_path / "cache" / "converters" / "bin")
         if "venv" in command:
             os.makedirs(command[-1])
         return converters.subprocess.CompletedProcess(command, 0, "", "")
@@ -83,6 +85,13 @@ def test_an_environment_is_made_once_with_a_message(script, tmp_path, monkeypatc
     assert converter_python(None, told.append) == first and first.startswith(str(tmp_path / "cache"))
     assert [command[:2] for command in ran] == [["-m", "venv"], ["-I", "-m"]] and len(told) == 1
     assert set(converters.PACKAGES) <= set(ran[1])
+
+
+def test_a_converter_that_does_not_end_is_stopped(script, tmp_path, monkeypatch):
+    monkeypatch.setattr(converters, "LONGEST", 0.5)
+    with pytest.raises(ShotError, match="has not ended") as refused:
+        convert(Description("r.urdf", "urdf"), str(tmp_path / "out"), str(script("import time; time.sleep(60)")))
+    assert refused.value.path == "r.urdf" and refused.value.remedy
 
 
 def test_an_environment_that_cannot_be_made_is_no_environment(tmp_path, monkeypatch):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+
 import pytest
 from calmotion.errors import ShotError
 from calmotion.workflow.importing.descriptions import read_description
@@ -87,3 +89,29 @@ def test_what_cannot_be_converted_is_refused(read, name):
 def test_a_file_that_is_missing_is_refused(tmp_path):
     with pytest.raises(ShotError, match="cannot be read"):
         read_description(str(tmp_path / "none.urdf"), {})
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="this system has no named pipes")
+@pytest.mark.parametrize(
+    "where", ["beside", "in a folder of meshes", "in a file that is included", "as the included file"]
+)
+def test_a_pipe_in_the_place_of_a_file_of_an_mjcf_robot_is_refused(tmp_path, where):
+    (tmp_path / "meshes").mkdir()
+    for folder in (tmp_path, tmp_path / "meshes"):
+        os.mkfifo(folder / "pipe.stl")
+    asset = '<asset><mesh name="m" file="pipe.stl"/></asset>'
+    texts = {
+        "beside": asset,
+        "in a folder of meshes": f'<compiler meshdir="meshes"/>{asset.replace("pipe", "./pipe")}',
+        "in a file that is included": '<include file="part.xml"/>',
+        "as the included file": '<include file="pipe.stl"/>',
+    }
+    (tmp_path / "part.xml").write_text(f'<mujoco><include file="robot.xml"/>{asset}</mujoco>')
+    (tmp_path / "robot.xml").write_text(f"<mujoco>{texts[where]}</mujoco>")
+    with pytest.raises(ShotError, match="named pipe"):
+        read_description(str(tmp_path / "robot.xml"), {})
+
+
+def test_files_of_an_mjcf_robot_are_allowed_also_if_they_include_each_other(tmp_path):
+    (tmp_path / "robot.xml").write_text('<mujoco><include file="robot.xml"/><include file="none.xml"/></mujoco>')
+    assert read_description(str(tmp_path / "robot.xml"), {}).kind == "mjcf"

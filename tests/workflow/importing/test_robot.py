@@ -155,3 +155,10 @@ robot.import_robot({str(robot)!r}, layer={str(tmp_path / "out" / "shot.usda")!r}
     with temporary_folder(str(tmp_path / "out" / "shot.usda")) as folder:
         assert [path.name for path in (tmp_path / "out").iterdir()] == [Path(folder).name]
     assert list((tmp_path / "out").iterdir()) == []
+
+
+@pytest.mark.parametrize("setting", ["motion.read.angle=deg", "motion.raed.angles=deg", "fe.mesh.element_size=5"])
+def test_a_setting_that_does_not_exist_is_refused_before_anything_is_made(robot, tmp_path, calmotion, setting):
+    done = calmotion("import", robot, "-o", tmp_path / "shot.usda", "--set", setting)
+    assert done.returncode == 2 and setting.rpartition(".")[0] in done.stderr
+    assert not (tmp_path / "shot.usda").exists()

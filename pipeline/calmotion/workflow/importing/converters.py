@@ -20,6 +20,7 @@ VARIABLE = "CALMOTION_CONVERTERS"  # names an environment that has them
 _MODULES = ("urdf_usd_converter", "mujoco_usd_converter")
 _PYTHONS = ((3, 10), (3, 12))  # oldest and newest version that they support
 _READY = "ready"
+LONGEST = 1800.0  # time of a conversion [s]
 _BAD_WORDS = ("Failed to", "Cannot", "not found")  # of warnings after which a part of the robot is missing
 
 
@@ -73,7 +74,13 @@ def convert(description: Description, output: str, python: str) -> tuple[str, tu
     packages = [word for name, folder in description.packages.items() for word in ("--package", f"{name}={folder}")]
     # in isolation, so that neither the variables of this environment nor its packages reach it
     command = [python, "-I", "-m", module, os.path.abspath(description.path), output, *packages]
-    done = subprocess.run(command, capture_output=True, text=True, env=_plain_environment())
+    try:
+        done = subprocess.run(command, capture_output=True, text=True, env=_plain_environment(), timeout=LONGEST)
+    except subprocess.TimeoutExpired:
+        raise ShotError(
+            f"the converter has not ended after {LONGEST / 60:g} minutes", path=description.path,
+            remedy=f"Make the meshes smaller; `{module}` of the converters' environment shows where it is",
+        ) from None  # fmt: skip
     lines = [line.strip() for line in (done.stdout + done.stderr).splitlines() if line.strip()]
     files = [path for path in Path(output).glob("*.usd*") if path.is_file()] if os.path.isdir(output) else []
     if done.returncode or len(files) != 1:
@@ -103,7 +110,7 @@ def _make(folder: Path) -> None:
     shutil.rmtree(folder, ignore_errors=True)
     for command in (
         [python, "-m", "venv", str(folder)],
-        [str(_python_of(folder)), "-I", "-m", "pip", "install", "--quiet", *PACKAGES],
+        [str(_python_in(folder)), "-I", "-m", "pip", "install", "--quiet", *PACKAGES],
     ):
         done = subprocess.run(command, capture_output=True, text=True)
         if done.returncode:
@@ -123,9 +130,12 @@ def _supported_python() -> str | None:
 
 
 def _python_of(named: Path) -> Path:
-    if named.is_dir():
-        return named / ("Scripts/python.exe" if os.name == "nt" else "bin/python")
-    return named
+    return _python_in(named) if named.is_dir() else named
+
+
+def _python_in(environment: Path) -> Path:
+    """The Python of an environment, also of one that is not made yet."""
+    return environment / ("Scripts/python.exe" if os.name == "nt" else "bin/python")
 
 
 def _lacks(python: Path) -> str:

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from calmotion.errors import ShotError, raise_all
-from calmotion.support.files import refuse_special
+from calmotion.support.files import is_special, refuse_special
 from calmotion.support.foreign_files import remedy_for
 from calmotion.support.naming import nearest
 
@@ -51,6 +51,7 @@ def read_description(path: str, packages: Mapping[str, str]) -> Description:
     """
     root = _root(path)
     if root.tag == "mujoco":
+        _refuse_special_files(root, path)
         return Description(path, MJCF)
     if root.tag != "robot":
         raise ShotError(
@@ -101,7 +102,7 @@ def _root(path: str) -> xml.Element:
             "the robot is no XML file, or it is damaged", path=path, found=error,
             remedy="Declare the prefix, as in <robot xmlns:drake=...>, or remove its elements"
             if "unbound prefix" in str(error)
-            else remedy_for(path) or "Name a .urdf file, or an .xml file of MuJoCo",
+            else remedy_for(path, URDF) or "Name a .urdf file, or an .xml file of MuJoCo",
         ) from error  # fmt: skip
 
 
@@ -110,6 +111,27 @@ def _meshes(root: xml.Element) -> Iterator[tuple[str, str]]:
     for link in root.findall("link"):
         for mesh in link.iter("mesh"):
             yield link.get("name", ""), mesh.get("filename", "")
+
+
+def _refuse_special_files(root: xml.Element, path: str, seen: frozenset[str] = frozenset()) -> None:
+    """Refuse named pipes and the like among the files of an MJCF robot, for which a converter would wait for ever.
+
+    Args:
+        seen: Files that include this one.
+    """
+    here = os.path.dirname(os.path.abspath(path))
+    named = ("meshdir", "texturedir", "assetdir")
+    folders = [here, *(os.path.join(here, node.get(name, "")) for node in root.iter("compiler") for name in named)]
+    for node in root.iter():
+        for name in (value for key, value in node.items() if key == "file" or key.startswith("file")):
+            for file in dict.fromkeys(os.path.join(folder, name) for folder in folders):
+                if is_special(file):
+                    raise ShotError(
+                        "this is not a file but a named pipe, a socket or a device", path=path,
+                        attribute=f"{node.tag}.file", found=name, remedy="Name a file",
+                    )  # fmt: skip
+                if node.tag == "include" and os.path.isfile(file) and file not in seen:
+                    _refuse_special_files(_root(file), file, seen | {file})
 
 
 def _packages(root: xml.Element, path: str, given: Mapping[str, str]) -> dict[str, str]:

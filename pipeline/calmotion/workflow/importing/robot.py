@@ -113,11 +113,13 @@ def import_robot(
     """
     target = os.fspath(layer)
     _refuse_wrong_output(target)
+    host = open_host([os.fspath(p) for p in plugins])
+    host.properties(read_settings(settings))  # wrong names are refused, also where no operator runs
     known = known_materials(material_files)
     links = tuple(flexible_links(text, known) for text in flexible)
     named = {name: os.fspath(folder) for name, folder in (packages or {}).items()}
     description = read_description(os.fspath(robot), named)
-    tracks = _motion(open_host([os.fspath(p) for p in plugins]), motion, settings) if motion is not None else None
+    tracks = _motion(host, motion, settings) if motion is not None else None
     options = RobotOptions(
         links, tuple(targets), description.efforts, description.without_mass, description.massless,
         None if solid is None else material_named(solid, known)[1], tracks, frames_per_second(tracks),
@@ -147,7 +149,10 @@ def flexible_links(text: str, known: Mapping[str, Material]) -> FlexibleLinks:
             "this thickness has no unit", path="--flexible", found=text, remedy=f"Write {number}mm or {number}m."
         )
     if wall is not None and not 0.0 < wall < 1.0:
-        raise SettingError("a wall is thicker than nothing and thinner than 1 m", path="--flexible", found=text)
+        raise SettingError(
+            "a wall is thicker than nothing and thinner than 1 m", path="--flexible", found=text,
+            remedy="Write a thickness such as 3mm, or leave it out for a solid link.",
+        )  # fmt: skip
     name, found = material_named(material, known)
     return FlexibleLinks(pattern.strip(), name, found, wall)
 
