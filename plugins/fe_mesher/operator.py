@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 from calmotion.errors import ShotError, raise_all
 from calmotion.host import Operator, Property, RunContext
 from calmotion.shot import Character, FEMeshes, ModelChoices
@@ -12,7 +13,7 @@ from calmotion.shot.model_choice import no_flexible_bodies
 
 if TYPE_CHECKING:
     from calmotion.reduction.interfaces.interface_patches import AttachmentFrame
-    from calmotion.shot import FEMesh
+    from calmotion.shot import Body, FEMesh
 
     from .body_mesh import MeshOptions, Volume
 
@@ -86,6 +87,30 @@ class TetrahedralizeFlexibleBodies(Operator):
         return (FEMeshes(tuple(meshes)),)
 
 
+def _refuse_large_elements(body: Body, given: float) -> None:
+    """Refuse elements that are larger than a body: their size was mostly meant in another unit.
+
+    Args:
+        body: Flexible.
+        given: Size of the elements of every body [m]; not positive: that of the shot.
+
+    Raises:
+        ShotError: They are.
+    """
+    assert body.flexible is not None
+    size = given if given > 0.0 else body.flexible.element_size or 0.0
+    parts = [surface.points for surface in body.surfaces if len(surface.points)]
+    length = float(max((np.ptp(points, axis=0).max() for points in parts), default=np.inf))
+    if size > length:
+        raise ShotError(
+            "the elements would be larger than the body",
+            path=body.path,
+            attribute="fe.mesh.element_size" if given > 0.0 else "calm:flexible:elementSize",
+            found=f"{size:g} m, where the body is {length:.3g} m long",
+            remedy="Use a smaller size, such as a third of its thickness, or leave it out.",
+        )
+
+
 def _attachments(character: Character) -> dict[int, Sequence[AttachmentFrame]]:
     """Frames of the joints and targets of each flexible body; none where its joints are wrong, which others report."""
     from calmotion.multibody.model.model import body_anchors
@@ -116,6 +141,7 @@ def _geometries(character: Character, flexible: Sequence[int], options: MeshOpti
     problems = []
     for index in flexible:
         try:
+            _refuse_large_elements(character.bodies[index], options.element_size)
             geometries[index] = geometry_of(index, character.bodies[index], options, frames_of(character, index))
         except ShotError as problem:
             problems.append(problem)

@@ -152,6 +152,7 @@ class OptimizeShot(Operator):
             int,
             7,
             minimum=3,
+            maximum=999,
             description="Number of these robots; with 1 + 2 n for n uncertain parameters they have their covariance",
         ),
         Property(
@@ -162,7 +163,9 @@ class OptimizeShot(Operator):
             description="Length of the windows in which a long shot is searched; -1: 20 s where it is longer than "
             "60 s; 0: one search",
         ),
-        Property("draws", int, 200, minimum=20, description="Random robots on which the curves are measured"),
+        Property(
+            "draws", int, 200, minimum=20, maximum=100_000, description="Random robots on which the curves are measured"
+        ),
     )
 
     @classmethod

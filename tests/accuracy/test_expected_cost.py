@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from calmotion.accuracy.expected_cost import ExpectedCost, expected_cost, readable_hours, refuse_unaffordable
 from calmotion.errors import ShotError
-from calmotion.shot.robust.settings import RobustSettings
 from calmotion.shot.run import RunSettings
 
 
@@ -69,10 +68,3 @@ def test_a_time_step_of_the_shot_is_named_as_such(arm, animation):
     with pytest.raises(ShotError) as error:
         refuse_unaffordable(expected_cost(fine, animation, RunSettings(), False), arm.path, 24.0, 1e3)
     assert error.value.attribute == "calm:retarget:timeStep"
-
-
-def test_a_search_for_many_robots_costs_as_many_searches(arm, animation):
-    one = expected_cost(arm, animation, RunSettings(), True)
-    many = expected_cost(arm, animation, RunSettings(robust=RobustSettings("worst", 99_999, 200)), True)
-    assert many.hours > 9e4 * one.hours and many.memory > 1e4 * one.memory
-    assert readable_hours(1e-9) == "less than a minute"

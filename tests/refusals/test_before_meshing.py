@@ -188,6 +188,22 @@ CASES = {
     "a modulus in MPa": (optimize, soft(2e3), {}, "physics:youngsModulus"),
     "two interfaces on one face": (simulate, interfaces([0, 1], [1]), {}, "other"),
     "an interface without area": (simulate, interfaces([0], [1], flat=True), {}, "elbow"),
+    "elements that are larger than the body": (
+        simulate, no_edit, {"settings": {"fe.mesh.element_size": "5m"}}, "fe.mesh.element_size"
+    ),
+    "a step that is longer than the shot": (simulate, no_edit, {"step": 5.0}, "--step"),
+    "knots farther apart than the shot is long": (
+        optimize, no_edit, {"settings": {"retarget.optimize.knot_spacing": "10s"}}, "retarget.optimize.knot_spacing"
+    ),
+    "knots of a shot farther apart than it is long": (
+        optimize, shot_settings(knotSpacing=2.0), {}, "calm:retarget:knotSpacing"
+    ),
+    "more robots than can be computed": (
+        optimize, no_edit, {"settings": {"retarget.optimize": {"robust": "mean", "scenarios": 99_999}}}, "scenarios"
+    ),
+    "more random robots than can be computed": (
+        optimize, no_edit, {"settings": {"retarget.optimize": {"robust": "mean", "draws": 10**9}}}, "draws"
+    ),
     "elements that are too small": (simulate, no_edit, {"settings": {"fe.mesh.element_size": "0.02mm"}}, "elementSize"),
     "motors that contradict each other later": (simulate, closed_chain(0.0), {"pre_roll": 0.0}, "/Arm/joints/"),
     "motors that contradict each other at once": (optimize, closed_chain(0.03), {"pre_roll": 0.0}, "/Arm/joints/"),

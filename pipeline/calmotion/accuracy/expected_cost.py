@@ -69,11 +69,7 @@ def expected_cost(character: Character, animation: Animation, options: RunSettin
     share = _share_in_window(animation, options, character.retarget.cyclic) if searches else 0.0
     copies = COPIES_OF_SEARCH if share == 1.0 else COPIES + COPIES_OF_SEARCH * share
     again = 1.0 if share in (0.0, 1.0) else 1.0 + WINDOW_OVERLAP  # what overlaps is searched twice
-    runs = SEARCH * again if searches else 1.0
-    if searches and options.robust is not None:
-        runs = SEARCH * options.robust.scenarios + options.robust.draws
-        copies += options.robust.scenarios
-    hours = SECONDS * steps * coordinates * runs / 3600.0
+    hours = SECONDS * steps * coordinates * (SEARCH * again if searches else 1.0) / 3600.0
     return ExpectedCost(frames, steps, coordinates, hours, 8.0 * copies * numbers * steps, cause)
 
 

@@ -156,3 +156,11 @@ def test_the_analysis_leaves_small_gaps_to_bodies_that_give_way():
 def test_a_crank_that_turns_through_is_analysed():
     whole = Track(FRAMES, np.linspace(0.0, 0.9, len(FRAMES)) ** 2)
     assert analysed(four_bar((0,)), (whole,)).rows
+
+
+def test_a_single_motor_is_not_said_to_contradict_others():
+    tracks = (drift(0.25, 57.3 * 0.3),)
+    with pytest.raises(ShotError, match="do not meet") as error:
+        analysed(four_bar((0,)), tracks)
+    assert "cannot reach" in error.value.remedy and "one of them" not in error.value.remedy
+    assert NAMES[0] in error.value.remedy and "degrees in a shot" in error.value.remedy

@@ -78,6 +78,15 @@ def test_what_cannot_be_shaped_is_refused(parts):
         assert error.value.remedy and error.value.found == kind
 
 
+def test_a_cutoff_that_the_steps_do_not_hold_is_refused(parts):
+    highest = 240.0 / FREQUENCIES[0]
+    shaped(*parts, "lowpass", FREQUENCIES, RATIOS, 0.99 * highest)
+    for cutoff in (highest, 1e9):
+        with pytest.raises(ShotError, match="beyond what the steps") as error:
+            shaped(*parts, "lowpass", FREQUENCIES, RATIOS, cutoff)
+        assert f"less than {highest:.3g}" in error.value.remedy
+
+
 @pytest.mark.parametrize("late", [0.0, 0.1, 0.31])
 def test_the_best_delay_is_the_one_by_which_a_motion_is_late(late):
     h = 1 / 500

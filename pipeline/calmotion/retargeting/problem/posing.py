@@ -91,6 +91,14 @@ def unknowns(character: Character, animation: Animation, grid: TimeGrid, options
     coupling = coupling_of(character, motors)
     kept_ends, offsets = settings.endpoints == "kept", existing_offsets(animation, grid, motors)
     spacing = knot_spacing(character, options)
+    if spacing and not spacing <= grid.end:
+        raise ShotError(
+            "the knots would be farther apart than the shot is long",
+            path=character.path,
+            attribute="retarget.optimize.knot_spacing" if options.knot_spacing else "calm:retarget:knotSpacing",
+            found=f"{spacing:g} s, where the shot lasts {grid.end:g} s",
+            remedy="Use a shorter distance, or leave it out.",
+        )
     if spacing:
         breaks = uniform_breaks(grid, spacing)
     else:

@@ -144,7 +144,12 @@ def chain_error(character: Character, model: Model, joint: int, gap: Array, time
     if time < 0.0:
         when = f"in the pre-roll, {when}"
     remedy = "Check physics:localPos0, localRot0, localPos1 and localRot1 of the joints of this chain"
-    if motors:
+    if len(motors) == 1:
+        remedy = (
+            "Correct the angles of its motor there, which the chain cannot reach (they are degrees in a shot, and rad "
+            f"in a table of --motion): {motors[0]}"
+        )
+    elif motors:
         remedy = f"Correct the angles of its motors there, or remove the drive of one of them: {', '.join(named)}"
     if time < 0.0:
         remedy += (

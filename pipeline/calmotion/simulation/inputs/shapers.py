@@ -66,7 +66,15 @@ def shaped(
     if kind == "lowpass":
         from scipy.signal import butter, sosfiltfilt
 
-        sections = butter(2, cutoff * frequencies[0], fs=1.0 / grid.h, output="sos")
+        edge, highest = cutoff * frequencies[0], 0.5 / grid.h
+        if not edge < highest:
+            raise ShotError(
+                "the cutoff of the low-pass filter is beyond what the steps of the simulation hold",
+                attribute="retarget.shape.cutoff",
+                found=f"{cutoff:g}, which is {edge:.4g} Hz, with steps of {1e3 * grid.h:.3g} ms",
+                remedy=f"Use less than {highest / frequencies[0]:.3g}, or a smaller --step.",
+            )
+        sections = butter(2, edge, fs=1.0 / grid.h, output="sos")
         angles = sosfiltfilt(sections, curves.angles, axis=0, padtype="constant", padlen=min(len(times) - 1, 4000))
     else:
         source, angles = CubicSpline(times, curves.angles), np.zeros_like(curves.angles)
