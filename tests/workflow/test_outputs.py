@@ -7,6 +7,8 @@ import pytest
 from calmotion.host import SettingError
 from calmotion.workflow.outputs import refuse_overwriting
 from one_hinge import HINGE, ONE_HINGE
+from pxr import Sdf
+from small_shots import FORE, make_flexible, write_arm
 
 MOTION = f"time_s,{HINGE}\n0,0\n0.5,0.1\n1,0.2\n"
 
@@ -94,3 +96,19 @@ def test_the_option_and_what_it_would_overwrite_are_named(tmp_path):
     with pytest.raises(SettingError, match="this file is read as the motion") as error:
         refuse_overwriting({"the motion": str(tmp_path / "a.csv")}, {"--csv": str(tmp_path / "a.csv")})
     assert error.value.path == "--csv"
+
+
+@pytest.mark.parametrize("command", [("simulate", "--csv"), ("export", "--to", "csv", "-o")])
+def test_a_mesh_of_the_shot_is_never_written_over(tmp_path, calmotion, monkeypatch, command):
+    def edit(stage):
+        make_flexible(stage)
+        attribute = stage.GetPrimAtPath(FORE).CreateAttribute("calm:flexible:meshFile", Sdf.ValueTypeNames.Asset)
+        attribute.Set(Sdf.AssetPath("./link.msh"))
+
+    write_arm(tmp_path / "shot.usda", edit)
+    (tmp_path / "link.msh").write_text("a mesh")
+    monkeypatch.chdir(tmp_path)
+    done = calmotion(command[0], "shot.usda", *command[1:], "link.msh", "--json", "--quiet")
+    assert done.returncode == 2, done.stdout
+    assert "a mesh of the shot" in json.loads(done.stdout)["error"]["problem"]
+    assert (tmp_path / "link.msh").read_text() == "a mesh"

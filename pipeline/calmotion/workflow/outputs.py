@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from calmotion.host import SettingError
-from calmotion.shot import Provenance
+from calmotion.shot import Character, Provenance
 from calmotion.shot.run import OutputPaths
 from calmotion.support.files import try_writing
 
@@ -73,25 +73,29 @@ def refuse_overwriting(inputs: Mapping[str, str], files: Mapping[str, str]) -> N
                 )  # fmt: skip
 
 
-def refuse_layers(shot: str, provenance: Provenance, files: Mapping[str, str]) -> None:
-    """Refuse outputs that are layers of the shot, as soon as these are known.
+def refuse_layers(shot: str, provenance: Provenance, character: Character | None, files: Mapping[str, str]) -> None:
+    """Refuse outputs that are layers or meshes of the shot, as soon as these are known.
 
     Args:
         shot: Its file.
         provenance: With its layers.
+        character: With the mesh files of its bodies, where it was read.
         files: Files that are written, by their options.
 
     Raises:
         SettingError: One is.
     """
     folder = os.path.dirname(os.path.realpath(shot))
-    layers = [os.path.join(folder, layer.path) for layer in provenance.layers]
+    read = {os.path.join(folder, layer.path): "layer" for layer in provenance.layers}
+    bodies = () if character is None else character.bodies
+    read |= {body.flexible.mesh_file: "mesh" for body in bodies if body.flexible and body.flexible.mesh_file}
     for option, path in files.items():
-        if any(os.path.exists(layer) and _is_same(path, layer) for layer in layers):
-            raise SettingError(
-                "this file is a layer of the shot, which is never overwritten", path=option, found=path,
-                remedy="Choose another.",
-            )  # fmt: skip
+        for file, kind in read.items():
+            if os.path.exists(file) and _is_same(path, file):
+                raise SettingError(
+                    f"this file is a {kind} of the shot, which is never overwritten", path=option, found=path,
+                    remedy="Choose another.",
+                )  # fmt: skip
 
 
 def _is_same(one: str, other: str) -> bool:

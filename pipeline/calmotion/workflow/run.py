@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 
 from calmotion.errors import ShotError
 from calmotion.host import Host, OperatorResult, Run, SettingError, Settings, merge, nearest
-from calmotion.shot import Provenance
+from calmotion.shot import Character, Provenance
 from calmotion.shot.outputs import CsvFile, Figures, Recording, Video, WrittenLayer
 from calmotion.shot.run import INTEGRATORS, SHAPERS, OutputPaths, Source
 from calmotion.support import interrupts
@@ -149,7 +149,7 @@ def carry_out(
         for result in run:
             if unread and (provenance := run.get(Provenance)) is not None:
                 unread = False
-                refuse_layers(shot.path, provenance, files_of(outputs))
+                refuse_layers(shot.path, provenance, run.get(Character), files_of(outputs))
             if hooks.on_operator:
                 hooks.on_operator(result)
     except _Stop:

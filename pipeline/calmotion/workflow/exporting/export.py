@@ -184,8 +184,9 @@ def export(
         outcome = carry_out(opened, "simulate", wanted=_READ, operators=operators, settings=chosen, hooks=hooks)
     target = os.fspath(file) if file is not None else f"{FilePath(opened.path).stem}{cls.suffix}"
     refuse_overwriting(opened.inputs, {"-o": target})
-    refuse_layers(opened.path, outcome.require(Provenance), {"-o": target})
-    refuse_beyond_shot(outcome.require(Character), outcome.require(Animation), given)
+    character = outcome.require(Character)
+    refuse_layers(opened.path, outcome.require(Provenance), character, {"-o": target})
+    refuse_beyond_shot(character, outcome.require(Animation), given)
     exporter = _Exporter(outcome, result, given, chosen, hooks)
     # what is wrong with the format's settings is refused here, before the first mesh
     written = exporter.written(given.rate, target)
