@@ -171,11 +171,20 @@ def loaded_rows(text: str) -> dict[str, Row]:
 def main(arguments: Sequence[str]) -> int:
     """The benchmark's command line."""
     parser = bench_parser("reading", "Which robots and characters of a folder load, and why the others do not.")
-    parser.add_argument("folders", nargs="+", type=Path, metavar="FOLDER", help="folder with robots and characters")
+    parser.add_argument("folders", nargs="*", type=Path, metavar="FOLDER", help="folder with robots and characters")
     parser.add_argument("--import", dest="imports", action="store_true", help="also import URDF and MJCF robots")
     parser.add_argument("-o", "--output", type=Path, help="page to write (Markdown)")
     parser.add_argument("--again", action="store_true", help="keep what loads by the page, and try the rest again")
+    parser.add_argument("--prims", type=int, metavar="N", help="read --shot with a set of so many prims around it")
+    parser.add_argument("--shot", type=Path, default=Path("samples/drummer/drummer.usda"), help="shot of --prims")
     args = parser.parse_args(arguments)
+    if args.prims:
+        from calmotion.benchmarks.speed.large_stages import compare
+
+        print(compare(args.shot, args.prims), end="")
+        return 0
+    if not args.folders:
+        parser.error("name a folder, or --prims")
     known = loaded_rows(args.output.read_text(encoding="utf-8")) if args.again and args.output else {}
     rows: list[Row] = []
     for folder in args.folders:

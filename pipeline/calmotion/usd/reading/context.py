@@ -32,6 +32,7 @@ class Reading:
         notes: Sentences for the user about assumptions where the shot does not say.
         problems: Errors of the shot that were found so far.
         warnings: What can be processed, but not exactly as authored; also among the notes.
+        whole: The stage with all of its prims, where `stage` holds a part of it; None: it is whole.
     """
 
     stage: Any
@@ -40,6 +41,7 @@ class Reading:
     notes: list[str] = field(default_factory=list)
     problems: list[ShotError] = field(default_factory=list)
     warnings: list[ShotError] = field(default_factory=list)
+    whole: Any = None
 
     def __post_init__(self) -> None:
         from pxr import UsdGeom

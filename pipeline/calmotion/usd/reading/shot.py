@@ -18,6 +18,7 @@ from calmotion.usd.reading.animated_transforms import carriers, codes_of
 from calmotion.usd.reading.character import Skeleton, build_character, read_skeleton
 from calmotion.usd.reading.context import Reading, is_rigid_body, prims_of
 from calmotion.usd.reading.joints import joint_prims
+from calmotion.usd.reading.masks import masked
 from calmotion.usd.reading.motors.driven_motors import BODIES, CONSTANT, DRIVE, GIVEN, Drive, to_si
 from calmotion.usd.reading.motors.free_ranges import free_tracks
 from calmotion.usd.reading.motors.given_tracks import given_joints, given_track
@@ -61,13 +62,15 @@ def read_shot(
         stages.refuse_result_layer(composed, path)
         earlier = stages.earlier_layers(composed)
         stage = stages.open_stage(path, muted=earlier) if earlier else composed
-        read = read_stage(stage, still, given, measured)
+        part = masked(stage, earlier)
+        read = read_stage(part, still, given, measured, stage)
         reading, clock, character, tracks = read.reading, read.clock, read.character, read.tracks
         current = tracks
         if earlier:
             # predicted motions are not animation; optimised curves of bodies and skeletons are
             motions = stages.earlier_layers(composed, (stages.MOTION,))
             result = stages.open_stage(path, muted=motions) if motions else composed
+            result = result if part is stage else masked(result, motions)
             of_motors = Reading(result, reading.units, clock.start)
             standing = hinge_stacks(reading, read.skeleton.drives)
             current = motor_tracks(of_motors, read.skeleton.drives, clock, given, standing)
@@ -76,9 +79,9 @@ def read_shot(
             note = f"the shot carries results of Calmotion ({names}); the intended motion is the animation beneath them"
             character = dataclasses.replace(character, notes=(*character.notes, note))
         provenance = provenance_of(path, stage, clock, earlier)
-        weights = weight_tracks(stage, character.targets, clock)
-        free = free_tracks(stage, character.motors, clock)
-    notes = (f"{place}: {message}" for place, message in with_places(messages, stage, prims_of(stage)))
+        weights = weight_tracks(part, character.targets, clock)
+        free = free_tracks(part, character.motors, clock)
+    notes = (f"{place}: {message}" for place, message in with_places(messages, part, prims_of(part)))
     character = dataclasses.replace(character, notes=(*character.notes, *notes))
     return character, Animation(clock.frame_times(), tracks, current, read.moving, weights, free), provenance
 
@@ -96,15 +99,20 @@ class StageReading:
 
 
 def read_stage(
-    stage: Usd.Stage, still: bool = False, given: MotorTracks | None = None, measured: Sequence[str] = ()
-) -> StageReading:
-    """Read a composed stage; arguments and errors as for `read_shot`."""
+    stage: Usd.Stage, still: bool = False, given: MotorTracks | None = None, measured: Sequence[str] = (),
+    whole: Usd.Stage | None = None,
+) -> StageReading:  # fmt: skip
+    """Read a composed stage; arguments and errors as for `read_shot`.
+
+    Args:
+        whole: The stage with all of its prims, of which `stage` is a part; None: it is whole.
+    """
     with stages.refused_by_usd(stage):
         raise_all(list(wrong_types(stage)))
         raise_all(list(broken_transforms(stage)))
         units = units_of(stage)
         clock = shot_clock(stage, given)
-        reading = Reading(stage, units, clock.start)
+        reading = Reading(stage, units, clock.start, whole=whole)
         skeleton = read_skeleton(reading, clock, still, given_joints(stage, given), measured)
         tracks = motor_tracks(reading, skeleton.drives, clock, given)
         moving = moving_frames(reading, skeleton.joints, skeleton.poses, clock)

@@ -16,10 +16,11 @@ from calmotion.usd.reading.context import Reading, is_rigid_body
 from calmotion.views.playback import rotation_matrices
 
 if TYPE_CHECKING:
-    from pxr import Usd
+    from pxr import Usd, UsdGeom
 
 NEAR = 1.5  # sizes of the robot: what lies farther from its middle is not read
 LARGEST = 5.0  # sizes of the robot: a larger prim is a sky or a landscape
+MOST_PRIMS = 20_000  # that are looked at
 MOST_TRIANGLES = 200_000  # of all scenery; pictures do not need the rest of a set
 SHOWN = ("default", "render")
 
@@ -34,6 +35,8 @@ def scenery_of(reading: Reading, bodies: Sequence[Body]) -> tuple[SurfaceMesh, .
         reading: The stage.
         bodies: The bodies of the robot.
     """
+    from pxr import Tf
+
     cloud = [
         surface.points @ rotation_matrices(body.rest.rotation).T + body.rest.position
         for body in bodies
@@ -46,10 +49,10 @@ def scenery_of(reading: Reading, bodies: Sequence[Body]) -> tuple[SurfaceMesh, .
     size, middle = float(np.linalg.norm(high - low)), 0.5 * (low + high)
     found: list[SurfaceMesh] = []
     count = 0
-    for prim in _still_geometry(reading):
+    for prim in _still_geometry(reading, middle, size):
         try:
             surface = _surface(reading, prim)
-        except ShotError:
+        except (ShotError, Tf.ErrorException):
             continue
         if surface is None or not _is_near(surface.points, middle, size):
             continue
@@ -63,22 +66,55 @@ def scenery_of(reading: Reading, bodies: Sequence[Body]) -> tuple[SurfaceMesh, .
 def _is_near(points: Array, middle: Array, size: float) -> bool:
     """Whether the box of points is not too large, and near the middle of the robot."""
     low, high = points.min(axis=0), points.max(axis=0)
-    gap = np.maximum(np.maximum(low - middle, middle - high), 0.0)
-    return bool(np.max(high - low) < LARGEST * size and np.linalg.norm(gap) < NEAR * size)
+    return bool(np.max(high - low) < LARGEST * size and _gap(low, high, middle) < NEAR * size)
 
 
-def _still_geometry(reading: Reading) -> Iterator[Usd.Prim]:
-    """Meshes and simple solids that are visible, not animated, and below no body, skinned character or instancer."""
+def _gap(low: Array, high: Array, middle: Array) -> float:
+    """Distance of a point from a box [m]."""
+    return float(np.linalg.norm(np.maximum(np.maximum(low - middle, middle - high), 0.0)))
+
+
+def _still_geometry(reading: Reading, middle: Array, size: float) -> Iterator[Usd.Prim]:
+    """Meshes and simple solids near the robot that are visible, not animated, and below no body, skinned character or
+    instancer.
+
+    What is far is left out by its box, models as a whole by their extents hints. Of a set of hundreds of thousands of
+    prims only the first ones are looked at.
+    """
     from pxr import Usd, UsdGeom
 
-    walk = iter(reading.stage.Traverse(Usd.TraverseInstanceProxies(Usd.PrimDefaultPredicate)))
-    for prim in walk:
+    boxes, scale = UsdGeom.BBoxCache(reading.start, list(SHOWN), useExtentsHint=True), reading.units.length(1.0)
+    stage = reading.whole or reading.stage
+    walk = iter(stage.Traverse(Usd.TraverseInstanceProxies(Usd.PrimDefaultPredicate)))
+    for count, prim in enumerate(walk):
+        if count > MOST_PRIMS:
+            reading.note(f"the stage is large: scenery is shown of its first {MOST_PRIMS:,} prims alone")
+            return
+        if not _box_is_near(boxes, prim, middle / scale, size / scale):
+            walk.PruneChildren()
+            continue
         kind = str(prim.GetTypeName())
         if is_rigid_body(prim) or kind in ("SkelRoot", "PointInstancer") or _is_animated_or_hidden(prim, reading.start):
             walk.PruneChildren()
         elif kind == "Mesh" or kind in primitives.TYPES:
             if str(UsdGeom.Imageable(prim).ComputePurpose()) in SHOWN:
                 yield prim
+
+
+def _box_is_near(boxes: UsdGeom.BBoxCache, prim: Usd.Prim, middle: Array, size: float) -> bool:
+    """Whether a prim may be near the robot, all in stage units; True where that is not known without its children."""
+    from pxr import Tf, UsdGeom
+
+    if not prim.IsA(UsdGeom.Boundable) and not prim.HasAttribute("extentsHint"):
+        return True
+    try:
+        box = boxes.ComputeWorldBound(prim).ComputeAlignedRange()
+    except Tf.ErrorException:
+        return True
+    if box.IsEmpty():
+        return False
+    low, high = np.array(box.GetMin()), np.array(box.GetMax())
+    return not np.all(np.isfinite(low) & np.isfinite(high)) or _gap(low, high, middle) < NEAR * size
 
 
 def _is_animated_or_hidden(prim: Usd.Prim, time: float) -> bool:

@@ -1,0 +1,82 @@
+"""Large stages: `calmotion bench reading --prims N` reads a shot alone and with a set of N prims around it."""
+
+from __future__ import annotations
+
+import json
+import subprocess  # nosec B404  # runs this program
+import sys
+import tempfile
+from pathlib import Path
+
+from calmotion.benchmarks.common.tables import markdown
+
+GROUP = 100  # prims of a group of the set
+_READ = (
+    "import json, sys, time\n"
+    "import calmotion.usd.reading.shot as reading\n"
+    "def peak():  # of this program: what is counted for the process includes the one that started it\n"
+    "    with open('/proc/self/status') as status:\n"
+    "        return next(int(line.split()[1]) for line in status if line.startswith('VmHWM')) / 1e3\n"
+    "begin, cpu = time.perf_counter(), time.process_time()\n"
+    "character = reading.read_shot(sys.argv[1])[0]\n"
+    "used = time.perf_counter() - begin, time.process_time() - cpu\n"
+    "print(json.dumps([*used, peak(), len(character.bodies)]))\n"
+)
+
+
+def write_large_stage(shot: Path, prims: int, folder: Path) -> Path:
+    """A root layer with a shot and a set of still meshes and cubes in groups, away from it.
+
+    Args:
+        shot: USD file.
+        prims: Number of prims of the set, about.
+        folder: Where it is written.
+    """
+    from pxr import Gf, Sdf
+
+    layer = Sdf.Layer.CreateNew(str(folder / "set.usdc"))
+    root = Sdf.CreatePrimInLayer(layer, "/Set")
+    root.specifier, root.typeName = Sdf.SpecifierDef, "Xform"
+    types, corners = Sdf.ValueTypeNames, [(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)]
+    with Sdf.ChangeBlock():
+        for g in range(max(1, prims // (GROUP + 1))):
+            group = Sdf.PrimSpec(root, f"group{g}", Sdf.SpecifierDef, "Xform")
+            for k in range(GROUP):
+                prim = Sdf.PrimSpec(group, f"part{k}", Sdf.SpecifierDef, "Cube" if k % 2 else "Mesh")
+                place = Sdf.AttributeSpec(prim, "xformOp:translate", types.Double3)
+                place.default = Gf.Vec3d(2e3 + 2.0 * g, 2.0 * k, 0.0)
+                order = Sdf.AttributeSpec(prim, "xformOpOrder", types.TokenArray, Sdf.VariabilityUniform)
+                order.default = ["xformOp:translate"]
+                Sdf.AttributeSpec(prim, "extent", types.Float3Array).default = [(-1, -1, -1), (1, 1, 1)]
+                if not k % 2:
+                    Sdf.AttributeSpec(prim, "points", types.Point3fArray).default = corners
+                    Sdf.AttributeSpec(prim, "faceVertexCounts", types.IntArray).default = [3] * 4
+                    faces = [0, 2, 1, 0, 1, 3, 1, 2, 3, 0, 3, 2]
+                    Sdf.AttributeSpec(prim, "faceVertexIndices", types.IntArray).default = faces
+    layer.Save()
+    source = Sdf.Layer.FindOrOpen(str(shot))
+    top = Sdf.Layer.CreateNew(str(folder / "large.usda"))
+    top.subLayerPaths = [str(shot.resolve()), "./set.usdc"]
+    for key in source.pseudoRoot.ListInfoKeys():
+        if key not in ("subLayers", "subLayerOffsets", "customLayerData"):
+            top.pseudoRoot.SetInfo(key, source.pseudoRoot.GetInfo(key))
+    top.Save()
+    return folder / "large.usda"
+
+
+def measured(path: Path) -> tuple[float, float, float, int]:
+    """Time [s], processor time [s] and peak memory [MB] of reading a shot in a process of its own, and its bodies."""
+    done = subprocess.run([sys.executable, "-c", _READ, str(path)], capture_output=True, text=True, check=True)  # nosec B603  # no shell
+    wall, used, memory, bodies = json.loads(done.stdout)
+    return wall, used, memory, bodies
+
+
+def compare(shot: Path, prims: int) -> str:
+    """A table of reading a shot alone and with a set."""
+    with tempfile.TemporaryDirectory() as temporary:
+        large = write_large_stage(shot, prims, Path(temporary))
+        rows = [("alone", *measured(shot)), (f"with {prims} prims", *measured(large))]
+    more = [after - before for before, after in zip(rows[0][1:4], rows[1][1:4], strict=True)]
+    cells = [[name, f"{wall:.2f} s", f"{used:.2f} s", f"{memory:.0f} MB"] for name, wall, used, memory, _ in rows]
+    cells.append(["more", f"{more[0]:.2f} s", f"{more[1]:.2f} s", f"{more[2]:.0f} MB"])
+    return markdown([shot.name, "time", "processor time", "peak memory"], cells)

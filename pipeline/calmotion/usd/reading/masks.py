@@ -1,0 +1,74 @@
+"""Large stages: a set of many prims around a character is composed once, and then left out by a population mask.
+
+Reading looks at all prims several times. In a large stage it looks at those with physics, at those below them, and at
+what they refer to: one pass finds them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from pxr import Sdf, Usd
+
+LARGE = 20_000  # prims
+_SCHEMAS = (
+    "PhysicsRigidBodyAPI", "PhysicsArticulationRootAPI", "PhysicsMassAPI", "PhysicsDriveAPI", "PhysicsLimitAPI",
+    "PhysicsVolumeDeformableMaterialAPI", "PhysicsMaterialAPI", "Calm", "Mjc", "Newton", "Physx", "SkelBindingAPI",
+)  # fmt: skip
+_TYPES = ("SkelRoot", "Skeleton", "SkelAnimation", "PhysicsScene", "Mjc", "Newton")
+_ATTRIBUTES = ("calm:", "drive:", "mjc:", "newton:", "physx", "physics:mass", "physics:density", "physics:rigidBody")
+
+
+def masked(stage: Usd.Stage, muted: Iterable[str] = ()) -> Usd.Stage:
+    """The part of a stage that a reader of characters looks at; the stage itself where it is not large.
+
+    Args:
+        stage: A composed stage.
+        muted: Identifiers of layers that it mutes.
+    """
+    from pxr import Usd
+
+    anchors = _anchors(stage)
+    if anchors is None:
+        return stage
+    mask = Usd.StagePopulationMask(anchors)
+    found = Usd.Stage.OpenMasked(stage.GetRootLayer(), mask, Usd.Stage.LoadAll)
+    found.MuteAndUnmuteLayers(list(muted), [])
+    # materials, bodies of joints, skeletons: what the prims in the mask refer to
+    found.ExpandPopulationMask(Usd.PrimDefaultPredicate, lambda relationship: True, lambda attribute: False)
+    return found
+
+
+def _anchors(stage: Usd.Stage) -> list[Sdf.Path] | None:
+    """Paths of the prims that have to do with physics, none below another; None where the stage is not large."""
+    from pxr import Usd
+
+    count, found = 0, []
+    walk = iter(stage.Traverse(Usd.TraverseInstanceProxies(Usd.PrimIsActive)))
+    for prim in walk:
+        count += 1
+        if _is_anchor(prim):
+            found.append(_outermost(prim).GetPath())
+            for _ in Usd.PrimRange(prim, Usd.TraverseInstanceProxies(Usd.PrimIsActive)):
+                count += 1
+            walk.PruneChildren()
+    return found if found and count > LARGE else None
+
+
+def _outermost(prim: Usd.Prim) -> Usd.Prim:
+    """The prim itself, or the outermost instance that it belongs to: masks name no prims inside instances."""
+    while prim.IsInstanceProxy():
+        prim = prim.GetParent()
+    return prim
+
+
+def _is_anchor(prim: Usd.Prim) -> bool:
+    kind = str(prim.GetTypeName())
+    if kind.startswith(_TYPES) or (kind.startswith("Physics") and kind.endswith("Joint")):
+        return True
+    info = prim.GetPrimTypeInfo()
+    if any(schema.startswith(_SCHEMAS) for schema in info.GetAppliedAPISchemas()):
+        return True
+    return any(name.startswith(_ATTRIBUTES) for name in prim.GetAuthoredPropertyNames())
