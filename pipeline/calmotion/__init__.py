@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from calmotion.workflow.publishing.manifest import write_manifest
     from calmotion.workflow.results import MotorMotion, OptimizationResult, RobotMotion, SimulationResult, TargetMotion
     from calmotion.workflow.run import Progress
+    from calmotion.workflow.sequence.run import Repertoire, sequence
     from calmotion.workflow.shot import Shot, open_shot
 
 __all__ = [
@@ -44,6 +45,7 @@ __all__ = [
     "OptimizationResult",
     "OutputPaths",
     "Progress",
+    "Repertoire",
     "RobotMotion",
     "RunError",
     "SettingError",
@@ -62,6 +64,7 @@ __all__ = [
     "optimize",
     "publishing_problems",
     "rig",
+    "sequence",
     "simulate",
     "verify",
     "warmup",
@@ -84,6 +87,7 @@ _HOMES = {
     "workflow.publishing.manifest": ("write_manifest",),
     "workflow.results": ("MotorMotion", "OptimizationResult", "RobotMotion", "SimulationResult", "TargetMotion"),
     "workflow.run": ("Progress",),
+    "workflow.sequence.run": ("Repertoire", "sequence"),
     "workflow.shot": ("Shot", "open_shot"),
 }
 

@@ -50,10 +50,8 @@ EXAMPLES: dict[str, tuple[tuple[str, str], ...]] = {
         ("calmotion batch shots/*.usda -o calm --workers 2", "two shots at a time, on this machine"),
         ("calmotion batch shots/*.usda -o calm --on dask://host:8786", "on the workers of a Dask scheduler"),
     ),
-    "submit": (
-        ("calmotion submit shots/*.usda --openjd job.yaml -o /farm/calm", "a task for each shot"),
-        ("openjd run job.yaml", "run all of them here"),
-    ),
+    "sequence": (("calmotion sequence clips.toml -o build/repertoire", "clips and all transitions between them"),),
+    "submit": (("calmotion submit shots/*.usda --openjd job.yaml -o /farm/calm", "a task for each shot"),),
     "export": (
         ("calmotion export calm_root.usda --to csv --rate 200Hz", "a table for any controller"),
         ("calmotion export calm_root.usda --to ros2 -o trajectory.yaml", "a ROS 2 JointTrajectory"),

@@ -14,11 +14,11 @@ from calmotion.shot import Animation, Character, MotorTracks, MovingFrame, Prove
 from calmotion.usd import stages
 from calmotion.usd.clock import Clock, clock_of, still_clock
 from calmotion.usd.diagnostics import quiet, with_places
+from calmotion.usd.masks import masked
 from calmotion.usd.reading.animated_transforms import carriers, codes_of
 from calmotion.usd.reading.character import Skeleton, build_character, read_skeleton
 from calmotion.usd.reading.context import Reading, is_rigid_body, prims_of
 from calmotion.usd.reading.joints import joint_prims
-from calmotion.usd.reading.masks import masked
 from calmotion.usd.reading.motors.driven_motors import BODIES, CONSTANT, DRIVE, GIVEN, Drive, to_si
 from calmotion.usd.reading.motors.free_ranges import free_tracks
 from calmotion.usd.reading.motors.given_tracks import given_joints, given_track

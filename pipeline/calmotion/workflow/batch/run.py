@@ -69,7 +69,7 @@ def batch(
         ShotError: The shots cannot be a batch, the backend does not answer, or another batch runs in this folder.
         SettingError: An argument does not fit.
     """
-    begin, target = time.perf_counter(), os.path.abspath(os.fspath(folder))
+    target = os.path.abspath(os.fspath(folder))
     unknown = [name for name in extras if name not in EXTRAS]
     if unknown or (workers is not None and workers < 1):
         raise SettingError(
@@ -80,6 +80,19 @@ def batch(
     if shared_cache is not None:
         variables[SHARED_VARIABLE] = os.path.abspath(os.fspath(shared_cache))
     jobs = jobs_for(shots, target, command, arguments, extras, variables)
+    return run_jobs(jobs, target, command, on, workers, progress, cancel)
+
+
+def run_jobs(
+    jobs: Sequence[Job], target: str, command: str, on: str = LOCAL, workers: int | None = None,
+    progress: Callable[[Progress], None] | None = None, cancel: Callable[[], bool] | None = None,
+) -> BatchResult:  # fmt: skip
+    """Run jobs that may differ in more than their shots; arguments and errors as of `batch`.
+
+    Args:
+        target: Folder of the results, absolute.
+    """
+    begin = time.perf_counter()
     try:
         try_writing(Path(target) / LOGS / "file")
     except OSError as error:

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 def add_to(commands: Commands) -> None:
     """Add the command."""
-    text = "optimise or simulate many shots, here, on a Dask cluster or on Slurm"
+    text = "optimise or simulate many shots, also on a cluster"
     command = commands.add_parser("batch", help=text, description=text[0].upper() + text[1:] + ".")
     command.set_defaults(command=_run)
     file_argument(command, "shots", metavar="SHOTS", nargs="+", help="USD files")
@@ -31,7 +31,10 @@ def add_to(commands: Commands) -> None:
         help="local (default), dask://HOST:PORT, or slurm, also with its parameters: 'slurm?slurm_partition=cpu'",
     )  # fmt: skip
     group.add_argument(
-        "--workers", metavar="N", type=_count, help="most jobs at once (default: one for each processor; elsewhere all)"
+        "--workers",
+        metavar="N",
+        type=worker_count,
+        help="most jobs at once (default: one for each processor; elsewhere all)",
     )
     file_argument(
         group, "--shared-cache", metavar="DIR",
@@ -40,7 +43,7 @@ def add_to(commands: Commands) -> None:
     forwarded_options(command)
 
 
-def _count(text: str) -> int:
+def worker_count(text: str) -> int:
     if not text.isdigit() or not int(text):
         raise argparse.ArgumentTypeError(f"{text} is not a number of workers")
     return int(text)

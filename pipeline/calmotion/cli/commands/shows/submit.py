@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 def add_to(commands: Commands) -> None:
     """Add the command."""
-    text = "write a template of Open Job Description, by which a render farm optimises many shots"
+    text = "write a job template for a render farm (OpenJD)"
     command = commands.add_parser("submit", help=text, description=text[0].upper() + text[1:] + ".")
     command.set_defaults(command=_run)
     file_argument(command, "shots", metavar="SHOTS", nargs="+", help="USD files, by paths that the farm sees as well")

@@ -2,7 +2,7 @@
 
 import pytest
 from calmotion.reduction.cache import cache_key
-from calmotion.usd.reading import masks
+from calmotion.usd import masks
 from calmotion.usd.reading.bodies import scenery
 from calmotion.usd.reading.shot import read_shot
 from calmotion.usd.stages import open_stage

@@ -1,0 +1,58 @@
+"""`calmotion sequence`: clips that may follow one another in any order, and all transitions between them."""
+
+from __future__ import annotations
+
+import argparse
+from typing import TYPE_CHECKING, Any, TextIO
+
+from calmotion.cli.commands.shows.batch import worker_count
+from calmotion.cli.commands.shows.forwarding import forwarded, forwarded_options
+from calmotion.cli.options import Commands, file_argument
+
+if TYPE_CHECKING:
+    from calmotion.cli.output import Output
+
+
+def add_to(commands: Commands) -> None:
+    """Add the command."""
+    text = "retarget clips and all transitions between them"
+    command = commands.add_parser("sequence", help=text, description=text[0].upper() + text[1:] + ".")
+    command.set_defaults(command=_run)
+    file_argument(command, "clips", metavar="CLIPS", help='TOML file: [clips] with NAME = "SHOT.usda" for each')
+    file_argument(
+        command, "-o", "--output", metavar="DIR", required=True,
+        help="folder for layers, manifests and the table of what each transition costs",
+    )  # fmt: skip
+    command.add_argument("--json", action="store_true", help="print one JSON object on stdout, and nothing else there")
+    command.add_argument("--quiet", action="store_true", help="print nothing but errors (and the object of --json)")
+    command.add_argument("--progress", action="store_true", help="print machine-readable progress to stderr")
+    command.add_argument("--on", metavar="WHERE", default="local", help="as of `calmotion batch`")
+    command.add_argument("--workers", metavar="N", type=worker_count, help="most jobs at once")
+    forwarded_options(command)
+
+
+def _run(args: argparse.Namespace, output: Output) -> int:
+    from calmotion.cli.output import FAILED, INTERRUPTED, conclude
+    from calmotion.cli.progress import ProgressDisplay
+    from calmotion.host import SettingError
+    from calmotion.workflow.sequence.run import sequence
+
+    if args.simulate:
+        raise SettingError("a sequence is optimised", path="--simulate", remedy="Remove the option.")
+    with ProgressDisplay(args.quiet, args.progress) as display:
+        found = sequence(
+            args.clips, args.output, arguments=forwarded(args), plugins=args.plugins, on=args.on, workers=args.workers,
+            progress=display,
+        )  # fmt: skip
+    conclude(found.report() | {"page": found.page()}, [], output, None if args.quiet else _print)
+    if found.interrupted:
+        return INTERRUPTED
+    return 0 if found.good else FAILED
+
+
+def _print(report: dict[str, Any], stream: TextIO) -> None:
+    print(report["page"], end="", file=stream)
+    for member in (*report["clips"], *report["transitions"]):
+        if member["problem"]:
+            print(f"{member['name']}: {member['problem']['problem']}", file=stream)
+    print(f"report: {report['folder']}/sequence.md", file=stream)
