@@ -71,6 +71,7 @@ def test_a_job_whose_process_is_killed_is_tried_again_and_has_the_same_result(sh
     assert layers[0] == layers[1]
 
 
+@pytest.mark.long
 def test_a_job_that_always_dies_is_given_up_and_leaves_no_files(shots, tmp_path, trap):
     result = batch(shots[:1], tmp_path / "out", workers=1, **trap("always"))
     assert outcomes(result) == ["died"] and result.jobs[0].attempts == batches.MOST_ATTEMPTS

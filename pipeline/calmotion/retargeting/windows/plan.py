@@ -18,7 +18,7 @@ from calmotion.shot.character import Array
 from calmotion.shot.run import LONG_SHOT, WINDOW, WINDOW_OVERLAP, RunSettings
 
 FALL = 10.0  # factor by which the slowest mode falls in an overlap
-LEAST = 1.0  # overlap [s]
+LEAST = 1.0  # overlap, but not above half a window [s]
 FEWEST = 12  # frames of a window
 
 
@@ -87,8 +87,8 @@ def overlap_time(frequencies: Array, damping: Array, length: float) -> float:
     """
     rates = 2.0 * np.pi * np.asarray(frequencies) * np.asarray(damping)  # amplitudes fall like exp(-rate t)
     slowest = float(np.min(rates[rates > 0.0], initial=math.inf))
-    most = max(LEAST, WINDOW_OVERLAP * length)
-    return min(max(LEAST, math.log(FALL) / slowest if math.isfinite(slowest) else LEAST), most)
+    falling = math.log(FALL) / slowest if math.isfinite(slowest) else LEAST
+    return min(max(LEAST, falling), WINDOW_OVERLAP * length)
 
 
 def plan_windows(frame_times: Array, length: float, overlap: float) -> tuple[Window, ...]:
