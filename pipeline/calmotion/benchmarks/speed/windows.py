@@ -185,9 +185,10 @@ def main(arguments: Sequence[str]) -> int:
     parser.add_argument("--window", default=None, help="length of the windows (default: automatic)")
     parser.add_argument("--tolerance", default="1mm")
     parser.add_argument("--compare", type=float, metavar="SECONDS", help="also compare with one long search")
+    parser.add_argument("--set", action="append", default=[], metavar="NAME=VALUE", help="property of an operator")
     parser.add_argument("--json", action="store_true", help="print one JSON object on stdout, and nothing else there")
     args = parser.parse_args(arguments)
-    options = [f"--tolerance={args.tolerance}"]
+    options = [f"--tolerance={args.tolerance}", *(f"--set={text}" for text in args.set)]
     windows = [] if args.window is None else [f"--window={args.window}"]
     shot = Shot(args.shot).read()
     compared: dict[str, Any] | None = None
@@ -209,6 +210,7 @@ def main(arguments: Sequence[str]) -> int:
         return 0
     print(table(runs), f"time of the search grows with length to the power {exponent(runs):.2f}", sep="")
     if compared:
+        print(table([LongRun(**compared["windows"]), LongRun(**compared["one_search"])]), end="")
         print(
             f"{args.compare:g} s in windows and in one search: targets are up to {1e3 * compared['distance_m']:.3f} mm "
             f"apart, their errors differ by up to {1e3 * compared['profile_m']:.3f} mm; searches of "

@@ -8,6 +8,7 @@ import threading
 import time
 from abc import ABC, abstractmethod
 from concurrent.futures import Executor, Future, ThreadPoolExecutor
+from contextlib import suppress
 from typing import Any
 from urllib.parse import parse_qsl
 
@@ -94,6 +95,8 @@ class DaskBackend(Backend):
     def __init__(self, address: str, workers: int | None):
         self.limit, self._address = workers, address
         self._client = self._connected(10.0)
+        with suppress(TimeoutError, OSError):  # workers may start together with the batch
+            self._client.wait_for_workers(1, timeout=_PATIENCE)
         versions = self._client.run(_version)
         wrong = {name: found for name, found in versions.items() if found != __version__}
         if wrong or not versions:
