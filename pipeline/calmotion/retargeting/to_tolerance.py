@@ -91,7 +91,8 @@ def optimize_to_tolerance(
         assert result.accuracy is not None
         allowed = allowed_step_error(character, options, left_out) if chooses else np.inf
         fine = result.accuracy.step_m <= allowed or step <= LAST
-        ended = latest.iterations >= options.max_iterations  # a new POD subspace would allow no further iteration
+        iterations = max((row.iterations for row in latest.windows), default=latest.iterations)
+        ended = iterations >= options.max_iterations  # a new POD subspace would allow no further iteration
         if fine and (ended or projected.is_accurate_for(tracks, own_step(character, options))):
             break
         if not fine:
