@@ -20,7 +20,7 @@ from calmotion.shot.run import RunSettings
 from calmotion.simulation.bodies import reduce_bodies
 from calmotion.simulation.compiled_shot import CompiledShot, compile_shot
 
-REFERENCE = RunSettings(step=1.0 / 480.0, integrator="radau")  # of the real robot: order 5
+REFERENCE = RunSettings(step=1.0 / 7680.0, integrator="newmark")  # of the real robot
 RATES = {MARKER: 120.0, ACCELEROMETER: 800.0, ANGLE: 200.0}  # of the sensors [Hz]
 NOISE = {MARKER: 3e-4, ACCELEROMETER: 0.1, ANGLE: 3e-4}  # [m], [m/s^2], [rad]
 BIAS, PLACE, DRIFT = 0.2, 1e-3, 3e-5  # standard deviations of what sensors have of their own
