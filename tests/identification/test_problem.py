@@ -2,22 +2,13 @@
 
 import numpy as np
 import pytest
-from calmotion.identification.measurement import Measurement, measurement_parameters, sensors_of
-from calmotion.identification.parameters import robot_parameters
-from calmotion.identification.problem import DIFFERENCE, Calibrated
-from calmotion.shot.run import RunSettings
-from recorded import CLOCKS
+from calmotion.identification.problem import DIFFERENCE
+from recorded import problem_of
 
 
 @pytest.fixture(scope="module")
 def problem(recorded_shot, recordings):
-    shot, clocks = recorded_shot, list(CLOCKS.values())
-    measurement = Measurement(
-        tuple(r.file for r in recordings), sensors_of(shot.character, recordings, clocks, -0.5, 1.75),
-        measurement_parameters(recordings, clocks),
-    )  # fmt: skip
-    options = RunSettings(step=1 / 240, integrator="generalized-alpha")
-    return Calibrated(shot, robot_parameters(shot), measurement, options, 0.5)
+    return problem_of(recorded_shot, recordings)
 
 
 def test_differences_are_derivatives(problem):

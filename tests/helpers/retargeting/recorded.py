@@ -5,6 +5,9 @@ import dataclasses
 import numpy as np
 import pytest
 from calmotion.benchmarks.scenes.beam_arm import beam_arm, quintic, shot_of
+from calmotion.identification.measurement import Measurement, measurement_parameters, sensors_of
+from calmotion.identification.parameters import robot_parameters
+from calmotion.identification.problem import Calibrated
 from calmotion.identification.robots import robot_with
 from calmotion.identification.signals import signals_of
 from calmotion.multibody.model.topology import span_tree
@@ -61,6 +64,17 @@ def only(recordings, *kinds):
         if channels:
             found.append(dataclasses.replace(item, channels=channels))
     return found
+
+
+def problem_of(shot, recordings, step=1 / 240):
+    """The problem of a calibration whose clocks are known."""
+    clocks = [CLOCKS[item.file] for item in recordings]
+    measurement = Measurement(
+        tuple(item.file for item in recordings), sensors_of(shot.character, recordings, clocks, -0.5, 1.75),
+        measurement_parameters(recordings, clocks),
+    )  # fmt: skip
+    options = RunSettings(step=step, integrator="generalized-alpha")
+    return Calibrated(shot, robot_parameters(shot), measurement, options, 0.5)
 
 
 @pytest.fixture(scope="session")
