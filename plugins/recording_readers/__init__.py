@@ -1,4 +1,4 @@
-"""Readers of recordings: tables of any columns, and accelerometer logs of 3D printers."""
+"""Readers of recordings: tables of any columns, accelerometer logs of 3D printers, motion captures in C3D."""
 
 from __future__ import annotations
 
@@ -60,8 +60,25 @@ class ReadPrinterAccelerometer(RecordingReader):
         return read_log(request, properties.prim, properties.axes, properties.unit)
 
 
+class ReadMotionCapture(RecordingReader):
+    """The markers of a motion capture in a C3D file; a TOML map beside it says on which prims they sit."""
+
+    idname = "recording.c3d"
+    label = "Read the motion capture"
+    suffixes: ClassVar[tuple[str, ...]] = (".c3d",)
+    properties: ClassVar[tuple[Property, ...]] = (
+        Property("map", str, "", description="TOML map of the labels; without it FILE.toml beside the recording"),
+    )
+
+    def read(self, request: RecordingRequest, properties: PropertyValues) -> SensorRecording:
+        """The recording."""
+        from .motion_capture import read_c3d
+
+        return read_c3d(request, properties.map)
+
+
 def _of_printer(request: RecordingRequest) -> bool:
     return first_line(request.file).replace(" ", "").lower().startswith(PRINTER_HEAD)
 
 
-register, unregister = registration(ReadRecordedTable, ReadPrinterAccelerometer)
+register, unregister = registration(ReadRecordedTable, ReadPrinterAccelerometer, ReadMotionCapture)

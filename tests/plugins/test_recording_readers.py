@@ -138,3 +138,53 @@ def test_files_without_a_reader_and_missing_ones_are_wrong_arguments(read, repos
 def test_a_prim_may_follow_the_file():
     assert requested("a@b.csv") == RecordingRequest("a@b.csv", "")
     assert requested("a@b.csv@/Arm/Hand") == RecordingRequest("a@b.csv", "/Arm/Hand")
+
+
+@pytest.fixture
+def capture(tmp_path):
+    """A C3D file of two markers, the second of which is lost in the middle."""
+    ezc3d = pytest.importorskip("ezc3d")
+    content = ezc3d.c3d()
+    content["parameters"]["POINT"]["RATE"]["value"] = [100.0]
+    content["parameters"]["POINT"]["LABELS"]["value"] = ["Cup1", "/Arm/Fore"]
+    content["parameters"]["POINT"]["UNITS"]["value"] = ["mm"]
+    points = np.ones((4, 2, 5))
+    points[:3, 0] = np.arange(15.0).reshape(3, 5)
+    points[:3, 1, 2] = np.nan
+    content["data"]["points"] = points
+    file = tmp_path / "take.c3d"
+    content.write(str(file))
+    return file
+
+
+def test_markers_of_a_capture_have_prims_by_their_labels_or_by_a_map(repository, capture):
+    host = host_with(repository / "plugins" / "recording_readers")
+    (found,) = read_recordings(host, [str(capture)], {})
+    (fore,) = found.channels
+    assert fore.path == "/Arm/Fore" and fore.times.tolist() == [0.0, 0.01, 0.03, 0.04]
+    assert fore.values == pytest.approx(1e-3 * np.ones((4, 3)))
+    capture.with_suffix(".toml").write_text('axes = "x, -z, y"\n[markers]\nCup1 = "/Arm/Hand/cup"\n')
+    (found,) = read_recordings(host, [str(capture)], {})
+    (cup,) = found.channels
+    assert cup.path == "/Arm/Hand/cup" and cup.kind == "marker"
+    assert cup.values[1] == pytest.approx(1e-3 * np.array([1.0, -11.0, 6.0]))
+
+
+@pytest.mark.parametrize(
+    ("beside", "match"),
+    [
+        ('[markers]\nCup = "/A"\n', "Cup1"), ("[markers]\nCup1 = 3\n", "prim paths"), ("x = [", "cannot be read"),
+        ('axes = "x, x, z"\n[markers]\nCup1 = "/A"\n', "each axis"),
+    ],
+)  # fmt: skip
+def test_wrong_maps_of_a_capture_are_refused(repository, capture, beside, match):
+    capture.with_suffix(".toml").write_text(beside)
+    with pytest.raises(ShotError, match=match):
+        read_recordings(host_with(repository / "plugins" / "recording_readers"), [str(capture)], {})
+
+
+def test_a_file_that_is_no_capture_is_refused(repository, tmp_path):
+    pytest.importorskip("ezc3d")
+    (tmp_path / "a.c3d").write_text("no capture")
+    with pytest.raises(ShotError, match="not a C3D file"):
+        read_recordings(host_with(repository / "plugins" / "recording_readers"), [str(tmp_path / "a.c3d")], {})

@@ -1,0 +1,103 @@
+"""Markers of a motion capture in C3D files."""
+
+from __future__ import annotations
+
+import os
+
+import numpy as np
+from calmotion.errors import ShotError
+from calmotion.shot.calibration.recording import MARKER, Channel, RecordingRequest, SensorRecording
+from calmotion.support.naming import nearest
+from calmotion.support.reading import read_toml
+from calmotion.workflow.calibration.recording_reader import hash_of
+
+from .columns import UNITS
+
+EXAMPLE = 'Write [markers] with lines such as Cup1 = "/Arm/Hand/cup", and axes = "x, z, -y" above it if axes differ'
+LENGTHS = ("m", "cm", "mm", "in")
+
+
+def read_c3d(request: RecordingRequest, map_file: str) -> SensorRecording:
+    """The markers of a C3D file.
+
+    Args:
+        request: Its file.
+        map_file: TOML map from labels to prims; empty: FILE.toml beside it; without one, labels are prim paths.
+
+    Raises:
+        ShotError: The file or the map cannot be read, or do not fit.
+    """
+    file = request.file
+    try:
+        from ezc3d import c3d
+    except ImportError as error:
+        raise ShotError(
+            "C3D files need the library ezc3d", path=file, remedy="Run pip install calmotion[c3d], or export a table"
+        ) from error
+    try:
+        content = c3d(file)
+    except Exception as error:  # of a library in C++, which has no classes of its own
+        raise ShotError(
+            "this is not a C3D file, or it is damaged", path=file, found=error, remedy="Export it again"
+        ) from error
+    parameters = content["parameters"]["POINT"]
+    labels = [str(label).strip() for label in parameters["LABELS"]["value"]]
+    unit = str((parameters.get("UNITS", {}).get("value") or ["mm"])[0]).strip() or "mm"
+    rate = float(np.ravel(parameters["RATE"]["value"])[0])
+    if unit not in LENGTHS or not rate > 0.0:
+        raise ShotError(
+            "the file has a unit or a rate that does not fit", path=file, attribute="POINT:UNITS and POINT:RATE",
+            found=f"{unit} and {rate:g}", remedy=f"Export it again in {', '.join(LENGTHS)}",
+        )  # fmt: skip
+    markers, axes = _map(file, map_file, labels)
+    points = np.asarray(content["data"]["points"], np.float64)[:3]
+    lost = np.asarray(content["data"]["meta_points"]["residuals"])[0] < 0.0
+    points[:, lost] = np.nan
+    times = np.arange(points.shape[2]) / rate
+    channels = []
+    for label, path in markers.items():
+        values = UNITS[unit] * np.stack([sign * points[axis, labels.index(label)] for axis, sign in axes], axis=1)
+        rows = np.isfinite(values).all(axis=1)
+        if rows.any():
+            channels.append(Channel(MARKER, path, times[rows], values[rows]))
+    if not channels:
+        raise ShotError("no marker has a sample", path=file, found=", ".join(markers), remedy=EXAMPLE)
+    return SensorRecording(file, hash_of(file), tuple(channels))
+
+
+def _map(file: str, map_file: str, labels: list[str]) -> tuple[dict[str, str], list[tuple[int, float]]]:
+    """Prim paths by label, and the column and sign of each axis of the world."""
+    beside = map_file or f"{os.path.splitext(file)[0]}.toml"
+    if not map_file and not os.path.isfile(beside):
+        paths = {label: label for label in labels if label.startswith("/")}
+        if not paths:
+            raise ShotError(
+                "nothing says on which prims the markers sit", path=file, found=", ".join(labels[:8]),
+                remedy=f"Write {beside}. {EXAMPLE}",
+            )  # fmt: skip
+        return paths, [(0, 1.0), (1, 1.0), (2, 1.0)]
+    try:
+        content = read_toml(beside)
+    except (OSError, ValueError) as error:
+        raise ShotError("the map of the recording cannot be read", path=beside, found=error, remedy=EXAMPLE) from error
+    markers = content.get("markers")
+    if not isinstance(markers, dict) or not all(isinstance(p, str) and p.startswith("/") for p in markers.values()):
+        raise ShotError("must be a table of prim paths", path=beside, attribute="markers", remedy=EXAMPLE)
+    for label in markers:
+        if label not in labels:
+            raise ShotError(
+                "the recording has no marker of this label", path=beside, attribute=f"markers.{label}",
+                remedy=f"{nearest(label, labels)}Its labels are {', '.join(labels)}",
+            )  # fmt: skip
+    return {str(k): str(v) for k, v in markers.items()}, _axes(str(content.get("axes", "x, y, z")), beside)
+
+
+def _axes(text: str, file: str) -> list[tuple[int, float]]:
+    names = [name.strip().lower() for name in text.split(",")]
+    plain = [name.lstrip("+-") for name in names]
+    if sorted(plain) != ["x", "y", "z"]:
+        raise ShotError(
+            "must name each axis of the recording once", path=file, attribute="axes", found=text,
+            remedy="Write those along x, y and z of the stage, such as x, z, -y",
+        )  # fmt: skip
+    return [("xyz".index(own), -1.0 if name.startswith("-") else 1.0) for name, own in zip(names, plain, strict=True)]
