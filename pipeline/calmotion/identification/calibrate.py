@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -102,16 +103,17 @@ def calibrate_shot(
     spreads = np.array([p.spread for p in _all(found.problem)])
     return Calibration(
         estimates, spreads[:, None] * found.covariance * spreads, {r.file: r.sha256 for r in recordings}, fits, curves,
-        found.solution.converged, found.iterations, found.problem.simulations, step_of(found.problem), found.shift,
+        found.solution.converged, found.iterations, told.count, step_of(found.problem), found.shift,
         time.perf_counter() - begin, tuple(_notes(found, estimates, settings)),
     )  # fmt: skip
 
 
 class _Told:
-    """Progress with the number of simulations."""
+    """Progress with the number of simulations, in the thread that began: simulations run in others as well."""
 
     def __init__(self, progress: Callable[[float, str], None]):
-        self._progress, self._fraction, self._message, self._count = progress, 0.05, "", 0
+        self._progress, self._fraction, self._message, self.count = progress, 0.05, "", 0
+        self._thread = threading.get_ident()
 
     def __call__(self, fraction: float, message: str) -> None:
         self._fraction, self._message = fraction, message
@@ -119,8 +121,9 @@ class _Told:
 
     def simulated(self) -> None:
         """One more."""
-        self._count += 1
-        self._progress(self._fraction, f"{self._message}: {self._count} simulations")
+        self.count += 1
+        if threading.get_ident() == self._thread:
+            self._progress(self._fraction, f"{self._message}: {self.count} simulations")
 
 
 def _simulable(shot: CompiledShot, options: RunSettings, after: float) -> tuple[RunSettings, Signals]:

@@ -85,12 +85,13 @@ class Calibrated:
         return other
 
     def signals(self, z: Array) -> Signals:
-        """Of the robot at z.
+        """Of the robot at z, in the thread of the caller.
 
         Raises:
             ShotError: It cannot be simulated.
             SimulationFailure: A step fails.
         """
+        interrupts.check()
         x = z[: len(self.parameters)]
         if self._last is None or not np.array_equal(self._last[0], x):
             self._last = x.copy(), self._simulated(x)
@@ -148,7 +149,6 @@ class Calibrated:
         return Differences(x.copy(), tuple(ahead), tuple(behind), widths)
 
     def _simulated(self, x: Array) -> Signals:
-        interrupts.check()
         self.simulations += 1
         self.tell()
         return signals_of(robot_at(self.shot, self.parameters, x), self.options, self.after)
