@@ -13,15 +13,15 @@ from calmotion.errors import ShotError
 from calmotion.shot import Follows, Motor
 from calmotion.usd import schemas
 from calmotion.usd.dialects import number_of
+from calmotion.usd.reading.actuators.motor_models import motor_model, read_gains
+from calmotion.usd.reading.actuators.named_types import named_type
+from calmotion.usd.reading.actuators.newton_actuators import ACTUATOR, TARGETS, newton_actuator
+from calmotion.usd.reading.actuators.rotors import read_backlash, read_delay, read_rotor
 from calmotion.usd.reading.context import Reading, prims_of
 from calmotion.usd.reading.joints import JointPrim, refuse_unsupported
 from calmotion.usd.reading.motors.free_ranges import may_change
 from calmotion.usd.reading.motors.gearing import Gear, read_gear, resolve
 from calmotion.usd.reading.motors.motor_limits import calmotion_limit, effort_limit, velocity_limit
-from calmotion.usd.reading.motors.motor_models import motor_model, read_gains
-from calmotion.usd.reading.motors.named_types import named_type
-from calmotion.usd.reading.motors.newton_actuators import ACTUATOR, TARGETS, newton_actuator
-from calmotion.usd.reading.motors.rotors import read_backlash, read_delay, read_rotor
 from calmotion.usd.reading.motors.tracks import sample_codes
 from calmotion.usd.reading.motors.unused_animation import refuse_unused_animation
 from calmotion.usd.units import StageUnits

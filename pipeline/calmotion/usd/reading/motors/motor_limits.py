@@ -12,8 +12,8 @@ from calmotion.control.motor_types import MotorType
 from calmotion.errors import ShotError
 from calmotion.usd import schemas
 from calmotion.usd.dialects import EFFORT_LIMIT, VELOCITY_LIMIT, Spelling, authored, first_finite
+from calmotion.usd.reading.actuators.newton_actuators import NewtonActuator
 from calmotion.usd.reading.joints import JointPrim
-from calmotion.usd.reading.motors.newton_actuators import NewtonActuator
 from calmotion.usd.units import StageUnits
 
 if TYPE_CHECKING:

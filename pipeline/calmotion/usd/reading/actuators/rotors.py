@@ -17,8 +17,8 @@ from calmotion.control.motor_types import MotorType
 from calmotion.errors import ShotError
 from calmotion.shot.motor import PRESCRIBED, SERVO, Rotor
 from calmotion.usd.dialects import ARMATURE, FRICTION, VISCOUS_FRICTION, Spelling, authored
+from calmotion.usd.reading.actuators.newton_actuators import NewtonActuator
 from calmotion.usd.reading.joints import JointPrim
-from calmotion.usd.reading.motors.newton_actuators import NewtonActuator
 from calmotion.usd.units import StageUnits
 
 if TYPE_CHECKING:

@@ -15,9 +15,9 @@ from calmotion.shot.motor import DRIVE, PRESCRIBED, SERVO
 from calmotion.support.naming import nearest
 from calmotion.usd import schemas
 from calmotion.usd.dialects import GAINS, POSITION_ACTUATOR, Spelling, authored
+from calmotion.usd.reading.actuators.named_types import TYPE
+from calmotion.usd.reading.actuators.newton_actuators import NewtonActuator
 from calmotion.usd.reading.joints import JointPrim
-from calmotion.usd.reading.motors.named_types import TYPE
-from calmotion.usd.reading.motors.newton_actuators import NewtonActuator
 from calmotion.usd.units import StageUnits
 
 if TYPE_CHECKING:
