@@ -48,7 +48,8 @@ def run_shot(
             **options,
         )
     report = result.report()
-    report["manifest"] = _write_manifest(result, args)
+    if manifest := _write_manifest(result, args):
+        report["manifest"] = manifest
     conclude(report, result.problems, output, None if args.quiet else partial(print_run, verbose=args.verbose))
     if result.interrupted:
         return INTERRUPTED
