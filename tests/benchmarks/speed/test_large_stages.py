@@ -12,7 +12,8 @@ from one_hinge import ONE_HINGE
 def test_the_set_adds_prims_and_changes_nothing_of_the_character(tmp_path):
     (tmp_path / "shot.usda").write_text(ONE_HINGE)
     large = write_large_stage(tmp_path / "shot.usda", 505, tmp_path)
-    assert sum(1 for _ in open_stage(str(large)).Traverse()) > 500
+    stage = open_stage(str(large))
+    assert sum(1 for _ in stage.Traverse()) > 500
     assert [body.path for body in read_shot(str(large))[0].bodies] == ["/Robot/Link"]
 
 
