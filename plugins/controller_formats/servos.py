@@ -58,7 +58,7 @@ def read_servos(file: str, curves: MotorCurves) -> tuple[Servo, ...]:
     """
     if not file:
         raise ShotError(
-            "no servos are named for the ticks", attribute="export.ticks.motors", remedy=f"{_EXAMPLE}. {_REMEDY}"
+            "no servos are named for the ticks", attribute="export.ticks.motors", remedy=f"Use {_EXAMPLE}. {_REMEDY}"
         )
     try:
         tables = read_toml(file)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 
 import numpy as np
@@ -10,6 +11,7 @@ from calmotion.cli.inspect_tables import _solid_row
 from calmotion.shot import Body, ElasticMaterial, FEMesh, FlexibleSettings, Frame
 from calmotion.shot.meshes import MeshQuality
 from calmotion.workflow.inspection import _body
+from one_hinge import ONE_HINGE
 
 BODY = Body(
     "/Arm/fore", Frame(np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0])), None,
@@ -31,3 +33,11 @@ def test_a_meshed_body_says_what_its_solid_is_made_of_and_how_good_its_mesh_is()
 @pytest.mark.parametrize("body", [BODY, replace(BODY, flexible=None)])
 def test_a_body_without_a_mesh_has_no_solid(body):
     assert "solid" not in _body(body, None, None, False)
+
+
+def test_mode_shapes_of_a_rigid_robot_are_refused_with_the_reason(calmotion, tmp_path):
+    (tmp_path / "shot.usda").write_text(ONE_HINGE)
+    done = calmotion("inspect", tmp_path / "shot.usda", "--modes", tmp_path / "modes", "--json", "--quiet")
+    error = json.loads(done.stdout)["error"]
+    assert done.returncode == 1 and "Write the mode shapes" in error["problem"]
+    assert "nothing is flexible" in error["found"] and "there is no" not in error["found"] and error["remedy"]

@@ -56,10 +56,25 @@ def problems_of(run: Run, wanted: Sequence[type]) -> list[Problem]:
         return problems
     for kind in wanted:
         if run.get(kind) is None:
-            makers = {cls.idname for cls in run.plan.operators if kind in cls.provides}
-            reasons = "; ".join(f"{row.idname}: {row.reason}" for row in run.results if row.idname in makers)
-            problems.append(Problem(HostError(f"there is no {kind.__name__}", found=reasons or None)))
+            makers = [cls for cls in run.plan.operators if kind in cls.provides]
+            what = f"the step `{makers[0].label}` cannot be done" if makers else f"no operator makes {kind.__name__}"
+            reasons = "; ".join(_reasons(run, kind, frozenset()))
+            remedy = "Leave out the option that asks for it, or give the shot what it lacks" if reasons else ""
+            problems.append(Problem(HostError(what, found=reasons or None, remedy=remedy)))
     return problems
+
+
+def _reasons(run: Run, kind: type, seen: frozenset[type]) -> list[str]:
+    """Why a value was not made: the reasons of the operators at the begin of the chain, not "there is no ..."."""
+    rows = {row.idname: row for row in run.results}
+    found: dict[str, None] = {}
+    for cls in run.plan.operators:
+        if kind not in cls.provides or cls.idname not in rows:
+            continue
+        missing = [need for need in cls.requires if run.get(need) is None and need not in seen and need is not kind]
+        deeper = [reason for need in missing for reason in _reasons(run, need, seen | {kind})]
+        found |= dict.fromkeys(deeper or [rows[cls.idname].reason])
+    return [reason for reason in found if reason]
 
 
 def value_of(run: Run, kind: type[T], problems: Sequence[Problem] = ()) -> T:
