@@ -207,7 +207,7 @@ CASES = {
     "elements that are too small": (simulate, no_edit, {"settings": {"fe.mesh.element_size": "0.02mm"}}, "elementSize"),
     "motors that contradict each other later": (simulate, closed_chain(0.0), {"pre_roll": 0.0}, "/Arm/joints/"),
     "motors that contradict each other at once": (optimize, closed_chain(0.03), {"pre_roll": 0.0}, "/Arm/joints/"),
-    "a pre-roll that takes too long": (simulate, no_edit, {"pre_roll": 1e7}, "endTimeCode"),
+    "a pre-roll that takes too long": (simulate, no_edit, {"pre_roll": 1e7}, "--pre-roll"),
 }  # fmt: skip
 
 
