@@ -65,3 +65,14 @@ def test_patterns_choose_paths_and_priors_replace_the_usual_ones(shot):
 def test_what_the_robot_does_not_have_is_refused(shot, wanted, priors, match):
     with pytest.raises(ShotError, match=match):
         robot_parameters(shot, wanted, priors)
+
+
+def test_a_link_whose_mass_is_authored_has_no_density(shot):
+    assert [p.name for p in robot_parameters(shot, ("density",))] == ["density /Arm/Nylon"]
+    heavy = [
+        dataclasses.replace(body, mass=shot.character.bodies[2].mass) if body.flexible else body
+        for body in shot.character.bodies
+    ]
+    character = dataclasses.replace(shot.character, bodies=tuple(heavy))
+    with pytest.raises(ShotError, match="no parameter of these kinds"):
+        robot_parameters(compile_shot(character, shot.animation, shot.bodies), ("density",))

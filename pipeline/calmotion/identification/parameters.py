@@ -174,7 +174,8 @@ def _of_kind(shot: CompiledShot, kind: str, pattern: str, prior: float) -> list[
                     DAMPING: (material.damping_ratio if material.rayleigh is None else 1.0, ""),
                     DENSITY: (material.density, "kg/m^3"),
                 }[kind]
-                if value[0] > 0.0:
+                # the density of a body whose mass is authored follows from that mass
+                if value[0] > 0.0 and not (kind == DENSITY and body.mass is not None):
                     found[material.path] = Parameter(kind, material.path, value[0], spread, value[1])
         return list(found.values())
     if kind in (MASS, CENTRE):

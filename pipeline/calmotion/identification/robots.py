@@ -104,7 +104,8 @@ def _body(own: Body, body: ReducedBody, values: Values) -> ReducedBody:
         given = own.flexible.material
         material = material_with(given, values)
         body = with_scaled_stiffness(body, material.youngs_modulus / given.youngs_modulus)
-        return with_scaled_density(body, material.density / given.density)
+        # a body whose mass is authored keeps it
+        return with_scaled_density(body, material.density / given.density) if own.mass is None else body
     if own.mass is None:
         return body
     mass = values.get((MASS, own.path, -1), own.mass.mass)
