@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 def add_to(commands: Commands) -> None:
     """Add the command."""
-    text = "list materials for flexible links, with modulus, density, damping and their sources"
+    text = "list materials for flexible links, with their sources"
     command = commands.add_parser("materials", help=text, description=text[0].upper() + text[1:] + ".")
     command.set_defaults(command=_run)
     command.add_argument("name", nargs="?", metavar="NAME", help="show only this material, with its source")

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 def add_to(commands: Commands) -> None:
     """Add the command."""
-    text = "list real motors that a joint can name (calm:motor:type), with torque, speed and their sources"
+    text = "list real motors that a joint can name, with their sources"
     command = commands.add_parser("motors", help=text, description=text[0].upper() + text[1:] + ".")
     command.set_defaults(command=_run)
     command.add_argument("name", nargs="?", metavar="NAME", help="show only this motor, each value with its source")

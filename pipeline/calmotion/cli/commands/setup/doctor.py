@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 def add_to(commands: Commands) -> None:
     """Add the command."""
-    text = "check versions, caches, processor, memory, disk and viewers, and say what to do"
+    text = "check the installation and the machine, and say what to do"
     command = commands.add_parser(
         "doctor", help=text, description=f"{text[0].upper()}{text[1:]}. Exit status 1 if something is wrong."
     )

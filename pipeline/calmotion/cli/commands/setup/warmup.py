@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 def add_to(commands: Commands) -> None:
     """Add the command."""
-    text = "compile the kernels now, so that the first shot does not wait for them"
+    text = "compile the kernels ahead of the first shot"
     command = commands.add_parser("warmup", help=text, description=f"{text[0].upper()}{text[1:]}. Takes half a minute.")
     command.add_argument("--json", action="store_true", help="print one JSON object on stdout")
     command.add_argument("--quiet", action="store_true", help="print no progress and no report")

@@ -13,9 +13,7 @@ if TYPE_CHECKING:
 
 def add_to(commands: Commands) -> None:
     """Add the command."""
-    command = shot_command(
-        commands, "calibrate", _run, "estimate the parameters of the robot from recordings of its performance"
-    )
+    command = shot_command(commands, "calibrate", _run, "estimate parameters of the robot from recordings")
     file_argument(
         command, "--recording", metavar="FILE", action="append", required=True,
         help="what was recorded: a table with columns named after prims or with a TOML map beside it, or an "
