@@ -102,17 +102,9 @@ def imported(path: Path) -> set[str]:
 
 def test_every_import_is_declared(repository: Path):
     project = tomllib.loads((repository / "pyproject.toml").read_text())["project"]
-    declared = {canonicalize_name(Requirement(text).name) for text in project["dependencies"]}
-    # each where its users have it
-    optional = {
-        "bpy",
-        "bpy_extras",
-        "mathutils",
-        "exudyn",
-        "mcap_ros2",
-        "pytest",
-        "pandas",
-    }  # each where its users have it
+    extras = [text for name, texts in project["optional-dependencies"].items() if name != "dev" for text in texts]
+    declared = {canonicalize_name(Requirement(text).name) for text in [*project["dependencies"], *extras]}
+    optional = {"bpy", "bpy_extras", "mathutils", "pytest", "pandas"}  # each where its users have it
     owners = packages_distributions()
     modules = [path for room in ("pipeline", "plugins") for path in (repository / room).rglob("*.py")]
     assert len(modules) > 200
