@@ -69,6 +69,7 @@ def test_arm_moves_as_by_position_actuators_of_mujoco():
     assert np.abs(states.u[:, :, 0] - expected).max() < 1e-4 * np.ptp(expected)
 
 
+@pytest.mark.long
 def test_kuka_on_the_actuators_of_its_own_file_moves_as_in_mujoco(shared_data):
     """Seven motors whose gains (kp 2000, kv 200) the converter wrote; every joint turns at once."""
     pytest.importorskip("mujoco")

@@ -64,7 +64,7 @@ def test_gains_that_are_not_used_tell_what_they_would_do_as_the_simulation_with_
     assert found.droop == pytest.approx([droop], rel=0.02) and found.droop == pytest.approx(simulated.sag, rel=1e-9)
 
 
-@pytest.mark.parametrize("gain", [30.0, 150.0, 600.0])
+@pytest.mark.parametrize("gain", [30.0, *(pytest.param(k, marks=pytest.mark.long) for k in (150.0, 600.0))])
 def test_on_flexible_links_the_effect_of_gains_is_that_of_a_finer_simulation_with_drives(flexible_arm, gain):
     """Drives shift the frequencies of the links, so that their errors do not add up."""
     motors = tuple(replace(m, position_gain=gain, velocity_gain=gain / 50.0) for m in flexible_arm.character.motors)

@@ -14,8 +14,12 @@ TOO_SOFT = [f"1e{power} Pa" for power in (4, 5, 6, 7, 8)] + ["load a million arm
 TOO_FAST = ["half a turn in a frame, plastic", "100 rad/s, steps of 1/24 s"]
 
 
+LONG = ["chain, ", "step, 1e-05 s"]
+
+
 def _marked(case):
-    return pytest.param(case, id=f"{case.group}, {case.name}", marks=pytest.mark.long if case.group == "chain" else ())
+    name = f"{case.group}, {case.name}"
+    return pytest.param(case, id=name, marks=pytest.mark.long if name.startswith(tuple(LONG)) else ())
 
 
 @pytest.mark.parametrize("case", [_marked(case) for case in CASES])

@@ -25,7 +25,10 @@ def test_every_integrator_has_steps():
     assert tuple(STEPS) == INTEGRATORS
 
 
-@pytest.mark.parametrize("name", MAPS)
+LONG = dict.fromkeys(("load", "speed"), pytest.mark.long)
+
+
+@pytest.mark.parametrize("name", [pytest.param(name, marks=LONG.get(name, ())) for name in MAPS])
 def test_cells_run_or_are_refused_with_a_reason(name):
     values = MAPS[name][1]
     steps = {integrator: own[1:2] for integrator, own in STEPS.items()}

@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+import pytest
 from calmotion.benchmarks.speed.large_stages import compare
 from calmotion.usd.reading.shot import read_shot
 from calmotion.usd.stages import open_stage
@@ -17,6 +18,7 @@ def test_the_set_adds_prims_and_changes_nothing_of_the_character(tmp_path):
     assert [body.path for body in read_shot(str(large))[0].bodies] == ["/Robot/Link"]
 
 
+@pytest.mark.long
 def test_a_table_compares_both(tmp_path):
     (tmp_path / "shot.usda").write_text(ONE_HINGE)
     text = compare(Path(tmp_path / "shot.usda"), 202)
