@@ -129,7 +129,13 @@ def print_verdict(console: Console, report: dict[str, Any]) -> None:
         change = "falls" if after < before else "does not fall"
         say(console, f"The largest error {change} from {length(before)} to {length(after)} (at {worst['path']}).")
     elif worst is not None:
-        say(console, f"As animated, the largest error is {length(worst['max_error_m'])} (at {worst['path']}).")
+        shaper, motion = report.get("shaper"), "As animated"
+        if shaper:
+            motion = "With the low-pass filter" if shaper == "lowpass" else f"With the shaper {shaper}"
+        say(console, f"{motion}, the largest error is {length(worst['max_error_m'])} (at {worst['path']}).")
+        if shaper:
+            said = f"{report['shaper_delay_s']:.3f} s, not counted: {length(report['delayed_max_error_m'])}"
+            say(console, f"It delays the motion by {said}.")
     tolerance = length(report["tolerance_m"])
     if report["tolerance_kept"]:
         error = length(report["simulation_error_m"])
@@ -249,12 +255,6 @@ def print_warnings(console: Console, report: dict[str, Any]) -> None:
         gain = report["expected_further_gain_m"]
         more = "" if gain is None else f", {length(gain)} expected gain of one more iteration"
         say(console, f"stopped: {report['stopped']}{more}")
-    if report.get("shaper"):
-        say(
-            console,
-            f"{report['shaper']} delays the motion by {report['shaper_delay_s']:.3f} s; largest error from the "
-            f"intended motion with that delay: {length(report['delayed_max_error_m'])}",
-        )
     print_shares(console, report["error_shares"])
     print_lost_motion(console, report["lost_motion"], suffix)
     print_limits(console, report["limits"], bool(suffix))
