@@ -57,8 +57,8 @@ def plot_signals(curves: Sequence[ChannelCurves]) -> Figure:
             if c >= curve.measured.shape[1]:
                 axes.set_axis_off()
                 continue
-            for begin, end in _ranges(curve):
-                axes.axvspan(begin, end, color="#f0f0f0", zorder=0)
+            for n, (begin, end) in enumerate(_ranges(curve)):
+                axes.axvspan(begin, end, color="#e4e4e4", zorder=0, label="" if n else "held out")
             axes.plot(curve.times, curve.measured[:, c], ".", color=LIMIT, markersize=1.5, label="measured")
             for values, color, style, label in (
                 (curve.before, BEFORE, "--", "as in the shot"), (curve.after, AFTER, "-", "calibrated"),
@@ -101,7 +101,7 @@ def plot_intervals(calibration: Calibration) -> Figure:
         axes.errorbar(middle, k, xerr=half, fmt="o", color=color, markersize=3.5, capsize=3.0)
     names = [f"{item.kind} {short(item.path)}{item.name[len(item.kind) + len(item.path) + 1 :]}" for item in items]
     axes.set_yticks(range(len(items)), names)
-    axes.invert_yaxis()
+    axes.set_ylim(len(items) - 0.4, -0.6)  # the first one on top
     tidy(axes, "", "95% intervals: before (grey), after (green; orange: not identifiable)")
     axes.set_xlabel("difference from the shot, in standard deviations of the prior", fontsize=SMALL)
     return figure
