@@ -15,7 +15,7 @@ from calmotion.multibody.sensitivity.linearization import spare_memory
 from calmotion.retargeting.problem.offset_space import OffsetSpace
 from calmotion.retargeting.problem.parallel import in_parallel
 from calmotion.retargeting.problem.robot import Robot
-from calmotion.shot.character import Array, IntArray
+from calmotion.shot.character import Array, BoolArray, IntArray
 
 COST = 1 / 64  # of a response, in products: half of the instants, at a sixteenth of the time of a sweep
 LEAST = 24  # products: the matrix is not made for less; few robots need its kernels, which take seconds to compile
@@ -26,10 +26,11 @@ _SHARE = 0.5  # of the memory for a linearisation
 
 def products_worth(robots: Sequence[Robot], space: OffsetSpace) -> int | None:
     """Number of products that the matrix costs; None where it cannot be made, or not be stored."""
-    rows = sum(len(robot.residuals) * len(_rows(robot)[0]) for robot in robots[:1])
-    memory = 8.0 * space.size * (rows + 3 * space.size)
-    blocked = all(robot.simulator.can_be_blocked() for robot in robots)
-    if not blocked or space.size > _LARGEST or memory > _SHARE * spare_memory():
+    if space.size > _LARGEST or not all(robot.simulator.can_be_blocked() for robot in robots):
+        return None
+    # robots follow one after the other: the responses of one are in memory at a time
+    rows = len(robots[0].residuals) * np.count_nonzero(_varying(robots[0]))
+    if 8.0 * space.size * (rows + 3 * space.size) > _SHARE * spare_memory():
         return None
     return max(LEAST, round(COST * space.size))
 
@@ -69,6 +70,11 @@ def _responses(robot: Robot, space: OffsetSpace) -> Array:
 def _rows(robot: Robot) -> tuple[IntArray, Array]:
     """The component and the derivatives of each residual that is not always zero, shapes [r] and [T, r, N]."""
     jacobian = robot.jacobian
-    target, row = np.nonzero(np.any(jacobian, axis=(0, 3)))
+    target, row = np.nonzero(_varying(robot))
     component = np.asarray(robot.model.targets.component)[target].astype(np.int32)
     return component, np.ascontiguousarray(jacobian[:, target, row])
+
+
+def _varying(robot: Robot) -> BoolArray:
+    """Which weighted residuals depend on the motion at any instant, shape [K, 6]."""
+    return np.asarray(np.any(robot.jacobian, axis=(0, 3)))
