@@ -27,6 +27,12 @@ MEANINGS = {
 KINDS = tuple(MEANINGS)
 
 
+def report_options(command: argparse.ArgumentParser) -> None:
+    """The options of a command that prints a report: --json and --quiet."""
+    command.add_argument("--json", action="store_true", help="print one JSON object on stdout, and nothing else there")
+    command.add_argument("--quiet", action="store_true", help="print nothing but errors (and the object of --json)")
+
+
 def shot_command(commands: Commands, name: str, function: Command, text: str) -> argparse.ArgumentParser:
     """Add a command on a shot, with the options that all of them have.
 
@@ -39,8 +45,7 @@ def shot_command(commands: Commands, name: str, function: Command, text: str) ->
     command = commands.add_parser(name, help=text, description=text[0].upper() + text[1:] + ".")
     command.set_defaults(command=function)
     file_argument(command, "shot", metavar="SHOT", help="USD file of the shot")
-    command.add_argument("--json", action="store_true", help="print one JSON object on stdout, and nothing else there")
-    command.add_argument("--quiet", action="store_true", help="print nothing but errors (and the object of --json)")
+    report_options(command)
     command.add_argument("--progress", action="store_true", help="print machine-readable progress to stderr")
     command.add_argument(
         "--openjd", action="store_true", help="print progress to stdout in the words of Open Job Description"

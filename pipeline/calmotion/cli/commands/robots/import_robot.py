@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING, Any, TextIO
 
-from calmotion.cli.options import Commands, file_argument, plugin_option
+from calmotion.cli.options import Commands, file_argument, plugin_option, report_options
 
 if TYPE_CHECKING:
     from calmotion.cli.output import Output
@@ -44,8 +44,7 @@ def add_to(commands: Commands) -> None:
         "--set", metavar="NAME=VALUE", action="append", default=[],
         help="set a property of an operator, such as motion.read.angles=deg",
     )  # fmt: skip
-    command.add_argument("--json", action="store_true", help="print one JSON object on stdout, and nothing else there")
-    command.add_argument("--quiet", action="store_true", help="print nothing but errors (and the object of --json)")
+    report_options(command)
 
 
 def _run(args: argparse.Namespace, output: Output) -> int:

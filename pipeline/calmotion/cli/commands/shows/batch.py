@@ -6,7 +6,7 @@ import argparse
 from typing import TYPE_CHECKING, Any, TextIO
 
 from calmotion.cli.commands.shows.forwarding import command_of, extras_of, forwarded, forwarded_options
-from calmotion.cli.options import Commands, file_argument
+from calmotion.cli.options import Commands, file_argument, report_options
 
 if TYPE_CHECKING:
     from calmotion.cli.output import Output
@@ -22,8 +22,7 @@ def add_to(commands: Commands) -> None:
         command, "-o", "--output", metavar="DIR", required=True,
         help="folder for layers, manifests, logs and the report; the same command goes on after an interruption",
     )  # fmt: skip
-    command.add_argument("--json", action="store_true", help="print one JSON object on stdout, and nothing else there")
-    command.add_argument("--quiet", action="store_true", help="print nothing but errors (and the object of --json)")
+    report_options(command)
     command.add_argument("--progress", action="store_true", help="print machine-readable progress to stderr")
     group = command.add_argument_group("workers")
     group.add_argument(

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, TextIO
 
 from calmotion.cli.commands.shows.batch import worker_count
 from calmotion.cli.commands.shows.forwarding import forwarded, forwarded_options
-from calmotion.cli.options import Commands, file_argument
+from calmotion.cli.options import Commands, file_argument, report_options
 
 if TYPE_CHECKING:
     from calmotion.cli.output import Output
@@ -23,8 +23,7 @@ def add_to(commands: Commands) -> None:
         command, "-o", "--output", metavar="DIR", required=True,
         help="folder for layers, manifests and the table of what each transition costs",
     )  # fmt: skip
-    command.add_argument("--json", action="store_true", help="print one JSON object on stdout, and nothing else there")
-    command.add_argument("--quiet", action="store_true", help="print nothing but errors (and the object of --json)")
+    report_options(command)
     command.add_argument("--progress", action="store_true", help="print machine-readable progress to stderr")
     command.add_argument("--on", metavar="WHERE", default="local", help="as of `calmotion batch`")
     command.add_argument("--workers", metavar="N", type=worker_count, help="most jobs at once")

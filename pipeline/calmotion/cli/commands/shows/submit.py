@@ -6,7 +6,7 @@ import argparse
 from typing import TYPE_CHECKING, Any, TextIO
 
 from calmotion.cli.commands.shows.forwarding import command_of, extras_of, forwarded, forwarded_options
-from calmotion.cli.options import Commands, file_argument
+from calmotion.cli.options import Commands, file_argument, report_options
 
 if TYPE_CHECKING:
     from calmotion.cli.output import Output
@@ -20,8 +20,7 @@ def add_to(commands: Commands) -> None:
     file_argument(command, "shots", metavar="SHOTS", nargs="+", help="USD files, by paths that the farm sees as well")
     file_argument(command, "--openjd", metavar="TEMPLATE", required=True, help="YAML file to write")
     file_argument(command, "-o", "--output", metavar="DIR", required=True, help="folder of the results")
-    command.add_argument("--json", action="store_true", help="print one JSON object on stdout, and nothing else there")
-    command.add_argument("--quiet", action="store_true", help="print nothing but errors (and the object of --json)")
+    report_options(command)
     forwarded_options(command)
 
 
