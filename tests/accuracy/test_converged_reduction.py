@@ -57,6 +57,15 @@ def test_a_shake_that_will_be_removed_needs_less_accuracy(arm, animation, meshes
     assert loose < count(refined(arm, animation, meshes, 1e-3).shot)
 
 
+def test_a_reduction_is_not_refined_far_below_the_error_of_the_meshes(arm, animation, meshes, monkeypatch):
+    monkeypatch.setattr(module, "SHARE", 1e-9)  # never reached
+    monkeypatch.setattr(module, "MOST", 3)
+    finest = refined(arm, animation, meshes, 1e-2)
+    monkeypatch.setattr(module, "mesh_error", lambda shot, options, run: 1.0)
+    stopped = refined(arm, animation, meshes, 1e-2)
+    assert count(stopped.shot) < count(finest.shot) and stopped.error_m > 1e-9
+
+
 def test_fine_reductions_see_pairs_as_for_a_tenth_of_the_tolerance(arm, animation, meshes, monkeypatch):
     levels = []
 

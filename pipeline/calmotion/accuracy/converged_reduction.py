@@ -11,7 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from calmotion.accuracy.mesh_budget import meshes_to_tolerance
+from calmotion.accuracy.mesh_budget import mesh_error, meshes_to_tolerance
 from calmotion.accuracy.pod_subspace import ReferenceRun, reference_run
 from calmotion.accuracy.reduced_bodies import ConvergedReduction
 from calmotion.accuracy.simulate_to_tolerance import OF_SHAKE, intended_positions
@@ -26,6 +26,7 @@ from calmotion.simulation.inputs.time_grid import MAX_STEP
 SHARE = 0.4  # of the tolerance, that what is left out may take
 PAIRS = 0.1  # of the tolerance: a reduction finer than this sees pairs of coordinates as for this
 FINER, MOST = 0.1, 6  # each tolerance of the reduction over the last, and how many there are
+OF_MESH = 0.3  # of the error of meshes that cannot keep their share: a finer reduction would not improve the result
 
 
 def converged_reduction(
@@ -71,7 +72,7 @@ def converged_reduction(
             found, then = simulated(shot, options), simulated(finer, options)
         off = distance(then.run.positions, found.run.positions)
         shot, found = finer, then
-        if off <= allowed:
+        if off <= allowed or (k and not retargeted and off <= OF_MESH * (mesh_error(shot, options, found.run) or 0.0)):
             break
     reduction.release()
     return ConvergedReduction(shot, off, found, reduction)

@@ -5,6 +5,7 @@ import re
 import numpy as np
 import pytest
 from boxes import box_tets
+from calmotion.errors import ShotError
 from calmotion.reduction.basis.craig_bampton import reduced_basis
 from calmotion.reduction.basis.modal_derivatives import Support
 from calmotion.reduction.elements.assembly import assemble
@@ -47,7 +48,16 @@ def test_a_slow_swing_is_linear_and_a_fast_one_is_not():
 
 
 def test_rubber_needs_the_material_law():
-    assert choose_law(*arm(5e6), swing(1.0), 1e-3).law == "neohookean"
+    assert choose_law(*arm(1.6e7), swing(1.0), 1e-3).law == "neohookean"
+
+
+def test_a_body_that_hangs_like_a_rope_is_refused_with_the_least_modulus():
+    with pytest.raises(ShotError, match="too soft for this shot") as refused:
+        choose_law(*arm(5e6), swing(1.0), 1e-3, "/Arm")
+    least = float(re.search(r"a modulus of (\S+) Pa is the least", refused.value.remedy)[1])
+    assert choose_law(*arm(1.05 * least), swing(1.0), 1e-3).law == "neohookean"
+    with pytest.raises(ShotError):
+        choose_law(*arm(0.9 * least), swing(1.0), 1e-3)
 
 
 def test_at_rest_everything_is_linear():

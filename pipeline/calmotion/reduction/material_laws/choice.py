@@ -27,7 +27,7 @@ from calmotion.shot.character import Array, ElasticMaterial
 
 _MODES = 4  # the lowest modes, which make nearly all of a deflection
 _LARGE_STRAIN = 0.1  # below, the bound of the loads is too pessimistic to require a nonlinear material
-UNPHYSICAL = 100.0  # deflection over the size of the body, beyond any real one
+UNPHYSICAL = 10.0  # linear deflection over the size of a body that hangs like a rope: beyond any reduced basis
 
 
 @dataclass(frozen=True)
@@ -86,7 +86,9 @@ def choose_law(
             path=path,
             attribute="physics:youngsModulus",
             found=f"{material.youngs_modulus:.3g} Pa",
-            remedy="Check it, in units of the stage, and the masses that the body carries.",
+            remedy="Check it, in units of the stage, and the masses that the body carries. Bodies with more than "
+            f"{UNPHYSICAL:g} times hang like ropes, and cannot be simulated; here a modulus of "
+            f"{material.youngs_modulus * deflection / (UNPHYSICAL * size):.2g} Pa is the least",
         )
     linear_error = shortening + moved * softening
     strain = float(np.sqrt(deflections @ (omega_squared * deflections) / (material.youngs_modulus * model.mesh.volume)))
