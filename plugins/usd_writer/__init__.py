@@ -82,7 +82,6 @@ class WriteResult(Operator):
             str(context.get(OutputPaths).layer),
             options,
         )
-        context.report("info", f"open {root} to see {layer} together with the shot")
         return (WrittenLayer(layer=layer, root=root),)
 
     @staticmethod

@@ -236,7 +236,8 @@ def print_files(console: Console, report: dict[str, Any]) -> None:
     for figure in report["figures"]:
         say(console, f"wrote {unbroken(figure)}")
     if report["root_layer"]:
-        say(console, f"next: open {unbroken(report['root_layer'])}, which shows the shot with the new curves")
+        shown_with = "the new curves" if _last(report) else "the simulated motion"
+        say(console, f"next: open {unbroken(report['root_layer'])}, which shows the shot with {shown_with}")
     if report["rrd"]:
         say(console, f"next: rerun {unbroken(report['rrd'])}")
     if not any(report[name] for name in ("layer", "rrd", "video")):
