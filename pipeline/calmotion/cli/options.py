@@ -27,9 +27,14 @@ MEANINGS = {
 KINDS = tuple(MEANINGS)
 
 
+def json_option(command: argparse.ArgumentParser) -> None:
+    """The option --json."""
+    command.add_argument("--json", action="store_true", help="print one JSON object on stdout, and nothing else there")
+
+
 def report_options(command: argparse.ArgumentParser) -> None:
     """The options of a command that prints a report: --json and --quiet."""
-    command.add_argument("--json", action="store_true", help="print one JSON object on stdout, and nothing else there")
+    json_option(command)
     command.add_argument("--quiet", action="store_true", help="print nothing but errors (and the object of --json)")
 
 

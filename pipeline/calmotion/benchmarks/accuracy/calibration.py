@@ -19,7 +19,7 @@ from pathlib import Path
 
 import numpy as np
 
-from calmotion.benchmarks.common.parsers import bench_parser
+from calmotion.benchmarks.common.parsers import bench_parser, output_options
 from calmotion.benchmarks.common.tables import markdown, write_rows
 from calmotion.benchmarks.scenes.recorded_arm import recorded_arm
 from calmotion.errors import ShotError
@@ -127,9 +127,7 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--trials", type=int, default=20, help="number of trials (default: 20)")
     parser.add_argument("--first", type=int, default=0, metavar="K", help="number of the first trial (default: 0)")
     parser.add_argument("--finer-mesh", action="store_true", help="the real arm has a finer mesh and more modes")
-    parser.add_argument("--json", action="store_true", help="print one JSON object on stdout, and nothing else there")
-    parser.add_argument("--csv", metavar="FILE", help="also write a row for each parameter of each trial")
-    parser.add_argument("--markdown", metavar="FILE", help="also write the table as Markdown")
+    output_options(parser, csv="a row for each parameter of each trial", markdown=True)
     options = parser.parse_args(arguments)
     rows: list[Recovered] = []
     for number in range(options.first, options.first + options.trials):

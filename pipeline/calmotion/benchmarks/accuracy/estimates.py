@@ -23,7 +23,7 @@ from calmotion.accuracy.mesh_budget import mesh_error
 from calmotion.accuracy.simulate_to_tolerance import simulate_to_tolerance
 from calmotion.accuracy.step_error import ORDER, StepRun, distance, frames_of, simulate_at
 from calmotion.benchmarks.common.finer_meshes import with_more_nodes
-from calmotion.benchmarks.common.parsers import bench_parser
+from calmotion.benchmarks.common.parsers import bench_parser, output_options
 from calmotion.benchmarks.common.tables import markdown, write_rows
 from calmotion.benchmarks.scenes.beam_arm import beam_arm, quintic, shot_of
 from calmotion.errors import ShotError
@@ -155,9 +155,7 @@ def main(arguments: list[str] | None = None) -> int:
     parser = bench_parser("estimates", __doc__)
     parser.add_argument("--count", type=int, default=200, help="number of shots (default: 200)")
     parser.add_argument("--first", type=int, default=0, metavar="K", help="number of the first shot (default: 0)")
-    parser.add_argument("--json", action="store_true", help="print one JSON object on stdout, and nothing else there")
-    parser.add_argument("--csv", metavar="FILE", help="also write a row for each shot")
-    parser.add_argument("--markdown", metavar="FILE", help="also write the table as Markdown")
+    output_options(parser, csv="a row for each shot", markdown=True)
     options = parser.parse_args(arguments)
     rows: list[Judged] = []
     for number in range(options.first, options.first + options.count):

@@ -22,7 +22,7 @@ from calmotion.accuracy.simulate_to_tolerance import simulate_to_tolerance
 from calmotion.accuracy.step_error import StepRun, distance, frames_of
 from calmotion.benchmarks.accuracy.work_precision import machine
 from calmotion.benchmarks.common.fresh_cache import fresh_cache
-from calmotion.benchmarks.common.parsers import bench_parser
+from calmotion.benchmarks.common.parsers import bench_parser, output_options
 from calmotion.benchmarks.common.tables import write_rows
 from calmotion.benchmarks.scenes.simplification_shots import (
     SimplificationShot,
@@ -168,8 +168,7 @@ def print_pairs(found: Sequence[Pair]) -> None:
 def main(arguments: list[str] | None = None) -> int:
     """The command."""
     parser = bench_parser("simplification", __doc__)
-    parser.add_argument("--json", action="store_true", help="print one JSON object on stdout, and nothing else there")
-    parser.add_argument("--csv", metavar="FILE", help="also write a table")
+    output_options(parser, csv="a table")
     parser.add_argument(
         "--only", metavar="KIND", action="append", help="only this kind of simplification; may be repeated"
     )

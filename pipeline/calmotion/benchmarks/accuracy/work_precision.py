@@ -21,7 +21,7 @@ import numpy as np
 
 from calmotion.benchmarks.accuracy.pareto import over_fastest, print_over_fastest
 from calmotion.benchmarks.accuracy.reference_bench import REPEATS, TOLERANCES, Bench, Point
-from calmotion.benchmarks.common.parsers import bench_parser
+from calmotion.benchmarks.common.parsers import bench_parser, output_options
 from calmotion.benchmarks.common.shots import load_unreduced
 from calmotion.benchmarks.common.tables import write_rows
 
@@ -62,8 +62,7 @@ def main(arguments: list[str] | None = None) -> int:
     """The command."""
     parser = bench_parser("work-precision", __doc__)
     parser.add_argument("shots", metavar="SHOT", nargs="*", default=list(SAMPLES), help="USD file (default: samples)")
-    parser.add_argument("--json", action="store_true", help="print one JSON object on stdout, and nothing else there")
-    parser.add_argument("--csv", metavar="FILE", help="also write a table")
+    output_options(parser, csv="a table")
     parser.add_argument("--figures", metavar="DIR", help="also draw error against run time, to this folder")
     parser.add_argument("--elements", action="store_true", help="also vary the element size; takes long")
     parser.add_argument(

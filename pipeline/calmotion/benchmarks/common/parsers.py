@@ -7,6 +7,7 @@ import re
 from collections.abc import Sequence
 
 from calmotion.benchmarks.common.shots import MADE
+from calmotion.cli.options import json_option
 
 
 class _Paragraphs(argparse.HelpFormatter):
@@ -22,6 +23,21 @@ def bench_parser(name: str, description: str | None) -> argparse.ArgumentParser:
     return argparse.ArgumentParser(prog=f"calmotion bench {name}", description=description, formatter_class=_Paragraphs)
 
 
+def output_options(parser: argparse.ArgumentParser, csv: str | None = None, markdown: bool = False) -> None:
+    """The options for what a benchmark prints and writes: --json, and --csv and --markdown where it has a table.
+
+    Args:
+        parser: To which they are added.
+        csv: What the CSV file contains; None: there is none.
+        markdown: Whether the table can be written as Markdown.
+    """
+    json_option(parser)
+    if csv is not None:
+        parser.add_argument("--csv", metavar="FILE", help=f"also write {csv}")
+    if markdown:
+        parser.add_argument("--markdown", metavar="FILE", help="also write the table as Markdown")
+
+
 def shots_parser(name: str, description: str | None) -> argparse.ArgumentParser:
     """The arguments of a benchmark that runs on shots, or on the synthetic ones of `MADE`."""
     made = "; ".join(f"{shot}: {text}" for shot, text in MADE.items())
@@ -30,7 +46,7 @@ def shots_parser(name: str, description: str | None) -> argparse.ArgumentParser:
         "shots", metavar="SHOT", nargs="*", default=["arm", "linkage"],
         help=f"USD file, or a synthetic shot ({made}); default: arm linkage",
     )  # fmt: skip
-    parser.add_argument("--json", action="store_true", help="print one JSON object on stdout, and nothing else there")
+    output_options(parser)
     return parser
 
 
@@ -41,7 +57,5 @@ def table_parser(
     parser = bench_parser(name, description)
     parser.add_argument("shots", metavar="SHOT", nargs="*", default=list(shots), help="USD file (default: samples)")
     parser.add_argument("--tolerances", metavar="METRES", nargs="+", type=float, default=list(tolerances))
-    parser.add_argument("--json", action="store_true", help="print one JSON object on stdout, and nothing else there")
-    parser.add_argument("--csv", metavar="FILE", help="also write a table")
-    parser.add_argument("--markdown", metavar="FILE", help="also write the table as Markdown")
+    output_options(parser, csv="a table", markdown=True)
     return parser

@@ -18,7 +18,7 @@ from dataclasses import asdict, dataclass, replace
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from calmotion.benchmarks.common.parsers import bench_parser
+from calmotion.benchmarks.common.parsers import bench_parser, output_options
 from calmotion.benchmarks.integrators.audits import Audit, audit
 from calmotion.benchmarks.integrators.outcomes import FAILED, REFUSED, RUNS, Case, Outcome, Scene, run_case
 from calmotion.benchmarks.scenes.beam_arm import beam_arm, quintic, shot_of
@@ -217,7 +217,7 @@ def print_all(outcomes: Sequence[tuple[Outcome, str]], grown: Sequence[Growth], 
 def main(arguments: list[str] | None = None) -> int:
     """The command: exit status 1 when a verdict is wrong, the cost grows too fast or an audit fails."""
     parser = bench_parser("extremes", __doc__)
-    parser.add_argument("--json", action="store_true", help="print one JSON object on stdout, and nothing else there")
+    output_options(parser)
     parser.add_argument(
         "--only", metavar="TEXT", default="", help="scenes whose name contains a text, and nothing else"
     )

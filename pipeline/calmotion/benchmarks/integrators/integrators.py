@@ -16,7 +16,7 @@ import sys
 from collections.abc import Callable
 from dataclasses import asdict
 
-from calmotion.benchmarks.common.parsers import bench_parser
+from calmotion.benchmarks.common.parsers import bench_parser, output_options
 from calmotion.benchmarks.integrators.integrator_errors import (
     Fate,
     Measured,
@@ -34,7 +34,7 @@ from calmotion.benchmarks.integrators.integrator_errors import (
 def main(arguments: list[str] | None = None) -> int:
     """The command."""
     parser = bench_parser("integrators", __doc__)
-    parser.add_argument("--json", action="store_true", help="print one JSON object on stdout, and nothing else there")
+    output_options(parser)
     parser.add_argument("--figures", metavar="DIR", help="also draw figures into this folder")
     options = parser.parse_args(arguments)
     scenes: dict[str, Callable[[], Scene]] = {"flexible arm": arm_scene, "four-bar, flexible coupler": four_bar_scene}

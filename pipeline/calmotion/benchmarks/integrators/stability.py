@@ -13,7 +13,7 @@ import time
 from collections.abc import Sequence
 from dataclasses import asdict
 
-from calmotion.benchmarks.common.parsers import bench_parser
+from calmotion.benchmarks.common.parsers import bench_parser, output_options
 from calmotion.benchmarks.common.tables import write_rows
 from calmotion.benchmarks.integrators.outcomes import CASES, FAILED, Outcome, run_case
 
@@ -45,8 +45,7 @@ def main(arguments: list[str] | None = None) -> int:
     from calmotion.benchmarks.integrators.stability_map import MAPS, Cell, all_cells, print_cells
 
     parser = bench_parser("stability", __doc__)
-    parser.add_argument("--json", action="store_true", help="print one JSON object on stdout, and nothing else there")
-    parser.add_argument("--csv", metavar="FILE", help="also write the cells of the maps as a table")
+    output_options(parser, csv="the cells of the maps as a table")
     parser.add_argument("--figures", metavar="DIR", help="also draw the maps, to this folder")
     parser.add_argument(
         "--only",

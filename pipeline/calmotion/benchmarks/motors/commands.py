@@ -21,7 +21,7 @@ from pathlib import Path
 import numpy as np
 
 from calmotion.accuracy.motors.motor_effects import with_gains_used
-from calmotion.benchmarks.common.parsers import bench_parser
+from calmotion.benchmarks.common.parsers import bench_parser, output_options
 from calmotion.benchmarks.motors.lumped import STEP, LumpedMotion, simulate_lumped
 from calmotion.errors import ShotError
 from calmotion.retargeting.optimize import optimize_shot
@@ -153,7 +153,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument(
         "--pre-roll", metavar="S", type=float, help="length of the pre-roll of a shot that starts in motion"
     )
-    parser.add_argument("--json", action="store_true", help="print one JSON object on stdout, and nothing else there")
+    output_options(parser)
     options = parser.parse_args(arguments)
     rows = [
         compare(Path(path).stem, giving_shot(path, options.seconds), pre_roll=options.pre_roll)

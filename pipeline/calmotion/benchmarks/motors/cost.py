@@ -16,7 +16,7 @@ from dataclasses import asdict, dataclass, replace
 
 import numpy as np
 
-from calmotion.benchmarks.common.parsers import bench_parser
+from calmotion.benchmarks.common.parsers import bench_parser, output_options
 from calmotion.benchmarks.common.shots import MADE, load
 from calmotion.multibody.analysis.kinematics import rigid_state
 from calmotion.multibody.integrators.simulation import simulate
@@ -145,7 +145,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         help=f"USD file, or a synthetic shot ({known}; {RIGID}: rigid); default: {' '.join(default)}",
     )  # fmt: skip
     parser.add_argument("--repeats", metavar="N", type=int, default=9, help="runs of each model (default 9)")
-    parser.add_argument("--json", action="store_true", help="print one JSON object on stdout, and nothing else there")
+    output_options(parser)
     options = parser.parse_args(arguments)
     rows: list[Row] = []
     for name in options.shots:

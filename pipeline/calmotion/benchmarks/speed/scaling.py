@@ -19,7 +19,7 @@ from typing import Any
 
 import numpy as np
 
-from calmotion.benchmarks.common.parsers import bench_parser
+from calmotion.benchmarks.common.parsers import bench_parser, output_options
 from calmotion.benchmarks.common.timing import median_time
 from calmotion.benchmarks.speed.growth import STEP, Growth, branches, growths, motion, prepared, step_time
 from calmotion.linear_algebra.blas_threads import one_blas_thread
@@ -90,7 +90,7 @@ def main(arguments: list[str] | None = None) -> int:
     """The command."""
     parser = bench_parser("scaling", __doc__)
     parser.add_argument("--quick", action="store_true", help="fewer and smaller sizes")
-    parser.add_argument("--json", action="store_true", help="print one JSON object on stdout, and nothing else there")
+    output_options(parser)
     parser.add_argument("--figures", metavar="DIR", help="also draw the laws of growth, to this folder")
     options = parser.parse_args(arguments)
     measured = growths((4, 8, 16, 32), (1_000, 5_000), (4, 8, 16, 32)) if options.quick else growths()

@@ -21,7 +21,7 @@ from typing import Any
 
 import numpy as np
 
-from calmotion.benchmarks.common.parsers import bench_parser
+from calmotion.benchmarks.common.parsers import bench_parser, output_options
 from calmotion.benchmarks.common.tables import markdown
 from calmotion.errors import ShotError
 from calmotion.shot.character import Array
@@ -186,7 +186,7 @@ def main(arguments: Sequence[str]) -> int:
     parser.add_argument("--tolerance", default="1mm")
     parser.add_argument("--compare", type=float, metavar="SECONDS", help="also compare with one long search")
     parser.add_argument("--set", action="append", default=[], metavar="NAME=VALUE", help="property of an operator")
-    parser.add_argument("--json", action="store_true", help="print one JSON object on stdout, and nothing else there")
+    output_options(parser)
     args = parser.parse_args(arguments)
     options = [f"--tolerance={args.tolerance}", *(f"--set={text}" for text in args.set)]
     windows = [] if args.window is None else [f"--window={args.window}"]

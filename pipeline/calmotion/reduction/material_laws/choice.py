@@ -88,7 +88,7 @@ def choose_law(
             found=f"{material.youngs_modulus:.3g} Pa",
             remedy="Check it, in units of the stage, and the masses that the body carries. Bodies with more than "
             f"{UNPHYSICAL:g} times hang like ropes, and cannot be simulated; here a modulus of "
-            f"{material.youngs_modulus * deflection / (UNPHYSICAL * size):.2g} Pa is the least",
+            f"{material.youngs_modulus * deflection / (UNPHYSICAL * size):.2g} Pa is the least.",
         )
     linear_error = shortening + moved * softening
     strain = float(np.sqrt(deflections @ (omega_squared * deflections) / (material.youngs_modulus * model.mesh.volume)))

@@ -6,7 +6,7 @@ import argparse
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
-from calmotion.cli.options import Commands, file_argument
+from calmotion.cli.options import Commands, file_argument, json_option
 
 if TYPE_CHECKING:
     from calmotion.cli.output import Output
@@ -22,7 +22,7 @@ def add_to(commands: Commands) -> None:
         command, "--materials", metavar="FILE", action="append", default=[],
         help="TOML file with more materials; may be repeated",
     )  # fmt: skip
-    command.add_argument("--json", action="store_true", help="print one JSON object on stdout, and nothing else there")
+    json_option(command)
     command.add_argument("--toml", action="store_true", help="print TOML, to be changed and used with --materials")
 
 

@@ -7,7 +7,7 @@ import json
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
-from calmotion.cli.options import Commands, file_argument
+from calmotion.cli.options import Commands, file_argument, json_option
 
 if TYPE_CHECKING:
     from calmotion.cli.output import Output
@@ -24,7 +24,7 @@ def add_to(commands: Commands) -> None:
         command, "--motors", metavar="FILE", action="append", default=[],
         help="TOML file with more motors, to check it; shots use those of motors.toml in the configuration folder",
     )  # fmt: skip
-    command.add_argument("--json", action="store_true", help="print one JSON object on stdout, and nothing else there")
+    json_option(command)
     command.add_argument("--toml", action="store_true", help="print TOML, to be changed and saved as motors.toml")
 
 

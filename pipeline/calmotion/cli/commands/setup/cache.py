@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING, Any
 
-from calmotion.cli.options import Commands
+from calmotion.cli.options import Commands, json_option
 from calmotion.support.caching.cache_folder import CACHES, cache_folder
 
 if TYPE_CHECKING:
@@ -37,7 +37,7 @@ def add_to(commands: Commands) -> None:
             help=f"{', '.join(CACHES)} or all (default)",
         )  # fmt: skip
     for action, act in ((info, _info), (clear, _clear), (prune, _prune)):
-        action.add_argument("--json", action="store_true", help="print one JSON object on stdout")
+        json_option(action)
         action.set_defaults(command=act)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING
 
-from calmotion.cli.options import Commands
+from calmotion.cli.options import Commands, json_option
 
 if TYPE_CHECKING:
     from calmotion.cli.output import Output
@@ -17,7 +17,7 @@ def add_to(commands: Commands) -> None:
     command = commands.add_parser(
         "doctor", help=text, description=f"{text[0].upper()}{text[1:]}. Exit status 1 if something is wrong."
     )
-    command.add_argument("--json", action="store_true", help="print one JSON object on stdout")
+    json_option(command)
     command.set_defaults(command=_run)
 
 

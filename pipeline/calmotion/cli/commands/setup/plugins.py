@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING
 
-from calmotion.cli.options import Command, Commands, file_argument, plugin_option
+from calmotion.cli.options import Command, Commands, file_argument, json_option, plugin_option
 
 if TYPE_CHECKING:
     from calmotion.cli.output import Output
@@ -35,7 +35,7 @@ def add_to(commands: Commands) -> None:
     new.add_argument("name", metavar="NAME", help="id of the plugin: a-z, 0-9 and _")
     file_argument(new, "--folder", metavar="DIR", default=".", help="where the folder NAME is made (default: here)")
     for command in (listing, check, *choices, new):
-        command.add_argument("--json", action="store_true", help="print one JSON object on stdout")
+        json_option(command)
 
 
 def _action(name: str) -> Command:

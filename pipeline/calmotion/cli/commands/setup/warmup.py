@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING
 
-from calmotion.cli.options import Commands
+from calmotion.cli.options import Commands, json_option
 
 if TYPE_CHECKING:
     from calmotion.cli.output import Output
@@ -15,7 +15,7 @@ def add_to(commands: Commands) -> None:
     """Add the command."""
     text = "compile the kernels ahead of the first shot"
     command = commands.add_parser("warmup", help=text, description=f"{text[0].upper()}{text[1:]}. Takes half a minute.")
-    command.add_argument("--json", action="store_true", help="print one JSON object on stdout")
+    json_option(command)
     command.add_argument("--quiet", action="store_true", help="print no progress and no report")
     command.set_defaults(command=_run)
 
