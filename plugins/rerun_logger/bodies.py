@@ -43,6 +43,8 @@ def log_bodies(
     depth = INSIDE * scale
     # transforms add up along the entity tree, which mirrors the prims'
     for index, (body, carrier) in enumerate(zip(character.bodies, carriers(character.bodies), strict=True)):
+        if body.between:
+            continue
         positions, rotations = relative_poses(motion, index, carrier)
         columns = rr.Transform3D.columns(translation=positions, quaternion=rotations[:, [1, 2, 3, 0]])
         recording.send_columns(root + body.path, [frames], columns)

@@ -22,6 +22,11 @@ BoolArray = NDArray[np.bool_]
 WORLD = -1
 
 
+def prim_path(path: str) -> str:
+    """The prim of a path that may have the name of an axis behind it."""
+    return path.partition(".")[0]
+
+
 @dataclass(frozen=True, eq=False)
 class Frame:
     """A frame fixed in a body (or in the world).
@@ -178,6 +183,8 @@ class Body:
         interfaces: Interface patches that are named in the shot.
         stiff: Whether a flexible body is simulated as rigid, as the user forces it; it then has a `mass`.
         non_rotating: Whether it does not rotate in this shot, so that its inertia is constant.
+        between: Path of the joint of several axes that it is a part of, between two of them; it then is no prim, and
+            its mass is that of nothing that matters. Empty for the bodies of the shot.
     """
 
     path: str
@@ -189,6 +196,7 @@ class Body:
     interfaces: tuple[InterfaceSurface, ...] = ()
     stiff: bool = False
     non_rotating: bool = False
+    between: str = ""
 
     @property
     def simulated_flexible(self) -> bool:
@@ -201,7 +209,7 @@ class Joint:
     """A joint between two bodies; its axis is the z axis of both frames.
 
     Attributes:
-        path: Prim path.
+        path: Prim path; of one axis of a joint of several axes with the name of the axis behind it (`/Arm/wrist.rotX`).
         kind: `revolute`, `prismatic`, `spherical` or `fixed`.
         body0, body1: Body indices, -1 for the world. The angle is that of body1 relative to body0 about z, the
             length of a prismatic joint that of frame1 beyond frame0 along z.
@@ -223,6 +231,11 @@ class Joint:
     closes_chain: bool = False
     redundant: bool = False
     name: str = ""
+
+    @property
+    def prim_path(self) -> str:
+        """Path of its prim, without the name of an axis."""
+        return prim_path(self.path)
 
 
 @dataclass(frozen=True, eq=False)

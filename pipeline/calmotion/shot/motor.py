@@ -56,7 +56,7 @@ class Motor:
 
     Attributes:
         joint: Index of the joint.
-        path: Prim path of the joint.
+        path: Prim path of the joint, with the name of the axis behind it where the joint has several (`.rotX`).
         attribute: Name of the attribute that holds its track.
         source: Where the track is: `drive` (the target position of its drive), `bodies` (the transforms of the bodies
             that it joins), or `skeleton` (a joint of a UsdSkel animation).
@@ -96,6 +96,11 @@ class Motor:
     delay: float = 0.0
     backlash: float = 0.0
     kind: str = ""
+
+    @property
+    def prim_path(self) -> str:
+        """Path of the joint's prim, without the name of an axis."""
+        return self.path.partition(".")[0]
 
 
 class Measure(NamedTuple):

@@ -131,7 +131,7 @@ def fem_anchors(character: Character, body: Body, anchors: BodyAnchors) -> list[
     from calmotion.reduction.interfaces.interface_patches import AttachmentFrame
 
     joints, targets = character.joints, character.targets
-    paths = [joints[k].path for k in anchors.joints] + [targets[k].path for k in anchors.targets]
+    paths = [joints[k].prim_path for k in anchors.joints] + [targets[k].path for k in anchors.targets]
     kinds = ["interface"] * len(anchors.joints) + ["point"] * len(anchors.targets)
     held = {surface.joint: surface for surface in body.interfaces}
     named = [held.get(path) for path in paths]

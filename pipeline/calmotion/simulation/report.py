@@ -108,7 +108,7 @@ def simulation_of(prepared: Prepared, run: ForwardRun, intended: IntendedMotion)
 def left_out_rows(prepared: Prepared) -> list[Simplification]:
     """What a run of this shot leaves out."""
     character, grid = prepared.character, prepared.grid
-    rigid = [body.path for body in character.bodies if body.flexible is None]
+    rigid = [body.path for body in character.bodies if body.flexible is None and not body.between]
     names = ", ".join(distinct_names(rigid).values())
     rows = [Simplification(f"{names}: rigid", "without CalmFlexibleBodyAPI")] if rigid else []
     rows += [row for body in prepared.bodies for row in body.left_out]

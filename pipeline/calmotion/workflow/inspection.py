@@ -115,6 +115,7 @@ def inspect_report(run: Run, settings: Settings | None = None) -> dict[str, Any]
         "bodies": [
             _body(body, tables.get(index), meshes.get(index), flexible[index])
             for index, body in enumerate(character.bodies)
+            if not body.between
         ],
         "joints": [
             {

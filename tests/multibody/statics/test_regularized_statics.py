@@ -53,12 +53,12 @@ def test_solutions_are_those_of_the_whole_matrix(made, transposed):
     A = dense_matrix(system, Blocks(*[part.copy() for part in blocks]))
     A = A.T if transposed else A  # free rows of joints are zero
     b = A @ np.random.default_rng(3).normal(size=len(A))  # that has a solution, though multipliers are redundant
-    regularize(system, blocks.D, blocks.K, blocks.Nc)
+    regularize(system, blocks.K, blocks.Lc, blocks.Nc)
     assert factor(system, blocks, matrix, solution.block) == -1
     factor_closed_chains(system, matrix, ws.scratch.border, solution)
     x, lam = split(system, b)
     solve = solve_statics_transposed if transposed else solve_statics
-    solve(system, blocks.D, matrix, x, lam, solution)
+    solve(system, matrix, x, lam, solution)
     found, expected = join(system, x, lam), np.linalg.lstsq(A, b, rcond=1e-10)[0]
     assert np.abs(A @ found - b).max() < 1e-9 * np.abs(b).max()
     motion = slice(0, 6 * len(system.parent))
@@ -76,7 +76,7 @@ def test_a_free_joint_without_stiffness_keeps_its_angle_and_moves_with_its_paren
 
 def test_joints_with_motors_need_no_regularisation():
     model = compiled(chain(2, driven=(0, 1)))
-    K, D, Nc = np.zeros((2, 6, 6)), np.ones((2, 6, 6)), np.zeros((2, 6, 3))
-    regularize(model.system, D, K, Nc)
-    assert not K.any() and not Nc.any() and not is_regularized(model.system)
+    K, Lc, Nc = np.zeros((2, 6, 6)), np.zeros((2, 6, 6)), np.zeros((2, 6, 3))
+    regularize(model.system, K, Lc, Nc)
+    assert not K.any() and not Lc.any() and not Nc.any() and not is_regularized(model.system)
     assert is_regularized(compiled(chain(2, driven=(0,))).system)

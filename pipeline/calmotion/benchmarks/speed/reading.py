@@ -83,8 +83,8 @@ def study(folder: Path, imports: bool = False, known: Mapping[str, Row] | None =
         sources = sorted({motor.source for motor in character.motors})
         frames = len(animation.frame_times)
         yield Row(
-            name, outcome, len(character.bodies), len(character.motors), len(character.targets), frames,
-            time.perf_counter() - start, f"motors by {', '.join(sources)}" if frames > 1 else "no animation", line,
+            name, outcome, sum(not body.between for body in character.bodies), len(character.motors),
+            len(character.targets), frames, time.perf_counter() - start, f"motors by {', '.join(sources)}" if frames > 1 else "no animation", line,
         )  # fmt: skip
 
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from calmotion.multibody.model.joint_arrays import BodyAnchors, body_anchors, joint_arrays, rotation_matrix
+from calmotion.multibody.model.joint_arrays import BodyAnchors, JointArrays, body_anchors, joint_arrays, rotation_matrix
 from calmotion.multibody.model.system import LINEAR, NEOHOOKEAN, STVK, System, components, coordinate_units
 from calmotion.multibody.model.topology import Tree, span_tree
 from calmotion.multibody.motors.drives import add_motors, giving_motors
@@ -119,11 +119,29 @@ def compile_model(character: Character, tree: Tree, bodies: Sequence[ReducedBody
         M4=M4, S=S, axial=axial, axial0=axial0, rotating=components(~nonrotating), nonrotating=components(nonrotating),
         inertia=np.where(np.arange(r_max) < elastic[:, None], 1.0, 0.0), stiffness=stiffness, damping=damping,
         gravity=np.asarray(character.gravity, dtype=float),
+        held=_held(character, tree, mass, Z, joints),
         unit=coordinate_units(mass, Z, joints.arrays["side"], joints.arrays["position"], r_max),
         **_elastic_laws([bodies[b] for b in tree.body]), **joints.arrays,
     )  # fmt: skip
     targets = _targets(character, tree, bodies, anchors, r_max)
     return with_drives(Model(system, tree, joints.motor, joints.sign, targets, joints.rest), character.motors)
+
+
+def _held(character: Character, tree: Tree, mass: Array, Z: Array, joints: JointArrays) -> Array:
+    """`System.held`; a part between the axes of a joint is held as the body beyond it."""
+    held, child = np.zeros(len(tree.body)), {parent: b for b, parent in enumerate(tree.parent)}
+    for b in range(len(held)):
+        own = b
+        while character.bodies[tree.body[own]].between and own in child:
+            own = child[own]
+        inertia, axis = np.trace(Z[own]) * np.eye(3) - Z[own], joints.arrays["rotation"][b, 1, :, 2]
+        if joints.arrays["sliding"][b]:
+            held[b] = mass[own]
+        elif joints.arrays["rows"][b] == 5 and own == b:
+            held[b] = axis @ inertia @ axis
+        else:
+            held[b] = np.trace(inertia) / 3.0
+    return held
 
 
 def with_drives(model: Model, motors: Sequence[Motor]) -> Model:

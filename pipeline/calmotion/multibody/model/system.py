@@ -42,6 +42,8 @@ class System(NamedTuple):
             of it up to which the largest effort is there.
         sliding: Whether a joint has a length along its axis instead of an angle, shape [J].
         moving: Row of `work.Work.world` that moves the world-side marker of a joint, -1 for none, shape [J].
+        held: Inertia by which the regularised statics hold a component on a free joint [kg m^2], or its mass on a free
+            slider [kg], shape [B]; see `statics.regularized_statics`.
         mass, s, Z, M3, M4, S: Inertia integrals, see `reduced_body.Invariants`.
         axial: axial(S[j, k]) = int rho phi_j x phi_k, shape [B, R, R, 3].
         axial0: axial(M4[j]) = int rho X x phi_j, shape [B, R, 3].
@@ -74,6 +76,7 @@ class System(NamedTuple):
     servo: Array
     sliding: IntArray
     moving: IntArray
+    held: Array
     mass: Array
     s: Array
     Z: Array

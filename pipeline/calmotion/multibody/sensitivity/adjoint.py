@@ -140,7 +140,7 @@ def _adjoint(
         if n > 0:
             solve_system_transposed(system, matrix, x, lam, solution)
         else:
-            solve_statics_transposed(system, window.steps.D[0], matrix, x, lam, solution)
+            solve_statics_transposed(system, matrix, x, lam, solution)
         motor_gradient(system, window.steps, at, 1.0, x, lam, g_angle[n], g_rate[n])
         if n == 0:
             continue

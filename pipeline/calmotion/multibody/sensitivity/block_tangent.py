@@ -142,7 +142,7 @@ def _right_hand_sides(
 
 
 @inlined_kernel
-def _solve_statics(system: System, D: Array, matrix: StepMatrix, scratch: BlockScratch) -> None:
+def _solve_statics(system: System, matrix: StepMatrix, scratch: BlockScratch) -> None:
     """`solve_statics`, one direction after the other."""
     x, lam = scratch.single.x, scratch.single.lam
     for q in range(scratch.x.shape[2]):
@@ -152,7 +152,7 @@ def _solve_statics(system: System, D: Array, matrix: StepMatrix, scratch: BlockS
         for j in range(lam.shape[0]):
             for i in range(JOINT_ROWS):
                 lam[j, i] = scratch.lam[j, i, q]
-        solve_statics(system, D, matrix, x, lam, scratch.single.solution)
+        solve_statics(system, matrix, x, lam, scratch.single.solution)
         for b in range(x.shape[0]):
             for i in range(6 + system.elastic[b]):
                 scratch.x[b, i, q] = x[b, i]
@@ -223,7 +223,7 @@ def _block_tangent(
         if n > 0:
             solve_block(system, matrix, scratch.x, scratch.lam, scratch.solution)
         else:
-            _solve_statics(system, window.steps.D[0], matrix, scratch)
+            _solve_statics(system, matrix, scratch)
         _remember(system, window, n, scratch)
         for row in range(len(component)):
             b = component[row]

@@ -133,7 +133,7 @@ def _start(
                 x[b, 3 + i] += R[b, k, i] * mu_xi[b, 3 + k]
         for i in range(6, 6 + system.elastic[b]):
             x[b, i] = mu_xi[b, i]
-    solve_statics_transposed(system, steps.D[0], matrix_at(steps.matrix, 0), x, lam, scratch.solution)
+    solve_statics_transposed(system, matrix_at(steps.matrix, 0), x, lam, scratch.solution)
     motor_gradient(system, steps, 0, 1.0, x, lam, g_angle, g_rate)
 
 

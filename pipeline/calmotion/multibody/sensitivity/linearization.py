@@ -103,7 +103,7 @@ def _linearize(
         kind = STATIC if n == 0 else integrator
         assemble(system, kind, now, scratch.Vd, inputs.angles[n], inputs.rates[n], Hv, YES, work, blocks)
         if n == 0:
-            regularize(system, blocks.D, blocks.K, blocks.Nc)
+            regularize(system, blocks.K, blocks.Lc, blocks.Nc)
         _keep_blocks(blocks, matrix, at, steps)
         bad = factor(system, blocks, matrix, scratch.solution.block)
         if bad >= 0:

@@ -149,7 +149,7 @@ def _tangent(
         if n > 0:
             solve_system(system, matrix, x, lam, solution)
         else:
-            solve_statics(system, window.steps.D[0], matrix, x, lam, solution)
+            solve_statics(system, matrix, x, lam, solution)
         if len(d_effort):
             for j in range(len(system.rows)):
                 d_effort[n, j] = effort_tangent(system, j, window.axes[n], window.lam[n], matrix.Jp, x, lam)

@@ -136,7 +136,7 @@ def _iterate(
         linearize(system, state, angle, ws)
         blocks = ws.blocks
         blocks.K[:] += inertia * blocks.D
-        regularize(system, blocks.D, blocks.K, blocks.Nc)
+        regularize(system, blocks.K, blocks.Lc, blocks.Nc)
         component = factor(system, blocks, ws.matrix, solution.block)
         if component >= 0:
             return component, iteration + 1

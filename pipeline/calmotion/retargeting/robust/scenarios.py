@@ -66,7 +66,7 @@ def _calibrated(shot: CompiledShot) -> tuple[Parameter, ...]:
     flexible = [b for b in character.bodies if b.flexible is not None and b.simulated_flexible]
     paths = {
         **dict.fromkeys((MODULUS, DAMPING), [b.flexible.material.path for b in flexible if b.flexible]),
-        MASS: [b.path for b in character.bodies if not b.simulated_flexible],
+        MASS: [b.path for b in character.bodies if not (b.simulated_flexible or b.between)],
         **dict.fromkeys((*OF_MOTOR, *OF_ROTOR), [m.path for m in character.motors if m.model != PRESCRIBED]),
     }
     own = [k for k, name in enumerate(given.names) if name.partition(" ")[2] in paths.get(name.partition(" ")[0], ())]

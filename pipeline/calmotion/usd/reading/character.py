@@ -20,6 +20,7 @@ from calmotion.usd.reading.bodies.interfaces import interfaces_of
 from calmotion.usd.reading.bodies.scenery import scenery_of
 from calmotion.usd.reading.bodies.shapes import shapes_of, tets_of
 from calmotion.usd.reading.context import Reading, grouped, is_rigid_body, prims_of
+from calmotion.usd.reading.generic_joints.chains import Between, expanded
 from calmotion.usd.reading.joints import (
     JointPrim,
     body_index,
@@ -38,6 +39,7 @@ if TYPE_CHECKING:
 
 # Other robots are mostly robots in other units.
 LIGHTEST, HEAVIEST = 1e-3, 1e3  # [kg]
+BETWEEN = 1e-6  # mass and inertia of a part between two axes of a joint, over those of the lighter body at the joint
 SMALLEST, LARGEST = 1e-3, 1e2  # [m]
 
 
@@ -51,6 +53,7 @@ class Skeleton:
         joints: In the order of the bodies they carry.
         drives: The driven joints, in the order of the joints.
         targets: Target prims with the path of their body.
+        between: Those of the bodies that are no prims but parts between the axes of a joint.
     """
 
     bodies: list[str]
@@ -58,6 +61,7 @@ class Skeleton:
     joints: list[JointPrim]
     drives: list[motors.Drive]
     targets: list[tuple[Any, str]]
+    between: dict[str, Between]
 
 
 def read_skeleton(
@@ -97,10 +101,11 @@ def read_skeleton(
     poses = dict(reading.each(prims, lambda path: (path, reading.pose(prims[path]))))
     raise_all(reading.problems)  # joints refer to poses
     joints = [joint for joint in reading.each(joints_of_stage, lambda prim: read_joint(reading, prim, poses)) if joint]
+    joints, between = expanded(reading, joints, poses)
     root = topology.common_path(list(prims))
     drives = motors.read_drives(reading, joints, root, posed_joints(reading, joints, clock), given, still)
     target_prims = targets.target_prims(reading, measured)
-    bodies = _moving_bodies(reading, list(prims), joints, drives, [body for _, body in target_prims])
+    bodies = _moving_bodies(reading, [*prims, *between], joints, drives, [body for _, body in target_prims])
     kept = set(bodies)
     joints = [j for j in joints if (j.body0 or j.body1) in kept]
     reading.each(joints, refuse_unsupported)
@@ -114,9 +119,10 @@ def read_skeleton(
     roots = {j.body1 for j in joints if j.body0 == ""}
     posing = any(drive.source == motors.BODIES for drive in drives)
     with reading.collecting_problems():
-        others = [] if posing else [prims[b] for b in bodies if b not in roots]
-        refuse_moving(reading, {prims[b]: fixed[b] for b in fixed}, others)
-    return Skeleton(bodies, {b: poses[b] for b in bodies}, joints, drives, target_prims)
+        others = [] if posing else [prims[b] for b in bodies if b in prims and b not in roots]
+        refuse_moving(reading, {prims[b]: fixed[b] for b in fixed if b in prims}, others)
+    inside = {b: between[b] for b in bodies if b in between}
+    return Skeleton(bodies, {b: poses[b] for b in bodies}, joints, drives, target_prims, inside)
 
 
 def build_character(reading: Reading, skeleton: Skeleton) -> Character:
@@ -126,13 +132,13 @@ def build_character(reading: Reading, skeleton: Skeleton) -> Character:
         ShotError: All problems of the shot, those of `read_skeleton` included.
     """
     numbers = {path: k for k, path in enumerate(skeleton.bodies)}
-    touching = {path: [j.path for j in skeleton.joints if path in (j.body0, j.body1)] for path in skeleton.bodies}
+    touching = {path: [j.prim_path for j in skeleton.joints if path in (j.body0, j.body1)] for path in skeleton.bodies}
     fixed = {j.body1 for j in skeleton.joints if j.body0 == "" and j.kind == "fixed"}
-    bodies = tuple(
-        reading.each(
-            skeleton.bodies, lambda path: _body(reading, path, skeleton.poses[path], touching[path], path in fixed)
-        )
+    real = reading.each(
+        [path for path in skeleton.bodies if path not in skeleton.between],
+        lambda path: _body(reading, path, skeleton.poses[path], touching[path], path in fixed),
     )
+    bodies = _with_parts_between(skeleton, real, reading.units.length(1.0))
     joints = tuple(
         Joint(
             j.path,
@@ -159,7 +165,7 @@ def build_character(reading: Reading, skeleton: Skeleton) -> Character:
     driven = reading.each(
         skeleton.drives, lambda drive: motors.read_motor(drive, order[id(drive.joint)], index, reading)
     )
-    root = topology.common_path(skeleton.bodies)
+    root = topology.common_path([path for path in skeleton.bodies if path not in skeleton.between])
     gravity, settings = np.zeros(3), RetargetSettings()
     with reading.collecting_problems():
         gravity = scene.gravity(reading)
@@ -171,7 +177,7 @@ def build_character(reading: Reading, skeleton: Skeleton) -> Character:
         chosen = tuple(targets.outermost_target(bodies[numbers[b]], numbers[b], joints) for b in outer)
         reading.note(f"no CalmTargetAPI: the outermost point of {', '.join(outer)} is taken as target")
     default = reading.stage.GetDefaultPrim()
-    whole = default and all(b.startswith(f"{default.GetPath()}/") for b in skeleton.bodies)
+    whole = default and all(b.startswith(f"{default.GetPath()}/") for b in skeleton.bodies if b not in skeleton.between)
     character = Character(
         path=str(default.GetPath()) if whole else root,
         bodies=bodies,
@@ -255,6 +261,20 @@ def _body(reading: Reading, path: str, pose: Pose, joints: list[str], fixed: boo
     )
 
 
+def _with_parts_between(skeleton: Skeleton, real: Sequence[Body], meters: float) -> tuple[Body, ...]:
+    """The bodies of a skeleton, those between the axes of a joint included: they have a share of the mass of the
+    lighter body that the joint connects, which no motion shows."""
+    by_path = {body.path: body for body in real}
+    for path, part in skeleton.between.items():
+        ends = [by_path[end].mass for end in part.ends if end in by_path]
+        known = [properties for properties in ends if properties is not None]
+        mass = min((properties.mass for properties in known), default=1.0)
+        inertia = min((float(np.trace(properties.inertia)) / 3.0 for properties in known), default=1e-3)
+        light = MassProperties(BETWEEN * mass, np.zeros(3), BETWEEN * inertia * np.eye(3))
+        by_path[path] = Body(path, skeleton.poses[path].frame(meters), light, between=part.joint)
+    return tuple(by_path[path] for path in skeleton.bodies if path in by_path)
+
+
 def _moving_bodies(
     reading: Reading, bodies: list[str], joints: list[JointPrim], drives: list[motors.Drive], wanted: list[str]
 ) -> list[str]:
@@ -276,12 +296,13 @@ def _world_joints(
     added = []
     attached = {j.body1 for j in joints if j.body0 == ""}
     for group in topology.components(bodies, joints):
-        kinematic = [b for b in group if prims[b].GetAttribute("physics:kinematicEnabled").Get() and b not in attached]
+        own = [b for b in group if b in prims]
+        kinematic = [b for b in own if prims[b].GetAttribute("physics:kinematicEnabled").Get() and b not in attached]
         added += [joint_to_world(body, poses[body], reading.units.length(1.0)) for body in kinematic]
         if kinematic or attached.intersection(group):
             continue
         carried = {j.body1 for j in joints}
-        root = next(iter([b for b in group if b not in carried] or group))
+        root = next(iter([b for b in own if b not in carried] or own))
         reading.note(f"{root}: no joint connects the character with the world; this body is fixed at its pose")
         added.append(joint_to_world(root, poses[root], reading.units.length(1.0)))
     return added

@@ -13,8 +13,8 @@ from calmotion.shot import WORLD, Frame
 from calmotion.shot.character import Array
 from calmotion.support.naming import nearest
 from calmotion.usd import gf
-from calmotion.usd.reading import d6_joints
 from calmotion.usd.reading.context import Reading, prims_of
+from calmotion.usd.reading.generic_joints import freedoms
 from calmotion.usd.transforms import Pose, axis_rotation, quaternion_from_rotation, rotation_from_quaternion
 
 if TYPE_CHECKING:
@@ -28,7 +28,7 @@ _WITH_AXIS = ("revolute", "prismatic")
 _DRIVES = {"revolute": "angular", "prismatic": "linear"}
 _LIMITS = ("physics:lowerLimit", "physics:upperLimit")
 UNSUPPORTED = "unsupported"
-_HALF_TURN = np.diag([1.0, -1.0, -1.0])  # about x: turns the z axis over
+HALF_TURN = np.diag([1.0, -1.0, -1.0])  # about x: turns the z axis over
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,14 +38,17 @@ class JointPrim:
     Attributes:
         prim: The Usd.Prim, None for a joint that the reader added.
         path: Its path.
-        kind: `revolute`, `prismatic`, `spherical` or `fixed`, or `UNSUPPORTED`, which matters only where the joint is
-            part of the character.
+        kind: `revolute`, `prismatic`, `spherical` or `fixed`; `freedoms.SEVERAL` before `chains.expanded`; or
+            `UNSUPPORTED`, which matters only where the joint is part of the character.
         body0, body1: Paths of the bodies, empty for the world.
         frame0, frame1: Frames in them, m.
         lower, upper: Limits [rad or m].
         closes_chain: Whether the shot excludes this joint from the spanning tree (it closes a chain).
         drive: Name of the PhysicsDriveAPI that drives it: `angular`, `linear`, or the free direction of a generic
             joint; empty where nothing can.
+        free: Directions that a joint of several axes leaves free.
+        turned: Whether the world is authored as body 1 of such a joint.
+        whole: The joint of several axes of which it is one.
     """
 
     prim: Any
@@ -59,6 +62,14 @@ class JointPrim:
     upper: float = np.inf
     closes_chain: bool = False
     drive: str = ""
+    free: tuple[str, ...] = ()
+    turned: bool = False
+    whole: JointPrim | None = None
+
+    @property
+    def prim_path(self) -> str:
+        """Path of its prim, which the axes of a joint share."""
+        return self.path if self.prim is None else str(self.prim.GetPath())
 
 
 def joint_prims(stage: Usd.Stage) -> list[Usd.Prim]:
@@ -99,11 +110,14 @@ def read_joint(reading: Reading, prim: Usd.Prim, poses: dict[str, Pose]) -> Join
             found=ends[0][0],
             remedy="Correct physics:body0 or physics:body1",
         )
-    kind, limits = _KINDS.get(str(prim.GetTypeName()), UNSUPPORTED), _LIMITS
-    if prim.GetTypeName() == d6_joints.TYPE:
-        simple = d6_joints.simple_joint(prim)
-        kind, drive, axis, limits = simple.kind or UNSUPPORTED, simple.freedom, simple.axis, simple.limits
-        if simple.kind:
+    kind, limits, free = _KINDS.get(str(prim.GetTypeName()), UNSUPPORTED), _LIMITS, ()
+    if prim.GetTypeName() == freedoms.TYPE:
+        found = freedoms.freedoms(prim)
+        kind, drive, axis, limits, free = found.kind, found.freedom, found.axis, found.limits, found.free
+        if not kind:
+            reading.note(f"{path}: it leaves all directions free and nothing drives it, so it is left out")
+            return None
+        if kind != freedoms.SEVERAL:
             reading.note(f"{path}: a generic joint, {kind} by the directions that it locks")
     else:
         drive, axis = _DRIVES.get(kind, ""), _axis(prim) if kind in _WITH_AXIS else ""
@@ -112,12 +126,13 @@ def read_joint(reading: Reading, prim: Usd.Prim, poses: dict[str, Pose]) -> Join
     to_si = np.deg2rad(1.0) if kind == "revolute" else meters
     lower, upper = _limits(prim, limits, to_si) if kind in _WITH_AXIS else (-np.inf, np.inf)
     (body0, position0, rotation0), (body1, position1, rotation1) = ends
-    if body1 == "":
+    turned = body1 == ""
+    if turned:
         # The world comes first. Turning the axis over keeps the sense of angle or length, so limits and track stay.
         body0, body1 = body1, body0
         position0, position1 = position1, position0
         rotation0, rotation1 = rotation1, rotation0
-        turn = turn @ _HALF_TURN
+        turn = turn @ HALF_TURN if kind != freedoms.SEVERAL else turn
     return JointPrim(
         prim,
         path,
@@ -130,7 +145,20 @@ def read_joint(reading: Reading, prim: Usd.Prim, poses: dict[str, Pose]) -> Join
         upper,
         prim.GetAttribute("physics:excludeFromArticulation").Get() is True,
         drive,
+        free if kind == freedoms.SEVERAL else (),
+        turned and kind == freedoms.SEVERAL,
     )
+
+
+def axis_limits(prim: Usd.Prim, direction: str, kind: str, meters: float) -> tuple[float, float]:
+    """Lower and upper limit [rad or m] of a direction of a generic joint, infinite where there is none.
+
+    Args:
+        direction: `rotX`, `transZ`, ...
+        kind: `revolute` or `prismatic`.
+        meters: Metres in the stage's unit of length.
+    """
+    return _limits(prim, freedoms.limits_of(direction), np.deg2rad(1.0) if kind == "revolute" else meters)
 
 
 def joint_to_world(body: str, pose: Pose, meters: float) -> JointPrim:
@@ -226,15 +254,12 @@ def _limits(prim: Usd.Prim, names: tuple[str, str], to_si: float) -> tuple[float
 def refuse_unsupported(joint: JointPrim) -> None:
     """Raise a ShotError for a joint of a kind that cannot be simulated yet."""
     if joint.kind == UNSUPPORTED:
-        found = str(joint.prim.GetTypeName())
-        if found == d6_joints.TYPE:
-            found += f" that is free in {', '.join(d6_joints.simple_joint(joint.prim).free)}"
         raise ShotError(
-            "a joint of this type is not supported yet",
+            "a joint of this type is not supported",
             path=joint.path,
-            found=found,
+            found=str(joint.prim.GetTypeName()),
             remedy="Use a revolute, prismatic, spherical or fixed joint, or a PhysicsJoint whose PhysicsLimitAPIs lock "
-            "all other directions (low above high), or disable it with physics:jointEnabled = false",
+            "some directions (low above high), or disable it with physics:jointEnabled = false",
         )
 
 

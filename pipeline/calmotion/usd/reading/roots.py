@@ -11,6 +11,7 @@ from calmotion.shot import Frame, MovingFrame
 from calmotion.usd.clock import Clock
 from calmotion.usd.reading.animated_transforms import carriers, codes_of, moves
 from calmotion.usd.reading.context import Reading
+from calmotion.usd.reading.generic_joints.chains import axis_joints
 from calmotion.usd.reading.joints import JointPrim, read_joint
 from calmotion.usd.transforms import Pose
 
@@ -78,4 +79,6 @@ def world_frame(reading: Reading, joint: JointPrim, prim: Usd.Prim, poses: dict[
         return reading.pose(prim).frame(reading.units.length(1.0))
     there = read_joint(reading, joint.prim, poses)
     assert there is not None
+    if joint.whole is not None:
+        there = axis_joints(there, reading.units.length(1.0))[0]
     return there.frame0

@@ -47,7 +47,8 @@ def _beyond_limits(read: StageReading) -> Iterator[Finding]:
         for value, limit, beyond in ((low, joint.lower, low < joint.lower), (high, joint.upper, high > joint.upper)):
             if beyond and abs(value - limit) > 1e-6:
                 yield Finding(
-                    WARNING, LIMITS, motor.path, motor.attribute, "the animation goes beyond the limit of the joint",
+                    WARNING, LIMITS, motor.prim_path, motor.attribute,
+                    "the animation goes beyond the limit of the joint",
                     f"{value / unit:.6g}, limit {limit / unit:.6g}", "Animate within the limit, or correct the limit",
                 )  # fmt: skip
 

@@ -49,10 +49,14 @@ def bake_bodies(
     codes = clock.time_codes(motion.times)
     poses = _rest_poses(stage, character, clock.start)
     worlds = {
-        body.path: _world_matrices(poses[body.path], motion, k, meters) for k, body in enumerate(character.bodies)
+        body.path: _world_matrices(poses[body.path], motion, k, meters)
+        for k, body in enumerate(character.bodies)
+        if not body.between
     }
     written = {}
     for body in character.bodies:
+        if body.between:
+            continue
         prim = stage.GetPrimAtPath(body.path)
         reset = UsdGeom.Xformable(prim).GetResetXformStack()
         local = worlds[body.path]
@@ -128,6 +132,7 @@ def _rest_poses(stage: Usd.Stage, character: Character, start: float) -> dict[st
             gf.matrix(xforms.GetLocalToWorldTransform(stage.GetPrimAtPath(body.path))), body.path
         )
         for body in character.bodies
+        if not body.between
     }
 
 

@@ -69,7 +69,7 @@ def author_curves(
     written = {}
     for curve in curves:
         motor = character.motors[curve.motor]
-        path = f"{motor.path}.{motor.attribute}"
+        path = f"{motor.prim_path}.{motor.attribute}"
         spec = attribute_spec(layer, path, Sdf.ValueTypeNames.Float)
         unit = meters if motor.linear else np.deg2rad(1.0)
         values = curve_values(animation, curve, times, character.retarget.cyclic)
@@ -86,10 +86,10 @@ def ensure_drives(layer: Sdf.Layer, stage: Usd.Stage, motors: Iterable[Motor]) -
 
     for motor in motors:
         drive = f"PhysicsDriveAPI:{motor.attribute.split(':')[1]}"
-        if not is_applied(stage.GetPrimAtPath(motor.path), drive):
+        if not is_applied(stage.GetPrimAtPath(motor.prim_path), drive):
             schemas = Sdf.TokenListOp()
             schemas.prependedItems = [drive]
-            Sdf.CreatePrimInLayer(layer, motor.path).SetInfo("apiSchemas", schemas)
+            Sdf.CreatePrimInLayer(layer, motor.prim_path).SetInfo("apiSchemas", schemas)
 
 
 def attribute_spec(layer: Sdf.Layer, path: str, kind: Sdf.ValueTypeName, uniform: bool = False) -> Sdf.AttributeSpec:

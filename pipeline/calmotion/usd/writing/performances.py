@@ -49,7 +49,7 @@ def write_performance(
         for motor, values in zip(character.motors, motion[1].T, strict=True):
             if motor.follows is not None:
                 continue
-            joint = Sdf.CreatePrimInLayer(layer, motor.path)
+            joint = Sdf.CreatePrimInLayer(layer, motor.prim_path)
             track = Sdf.AttributeSpec(joint, motor.attribute, Sdf.ValueTypeNames.Float)
             shown = values / provenance.meters_per_unit if motor.linear else np.degrees(values)
             for code, value in zip(codes, shown, strict=True):

@@ -64,7 +64,7 @@ def author_splines(
             forever = Ts.Extrapolation(Ts.ExtrapLoopRepeat)
             spline.SetPreExtrapolation(forever)
             spline.SetPostExtrapolation(forever)
-        path = f"{motor.path}.{motor.attribute}"
+        path = f"{motor.prim_path}.{motor.attribute}"
         attribute_spec(layer, path, Sdf.ValueTypeNames.Float).SetSpline(spline)
         written[path] = len(times)
     return written

@@ -61,7 +61,7 @@ class ImportedRobot:
                 "layer": self.layer,
                 "folder": self.folder,
                 "robot": character.path,
-                "bodies": len(character.bodies),
+                "bodies": sum(not body.between for body in character.bodies),
                 "flexible": [body.path for body in character.bodies if body.flexible is not None],
                 "mass_kg": sum(body.mass.mass for body in character.bodies if body.mass is not None),
                 "joints": len(character.joints),

@@ -80,7 +80,7 @@ class Drive:
 
     def attribute(self, stage: Usd.Stage) -> Any:
         """The target position of its drive, on a stage; invalid where the joint has no drive."""
-        return stage.GetPrimAtPath(self.joint.path).GetAttribute(target_attribute(self.joint))
+        return stage.GetPrimAtPath(self.joint.prim_path).GetAttribute(target_attribute(self.joint))
 
 
 def actuated_joints(stage: Usd.Stage) -> dict[str, str]:
@@ -251,6 +251,8 @@ def _drive(
     prim, name = joint.prim, target_attribute(joint)
     drive, unit = joint.drive, _UNITS[joint.kind]
     has_drive, ours = schemas.is_applied(prim, f"PhysicsDriveAPI:{drive}"), schemas.is_applied(prim, _SCHEMA)
+    if joint.whole is not None and any(_has_drive(prim, other) for other in joint.free):
+        ours = ours and has_drive  # it is for those axes that have a drive
     if joint.path in given:
         return Drive(joint, GIVEN)
     attribute = prim.GetAttribute(name)
@@ -292,6 +294,10 @@ def _drive(
         return Drive(joint, CONSTANT, constant=0.0)
     reading.note(f"{joint.path}: its drive has neither a target position nor a stiffness, so the joint moves freely")
     return None
+
+
+def _has_drive(prim: Usd.Prim, direction: str) -> bool:
+    return schemas.is_applied(prim, f"PhysicsDriveAPI:{direction}")
 
 
 def _refuse_wrong_motor(joint: JointPrim) -> None:

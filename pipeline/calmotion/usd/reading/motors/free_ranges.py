@@ -35,7 +35,7 @@ def free_tracks(stage: Usd.Stage, motors: Sequence[Motor], clock: Clock) -> tupl
     the next."""
     ranges = []
     for index, motor in enumerate(motors):
-        samples = _free_samples(stage.GetPrimAtPath(motor.path))
+        samples = _free_samples(stage.GetPrimAtPath(motor.prim_path))
         if len({value for _, value in samples}) > 1:
             codes, values = zip(*samples, strict=True)
             ranges.append(FreeTrack(index, clock.seconds(np.array(codes, dtype=np.float64)), np.array(values, bool)))

@@ -48,6 +48,8 @@ def read_gear(joint: JointPrim, kinds: dict[str, str], units: StageUnits) -> Gea
             is not finite.
     """
     for spelling in GEARS if joint.prim is not None else ():
+        if joint.whole is not None and f":{joint.drive}:" not in spelling.leader:
+            continue  # it would be about each of its axes
         relationship = joint.prim.GetRelationship(spelling.leader)
         targets = relationship.GetForwardedTargets() if relationship else []
         switch = joint.prim.GetAttribute(spelling.enabled) if spelling.enabled else None

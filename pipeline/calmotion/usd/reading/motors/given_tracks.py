@@ -9,6 +9,7 @@ import numpy as np
 from calmotion.errors import ShotError
 from calmotion.shot import MotorTracks, Track
 from calmotion.support.naming import nearest
+from calmotion.usd.reading.generic_joints import freedoms
 from calmotion.usd.reading.joints import JointPrim, joint_prims
 
 if TYPE_CHECKING:
@@ -23,7 +24,7 @@ def given_joints(stage: Usd.Stage, given: MotorTracks | None) -> tuple[str, ...]
     """
     if given is None:
         return ()
-    paths = [str(prim.GetPath()) for prim in joint_prims(stage)]
+    paths = [path for prim in joint_prims(stage) for path in _paths(prim)]
     found = []
     for name in given.values:
         named = [path for path in paths if path == name] or [path for path in paths if path.split("/")[-1] == name]
@@ -37,6 +38,15 @@ def given_joints(stage: Usd.Stage, given: MotorTracks | None) -> tuple[str, ...]
             )
         found += named
     return tuple(found)
+
+
+def _paths(prim: Usd.Prim) -> list[str]:
+    """The path of a joint, or those of its axes where it has several."""
+    path = str(prim.GetPath())
+    if prim.GetTypeName() != freedoms.TYPE:
+        return [path]
+    found = freedoms.freedoms(prim)
+    return [f"{path}.{name}" for name in found.free] if found.kind == freedoms.SEVERAL else [path]
 
 
 def given_track(given: MotorTracks, joint: JointPrim) -> Track:

@@ -15,6 +15,7 @@ from calmotion.usd import gf
 from calmotion.usd.clock import Clock
 from calmotion.usd.reading.animated_transforms import carriers, codes_of, moves
 from calmotion.usd.reading.context import Reading
+from calmotion.usd.reading.generic_joints.chains import axis_values
 from calmotion.usd.reading.joints import JointPrim
 from calmotion.usd.reading.roots import world_frame, world_side_prim
 from calmotion.usd.transforms import pose_from_matrix, rotation_from_quaternion
@@ -47,7 +48,7 @@ def pose_codes(stage: Usd.Stage, joints: Sequence[JointPrim], clock: Clock) -> A
     """Time codes at which bodies of joints are posed: their samples within the shot, and its frames; empty where no
     body has any."""
     found: set[float] = set()
-    for path in {end for joint in joints for end in (joint.body0, joint.body1) if end}:
+    for path in _bodies(joints):
         for prim in carriers(stage.GetPrimAtPath(path)):
             found.update(codes_of(prim))
     if not found:
@@ -66,10 +67,10 @@ def joint_motions(reading: Reading, joints: Sequence[JointPrim], codes: Array) -
         joints: Joints to evaluate.
         codes: Time codes, ascending, shape [n].
     """
-    bodies = {end for joint in joints for end in (joint.body0, joint.body1) if end}
-    poses = _poses(reading.stage, sorted(bodies), codes, reading.units)
+    poses = _poses(reading.stage, _bodies(joints), codes, reading.units)
     found = []
-    for joint in joints:
+    for axis in joints:
+        joint = axis.whole or axis
         R1, p1 = _joint_frame(*poses[joint.body1], joint.frame1)
         if joint.body0:
             R0, p0 = _joint_frame(*poses[joint.body0], joint.frame0)
@@ -77,8 +78,18 @@ def joint_motions(reading: Reading, joints: Sequence[JointPrim], codes: Array) -
             R0, p0 = _world_frames(reading, joint, codes)
         R = np.swapaxes(R0, 1, 2) @ R1
         x = np.einsum("nji,nj->ni", R0, p1 - p0)
-        found.append(_about_z(R, x, joint.kind == "prismatic"))
+        if axis.whole is None:
+            found.append(_about_z(R, x, joint.kind == "prismatic"))
+        else:
+            values, tilt, gap = axis_values(joint, R, x)
+            found.append(JointMotion(values[:, joint.free.index(axis.drive)].copy(), tilt, gap))
     return found
+
+
+def _bodies(joints: Sequence[JointPrim]) -> list[str]:
+    """The bodies that joints connect, without the parts between the axes of one."""
+    wholes = [joint.whole or joint for joint in joints]
+    return sorted({end for joint in wholes for end in (joint.body0, joint.body1) if end})
 
 
 def _about_z(R: Array, x: Array, slides: bool) -> JointMotion:
@@ -134,14 +145,13 @@ def posed_joints(reading: Reading, joints: Sequence[JointPrim], clock: Clock) ->
     return [
         joint.path
         for joint, motion in zip(able, motions, strict=True)
-        if np.ptp(motion.values) > MOVED and driven.intersection((joint.body0, joint.body1))
+        if np.ptp(motion.values) > MOVED and driven.intersection(_bodies([joint]))
     ]
 
 
 def _animated_bodies(reading: Reading, joints: Sequence[JointPrim], codes: Array) -> set[str]:
     """Bodies that the shot moves in the world, without kinematic roots, whose motion animates no joint."""
-    bodies = sorted({end for joint in joints for end in (joint.body0, joint.body1) if end})
-    poses = _poses(reading.stage, bodies, codes, reading.units)
+    poses = _poses(reading.stage, _bodies(joints), codes, reading.units)
     return {
         path
         for path, (R, p) in poses.items()

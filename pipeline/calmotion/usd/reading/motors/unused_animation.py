@@ -6,8 +6,8 @@ from collections.abc import Collection, Sequence
 from typing import Any
 
 from calmotion.errors import ShotError
-from calmotion.usd.reading import d6_joints
 from calmotion.usd.reading.context import Reading
+from calmotion.usd.reading.generic_joints import freedoms
 from calmotion.usd.reading.joints import UNSUPPORTED, JointPrim, joint_prims
 from calmotion.usd.reading.motors.tracks import sample_codes
 
@@ -35,31 +35,37 @@ def refuse_unused_animation(
     Raises:
         ShotError: There is one.
     """
-    by_path = {joint.path: joint for joint in joints}
+    by_path: dict[str, list[JointPrim]] = {}
+    for joint in joints:
+        by_path.setdefault(joint.prim_path, []).append(joint)
     for prim in joint_prims(reading.stage):
         path = str(prim.GetPath())
         animated = [attribute for attribute in target_positions(prim) if len(sample_codes(attribute))]
-        joint = by_path.get(path)
-        if not animated or path in given or (joint is not None and joint.kind == UNSUPPORTED):
+        axes = by_path.get(path, [])
+        if not animated or path in given or any(joint.kind == UNSUPPORTED for joint in axes):
             continue
+        own = [_TARGET_POSITION.format(joint.drive) for joint in axes if joint.drive]
         names = [attribute.GetName() for attribute in animated]
-        if joint is None:
+        stray = [name for name in names if name not in own]
+        if not axes:
             if not driven:
                 raise ShotError(
                     "this joint is animated, but connects no body", path=path, attribute="physics:body1",
                     remedy="Name the bodies that it joins in physics:body0 and physics:body1, and apply "
                     "PhysicsRigidBodyAPI to them",
                 )  # fmt: skip
-        elif not joint.drive or _TARGET_POSITION.format(joint.drive) not in names:
+        elif len(stray) == len(names) or (len(axes) > 1 and stray):
+            free = ", ".join(joint.drive for joint in axes)
             raise ShotError(
-                "the drive is animated in a direction in which its joint does not move", path=path, attribute=names[0],
-                found=f"a {joint.kind} joint", remedy=_remedy(joint, names[0]),
+                "the drive is animated in a direction in which its joint does not move", path=path, attribute=stray[0],
+                found=f"a {axes[0].kind} joint" if len(axes) == 1 else f"a joint that is free in {free}",
+                remedy=_remedy(axes[0], stray[0]),
             )  # fmt: skip
 
 
 def _remedy(joint: JointPrim, name: str) -> str:
     direction = name.split(":")[1]
-    if joint.prim.GetTypeName() == d6_joints.TYPE:
+    if joint.prim.GetTypeName() == freedoms.TYPE:
         wanted = f"Lock all directions but {direction} by PhysicsLimitAPIs (low above high)"
         return f"{wanted}, or animate {_TARGET_POSITION.format(joint.drive)}" if joint.drive else wanted
     if joint.drive:
