@@ -105,9 +105,11 @@ class PlanStep(Operator):
 
     @classmethod
     def poll(cls, data: Mapping[type, Any]) -> str | None:
-        source, character = data.get(Source), data.get(Character)
+        source, character, animation = data.get(Source), data.get(Character), data.get(Animation)
         if source is not None and source.command != "inspect":
             return NotAsked("other commands choose it themselves")
+        if animation is not None and len(animation.frame_times) < 2:
+            return "the shot has one frame, and so no motion"
         reason = no_flexible_bodies(data)
         if reason is None or character is None:
             return None

@@ -181,8 +181,7 @@ def _of_kind(shot: CompiledShot, kind: str, pattern: str, prior: float) -> list[
     if kind in (MASS, CENTRE):
         ends, rows = set(payload_bodies(shot)), []
         for index, body in enumerate(character.bodies):
-            inner = body.simulated_flexible or body.mass is None or bool(body.between)
-            if inner or not (pattern or index in ends):
+            if body.simulated_flexible or body.mass is None or body.between or not (pattern or index in ends):
                 continue
             if kind == MASS:
                 rows.append(Parameter(kind, body.path, body.mass.mass, spread, "kg"))

@@ -116,3 +116,13 @@ def test_names_that_nothing_has_are_refused(make, options, problem, remedy):
     with pytest.raises(ShotError) as refused:
         make(**options)
     assert problem in refused.value.problem and remedy in refused.value.remedy
+
+
+def test_patterns_name_the_joints_that_are_motors(make):
+    character, _, _ = make(motors=("ELB*",))
+    assert [motor.path for motor in character.motors] == [ELBOW, MIMIC]
+    character, _, _ = make(motors=("all",))
+    assert {PAN, ELBOW} <= {motor.path for motor in character.motors}
+    with pytest.raises(ShotError) as refused:
+        make(motors=("elbw",))
+    assert refused.value.attribute == "--motors" and "elbow" in refused.value.remedy

@@ -84,7 +84,8 @@ def study(folder: Path, imports: bool = False, known: Mapping[str, Row] | None =
         frames = len(animation.frame_times)
         yield Row(
             name, outcome, sum(not body.between for body in character.bodies), len(character.motors),
-            len(character.targets), frames, time.perf_counter() - start, f"motors by {', '.join(sources)}" if frames > 1 else "no animation", line,
+            len(character.targets), frames, time.perf_counter() - start,
+            f"motors by {', '.join(sources)}" if frames > 1 else "no animation", line,
         )  # fmt: skip
 
 

@@ -45,7 +45,8 @@ def _hinge(system: System, b: int) -> bool:
 @kernel
 def _ball(system: System, b: int) -> bool:
     """Whether it is carried by a ball joint."""
-    return system.rows[b] == BALL
+    ball: bool = system.rows[b] == BALL
+    return ball
 
 
 @kernel

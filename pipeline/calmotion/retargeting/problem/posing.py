@@ -114,11 +114,14 @@ def unknowns(character: Character, animation: Animation, grid: TimeGrid, options
         )
     fixed = locked_coefficients(animation, basis, motors, grid.end)
     if not len(motors) or np.all(fixed):
+        none = not character.motors
         raise ShotError(
-            "every motor is locked, so there is nothing to optimise",
+            "the shot has no motors" if none else "every motor is locked, so there is nothing to optimise",
             path=character.path,
-            attribute="calm:motor:optimize",
-            remedy="Set it to true on the motors that may change.",
+            attribute="" if none else "calm:motor:optimize",
+            remedy="Drive its joints, as `calmotion import` does, or simulate it."
+            if none
+            else "Set it to true on the motors that may change.",
         )
     bounds = motor_bounds(character, np.any(coupling, axis=1))
     continuous = options.adjoint == "continuous"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import fnmatch
 import os
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
@@ -16,17 +16,15 @@ from calmotion.shot import MotorTracks
 from calmotion.support.naming import nearest
 from calmotion.usd import stages
 from calmotion.usd.diagnostics import quiet
-from calmotion.usd.dialects import GEARS
+from calmotion.usd.importing.robot_motors import author_motors, named
 from calmotion.usd.reading.context import is_rigid_body, prims_of
-from calmotion.usd.reading.joints import joint_prims
-from calmotion.usd.reading.motors.driven_motors import actuated_joints
 from calmotion.usd.rigging.materials import author_material
+from calmotion.usd.schemas import is_applied
 from calmotion.usd.units import StageUnits, units_of
 
 if TYPE_CHECKING:
     from pxr import Sdf, Usd
 
-_DRIVES = {"PhysicsRevoluteJoint": "angular", "PhysicsPrismaticJoint": "linear"}
 _FRAME_MASS, _FRAME_INERTIA = 1e-6, 1e-10  # of links without mass [kg], [kg m^2]
 _SMALLEST_MOMENT, _RAISED = 1e-6, 1e-2  # of the largest moment of inertia of a link
 _THICKNESS = "calm:flexible:wallThickness"
@@ -61,7 +59,8 @@ class RobotOptions:
         massless: Names of links whose mass is 0.
         solid: Material from which links without inertia get their mass, or None.
         motion: Of its joints, or None.
-        frames_per_second: Of the shot.
+        frames_per_second: Of the shot; None where no motion is given: that of the robot.
+        motors: Patterns of names of joints that motors drive; none: see `robot_motors`.
     """
 
     flexible: tuple[FlexibleLinks, ...] = ()
@@ -71,7 +70,8 @@ class RobotOptions:
     massless: tuple[str, ...] = ()
     solid: Material | None = None
     motion: MotorTracks | None = None
-    frames_per_second: float = 60.0
+    frames_per_second: float | None = 60.0
+    motors: tuple[str, ...] = ()
 
 
 def robot_layer(converted: str, asset: str, options: RobotOptions) -> tuple[Sdf.Layer, tuple[str, ...]]:
@@ -107,11 +107,6 @@ def robot_layer(converted: str, asset: str, options: RobotOptions) -> tuple[Sdf.
     return layer, notes
 
 
-def named(prim: Usd.Prim) -> str:
-    """The name of a prim as its author wrote it, where USD allows no such name."""
-    return str(prim.GetDisplayName() or prim.GetName())
-
-
 class _Author:
     """Authors over a robot.
 
@@ -137,11 +132,21 @@ class _Author:
         UsdGeom.SetStageMetersPerUnit(self._stage, UsdGeom.GetStageMetersPerUnit(self._robot))
         UsdGeom.SetStageUpAxis(self._stage, UsdGeom.GetStageUpAxis(self._robot))
         UsdPhysics.SetStageKilogramsPerUnit(self._stage, UsdPhysics.GetStageKilogramsPerUnit(self._robot))
-        root.timeCodesPerSecond = root.framesPerSecond = options.frames_per_second
+        own = self._robot.GetRootLayer()
+        if options.frames_per_second is None:
+            root.timeCodesPerSecond, root.framesPerSecond = own.timeCodesPerSecond, own.framesPerSecond
+            if self._robot.HasAuthoredTimeCodeRange():
+                root.startTimeCode, root.endTimeCode = own.startTimeCode, own.endTimeCode
+        else:
+            root.timeCodesPerSecond = root.framesPerSecond = options.frames_per_second
         if options.motion is not None:
             root.startTimeCode = 0.0
-            frames = float(options.motion.times[-1]) * options.frames_per_second
+            frames = float(options.motion.times[-1]) * self._rate
             root.endTimeCode = float(np.floor(frames + 1e-6))
+
+    @property
+    def _rate(self) -> float:
+        return float(self._options.frames_per_second or self._robot.GetTimeCodesPerSecond())
 
     def masses(self) -> None:
         """Densities of the links that have no inertia, and a milligram for those that have no mass."""
@@ -157,6 +162,8 @@ class _Author:
             self.notes.append(f"links of mass 0 are frames, and get {1e6 * _FRAME_MASS:g} mg each: {names}")
         self._raise_moments()
         without = [prim for prim in self._bodies if named(prim) in self._options.without_mass]
+        if self._options.solid is not None:
+            without += [prim for prim in self._bodies if prim not in without and _has_no_mass(prim)]
         if not without:
             return
         names = ", ".join(map(named, without))
@@ -193,63 +200,11 @@ class _Author:
             )
 
     def motors(self) -> None:
-        """Drives: of the joints that actuators drive, or of all where there are none; and of those in the motion."""
-        from pxr import Sdf, UsdPhysics
-
-        joints = [prim for prim in joint_prims(self._stage) if prim.GetTypeName() in _DRIVES]
-        moved = self._moved(joints)
-        actuated = actuated_joints(self._stage)
-        for prim in joints:
-            path = str(prim.GetPath())
-            geared = any(prim.GetRelationship(spelling.leader).HasAuthoredTargets() for spelling in GEARS)
-            closing = prim.GetAttribute("physics:excludeFromArticulation").Get()
-            if path not in moved and (geared or closing or (actuated and path not in actuated)):
-                continue
-            drive = _DRIVES[prim.GetTypeName()]
-            api = UsdPhysics.DriveAPI.Apply(prim, drive)
-            effort = self._options.efforts.get(named(prim))
-            if effort is not None:
-                unit = self._units.torque(1.0) if drive == "angular" else self._units.force(1.0)
-                api.CreateMaxForceAttr(effort / unit)
-            attribute = api.CreateTargetPositionAttr()
-            if path in moved:
-                scale = np.degrees(1.0) if drive == "angular" else 1.0 / self._units.length(1.0)
-                codes = moved[path].times * self._options.frames_per_second
-                values = moved[path].values[next(iter(moved[path].values))] * scale
-                spec = self._stage.GetRootLayer().GetAttributeAtPath(attribute.GetPath())
-                assert spec.typeName == Sdf.ValueTypeNames.Float
-                for code, value in zip(codes, values, strict=True):
-                    attribute.Set(float(value), float(round(code, 6)))
-            else:
-                attribute.Set(self._rest(prim))
-
-    def _rest(self, prim: Usd.Prim) -> float:
-        """The value nearest to 0 within the limits of a joint."""
-        low, high = (prim.GetAttribute(f"physics:{end}Limit").Get() for end in ("lower", "upper"))
-        low, high = (-np.inf if low is None else low), (np.inf if high is None else high)
-        return float(min(max(0.0, low), high)) if low <= high else 0.0
-
-    def _moved(self, joints: Sequence[Usd.Prim]) -> dict[str, MotorTracks]:
-        """The joints of the motion by path, each with its track alone."""
-        motion = self._options.motion
-        if motion is None:
-            return {}
-        found, problems = {}, []
-        for name, values in motion.values.items():
-            prims = [prim for prim in joints if name in (named(prim), prim.GetName(), str(prim.GetPath()))]
-            if len(prims) != 1:
-                names = sorted({named(prim) for prim in joints})
-                problems.append(
-                    ShotError(
-                        "several joints have this name" if prims else "no joint of the robot has this name",
-                        path=motion.origin, found=name,
-                        remedy=f"{nearest(name, names)}Its joints are {', '.join(names)}",
-                    )
-                )  # fmt: skip
-            else:
-                found[str(prims[0].GetPath())] = MotorTracks(motion.origin, motion.times, {name: values})
-        raise_all(problems)
-        return found
+        """Drives, see `robot_motors`."""
+        options = self._options
+        self.notes += author_motors(
+            self._stage, self._units, options.motion, self._rate, options.efforts, options.motors
+        )
 
     def links(self) -> None:
         """Flexible links with their materials."""
@@ -302,6 +257,19 @@ class _Author:
                 remedy=f"{nearest(pattern.strip('*'), names)}Its links are {', '.join(names)}",
             )  # fmt: skip
         return found
+
+
+def _has_no_mass(body: Usd.Prim) -> bool:
+    """Whether neither a mass nor a density is authored on a body or what it carries, and nothing collides."""
+    authored = (
+        attribute
+        for prim in _below(body)
+        for name in ("physics:mass", "physics:density")
+        if (attribute := prim.GetAttribute(name)) and attribute.HasAuthoredValue()
+    )
+    return not any(attribute.Get() for attribute in authored) and not any(
+        is_applied(prim, "PhysicsCollisionAPI") for prim in _below(body)
+    )
 
 
 def _below(body: Usd.Prim) -> Iterable[Usd.Prim]:

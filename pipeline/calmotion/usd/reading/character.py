@@ -13,7 +13,7 @@ from calmotion.shot import Body, Character, Joint, MassProperties, RetargetSetti
 from calmotion.shot.tolerance import reach
 from calmotion.usd.clock import Clock
 from calmotion.usd.reading import scene, targets, topology
-from calmotion.usd.reading.animated_transforms import refuse_moving
+from calmotion.usd.reading.animated_transforms import moves, refuse_moving
 from calmotion.usd.reading.bodies import mass
 from calmotion.usd.reading.bodies.flexible import flexible_settings
 from calmotion.usd.reading.bodies.interfaces import interfaces_of
@@ -103,7 +103,8 @@ def read_skeleton(
     joints = [joint for joint in reading.each(joints_of_stage, lambda prim: read_joint(reading, prim, poses)) if joint]
     joints, between = expanded(reading, joints, poses)
     root = topology.common_path(list(prims))
-    drives = motors.read_drives(reading, joints, root, posed_joints(reading, joints, clock), given, still)
+    rooted = _root_moves(reading, prims, joints)
+    drives = motors.read_drives(reading, joints, root, posed_joints(reading, joints, clock), given, still, rooted)
     target_prims = targets.target_prims(reading, measured)
     bodies = _moving_bodies(reading, [*prims, *between], joints, drives, [body for _, body in target_prims])
     kept = set(bodies)
@@ -275,11 +276,21 @@ def _with_parts_between(skeleton: Skeleton, real: Sequence[Body], meters: float)
     return tuple(by_path[path] for path in skeleton.bodies if path in by_path)
 
 
+def _root_moves(reading: Reading, prims: dict[str, Usd.Prim], joints: Sequence[JointPrim]) -> bool:
+    """Whether the shot moves a kinematic body, or what a joint to the world is on."""
+    roots = [prim for prim in prims.values() if prim.GetAttribute("physics:kinematicEnabled").Get()]
+    return any(moves(reading, prim) is not None for prim in roots) or any(
+        joint.body0 == "" and on_moving_prim(reading, joint) for joint in joints
+    )
+
+
 def _moving_bodies(
     reading: Reading, bodies: list[str], joints: list[JointPrim], drives: list[motors.Drive], wanted: list[str]
 ) -> list[str]:
     """The bodies of every group that a motor moves or a target is on; a note for the others."""
-    driven = {end for drive in drives for end in (drive.joint.body0, drive.joint.body1) if end} | set(wanted)
+    # where nothing is driven, what joints connect swings
+    moved = [drive.joint for drive in drives] or joints
+    driven = {end for joint in moved for end in (joint.body0, joint.body1) if end} | set(wanted)
     kept = []
     for group in topology.components(bodies, joints):
         if driven.intersection(group):

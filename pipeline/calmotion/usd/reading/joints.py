@@ -110,7 +110,8 @@ def read_joint(reading: Reading, prim: Usd.Prim, poses: dict[str, Pose]) -> Join
             found=ends[0][0],
             remedy="Correct physics:body0 or physics:body1",
         )
-    kind, limits, free = _KINDS.get(str(prim.GetTypeName()), UNSUPPORTED), _LIMITS, ()
+    kind, limits = _KINDS.get(str(prim.GetTypeName()), UNSUPPORTED), _LIMITS
+    free: tuple[str, ...] = ()
     if prim.GetTypeName() == freedoms.TYPE:
         found = freedoms.freedoms(prim)
         kind, drive, axis, limits, free = found.kind, found.freedom, found.axis, found.limits, found.free

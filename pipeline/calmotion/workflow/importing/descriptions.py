@@ -13,7 +13,7 @@ from calmotion.support.files import is_special, refuse_special
 from calmotion.support.foreign_files import remedy_for
 from calmotion.support.naming import nearest
 
-URDF, MJCF = "urdf", "mjcf"
+URDF, MJCF, USD = "urdf", "mjcf", "usd"
 _JOINTS = ("revolute", "continuous", "prismatic", "fixed")
 _SHOWN = 4  # missing files in a message
 
@@ -24,7 +24,7 @@ class Description:
 
     Attributes:
         path: The file.
-        kind: `URDF` or `MJCF`.
+        kind: `URDF`, `MJCF` or `USD`.
         packages: Folders of the ROS packages that it names.
         efforts: Largest effort of each joint of a URDF, where it is positive [N m or N].
         without_mass: Links of a URDF with geometry and without inertia.
@@ -56,7 +56,7 @@ def read_description(path: str, packages: Mapping[str, str]) -> Description:
     if root.tag != "robot":
         raise ShotError(
             "this is neither a URDF nor an MJCF robot", path=path, found=f"<{root.tag}>",
-            remedy="Name a .urdf file, or an .xml file of MuJoCo; a USD file needs no import",
+            remedy="Name a .urdf file, an .xml file of MuJoCo, or a USD file",
         )  # fmt: skip
     macros = next((node.tag for node in root.iter() if "xacro" in str(node.tag) or "${" in str(node.attrib)), None)
     if macros is not None:

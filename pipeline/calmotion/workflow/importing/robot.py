@@ -1,4 +1,4 @@
-"""`calmotion import`: a robot's URDF or MJCF file becomes a shot."""
+"""`calmotion import`: a robot's URDF, MJCF or USD file becomes a shot."""
 
 from __future__ import annotations
 
@@ -17,11 +17,12 @@ from calmotion.shot import Animation, Character, MotorTracks
 from calmotion.shot.run import Source
 from calmotion.support.files import try_writing
 from calmotion.usd.importing.robot_layer import FlexibleLinks, RobotOptions, robot_layer
-from calmotion.usd.layers import EXTENSIONS, write_layer
+from calmotion.usd.layers import EXTENSIONS, refuse_input_as_output, write_layer
 from calmotion.usd.reading.shot import read_shot
+from calmotion.usd.writing.root import relative_asset
 from calmotion.version import __version__
 from calmotion.workflow.importing.converters import convert, converter_python, temporary_folder
-from calmotion.workflow.importing.descriptions import Description, read_description
+from calmotion.workflow.importing.descriptions import USD, Description, read_description
 from calmotion.workflow.materials import known_materials
 from calmotion.workflow.problems import problems_of, value_of
 from calmotion.workflow.shot import Given, Path, read_settings
@@ -37,7 +38,7 @@ class ImportedRobot:
 
     Attributes:
         layer: The shot, which opens the converted robot and adds motors, motion, flexible links and targets.
-        folder: Folder beside it with the converted robot.
+        folder: Folder beside it with the converted robot; empty where the robot is USD, which is opened where it is.
         character: What was read of it again.
         animation: Its motion; of one frame where none was given.
         notes: What the user should know, as sentences.
@@ -84,6 +85,7 @@ def import_robot(
     flexible: Sequence[str] = (),
     targets: Sequence[str] = (),
     solid: str | None = None,
+    motors: Sequence[str] = (),
     packages: Mapping[str, Path] | None = None,
     material_files: Sequence[Path] = (),
     converters: Path | None = None,
@@ -91,15 +93,17 @@ def import_robot(
     settings: Given = None,
     tell: Callable[[str], None] = lambda text: None,
 ) -> ImportedRobot:
-    """Make a shot of a robot's URDF or MJCF file.
+    """Make a shot of a robot's URDF, MJCF or USD file.
 
     Args:
-        robot: A .urdf file, or an .xml file of MuJoCo.
+        robot: A .urdf file, an .xml file of MuJoCo, or a USD file whose joints have no motors, or others than wanted.
         layer: USD layer to write; the converted robot goes into a folder beside it.
         motion: CSV, NPZ or BVH file with a motion of its joints.
         flexible: Links that bend, as `PATTERN=MATERIAL` or `PATTERN=MATERIAL,THICKNESS` (`"*forearm*=abs,3mm"`).
         targets: Patterns of names of links or frames that are targets; none: the outermost points of the robot.
         solid: Material from whose density links without inertia get their mass.
+        motors: Patterns of names of joints that motors drive, `all` for all of them; none: those that actuators or
+            drives of the file move, else all of them.
         packages: Folders of ROS packages by name.
         material_files: TOML files with more materials.
         converters: Environment that has the converters; None: one of our own is made.
@@ -118,12 +122,16 @@ def import_robot(
     known = known_materials(material_files)
     links = tuple(flexible_links(text, known) for text in flexible)
     named = {name: os.fspath(folder) for name, folder in (packages or {}).items()}
-    description = read_description(os.fspath(robot), named)
+    is_usd = os.path.splitext(os.fspath(robot))[1].lower() in (*EXTENSIONS, ".usdz")
+    description = Description(os.fspath(robot), USD) if is_usd else read_description(os.fspath(robot), named)
     tracks = _motion(host, motion, settings) if motion is not None else None
     options = RobotOptions(
         links, tuple(targets), description.efforts, description.without_mass, description.massless,
-        None if solid is None else material_named(solid, known)[1], tracks, frames_per_second(tracks),
+        None if solid is None else material_named(solid, known)[1], tracks,
+        None if is_usd and tracks is None else frames_per_second(tracks), tuple(motors),
     )  # fmt: skip
+    if is_usd:
+        return _over_usd(description.path, target, options)
     python = converter_python(None if converters is None else os.fspath(converters), tell)
     return _Import(description, target, options).made(python)
 
@@ -178,6 +186,16 @@ def _motion(host: Host, path: Path, settings: Given) -> MotorTracks:
             "no plugin reads this motion", path="--motion", found=path, remedy="Name a .csv, .npz or .bvh file."
         )
     return value_of(run, MotorTracks, problems)
+
+
+def _over_usd(robot: str, layer: str, options: RobotOptions) -> ImportedRobot:
+    """A layer over a robot that is USD, which stays where it is."""
+    refuse_input_as_output(layer, [robot])
+    made, notes = robot_layer(robot, relative_asset(robot, os.path.dirname(os.path.realpath(layer))), options)
+    read: list[tuple[Character, Animation]] = []
+    write_layer(made, layer, lambda path: read.append(read_shot(path, still=True)[:2]))
+    character, animation = read[0]
+    return ImportedRobot(layer, "", character, animation, (*notes, *character.notes))
 
 
 class _Import:

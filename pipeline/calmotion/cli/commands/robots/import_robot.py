@@ -1,4 +1,4 @@
-"""`calmotion import`: a shot from a robot's URDF or MJCF file."""
+"""`calmotion import`: a shot from a robot's URDF, MJCF or USD file."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ if TYPE_CHECKING:
 
 def add_to(commands: Commands) -> None:
     """Add the command."""
-    text = "make a shot from a URDF or MJCF robot, with a motion, flexible links and targets"
+    text = "make a shot from a URDF, MJCF or USD robot, with a motion, flexible links and targets"
     command = commands.add_parser("import", help=text, description=text[0].upper() + text[1:] + ".")
     command.set_defaults(command=_run)
-    file_argument(command, "robot", metavar="ROBOT", help=".urdf file, or .xml file of MuJoCo")
+    file_argument(command, "robot", metavar="ROBOT", help=".urdf file, .xml file of MuJoCo, or USD file")
     file_argument(command, "-o", "--output", metavar="LAYER", required=True, help="USD layer to write")
     file_argument(
         command, "--motion", metavar="FILE",
@@ -25,6 +25,7 @@ def add_to(commands: Commands) -> None:
     for flag, metavar, help_text in (
         ("--flexible", "PATTERN=MATERIAL[,WALL]", 'links that bend: "*forearm*=abs,3mm"; see `calmotion materials`'),
         ("--target", "PATTERN", "links or frames whose motion counts (default: the outermost points of the robot)"),
+        ("--motors", "PATTERN", "joints that motors drive, or `all` (default: those that the file drives, else all)"),
         ("--package", "NAME=FOLDER", "folder of a ROS package that package:// names"),
     ):
         command.add_argument(flag, metavar=metavar, action="append", default=[], help=f"{help_text}; may be repeated")
@@ -62,8 +63,9 @@ def _run(args: argparse.Namespace, output: Output) -> int:
             )  # fmt: skip
     made = import_robot(
         args.robot, layer=args.output, motion=args.motion, flexible=args.flexible, targets=args.target,
-        solid=args.solid, packages=packages, material_files=args.materials, converters=args.converters,
-        plugins=args.plugins, settings=assignments(args), tell=(lambda text: None) if args.quiet else notice,
+        solid=args.solid, motors=args.motors, packages=packages, material_files=args.materials,
+        converters=args.converters, plugins=args.plugins, settings=assignments(args),
+        tell=(lambda text: None) if args.quiet else notice,
     )  # fmt: skip
     conclude(made.report(), (), output, None if args.quiet else _print)
     return 0
@@ -88,4 +90,5 @@ def _print(report: dict[str, Any], stream: TextIO) -> None:
         say(console, f"target: {path}")
     for note in report["notes"]:
         say(console, f"note: {note}")
-    say(console, f"wrote {report['layer']}, and {report['folder']} with the converted robot")
+    beside = f", and {report['folder']} with the converted robot" if report["folder"] else ""
+    say(console, f"wrote {report['layer']}{beside}")

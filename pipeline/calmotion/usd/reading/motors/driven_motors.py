@@ -101,8 +101,9 @@ def actuated_joints(stage: Usd.Stage) -> dict[str, str]:
 
 
 def read_drives(
-    reading: Reading, joints: list[JointPrim], root: str, posed: Sequence[str], given: Sequence[str], still: bool
-) -> list[Drive]:
+    reading: Reading, joints: list[JointPrim], root: str, posed: Sequence[str], given: Sequence[str], still: bool,
+    rooted: bool = False,
+) -> list[Drive]:  # fmt: skip
     """The driven joints.
 
     A revolute joint with an angular drive, or a prismatic one with a linear drive, is a motor, and one that an actuator
@@ -116,6 +117,7 @@ def read_drives(
             motors that hold still are read from the bodies as well.
         given: Joints whose tracks are given beside the shot.
         still: Whether a character that is not animated at all may be read.
+        rooted: Whether the shot moves a root of the character, which then needs no animated motor, and no motor.
 
     Raises:
         ShotError: No motors; none that is animated; a motor inside an instance, where nothing can be written.
@@ -130,7 +132,7 @@ def read_drives(
             gear = read_gear(joint, kinds, reading.units)
             if gear is not None:
                 gears[joint.path] = gear
-            drive = _drive(joint, actuated, reading, posed, given, still or gear is not None)
+            drive = _drive(joint, actuated, reading, posed, given, still or rooted or gear is not None)
             if drive is not None:
                 drives[joint.path] = replace(drive, actuator=actuated.get(joint.path, ""))
     with reading.collecting_problems():
@@ -143,13 +145,9 @@ def read_drives(
     if not found:
         for joint in joints:
             refuse_unsupported(joint)
-        raise ShotError(
-            "no motors: none of its joints is driven",
-            path=root,
-            remedy="Apply PhysicsDriveAPI:angular to the revolute joints that motors drive, and author time samples "
-            f"of {_TARGET_POSITION.format('angular')}, in degrees",
-        )
-    if not still and all(drive.source in (CONSTANT, GEARED) for drive in found):
+        _without_motors(reading, joints, root, still or rooted)
+        return found
+    if not (still or rooted) and all(drive.source in (CONSTANT, GEARED) for drive in found):
         raise ShotError(
             "a motor without animation, and no other motor is animated",
             path=found[0].joint.path,
@@ -168,6 +166,30 @@ def read_drives(
                 )
             )
     return found
+
+
+def _without_motors(reading: Reading, joints: Sequence[JointPrim], root: str, passive: bool) -> None:
+    """Note that nothing drives a character, or refuse it: at rest it hangs, and a shot of that has no motion."""
+    free = [joint for joint in joints if joint.kind != "fixed"]
+    if not free:
+        raise ShotError(
+            "nothing of it can move: all its joints are fixed",
+            path=root,
+            found=", ".join(joint.path for joint in joints[:4]) or "no joint between bodies",
+            remedy="Connect its parts by revolute or prismatic joints, with motors",
+        )
+    layer = reading.stage.GetRootLayer()
+    command = f"`calmotion import {layer.GetDisplayName()} -o robot.usda`"
+    if passive:
+        reading.note(f"{root}: no motors: its joints move freely; {command} makes motors of them")
+        return
+    raise ShotError(
+        "no motors: none of its joints is driven",
+        path=root,
+        remedy=f"{command} makes motors of its joints (--motors PATTERN: of some, --motion FILE: with a motion). In "
+        "the shot itself, apply PhysicsDriveAPI:angular to the revolute joints that motors drive, and author time "
+        f"samples of {_TARGET_POSITION.format('angular')}, in degrees",
+    )
 
 
 def _refuse_duplicate_motors(drives: Sequence[Drive], reading: Reading) -> None:

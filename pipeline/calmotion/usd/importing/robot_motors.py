@@ -1,0 +1,260 @@
+"""Which joints of an imported robot get motors, and their drives."""
+
+from __future__ import annotations
+
+import fnmatch
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from calmotion.errors import ShotError, raise_all
+from calmotion.shot import MotorTracks
+from calmotion.support.naming import nearest
+from calmotion.usd import schemas
+from calmotion.usd.dialects import GEARS
+from calmotion.usd.reading.context import is_rigid_body
+from calmotion.usd.reading.generic_joints import freedoms
+from calmotion.usd.reading.joints import joint_prims
+from calmotion.usd.reading.motors.driven_motors import actuated_joints
+from calmotion.usd.units import StageUnits
+
+if TYPE_CHECKING:
+    from pxr import Usd
+
+ALL = "all"
+_DRIVES = {"PhysicsRevoluteJoint": "angular", "PhysicsPrismaticJoint": "linear"}
+
+
+def named(prim: Usd.Prim) -> str:
+    """The name of a prim as its author wrote it, where USD allows no such name."""
+    return str(prim.GetDisplayName() or prim.GetName())
+
+
+@dataclass(frozen=True)
+class Axis:
+    """A direction in which a joint moves.
+
+    Attributes:
+        prim: The joint.
+        drive: The instance of PhysicsDriveAPI that drives it: `angular`, `linear`, `rotX`, ...
+        several: Whether the joint has others.
+    """
+
+    prim: Usd.Prim
+    drive: str
+    several: bool = False
+
+    @property
+    def path(self) -> str:
+        """The path of the joint, with the direction behind it where there are several."""
+        return f"{self.prim.GetPath()}{self._behind}"
+
+    @property
+    def name(self) -> str:
+        """The name of the joint, in the same way."""
+        return f"{named(self.prim)}{self._behind}"
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """What a motion or a pattern may name it by."""
+        return self.name, f"{self.prim.GetName()}{self._behind}", self.path
+
+    @property
+    def linear(self) -> bool:
+        """Whether it is a length."""
+        return self.drive == "linear" or self.drive in freedoms.TRANSLATIONS
+
+    @property
+    def _behind(self) -> str:
+        return f".{self.drive}" if self.several else ""
+
+
+def axes_of(prim: Usd.Prim) -> list[Axis]:
+    """The directions in which a joint moves that motors can drive."""
+    if prim.GetTypeName() == freedoms.TYPE:
+        free = freedoms.freedoms(prim)
+        names = free.free if free.kind in (freedoms.SEVERAL, "spherical", "revolute", "prismatic") else ()
+        return [Axis(prim, name, len(names) > 1) for name in names]
+    drive = _DRIVES.get(str(prim.GetTypeName()))
+    return [] if drive is None else [Axis(prim, drive)]
+
+
+def author_motors(
+    stage: Usd.Stage, units: StageUnits, motion: MotorTracks | None, frames_per_second: float,
+    efforts: Mapping[str, float], patterns: Sequence[str],
+) -> list[str]:  # fmt: skip
+    """Author drives of the joints that patterns name; without patterns of those that actuators or drives move, else of
+    all of them; and of those in the motion. A joint that no motion moves keeps its target position, or gets that
+    nearest to 0 within its limits.
+
+    Args:
+        stage: Where they are authored.
+        units: Of the stage.
+        motion: Of the joints, or None.
+        frames_per_second: Time codes in a second.
+        efforts: Largest effort by name of a joint [N m or N].
+        patterns: Of names of joints, with `*` and `?`; `all` names all of them.
+
+    Returns:
+        Notes for the user.
+
+    Raises:
+        ShotError: A name that no joint has; a closed chain, all of whose joints would be motors; no joint at all that a
+            motor can drive.
+    """
+    axes = [axis for prim in joint_prims(stage) for axis in axes_of(prim)]
+    moved = _moved(axes, motion)
+    chosen = _named(axes, patterns) if patterns else _by_default(stage, axes, moved)
+    driven = [axis for axis in axes if axis in chosen or axis.path in moved]
+    if not driven:
+        raise ShotError(
+            "the robot has no joint that a motor can drive", path=str(stage.GetDefaultPrim().GetPath()),
+            found=", ".join(sorted({str(prim.GetTypeName()) for prim in joint_prims(stage)})) or "no joints",
+            remedy="Connect its parts by revolute or prismatic joints. A passive linkage needs no import: animate the "
+            "transform of its root, with physics:kinematicEnabled, and simulate that shot",
+        )  # fmt: skip
+    for axis in driven:
+        _author(axis, moved.get(axis.path), units, frames_per_second, efforts.get(named(axis.prim)))
+    passive = [axis for axis in _free(axes) if axis not in driven]
+    if not passive or patterns or moved:
+        return []
+    names = ", ".join(axis.name for axis in passive)
+    return [f"joints that nothing in the file drives move freely: {names}; --motors all makes motors of them"]
+
+
+def _author(
+    axis: Axis, track: MotorTracks | None, units: StageUnits, frames_per_second: float, effort: float | None
+) -> None:  # fmt: skip
+    from pxr import UsdPhysics
+
+    api = UsdPhysics.DriveAPI.Apply(axis.prim, axis.drive)
+    if effort is not None:
+        api.CreateMaxForceAttr(effort / (units.force(1.0) if axis.linear else units.torque(1.0)))
+    attribute = api.CreateTargetPositionAttr()
+    if track is not None:
+        scale = 1.0 / units.length(1.0) if axis.linear else np.degrees(1.0)
+        values = next(iter(track.values.values())) * scale
+        for code, value in zip(track.times * frames_per_second, values, strict=True):
+            attribute.Set(float(value), float(round(code, 6)))
+    elif not (attribute.HasAuthoredValue() or attribute.GetNumTimeSamples()):
+        attribute.Set(_rest(axis))
+
+
+def _rest(axis: Axis) -> float:
+    """The value nearest to 0 within the limits of a joint."""
+    names = freedoms.limits_of(axis.drive)
+    if axis.prim.GetTypeName() != freedoms.TYPE:
+        names = ("physics:lowerLimit", "physics:upperLimit")
+    low, high = (attribute.Get() if (attribute := axis.prim.GetAttribute(name)) else None for name in names)
+    low, high = (-np.inf if low is None else low), (np.inf if high is None else high)
+    return float(min(max(0.0, low), high)) if low <= high else 0.0
+
+
+def _by_default(stage: Usd.Stage, axes: Sequence[Axis], moved: Mapping[str, MotorTracks]) -> list[Axis]:
+    """Those that actuators or drives move; all that follow no other joint and close no chain where there are none."""
+    free = _free(axes)
+    actuated = actuated_joints(stage)
+    driven = [axis for axis in free if _is_driven(axis) or str(axis.prim.GetPath()) in actuated]
+    if driven:
+        return driven
+    loop = _loop(stage)
+    if loop is None:
+        return free
+    if moved:
+        return []
+    names = [axis.name for axis in free]
+    raise ShotError(
+        "the robot has a closed chain, so not all of its joints can be motors", path=loop, attribute="--motors",
+        found=f"{len(names)} joints: {', '.join(names[:8])}{', ...' if len(names) > 8 else ''}",
+        remedy="Name those that are, as --motors 'hip*' --motors 'knee*', or give a motion of them",
+    )  # fmt: skip
+
+
+def _free(axes: Sequence[Axis]) -> list[Axis]:
+    """Those that follow no other joint and close no chain."""
+    return [
+        axis
+        for axis in axes
+        if not any(axis.prim.GetRelationship(spelling.leader).HasAuthoredTargets() for spelling in GEARS)
+        and not axis.prim.GetAttribute("physics:excludeFromArticulation").Get()
+    ]
+
+
+def _is_driven(axis: Axis) -> bool:
+    """Whether a drive is applied, or CalmMotorAPI to a joint that has no drive."""
+    applied = [name for name in axis.prim.GetAppliedSchemas() if name.startswith("PhysicsDriveAPI:")]
+    if applied:
+        return f"PhysicsDriveAPI:{axis.drive}" in applied
+    return schemas.is_applied(axis.prim, "CalmMotorAPI")
+
+
+def _loop(stage: Usd.Stage) -> str | None:
+    """Path of a joint that closes a chain of bodies, though nothing excludes it from the articulation."""
+    leader: dict[str, str] = {}
+
+    def group(path: str) -> str:
+        while leader.get(path, path) != path:
+            path = leader[path]
+        return path
+
+    for prim in joint_prims(stage):
+        if prim.GetAttribute("physics:excludeFromArticulation").Get():
+            continue
+        one, other = (group(_body(stage, prim, side)) for side in (0, 1))
+        if one == other:
+            return str(prim.GetPath())
+        leader[one] = other
+    return None
+
+
+def _body(stage: Usd.Stage, prim: Usd.Prim, side: int) -> str:
+    """The body on a side of a joint; empty for the world."""
+    relationship = prim.GetRelationship(f"physics:body{side}")
+    for target in relationship.GetForwardedTargets() if relationship else []:
+        body = stage.GetPrimAtPath(target)
+        while body and not is_rigid_body(body):
+            body = body.GetParent()
+        return str(body.GetPath()) if body else ""
+    return ""
+
+
+def _named(axes: Sequence[Axis], patterns: Sequence[str]) -> list[Axis]:
+    """The axes that patterns name."""
+    found: list[Axis] = []
+    for pattern in patterns:
+        fitting = [
+            axis
+            for axis in axes
+            if pattern == ALL or any(fnmatch.fnmatchcase(name.lower(), pattern.lower()) for name in axis.names)
+        ]
+        if not fitting:
+            names = sorted({axis.name for axis in axes})
+            raise ShotError(
+                "no joint that a motor can drive has such a name", attribute="--motors", found=pattern,
+                remedy=f"{nearest(pattern.strip('*'), names)}Its joints are {', '.join(names) or 'all fixed'}",
+            )  # fmt: skip
+        found += fitting
+    return found
+
+
+def _moved(axes: Sequence[Axis], motion: MotorTracks | None) -> dict[str, MotorTracks]:
+    """The axes of the motion by path, each with its track alone."""
+    found, problems = {}, []
+    for name, values in motion.values.items() if motion is not None else ():
+        fitting = [axis for axis in axes if name in axis.names]
+        assert motion is not None
+        if len(fitting) != 1:
+            names = sorted({axis.name for axis in axes})
+            problems.append(
+                ShotError(
+                    "several joints have this name" if fitting else "no joint of the robot has this name",
+                    path=motion.origin, found=name,
+                    remedy=f"{nearest(name, names)}Its joints are {', '.join(names)}",
+                )
+            )  # fmt: skip
+        else:
+            found[fitting[0].path] = MotorTracks(motion.origin, motion.times, {name: values})
+    raise_all(problems)
+    return found
