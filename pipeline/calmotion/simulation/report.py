@@ -8,12 +8,13 @@ import numpy as np
 
 from calmotion.multibody.analysis.dead_centres import dead_centres
 from calmotion.multibody.analysis.reactions import reactions
+from calmotion.multibody.analysis.unheld_joints import unheld_joints
 from calmotion.multibody.failure import SimulationFailure
 from calmotion.multibody.model.model import Model
 from calmotion.shot import LimitUse, Motion, Simplification, Simulation
 from calmotion.shot.character import Array
 from calmotion.simulation.forward import ForwardRun
-from calmotion.simulation.inputs.curves import Curves
+from calmotion.simulation.inputs.curves import Curves, sample_tracks
 from calmotion.simulation.inputs.time_grid import TimeGrid
 from calmotion.simulation.intended_motion import rigid_motion
 from calmotion.simulation.motor_limits import Excess
@@ -114,9 +115,22 @@ def left_out_rows(prepared: Prepared) -> list[Simplification]:
     rows += [row for body in prepared.bodies for row in body.left_out]
     if not grid.pre_roll:
         rows.append(Simplification("no pre-roll", "the shot is cyclic" if grid.cyclic else "the shot starts at rest"))
+    rows += _unheld_rows(prepared)
     locked = [motor.path for motor in character.motors if not motor.optimize]
     rows += [Simplification(f"{path}: not optimised", "calm:motor:optimize is false") for path in locked]
     return rows
+
+
+def _unheld_rows(prepared: Prepared) -> list[Simplification]:
+    """The free joints that start where the shot has them, since nothing holds them there."""
+    model, grid = prepared.model, prepared.grid
+    angles, _ = sample_tracks(prepared.shot.animation.tracks, grid)
+    joints = unheld_joints(model, model.joint_angles(angles[0]), prepared.world[0])
+    why = "it is free there: neither gravity nor a spring moves it"
+    return [
+        Simplification(f"{prepared.character.joints[model.tree.joint[b]].path}: starts where the shot has it", why)
+        for b in joints
+    ]
 
 
 def limit_uses(

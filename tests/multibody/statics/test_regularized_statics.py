@@ -5,6 +5,7 @@ import pytest
 from arms import chain, compiled
 from calmotion.benchmarks.scenes.neutral_hinges import push_rod, turning
 from calmotion.multibody.analysis.kinematics import rigid_state
+from calmotion.multibody.failure import SimulationFailure
 from calmotion.multibody.integrators.workspace import Workspace
 from calmotion.multibody.linear_solver.closed_chains import factor_closed_chains
 from calmotion.multibody.linear_solver.elimination import factor
@@ -16,7 +17,8 @@ from calmotion.multibody.statics.regularized_statics import (
     solve_statics,
     solve_statics_transposed,
 )
-from dense import dense_matrix, join, split
+from calmotion.shot import WORLD, Body, Character, Frame, Joint, MassProperties, Motor, Target
+from dense import dense_matrix, free_sliders, join, multipliers, split
 from scipy.spatial.transform import Rotation
 
 
@@ -72,6 +74,68 @@ def test_a_free_joint_without_stiffness_keeps_its_angle_and_moves_with_its_paren
     for rotation in Rotation.from_quat(np.roll(state.q, -1, axis=1)).as_rotvec():
         np.testing.assert_allclose(rotation, [0.0, 0.0, 0.4], atol=1e-10)
     assert np.abs(ws.blocks.res).max() < 1e-10
+
+
+def carried(kind, gravity=(0.0, 0.0, -9.81)):
+    """An arm that a motor turns about z, with a carriage on a rail along x or a rod on a ball joint."""
+    still = np.array([1.0, 0.0, 0.0, 0.0])
+    along_x = np.array([np.sqrt(0.5), 0.0, np.sqrt(0.5), 0.0])
+    heavy = [MassProperties(0.7, np.array([0.0, 0.0, z]), np.diag([2e-3, 2e-3, 1e-3])) for z in (0.0, -0.1)]
+    at, end = Frame(np.zeros(3), still), np.array([0.3, 0.0, 0.0])
+    bodies = (Body("/C/Arm", at, heavy[0]), Body("/C/End", Frame(end, still), heavy[1]))
+    turned = along_x if kind == "prismatic" else still
+    start = 0.2 if kind == "prismatic" else 0.3  # of the rail; the carriage stands 0.1 m from it
+    joints = (
+        Joint("/C/Motor", "revolute", WORLD, 0, at, at),
+        Joint("/C/Free", kind, 0, 1, Frame(np.array([start, 0.0, 0.0]), turned), Frame(np.zeros(3), turned)),
+    )
+    target = Target("/C/End", 1, Frame(np.zeros(3), still))
+    motor = Motor(0, joints[0].path, "drive:angular:physics:targetPosition")
+    return compiled(Character("/C", bodies, joints, (motor,), (target,), np.array(gravity)))
+
+
+def test_a_carriage_that_nothing_holds_keeps_its_place_on_the_rail():
+    model = carried("prismatic")
+    ws = Workspace.for_system(model.system)
+    angles = np.array([0.4, 0.1])
+    state, _ = equilibrium(model.system, rigid_state(model, angles), angles * [1, 0], ws)
+    np.testing.assert_allclose(state.c[1], [0.3 * np.cos(0.4), 0.3 * np.sin(0.4), 0.0], atol=1e-9)
+    assert np.abs(ws.blocks.res).max() < 1e-9
+
+
+def test_a_carriage_on_a_rail_that_slopes_falls():
+    model = carried("prismatic", (-1.0, 0.0, -9.81))
+    angles = np.array([0.4, 0.1])
+    with pytest.raises(SimulationFailure):
+        equilibrium(model.system, rigid_state(model, angles), angles * [1, 0], Workspace.for_system(model.system))
+
+
+@pytest.mark.parametrize("transposed", [False, True], ids=["plain", "transposed"])
+@pytest.mark.parametrize("kind", ["prismatic", "spherical"])
+def test_solutions_with_directions_that_nothing_holds_are_those_of_the_whole_matrix(kind, transposed):
+    model = carried(kind)
+    system, ws = model.system, Workspace.for_system(model.system)
+    angles = np.array([0.4, 0.1 if kind == "prismatic" else 0.0])
+    state, _ = equilibrium(system, rigid_state(model, angles), angles * [1, 0], ws)
+    linearize(system, state, angles * [1, 0], ws)
+    blocks, matrix, solution = ws.blocks, ws.matrix, ws.scratch.solution
+    A = dense_matrix(system, Blocks(*[part.copy() for part in blocks]))
+    for joint in np.flatnonzero(free_sliders(system)):
+        row = multipliers(system, joint).start + 2
+        A[row, row] = 1.0  # the length is an unknown
+    A = A.T if transposed else A
+    b = A @ np.random.default_rng(3).normal(size=len(A))
+    regularize(system, blocks.K, blocks.Lc, blocks.Nc)
+    assert factor(system, blocks, matrix, solution.block) == -1
+    x, lam = split(system, b)
+    (solve_statics_transposed if transposed else solve_statics)(system, matrix, x, lam, solution)
+    assert np.abs(A @ join(system, x, lam) - b).max() < 1e-8 * np.abs(b).max()
+    if kind == "prismatic" and not transposed:
+        # the arm's motor turns the carriage with it: no length along the rail
+        x, lam = np.zeros_like(x), np.zeros_like(lam)
+        lam[:] = -blocks.by_angle * np.array([1.0, 0.0])[:, None]
+        solve_statics(system, matrix, x, lam, solution)
+        assert abs(lam[1, 2]) < 1e-12 and abs(x[1, 5] - 1.0) < 1e-9
 
 
 def test_joints_with_motors_need_no_regularisation():
