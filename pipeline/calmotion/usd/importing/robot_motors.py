@@ -14,10 +14,12 @@ from calmotion.shot import MotorTracks
 from calmotion.support.naming import nearest
 from calmotion.usd import schemas
 from calmotion.usd.dialects import GEARS
-from calmotion.usd.reading.context import is_rigid_body
+from calmotion.usd.reading.context import body_on, prims_of
 from calmotion.usd.reading.generic_joints import freedoms
 from calmotion.usd.reading.joints import joint_prims
 from calmotion.usd.reading.motors.driven_motors import actuated_joints
+from calmotion.usd.reading.motors.gear_joints import HINGES
+from calmotion.usd.reading.motors.gear_joints import TYPE as GEAR
 from calmotion.usd.units import StageUnits
 
 if TYPE_CHECKING:
@@ -174,10 +176,18 @@ def _by_default(stage: Usd.Stage, axes: Sequence[Axis], moved: Mapping[str, Moto
 
 def _free(axes: Sequence[Axis]) -> list[Axis]:
     """Those that follow no other joint and close no chain."""
+    stage = axes[0].prim.GetStage() if axes else None
+    geared = {
+        str(target)
+        for prim in (prims_of(stage) if stage is not None else ())
+        if prim.GetTypeName() == GEAR
+        for target in prim.GetRelationship(HINGES[1]).GetForwardedTargets()
+    }
     return [
         axis
         for axis in axes
         if not any(axis.prim.GetRelationship(spelling.leader).HasAuthoredTargets() for spelling in GEARS)
+        and str(axis.prim.GetPath()) not in geared
         and not axis.prim.GetAttribute("physics:excludeFromArticulation").Get()
     ]
 
@@ -202,22 +212,11 @@ def _loop(stage: Usd.Stage) -> str | None:
     for prim in joint_prims(stage):
         if prim.GetAttribute("physics:excludeFromArticulation").Get():
             continue
-        one, other = (group(_body(stage, prim, side)) for side in (0, 1))
+        one, other = (group(body_on(stage, prim, side)) for side in (0, 1))
         if one == other:
             return str(prim.GetPath())
         leader[one] = other
     return None
-
-
-def _body(stage: Usd.Stage, prim: Usd.Prim, side: int) -> str:
-    """The body on a side of a joint; empty for the world."""
-    relationship = prim.GetRelationship(f"physics:body{side}")
-    for target in relationship.GetForwardedTargets() if relationship else []:
-        body = stage.GetPrimAtPath(target)
-        while body and not is_rigid_body(body):
-            body = body.GetParent()
-        return str(body.GetPath()) if body else ""
-    return ""
 
 
 def _named(axes: Sequence[Axis], patterns: Sequence[str]) -> list[Axis]:

@@ -125,6 +125,17 @@ def prims_below(prim: Usd.Prim, stop: Callable[[Usd.Prim], bool]) -> Iterator[Us
         yield below
 
 
+def body_on(stage: Usd.Stage, prim: Usd.Prim, side: int) -> str:
+    """Path of the body on a side of a joint's prim, as authored; empty for the world."""
+    relationship = prim.GetRelationship(f"physics:body{side}")
+    for target in relationship.GetForwardedTargets() if relationship else []:
+        body = stage.GetPrimAtPath(target)
+        while body and not is_rigid_body(body):
+            body = body.GetParent()
+        return str(body.GetPath()) if body else ""
+    return ""
+
+
 def is_rigid_body(prim: Usd.Prim) -> bool:
     """Whether a prim is an enabled rigid body."""
     if not is_applied(prim, "PhysicsRigidBodyAPI"):

@@ -20,6 +20,7 @@ from calmotion.usd.reading.actuators.rotors import read_backlash, read_delay, re
 from calmotion.usd.reading.context import Reading, prims_of
 from calmotion.usd.reading.joints import JointPrim, refuse_unsupported
 from calmotion.usd.reading.motors.free_ranges import may_change
+from calmotion.usd.reading.motors.gear_joints import gears_of_joints
 from calmotion.usd.reading.motors.gearing import Gear, read_gear, resolve
 from calmotion.usd.reading.motors.motor_limits import calmotion_limit, effort_limit, velocity_limit
 from calmotion.usd.reading.motors.tracks import sample_codes
@@ -136,6 +137,7 @@ def read_drives(
             if drive is not None:
                 drives[joint.path] = replace(drive, actuator=actuated.get(joint.path, ""))
     with reading.collecting_problems():
+        gears |= gears_of_joints(reading, joints, {*drives, *gears})
         _add_geared_motors(drives, resolve(gears), {joint.path: joint for joint in joints}, reading)
     with reading.collecting_problems():
         refuse_unused_animation(reading, joints, drives, given)
