@@ -102,7 +102,8 @@ def _coupling(reading: Reading, prim: Usd.Prim, hinges: Mapping[str, JointPrim])
         if not on.intersection(end for end in ends if end):
             raise ShotError(
                 "a gear is on the bodies that its hinges turn", path=path, attribute="physics:body0",
-                found=", ".join(sorted(on)) or None, remedy=f"Name bodies of {targets[0]}: {', '.join(filter(None, ends))}",
+                found=", ".join(sorted(on)) or None,
+                remedy=f"Name bodies of {targets[0]}: {', '.join(filter(None, ends))}",
             )  # fmt: skip
         found.append(targets[0])
         signs.append(-1.0 if ends[0] in on else 1.0)
