@@ -164,6 +164,14 @@ class OptimizeShot(Operator):
             "60 s; 0: one search",
         ),
         Property(
+            "avoid_reversals",
+            float,
+            0.0,
+            minimum=0.0,
+            description="Weight of what the play of gears would move the targets, over that of their errors; 0: play "
+            "does not count",
+        ),
+        Property(
             "draws", int, 200, minimum=20, maximum=100_000, description="Random robots on which the curves are measured"
         ),
     )
@@ -214,6 +222,7 @@ class OptimizeShot(Operator):
             knot_spacing=values.knot_spacing if values.knot_spacing > 0.0 else None,
             smoothness=values.smoothness if values.smoothness >= 0.0 else None,
             adjoint=values.adjoint,
+            avoid_reversals=values.avoid_reversals,
             window=values.window if values.window >= 0.0 else None,
             robust=None if values.robust == "off" else RobustSettings(values.robust, values.scenarios, values.draws),
         )

@@ -11,6 +11,7 @@ import numpy as np
 from calmotion.errors import ShotError
 from calmotion.multibody.failure import SimulationFailure
 from calmotion.multibody.integrators.workspace import Workspace
+from calmotion.retargeting.avoided_reversals import count_reversals, play_of
 from calmotion.retargeting.checkpoint import Checkpoint, problem_key
 from calmotion.retargeting.found_curves import found_curves
 from calmotion.retargeting.problem.limit_costs import limit_costs
@@ -116,6 +117,8 @@ def _optimized(
         assert problem.failure is not None
         raise failure_error(prepared, problem.failure)
     refuse_open_joints(character, prepared.model, prepared.grid, problem.run, options)
+    if options.avoid_reversals:
+        count_reversals(problem, play_of(character), options.avoid_reversals)
     before, before_value, used_before = problem.run, problem.objective_value(), _used(problem, character)
     if problem.limits is not None:
         problem.limits.rho = (

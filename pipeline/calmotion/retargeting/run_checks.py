@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from calmotion.accuracy.run_checks import check_simulation
+from calmotion.retargeting.avoided_reversals import refuse_without_play
 from calmotion.retargeting.optimize import refuse_other_integrators
 from calmotion.retargeting.problem.posing import unknowns
 from calmotion.retargeting.robust.retarget import uncertainties_of
@@ -16,11 +17,12 @@ def check_search(character: Character, animation: Animation, options: RunSetting
     """Refuse what a search would refuse.
 
     Raises:
-        ShotError: A setting that is not supported, options that contradict each other, no motor that may change, or a
-            robot of which nothing is uncertain, to be robust against.
+        ShotError: A setting that is not supported, options that contradict each other, no motor that may change, a
+            robot of which nothing is uncertain, to be robust against, or none whose gears have play to avoid reversals.
     """
     refuse_other_integrators(options)
     window_length(character, animation, options)
+    refuse_without_play(character, options)
     if options.robust is not None:
         uncertainties_of(compile_shot(character, animation))
     unknowns(character, animation, check_simulation(character, animation, options), options)

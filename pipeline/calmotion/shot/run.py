@@ -25,6 +25,8 @@ class RunSettings:
         ideal_motors: Whether joints follow their curves exactly, whatever the models of their motors say.
         directions: `auto`, `on` (bodies keep all coordinates) or `off` (the smallest POD subspaces at any error).
         window: Length of the windows in which a long shot is searched [s]; 0: one search; None: by its length.
+        avoid_reversals: Weight of the squared ways of the targets across the play of gears, over squared errors; 0:
+            play does not count.
         robust: Settings of an optimisation for a set of robots; None: for the nominal robot alone.
     """
 
@@ -42,6 +44,7 @@ class RunSettings:
     directions: str = "auto"
     robust: RobustSettings | None = None
     window: float | None = None
+    avoid_reversals: float = 0.0
 
     @property
     def scheme(self) -> str:

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from calmotion.multibody.analysis.reactions import reactions
+from calmotion.multibody.analysis.reactions import reactions, transmitted
 from calmotion.multibody.sensitivity.adjoint import adjoint
 from calmotion.multibody.sensitivity.linearization import linearize
 from calmotion.multibody.sensitivity.linearized_steps import bytes_of_an_instant
@@ -56,16 +56,20 @@ def test_gradient_matches_central_differences_of_the_whole_simulation(case):
     assert abs(found - expected) < 1e-7 * abs(expected)
 
 
-def test_efforts_of_motors_match_differences_and_their_transpose(case):
+def test_what_motors_transmit_matches_differences_and_its_transpose(case):
     case, lin, gradient = case
-    driven = (case.system.rows == 6) & (case.system.rotor < 0)  # the model of a servo limits its own
+    driven = case.system.rows == 6
     weights = np.random.default_rng(8).normal(size=(len(TIMES), len(driven))) * driven
     # holding torques are large, and would hide the rest; those of a free slider at rest are not determined
     weights[0] *= 0.0 if np.any((case.system.rows == 5) & (case.system.sliding == 1)) else 1e-2
 
     def effort(p):
         trajectory, angles, rates = case.simulate(p)
-        return float(np.sum(weights * reactions(case.system, trajectory, angles, rates).efforts))
+        found = reactions(case.system, trajectory, angles, rates)
+        own = driven & (case.system.rotor < 0)  # a servo's motor also turns its rotor
+        through = transmitted(case.system, found)
+        assert np.allclose(found.efforts[:, own], through[:, own], rtol=1e-12, atol=1e-12)
+        return float(np.sum(weights * through))
 
     d_angle, d_rate = curves(case.dp)
     moved, change = tangent(lin, d_angle, d_rate, efforts=True)

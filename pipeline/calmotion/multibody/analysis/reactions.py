@@ -85,3 +85,10 @@ def reactions(system: System, trajectory: Trajectory, angles: Array, rates: Arra
     )  # fmt: skip
     _reactions(system, trajectory.states, Inputs(angles, rates, trajectory.world), work, result)
     return result
+
+
+def transmitted(system: System, found: Reactions) -> Array:
+    """What each joint's gear transmits along its axis [N m or N], shape [T, J]: not what a servo's motor exerts, which
+    also turns its rotor."""
+    loads = np.where((system.sliding == 1)[:, None], found.forces, found.moments)
+    return np.asarray(np.einsum("tji,tji->tj", found.axes[..., 2], loads))

@@ -101,13 +101,13 @@ def window_of(lin: Linearization, first: int, last: int, efforts: bool) -> Windo
 
 @kernel
 def effort_tangent(system: System, j: int, axes: Array, lam_of: Array, Jp: Array, x: Array, lam: Array) -> float:
-    """Change of a driven joint's effort by the coordinates x and the multipliers lam; 0 for other joints, and
-    for servos, whose own limits keep it.
+    """Change of what a driven joint transmits along its axis by the coordinates x and the multipliers lam; 0 for other
+    joints. It is the motor's effort but for servos, which turn their rotors as well and limit their efforts themselves.
 
     Args:
         axes, lam_of: Axes of the joints' parent-side markers, shape [J, 3, 3], and multipliers of the motion.
     """
-    if system.rows[j] < JOINT_ROWS or system.rotor[j] >= 0:
+    if system.rows[j] < JOINT_ROWS:
         return 0.0
     if not system.sliding[j]:
         moment: float = lam[j, 5]
@@ -127,7 +127,7 @@ def effort_adjoint(
     system: System, j: int, axes: Array, lam_of: Array, Jp: Array, bar: float, x: Array, lam: Array
 ) -> None:
     """Transpose of `effort_tangent`: adds to x and lam."""
-    if system.rows[j] < JOINT_ROWS or system.rotor[j] >= 0:
+    if system.rows[j] < JOINT_ROWS:
         return
     if not system.sliding[j]:
         lam[j, 5] += bar

@@ -165,8 +165,8 @@ def tangent(lin: Linearization, d_angle: Array, d_rate: Array, efforts: bool = F
         efforts: Whether to compute the change of the motors' efforts.
 
     Returns:
-        (R^T dc, dphi, du) of each component, shape [T, B, N], and the change of the efforts of driven joints
-        (`reactions.Reactions`), shape [T, J], or [0, J] without `efforts`.
+        (R^T dc, dphi, du) of each component, shape [T, B, N], and the change of what driven joints transmit
+        (`reactions.transmitted`), shape [T, J], or [0, J] without `efforts`.
     """
     dX = np.zeros((len(d_angle), len(lin.system.parent), lin.system.size))
     return dX, sweep_tangent(lin, d_angle, d_rate, efforts, allocate_memory(lin.system, 3), dX)

@@ -24,6 +24,15 @@ from calmotion.retargeting.problem.rigid_approximation import (
     rigid_response,
 )
 from calmotion.retargeting.problem.robot import Robot
+from calmotion.retargeting.problem.several_robots import (
+    adjoints,
+    continuous_adjoints,
+    further_efforts,
+    joined_residuals,
+    reversal_curvatures,
+    squared_errors,
+    tangents,
+)
 from calmotion.retargeting.solver.dense_preconditioner import DensePreconditioner
 from calmotion.retargeting.solver.preconditioner import RigidPreconditioner
 from calmotion.shot.character import Array, BoolArray, IntArray
@@ -128,13 +137,12 @@ class RetargetProblem:
     @property
     def error(self) -> float:
         """Root-mean-square error of the point evaluated last, weighted [m]."""
-        return float(np.sqrt(np.sum(self.residuals**2) / self._unit))
+        return float(np.sqrt(squared_errors(self.robots) / self._unit))
 
     @property
     def residuals(self) -> Array:
-        """Weighted residuals of the point evaluated last, robot after robot, shape [S T, K, 6]."""
-        robots = self.robots
-        return robots[0].residuals if len(robots) == 1 else np.concatenate([robot.residuals for robot in robots])
+        """Weighted residuals of the point evaluated last, robot after robot, shape [S T, R]."""
+        return joined_residuals(self.robots)
 
     @property
     def _acting(self) -> LimitTerms | None:
@@ -154,9 +162,7 @@ class RetargetProblem:
             own = [name for name in bounds if name in QUANTITIES]
             self._limited = limited_values(self.model, own, self.changed_curves, self.run)
             if EFFORT in bounds:
-                for k, robot in enumerate(self.robots[1:], 1):
-                    found = limited_values(robot.model, (EFFORT,), self.changed_curves, robot.run)
-                    self._limited[effort_of(k)] = found[EFFORT]
+                self._limited |= further_efforts(self.robots, self.changed_curves)
         return self._limited
 
     def hold(self, first: int) -> None:
@@ -218,7 +224,7 @@ class RetargetProblem:
 
     def continuous_gradient(self) -> Array:
         """The same by the continuous adjoint, which has its own linearisation and does not support limits of effort."""
-        pulls = _summed(in_parallel(Robot.continuous_adjoint, self.robots))
+        pulls = continuous_adjoints(self.robots)
         return self._to_unknowns(*pulls, self._limit_pulls()) + self.penalty_gradient(self.x)
 
     def _limit_pulls(self) -> dict[str, Array]:
@@ -227,12 +233,7 @@ class RetargetProblem:
 
     def vjp(self, residuals: Array, limited: dict[str, Array]) -> Array:
         """The transpose of `jvp`: weighted residuals and limited quantities to the unknowns."""
-        parts = np.split(residuals, len(self.robots))
-
-        def pulled(k: int) -> tuple[Array, Array]:
-            return self.robots[k].adjoint(parts[k], limited.get(effort_of(k)))
-
-        return self._to_unknowns(*_summed(in_parallel(pulled, range(len(parts)))), limited)
+        return self._to_unknowns(*adjoints(self.robots, residuals, limited), limited)
 
     def _to_unknowns(self, by_value: Array, by_rate: Array, limited: dict[str, Array]) -> Array:
         """Derivatives by the motors' values and rates, and by limited curves, shape [T, M], gathered by unknown."""
@@ -244,14 +245,11 @@ class RetargetProblem:
         return pulled
 
     def jvp(self, direction: Array) -> tuple[Array, dict[str, Array]]:
-        """Change of the weighted residuals along a direction, shape [T, K, 6], and of the limited quantities."""
+        """Change of the weighted residuals along a direction, shape [S T, R], and of the limited quantities."""
         bounds, space = {} if self._acting is None else self._acting.bounds, self.space
-        offsets = space.offsets(direction)
-        found = in_parallel(lambda robot: robot.tangent(*offsets, EFFORT in bounds), self.robots)
+        residuals, efforts = tangents(self.robots, *space.offsets(direction), EFFORT in bounds)
         changes = {name: space.spread(spline, direction) for name, spline in space.splines.items() if name in bounds}
-        if EFFORT in bounds:
-            changes |= {effort_of(k): effort for k, (_, effort) in enumerate(found)}
-        return found[0][0] if len(found) == 1 else np.concatenate([residuals for residuals, _ in found]), changes
+        return residuals, changes | efforts
 
     def penalty_gradient(self, x: Array) -> Array:
         """Gradient of the regulariser."""
@@ -286,6 +284,7 @@ class RetargetProblem:
         curvatures = {}
         if acting is not None:
             curvatures = {name: acting.curvature(name, v) for name, v in (values or self.limited).items()}
+        curvatures |= reversal_curvatures(self.robots)
         self._preconditioner.factor(fixed, limit_metrics(response.inertia, self.space, curvatures))
         return self._preconditioner.solve
 
@@ -341,10 +340,3 @@ class RetargetProblem:
     def tighten(self) -> bool:
         """Switch the limits on if they are violated, or update their multipliers; whether the merit changed."""
         return self.limits is not None and self.limits.tighten(self.limited)
-
-
-def _summed(pulls: Sequence[tuple[Array, Array]]) -> tuple[Array, Array]:
-    """The sums of derivatives by values and by rates."""
-    if len(pulls) == 1:
-        return pulls[0]
-    return np.sum([by_value for by_value, _ in pulls], axis=0), np.sum([by_rate for _, by_rate in pulls], axis=0)

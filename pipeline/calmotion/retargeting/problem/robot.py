@@ -1,10 +1,11 @@
-"""One robot of a retargeting problem: its simulation, the errors at its targets, and their derivatives."""
+"""One robot of a retargeting problem: its simulation, the residuals of its targets and gears, and their derivatives."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from calmotion.multibody.model.model import Model, with_damping
+from calmotion.retargeting.problem.reversals import ReversalTerms, transmitted_by
 from calmotion.shot.character import Array
 from calmotion.simulation.forward import ForwardRun
 from calmotion.simulation.simulator import Simulator
@@ -23,6 +24,8 @@ class Robot:
     def __init__(self, simulator: Simulator, objective: Objective, weight: float = 1.0):
         self.simulator, self.objective, self.weight = simulator, objective, weight
         self.residuals = self._inverse = self._jacobian = np.zeros(0)
+        self.reversals: ReversalTerms | None = None  # of the play of its gears, where reversals are to be avoided
+        self._efforts = np.zeros(0)  # transmitted by its gears, where they count
         self._run: ForwardRun | None = None
 
     @property
@@ -50,6 +53,28 @@ class Robot:
         self._run = self.simulator.run(angles, rates)
         residuals, self._inverse = self.objective.residuals(self._run.target_positions, self._run.target_rotations)
         self.residuals = np.sqrt(self.weight) * residuals
+        self.count(self.reversals)
+
+    def count(self, reversals: ReversalTerms | None) -> None:
+        """Count the play of its gears, where there are terms of it, for the curves performed last and from now on."""
+        self.reversals = reversals
+        if reversals is not None:
+            self._efforts = transmitted_by(self.model, self.run)
+
+    @property
+    def stacked(self) -> Array:
+        """Its R residuals at each instant, shape [T, R]: the weighted errors, and those of its gears' play."""
+        errors = self.residuals.reshape(len(self.residuals), -1)
+        if self.reversals is None:
+            return errors
+        return np.concatenate([errors, np.sqrt(self.weight) * self.reversals.residuals(self._efforts)], axis=1)
+
+    def by_effort(self) -> Array:
+        """Gauss-Newton matrix of the residuals of its gears' play by the efforts: its diagonal, shape [T, M]."""
+        assert self.reversals is not None
+        found = np.zeros(self._efforts.shape)
+        found[:, self.reversals.motors] = self.weight * self.reversals.slopes(self._efforts) ** 2
+        return found
 
     def linearize(self) -> None:
         """Linearise about the curves performed last."""
@@ -62,14 +87,25 @@ class Robot:
         self._jacobian *= np.sqrt(self.weight)
 
     def tangent(self, values: Array, rates: Array, efforts: bool) -> tuple[Array, Array]:
-        """Change of the residuals, shape [T, K, 6], and where wanted of the motors' efforts, with the motor curves,
-        shape [T, M] each."""
-        motion, effort = self.simulator.tangent(values, rates, efforts)
-        return self.objective.gather(self._jacobian, motion), effort
+        """Change of the residuals, shape [T, R], and where wanted of the motors' efforts, with the motor curves, shape
+        [T, M] each."""
+        motion, effort = self.simulator.tangent(values, rates, efforts or self.reversals is not None)
+        errors = self.objective.gather(self._jacobian, motion)
+        errors = errors.reshape(len(errors), -1)
+        if self.reversals is None:
+            return errors, effort
+        slopes = np.sqrt(self.weight) * self.reversals.slopes(self._efforts)
+        return np.concatenate([errors, slopes * effort[:, self.reversals.motors]], axis=1), effort
 
     def adjoint(self, residuals: Array, effort: Array | None) -> tuple[Array, Array]:
         """The transpose of `tangent`: derivatives by the motors' values and rates, shape [T, M] each."""
-        return self.simulator.adjoint(self.objective.scatter(self._jacobian, residuals), effort)
+        count = int(np.prod(self.residuals.shape[1:]))
+        if self.reversals is not None:
+            slopes = np.sqrt(self.weight) * self.reversals.slopes(self._efforts)
+            effort = np.zeros(self._efforts.shape) if effort is None else effort.copy()
+            effort[:, self.reversals.motors] += slopes * residuals[:, count:]
+        errors = residuals[:, :count].reshape(self.residuals.shape)
+        return self.simulator.adjoint(self.objective.scatter(self._jacobian, errors), effort)
 
     def continuous_adjoint(self) -> tuple[Array, Array]:
         """Derivatives of half the squared residuals by the continuous adjoint."""
@@ -77,6 +113,6 @@ class Robot:
         return self.simulator.continuous_adjoint(self.run, self.objective.scatter(self._jacobian, self.residuals))
 
     def damped(self, ratio: float, frequency: float) -> Robot:
-        """The robot with more damping, see `model.with_damping`."""
+        """The robot with more damping, see `model.with_damping`; the play of its gears does not count."""
         damped = with_damping(self.model, ratio, frequency)
         return Robot(self.simulator.of(damped), self.objective, self.weight)

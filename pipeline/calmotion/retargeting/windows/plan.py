@@ -50,9 +50,9 @@ def window_length(character: Character, animation: Animation, options: RunSettin
         ShotError: Windows are requested where there can be none.
     """
     length, wanted = float(animation.frame_times[-1]), options.window
-    cyclic, robust = character.retarget.cyclic, options.robust is not None
+    cyclic, robust, play = character.retarget.cyclic, options.robust is not None, options.avoid_reversals > 0.0
     if wanted is None:
-        one = cyclic or robust or options.adjoint == "continuous"
+        one = cyclic or robust or play or options.adjoint == "continuous"
         return WINDOW if length > LONG_SHOT and not one else None
     if wanted == 0.0:
         return None
@@ -69,6 +69,11 @@ def window_length(character: Character, animation: Animation, options: RunSettin
             found=True if cyclic else options.robust.kind if options.robust else None,
             remedy="Remove --window",
         )
+    if play:
+        raise ShotError(
+            "windows do not support --avoid-reversals: what counts is on which side a gear lies in the first pose",
+            path=character.path, attribute="--avoid-reversals", found=options.avoid_reversals, remedy="Remove --window",
+        )  # fmt: skip
     frame = float(animation.frame_times[1] - animation.frame_times[0])
     if wanted < FEWEST * frame:
         raise ShotError(

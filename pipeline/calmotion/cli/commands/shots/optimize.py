@@ -24,6 +24,15 @@ def add_to(commands: Commands) -> None:
         help="length of the windows in which a long shot is searched, each going on from the one before (default: 20 s "
         "where the shot is longer than 60 s; 0: one search)",
     )
+    command.add_argument(
+        "--avoid-reversals",
+        metavar="WEIGHT",
+        nargs="?",
+        const=1.0,
+        type=quantity("", positive=True),
+        help="avoid reversals of the torques of gears with play (calm:motor:backlash) where they move the targets: "
+        "weight of the way across the play over that of the error (default: 1)",
+    )
     group = command.add_argument_group(
         "robust curves", "Robots differ from their model: calm:retarget:uncertainty:modulus, :damping and :payload."
     )

@@ -14,7 +14,19 @@ EXTRAS = {
     "figures": "figures of each shot",
     "video": "a video of each shot",
 }
-_VALUES = ("tolerance", "step", "integrator", "pre_roll", "robust", "scenarios", "window", "bake", "samples_per_second")
+_VALUES = (
+    "tolerance",
+    "step",
+    "integrator",
+    "pre_roll",
+    "robust",
+    "scenarios",
+    "window",
+    "avoid_reversals",
+    "bake",
+    "samples_per_second",
+)
+_OF_SEARCHES = ("robust", "scenarios", "window", "avoid_reversals")
 _FLAGS = ("verify", "strict", "splines")
 _LISTS = {"keep": "--keep", "leave_out": "--leave-out", "run": "--run", "set": "--set"}
 
@@ -30,6 +42,9 @@ def forwarded_options(command: argparse.ArgumentParser) -> None:
     group.add_argument("--robust", nargs="?", const="worst", choices=("worst", "mean"), help="robust curves")
     group.add_argument("--scenarios", metavar="N", help="robots of --robust")
     group.add_argument("--window", metavar="TIME", help="length of the windows of long shots")
+    group.add_argument(
+        "--avoid-reversals", metavar="WEIGHT", nargs="?", const="1", help="avoid reversals of gears with play"
+    )
     group.add_argument("--bake", nargs="?", const="motors", choices=("motors", "simulated"), help="body transforms")
     group.add_argument("--samples-per-second", metavar="HZ", help="more samples than the frames")
     group.add_argument("--splines", action="store_true", help="curves as splines")
@@ -59,7 +74,7 @@ def _forwarded(args: argparse.Namespace) -> Iterator[str]:
     optimizes = command_of(args) == "optimize"
     for name in _VALUES:
         value = getattr(args, name)
-        if value is None or (name in ("robust", "scenarios", "window") and not optimizes):
+        if value is None or (name in _OF_SEARCHES and not optimizes):
             continue
         text = f"{value!r}{_UNITS.get(name, '')}" if isinstance(value, float) else str(value)
         yield f"--{name.replace('_', '-')}={text}"

@@ -1,0 +1,117 @@
+"""The play of gears in the objective: gears should not change their sides for little, where the targets matter.
+
+A gear with play b lies on the side to which the torque tau that it transmits pushes it (`accuracy.motors.backlash`).
+With J the motion of the targets by the joint, weighted as their errors are, they move by |J| b where it changes its
+side. Some reversals cannot be avoided: a link that swings must be braked. Others are short, or hardly push. Sides
+sigma(t) = +1 or -1 that a gear should have are those of least
+
+    int (max(0, -sigma tau) / max |tau|)^2 dt  +  (`REVERSAL` for each change of sigma)
+
+along the input: what torques would have to change by, against reversals. Half the squares of
+
+    r(t) = sqrt(weight) |J(t)| b / 2 (1 - sigma(t) tanh(tau(t) / w))
+
+are added to the objective: the way of the targets across the play while a gear is on the wrong side, smoothed. While
+sigma changes nothing counts, and where a torque is far on the wrong side, r no longer depends on it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from calmotion.multibody.analysis.reactions import reactions, transmitted
+from calmotion.multibody.model.model import Model
+from calmotion.shot.character import Array, BoolArray, IntArray
+from calmotion.simulation.forward import ForwardRun
+
+WIDTH = 0.1  # of a gear's largest torque in the input: within it the side changes smoothly
+CLEAR = 2.0  # widths from zero at which a change of sides has ended
+REVERSAL = 0.01  # what a reversal counts [s]: the largest torque on the wrong side for so long
+
+
+@dataclass(frozen=True, eq=False)
+class ReversalTerms:
+    """Residuals of P motors with play, functions of the efforts that their gears transmit.
+
+    Attributes:
+        motors: Their numbers, shape [P].
+        sides: On which side each should lie, 1 or -1, shape [T, P].
+        widths: w, the effort within which it changes its side [N m or N], shape [P].
+        ways: sqrt(weight) |J| b / 2; 0 while a gear changes its side, shape [T, P].
+    """
+
+    motors: IntArray
+    sides: Array
+    widths: Array
+    ways: Array
+
+    def residuals(self, efforts: Array) -> Array:
+        """r for the efforts of all motors, shape [T, M] to [T, P]."""
+        return np.asarray(self.ways * (1.0 - self.sides * self._side(efforts)))
+
+    def slopes(self, efforts: Array) -> Array:
+        """Derivative of each residual by the effort of its motor, shape [T, P]."""
+        return np.asarray(-self.ways * self.sides * (1.0 - self._side(efforts) ** 2) / self.widths)
+
+    def _side(self, efforts: Array) -> Array:
+        return np.asarray(np.tanh(efforts[:, self.motors] / self.widths))
+
+
+def transmitted_by(model: Model, run: ForwardRun) -> Array:
+    """The torque [N m] or force [N] that each motor's gear transmits in a run, shape [T, M]."""
+    found = reactions(model.system, run.trajectory, run.joint_angles, run.joint_rates)
+    return model.motor_values(transmitted(model.system, found))
+
+
+def reversal_terms(
+    play: Array, efforts: Array, h: float, judged: BoolArray, levers: Array, weight: float
+) -> ReversalTerms:
+    """The terms of the motors that have play.
+
+    Args:
+        play: Of all motors [rad or m], shape [M].
+        efforts: That their gears transmit with the curves of the input, shape [T, M].
+        h: Step [s].
+        judged: Instants of the shot, shape [T].
+        levers: Weighted motion of the targets by the motors with play, shape [T, K, 6, P].
+        weight: Of a squared way of a target, over that of a squared error.
+    """
+    motors = np.flatnonzero(play > 0.0).astype(np.int32)
+    pushed = efforts[:, motors]
+    largest = np.abs(pushed[judged]).max(axis=0, initial=0.0)
+    shares = pushed / np.where(largest > 0.0, largest, 1.0)
+    wanted = np.stack([wanted_sides(share, h) for share in shares.T], axis=1)
+    changing = np.stack([_changing(*pair) for pair in zip(wanted.T, shares.T, strict=True)], axis=1)
+    ways = 0.5 * np.sqrt(weight) * np.sqrt(np.sum(levers**2, axis=(1, 2))) * play[motors]
+    return ReversalTerms(motors, wanted, WIDTH * np.where(largest > 0.0, largest, 1.0), np.where(changing, 0.0, ways))
+
+
+def wanted_sides(share: Array, h: float) -> Array:
+    """The sides of one gear with the least cost, by dynamic programming, shape [T].
+
+    Args:
+        share: The efforts that it transmits, over the largest, shape [T].
+        h: Step [s].
+    """
+    wrong = h * np.stack([np.maximum(0.0, share) ** 2, np.maximum(0.0, -share) ** 2])  # on side -1, on side +1
+    came = np.zeros((2, len(share)), np.int8)
+    low, high = wrong[:, 0]
+    for n in range(1, len(share)):
+        came[0, n], came[1, n] = high + REVERSAL < low, not low + REVERSAL < high
+        low, high = min(low, high + REVERSAL) + wrong[0, n], min(high, low + REVERSAL) + wrong[1, n]
+    sides, side = np.zeros(len(share)), int(high < low)
+    for n in range(len(share) - 1, -1, -1):
+        sides[n] = 2 * side - 1
+        side = int(came[side, n])
+    return sides
+
+
+def _changing(sides: Array, share: Array) -> BoolArray:
+    """While a gear changes its side: around each change, until the effort is clearly on the wanted side, shape [T]."""
+    clear, found = sides * share > CLEAR * WIDTH, np.zeros(len(sides), bool)
+    for n in np.flatnonzero(np.diff(sides)):
+        before, after = np.flatnonzero(clear[: n + 1]), np.flatnonzero(clear[n + 1 :])
+        found[before[-1] + 1 if len(before) else 0 : n + 1 + after[0] if len(after) else len(sides)] = True
+    return found
