@@ -42,15 +42,13 @@ def test_a_tremble_that_crosses_the_play_is_smoothed_for_some_millimetres():
     lift = eased(0.2, 1.3) + 0.05 * np.sin(20 * FRAMES) * np.sin(np.pi * FRAMES / 2) ** 2
     error, before, after, lost = searched(lift, 0.0)
     assert error < 1e-3 and before == after == 6 and lost == pytest.approx(5.24, abs=0.01)
-    error, _, after, lost = searched(lift, 1.0)
-    assert error < 3.0 and after <= 4
     error, _, after, lost = searched(lift, 10.0)
-    assert error < 8.0 and after == 0 and lost == 0.0
+    assert error < 5.0 and after == 0 and lost == 0.0
 
 
 def test_a_reversal_that_cannot_be_avoided_is_left_alone():
     error, before, after, lost = searched(eased(1.2, 2.0), 10.0)  # past the lowest point: gravity turns the torque
-    assert before == after == 1 and error < 0.1 and lost == pytest.approx(5.24, abs=0.01)
+    assert before == after == 1 and error < 1e-3 and lost == pytest.approx(5.24, abs=0.01)
 
 
 def test_what_cannot_be_done_is_refused():

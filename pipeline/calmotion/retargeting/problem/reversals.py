@@ -9,10 +9,11 @@ sigma(t) = +1 or -1 that a gear should have are those of least
 
 along the input: what torques would have to change by, against reversals. Half the squares of
 
-    r(t) = sqrt(weight) |J(t)| b / 2 (1 - sigma(t) tanh(tau(t) / w))
+    r(t) = sqrt(weight) |J(t)| b / 2 (1 - tanh(sigma(t) tau(t) / w + 1))
 
-are added to the objective: the way of the targets across the play while a gear is on the wrong side, smoothed. While
-sigma changes nothing counts, and where a torque is far on the wrong side, r no longer depends on it.
+are added to the objective: the way of the targets across the play while a gear is on the wrong side, smoothed. A gear
+that nothing pushes stays where it is, so that this begins somewhat beyond zero. While sigma changes nothing counts, and
+where a torque is far on the wrong side, r no longer depends on it.
 """
 
 from __future__ import annotations
@@ -26,7 +27,7 @@ from calmotion.multibody.model.model import Model
 from calmotion.shot.character import Array, BoolArray, IntArray
 from calmotion.simulation.forward import ForwardRun
 
-WIDTH = 0.1  # of a gear's largest torque in the input: within it the side changes smoothly
+WIDTH = 0.05  # of a gear's largest torque in the input: within it the side changes smoothly
 CLEAR = 2.0  # widths from zero at which a change of sides has ended
 REVERSAL = 0.01  # what a reversal counts [s]: the largest torque on the wrong side for so long
 
@@ -49,14 +50,14 @@ class ReversalTerms:
 
     def residuals(self, efforts: Array) -> Array:
         """r for the efforts of all motors, shape [T, M] to [T, P]."""
-        return np.asarray(self.ways * (1.0 - self.sides * self._side(efforts)))
+        return np.asarray(self.ways * (1.0 - self._side(efforts)))
 
     def slopes(self, efforts: Array) -> Array:
         """Derivative of each residual by the effort of its motor, shape [T, P]."""
         return np.asarray(-self.ways * self.sides * (1.0 - self._side(efforts) ** 2) / self.widths)
 
     def _side(self, efforts: Array) -> Array:
-        return np.asarray(np.tanh(efforts[:, self.motors] / self.widths))
+        return np.asarray(np.tanh(self.sides * efforts[:, self.motors] / self.widths + 1.0))
 
 
 def transmitted_by(model: Model, run: ForwardRun) -> Array:

@@ -28,10 +28,10 @@ def add_to(commands: Commands) -> None:
         "--avoid-reversals",
         metavar="WEIGHT",
         nargs="?",
-        const=1.0,
+        const=10.0,
         type=quantity("", positive=True),
         help="avoid reversals of the torques of gears with play (calm:motor:backlash) where they move the targets: "
-        "weight of the way across the play over that of the error (default: 1)",
+        "weight of the way across the play over that of the error (default: 10)",
     )
     group = command.add_argument_group(
         "robust curves", "Robots differ from their model: calm:retarget:uncertainty:modulus, :damping and :payload."

@@ -43,7 +43,7 @@ def forwarded_options(command: argparse.ArgumentParser) -> None:
     group.add_argument("--scenarios", metavar="N", help="robots of --robust")
     group.add_argument("--window", metavar="TIME", help="length of the windows of long shots")
     group.add_argument(
-        "--avoid-reversals", metavar="WEIGHT", nargs="?", const="1", help="avoid reversals of gears with play"
+        "--avoid-reversals", metavar="WEIGHT", nargs="?", const="10", help="avoid reversals of gears with play"
     )
     group.add_argument("--bake", nargs="?", const="motors", choices=("motors", "simulated"), help="body transforms")
     group.add_argument("--samples-per-second", metavar="HZ", help="more samples than the frames")
