@@ -53,7 +53,7 @@ class MeshOptions:
     """
 
     element_size: float = -1.0
-    time_limit: float = 60.0
+    time_limit: float = 20.0
     cache: bool = True
 
 

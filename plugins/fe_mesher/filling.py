@@ -18,8 +18,9 @@ from calmotion.geometry.tetrahedra import (
 )
 from calmotion.shot import Body, FEMesh
 
+from .gridding import grid_note, on_grid
 from .repair import Solid, simplified
-from .tetwild import MORE_TIME, OutOfTime, ProcessorTime, tetrahedralize
+from .tetwild import MORE_TIME, REMEDY, OutOfTime, ProcessorTime, tetrahedralize
 
 # Wanted and largest allowed error. An error of half a percent of volume in thin walls is larger than that in a
 # frequency. Where a better mesh would take too long, a larger error is accepted and reported.
@@ -28,8 +29,9 @@ _GOOD_VOLUME, MAX_VOLUME_ERROR, _ACCEPTED = 0.005, 0.01, 0.05
 # have few enough triangles: fTetWild takes 1.5 ms for each.
 _DETAIL, _DENSE_DETAILS, _DENSE, _MANY = 0.1, (0.5, 1.0), 2_500, 8_000
 _ATTEMPTS = 3
-_FIRST = 0.6  # share of the time for the first mesh; what is left is for a coarser one
-_COARSER = 1.6  # factor of size and envelope of a mesh that took too long
+_FIRST = 0.6  # share of the time for one mesh
+_TRIANGLE = 2.5e-3  # least processor time for a triangle of a surface with many details [s]
+_COARSEST = 0.3  # largest error of the volume of a mesh of a grid, which is reported
 _LOOSE = 0.05  # of the volume: parts that a thin connection, which the mesh did not follow, held
 
 
@@ -46,7 +48,7 @@ def filled(
 ) -> FEMesh:
     """Tetrahedra of uniform size that fill a solid.
 
-    A mesh that takes most of the time is replaced by a coarser one. A mesh with an error of its volume is followed by
+    A mesh that takes, or would take, most of the time is replaced by one of a regular grid. A mesh with an error of its volume is followed by
     one that is closer to the surface as long as there is time; the best one counts, with its error.
 
     Args:
@@ -71,12 +73,10 @@ def filled(
         attempt = _Attempt(size, envelope(size, diagonal, shape.thickness, len(solid.triangles), number))
         try:
             points, tets = _meshed(solid, attempt, body.path, time, _FIRST, use_cache)
-        except OutOfTime:
+        except OutOfTime as reason:
             if best is not None:
                 break
-            coarser = _Attempt(_COARSER * attempt.size, _COARSER * attempt.distance)
-            points, tets = _meshed(solid, coarser, body.path, time, 1.0, use_cache)
-            notes = (f"meshed with elements {_COARSER:g} times as large, since smaller ones took too long",)
+            return _on_grid(index, body, solid, shape, size, reason)
         quality = measure_quality(points, tets, surface_volume=solid.volume, repairs=(*solid.repairs, *notes))
         volumes.append(quality.volume)
         if best is None or quality.volume_error < best.quality.volume_error:
@@ -98,6 +98,11 @@ def _meshed(
     diagonal = float(np.linalg.norm(np.ptp(solid.points, axis=0)))
     points, triangles = _simplified(solid, attempt.distance)
     part = time.part(share)
+    if len(triangles) > _MANY and _TRIANGLE * len(triangles) > part.limit:
+        raise OutOfTime(
+            "tetrahedralising would exceed the limit of processor time", path=path,
+            found=f"{len(triangles)} triangles, {time.limit:g} s", remedy=REMEDY + MORE_TIME.format(4.0 * time.limit),
+        )  # fmt: skip
     try:
         made, tets = tetrahedralize(
             points, triangles, attempt.size, attempt.distance / diagonal, path, part, use_cache
@@ -108,6 +113,19 @@ def _meshed(
     time.used = part.used
     tets, _ = oriented_tets(made, tets, path)
     return without_unused_points(made, tets)
+
+
+def _on_grid(index: int, body: Body, solid: Solid, shape: Shape, size: float, reason: ShotError) -> FEMesh:
+    """The tetrahedra of a grid, since others would take too long.
+
+    Raises:
+        ShotError: The reason, where a grid does not resolve the solid.
+    """
+    mesh = on_grid(index, body, solid, shape, size)
+    if mesh is None or mesh.quality.volume_error > _COARSEST:
+        raise reason
+    note = grid_note(mesh, shape, size, f"others would take too long ({reason.found})")
+    return replace(mesh, quality=replace(mesh.quality, repairs=(*mesh.quality.repairs, note)))
 
 
 def _simplified(solid: Solid, distance: float) -> tuple[np.ndarray, np.ndarray]:

@@ -20,7 +20,7 @@ from calmotion.support.files import temporary_folder
 
 from . import cache
 
-_REMEDY = "Simplify or repair the Mesh, author a larger calm:flexible:elementSize, or give a TetMesh or a mesh file"
+REMEDY = "Simplify or repair the Mesh, author a larger calm:flexible:elementSize, or give a TetMesh or a mesh file"
 MORE_TIME = ", or allow more with --set fe.mesh.time_limit={:.0f}"
 _TRIES = 3  # attempts at a mesh without flat elements
 # Number of passes that improve the elements, and the energy of the worst element at which they end. On dense surfaces
@@ -132,13 +132,13 @@ def _run(
             last = messages.decode(errors="replace").strip().splitlines()[-1:] or ["no message"]
             raise ShotError(
                 "the tetrahedraliser failed",
-                path=path, found=f"exit status {status}: {last[0]}", remedy=_REMEDY,
+                path=path, found=f"exit status {status}: {last[0]}", remedy=REMEDY,
             )  # fmt: skip
         with np.load(destination) as file:
             made, tets = file["points"] * diagonal + center, file["tets"]
             time.used += float(file["seconds"])
     if len(tets) == 0:
-        raise ShotError("the surface encloses no volume", path=path, found="no tetrahedra", remedy=_REMEDY)
+        raise ShotError("the surface encloses no volume", path=path, found="no tetrahedra", remedy=REMEDY)
     return made, tets
 
 
@@ -167,7 +167,7 @@ def _limited(command: list[str], folder: Path, time: ProcessorTime, size: str, p
             process.kill()
             raise ShotError(
                 "the tetrahedraliser does not end", path=path,
-                found=f"{size}, {_PATIENCE * left:g} s without using {left} s of processor time", remedy=_REMEDY,
+                found=f"{size}, {_PATIENCE * left:g} s without using {left} s of processor time", remedy=REMEDY,
             ) from None  # fmt: skip
         except BaseException:  # an interrupt
             process.kill()
@@ -175,6 +175,6 @@ def _limited(command: list[str], folder: Path, time: ProcessorTime, size: str, p
         if process.returncode == -signal.SIGXCPU:
             raise OutOfTime(
                 "tetrahedralising exceeded the limit of processor time", path=path,
-                found=f"{size}, {time.limit:g} s", remedy=_REMEDY + MORE_TIME.format(4.0 * time.limit),
+                found=f"{size}, {time.limit:g} s", remedy=REMEDY + MORE_TIME.format(4.0 * time.limit),
             )  # fmt: skip
         return process.returncode, messages

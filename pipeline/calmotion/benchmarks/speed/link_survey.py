@@ -32,7 +32,7 @@ class LinkRow:
         farthest: Of these from the solid [mm].
         nodes: Of the ten-node tetrahedra.
         volume_error: Of the tetrahedra against the solid [%].
-        seconds: Processor time of solid, mesh, interface patches and refinement [s].
+        seconds: Processor time of solid, mesh, refinement and estimated error [s].
         f1, f2, f3: First frequencies, held by the joint towards the world, in polyamide [Hz].
         estimate: Error of the frequencies that is estimated [%].
         note: Why it was refused, or why another source than the visual surface was taken.
@@ -89,10 +89,12 @@ def survey_row(link: Link, robot: str, mesher: Any, time_limit: float, geometry_
         geometry = mesher.geometry_of(0, body, options, frames)
         row = _with_solid(row, geometry, visual, frames)
         if not geometry_only:
-            row = _with_mesh(row, mesher.mesh_of(0, body, geometry, options, frames), link, frames)
+            mesh = mesher.mesh_of(0, body, geometry, options, frames)
+            row = replace(row, seconds=_processor_time() - begin)
+            row = _with_mesh(row, mesh, link, frames)
     except ShotError as problem:
         row = replace(row, note=str(problem), nodes=0)
-    return replace(row, seconds=_processor_time() - begin)
+    return row if row.nodes else replace(row, seconds=_processor_time() - begin)
 
 
 def _with_solid(row: LinkRow, geometry: Any, visual: Sequence[Any], frames: Sequence[Any]) -> LinkRow:
@@ -133,6 +135,7 @@ def _with_mesh(row: LinkRow, mesh: Any, link: Link, frames: Sequence[Any]) -> Li
     return replace(
         row, nodes=len(model.mesh.nodes), volume_error=100.0 * mesh.quality.volume_error, f1=float(f1), f2=float(f2),
         f3=float(f3), estimate=np.nan if error is None else 100.0 * error,
+        note="; ".join(filter(None, (row.note, *(note for note in mesh.quality.repairs if "grid" in note)))),
     )  # fmt: skip
 
 
