@@ -95,3 +95,31 @@ def test_an_anchor_in_the_opening_of_a_tube_takes_its_whole_end(helpers):
     # inside of the tube it is the wall around the frame
     (inner,) = interface_patches(tube, [AttachmentFrame("/j", helpers.frame(0.1, 0.0, 0.0), "interface")], -1.0, "/b")
     assert np.abs(tube.nodes[inner.nodes, 0] - 0.1).max() < 0.06 and len(inner.nodes) > 6
+
+
+def test_the_ground_of_a_recess_is_no_end_face(helpers):
+    """Of a block that is 100 mm wide, a hole of 6 mm in the middle of its end, 1 mm deep, has a flat ground."""
+    side = np.array([-50.0, -20.0, -3.0, 3.0, 20.0, 50.0]) * 1e-3
+    along = np.array([0.0, 0.08, 0.16, 0.239, 0.24])
+    points, tets = helpers.box((5, 5, 4), (1.0, 1.0, 1.0))
+    points = np.column_stack(
+        [side[np.rint(5 * points[:, 0]).astype(int)], side[np.rint(5 * points[:, 1]).astype(int)], along[np.rint(4 * points[:, 2]).astype(int)]]
+    )  # fmt: skip
+    middle = points[tets].mean(axis=1)
+    block = quadratic_mesh(points, tets[(np.abs(middle[:, :2]).max(axis=1) > 3e-3) | (middle[:, 2] < 0.239)])
+    face, radius = look(block, (0.0, 0.0, 0.239))
+    assert len(face) == 0
+    assert 0.02 < radius < 0.08
+
+
+def test_a_patch_of_a_joint_in_a_screw_hole_is_no_point(helpers):
+    """A bar of 150 mm with a joint on the axis of a hole of 1 mm through a wall: the wall alone would give half a
+    millimetre, on which the bar would turn as on a ball."""
+    side = np.array([-15.0, -0.5, 0.5, 15.0]) * 1e-3
+    points, tets = helpers.box((3, 3, 2), (1.0, 1.0, 1.0))
+    x, y, z = np.rint(points * [3, 3, 2]).astype(int).T
+    points = np.column_stack([side[x], side[y], np.array([0.0, 0.149, 0.15])[z]])
+    middle = points[tets].mean(axis=1)
+    bar = quadratic_mesh(points, tets[np.abs(middle[:, :2]).max(axis=1) > 0.5e-3])
+    _, radius = look(bar, (0.0, 0.0, 0.1495))
+    assert radius >= 1.5e-3

@@ -13,6 +13,11 @@ _DIRECTIONS = 16  # rays across the body that measure its width
 _FLAT_COSINE = np.cos(np.radians(10.0))  # a tetrahedraliser may tilt the triangles of a plane by a few degrees
 _SECTORS, _COVERED = 16, 12  # of the angle around an opening, and how many its end face covers
 _FLAT_OFFSET = 3e-3  # and move its corners by about a thousandth of the body
+_LEAST_FACE = 0.2  # of the half width of the body below: a smaller flat is the ground of a recess or the tip of a screw
+# The least radius, of that at which a rigid disc on a half space turns as easily as a bar of the body's volume and length
+# bends, and of the body's size
+_LEAST_RADIUS, _LEAST_PART = 0.5, 0.05
+_POISSON = 0.35
 
 
 _PARTS = triangle_parts(6)
@@ -25,7 +30,8 @@ def end_face(
 
     A joint in the middle of the end of a link is attached to the whole end, as a flange is, and not to the sides: this
     is the clamped beam of the text books. A face is an end face when the body behind it is deeper than the face is
-    wide, both measured from the attachment frame. The end of a tube around the frame is one as well.
+    wide, both measured from the attachment frame, and not much wider than the face. The end of a tube around the frame
+    is one as well.
 
     Args:
         mesh: Of the body.
@@ -56,7 +62,7 @@ def end_face(
     face = flat[label == label[np.searchsorted(flat, nearest)]]
     extent = float(np.linalg.norm(triangles[face] - center, axis=-1).max())
     depth = _depth(closest[nearest], normal, triangles, size)
-    if extent > min(0.5 * depth, room):
+    if extent > min(0.5 * depth, room) or extent < _LEAST_FACE * _width_at(closest, gaps, triangles, size):
         return none
     return np.unique(mesh.surface[face])
 
@@ -106,8 +112,23 @@ def automatic_radius(center: Array, triangles: Array, closest: Array, gaps: Arra
         widths.append(_width_at(near, np.linalg.norm(near - center - step, axis=1), triangles, size))
     finite = [width for width in widths if np.isfinite(width)]
     width = float(np.median(finite)) if finite else 0.5 * size
-    radius = max(1.25 * gap, float(np.hypot(gap, width)))
+    radius = max(1.25 * gap, float(np.hypot(gap, width)), _least_radius(triangles, size))
     return min(radius, max(0.45 * room, 1.25 * gap))
+
+
+def _least_radius(triangles: Array, size: float) -> float:
+    """Radius below which a patch, not the body, would decide how far the body bends [m].
+
+    A patch that is nearly a point turns on its ground: its compliance goes with the third power of one over its radius.
+    At half the radius at which that is the compliance of the body itself, it is eight times as large.
+
+    Source: Johnson 1985, 3.6, a rigid disc on a half space under a moment: 8 G a^3 / (3 (1 - nu)); a bar: E I / L.
+    """
+    volume = abs(float(np.linalg.det(triangles).sum())) / 6.0
+    length = float(np.ptp(triangles.reshape(-1, 3), axis=0).max())
+    bar = 2.0 * (1.0 + _POISSON) * volume**2 / (12.0 * length**3)  # over G; a square section of the mean area
+    alike = (3.0 / 8.0 * (1.0 - _POISSON) * bar) ** (1.0 / 3.0)
+    return float(min(_LEAST_RADIUS * alike, _LEAST_PART * size))
 
 
 def _width_at(closest: Array, gaps: Array, triangles: Array, size: float) -> float:
