@@ -1,11 +1,11 @@
-"""Formats of `calmotion export`: ROS 2 JointTrajectory, CSV with units, servo ticks as JSON and C header."""
+"""Formats of `calmotion export`: ROS 2, CSV with units, servo ticks, URScript, curves of Bottango."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from typing import ClassVar
 
-from calmotion.control.commands import CUBIC, HOLD, LINEAR, QUINTIC, Commands, MotorCurves
+from calmotion.control.commands import CUBIC, HOLD, LINEAR, QUINTIC, Commands, Follower, MotorCurves
 from calmotion.host import Property, PropertyValues, registration
 from calmotion.workflow.exporting.command_format import CommandFormat
 
@@ -30,7 +30,7 @@ class Ros2Trajectory(CommandFormat):
 
     def sampled(self, curves: MotorCurves, rate: float, properties: PropertyValues) -> Commands:
         """Positions at the rate, with the derivatives of the same cubics."""
-        from .sampling import smooth_commands
+        from calmotion.control.sampling import smooth_commands
 
         kinds = {"positions": LINEAR, "velocities": CUBIC, "accelerations": QUINTIC}
         return smooth_commands(curves, rate, kinds[properties.fields])
@@ -104,7 +104,7 @@ class CsvTable(CommandFormat):
 
     def sampled(self, curves: MotorCurves, rate: float, properties: PropertyValues) -> Commands:
         """Positions at the rate, with the derivatives that the player needs."""
-        from .sampling import held_commands, smooth_commands
+        from calmotion.control.sampling import held_commands, smooth_commands
 
         if properties.player == HOLD:
             return held_commands(curves, rate)
@@ -143,7 +143,7 @@ class ServoTicks(CommandFormat):
 
     def sampled(self, curves: MotorCurves, rate: float, properties: PropertyValues) -> Commands:
         """Positions at the rate."""
-        from .sampling import held_commands
+        from calmotion.control.sampling import held_commands
 
         return held_commands(curves, rate)
 
@@ -163,4 +163,103 @@ class ServoTicks(CommandFormat):
         return read_ticks(files[0], curves)
 
 
-register, unregister = registration(Ros2Trajectory, Ros2Bag, CsvTable, ServoTicks)
+class UrScript(CommandFormat):
+    """A program of servoj commands for a robot of Universal Robots.
+
+    Universal Robots documents what gain and lookahead time of servoj mean, not its law. The player takes them at their
+    word: the acceleration is gain times the distance to the command of the position projected forward by the lookahead
+    time.
+    """
+
+    idname = "export.ur"
+    label = "Write a program in URScript"
+    format = "ur"
+    suffix = ".script"
+    highest_rate = 500.0
+    properties = (
+        Property("gain", float, 2000.0, minimum=100.0, maximum=2000.0, description="Gain of servoj, 1/s^2"),
+        Property(
+            "lookahead", float, 0.03, unit="s", minimum=0.03, maximum=0.2, description="Lookahead time of servoj"
+        ),
+        Property(
+            "cycle", float, 0.002, unit="s", minimum=0.001, maximum=0.1,
+            description="Cycle of the controller: 2 ms of the e-Series, 8 ms of the CB3",
+        ),
+        Property(
+            "joints", str, "",
+            description="Names of base, shoulder, elbow, wrist 1, 2 and 3, with commas; by default those of Universal "
+            "Robots' description, else the order of the shot",
+        ),
+    )  # fmt: skip
+
+    def sampled(self, curves: MotorCurves, rate: float, properties: PropertyValues) -> Commands:
+        """Commands ahead of the curves by the lag of the controller."""
+        from calmotion.control.sampling import followed_commands
+
+        return followed_commands(curves, rate, properties.cycle, Follower(properties.gain, properties.lookahead))
+
+    def write(
+        self, file: str, commands: Commands, curves: MotorCurves, rate: float, properties: PropertyValues
+    ) -> tuple[str, ...]:
+        """Write the program."""
+        from .ur_script import write_program
+
+        write_program(file, commands, curves, rate, self._order(curves, properties))
+        return (file,)
+
+    def read(self, files: Sequence[str], curves: MotorCurves, properties: PropertyValues) -> Commands:
+        """Read the program."""
+        from .ur_script import read_program
+
+        return read_program(files[0], self._order(curves, properties))
+
+    def notes(self, commands: Commands, curves: MotorCurves) -> tuple[str, ...]:
+        """What the player assumes of the controller."""
+        return (
+            "Universal Robots does not publish the law of servoj; the loss holds for acceleration = gain x (command - "
+            "position - lookahead x speed), whose lag the commands anticipate. Run the program slowly first",
+        )
+
+    def _order(self, curves: MotorCurves, properties: PropertyValues) -> list[int]:
+        from .ur_script import order_of
+
+        return order_of([name.strip() for name in properties.joints.split(",") if name.strip()], curves)
+
+
+class BottangoCurves(CommandFormat):
+    """Curves for Bottango's open-source drivers, and a JSON with the ranges of the motors."""
+
+    idname = "export.bottango"
+    label = "Write curves for Bottango"
+    format = "bottango"
+    suffix = ".txt"
+    highest_rate = 500.0
+    properties = (
+        Property(
+            "motors", str, "",
+            description="TOML file with a table for each motor: id, range in degrees or m; see docs/exporting.md",
+        ),
+    )  # fmt: skip
+
+    def sampled(self, curves: MotorCurves, rate: float, properties: PropertyValues) -> Commands:
+        """Keyframes at the rate."""
+        from calmotion.control.sampling import bezier_commands
+
+        return bezier_commands(curves, rate)
+
+    def write(
+        self, file: str, commands: Commands, curves: MotorCurves, rate: float, properties: PropertyValues
+    ) -> tuple[str, ...]:
+        """Write both files."""
+        from .bottango import effectors_of, write_curves
+
+        return write_curves(file, commands, curves, effectors_of(properties.motors, commands, curves))
+
+    def read(self, files: Sequence[str], curves: MotorCurves, properties: PropertyValues) -> Commands:
+        """Read both files."""
+        from .bottango import read_curves
+
+        return read_curves(files, curves)
+
+
+register, unregister = registration(Ros2Trajectory, Ros2Bag, CsvTable, ServoTicks, UrScript, BottangoCurves)

@@ -12,6 +12,7 @@ from calmotion.testing import check_plugin
 @pytest.mark.parametrize(
     "name",
     [
+        "animation_formats",
         "body_reduction",
         "bvh_reader",
         "controller_formats",

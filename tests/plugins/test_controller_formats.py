@@ -43,7 +43,7 @@ def curves():
 
 @pytest.fixture
 def write(repository, curves, tmp_path):
-    def run(name, rate=100.0, file="out/commands", **settings):
+    def run(name, rate=100.0, file="out/commands", curves=curves, **settings):
         host = host_with(repository / "plugins" / "controller_formats")
         request = ExportRequest(name, rate, str(tmp_path / file))
         (found,) = run_operator(host, f"export.{name}", [curves, request], {f"export.{name}": settings})
@@ -189,6 +189,77 @@ def test_a_compiler_takes_the_header(write, servos, tmp_path):
     printed = subprocess.run([tmp_path / "a"], capture_output=True, text=True, check=True).stdout
     content = json.loads(open(written.files[0]).read())
     assert printed == f"{len(content['ticks'])} {content['ticks'][7][1]} {content['start'][0]}"
+
+
+def six_motors(curves):
+    motors = tuple(dataclasses.replace(curves.motors[k % 2], path=f"/Arm/Joint{k}", joint=k) for k in range(6))
+    names = (
+        "wrist_2_joint",
+        "shoulder_pan_joint",
+        "elbow_joint",
+        "shoulder_lift_joint",
+        "wrist_1_joint",
+        "wrist_3_joint",
+    )
+    turns = np.arange(1.0, 7.0)
+    return dataclasses.replace(
+        curves, motors=motors, names=names, limits=np.tile([-np.inf, np.inf], (6, 1)),
+        sample=lambda times, order: curves.sample(times, order)[:, :1] * turns,
+    )  # fmt: skip
+
+
+def test_a_ur_program_has_the_joints_in_the_controllers_order_and_whole_cycles(write, curves):
+    six = six_motors(curves)
+    written = write("ur", rate=30.0, file="show.script", curves=six)
+    lines = open(written.files[0]).read().splitlines()
+    assert lines[0] == "def calmotion():" and lines[-2:] == ["  stopj(2.0)", "end"]
+    rows = [re.fullmatch(r"  servoj\(\[(.*)\], 0, 0, ([\d.]+), 0\.03, 2000\)", line) for line in lines[3:-2]]
+    assert all(rows)
+    periods = np.array([float(row[2]) for row in rows])
+    np.testing.assert_allclose(np.round(periods / 0.002), periods / 0.002, atol=1e-9)
+    assert np.abs(np.cumsum(periods[:-1]) - np.arange(1, len(periods)) / 30.0).max() <= 0.001 + 1e-9
+    # commands are ahead by lookahead time and half a period; base is the second motor, whose curve is twice the first
+    sent = np.array([row[1].split(",") for row in rows], float)
+    ahead = six.at(written.exact.times + 0.03 + 0.5 / 30.0)
+    np.testing.assert_allclose(sent, ahead[:, [1, 3, 2, 4, 0, 5]], atol=1e-6)
+    np.testing.assert_allclose(written.read.positions, ahead, atol=1e-6)
+    assert written.exact.times[-1] > 1.0 + 0.2, "the commands go on until the robot stands"
+    assert "law of servoj" in written.notes[0]
+
+
+def test_the_joints_of_a_ur_program_may_be_named(write, curves):
+    six = six_motors(curves)
+    plain = dataclasses.replace(six, names=tuple("abcdef"))
+    named = write("ur", file="a.script", curves=plain, joints="f, e, d, c, b, /Arm/Joint0")
+    first = re.search(r"movej\(\[(.*?)\]", open(named.files[0]).read())[1]
+    np.testing.assert_allclose([float(x) for x in first.split(",")], plain.at(np.zeros(1))[0, ::-1], atol=1e-6)
+    for joints, problem in (("f,e,d,c,b,b", "named once"), ("f,e,d,c,b,g", "no motor has this name")):
+        with pytest.raises(ShotError, match=problem):
+            write("ur", curves=plain, joints=joints)
+    with pytest.raises(ShotError, match="six hinges"):
+        write("ur")
+
+
+def test_curves_of_bottango_are_whole_numbers_in_its_range(write, curves, tmp_path):
+    (tmp_path / "motors.toml").write_text('[shoulder]\nid = "64"\nminimum = -90\nmaximum = 90\n')
+    written = write("bottango", rate=10.0, file="show.txt", motors=str(tmp_path / "motors.toml"))
+    rows = [line.split(",") for line in open(written.files[0]).read().splitlines()]
+    assert {row[1] for row in rows} == {"64", "2"} and all(row[0] == "sC" and len(row) == 10 for row in rows)
+    own = np.array([row[2:] for row in rows if row[1] == "64"], int)
+    np.testing.assert_array_equal(own[:, 0], 100 * np.arange(10))
+    expected = (curves.sample(own[:, 0] / 1e3, 0)[:, 0] + np.pi / 2.0) * 8192 / np.pi
+    assert np.abs(own[:, 2] - expected).max() <= 0.5 + 1e-9
+    ranges = json.loads(open(written.files[1]).read())["motors"]
+    # without a range of its own the motor has the limits of its joint
+    assert (ranges[1]["minimum"], ranges[1]["maximum"]) == (-2.0, 2.0)
+    assert np.abs(written.read.positions - written.exact.positions).max() < 0.5 * np.pi / 8192 * 1.3
+    for text, problem in (
+        ("[shoulder]\nminimum = 0\nmaximum = 1\n", "leaves the range"), ("[knee]\n", "no motor has this name"),
+        ("[elbow]\nid = 1\n", "the same id"), ("[elbow]\nmaximum = 'a'\n", "does not fit"), ("[", "cannot be read"),
+    ):  # fmt: skip
+        (tmp_path / "motors.toml").write_text(text)
+        with pytest.raises(ShotError, match=problem):
+            write("bottango", motors=str(tmp_path / "motors.toml"))
 
 
 REFUSED = {

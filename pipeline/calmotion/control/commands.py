@@ -7,12 +7,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from calmotion.shot.character import Array
+from calmotion.shot.animation import Animation
+from calmotion.shot.character import Array, Character
 from calmotion.shot.motor import Motor
 
-HOLD, LINEAR, CUBIC, QUINTIC = "hold", "linear", "cubic", "quintic"
+HOLD, LINEAR, CUBIC, QUINTIC, BEZIER, FOLLOW = "hold", "linear", "cubic", "quintic", "bezier", "follow"
 LOWEST_RATE, HIGHEST_RATE = 1.0, 1e5  # commands a second [Hz]
-INTERPOLATIONS = (HOLD, LINEAR, CUBIC, QUINTIC)
+INTERPOLATIONS = (HOLD, LINEAR, CUBIC, QUINTIC, BEZIER, FOLLOW)
 # A held value is a step, which no motor can follow: it gets there at constant speed within this time, or within a
 # period where that is shorter [s]. Steps of splines are played within the same time.
 SETTLED = 0.01
@@ -45,6 +46,8 @@ class MotorCurves:
         names: Names of their joints as a controller knows them.
         limits: Lower and upper limit of each joint [rad or m], shape [M, 2]; infinite where there is none.
         sample: Times within the shot [s], shape [n], and the order of the derivative -> [rad or m, s], shape [n, M].
+        character: The robot, and
+        animation: its moving roots, for formats that hold its bodies; None where there are only curves.
     """
 
     shot: str
@@ -54,6 +57,8 @@ class MotorCurves:
     names: tuple[str, ...]
     limits: Array
     sample: Callable[[Array, int], Array]
+    character: Character | None = None
+    animation: Animation | None = None
 
     def at(self, times: Array, order: int = 0) -> Array:
         """The same at any time: a shot that loops goes on, any other holds its last pose, at rest."""
@@ -69,17 +74,33 @@ class MotorCurves:
         return values if order == 0 else np.where((times <= self.end + 1e-9)[:, None], values, 0.0)
 
 
+@dataclass(frozen=True)
+class Follower:
+    """How a controller follows the commands that it holds: acceleration = gain (command - q - lookahead velocity).
+
+    Attributes:
+        gain: [1/s^2].
+        lookahead: [s]; also how much later than its commands a motor at constant speed is.
+    """
+
+    gain: float
+    lookahead: float
+
+
 @dataclass(frozen=True, eq=False)
 class Commands:
     """Commands for M motors at n instants, in the order of the curves' motors; SI units.
 
     Attributes:
         interpolation: How the player gets from one to the next, one of `INTERPOLATIONS`; `CUBIC` needs velocities,
-            `QUINTIC` accelerations as well.
+            `QUINTIC` accelerations as well, `BEZIER` handles and `FOLLOW` a follower.
         times: [s] after the start, increasing, first 0, shape [n].
         positions: [rad or m], shape [n, M].
         velocities, accelerations: The derivatives, shape [n, M]; None where the format has none.
         start: Pose from which a player that holds its commands sets out, shape [M]; None: the first of them.
+        handles: Of cubic Bezier curves between the commands: time and value of the control point after a command,
+            relative to it, and of the one before the next command, relative to that, shape [n - 1, M, 4].
+        follower: How the controller follows commands that it holds.
     """
 
     interpolation: str
@@ -88,6 +109,8 @@ class Commands:
     velocities: Array | None = None
     accelerations: Array | None = None
     start: Array | None = None
+    handles: Array | None = None
+    follower: Follower | None = None
 
 
 @dataclass(frozen=True, eq=False)

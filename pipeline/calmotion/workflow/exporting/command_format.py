@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar
 
-from calmotion.control.commands import Commands, ExportRequest, MotorCurves, WrittenCommands
+from calmotion.control.commands import HIGHEST_RATE, Commands, ExportRequest, MotorCurves, WrittenCommands
 from calmotion.errors import ShotError
 from calmotion.host import NotAsked, Operator, PropertyValues, RunContext
 
@@ -19,10 +19,12 @@ class CommandFormat(Operator):
     Attributes:
         format: Name for `--to`.
         suffix: Of its files, with the dot.
+        highest_rate: Commands a second that its player takes at most [Hz].
     """
 
     format: ClassVar[str] = ""
     suffix: ClassVar[str] = ""
+    highest_rate: ClassVar[float] = HIGHEST_RATE
     requires = (MotorCurves, ExportRequest)
     provides = (WrittenCommands,)
 

@@ -26,7 +26,7 @@ from calmotion.simulation.playing.lowest_rate import lowest_rate
 from calmotion.simulation.playing.playback import Loss, Playback
 from calmotion.version import __version__
 from calmotion.workflow.exporting.controller_files import curves_of, format_named, write_commands
-from calmotion.workflow.exporting.given import GivenExport, given_export, refuse_beyond_shot
+from calmotion.workflow.exporting.given import GivenExport, given_export, refuse_beyond_format, refuse_beyond_shot
 from calmotion.workflow.outputs import refuse_layers, refuse_overwriting
 from calmotion.workflow.results import SimulationResult
 from calmotion.workflow.run import Hooks, Outcome, Progress, carry_out
@@ -182,12 +182,13 @@ def export(
         opened, result = shot if isinstance(shot, Shot) else Shot(with_shot(os.fspath(shot))), None
         cls = format_named(opened.host, to)
         outcome = carry_out(opened, "simulate", wanted=_READ, operators=operators, settings=chosen, hooks=hooks)
+    refuse_beyond_format(cls.highest_rate, given)
     target = os.fspath(file) if file is not None else f"{FilePath(opened.path).stem}{cls.suffix}"
     refuse_overwriting(opened.inputs, {"-o": target})
     character = outcome.require(Character)
     refuse_layers(opened.path, outcome.require(Provenance), character, {"-o": target})
     refuse_beyond_shot(character, outcome.require(Animation), given)
-    exporter = _Exporter(outcome, result, given, chosen, hooks)
+    exporter = _Exporter(outcome, result, given, chosen, hooks, highest=cls.highest_rate)
     # what is wrong with the format's settings is refused here, before the first mesh
     written = exporter.written(given.rate, target)
     compiled = outcome if result is not None else _compiled(opened, given, chosen, hooks)
@@ -216,11 +217,14 @@ class _Exporter:
         given: What the user wants.
         settings: Of operators.
         hooks: Progress and cancelling.
+        highest: Rate that the player of the format takes at most [Hz].
     """
 
     def __init__(
-        self, outcome: Outcome, result: Result | None, given: GivenExport, settings: Settings, hooks: Hooks
-    ) -> None:
+        self, outcome: Outcome, result: Result | None, given: GivenExport, settings: Settings, hooks: Hooks, *,
+        highest: float,
+    ) -> None:  # fmt: skip
+        self._highest = int(min(max(HIGHEST, given.rate), highest))
         self._outcome, self._given, self._settings, self._hooks = outcome, given, settings, hooks
         self._curves = curves_of(outcome, result)
         self._playback: Playback
@@ -277,7 +281,6 @@ class _Exporter:
         """The lowest rate that keeps the tolerance, from files that are written for the purpose and removed."""
         given, tried = self._given, 0
         known = {int(given.rate): loss.largest} if float(given.rate).is_integer() else {}
-        highest = max(HIGHEST, int(given.rate))
         with tempfile.TemporaryDirectory(prefix="calmotion-export-") as folder:
 
             def at(rate: int) -> float:
@@ -288,7 +291,7 @@ class _Exporter:
                 step = self._playback.step_for(1.0 / rate) / self._finer
                 return self._loss(written.read, step, given.delay).largest
 
-            return lowest_rate(at, self._tolerance, known, highest)
+            return lowest_rate(at, self._tolerance, known, self._highest)
 
     def _tell(self, fraction: float, message: str) -> None:
         if self._hooks.progress:

@@ -48,6 +48,22 @@ def given_export(to: str, rate: float, start_delay: float | str, tolerance: floa
     return GivenExport(to, float(rate), delay, error)
 
 
+def refuse_beyond_format(highest: float, given: GivenExport) -> None:
+    """Refuse a rate that the player of the format does not take.
+
+    Args:
+        highest: Commands a second that it takes [Hz].
+
+    Raises:
+        SettingError: The rate is higher.
+    """
+    if given.rate > highest:
+        raise SettingError(
+            f"the player of {given.format} takes at most {highest:g} commands a second", path="--rate",
+            found=given.rate, remedy=f"Use {highest:g} or less.",
+        )  # fmt: skip
+
+
 def refuse_beyond_shot(character: Character, animation: Animation, given: GivenExport) -> None:
     """Refuse a tolerance that no simulation of the shot supports, and a start after its end.
 

@@ -17,7 +17,10 @@ def add_to(commands: Commands) -> None:
         commands, "export", _run, "write the motor curves for a controller, and measure what playing them costs"
     )
     command.add_argument(
-        "--to", metavar="FORMAT", required=True, help="format of a plugin: ros2, mcap, csv, ticks (servos), ..."
+        "--to",
+        metavar="FORMAT",
+        required=True,
+        help="format: ros2, mcap, csv, ticks (servos), ur, bottango, keyframes, bvh, gltf, or that of a plugin",
     )
     command.add_argument("--rate", metavar="HZ", type=_rate, default=100.0, help="commands a second (default: 100)")
     file_argument(
@@ -81,6 +84,7 @@ def _print(report: dict[str, Any], stream: TextIO) -> None:
     ]
     print_table(console, "What playing the commands costs at the targets, at most", heads, rows)
     ways = {"hold": "is held", "linear": "is followed along lines", "cubic": "is followed along cubics"}
+    ways |= {"bezier": "is followed along Bezier curves", "follow": "is followed as the controller does"}
     way = ways.get(report["interpolation"], "is followed along quintics")
     say(
         console,

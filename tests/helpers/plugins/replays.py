@@ -1,0 +1,226 @@
+"""Players of exported files that share nothing with Calmotion: they parse the files and interpolate on their own."""
+
+from __future__ import annotations
+
+import csv
+import json
+import re
+import struct
+
+import numpy as np
+import yaml
+from scipy.interpolate import BPoly
+from scipy.spatial.transform import Rotation, Slerp
+
+SETTLED = 0.01  # within which a motor reaches a held command [s]
+
+
+def replay_trajectory(message, names, at):
+    """A JointTrajectory as joint_trajectory_controller interpolates it."""
+    order = [message["joint_names"].index(name) for name in names]
+    points = message["points"]
+    times = np.array([p["time_from_start"]["sec"] + 1e-9 * p["time_from_start"]["nanosec"] for p in points])
+    fields = [f for f in ("positions", "velocities", "accelerations") if f in points[0] and len(points[0][f])]
+    values = np.array([[np.array(p[f])[order] for f in fields] for p in points])
+    if len(fields) == 1:
+        return lines(at, times, values[:, 0])
+    return BPoly.from_derivatives(times, values)(np.clip(at, 0.0, times[-1]))
+
+
+def replay_ros2(files, names, at):
+    with open(files[0]) as stream:
+        return replay_trajectory(yaml.safe_load(stream), names, at)
+
+
+def replay_mcap(files, names, at):
+    from mcap_ros2.reader import read_ros2_messages
+
+    with open(files[0], "rb") as stream:
+        (found,) = read_ros2_messages(stream)
+    message = found.ros_msg
+    points = [
+        {f: list(getattr(p, f)) for f in ("positions", "velocities", "accelerations")}
+        | {"time_from_start": {"sec": p.time_from_start.sec, "nanosec": p.time_from_start.nanosec}}
+        for p in message.points
+    ]
+    return replay_trajectory({"joint_names": list(message.joint_names), "points": points}, names, at)
+
+
+def replay_csv(files, names, at):
+    with open(files[0], newline="") as stream:
+        text = stream.read().splitlines()
+    facts = dict(line[2:].split(": ", 1) for line in text if line.startswith("# ") and ": " in line)
+    head, *rows = csv.reader(line for line in text if not line.startswith("#"))
+    table = np.array(rows, float)
+    times, values = table[:, 0], table[:, [head.index(f"/Arm/{name}") for name in names]]
+    if facts["player"] == "hold":
+        return held(at, times, values, np.array(facts["start"].split(", "), float))
+    assert facts["player"] == "linear"
+    return lines(at, times, values)
+
+
+def replay_ticks(files, names, at):
+    """From the header for C, which the export does not read."""
+    with open(files[1]) as stream:
+        text = stream.read()
+    rate = float(re.search(r"_RATE_HZ ([\d.]+)", text)[1])
+    start = np.array(re.search(r"_start\[\d+\] = \{(.*?)\}", text)[1].split(","), float)
+    rows = re.findall(r"^    \{(.*?)\},", text, re.MULTILINE)
+    ticks = np.array([row.split(",") for row in rows], float)
+    to_angle = 2.0 * np.pi / 4096
+    return held(at, np.arange(len(ticks)) / rate, (ticks - 2048) * to_angle, (start - 2048) * to_angle)
+
+
+def replay_ur(files, names, at):
+    """The law of the note, integrated by the semi-implicit Euler method with steps of 20 microseconds."""
+    with open(files[0]) as stream:
+        text = stream.read()
+    number = r"([-\d.e]+)"
+    q = np.array(re.search(r"movej\(\[(.*?)\]", text)[1].split(","), float)
+    found = re.findall(rf"servoj\(\[(.*?)\], 0, 0, {number}, {number}, {number}\)", text)
+    h, v, track = 2e-5, np.zeros(6), [q]
+    for row, period, lookahead, gain in found:
+        command = np.array(row.split(","), float)
+        for _ in range(round(float(period) / h)):
+            v = v + h * float(gain) * (command - q - float(lookahead) * v)
+            q = q + h * v
+            track.append(q)
+    return lines(at, h * np.arange(len(track)), np.array(track))
+
+
+def replay_keyframes(files, names, at):
+    with open(files[0]) as stream:
+        content = json.load(stream)
+    columns = []
+    for name in names:
+        (motor,) = [entry for entry in content["motors"] if entry["name"] == name]
+        frames, column = motor["keyframes"], np.empty(len(at))
+        for one, other in zip(frames[:-1], frames[1:], strict=True):
+            p = [(one["time"], one["value"]), np.add((one["time"], one["value"]), one["out"])]
+            p += [np.add((other["time"], other["value"]), other["in"]), (other["time"], other["value"])]
+            inside = (at >= one["time"] - 1e-9) & (at <= other["time"] + 1e-9)
+            column[inside] = casteljau(np.array(p, float), at[inside])
+        columns.append(column)
+    return np.stack(columns, axis=1)
+
+
+def replay_bottango(files, names, at):
+    with open(files[1]) as stream:
+        motors = {entry["name"]: entry for entry in json.load(stream)["motors"]}
+    with open(files[0]) as stream:
+        rows = [line.strip().split(",") for line in stream]
+    columns = []
+    for name in names:
+        column, motor = np.empty(len(at)), motors[name]
+        for row in (row for row in rows if row[:2] == ["sC", motor["id"]]):
+            start, duration, y0, x1, y1, y3, x2, y2 = map(int, row[2:])
+            p = np.array([(0, y0), (x1, y0 + y1), (duration + x2, y3 + y2), (duration, y3)], float)
+            inside = (1e3 * at >= start - 1e-6) & (1e3 * at <= start + duration + 1e-6)
+            column[inside] = casteljau(p, 1e3 * at[inside] - start) / 8192
+        columns.append(motor["minimum"] + (motor["maximum"] - motor["minimum"]) * column)
+    return np.stack(columns, axis=1)
+
+
+def replay_bvh(files, at):
+    """World transforms of the joints: place [m] and rotation of each by name, channels interpolated by lines."""
+    with open(files[0]) as stream:
+        head, motion = stream.read().split("MOTION")
+    frame_time = float(re.search(r"Frame Time: (\S+)", motion)[1])
+    rows = np.array([line.split() for line in motion.splitlines()[3:] if line.strip()], float)
+    values = lines(at, np.arange(len(rows)) * frame_time, rows)
+    stack, worlds, column, tips = [], {}, 0, {}
+    identity = (np.zeros((len(at), 3)), Rotation.from_quat(np.tile([0.0, 0.0, 0.0, 1.0], (len(at), 1))))
+    for words in (line.split() for line in head.splitlines() if line.split()):
+        if words[0] in ("ROOT", "JOINT", "End"):
+            stack.append(words[1])
+        elif words[0] == "OFFSET":
+            offset = 0.01 * np.array(words[1:], float)
+            place, turn = worlds.get(stack[-2], identity) if len(stack) > 1 else identity
+            worlds[stack[-1]] = (place + turn.apply(np.tile(offset, (len(at), 1))), turn)
+            if stack[-1] == "Site":
+                tips[stack[-2]] = worlds.pop("Site")[0]
+        elif words[0] == "CHANNELS":
+            place, turn = worlds[stack[-1]]
+            moved = [w for w in words[2:] if w.endswith("position")]
+            if moved:
+                assert len(stack) == 1 and moved == ["Xposition", "Yposition", "Zposition"]
+                place = 0.01 * values[:, column : column + 3]
+            order = "".join(w[0] for w in words[2:] if w.endswith("rotation"))
+            angles = values[:, column + len(moved) : column + len(moved) + 3]
+            worlds[stack[-1]] = (place, turn * Rotation.from_euler(order, angles, degrees=True))
+            column += len(words) - 2
+        elif words[0] == "}":
+            stack.pop()
+    assert column == rows.shape[1]
+    return worlds, tips
+
+
+def replay_gltf(files, at):
+    """World transforms of the nodes by name, as the specification composes and interpolates them."""
+    with open(files[0], "rb") as stream:
+        raw = stream.read()
+    size = struct.unpack_from("<I", raw, 12)[0]
+    content, binary = json.loads(raw[20 : 20 + size]), raw[28 + size :]
+    nodes, (animation,) = content["nodes"], content["animations"]
+
+    def read(index):
+        accessor = content["accessors"][index]
+        start = content["bufferViews"][accessor["bufferView"]]["byteOffset"]
+        width = {"SCALAR": 1, "VEC3": 3, "VEC4": 4}[accessor["type"]]
+        numbers = struct.unpack_from(f"<{width * accessor['count']}f", binary, start)
+        return np.reshape(numbers, (-1, width))
+
+    moving = {}
+    for channel in animation["channels"]:
+        sampler = animation["samplers"][channel["sampler"]]
+        assert sampler["interpolation"] == "LINEAR"
+        times, values = read(sampler["input"])[:, 0], read(sampler["output"])
+        key = (channel["target"]["node"], channel["target"]["path"])
+        inside = np.clip(at, times[0], times[-1])
+        if key[1] == "rotation":
+            moving[key] = Slerp(times, Rotation.from_quat(values))(inside)
+        else:
+            moving[key] = lines(inside, times, values)
+    worlds = {}
+
+    def visit(index, place, turn):
+        node = nodes[index]
+        shift = moving.get((index, "translation"), np.tile(node.get("translation", [0.0, 0.0, 0.0]), (len(at), 1)))
+        rest = Rotation.from_quat(np.tile(node.get("rotation", [0.0, 0.0, 0.0, 1.0]), (len(at), 1)))
+        place, turn = place + turn.apply(shift), turn * moving.get((index, "rotation"), rest)
+        worlds[node["name"]] = (place, turn)
+        for child in node.get("children", []):
+            visit(child, place, turn)
+
+    identity = Rotation.from_quat(np.tile([0.0, 0.0, 0.0, 1.0], (len(at), 1)))
+    visit(content["scenes"][0]["nodes"][0], np.zeros((len(at), 3)), identity)
+    return worlds
+
+
+def lines(at, times, values):
+    return np.stack([np.interp(at, times, column) for column in values.T], axis=1)
+
+
+def held(at, times, values, start):
+    """Each command is reached at constant speed."""
+    reach = min(SETTLED, times[1] - times[0])
+    n = np.clip(np.searchsorted(times, at + 1e-12, side="right") - 1, 0, len(times) - 1)
+    before = np.where((n > 0)[:, None], values[np.maximum(n - 1, 0)], start)
+    share = np.clip((at - times[n]) / reach, 0.0, 1.0)[:, None]
+    return before + share * (values[n] - before)
+
+
+def casteljau(p, x):
+    """Value of a cubic Bezier curve where its first coordinate is x, by bisection."""
+
+    def at(u, c):
+        a = [c[k] + u * (c[k + 1] - c[k]) for k in range(3)]
+        b = [a[k] + u * (a[k + 1] - a[k]) for k in range(2)]
+        return b[0] + u * (b[1] - b[0])
+
+    low, high = np.zeros_like(x), np.ones_like(x)
+    for _ in range(45):
+        u = 0.5 * (low + high)
+        early = at(u, p[:, 0]) < x
+        low, high = np.where(early, u, low), np.where(early, high, u)
+    return at(0.5 * (low + high), p[:, 1])
