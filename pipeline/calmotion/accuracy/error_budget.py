@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from calmotion.accuracy import converged_reduction, simulate_to_tolerance
+from calmotion.accuracy import converged_reduction, mesh_budget, simulate_to_tolerance
 from calmotion.shot import Character, Result
 from calmotion.shot.budget import CHOICES, MESH, REDUCTION, SEARCH, SEARCH_SHARE, STEP, SUBSPACE, BudgetEntry
 from calmotion.shot.tolerance import tolerance_of
@@ -40,7 +40,8 @@ def _budget(result: Result, tolerance: float) -> tuple[BudgetEntry, ...]:
         entry(CHOICES, simulate_to_tolerance.HELD, accuracy.choices_m),
     ]
     if result.modes:
-        left = max(tolerance - sum(other.estimated_m or 0.0 for other in entries), 0.0)
+        rest = tolerance - sum(other.estimated_m or 0.0 for other in entries)
+        left = max(rest, mesh_budget.SHARE * tolerance)  # other entries may be beyond their shares
         entries.append(_mesh_entry(result, accuracy.mesh_m, left))
     if result.after is not None:
         ended = result.stopped == "converged"
@@ -50,7 +51,7 @@ def _budget(result: Result, tolerance: float) -> tuple[BudgetEntry, ...]:
 
 
 def _mesh_entry(result: Result, estimated: float | None, left: float) -> BudgetEntry:
-    """The finite-element meshes may cost what all else leaves of the tolerance [m]."""
+    """The finite-element meshes may cost what all else leaves of the tolerance, at least their share of it [m]."""
     elements, count = sum(table.elements for table in result.modes), len(result.modes)
     choice = f"{elements} elements in {count} flexible {'body' if count == 1 else 'bodies'}"
     reason = "by the element sizes of the bodies" if estimated is not None else "the error of a given mesh is not known"
