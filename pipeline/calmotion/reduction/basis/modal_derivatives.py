@@ -123,18 +123,21 @@ def modal_derivatives(
 
 def extended_basis(
     model: FEModel, support: Support, basis: Basis, count: int, material: ElasticMaterial, law: str,
-    negligible: float = NEGLIGIBLE,
+    negligible: float = NEGLIGIBLE, deflections: Array | None = None,
 ) -> Basis:  # fmt: skip
     """A basis and the modal derivatives of its first modes, made mass-orthonormal.
 
-    A derivative is weighted by the deflections of its modes under the same load (by 1/omega^2); directions whose strain
-    energy is negligible with these weights are dropped. The changes of shape of rotating patches are coordinates of
-    their own, which penalty springs couple to the rotations (see `patch_rotation`).
+    A derivative is weighted by the deflections of its modes under the same load (by 1/omega^2), or, where the bending
+    of other modes moves them farther, by that; directions whose strain energy is negligible with these weights are
+    dropped. Without the second, more modes made a link of 0.29 m with a deflection of 27 mm stiffer, by 1.4%.
+    The changes of shape of rotating patches are coordinates of their own, which penalty springs couple to the rotations
+    (see `patch_rotation`).
 
     Args:
         model, support, basis, material, law: As of `modal_derivatives`.
         count: Number of the first modes that are paired.
         negligible: Square root of the negligible share of the largest strain energy among the derivatives.
+        deflections: Amplitude of each mode by the loads; None: not known.
 
     Returns:
         The basis: its stiffness, with that of the springs, is diagonal; its lowest modes are nearly those of `basis`.
@@ -145,6 +148,8 @@ def extended_basis(
     derivatives = modal_derivatives(model, support, basis, count, material, law)
     n, p = len(model.mesh.nodes), len(support.patches)
     amplitude = basis.omega_squared[0] / basis.omega_squared[:count]
+    if deflections is not None:
+        amplitude = np.maximum(amplitude, _second_order(model, basis, derivatives, deflections[:count]))
     first, second = np.triu_indices(count)
     weight = amplitude[first] * amplitude[second]
     change_sizes = derivatives.change_sizes * weight
@@ -184,6 +189,23 @@ def extended_basis(
         first_order=result.T @ (M @ modes),
         second_order=result.T @ (M @ derivatives.fields.reshape(3 * n, -1)),
     )
+
+
+def _second_order(model: FEModel, basis: Basis, derivatives: Derivatives, deflections: Array) -> Array:
+    """How far modes move to second order where they bend together, over the deflection of the first, shape [c].
+
+    A bending mode of large deflection moves axial and higher modes far more than the loads do.
+
+    Args:
+        deflections: Amplitude of each of the c modes that are paired by the loads.
+    """
+    count = len(deflections)
+    modes = basis.modes[:, :, :count].reshape(-1, count)
+    share = modes.T @ (vector_mass(model.mass) @ derivatives.fields.reshape(len(modes), -1))
+    first, second = np.triu_indices(count)
+    pairs = np.where(first == second, 0.5, 1.0) * deflections[first] * deflections[second]
+    moved = np.linalg.norm(share * pairs, axis=1)
+    return np.asarray(np.minimum(moved / max(deflections[0], np.finfo(float).tiny), 1.0))
 
 
 def _without_modes(modes: Array, patch_motion: Array, M: Any, fields: Array, motion: Array) -> tuple[Array, Array]:

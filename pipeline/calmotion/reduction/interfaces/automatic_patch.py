@@ -14,8 +14,8 @@ _FLAT_COSINE = np.cos(np.radians(10.0))  # a tetrahedraliser may tilt the triang
 _SECTORS, _COVERED = 16, 12  # of the angle around an opening, and how many its end face covers
 _FLAT_OFFSET = 3e-3  # and move its corners by about a thousandth of the body
 _LEAST_FACE = 0.2  # of the half width of the body below: a smaller flat is the ground of a recess or the tip of a screw
-# The least radius, of that at which a rigid disc on a half space turns as easily as a bar of the body's volume and length
-# bends, and of the body's size
+# Of the least radius: of that at which a rigid disc on a half space turns as easily as a bar of the body's volume and
+# length bends, and of the body's size
 _LEAST_RADIUS, _LEAST_PART = 0.5, 0.05
 _POISSON = 0.35
 

@@ -16,7 +16,7 @@ from calmotion.reduction.interfaces.patch_rotation import spring_rows, springs
 from calmotion.reduction.load_envelope import LoadEnvelope
 from calmotion.reduction.material_laws.choice import work_of_loads
 from calmotion.reduction.reduced_body import Elasticity
-from calmotion.shot.character import DEFAULT_TOLERANCE, ElasticMaterial
+from calmotion.shot.character import DEFAULT_TOLERANCE, Array, ElasticMaterial
 
 PAIRED_MODES = 16  # largest number of modes with derivatives
 _NEGLIGIBLE_ENERGY = 1e-3  # share of the derivatives' strain energy, times the tolerance over the body's size
@@ -42,11 +42,12 @@ def large_deflection(
     Returns:
         The extended basis, and the law without damping.
     """
+    deflections = None
     if load_envelope is not None:
-        basis = _by_deflection(model, basis, basis.load_envelope or load_envelope)
+        basis, deflections = _by_deflection(model, basis, basis.load_envelope or load_envelope)
     size = float(np.ptp(model.mesh.nodes, axis=0).max())
     negligible = float(np.clip(np.sqrt(_NEGLIGIBLE_ENERGY * tolerance / size), _FINEST, NEGLIGIBLE))
-    extended = extended_basis(model, support, basis, PAIRED_MODES, material, law, negligible)
+    extended = extended_basis(model, support, basis, PAIRED_MODES, material, law, negligible, deflections)
     lame = lame_constants(material.youngs_modulus, material.poissons_ratio)
     if law == "stvk":
         law_of = partial(_stvk, model, support, extended, material)
@@ -78,18 +79,19 @@ def _stvk(
     return replace(law, strain_projection=subspace.projection, strain_error_m=subspace.error_m)
 
 
-def _by_deflection(model: FEModel, basis: Basis, load_envelope: LoadEnvelope) -> Basis:
-    """The basis, ordered by the deflection of its modes under the loads of the shot.
+def _by_deflection(model: FEModel, basis: Basis, load_envelope: LoadEnvelope) -> tuple[Basis, Array]:
+    """The basis, ordered by the deflection of its modes under the loads of the shot, and the amplitude of each.
 
     In the order of frequencies, residual vectors come last, although a link may deflect in them as far as in the first
     mode. A mode without derivatives stretches the link as it bends, so its deflection would be too small.
     """
     largest = np.abs(basis.modes).max(axis=(0, 1))
-    deflection = largest * work_of_loads(model, basis.modes, basis.patch_motion, load_envelope) / basis.omega_squared
-    order = np.argsort(-deflection, kind="stable")
-    return replace(
+    amplitude = work_of_loads(model, basis.modes, basis.patch_motion, load_envelope) / basis.omega_squared
+    order = np.argsort(-largest * amplitude, kind="stable")
+    ordered = replace(
         basis,
         modes=basis.modes[:, :, order],
         omega_squared=basis.omega_squared[order],
         patch_motion=basis.patch_motion[:, :, order],
     )
+    return ordered, amplitude[order]
