@@ -102,9 +102,8 @@ def test_the_ground_of_a_recess_is_no_end_face(helpers):
     side = np.array([-50.0, -20.0, -3.0, 3.0, 20.0, 50.0]) * 1e-3
     along = np.array([0.0, 0.08, 0.16, 0.239, 0.24])
     points, tets = helpers.box((5, 5, 4), (1.0, 1.0, 1.0))
-    points = np.column_stack(
-        [side[np.rint(5 * points[:, 0]).astype(int)], side[np.rint(5 * points[:, 1]).astype(int)], along[np.rint(4 * points[:, 2]).astype(int)]]
-    )  # fmt: skip
+    x, y, z = np.rint(points * [5, 5, 4]).astype(int).T
+    points = np.column_stack([side[x], side[y], along[z]])
     middle = points[tets].mean(axis=1)
     block = quadratic_mesh(points, tets[(np.abs(middle[:, :2]).max(axis=1) > 3e-3) | (middle[:, 2] < 0.239)])
     face, radius = look(block, (0.0, 0.0, 0.239))
