@@ -14,6 +14,7 @@ from calmotion.retargeting.problem.offset_space import OffsetSpace
 from calmotion.retargeting.problem.problem import RetargetProblem
 from calmotion.shot import Animation, Character
 from calmotion.shot.character import Array, BoolArray, IntArray
+from calmotion.shot.motor import PRESCRIBED
 from calmotion.shot.run import RunSettings
 from calmotion.simulation.inputs.curves import Curves, sample_tracks
 from calmotion.simulation.inputs.gearing import coupling_of, leaders
@@ -24,6 +25,7 @@ from calmotion.simulation.target_errors import IntendedMotion, Objective
 
 SMOOTHNESS = 1e-10
 CLOSENESS = 1e-4  # an offset of 0.1 rad has the weight of an error of 1 mm [m^2/rad^2]
+CLOSENESS_OF_COMMANDS = 3e-6  # the same where motors give: commands are ahead of the motion by what motors lag
 
 
 def pose(
@@ -45,7 +47,7 @@ def pose(
     smoothness = next(v for v in (options.smoothness, character.retarget.smoothness, SMOOTHNESS) if v is not None)
     problem = RetargetProblem(
         prepared.model, grid, curves, Objective.over(prepared.model, intended, grid, animation.weights),
-        OffsetSpace(known.basis, known.motors, known.coupling, smoothness, CLOSENESS), prepared.world,
+        OffsetSpace(known.basis, known.motors, known.coupling, smoothness, closeness_of(character)), prepared.world,
         LimitTerms(known.bounds, grid.judged, grid.h, 1.0) if known.bounds else None, known.continuous,
     )  # fmt: skip
     offsets = known.offsets
@@ -74,6 +76,12 @@ class Unknowns:
     fixed: BoolArray
     bounds: dict[str, Bounds]
     continuous: bool
+
+
+def closeness_of(character: Character) -> float:
+    """Weight of the squared offsets [m^2/rad^2]."""
+    gives = any(motor.model != PRESCRIBED for motor in character.motors)
+    return CLOSENESS_OF_COMMANDS if gives else CLOSENESS
 
 
 def knot_spacing(character: Character, options: RunSettings) -> float | None:

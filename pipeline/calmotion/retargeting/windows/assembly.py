@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from calmotion.retargeting.problem.posing import CLOSENESS, SMOOTHNESS
+from calmotion.retargeting.problem.posing import SMOOTHNESS, closeness_of
 from calmotion.retargeting.simplification.pruning import UNCHANGED
 from calmotion.retargeting.windows.parts import Piece, added, joined, offset_curves
 from calmotion.retargeting.windows.plan import Window
@@ -138,7 +138,7 @@ def _penalty(offsets: Curves, prepared: Prepared, options: RunSettings) -> float
     """The regulariser of the offsets."""
     given = (options.smoothness, prepared.character.retarget.smoothness, SMOOTHNESS)
     smoothness = next(value for value in given if value is not None)
-    sums = CLOSENESS * np.sum(offsets.angles**2) + smoothness * np.sum(offsets.accelerations**2)
+    sums = closeness_of(prepared.character) * np.sum(offsets.angles**2) + smoothness * np.sum(offsets.accelerations**2)
     return 0.5 * prepared.grid.h * float(sums)
 
 

@@ -13,7 +13,7 @@ from calmotion.retargeting.problem.adaptive_knots import first_breaks
 from calmotion.retargeting.problem.limits import LimitTerms
 from calmotion.retargeting.problem.offset_basis import basis_on, uniform_breaks
 from calmotion.retargeting.problem.offset_space import BaseOffsets, OffsetSpace
-from calmotion.retargeting.problem.posing import CLOSENESS, SMOOTHNESS, knot_spacing, locked_coefficients
+from calmotion.retargeting.problem.posing import SMOOTHNESS, closeness_of, knot_spacing, locked_coefficients
 from calmotion.retargeting.problem.problem import RetargetProblem
 from calmotion.retargeting.problem.robot import Robot
 from calmotion.retargeting.search import RetargetSearch
@@ -137,7 +137,7 @@ def _posed(
     objective = Objective.over(model, part.intended_of(intended), grid, prepared.shot.animation.weights)
     problem = RetargetProblem(
         model, grid, added(part.curves_of(curves), own), objective,
-        OffsetSpace(basis, motors, coupling, smoothness, CLOSENESS, there), prepared.world,
+        OffsetSpace(basis, motors, coupling, smoothness, closeness_of(character), there), prepared.world,
         LimitTerms(bounds, grid.judged, grid.h, 1.0) if bounds else None,
     )  # fmt: skip
     if beginning is not None:
