@@ -74,7 +74,6 @@ REFUSED = {
     "a floating joint": (urdf(joint=JOINT.replace("revolute", "floating")), "floating joint is not supported"),
     "another file": ("<svg/>", "neither a URDF nor an MJCF"),
     "no XML": ("hello", "no XML file"),
-    "a prefix that is not declared": (urdf().replace('<link name="a"/>', "<drake:joint/>"), "Declare the prefix"),
 }  # fmt: skip
 
 

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import os
+import re
 import shutil
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -21,7 +22,23 @@ _MODULES = ("urdf_usd_converter", "mujoco_usd_converter")
 _PYTHONS = ((3, 10), (3, 12))  # oldest and newest version that they support
 _READY = "ready"
 LONGEST = 1800.0  # time of a conversion [s]
+_BROKEN_OBJ = re.compile(r'Failed to convert mesh(?: "[^"]*" from|:) (.+?\.obj)(?=:|$)', re.IGNORECASE)
 _BAD_WORDS = ("Failed to", "Cannot", "not found")  # of warnings after which a part of the robot is missing
+
+
+class BrokenMeshes(ShotError):
+    """OBJ meshes that a converter refuses, as files.
+
+    Attributes:
+        files: Their paths.
+    """
+
+    def __init__(self, robot: str, meshes: Sequence[str]) -> None:
+        super().__init__(
+            "meshes of the robot cannot be converted", path=robot, attribute="mesh", found=", ".join(meshes[:4]),
+            remedy="Write them anew with a mesh editor, as .stl for example",
+        )  # fmt: skip
+        self.files = tuple(dict.fromkeys(meshes))
 
 
 def environment_folder() -> Path:
@@ -68,6 +85,7 @@ def convert(description: Description, output: str, python: str) -> tuple[str, tu
         The USD file in the folder, and the warnings of the converter.
 
     Raises:
+        BrokenMeshes: OBJ meshes cannot be converted as they are.
         ShotError: The robot cannot be converted.
     """
     module = _MODULES[description.kind != URDF]
@@ -91,6 +109,9 @@ def convert(description: Description, output: str, python: str) -> tuple[str, tu
     warnings = [line.partition("] ")[2].partition("] ")[2] or line for line in lines if "Warning" in line]
     lost = [line for line in warnings if line.startswith(_BAD_WORDS)]
     if lost:
+        broken = [match.group(1) for line in lost if (match := _BROKEN_OBJ.match(line))]
+        if len(broken) == len(lost):
+            raise BrokenMeshes(description.path, broken)
         raise ShotError(
             "a part of the robot cannot be converted", path=description.path, found="; ".join(lost[:3]),
             remedy="Correct the file: meshes are .stl, .obj or .dae, and their names relative to it",

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import os
 import xml.etree.ElementTree as xml
-from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from calmotion.errors import ShotError, raise_all
 from calmotion.support.files import is_special, refuse_special
 from calmotion.support.foreign_files import remedy_for
 from calmotion.support.naming import nearest
+from calmotion.workflow.importing.repairs import faults, parsed, repaired_copy, with_clean_meshes
 
 URDF, MJCF, USD = "urdf", "mjcf", "usd"
 _JOINTS = ("revolute", "continuous", "prismatic", "fixed")
@@ -29,6 +30,7 @@ class Description:
         efforts: Largest effort of each joint of a URDF, where it is positive [N m or N].
         without_mass: Links of a URDF with geometry and without inertia.
         massless: Links of a URDF whose mass is 0, and those with neither inertia nor geometry: frames.
+        faults: What of a URDF is repaired in a copy before it is converted, as sentences for the user.
     """
 
     path: str
@@ -37,6 +39,7 @@ class Description:
     efforts: Mapping[str, float] = field(default_factory=dict)
     without_mass: tuple[str, ...] = ()
     massless: tuple[str, ...] = ()
+    faults: tuple[str, ...] = ()
 
 
 def read_description(path: str, packages: Mapping[str, str]) -> Description:
@@ -49,7 +52,7 @@ def read_description(path: str, packages: Mapping[str, str]) -> Description:
     Raises:
         ShotError: It is neither URDF nor MJCF, is a xacro, or a mesh is missing.
     """
-    root = _root(path)
+    root, prefixes = _root(path)
     if root.tag == "mujoco":
         _refuse_special_files(root, path)
         return Description(path, MJCF)
@@ -72,8 +75,26 @@ def read_description(path: str, packages: Mapping[str, str]) -> Description:
     without = {link for link in links if link.find("inertial") is None}
     weightless = {link for link in links if _number(link.find("inertial/mass"), "value", 1.0) == 0.0}
     return Description(
-        path, URDF, found, _efforts(root), _names(without & shaped), _names(weightless | (without - shaped))
-    )
+        path, URDF, found, _efforts(root), _names(without & shaped), _names(weightless | (without - shaped)),
+        faults(root, prefixes),
+    )  # fmt: skip
+
+
+def repaired(description: Description, folder: str, broken_meshes: Sequence[str] = ()) -> Description:
+    """A description of a repaired copy of a URDF.
+
+    Args:
+        description: The robot.
+        folder: An empty one, for the copy.
+        broken_meshes: OBJ files that cannot be converted as they are.
+    """
+    root, _ = _root(description.path)
+
+    def file(name: str) -> str:
+        return mesh_file(name, description.path, description.packages)
+
+    with_clean_meshes(root, broken_meshes, folder, file)
+    return replace(description, path=repaired_copy(root, description.path, folder, file))
 
 
 def _refuse_other_joints(root: xml.Element, path: str) -> None:
@@ -89,10 +110,16 @@ def _refuse_other_joints(root: xml.Element, path: str) -> None:
     raise_all(problems)
 
 
-def _root(path: str) -> xml.Element:
+def _root(path: str) -> tuple[xml.Element, tuple[str, ...]]:
+    """The root, and prefixes that nothing declares."""
     try:
         refuse_special(path)
-        return xml.parse(path).getroot()  # nosec B314  # expat limits the expansion of entities
+        try:
+            return xml.parse(path).getroot(), ()  # nosec B314  # expat limits the expansion of entities
+        except xml.ParseError as error:
+            if "unbound prefix" not in str(error):
+                raise
+            return parsed(Path(path).read_text(encoding="utf-8"))
     except OSError as error:
         raise ShotError(
             "the robot cannot be read", path=path, found=error.strerror, remedy="Check the path of the file"
@@ -100,9 +127,7 @@ def _root(path: str) -> xml.Element:
     except (xml.ParseError, UnicodeDecodeError, ValueError) as error:
         raise ShotError(
             "the robot is no XML file, or it is damaged", path=path, found=error,
-            remedy="Declare the prefix, as in <robot xmlns:drake=...>, or remove its elements"
-            if "unbound prefix" in str(error)
-            else remedy_for(path, URDF) or "Name a .urdf file, or an .xml file of MuJoCo",
+            remedy=remedy_for(path, URDF) or "Name a .urdf file, or an .xml file of MuJoCo",
         ) from error  # fmt: skip
 
 
@@ -131,7 +156,7 @@ def _refuse_special_files(root: xml.Element, path: str, seen: frozenset[str] = f
                         attribute=f"{node.tag}.file", found=name, remedy="Name a file",
                     )  # fmt: skip
                 if node.tag == "include" and os.path.isfile(file) and file not in seen:
-                    _refuse_special_files(_root(file), file, seen | {file})
+                    _refuse_special_files(_root(file)[0], file, seen | {file})
 
 
 def _packages(root: xml.Element, path: str, given: Mapping[str, str]) -> dict[str, str]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path as FilePath
@@ -21,8 +22,8 @@ from calmotion.usd.layers import EXTENSIONS, refuse_input_as_output, write_layer
 from calmotion.usd.reading.shot import read_shot
 from calmotion.usd.writing.root import relative_asset
 from calmotion.version import __version__
-from calmotion.workflow.importing.converters import convert, converter_python, temporary_folder
-from calmotion.workflow.importing.descriptions import USD, Description, read_description
+from calmotion.workflow.importing.converters import BrokenMeshes, convert, converter_python, temporary_folder
+from calmotion.workflow.importing.descriptions import USD, Description, read_description, repaired
 from calmotion.workflow.materials import known_materials
 from calmotion.workflow.problems import problems_of, value_of
 from calmotion.workflow.shot import Given, Path, read_settings
@@ -209,7 +210,7 @@ class _Import:
         self._refuse_foreign_folder()
         with temporary_folder(self._layer) as work:
             parts = os.path.join(work, os.path.basename(self._folder))
-            converted, warnings = convert(self._description, parts, python)
+            converted, warnings, changes = self._converted(work, parts, python)
             FilePath(parts, _MARKER).touch()
             asset = f"./{os.path.basename(parts)}/{os.path.basename(converted)}"
             layer, notes = robot_layer(converted, asset, self._options)
@@ -220,7 +221,23 @@ class _Import:
             self._move(parts, draft)
         character, animation = read[0]
         told = [f"converter: {text}" for text in warnings]
-        return ImportedRobot(self._layer, self._folder, character, animation, (*notes, *told, *character.notes))
+        return ImportedRobot(
+            self._layer, self._folder, character, animation, (*changes, *notes, *told, *character.notes)
+        )
+
+    def _converted(self, work: str, parts: str, python: str) -> tuple[str, tuple[str, ...], tuple[str, ...]]:
+        """The converted robot, warnings of the converter, and what was repaired for it."""
+        description, changes = self._description, self._description.faults
+        if changes:
+            description = repaired(description, _folder(work, "repaired"))
+        try:
+            return *convert(description, parts, python), changes
+        except BrokenMeshes as broken:
+            shutil.rmtree(parts, ignore_errors=True)
+            description = repaired(description, _folder(work, "cleaned"), broken.files)
+            names = ", ".join(os.path.basename(file) for file in broken.files)
+            changes += (f"meshes with loose points or normals are converted without these: {names}",)
+            return *convert(description, parts, python), changes
 
     def _move(self, parts: str, draft: str) -> None:
         former = None
@@ -244,6 +261,12 @@ class _Import:
                 path=self._folder,
                 remedy="Choose another output, or move the folder.",
             )
+
+
+def _folder(parent: str, name: str) -> str:
+    path = os.path.join(parent, name)
+    os.mkdir(path)
+    return path
 
 
 def _refuse_wrong_output(layer: str) -> None:

@@ -1,0 +1,165 @@
+"""Repairs of robots that others read and the converters refuse: a copy of a URDF, and of meshes, is converted instead.
+
+Repaired are prefixes that nothing declares, a robot without a name, joints that follow (mimic) a later one, and OBJ
+meshes with points, normals or texture coordinates that no face, or not every face, refers to.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import xml.etree.ElementTree as xml
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+
+_FOREIGN = "urn:undeclared:"
+_PREFIX = re.compile(r"(?:</?|\s)([A-Za-z_][\w.-]*):[A-Za-z_][\w.-]*(?=[\s/>=])")
+_ROOT = re.compile(r"<(robot|mujoco)(?=[\s/>])")
+_KEPT = ("usemtl", "o", "g")  # lines of an OBJ that stay as they are
+
+
+def parsed(text: str) -> tuple[xml.Element, tuple[str, ...]]:
+    """The root of an XML robot, its undeclared prefixes declared, and those prefixes.
+
+    Raises:
+        xml.ParseError: It is damaged in another way.
+    """
+    try:
+        return xml.fromstring(text), ()  # nosec B314  # expat limits the expansion of entities
+    except xml.ParseError as error:
+        if "unbound prefix" not in str(error):
+            raise
+    bare = re.sub(r"<!--.*?-->|<\?.*?\?>", "", text, flags=re.DOTALL)
+    declared = set(re.findall(r"xmlns:([\w.-]+)\s*=", bare)) | {"xml", "xmlns"}
+    prefixes = sorted(set(_PREFIX.findall(bare)) - declared)
+    names = "".join(f' xmlns:{prefix}="{_FOREIGN}{prefix}"' for prefix in prefixes)
+    whole = _ROOT.sub(lambda match: match.group(0) + names, bare, count=1)
+    return xml.fromstring(whole), tuple(prefixes)  # nosec B314
+
+
+def faults(root: xml.Element, prefixes: Sequence[str]) -> tuple[str, ...]:
+    """What of a URDF is repaired, as sentences for the user."""
+    found = []
+    if prefixes:
+        names = ", ".join(f"{prefix}:" for prefix in prefixes)
+        found.append(f"elements with the prefixes {names}, which nothing declares, are left out")
+    if not root.get("name"):
+        found.append("the robot has no name, and gets that of its file")
+    late = [joint.get("name", "") for joint in _late_followers(root)]
+    if late:
+        found.append(f"joints that follow a later one are moved behind it: {', '.join(late)}")
+    return tuple(found)
+
+
+def repaired_copy(root: xml.Element, path: str, folder: str, mesh_file: Callable[[str], str]) -> str:
+    """Write a repaired URDF.
+
+    Args:
+        root: Of the robot, as `parsed` gives it; it is changed.
+        path: The robot's file.
+        folder: Where the copy is written.
+        mesh_file: The file that the name of a mesh or texture means.
+
+    Returns:
+        The copy, which names its meshes by their whole paths.
+    """
+    _leave_out_foreign(root)
+    if not root.get("name"):
+        root.set("name", re.sub(r"\W", "_", Path(path).stem))
+    order = {id(joint): k for k, joint in enumerate(_leaders_first(root))}
+    joints = [node for node in root if node.tag == "joint"]
+    places = [k for k, node in enumerate(root) if node.tag == "joint"]
+    for place, joint in zip(places, sorted(joints, key=lambda node: order[id(node)]), strict=True):
+        root[place] = joint
+    for node in (*root.iter("mesh"), *root.iter("texture")):
+        name = node.get("filename", "")
+        if name and os.path.isfile(mesh_file(name)):
+            node.set("filename", os.path.abspath(mesh_file(name)))
+    copy = os.path.join(folder, os.path.basename(path))
+    xml.ElementTree(root).write(copy, encoding="unicode")
+    return copy
+
+
+def _leave_out_foreign(root: xml.Element) -> None:
+    for node in root.iter():
+        for child in [child for child in node if str(child.tag).startswith(f"{{{_FOREIGN}")]:
+            node.remove(child)
+        for name in [name for name in node.attrib if name.startswith(f"{{{_FOREIGN}")]:
+            del node.attrib[name]
+
+
+def _late_followers(root: xml.Element) -> list[xml.Element]:
+    """Joints that follow one further down in the file."""
+    joints = root.findall("joint")
+    place = {joint.get("name"): k for k, joint in enumerate(joints)}
+    return [joint for k, joint in enumerate(joints) if place.get(_leader(joint), -1) > k]
+
+
+def _leader(joint: xml.Element) -> str | None:
+    mimic = joint.find("mimic")
+    return None if mimic is None else mimic.get("joint")
+
+
+def _leaders_first(root: xml.Element) -> Iterator[xml.Element]:
+    """The joints of a robot, each behind the one that it follows, otherwise in their order."""
+    joints = {joint.get("name"): joint for joint in root.findall("joint")}
+    done: set[int] = set()
+    for joint in root.findall("joint"):
+        chain: list[xml.Element] = []
+        node: xml.Element | None = joint
+        while node is not None and id(node) not in done:
+            chain.append(node)
+            done.add(id(node))
+            node = joints.get(_leader(node))
+        yield from reversed(chain)
+
+
+def with_clean_meshes(root: xml.Element, broken: Sequence[str], folder: str, mesh_file: Callable[[str], str]) -> None:
+    """Let a robot name clean copies of OBJ meshes.
+
+    Args:
+        root: Of the robot; it is changed.
+        broken: The meshes that cannot be converted, as files.
+        folder: Where the copies are written.
+        mesh_file: The file that the name of a mesh means.
+    """
+    wrong = {os.path.realpath(path) for path in broken}
+    copies: dict[str, str] = {}
+    for node in root.iter("mesh"):
+        source = os.path.realpath(mesh_file(node.get("filename", "")))
+        if source not in wrong:
+            continue
+        if source not in copies:
+            # a folder for each: names repeat, and materials are found beside the mesh
+            place = os.path.join(folder, f"mesh_{len(copies)}")
+            os.makedirs(place)
+            copies[source] = os.path.join(place, os.path.basename(source))
+            text = Path(source).read_text(encoding="utf-8", errors="replace")
+            Path(copies[source]).write_text(clean_obj(text), encoding="utf-8")
+            for library in re.findall(r"^\s*mtllib\s+(.+?)\s*$", text, flags=re.MULTILINE):
+                materials = os.path.join(os.path.dirname(source), library)
+                if os.path.isfile(materials):
+                    shutil.copy(materials, os.path.join(place, os.path.basename(library)))
+        node.set("filename", copies[source])
+
+
+def clean_obj(text: str) -> str:
+    """An OBJ with the same faces and materials, whose points all belong to faces, without normals and textures."""
+    points: list[str] = []
+    numbers: dict[int, int] = {}
+    lines: list[str] = []
+    for line in text.replace("\\\n", " ").splitlines():
+        kind, _, rest = line.strip().partition(" ")
+        if kind == "v":
+            points.append(" ".join(rest.split()[:3]))
+        elif kind == "f":
+            corners = [int(word.split("/")[0]) for word in rest.split()]
+            corners = [corner - 1 if corner > 0 else len(points) + corner for corner in corners]
+            if len(set(corners)) > 2 and all(0 <= corner < len(points) for corner in corners):
+                lines.append("f " + " ".join(str(numbers.setdefault(c, len(numbers) + 1)) for c in corners))
+        elif kind == "mtllib":
+            lines.insert(0, f"mtllib {os.path.basename(rest.strip())}")
+        elif kind in _KEPT:
+            lines.append(line.strip())
+    return "\n".join([*(f"v {points[index]}" for index in numbers), *lines]) + "\n"

@@ -1,0 +1,111 @@
+"""Repairs of what converters refuse: the copies say the same as the robot."""
+
+from __future__ import annotations
+
+import os
+import xml.etree.ElementTree as xml
+from pathlib import Path
+
+import pytest
+import trimesh
+from calmotion.workflow.importing import robot as importing
+from calmotion.workflow.importing.converters import BrokenMeshes
+from calmotion.workflow.importing.descriptions import read_description, repaired
+from calmotion.workflow.importing.repairs import clean_obj, parsed
+from converted_arm import CONVERTED
+
+LINK = '<link name="{0}"><visual><geometry><mesh filename="{1}"/></geometry></visual>'
+LINK += '<inertial><mass value="1"/></inertial></link>'
+JOINT = '<joint name="{0}" type="continuous"><parent link="{1}"/><child link="{2}"/>{3}</joint>'
+MIMIC = '<mimic joint="{0}" multiplier="2"/>'
+CORNERS = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\n"
+OBJ = {
+    "loose points": "v 9 9 9\nv 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 2 4 3\nf 2 3 5\nf 3 4 5\nf 4 2 5\n",
+    "normals of some faces": f"{CORNERS}vn 0 0 -1\nf 1//1 3//1 2//1\nf 1 2 4\nf 2 3 4\nf 3 1 4\n",
+    "counted from the end": f"{CORNERS}f -4 -2 -3\nf -4 -3 -1\nf -3 -2 -1\nf -2 -4 -1\n",
+    "faces that are lines": f"{CORNERS}f 1 2\nf 1 3 2\nf 1 1 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\nl 1 2\n",
+}
+
+
+def written(tmp_path, body, name='name="arm"'):
+    (tmp_path / "part.obj").write_text(OBJ["loose points"])
+    robot = tmp_path / "arm.urdf"
+    robot.write_text(f"<robot {name}>{body}</robot>")
+    return robot
+
+
+def chain():
+    """Followers stand before their leaders: c follows b, which follows a."""
+    links = "".join(LINK.format(name, "part.obj") for name in "uvwx")
+    joints = (("c", "w", "x", MIMIC.format("b")), ("b", "v", "w", MIMIC.format("a")), ("a", "u", "v", ""))
+    return links + "".join(JOINT.format(*joint) for joint in joints)
+
+
+def copy_of(robot: Path, folder: Path, broken=()):
+    description = read_description(str(robot), {})
+    folder.mkdir()
+    return description, xml.parse(repaired(description, str(folder), broken).path).getroot()
+
+
+def test_joints_stand_behind_those_that_they_follow(tmp_path):
+    description, root = copy_of(written(tmp_path, chain()), tmp_path / "copy")
+    assert [joint.get("name") for joint in root.findall("joint")] == ["a", "b", "c"]
+    assert "c, b" in description.faults[0]
+    mesh = root.find("link/visual/geometry/mesh").get("filename")
+    assert os.path.isabs(mesh) and os.path.samefile(mesh, tmp_path / "part.obj")
+
+
+def test_a_robot_gets_the_name_of_its_file(tmp_path):
+    description, root = copy_of(written(tmp_path, LINK.format("a", "part.obj"), ""), tmp_path / "copy")
+    assert root.get("name") == "arm" and "no name" in description.faults[0]
+
+
+def test_elements_with_a_prefix_that_nothing_declares_are_left_out(tmp_path):
+    body = f'<drake:diff/>{LINK.format("a", "part.obj")}<!-- odd:one --><joint name="j" drake:x="1" type="fixed"/>'
+    description, root = copy_of(written(tmp_path, body), tmp_path / "copy")
+    assert "drake:" in description.faults[0] and "odd" not in description.faults[0]
+    assert [node.tag for node in root] == ["link", "joint"] and set(root.find("joint").attrib) == {"name", "type"}
+
+
+def test_a_damaged_file_is_not_repaired():
+    with pytest.raises(xml.ParseError):
+        parsed("<robot><link></robot>")
+
+
+def test_nothing_is_repaired_of_a_sound_robot(tmp_path):
+    assert read_description(str(written(tmp_path, LINK.format("a", "part.obj"))), {}).faults == ()
+
+
+@pytest.mark.parametrize("name", OBJ)
+def test_a_clean_mesh_is_the_same_solid(name):
+    text = clean_obj(OBJ[name])
+    mesh = trimesh.load(trimesh.util.wrap_as_stream(text), file_type="obj", process=False)
+    assert mesh.volume == pytest.approx(1 / 6) and len(mesh.vertices) == 4 and len(mesh.faces) == 4
+    assert "vn" not in text and text.count("v ") == 4
+
+
+def test_a_clean_mesh_keeps_its_materials_and_polygons():
+    text = clean_obj(f"mtllib some/colors.mtl\n{CORNERS}v 1 1 0\nusemtl red\nf 1/1 2/2 5/3 3/4\n")
+    assert text.splitlines()[0] == "v 0 0 0" and "mtllib colors.mtl" in text and "usemtl red\nf 1 2 3 4" in text
+
+
+def test_a_robot_is_converted_again_with_clean_meshes(tmp_path, monkeypatch):
+    robot, seen = written(tmp_path, chain()), []
+
+    def convert(description, output, python):
+        root = xml.parse(description.path).getroot()
+        meshes = {mesh.get("filename") for mesh in root.iter("mesh")}
+        seen.append(meshes)
+        Path(output).mkdir()
+        if any(os.path.samefile(mesh, tmp_path / "part.obj") for mesh in meshes):
+            raise BrokenMeshes(description.path, [str(tmp_path / "part.obj")])
+        assert all(len(trimesh.load(mesh).vertices) == 4 for mesh in meshes)
+        Path(output, "arm.usda").write_text(CONVERTED)
+        return str(Path(output, "arm.usda")), ()
+
+    monkeypatch.setattr(importing, "convert", convert)
+    monkeypatch.setattr(importing, "converter_python", lambda named, tell: "python")
+    made = importing.import_robot(robot, layer=tmp_path / "shot.usda", solid="abs")
+    assert len(seen) == 2 and any("part.obj" in note for note in made.notes)
+    assert any("moved behind it" in note for note in made.notes)
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["arm.urdf", "part.obj", "shot.usda", "shot_robot"]
