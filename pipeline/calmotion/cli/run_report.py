@@ -61,6 +61,23 @@ def print_shares(console: Console, shares: Sequence[dict[str, Any]]) -> None:
     print_table(console, title, ["target", "motors alone", "links alone"], rows)
 
 
+def print_support(console: Console, reactions: Sequence[dict[str, Any]]) -> None:
+    """Whether a base that nothing joins to the world would stand."""
+    for row in reactions:
+        margin = row["support_margin_m"]
+        if margin is None:
+            continue
+        at = f"at {row['support_time_s']:.3f} s"
+        if margin < 0.0:
+            say(
+                console,
+                f"{row['body']} would tip over {at}: nothing joins it to the world, and the centre of pressure is "
+                f"{length(-margin)} outside of what it stands on. Hold it by a joint to the world, or move slower",
+            )
+        else:
+            say(console, f"{row['body']} stands: its centre of pressure stays {length(margin)} inside ({at})")
+
+
 def print_lost_motion(console: Console, lost: dict[str, Any] | None, suffix: str) -> None:
     """What the play of gears would do at the target that it moves farthest.
 
@@ -277,6 +294,7 @@ def print_warnings(console: Console, report: dict[str, Any]) -> None:
         say(console, f"{report['refined_steps']} steps were divided into smaller ones: try a smaller --step")
     print_joint_gap(console, report["max_joint_gap_m"])
     print_efforts(console, report["efforts"], True)
+    print_support(console, report["reactions"])
 
 
 def print_work(console: Console, report: dict[str, Any]) -> None:
@@ -298,3 +316,6 @@ def print_work(console: Console, report: dict[str, Any]) -> None:
         + (f", peak memory {report['peak_memory_gb']:.2f} GB" if report["peak_memory_gb"] else ""),
     )
     print_efforts(console, report["efforts"], False)
+    for row in report["reactions"]:
+        force, moment = f"{row['max_force_n']:.4g} N", f"{row['max_moment_n_m']:.4g} N m"
+        say(console, f"the world holds {row['body']} with up to {force} and {moment}")

@@ -6,13 +6,14 @@ import calmotion as cm
 import numpy as np
 import pytest
 from calmotion.errors import ShotError
+from calmotion.usd.transforms import rotation_from_quaternion
 from pxr import Gf, UsdGeom, UsdPhysics
 from small_shots import BASE, ELBOW, FRAMES, SHOULDER, TARGET_POSITION, write_arm
 
 SWAY = 0.02
 
 
-def passive(stage):
+def passive(stage, kinematic=True):
     """Both hinges free and hanging down, on a base that sways along y, across their axes, which are along x."""
     stage.RemovePrim("/Arm/joints/stand")
     for path in (SHOULDER, ELBOW):
@@ -20,22 +21,22 @@ def passive(stage):
         prim.RemoveAppliedSchema("PhysicsDriveAPI:angular")
         prim.RemoveProperty(TARGET_POSITION)
     base = UsdGeom.Xformable(stage.GetPrimAtPath(BASE))
-    UsdPhysics.RigidBodyAPI(base).CreateKinematicEnabledAttr(True)
+    UsdPhysics.RigidBodyAPI(base).CreateKinematicEnabledAttr(kinematic)
     op = base.GetOrderedXformOps()[0]
     for frame in range(FRAMES + 1):
         op.Set(Gf.Vec3d(SWAY * 0.5 * (1.0 - np.cos(2.0 * np.pi * frame / FRAMES)), 0.0, 1.0), frame)
 
 
-def test_a_passive_linkage_swings_with_its_root(tmp_path):
-    result = cm.simulate(write_arm(tmp_path / "arm.usda", passive), step=1 / 240, pre_roll=0.0)
+@pytest.mark.parametrize("kinematic", [True, False])
+def test_a_passive_linkage_swings_with_its_root(tmp_path, kinematic):
+    path = write_arm(tmp_path / "arm.usda", lambda stage: passive(stage, kinematic))
+    result = cm.simulate(path, step=1 / 240, pre_roll=0.0)
     character, motion = result.shot.character, result.result.before.motion
     assert not character.motors and any("move freely" in note for note in character.notes)
     # forces on what hangs are those that its centre of mass needs, so momentum is conserved
     masses = np.array([body.mass.mass for body in character.bodies])
     base = next(k for k, body in enumerate(character.bodies) if body.path == BASE)
     root = next(k for k, joint in enumerate(character.joints) if joint.body0 < 0)
-    from calmotion.usd.transforms import rotation_from_quaternion
-
     R = rotation_from_quaternion(motion.rotations)
     centers = motion.positions + np.einsum("nbij,bj->nbi", R, np.array([b.mass.center for b in character.bodies]))
     momentum = np.einsum("b,nbi->ni", masses, np.gradient(centers, motion.times, axis=0))

@@ -71,7 +71,6 @@ REFUSED = {
     "a mesh that is missing": (urdf(mesh("b.stl")), "b.stl of b"),
     "a xacro": (urdf().replace("<robot", '<robot xmlns:xacro="http://www.ros.org/wiki/xacro"').replace(
         '<link name="a"/>', '<xacro:arm/><link name="a"/>'), "xacro"),
-    "a floating joint": (urdf(joint=JOINT.replace("revolute", "floating")), "floating joint is not supported"),
     "another file": ("<svg/>", "neither a URDF nor an MJCF"),
     "no XML": ("hello", "no XML file"),
 }  # fmt: skip

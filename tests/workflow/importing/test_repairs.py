@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 import trimesh
+from calmotion.errors import ShotError
 from calmotion.workflow.importing import robot as importing
 from calmotion.workflow.importing.converters import BrokenMeshes
 from calmotion.workflow.importing.descriptions import read_description, repaired
@@ -65,6 +66,17 @@ def test_elements_with_a_prefix_that_nothing_declares_are_left_out(tmp_path):
     description, root = copy_of(written(tmp_path, body), tmp_path / "copy")
     assert "drake:" in description.faults[0] and "odd" not in description.faults[0]
     assert [node.tag for node in root] == ["link", "joint"] and set(root.find("joint").attrib) == {"name", "type"}
+
+
+@pytest.mark.parametrize("kind", ["floating", "planar"])
+def test_a_root_that_floats_becomes_fixed_but_no_other_joint(tmp_path, kind):
+    body = chain().replace('name="a" type="continuous"', f'name="a" type="{kind}"')
+    description, root = copy_of(written(tmp_path, body), tmp_path / "copy")
+    assert [joint.get("type") for joint in root.findall("joint")] == ["fixed", "continuous", "continuous"]
+    assert any("a becomes fixed" in fault for fault in description.faults)
+    inner = chain().replace('name="c" type="continuous"', f'name="c" type="{kind}"')
+    with pytest.raises(ShotError, match=f"a {kind} joint is not supported"):
+        read_description(str(written(tmp_path, inner)), {})
 
 
 def test_a_damaged_file_is_not_repaired():

@@ -277,8 +277,13 @@ def _with_parts_between(skeleton: Skeleton, real: Sequence[Body], meters: float)
 
 
 def _root_moves(reading: Reading, prims: dict[str, Usd.Prim], joints: Sequence[JointPrim]) -> bool:
-    """Whether the shot moves a kinematic body, or what a joint to the world is on."""
-    roots = [prim for prim in prims.values() if prim.GetAttribute("physics:kinematicEnabled").Get()]
+    """Whether the shot moves a kinematic body, one that hangs on no joint, or what a joint to the world is on."""
+    carried = {joint.body1 for joint in joints}
+    roots = [
+        prim
+        for path, prim in prims.items()
+        if path not in carried or prim.GetAttribute("physics:kinematicEnabled").Get()
+    ]
     return any(moves(reading, prim) is not None for prim in roots) or any(
         joint.body0 == "" and on_moving_prim(reading, joint) for joint in joints
     )

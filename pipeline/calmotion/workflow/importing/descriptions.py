@@ -12,7 +12,7 @@ from calmotion.errors import ShotError, raise_all
 from calmotion.support.files import is_special, refuse_special
 from calmotion.support.foreign_files import remedy_for
 from calmotion.support.naming import nearest
-from calmotion.workflow.importing.repairs import faults, parsed, repaired_copy, with_clean_meshes
+from calmotion.workflow.importing.repairs import faults, parsed, repaired_copy, root_joints, with_clean_meshes
 
 URDF, MJCF, USD = "urdf", "mjcf", "usd"
 _JOINTS = ("revolute", "continuous", "prismatic", "fixed")
@@ -99,13 +99,14 @@ def repaired(description: Description, folder: str, broken_meshes: Sequence[str]
 
 def _refuse_other_joints(root: xml.Element, path: str) -> None:
     """Refuse joints that no motor of Calmotion can be, and which a converter drops."""
+    loose = root_joints(root)
     problems = [
         ShotError(
             f"a {joint.get('type')} joint is not supported", path=path, attribute=joint.get("name", "joint"),
-            found=joint.get("type"), remedy=f"Write one of {', '.join(_JOINTS)}; a base that stands is fixed",
+            found=joint.get("type"), remedy=f"Write one of {', '.join(_JOINTS)}",
         )
         for joint in root.findall("joint")
-        if joint.get("type") not in _JOINTS
+        if joint.get("type") not in _JOINTS and joint not in loose
     ]  # fmt: skip
     raise_all(problems)
 

@@ -1,7 +1,8 @@
 """Repairs of robots that others read and the converters refuse: a copy of a URDF, and of meshes, is converted instead.
 
 Repaired are prefixes that nothing declares, a robot without a name, joints that follow (mimic) a later one, and OBJ
-meshes with points, normals or texture coordinates that no face, or not every face, refers to.
+meshes with points, normals or texture coordinates that no face, or not every face, refers to. A root that floats, or
+slides on a plane, becomes fixed: a shot moves a root by its transform.
 """
 
 from __future__ import annotations
@@ -49,7 +50,25 @@ def faults(root: xml.Element, prefixes: Sequence[str]) -> tuple[str, ...]:
     late = [joint.get("name", "") for joint in _late_followers(root)]
     if late:
         found.append(f"joints that follow a later one are moved behind it: {', '.join(late)}")
+    loose = [joint.get("name", "") for joint in root_joints(root)]
+    if loose:
+        found.append(
+            f"the root stands where it is: {', '.join(loose)} becomes fixed; to move it, animate the transform of the "
+            "robot's first body"
+        )
     return tuple(found)
+
+
+def root_joints(root: xml.Element) -> list[xml.Element]:
+    """Floating and planar joints of a URDF by which its root moves in the world."""
+    children = {child.get("link") for child in root.findall("joint/child")}
+    return [
+        joint
+        for joint in root.findall("joint")
+        if joint.get("type") in ("floating", "planar")
+        and (parent := joint.find("parent")) is not None
+        and parent.get("link") not in children
+    ]
 
 
 def repaired_copy(root: xml.Element, path: str, folder: str, mesh_file: Callable[[str], str]) -> str:
@@ -65,6 +84,8 @@ def repaired_copy(root: xml.Element, path: str, folder: str, mesh_file: Callable
         The copy, which names its meshes by their whole paths.
     """
     _leave_out_foreign(root)
+    for joint in root_joints(root):
+        joint.set("type", "fixed")
     if not root.get("name"):
         root.set("name", re.sub(r"\W", "_", Path(path).stem))
     order = {id(joint): k for k, joint in enumerate(_leaders_first(root))}
