@@ -56,6 +56,13 @@ def test_joints_stand_behind_those_that_they_follow(tmp_path):
     assert os.path.isabs(mesh) and os.path.samefile(mesh, tmp_path / "part.obj")
 
 
+def test_a_joint_that_follows_one_that_is_not_there_moves_by_itself(tmp_path):
+    body = chain().replace('mimic joint="b"', 'mimic joint="gone"')
+    description, root = copy_of(written(tmp_path, body), tmp_path / "copy")
+    assert [joint.get("name") for joint in root.findall("joint") if joint.find("mimic") is not None] == ["b"]
+    assert any("not there" in fault and fault.endswith(": c") for fault in description.faults)
+
+
 def test_a_robot_gets_the_name_of_its_file(tmp_path):
     description, root = copy_of(written(tmp_path, LINK.format("a", "part.obj"), ""), tmp_path / "copy")
     assert root.get("name") == "arm" and "no name" in description.faults[0]

@@ -1,8 +1,8 @@
 """Repairs of robots that others read and the converters refuse: a copy of a URDF, and of meshes, is converted instead.
 
-Repaired are prefixes that nothing declares, a robot without a name, joints that follow (mimic) a later one, and OBJ
-meshes with points, normals or texture coordinates that no face, or not every face, refers to. A root that floats, or
-slides on a plane, becomes fixed: a shot moves a root by its transform.
+Repaired are prefixes that nothing declares, a robot without a name, joints that follow (mimic) a later one or none, and
+OBJ meshes with points, normals or texture coordinates that no face, or not every face, refers to. A root that floats,
+or slides on a plane, becomes fixed: a shot moves a root by its transform.
 """
 
 from __future__ import annotations
@@ -50,6 +50,9 @@ def faults(root: xml.Element, prefixes: Sequence[str]) -> tuple[str, ...]:
     late = [joint.get("name", "") for joint in _late_followers(root)]
     if late:
         found.append(f"joints that follow a later one are moved behind it: {', '.join(late)}")
+    lost = [joint.get("name", "") for joint in _followers_of_none(root)]
+    if lost:
+        found.append(f"joints that follow one that is not there move by themselves: {', '.join(lost)}")
     loose = [joint.get("name", "") for joint in root_joints(root)]
     if loose:
         found.append(
@@ -86,6 +89,8 @@ def repaired_copy(root: xml.Element, path: str, folder: str, mesh_file: Callable
     _leave_out_foreign(root)
     for joint in root_joints(root):
         joint.set("type", "fixed")
+    for joint in _followers_of_none(root):
+        joint[:] = [node for node in joint if node.tag != "mimic"]
     if not root.get("name"):
         root.set("name", re.sub(r"\W", "_", Path(path).stem))
     order = {id(joint): k for k, joint in enumerate(_leaders_first(root))}
@@ -115,6 +120,12 @@ def _late_followers(root: xml.Element) -> list[xml.Element]:
     joints = root.findall("joint")
     place = {joint.get("name"): k for k, joint in enumerate(joints)}
     return [joint for k, joint in enumerate(joints) if place.get(_leader(joint), -1) > k]
+
+
+def _followers_of_none(root: xml.Element) -> list[xml.Element]:
+    """Joints that follow one that the robot does not have."""
+    names = {joint.get("name") for joint in root.findall("joint")}
+    return [joint for joint in root.findall("joint") if joint.find("mimic") is not None and _leader(joint) not in names]
 
 
 def _leader(joint: xml.Element) -> str | None:
