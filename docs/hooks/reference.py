@@ -6,6 +6,7 @@ import inspect
 import os
 import re
 import sys
+import tomllib
 from pathlib import Path
 from typing import Any
 
@@ -30,22 +31,25 @@ def schemas() -> str:
     from pxr import Sdf
 
     layer = Sdf.Layer.FindOrOpen(str(ROOT / "usd_schemas" / "calmotion" / "schema.usda"))
-    lines = ["# Schemas", "", (ROOT / "docs" / "reference" / "schemas_head.txt").read_text().strip(), ""]
+    folder = ROOT / "docs" / "reference"
+    use = tomllib.loads((folder / "schema_use.toml").read_text())
+    lines = ["# Schemas", "", (folder / "schemas_head.txt").read_text().strip(), ""]
     for prim in layer.rootPrims:
         if not prim.name.startswith("Calm"):
             continue
         lines += [f"## {prim.name}", "", plain(prim.documentation), ""]
-        lines += ["| attribute | type | default | meaning |", "| --- | --- | --- | --- |"]
+        lines += ["| attribute | type | unit | default | meaning | when to set it |"]
+        lines += ["| --- | --- | --- | --- | --- | --- |"]
         for attribute in prim.attributes:
-            lines.append(schema_row(attribute))
+            lines.append(schema_row(attribute, use.get(attribute.name, {})))
         for relationship in prim.relationships:
-            lines.append(f"| `{relationship.name}` | relationship | | {cell(relationship.documentation)} |")
+            lines.append(f"| `{relationship.name}` | relationship | | | {cell(relationship.documentation)} | |")
         lines.append("")
     return "\n".join(lines)
 
 
-def schema_row(attribute: Any) -> str:
-    """One attribute of a schema."""
+def schema_row(attribute: Any, use: dict[str, str]) -> str:
+    """One attribute of a schema, with its unit and when to set it."""
     default = attribute.default
     if isinstance(default, float):
         default = f"{default:.6g}"
@@ -54,7 +58,8 @@ def schema_row(attribute: Any) -> str:
     tokens = attribute.GetInfo("allowedTokens") if attribute.HasInfo("allowedTokens") else ()
     if tokens:
         meaning += " One of " + ", ".join(f"`{token}`" for token in tokens) + "."
-    return f"| `{attribute.name}` | {attribute.typeName} | {shown} | {meaning} |"
+    unit, when = use.get("unit", ""), cell(use.get("use", ""))
+    return f"| `{attribute.name}` | {attribute.typeName} | {unit} | {shown} | {meaning} | {when} |"
 
 
 def plain(text: str) -> str:

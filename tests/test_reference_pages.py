@@ -1,0 +1,102 @@
+"""The pages of the reference, the citation and the container file, against what they describe."""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+import re
+import shlex
+import tomllib
+
+import pytest
+import yaml
+
+# exponents of mass, length and time of each row of the table of units
+DIMENSIONS = {
+    "length, tolerance, element size": (0, 1, 0), "mass": (1, 0, 0), "Young's modulus": (1, -1, -2),
+    "density": (1, -3, 0), "torque (`maxTorque`)": (1, 2, -2), "force of a prismatic motor": (1, 1, -2),
+    "stiffness of a revolute drive": (1, 2, -2), "damping of a revolute drive": (1, 2, -1), "armature": (1, 2, 0),
+    "speed of a motor": (0, 0, -1),
+}  # fmt: skip
+DEGREE = 3.14159265358979 / 180.0
+
+
+def test_the_factors_between_units_follow_from_their_dimensions(repository):
+    page = (repository / "docs" / "reference" / "schemas_head.txt").read_text()
+    rows = [line.split("|")[1:-1] for line in page.splitlines() if line.startswith("| ")][2:]
+    assert {row[0].strip() for row in rows} == set(DIMENSIONS)
+    for name, _, *factors in ([cell.strip() for cell in row] for row in rows):
+        mass, length, _ = DIMENSIONS[name]
+        angle = DEGREE if "drive" in name else 1.0 / DEGREE if "speed" in name else 1.0
+        for text, grams, units in zip(factors, (1, 1, 1000), (1, 100, 1000), strict=True):
+            found = float(re.match(r"[\d.e+-]+", text)[0])
+            assert found == pytest.approx(angle * grams**mass * units**length, rel=1e-3), (name, text)
+
+
+def test_advice_on_attributes_is_about_attributes_there_are(repository):
+    from pxr import Sdf
+
+    layer = Sdf.Layer.FindOrOpen(str(repository / "usd_schemas" / "calmotion" / "schema.usda"))
+    there = {attribute.name for prim in layer.rootPrims for attribute in prim.attributes}
+    advice = tomllib.loads((repository / "docs" / "reference" / "schema_use.toml").read_text())
+    assert len(advice) > 40 and set(advice) <= there
+    assert all(set(entry) == {"unit", "use"} and all(entry.values()) for entry in advice.values())
+
+
+def test_the_page_of_schemas_has_units_defaults_and_advice(repository):
+    path = repository / "docs" / "hooks" / "reference.py"
+    spec = importlib.util.spec_from_file_location("reference_hook", path)
+    hook = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(hook)
+    (row,) = [line for line in hook.schemas().splitlines() if line.startswith("| `calm:target:rotationWeight`")]
+    assert row.split("|")[2:5] == [" float ", " m² (of rad²) ", " `0` "] and "0.05" in row
+
+
+def test_the_keys_of_an_export_are_those_of_the_page(repository, tmp_path, calmotion):
+    from one_hinge import ONE_HINGE
+
+    (tmp_path / "shot.usda").write_text(ONE_HINGE)
+    done = calmotion("export", tmp_path / "shot.usda", "--to", "csv", "--rate", "30", "--json", "--no-search",
+                     "-o", tmp_path / "a.csv")  # fmt: skip
+    report = json.loads(done.stdout)
+    page = (repository / "docs" / "reference" / "outputs.md").read_text()
+    section = page.split("`export` prints")[1].split("An error is one object")[0]
+    named = set(re.findall(r"`([a-z_]+)`", section))
+    assert set(report) - {"command", "version", "start_delay_s", "total_wall_s"} <= named
+    assert set(report["targets"][0]) <= named
+
+
+def test_the_citation_names_this_version_and_the_paper(repository):
+    from calmotion.version import __version__
+
+    citation = yaml.safe_load((repository / "CITATION.cff").read_text())
+    assert citation["cff-version"] == "1.2.0" and citation["version"] == __version__
+    assert {"title", "message", "authors", "license"} <= set(citation)
+    assert [author["family-names"] for author in citation["references"][0]["authors"]][0] == "Hoshyari"
+
+
+def test_the_container_runs_commands_and_extras_there_are(repository):
+    from calmotion.cli.main import build_parser
+
+    text = (repository / "Containerfile").read_text().replace("\\\n", "")
+    command = json.loads(re.search(r"^CMD (\[.*\])$", text, re.MULTILINE)[1])
+    parsed = build_parser().parse_args(command[1:])
+    assert (repository / str(parsed.shot).removeprefix("/opt/calmotion/")).is_file()
+    extras = tomllib.loads((repository / "pyproject.toml").read_text())["project"]["optional-dependencies"]
+    assert set(re.search(r"/opt/calmotion\[(.*?)\]", text)[1].split(",")) <= set(extras)
+    for line in re.findall(r"^RUN (calmotion .*)$", text, re.MULTILINE):
+        build_parser().parse_args(shlex.split(line)[1:])
+    python = re.search(r"^FROM \S+/python:(\S+)-slim", text, re.MULTILINE)[1]
+    assert python in ("3.11", "3.12", "3.13")
+
+
+def test_ten_questions_of_newcomers_are_answered_within_two_clicks(repository):
+    """Each answer is a page, or a section of one, that the front page links to; the build checks the sections."""
+    docs = repository / "docs"
+    page = (docs / "index.md").read_text().split("## Questions of newcomers")[1].split("\n## ")[0]
+    rows = [line.split("|")[1:3] for line in page.splitlines() if line.startswith("| ") and "?" in line]
+    assert len(rows) >= 10
+    generated = {"reference/schemas.md", "reference/commands.md", "reference/python.md"}
+    for question, answer in rows:
+        links = re.findall(r"\]\(([\w/.]+)", answer)
+        assert links and all(link in generated or (docs / link).is_file() for link in links), question
