@@ -5,7 +5,7 @@ from __future__ import annotations
 from operator import itemgetter
 from typing import TYPE_CHECKING, Any, TextIO
 
-from calmotion.cli.quantities import angle, counted, length
+from calmotion.cli.quantities import angle, counted, length, memory
 from calmotion.cli.run_report import print_left_out, print_notes
 from calmotion.cli.sentences import unbroken
 from calmotion.cli.tables import console_on, print_table, say
@@ -88,11 +88,13 @@ def _print_contents(console: Console, report: dict[str, Any]) -> None:
 
 def _expected(row: dict[str, Any]) -> str:
     """What `optimize` is expected to take, as a sentence."""
-    time = f"{60.0 * row['hours']:.3g} min" if row["hours"] < 2.0 else f"{row['hours']:.3g} h"
+    from calmotion.accuracy.expected_cost import readable_hours
+
     windows = ""
     if row["windows"] > 1:
         windows = f", in {row['windows']} windows of {row['window_s']:.3g} s that overlap by {row['overlap_s']:.3g} s"
-    return f"optimize is expected to take {time} of processor time and {row['memory_gb']:.2g} GB of memory{windows}"
+    time, size = readable_hours(row["hours"]), memory(1e9 * row["memory_gb"])
+    return f"optimize is expected to take {time} of processor time and {size} of memory{windows}"
 
 
 def _print_gains(console: Console, report: dict[str, Any]) -> None:

@@ -151,7 +151,7 @@ def _merged(errors: list[ShotError]) -> list[ShotError]:
         groups.setdefault((error.problem, error.attribute, str(error.found), error.remedy), []).append(error)
     merged = []
     for (problem, attribute, _, remedy), group in groups.items():
-        others = f", here and at {len(group) - 1} other prims" if len(group) > 1 else ""
+        others = f", here and at {len(group) - 1} other prim{'s' * (len(group) > 2)}" if len(group) > 1 else ""
         paths = sorted(error.path for error in group)
         merged.append(
             ShotError(problem + others, path=paths[0], attribute=attribute, found=group[0].found, remedy=remedy)

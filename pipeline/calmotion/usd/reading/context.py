@@ -101,7 +101,7 @@ def grouped(notes: list[str]) -> tuple[str, ...]:
         if text.startswith(places[0]) and len(places) == 1:
             merged.append(text)
         else:
-            others = f" and {len(places) - 1} others" if len(places) > 1 else ""
+            others = f" and {len(places) - 1} other{'s' * (len(places) > 2)}" if len(places) > 1 else ""
             merged.append(f"{places[0]}{others}: {text}")
     return tuple(merged)
 
