@@ -20,6 +20,7 @@ import numpy as np
 from calmotion.accuracy.converged_reduction import converged_reduction
 from calmotion.accuracy.integrator_choice import by_fast_scheme
 from calmotion.accuracy.mesh_budget import mesh_error
+from calmotion.accuracy.pod_subspace import project_to_subspace
 from calmotion.accuracy.simulate_to_tolerance import simulate_to_tolerance
 from calmotion.accuracy.step_error import ORDER, StepRun, distance, frames_of, simulate_at
 from calmotion.benchmarks.common.finer_meshes import with_more_nodes
@@ -37,6 +38,7 @@ from calmotion.simulation.compiled_shot import CompiledShot, compile_shot
 EDGES = (0.0, 0.05, 0.1, 0.2, 0.5, 1.0, 1.5, np.inf)  # of the classes of error over estimate
 FINER = 1.0 / 30.0  # tolerance of the reference's reduction over that of the result
 MESH_ACCURACY, MAX_NODES = 0.01, 15_000  # of the first meshes, as of the mesher
+HELD = 1e-3  # of the tolerance: what POD subspaces of the reference may change
 STEPS = (0.25, 0.125)  # of the reference over that of the result
 
 
@@ -122,8 +124,10 @@ def judged(number: int) -> Judged:
 def _reference(shot: Drawn, reduction: BodyReduction, options: RunSettings, step: float) -> tuple[Array, float, int]:
     """Positions of a far finer run [m], the estimated error of its meshes [m], and their nodes."""
     first = BodyReduction(shot.character, shot.meshes, reduction.loads)
-    finer = with_more_nodes(first, tolerance=shot.tolerance)
-    fine = compile_shot(shot.character, shot.animation, finer.bodies(FINER * shot.tolerance))
+    # to the finer tolerance, since a link that hardly bends has no modes by which its mesh would be refined
+    finer = with_more_nodes(first, tolerance=FINER * shot.tolerance)
+    complete = compile_shot(shot.character, shot.animation, finer.bodies(FINER * shot.tolerance))
+    fine = project_to_subspace(complete, options, step, lambda item: HELD * shot.tolerance).shot
 
     def run(part: float) -> StepRun:
         return by_fast_scheme(options, lambda options: simulate_at(fine, options, part * step))
