@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from calmotion.accuracy.element_size import ACCURACY
-from calmotion.shot import Body, Character, Frame
+from calmotion.geometry.tetrahedra import tet_volumes
+from calmotion.shot import Body, Character, FEMesh, Frame
 from calmotion.shot.meshes import MeshQuality
 
 # The estimate is 1.2 to 3 times the true error of clamped beams and plates on meshes that are nearly fine enough, and
@@ -23,6 +24,8 @@ def mass_note(body: Body, volume: float) -> tuple[str, ...]:
     if body.mass is None or body.flexible is None:
         return ()
     material = body.flexible.material
+    if material.core is not None:
+        return ()  # see `print_note`
     ratio = body.mass.mass / (material.density * volume)
     if abs(ratio - 1.0) <= _SAME_MASS:
         return ()
@@ -31,6 +34,27 @@ def mass_note(body: Body, volume: float) -> tuple[str, ...]:
         f"its density is {material.density * ratio:.4g} instead of {material.density:.4g} kg/m^3"
     )
     return (note + ("; if it is hollow, author calm:flexible:wallThickness" if ratio < _HOLLOW else ""),)
+
+
+def print_note(body: Body, mesh: FEMesh) -> tuple[str, ...]:
+    """Message about what a printed part is taken for, and about a stated mass that is not that of the print."""
+    from calmotion.geometry.print_core import skin_share
+
+    if body.flexible is None or body.flexible.material.core is None:
+        return ()
+    material, core = body.flexible.material, body.flexible.material.core
+    share = skin_share(mesh.points, mesh.tets, core).relative(core.infill)
+    mass = float(material.density * (tet_volumes(mesh.points, mesh.tets) @ share))
+    note = (
+        f"printed: a solid skin of {1e3 * core.skin:.3g} mm around {100.0 * core.infill:.3g}% infill with "
+        f"{100.0 * core.stiffness:.2g}% of the modulus (Hashin-Shtrikman); its mass is "
+        f"{100.0 * mass / (material.density * mesh.quality.volume):.3g}% of that of a solid part, {mass:.3g} kg"
+    )
+    if body.mass is not None and abs(body.mass.mass / mass - 1.0) > _SAME_MASS:
+        note += (
+            f", where the shot states {body.mass.mass:.3g} kg: densities are {body.mass.mass / mass:.3g} times those"
+        )
+    return (note,)
 
 
 def remark(quality: MeshQuality) -> tuple[str, ...]:

@@ -24,7 +24,7 @@ from calmotion.geometry.tetrahedra import (
 )
 from calmotion.shot import Body, FEMesh, Frame, TetGeometry
 
-from .accuracy import ENOUGH, mass_note, remark
+from .accuracy import ENOUGH, mass_note, print_note, remark
 from .filling import filled, refuse_loose_parts, refuse_too_many
 from .mesh_file import read_mesh_file
 from .repair import Solid
@@ -102,7 +102,7 @@ def mesh_of(
         mesh = _accurate(index, body, geometry, options, carrier, attachments)
     quality = mesh.quality
     source = geometry.solid.source if isinstance(geometry, Volume) else quality.source
-    repairs = (*quality.repairs, *mass_note(body, quality.volume))
+    repairs = (*quality.repairs, *mass_note(body, quality.volume), *print_note(body, mesh))
     return replace(mesh, quality=replace(quality, repairs=repairs, source=source))
 
 

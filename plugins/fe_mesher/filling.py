@@ -7,7 +7,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from calmotion.accuracy.element_size import Shape, envelope, expected_nodes, smallest_size
 from calmotion.errors import ShotError
+from calmotion.geometry.boundary_fit import fitted
 from calmotion.geometry.closed_surfaces import enclosed_volume
+from calmotion.geometry.grid_tets import GRID, grid_tets
 from calmotion.geometry.tetrahedra import (
     connected_parts,
     largest_part,
@@ -18,7 +20,6 @@ from calmotion.geometry.tetrahedra import (
 )
 from calmotion.shot import Body, FEMesh
 
-from .gridding import grid_note, on_grid
 from .repair import Solid, simplified
 from .tetwild import MORE_TIME, REMEDY, OutOfTime, ProcessorTime, tetrahedralize
 
@@ -34,6 +35,13 @@ _TRIANGLE = 2.5e-3  # least processor time for a triangle of a surface with many
 _COARSEST = 0.3  # largest error of the volume of a mesh of a grid, which is reported
 _LOOSE = 0.05  # of the volume: parts that a thin connection, which the mesh did not follow, held
 
+# Largest number of nodes of ten-node tetrahedra: twice as many where walls are
+# thin, for some ten seconds; walls that are thinner than the spacing have gaps
+_GRID_NODES = 12_000
+_GRID_WALL = 0.8  # of the thinner walls: spacing with which they have none
+# Factor of the spacing while the volume error is larger than that; largest way of a corner to the surface
+_FINER, _NEAR_VOLUME, _MOVED = 0.8, 0.02, 0.5
+
 
 @dataclass(frozen=True)
 class _Attempt:
@@ -48,8 +56,9 @@ def filled(
 ) -> FEMesh:
     """Tetrahedra of uniform size that fill a solid.
 
-    A mesh that takes, or would take, most of the time is replaced by one of a regular grid. A mesh with an error of its volume is followed by
-    one that is closer to the surface as long as there is time; the best one counts, with its error.
+    A mesh that takes, or would take, most of the time is replaced by one of a regular grid. A mesh with an error of its
+    volume is followed by one that is closer to the surface as long as there is time; the best one counts, with its
+    error.
 
     Args:
         index: Of the body in its character.
@@ -88,7 +97,11 @@ def filled(
             break
         size *= 0.8 if best.quality.volume_error > MAX_VOLUME_ERROR else 1.0
     assert best is not None
-    return _whole(_accepted(best, solid, volumes, body.path), body.path)
+    try:
+        accepted = _accepted(best, solid, volumes, body.path)
+    except ShotError as error:
+        return _on_grid(index, body, solid, shape, size, error)
+    return _whole(accepted, body.path)
 
 
 def _meshed(
@@ -124,7 +137,7 @@ def _on_grid(index: int, body: Body, solid: Solid, shape: Shape, size: float, re
     mesh = on_grid(index, body, solid, shape, size)
     if mesh is None or mesh.quality.volume_error > _COARSEST:
         raise reason
-    note = grid_note(mesh, shape, size, f"others would take too long ({reason.found})")
+    note = grid_note(mesh, shape, size, f"{reason.problem} ({reason.found})")
     return replace(mesh, quality=replace(mesh.quality, repairs=(*mesh.quality.repairs, note)))
 
 
@@ -195,3 +208,46 @@ def refuse_loose_parts(tets: np.ndarray, path: str) -> None:
             "its tetrahedra are not connected", path=path, found=f"{count} separate parts",
             remedy="Make the parts overlap or touch, or split them into several bodies",
         )  # fmt: skip
+
+
+def on_grid(index: int, body: Body, solid: Solid, shape: Shape, size: float) -> FEMesh | None:
+    """A mesh of a grid, as close to a solid as a number of nodes allows; None where no grid is fine enough for any.
+
+    Args:
+        index: Of the body in its character.
+        body: For the path in messages.
+        solid: Closed.
+        shape: Of the solid.
+        size: Wanted edge length of the elements [m].
+    """
+    least = smallest_size(shape, _GRID_NODES) / GRID
+    spacing = max(min(size / GRID, _GRID_WALL * shape.thickness), least)
+    best: FEMesh | None = None
+    while True:
+        try:
+            points, tets = grid_tets(solid.points, solid.triangles, spacing)
+            points = fitted(points, tets, solid.points, solid.triangles, _MOVED * spacing)  # with its edges
+        except ValueError:
+            pass
+        else:
+            quality = measure_quality(points, tets, surface_volume=solid.volume, repairs=solid.repairs)
+            if best is None or quality.volume_error < best.quality.volume_error:
+                best = FEMesh(index, points, tets, quality)
+        if spacing <= least or (best is not None and best.quality.volume_error <= _NEAR_VOLUME):
+            return best
+        spacing = max(_FINER * spacing, least)
+
+
+def grid_note(mesh: FEMesh, shape: Shape, size: float, reason: str) -> str:
+    """Message about a mesh of a grid."""
+    edges = mesh.points[mesh.tets[:, [0, 0, 0, 1, 1, 2]]] - mesh.points[mesh.tets[:, [1, 2, 3, 2, 3, 3]]]
+    length = float(np.median(np.linalg.norm(edges, axis=2)))
+    finer = (
+        ""
+        if expected_nodes(shape, size) > _GRID_NODES
+        else "; author a smaller calm:flexible:elementSize to follow more"
+    )
+    return (
+        f"meshed on a grid with elements of {1e3 * length:.2g} mm, since {reason}: details and walls that are thinner "
+        f"are missing, {100.0 * mesh.quality.volume_error:.2g}% of its volume{finer}"
+    )

@@ -29,7 +29,8 @@ values = {a.GetName(): a.Get() for a in body.GetAttributes()}
 expected = {
     "calm:flexible:enabled": True, "calm:flexible:modeCount": -1, "calm:flexible:maxFrequency": -1.0,
     "calm:flexible:elementSize": -1.0, "calm:flexible:interfaceRadius": -1.0, "calm:flexible:elasticity": "auto",
-    "calm:flexible:geometry": "auto", "calm:flexible:wallThickness": -1.0, "calm:flexible:section": "auto",
+    "calm:flexible:geometry": "auto", "calm:flexible:wallThickness": -1.0,
+    "calm:flexible:infill": -1.0, "calm:flexible:perimeters": -1, "calm:flexible:section": "auto",
     "calm:flexible:meshFile": None, "calm:damping:rayleighMass": None, "calm:damping:rayleighStiffness": None,
     "calm:motor:maxVelocity": float("inf"), "calm:motor:maxAcceleration": float("inf"), "calm:motor:skelJoint": None,
     "calm:target:positionWeight": 1.0, "calm:target:rotationWeight": 0.0, "calm:retarget:reference": "rigid",

@@ -14,7 +14,7 @@ import numpy as np
 
 from calmotion.geometry.nearby_triangles import NearbyTriangles
 from calmotion.geometry.tetrahedra import Indices, tet_volumes, without_unused_points
-from calmotion.shot.character import Array, IntArray
+from calmotion.shot.character import Array, BoolArray, IntArray
 from calmotion.support.compilation import kernel
 
 GRID = 1.12  # edge of a regular tetrahedron of the volume of a grid's, of the spacing
@@ -47,7 +47,7 @@ def grid_tets(points: Array, triangles: Indices, spacing: float) -> tuple[Array,
     )
     used, place = np.unique(corners, return_inverse=True)
     at = low + spacing * np.stack(np.unravel_index(used, tuple(counts)), axis=1)
-    tets = place.reshape(-1, 8)[:, _KUHN].reshape(-1, 4)
+    tets = place.reshape(-1, 8)[:, _KUHN].reshape(-1, 4).astype(np.int32)
     near = NearbyTriangles(points, triangles, _REACH * spacing).closest(at)
     distance = np.nan_to_num(np.linalg.norm(at - near, axis=1), nan=_REACH * spacing)
     depth = np.where(inside.ravel()[used], 1.0, -1.0) * np.maximum(distance, 1e-9 * spacing)
@@ -57,16 +57,16 @@ def grid_tets(points: Array, triangles: Indices, spacing: float) -> tuple[Array,
     return _in_one_piece(made, cut[np.abs(tet_volumes(made, cut)) > _FLAT * spacing**3 / 6.0])
 
 
-def _cells(inside: Array) -> Array:
+def _cells(inside: BoolArray) -> Indices:
     """First corners of the cells with a corner inside."""
     some = inside
     for axis in range(3):
         last = some.shape[axis] - 1
         some = np.take(some, range(last), axis) | np.take(some, range(1, last + 1), axis)
-    return np.asarray(np.ravel_multi_index(np.nonzero(some), inside.shape))
+    return np.asarray(np.ravel_multi_index(np.nonzero(some), inside.shape), np.int64)
 
 
-def _snapped(at: Array, depth: Array, near: Array, tets: Indices, spacing: float) -> tuple[Array, Array]:
+def _snapped(at: Array, depth: Array, near: Array, tets: IntArray, spacing: float) -> tuple[Array, Array]:
     """The grid with corners that are close to the surface on it, as far as no tetrahedron becomes flat by that."""
     chosen = np.abs(depth) < _SNAP * spacing
     for _ in range(10):
@@ -78,7 +78,7 @@ def _snapped(at: Array, depth: Array, near: Array, tets: Indices, spacing: float
     return moved, np.where(chosen, 0.0, depth)
 
 
-def _cut(at: Array, depth: Array, tets: Indices) -> tuple[Array, Array]:
+def _cut(at: Array, depth: Array, tets: IntArray) -> tuple[Array, IntArray]:
     """Points and tetrahedra of the part with positive depth, which is linear between corners."""
     # corners inside first, in the order of their numbers, so that neighbours cut their common side alike; then those
     # on the surface, then those outside
@@ -86,7 +86,7 @@ def _cut(at: Array, depth: Array, tets: Indices) -> tuple[Array, Array]:
     order = np.lexsort((tets, kind[tets]), axis=1)
     tets = np.take_along_axis(tets, order, axis=1)
     within, on = (kind[tets] == 0).sum(axis=1), (kind[tets] == 1).sum(axis=1)
-    pieces: list[Array] = []  # corners as pairs: a point itself, or that between a corner inside and one outside
+    pieces: list[IntArray] = []  # corners as pairs: a point itself, or that between a corner inside and one outside
 
     def add(selected: Array, *wanted: tuple[int, int]) -> None:
         chosen = tets[selected]
@@ -109,14 +109,14 @@ def _cut(at: Array, depth: Array, tets: Indices) -> tuple[Array, Array]:
     add(prism, (0, 0), (1, 1), (1, 3), (2, 3))
     add(prism, (0, 0), (0, 3), (1, 3), (2, 3))
     ends = np.sort(np.concatenate(pieces), axis=2)
-    keys, made = np.unique(ends[..., 0] * len(at) + ends[..., 1], return_inverse=True)
+    keys, made = np.unique(ends[..., 0].astype(np.int64) * len(at) + ends[..., 1], return_inverse=True)
     a, b = keys // len(at), keys % len(at)
     whole = a == b
     share = np.where(whole, 0.0, depth[a] / np.where(whole, 1.0, depth[a] - depth[b]))
-    return at[a] + share[:, None] * (at[b] - at[a]), made.reshape(-1, 4)
+    return at[a] + share[:, None] * (at[b] - at[a]), made.reshape(-1, 4).astype(np.int32)
 
 
-def _in_one_piece(points: Array, tets: Array) -> tuple[Array, IntArray]:
+def _in_one_piece(points: Array, tets: IntArray) -> tuple[Array, IntArray]:
     """The largest part of tetrahedra that are connected by sides: what hangs at an edge would be a hinge."""
     from scipy.sparse import coo_matrix
     from scipy.sparse.csgraph import connected_components
@@ -131,7 +131,7 @@ def _in_one_piece(points: Array, tets: Array) -> tuple[Array, IntArray]:
     label = connected_components(graph, directed=False)[1]
     volume = tet_volumes(points, tets)
     kept = label == np.bincount(label, np.abs(volume)).argmax()
-    tets, volume = tets[kept].astype(np.int32), volume[kept]
+    tets, volume = tets[kept], volume[kept]
     tets[volume < 0.0] = tets[volume < 0.0][:, [1, 0, 2, 3]]
     return without_unused_points(points, tets)
 

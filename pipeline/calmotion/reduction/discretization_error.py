@@ -68,20 +68,23 @@ def element_errors(mesh: QuadraticMesh, material: ElasticMaterial, u: Array) -> 
     Source: Zienkiewicz and Zhu 1992.
     """
     # at the points of the degree-2 rule the strains of quadratic elements are better than elsewhere
-    sampling = GradientRule(mesh, 2)
+    sampling = GradientRule(mesh, 2, solid=True)
     recovered = _recovered(mesh, sampling.points, _strains(sampling, u))
     # both fields at the points of a degree-4 rule; strains of the elements are linear, the recovered ones quadratic
-    integration = GradientRule(mesh, 4)
+    integration = GradientRule(mesh, 4, solid=True)
     shapes = np.stack([mesh.basis.elem.lbasis(integration.points, a)[0] for a in range(10)])
     exact = np.einsum("aq,eack->eqck", shapes, recovered[mesh.tets], optimize=True)
     strains = _strains(integration, u)
+    weights = integration.weights
+    if mesh.filling is not None:
+        weights = weights * mesh.filling.weights.sum(axis=1)[:, None]
     lame = material.poissons_ratio / (1.0 - 2.0 * material.poissons_ratio)
 
     def energy(e: Array) -> Array:
         # mu = 1: 2 e:e + lambda tr(e)^2, shear strains being doubled
         dense = 2.0 * (e[:, :, :3] ** 2).sum(axis=2) + (e[:, :, 3:] ** 2).sum(axis=2)
         dense += 2.0 * lame * e[:, :, :3].sum(axis=2) ** 2
-        return np.asarray(np.einsum("eq,eqk->ek", integration.weights, dense))
+        return np.asarray(np.einsum("eq,eqk->ek", weights, dense))
 
     return np.asarray(energy(exact - strains) / energy(strains).sum(axis=0))
 

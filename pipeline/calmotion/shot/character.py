@@ -12,6 +12,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from calmotion.shot.materials.printed import Core
 from calmotion.shot.motor import PRESCRIBED, Motor
 from calmotion.shot.robust.settings import Uncertainty
 
@@ -72,6 +73,7 @@ class ElasticMaterial:
         density: [kg/m^3].
         damping_ratio: Fraction of critical damping of each mode of the character, used when `rayleigh` is None.
         rayleigh: (mass [1/s], stiffness [s]) coefficients, or None.
+        core: Of a printed body, whose skin is of this material; None: it is solid.
     """
 
     path: str
@@ -80,6 +82,7 @@ class ElasticMaterial:
     density: float
     damping_ratio: float = 0.01
     rayleigh: tuple[float, float] | None = None
+    core: Core | None = None
 
 
 @dataclass(frozen=True, eq=False)

@@ -128,7 +128,9 @@ def rigid_bodies(character: Character, tree: Tree, meshes: FEMeshes | None) -> l
     for index, (body, anchors) in enumerate(zip(character.bodies, body_anchors(character, tree), strict=True)):
         if body.flexible is not None and body.simulated_flexible and index in mesh_of:
             mesh, own = mesh_of[index], None if body.mass is None else body.mass.mass
-            body = replace(body, mass=mass_of_tets(mesh.points, mesh.tets, body.flexible.material.density, own))
+            material = body.flexible.material
+            found = mass_of_tets(mesh.points, mesh.tets, material.density, own, material.core)
+            body = replace(body, mass=found)
         result.append(rigid_body(body, anchors))
     return result
 

@@ -4,7 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from calmotion.shot import MassProperties, TetGeometry
+from calmotion.shot import FEMesh, MassProperties, TetGeometry
+from calmotion.shot.materials.printed import core_of
 from calmotion.shot.meshes import MeshQuality
 from mesher_links import box, link, run, surface
 
@@ -46,3 +47,21 @@ def test_a_stated_mass_that_the_material_does_not_give_is_reported(package):
     assert "0.5 times" in note and "600 instead of 1200 kg/m^3" in note and "wallThickness" in note
     assert mass_note(replace(link(), mass=stated), 4.0e-5) == ()
     assert mass_note(link(), 8e-5) == ()
+
+
+def test_a_print_is_described_and_a_mass_that_is_not_its_own_is_reported(package, helpers):
+    points, tets = helpers.box((16, 2, 2), (0.2, 0.02, 0.02))
+    mesh = FEMesh(0, np.asarray(points), tets, MeshQuality(20.0, 8e-5, 0.0))
+    body = link()
+    note = package("accuracy").print_note
+    assert note(body, mesh) == ()
+    material = replace(body.flexible.material, core=core_of(0.2, 0.9e-3))
+    body = replace(body, flexible=replace(body.flexible, material=material))
+    inner = (0.2 - 1.8e-3) * (0.02 - 1.8e-3) ** 2
+    mass = 1200.0 * (8e-5 - 0.8 * inner)
+    (text,) = note(body, mesh)
+    assert "0.9 mm around 20% infill with 7.7% of the modulus" in text and f"{mass:.2g}"[:4] in text
+    assert "states" not in text
+    heavy = replace(body, mass=MassProperties(2.0 * mass, np.zeros(3), np.eye(3)))
+    assert "densities are 2" in note(heavy, mesh)[0] or "densities are 1.9" in note(heavy, mesh)[0]
+    assert package("accuracy").mass_note(heavy, 8e-5) == ()

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
+from calmotion.geometry.print_core import skin_share
 from calmotion.geometry.tetrahedra import boundary_triangles, tet_volumes, without_unused_points
+from calmotion.reduction.elements.filling import Filling, element_masses, filling_of
 from calmotion.shot.character import Array, ElasticMaterial, IntArray
 
 
@@ -21,12 +23,14 @@ class QuadraticMesh:
             edges 01, 12, 02, 03, 13, 23.
         surface: Outward boundary triangles, shape [k, 6]: three corners, then the midpoints of edges 01, 12, 20.
         basis: scikit-fem's scalar basis.
+        filling: The material in the elements of a printed part; None: all are solid.
     """
 
     nodes: Array
     tets: IntArray
     surface: IntArray
     basis: Any
+    filling: Filling | None = None
 
     @property
     def surface_nodes(self) -> IntArray:
@@ -79,10 +83,39 @@ def quadratic_mesh(points: Array, tets: IntArray) -> QuadraticMesh:
 
 
 def assemble_mass(mesh: QuadraticMesh, density: float) -> Any:
-    """Scalar consistent mass matrix [kg], CSR, shape [n, n]; density in kg/m^3."""
+    """Scalar consistent mass matrix [kg], CSR, shape [n, n]; density (of the skin of a printed part) in kg/m^3."""
     from skfem.models.poisson import mass
 
+    if mesh.filling is not None:
+        return density * _mass_of_filling(mesh, mesh.filling)
     return (density * mass.assemble(mesh.basis)).tocsr()
+
+
+def _mass_of_filling(mesh: QuadraticMesh, filling: Filling) -> Any:
+    """`assemble_mass` of a printed part, for a density of 1."""
+    from scipy.sparse import coo_matrix
+
+    n, tets = len(mesh.nodes), mesh.tets.astype(np.int64)
+    values = np.stack([mesh.basis.elem.lbasis(mesh.basis.X, a)[0] for a in range(10)])
+    exact = np.einsum("aq,bq,q->ab", values, values, mesh.basis.W) / mesh.basis.W.sum()
+    places = filling.skin.places[:, 1:].T
+    shapes = np.stack([mesh.basis.elem.lbasis(places, a)[0] for a in range(10)], axis=1)
+    blocks = element_masses(filling, shapes, exact) * mesh.basis.dx.sum(axis=1)[:, None, None]
+    rows, columns = np.repeat(tets, 10, axis=1), np.tile(tets, (1, 10))
+    matrix = coo_matrix((blocks.ravel(), (rows.ravel(), columns.ravel())), shape=(n, n)).tocsr()
+    return 0.5 * (matrix + matrix.T)
+
+
+def corner_gradients(mesh: QuadraticMesh) -> Array:
+    """Gradients of the shape functions at the corners of each element [1/m], shape [10, 3, m, 4].
+
+    Gradients of quadratic shape functions are linear: those at a point follow with its barycentric coordinates.
+    """
+    from skfem import Basis, ElementTetP2
+
+    corners = np.array([[0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, 0.0, 0.0, 1.0]])
+    basis = Basis(mesh.basis.mesh, ElementTetP2(), quadrature=(corners, np.full(4, 1.0 / 24.0)))
+    return np.stack([np.asarray(field[0].grad) for field in basis.basis])
 
 
 def assemble_stiffness(mesh: QuadraticMesh, youngs_modulus: float, poissons_ratio: float) -> Any:
@@ -100,9 +133,14 @@ def assemble_stiffness(mesh: QuadraticMesh, youngs_modulus: float, poissons_rati
     n, tets = len(mesh.nodes), mesh.tets.astype(np.int64)
     keys, place = np.unique((n * tets[:, :, None] + tets[:, None, :]).ravel(), return_inverse=True)
     gradient = [np.stack([np.asarray(field[0].grad[a]) for field in basis.basis], axis=1) for a in range(3)]
+    weights = basis.dx
+    if mesh.filling is not None:
+        at_points = np.einsum("ajec,eqc->jeaq", corner_gradients(mesh), mesh.filling.points, optimize=True)
+        gradient = list(at_points)
+        weights = basis.dx.sum(axis=1)[:, None] * mesh.filling.weights
     blocks = np.zeros((len(keys), 3, 3))
     for a in range(3):
-        weighted = gradient[a] * basis.dx[:, None, :]  # [e, 10, q]
+        weighted = gradient[a] * weights[:, None, :]  # [e, 10, q]
         for b in range(3):
             D = weighted @ gradient[b].transpose(0, 2, 1)
             summed = np.bincount(place, weights=D.ravel(), minlength=len(keys))
@@ -122,13 +160,17 @@ def assemble(points: Array, tets: IntArray, material: ElasticMaterial, mass: flo
     Args:
         points: Corners [m], shape [n, 3].
         tets: Shape [m, 4], positive volumes.
-        material: Young's modulus [Pa], Poisson's ratio, density [kg/m^3].
+        material: Young's modulus [Pa], Poisson's ratio, density [kg/m^3]; that of the skin where it has a core.
         mass: Total mass [kg] that the density is scaled to; None keeps the material's density.
     """
     mesh = quadratic_mesh(*without_unused_points(points, tets))
-    density = material.density
+    density, volume = material.density, tet_volumes(points, tets)
+    if material.core is not None:
+        skin = skin_share(mesh.nodes, mesh.tets[:, :4], material.core)
+        mesh = replace(mesh, filling=filling_of(material.core, skin))
+        volume = volume * skin.relative(material.core.infill)
     if mass is not None:
-        density = mass / float(tet_volumes(points, tets).sum())
+        density = mass / float(volume.sum())
     return FEModel(
         mesh=mesh,
         mass=assemble_mass(mesh, density),

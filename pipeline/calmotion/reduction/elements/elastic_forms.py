@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from calmotion.reduction.elements.assembly import QuadraticMesh
+from calmotion.reduction.elements.assembly import QuadraticMesh, corner_gradients
 from calmotion.reduction.elements.green_strain_fields import green_fields
 from calmotion.shot.character import Array
 
@@ -20,14 +20,16 @@ class GradientRule:
 
     Args:
         mesh: Of the body, m elements.
-        order: Polynomial degree that the rule integrates exactly.
+        order: Polynomial degree that the rule integrates exactly. The rule of a printed part, weighted by its relative
+            modulus, is of order 2.
+        solid: Whether the rule ignores what a printed part is filled with.
 
     Attributes:
-        points: Quadrature points in the reference tetrahedron, shape [3, q].
+        points: Quadrature points in the reference tetrahedron, shape [3, q]; not those of a printed part.
         weights: Quadrature weights times volume [m^3], shape [m, q].
     """
 
-    def __init__(self, mesh: QuadraticMesh, order: int):
+    def __init__(self, mesh: QuadraticMesh, order: int, solid: bool = False):
         from skfem import Basis, ElementTetP2
 
         basis = Basis(mesh.basis.mesh, ElementTetP2(), intorder=order)
@@ -36,6 +38,10 @@ class GradientRule:
         self._nodes = len(mesh.nodes)
         self.points: Array = basis.X
         self.weights: Array = np.ascontiguousarray(basis.dx)
+        if mesh.filling is not None and not solid:
+            at_points = np.einsum("ajec,eqc->ajeq", corner_gradients(mesh), mesh.filling.points, optimize=True)
+            self._shape = np.ascontiguousarray(at_points)
+            self.weights = basis.dx.sum(axis=1)[:, None] * mesh.filling.weights
 
     def gradients(self, modes: Array, elements: slice = slice(None)) -> Array:
         """G_ij = d(displacement i)/dX_j of nodal fields of shape [n, 3, r]; shape [r, m, q, 3, 3]."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -14,6 +15,7 @@ from calmotion.support.naming import nearest
 from calmotion.usd import schemas
 from calmotion.usd.dependencies import refuse_place
 from calmotion.usd.reading.bodies.materials import elastic_material
+from calmotion.usd.reading.bodies.prints import print_of
 from calmotion.usd.reading.context import Reading
 from calmotion.usd.transforms import Pose
 
@@ -39,8 +41,10 @@ def flexible_settings(reading: Reading, prim: Usd.Prim, pose: Pose) -> FlexibleS
     if not schemas.value(prim, _SCHEMA, "calm:flexible:enabled"):
         return None
     mesh_file = _mesh_file(prim)
+    section = _token(prim, "calm:flexible:section", _SECTION, "a section")
+    wall, core = print_of(reading, prim, _length(reading, prim, "calm:flexible:wallThickness"), section)
     return FlexibleSettings(
-        material=elastic_material(reading, prim),
+        material=replace(elastic_material(reading, prim), core=core),
         mode_count=int(_automatic(prim, "calm:flexible:modeCount")),
         max_frequency=_automatic(prim, "calm:flexible:maxFrequency"),
         element_size=_length(reading, prim, "calm:flexible:elementSize"),
@@ -48,8 +52,8 @@ def flexible_settings(reading: Reading, prim: Usd.Prim, pose: Pose) -> FlexibleS
         mesh_file=mesh_file,
         mesh_scale=_mesh_scale(reading, prim, pose) if mesh_file else 1.0,
         elasticity=_token(prim, "calm:flexible:elasticity", _ELASTICITY, "an elasticity model"),
-        wall_thickness=_length(reading, prim, "calm:flexible:wallThickness"),
-        section=_token(prim, "calm:flexible:section", _SECTION, "a section"),
+        wall_thickness=wall,
+        section=section,
         geometry=_token(prim, "calm:flexible:geometry", _GEOMETRY, "a source of geometry"),
     )
 

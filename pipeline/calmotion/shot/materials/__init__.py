@@ -1,0 +1,1 @@
+"""What flexible bodies are made of."""
