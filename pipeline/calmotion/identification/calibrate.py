@@ -83,7 +83,7 @@ def calibrate_shot(
     parameters = robot_parameters(shot, settings.parameters, settings.priors)
     if not ends_at_rest(shot.animation):  # what a robot does that is stopped amid a motion is not known
         settings = replace(settings, after=0.0)
-    options, nominal = _simulable(shot, options, settings.after)
+    options, nominal = simulable(shot, options, settings.after)
     progress(0.02, "finding the clocks of the recordings")
     known = CLOCK_OFFSET in settings.priors  # then time 0 is the first frame, within this standard deviation
     clocks = [0.0 if known else clock_of(recording, shot.character, nominal) for recording in recordings]
@@ -126,7 +126,7 @@ class _Told:
             self._progress(self._fraction, f"{self._message}: {self.count} simulations")
 
 
-def _simulable(shot: CompiledShot, options: RunSettings, after: float) -> tuple[RunSettings, Signals]:
+def simulable(shot: CompiledShot, options: RunSettings, after: float) -> tuple[RunSettings, Signals]:
     """Options with a step and an integrator that simulate the shot, and its signals."""
     step = options.step or shot.character.retarget.time_step or MAX_STEP
     given = options.integrator

@@ -1,0 +1,244 @@
+"""A short test motion that makes parameters of a robot identifiable, found by its information.
+
+The covariance of the parameters after a recording, (J^T J + E)^-1 in standard deviations of their priors, has the
+derivatives J of what the sensors will measure, over their noise; clocks, biases and places of sensors are unknown too.
+The motion of a family of tones with the least determinant of the robot's block is looked for (D-optimality), by an
+evolution strategy with one parent and one child; every motion that counts keeps all limits in the simulation.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from calmotion.errors import ShotError
+from calmotion.identification.advice import IDENTIFIABLE
+from calmotion.identification.calibrate import simulable
+from calmotion.identification.measurement import Measurement, measurement_parameters, sensors_of
+from calmotion.identification.parameters import DEFAULT, Parameter, robot_parameters
+from calmotion.identification.problem import Calibrated
+from calmotion.identification.signals import Signals, refuse_cyclic
+from calmotion.identification.waveforms import MARGIN, Family, bounds_of, family_of
+from calmotion.multibody.failure import SimulationFailure
+from calmotion.shot import Animation, Track
+from calmotion.shot.calibration.excitation import Excitation, MotorUse, PlannedSensor, Predicted
+from calmotion.shot.calibration.recording import COMPONENTS, Channel, SensorRecording
+from calmotion.shot.character import Array
+from calmotion.shot.motor import SERVO
+from calmotion.shot.run import RunSettings
+from calmotion.simulation.compiled_shot import CompiledShot
+from calmotion.simulation.prepare import pose_modes
+
+AFTER = 1.0  # of rest after the motion, which is recorded as well [s]
+EXCITED = 4  # natural frequencies that are to be excited
+STEP = 1.0 / 240.0  # of the simulations that compare motions [s]
+AT_RANDOM = 0.3  # of the tries: points of the family that have nothing to do with one another
+CHANGE, GROWN, SHRUNK = 0.6, 1.5, 0.85  # first size of a change, and its factors after a success and a failure
+LESS, TIMES = 0.8, 12  # share of a motion that exceeds a limit that is tried next, and how often
+
+
+@dataclass(frozen=True)
+class ExcitationSettings:
+    """What the test motion is for.
+
+    Attributes:
+        sensors: By which it will be recorded.
+        parameters, priors: As of `calibrate.CalibrationSettings`.
+        duration: [s].
+        amplitude, travel: Largest excursion of a hinge [rad] and of a slider [m].
+        tries: Number of motions that are tried.
+        seed: Of the search.
+    """
+
+    sensors: tuple[PlannedSensor, ...]
+    parameters: tuple[str, ...] = DEFAULT
+    priors: Mapping[str, float] = field(default_factory=dict)
+    duration: float = 4.0
+    amplitude: float = float(np.radians(10.0))
+    travel: float = 0.05
+    tries: int = 60
+    seed: int = 0
+
+
+def excite_shot(
+    shot: CompiledShot, settings: ExcitationSettings, options: RunSettings,
+    progress: Callable[[float, str], None] = lambda fraction, message: None,
+) -> Excitation:  # fmt: skip
+    """Find a test motion.
+
+    Args:
+        shot: With a target at each prim that will have a sensor; its curves say what the robot may do.
+        settings: What the motion is for.
+        options: Step and integrator.
+        progress: Called with a fraction and a message.
+
+    Raises:
+        ShotError: The shot loops, nothing may move or is to be identified, or no motion within the limits was found.
+    """
+    begin, animation = time.perf_counter(), shot.animation
+    refuse_cyclic(shot.character.retarget.cyclic, shot.character.path)
+    parameters = robot_parameters(shot, settings.parameters, settings.priors)
+    bounds = bounds_of(shot.character, animation, settings.amplitude, settings.travel)
+    frequencies = pose_modes(shot)[0][:EXCITED]
+    family = family_of(shot.character, animation, frequencies, bounds, settings.duration)
+    chosen = replace(options, step=options.step or shot.character.retarget.time_step or STEP, pre_roll=0.0)
+    chosen, _ = simulable(
+        _performing(shot, family, family.within(np.zeros((len(family.times), len(family.leading))))), chosen, 0.0
+    )
+    trial = _Trial(shot, family, parameters, settings, chosen)
+    progress(0.05, "measuring a chirp")
+    chirp = trial.rate(family.chirp())
+    best, count = _searched(trial, settings, progress)
+    if chirp is None or best is None:
+        raise ShotError(
+            "no test motion keeps all limits", path=shot.character.path, attribute="calm:motor:maxTorque",
+            found=f"{count} motions tried", remedy="Check the limits: the robot can hardly hold its first pose",
+        )  # fmt: skip
+    predicted = tuple(
+        Predicted(
+            p.name,
+            p.kind,
+            p.path,
+            p.unit,
+            p.nominal,
+            p.slope(0.0),
+            p.slope(0.0) * own,
+            p.slope(0.0) * other,
+            own <= IDENTIFIABLE,
+        )
+        for p, own, other in zip(parameters, best.deviations, chirp.deviations, strict=True)
+    )
+    return Excitation(
+        family.times, best.values, predicted, _uses(shot, family, best), settings.sensors, chirp.score - best.score,
+        count, time.perf_counter() - begin,
+    )  # fmt: skip
+
+
+def _searched(
+    trial: _Trial, settings: ExcitationSettings, progress: Callable[[float, str], None]
+) -> tuple[_Rated | None, int]:
+    """The best motion that was found, and how many were tried."""
+    random, size = np.random.default_rng(settings.seed), trial.family.size
+    half = size // 2
+    point, best, change = np.zeros(size), None, CHANGE
+    for k in range(settings.tries):
+        progress(0.1 + 0.9 * k / settings.tries, "looking for the best motion")
+        local = best is not None and k >= AT_RANDOM * settings.tries
+        if local:
+            then = point + change * random.standard_normal(size) * np.repeat([1.0, np.pi / 2], half)
+        else:
+            then = np.concatenate([random.standard_normal(half), random.uniform(-np.pi, np.pi, size - half)])
+        found = trial.rate(trial.family.tones_of(then))
+        better = found is not None and (best is None or found.score < best.score)
+        if better:
+            point, best = then, found
+        if local:
+            change *= GROWN if better else SHRUNK
+    return best, settings.tries
+
+
+@dataclass(frozen=True, eq=False)
+class _Rated:
+    """A motion: its values, its simulation, the standard deviations of the parameters over those of their priors, and
+    half the logarithm of the determinant of their covariance."""
+
+    values: Array
+    signals: Signals
+    deviations: Array
+    score: float
+
+
+class _Trial:
+    """Rates motions."""
+
+    def __init__(
+        self, shot: CompiledShot, family: Family, parameters: Sequence[Parameter], settings: ExcitationSettings,
+        options: RunSettings,
+    ):  # fmt: skip
+        self.shot, self.family, self.parameters, self.options = shot, family, tuple(parameters), options
+        self._recordings = _blank(settings.sensors, float(family.times[-1]) + AFTER)
+        clocks = [0.0] * len(self._recordings)
+        self._measurement = Measurement(
+            tuple(item.file for item in self._recordings),
+            sensors_of(shot.character, self._recordings, clocks, -np.inf, float(family.times[-1]) + AFTER, False),
+            measurement_parameters(self._recordings, clocks, settings.priors),
+        )  # fmt: skip
+
+    def rate(self, values: Array) -> _Rated | None:
+        """A motion, made smaller until it keeps the limits; None where it does not, or cannot be simulated."""
+        start = self.family.start
+        for _ in range(TIMES):
+            problem = Calibrated(
+                _performing(self.shot, self.family, values), self.parameters, self._measurement, self.options, AFTER
+            )
+            z = np.zeros(len(self.parameters) + len(self._measurement.parameters))
+            try:
+                signals = problem.signals(z)
+                if self._kept(signals):
+                    J = problem.linearized(z)[1]
+                    break
+            except (ShotError, SimulationFailure):
+                return None
+            values = start + LESS * (values - start)
+        else:
+            return None
+        n = len(self.parameters)
+        covariance = np.linalg.inv(J.T @ J + np.eye(J.shape[1]))[:n, :n]
+        return _Rated(values, signals, np.sqrt(np.diag(covariance)), 0.5 * float(np.linalg.slogdet(covariance)[1]))
+
+    def _kept(self, signals: Signals) -> bool:
+        """Whether the simulated motors stay within their efforts, and their joints within their ranges."""
+        character, bounds = self.shot.character, self.family.bounds
+        limited = np.array([m.model != SERVO for m in character.motors])  # a servo's motor limits itself
+        efforts = np.abs(signals.efforts).max(axis=0, initial=0.0)
+        lower = np.array([character.joints[m.joint].lower for m in character.motors])
+        upper = np.array([character.joints[m.joint].upper for m in character.motors])
+        inside = (signals.angles >= lower - 1e-9) & (signals.angles <= upper + 1e-9)
+        return bool(np.all(inside) and np.all(efforts[limited] <= MARGIN * bounds.effort[limited]))
+
+
+def _performing(shot: CompiledShot, family: Family, values: Array) -> CompiledShot:
+    """The robot of a shot with other curves."""
+    tracks = tuple(Track(family.times, column) for column in values.T)
+    return replace(shot, animation=Animation(family.times, tracks, tracks, shot.animation.moving))
+
+
+def _blank(sensors: Sequence[PlannedSensor], end: float) -> list[SensorRecording]:
+    """Recordings without what they will hold, one for each kind of sensor: each has a clock of its own."""
+    found = []
+    for kind in dict.fromkeys(sensor.kind for sensor in sensors):
+        channels = []
+        for sensor in sensors:
+            if sensor.kind == kind:
+                times = np.arange(0.0, end, 1.0 / sensor.rate)
+                channels.append(
+                    Channel(kind, sensor.path, times, np.zeros((len(times), COMPONENTS[kind])), sensor.sigma)
+                )
+        found.append(SensorRecording(kind, "", tuple(channels)))
+    return found
+
+
+def _uses(shot: CompiledShot, family: Family, rated: _Rated) -> tuple[MotorUse, ...]:
+    rows = []
+    for k, motor in enumerate(shot.character.motors):
+        offsets = rated.values[:, k] - family.start[k]
+        rate = np.gradient(offsets, family.times)
+        shares = family.uses(offsets, k)[1] if np.any(offsets) else np.zeros(3)
+        effort = float(np.abs(rated.signals.efforts[:, k]).max())
+        rows.append(
+            MotorUse(
+                motor.path,
+                float(np.abs(offsets).max()),
+                float(np.abs(rate).max()),
+                float(np.abs(np.gradient(rate, family.times)).max()),
+                effort,
+                float(shares[0]),
+                float(shares[1]),
+                float(shares[2]),
+                effort / motor.max_torque if np.isfinite(motor.max_torque) else 0.0,
+            )  # fmt: skip
+        )
+    return tuple(rows)
