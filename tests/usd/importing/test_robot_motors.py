@@ -86,7 +86,7 @@ def test_a_robot_without_hinges_and_sliders_is_refused(tmp_path):
     robot = write_arm(tmp_path / "arm.usda", balls)
     with pytest.raises(ShotError, match="no joint that a motor can drive") as refused:
         cm.import_robot(robot, layer=tmp_path / "shot.usda")
-    assert "PhysicsSphericalJoint" in str(refused.value.found) and "physics:kinematicEnabled" in refused.value.remedy
+    assert "PhysicsSphericalJoint" in str(refused.value.found) and "leave it passive" in refused.value.remedy
 
 
 def test_solid_gives_bodies_without_mass_that_of_their_geometry(tmp_path):

@@ -63,6 +63,18 @@ def test_a_joint_that_follows_one_that_is_not_there_moves_by_itself(tmp_path):
     assert any("not there" in fault and fault.endswith(": c") for fault in description.faults)
 
 
+def test_a_package_with_a_slash_too_many_is_found(tmp_path):
+    robot = written(tmp_path, LINK.format("a", f"package:///{tmp_path.name}/part.obj"))
+    description, root = copy_of(robot, tmp_path / "copy")
+    assert "a slash too many" in description.faults[0]
+    assert os.path.samefile(root.find("link/visual/geometry/mesh").get("filename"), tmp_path / "part.obj")
+
+
+def test_a_robot_without_links_is_refused(tmp_path):
+    with pytest.raises(ShotError, match="has no links"):
+        read_description(str(written(tmp_path, "")), {})
+
+
 def test_a_robot_gets_the_name_of_its_file(tmp_path):
     description, root = copy_of(written(tmp_path, LINK.format("a", "part.obj"), ""), tmp_path / "copy")
     assert root.get("name") == "arm" and "no name" in description.faults[0]

@@ -111,11 +111,13 @@ def author_motors(
     chosen = _named(axes, patterns) if patterns else _by_default(stage, axes, moved)
     driven = [axis for axis in axes if axis in chosen or axis.path in moved]
     if not driven:
+        kinds = sorted({str(prim.GetTypeName()) for prim in joint_prims(stage)})
+        swings = bool(set(kinds) - {"PhysicsFixedJoint"})
         raise ShotError(
             "the robot has no joint that a motor can drive", path=str(stage.GetDefaultPrim().GetPath()),
-            found=", ".join(sorted({str(prim.GetTypeName()) for prim in joint_prims(stage)})) or "no joints",
-            remedy="Connect its parts by revolute or prismatic joints. A passive linkage needs no import: animate the "
-            "transform of its root, with physics:kinematicEnabled, and simulate that shot",
+            found=", ".join(kinds) or "no joints",
+            remedy="Connect its parts by revolute or prismatic joints"
+            + ("; or leave it passive: animate the transform of its root, and simulate that shot" if swings else ""),
         )  # fmt: skip
     for axis in driven:
         _author(axis, moved.get(axis.path), units, frames_per_second, efforts.get(named(axis.prim)))

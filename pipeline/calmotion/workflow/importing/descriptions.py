@@ -12,7 +12,15 @@ from calmotion.errors import ShotError, raise_all
 from calmotion.support.files import is_special, refuse_special
 from calmotion.support.foreign_files import remedy_for
 from calmotion.support.naming import nearest
-from calmotion.workflow.importing.repairs import faults, parsed, repaired_copy, root_joints, with_clean_meshes
+from calmotion.workflow.importing.repairs import (
+    PACKAGE,
+    faults,
+    in_package,
+    parsed,
+    repaired_copy,
+    root_joints,
+    with_clean_meshes,
+)
 
 URDF, MJCF, USD = "urdf", "mjcf", "usd"
 _JOINTS = ("revolute", "continuous", "prismatic", "fixed")
@@ -66,6 +74,11 @@ def read_description(path: str, packages: Mapping[str, str]) -> Description:
         raise ShotError(
             "this is a xacro, from which a URDF is made first", path=path, found=macros,
             remedy=f"Run `xacro {os.path.basename(path)} > robot.urdf`, and import robot.urdf",
+        )  # fmt: skip
+    if root.find("link") is None:
+        raise ShotError(
+            "the robot has no links", path=path, found="<robot> without <link>",
+            remedy="Name the file that describes the whole robot; from a .xacro, `xacro FILE > robot.urdf` makes it",
         )  # fmt: skip
     _refuse_other_joints(root, path)
     found = _packages(root, path, packages)
@@ -166,7 +179,7 @@ def _packages(root: xml.Element, path: str, given: Mapping[str, str]) -> dict[st
     Raises:
         ShotError: One is given that is no folder, or one is not found.
     """
-    named = {name.removeprefix("package://").split("/", 1)[0] for _, name in _meshes(root) if "package://" in name}
+    named = {in_package(name)[0] for _, name in _meshes(root) if name.startswith(PACKAGE)}
     problems, found = [], {}
     for name in sorted(named):
         folder = given.get(name) or _above(name, path)
@@ -197,8 +210,8 @@ def _above(name: str, path: str) -> str | None:
 
 def mesh_file(name: str, path: str, packages: Mapping[str, str]) -> str:
     """The file that a mesh of a URDF names."""
-    if name.startswith("package://"):
-        package, _, rest = name.removeprefix("package://").partition("/")
+    if name.startswith(PACKAGE):
+        package, rest = in_package(name)
         return os.path.join(packages[package], rest)
     return os.path.join(os.path.dirname(os.path.abspath(path)), name.removeprefix("file://"))
 

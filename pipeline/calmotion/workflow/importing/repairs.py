@@ -14,6 +14,7 @@ import xml.etree.ElementTree as xml
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
+PACKAGE = "package://"
 _FOREIGN = "urn:undeclared:"
 _PREFIX = re.compile(r"(?:</?|\s)([A-Za-z_][\w.-]*):[A-Za-z_][\w.-]*(?=[\s/>=])")
 _ROOT = re.compile(r"<(robot|mujoco)(?=[\s/>])")
@@ -53,6 +54,8 @@ def faults(root: xml.Element, prefixes: Sequence[str]) -> tuple[str, ...]:
     lost = [joint.get("name", "") for joint in _followers_of_none(root)]
     if lost:
         found.append(f"joints that follow one that is not there move by themselves: {', '.join(lost)}")
+    if any(node.get("filename", "").startswith(f"{PACKAGE}/") for node in root.iter("mesh")):
+        found.append(f"meshes are named with {PACKAGE}/, a slash too many")
     loose = [joint.get("name", "") for joint in root_joints(root)]
     if loose:
         found.append(
@@ -60,6 +63,12 @@ def faults(root: xml.Element, prefixes: Sequence[str]) -> tuple[str, ...]:
             "robot's first body"
         )
     return tuple(found)
+
+
+def in_package(name: str) -> tuple[str, str]:
+    """The ROS package that the name of a mesh begins with, and the path in it."""
+    package, _, rest = name.removeprefix(PACKAGE).lstrip("/").partition("/")
+    return package, rest
 
 
 def root_joints(root: xml.Element) -> list[xml.Element]:
