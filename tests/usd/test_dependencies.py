@@ -49,6 +49,7 @@ def test_places_of_the_network_and_of_devices_are_refused(tmp_path, name):
 def test_a_clip_inside_a_variant_is_refused(tmp_path):
     path = small_shots.write_arm(tmp_path / "arm.usda")
     layer = Sdf.Layer.OpenAsAnonymous(str(path))
+    layer.GetPrimAtPath(small_shots.FORE).variantSetNameList.Prepend("level")  # else USD does not look at the set
     choices = Sdf.VariantSetSpec(layer.GetPrimAtPath(small_shots.FORE), "level")
     clips(layer, Sdf.VariantSpec(choices, "high").primSpec, "/dev/zero")
     layer.Export(str(tmp_path / "broken.usda"))

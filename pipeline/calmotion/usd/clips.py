@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from pxr import Sdf
 
 MOST_CLIPS = 100_000  # of one template: USD looks for each of them
-CLIPS = "clips"  # metadata of a prim
+CLIPS, _VARIANT_SETS = "clips", "variantSetNames"  # metadata of a prim
 
 
 def clip_assets(layer: Sdf.Layer) -> list[str]:
@@ -40,9 +40,10 @@ def _prims(prim: Sdf.PrimSpec) -> Iterator[Sdf.PrimSpec]:
     while waiting:
         one = waiting.pop()
         yield one
-        waiting += list(one.nameChildren)
-        for variants in () if one.path.IsAbsoluteRootPath() else one.variantSets.values():
-            waiting += [variant.primSpec for variant in variants.variants.values()]
+        waiting += one.nameChildren.values()
+        if one.HasInfo(_VARIANT_SETS):  # asking for the sets themselves takes as long as all else
+            for variants in one.variantSets.values():
+                waiting += [variant.primSpec for variant in variants.variants.values()]
 
 
 def _named(clips: Mapping[str, Any]) -> list[str]:

@@ -6,7 +6,9 @@ what they refer to: one pass finds them.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable
+from functools import cache
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -18,7 +20,9 @@ _SCHEMAS = (
     "PhysicsVolumeDeformableMaterialAPI", "PhysicsMaterialAPI", "Calm", "Mjc", "Newton", "Physx", "SkelBindingAPI",
 )  # fmt: skip
 _TYPES = ("SkelRoot", "Skeleton", "SkelAnimation", "PhysicsScene", "Mjc", "Newton")
-_ATTRIBUTES = ("calm:", "drive:", "mjc:", "newton:", "physx", "physics:mass", "physics:density", "physics:rigidBody")
+_ATTRIBUTE = re.compile(  # one search in all names of a prim: most of the time goes into this
+    "^(?:calm:|drive:|mjc:|newton:|physx|physics:mass|physics:density|physics:rigidBody)", re.MULTILINE
+)
 
 
 def masked(stage: Usd.Stage, muted: Iterable[str] = ()) -> Usd.Stage:
@@ -65,10 +69,13 @@ def _outermost(prim: Usd.Prim) -> Usd.Prim:
 
 
 def _is_anchor(prim: Usd.Prim) -> bool:
-    kind = str(prim.GetTypeName())
-    if kind.startswith(_TYPES) or (kind.startswith("Physics") and kind.endswith("Joint")):
-        return True
     info = prim.GetPrimTypeInfo()
-    if any(schema.startswith(_SCHEMAS) for schema in info.GetAppliedAPISchemas()):
+    schemas = info.GetAppliedAPISchemas()
+    if _is_type(str(info.GetTypeName())) or (schemas and any(schema.startswith(_SCHEMAS) for schema in schemas)):
         return True
-    return any(name.startswith(_ATTRIBUTES) for name in prim.GetAuthoredPropertyNames())
+    return _ATTRIBUTE.search("\n".join(prim.GetAuthoredPropertyNames())) is not None
+
+
+@cache
+def _is_type(kind: str) -> bool:
+    return kind.startswith(_TYPES) or (kind.startswith("Physics") and kind.endswith("Joint"))

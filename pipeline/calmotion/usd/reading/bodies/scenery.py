@@ -103,7 +103,7 @@ def _still_geometry(reading: Reading, middle: Array, size: float) -> Iterator[Us
 
 def _box_is_near(boxes: UsdGeom.BBoxCache, prim: Usd.Prim, middle: Array, size: float) -> bool:
     """Whether a prim may be near the robot, all in stage units; True where that is not known without its children."""
-    from pxr import Tf, UsdGeom
+    from pxr import Gf, Tf, UsdGeom
 
     if not prim.IsA(UsdGeom.Boundable) and not prim.HasAttribute("extentsHint"):
         return True
@@ -113,8 +113,8 @@ def _box_is_near(boxes: UsdGeom.BBoxCache, prim: Usd.Prim, middle: Array, size: 
         return True
     if box.IsEmpty():
         return False
-    low, high = np.array(box.GetMin()), np.array(box.GetMax())
-    return not np.all(np.isfinite(low) & np.isfinite(high)) or _gap(low, high, middle) < NEAR * size
+    squared = box.GetDistanceSquared(Gf.Vec3d(*middle))
+    return squared == np.inf or bool(squared < (NEAR * size) ** 2)
 
 
 def _is_animated_or_hidden(prim: Usd.Prim, time: float) -> bool:
