@@ -7,7 +7,7 @@ from calmotion.accuracy.error_budget import with_budget
 from calmotion.accuracy.simulate_to_tolerance import simulate_to_tolerance
 from calmotion.retargeting.to_tolerance import optimize_to_tolerance
 from calmotion.shot import ModelChoice, ModelChoices
-from calmotion.shot.budget import CHOICES, MESH, REDUCTION, SEARCH, STEP, SUBSPACE, verdict_on
+from calmotion.shot.budget import CHOICES, MESH, PATCHES, REDUCTION, SEARCH, STEP, SUBSPACE, verdict_on
 from calmotion.shot.model_choice import with_choices
 from calmotion.shot.run import RunSettings
 from calmotion.simulation.compiled_shot import compile_shot
@@ -29,19 +29,20 @@ def test_the_entries_add_up_to_the_estimates_largest_first(simulated, arm):
     chosen = with_choices(simulated, ModelChoices(arm, rows))
     result = with_budget(chosen, arm, TOLERANCE)
     entries = {entry.source: entry for entry in result.budget}
-    assert set(entries) == {MESH, STEP, REDUCTION, SUBSPACE, CHOICES} and result.tolerance_m == TOLERANCE
+    assert set(entries) == {MESH, PATCHES, STEP, REDUCTION, SUBSPACE, CHOICES} and result.tolerance_m == TOLERANCE
     estimates = [entry.estimated_m or 0.0 for entry in result.budget]
     assert estimates == sorted(estimates, reverse=True)
     assert entries[STEP].estimated_m == result.accuracy.step_m and entries[CHOICES].estimated_m == 1e-4
     without_mesh = sum(entry.estimated_m for entry in result.budget if entry.source != MESH)
-    assert without_mesh == pytest.approx(result.accuracy.estimated_m)
+    assert entries[PATCHES].estimated_m == result.accuracy.patches_m
+    assert without_mesh == pytest.approx(result.accuracy.estimated_m + result.accuracy.patches_m)
     assert entries[MESH].allowed_m == pytest.approx(TOLERANCE - without_mesh) and without_mesh < 0.75 * TOLERANCE
     assert "time step" in entries[STEP].choice and "gyroscopic" in entries[CHOICES].choice
 
 
 def test_a_larger_mesh_error_decides_the_verdict(simulated, arm):
     for mesh, kept in ((0.0, True), (2.0 * TOLERANCE, False)):
-        accuracy = dataclasses.replace(simulated.accuracy, mesh_m=mesh)
+        accuracy = dataclasses.replace(simulated.accuracy, mesh_m=mesh, patches_m=0.0)
         result = with_budget(dataclasses.replace(simulated, accuracy=accuracy), arm, TOLERANCE)
         verdict = verdict_on(result.budget, TOLERANCE)
         assert (verdict.kept, verdict.short) == (kept, "" if kept else MESH)
@@ -54,7 +55,7 @@ def test_a_given_step_is_estimated_and_falls_short_where_it_is_too_long(arm, ani
     assert step.estimated_m > 1e-4 and step.reason == "given by --step"
     # the meshes keep their share of it, which the step has used
     assert next(entry for entry in result.budget if entry.source == MESH).allowed_m == pytest.approx(0.25e-4)
-    verdict = verdict_on([entry for entry in result.budget if entry.source != MESH], 1e-4)
+    verdict = verdict_on([entry for entry in result.budget if entry.source not in (MESH, PATCHES)], 1e-4)
     assert not verdict.kept and verdict.short == STEP
 
 

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 from calmotion.accuracy import mesh_budget
-from calmotion.accuracy.mesh_budget import mesh_error, meshes_to_tolerance
+from calmotion.accuracy.mesh_budget import mesh_error, meshes_to_tolerance, patch_error
 from calmotion.accuracy.step_error import distance, simulate_at
 from calmotion.reduction.scaled_stiffness import with_scaled_stiffness
 from calmotion.shot.run import RunSettings
@@ -83,3 +83,17 @@ def test_errors_at_the_targets_count_in_place_of_deflections_where_they_are_know
     total = mesh_error(shot, OPTIONS, run)
     ratio = by_motion.wanted[0] / by_deflection.wanted[0]
     assert ratio == pytest.approx(2e-3 / total, rel=1e-6)  # deflections: two bodies of a millimetre each
+
+
+def test_patches_cost_what_softer_bodies_do_whether_the_mesh_is_known_or_not(arm, animation, bodies):
+    cut = [replace(body, patch_error=0.0) for body in with_mesh_errors(bodies, 0.02, 0.01)]
+    shot = compile_shot(arm, animation, cut)
+    run = simulate_at(shot, OPTIONS, STEP)
+    assert patch_error(shot, OPTIONS, run) == 0.0
+    with_rims = [replace(body, patch_error=0.5 * (body.mesh_error or 0.0)) for body in cut]
+    found = patch_error(shot.with_bodies(with_rims), OPTIONS, run)
+    meshes = mesh_error(shot.with_bodies(with_rims), OPTIONS, run)
+    assert meshes == mesh_error(shot, OPTIONS, run) and found == pytest.approx(0.5 * meshes, rel=0.1)
+    given = [replace(body, mesh_error=None, mesh_error_m=None) for body in with_rims]
+    assert mesh_error(shot.with_bodies(given), OPTIONS, run) is None
+    assert patch_error(shot.with_bodies(given), OPTIONS, run) == found

@@ -6,7 +6,17 @@ from dataclasses import replace
 
 from calmotion.accuracy import converged_reduction, mesh_budget, simulate_to_tolerance
 from calmotion.shot import Character, Result
-from calmotion.shot.budget import CHOICES, MESH, REDUCTION, SEARCH, SEARCH_SHARE, STEP, SUBSPACE, BudgetEntry
+from calmotion.shot.budget import (
+    CHOICES,
+    MESH,
+    PATCHES,
+    REDUCTION,
+    SEARCH,
+    SEARCH_SHARE,
+    STEP,
+    SUBSPACE,
+    BudgetEntry,
+)
 from calmotion.shot.tolerance import tolerance_of
 
 
@@ -40,6 +50,11 @@ def _budget(result: Result, tolerance: float) -> tuple[BudgetEntry, ...]:
         entry(CHOICES, simulate_to_tolerance.HELD, accuracy.choices_m),
     ]
     if result.modes:
+        how = (
+            "cut along the rims where the mesh is the program's; end faces and named surfaces have no rim of their own"
+        )
+        why = "rims are polygons" if accuracy.patches_m else "their rims are edges of the surface"
+        entries.append(BudgetEntry(PATCHES, simulate_to_tolerance.HELD * tolerance, accuracy.patches_m, how, why))
         rest = tolerance - sum(other.estimated_m or 0.0 for other in entries)
         left = max(rest, mesh_budget.SHARE * tolerance)  # other entries may be beyond their shares
         entries.append(_mesh_entry(result, accuracy.mesh_m, left))

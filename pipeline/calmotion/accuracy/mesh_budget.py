@@ -6,7 +6,7 @@ are softer by the estimated error of their stiffness. Where the shake will be re
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 from calmotion.accuracy.step_error import StepRun, distance, simulate_at
@@ -67,12 +67,35 @@ def mesh_error(shot: CompiledShot, options: RunSettings, run: StepRun) -> float 
     flexible = [body for body in shot.bodies if len(body.stiffness)]
     if not flexible or any(body.mesh_error is None for body in flexible):
         return None
-    softer = [with_scaled_stiffness(body, max(1.0 - (body.mesh_error or 0.0), _SOFTEST)) for body in shot.bodies]
+    off = _if_softer(shot, options, run, [body.mesh_error or 0.0 for body in shot.bodies])
+    return sum(body.mesh_error_m or 0.0 for body in flexible) if off is None else off
+
+
+def patch_error(shot: CompiledShot, options: RunSettings, run: StepRun) -> float:
+    """Estimated error of the interface patches at the targets by their rims [m]; arguments as of `mesh_error`.
+
+    The error of the meshes does not contain it: finer meshes have the same rims.
+    """
+    errors = [body.patch_error if len(body.stiffness) else 0.0 for body in shot.bodies]
+    if not any(errors):
+        return 0.0
+    off = _if_softer(shot, options, run, errors)
+    bent = [
+        body.mesh_error_m / body.mesh_error if body.mesh_error_m and body.mesh_error else 0.0 for body in shot.bodies
+    ]
+    return sum(error * by for error, by in zip(errors, bent, strict=True)) if off is None else off
+
+
+def _if_softer(shot: CompiledShot, options: RunSettings, run: StepRun, errors: Sequence[float]) -> float | None:
+    """How far targets move where bodies are softer by relative errors [m]; None where they buckle then."""
+    softer = [
+        with_scaled_stiffness(body, max(1.0 - error, _SOFTEST)) for body, error in zip(shot.bodies, errors, strict=True)
+    ]
     options = replace(options, integrator=run.integrator or options.integrator)
     try:
         other = simulate_at(shot.with_bodies(softer), options, run.step)
-    except ShotError:  # bodies that buckle when they are a little softer
-        return sum(body.mesh_error_m or 0.0 for body in flexible)
+    except ShotError:
+        return None
     return distance(run.positions, other.positions)
 
 

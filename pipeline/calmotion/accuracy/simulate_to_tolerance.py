@@ -12,7 +12,7 @@ from functools import partial
 import numpy as np
 
 from calmotion.accuracy.integrator_choice import by_fast_scheme
-from calmotion.accuracy.mesh_budget import mesh_error
+from calmotion.accuracy.mesh_budget import mesh_error, patch_error
 from calmotion.accuracy.pod_subspace import ProjectedShot, ReferenceRun, project_to_subspace
 from calmotion.accuracy.step_error import (
     ORDER,
@@ -212,10 +212,10 @@ def omitted_error(bodies: Sequence[ReducedBody]) -> float:
 
 
 def _accuracy(step: float, left_out: float, shot: CompiledShot, options: RunSettings, run: StepRun) -> Accuracy:
-    """The estimates for a run: of its step, of what its bodies do without, and of their meshes [m]."""
+    """The estimates for a run: of its step, of what its bodies do without, of their meshes and patches [m]."""
     rows = [row for body in shot.bodies for row in body.left_out]
     subspace = sum(row.estimated_error_m or 0.0 for row in rows if row.source == SUBSPACE)
-    return Accuracy(step, left_out, mesh_error(shot, options, run), subspace)
+    return Accuracy(step, left_out, mesh_error(shot, options, run), subspace, patch_error(shot, options, run))
 
 
 def intended_positions(shot: CompiledShot, options: RunSettings) -> Array:

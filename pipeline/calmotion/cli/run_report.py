@@ -10,12 +10,13 @@ from rich.console import Console
 from calmotion.cli.quantities import angle, length
 from calmotion.cli.sentences import unbroken
 from calmotion.cli.tables import console_on, print_table, say
-from calmotion.shot.budget import CHOICES, MEASURED, MESH, REDUCTION, STEP, SUBSPACE
+from calmotion.shot.budget import CHOICES, MEASURED, MESH, PATCHES, REDUCTION, STEP, SUBSPACE
 
 # What helps where an entry of the error budget is too large.
 _SENSITIVE = "With large deflections, or near buckling, small errors grow: use a stiffer robot or a slower motion."
 REMEDIES = {
     MESH: "Use smaller elements: calm:flexible:elementSize of the body, or --set fe.mesh.element_size=LENGTH.",
+    PATCHES: "Name the faces that joints hold: a GeomSubset of family calmInterface (docs/reading_usd.md).",
     STEP: f"Use a shorter --step, or none. {_SENSITIVE}",
     REDUCTION: f"Remove calm:flexible:modeCount and calm:flexible:elasticity, or use a larger tolerance. {_SENSITIVE}",
     SUBSPACE: f"Use --keep directions. {_SENSITIVE}",

@@ -15,6 +15,7 @@ from calmotion.reduction.elements.assembly import FEModel, QuadraticMesh, assemb
 from calmotion.reduction.elements.embedding import Embedding, embed
 from calmotion.reduction.inertia_integrals import inertia_integrals
 from calmotion.reduction.interfaces.interface_patches import AttachmentFrame, InterfacePatch, interface_patches
+from calmotion.reduction.interfaces.rim_error import compliance_error, rim_error
 from calmotion.reduction.load_envelope import LoadEnvelope, patch_load_envelope
 from calmotion.reduction.reduced_body import Elasticity, Marker, ReducedBody
 from calmotion.shot.budget import REDUCTION
@@ -61,6 +62,7 @@ def reduce_body(
     material = _material(mesh, body.flexible.material)
     settings = replace(body.flexible, material=material)
     body = replace(body, flexible=settings)
+    patch_error = compliance_error(linear.rims, material, basis.omega_squared, basis.patch_motion)
     elasticity = None
     law, simplifications = _law(model, linear.support, basis, body, load_envelope, tolerance)
     left_out += simplifications
@@ -84,6 +86,7 @@ def reduce_body(
         left_out=left_out,
         mesh_error_m=_mesh_error_at_targets(mesh_error, linear),
         mesh_error=mesh_error,
+        patch_error=patch_error,
     )
     return damped(reduced, material)
 
@@ -96,11 +99,13 @@ class FullBody:
         model: Full model.
         support: Its root patch and moving patches.
         moving: The moving patches, in the order of the support.
+        rims: `rim_error` of the root patch, and of each moving patch.
     """
 
     model: FEModel
     support: Support
     moving: Sequence[InterfacePatch]
+    rims: Sequence[tuple[float, float]]
 
     @property
     def entries(self) -> int:
@@ -125,7 +130,13 @@ def full_body(mesh: FEMesh, body: Body, attachments: Sequence[AttachmentFrame], 
         )  # fmt: skip
     moving = [patch for patch in patches if patch is not root_patch]
     centers = [attachments[patch.attachments[0]].frame.position for patch in moving]
-    return FullBody(model, Support(root_patch.nodes, [patch.nodes for patch in moving], centers), moving)
+    support = Support(root_patch.nodes, [patch.nodes for patch in moving], centers)
+    origins = [attachments[patch.attachments[0]].frame.position for patch in (root_patch, *moving)]
+    rims = [
+        rim_error(model.mesh, patch, origin, mesh.patches)
+        for patch, origin in zip((root_patch, *moving), origins, strict=True)
+    ]
+    return FullBody(model, support, moving, rims)
 
 
 def _material(mesh: FEMesh, material: ElasticMaterial) -> ElasticMaterial:
@@ -164,7 +175,7 @@ def linear_modes(
         tolerance=settings.modes_share * tolerance if load_envelope is not None else None,
         targets=_points(model.mesh, attachments).displacements, fixed=support.fixed(model),
     )  # fmt: skip
-    return LinearModes(model, support, moving, basis, load_envelope)
+    return LinearModes(model, support, moving, full.rims, basis, load_envelope)
 
 
 def _law(

@@ -97,6 +97,7 @@ class ReducedBody:
         left_out: Simplifications of the model of this body, with their estimated errors.
         mesh_error_m: Estimated error of its finite-element mesh in the shot [m]; None where it is not known.
         mesh_error: Estimated relative error of its stiffness by the mesh, which makes a body too stiff; likewise.
+        patch_error: Estimated relative error of its compliance by the rims of its interface patches.
     """
 
     invariants: Invariants
@@ -110,6 +111,7 @@ class ReducedBody:
     left_out: tuple[Simplification, ...] = ()
     mesh_error_m: float | None = None
     mesh_error: float | None = None
+    patch_error: float = 0.0
 
     @property
     def frequencies(self) -> Array:
