@@ -191,7 +191,9 @@ def _of_kind(shot: CompiledShot, kind: str, pattern: str, prior: float) -> list[
                     for axis in range(3)
                 ]
         return rows
-    return [row for motor in character.motors for row in _of_motor(motor, kind, spread)]
+    # calm:motor:... of a joint is that of all its axes, so that a value of one axis has no place
+    alone = [motor for motor in character.motors if motor.path == motor.prim_path]
+    return [row for motor in alone for row in _of_motor(motor, kind, spread)]
 
 
 def _of_motor(motor: Motor, kind: str, spread: float) -> list[Parameter]:

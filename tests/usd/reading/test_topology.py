@@ -31,6 +31,8 @@ def test_leaves_are_the_outermost_bodies_also_in_closed_chains():
     four_bar = [joint("", "base"), joint("base", "left"), joint("base", "right"), joint("left", "top"),
                 joint("right", "top")]  # fmt: skip
     assert leaves(["base", "left", "right", "top"], four_bar) == ["top"]
+    five_bar = [*four_bar[:3], joint("left", "one"), joint("right", "two"), joint("one", "two")]
+    assert leaves(["base", "left", "right", "one", "two"], five_bar) == ["one"], "two are equally far"
 
 
 def test_the_common_path_is_the_deepest_that_contains_all():

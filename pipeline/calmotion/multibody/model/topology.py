@@ -97,6 +97,9 @@ def _spanning(character: Character) -> tuple[list[int], list[int]]:
         joint = character.joints[index]
         # a free slider has no stiffness at rest, which the joints of the tree need
         kind = 0 if index in driven else {"fixed": 1, "revolute": 2, "spherical": 3, "prismatic": 4}[joint.kind]
+        # a part between the axes of a joint weighs almost nothing, and must not end in a chain that is closed there
+        if any(end != WORLD and character.bodies[end].between for end in (joint.body0, joint.body1)):
+            return min(kind, 1), index
         return (5 if joint.closes_chain else kind), index
 
     group = {index: index for index in range(WORLD, len(character.bodies))}

@@ -174,7 +174,8 @@ def build_character(reading: Reading, skeleton: Skeleton) -> Character:
         settings = scene.retarget_settings(reading, root)
     raise_all(reading.problems)
     if not chosen:
-        outer = topology.leaves(skeleton.bodies, skeleton.joints)
+        joints_as_authored = list(dict.fromkeys(joint.whole or joint for joint in skeleton.joints))
+        outer = topology.leaves([path for path in skeleton.bodies if path not in skeleton.between], joints_as_authored)
         chosen = tuple(targets.outermost_target(bodies[numbers[b]], numbers[b], joints) for b in outer)
         reading.note(f"no CalmTargetAPI: the outermost point of {', '.join(outer)} is taken as target")
     default = reading.stage.GetDefaultPrim()

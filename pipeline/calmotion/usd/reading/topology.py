@@ -44,10 +44,12 @@ def distances(bodies: list[str], joints: list[JointPrim]) -> dict[str, int]:
 
 
 def leaves(bodies: list[str], joints: list[JointPrim]) -> list[str]:
-    """The outermost bodies: those all of whose neighbours are nearer to the world."""
+    """The outermost bodies: those all of whose neighbours are nearer to the world; where there is none, as in a closed
+    chain of which two bodies are equally far, the first of the farthest."""
     far = distances(bodies, joints)
     neighbours = _neighbours(bodies, joints)
-    return [b for b in bodies if all(far[n] < far[b] for n in neighbours[b])]
+    found = [b for b in bodies if all(far[n] < far[b] for n in neighbours[b])]
+    return found or [max(bodies, key=lambda body: far[body])]
 
 
 def common_path(paths: list[str]) -> str:

@@ -106,6 +106,50 @@ def test_curves_are_written_to_the_drive_of_each_axis_and_motions_to_bodies_alon
     assert sample == pytest.approx(CURVES["rotZ"][6], abs=1e-5)
 
 
+@pytest.mark.parametrize("closing", [False, True])
+def test_a_closed_chain_with_a_universal_joint_moves_and_loads_its_motor_as_one_of_hinges(tmp_path, closing):
+    """Base, upper arm, rod and rocker in a plane, with hinges about y; one of them may be universal."""
+
+    def edit(stage, universal=""):
+        stage.GetPrimAtPath(ELBOW).RemoveAppliedSchema("PhysicsDriveAPI:angular")
+        stage.GetPrimAtPath(ELBOW).RemoveProperty("drive:angular:physics:targetPosition")
+        rocker = UsdGeom.Xform.Define(stage, "/Arm/rocker")
+        rocker.AddTranslateOp().Set(Gf.Vec3d(LENGTH, 0.0, 0.7))
+        UsdPhysics.RigidBodyAPI.Apply(rocker.GetPrim())
+        mass = UsdPhysics.MassAPI.Apply(rocker.GetPrim())
+        mass.CreateMassAttr(0.3)
+        mass.CreateDiagonalInertiaAttr(Gf.Vec3f(0.01, 0.01, 0.01))
+        stage.RemovePrim("/Arm/fore/skin")
+        for name, bodies, at0, at1 in (
+            ("tip", (FORE, "/Arm/rocker"), (0.3, 0.0, 0.0), (0.3, 0.0, 0.3)),
+            ("foot", ("/Arm/base", "/Arm/rocker"), (LENGTH, 0.0, -0.3), (0.0, 0.0, 0.0)),
+        ):
+            joint = UsdPhysics.RevoluteJoint.Define(stage, f"/Arm/joints/{name}")
+            joint.CreateBody0Rel().SetTargets([bodies[0]])
+            joint.CreateBody1Rel().SetTargets([bodies[1]])
+            joint.CreateLocalPos0Attr(Gf.Vec3f(*at0))
+            joint.CreateLocalPos1Attr(Gf.Vec3f(*at1))
+            joint.CreateAxisAttr("Y")
+            joint.CreateLowerLimitAttr(-90.0)
+            joint.CreateUpperLimitAttr(90.0)
+        if universal:
+            generic(stage, universal, ["rotX", "rotY"])
+            for name in ("rotX", "rotY"):
+                stage.GetPrimAtPath(universal).RemoveProperty(f"drive:{name}:physics:targetPosition")
+
+    universal = "/Arm/joints/foot" if closing else ELBOW
+    results = [
+        cm.simulate(write_arm(tmp_path / f"{k}.usda", lambda s, u=u: edit(s, u)), step=1 / 96, pre_roll=0.0)
+        for k, u in enumerate(("", universal))
+    ]
+    efforts, targets = zip(
+        *[(r.motors["/Arm/joints/shoulder"].effort, list(r.targets.values())[0]) for r in results], strict=True
+    )
+    assert np.abs(efforts[1] - efforts[0]).max() < 1e-5 * np.abs(efforts[0]).max()
+    np.testing.assert_allclose(targets[1].position, targets[0].position, atol=1e-8)
+    assert results[1].result.before.max_joint_gap < 1e-8
+
+
 MUJOCO = """<mujoco><compiler angle="radian" inertiafromgeom="false"/><option gravity="0 0 -9.81"/><worldbody>
 <body pos="0 0 1"><inertial pos="0.2 0 0" mass="{0}" diaginertia="{1} {2} {3}"/><joint axis="0 1 0"/>
 <body pos="0.4 0 0"><inertial pos="0.2 0 0" mass="0.5" diaginertia="1e-4 7e-3 7e-3"/>{4}
