@@ -6,7 +6,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from calmotion.shot import Animation, MotorCurve, Track
+from calmotion.shot import Animation, Motor, MotorCurve, Track
 from calmotion.usd.clock import Clock
 from calmotion.usd.writing.curves import attribute_spec, author_curves, curve_values, sample_times
 from pxr import Sdf
@@ -20,7 +20,7 @@ CURVE = MotorCurve(0, True, FRAMES, 0.3 * np.sin(9.0 * FRAMES), 0.3)
 def authored(path, attribute, linear):
     """A layer with the curve of a motor, the path of its attribute, and what was written."""
     layer = Sdf.Layer.CreateAnonymous(".usda")
-    motor = SimpleNamespace(path=path, attribute=attribute, linear=linear)
+    motor = Motor(0, path, attribute, linear=linear)
     character = SimpleNamespace(motors=[motor], retarget=SimpleNamespace(cyclic=False))
     clock = Clock(start=101, end=113, time_codes_per_second=24, frames_per_second=24)
     return layer, f"{path}.{attribute}", author_curves(layer, character, ANIMATION, (CURVE,), FRAMES, clock, 0.01)

@@ -4,7 +4,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from calmotion.shot import Animation, MotorCurve, Track
+from calmotion.shot import Animation, Motor, MotorCurve, Track
 from calmotion.shot.curves import curve_of
 from calmotion.usd.clock import Clock
 from calmotion.usd.reading.context import Reading
@@ -45,7 +45,7 @@ def sparse():
 )
 def test_the_spline_is_the_solver_s_curve_between_frames_too(base, cyclic):
     animation, curve = optimised(base, cyclic)
-    motor = SimpleNamespace(path="/arm/elbow", attribute="drive:angular:physics:targetPosition", linear=False)
+    motor = Motor(0, "/arm/elbow", "drive:angular:physics:targetPosition")
     character = SimpleNamespace(motors=[motor], retarget=SimpleNamespace(cyclic=cyclic))
     layer = Sdf.Layer.CreateAnonymous(".usda")
     written = author_splines(layer, character, animation, (curve,), CLOCK, 1.0)
@@ -69,7 +69,7 @@ def test_the_spline_is_the_solver_s_curve_between_frames_too(base, cyclic):
 @pytest.mark.parametrize("cyclic", [False, True])
 def test_what_was_written_is_read_back_as_the_same_curve(cyclic):
     animation, curve = optimised(sparse(), cyclic)
-    motor = SimpleNamespace(path="/arm/slide", attribute="drive:linear:physics:targetPosition", linear=True)
+    motor = Motor(0, "/arm/slide", "drive:linear:physics:targetPosition", linear=True)
     character = SimpleNamespace(motors=[motor], retarget=SimpleNamespace(cyclic=cyclic))
     layer = Sdf.Layer.CreateAnonymous(".usda")
     author_splines(layer, character, animation, (curve,), CLOCK, 0.01)
