@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from calmotion.workflow.batch.report import BatchResult, JobResult
     from calmotion.workflow.batch.run import batch
     from calmotion.workflow.calibration.calibrate import CalibratedShot, calibrate
+    from calmotion.workflow.calibration.excite import ExcitedShot, excite
     from calmotion.workflow.commands import inspect, optimize, rig, simulate, verify
     from calmotion.workflow.exporting.export import Export, export
     from calmotion.workflow.importing.robot import ImportedRobot, import_robot
@@ -37,6 +38,7 @@ __all__ = [
     "CalibratedShot",
     "BatchResult",
     "Cancelled",
+    "ExcitedShot",
     "Export",
     "ImportedRobot",
     "Inspection",
@@ -56,6 +58,7 @@ __all__ = [
     "Warmup",
     "__version__",
     "calibrate",
+    "excite",
     "batch",
     "export",
     "import_robot",
@@ -75,6 +78,7 @@ _HOMES = {
     "host.errors": ("SettingError",),
     "shot.run": ("OutputPaths",),
     "workflow.calibration.calibrate": ("CalibratedShot", "calibrate"),
+    "workflow.calibration.excite": ("ExcitedShot", "excite"),
     "workflow.batch.report": ("BatchResult", "JobResult"),
     "workflow.batch.run": ("batch",),
     "workflow.commands": ("inspect", "optimize", "rig", "simulate", "verify"),

@@ -15,7 +15,7 @@ from calmotion.support.naming import nearest, nearest_name
 # Commands that are named nowhere here stand in the last group.
 TASKS = (
     ("Prepare a shot", ("import", "rig", "motors", "materials", "inspect")),
-    ("Remove the shake", ("simulate", "optimize", "watch", "calibrate")),
+    ("Remove the shake", ("simulate", "optimize", "watch", "calibrate", "excite")),
     ("Work on a show", ("batch", "sequence", "submit")),
     ("Play it on the robot", ("export",)),
     ("Measure, extend, set up", ("bench", "plugins", "warmup", "doctor", "log", "cache", "completion")),
@@ -41,6 +41,11 @@ EXAMPLES: dict[str, tuple[tuple[str, str], ...]] = {
         ("calmotion calibrate shot.usda --recording take.csv -o robot.usda", "markers, encoders"),
         ("calmotion calibrate shot.usda --recording accel.csv@/Arm/Hand/sensor -o robot.usda", "a printer's log"),
         ("calmotion calibrate shot.usda --recording a.csv --parameters modulus damping", "these alone"),
+    ),
+    "excite": (
+        ("calmotion excite shot.usda -o test.usda", "accelerometers at the targets, encoders"),
+        ("calmotion excite shot.usda -o test.usda --sensor marker=0.3mm --duration 3s", "markers"),
+        ("calmotion calibrate test.usda --recording take.csv -o robot.usda", "after the robot has played it"),
     ),
     "watch": (
         ("calmotion watch shot.usda", "how much does it shake, after each save?"),

@@ -59,7 +59,7 @@ class ExcitationSettings:
     duration: float = 4.0
     amplitude: float = float(np.radians(10.0))
     travel: float = 0.05
-    tries: int = 60
+    tries: int = 40
     seed: int = 0
 
 
@@ -159,11 +159,11 @@ class _Trial:
         options: RunSettings,
     ):  # fmt: skip
         self.shot, self.family, self.parameters, self.options = shot, family, tuple(parameters), options
-        self._recordings = _blank(settings.sensors, float(family.times[-1]) + AFTER)
+        self._recordings = blank_recordings(settings.sensors, float(family.times[-1]) + AFTER)
         clocks = [0.0] * len(self._recordings)
         self._measurement = Measurement(
             tuple(item.file for item in self._recordings),
-            sensors_of(shot.character, self._recordings, clocks, -np.inf, float(family.times[-1]) + AFTER, False),
+            sensors_of(shot.character, self._recordings, clocks, -1.0, float(family.times[-1]) + AFTER, False),
             measurement_parameters(self._recordings, clocks, settings.priors),
         )  # fmt: skip
 
@@ -206,7 +206,7 @@ def _performing(shot: CompiledShot, family: Family, values: Array) -> CompiledSh
     return replace(shot, animation=Animation(family.times, tracks, tracks, shot.animation.moving))
 
 
-def _blank(sensors: Sequence[PlannedSensor], end: float) -> list[SensorRecording]:
+def blank_recordings(sensors: Sequence[PlannedSensor], end: float) -> list[SensorRecording]:
     """Recordings without what they will hold, one for each kind of sensor: each has a clock of its own."""
     found = []
     for kind in dict.fromkeys(sensor.kind for sensor in sensors):

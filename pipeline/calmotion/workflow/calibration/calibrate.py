@@ -116,11 +116,11 @@ def calibrate(
     refuse_unknown(parameters, priors or {})
     files = [recordings] if isinstance(recordings, (str, os.PathLike)) else recordings
     names = [os.fspath(file) for file in files]
-    opened = _with_sensors(shot)
+    opened = with_sensors(shot)
     read = read_recordings(opened.host, names, merge([opened.settings, chosen]))
     options = RunSettings(tolerance=_quantity(tolerance, "m"), step=_quantity(step, "s"), integrator=integrator)
     target = None if layer is None else os.fspath(layer)
-    outcome = _compiled(opened, read, options, target, operators, chosen, hooks)
+    outcome = compiled_with_sensors(opened, read, options, target, operators, chosen, hooks)
 
     def tell(fraction: float, message: str) -> None:
         if cancel is not None and cancel():
@@ -139,7 +139,7 @@ def calibrate(
     return CalibratedShot(calibration, written, drawn, time.perf_counter() - begin, outcome)
 
 
-def _compiled(
+def compiled_with_sensors(
     opened: Shot, recordings: Sequence[SensorRecording], options: RunSettings, layer: str | None,
     operators: Sequence[str], settings: Settings, hooks: Hooks,
 ) -> Outcome:  # fmt: skip
@@ -167,7 +167,7 @@ def _compiled(
     return outcome
 
 
-def _with_sensors(shot: Shot | Path) -> Shot:
+def with_sensors(shot: Shot | Path) -> Shot:
     """The shot, to be read again: the prims of sensors are targets of this reading alone."""
     if not isinstance(shot, Shot):
         from calmotion.workflow.exporting.export import with_shot

@@ -26,11 +26,7 @@ def add_to(commands: Commands) -> None:
         "armature, friction, viscous_friction, delay, encoder_offset, each also as KIND:PATTERN for some prim paths "
         "(default: all but density, centre and encoder_offset)",
     )  # fmt: skip
-    command.add_argument(
-        "--prior", metavar="KIND=VALUE", action="append", default=[], type=_prior,
-        help="standard deviation of what is known before, relative (modulus=0.3) or in SI (delay=0.005, bias=0.3, "
-        "place=0.002, clock_drift=1e-4); may be repeated",
-    )  # fmt: skip
+    prior_option(command)
     command.add_argument(
         "--no-validation", action="store_true", help="fit all samples; by default every fifth part is held out"
     )
@@ -49,6 +45,15 @@ def add_to(commands: Commands) -> None:
     file_argument(
         command, "--motion", metavar="FILE",
         help="file with a motion for the motors, such as a BVH file (with --set bvh.read.map=...)",
+    )  # fmt: skip
+
+
+def prior_option(command: argparse.ArgumentParser) -> None:
+    """Add `--prior`."""
+    command.add_argument(
+        "--prior", metavar="KIND=VALUE", action="append", default=[], type=_prior,
+        help="standard deviation of what is known before, relative (modulus=0.3) or in SI (delay=0.005, bias=0.3, "
+        "place=0.002, clock_drift=1e-4); may be repeated",
     )  # fmt: skip
 
 

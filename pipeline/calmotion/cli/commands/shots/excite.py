@@ -1,0 +1,94 @@
+"""`calmotion excite`: a test motion that makes the parameters of the robot identifiable."""
+
+from __future__ import annotations
+
+import argparse
+from typing import TYPE_CHECKING, Any, TextIO
+
+from calmotion.cli.commands.shots.calibrate import prior_option
+from calmotion.cli.options import Commands, assignments, file_argument, opened_shot, quantity, shot_command
+
+if TYPE_CHECKING:
+    from calmotion.cli.output import Output
+
+
+def add_to(commands: Commands) -> None:
+    """Add the command."""
+    command = shot_command(commands, "excite", _run, "find a test motion that tells the parameters of the robot")
+    file_argument(
+        command, "-o", "--output", metavar="LAYER", required=True,
+        help="USD layer to write; it opens the shot with the motion",
+    )  # fmt: skip
+    command.add_argument(
+        "--sensor", metavar="KIND[@/PRIM][=NOISE]", action="append", default=[],
+        help="what will record it: marker, accelerometer, angle or effort, at all targets or motors or at a prim, with "
+        "the standard deviation of its noise in SI or with a unit; may be repeated (default: accelerometer and angle)",
+    )  # fmt: skip
+    command.add_argument(
+        "--parameters", metavar="KIND", nargs="+", help="what is to be estimated, as of calmotion calibrate"
+    )
+    prior_option(command)
+    command.add_argument(
+        "--duration", metavar="TIME", type=quantity("s", positive=True), default=4.0,
+        help="length of the motion; a second of rest behind it counts as well (default: 4 s)",
+    )  # fmt: skip
+    command.add_argument(
+        "--amplitude", metavar="ANGLE", type=quantity("rad", positive=True), default=None,
+        help="largest excursion of a hinge from the first pose, in rad or with a unit (default: 10deg)",
+    )  # fmt: skip
+    command.add_argument(
+        "--tries", metavar="N", type=int, default=40, help="number of motions that are tried (default: 40)"
+    )
+    command.add_argument(
+        "--step", metavar="TIME", type=quantity("s", positive=True), help="time step of the simulations"
+    )
+
+
+def _run(args: argparse.Namespace, output: Output) -> int:
+    from calmotion.cli.output import conclude
+    from calmotion.cli.progress import ProgressDisplay
+    from calmotion.identification.parameters import DEFAULT
+    from calmotion.workflow.calibration.excite import SENSORS, excite
+
+    shot = opened_shot(args)
+    with ProgressDisplay(args.quiet, args.progress, args.log) as display:
+        made = excite(
+            shot, layer=args.output, sensors=args.sensor or SENSORS, parameters=args.parameters or DEFAULT,
+            priors=dict(args.prior), duration=args.duration, amplitude=args.amplitude or "10deg",
+            tries=max(1, args.tries), step=args.step, operators=args.run, settings=assignments(args), progress=display,
+            on_operator=display.done,
+        )  # fmt: skip
+    conclude(made.report(), (), output, None if args.quiet else _print)
+    return 0
+
+
+def _print(report: dict[str, Any], stream: TextIO) -> None:
+    from calmotion.cli.tables import console_on, print_table, say
+
+    console = console_on(stream)
+    rows = [
+        [
+            row["kind"], row["path"], f"{row['value']:.4g} {row['unit']}".rstrip(),
+            *(f"{value:.2g}" for value in (
+                row["prior"]["standard_deviation"], row["standard_deviation_chirp"], row["standard_deviation"]
+            )),
+            "yes" if row["identifiable"] else "no",
+        ]
+        for row in report["parameters"]
+    ]  # fmt: skip
+    print_table(
+        console, "Standard deviations to expect",
+        ["parameter", "of", "in the shot", "before", "after a chirp", "after this motion", "identifiable"], rows,
+        texts=2,
+    )  # fmt: skip
+    rows = [
+        [row["path"], *(f"{row[name]:.3g}" for name in ("excursion", "velocity", "acceleration", "effort")),
+         f"{max(row[f'{name}_share'] for name in ('range', 'velocity', 'acceleration', 'effort')):.0%}"]
+        for row in report["motors"]
+    ]  # fmt: skip
+    print_table(
+        console, "What the motors do (rad or m, s, N m or N)",
+        ["motor", "excursion", "velocity", "acceleration", "effort", "of its limits"], rows,
+    )  # fmt: skip
+    say(console, f"{report['motions']} motions tried in {report['wall_s']:.3g} s; collisions are not checked")
+    say(console, f"wrote {report['layer']}")
