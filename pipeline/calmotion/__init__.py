@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from calmotion.workflow.batch.run import batch
     from calmotion.workflow.calibration.calibrate import CalibratedShot, calibrate
     from calmotion.workflow.calibration.excite import ExcitedShot, excite
+    from calmotion.workflow.calibration.refine import RefinedShot, refine
     from calmotion.workflow.commands import inspect, optimize, rig, simulate, verify
     from calmotion.workflow.exporting.export import Export, export
     from calmotion.workflow.importing.robot import ImportedRobot, import_robot
@@ -48,6 +49,7 @@ __all__ = [
     "OutputPaths",
     "Progress",
     "Repertoire",
+    "RefinedShot",
     "RobotMotion",
     "RunError",
     "SettingError",
@@ -66,6 +68,7 @@ __all__ = [
     "open_shot",
     "optimize",
     "publishing_problems",
+    "refine",
     "rig",
     "sequence",
     "simulate",
@@ -79,6 +82,7 @@ _HOMES = {
     "shot.run": ("OutputPaths",),
     "workflow.calibration.calibrate": ("CalibratedShot", "calibrate"),
     "workflow.calibration.excite": ("ExcitedShot", "excite"),
+    "workflow.calibration.refine": ("RefinedShot", "refine"),
     "workflow.batch.report": ("BatchResult", "JobResult"),
     "workflow.batch.run": ("batch",),
     "workflow.commands": ("inspect", "optimize", "rig", "simulate", "verify"),

@@ -1,4 +1,4 @@
-"""Readers of recordings: tables of any columns, accelerometer logs of 3D printers, motion captures in C3D."""
+"""Readers of recordings: tables, accelerometer logs of 3D printers, motion captures in C3D, bags of ROS 2."""
 
 from __future__ import annotations
 
@@ -77,8 +77,25 @@ class ReadMotionCapture(RecordingReader):
         return read_c3d(request, properties.map)
 
 
+class ReadBag(RecordingReader):
+    """A bag of ROS 2 with JointState, Imu or PoseStamped; a TOML map beside it says to which prims they belong."""
+
+    idname = "recording.bag"
+    label = "Read the bag"
+    suffixes: ClassVar[tuple[str, ...]] = (".mcap", ".db3")
+    properties: ClassVar[tuple[Property, ...]] = (
+        Property("map", str, "", description="TOML map of joints and topics; without it FILE.toml beside the bag"),
+    )
+
+    def read(self, request: RecordingRequest, properties: PropertyValues) -> SensorRecording:
+        """The recording."""
+        from .bags import read_bag
+
+        return read_bag(request, properties.map)
+
+
 def _of_printer(request: RecordingRequest) -> bool:
     return first_line(request.file).replace(" ", "").lower().startswith(PRINTER_HEAD)
 
 
-register, unregister = registration(ReadRecordedTable, ReadPrinterAccelerometer, ReadMotionCapture)
+register, unregister = registration(ReadRecordedTable, ReadPrinterAccelerometer, ReadMotionCapture, ReadBag)

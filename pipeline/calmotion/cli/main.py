@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 from calmotion.cli.commands.robots import import_robot, materials, motors, rig
 from calmotion.cli.commands.setup import bench, cache, completion, doctor, plugins, warmup
-from calmotion.cli.commands.shots import calibrate, excite, export, inspect, optimize, simulate
+from calmotion.cli.commands.shots import calibrate, excite, export, inspect, optimize, refine, simulate
 from calmotion.cli.commands.shows import batch, sequence, submit
 from calmotion.cli.parser import Parser, add_examples, overview
 from calmotion.cli.signals import as_interrupts, ignore
@@ -82,6 +82,7 @@ def build_parser() -> Parser:
         optimize,
         calibrate,
         excite,
+        refine,
         batch,
         sequence,
         submit,

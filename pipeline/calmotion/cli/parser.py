@@ -15,7 +15,7 @@ from calmotion.support.naming import nearest, nearest_name
 # Commands that are named nowhere here stand in the last group.
 TASKS = (
     ("Prepare a shot", ("import", "rig", "motors", "materials", "inspect")),
-    ("Remove the shake", ("simulate", "optimize", "watch", "calibrate", "excite")),
+    ("Remove the shake", ("simulate", "optimize", "watch", "excite", "calibrate", "refine")),
     ("Work on a show", ("batch", "sequence", "submit")),
     ("Play it on the robot", ("export",)),
     ("Measure, extend, set up", ("bench", "plugins", "warmup", "doctor", "log", "cache", "completion")),
@@ -46,6 +46,11 @@ EXAMPLES: dict[str, tuple[tuple[str, str], ...]] = {
         ("calmotion excite shot.usda -o test.usda", "accelerometers at the targets, encoders"),
         ("calmotion excite shot.usda -o test.usda --sensor marker=0.3mm --duration 3s", "markers"),
         ("calmotion calibrate test.usda --recording take.csv -o robot.usda", "after the robot has played it"),
+    ),
+    "refine": (
+        ("calmotion optimize shot.usda -o take1.usda", "the curves of the first take"),
+        ("calmotion refine take1_root.usda --recording take1.csv -o take2.usda", "better curves for the second one"),
+        ("calmotion refine take2_root.usda --recording take2.csv -o take3.usda", "and for the third one"),
     ),
     "watch": (
         ("calmotion watch shot.usda", "how much does it shake, after each save?"),

@@ -13,6 +13,12 @@ if TYPE_CHECKING:
     from pxr import Usd
 
 
+def count(shot: str) -> int:
+    """Number of calibrations that a shot carries."""
+    stage = stages.open_stage(shot)  # its layers live as long as it does
+    return sum(stages.role_of(layer) == stages.CALIBRATION for layer in stage.GetLayerStack())
+
+
 def known_factors(stage: Usd.Stage) -> KnownFactors:
     """The factors that calibrations of a stage tell; of a parameter that several tell, the strongest layer's.
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from calmotion.errors import ShotError
 from calmotion.shot import Provenance
 from calmotion.usd import stages
-from calmotion.usd.layers import write_layer
+from calmotion.usd.layers import refuse_input_as_output, write_layer
 from calmotion.usd.writing.metadata import author_origin, author_stage_metadata
 
 
@@ -48,6 +48,18 @@ def write_root(layer: str, provenance: Provenance, role: str) -> str:
     root.documentation = f"Opens {os.path.basename(layer)} over its shot."
     write_layer(root, output, lambda temporary: _validate(temporary, provenance))
     return output
+
+
+def refuse_layers_of(shot: str, output: str) -> None:
+    """Refuse an output, or its root layer, that is a layer of a shot.
+
+    Raises:
+        ShotError: It is, or the shot cannot be opened.
+    """
+    stage = stages.open_stage(shot)  # its layers live as long as it does
+    inputs = [layer.realPath for layer in stage.GetUsedLayers() if layer.realPath]
+    for name in (output, root_path(output)):
+        refuse_input_as_output(name, inputs)
 
 
 def refuse_foreign_root(layer: str) -> None:

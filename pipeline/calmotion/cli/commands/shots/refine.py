@@ -1,0 +1,86 @@
+"""`calmotion refine`: better curves for the next take from a recording of this one."""
+
+from __future__ import annotations
+
+import argparse
+from typing import TYPE_CHECKING, Any, TextIO
+
+from calmotion.cli.commands.shots.calibrate import prior_option
+from calmotion.cli.options import Commands, assignments, file_argument, opened_shot, quantity, shot_command
+
+if TYPE_CHECKING:
+    from calmotion.cli.output import Output
+
+
+def add_to(commands: Commands) -> None:
+    """Add the command."""
+    command = shot_command(commands, "refine", _run, "improve model and curves from a recording of the current curves")
+    file_argument(
+        command, "--recording", metavar="FILE", action="append", required=True,
+        help="recording of this take, as of calmotion calibrate; may be repeated",
+    )  # fmt: skip
+    file_argument(
+        command, "-o", "--output", metavar="LAYER", required=True,
+        help="USD layer with the curves of the next take; the model goes beside it as <stem>_model.usda",
+    )  # fmt: skip
+    command.add_argument("--parameters", metavar="KIND", nargs="+", help="what is estimated, as of calmotion calibrate")
+    prior_option(command)
+    command.add_argument(
+        "--tolerance", metavar="LENGTH", type=quantity("m", needs_unit=True, positive=True),
+        help="acceptable error at the targets, with a unit (1mm; default: the tolerance of the shot)",
+    )  # fmt: skip
+    command.add_argument(
+        "--step", metavar="TIME", type=quantity("s", positive=True), help="first time step of the calibration"
+    )
+
+
+def _run(args: argparse.Namespace, output: Output) -> int:
+    from calmotion.cli.output import conclude
+    from calmotion.cli.progress import ProgressDisplay
+    from calmotion.identification.parameters import DEFAULT
+    from calmotion.workflow.calibration.refine import refine
+    from calmotion.workflow.exporting.export import with_shot
+
+    args.shot = with_shot(args.shot)
+    shot = opened_shot(args)
+    with ProgressDisplay(args.quiet, args.progress, args.log) as display:
+        made = refine(
+            shot, args.recording, layer=args.output, parameters=args.parameters or DEFAULT,
+            priors=dict(args.prior), tolerance=args.tolerance, step=args.step, operators=args.run,
+            settings=assignments(args), progress=display, on_operator=display.done,
+        )  # fmt: skip
+    conclude(made.report(), (), output, None if args.quiet else _print)
+    return 0
+
+
+def _print(report: dict[str, Any], stream: TextIO) -> None:
+    from calmotion.cli.quantities import length
+    from calmotion.cli.tables import console_on, print_table, say
+
+    console = console_on(stream)
+    rows = [
+        [
+            row["name"], f"{row['prior']['value']:.5g} {row['unit']}".rstrip(), f"{row['value']:.5g}",
+            f"{row['standard_deviation']:.2g}", "yes" if row["identifiable"] else "no",
+        ]
+        for row in report["parameters"]
+        if row["of_robot"]
+    ]  # fmt: skip
+    print_table(
+        console, f"The robot after take {report['take']}",
+        ["parameter", "before", "now", "standard deviation", "identifiable"], rows,
+    )  # fmt: skip
+    rows = [
+        [
+            row["path"], length(row["max_error_played_m"]), length(row["max_error_m"]),
+            length(row["expected_max_error_m"]), length(row["expected_p95_max_error_m"]),
+        ]
+        for row in report["targets"]
+    ]  # fmt: skip
+    print_table(
+        console, "Largest error at the targets",
+        ["target", f"of take {report['take']}", "of the new curves", "to expect (median)", "95%"], rows,
+    )  # fmt: skip
+    for note in report["notes"]:
+        say(console, f"note: {note}")
+    say(console, f"play {report['root']} in take {report['take'] + 1}, and refine it with its recording")
