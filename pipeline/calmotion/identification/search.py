@@ -8,17 +8,19 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from calmotion.errors import ShotError
+from calmotion.identification.free_decay import decay_factors
 from calmotion.identification.least_squares import Solution, chord, loss_of, minimize, posterior
 from calmotion.identification.measurement import Measurement, Sensor
 from calmotion.identification.noise import correlation_time, least_sigma, spread_of
 from calmotion.identification.problem import Calibrated, Measured
 from calmotion.multibody.failure import SimulationFailure
 from calmotion.retargeting.problem.parallel import in_parallel
-from calmotion.shot.calibration.estimates import GEAR_STIFFNESS, MODULUS, POSITION_GAIN
+from calmotion.shot.calibration.estimates import DAMPING, GEAR_STIFFNESS, MODULUS, POSITION_GAIN
 from calmotion.shot.character import Array
 
 STIFF = (MODULUS, POSITION_GAIN, GEAR_STIFFNESS)  # what decides about frequencies
 TRIED = np.linspace(-2.4, 2.4, 17)  # of all of them at once, in standard deviations of their priors
+FARTHEST = 5.0  # that the free decay may be away from the shot, in standard deviations
 BEST = 3  # of these, from which searches begin until one explains the recordings
 FIRST_ITERATIONS, EXPLAINED = 6, 2.0  # of such a search, and its loss over that of noise alone
 ROUNDS, STEADY = 5, 0.05  # of the noise, and its relative change at which they end
@@ -170,6 +172,7 @@ def _starts(problem: Calibrated, tell: Callable[[float, str], None]) -> list[Arr
     stiff = np.array([p.kind in STIFF for p in problem.parameters], float)
     tell(0.1, "looking for the stiffness")
     points = [np.concatenate([v * stiff, np.zeros(m)]) for v in (TRIED if stiff.any() else (0.0,))]
+    points += _of_decay(problem)
 
     def tried(z: Array) -> tuple[float, Array, Calibrated] | None:
         own = problem.with_measurement(problem.measurement)
@@ -190,6 +193,22 @@ def _starts(problem: Calibrated, tell: Callable[[float, str], None]) -> list[Arr
         )  # fmt: skip
     found.sort(key=lambda item: item[0])
     return [z for _, z, _ in found[:BEST]]
+
+
+def _of_decay(problem: Calibrated) -> list[Array]:
+    """The robot whose free decay has the frequency and the damping of the recordings', where these tell it."""
+    z = np.zeros(len(problem.parameters) + len(problem.measurement.parameters))
+    try:
+        found = decay_factors(problem.measurement, problem.signals(z), float(problem.shot.animation.frame_times[-1]))
+    except (ShotError, SimulationFailure):
+        return []
+    if found is None:
+        return []
+    for k, p in enumerate(problem.parameters):
+        if p.kind in STIFF or p.kind == DAMPING:
+            factor = found[0] ** 2 if p.kind in STIFF else found[1]
+            z[k] = np.clip(np.log(factor) / p.spread, -FARTHEST, FARTHEST)
+    return [z]
 
 
 def _common_noise(problem: Calibrated) -> Measurement:
