@@ -45,10 +45,8 @@ EXAMPLES: dict[str, tuple[tuple[str, str], ...]] = {
     "excite": (
         ("calmotion excite shot.usda -o test.usda", "accelerometers at the targets, encoders"),
         ("calmotion excite shot.usda -o test.usda --sensor marker=0.3mm --duration 3s", "markers"),
-        ("calmotion calibrate test.usda --recording take.csv -o robot.usda", "after the robot has played it"),
     ),
     "refine": (
-        ("calmotion optimize shot.usda -o take1.usda", "the curves of the first take"),
         ("calmotion refine take1_root.usda --recording take1.csv -o take2.usda", "better curves for the second one"),
         ("calmotion refine take2_root.usda --recording take2.csv -o take3.usda", "and for the third one"),
     ),

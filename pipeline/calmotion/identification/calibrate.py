@@ -13,6 +13,7 @@ from calmotion.errors import ShotError
 from calmotion.identification.advice import IDENTIFIABLE, advised
 from calmotion.identification.clocks import clock_of
 from calmotion.identification.measurement import Measurement, measurement_parameters, sensors_of
+from calmotion.identification.motor_groups import grouped, of_each_motor
 from calmotion.identification.parameters import DEFAULT, Parameter, robot_parameters
 from calmotion.identification.problem import Calibrated
 from calmotion.identification.robots import robot_with
@@ -50,6 +51,7 @@ class CalibrationSettings:
         validate: Whether a fifth of the samples is held out.
         halvings: Most halvings of the time step.
         after: What is used of a recording after the end of the shot [s].
+        by_motor_type: Whether motors of one type share their parameters.
     """
 
     parameters: tuple[str, ...] = DEFAULT
@@ -57,6 +59,7 @@ class CalibrationSettings:
     validate: bool = True
     halvings: int = HALVINGS
     after: float = AFTER
+    by_motor_type: bool = False
 
 
 def calibrate_shot(
@@ -81,6 +84,8 @@ def calibrate_shot(
     if not recordings:
         raise ShotError("there are no recordings", path=shot.character.path, remedy="Name one with --recording")
     parameters = robot_parameters(shot, settings.parameters, settings.priors)
+    if settings.by_motor_type:
+        parameters = grouped(parameters, shot.character)
     if not ends_at_rest(shot.animation):  # what a robot does that is stopped amid a motion is not known
         settings = replace(settings, after=0.0)
     options, nominal = simulable(shot, options, settings.after)
@@ -101,10 +106,12 @@ def calibrate_shot(
     estimates = _estimates(found)
     fits, curves = _fits(found, *before, recordings)
     spreads = np.array([p.spread for p in _all(found.problem)])
+    notes = tuple(_notes(found, estimates, settings))
+    estimates, covariance = of_each_motor(parameters, estimates, spreads[:, None] * found.covariance * spreads)
     return Calibration(
-        estimates, spreads[:, None] * found.covariance * spreads, {r.file: r.sha256 for r in recordings}, fits, curves,
+        estimates, covariance, {r.file: r.sha256 for r in recordings}, fits, curves,
         found.solution.converged, found.iterations, told.count, step_of(found.problem), found.shift,
-        time.perf_counter() - begin, tuple(_notes(found, estimates, settings)),
+        time.perf_counter() - begin, notes,
     )  # fmt: skip
 
 

@@ -7,7 +7,7 @@ sense, nominal + spread x otherwise. The prior of x is the standard normal distr
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
 
 import numpy as np
@@ -63,6 +63,7 @@ class Parameter:
         spread: Standard deviation of the prior, of the logarithm where it is logarithmic.
         logarithmic: Whether it is searched as a factor.
         lower: Least value.
+        alike: Paths and nominal values of other motors that differ from theirs as this one does.
     """
 
     kind: str
@@ -73,6 +74,7 @@ class Parameter:
     axis: int = -1
     logarithmic: bool = True
     lower: float = -np.inf
+    alike: tuple[tuple[str, float], ...] = ()
 
     @property
     def name(self) -> str:
@@ -87,6 +89,13 @@ class Parameter:
     def value(self, x: float) -> float:
         """The value at x standard deviations of the prior."""
         return float(self.nominal * np.exp(self.spread * x) if self.logarithmic else self.nominal + self.spread * x)
+
+    def values(self, x: float) -> dict[tuple[str, str, int], float]:
+        """The values of all that it stands for, by kind, path and axis."""
+        found = {(self.kind, self.path, self.axis): self.value(x)}
+        for path, nominal in self.alike:
+            found[self.kind, path, self.axis] = replace(self, nominal=nominal).value(x)
+        return found
 
     def slope(self, x: float) -> float:
         """Derivative of the value by x."""

@@ -51,7 +51,10 @@ class Robot:
 
 def robot_at(shot: CompiledShot, parameters: Sequence[Parameter], x: Array) -> Robot:
     """The robot at values of its parameters, in standard deviations of their priors, shape [n]."""
-    return robot_with(shot, {(p.kind, p.path, p.axis): p.value(float(v)) for p, v in zip(parameters, x, strict=True)})
+    values: dict[tuple[str, str, int], float] = {}
+    for p, v in zip(parameters, x, strict=True):
+        values |= p.values(float(v))
+    return robot_with(shot, values)
 
 
 def robot_with(shot: CompiledShot, values: Values) -> Robot:

@@ -82,6 +82,7 @@ def calibrate(
     parameters: Sequence[str] = DEFAULT,
     priors: Mapping[str, float] | None = None,
     validate: bool = True,
+    by_motor_type: bool = False,
     tolerance: float | str | None = None,
     step: float | str | None = None,
     integrator: str | None = None,
@@ -100,6 +101,7 @@ def calibrate(
         layer: USD layer to write.
         parameters: What to estimate: kinds, each by itself or as `KIND:PATTERN` for some prim paths.
         priors: Standard deviations of what is known before, by kind; relative ones, or SI of those about zero.
+        by_motor_type: Motors of one type (`calm:motor:type`) share their parameters.
         validate: Hold out a fifth of the recordings, and compare it with the result.
         tolerance: Acceptable error of the model at the targets, [m] or text with a unit; None: the shot's own.
         step: First time step, [s] or text with a unit; it is halved until the estimates no longer depend on it.
@@ -131,7 +133,9 @@ def calibrate(
             progress(Progress("Estimate the parameters", fraction, message))
 
     calibration = calibrate_shot(
-        compiled_in(outcome.run.get), read, CalibrationSettings(tuple(parameters), dict(priors or {}), validate),
+        compiled_in(outcome.run.get), read, CalibrationSettings(
+            tuple(parameters), dict(priors or {}), validate, by_motor_type=by_motor_type
+        ),
         options, tell,
     )  # fmt: skip
     written = None if target is None else _written(outcome, calibration, target)

@@ -12,7 +12,7 @@ from typing import Any
 from calmotion.accuracy.reduced_bodies import compiled_in
 from calmotion.errors import ShotError
 from calmotion.host import SettingError, parse_quantity
-from calmotion.identification.excitation import ExcitationSettings, blank_recordings, excite_shot
+from calmotion.identification.excitation.design import ExcitationSettings, blank_recordings, excite_shot
 from calmotion.identification.parameters import DEFAULT, refuse_unknown
 from calmotion.shot import Character, Provenance
 from calmotion.shot.calibration.excitation import Excitation, PlannedSensor
@@ -86,6 +86,7 @@ def excite(
     duration: float | str = 4.0,
     amplitude: float | str = "10deg",
     tries: int = 40,
+    by_motor_type: bool = False,
     step: float | str | None = None,
     operators: Sequence[str] = (),
     settings: Given = None,
@@ -104,6 +105,7 @@ def excite(
         duration: [s] or text with a unit.
         amplitude: Largest excursion of a hinge from the first pose, [rad] or text with a unit.
         tries: Number of motions that are tried.
+        by_motor_type: As of `calibrate`.
         step: Of the simulations, [s] or text with a unit.
         operators, settings, progress, on_operator, cancel: As of `simulate`.
 
@@ -135,7 +137,8 @@ def excite(
     found = excite_shot(
         compiled_in(outcome.run.get),
         ExcitationSettings(
-            _placed(wanted, character), tuple(parameters), dict(priors or {}), length, largest, tries=tries
+            _placed(wanted, character), tuple(parameters), dict(priors or {}), length, largest, tries=tries,
+            by_motor_type=by_motor_type,
         ),
         options, tell,
     )  # fmt: skip

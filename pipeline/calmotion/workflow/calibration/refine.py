@@ -97,6 +97,7 @@ def refine(
     layer: Path,
     parameters: Sequence[str] = DEFAULT,
     priors: Mapping[str, float] | None = None,
+    by_motor_type: bool = False,
     tolerance: float | str | None = None,
     step: float | str | None = None,
     operators: Sequence[str] = (),
@@ -114,7 +115,7 @@ def refine(
         shot: The shot that was performed, with its curves: the root layer of the last take, or of `optimize`.
         recordings: Of this take, as of `calibrate`.
         layer: USD layer to write.
-        parameters, priors, step: As of `calibrate`.
+        parameters, priors, by_motor_type, step: As of `calibrate`.
         tolerance: Of model and curves, [m] or text with a unit.
         operators, settings, progress, on_operator, cancel: As of `simulate`.
 
@@ -130,7 +131,16 @@ def refine(
         "tolerance": tolerance, "operators": operators, "settings": settings, "progress": progress,
         "on_operator": on_operator, "cancel": cancel,
     }  # fmt: skip
-    calibrated = calibrate(opened, recordings, layer=model, parameters=parameters, priors=priors, step=step, **common)
+    calibrated = calibrate(
+        opened,
+        recordings,
+        layer=model,
+        parameters=parameters,
+        priors=priors,
+        step=step,
+        by_motor_type=by_motor_type,
+        **common,
+    )
     assert calibrated.layer is not None
     root = calibrated.layer.root
     improved = copy.copy(opened)

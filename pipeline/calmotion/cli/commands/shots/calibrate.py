@@ -49,11 +49,15 @@ def add_to(commands: Commands) -> None:
 
 
 def prior_option(command: argparse.ArgumentParser) -> None:
-    """Add `--prior`."""
+    """Add `--prior` and `--by-motor-type`."""
     command.add_argument(
         "--prior", metavar="KIND=VALUE", action="append", default=[], type=_prior,
         help="standard deviation of what is known before, relative (modulus=0.3) or in SI (delay=0.005, bias=0.3, "
         "place=0.002, clock_drift=1e-4); may be repeated",
+    )  # fmt: skip
+    command.add_argument(
+        "--by-motor-type", action="store_true",
+        help="motors of one type (calm:motor:type) share their gains, friction, armature, gear and delay",
     )  # fmt: skip
 
 
@@ -77,7 +81,8 @@ def _run(args: argparse.Namespace, output: Output) -> int:
     with ProgressDisplay(args.quiet, args.progress, args.log) as display:
         made = calibrate(
             shot, args.recording, layer=args.output, parameters=args.parameters or DEFAULT, priors=dict(args.prior),
-            validate=not args.no_validation, tolerance=args.tolerance, step=args.step, integrator=args.integrator,
+            validate=not args.no_validation, by_motor_type=args.by_motor_type,
+            tolerance=args.tolerance, step=args.step, integrator=args.integrator,
             figures=args.figures, operators=args.run, settings=assignments(args), progress=display,
             on_operator=display.done,
         )  # fmt: skip

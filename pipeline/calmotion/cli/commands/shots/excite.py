@@ -54,7 +54,8 @@ def _run(args: argparse.Namespace, output: Output) -> int:
     with ProgressDisplay(args.quiet, args.progress, args.log) as display:
         made = excite(
             shot, layer=args.output, sensors=args.sensor or SENSORS, parameters=args.parameters or DEFAULT,
-            priors=dict(args.prior), duration=args.duration, amplitude=args.amplitude or "10deg",
+            priors=dict(args.prior), by_motor_type=args.by_motor_type,
+            duration=args.duration, amplitude=args.amplitude or "10deg",
             tries=max(1, args.tries), step=args.step, operators=args.run, settings=assignments(args), progress=display,
             on_operator=display.done,
         )  # fmt: skip

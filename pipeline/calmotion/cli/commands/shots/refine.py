@@ -46,7 +46,8 @@ def _run(args: argparse.Namespace, output: Output) -> int:
     with ProgressDisplay(args.quiet, args.progress, args.log) as display:
         made = refine(
             shot, args.recording, layer=args.output, parameters=args.parameters or DEFAULT,
-            priors=dict(args.prior), tolerance=args.tolerance, step=args.step, operators=args.run,
+            priors=dict(args.prior), by_motor_type=args.by_motor_type,
+            tolerance=args.tolerance, step=args.step, operators=args.run,
             settings=assignments(args), progress=display, on_operator=display.done,
         )  # fmt: skip
     conclude(made.report(), (), output, None if args.quiet else _print)

@@ -5,8 +5,8 @@ import dataclasses
 import numpy as np
 import pytest
 from calmotion.errors import ShotError
-from calmotion.identification.excitation import ExcitationSettings, excite_shot
-from calmotion.identification.waveforms import bounds_of, family_of
+from calmotion.identification.excitation.design import ExcitationSettings, excite_shot
+from calmotion.identification.excitation.waveforms import bounds_of, family_of
 from calmotion.shot.calibration.excitation import PlannedSensor
 from calmotion.shot.calibration.recording import ACCELEROMETER, EFFORT
 from calmotion.shot.run import RunSettings

@@ -17,11 +17,12 @@ import numpy as np
 from calmotion.errors import ShotError
 from calmotion.identification.advice import IDENTIFIABLE
 from calmotion.identification.calibrate import simulable
+from calmotion.identification.excitation.waveforms import MARGIN, Family, bounds_of, family_of
 from calmotion.identification.measurement import Measurement, measurement_parameters, sensors_of
+from calmotion.identification.motor_groups import grouped
 from calmotion.identification.parameters import DEFAULT, Parameter, robot_parameters
 from calmotion.identification.problem import Calibrated
 from calmotion.identification.signals import Signals, refuse_cyclic
-from calmotion.identification.waveforms import MARGIN, Family, bounds_of, family_of
 from calmotion.multibody.failure import SimulationFailure
 from calmotion.shot import Animation, Track
 from calmotion.shot.calibration.excitation import Excitation, MotorUse, PlannedSensor, Predicted
@@ -51,6 +52,7 @@ class ExcitationSettings:
         amplitude, travel: Largest excursion of a hinge [rad] and of a slider [m].
         tries: Number of motions that are tried.
         seed: Of the search.
+        by_motor_type: As of `calibrate.CalibrationSettings`.
     """
 
     sensors: tuple[PlannedSensor, ...]
@@ -61,6 +63,7 @@ class ExcitationSettings:
     travel: float = 0.05
     tries: int = 40
     seed: int = 0
+    by_motor_type: bool = False
 
 
 def excite_shot(
@@ -81,6 +84,8 @@ def excite_shot(
     begin, animation = time.perf_counter(), shot.animation
     refuse_cyclic(shot.character.retarget.cyclic, shot.character.path)
     parameters = robot_parameters(shot, settings.parameters, settings.priors)
+    if settings.by_motor_type:
+        parameters = grouped(parameters, shot.character)
     bounds = bounds_of(shot.character, animation, settings.amplitude, settings.travel)
     frequencies = pose_modes(shot)[0][:EXCITED]
     family = family_of(shot.character, animation, frequencies, bounds, settings.duration)

@@ -1,0 +1,1 @@
+"""Test motions that make parameters of a robot identifiable."""
