@@ -48,6 +48,7 @@ def test_it_tells_more_than_a_chirp_of_the_same_length(found):
         assert row.identifiable and row.excited < row.prior and row.chirp < row.prior
 
 
+@pytest.mark.long
 def test_a_calibration_has_the_promised_standard_deviations(recorded_shot, found):
     from calmotion.identification.calibrate import CalibrationSettings, calibrate_shot
     from calmotion.identification.robots import robot_with
