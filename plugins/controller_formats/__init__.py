@@ -215,10 +215,9 @@ class UrScript(CommandFormat):
 
     def notes(self, commands: Commands, curves: MotorCurves) -> tuple[str, ...]:
         """What the player assumes of the controller."""
-        return (
-            "Universal Robots does not publish the law of servoj; the loss holds for acceleration = gain x (command - "
-            "position - lookahead x speed), whose lag the commands anticipate. Run the program slowly first",
-        )
+        from .ur_script import notes_on
+
+        return notes_on(curves)
 
     def _order(self, curves: MotorCurves, properties: PropertyValues) -> list[int]:
         from .ur_script import order_of

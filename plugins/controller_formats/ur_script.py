@@ -19,6 +19,7 @@ _LIST = rf"\[\s*({_NUMBER}(?:\s*,\s*{_NUMBER}){{5}})\s*\]"
 _SERVOJ = re.compile(rf"^\s*servoj\({_LIST}\s*,\s*0\s*,\s*0\s*,\s*({_NUMBER})\s*,\s*({_NUMBER})\s*,\s*({_NUMBER})\)")
 _MOVEJ = re.compile(rf"^\s*movej\({_LIST}")
 _ATTRIBUTE = "export.ur.joints"
+_REST = 1e-3  # speed that counts as rest [rad/s]
 
 
 def order_of(names: Sequence[str], curves: MotorCurves) -> list[int]:
@@ -99,6 +100,18 @@ def read_program(file: str, order: Sequence[int]) -> Commands:
     times = np.concatenate([[0.0], np.cumsum(periods[:-1])])
     begin = np.array(start[1].split(","), np.float64)[back]
     return Commands(FOLLOW, times, positions, start=begin, follower=Follower(float(gains[0]), float(lookaheads[0])))
+
+
+def notes_on(curves: MotorCurves) -> tuple[str, ...]:
+    """What the player assumes of the controller, and whether the robot must start in motion."""
+    law = (
+        "Universal Robots does not publish the law of servoj; the loss holds for acceleration = gain x (command - "
+        "position - lookahead x speed), whose lag the commands anticipate. Run the program slowly first"
+    )
+    if np.max(np.abs(curves.at(np.zeros(1), 1))) <= _REST:
+        return (law,)
+    moving = "the shot begins in motion, but the robot at rest: it catches up, which is part of the loss. Begin at rest"
+    return law, moving
 
 
 def _row(values: np.ndarray) -> str:

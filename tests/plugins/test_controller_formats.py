@@ -225,6 +225,8 @@ def test_a_ur_program_has_the_joints_in_the_controllers_order_and_whole_cycles(w
     np.testing.assert_allclose(written.read.positions, ahead, atol=1e-6)
     assert written.exact.times[-1] > 1.0 + 0.2, "the commands go on until the robot stands"
     assert "law of servoj" in written.notes[0]
+    moving = dataclasses.replace(six, sample=lambda times, order: six.sample(0.5 * times + 0.25, order))
+    assert "begins in motion" in write("ur", file="b.script", curves=moving).notes[1]
 
 
 def test_the_joints_of_a_ur_program_may_be_named(write, curves):
