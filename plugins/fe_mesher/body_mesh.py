@@ -14,6 +14,7 @@ from calmotion.accuracy.element_size import (
     envelope,
     shape_of,
 )
+from calmotion.errors import ShotError
 from calmotion.geometry.tetrahedra import (
     connected_parts,
     measure_quality,
@@ -31,7 +32,7 @@ from .repair import Solid
 from .sources.beam import equivalent_beam
 from .sources.choice import solid_of
 from .sources.hollow import hollowed
-from .tetwild import ProcessorTime
+from .tetwild import OutOfTime, ProcessorTime
 
 if TYPE_CHECKING:
     from calmotion.reduction.interfaces.interface_patches import AttachmentFrame
@@ -39,6 +40,7 @@ if TYPE_CHECKING:
 # Nodes of the first mesh at most, for some seconds; where the shot needs more, it is refined for its loads.
 _REFINED = 12_000
 _FIT = 4.0  # of the distance to the surface that the mesher is allowed: how far corners are moved to fit it
+_SIMPLE = ("collision surface", "wrapped collision surface", "equivalent beam")
 _WELD = 1e-6  # distance of coincident points, of the diagonal
 
 
@@ -53,7 +55,7 @@ class MeshOptions:
     """
 
     element_size: float = -1.0
-    time_limit: float = 20.0
+    time_limit: float = 60.0
     cache: bool = True
 
 
@@ -91,6 +93,45 @@ def mesh_of(
     Raises:
         ShotError: It cannot be meshed.
     """
+    try:
+        return _meshed(index, body, geometry, options, frames, attachments)
+    except OutOfTime as reason:
+        simpler = _simpler(index, body, geometry, options, frames, reason)
+        if simpler is None:
+            raise
+        return _meshed(index, body, simpler, options, frames, attachments)
+
+
+def _simpler(
+    index: int, body: Body, geometry: FEMesh | Volume, options: MeshOptions, frames: Sequence[Frame], reason: ShotError
+) -> Volume | None:  # fmt: skip
+    """The collision surface of a body, or a beam, in place of a visual surface that takes too long, or None."""
+    if body.flexible is None or body.flexible.geometry != "auto" or not isinstance(geometry, Volume):
+        return None
+    if geometry.solid.source in _SIMPLE:
+        return None
+    hidden = any(not surface.visible and len(surface.triangles) for surface in body.surfaces)
+    for source in ("collision", "beam") if hidden else ("beam",):
+        settings = replace(body.flexible, geometry=source, mesh_file="", wall_thickness=-1.0)
+        try:
+            found = geometry_of(index, replace(body, flexible=settings, tets=None), options, frames)
+        except ShotError:
+            continue
+        if isinstance(found, Volume) and found.solid.source in _SIMPLE:
+            ratio = found.solid.volume / geometry.solid.volume
+            note = (
+                f"meshed the {found.solid.source}, with {ratio:.2g} of the volume of the visual surface, which takes "
+                f"too long ({reason.found}): its stiffness differs; give a TetMesh or a simpler mesh file"
+            )
+            return replace(found, solid=replace(found.solid, repairs=(note, *found.solid.repairs)))
+    return None
+
+
+def _meshed(
+    index: int, body: Body, geometry: FEMesh | Volume, options: MeshOptions, frames: Sequence[Frame],
+    attachments: Sequence[AttachmentFrame],
+) -> FEMesh:  # fmt: skip
+    """`mesh_of` a geometry, without another one in its place."""
     carrier = frames[0] if frames else None
     if isinstance(geometry, FEMesh):
         mesh = _judged(geometry, body, carrier)

@@ -30,14 +30,16 @@ _GOOD_VOLUME, MAX_VOLUME_ERROR, _ACCEPTED = 0.005, 0.01, 0.05
 # have few enough triangles: fTetWild takes 1.5 ms for each.
 _DETAIL, _DENSE_DETAILS, _DENSE, _MANY = 0.1, (0.5, 1.0), 2_500, 8_000
 _ATTEMPTS = 3
-_FIRST = 0.6  # share of the time for one mesh
+_FIRST = 0.6  # share of the time for the first mesh; what is left is for a coarser one
+_COARSER = 1.6  # factor of size and envelope of a mesh that took too long
+_SOON = 1 / 3  # share of the time that a surface with many details may take
 _TRIANGLE = 2.5e-3  # least processor time for a triangle of a surface with many details [s]
 _COARSEST = 0.3  # largest error of the volume of a mesh of a grid, which is reported
 _LOOSE = 0.05  # of the volume: parts that a thin connection, which the mesh did not follow, held
 
 # Largest number of nodes of ten-node tetrahedra: twice as many where walls are
 # thin, for some ten seconds; walls that are thinner than the spacing have gaps
-_GRID_NODES = 12_000
+_GRID_NODES = 16_000
 _GRID_WALL = 0.8  # of the thinner walls: spacing with which they have none
 # Factor of the spacing while the volume error is larger than that; largest way of a corner to the surface
 _FINER, _NEAR_VOLUME, _MOVED = 0.8, 0.02, 0.5
@@ -70,6 +72,7 @@ def filled(
         use_cache: Whether the cache folder is used.
 
     Raises:
+        OutOfTime: It cannot be meshed in time, not even on a grid.
         ShotError: The solid cannot be meshed, or the tetrahedra do not fill it.
     """
     refuse_too_many(shape, size, time, body.path)
@@ -85,7 +88,14 @@ def filled(
         except OutOfTime as reason:
             if best is not None:
                 break
-            return _on_grid(index, body, solid, shape, size, reason)
+            gridded = _on_grid(index, body, solid, shape, size, reason, time)
+            if gridded is not None:
+                return gridded
+            if dense:  # as hopeless
+                raise
+            coarser = _Attempt(_COARSER * attempt.size, _COARSER * attempt.distance)
+            points, tets = _meshed(solid, coarser, body.path, time, 1.0, use_cache)
+            notes = (f"meshed with elements {_COARSER:g} times as large, since smaller ones took too long",)
         quality = measure_quality(points, tets, surface_volume=solid.volume, repairs=(*solid.repairs, *notes))
         volumes.append(quality.volume)
         if best is None or quality.volume_error < best.quality.volume_error:
@@ -100,7 +110,10 @@ def filled(
     try:
         accepted = _accepted(best, solid, volumes, body.path)
     except ShotError as error:
-        return _on_grid(index, body, solid, shape, size, error)
+        gridded = _on_grid(index, body, solid, shape, size, error, time)
+        if gridded is None:
+            raise
+        return gridded
     return _whole(accepted, body.path)
 
 
@@ -111,7 +124,7 @@ def _meshed(
     diagonal = float(np.linalg.norm(np.ptp(solid.points, axis=0)))
     points, triangles = _simplified(solid, attempt.distance)
     part = time.part(share)
-    if len(triangles) > _MANY and _TRIANGLE * len(triangles) > part.limit:
+    if len(triangles) > _MANY and _TRIANGLE * len(triangles) > _SOON * time.limit:
         raise OutOfTime(
             "tetrahedralising would exceed the limit of processor time", path=path,
             found=f"{len(triangles)} triangles, {time.limit:g} s", remedy=REMEDY + MORE_TIME.format(4.0 * time.limit),
@@ -128,15 +141,14 @@ def _meshed(
     return without_unused_points(made, tets)
 
 
-def _on_grid(index: int, body: Body, solid: Solid, shape: Shape, size: float, reason: ShotError) -> FEMesh:
-    """The tetrahedra of a grid, since others would take too long.
-
-    Raises:
-        ShotError: The reason, where a grid does not resolve the solid.
-    """
+def _on_grid(
+    index: int, body: Body, solid: Solid, shape: Shape, size: float, reason: ShotError, time: ProcessorTime
+) -> FEMesh | None:  # fmt: skip
+    """The tetrahedra of a grid, for a reason; None where it does not resolve thin walls."""
     mesh = on_grid(index, body, solid, shape, size)
-    if mesh is None or mesh.quality.volume_error > _COARSEST:
-        raise reason
+    dense = len(solid.triangles) > _DENSE or time.used >= time.limit
+    if mesh is None or mesh.quality.volume_error > (_COARSEST if dense else _ACCEPTED):
+        return None
     note = grid_note(mesh, shape, size, f"{reason.problem} ({reason.found})")
     return replace(mesh, quality=replace(mesh.quality, repairs=(*mesh.quality.repairs, note)))
 

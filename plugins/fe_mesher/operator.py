@@ -38,7 +38,7 @@ class TetrahedralizeFlexibleBodies(Operator):
         Property(
             "time_limit",
             float,
-            20.0,
+            60.0,
             unit="s",
             minimum=1.0,
             description="Largest processor time for the meshes of one body; then a coarser one is made.",

@@ -23,3 +23,14 @@ def test_closest_points_are_those_of_all_triangles(scale):
         else:
             assert np.linalg.norm(closest - place) == pytest.approx(distance, abs=1e-12 * scale)
     assert 0 < far < len(places)
+
+
+@pytest.mark.parametrize("corners", [(0, 0, 1), (0, 1, 0), (0, 1, 1), (0, 0, 0), (0, 1, 2)])
+def test_a_triangle_without_area_is_the_edge_that_it_is(corners):
+    points = np.array([[0.0, 0, 0], [1, 0, 0], [2, 0, 0]])  # the last case is a line through three corners
+    places = np.random.default_rng(5).uniform(-0.5, 2.5, size=(40, 3))
+    places = np.vstack([places, points, [[0.3, 0.0, 0.0], [0.0, 0.4, 0.0]]])
+    found = NearbyTriangles(points, np.array([corners]), 5.0).closest(places)
+    end = float(max(corners))
+    foot = np.clip(places[:, 0], 0.0, end)
+    assert found == pytest.approx(np.column_stack([foot, 0.0 * foot, 0.0 * foot]))

@@ -9,6 +9,7 @@ from calmotion.shot.character import Array
 from calmotion.support.compilation import kernel
 
 _CELLS = 64  # along the longest side of the surface
+_NO_AREA = 1e-13  # square of the sine of an angle below which a triangle is a line
 
 
 class NearbyTriangles:
@@ -91,12 +92,32 @@ def _closest(
 
 
 @kernel
+def _closest_on_edges(point: Array, corners: Array, out: Array) -> None:
+    """Closest point of the edges of a triangle without area, some of which may be points."""
+    nearest = np.inf
+    for k in range(3):
+        last = (k + 1) % 3
+        along, length = 0.0, 0.0
+        for i in range(3):
+            along += (point[i] - corners[k, i]) * (corners[last, i] - corners[k, i])
+            length += (corners[last, i] - corners[k, i]) ** 2
+        share = min(max(along / length, 0.0), 1.0) if length > 0.0 else 0.0
+        distance = 0.0
+        for i in range(3):
+            distance += (corners[k, i] + share * (corners[last, i] - corners[k, i]) - point[i]) ** 2
+        if distance < nearest:
+            nearest = distance
+            for i in range(3):
+                out[i] = corners[k, i] + share * (corners[last, i] - corners[k, i])
+
+
+@kernel
 def closest_on_triangle(point: Array, corners: Array, out: Array) -> None:
     """Closest point of a triangle, corners of shape [3, 3], into `out`, shape [3].
 
     Source: Ericson, Real-Time Collision Detection, 5.1.5.
     """
-    d1, d2, d3, d4, d5, d6 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    d1, d2, d3, d4, d5, d6, ee, ff = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     for i in range(3):
         e, f = corners[1, i] - corners[0, i], corners[2, i] - corners[0, i]
         a, b, c = point[i] - corners[0, i], point[i] - corners[1, i], point[i] - corners[2, i]
@@ -106,6 +127,8 @@ def closest_on_triangle(point: Array, corners: Array, out: Array) -> None:
         d4 += f * b
         d5 += e * c
         d6 += f * c
+        ee += e * e
+        ff += f * f
     va, vb, vc = d3 * d6 - d5 * d4, d5 * d2 - d1 * d6, d1 * d4 - d3 * d2
     v, w = 0.0, 0.0
     if d1 <= 0.0 and d2 <= 0.0:
@@ -114,14 +137,17 @@ def closest_on_triangle(point: Array, corners: Array, out: Array) -> None:
         v = 1.0
     elif d6 >= 0.0 and d5 <= d6:
         w = 1.0
-    elif vc <= 0.0 and d1 >= 0.0 and d3 <= 0.0:
+    elif vc <= 0.0 and d1 >= 0.0 and d3 <= 0.0 and d1 > d3:
         v = d1 / (d1 - d3)
-    elif vb <= 0.0 and d2 >= 0.0 and d6 <= 0.0:
+    elif vb <= 0.0 and d2 >= 0.0 and d6 <= 0.0 and d2 > d6:
         w = d2 / (d2 - d6)
-    elif va <= 0.0 and d4 - d3 >= 0.0 and d5 - d6 >= 0.0:
+    elif va <= 0.0 and d4 - d3 >= 0.0 and d5 - d6 >= 0.0 and (d4 - d3) + (d5 - d6) > 0.0:
         w = (d4 - d3) / ((d4 - d3) + (d5 - d6))
         v = 1.0 - w
-    elif va + vb + vc > 0.0:
+    elif va + vb + vc > _NO_AREA * ee * ff:
         v, w = vb / (va + vb + vc), vc / (va + vb + vc)
+    else:
+        _closest_on_edges(point, corners, out)
+        return
     for i in range(3):
         out[i] = (1.0 - v - w) * corners[0, i] + v * corners[1, i] + w * corners[2, i]

@@ -132,10 +132,11 @@ def _with_mesh(row: LinkRow, mesh: Any, link: Link, frames: Sequence[Any]) -> Li
     clamped = patches[0].nodes if link.carrier is not None else None
     f1, f2, f3 = clamped_modes(model, 3, clamped)[0]
     error = mesh.quality.frequency_error
+    late = [note for note in mesh.quality.repairs if "too long" in note or "would exceed" in note]
     return replace(
-        row, nodes=len(model.mesh.nodes), volume_error=100.0 * mesh.quality.volume_error, f1=float(f1), f2=float(f2),
-        f3=float(f3), estimate=np.nan if error is None else 100.0 * error,
-        note="; ".join(filter(None, (row.note, *(note for note in mesh.quality.repairs if "grid" in note)))),
+        row, source=mesh.quality.source, nodes=len(model.mesh.nodes), volume_error=100.0 * mesh.quality.volume_error,
+        f1=float(f1), f2=float(f2), f3=float(f3), estimate=np.nan if error is None else 100.0 * error,
+        note="; ".join(filter(None, (row.note, *late))),
     )  # fmt: skip
 
 

@@ -185,7 +185,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("links", nargs="+", metavar="FILE[:PRIM]", help="links; all bodies without a prim")
     parser.add_argument("--sizes", nargs="+", help="multiples of the automatic element size, or lengths (8mm)")
     parser.add_argument("--geometry-only", action="store_true", help="make solids, and no meshes")
-    parser.add_argument("--time-limit", type=float, default=20.0, help="processor time of the meshes of a link [s]")
+    parser.add_argument("--time-limit", type=float, default=60.0, help="processor time of the meshes of a link [s]")
     parser.add_argument("-o", "--output", help="file of the table, .md or .csv")
     options = parser.parse_args(arguments)
 
