@@ -1,10 +1,12 @@
 """Which of a body's surfaces count, and whether the tetrahedra fill them."""
 
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from calmotion.errors import ShotError
+from calmotion.shot import Frame, MassProperties
 from mesher_links import box, link, run, solid, surface
 
 
@@ -66,7 +68,7 @@ def test_copies_count_once_and_hidden_geometry_not_at_all(package):
     assert package("sources.choice").solid_of(body, body.surfaces).volume == pytest.approx(8e-5)
 
 
-def test_tetrahedra_that_do_not_fill_the_surface_are_refused(host, package, monkeypatch):
+def test_tetrahedra_that_do_not_fill_the_surface_are_refused_where_a_grid_does_not_either(host, package, monkeypatch):
     small = box((0.19, 0.019, 0.019))
     corners = np.array(small.vertices)
     tets = np.array([[0, 1, 2, 4], [3, 1, 7, 2], [5, 1, 4, 7], [6, 2, 7, 4], [1, 2, 4, 7]], dtype=np.int32)
@@ -77,6 +79,7 @@ def test_tetrahedra_that_do_not_fill_the_surface_are_refused(host, package, monk
         return corners, tets
 
     monkeypatch.setattr(package("filling"), "tetrahedralize", shrunken)
+    monkeypatch.setattr(package("filling"), "on_grid", lambda *given: None)
     with pytest.raises(ShotError, match="do not fill"):
         run(host, link(surface(box())))
     assert len(calls) == 3 and calls == sorted(calls, reverse=True)
@@ -92,3 +95,28 @@ def test_elements_that_are_too_many_for_the_limit_are_refused_before_the_mesher_
     monkeypatch.undo()
     shape = package("body_mesh").shape_of(np.array(box().vertices), np.array(box().faces))
     assert package("filling").expected_nodes(shape, 1.1 * least) * package("tetwild")._SECONDS < 60.0
+
+
+def test_a_visual_surface_that_takes_too_long_gives_way_to_the_collision_surface_or_a_beam(package, monkeypatch):
+    made, tetwild = package("body_mesh"), package("tetwild")
+    fill, shown = made.filled, surface(box(), "/Arm/link/shown")
+    hull = surface(box((0.2, 0.03, 0.02)), "/Arm/link/hull", visible=False)
+
+    def late(index, body, solid, *rest):
+        if solid.source == "visual surface":
+            raise tetwild.OutOfTime("took too long", path=body.path, found="9 triangles, 60 s")
+        return fill(index, body, solid, *rest)
+
+    monkeypatch.setattr(made, "filled", late)
+    options, frames = made.MeshOptions(element_size=0.03), (Frame(np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0])),)
+    mesh = made.mesh_body(0, link(shown, hull), options, frames)
+    assert mesh.quality.source == "collision surface" and mesh.quality.volume == pytest.approx(1.2e-4, rel=1e-2)
+    (note,) = [note for note in mesh.quality.repairs if "too long" in note]
+    assert "1.5 of the volume of the visual surface" in note and "9 triangles" in note
+    mass = MassProperties(0.1, np.array([0.1, 0.0, 0.0]), np.diag([1e-6, 1e-4, 1e-4]))
+    beam = made.mesh_body(0, replace(link(shown), mass=mass), options, frames)
+    assert beam.quality.source == "equivalent beam"
+    with pytest.raises(tetwild.OutOfTime):  # nothing else is there, or the shot asks for this surface
+        made.mesh_body(0, link(shown), options, frames)
+    with pytest.raises(tetwild.OutOfTime):
+        made.mesh_body(0, link(shown, hull, geometry="visual"), options, frames)
