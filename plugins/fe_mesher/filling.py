@@ -93,7 +93,9 @@ def filled(
                 return gridded
             if dense:  # as hopeless
                 raise
-            coarser = _Attempt(_COARSER * attempt.size, _COARSER * attempt.distance)
+            # as far from the surface as one of many triangles is followed
+            wide = envelope(_COARSER * size, diagonal, shape.thickness, _DENSE, 0)
+            coarser = _Attempt(_COARSER * attempt.size, max(_COARSER * attempt.distance, wide))
             points, tets = _meshed(solid, coarser, body.path, time, 1.0, use_cache)
             notes = (f"meshed with elements {_COARSER:g} times as large, since smaller ones took too long",)
         quality = measure_quality(points, tets, surface_volume=solid.volume, repairs=(*solid.repairs, *notes))
