@@ -83,10 +83,10 @@ def allocate_law_work(r: int, p: int, cubature: bool) -> LawWork:
     """Scratch for components of at most r elastic coordinates.
 
     Args:
-        p: Largest dimension of a subspace of the quadratic strain; 0 where no component is of that law.
+        p: Largest dimension of a subspace of the quadratic strain, perhaps 0; -1 where no component is of that law.
         cubature: Whether a component is integrated by cubature.
     """
-    size = r + p * (p + 1) // 2 if p else 0
+    size, p = r + p * (p + 1) // 2 if p >= 0 else 0, max(p, 0)
     points = 18 if cubature else 0
     return LawWork(
         strain=np.zeros(2 * size),
@@ -126,5 +126,5 @@ def allocate_work(system: System) -> Work:
         world=np.zeros((int(system.moving.max(initial=-1)) + 1, WORLD_MARKER)),
         i=allocate_marker(system.size),
         j=allocate_marker(system.size),
-        law=allocate_law_work(r, int(system.points[system.stvk].max(initial=0)), len(system.neohookean) > 0),
+        law=allocate_law_work(r, int(system.points[system.stvk].max(initial=-1)), len(system.neohookean) > 0),
     )
