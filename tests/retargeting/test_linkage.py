@@ -28,6 +28,7 @@ def result(shot):
     return optimize_shot(shot.compiled, OPTIONS, ignore_progress)
 
 
+@pytest.mark.long
 def test_the_hand_that_was_off_by_a_quarter_of_a_metre_follows_to_a_few_millimetres(result):
     before, after = largest(result.before), largest(result.after)
     assert before[1] > 0.2

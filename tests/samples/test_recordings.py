@@ -7,7 +7,7 @@ from sample_recordings import check_recording
 from sample_shots import KINDS, path_of
 
 # bodies and skeletons are animated in other tests, too
-LONG = dict.fromkeys(("dancer", "drummer", "boxer", "rapper"), pytest.mark.long)
+LONG = dict.fromkeys(("dancer", "drummer", "boxer", "rapper", "lamp"), pytest.mark.long)
 FINE = {"lamp": "1mm"}  # at 20 mm its stiff links need no modes
 
 

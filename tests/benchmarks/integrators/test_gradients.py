@@ -1,11 +1,13 @@
 """The benchmark of both adjoints, on the smallest of its shots."""
 
+import pytest
 from calmotion.benchmarks.common.shots import load
 from calmotion.benchmarks.integrators import gradient_error
 from calmotion.benchmarks.integrators.gradient_error import errors
 from calmotion.benchmarks.integrators.gradient_figure import draw
 
 
+@pytest.mark.long
 def test_the_discrete_adjoint_is_exact_and_the_continuous_one_of_second_order(tmp_path, monkeypatch):
     monkeypatch.setattr(gradient_error, "DIRECTIONS", 2)
     monkeypatch.setattr(gradient_error, "REPEATS", 1)

@@ -25,7 +25,7 @@ SECOND = {"bdf2": (16, 32), "newmark": (16, 32), "generalized-alpha": (16, 32)}
     "scene, explicit",
     [
         pytest.param(arm_scene, (16, 32), id="flexible arm", marks=pytest.mark.long),
-        pytest.param(four_bar_scene, (32, 64), id="four-bar"),
+        pytest.param(four_bar_scene, (32, 64), id="four-bar", marks=pytest.mark.long),
     ],
 )
 def test_orders_are_those_of_the_methods(scene, explicit):

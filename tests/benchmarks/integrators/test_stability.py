@@ -14,7 +14,7 @@ TOO_SOFT = [f"1e{power} Pa" for power in (4, 5, 6, 7, 8)] + ["load a million arm
 TOO_FAST = ["half a turn in a frame, plastic", "100 rad/s, steps of 1/24 s"]
 
 
-LONG = ["chain, ", "step, 1e-05 s"]
+LONG = ["chain, ", "step, 1e-05 s", "jump, half a turn in a frame, plastic"]
 
 
 def _marked(case):

@@ -19,6 +19,7 @@ def test_gauss_newton_needs_a_fraction_of_a_quasi_newton_method(capsys):
     assert unknowns[0] <= 10 and unknowns[-1] > 1500 and all(row["product"] > 0 for row in report["costs"])
 
 
+@pytest.mark.long
 def test_no_shaper_comes_near_the_optimised_curves(capsys):
     assert baselines.main(["arm", "--json"]) == 0
     rows = {row["method"]: row for row in json.loads(capsys.readouterr().out)}

@@ -50,7 +50,7 @@ def tip(body, size):
     return marker.Phi @ equilibrium(whole_gram(body), load, np.zeros(len(load)), steps=8)
 
 
-@pytest.mark.parametrize("size", [60.0, 300.0])
+@pytest.mark.parametrize("size", [pytest.param(60.0, marks=pytest.mark.long), 300.0])
 def test_a_link_with_a_strain_subspace_deflects_like_one_with_the_full_quadratic_strain(plastic, size, monkeypatch):
     tolerance = 1e-5
     few = link(plastic, tolerance, loads(size))

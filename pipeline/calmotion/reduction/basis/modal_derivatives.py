@@ -147,11 +147,11 @@ def extended_basis(
         return basis
     derivatives = modal_derivatives(model, support, basis, count, material, law)
     n, p = len(model.mesh.nodes), len(support.patches)
-    amplitude = basis.omega_squared[0] / basis.omega_squared[:count]
+    amplitude = static = basis.omega_squared[0] / basis.omega_squared[:count]
     if deflections is not None:
-        amplitude = np.maximum(amplitude, _second_order(model, basis, derivatives, deflections[:count]))
+        amplitude = np.maximum(static, _second_order(model, basis, derivatives, deflections[:count]))
     first, second = np.triu_indices(count)
-    weight = amplitude[first] * amplitude[second]
+    weight, static_weight = amplitude[first] * amplitude[second], static[first] * static[second]
     change_sizes = derivatives.change_sizes * weight
     shapes, shape_motion = derivatives.shapes.reshape(3 * n, -1), derivatives.shape_motion
     # the derivatives without changes of shape, and the responses to these changes
@@ -162,8 +162,16 @@ def extended_basis(
     for _ in range(2):  # the second pass removes the rounding of the first
         extra, moved = _without_modes(modes, basis.patch_motion, M, extra, moved)
         shapes, shape_motion = _without_modes(modes, basis.patch_motion, M, shapes, shape_motion)
-    energy, directions = np.linalg.eigh(extra.T @ (K @ extra))
-    dropped = negligible**2 * max(float(energy[-1]), np.finfo(float).tiny)
+    # Those that matter by either weight are kept. By the second alone, the energy of stiff modes that bending moves far
+    # would hide the derivatives of the bending itself.
+    strain_energy = extra.T @ (K @ extra)
+    share = static_weight / weight
+    first_energy = max(float(np.linalg.eigvalsh(strain_energy * np.outer(share, share))[-1]), np.finfo(float).tiny)
+    second_energy = max(float(np.linalg.eigvalsh(strain_energy)[-1]), np.finfo(float).tiny)
+    scale = np.sqrt(np.maximum(share**2 / first_energy, 1.0 / second_energy))
+    extra, moved, change_sizes = extra * scale, moved * scale, change_sizes * scale
+    energy, directions = np.linalg.eigh(strain_energy * np.outer(scale, scale))
+    dropped = negligible**2
     keep = directions[:, energy > dropped]
     extra, moved = extra @ keep, moved @ keep
     # the changes of shape that rotations of the patches cause; a missing one would make the springs resist the rotation

@@ -47,7 +47,7 @@ def neohookean_cubature(model: FEModel, basis: Basis, material: ElasticMaterial)
         raise ShotError(
             "no cubature of the Neo-Hookean energy is accurate enough", path=material.path,
             attribute="calm:flexible:elasticity", found=f"error {error:.2%} with {len(chosen)} points",
-            remedy="Use stvk, which needs no cubature, or a coarser mesh",
+            remedy="Use stvk, which needs no cubature, or a coarser mesh.",
         )  # fmt: skip
     C = linear_tangent(lame, mu)
     points = candidates[chosen]
