@@ -10,7 +10,7 @@ from calmotion.host import NotAsked, Operator, Property, RunContext, registratio
 from calmotion.shot import Animation, Character, ModelChoices, Result
 from calmotion.shot.model_choice import run_settings, simplified_character, with_choices
 from calmotion.shot.outputs import ShapedTracks
-from calmotion.shot.result import is_reached
+from calmotion.shot.result import is_exceeded, is_reached
 from calmotion.shot.robust.settings import RobustSettings
 from calmotion.shot.run import OutputPaths, Source
 from calmotion.simulation.compiled_shot import CompiledShot
@@ -205,8 +205,13 @@ class OptimizeShot(Operator):
             )
         before, after = result.objective_before, result.objective_after
         if after is None or not after <= before:
-            ended = f"the search ended: {result.stopped}"
-            reason = "the limits of the motors require it" if any(map(is_reached, result.limits)) else ended
+            reason = f"the search ended: {result.stopped}"
+            if any(map(is_exceeded, result.limits)):
+                reason += (
+                    ", and limits of motors are still exceeded. Slow the animation down there, or raise the limits"
+                )
+            elif any(map(is_reached, result.limits)):
+                reason = "the limits of the motors require it"
             context.report(
                 "warning",
                 f"the new curves are worse than the animated ones: objective {before} -> {after}; {reason}",

@@ -144,8 +144,11 @@ def print_verdict(console: Console, report: dict[str, Any]) -> None:
     if worst is not None and "objective_after" in report:
         before = max(target["max_error_before_m"] for target in report["targets"])
         after = worst["max_error_after_m"]
-        change = "falls" if after < before else "does not fall"
-        say(console, f"The largest error {change} from {length(before)} to {length(after)} (at {worst['path']}).")
+        now = f"{length(after)} (at {worst['path']})"
+        if length(after) == length(before):
+            say(console, f"The largest error stays at {now}.")
+        else:
+            say(console, f"The largest error {'falls' if after < before else 'rises'} from {length(before)} to {now}.")
     elif worst is not None:
         shaper, motion = report.get("shaper"), "As animated"
         if shaper:

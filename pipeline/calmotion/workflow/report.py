@@ -14,13 +14,12 @@ from calmotion.shot.budget import Verdict, verdict_on
 from calmotion.shot.character import Array
 from calmotion.shot.motor import measure_of
 from calmotion.shot.outputs import CsvFile, Figures, Recording, Rig, Verification, Video, WrittenLayer
+from calmotion.shot.result import is_exceeded
 from calmotion.shot.robust.robots import CURVES
 from calmotion.shot.run import Source
 from calmotion.support.memory import peak_memory
 from calmotion.version import __version__
 from calmotion.workflow.reactions import reaction_rows
-
-LIMIT_KEPT = 1e-6  # relative excess that is rounding
 
 
 def error_norms(errors: Array) -> tuple[Array, Array]:
@@ -71,7 +70,7 @@ def limit_row(character: Character, limit: LimitUse) -> dict[str, Any]:
         "after": limit.after,
         "time_s": limit.time_s,
         "shown": [measure_of(motor).shown(limit.quantity, v) for v in (limit.limit, limit.before, limit.after)],
-        "exceeded": limit.excess > LIMIT_KEPT,
+        "exceeded": is_exceeded(limit),
         "cost_m": limit.cost_m,
     }
 
