@@ -86,7 +86,7 @@ def test_the_container_runs_commands_and_extras_there_are(repository):
     assert set(re.search(r"/opt/calmotion\[(.*?)\]", text)[1].split(",")) <= set(extras)
     for line in re.findall(r"^RUN (calmotion .*)$", text, re.MULTILINE):
         build_parser().parse_args(shlex.split(line)[1:])
-    python = re.search(r"^FROM \S+/python:(\S+)-slim", text, re.MULTILINE)[1]
+    python = re.search(r"^FROM (?:\S+/)?python:(\S+)-slim", text, re.MULTILINE)[1]
     assert python in ("3.11", "3.12", "3.13")
 
 
