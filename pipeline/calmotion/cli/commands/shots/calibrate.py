@@ -69,10 +69,18 @@ def _prior(text: str) -> tuple[str, float]:
         raise argparse.ArgumentTypeError(f"{text} is not KIND=VALUE, such as modulus=0.3") from None
 
 
+def parameter_arguments(args: argparse.Namespace) -> dict[str, Any]:
+    """What is estimated, as `calibrate`, `excite` and `refine` take it."""
+    from calmotion.identification.parameters import DEFAULT
+
+    return {
+        "parameters": args.parameters or DEFAULT, "priors": dict(args.prior), "by_motor_type": args.by_motor_type,
+    }  # fmt: skip
+
+
 def _run(args: argparse.Namespace, output: Output) -> int:
     from calmotion.cli.output import conclude
     from calmotion.cli.progress import ProgressDisplay
-    from calmotion.identification.parameters import DEFAULT
     from calmotion.workflow.calibration.calibrate import calibrate
     from calmotion.workflow.exporting.export import with_shot
 
@@ -80,8 +88,7 @@ def _run(args: argparse.Namespace, output: Output) -> int:
     shot = opened_shot(args)
     with ProgressDisplay(args.quiet, args.progress, args.log) as display:
         made = calibrate(
-            shot, args.recording, layer=args.output, parameters=args.parameters or DEFAULT, priors=dict(args.prior),
-            validate=not args.no_validation, by_motor_type=args.by_motor_type,
+            shot, args.recording, layer=args.output, **parameter_arguments(args), validate=not args.no_validation,
             tolerance=args.tolerance, step=args.step, integrator=args.integrator,
             figures=args.figures, operators=args.run, settings=assignments(args), progress=display,
             on_operator=display.done,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING, Any, TextIO
 
-from calmotion.cli.commands.shots.calibrate import prior_option
+from calmotion.cli.commands.shots.calibrate import parameter_arguments, prior_option
 from calmotion.cli.options import Commands, assignments, file_argument, opened_shot, quantity, shot_command
 
 if TYPE_CHECKING:
@@ -47,14 +47,12 @@ def add_to(commands: Commands) -> None:
 def _run(args: argparse.Namespace, output: Output) -> int:
     from calmotion.cli.output import conclude
     from calmotion.cli.progress import ProgressDisplay
-    from calmotion.identification.parameters import DEFAULT
     from calmotion.workflow.calibration.excite import SENSORS, excite
 
     shot = opened_shot(args)
     with ProgressDisplay(args.quiet, args.progress, args.log) as display:
         made = excite(
-            shot, layer=args.output, sensors=args.sensor or SENSORS, parameters=args.parameters or DEFAULT,
-            priors=dict(args.prior), by_motor_type=args.by_motor_type,
+            shot, layer=args.output, sensors=args.sensor or SENSORS, **parameter_arguments(args),
             duration=args.duration, amplitude=args.amplitude or "10deg",
             tries=max(1, args.tries), step=args.step, operators=args.run, settings=assignments(args), progress=display,
             on_operator=display.done,
