@@ -7,46 +7,15 @@ import numpy as np
 import pytest
 from calmotion.errors import ShotError
 from calmotion.usd.reading import read_shot
-from pxr import Sdf
-from small_shots import (
-    BASE,
-    FORE,
-    HAND,
-    PLASTIC,
-    RATE,
-    SHOULDER,
-    TARGET_POSITION,
-    make_flexible,
-    make_target,
-    write_arm,
-)
+from small_shots import BASE, FORE, HAND, PLASTIC
+from swung_plastic import ease, swung_plastic
 
 TRUTH = {"youngsModulus": 1.15e8, "damping": 0.02}
 
 
-def ease(s):
-    s = np.clip(s, 0.0, 1.0)
-    return s**3 * (10.0 - 15.0 * s + 6.0 * s * s)
-
-
-def shot_at(path, modulus=1e8, damping=0.015):
-    """The small arm of a soft plastic, whose shoulder makes two moves from rest to rest."""
-
-    def edit(stage):
-        make_flexible(stage, FORE, youngsModulus=modulus)
-        make_target(stage)
-        material = stage.GetPrimAtPath(PLASTIC)
-        material.AddAppliedSchema("CalmDampingAPI")
-        material.CreateAttribute("calm:damping:ratio", Sdf.ValueTypeNames.Float).Set(damping)
-        for path in (SHOULDER, "/Arm/joints/elbow"):
-            attribute = stage.GetPrimAtPath(path).GetAttribute(TARGET_POSITION)
-            attribute.Clear()
-            for frame in range(25):
-                t = frame / RATE
-                angle = 30.0 * ease((t - 0.1) / 0.25) - 20.0 * ease((t - 0.5) / 0.2) if path == SHOULDER else 10.0
-                attribute.Set(angle, frame)
-
-    return write_arm(path, edit)
+def shot_at(path, *material):
+    """The shoulder makes two moves from rest to rest."""
+    return swung_plastic(path, lambda t: 30.0 * ease((t - 0.1) / 0.25) - 20.0 * ease((t - 0.5) / 0.2), 24, *material)
 
 
 @pytest.fixture(scope="module")

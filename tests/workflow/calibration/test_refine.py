@@ -8,34 +8,16 @@ import pytest
 from calmotion.errors import ShotError
 from calmotion.usd.calibrations import count
 from pxr import Sdf, Usd
-from small_shots import FORE, PLASTIC, RATE, SHOULDER, TARGET_POSITION, make_flexible, make_target, write_arm
+from small_shots import FORE, PLASTIC
+from swung_plastic import ease, swung_plastic
 
 TARGET = f"{FORE}/hand"
 COARSE = {"fe.mesh.element_size": "40mm"}
 NOISE, FRAMES = 1e-4, 26
 
 
-def ease(s):
-    s = np.clip(s, 0.0, 1.0)
-    return s**3 * (10.0 - 15.0 * s + 6.0 * s * s)
-
-
-def shot_at(path, modulus=1e8, damping=0.015):
-    def edit(stage):
-        make_flexible(stage, FORE, youngsModulus=modulus)
-        make_target(stage)
-        material = stage.GetPrimAtPath(PLASTIC)
-        material.AddAppliedSchema("CalmDampingAPI")
-        material.CreateAttribute("calm:damping:ratio", Sdf.ValueTypeNames.Float).Set(damping)
-        for path in (SHOULDER, "/Arm/joints/elbow"):
-            attribute = stage.GetPrimAtPath(path).GetAttribute(TARGET_POSITION)
-            attribute.Clear()
-            for frame in range(FRAMES + 1):
-                angle = 30.0 * ease((frame / RATE - 0.2) / 0.6) if path == SHOULDER else 10.0
-                attribute.Set(float(angle), frame)
-        stage.SetEndTimeCode(FRAMES)
-
-    return write_arm(path, edit)
+def shot_at(path):
+    return swung_plastic(path, lambda t: 30.0 * ease((t - 0.2) / 0.6), FRAMES)
 
 
 def played(root, folder, name, number):
