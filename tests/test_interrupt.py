@@ -39,7 +39,7 @@ def kept(layer):
     return layer.with_name(f".{layer.name}.checkpoint.npz")
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("number", [signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.long)])
 def test_a_signal_writes_the_best_so_far_and_the_same_command_resumes(repository, tmp_path, number):
     layer = tmp_path / "calm.usda"
     process = started(repository, layer)

@@ -1,7 +1,7 @@
 import math
 
 import pytest
-from calmotion.cli.quantities import angle, counted, length, memory
+from calmotion.cli.quantities import angle, counted, length, measured, memory, quantity_in
 
 
 @pytest.mark.parametrize(
@@ -40,3 +40,28 @@ def test_one_thing_has_no_plural():
 )  # fmt: skip
 def test_memory_has_two_digits(size, text):
     assert memory(size) == text
+
+
+@pytest.mark.parametrize(
+    "value, deviation, unit, texts",
+    [
+        (1.59932e9, 4.9e6, "Pa", ("1.5993 GPa", "0.0049 GPa")),
+        (2.56e-5, 4.0e-5, "s", ("0.026 ms", "0.040 ms")),
+        (-3e-9, 1.2e-5, "m", ("0.000 mm", "0.012 mm")),
+        (0.0391, 0.0018, "", ("0.0391", "0.0018")),
+        (1234.5, 67.0, "N m/rad", ("1234 N m/rad", "67 N m/rad")),
+        (math.radians(2.0), math.radians(0.25), "rad", ("2.00°", "0.25°")),
+        (0.2, 0.0, "kg", ("0.2 kg", "-")),
+        (0.2, math.inf, "kg", ("0.2 kg", "-")),
+    ],
+)  # fmt: skip
+def test_an_estimate_has_the_digits_of_its_standard_deviation(value, deviation, unit, texts):
+    assert measured(value, deviation, unit) == texts
+
+
+@pytest.mark.parametrize(
+    "value, unit, text",
+    [(2.1e9, "Pa", "2.1 GPa"), (950.0, "Pa", "950 Pa"), (6.7e-16, "s", "0 ms"), (-0.004, "m", "-4 mm"), (1.0, "", "1")],
+)
+def test_a_quantity_has_the_unit_that_suits_its_size(value, unit, text):
+    assert quantity_in(value, unit) == text

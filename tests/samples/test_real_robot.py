@@ -3,9 +3,11 @@
 import importlib.util
 import json
 
+import pytest
 from pxr import Sdf, Usd
 
 
+@pytest.mark.long
 def test_the_shake_of_a_real_robot_with_soft_arms_is_removed(calmotion, repository, shared_data, tmp_path):
     folder = repository / "samples" / "real"
     spec = importlib.util.spec_from_file_location("compose", folder / "compose.py")

@@ -98,33 +98,33 @@ def _run(args: argparse.Namespace, output: Output) -> int:
 
 
 def _print(report: dict[str, Any], stream: TextIO) -> None:
+    from calmotion.cli.quantities import measured, quantity_in
+    from calmotion.cli.sentences import unbroken
     from calmotion.cli.tables import console_on, print_table, say
 
     console = console_on(stream)
+    for row in report["channels"]:
+        held_out = row["validation_rms"]
+        before, after, noise = (quantity_in(row[name], row["unit"], 3) for name in ("rms_before", "rms", "noise"))
+        others = "" if held_out is None else f", {quantity_in(held_out, row['unit'], 3)} in samples not fitted"
+        say(
+            console,
+            f"{row['name']}: the difference of recording and robot falls from {before} to {after}{others} "
+            f"(root mean square; noise {noise}).",
+        )
     for of_robot, title in ((True, "Parameters of the robot"), (False, "Parameters of the measurement")):
-        rows = [
-            [
-                row["kind"], row["name"].partition(" ")[2], _value(row["prior"]["value"], row["unit"]),
-                _value(row["value"], row["unit"]), _deviation(row), "yes" if row["identifiable"] else "no",
-            ]
-            for row in report["parameters"]
-            if row["of_robot"] == of_robot
-        ]  # fmt: skip
+        rows = []
+        for row in report["parameters"]:
+            if row["of_robot"] == of_robot:
+                value, deviation = measured(row["value"], row["standard_deviation"], row["unit"])
+                rows.append([
+                    row["kind"], row["name"].partition(" ")[2], quantity_in(row["prior"]["value"], row["unit"]), value,
+                    deviation + _share(row), "yes" if row["identifiable"] else "no",
+                ])  # fmt: skip
         print_table(
             console, title, ["parameter", "of", "in the shot", "estimated", "standard deviation", "identifiable"], rows,
             texts=2,
         )  # fmt: skip
-    rows = [
-        [
-            row["name"], str(row["samples"]), _value(row["noise"], row["unit"]), f"{row['rms_before']:.3g}",
-            f"{row['rms']:.3g}", "-" if row["validation_rms"] is None else f"{row['validation_rms']:.3g}",
-        ]
-        for row in report["channels"]
-    ]  # fmt: skip
-    print_table(
-        console, "Difference between recordings and robot, root mean square",
-        ["channel", "values", "noise", "as in the shot", "fitted", "held out"], rows,
-    )  # fmt: skip
     for row in report["parameters"]:
         if row["advice"]:
             say(console, f"{row['name']} is not identifiable from these recordings: {row['advice']}")
@@ -138,13 +138,11 @@ def _print(report: dict[str, Any], stream: TextIO) -> None:
     for file in (report["layer"], report["root"], *report["figures"]):
         if file:
             say(console, f"wrote {file}")
+    if report["root"]:
+        say(console, f"next: calmotion optimize {unbroken(report['root'])} -o LAYER makes curves for this robot")
 
 
-def _value(value: float, unit: str) -> str:
-    return f"{value:.5g} {unit}".rstrip()
-
-
-def _deviation(row: dict[str, Any]) -> str:
+def _share(row: dict[str, Any]) -> str:
+    """The standard deviation as a share of the value; not of offsets, whose zero is free."""
     share = abs(row["standard_deviation"] / row["value"]) if row["value"] else float("inf")
-    relative = f" ({100.0 * share:.2g}%)" if row["prior"]["value"] and share < 10.0 else ""
-    return f"{row['standard_deviation']:.2g} {row['unit']}".rstrip() + relative
+    return f" ({100.0 * share:.2g}%)" if row["of_robot"] and row["prior"]["value"] and share < 1.0 else ""

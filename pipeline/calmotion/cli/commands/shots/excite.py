@@ -62,12 +62,13 @@ def _run(args: argparse.Namespace, output: Output) -> int:
 
 
 def _print(report: dict[str, Any], stream: TextIO) -> None:
+    from calmotion.cli.quantities import quantity_in
     from calmotion.cli.tables import console_on, print_table, say
 
     console = console_on(stream)
     rows = [
         [
-            row["kind"], row["path"], f"{row['value']:.4g} {row['unit']}".rstrip(),
+            row["kind"], row["path"], quantity_in(row["value"], row["unit"]),
             *(f"{value:.2g}" for value in (
                 row["prior"]["standard_deviation"], row["standard_deviation_chirp"], row["standard_deviation"]
             )),

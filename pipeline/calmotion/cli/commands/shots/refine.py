@@ -53,14 +53,14 @@ def _run(args: argparse.Namespace, output: Output) -> int:
 
 
 def _print(report: dict[str, Any], stream: TextIO) -> None:
-    from calmotion.cli.quantities import length
+    from calmotion.cli.quantities import length, measured, quantity_in
     from calmotion.cli.tables import console_on, print_table, say
 
     console = console_on(stream)
     rows = [
         [
-            row["name"], f"{row['prior']['value']:.5g} {row['unit']}".rstrip(), f"{row['value']:.5g}",
-            f"{row['standard_deviation']:.2g}", "yes" if row["identifiable"] else "no",
+            row["name"], quantity_in(row["prior"]["value"], row["unit"]),
+            *measured(row["value"], row["standard_deviation"], row["unit"]), "yes" if row["identifiable"] else "no",
         ]
         for row in report["parameters"]
         if row["of_robot"]
