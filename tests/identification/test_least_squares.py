@@ -11,7 +11,7 @@ class Linear:
     """Residuals A z - b."""
 
     def __init__(self, A, b):
-        self.A, self.b = A, b
+        self.A, self.b, self.counts = A, b, np.ones(len(b))
 
     def residuals(self, z):
         return self.A @ z - self.b
@@ -23,7 +23,7 @@ class Linear:
 class Exponential:
     """A decaying oscillation of unknown rate and frequency, sampled with an exact derivative."""
 
-    times = np.linspace(0.0, 2.0, 200)
+    times, counts = np.linspace(0.0, 2.0, 200), np.ones(200)
 
     def __init__(self, truth, sigma=1e-3, failing=False):
         self.sigma, self.failing = sigma, failing
@@ -49,8 +49,32 @@ def test_a_linear_problem_has_the_minimum_and_covariance_of_its_normal_equations
     H = A.T @ A + np.eye(2)
     assert found.converged and found.z == pytest.approx(np.linalg.solve(H, A.T @ b), abs=2e-3)
     assert np.allclose(posterior(A, np.zeros(30), np.ones(30)), np.linalg.inv(H))
+    assert np.allclose(posterior(A, np.ones(30), np.ones(30)), np.linalg.inv(H))
     # residuals of which four count as one tell a quarter
     assert np.allclose(posterior(A, np.zeros(30), np.full(30, 4.0)), np.linalg.inv(A.T @ A / 4.0 + np.eye(2)))
+
+
+def test_deviations_are_those_of_repeated_experiments_also_where_the_noise_is_not_as_assumed():
+    """The noise is three times as large where the second parameter is told."""
+    rng, columns = np.random.default_rng(3), np.zeros((400, 2))
+    columns[:200, 0], columns[200:, 1] = 1.0, 1.0
+    found = []
+    for _ in range(400):
+        noise = rng.standard_normal(400) * np.where(np.arange(400) < 200, 1.0, 3.0)
+        solution = minimize(Linear(columns, noise), np.zeros(2), FREE)
+        found.append((solution.z, np.sqrt(np.diag(posterior(columns, solution.residuals, np.ones(400))))))
+    spread = np.std([z for z, _ in found], axis=0)
+    told = np.mean([deviation for _, deviation in found], axis=0)
+    assert spread[1] > 2.0 * spread[0]
+    assert told == pytest.approx(spread, rel=0.1)
+
+
+def test_residuals_of_which_many_count_as_one_do_not_outweigh_the_prior():
+    """A constant that is one, in 100 residuals of deviation 1 that are all the same."""
+    problem = Linear(np.ones((100, 1)), np.ones(100))
+    assert minimize(problem, np.zeros(1), FREE[:1]).z == pytest.approx(100.0 / 101.0, abs=1e-3)
+    problem.counts = np.full(100, 100.0)
+    assert minimize(problem, np.zeros(1), FREE[:1]).z == pytest.approx(0.5, abs=1e-3)
 
 
 def test_a_nonlinear_problem_is_solved_also_where_steps_fail():

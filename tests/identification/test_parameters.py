@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from calmotion import ShotError
 from calmotion.identification.parameters import Parameter, robot_parameters
+from calmotion.shot.calibration.estimates import ROBOT_KINDS
 from calmotion.shot.motor import DRIVE, SERVO, Rotor
 from calmotion.simulation.compiled_shot import compile_shot
 
@@ -31,8 +32,13 @@ def test_a_factor_is_searched_by_its_logarithm_and_an_offset_as_it_is():
 
 def test_parameters_are_those_of_the_materials_and_the_payload(shot):
     found = robot_parameters(shot)
-    assert [p.name for p in found] == ["modulus /Arm/Nylon", "damping /Arm/Nylon", "mass /Arm/Hand"]
-    assert [p.nominal for p in found] == [2e9, 0.015, 0.5]
+    assert [p.name for p in found] == [
+        "modulus /Arm/Nylon",
+        "damping /Arm/Nylon",
+        "mass /Arm/Hand",
+        "higher_modes /Arm/Nylon",
+    ]
+    assert [p.nominal for p in found] == [2e9, 0.015, 0.5, 0.0]
 
 
 def test_motors_that_give_have_gains_and_a_delay_and_servos_what_the_shot_guesses(shot):
@@ -46,7 +52,8 @@ def test_motors_that_give_have_gains_and_a_delay_and_servos_what_the_shot_guesse
 
 
 def test_patterns_choose_paths_and_priors_replace_the_usual_ones(shot):
-    (found,) = robot_parameters(shot, ("modulus:*Nylon",), {"modulus": 0.1})
+    found, graded = robot_parameters(shot, ("modulus:*Nylon",), {"modulus": 0.1})
+    assert graded.name == "higher_modes /Arm/Nylon" and graded.kind not in ROBOT_KINDS
     assert found.spread == pytest.approx(np.log(1.1))
     centre = robot_parameters(shot, ("centre",))
     assert [p.name for p in centre] == [f"centre /Arm/Hand.{axis}" for axis in "xyz"] and centre[0].nominal == 0.03

@@ -10,7 +10,7 @@ from calmotion.geometry.tetrahedra import measure_quality
 from calmotion.reduction.interfaces.interface_patches import AttachmentFrame
 from calmotion.reduction.load_envelope import LoadEnvelope
 from calmotion.reduction.reduce import reduce_body
-from calmotion.reduction.scaled_stiffness import with_scaled_stiffness
+from calmotion.reduction.scaled_stiffness import with_graded_stiffness, with_scaled_stiffness
 from calmotion.shot import Body, FEMesh, FlexibleSettings
 
 
@@ -43,3 +43,24 @@ def test_the_stiffness_is_that_of_another_material(helpers, plastic, law):
         assert scaled.elasticity.lame == pytest.approx(other.elasticity.lame)
         assert np.array_equal(scaled.elasticity.data[: r * r], 0.9 * body.elasticity.data[: r * r])
         assert np.array_equal(scaled.elasticity.data[r * r :], body.elasticity.data[r * r :])
+    check_grading(body)
+
+
+def check_grading(body):
+    """The linear part of the law is the stiffness, also where that grows with the frequency."""
+    graded = with_graded_stiffness(body, 0.1)
+    ratio = body.frequencies / body.frequencies.min()
+    assert graded.stiffness == pytest.approx(body.stiffness * ratio**0.1)
+    assert with_graded_stiffness(body, 0.0) is body
+    if body.elasticity is None:
+        return
+    r, law, before = len(body.stiffness), graded.elasticity, body.elasticity
+    if before.law == "stvk":
+        size = round(np.sqrt(len(law.data)))
+        gram = law.data.reshape(size, size)
+        assert np.diag(gram)[:r] == pytest.approx(np.diag(before.data.reshape(size, size))[:r] * ratio**0.1)
+        assert np.array_equal(gram[r:, r:], before.data.reshape(size, size)[r:, r:])
+        assert np.linalg.eigvalsh(gram).min() > -1e-9 * np.abs(gram).max()
+    else:
+        change = (law.data - before.data)[: r * r].reshape(r, r)
+        assert change == pytest.approx(np.diag(graded.stiffness - body.stiffness), abs=1e-9 * body.stiffness.max())

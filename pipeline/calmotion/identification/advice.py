@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from calmotion.identification.problem import Calibrated
+from calmotion.shot.calibration.estimates import ROBOT_KINDS
 from calmotion.shot.calibration.recording import ACCELEROMETER, ANGLE, EFFORT, MARKER
 from calmotion.shot.character import Array
 
@@ -51,7 +52,12 @@ def advised(problem: Calibrated, information: Array, z: Array) -> dict[int, Advi
     differences, count = problem.differences, len(problem.parameters)
     if differences is None or not count:
         return {}
-    missing = [k for k, sd in enumerate(np.sqrt(np.diag(np.linalg.inv(information)))[:count]) if sd > IDENTIFIABLE]
+    deviations = np.sqrt(np.diag(np.linalg.inv(information)))[:count]
+    missing = [
+        k
+        for k, (p, deviation) in enumerate(zip(problem.parameters, deviations, strict=True))
+        if p.kind in ROBOT_KINDS and deviation > IDENTIFIABLE
+    ]
     if not missing:
         return {}
     here = problem.signals(z)

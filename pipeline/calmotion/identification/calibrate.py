@@ -14,6 +14,7 @@ from calmotion.identification.advice import IDENTIFIABLE, advised
 from calmotion.identification.clocks import clock_of
 from calmotion.identification.measurement import Measurement, measurement_parameters, sensors_of
 from calmotion.identification.motor_groups import grouped, of_each_motor
+from calmotion.identification.noise import noise_of
 from calmotion.identification.parameters import DEFAULT, Parameter, robot_parameters
 from calmotion.identification.problem import Calibrated
 from calmotion.identification.robots import robot_with
@@ -24,6 +25,7 @@ from calmotion.multibody.integrators.coefficients import IMPLICIT
 from calmotion.shot.calibration.estimates import (
     CLOCK_DRIFT,
     CLOCK_OFFSET,
+    ROBOT_KINDS,
     Calibration,
     ChannelCurves,
     ChannelFit,
@@ -39,6 +41,7 @@ from calmotion.simulation.prepare import failure_error, prepare
 AFTER = 1.0  # what a recording holds after the end of the shot is used up to here [s]
 SCHEME = "generalized-alpha"  # a quarter of BDF2's error, and no damping to speak of
 STRONG = 0.9  # correlation that is worth a note
+MISSED, TOGETHER = 1.5, 3.0  # residuals over the noise, and samples that count as one: the model misses something
 
 
 @dataclass(frozen=True)
@@ -172,7 +175,7 @@ def _estimates(found: Found) -> tuple[Estimate, ...]:
         x, sd = float(found.z[k]), float(deviations[k])
         identifiable = sd <= IDENTIFIABLE
         text = ""
-        if not identifiable and k < len(problem.parameters):
+        if not identifiable and p.kind in ROBOT_KINDS:
             text = (
                 f"{advice[k].sentence} narrow it to {100.0 * advice[k].sigma:.2g}% of its prior" if k in advice
                 else "no single marker, accelerometer, encoder or torque would tell it from this motion"
@@ -243,6 +246,7 @@ def _notes(found: Found, estimates: Sequence[Estimate], settings: CalibrationSet
         notes.append("the search did not converge: the estimates may be far from the best ones")
     if settings.halvings and found.shift > 1.0:
         notes.append("the estimates still depend on the time step: give a smaller one with --step")
+    notes += _missed(found)
     deviations = np.sqrt(np.diag(found.covariance))
     correlations = found.covariance / np.outer(deviations, deviations)
     robot = [k for k, item in enumerate(estimates) if item.of_robot]
@@ -260,4 +264,21 @@ def _notes(found: Found, estimates: Sequence[Estimate], settings: CalibrationSet
             f"{item.name} is {abs(found.z[k]):.1f} standard deviations of its prior away from the shot: check the "
             f"units and axes of the recording, or give it a wider prior (--prior {item.kind}=...)"
         )
+    return notes
+
+
+def _missed(found: Found) -> list[str]:
+    """Sensors that measured something which no robot of this kind does: more than noise is left, and not at random."""
+    measurement, y, notes = found.problem.measurement, found.z[len(found.problem.parameters) :], []
+    signals = found.problem.signals(found.z)
+    for sensor in measurement.sensors:
+        channel = sensor.channel
+        noise = channel.sigma if channel.sigma is not None else noise_of(channel.values[sensor.used])
+        left = _rms((channel.values - measurement.predicted(signals, sensor, y))[sensor.fitted])
+        if left > MISSED * noise and sensor.count > TOGETHER:
+            notes.append(
+                f"{channel.name} still differs by {left / noise:.2g} times its noise, and not at random: the model "
+                "misses something, and the estimates may be wrong by more than their standard deviations. Try a finer "
+                "model (a smaller --tolerance), or more --parameters"
+            )
     return notes

@@ -1,9 +1,11 @@
 """Levenberg-Marquardt with a normal prior, bounds, and a loss that outliers cannot dominate.
 
-    min_z  sum_i rho(r_i(z)) + 1/2 z^T z
+    min_z  sum_i rho(r_i(z)) / n_i + 1/2 z^T z
 
-where rho is Huber's loss: quadratic up to `HUBER`, linear beyond. Each iteration weighs a residual r beyond it by
-HUBER / |r| (iteratively reweighted least squares). Entries of z at a bound that would leave it are held there.
+where rho is Huber's loss: quadratic up to `HUBER`, linear beyond. n_i successive residuals count as one: where they are
+correlated in time, as those of a model that misses something, they do not outweigh the prior. Each iteration weighs a
+residual r beyond `HUBER` by HUBER / |r| (iteratively reweighted least squares). Entries of z at a bound that would
+leave it are held there.
 
 Source: Nocedal, Wright, Numerical Optimization, 2006, section 10.3; Huber, Robust Statistics, 1981.
 """
@@ -25,6 +27,10 @@ FIRST, LARGEST = 1e-3, 1e8  # damping, relative to the diagonal of the Gauss-New
 
 class Problem(Protocol):
     """Residuals over their standard deviations, shape [N], and their derivative by z, shape [N, n]."""
+
+    @property
+    def counts(self) -> Array:
+        """How many successive residuals count as one, shape [N]."""
 
     def residuals(self, z: Array) -> Array | None:
         """At z; None where there is no value."""
@@ -60,10 +66,10 @@ def weights_of(residuals: Array) -> Array:
     return np.where(size > HUBER, HUBER / np.maximum(size, HUBER), 1.0)
 
 
-def loss_of(residuals: Array) -> float:
-    """Sum of Huber's loss."""
+def loss_of(residuals: Array, counts: Array | float = 1.0) -> float:
+    """Sum of Huber's loss, of residuals of which so many count as one."""
     size = np.abs(residuals)
-    return float(np.where(size > HUBER, HUBER * (size - 0.5 * HUBER), 0.5 * size**2).sum())
+    return float((np.where(size > HUBER, HUBER * (size - 0.5 * HUBER), 0.5 * size**2) / counts).sum())
 
 
 def minimize(problem: Problem, start: Array, lower: Array, most: int = MOST) -> Solution:
@@ -78,12 +84,12 @@ def minimize(problem: Problem, start: Array, lower: Array, most: int = MOST) -> 
     Raises:
         ValueError: The residuals have no value at the start.
     """
-    z = np.maximum(start, lower)
+    z, counts = np.maximum(start, lower), problem.counts
     damping = FIRST
     for iteration in range(1, most + 1):
         r, J = problem.linearized(z)
-        cost = loss_of(r) + 0.5 * float(z @ z)
-        w = weights_of(r)
+        cost = loss_of(r, counts) + 0.5 * float(z @ z)
+        w = weights_of(r) / counts
         H = J.T @ (w[:, None] * J) + np.eye(len(z))
         gradient = J.T @ (w * r) + z
         free = ~((z <= lower) & (gradient > 0.0))
@@ -98,7 +104,7 @@ def minimize(problem: Problem, start: Array, lower: Array, most: int = MOST) -> 
             if small:
                 break
             tried = problem.residuals(then)
-            after = np.inf if tried is None else loss_of(tried) + 0.5 * float(then @ then)
+            after = np.inf if tried is None else loss_of(tried, counts) + 0.5 * float(then @ then)
             if after <= cost:
                 expected = -(gradient @ taken + 0.5 * taken @ H @ taken)
                 gain = (cost - after) / expected if expected > 0.0 else 1.0
@@ -111,7 +117,7 @@ def minimize(problem: Problem, start: Array, lower: Array, most: int = MOST) -> 
         if small:
             return Solution(z, r, J, cost, iteration, True)
     r, J = problem.linearized(z)
-    return Solution(z, r, J, loss_of(r) + 0.5 * float(z @ z), most, False)
+    return Solution(z, r, J, loss_of(r, counts) + 0.5 * float(z @ z), most, False)
 
 
 def chord(problem: Problem, known: Solution, most: int = 4) -> Solution:
@@ -126,7 +132,7 @@ def chord(problem: Problem, known: Solution, most: int = 4) -> Solution:
     for _ in range(most):
         if r is None:
             return known
-        w = weights_of(r)
+        w = weights_of(r) / problem.counts
         H = J.T @ (w[:, None] * J) + np.eye(len(z))
         step = -np.linalg.solve(H, J.T @ (w * r) + z)
         if float(np.sqrt(step @ H @ step)) < ENOUGH:
@@ -135,16 +141,26 @@ def chord(problem: Problem, known: Solution, most: int = 4) -> Solution:
         r = problem.residuals(z)
     if r is None:
         return known
-    return Solution(z, r, J, loss_of(r) + 0.5 * float(z @ z), known.iterations, known.converged)
+    return Solution(z, r, J, loss_of(r, problem.counts) + 0.5 * float(z @ z), known.iterations, known.converged)
 
 
 def posterior(jacobian: Array, residuals: Array, counts: Array) -> Array:
-    """Covariance (J^T W J + E)^-1 of z about a minimum, shape [n, n].
+    """Covariance of z about a minimum, shape [n, n].
+
+    It is A^-1 with A = J^T D J + E, D the curvature of the loss. Where a model misses something that its parameters
+    move, residuals are large where J is: a standard deviation is at least that of A^-1 B A^-1 with B = J^T P J + E, P
+    the square of the slope of the loss.
 
     Args:
         jacobian, residuals: There.
         counts: How many successive residuals count as one, shape [N].
+
+    Source: Huber, Robust Statistics, 1981, section 7.6.
     """
-    w = weights_of(residuals) / counts
-    H = jacobian.T @ (w[:, None] * jacobian) + np.eye(jacobian.shape[1])
-    return np.asarray(np.linalg.inv(H))
+    size = np.abs(residuals)
+    prior = np.eye(jacobian.shape[1])
+    A = jacobian.T @ (((size <= HUBER) / counts)[:, None] * jacobian) + prior
+    B = jacobian.T @ ((np.minimum(size, HUBER) ** 2 / counts)[:, None] * jacobian) + prior
+    inverse = np.linalg.inv(A)
+    wider = np.sqrt(np.maximum(np.diag(inverse @ B @ inverse) / np.diag(inverse), 1.0))
+    return np.asarray(wider[:, None] * inverse * wider)

@@ -38,7 +38,7 @@ class Sensor:
         used: Samples during the shot and shortly before and after it, shape [n].
         held_out: Those of them that are not fitted, shape [n].
         sigma: Standard deviation of its noise.
-        count: How many successive samples count as one, for the errors of estimates.
+        count: How many successive samples count as one: 1 for white noise.
     """
 
     recording: int
@@ -220,6 +220,11 @@ class Measurement:
             [part[sensor.fitted] / sensor.sigma for sensor, part in zip(self.sensors, values, strict=True)]
         )
 
+    @property
+    def counts(self) -> Array:
+        """How many successive values of those of `residuals` count as one, shape [N]."""
+        return np.concatenate([np.full(int(sensor.fitted.sum()), sensor.count) for sensor in self.sensors])
+
     def with_sensors(self, sensors: Sequence[Sensor]) -> Measurement:
-        """The same with other noise of the sensors."""
+        """The same with other noise of the sensors, or another count."""
         return replace(self, sensors=tuple(sensors))

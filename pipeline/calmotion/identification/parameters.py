@@ -27,6 +27,7 @@ from calmotion.shot.calibration.estimates import (
     ENCODER_OFFSET,
     FRICTION,
     GEAR_STIFFNESS,
+    HIGHER_MODES,
     MASS,
     MODULUS,
     PLACE,
@@ -43,7 +44,8 @@ from calmotion.support.naming import nearest
 PRIORS: Mapping[str, float] = {
     MODULUS: 0.3, DAMPING: 1.0, DENSITY: 0.05, MASS: 0.1, CENTRE: 0.01, POSITION_GAIN: 0.3, VELOCITY_GAIN: 0.5,
     GEAR_STIFFNESS: 0.5, ARMATURE: 0.5, FRICTION: 1.0, VISCOUS_FRICTION: 1.0, DELAY: 0.005,
-    ENCODER_OFFSET: float(np.radians(1.0)), CLOCK_OFFSET: 0.05, CLOCK_DRIFT: 1e-4, BIAS: 0.3, PLACE: 0.002,
+    ENCODER_OFFSET: float(np.radians(1.0)), HIGHER_MODES: 0.01, CLOCK_OFFSET: 0.05, CLOCK_DRIFT: 1e-4,
+    BIAS: 0.3, PLACE: 0.002,
 }  # fmt: skip
 DEFAULT = (
     MODULUS, DAMPING, MASS, POSITION_GAIN, VELOCITY_GAIN, GEAR_STIFFNESS, ARMATURE, FRICTION, VISCOUS_FRICTION, DELAY,
@@ -105,7 +107,7 @@ class Parameter:
 def robot_parameters(
     shot: CompiledShot, wanted: Sequence[str] = DEFAULT, priors: Mapping[str, float] | None = None
 ) -> tuple[Parameter, ...]:
-    """The parameters of a robot.
+    """The parameters of a robot, and, with each modulus, the grading of the stiffness of its modes.
 
     Args:
         shot: The shot.
@@ -141,7 +143,10 @@ def robot_parameters(
             remedy="Make a link flexible (CalmFlexibleBodyAPI) or a motor give (calm:motor:model), or ask for mass or "
             "encoder_offset",
         )
-    return tuple(found.values())
+    # without it, the error of the mesh would be taken for another modulus and mass
+    moduli = [p for p in found.values() if p.kind == MODULUS]
+    graded = [Parameter(HIGHER_MODES, p.path, 0.0, given[HIGHER_MODES], logarithmic=False) for p in moduli]
+    return (*found.values(), *graded)
 
 
 def refuse_unknown(wanted: Sequence[str], priors: Mapping[str, float]) -> None:

@@ -71,6 +71,11 @@ class Calibrated:
         """Least values of z."""
         return np.array([p.least for p in (*self.parameters, *self.measurement.parameters)])
 
+    @property
+    def counts(self) -> Array:
+        """How many successive residuals count as one, shape [N]."""
+        return self.measurement.counts
+
     def with_measurement(self, measurement: Measurement) -> Calibrated:
         """The same with other noise of the sensors; what was simulated is kept."""
         other = Calibrated(self.shot, self.parameters, measurement, self.options, self.after, self.tell)
@@ -159,6 +164,11 @@ class Measured:
 
     def __init__(self, measurement: Measurement, signals: Signals):
         self._measurement, self._signals = measurement, signals
+
+    @property
+    def counts(self) -> Array:
+        """How many successive residuals count as one, shape [N]."""
+        return self._measurement.counts
 
     def residuals(self, z: Array) -> Array | None:
         """(measured - predicted) / sigma, shape [N]."""

@@ -9,7 +9,7 @@ import numpy as np
 
 from calmotion.identification.parameters import Parameter
 from calmotion.reduction.reduced_body import Invariants, ReducedBody
-from calmotion.reduction.scaled_stiffness import with_scaled_density, with_scaled_stiffness
+from calmotion.reduction.scaled_stiffness import with_graded_stiffness, with_scaled_density, with_scaled_stiffness
 from calmotion.shot import Body
 from calmotion.shot.calibration.estimates import (
     ARMATURE,
@@ -20,6 +20,7 @@ from calmotion.shot.calibration.estimates import (
     ENCODER_OFFSET,
     FRICTION,
     GEAR_STIFFNESS,
+    HIGHER_MODES,
     MASS,
     MATERIAL_KINDS,
     MODULUS,
@@ -107,6 +108,7 @@ def _body(own: Body, body: ReducedBody, values: Values) -> ReducedBody:
         given = own.flexible.material
         material = material_with(given, values)
         body = with_scaled_stiffness(body, material.youngs_modulus / given.youngs_modulus)
+        body = with_graded_stiffness(body, values.get((HIGHER_MODES, given.path, -1), 0.0))
         # a body whose mass is authored keeps it
         return with_scaled_density(body, material.density / given.density) if own.mass is None else body
     if own.mass is None:

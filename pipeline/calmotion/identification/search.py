@@ -70,6 +70,7 @@ def search(problem: Calibrated, tell: Callable[[float, str], None], halvings: in
         z, iterations = solution.z, iterations + solution.iterations
         used = np.array([s.sigma for s in best.measurement.sensors])
         best = best.with_measurement(renoised(best, z))
+        best = best.with_measurement(correlated(best, z))
         if np.all(np.abs(np.array([s.sigma for s in best.measurement.sensors]) / used - 1.0) < STEADY):
             break
     tell(0.8, "halving the time step")
@@ -100,6 +101,7 @@ def _converged(problem: Calibrated, solution: Solution, iterations: int, halving
         earlier, limit, extrapolated = solution.z, then, True
         if shift <= SHIFT:
             break
+    problem = problem.with_measurement(correlated(problem, solution.z))
     return Found(limit, problem, solution, covariance_of(problem, solution), iterations, shift)
 
 
@@ -111,13 +113,19 @@ def step_of(problem: Calibrated) -> float:
 
 def covariance_of(problem: Calibrated, solution: Solution) -> Array:
     """Of z about a solution; residuals that are correlated in time count as fewer."""
-    y = solution.z[len(problem.parameters) :]
-    signals, counts = problem.signals(solution.z), []
-    for sensor in problem.measurement.sensors:
-        off = sensor.channel.values - problem.measurement.predicted(signals, sensor, y)
-        count = correlation_time(np.where(sensor.fitted, off, np.nan)[sensor.used])
-        counts.append(np.full(int(sensor.fitted.sum()), count))
-    return posterior(solution.jacobian, solution.residuals, np.concatenate(counts))
+    return posterior(solution.jacobian, solution.residuals, correlated(problem, solution.z).counts)
+
+
+def correlated(problem: Calibrated, z: Array) -> Measurement:
+    """The measurement with the number of successive samples that count as one, as the residuals have it."""
+    measurement, y = problem.measurement, z[len(problem.parameters) :]
+    signals = problem.signals(z)
+
+    def of(sensor: Sensor) -> Sensor:
+        off = sensor.channel.values - measurement.predicted(signals, sensor, y)
+        return replace(sensor, count=correlation_time(np.where(sensor.fitted, off, np.nan)[sensor.used]))
+
+    return measurement.with_sensors([of(sensor) for sensor in measurement.sensors])
 
 
 def renoised(problem: Calibrated, z: Array) -> Measurement:

@@ -19,6 +19,28 @@ def with_scaled_stiffness(body: ReducedBody, factor: float) -> ReducedBody:
     )
 
 
+def with_graded_stiffness(body: ReducedBody, exponent: float) -> ReducedBody:
+    """The body with the stiffness of each mode multiplied by (its frequency over the lowest)^exponent.
+
+    A mesh is the stiffer the higher the mode, and so are a model of the material and of what it leaves out: an exponent
+    of 0.01 makes a mode of e times the lowest frequency one per cent stiffer.
+    """
+    if exponent == 0.0 or not len(body.stiffness) or body.stiffness.min() <= 0.0:
+        return body
+    factors = (body.stiffness / body.stiffness.min()) ** (0.5 * exponent)
+    law = body.elasticity
+    if law is not None and law.law == "stvk":
+        # the strain of each mode grows, that of pairs of modes does not: the energy is still a sum of squares
+        size = round(np.sqrt(len(law.data)))
+        scale = np.concatenate([np.sqrt(factors), np.ones(size - len(factors))])
+        law = replace(law, data=(law.data.reshape(size, size) * np.outer(scale, scale)).ravel())
+    elif law is not None:
+        data, r = law.data.copy(), len(factors)
+        data[: r * r] += np.diag((factors - 1.0) * body.stiffness).ravel()
+        law = replace(law, data=data)
+    return replace(body, stiffness=factors * body.stiffness, elasticity=law)
+
+
 def with_scaled_density(body: ReducedBody, factor: float) -> ReducedBody:
     """The body with its mass multiplied by a factor, its elastic forces unchanged; its modes have unit mass again.
 

@@ -25,6 +25,7 @@ from calmotion.identification.problem import Calibrated
 from calmotion.identification.signals import Signals, refuse_cyclic
 from calmotion.multibody.failure import SimulationFailure
 from calmotion.shot import Animation, Track
+from calmotion.shot.calibration.estimates import ROBOT_KINDS
 from calmotion.shot.calibration.excitation import Excitation, MotorUse, PlannedSensor, Predicted
 from calmotion.shot.calibration.recording import COMPONENTS, Channel, SensorRecording
 from calmotion.shot.character import Array
@@ -114,7 +115,9 @@ def excite_shot(
             p.slope(0.0) * other,
             own <= IDENTIFIABLE,
         )
-        for p, own, other in zip(parameters, best.deviations, chirp.deviations, strict=True)
+        for p, own, other in zip(
+            [p for p in parameters if p.kind in ROBOT_KINDS], best.deviations, chirp.deviations, strict=True
+        )
     )
     return Excitation(
         family.times, best.values, predicted, _uses(shot, family, best), settings.sensors, chirp.score - best.score,
@@ -190,8 +193,9 @@ class _Trial:
             values = start + LESS * (values - start)
         else:
             return None
-        n = len(self.parameters)
-        covariance = np.linalg.inv(J.T @ J + np.eye(J.shape[1]))[:n, :n]
+        # what the model has wrong is estimated beside the robot's parameters, and not wanted
+        wanted = [k for k, p in enumerate(self.parameters) if p.kind in ROBOT_KINDS]
+        covariance = np.linalg.inv(J.T @ J + np.eye(J.shape[1]))[np.ix_(wanted, wanted)]
         return _Rated(values, signals, np.sqrt(np.diag(covariance)), 0.5 * float(np.linalg.slogdet(covariance)[1]))
 
     def _kept(self, signals: Signals) -> bool:

@@ -14,6 +14,8 @@ MODULUS, DAMPING, DENSITY, MASS, CENTRE = "modulus", "damping", "density", "mass
 POSITION_GAIN, VELOCITY_GAIN, GEAR_STIFFNESS = "position_gain", "velocity_gain", "gear_stiffness"
 ARMATURE, FRICTION, VISCOUS_FRICTION, DELAY = "armature", "friction", "viscous_friction", "delay"
 ENCODER_OFFSET = "encoder_offset"
+# what the model of the robot has wrong, and no attribute of a shot takes
+HIGHER_MODES = "higher_modes"
 # kinds of parameters of a measurement
 CLOCK_OFFSET, CLOCK_DRIFT, BIAS, PLACE = "clock_offset", "clock_drift", "bias", "place"
 
@@ -23,6 +25,7 @@ MOTOR_KINDS = (
     POSITION_GAIN, VELOCITY_GAIN, GEAR_STIFFNESS, ARMATURE, FRICTION, VISCOUS_FRICTION, DELAY, ENCODER_OFFSET,
 )  # fmt: skip
 ROBOT_KINDS = (*MATERIAL_KINDS, *BODY_KINDS, *MOTOR_KINDS)
+MODEL_KINDS = (HIGHER_MODES,)
 MEASUREMENT_KINDS = (CLOCK_OFFSET, CLOCK_DRIFT, BIAS, PLACE)
 AXES = "xyz"
 
@@ -32,7 +35,7 @@ class Estimate:
     """A parameter as it was estimated.
 
     Attributes:
-        kind: One of `ROBOT_KINDS` or `MEASUREMENT_KINDS`.
+        kind: One of `ROBOT_KINDS`, `MODEL_KINDS` or `MEASUREMENT_KINDS`.
         path: Prim path of the material, body, joint or sensor; the file of a recording for its clock.
         axis: Component, -1 where it is a number.
         unit: Of the value, SI.
@@ -64,7 +67,7 @@ class Estimate:
 
     @property
     def of_robot(self) -> bool:
-        """Whether it belongs to the robot, not to a measurement."""
+        """Whether it belongs to the robot, not to its model or a measurement."""
         return self.kind in ROBOT_KINDS
 
 

@@ -112,7 +112,7 @@ def _print(report: dict[str, Any], stream: TextIO) -> None:
             f"{row['name']}: the difference of recording and robot falls from {before} to {after}{others} "
             f"(root mean square; noise {noise}).",
         )
-    for of_robot, title in ((True, "Parameters of the robot"), (False, "Parameters of the measurement")):
+    for of_robot, title in ((True, "Parameters of the robot"), (False, "Parameters of the model and the measurement")):
         rows = []
         for row in report["parameters"]:
             if row["of_robot"] == of_robot:
