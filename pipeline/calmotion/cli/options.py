@@ -136,7 +136,8 @@ def run_options(command: argparse.ArgumentParser) -> None:
     command.add_argument(
         "--strict",
         action="store_true",
-        help="exit with status 1 if the simulation does not keep the tolerance; the outputs are written all the same",
+        help="exit with status 1 if the simulation does not keep the tolerance, or a foot asks of the ground what no "
+        "ground does; the outputs are written all the same",
     )
 
 

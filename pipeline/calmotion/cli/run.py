@@ -53,7 +53,8 @@ def run_shot(
     conclude(report, result.problems, output, None if args.quiet else partial(print_run, verbose=args.verbose))
     if result.interrupted:
         return INTERRUPTED
-    return FAILED if result.problems or (args.strict and not report["tolerance_kept"]) else 0
+    unlike = any(row["unlike_ground"] for row in report["contacts"])
+    return FAILED if result.problems or (args.strict and (unlike or not report["tolerance_kept"])) else 0
 
 
 def _write_manifest(result: SimulationResult, args: argparse.Namespace) -> str | None:

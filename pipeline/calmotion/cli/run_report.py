@@ -8,6 +8,7 @@ from typing import Any, TextIO
 from rich.console import Console
 
 from calmotion.cli.quantities import angle, length
+from calmotion.cli.reports.feet import print_contacts, print_support
 from calmotion.cli.sentences import unbroken
 from calmotion.cli.tables import console_on, print_table, say
 from calmotion.shot.budget import CHOICES, MEASURED, MESH, PATCHES, REDUCTION, STEP, SUBSPACE
@@ -60,23 +61,6 @@ def print_shares(console: Console, shares: Sequence[dict[str, Any]]) -> None:
     rows = [[row["path"], length(row["motors_m"]), length(row["links_m"])] for row in shares]
     title = "Causes of the input's error (max)"
     print_table(console, title, ["target", "motors alone", "links alone"], rows)
-
-
-def print_support(console: Console, reactions: Sequence[dict[str, Any]]) -> None:
-    """Whether a base that nothing joins to the world would stand."""
-    for row in reactions:
-        margin = row["support_margin_m"]
-        if margin is None:
-            continue
-        at = f"at {row['support_time_s']:.3f} s"
-        if margin < 0.0:
-            say(
-                console,
-                f"{row['body']} would tip over {at}: nothing joins it to the world, and the centre of pressure is "
-                f"{length(-margin)} outside of what it stands on. Hold it by a joint to the world, or move slower",
-            )
-        else:
-            say(console, f"{row['body']} stands: its centre of pressure stays {length(margin)} inside ({at})")
 
 
 def print_lost_motion(console: Console, lost: dict[str, Any] | None, suffix: str) -> None:
@@ -299,6 +283,7 @@ def print_warnings(console: Console, report: dict[str, Any]) -> None:
     print_joint_gap(console, report["max_joint_gap_m"])
     print_efforts(console, report["efforts"], True)
     print_support(console, report["reactions"])
+    print_contacts(console, report["contacts"])
 
 
 def print_work(console: Console, report: dict[str, Any]) -> None:

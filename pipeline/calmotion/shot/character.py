@@ -208,12 +208,31 @@ class Body:
 
 
 @dataclass(frozen=True, eq=False)
+class Contact:
+    """When a joint to the world holds: a foot that stands, a hand that holds on.
+
+    Attributes:
+        times: [s] after the first frame of the shot, strictly increasing, shape [k].
+        active: Whether it holds from each time on, and before the first as from it, shape [k], bool.
+        friction: Coefficient of friction with the ground; -1: not known.
+    """
+
+    times: Array
+    active: BoolArray
+    friction: float = -1.0
+
+    def holds_at(self, time: float) -> bool:
+        """Whether it holds from a time [s] on."""
+        return bool(self.active[max(int(np.searchsorted(self.times, time + 1e-9, "right")) - 1, 0)])
+
+
+@dataclass(frozen=True, eq=False)
 class Joint:
     """A joint between two bodies; its axis is the z axis of both frames.
 
     Attributes:
         path: Prim path; of one axis of a joint of several axes with the name of the axis behind it (`/Arm/wrist.rotX`).
-        kind: `revolute`, `prismatic`, `spherical` or `fixed`.
+        kind: `revolute`, `prismatic`, `spherical`, `fixed`, or `floating` of a base that only contacts hold.
         body0, body1: Body indices, -1 for the world. The angle is that of body1 relative to body0 about z, the
             length of a prismatic joint that of frame1 beyond frame0 along z.
         frame0, frame1: The joint frame in body0 (in the world for -1) and in body1.
@@ -221,6 +240,7 @@ class Joint:
         closes_chain: Whether the shot excludes this joint from the spanning tree, so that it closes a chain.
         redundant: Whether it is left out of the dynamics, since other joints impose the same constraints.
         name: As its author wrote it, where USD allows no such name of a prim; else the last part of its path.
+        contact: When it holds, of a joint to the world that comes and goes; else None.
     """
 
     path: str
@@ -234,6 +254,7 @@ class Joint:
     closes_chain: bool = False
     redundant: bool = False
     name: str = ""
+    contact: Contact | None = None
 
     @property
     def prim_path(self) -> str:
@@ -307,6 +328,11 @@ class Character:
     retarget: RetargetSettings = field(default_factory=RetargetSettings)
     notes: tuple[str, ...] = ()
     scenery: tuple[SurfaceMesh, ...] = ()
+
+
+def contact_joints(character: Character) -> list[int]:
+    """The joints that come and go."""
+    return [k for k, joint in enumerate(character.joints) if joint.contact is not None]
 
 
 def motors_give(character: Character) -> bool:

@@ -13,9 +13,10 @@ from calmotion.multibody.failure import NOWHERE, Reason, SimulationFailure
 from calmotion.multibody.model.model import Model
 from calmotion.reduction.reduced_body import ReducedBody
 from calmotion.shot import Animation, Character
-from calmotion.shot.character import Array
+from calmotion.shot.character import Array, contact_joints
 from calmotion.shot.run import RunSettings
 from calmotion.simulation.compiled_shot import CompiledShot
+from calmotion.simulation.inputs.contacts import sample_world
 from calmotion.simulation.inputs.curves import needed_pre_roll, sample_tracks
 from calmotion.simulation.inputs.open_chains import chain_error
 from calmotion.simulation.inputs.roots import root_tracks, sample_roots
@@ -56,7 +57,10 @@ def prepare(shot: CompiledShot, options: RunSettings) -> Prepared:
     character, animation = shot.character, shot.animation
     refuse_unsupported(character, animation, options)
     grid = grid_of(character, animation, options)
-    return Prepared(shot, grid, sample_roots(animation.moving, grid))
+    # only contacts need the model, which is compiled when it is first used
+    contacts = contact_joints(character)
+    world = sample_world(character, animation, shot.model, grid) if contacts else sample_roots(animation.moving, grid)
+    return Prepared(shot, grid, world)
 
 
 def grid_of(character: Character, animation: Animation, options: RunSettings) -> TimeGrid:
@@ -84,6 +88,13 @@ def pose_modes(shot: CompiledShot, time: float = 0.0) -> tuple[Array, Array]:
 def modes_of(prepared: Prepared, time: float = 0.0) -> tuple[Array, Array]:
     """The same of a shot that is prepared."""
     angles, _ = sample_tracks(prepared.shot.animation.tracks, prepared.grid)
+    if time > 0.0 and contact_joints(prepared.character):
+        raise ShotError(
+            "where its feet stand later follows from a simulation: natural frequencies are those of the first frame",
+            path=prepared.character.path,
+            found=f"{time:g} s",
+            remedy="Ask for time 0.",
+        )
     row = int(np.argmin(np.abs(prepared.grid.times - time)))
     try:
         return system_modes(prepared.model, prepared.model.joint_angles(angles[row]), prepared.world[row])

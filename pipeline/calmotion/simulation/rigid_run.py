@@ -19,10 +19,11 @@ from calmotion.reduction.reduced_body import ReducedBody
 from calmotion.shot import Animation, Character, FEMeshes
 from calmotion.shot.character import Array, with_ideal_motors
 from calmotion.simulation.forward import ForwardRun, run_forward
+from calmotion.simulation.inputs.contacts import sample_world
 from calmotion.simulation.inputs.curves import sample_tracks
 from calmotion.simulation.inputs.open_chains import refuse_open_chains, refuse_open_failure
-from calmotion.simulation.inputs.roots import sample_roots
 from calmotion.simulation.inputs.time_grid import TimeGrid
+from calmotion.simulation.standing.slipping import refuse_slipping
 
 _POWER_LEFT = 1e-3  # of a signal's power may lie above the highest frequency that matters: 3% of its amplitude
 _NOTHING = 1e-9  # of gravity, or of it over a metre: an acceleration that is rounding
@@ -110,6 +111,7 @@ def rigid_poses(
         refuse_open_failure(character, model, grid, joint_angles, world, failure)
         raise
     refuse_open_chains(character, model, grid, run, tolerance)
+    refuse_slipping(character, model, grid, run, tolerance)
     return RigidPoses(model, run.trajectory.states.c, run.trajectory.states.q, joint_angles, world, grid.h)
 
 
@@ -118,7 +120,8 @@ def _compiled(
 ) -> tuple[Model, Array, Array, Array]:
     """The model, the motors' angles and rates on the grid, shape [T, M], and the moving roots."""
     model = compile_model(character, tree, bodies, [frame.joint for frame in animation.moving])
-    return model, *sample_tracks(animation.tracks, grid), sample_roots(animation.moving, grid)
+    world = sample_world(character, animation, model, grid)
+    return model, *sample_tracks(animation.tracks, grid), world
 
 
 def rigid_bodies(character: Character, tree: Tree, meshes: FEMeshes | None) -> list[ReducedBody]:

@@ -8,6 +8,7 @@ from calmotion.multibody.analysis.kinematics import target_frames
 from calmotion.multibody.integrators.simulation import simulate_from
 from calmotion.multibody.integrators.workspace import Workspace
 from calmotion.multibody.model.model import Model
+from calmotion.multibody.model.phases import has_contacts
 from calmotion.multibody.sensitivity.adjoint import adjoint
 from calmotion.multibody.sensitivity.block_tangent import block_tangent, can_be_blocked
 from calmotion.multibody.sensitivity.continuous_adjoint import continuous_adjoint
@@ -53,9 +54,10 @@ class Simulator:
         """From now on motor curves stay as they are before an instant.
 
         Simulations then go on from the first instant at which they differ from the one before, and derivatives by what
-        acts before the instant are not worked out: they are zero. Loops have no beginning that could stay.
+        acts before the instant are not worked out: they are zero. Loops have no beginning that could stay, and
+        with contacts all is simulated from its start.
         """
-        if self._steady is None:
+        if self._steady is None and not has_contacts(self.model.system):
             self._first = first
 
     def forget(self) -> None:

@@ -1,4 +1,4 @@
-"""What the world does to the robot: reactions at its bases, and whether a base that only stands would tip over."""
+"""What the world does to the robot: reactions at its bases and feet, and whether what only stands would tip over."""
 
 from __future__ import annotations
 
@@ -7,9 +7,10 @@ from typing import Any
 import numpy as np
 
 from calmotion.shot import Character, Motion
-from calmotion.shot.character import WORLD, Array, Body
+from calmotion.shot.character import WORLD, Array
+from calmotion.simulation.standing.held_feet import HeldFoot, held_feet, unlike_ground
+from calmotion.simulation.standing.soles import STANDS, centres_of_pressure, margins, points_of, sole_of
 
-_STANDS = 5e-3  # points of a base that are higher above its lowest one, over its extent, do not stand on the ground
 _STILL = 1e-6  # a base that moves by more does not stand [m]
 
 
@@ -26,7 +27,7 @@ def reaction_rows(character: Character, motion: Motion) -> list[dict[str, Any]]:
     rows, found = motion.judged, []
     times = motion.times[rows]
     for j, joint in enumerate(character.joints):
-        if joint.body0 != WORLD:
+        if joint.body0 != WORLD or joint.contact is not None or joint.kind == "floating":
             continue
         body = character.bodies[joint.body1]
         forces, moments = motion.joint_forces[rows, j], motion.joint_moments[rows, j]
@@ -50,51 +51,46 @@ def _standing(character: Character, motion: Motion, base: int, forces: Array, mo
     if weight == 0.0 or not still or len(forces) == 0:
         return {}
     up = -character.gravity / weight
-    lowest = [float((cloud @ up).min()) for body in character.bodies if len(cloud := _points(body))]
-    points = _points(character.bodies[base])
+    clouds = [points_of(body, body.rest) for body in character.bodies]
+    lowest, points = [float((cloud @ up).min()) for cloud in clouds if len(cloud)], clouds[base]
     if not len(points):
         return {}
-    heights = points @ up
-    ground, extent = float(heights.min()), float(np.ptp(points, axis=0).max())
-    sole = points[heights <= ground + _STANDS * extent]
-    if min(lowest) < ground - _STANDS * extent or len(sole) < 3:
+    sole, ground = sole_of(points, up)
+    if min(lowest) < ground - STANDS * float(np.ptp(points, axis=0).max()):
         return {}
     lift = forces @ up
     if lift.min() <= 0.0:
         return {}  # it is pulled down, and nothing stands like this
-    at = motion.positions[0, base]
-    pressure = at + (np.cross(up, moments) + (ground - at @ up) * forces) / lift[:, None]
-    margins = _margins(sole, pressure, up)
-    if margins is None:
+    places = np.broadcast_to(motion.positions[0, base], forces.shape)
+    pressure = centres_of_pressure(forces, moments, places, up, ground)
+    inside = margins(sole, pressure, up)
+    if inside is None:
         return {}
-    worst = int(np.argmin(margins))
+    worst = int(np.argmin(inside))
     return {
-        "support_margin_m": float(margins[worst]), "support_time_s": float(motion.times[motion.judged][worst]),
+        "support_margin_m": float(inside[worst]), "support_time_s": float(motion.times[motion.judged][worst]),
         "center_of_pressure_m": pressure[worst].tolist(),
     }  # fmt: skip
 
 
-def _points(body: Body) -> Array:
-    """Points of a body's geometry in the pose of the first frame, world, shape [n, 3]."""
-    from scipy.spatial.transform import Rotation
-
-    clouds = [surface.points for surface in body.surfaces if surface.visible] or [s.points for s in body.surfaces]
-    if not clouds:
-        return np.zeros((0, 3))
-    turn = Rotation.from_quat(body.rest.rotation, scalar_first=True)
-    return np.asarray(turn.apply(np.concatenate(clouds)) + body.rest.position)
+def contact_rows(character: Character, motion: Motion) -> list[dict[str, Any]]:
+    """What the ground does to each contact each time it holds, see `held_feet`; `unlike_ground` names what no ground
+    does."""
+    return [_contact_row(character, foot) for foot in held_feet(character, motion)]
 
 
-def _margins(sole: Array, places: Array, up: Array) -> Array | None:
-    """How far places are inside of the outline of a sole, seen from above, shape [T]; None where it has no area."""
-    from scipy.spatial import ConvexHull, QhullError
-
-    across = np.cross(up, np.eye(3)[int(np.argmin(np.abs(up)))])
-    across /= np.linalg.norm(across)
-    plane = np.stack([across, np.cross(up, across)], axis=1)
-    try:
-        hull = ConvexHull(sole @ plane)
-    except QhullError:
-        return None
-    # rows (n, c) with n.x + c <= 0 inside
-    return np.asarray(-(places @ plane @ hull.equations[:, :2].T + hull.equations[:, 2]).max(axis=1))
+def _contact_row(character: Character, foot: HeldFoot) -> dict[str, Any]:
+    joint = character.joints[foot.joint]
+    contact = joint.contact
+    normal, margin, friction = foot.normal, foot.margin, foot.friction
+    return {
+        "path": joint.path, "body": character.bodies[joint.body1].path, "from_s": foot.start, "to_s": foot.end,
+        "max_force_n": foot.force,
+        "min_normal_force_n": normal[0] if normal else None, "min_normal_time_s": normal[1] if normal else None,
+        "support_margin_m": margin[0] if margin else None, "support_time_s": margin[1] if margin else None,
+        "center_of_pressure_m": margin[2].tolist() if margin else None,
+        "friction_needed": friction[0] if friction else None, "friction_time_s": friction[1] if friction else None,
+        "friction": contact.friction if contact is not None and contact.friction >= 0.0 else None,
+        "landing_speed_m_s": foot.landing_speed, "landing_impulse_n_s": foot.impulse, "slip_m": foot.slip,
+        "unlike_ground": unlike_ground(character, foot),
+    }  # fmt: skip

@@ -19,7 +19,7 @@ from calmotion.shot.robust.robots import CURVES
 from calmotion.shot.run import Source
 from calmotion.support.memory import peak_memory
 from calmotion.version import __version__
-from calmotion.workflow.reactions import reaction_rows
+from calmotion.workflow.reactions import contact_rows, reaction_rows
 
 
 def error_norms(errors: Array) -> tuple[Array, Array]:
@@ -129,6 +129,7 @@ def run_report(run: Run, character: Character, result: Result, command: str, tot
         "lost_motion": lost_motion(character, result),
         "efforts": effort_rows(character, result),
         "reactions": reaction_rows(character, final.motion),
+        "contacts": contact_rows(character, final.motion),
         "windows": [asdict(row) for row in result.windows],
         "frequencies_hz": {character.bodies[table.body].path: table.frequencies for table in result.modes},
     }

@@ -13,6 +13,7 @@ from calmotion.geometry.solid import solid_of
 from calmotion.multibody.model.model import body_anchors, rigid_body
 from calmotion.multibody.model.topology import Tree, chain_members
 from calmotion.shot import Animation, Body, Character, MassProperties, ModelChoice
+from calmotion.shot.character import contact_joints
 from calmotion.shot.model_choice import AUTO, OFF, ON
 from calmotion.shot.run import RunSettings
 from calmotion.simulation.inputs.gearing import leaders
@@ -98,6 +99,8 @@ def _bodies(
 
 def _motors(character: Character, rigid: RigidPoses, choice: str) -> tuple[Character, list[ModelChoice]]:
     """Motors that move no target."""
+    if contact_joints(character):  # where a foot lands follows from all that was before
+        return character, []
     own = leaders(character)
     reach = influence(character, rigid, own) if len(own) else np.zeros(0)
     if choice == ON or not np.any(reach > NOTHING):

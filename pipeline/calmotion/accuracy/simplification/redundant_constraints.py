@@ -8,6 +8,7 @@ import numpy as np
 
 from calmotion.multibody.integrators.workspace import Workspace
 from calmotion.multibody.kernels.sliders import has_row
+from calmotion.multibody.model.phases import without_contacts
 from calmotion.multibody.model.system import allocate_state
 from calmotion.multibody.statics.equilibrium import linearize
 from calmotion.shot.character import Array
@@ -40,7 +41,7 @@ def closures_of(rigid: RigidPoses) -> Closures:
     """
     system, total = rigid.model.system, len(rigid.joint_angles)
     count = len(system.parent)
-    loops = range(count, len(system.rows))
+    loops = [joint for joint in range(count, len(system.rows)) if not system.contact[joint]]
     if not loops:
         return Closures()
     at = np.unique(np.linspace(0, total - 1, min(INSTANTS, total)).astype(int))
@@ -60,7 +61,7 @@ def closures_of(rigid: RigidPoses) -> Closures:
 
 def _rows(rigid: RigidPoses, n: int) -> list[Array]:
     """Constraint rows of every joint at an instant by all coordinates, lengths in units of the robot's size."""
-    system = rigid.model.system
+    system = without_contacts(rigid.model.system)  # which come and go
     ws, state = Workspace.for_system(system), allocate_state(system)
     state.c[:], state.q[:], ws.work.world[:] = rigid.c[n], rigid.q[n], rigid.world[n]
     linearize(system, state, rigid.joint_angles[n], ws)

@@ -44,7 +44,7 @@ def first_open_joint(
     for instant in np.flatnonzero((counted > allowed) | np.isfinite(turned)):
         workspace.work.world[:] = trajectory.world[instant]
         linearize(system, copy_of_instant(trajectory.states, int(instant)), angles[instant], workspace)
-        gaps = workspace.blocks.gap
+        gaps = np.where(system.contact[:, None] != 0, 0.0, workspace.blocks.gap)  # contacts hold wherever they come
         far = np.maximum(np.linalg.norm(gaps[:, :3], axis=1) / allowed, np.linalg.norm(gaps[:, 3:], axis=1) / turned)
         joint = int(np.argmax(far))
         if far[joint] > 1.0:

@@ -9,6 +9,7 @@ from calmotion.multibody.analysis.kinematics import rigid_state
 from calmotion.multibody.integrators.workspace import Workspace
 from calmotion.multibody.kernels.sliders import LENGTH, slides_freely
 from calmotion.multibody.model.model import Model
+from calmotion.multibody.model.phases import system_held
 from calmotion.multibody.model.system import State, System
 from calmotion.multibody.statics.equilibrium import equilibrium, linearize
 from calmotion.shot.character import Array
@@ -28,6 +29,7 @@ def system_modes(model: Model, joint_angles: Array, world: Array | None = None) 
     system, workspace = model.system, Workspace.for_system(model.system)
     if world is not None:
         workspace.work.world[:] = world
+        system = system_held(system, world)
     state, _ = equilibrium(system, rigid_state(model, joint_angles, world), joint_angles, workspace)
     omega, shapes, C = _natural_modes(system, state, joint_angles, workspace)
     damping = np.einsum("ik,ij,jk->k", shapes, C, shapes)

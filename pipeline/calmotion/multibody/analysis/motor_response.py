@@ -9,6 +9,7 @@ from calmotion.multibody.integrators.workspace import Workspace
 from calmotion.multibody.linear_solver.closed_chains import factor_closed_chains, solve_system
 from calmotion.multibody.linear_solver.elimination import factor
 from calmotion.multibody.model.model import Model
+from calmotion.multibody.model.phases import system_held
 from calmotion.multibody.model.system import System, allocate_state
 from calmotion.multibody.statics.equilibrium import linearize
 from calmotion.shot.character import Array, IntArray
@@ -50,17 +51,18 @@ def motor_responses(
     efforts = np.zeros((len(c), len(motors), joints))
     for n in range(len(c)):
         state.c[:], state.q[:], ws.work.world[:] = c[n], q[n], world[n]
-        linearize(system, state, joint_angles[n], ws)
+        held = system_held(system, world[n])
+        linearize(held, state, joint_angles[n], ws)
         blocks.K[:] = blocks.D
-        bad = factor(system, blocks, ws.matrix, scratch.solution.block)
+        bad = factor(held, blocks, ws.matrix, scratch.solution.block)
         if bad >= 0:
             raise SimulationFailure(float(times[n]), bad, Reason.SINGULAR)
         if joints > count:
-            factor_closed_chains(system, ws.matrix, scratch.border, scratch.solution)
+            factor_closed_chains(held, ws.matrix, scratch.border, scratch.solution)
         for m, imposed in enumerate(imposed_by):
             x[:] = 0.0
             lam[:] = -blocks.by_angle * imposed[:, None]
-            solve_system(system, ws.matrix, x, lam, scratch.solution)
+            solve_system(held, ws.matrix, x, lam, scratch.solution)
             motions[n, :, :, m] = x
             efforts[n, m] = _along_axes(system, ws.work.R, lam)
     by_motor = np.stack([rigid.motor_values(efforts[:, m]) for m in range(len(motors))], axis=2)

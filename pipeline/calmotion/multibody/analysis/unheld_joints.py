@@ -42,7 +42,7 @@ def unheld_joints(model: Model, joint_angles: Array, world: Array | None = None)
     for b in map(int, np.flatnonzero(free)):
         axis = R[b] @ system.rotation[b, 1, :, 2]
         weight = mass[b] * float(np.linalg.norm(g))
-        if b in chained:
+        if b in chained or system.rows[b] == 0:  # what floats is held by its contacts
             continue
         place = state.c[b] + R[b] @ system.position[b, 1]
         r, scale = moment[b] - mass[b] * place, _SMALL * weight * system.unit[0, 0]

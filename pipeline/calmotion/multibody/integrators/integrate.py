@@ -19,6 +19,7 @@ from calmotion.multibody.integrators.simulation import largest_gap, simulate
 from calmotion.multibody.integrators.trajectory import Inputs, Trajectory, copy_of_instant
 from calmotion.multibody.integrators.workspace import Workspace
 from calmotion.multibody.model.moving_markers import rooted
+from calmotion.multibody.model.phases import has_contacts
 from calmotion.multibody.model.system import State, System
 from calmotion.multibody.statics.equilibrium import equilibrium
 from calmotion.shot.character import Array
@@ -41,6 +42,8 @@ def integrate(
     Between instants `rk4` and `radau` use cubics through angles and rates, which is exact for a cubic spline with
     knots on instants.
     """
+    if has_contacts(system) and integrator != "bdf2":
+        raise ValueError(f"{integrator} does not support contacts")
     if integrator in IMPLICIT:
         try:
             return simulate(system, start, angles, rates, h, workspace, progress, from_equilibrium, integrator, world)

@@ -92,6 +92,10 @@ def _predict(system: System, h: float, before: State, now: State, memory: Array)
             now.u[b, j] = before.u[b, j] + h * (before.V[b, 6 + j] + 0.5 * h * memory[0, b, 6 + j])
         turn(before.q[b], now.turn[b], now.q[b])
     copy_rows(before.lam, now.lam)
+    for joint in range(len(system.parent), len(system.rows)):
+        if system.rows[joint] == 0:  # a contact that no longer holds
+            for i in range(JOINT_ROWS):
+                now.lam[joint, i] = 0.0
 
 
 @kernel

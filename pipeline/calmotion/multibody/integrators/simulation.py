@@ -25,7 +25,8 @@ from calmotion.multibody.kernels.so3 import matrix_of
 from calmotion.multibody.kernels.work import Work
 from calmotion.multibody.linear_solver.closed_chains import copy_rows
 from calmotion.multibody.model.moving_markers import rooted
-from calmotion.multibody.model.system import Integrator, State, System
+from calmotion.multibody.model.phases import EULER, Phase, phases_of, still, system_held
+from calmotion.multibody.model.system import Instants, Integrator, State, System
 from calmotion.multibody.statics.consistent_start import initial_acceleration, instant_before
 from calmotion.multibody.statics.equilibrium import equilibrium
 from calmotion.shot.character import Array
@@ -38,7 +39,7 @@ def _largest_gap(system: System, angle: Array, rate: Array, now: State, work: Wo
     for b in range(len(system.parent)):
         matrix_of(now.q[b], work.R[b])
     for joint in range(len(system.rows)):
-        if system.rows[joint] == 0:
+        if system.rows[joint] == 0 or system.contact[joint] != 0:
             continue
         joint_kinematics(system, joint, angle[joint], rate[joint], now, work)
         d = 0.0
@@ -116,7 +117,8 @@ def simulate(
     if world.shape[1:] != ws.work.world.shape:
         raise ValueError(f"world must hold the motion of {len(ws.work.world)} markers")
     ws.work.world[:] = world[0]
-    first, solved = equilibrium(system, start, angles[0], ws) if from_equilibrium else (start, 0)
+    held = system_held(system, world[0])
+    first, solved = equilibrium(held, start, angles[0], ws) if from_equilibrium else (start, 0)
     states = State(*[np.zeros((total,) + part.shape) for part in first])
     for part, value in zip(states, first, strict=True):
         part[0] = value
@@ -124,7 +126,7 @@ def simulate(
     ws.scratch.memory[:] = 0.0
     if not from_equilibrium:
         motors = np.gradient(rates[:3], h, axis=0)[0] if total > 2 else np.zeros_like(rates[0])
-        acceleration, states.lam[0] = initial_acceleration(system, first, angles[0], rates[0], motors, ws)
+        acceleration, states.lam[0] = initial_acceleration(held, first, angles[0], rates[0], motors, ws)
         earlier, states.turn[0] = instant_before(system, first, acceleration, h)
         ws.scratch.memory[:2] = acceleration
     margins, costs = np.zeros(total), np.zeros((total, 3))
@@ -200,31 +202,74 @@ def _march(
         begin: Time when the simulation was started [s].
         refined: Those before `done`.
     """
-    total, coefficients, all_refined = len(inputs.angles), IMPLICIT[integrator](h), list(refined)
+    total, all_refined = len(inputs.angles), list(refined)
     chunk = total if progress is None else max(1, total // 50)
-    while done < total:
-        last = min(done + chunk, total)
-        try:
-            code, done, component = _advance(system, coefficients, done, last, inputs, record, ws)
-        except ZeroDivisionError:  # of a kernel, whose numbers have left all bounds
-            done += int(np.argmin(record.costs[done:last, 0] > 0.0))  # steps that are done have counted their solutions
-            state = copy_of_instant(record.states, done - 1)
-            raise SimulationFailure(done * h, NOWHERE, Reason.DIVERGED, state) from None
-        if code != newton.CONVERGED:
-            reason = Reason.SINGULAR if code == newton.SINGULAR else Reason.DIVERGED
-            try:
-                exact = refined_step(system, integrator, h, done, inputs, record, ws)
-            except ZeroDivisionError:
-                exact = None
-            if exact is None:
-                raise SimulationFailure(done * h, component, reason, copy_of_instant(record.states, done - 1))
-            if not exact:
-                all_refined.append(done)
-            done += 1
-        if progress is not None:
-            progress(done / total)
+    for phase in phases_of(system, inputs.world, done, total):
+        for first in range(phase.first, phase.last, chunk):
+            last = min(first + chunk, phase.last)
+            if phase.restarts:
+                _restart(phase._replace(first=first, last=last), h, inputs, record, ws)
+            else:
+                _steps(phase._replace(first=first, last=last), integrator, h, inputs, record, ws, all_refined)
+            if progress is not None:
+                progress(last / total)
     solved, factorisations = (int(cost) for cost in record.costs[:, :2].sum(axis=0))
     return Trajectory(
         h, record.states, inputs.world, solved, factorisations, float(record.costs[:, 2].max()),
         time.perf_counter() - begin, integrator, tuple(all_refined), record.margins, record.costs,
     )  # fmt: skip
+
+
+def _steps(
+    phase: Phase, integrator: str, h: float, inputs: Inputs, record: Record, ws: Workspace, refined: list[int]
+) -> None:
+    """The steps of a phase, into the record; adds those that were refined.
+
+    Raises:
+        SimulationFailure: One that cannot be solved.
+    """
+    system, coefficients, done = phase.system, IMPLICIT[integrator](h), phase.first
+    while done < phase.last:
+        try:
+            code, done, component = _advance(system, coefficients, done, phase.last, inputs, record, ws)
+        except ZeroDivisionError:  # of a kernel, whose numbers have left all bounds
+            # steps that are done have counted their solutions
+            done += int(np.argmin(record.costs[done : phase.last, 0] > 0.0))
+            state = copy_of_instant(record.states, done - 1)
+            raise SimulationFailure(done * h, NOWHERE, Reason.DIVERGED, state) from None
+        if code == newton.CONVERGED:
+            continue
+        reason = Reason.SINGULAR if code == newton.SINGULAR else Reason.DIVERGED
+        try:
+            exact = refined_step(system, integrator, h, done, inputs, record, ws)
+        except ZeroDivisionError:
+            exact = None
+        if exact is None:
+            raise SimulationFailure(done * h, component, reason, copy_of_instant(record.states, done - 1))
+        if not exact:
+            refined.append(done)
+        done += 1
+
+
+def _restart(phase: Phase, h: float, inputs: Inputs, record: Record, ws: Workspace) -> None:
+    """The backward Euler steps after a change of contacts, into the record.
+
+    Raises:
+        SimulationFailure: One that cannot be solved.
+    """
+    coefficients = IMPLICIT["bdf2"](EULER * h)
+    for n in range(phase.first, phase.last):
+        before = still(State(*[part[n - 1] for part in record.states]))
+        instants = Instants(before, before, State(*[part[n] for part in record.states]))
+        ws.work.world[:] = inputs.world[n]
+        ws.scratch.memory[:] = 0.0
+        angle, rate = inputs.angles[n], inputs.rates[n]
+        code, factorisations, solutions, component = newton.step(
+            phase.system, coefficients, instants, angle, rate, False, ws
+        )
+        record.costs[n, :2] += solutions, factorisations
+        if code != newton.CONVERGED:
+            reason = Reason.SINGULAR if code == newton.SINGULAR else Reason.DIVERGED
+            raise SimulationFailure(n * h, component, reason, copy_of_instant(record.states, n - 1))
+        record.margins[n] = ws.scratch.border.margin[0]
+        record.costs[n, 2] = _largest_gap(phase.system, angle, rate, instants.now, ws.work)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from calmotion.multibody.kernels.components import marker_of
-from calmotion.multibody.kernels.joints import add_skew, is_hinge
+from calmotion.multibody.kernels.joints import add_skew, firmness, is_hinge
 from calmotion.multibody.kernels.markers import MarkerWork, marker_velocity_jacobian
 from calmotion.multibody.kernels.sliders import (
     free_columns,
@@ -104,7 +104,7 @@ def _component_rows(
     """Lc and Hc: the joint's columns and rows of the component on side 1; leaves M in the scratch."""
     b = system.side[joint, 1]
     n = 6 + system.elastic[b]
-    gamma, alpha, M = integrator.gamma, integrator.alpha, w.M
+    gamma, alpha, M = integrator.gamma, firmness(system, joint, integrator), w.M
     marker_velocity_jacobian(marker_of(system, joint, 1), V[b], w.j)
     _rows_by_multipliers(n, w.R[b], w.j, w.Q, -1.0, blocks.Lc[joint])
     _position_rows(n, w.R[b], w.j, gamma, alpha, 1.0, Hv[b], blocks.Hc[joint])

@@ -6,7 +6,8 @@ The rows (side i on the parent, j on the component; Q = R_i^T R_j, z the joint a
     gamma (Q (omega_j - theta' z) - omega_i) + alpha c                 3 rows (weld, motor), parent-side axes
     the x and y rows of it, without theta'                             2 rows (free hinge)
     no further row                                                     a ball joint
-    no row                                                             a component that floats freely
+    no row                                                             a component that floats freely, a contact
+                                                                       that does not hold
 
 On a slider theta is a length: the parent-side marker is moved along its z axis by it, and the rotation is locked; a
 free one has no row along its axis (`sliders`). Here
@@ -52,6 +53,15 @@ def apply_wrench(n: int, f: Array, t: Array, sign: float, m: MarkerWork, res: Ar
 def is_hinge(system: System, joint: int) -> bool:
     """Whether a joint rotates freely about one axis."""
     return system.rows[joint] == 5 and not system.sliding[joint]
+
+
+@kernel
+def firmness(system: System, joint: int, integrator: Integrator) -> float:
+    """Baumgarte's coefficient of a joint's rows: none of a contact in motion, which holds its frame where that is."""
+    if system.contact[joint] != 0 and integrator.gamma != 0.0:
+        return 0.0
+    alpha: float = integrator.alpha
+    return alpha
 
 
 @shared_kernel
@@ -106,11 +116,12 @@ def constraint_residual(
     """Residual of a joint's rows; leaves omega_j - theta' z in w.x, E in w.E, and the unused part of a free slider's
     first three rows, that along its axis, in w.along[0]."""
     hinge = is_hinge(system, joint)
+    alpha = firmness(system, joint, integrator)
     if system.sliding[joint]:
         angle = 0.0
         rate = 0.0
     for i in range(3):
-        gap[i] = integrator.gamma * (w.j.pd[i] - w.i.pd[i]) + integrator.alpha * (w.j.p[i] - w.i.p[i])
+        gap[i] = integrator.gamma * (w.j.pd[i] - w.i.pd[i]) + alpha * (w.j.p[i] - w.i.p[i])
         w.x[i] = w.j.w[i]
     if slides_freely(system, joint):
         x, y, z = gap[0], gap[1], gap[2]
@@ -126,15 +137,15 @@ def constraint_residual(
             t += w.Q[i, k] * w.x[k]
         w.y[i] = t
     if hinge:
-        gap[3] = integrator.gamma * (w.y[0] - w.i.w[0]) - integrator.alpha * w.Q[1, 2]
-        gap[4] = integrator.gamma * (w.y[1] - w.i.w[1]) + integrator.alpha * w.Q[0, 2]
+        gap[3] = integrator.gamma * (w.y[0] - w.i.w[0]) - alpha * w.Q[1, 2]
+        gap[4] = integrator.gamma * (w.y[1] - w.i.w[1]) + alpha * w.Q[0, 2]
         gap[5] = 0.0
         return
     _rotated_back(w.Q, angle, w.E)
     E = w.E
-    gap[3] = integrator.gamma * (w.y[0] - w.i.w[0]) + 0.5 * integrator.alpha * (E[2, 1] - E[1, 2])
-    gap[4] = integrator.gamma * (w.y[1] - w.i.w[1]) + 0.5 * integrator.alpha * (E[0, 2] - E[2, 0])
-    gap[5] = integrator.gamma * (w.y[2] - w.i.w[2]) + 0.5 * integrator.alpha * (E[1, 0] - E[0, 1])
+    gap[3] = integrator.gamma * (w.y[0] - w.i.w[0]) + 0.5 * alpha * (E[2, 1] - E[1, 2])
+    gap[4] = integrator.gamma * (w.y[1] - w.i.w[1]) + 0.5 * alpha * (E[0, 2] - E[2, 0])
+    gap[5] = integrator.gamma * (w.y[2] - w.i.w[2]) + 0.5 * alpha * (E[1, 0] - E[0, 1])
     if system.rows[joint] <= 3:
         for i in range(system.rows[joint], 6):
             gap[i] = 0.0

@@ -98,6 +98,15 @@ def allocate_law_work(r: int, p: int, cubature: bool) -> LawWork:
     )
 
 
+def _first_markers(system: System) -> Array:
+    """Moving markers of the world before they are given: zeros, and contacts where the shot was authored."""
+    markers = np.zeros((int(system.moving.max(initial=-1)) + 1, WORLD_MARKER))
+    for joint in np.flatnonzero(system.contact):
+        markers[system.moving[joint], :3] = system.position[joint, 0]
+        markers[system.moving[joint], 9:] = system.rotation[joint, 0].ravel()
+    return markers
+
+
 def allocate_work(system: System) -> Work:
     """Scratch for one system."""
     r, count = system.size - 6, len(system.parent)
@@ -123,7 +132,7 @@ def allocate_work(system: System) -> Work:
         length=np.zeros(system.size),
         moved=np.zeros((2, system.size)),
         columns=np.zeros((system.size, 3)),
-        world=np.zeros((int(system.moving.max(initial=-1)) + 1, WORLD_MARKER)),
+        world=_first_markers(system),
         i=allocate_marker(system.size),
         j=allocate_marker(system.size),
         law=allocate_law_work(r, int(system.points[system.stvk].max(initial=-1)), len(system.neohookean) > 0),

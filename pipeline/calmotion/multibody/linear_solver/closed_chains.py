@@ -182,12 +182,41 @@ def _scale(n: int, length: float, S: Array) -> tuple[float, float]:
     return rows, largest
 
 
+@kernel
+def _of_contact(system: System, i: int) -> bool:
+    """Whether row i of S is one of a contact that holds."""
+    joint = len(system.parent) + i // UNKNOWNS
+    return system.contact[joint] != 0 and i % UNKNOWNS < JOINT_ROWS and has_row(system, joint, i % UNKNOWNS)
+
+
+@inlined_kernel
+def _scale_contacts(system: System, n: int, S: Array) -> float:
+    """Scale the rows of contacts, which have no Baumgarte term, to the size of those of other joints; returns by how
+    much."""
+    own, others = 0.0, 0.0
+    for i in range(n):
+        for k in range(n):
+            if i % UNKNOWNS < JOINT_ROWS and k % UNKNOWNS < JOINT_ROWS:
+                if _of_contact(system, i):
+                    own = max(own, abs(S[i, k]))
+                else:
+                    others = max(others, abs(S[i, k]))
+    if own == 0.0 or others == 0.0:
+        return 1.0
+    for i in range(n):
+        if _of_contact(system, i):
+            for k in range(n):
+                S[i, k] *= others / own
+    return others / own
+
+
 @shared_kernel
 def factor_closed_chains(system: System, matrix: StepMatrix, border: Border, scratch: SolutionScratch) -> None:
     """S^+ of the closed chains into matrix.inverse, after the tree has been eliminated."""
     n = UNKNOWNS * (len(system.rows) - len(system.parent))
     _schur_complement(system, matrix, border, scratch)
     length = system.unit[0, 0]
+    contacts = _scale_contacts(system, n, border.S)
     rows, largest = _scale(n, length, border.S)
     inverse = matrix.inverse
     rank = pseudo_inverse(n, border.S, inverse, border.null, border.decomposition)
@@ -203,6 +232,8 @@ def factor_closed_chains(system: System, matrix: StepMatrix, border: Border, scr
             t = inverse[i, k] * _unit(k, length)
             if k % UNKNOWNS < JOINT_ROWS:
                 t /= rows
+            if _of_contact(system, k):
+                t *= contacts
             inverse[i, k] = t * _unit(i, length) / largest if i % UNKNOWNS < JOINT_ROWS else t
             t = border.null[i, k]
             border.null[i, k] = t * _unit(i, length) / largest if i % UNKNOWNS < JOINT_ROWS else t

@@ -13,7 +13,8 @@ from calmotion.multibody.model.topology import Tree
 from calmotion.reduction.reduced_body import Marker, ReducedBody
 from calmotion.shot.character import WORLD, Array, Character, Frame, IntArray
 
-_ROWS = {"fixed": 6, "revolute": 5, "spherical": 3, "prismatic": 5}  # constraint rows of a joint without a motor
+# constraint rows of a joint without a motor
+_ROWS = {"fixed": 6, "revolute": 5, "spherical": 3, "prismatic": 5, "floating": 0}
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,14 +68,17 @@ def joint_arrays(
     """Joints of the tree, by component, then those that close chains.
 
     Args:
-        moving: Joints whose world-side frame has a prescribed motion, in the order of `work.Work.world`.
+        moving: Joints whose world-side frame has a prescribed motion, in the order of `work.Work.world`, which
+            contacts follow.
     """
     component_of = {WORLD: -1} | {b: k for k, b in enumerate(tree.body)}
     order = [*tree.joint, *tree.closing]
     count = len(order)
     side, rows = np.zeros((count, 2), np.int32), np.zeros(count, np.int32)
     sliding, motor, sign = np.zeros(count, np.int32), np.full(count, -1, np.int32), np.ones(count)
-    moved = np.full(count, -1, np.int32)
+    moved, contact = np.full(count, -1, np.int32), np.zeros(count, np.int32)
+    contacts = [k for k in order if character.joints[k].contact is not None]
+    moving = [*moving, *contacts]
     position, rotation = np.zeros((count, 2, 3)), np.zeros((count, 2, 3, 3))
     Phi, Psi = np.zeros((count, 2, 3, r_max)), np.zeros((count, 2, 3, r_max))
     rest = np.zeros(count)
@@ -105,11 +109,13 @@ def joint_arrays(
         sliding[k] = joint.kind == "prismatic"
         moved[k] = moving.index(index) if index in moving else -1
         rows[k] = _ROWS[joint.kind] if motor[k] < 0 else 6
+        if joint.contact is not None:
+            contact[k], rows[k] = rows[k], rows[k] if joint.contact.holds_at(0.0) else 0
         rest[k] = _rest_value(character, bodies_of, position[k], rotation[k], joint.kind == "prismatic")
     arrays = {
         "side": side, "rows": rows, "servos": np.zeros(0, np.int32), "rotor": np.full(count, -1, np.int32),
-        "servo": np.zeros((count, 7)), "sliding": sliding, "moving": moved, "position": position, "rotation": rotation,
-        "Phi": Phi, "Psi": Psi,
+        "servo": np.zeros((count, 7)), "sliding": sliding, "moving": moved, "contact": contact, "position": position,
+        "rotation": rotation, "Phi": Phi, "Psi": Psi,
     }  # fmt: skip
     return JointArrays(arrays, motor, sign, rest)
 

@@ -240,9 +240,9 @@ def rigid_model(model: Model) -> Model:
 
 
 def moves_freely(model: Model) -> BoolArray:
-    """Which joints move freely: they have no motor and are no welds."""
-    rows = model.system.rows
-    return (rows > 0) & (rows < 6)
+    """Which joints move freely: they have no motor and are neither welds nor contacts."""
+    system = model.system
+    return np.asarray((system.rows < 6) & (system.contact == 0))
 
 
 def start_angles(model: Model, joint_angles: Array) -> Array:

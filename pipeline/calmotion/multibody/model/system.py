@@ -42,6 +42,7 @@ class System(NamedTuple):
             of it up to which the largest effort is there.
         sliding: Whether a joint has a length along its axis instead of an angle, shape [J].
         moving: Row of `work.Work.world` that moves the world-side marker of a joint, -1 for none, shape [J].
+        contact: Rows of a joint that comes and goes while it holds, 0 for other joints, shape [J]; see `phases`.
         held: Inertia by which the regularised statics hold a component on a free joint [kg m^2], or its mass on a free
             slider [kg], shape [B]; see `statics.regularized_statics`.
         mass, s, Z, M3, M4, S: Inertia integrals, see `reduced_body.Invariants`.
@@ -76,6 +77,7 @@ class System(NamedTuple):
     servo: Array
     sliding: IntArray
     moving: IntArray
+    contact: IntArray
     held: Array
     mass: Array
     s: Array

@@ -8,6 +8,8 @@ from dataclasses import dataclass
 from calmotion.errors import ShotError
 from calmotion.shot.character import WORLD, Character, IntArray
 
+_FREEDOM = {"fixed": 1, "revolute": 2, "spherical": 3, "prismatic": 4, "floating": 6}
+
 
 @dataclass(frozen=True)
 class Tree:
@@ -96,7 +98,7 @@ def _spanning(character: Character) -> tuple[list[int], list[int]]:
     def freedom(index: int) -> tuple[int, int]:
         joint = character.joints[index]
         # a free slider has no stiffness at rest, which the joints of the tree need
-        kind = 0 if index in driven else {"fixed": 1, "revolute": 2, "spherical": 3, "prismatic": 4}[joint.kind]
+        kind = 0 if index in driven else _FREEDOM[joint.kind]
         # a part between the axes of a joint weighs almost nothing, and must not end in a chain that is closed there
         if any(end != WORLD and character.bodies[end].between for end in (joint.body0, joint.body1)):
             return min(kind, 1), index
@@ -113,6 +115,9 @@ def _spanning(character: Character) -> tuple[list[int], list[int]]:
     inside, closing = [], []
     for index in sorted(range(len(character.joints)), key=freedom):
         joint = character.joints[index]
+        if joint.contact is not None:  # it comes and goes, and the tree does not
+            closing.append(index)
+            continue
         one, other = leader(joint.body0), leader(joint.body1)
         if one == other:
             closing.append(index)

@@ -22,7 +22,7 @@ from calmotion.multibody.sensitivity.sweep import (
     allocate_sweep,
     effort_adjoint,
     motor_gradient,
-    window_of,
+    parts_of,
 )
 from calmotion.multibody.statics.regularized_statics import solve_statics_transposed
 from calmotion.shot.character import Array
@@ -75,11 +75,11 @@ def _add_to_history(
     system: System, window: Window, n: int, memory: SweepMemory, Xbar: Array, scratch: SweepScratch
 ) -> None:
     """Adds the derivatives of instant n >= 1 by the instants before it, from its solution x and hV."""
-    at, back = n - window.first, n - 2 if n > 1 else 0
+    at, back = n - window.first, n - 2 if n > 1 and not window.restarts else n - 1
     R, Hv, P, D = window.steps.R[at], window.steps.Hv[at], window.steps.P[at], window.steps.D[at]
     cbar, nubar, thbar = memory.shift, memory.velocity, memory.turn
     x, hV, hA, tmp, J = scratch.x, scratch.hV, scratch.hA, scratch.tmp, scratch.J
-    c1, c2, half = 2.0 / window.h, 0.5 / window.h, 0.5 / window.h
+    c1, c2, half = 2.0 / window.h, 0.5 / window.h, 0.0 if window.restarts else 0.5 / window.h
     for b in range(len(system.parent)):
         m = 6 + system.elastic[b]
         for i in range(m):
@@ -180,6 +180,6 @@ def sweep_adjoint(
     effort_bar = np.zeros((0, joints)) if effort_gradient is None else effort_gradient
     g_angle, g_rate = np.zeros((total, joints)), np.zeros((total, joints))
     for first, last in reversed(lin.windows()):
-        window = window_of(lin, first, last, efforts)
-        _adjoint(lin.system, window, effort_bar, memory, Xbar, g_angle, g_rate, scratch)
+        for system, window in reversed(parts_of(lin, first, last, efforts)):
+            _adjoint(system, window, effort_bar, memory, Xbar, g_angle, g_rate, scratch)
     return g_angle, g_rate

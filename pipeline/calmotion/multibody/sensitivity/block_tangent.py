@@ -18,7 +18,7 @@ from calmotion.multibody.linear_solver.step_matrix import StepMatrix, matrix_at
 from calmotion.multibody.model.system import JOINT_ROWS, System
 from calmotion.multibody.sensitivity.linearization import Linearization
 from calmotion.multibody.sensitivity.linearized_steps import LinearizedSteps
-from calmotion.multibody.sensitivity.sweep import SweepScratch, Window, allocate_sweep, window_of
+from calmotion.multibody.sensitivity.sweep import SweepScratch, Window, allocate_sweep, parts_of
 from calmotion.multibody.statics.regularized_statics import solve_statics
 from calmotion.shot.character import Array, IntArray
 from calmotion.support.by_reference import by_reference
@@ -61,9 +61,11 @@ def _histories(system: System, window: Window, n: int, scratch: BlockScratch) ->
     dX, dc, nu, dth = scratch.dX, scratch.shift, scratch.velocity, scratch.turn
     x, hV, hA, tmp, J = scratch.x, scratch.hV, scratch.hA, scratch.tmp, scratch.J
     one, two = (n + 2) % 3, (n + 1) % 3
-    if n == 1:
-        two = one
     c1, c2, half = 2.0 / window.h, 0.5 / window.h, 0.5 / window.h
+    if n == 1 or window.restarts:
+        two = one
+    if window.restarts:
+        half = 0.0
     count = tmp.shape[1]
     for b in range(len(system.parent)):
         m = 6 + system.elastic[b]
@@ -211,8 +213,8 @@ def _block_tangent(
     system: System, window: Window, first: int, d_angle: Array, d_rate: Array, component: IntArray, jacobian: Array,
     scratch: BlockScratch, out: Array,
 ) -> None:  # fmt: skip
-    """The instants from `first` to the end of a window; arguments as of `block_tangent`."""
-    for n in range(first, window.last):
+    """The instants of a window from `first` on; arguments as of `block_tangent`."""
+    for n in range(max(first, window.first), window.last):
         at = n - window.first
         matrix = matrix_at(window.steps.matrix, at)
         if n > 0:
@@ -258,7 +260,6 @@ def block_tangent(
     """
     system, count = lin.system, d_angle.shape[2]
     bodies, size, joints = len(system.parent), system.size, len(system.rows)
-    window = window_of(lin, *lin.windows()[0], False)
     scratch = BlockScratch(
         dX=np.zeros((3, bodies, size, count)),
         shift=np.zeros((3, bodies, 3, count)),
@@ -274,5 +275,6 @@ def block_tangent(
         single=allocate_sweep(system),
     )
     out = np.empty((len(d_angle), len(component), count))
-    _block_tangent(system, window, first, d_angle, d_rate, component, jacobian, scratch, out)
+    for held, window in parts_of(lin, *lin.windows()[0], False):
+        _block_tangent(held, window, first, d_angle, d_rate, component, jacobian, scratch, out)
     return out

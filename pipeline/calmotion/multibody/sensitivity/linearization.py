@@ -26,6 +26,7 @@ from calmotion.multibody.kernels.assembly import assemble
 from calmotion.multibody.linear_solver.closed_chains import copy_rows, factor_closed_chains
 from calmotion.multibody.linear_solver.elimination import factor
 from calmotion.multibody.linear_solver.step_matrix import StepMatrix, matrix_at
+from calmotion.multibody.model.phases import EULER, has_contacts, phases_of
 from calmotion.multibody.model.system import Blocks, Instants, Integrator, State, System
 from calmotion.multibody.sensitivity.linearized_steps import (
     LinearizedSteps,
@@ -85,9 +86,13 @@ def _keep_blocks(blocks: Blocks, matrix: StepMatrix, at: int, steps: LinearizedS
 @kernel
 def _linearize(
     system: System, integrator: Integrator, continuous: bool, states: State, inputs: Inputs, first: int, last: int,
-    ws: Workspace, steps: LinearizedSteps,
+    restarts: int, ws: Workspace, steps: LinearizedSteps,
 ) -> tuple[int, int]:  # fmt: skip
-    """Blocks and factors of instants first..last-1; returns -1 or the component that is singular, and the instant."""
+    """Blocks and factors of instants first..last-1; returns -1 or the component that is singular, and the instant.
+
+    Args:
+        restarts: See `phases.Phase`; the integrator is that of these steps.
+    """
     work, blocks, scratch = ws.work, ws.blocks, ws.scratch
     count, joints = len(system.parent), len(system.rows)
     for n in range(first, last):
@@ -98,6 +103,11 @@ def _linearize(
             scratch.Vd[:] = 0.0
         else:
             instants = instants_of(instant_of(states, 0), states, n)
+            if restarts:
+                scratch.kept.turn[:] = 0.0
+                to = instants.before
+                before = State(to.c, to.q, to.u, scratch.kept.turn, to.V, to.lam)
+                instants = Instants(before, before, instants.now)
             _velocity_map(system, integrator, continuous, instants, scratch, Hv)
         copy_rows(inputs.world[n], work.world)
         kind = STATIC if n == 0 else integrator
@@ -140,10 +150,12 @@ def linearize(
 
     Raises:
         SimulationFailure: A singular step, or one that had to be refined: its equations are not those of the others.
-        ValueError: A simulation by another integrator than BDF2.
+        ValueError: A simulation by another integrator than BDF2; contacts and the continuous adjoint.
     """  # fmt: skip
     if trajectory.integrator != "bdf2":
         raise ValueError("only BDF2 has derivatives")
+    if continuous and has_contacts(system):
+        raise ValueError("the continuous adjoint does not support contacts")
     if trajectory.refined:
         raise SimulationFailure(trajectory.refined[0] * trajectory.h, 0, Reason.REFINED)
     reused = 0 if previous is None else previous.size * bytes_of_an_instant(system)
@@ -221,14 +233,20 @@ class Linearization:
         if first == self._loaded:
             return
         self._loaded = -1
-        trajectory, integrator = self.trajectory, bdf2_integrator(self.trajectory.h)
+        trajectory, h = self.trajectory, self.trajectory.h
         last = min(first + self.size, len(self.inputs.angles))
 
         def part(start: int, end: int, workspace: Workspace) -> tuple[int, int]:
-            steps = steps_between(self.steps, slice(start - first, end - first))
-            return _linearize(
-                self.system, integrator, self.continuous, trajectory.states, self.inputs, start, end, workspace, steps
-            )
+            for phase in phases_of(self.system, trajectory.world, start, end):
+                steps = steps_between(self.steps, slice(phase.first - first, phase.last - first))
+                integrator = bdf2_integrator(EULER * h if phase.restarts else h)
+                bad, instant = _linearize(
+                    phase.system, integrator, self.continuous, trajectory.states, self.inputs, phase.first, phase.last,
+                    phase.restarts, workspace, steps,
+                )  # fmt: skip
+                if bad >= 0:
+                    return bad, instant
+            return -1, 0
 
         # instants do not depend on each other, and kernels run without the interpreter's lock
         share = max(_FEW, math.ceil((last - first) / processors()))

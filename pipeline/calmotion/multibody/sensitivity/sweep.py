@@ -8,9 +8,10 @@ import numpy as np
 
 from calmotion.multibody.kernels.sliders import has_row
 from calmotion.multibody.linear_solver.step_matrix import SolutionScratch, allocate_solution
+from calmotion.multibody.model.phases import EULER, phases_of
 from calmotion.multibody.model.system import JOINT_ROWS, System
 from calmotion.multibody.sensitivity.linearization import Linearization
-from calmotion.multibody.sensitivity.linearized_steps import LinearizedSteps
+from calmotion.multibody.sensitivity.linearized_steps import LinearizedSteps, steps_between
 from calmotion.shot.character import Array
 from calmotion.support.by_reference import by_reference
 from calmotion.support.compilation import kernel
@@ -21,7 +22,8 @@ class Window(NamedTuple):
     """Linearised equations of instants first..last-1.
 
     Attributes:
-        h: Time step [s].
+        h: Time step [s]; of the first steps after a change of contacts 3/2 of it, see `phases`.
+        restarts: 1 where steps do not reach back over the instant before them, else 0.
         turn, lam: Of the trajectory, see `State`; all instants.
         axes: Axes of the joints' parent-side markers, shape [T, J, 3, 3]; empty where no efforts are needed.
         steps: Of these instants alone.
@@ -30,6 +32,7 @@ class Window(NamedTuple):
     first: int
     last: int
     h: float
+    restarts: int
     turn: Array
     lam: Array
     axes: Array
@@ -96,7 +99,18 @@ def window_of(lin: Linearization, first: int, last: int, efforts: bool) -> Windo
     """A window, computed if it is not there."""
     lin.load(first)
     states = lin.trajectory.states
-    return Window(first, last, lin.trajectory.h, states.turn, states.lam, lin.axes(efforts), lin.steps)
+    return Window(first, last, lin.trajectory.h, 0, states.turn, states.lam, lin.axes(efforts), lin.steps)
+
+
+def parts_of(lin: Linearization, first: int, last: int, efforts: bool) -> list[tuple[System, Window]]:
+    """A window by the phases in it, each with its system; computed if it is not there."""
+    whole, found = window_of(lin, first, last, efforts), []
+    for phase in phases_of(lin.system, lin.trajectory.world, first, last):
+        steps = steps_between(lin.steps, slice(phase.first - first, phase.last - first))
+        h = EULER * whole.h if phase.restarts else whole.h
+        part = whole._replace(first=phase.first, last=phase.last, h=h, restarts=phase.restarts, steps=steps)
+        found.append((phase.system, part))
+    return found
 
 
 @kernel

@@ -21,7 +21,7 @@ from calmotion.multibody.sensitivity.sweep import (
     allocate_memory,
     allocate_sweep,
     effort_tangent,
-    window_of,
+    parts_of,
 )
 from calmotion.multibody.statics.regularized_statics import solve_statics
 from calmotion.shot.character import Array
@@ -36,9 +36,11 @@ def _history(system: System, window: Window, n: int, memory: SweepMemory, dX: Ar
     dc, nu, dth = memory.shift, memory.velocity, memory.turn
     x, hV, hA, tmp, J = scratch.x, scratch.hV, scratch.hA, scratch.tmp, scratch.J
     one, two = (n + 2) % 3, (n + 1) % 3
-    if n == 1:
-        two = one
     c1, c2, half = 2.0 / window.h, 0.5 / window.h, 0.5 / window.h
+    if n == 1 or window.restarts:
+        two = one
+    if window.restarts:
+        half = 0.0
     for b in range(len(system.parent)):
         m = 6 + system.elastic[b]
         for i in range(3):
@@ -59,7 +61,7 @@ def _history(system: System, window: Window, n: int, memory: SweepMemory, dX: Ar
                 t -= Hv[b, 1 + i, 1 + k] * tmp[k] + half * J[i, k] * dth[one, b, k]
             hV[b, 3 + i] = t
             hA[b, 3 + i] = c2 * nu[two, b, 3 + i] - c1 * nu[one, b, 3 + i]
-        back = n - 2 if n > 1 else 0
+        back = n - 2 if n > 1 and not window.restarts else n - 1
         for i in range(6, m):
             hV[b, i] = c2 * dX[back, b, i] - c1 * dX[n - 1, b, i]
             hA[b, i] = c2 * nu[two, b, i] - c1 * nu[one, b, i]
@@ -182,6 +184,6 @@ def sweep_tangent(
     """
     d_effort, scratch = np.zeros((len(d_angle) if efforts else 0, len(lin.system.rows))), allocate_sweep(lin.system)
     for first, last in lin.windows():
-        window = window_of(lin, first, last, efforts)
-        _tangent(lin.system, window, d_angle, d_rate, memory, dX, d_effort, scratch)
+        for system, window in parts_of(lin, first, last, efforts):
+            _tangent(system, window, d_angle, d_rate, memory, dX, d_effort, scratch)
     return d_effort

@@ -4,7 +4,8 @@ At rest a joint that moves freely may have no other support than the closed chai
 horizontal plane, or a balanced one), or none at all (a wheel, a door, a carriage on a level rail): it keeps its angle
 or length then, but the tree cannot be eliminated. Each free hinge and slider therefore gets a weak spring that acts on
 the component that it carries, against the motion relative to its parent; on a ball joint the spring acts against the
-rotation of the component. With E the matrix of the springs, iterative refinement removes them from the solution,
+rotation of the component, on one that floats (and that contacts hold) against its translation, too. With E the matrix
+of the springs, iterative refinement removes them from the solution,
 
     (K + E) x_k+1 = r + E x_k
 
@@ -31,7 +32,7 @@ HINGE, BALL = 5, 3  # rows of a joint that rotates freely about one axis (or sli
 def is_regularized(system: System) -> bool:
     """Whether any component of the tree is."""
     for b in range(len(system.parent)):
-        if _hinge(system, b) or _ball(system, b) or slides_freely(system, b):
+        if _hinge(system, b) or _ball(system, b) or slides_freely(system, b) or system.rows[b] == 0:
             return True
     return False
 
@@ -64,6 +65,10 @@ def regularize(system: System, K: Array, Lc: Array, Nc: Array) -> None:
         elif _ball(system, b):
             for i in range(3):
                 K[b, 3 + i, 3 + i] += stiffness
+        elif system.rows[b] == 0:
+            for i in range(3):
+                K[b, i, i] += REGULARIZATION * system.mass[b]
+                K[b, 3 + i, 3 + i] += stiffness
         elif slides_freely(system, b):
             # the length is an unknown of its own
             for i in range(3):
@@ -93,6 +98,10 @@ def _add_regularization(
                     out[p, a] -= Jp[b, 2, a] * moment
         elif _ball(system, b):
             for i in range(3):
+                out[b, 3 + i] += stiffness * x[b, 3 + i]
+        elif system.rows[b] == 0:
+            for i in range(3):
+                out[b, i] += REGULARIZATION * system.mass[b] * x[b, i]
                 out[b, 3 + i] += stiffness * x[b, 3 + i]
         elif slides_freely(system, b):
             for i in range(3):

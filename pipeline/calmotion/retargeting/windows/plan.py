@@ -14,7 +14,7 @@ import numpy as np
 
 from calmotion.errors import ShotError
 from calmotion.shot import Animation, Character
-from calmotion.shot.character import Array
+from calmotion.shot.character import Array, contact_joints
 from calmotion.shot.run import LONG_SHOT, WINDOW, WINDOW_OVERLAP, RunSettings
 
 FALL = 10.0  # factor by which the slowest mode falls in an overlap
@@ -52,7 +52,7 @@ def window_length(character: Character, animation: Animation, options: RunSettin
     length, wanted = float(animation.frame_times[-1]), options.window
     cyclic, robust, play = character.retarget.cyclic, options.robust is not None, options.avoid_reversals > 0.0
     if wanted is None:
-        one = cyclic or robust or play or options.adjoint == "continuous"
+        one = cyclic or robust or play or options.adjoint == "continuous" or bool(contact_joints(character))
         return WINDOW if length > LONG_SHOT and not one else None
     if wanted == 0.0:
         return None
@@ -73,6 +73,12 @@ def window_length(character: Character, animation: Animation, options: RunSettin
         raise ShotError(
             "windows do not support --avoid-reversals: what counts is on which side a gear lies in the first pose",
             path=character.path, attribute="--avoid-reversals", found=options.avoid_reversals, remedy="Remove --window",
+        )  # fmt: skip
+    contacts = contact_joints(character)
+    if contacts:
+        raise ShotError(
+            "windows do not support contacts", path=character.joints[contacts[0]].path, attribute="--window",
+            found=f"{wanted:g} s", remedy="Use --window 0: one search for the whole shot",
         )  # fmt: skip
     frame = float(animation.frame_times[1] - animation.frame_times[0])
     if wanted < FEWEST * frame:

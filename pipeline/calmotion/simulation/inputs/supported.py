@@ -11,6 +11,7 @@ from calmotion.shot.character import Array
 from calmotion.shot.run import INTEGRATORS, RunSettings
 from calmotion.shot.tolerance import reach
 from calmotion.simulation.cyclic import refuse_open_loops
+from calmotion.simulation.inputs.contacts import refuse_unsupported_contacts
 from calmotion.simulation.inputs.time_grid import TimeGrid
 
 ROUNDING = 1e-9  # of the reach: no simulation has smaller errors
@@ -50,6 +51,7 @@ def refuse_unsupported(character: Character, animation: Animation, options: RunS
                 found=options.scheme,
                 remedy="Leave it out, or set calm:retarget:cyclic to false.",
             )
+    refuse_unsupported_contacts(character, options)
     if options.scheme not in INTEGRATORS:
         raise ShotError(
             "there is no such integrator",

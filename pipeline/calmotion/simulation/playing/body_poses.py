@@ -21,6 +21,7 @@ from calmotion.multibody.model.topology import Tree, span_tree
 from calmotion.shot.animation import Animation
 from calmotion.shot.character import Array, Body, Character, MassProperties, with_ideal_motors
 from calmotion.simulation.forward import run_forward
+from calmotion.simulation.inputs.contacts import sample_world
 from calmotion.simulation.inputs.curves import needed_pre_roll
 from calmotion.simulation.inputs.roots import root_tracks, sample_roots
 from calmotion.simulation.inputs.time_grid import MAX_STEP, TimeGrid
@@ -183,7 +184,7 @@ def _simulated(
     tree = bodies.tree
     model = compile_model(character, tree, rigid_bodies(character, tree, None), [f.joint for f in animation.moving])
     angles, rates = (over_playing(grid, curves.at, curves, 0.0, order) for order in (0, 1))
-    world = sample_roots(animation.moving, grid)
+    world = sample_world(character, animation, model, grid)
     try:
         run = run_forward(model, Workspace.for_system(model.system), angles, rates, h, world)
     except SimulationFailure as failure:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
@@ -19,6 +20,7 @@ from calmotion.usd.reading.bodies.flexible import flexible_settings
 from calmotion.usd.reading.bodies.interfaces import interfaces_of
 from calmotion.usd.reading.bodies.scenery import scenery_of
 from calmotion.usd.reading.bodies.shapes import shapes_of, tets_of
+from calmotion.usd.reading.contacts import contact_carriers, contact_joints
 from calmotion.usd.reading.context import Reading, grouped, is_rigid_body, prims_of
 from calmotion.usd.reading.generic_joints.chains import Between, expanded
 from calmotion.usd.reading.joints import (
@@ -110,7 +112,8 @@ def read_skeleton(
     kept = set(bodies)
     joints = [j for j in joints if (j.body0 or j.body1) in kept]
     reading.each(joints, refuse_unsupported)
-    joints += _world_joints(reading, bodies, joints, prims, poses)
+    held = contact_carriers(reading)
+    joints += _world_joints(reading, bodies, joints, prims, poses, set(held.values()))
     far = topology.distances(bodies, joints)
     bodies = list(far)
     joints.sort(key=lambda j: max(far.get(j.body0, 0), far.get(j.body1, 0)))  # stable: the shot's order otherwise
@@ -122,6 +125,7 @@ def read_skeleton(
     with reading.collecting_problems():
         others = [] if posing else [prims[b] for b in bodies if b in prims and b not in roots]
         refuse_moving(reading, {prims[b]: fixed[b] for b in fixed if b in prims}, others)
+    joints += contact_joints(reading, held, bodies, poses, clock)
     inside = {b: between[b] for b in bodies if b in between}
     return Skeleton(bodies, {b: poses[b] for b in bodies}, joints, drives, target_prims, inside)
 
@@ -134,7 +138,7 @@ def build_character(reading: Reading, skeleton: Skeleton) -> Character:
     """
     numbers = {path: k for k, path in enumerate(skeleton.bodies)}
     touching = {path: [j.prim_path for j in skeleton.joints if path in (j.body0, j.body1)] for path in skeleton.bodies}
-    fixed = {j.body1 for j in skeleton.joints if j.body0 == "" and j.kind == "fixed"}
+    fixed = {j.body1 for j in skeleton.joints if j.body0 == "" and j.kind == "fixed" and j.contact is None}
     real = reading.each(
         [path for path in skeleton.bodies if path not in skeleton.between],
         lambda path: _body(reading, path, skeleton.poses[path], touching[path], path in fixed),
@@ -152,6 +156,7 @@ def build_character(reading: Reading, skeleton: Skeleton) -> Character:
             j.upper,
             j.closes_chain,
             name=(j.prim.GetDisplayName() if j.prim else "") or j.path.rsplit("/", 1)[-1],
+            contact=j.contact,
         )
         for j in skeleton.joints
     )
@@ -174,7 +179,8 @@ def build_character(reading: Reading, skeleton: Skeleton) -> Character:
         settings = scene.retarget_settings(reading, root)
     raise_all(reading.problems)
     if not chosen:
-        joints_as_authored = list(dict.fromkeys(joint.whole or joint for joint in skeleton.joints))
+        lasting = [joint for joint in skeleton.joints if joint.contact is None]
+        joints_as_authored = list(dict.fromkeys(joint.whole or joint for joint in lasting))
         outer = topology.leaves([path for path in skeleton.bodies if path not in skeleton.between], joints_as_authored)
         chosen = tuple(targets.outermost_target(bodies[numbers[b]], numbers[b], joints) for b in outer)
         reading.note(f"no CalmTargetAPI: the outermost point of {', '.join(outer)} is taken as target")
@@ -307,9 +313,11 @@ def _moving_bodies(
 
 
 def _world_joints(
-    reading: Reading, bodies: list[str], joints: list[JointPrim], prims: dict[str, Usd.Prim], poses: dict[str, Pose]
-) -> list[JointPrim]:
-    """A joint to the world for each kinematic body, and for each group of bodies that has none."""
+    reading: Reading, bodies: list[str], joints: list[JointPrim], prims: dict[str, Usd.Prim], poses: dict[str, Pose],
+    held: AbstractSet[str],
+) -> list[JointPrim]:  # fmt: skip
+    """A joint to the world for each kinematic body, and for each group of bodies that has none; it leaves free where a
+    contact holds one of these."""
     added = []
     attached = {j.body1 for j in joints if j.body0 == ""}
     for group in topology.components(bodies, joints):
@@ -320,6 +328,11 @@ def _world_joints(
             continue
         carried = {j.body1 for j in joints}
         root = next(iter([b for b in own if b not in carried] or own))
-        reading.note(f"{root}: no joint connects the character with the world; this body is fixed at its pose")
-        added.append(joint_to_world(root, poses[root], reading.units.length(1.0)))
+        floats = not held.isdisjoint(group)
+        if floats:
+            reading.note(f"{root}: no joint connects the character with the world; its contacts hold it")
+        else:
+            reading.note(f"{root}: no joint connects the character with the world; this body is fixed at its pose")
+        kind = "floating" if floats else "fixed"
+        added.append(joint_to_world(root, poses[root], reading.units.length(1.0), kind))
     return added

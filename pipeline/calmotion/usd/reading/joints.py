@@ -10,7 +10,7 @@ import numpy as np
 
 from calmotion.errors import ShotError
 from calmotion.shot import WORLD, Frame
-from calmotion.shot.character import Array
+from calmotion.shot.character import Array, Contact
 from calmotion.support.naming import nearest
 from calmotion.usd import gf
 from calmotion.usd.reading.context import Reading, prims_of
@@ -38,8 +38,8 @@ class JointPrim:
     Attributes:
         prim: The Usd.Prim, None for a joint that the reader added.
         path: Its path.
-        kind: `revolute`, `prismatic`, `spherical` or `fixed`; `freedoms.SEVERAL` before `chains.expanded`; or
-            `UNSUPPORTED`, which matters only where the joint is part of the character.
+        kind: `revolute`, `prismatic`, `spherical`, `fixed` or `floating`; `freedoms.SEVERAL` before
+            `chains.expanded`; or `UNSUPPORTED`, which matters only where the joint is part of the character.
         body0, body1: Paths of the bodies, empty for the world.
         frame0, frame1: Frames in them, m.
         lower, upper: Limits [rad or m].
@@ -49,6 +49,7 @@ class JointPrim:
         free: Directions that a joint of several axes leaves free.
         turned: Whether the world is authored as body 1 of such a joint.
         whole: The joint of several axes of which it is one.
+        contact: When it holds, of a joint that comes and goes.
     """
 
     prim: Any
@@ -65,6 +66,7 @@ class JointPrim:
     free: tuple[str, ...] = ()
     turned: bool = False
     whole: JointPrim | None = None
+    contact: Contact | None = None
 
     @property
     def prim_path(self) -> str:
@@ -162,10 +164,10 @@ def axis_limits(prim: Usd.Prim, direction: str, kind: str, meters: float) -> tup
     return _limits(prim, freedoms.limits_of(direction), np.deg2rad(1.0) if kind == "revolute" else meters)
 
 
-def joint_to_world(body: str, pose: Pose, meters: float) -> JointPrim:
-    """A fixed joint between the world and a body at its pose at the first frame."""
+def joint_to_world(body: str, pose: Pose, meters: float, kind: str = "fixed") -> JointPrim:
+    """A joint between the world and a body at its pose at the first frame: a fixed one, or one that leaves it free."""
     here = Frame(np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0]))
-    return JointPrim(None, body, "fixed", "", body, pose.frame(meters), here)
+    return JointPrim(None, body, kind, "", body, pose.frame(meters), here)
 
 
 def _end(reading: Reading, prim: Usd.Prim, side: int, poses: dict[str, Pose]) -> tuple[str, Array, Array]:

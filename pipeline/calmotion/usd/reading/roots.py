@@ -52,7 +52,7 @@ def moving_frames(
     """
     moving = []
     for index, joint in enumerate(joints):
-        if joint.body0 != "":
+        if joint.body0 != "" or joint.contact is not None:
             continue
         prim = reading.stage.GetPrimAtPath(joint.body1) if joint.prim is None else world_side_prim(reading, joint)
         if prim is None or moves(reading, prim) is None:
@@ -64,7 +64,12 @@ def moving_frames(
         flips = np.where(np.sum(rotations[1:] * rotations[:-1], axis=1) < 0.0, -1.0, 1.0)
         rotations[1:] *= np.cumprod(flips)[:, None]
         moving.append(MovingFrame(index, clock.seconds(codes), np.array([f.position for f in frames]), rotations))
-        reading.note(f"{prim.GetPath()}: its transform is animated, and moves the root of the character")
+        if joint.kind == "floating":
+            reading.note(
+                f"{prim.GetPath()}: its animated transform counts at the first frame alone; contacts hold the robot"
+            )
+        else:
+            reading.note(f"{prim.GetPath()}: its transform is animated, and moves the root of the character")
     return tuple(moving)
 
 

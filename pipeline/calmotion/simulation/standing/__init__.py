@@ -1,0 +1,1 @@
+"""What robots stand on: soles, centres of pressure, contacts."""

@@ -1,0 +1,81 @@
+"""Feet that cannot stay where they are held: motors between them contradict each other, or nothing balances.
+
+Rigid legs with ideal motors between two held feet are a closed chain that their curves may not fit: the feet then share
+what is left. Contacts are no balance either: a robot on points falls over at rest.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from calmotion.errors import ShotError
+from calmotion.multibody.analysis.kinematics import rigid_state
+from calmotion.multibody.model.model import Model, start_angles
+from calmotion.multibody.model.phases import held_contacts
+from calmotion.shot import Character
+from calmotion.shot.tolerance import tolerance_of
+from calmotion.simulation.forward import ForwardRun
+from calmotion.simulation.inputs.time_grid import TimeGrid
+
+TOPPLED = 0.2  # turn of a base at rest that is no sag [rad]
+
+
+def refuse_slipping(
+    character: Character, model: Model, grid: TimeGrid, run: ForwardRun, tolerance: float | None
+) -> None:
+    """Refuse feet that slip by more than the tolerance while they are held, and robots that fall over at rest, by a
+    simulation of the rigid robot.
+
+    Raises:
+        ShotError: The contact, and when.
+    """
+    system, states = model.system, run.trajectory.states
+    joints = np.flatnonzero(system.contact)
+    if not len(joints):
+        return
+    _refuse_toppled(character, model, run)
+    allowed = tolerance_of(character, tolerance)
+    held, order = held_contacts(system, run.trajectory.world), [*model.tree.joint, *model.tree.closing]
+    for column, joint in enumerate(joints):
+        body = system.side[joint, 1]
+        turns = Rotation.from_quat(states.q[:, body], scalar_first=True)
+        places = states.c[:, body] + turns.apply(system.position[joint, 1])
+        anchor = 0
+        for n in range(1, len(places)):
+            if not held[n, column]:
+                anchor = n
+                continue
+            far = float(np.linalg.norm(places[n] - places[anchor]))
+            if far > allowed:
+                others = [
+                    character.joints[order[other]].path
+                    for k, other in enumerate(joints)
+                    if other != joint and held[n, k]
+                ]
+                raise ShotError(
+                    f"this contact slips by {1e3 * far:.3g} mm while it is held, at {grid.times[n]:.3f} s: the curves "
+                    f"of the motors between it and {', '.join(others) or 'the world'} contradict each other",
+                    path=character.joints[order[joint]].path,
+                    attribute="calm:contact:active",
+                    found=True,
+                    remedy="Hold one foot at a time (let one contact end when the other begins), correct the curves so "
+                    "that feet stay where they are held, or raise the tolerance above the slip",
+                )
+
+
+def _refuse_toppled(character: Character, model: Model, run: ForwardRun) -> None:
+    """Refuse a robot whose static start is far from the pose of its first frame."""
+    world = run.trajectory.world[0]
+    pose = rigid_state(model, start_angles(model, run.joint_angles[0]), world)
+    for base in np.flatnonzero(model.system.rows[: len(model.system.parent)] == 0):
+        turns = Rotation.from_quat(np.stack([pose.q[base], run.trajectory.states.q[0, base]]), scalar_first=True)
+        angle = float((turns[0].inv() * turns[1]).magnitude())
+        if angle > TOPPLED:
+            body = character.bodies[model.tree.body[base]].path
+            raise ShotError(
+                f"the robot falls over at rest: its contacts leave it free to turn, by {np.degrees(angle):.0f} degrees",
+                path=body,
+                attribute="calm:contact:kind",
+                remedy="Hold a foot as a sole, or by three points or more that are not in a line",
+            )
