@@ -12,6 +12,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from calmotion.shot.contact import Contact
 from calmotion.shot.materials.printed import Core
 from calmotion.shot.motor import PRESCRIBED, Motor
 from calmotion.shot.robust.settings import Uncertainty
@@ -205,25 +206,6 @@ class Body:
     def simulated_flexible(self) -> bool:
         """Whether it is simulated as flexible."""
         return self.flexible is not None and not self.stiff
-
-
-@dataclass(frozen=True, eq=False)
-class Contact:
-    """When a joint to the world holds: a foot that stands, a hand that holds on.
-
-    Attributes:
-        times: [s] after the first frame of the shot, strictly increasing, shape [k].
-        active: Whether it holds from each time on, and before the first as from it, shape [k], bool.
-        friction: Coefficient of friction with the ground; -1: not known.
-    """
-
-    times: Array
-    active: BoolArray
-    friction: float = -1.0
-
-    def holds_at(self, time: float) -> bool:
-        """Whether it holds from a time [s] on."""
-        return bool(self.active[max(int(np.searchsorted(self.times, time + 1e-9, "right")) - 1, 0)])
 
 
 @dataclass(frozen=True, eq=False)

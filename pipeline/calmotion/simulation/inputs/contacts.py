@@ -10,7 +10,8 @@ from calmotion.multibody.kernels.so3 import matrix_of
 from calmotion.multibody.model.model import Model, start_angles
 from calmotion.multibody.model.moving_markers import pack
 from calmotion.shot import Animation, Character
-from calmotion.shot.character import Array, BoolArray, Contact, contact_joints
+from calmotion.shot.character import Array, BoolArray, contact_joints
+from calmotion.shot.contact import Contact
 from calmotion.shot.run import RunSettings
 from calmotion.simulation.inputs.curves import sample_tracks
 from calmotion.simulation.inputs.roots import sample_roots
