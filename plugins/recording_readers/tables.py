@@ -31,6 +31,7 @@ SUFFIXES: Mapping[str, tuple[str, int]] = {
     ".az": (ACCELEROMETER, 2), ".angle": (ANGLE, 0), ".effort": (EFFORT, 0),
 }  # fmt: skip
 NOT_MEASURED = (".error", ".rotation_error", ".input", ".output")  # other columns of tables that --csv wrote
+BEFORE = "_before"  # end of those of the motion as animated
 REACTIONS = (".force", ".moment")
 FITTING = {
     MARKER: ("m", "cm", "mm", "in"), ACCELEROMETER: ("m/s^2", "mm/s^2", "g"),
@@ -81,7 +82,7 @@ def _named(file: str, columns: Mapping[str, Array], degrees: bool) -> tuple[list
         path, dot, suffix = name.rpartition(".")
         if name == TIME:
             continue
-        if f"{dot}{suffix}" in NOT_MEASURED or path.endswith(REACTIONS):
+        if f"{dot}{suffix}" in NOT_MEASURED or path.endswith(REACTIONS) or suffix.endswith(BEFORE):
             skipped.append(name)
         elif f"{dot}{suffix}" not in SUFFIXES or not path.startswith("/"):
             wrong.append(name)

@@ -28,10 +28,11 @@ def test_the_columns_are_those_of_the_contract(host, tmp_path):
     first = ["time_s", *names, f"{motor}.input", f"{motor}.output", f"{motor}.effort"]
     joints = [f"/Robot/Joints/{name}" for name in ("Mount", "Swing", "Weld")]
     reactions = [f"{joint}.{kind}.{axis}" for kind in ("force", "moment") for joint in joints for axis in "xyz"]
-    assert head == [*first, *reactions]
+    before = [f"{name}_before" for name in names]
+    assert head == [*first, *reactions, *before]
     expected = synthetic.motion(synthetic.CALM, 0.01)
     judged = expected.times >= -1e-9
-    found = rows[:, len(first) :].reshape(len(rows), 2, 3, 3)
+    found = rows[:, len(first) : -len(before)].reshape(len(rows), 2, 3, 3)
     np.testing.assert_allclose(found[:, 0], expected.joint_forces[judged], atol=1e-11)
     np.testing.assert_allclose(found[:, 1], expected.joint_moments[judged], atol=1e-11)
     assert rows[0, 0] == 0.0 and rows[-1, 0] == pytest.approx(1.0)
@@ -46,6 +47,11 @@ def test_the_optimised_motion_is_written_beside_the_animators_curve(host, tmp_pa
     np.testing.assert_allclose(rows[:, 6], synthetic.angle(times), atol=1e-11)
     np.testing.assert_allclose(rows[:, 7], expected.motor_values[judged, 0], atol=1e-11)
     assert np.abs(rows[:, 7] - rows[:, 6]).max() > 0.005
+    shaken = synthetic.result().before
+    times_before = shaken.motion.times[shaken.motion.judged]
+    error = np.interp(times, times_before, shaken.position_errors[shaken.motion.judged, 0])
+    np.testing.assert_allclose(rows[:, -2], error, atol=1e-11)
+    assert rows[:, -2].max() > 2.0 * rows[:, 4].max()
 
 
 def test_simulate_writes_the_simulated_motion(host, tmp_path):

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from calmotion.shot.character import Array, Character
-from calmotion.shot.result import Result
+from calmotion.shot.result import Result, Simulation
 
 
 def columns(character: Character, result: Result) -> dict[str, Array]:
     """Name to values, all of the same length; the pre-roll is not part of the shot and left out.
 
     The motion is the optimised one where there is one, else the simulated one. A motor's input is the
-    animator's curve, its output the curve that was simulated.
+    animator's curve, its output the curve that was simulated. The motion as animated follows in columns `..._before`
+    where there is an optimised one.
 
     Reactions are what each joint does to its body1, world axes, see `calmotion.shot.Motion`.
 
@@ -21,12 +24,7 @@ def columns(character: Character, result: Result) -> dict[str, Array]:
     simulation = result.after or result.before
     motion = simulation.motion
     rows = motion.judged
-    table = {"time_s": motion.times[rows]}
-    for k, target in enumerate(character.targets):
-        for axis, name in enumerate("xyz"):
-            table[f"{target.path}.{name}"] = motion.target_positions[rows, k, axis]
-        table[f"{target.path}.error"] = simulation.position_errors[rows, k]
-        table[f"{target.path}.rotation_error"] = simulation.rotation_errors[rows, k]
+    table = {"time_s": motion.times[rows]} | target_columns(character, simulation)
     for m, motor in enumerate(character.motors):
         table[f"{motor.path}.input"] = result.reference.motor_values[rows, m]
         table[f"{motor.path}.output"] = motion.motor_values[rows, m]
@@ -37,4 +35,19 @@ def columns(character: Character, result: Result) -> dict[str, Array]:
         for j, joint in enumerate(character.joints):
             for axis, letter in enumerate("xyz"):
                 table[f"{joint.path}.{name}.{letter}"] = values[rows, j, axis]
+    if result.after is not None:
+        before = target_columns(character, result.before)
+        times = result.before.motion.times[result.before.motion.judged]
+        table |= {f"{name}_before": np.interp(table["time_s"], times, values) for name, values in before.items()}
+    return table
+
+
+def target_columns(character: Character, simulation: Simulation) -> dict[str, Array]:
+    """Positions and errors of the targets [m], and rotation errors [rad], at each step of a simulation."""
+    rows, table = simulation.motion.judged, {}
+    for k, target in enumerate(character.targets):
+        for axis, name in enumerate("xyz"):
+            table[f"{target.path}.{name}"] = simulation.motion.target_positions[rows, k, axis]
+        table[f"{target.path}.error"] = simulation.position_errors[rows, k]
+        table[f"{target.path}.rotation_error"] = simulation.rotation_errors[rows, k]
     return table
