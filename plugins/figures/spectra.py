@@ -45,7 +45,7 @@ def plot_spectra(character: Character, result: Result, modes: SystemModes | None
                 xycoords=("data", "axes fraction"), xytext=(2, -2), textcoords="offset points",
                 fontsize=SMALL - 1.0, color=LIMIT, va="top",
             )  # fmt: skip
-        axes.legend(fontsize=SMALL, loc="upper right", framealpha=0.85, edgecolor="none")
+        axes.legend(fontsize=SMALL, loc="lower left", framealpha=0.85, edgecolor="none")
     all_axes[-1].set_xlabel("frequency [Hz]", fontsize=SMALL)
     return figure
 

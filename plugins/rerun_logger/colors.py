@@ -14,6 +14,7 @@ Color = tuple[int, int, int]
 BACKGROUND: Color = (236, 238, 241)  # of the 3D views, on every theme
 # Between these a color has a contrast of 3 or more both with white and with the dark theme's background.
 DARKEST, BRIGHTEST = 0.13, 0.29  # relative luminance
+PALE = 0.45  # share of the full color at the end of a line that fades
 SPREAD = 40.0 / 360.0  # of the hues of several curves
 
 
@@ -65,7 +66,10 @@ def contrast(first: Sequence[float], second: Sequence[float]) -> float:
 
 
 def fading(color: Color, count: int) -> Array:
-    """Colors from nearly the background's to the full color, shape [count, 3], 8 bits."""
-    shares = (np.arange(1, count + 1) / count) ** 1.3
+    """Colors from a pale one to the full color, shape [count, 3], 8 bits.
+
+    Lines of rerun are opaque: the background's color would be a white line where a body is behind it.
+    """
+    shares = np.linspace(PALE, 1.0, count)
     mixed = np.array(BACKGROUND) + shares[:, None] * (np.array(color, dtype=float) - BACKGROUND)
     return np.asarray(mixed.round(), dtype=np.uint8)

@@ -75,9 +75,10 @@ def choose_eye(character: Character, animation: Animation, result: Result) -> rr
 
 def spatial_view(name: str, root: str, eye: rrb.EyeControls3D) -> rrb.Spatial3DView:
     """One motion over the intended motion."""
+    trails = [f"/trails/{root}/**", f"/trails/{REFERENCE}/{root}/**"]
     return rrb.Spatial3DView(
         origin="/",
-        contents=[f"/{root}/**", f"/{REFERENCE}/**", f"/trails/{root}/**", f"/trails/{REFERENCE}/**", f"/{SCENERY}/**"],
+        contents=[f"/{root}/**", f"/{REFERENCE}/**", *trails, f"/{SCENERY}/**"],
         name=name,
         eye_controls=eye,
         background=rrb.Background(color=BACKGROUND, kind=rrb.BackgroundKind.SolidColor),

@@ -116,7 +116,8 @@ def log_all(
     for count, (root, motion) in enumerate(at_frames.items()):
         progress(count / (len(at_frames) + 1), f"{root} in 3D")
         log_bodies(recording, root, character, result, at_frames, scale)
-        log_trails(recording, root, character, whole_motion(result, root), motion.times)
+        if root != REFERENCE:
+            log_trails(recording, root, character, whole_motion(result, root), result.reference, motion.times, scale)
     log_scenery(recording, character)
     progress(len(at_frames) / (len(at_frames) + 1), "curves")
     log_errors(recording, character, INPUT, result.before, samples_per_plot)

@@ -7,38 +7,64 @@ import rerun as rr
 from calmotion.shot import Character, Motion
 from calmotion.shot.character import Array
 from calmotion.views.playback import sample_motion
+from numpy.typing import NDArray
 
-from .colors import fading
-from .layout import STYLES, TIME
+from .colors import Style, fading
+from .layout import REFERENCE, STYLES, TIME
 
 LENGTH_S = 0.8
 PIECES, POINTS = 10, 6  # of a trail, and of each of its pieces
+APART = 0.03  # of the largest deviation: nearer trails of two motions would flicker through each other
 
 
-def log_trails(recording: rr.RecordingStream, root: str, character: Character, motion: Motion, times: Array) -> None:
-    """The recent path of each target at each frame, and its place.
+def log_trails(
+    recording: rr.RecordingStream,
+    root: str,
+    character: Character,
+    motion: Motion,
+    intended: Motion,
+    times: Array,
+    scale: float,
+) -> None:
+    """The recent path of each target at each frame, and its place; those of the intended motion where they differ.
 
     Args:
         motion: Of all time steps, for smooth lines.
+        intended: Likewise.
         times: Of the frames [s].
+        scale: Largest deviation [m].
     """
-    style = STYLES[root]
-    frames = rr.TimeColumn(TIME, duration=times)
-    radii = style.width * np.linspace(0.4, 1.1, PIECES)
-    paths = recent_paths(motion, times)
+    own, meant = (recent_paths(run, times) for run in (motion, intended))
     for k, target in enumerate(character.targets):
-        entity = f"trails/{root}{target.path}"
-        look = rr.LineStrips3D.from_fields(
-            colors=fading(style.color, PIECES), radii=[rr.Radius.ui_points(radius) for radius in radii]
-        )
-        recording.log(entity, look, static=True)
-        strips = paths[:, :, :, k].reshape(-1, POINTS, 3)
-        columns = rr.LineStrips3D.columns(strips=list(strips)).partition([PIECES] * len(times))
-        recording.send_columns(entity, [frames], columns)
-        dot = f"{entity}/now"
-        recording.log(dot, rr.Points3D.from_fields(colors=[style.color], radii=[rr.Radius.ui_points(4.0)]), static=True)
-        places = paths[:, -1, -1, k]
-        recording.send_columns(dot, [frames], rr.Points3D.columns(positions=places))
+        differ = np.linalg.norm(own[:, :, :, k] - meant[:, :, :, k], axis=-1) > APART * scale
+        pieces = np.ones(own.shape[:2], dtype=bool)
+        log_trail(recording, f"trails/{root}{target.path}", STYLES[root], own[:, :, :, k], pieces, times)
+        entity = f"trails/{REFERENCE}/{root}{target.path}"
+        log_trail(recording, entity, STYLES[REFERENCE], meant[:, :, :, k], np.any(differ, axis=2), times)
+
+
+def log_trail(
+    recording: rr.RecordingStream, entity: str, style: Style, paths: Array, shown: NDArray[np.bool_], times: Array
+) -> None:
+    """One trail at each frame.
+
+    Args:
+        paths: [m], shape [f, PIECES, POINTS, 3].
+        shown: Which pieces are drawn, shape [f, PIECES]; the dot is drawn with the last one.
+        times: [s], shape [f].
+    """
+    frames = rr.TimeColumn(TIME, duration=times)
+    widths = [rr.Radius.ui_points(style.width * share) for share in np.linspace(0.15, 1.1, PIECES)]
+    look = rr.LineStrips3D.from_fields(colors=fading(style.color, PIECES), radii=widths)
+    recording.log(entity, look, static=True)
+    nothing = np.empty((0, 3), dtype=np.float32)
+    strips = [path if drawn else nothing for row, flags in zip(paths, shown, strict=True)
+              for path, drawn in zip(row, flags, strict=True)]  # fmt: skip
+    recording.send_columns(entity, [frames], rr.LineStrips3D.columns(strips=strips).partition([PIECES] * len(times)))
+    dot = f"{entity}/now"
+    recording.log(dot, rr.Points3D.from_fields(colors=[style.color], radii=[rr.Radius.ui_points(4.0)]), static=True)
+    places = rr.Points3D.columns(positions=paths[shown[:, -1], -1, -1])
+    recording.send_columns(dot, [frames], places.partition(shown[:, -1].astype(int)))
 
 
 def recent_paths(motion: Motion, times: Array) -> Array:

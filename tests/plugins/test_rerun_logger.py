@@ -183,6 +183,23 @@ def test_trails_end_at_the_target_and_show_its_last_moments_smoothly(columns):
     assert fade == sorted(fade, reverse=True) and fade[-1] < 3
 
 
+def test_the_intended_trail_is_drawn_only_where_it_can_be_told_from_the_other(columns):
+    result, frames = synthetic.result(), synthetic.animation().frame_times
+    meant = sample_motion(result.reference, frames).target_positions[:, 0]
+    drawn, off = {}, {}
+    for root, run in (("input", result.before), ("optimized", result.after)):
+        _, pieces = columns[f"/trails/reference/{root}/Robot/Tip/Target", "LineStrips3D:strips"]
+        _, dots = columns[f"/trails/reference/{root}/Robot/Tip/Target/now", "Points3D:positions"]
+        last = np.array([len(trail[-1]) > 0 for trail in pieces])
+        np.testing.assert_array_equal(last, [len(dot) > 0 for dot in dots], err_msg="the dot ends its trail")
+        drawn[root] = last
+        off[root] = np.linalg.norm(sample_motion(run.motion, frames).target_positions[:, 0] - meant, axis=1)
+    largest = off["input"].max()
+    for root, last in drawn.items():
+        assert last.any() and not last.all()
+        assert off[root][~last].max() < 0.04 * largest and off[root][last].max() > 0.03 * largest
+
+
 def test_the_ghost_lies_inside_the_body_where_nothing_is_off(columns):
     (own,), (ghost,) = (
         np.array(columns[f"/{root}/Robot/Tip/Ball", "Mesh3D:vertex_positions"][1]) for root in ("input", "reference")
