@@ -32,7 +32,7 @@ TESTS ?= tests
 # Two processes test at a time; threads of linear algebra that wait for each other would make that several times slower.
 test: export OPENBLAS_NUM_THREADS := 1
 
-.PHONY: help demo wheel test test-lowest test-portable docs fuzz torture audit samples pictures blender blender-test clean
+.PHONY: help demo wheel test test-lowest test-portable docs fuzz torture audit samples pictures blender blender-test blender-pictures clean
 .DELETE_ON_ERROR:
 
 help:
@@ -119,14 +119,21 @@ blender: $(MADE)
 	cd plugins/blender && $(CURDIR)/$(RUN) -m zipfile -c $(CURDIR)/dist/calmotion_blender.zip *.py *.toml README.md LICENSE
 
 # Blender's Python module is large, wants an older NumPy and is GPL: it gets an environment of its own.
+# Another version of Blender: make blender-test BPY=4.2.0 BLENDER_VENV=.venv-blender42
 BLENDER_VENV ?= .venv-blender
+BPY ?= 5.0.1
 $(BLENDER_VENV)/.installed:
 	python3.11 -m venv --clear $(BLENDER_VENV)
-	$(BLENDER_VENV)/bin/python -m pip install --quiet bpy==5.0.1
+	$(BLENDER_VENV)/bin/python -m pip install --quiet bpy==$(BPY)
 	@touch $@
 
 blender-test: $(INSTALLED_DEV) $(BLENDER_VENV)/.installed
 	CALMOTION_BLENDER_PYTHON=$(CURDIR)/$(BLENDER_VENV)/bin/python $(RUN) -m pytest -q tests/blender
+
+blender-pictures: $(INSTALLED) $(BLENDER_VENV)/.installed
+	CALMOTION_COMMAND="$(CURDIR)/$(RUN) -m calmotion" $(BLENDER_VENV)/bin/python plugins/blender/demo/render.py \
+		plugins/blender build/blender
+	$(RUN) samples/pictures.py --frames build/blender docs/tutorials/blender.webp
 
 samples: $(INSTALLED)
 	@for script in samples/*/build.py; do echo "$$script"; $(RUN) "$$script" || exit 1; done

@@ -1,6 +1,7 @@
 """Optimises samples, and keeps the filmstrip and a small video of each beside it.
 
-`python samples/pictures.py [NAME ...]`, or all.
+`python samples/pictures.py [NAME ...]`, or all samples. A real robot, which is not part of this repository, is drawn by
+`python samples/pictures.py --robot SHOT VIDEO`, and rendered frames become a video by `--frames FOLDER VIDEO`.
 """
 
 from __future__ import annotations
@@ -22,17 +23,35 @@ ROUNDS = 4  # of k-means over the palette; without them the few pixels of the ma
 def picture(name: str) -> None:
     """Optimise one sample with default settings and write its picture and video."""
     with tempfile.TemporaryDirectory() as folder:
-        shot, layer = HERE / name / f"{name}.usda", Path(folder) / f"{name}_calm.usda"
-        command = [sys.executable, "-m", "calmotion", "optimize", str(shot), "-o", str(layer)]
-        command += ["--figures", folder, "--set", f"figures.plot.dpi={DPI}"]
-        command += ["--video", str(HERE / name / f"{name}.webp")]
-        command += [option for setting in VIDEO for option in ("--set", f"video.write.{setting}")]
-        subprocess.run(command, check=True)
+        figures = ("--figures", folder, "--set", f"figures.plot.dpi={DPI}")
+        film(HERE / name / f"{name}.usda", HERE / name / f"{name}.webp", *figures)
         strip = Image.open(Path(folder) / "filmstrip.png").convert("RGB")
     flat = strip.quantize(COLORS, kmeans=ROUNDS, dither=Image.Dither.NONE)
     flat.save(HERE / name / f"{name}.png", optimize=True)
 
 
+def film(shot: Path, video: Path, *options: str) -> None:
+    """Optimise a shot with default settings and write a small video."""
+    with tempfile.TemporaryDirectory() as folder:
+        command = [sys.executable, "-m", "calmotion", "optimize", str(shot), "-o", str(Path(folder) / "calm.usda")]
+        command += ["--video", str(video), *options]
+        command += [option for setting in VIDEO for option in ("--set", f"video.write.{setting}")]
+        subprocess.run(command, check=True)
+
+
+def join(frames: Path, video: Path) -> None:
+    """Make a video of numbered pictures, at half the speed of 24 frames a second."""
+    first, *others = (Image.open(path).convert("RGB") for path in sorted(frames.glob("[0-9]*.png")))
+    first.save(video, save_all=True, append_images=others, duration=83, loop=0, quality=60, method=6)
+
+
 if __name__ == "__main__":
+    match sys.argv[1:]:
+        case ["--frames", folder, video]:
+            join(Path(folder), Path(video))
+            sys.exit()
+        case ["--robot", shot, video]:
+            film(Path(shot), Path(video))
+            sys.exit()
     for wanted in sys.argv[1:] or sorted(path.parent.name for path in HERE.glob("*/motion.py")):
         picture(wanted)

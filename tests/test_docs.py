@@ -32,6 +32,30 @@ def _exists(name: str) -> bool:
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(REPOSITORY)))
+def test_every_link_and_picture_of_a_page_exists(page):
+    # mkdocs checks those within docs/ as well, but not README.md, which leads there; it makes reference/ and images/
+    for target in re.findall(r"\]\(([^)\s]+)\)", re.sub(r"```.*?```", "", page.read_text(), flags=re.DOTALL)):
+        name, _, anchor = target.partition("#")
+        if (
+            "://" in name
+            or name.split("/")[-2:-1] == ["images"]
+            or name.endswith(("schemas.md", "commands.md", "python.md"))
+        ):
+            continue
+        file = (page.parent / name) if name else page
+        assert file.exists(), target
+        if anchor:
+            assert anchor in {
+                _anchor(heading) for heading in re.findall(r"^#+ (.*)$", file.read_text(), re.MULTILINE)
+            }, target
+
+
+def _anchor(heading: str) -> str:
+    """The anchor of a heading, as GitHub and mkdocs write it."""
+    return re.sub(r"[\s-]+", "-", re.sub(r"[^\w\s-]", "", heading.lower()).strip())
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(REPOSITORY)))
 def test_every_make_command_on_a_page_exists(page):
     targets = set(re.findall(r"^([\w-]+):(?!=)", (REPOSITORY / "Makefile").read_text(), re.MULTILINE))
     text = page.read_text()

@@ -5,12 +5,19 @@ from __future__ import annotations
 
 import bpy
 
-from .operators import CALMOTION_OT_cancel, CALMOTION_OT_optimize
+from .operators import CALMOTION_OT_cancel, CALMOTION_OT_optimize, CALMOTION_OT_worst_frame
 from .panel import CALMOTION_PT_panel
 from .preferences import CalmotionPreferences
 from .settings import CalmotionSettings
 
-CLASSES = (CalmotionPreferences, CalmotionSettings, CALMOTION_OT_optimize, CALMOTION_OT_cancel, CALMOTION_PT_panel)
+CLASSES = (
+    CalmotionPreferences,
+    CalmotionSettings,
+    CALMOTION_OT_optimize,
+    CALMOTION_OT_cancel,
+    CALMOTION_OT_worst_frame,
+    CALMOTION_PT_panel,
+)
 
 
 def register() -> None:

@@ -11,6 +11,8 @@ import bpy
 
 from .bring_back import bring_back
 from .character import character_of, export_character, is_animated
+from .error_table import read_errors
+from .errors import show_errors, worst_frame
 from .pipeline import PipelineRun, job_for
 from .preferences import command_of, preferences_of
 
@@ -102,7 +104,9 @@ class CALMOTION_OT_optimize(bpy.types.Operator):
                 return {"CANCELLED"}
             try:
                 changed = bring_back(context, bpy.data.objects[self._character], run.job.root)
-            except RuntimeError as error:
+                if settings.show_errors:
+                    _show(context, run.job.table)
+            except (RuntimeError, OSError, ValueError) as error:
                 self.report({"ERROR"}, str(error))
                 return {"CANCELLED"}
             before, after = (1e3 * run.report[f"max_error_{when}_m"] for when in ("before", "after"))
@@ -113,6 +117,23 @@ class CALMOTION_OT_optimize(bpy.types.Operator):
             preferences = preferences_of(context)
             if not (bpy.data.filepath and (preferences is None or preferences.keep_files)):
                 shutil.rmtree(self._folder, ignore_errors=True)
+
+
+class CALMOTION_OT_worst_frame(bpy.types.Operator):
+    """Go to the frame at which the robot would be farthest off without the optimisation"""
+
+    bl_idname = "calmotion.worst_frame"
+    bl_label = "Go to Largest Error"
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Whether errors are shown."""
+        return worst_frame(context.scene) is not None
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        """Set the frame."""
+        context.scene.frame_set(worst_frame(context.scene))
+        return {"FINISHED"}
 
 
 class CALMOTION_OT_cancel(bpy.types.Operator):
@@ -130,6 +151,14 @@ class CALMOTION_OT_cancel(bpy.types.Operator):
         """Ask the process to stop."""
         _RUNNING[context.scene.name].cancel()
         return {"FINISHED"}
+
+
+def _show(context: bpy.types.Context, table: Path) -> None:
+    """Show the errors of a table, whose times begin with the first frame of the scene."""
+    scene = context.scene
+    frames = range(scene.frame_start, scene.frame_end + 1)
+    rate = scene.render.fps / scene.render.fps_base
+    show_errors(context, read_errors(table, [(frame - scene.frame_start) / rate for frame in frames]), frames)
 
 
 def _folder(context: bpy.types.Context) -> Path:

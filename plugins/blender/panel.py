@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import bpy
 
+from .errors import errors_now
 from .preferences import command_of
 
 
@@ -27,6 +28,7 @@ class CALMOTION_PT_panel(bpy.types.Panel):
         made.prop(settings, "material")
         made.prop(settings, "flexible")
         layout.prop(settings, "tolerance")
+        layout.prop(settings, "show_errors")
         if command_of(context) is None:
             layout.label(text="The command calmotion was not found: see the preferences", icon="ERROR")
         layout.operator("calmotion.optimize", icon="ANIM_DATA")
@@ -35,3 +37,10 @@ class CALMOTION_PT_panel(bpy.types.Panel):
             layout.operator("calmotion.cancel", icon="CANCEL")
         elif settings.status:
             layout.label(text=settings.status)
+        errors = errors_now(context.scene)
+        if errors is not None:
+            box = layout.box()
+            box.label(text=f"Error at frame {context.scene.frame_current}", icon="DRIVER_DISTANCE")
+            box.label(text=f"as animated {errors[0]:.3g} mm", icon="COLORSET_02_VEC")
+            box.label(text=f"optimised {errors[1]:.3g} mm", icon="COLORSET_04_VEC")
+            box.operator("calmotion.worst_frame", icon="TIME")

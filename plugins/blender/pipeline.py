@@ -24,10 +24,12 @@ class Job:
     Attributes:
         commands: One after the other, each the words of a process.
         root: The layer that opens the result with its shot.
+        table: Places and errors of the targets over time.
     """
 
     commands: tuple[tuple[str, ...], ...]
     root: Path
+    table: Path
 
 
 def job_for(
@@ -43,7 +45,7 @@ def job_for(
         material, flexible: Of a robot that is made from the skin.
         tolerance: [m].
     """
-    rigged, result = folder / "robot.usda", folder / "calm.usda"
+    rigged, result, table = folder / "robot.usda", folder / "calm.usda", folder / "errors.csv"
     commands: list[tuple[str, ...]] = []
     if robot:
         rigged.write_text(composed(robot, shot, rigged), encoding="utf-8")
@@ -53,9 +55,10 @@ def job_for(
              f"rig.skeleton.material={material}", "--set", f"rig.skeleton.flexible={flexible.replace(' ', '')}")
         )  # fmt: skip
     commands.append(
-        (*command, "optimize", str(rigged), "-o", str(result), "--progress", "--json", "--tolerance", f"{tolerance:g}m")
-    )
-    return Job(tuple(commands), folder / "calm_root.usda")
+        (*command, "optimize", str(rigged), "-o", str(result), "--csv", str(table), "--progress", "--json",
+         "--tolerance", f"{tolerance:g}m")
+    )  # fmt: skip
+    return Job(tuple(commands), folder / "calm_root.usda", table)
 
 
 def composed(robot: str, shot: Path, target: Path) -> str:

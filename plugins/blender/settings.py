@@ -58,5 +58,10 @@ class CalmotionSettings(bpy.types.PropertyGroup):
         precision=4,
         unit="LENGTH",
     )
+    show_errors: bpy.props.BoolProperty(
+        name="Show Errors",
+        description="Draw the ways of the targets as animated (orange) and optimised (blue), and key the errors",
+        default=True,
+    )
     status: bpy.props.StringProperty(name="Status", options={"SKIP_SAVE", "HIDDEN"})
     progress: bpy.props.FloatProperty(name="Progress", min=0.0, max=1.0, options={"SKIP_SAVE", "HIDDEN"})

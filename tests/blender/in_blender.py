@@ -95,12 +95,46 @@ def check_optimize(folder: Path) -> None:
     changes = {p: max(abs(a - b) for a, b in zip(before[p], after[p], strict=True)) for p in before}
     moved = {path for path, change in changes.items() if change > 1e-4}
     assert moved and max(changes.values()) < 0.2, changes
-    assert set(bpy.data.objects.keys()) == objects and len(bpy.data.armatures) == 1, "what was imported is gone"
+    shown = set(bpy.data.collections["Calmotion Errors"].objects.keys())
+    assert set(bpy.data.objects.keys()) - shown == objects and len(bpy.data.armatures) == 1, "what was imported is gone"
     assert (folder / "scene_calmotion" / "calm.usda").is_file()
     assert "->" in settings.status
     error_before, error_after = (float(part.split()[0]) for part in settings.status.split(" -> "))
     assert error_after < 0.2 * error_before, settings.status
     print("optimised:", settings.status, sorted(moved))
+    check_errors(folder, error_before, error_after)
+
+
+def check_errors(folder: Path, before: float, after: float) -> None:
+    """What is shown of the errors is what the table says, at the frame that it is shown for."""
+    import csv
+
+    scene = bpy.context.scene
+    with (folder / "scene_calmotion" / "errors.csv").open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    collection = bpy.data.collections["Calmotion Errors"]
+    values = collection.objects["Calmotion Errors"]
+    (name,) = {obj.name.removesuffix(" as animated now") for obj in collection.objects if obj.name.endswith("ed now")
+               and "as animated" in obj.name}  # fmt: skip
+    path = next(column.removesuffix(".error") for column in rows[0] if column.endswith(f"{name}.error"))
+    worst = max(rows, key=lambda row: float(row[f"{path}.error_before"]))
+    assert bpy.ops.calmotion.worst_frame() == {"FINISHED"}
+    assert abs((scene.frame_current - scene.frame_start) / 24.0 - float(worst["time_s"])) < 0.6 / 24.0
+    assert 0.8 * before < values["as_animated_mm"] <= 1.001 * before, (values["as_animated_mm"], before)
+    assert values["optimised_mm"] <= 1.001 * after
+    row = min(rows, key=lambda row: abs(float(row["time_s"]) - (scene.frame_current - scene.frame_start) / 24.0))
+    for label, end in (("as animated", "_before"), ("optimised", "")):
+        mark = collection.objects[f"{name} {label} now"].matrix_world.translation
+        place = [float(row[f"{path}.{axis}{end}"]) for axis in "xyz"]
+        assert max(abs(a - b) for a, b in zip(mark, place, strict=True)) < 0.01, (list(mark), place)
+        trail = collection.objects[f"{name} {label}"].data.splines[0].points
+        assert len(trail) == 25 and (trail[scene.frame_current - 1].co.xyz - mark).length < 1e-5
+    blocks = [len(getattr(bpy.data, kind)) for kind in ("objects", "curves", "meshes", "actions", "collections")]
+    from calmotion_extension.operators import _show
+
+    _show(bpy.context, folder / "scene_calmotion" / "errors.csv")
+    again = [len(getattr(bpy.data, kind)) for kind in ("objects", "curves", "meshes", "actions", "collections")]
+    assert again == blocks, "a second run takes the place of the first"
 
 
 def export_again(folder: Path) -> None:
@@ -210,7 +244,8 @@ def check_objects(folder: Path) -> None:
     assert 1e-4 < bent < 0.3, bent
     error_before, error_after = (float(part.split()[0]) for part in scene.calmotion.status.split(" -> "))
     assert error_after < 0.2 * error_before, scene.calmotion.status
-    assert {obj.name for obj in bpy.data.objects} == {"Base", "Arm"}
+    shown = set(bpy.data.collections["Calmotion Errors"].objects.keys())
+    assert {obj.name for obj in bpy.data.objects} - shown == {"Base", "Arm"}
     print("objects:", scene.calmotion.status)
 
 

@@ -29,14 +29,19 @@ BLENDER = os.environ.get("CALMOTION_BLENDER_PYTHON", "")
 needs_blender = pytest.mark.skipif(not BLENDER, reason="no Blender: see make blender-test")
 
 
-@pytest.fixture(scope="module")
-def pipeline():
-    """The module that runs calmotion, which does not need Blender."""
-    spec = importlib.util.spec_from_file_location("blender_pipeline", EXTENSION / "pipeline.py")
+def loaded(name):
+    """A module of the extension that does not need Blender."""
+    spec = importlib.util.spec_from_file_location(f"blender_{name}", EXTENSION / f"{name}.py")
     module = importlib.util.module_from_spec(spec)
-    sys.modules["blender_pipeline"] = module
+    sys.modules[f"blender_{name}"] = module
     spec.loader.exec_module(module)
     return module
+
+
+@pytest.fixture(scope="module")
+def pipeline():
+    """The module that runs calmotion."""
+    return loaded("pipeline")
 
 
 def test_the_manifest_has_the_fields_that_blender_requires():
@@ -100,6 +105,33 @@ def test_a_robot_of_one_s_own_is_put_over_the_shot(pipeline, tmp_path):
     assert Sdf.Layer.FindOrOpen(str(tmp_path / "robot.usda")).pseudoRoot.GetInfo("metersPerUnit") == 1.0
 
 
+def test_the_errors_of_a_table_are_read_at_the_frames(tmp_path):
+    sys.path.insert(0, str(HERE.parent / "helpers" / "plugins"))
+    import synthetic
+    from calmotion.shot.table import columns
+
+    result, errors = synthetic.result(), loaded("error_table")
+    table, file = columns(synthetic.character(), result), tmp_path / "errors.csv"
+    lines = [",".join(f"{values[k]:.12g}" for values in table.values()) for k in range(len(table["time_s"]))]
+    file.write_text("\n".join([",".join(table), *lines]) + "\n")
+    times = [0.0, 0.123, 1.0, 9.0]
+    (target,) = errors.read_errors(file, times)
+    assert target.name == "Target"
+    for simulation, error, places in (
+        (result.before, target.error_before, target.before), (result.after, target.error_after, target.after)
+    ):  # fmt: skip
+        rows = simulation.motion.judged
+        found = np.interp(times, simulation.motion.times[rows], simulation.position_errors[rows, 0])
+        np.testing.assert_allclose(error, found, atol=1e-4 * found.max())
+        path = [np.interp(times, simulation.motion.times, x) for x in simulation.motion.target_positions[:, 0].T]
+        np.testing.assert_allclose(places, np.transpose(path), atol=1e-4)
+    farthest = errors.largest([target])
+    assert farthest == (list(target.error_before), list(target.error_after)) and max(farthest[0]) > 1e-3
+    file.write_text("time_s,/a.error\n0,1\n")
+    with pytest.raises(ValueError, match="no column /a.x_before"):
+        errors.read_errors(file, times)
+
+
 def test_progress_and_the_report_are_read(pipeline, tmp_path):
     command = script(tmp_path, """
 print("note: something", file=sys.stderr)
@@ -151,7 +183,7 @@ def test_the_real_program_reports_its_progress(pipeline, repository, tmp_path, m
     program = [sys.executable, "-c", f"import sys; sys.path.insert(0, {str(repository / 'pipeline')!r}); "
                "from calmotion.cli.main import main; sys.exit(main())"]  # fmt: skip
     (_, optimize) = job(pipeline, program, tmp_path).commands
-    run = pipeline.PipelineRun(pipeline.Job((optimize,), tmp_path / "calm_root.usda")).start()
+    run = pipeline.PipelineRun(pipeline.Job((optimize,), tmp_path / "calm_root.usda", tmp_path / "errors.csv")).start()
     seen = set()
     while run.running:
         seen.add(run.message)

@@ -140,6 +140,7 @@ def test_simulate_reports_without_before_and_after(run):
         "max_error_m",
         "rms_error_m",
         "max_rotation_error_rad",
+        "rotation_weight",
         "rms_rotation_error_rad",
         "sag_m",
         "seam_m",

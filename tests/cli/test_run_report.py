@@ -5,6 +5,8 @@ from calmotion.cli.run_report import (
     REMEDIES,
     print_budget,
     print_efforts,
+    print_errors,
+    print_files,
     print_joint_gap,
     print_robustness,
     print_verdict,
@@ -30,7 +32,7 @@ def printed(values):
 def test_the_error_budget_is_a_table_and_the_verdict_a_sentence():
     text = printed(report())
     assert "time step   0.5 mm     0.3 mm" in text and "mesh        0.4 mm    unknown" in text
-    assert "The simulation keeps the tolerance of 1 mm: error 0.3 mm." in " ".join(text.split())
+    assert "The simulation keeps the tolerance of 1 mm: these numbers are accurate to 0.3 mm." in " ".join(text.split())
     verified = {"verified_step_s": 5e-4, "verified_modes": 44, "verified_mesh_error_m": 5e-5}
     measured = printed(report(verified_error_m=2e-4, **verified))
     said = "measured simulation error 0.2 mm, against a run with steps of 0.5 ms and 44 elastic coordinates"
@@ -54,6 +56,23 @@ def test_joints_that_come_apart_are_reported(gap, told):
     stream = io.StringIO()
     print_joint_gap(console_on(stream), gap)
     assert stream.getvalue().startswith(told) and bool(stream.getvalue()) == bool(told)
+
+
+@pytest.mark.parametrize("verbose", [False, True])
+def test_rotations_without_weight_are_printed_only_on_request(verbose):
+    errors = {f"{kind}_{name}": 0.1 for kind in ("max", "rms") for name in ("error_m", "rotation_error_rad")}
+    targets = [{"path": "/Cup", "rotation_weight": 0.05} | errors, {"path": "/Elbow", "rotation_weight": 0.0} | errors]
+    stream = io.StringIO()
+    print_errors(console_on(stream), report(targets=targets), verbose)
+    position, rotation = stream.getvalue().split("Rotation error of the targets")
+    assert "/Elbow" in position and "/Cup" in rotation and ("/Elbow" in rotation) == verbose
+
+
+def test_figures_of_a_folder_are_named_on_one_line():
+    stream = io.StringIO()
+    files = dict.fromkeys(("layer", "root_layer", "rrd", "video", "csv"))
+    print_files(console_on(stream), report(**files, figures=["out/errors.png", "out/motors.png"]))
+    assert "wrote errors.png, motors.png in out" in stream.getvalue()
 
 
 def test_the_answer_comes_first():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from operator import itemgetter
 from typing import TYPE_CHECKING, Any, TextIO
 
@@ -38,6 +39,7 @@ def _print_contents(console: Console, report: dict[str, Any]) -> None:
     units = report["units"]
     frames = counted(report["frames"], "frame")
     say(console, f"{unbroken(report['shot'])}: {report['character']}, {frames}, {report['duration_s']:.4g} s")
+    _print_answer(console, report)
     gravity = ", ".join(f"{component:.4g}" for component in report["gravity_m_s2"])
     say(
         console,
@@ -78,12 +80,24 @@ def _print_contents(console: Console, report: dict[str, Any]) -> None:
         modes = zip(report["system_frequencies_hz"], report["system_damping_ratios"], strict=True)
         shown = ", ".join(f"{frequency:.4g} Hz ({ratio:.2g})" for frequency, ratio in modes)
         say(console, f"natural frequencies of the character in its first pose (damping ratios): {shown}, ...")
-    say(console, _expected(report["expected"]))
     _print_gains(console, report)
     print_left_out(console, report["left_out"])
     if report["mode_shapes"]:
         say(console, f"mode shapes: {', '.join(map(unbroken, report['mode_shapes']))}")
     print_notes(console, report["notes"])
+
+
+def _print_answer(console: Console, report: dict[str, Any]) -> None:
+    """What there is, what an optimisation would take, and the next command."""
+    bodies, motors = report["bodies"], report["motors"]
+    flexible = sum(body["simulated"] == "flexible" for body in bodies)
+    fixed = sum(not motor["optimize"] for motor in motors)
+    held = f" ({fixed} of them must not change)" if fixed else ""
+    parts = [f"{len(bodies)} {'body' if len(bodies) == 1 else 'bodies'} ({flexible} flexible)"]
+    parts += [counted(len(report["joints"]), "joint"), counted(len(motors), "motor") + held]
+    say(console, f"{', '.join(parts)} and {counted(len(report['targets']), 'target')}")
+    say(console, _expected(report["expected"]))
+    say(console, f"next: calmotion simulate {unbroken(shlex.quote(report['shot']))} shows how much it shakes")
 
 
 def _expected(row: dict[str, Any]) -> str:
@@ -112,12 +126,12 @@ def _print_gains(console: Console, report: dict[str, Any]) -> None:
         ideal = all(motor["model"] == PRESCRIBED for motor in report["motors"])
         lag, rest = (max(effects, key=itemgetter(key)) for key in ("max_error_m", "sag_m"))
         model = "servo" if any(motor["type"] for motor in report["motors"]) else "drive"
-        remedy = f"; set calm:motor:model to {model} to simulate them" if ideal else ""
+        remedy = f" This shot has ideal motors: set calm:motor:model to {model} to simulate the gains." if ideal else ""
         say(
             console,
-            f"with these gains {lag['path']} would be off by up to {length(lag['max_error_m'])} (with ideal motors "
-            f"{length(lag['ideal_max_error_m'])}), {rest['path']} at rest by {length(rest['sag_m'])} "
-            f"({length(rest['ideal_sag_m'])}); {'no motor gives' if ideal else 'motors give'} in this shot{remedy}",
+            f"With these gains the largest error as animated is about {length(lag['max_error_m'])} at {lag['path']} "
+            f"(ideal motors: {length(lag['ideal_max_error_m'])}), and the sag at rest {length(rest['sag_m'])} at "
+            f"{rest['path']} (ideal motors: {length(rest['ideal_sag_m'])}).{remedy}",
         )
 
 

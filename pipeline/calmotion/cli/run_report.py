@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any, TextIO
 
 from rich.console import Console
@@ -144,7 +145,7 @@ def print_verdict(console: Console, report: dict[str, Any]) -> None:
     tolerance = length(report["tolerance_m"])
     if report["tolerance_kept"]:
         error = length(report["simulation_error_m"])
-        say(console, f"The simulation keeps the tolerance of {tolerance}: error {error}.")
+        say(console, f"The simulation keeps the tolerance of {tolerance}: these numbers are accurate to {error}.")
     elif report["simulation_error_m"] is None:
         say(console, f"The error of the simulation was not estimated; the tolerance is {tolerance}.")
     else:
@@ -210,7 +211,7 @@ def print_run(report: dict[str, Any], stream: TextIO, verbose: bool = False) -> 
     """
     console = console_on(stream)
     print_verdict(console, report)
-    print_errors(console, report)
+    print_errors(console, report, verbose)
     print_robustness(console, report)
     print_files(console, report)
     print_warnings(console, report)
@@ -222,14 +223,19 @@ def print_run(report: dict[str, Any], stream: TextIO, verbose: bool = False) -> 
     print_left_out(console, report["left_out"])
 
 
-def print_errors(console: Console, report: dict[str, Any]) -> None:
-    """Errors of each target, before and after where the shot was optimised."""
+def print_errors(console: Console, report: dict[str, Any], verbose: bool = False) -> None:
+    """Errors of each target, before and after where the shot was optimised.
+
+    Args:
+        verbose: Whether rotations are printed also of targets whose rotation has no weight.
+    """
     suffixes = ["_before", "_after"] if _last(report) else [""]
     heads = [f"{kind}{' ' + s[1:] if s else ''}" for kind in ("max", "rms") for s in suffixes]
     for title, unit, shown in (("Position", "m", length), ("Rotation", "rad", angle)):
         name = "error" if unit == "m" else "rotation_error"
         keys = [f"{kind}_{name}{suffix}_{unit}" for kind in ("max", "rms") for suffix in suffixes]
-        rows = [[target["path"], *(shown(target[key]) for key in keys)] for target in report["targets"]]
+        targets = [t for t in report["targets"] if verbose or unit == "m" or t["rotation_weight"] > 0.0]
+        rows = [[target["path"], *(shown(target[key]) for key in keys)] for target in targets]
         print_table(console, f"{title} error of the targets", ["target", *heads], rows)
 
 
@@ -238,8 +244,10 @@ def print_files(console: Console, report: dict[str, Any]) -> None:
     for name in ("layer", "root_layer", "rrd", "video", "csv"):
         if report[name]:
             say(console, f"wrote {unbroken(report[name])}")
-    for figure in report["figures"]:
-        say(console, f"wrote {unbroken(figure)}")
+    figures = [Path(figure) for figure in report["figures"]]
+    for folder in dict.fromkeys(figure.parent for figure in figures):
+        names = ", ".join(figure.name for figure in figures if figure.parent == folder)
+        say(console, f"wrote {names} in {unbroken(folder)}")
     if report["root_layer"]:
         shown_with = "the new curves" if _last(report) else "the simulated motion"
         say(console, f"next: open {unbroken(report['root_layer'])}, which shows the shot with {shown_with}")

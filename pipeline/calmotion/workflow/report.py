@@ -42,6 +42,7 @@ def target_errors(character: Character, simulation: Simulation, suffix: str) -> 
     return [
         {
             "path": target.path,
+            "rotation_weight": target.rotation_weight,
             f"max_error{suffix}_m": float(position[0][k]),
             f"rms_error{suffix}_m": float(position[1][k]),
             f"max_rotation_error{suffix}_rad": float(rotation[0][k]),
