@@ -105,7 +105,8 @@ class SimulateShot(Operator):
         if shaped is not None:
             shot = shot.with_tracks(shaped.tracks)
         error, known = (None, None) if converged is None else (converged.error_m, converged.known)
-        result = simulate_to_tolerance(shot, _options(context), context.progress, error, known)
+        memory = None if converged is None else converged.memory
+        result = simulate_to_tolerance(shot, _options(context), context.progress, error, known, memory)
         return [_with_budget(context, result)]
 
 
@@ -197,8 +198,9 @@ class OptimizeShot(Operator):
         layer = paths.layer if paths is not None else None
         kept, stored = (checkpoint_path(layer), windows_path(layer)) if layer else (None, None)
         converged = context.get(ConvergedReduction)
-        known = None if converged is None else converged.known
-        result = optimize_to_tolerance(compiled_in(context.get), options, context.progress, kept, known, stored)
+        known, memory = (None, None) if converged is None else (converged.known, converged.memory)
+        shot = compiled_in(context.get)
+        result = optimize_to_tolerance(shot, options, context.progress, kept, known, stored, memory)
         if result.interrupted:
             context.report(
                 "warning", "interrupted: these are the best curves so far; the same command resumes from them"

@@ -105,3 +105,19 @@ def test_either_can_be_forced(nonlinear, known):
     loosely = held(nonlinear, known, 1.0).shot.bodies
     assert count(fewest.shot.bodies) == count(loosely) != count(nonlinear.bodies)
     assert fewest.error_m > 0.0 and fewest.is_accurate_for(known.animation.current, STEP)
+
+
+def test_more_directions_tell_whether_a_motion_leaves_the_subspaces(nonlinear, animation, known):
+    found = held(nonlinear, known)
+    run = simulate_at(found.shot, RunSettings(integrator=FAST), STEP)
+    near = found.finer_run(STEP, RunSettings(integrator=FAST))
+    assert distance(run.positions, near.positions) == pytest.approx(found.error_m, rel=0.3)
+    assert held(nonlinear, known, 0.0).finer_run(STEP, RunSettings()) is None, "nothing is finer than all coordinates"
+    faster = [Track(track.times, 3.0 * track.values) for track in animation.current]
+    moved = found.of_shot(nonlinear.with_tracks(faster), lambda item: ALLOWED)
+    assert moved.shot.bodies is not nonlinear.bodies and count(moved.shot.bodies) == count(found.shot.bodies)
+    off_by_finer = distance(
+        simulate_at(moved.shot, RunSettings(integrator=FAST), STEP).positions,
+        moved.finer_run(STEP, RunSettings(integrator=FAST)).positions,
+    )
+    assert off_by_finer > 0.3 * off(nonlinear, found.shot, faster, STEP)

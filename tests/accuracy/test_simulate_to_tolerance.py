@@ -203,9 +203,9 @@ def test_a_search_continues_where_the_pod_subspace_does_not_fit(arm, animation, 
         asked.append(tracks)
         return plain_hold(self, tracks, step) and len(asked) > 1
 
-    def search(shot, *more):
+    def search(shot, *more, **named):
         parts.append(shot)
-        return plain_search(shot, *more)
+        return plain_search(shot, *more, **named)
 
     monkeypatch.setattr(ProjectedShot, "is_accurate_for", is_accurate_for)
     monkeypatch.setattr(retarget, "optimize_shot", search)

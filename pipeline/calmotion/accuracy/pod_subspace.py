@@ -11,6 +11,7 @@ nothing beside it, how many. Linear bodies keep theirs: these are few, and cheap
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from copy import copy
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -29,6 +30,7 @@ from calmotion.simulation.compiled_shot import CompiledShot
 
 # Square roots of the shares of strain energy that may be missing, each tried after the last; beyond, rounding counts.
 MISSING = tuple(10.0 ** (-0.5 * k) for k in range(4, 13))
+FINER = 0.1  # of the missing share: directions of a subspace that tells the error of one
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,22 +65,58 @@ class ProjectedShot:
         self._complete, self._options = complete, options
         self._allowed, self._known = allowed, list(known)
         self._chosen = _candidates(complete, options)
-        self.shot, self.error_m = complete, 0.0
+        self.shot, self.error_m, self._missing = complete, 0.0, 0.0
         if self._chosen:
             self._project()
 
+    def of_shot(self, shot: CompiledShot, allowed: Callable[[ReferenceRun], float]) -> ProjectedShot:
+        """The same bodies in another shot of the robot, whose motion is almost that of the known simulations.
+
+        Args:
+            shot: Its bodies with all coordinates, the same as those of this one.
+            allowed: As of the class.
+        """
+        other = copy(self)
+        other._complete, other._known, other._allowed = shot, list(self._known), allowed
+        other.shot = shot if self.shot is self._complete else shot.with_bodies(self.shot.bodies)
+        return other
+
+    def finer_run(self, step: float, options: RunSettings, tracks: Sequence[Track] | None = None) -> StepRun | None:
+        """The shot in the directions for a hundredth of the missing energy; None where it has all coordinates.
+
+        It costs a fraction of a simulation with all coordinates, and its distance from the one in the directions tells
+        whether a motion that is almost a known one leaves them.
+
+        Args:
+            step: [s].
+            options: Of the run.
+            tracks: The motors' curves; None: the shot's current ones.
+
+        Raises:
+            ShotError: The simulation is not possible.
+        """
+        if self.shot is self._complete:
+            return None
+        complete = self._complete if tracks is None else self._complete.with_tracks(tracks)
+        return simulate_at(complete.with_bodies(self._few(FINER * self._missing)), options, step)
+
+    def _few(self, missing: float) -> list[ReducedBody]:
+        """The bodies in the directions of the known simulations, but for a share of their energy."""
+        few = list(self._complete.bodies)
+        for b in self._chosen:
+            motion = np.vstack([item.run.elastic[b] for item in self._known])
+            few[b] = projected_body(few[b], principal_subspace(few[b], motion, missing))
+        return few
+
     def _project(self) -> None:
         complete = self._complete
-        motion = {b: np.vstack([item.run.elastic[b] for item in self._known]) for b in self._chosen}
         for missing in MISSING:
-            few = list(complete.bodies)
-            for b, coordinates in motion.items():
-                few[b] = projected_body(few[b], principal_subspace(few[b], coordinates, missing))
+            few = self._few(missing)
             shot = complete.with_bodies(few)
             off = [self._off(shot, item) for item in self._known]
             forced = self._options.directions == OFF and all(map(np.isfinite, off))
             if forced or all(error <= self._allowed(item) for error, item in zip(off, self._known, strict=True)):
-                self.error_m = max(off)
+                self.error_m, self._missing = max(off), missing
                 self.shot = complete.with_bodies(_told(complete.character, complete.bodies, few, self.error_m))
                 return
         self.shot, self.error_m = complete, 0.0

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from calmotion.simulation.compiled_shot import CompiledShot
 
 if TYPE_CHECKING:
-    from calmotion.accuracy.pod_subspace import ReferenceRun
+    from calmotion.accuracy.pod_subspace import ProjectedShot, ReferenceRun
     from calmotion.reduction.reduced_body import ReducedBody
     from calmotion.shot import ModeTable
     from calmotion.simulation.body_reduction import BodyReduction
@@ -30,6 +30,23 @@ class ReducedBodies:
     reduction: BodyReduction | None = None
 
 
+@dataclass(eq=False)
+class RunMemory:
+    """What the last run of a shot with the same bodies found, for a run of almost the same motion.
+
+    Attributes:
+        projected: The bodies in its directions; None before the first run.
+        step: Its time step [s]; 0 where it was not chosen.
+        integrator: By which it was simulated.
+        search: What its search leaves to the next, see `retargeting.search_memory`.
+    """
+
+    projected: ProjectedShot | None = None
+    step: float = 0.0
+    integrator: str = ""
+    search: Any = None
+
+
 @dataclass(frozen=True, eq=False)
 class ConvergedReduction:
     """Reduced bodies that do for a shot.
@@ -40,12 +57,14 @@ class ConvergedReduction:
             where two reductions agree by chance the finer is the safer.
         known: The shot as animated, simulated with these bodies.
         reduction: Makes these bodies again to another tolerance, on their meshes.
+        memory: What runs with these bodies leave for the next one.
     """
 
     shot: CompiledShot
     error_m: float
     known: ReferenceRun
     reduction: BodyReduction | None = None
+    memory: RunMemory = field(default_factory=lambda: RunMemory())
 
 
 def compiled_in(get: Callable[[type[Any]], Any]) -> CompiledShot:

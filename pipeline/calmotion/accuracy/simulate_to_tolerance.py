@@ -14,6 +14,8 @@ import numpy as np
 from calmotion.accuracy.integrator_choice import by_fast_scheme
 from calmotion.accuracy.mesh_budget import mesh_error, patch_error
 from calmotion.accuracy.pod_subspace import ProjectedShot, ReferenceRun, project_to_subspace
+from calmotion.accuracy.reduced_bodies import RunMemory
+from calmotion.accuracy.simulate_again import with_last_choices
 from calmotion.accuracy.step_error import (
     ORDER,
     StepRun,
@@ -35,6 +37,7 @@ from calmotion.simulation.bodies import mode_tables
 from calmotion.simulation.compiled_shot import CompiledShot
 from calmotion.simulation.inputs.curves import sample_tracks
 from calmotion.simulation.inputs.time_grid import MAX_STEP, make_grid
+from calmotion.simulation.parallel import in_parallel
 from calmotion.simulation.prepare import prepare
 from calmotion.simulation.simulate import Progress, intended_motion, simulate_shot
 
@@ -49,18 +52,23 @@ FINDING = "choosing the subspace of the deformations in this shot"
 
 def simulate_to_tolerance(
     shot: CompiledShot, options: RunSettings, progress: Progress, left_out_m: float | None = None,
-    known: ReferenceRun | None = None,
+    known: ReferenceRun | None = None, memory: RunMemory | None = None,
 ) -> Result:  # fmt: skip
     """As `simulate_shot`, with POD subspaces of the bodies and a time step that keep the tolerance.
 
     Args:
         left_out_m: Error of what the bodies do without where it is known better than their own estimates [m].
         known: The shot, simulated with them; None: not known yet.
+        memory: Of the last run, whose choices are tried first, and which takes those of this one.
     """
+    character, chooses = shot.character, chooses_step(shot.character, options)
+    left_out_m = omitted_error(shot.bodies) if left_out_m is None else left_out_m
+    again = None if memory is None or not chooses else _simulated_again(shot, options, progress, left_out_m, memory)
+    if again is not None:
+        return again
     progress(0.0, FINDING)
-    projected, character = project_to_tolerance(shot, options, known), shot.character
-    left_out = (omitted_error(shot.bodies) if left_out_m is None else left_out_m) + projected.error_m
-    chooses = chooses_step(character, options)
+    projected = project_to_tolerance(shot, options, known)
+    left_out = left_out_m + projected.error_m
     if chooses:
         progress(0.0, "choosing the time step")
 
@@ -72,11 +80,31 @@ def simulate_to_tolerance(
         step, error = chosen_step(projected.shot, options, left_out, trials)
         result = with_modes(simulate_shot(projected.shot, replace(options, step=step), progress), shot.bodies)
         run = replace(frames_of(result, shot.animation.frame_times), integrator=options.scheme)
+        if memory is not None:
+            memory.projected, memory.step, memory.integrator = projected, step, options.scheme
         accuracy = _accuracy(error, left_out, projected.shot, options, run)
         return with_step(result, character, options, replace(accuracy, efforts=_effort_errors(run, trials)))
 
     # a search by the same given step uses BDF2 as well, and what it wrote shall have the same errors
     return by_fast_scheme(options, simulated) if chooses else simulated(options)
+
+
+def _simulated_again(
+    shot: CompiledShot, options: RunSettings, progress: Progress, left_out_m: float, memory: RunMemory
+) -> Result | None:
+    """The result by the choices of the last run, where they still keep the tolerance; else None."""
+    character = shot.character
+    found = with_last_choices(shot, options, progress, memory, allowed_by_subspaces(character, options))
+    if found is None:
+        return None
+    result, projected, run, coarse = found
+    error, left_out = step_error(coarse, run), left_out_m + projected.error_m
+    if error > allowed_step_error(character, options, left_out):
+        return None
+    options = replace(options, integrator=memory.integrator)
+    accuracy = _accuracy(error, left_out, projected.shot, options, coarse)  # differences of runs need no fine step
+    result = with_modes(result, shot.bodies)
+    return with_step(result, character, options, replace(accuracy, efforts=effort_errors(run, coarse)))
 
 
 def with_accuracy(result: Result, shot: CompiledShot, options: RunSettings, left_out: float) -> Result:
@@ -106,9 +134,16 @@ def project_to_tolerance(
         known: The shot, simulated with the bodies, where that was done.
         shake: How far a run is from what is intended, where that will be taken away [m].
     """
-    least = HELD * tolerance_of(shot.character, options.tolerance)
-    step = own_step(shot.character, options)
-    return project_to_subspace(shot, options, step, lambda item: max(least, HELD * OF_SHAKE * shake(item.run)), known)
+    allowed = allowed_by_subspaces(shot.character, options, shake)
+    return project_to_subspace(shot, options, own_step(shot.character, options), allowed, known)
+
+
+def allowed_by_subspaces(
+    character: Character, options: RunSettings, shake: Callable[[StepRun], float] = lambda run: 0.0
+) -> Callable[[ReferenceRun], float]:
+    """Error that POD subspaces may cause in a run [m]; arguments as of `project_to_tolerance`."""
+    least = HELD * tolerance_of(character, options.tolerance)
+    return lambda item: max(least, HELD * OF_SHAKE * shake(item.run))
 
 
 def own_step(character: Character, options: RunSettings) -> float:
@@ -215,7 +250,8 @@ def _accuracy(step: float, left_out: float, shot: CompiledShot, options: RunSett
     """The estimates for a run: of its step, of what its bodies do without, of their meshes and patches [m]."""
     rows = [row for body in shot.bodies for row in body.left_out]
     subspace = sum(row.estimated_error_m or 0.0 for row in rows if row.source == SUBSPACE)
-    return Accuracy(step, left_out, mesh_error(shot, options, run), subspace, patch_error(shot, options, run))
+    mesh, patch = in_parallel(lambda error: error(shot, options, run), (mesh_error, patch_error))
+    return Accuracy(step, left_out, mesh, subspace, patch or 0.0)
 
 
 def intended_positions(shot: CompiledShot, options: RunSettings) -> Array:

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from calmotion.accuracy.reduced_bodies import RunMemory
 from calmotion.errors import ShotError
 from calmotion.multibody.failure import SimulationFailure
 from calmotion.multibody.integrators.workspace import Workspace
@@ -20,6 +21,7 @@ from calmotion.retargeting.problem.problem import RetargetProblem
 from calmotion.retargeting.problem.robot import Robot
 from calmotion.retargeting.robust.scenarios import shot_of
 from calmotion.retargeting.search import RetargetSearch
+from calmotion.retargeting.search_memory import SearchMemory
 from calmotion.retargeting.simplification.report_rows import search_rows
 from calmotion.retargeting.solver.gauss_newton import Search
 from calmotion.shot import Character, OptimizerStep, Result
@@ -49,7 +51,7 @@ def _progress_of(search: Search) -> tuple[OptimizerStep, ...]:
 
 def optimize_shot(
     shot: CompiledShot, options: RunSettings, progress: Progress, checkpoint: Path | None = None,
-    scenarios: Sequence[Scenario] = (),
+    scenarios: Sequence[Scenario] = (), memory: RunMemory | None = None,
 ) -> Result:  # fmt: skip
     """Retarget a shot: change its motor curves so that the flexible robot moves as it was animated to.
 
@@ -59,6 +61,7 @@ def optimize_shot(
         checkpoint: File that stores the search after each iteration, and from which a search resumes if the file
             exists; None stores nothing.
         scenarios: Robots for all of which the curves are optimised, the nominal one first; none: that one alone.
+        memory: With what the last search left, and where this one leaves the same.
 
     Raises:
         ShotError: The shot cannot be processed.
@@ -77,7 +80,7 @@ def optimize_shot(
         compile_kernels(
             model, Workspace.for_system(model.system), curves.angles, curves.rates, grid.h, prepared.world
         )  # fmt: skip
-        return _optimized(prepared, (problem, start, adaptive), intended, options, progress, checkpoint)
+        return _optimized(prepared, (problem, start, adaptive), intended, options, progress, checkpoint, memory)
     except SimulationFailure as failure:
         raise failure_error(prepared, failure) from failure
 
@@ -106,7 +109,7 @@ def refuse_other_integrators(options: RunSettings) -> None:
 
 def _optimized(
     prepared: Prepared, posed: tuple[RetargetProblem, Array, bool], intended: IntendedMotion, options: RunSettings,
-    progress: Progress, checkpoint: Path | None,
+    progress: Progress, checkpoint: Path | None, memory: RunMemory | None,
 ) -> Result:  # fmt: skip
     """Simulate the input, search, simulate the result."""
     character, animation, begin = prepared.character, prepared.shot.animation, time.perf_counter()
@@ -130,8 +133,10 @@ def _optimized(
         problem, Search.start(start), (), character, animation, options, tolerance,
         lowest_frequency(prepared), adaptive, kept, progress,
     )  # fmt: skip
-    searched.run(start)
+    searched.run(start, None if memory is None else memory.search)
     problem, search = searched.problem, searched.search
+    if memory is not None:
+        memory.search = SearchMemory.of(problem, search)
     fixed = searched.hold()
     curves, x = found_curves(problem, len(character.motors), search.x)
     problem.forget()

@@ -12,6 +12,7 @@ from calmotion.retargeting.problem.adaptive_knots import converted, refined_brea
 from calmotion.retargeting.problem.offset_basis import OffsetBasis, basis_on
 from calmotion.retargeting.problem.posing import locked_coefficients
 from calmotion.retargeting.problem.problem import RetargetProblem
+from calmotion.retargeting.search_memory import SearchMemory
 from calmotion.retargeting.search_progress import SearchProgress
 from calmotion.retargeting.simplification.idle_motors import idle_gain, idle_motors
 from calmotion.retargeting.simplification.inactive_intervals import (
@@ -77,14 +78,17 @@ class RetargetSearch:
     def __post_init__(self) -> None:
         self._done = SearchProgress(WORTH * self.tolerance)
 
-    def run(self, start: Array) -> None:
+    def run(self, start: Array, last: SearchMemory | None = None) -> None:
         """Search from a point, or resume from the checkpoint; an interrupt (Ctrl-C) ends the search.
 
         Args:
             start: Shape [n].
+            last: What the search of almost the same shot left.
         """
         self.inactive = inactive_intervals(self.problem, start, self.frequency, self.tolerance, self.options.ranges)
         self.search = Search.start(np.where(self._fixed_on(self.problem.space.basis), 0.0, start))
+        if last is not None:
+            self.search = last.begun(self.problem, self.search)
         resumed = self._resume()
         fixed = self.hold()
         try:

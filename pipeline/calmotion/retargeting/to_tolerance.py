@@ -8,11 +8,14 @@ from pathlib import Path
 
 import numpy as np
 
-from calmotion.accuracy.pod_subspace import ReferenceRun
+from calmotion.accuracy.pod_subspace import ProjectedShot, ReferenceRun
+from calmotion.accuracy.reduced_bodies import RunMemory
 from calmotion.accuracy.simulate_to_tolerance import (
     FINDING,
     FIRST,
+    HELD,
     LAST,
+    allowed_by_subspaces,
     allowed_step_error,
     chooses_step,
     found_tracks,
@@ -27,6 +30,7 @@ from calmotion.accuracy.step_error import (
     ORDER,
     StepRun,
     distance,
+    frames_of,
     largest_step,
     simulate_at,
 )
@@ -36,7 +40,7 @@ from calmotion.retargeting.search_progress import SuccessiveSearches
 from calmotion.retargeting.simplification.idle_motors import ENOUGH
 from calmotion.retargeting.windows.optimize import optimize_windows
 from calmotion.retargeting.windows.plan import window_length
-from calmotion.shot import OptimizerStep, Result
+from calmotion.shot import OptimizerStep, Result, Track
 from calmotion.shot.model_choice import OFF
 from calmotion.shot.run import RunSettings
 from calmotion.shot.tolerance import tolerance_of
@@ -49,7 +53,7 @@ FIRST_STEP = 0.2  # of the shake: the error that the step of the first search ma
 
 def optimize_to_tolerance(
     shot: CompiledShot, options: RunSettings, progress: Progress, checkpoint: Path | None = None,
-    known: ReferenceRun | None = None, stored: Path | None = None,
+    known: ReferenceRun | None = None, stored: Path | None = None, memory: RunMemory | None = None,
 ) -> Result:  # fmt: skip
     """As `optimize_shot`, with the time step and the POD subspaces of the bodies chosen by their errors.
 
@@ -59,6 +63,7 @@ def optimize_to_tolerance(
 
     Args:
         stored: File of the windows of a long shot that are done, see `windows`.
+        memory: Of the last run, whose choices the first search takes, and which takes those of this one.
     """
     refuse_other_integrators(options)
     character, animation = shot.character, shot.animation
@@ -68,19 +73,28 @@ def optimize_to_tolerance(
         return distance(run.positions, intended())
 
     progress(0.0, FINDING)
-    projected = project_to_tolerance(shot.with_tracks(animation.tracks), options, known, shake)
+    memory = memory or RunMemory()
+    again = memory.projected is not None
+    if memory.projected is not None:
+        projected = memory.projected.of_shot(shot, allowed_by_subspaces(character, options, shake))
+    else:
+        projected = project_to_tolerance(shot.with_tracks(animation.tracks), options, known, shake)
     chooses = chooses_step(character, options)
     step = own_step(character, options)
-    if chooses:
+    if chooses and again and memory.step:
+        step = memory.step
+    elif chooses:
         progress(0.0, "choosing the time step")
         enough = allowed_step_error(character, options, omitted_error(projected.shot.bodies))
         trial = partial(simulate_at, projected.shot, options)
         step, _ = largest_step(trial, FIRST, LAST, lambda run: max(enough, FIRST_STEP * shake(run)))
     result, tracks, searches = None, animation.current, SuccessiveSearches(progress)
-    for _ in range(MOST):
+    for number in range(MOST):
+        if number:
+            memory.search = None  # a search that goes on from a checkpoint is to find the same
         reduced = projected.shot.with_tracks(tracks)
         of_step = replace(options, step=step) if chooses else options
-        latest = _searched(reduced, of_step, searches, checkpoint, stored)
+        latest = _searched(reduced, of_step, searches, checkpoint, stored, memory)
         searches.ended()
         result = with_modes(latest if result is None else _continued(result, latest), shot.bodies)
         if result.interrupted:
@@ -93,7 +107,8 @@ def optimize_to_tolerance(
         fine = result.accuracy.step_m <= allowed or step <= LAST
         iterations = max((row.iterations for row in latest.windows), default=latest.iterations)
         ended = iterations >= options.max_iterations  # a new POD subspace would allow no further iteration
-        if fine and (ended or projected.is_accurate_for(tracks, own_step(character, options))):
+        if fine and (ended or _is_accurate(projected, tracks, result, options, again)):
+            memory.projected, memory.step = projected, result.step_s
             break
         if not fine:
             step = max(LAST, MARGIN * result.step_s * (allowed / result.accuracy.step_m) ** (1.0 / ORDER))
@@ -109,30 +124,48 @@ def optimize_to_tolerance(
     return with_accuracy(with_modes(robust, shot.bodies), reduced, options, omitted_error(reduced.bodies))
 
 
+def _is_accurate(
+    projected: ProjectedShot, tracks: tuple[Track, ...], result: Result, options: RunSettings, again: bool
+) -> bool:
+    """Whether the subspaces do for the curves that were found; if not, they are chosen anew.
+
+    Args:
+        again: Whether they are those of almost the same shot: then more directions tell, else all of them.
+    """
+    animation, character = projected.shot.animation, projected.shot.character
+    if again:
+        finer = projected.finer_run(result.step_s, options, tracks)
+        run = frames_of(result, animation.frame_times)
+        off = 0.0 if finer is None else distance(finer.positions, run.positions)
+        if off <= HELD * tolerance_of(character, options.tolerance):
+            return True
+    return projected.is_accurate_for(tracks, max(result.step_s, own_step(character, options)))
+
+
 def _searched(
     shot: CompiledShot, options: RunSettings, progress: SuccessiveSearches, checkpoint: Path | None,
-    stored: Path | None,
+    stored: Path | None, memory: RunMemory,
 ) -> Result:  # fmt: skip
     """One search; it continues with the idle motors if these would gain too much."""
     character = shot.character
-    first = _search(shot, options, progress, checkpoint, stored)
+    first = _search(shot, options, progress, checkpoint, stored, memory)
     enough = ENOUGH * tolerance_of(character, options.tolerance)
     if first.interrupted or first.idle_gain_m is None or first.idle_gain_m <= enough or options.motors == OFF:
         return first
     progress.ended()
     motors = tuple(replace(motor, idle=False) for motor in character.motors)
     every = shot.with_tracks(found_tracks(first, shot.animation)).with_character(replace(character, motors=motors))
-    return _continued(first, _search(every, options, progress, checkpoint, stored))
+    return _continued(first, _search(every, options, progress, checkpoint, stored, memory))
 
 
 def _search(
     shot: CompiledShot, options: RunSettings, progress: SuccessiveSearches, checkpoint: Path | None,
-    stored: Path | None,
+    stored: Path | None, memory: RunMemory,
 ) -> Result:  # fmt: skip
     """One search over the shot, or in windows where it is long."""
     length = window_length(shot.character, shot.animation, options)
     if length is None:
-        return optimize_shot(shot, options, progress, checkpoint)
+        return optimize_shot(shot, options, progress, checkpoint, memory=memory)
     return optimize_windows(shot, options, length, progress, checkpoint, stored)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import time
 from collections.abc import Callable
 
@@ -25,3 +26,9 @@ def median_time(action: Callable[[], object], repeats: int = 5, *, warm: bool = 
         action()
         times.append(time.perf_counter() - begin)
     return float(np.median(times))
+
+
+def processor_time() -> float:
+    """That of this process and of those that it started and that have ended [s]."""
+    times = os.times()
+    return times.user + times.system + times.children_user + times.children_system

@@ -2,12 +2,12 @@
 
 Each shot is optimised as by `calmotion optimize`, with the caches as they are. Times are processor times of this
 process and those that it started, as other work on the machine changes them least; compiling is counted by itself.
+A second table tells what `calmotion watch` takes after one key was moved, over the first run, see `edits`.
 """
 
 from __future__ import annotations
 
 import argparse
-import os
 import tempfile
 import time
 from collections import defaultdict
@@ -18,6 +18,8 @@ from pathlib import Path
 from typing import Any
 
 from calmotion.benchmarks.common.tables import markdown
+from calmotion.benchmarks.common.timing import processor_time
+from calmotion.benchmarks.speed import edits
 from calmotion.errors import ShotError
 from calmotion.host import OperatorResult
 from calmotion.shot.run import OutputPaths
@@ -60,10 +62,10 @@ def measure(path: str) -> Stages:
     """
     compiling = _Compiling()
     used: defaultdict[str, float] = defaultdict(float)
-    state = {"cpu": _cpu(), "compile": 0.0}
+    state = {"cpu": processor_time(), "compile": 0.0}
 
     def done(result: OperatorResult) -> None:
-        now, compiled = _cpu(), compiling.seconds
+        now, compiled = processor_time(), compiling.seconds
         used[OPERATORS.get(result.idname, "other")] += now - state["cpu"] - (compiled - state["compile"])
         state.update({"cpu": now, "compile": compiled})
 
@@ -88,19 +90,14 @@ class _Compiling(event.Listener):  # type: ignore[misc]
     def on_start(self, happened: Any) -> None:
         """Called by numba when it begins to compile a function."""
         if not self._depth:
-            self._begin = _cpu()
+            self._begin = processor_time()
         self._depth += 1
 
     def on_end(self, happened: Any) -> None:
         """Called by numba when it has compiled it."""
         self._depth -= 1
         if not self._depth:
-            self.seconds += _cpu() - self._begin
-
-
-def _cpu() -> float:
-    times = os.times()
-    return times.user + times.system + times.children_user + times.children_system
+            self.seconds += processor_time() - self._begin
 
 
 def table(runs: Sequence[Stages]) -> str:
@@ -118,11 +115,14 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Measure shots and print the table."""
     parser = argparse.ArgumentParser(prog="calmotion bench speed", description="Where the time of a run goes.")
     parser.add_argument("shots", nargs="*", default=SHOTS, help="shots that are optimised (default: the samples)")
-    runs = []
+    parser.add_argument(
+        "--edit", nargs="*", metavar="SHOT", help="shots that are run again after an edit (default: the first one)"
+    )
+    args = parser.parse_args(argv)
     try:
-        for path in parser.parse_args(argv).shots:
-            runs.append(measure(path))
+        print(table([measure(path) for path in args.shots]))
+        for path in args.shots[:1] if args.edit is None else args.edit:
+            print(edits.table([edits.measure_edit(path, command) for command in edits.COMMANDS]))
     except ShotError as error:
         parser.exit(1, f"error: {error}\n")
-    print(table(runs))
     return 0

@@ -14,7 +14,6 @@ from calmotion.multibody.model.model import Model
 from calmotion.retargeting.problem.limits import LimitTerms
 from calmotion.retargeting.problem.offset_basis import OffsetBasis
 from calmotion.retargeting.problem.offset_space import OffsetSpace
-from calmotion.retargeting.problem.parallel import in_parallel
 from calmotion.retargeting.problem.response_gram import products_worth, response_gram
 from calmotion.retargeting.problem.rigid_approximation import (
     EFFORT,
@@ -40,6 +39,7 @@ from calmotion.simulation.forward import ForwardRun, limited_values
 from calmotion.simulation.inputs.curves import Curves
 from calmotion.simulation.inputs.time_grid import TimeGrid
 from calmotion.simulation.motor_limits import QUANTITIES
+from calmotion.simulation.parallel import in_parallel
 from calmotion.simulation.simulator import Simulator
 from calmotion.simulation.target_errors import Objective
 
@@ -69,7 +69,7 @@ class RetargetProblem:
         self._continuous = continuous
         self._limited: dict[str, Array] | None = None
         self.x = self._linearized_x = np.zeros(0)  # points evaluated and linearised last
-        self._preconditioner: RigidPreconditioner | DensePreconditioner | None = None
+        self.preconditioner: RigidPreconditioner | DensePreconditioner | None = None
         self._sharpened_x = np.zeros(0)  # point of the preconditioner's responses; empty for that of the rigid robot
         self._held = 0  # instant before which curves are fixed
         self._response: RigidResponse | None = None
@@ -101,7 +101,7 @@ class RetargetProblem:
             x: The same point in coefficients of the new basis.
         """
         other = self._copy()
-        other.space, other._preconditioner, other._sharpened_x = self.space.on_basis(basis), None, np.zeros(0)
+        other.space, other.preconditioner, other._sharpened_x = self.space.on_basis(basis), None, np.zeros(0)
         other.x = x
         other._linearized_x = np.zeros(0)
         return other
@@ -114,7 +114,7 @@ class RetargetProblem:
         """
         other = self._copy()
         other.space = replace(self.space, motors=motors, coupling=coupling)
-        other.limits, other._response, other._preconditioner = None, None, None
+        other.limits, other._response, other.preconditioner = None, None, None
         other._sharpened_x = np.zeros(0)
         other.x = np.zeros(other.space.size)
         return other
@@ -171,7 +171,7 @@ class RetargetProblem:
             robot.simulator.hold(first)
         if first < self._held and len(self._sharpened_x):
             # responses from a later instant on say nothing of the coefficients that are free from now on
-            self._preconditioner, self._sharpened_x = None, np.zeros(0)
+            self.preconditioner, self._sharpened_x = None, np.zeros(0)
         self._held = first
 
     def forget(self) -> None:
@@ -277,16 +277,16 @@ class RetargetProblem:
             values: Limited quantities, which say which limits act; None: at the point evaluated last.
         """
         response, acting = self._rigid(), self._acting
-        if self._preconditioner is None:
-            self._preconditioner = RigidPreconditioner(
+        if self.preconditioner is None:
+            self.preconditioner = RigidPreconditioner(
                 response, self.objective.weights, self.space.basis, self.space.penalty
             )
         curvatures = {}
         if acting is not None:
             curvatures = {name: acting.curvature(name, v) for name, v in (values or self.limited).items()}
         curvatures |= reversal_curvatures(self.robots)
-        self._preconditioner.factor(fixed, limit_metrics(response.inertia, self.space, curvatures))
-        return self._preconditioner.solve
+        self.preconditioner.factor(fixed, limit_metrics(response.inertia, self.space, curvatures))
+        return self.preconditioner.solve
 
     @property
     def patience(self) -> int | None:
@@ -300,10 +300,14 @@ class RetargetProblem:
         """The point at which `sharpen` was called last; empty if it was not."""
         return self._sharpened_x
 
+    def take(self, preconditioner: DensePreconditioner, point: Array) -> None:
+        """Precondition with a matrix of `sharpen` of almost the same problem, at a point."""
+        self.preconditioner, self._sharpened_x = preconditioner, point
+
     def sharpen(self) -> None:
         """Precondition with the Gauss-Newton matrix of the flexible robots where they are linearised, from now on."""
         gram = response_gram(self.robots, self.space)
-        self._preconditioner = DensePreconditioner(gram, self.space.penalty, self.space.basis.wraps)
+        self.preconditioner = DensePreconditioner(gram, self.space.penalty, self.space.basis.wraps)
         self._sharpened_x = self.x
 
     def damped(self, ratio: float, frequency: float) -> RetargetProblem:

@@ -4,7 +4,7 @@ import threading
 import time
 
 import pytest
-from calmotion.retargeting.problem.parallel import in_parallel
+from calmotion.simulation.parallel import in_parallel
 
 
 def test_results_keep_the_order_of_the_items():

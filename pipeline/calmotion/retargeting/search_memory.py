@@ -1,0 +1,47 @@
+"""What a search leaves to the next one of almost the same shot: its knots, its directions, and its preconditioner."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from calmotion.retargeting.problem.problem import RetargetProblem
+from calmotion.retargeting.solver.dense_preconditioner import DensePreconditioner
+from calmotion.retargeting.solver.gauss_newton import Search
+from calmotion.retargeting.solver.recycling import Recycled
+from calmotion.shot.character import Array, IntArray
+
+
+@dataclass(frozen=True, eq=False)
+class SearchMemory:
+    """The end of a search.
+
+    Attributes:
+        breaks, motors: Of its unknowns.
+        recycled: Directions of its linear systems.
+        sharpened: Preconditioner by the responses of the flexible robot, with their point; None where it had none.
+    """
+
+    breaks: IntArray
+    motors: IntArray
+    recycled: Recycled
+    sharpened: tuple[DensePreconditioner, Array] | None
+
+    @classmethod
+    def of(cls, problem: RetargetProblem, search: Search) -> SearchMemory:
+        """What the search of a problem leaves."""
+        space, own = problem.space, problem.preconditioner
+        sharpened = (own, problem.sharpened_at) if isinstance(own, DensePreconditioner) else None
+        return cls(space.basis.breaks, space.motors, search.recycled, sharpened)
+
+    def begun(self, problem: RetargetProblem, search: Search) -> Search:
+        """A search that has not begun, with what fits its problem; the problem takes the preconditioner."""
+        space = problem.space
+        if not np.array_equal(self.motors, space.motors) or not np.array_equal(self.breaks, space.basis.breaks):
+            return search
+        if self.recycled.p.shape[1] != len(search.x):
+            return search
+        if self.sharpened is not None:
+            problem.take(*self.sharpened)
+        return Search(search.x, search.radius, self.recycled, problem.sharpened_at)
