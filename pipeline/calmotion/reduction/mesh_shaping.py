@@ -29,6 +29,16 @@ class Surface:
     volume: float
     limit: float
 
+    @property
+    def nodes(self) -> Array:
+        """Its points, as of a mesh."""
+        return self.points
+
+    @property
+    def surface(self) -> Indices:
+        """Its triangles, as of a mesh."""
+        return self.triangles
+
 
 def shaped(mesh: FEMesh, body: Body, surface: Surface, attachments: Sequence[AttachmentFrame]) -> FEMesh:
     """The mesh, cut along the rims of its interface patches, with its boundary fitted to the surface.
@@ -39,7 +49,7 @@ def shaped(mesh: FEMesh, body: Body, surface: Surface, attachments: Sequence[Att
         surface: The surface.
         attachments: Frames of the joints and targets of the body; without any, nothing is cut.
     """
-    points, tets, rims = with_rims(mesh.points, mesh.tets, body, attachments)
+    points, tets, rims = with_rims(mesh.points, mesh.tets, body, attachments, surface)
     moved = fitted(points, tets, surface.points, surface.triangles, surface.limit)
     cut, fit = (_with(mesh, x, tets, rims, surface.volume) for x in (points, moved))
     # a surface that runs through itself is not what the elements fill

@@ -94,6 +94,8 @@ def survey_row(link: Link, robot: str, mesher: Any, time_limit: float, geometry_
             row = _with_mesh(row, mesh, link, frames)
     except ShotError as problem:
         row = replace(row, note=str(problem), nodes=0)
+    except Exception as fault:
+        row = replace(row, note=repr(fault), nodes=0)
     return row if row.nodes else replace(row, seconds=_processor_time() - begin)
 
 

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from typing import Protocol
+
 import numpy as np
 
 from calmotion.geometry.distances import closest_on_triangles, ray_length, triangle_parts
+from calmotion.geometry.tetrahedra import Indices
 from calmotion.reduction.elements.assembly import QuadraticMesh
 from calmotion.shot.character import Array, IntArray
 
@@ -23,9 +26,16 @@ _POISSON = 0.35
 _PARTS = triangle_parts(6)
 
 
-def end_face(
-    mesh: QuadraticMesh, center: Array, triangles: Array, closest: Array, gaps: Array, room: float
-) -> IntArray:
+class Skin(Protocol):
+    """A surface: points [m], shape [n, 3], and triangles, shape [k, 3 or more], corners first."""
+
+    @property
+    def nodes(self) -> Array: ...
+    @property
+    def surface(self) -> Indices: ...
+
+
+def end_face(mesh: Skin, center: Array, triangles: Array, closest: Array, gaps: Array, room: float) -> IntArray:
     """Nodes of the flat end face on which an attachment frame lies; empty where there is none.
 
     A joint in the middle of the end of a link is attached to the whole end, as a flange is, and not to the sides: this
@@ -34,7 +44,7 @@ def end_face(
     is one as well.
 
     Args:
-        mesh: Of the body.
+        mesh: Of the body, or its surface.
         center: Origin of the attachment frame [m], shape [3].
         triangles: Surface [m], shape [k, 3, 3], outward, in the order of `mesh.surface`.
         closest, gaps: Closest point of each triangle to the center [m], shape [k, 3], and its distance, shape [k].
@@ -67,7 +77,7 @@ def end_face(
     return np.unique(mesh.surface[face])
 
 
-def _end_ring(mesh: QuadraticMesh, center: Array, triangles: Array, size: float, room: float) -> IntArray:
+def _end_ring(mesh: Skin, center: Array, triangles: Array, size: float, room: float) -> IntArray:
     """Nodes of the flat end of a tube, around an attachment frame in the middle of its opening; empty without one."""
     none = np.zeros(0, dtype=np.int32)
     normals = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
@@ -176,6 +186,8 @@ def nodes_of_area(mesh: QuadraticMesh, candidates: IntArray, center: Array, radi
 
 
 def _half_width(start: Array, across: Array, triangles: Array) -> float:
+    height = (triangles - start) @ np.cross(across[0], across[1])
+    triangles = triangles[(height.min(axis=1) <= 0.0) & (height.max(axis=1) >= 0.0)]  # that rays across can hit
     angles = 2.0 * np.pi * np.arange(_DIRECTIONS) / _DIRECTIONS
     rays = np.stack([np.cos(angles), np.sin(angles)], axis=1) @ across
     lengths = np.array([ray_length(start, ray, triangles, 0.0) for ray in rays])

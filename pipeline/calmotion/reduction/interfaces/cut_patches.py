@@ -12,6 +12,7 @@ from calmotion.geometry.sphere_cut import cut, inside
 from calmotion.geometry.tetrahedra import boundary_triangles, surface_area
 from calmotion.reduction.elements.assembly import quadratic_mesh
 from calmotion.reduction.elements.bisection import bisected
+from calmotion.reduction.interfaces.automatic_patch import Skin
 from calmotion.reduction.interfaces.interface_patches import AttachmentFrame, interface_patches
 from calmotion.shot.character import Array, Body, IntArray
 
@@ -21,7 +22,7 @@ _BISECTIONS = 12
 
 
 def with_rims(
-    points: Array, tets: IntArray, body: Body, attachments: Sequence[AttachmentFrame]
+    points: Array, tets: IntArray, body: Body, attachments: Sequence[AttachmentFrame], meshed: Skin | None = None
 ) -> tuple[Array, IntArray, tuple[tuple[Array, IntArray], ...]]:
     """A mesh cut along the rims of the patches that are spheres about joints.
 
@@ -32,6 +33,7 @@ def with_rims(
         tets: Shape [m, 4], positive volumes.
         body: With `flexible` settings.
         attachments: Frames of its joints and targets.
+        meshed: The surface that was meshed; None: that of the mesh.
 
     Returns:
         Points and tetrahedra, and for each such patch the origin of its frame and its triangles, shape [k, 3].
@@ -40,7 +42,8 @@ def with_rims(
     if not any(attachment.kind == "interface" for attachment in attachments):
         return points, tets, ()
     try:
-        whole = interface_patches(quadratic_mesh(points, tets), attachments, body.flexible.interface_radius, body.path)
+        radius = body.flexible.interface_radius
+        whole = interface_patches(quadratic_mesh(points, tets), attachments, radius, body.path, meshed=meshed)
     except ShotError:
         return points, tets, ()  # the reduction reports it
     rims = []

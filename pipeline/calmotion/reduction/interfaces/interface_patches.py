@@ -11,9 +11,10 @@ from calmotion.errors import ShotError
 from calmotion.geometry.distances import closest_on_triangles
 from calmotion.geometry.nearby_triangles import NearbyTriangles
 from calmotion.reduction.elements.assembly import QuadraticMesh
-from calmotion.reduction.interfaces.automatic_patch import automatic_radius, end_face, nodes_of_area
+from calmotion.reduction.interfaces.automatic_patch import Skin, automatic_radius, end_face, nodes_of_area
 from calmotion.reduction.interfaces.contact_place import contact_place
 from calmotion.reduction.interfaces.named_patch import named_patch
+from calmotion.reduction.interfaces.seats import seat_radius
 from calmotion.shot.character import Array, Frame, IntArray, InterfaceSurface
 from calmotion.shot.meshes import CutPatch
 
@@ -60,7 +61,7 @@ class InterfacePatch:
 
 def interface_patches(
     mesh: QuadraticMesh, attachments: Sequence[AttachmentFrame], radius: float, body: str,
-    cut: Sequence[CutPatch] = (),
+    cut: Sequence[CutPatch] = (), meshed: Skin | None = None,
 ) -> list[InterfacePatch]:  # fmt: skip
     """The interface patches of a body, in the order of their first attachment frames.
 
@@ -76,6 +77,8 @@ def interface_patches(
         radius: Radius of the patches [m]; negative: chosen for each attachment frame (`automatic_radius`).
         body: Prim path of the body, for errors.
         cut: Patches along whose rims the mesh is cut; they are as they are.
+        meshed: The surface that was meshed, by which places and radii do not depend on the elements; None: that of the
+            mesh.
 
     Raises:
         ShotError: A patch carries no moment, or two named patches overlap.
@@ -96,14 +99,15 @@ def interface_patches(
                 break
         else:
             groups.append([index])
-    triangles = mesh.nodes[mesh.surface[:, :3]]
+    skin = meshed or mesh
+    measured = skin.nodes[skin.surface[:, :3]]
     surface = mesh.surface_nodes
     named = _named_patches(mesh, attachments, groups, body)
     frames = [attachments[group[0]].frame for group in groups]
     contacts = [
         None
         if k in named or radius >= 0.0
-        else contact_place(frame.position, frame.axis, triangles, mesh.nodes[surface])
+        else contact_place(frame.position, frame.axis, measured, measured.reshape(-1, 3))
         for k, frame in enumerate(frames)
     ]
     centers = np.array([f.position if c is None else c.position for f, c in zip(frames, contacts, strict=True)])
@@ -128,8 +132,8 @@ def interface_patches(
             continue
         others = np.linalg.norm(np.delete(centers, k, axis=0) - centers[k], axis=1)
         room = float(others.min(initial=np.inf, where=others > _TIE * size))
-        path = attachments[group[0]].path
-        patch = _patch(mesh, triangles, candidates, free, centers[k], path, group, radius, room, body)
+        place = _Place(centers[k], frames[k].axis, skin, measured, room)
+        patch = _patch(mesh, candidates, free, place, attachments[group[0]].path, group, radius, body)
         taken |= np.isin(surface, patch.nodes)
         patches.append(patch)
     return patches
@@ -169,7 +173,6 @@ def _named_patches(
     return patches
 
 
-# parameters: they are what is known of the body and of all its attachment frames
 def overlapping(surface: InterfaceSurface, joint: str) -> ShotError:
     """The error about a named interface that overlaps that of another joint."""
     return ShotError(
@@ -178,24 +181,58 @@ def overlapping(surface: InterfaceSurface, joint: str) -> ShotError:
     )  # fmt: skip
 
 
+@dataclass(frozen=True, eq=False)
+class _Place:
+    """Where a joint takes hold of a body.
+
+    Attributes:
+        center: [m], shape [3].
+        axis: Of the joint, unit vector, shape [3].
+        skin: The surface that is measured.
+        triangles: Of it [m], shape [k, 3, 3].
+        room: Distance to the next place [m].
+    """
+
+    center: Array
+    axis: Array
+    skin: Skin
+    triangles: Array
+    room: float
+
+    def end_and_radius(self) -> tuple[bool, float]:
+        """Whether the joint holds an end face, and the radius of what it holds [m]."""
+        closest = closest_on_triangles(self.center, self.triangles)
+        gaps = np.linalg.norm(closest - self.center, axis=1)
+        face = end_face(self.skin, self.center, self.triangles, closest, gaps, self.room)
+        if spans_a_plane(self.skin.nodes[face]):
+            return True, float(np.linalg.norm(self.skin.nodes[face] - self.center, axis=1).max())
+        seat = seat_radius(self.center, self.axis, self.triangles)
+        if seat is None:
+            return False, automatic_radius(self.center, self.triangles, closest, gaps, self.room)
+        return False, min(seat, max(0.45 * self.room, 1.25 * float(gaps.min())))
+
+
 def _patch(
-    mesh: QuadraticMesh, triangles: Array, candidates: IntArray, free: IntArray, center: Array, path: str,
-    group: list[int], radius: float, room: float, body: str,
+    mesh: QuadraticMesh, candidates: IntArray, free: IntArray, place: _Place, path: str, group: list[int],
+    radius: float, body: str,
 ) -> InterfacePatch:  # fmt: skip
     size = float(np.linalg.norm(np.ptp(mesh.nodes, axis=0)))
+    center, triangles = place.center, mesh.nodes[mesh.surface[:, :3]]
     closest = closest_on_triangles(center, triangles)
     gaps = np.linalg.norm(closest - center, axis=1)
     gap = float(gaps.min())
     automatic = radius < 0.0
-    if automatic:
-        radius = automatic_radius(center, triangles, closest, gaps, room)
-    elif gap > radius:  # nothing of the surface is inside: the radius counts from the nearest place
+    if not automatic and gap > radius:  # nothing of the surface is inside: the radius counts from the nearest place
         center = closest[int(gaps.argmin())]
         closest = closest_on_triangles(center, triangles)
         gaps = np.linalg.norm(closest - center, axis=1)
         gap = float(gaps.min())
     if automatic:
-        face = np.intersect1d(end_face(mesh, center, triangles, closest, gaps, room), candidates)
+        is_end, radius = place.end_and_radius()
+        radius = max(radius, 1.25 * gap)
+        face = np.zeros(0, dtype=np.int32)
+        if is_end:
+            face = np.intersect1d(end_face(mesh, center, triangles, closest, gaps, place.room), candidates)
         if spans_a_plane(mesh.nodes[face]):
             extent = float(np.linalg.norm(mesh.nodes[face] - center, axis=1).max())
             return InterfacePatch(nodes=face.astype(np.int32), attachments=tuple(group), radius=extent)
