@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -26,7 +27,7 @@ from calmotion.geometry.tetrahedra import (
 from calmotion.shot import Body, FEMesh, Frame, TetGeometry
 
 from .accuracy import ENOUGH, mass_note, print_note, remark
-from .filling import filled, refuse_loose_parts, refuse_too_many
+from .filling import DENSE, filled, refuse_loose_parts, refuse_too_many
 from .mesh_file import read_mesh_file
 from .repair import Solid
 from .sources.beam import equivalent_beam
@@ -96,20 +97,20 @@ def mesh_of(
     try:
         return _meshed(index, body, geometry, options, frames, attachments)
     except OutOfTime as reason:
-        simpler = _simpler(index, body, geometry, options, frames, reason)
-        if simpler is None:
-            raise
-        return _meshed(index, body, simpler, options, frames, attachments)
+        for simpler in _simpler(index, body, geometry, options, frames, reason):
+            with suppress(OutOfTime):
+                return _meshed(index, body, simpler, options, frames, attachments)
+        raise
 
 
 def _simpler(
     index: int, body: Body, geometry: FEMesh | Volume, options: MeshOptions, frames: Sequence[Frame], reason: ShotError
-) -> Volume | None:  # fmt: skip
-    """The collision surface of a body, or a beam, in place of a visual surface that takes too long, or None."""
+) -> Iterator[Volume]:  # fmt: skip
+    """The collision surface of a body, and a beam, in place of a visual surface that takes too long."""
     if body.flexible is None or body.flexible.geometry != "auto" or not isinstance(geometry, Volume):
-        return None
+        return
     if geometry.solid.source in _SIMPLE:
-        return None
+        return
     hidden = any(not surface.visible and len(surface.triangles) for surface in body.surfaces)
     for source in ("collision", "beam") if hidden else ("beam",):
         settings = replace(body.flexible, geometry=source, mesh_file="", wall_thickness=-1.0)
@@ -118,13 +119,14 @@ def _simpler(
         except ShotError:
             continue
         if isinstance(found, Volume) and found.solid.source in _SIMPLE:
+            if len(found.solid.triangles) >= max(len(geometry.solid.triangles), DENSE):
+                continue  # a copy of the visual surface takes as long
             ratio = found.solid.volume / geometry.solid.volume
             note = (
                 f"meshed the {found.solid.source}, with {ratio:.2g} of the volume of the visual surface, which takes "
                 f"too long ({reason.found}): its stiffness differs; give a TetMesh or a simpler mesh file"
             )
-            return replace(found, solid=replace(found.solid, repairs=(note, *found.solid.repairs)))
-    return None
+            yield replace(found, solid=replace(found.solid, repairs=(note, *found.solid.repairs)))
 
 
 def _meshed(

@@ -28,9 +28,10 @@ from .tetwild import MORE_TIME, REMEDY, OutOfTime, ProcessorTime, tetrahedralize
 _GOOD_VOLUME, MAX_VOLUME_ERROR, _ACCEPTED = 0.005, 0.01, 0.05
 # Detail that is removed, of the envelope, which the mesh does not resolve; more of it on dense surfaces, until they
 # have few enough triangles: fTetWild takes 1.5 ms for each.
-_DETAIL, _DENSE_DETAILS, _DENSE, _MANY = 0.1, (0.5, 1.0), 2_500, 8_000
+_DETAIL, _DENSE_DETAILS, DENSE, _MANY = 0.1, (0.5, 1.0), 2_500, 8_000
 _ATTEMPTS = 3
-_FIRST = 0.6  # share of the time for the first mesh; what is left is for a coarser one
+# Share of the time for the first mesh: what is left is for a coarser one, or that of a grid, which is made in seconds
+_FIRST, _FIRST_DENSE = 0.6, 0.2
 _COARSER = 1.6  # factor of size and envelope of a mesh that took too long
 _SOON = 1 / 3  # share of the time that a surface with many details may take
 _TRIANGLE = 2.5e-3  # least processor time for a triangle of a surface with many details [s]
@@ -79,12 +80,13 @@ def filled(
     volumes: list[float] = []
     best: FEMesh | None = None
     notes: tuple[str, ...] = ()
-    begun, dense = time.used, len(solid.triangles) > _DENSE
+    begun, dense = time.used, len(solid.triangles) > DENSE
     diagonal = float(np.linalg.norm(np.ptp(solid.points, axis=0)))
     for number in range(_ATTEMPTS):
         attempt = _Attempt(size, envelope(size, diagonal, shape.thickness, len(solid.triangles), number))
         try:
-            points, tets = _meshed(solid, attempt, body.path, time, _FIRST, use_cache)
+            share = _FIRST_DENSE if dense else _FIRST
+            points, tets = _meshed(solid, attempt, body.path, time, share, use_cache)
         except OutOfTime as reason:
             if best is not None:
                 break
@@ -94,7 +96,7 @@ def filled(
             if dense:  # as hopeless
                 raise
             # as far from the surface as one of many triangles is followed
-            wide = envelope(_COARSER * size, diagonal, shape.thickness, _DENSE, 0)
+            wide = envelope(_COARSER * size, diagonal, shape.thickness, DENSE, 0)
             coarser = _Attempt(_COARSER * attempt.size, max(_COARSER * attempt.distance, wide))
             points, tets = _meshed(solid, coarser, body.path, time, 1.0, use_cache)
             notes = (f"meshed with elements {_COARSER:g} times as large, since smaller ones took too long",)
@@ -148,7 +150,7 @@ def _on_grid(
 ) -> FEMesh | None:  # fmt: skip
     """The tetrahedra of a grid, for a reason; None where it does not resolve thin walls."""
     mesh = on_grid(index, body, solid, shape, size)
-    dense = len(solid.triangles) > _DENSE or time.used >= time.limit
+    dense = len(solid.triangles) > DENSE or time.used >= time.limit
     if mesh is None or mesh.quality.volume_error > (_COARSEST if dense else _ACCEPTED):
         return None
     note = grid_note(mesh, shape, size, f"{reason.problem} ({reason.found})")
@@ -158,7 +160,7 @@ def _on_grid(
 def _simplified(solid: Solid, distance: float) -> tuple[np.ndarray, np.ndarray]:
     """The surface without detail that a mesh at a distance does not resolve."""
     surface = solid.points, solid.triangles
-    for detail in (_DETAIL,) if len(solid.triangles) <= _DENSE else _DENSE_DETAILS:
+    for detail in (_DETAIL,) if len(solid.triangles) <= DENSE else _DENSE_DETAILS:
         surface = simplified(solid, detail * distance)
         if len(surface[1]) <= _MANY:
             break

@@ -11,6 +11,7 @@ from calmotion.errors import ShotError
 from calmotion.shot import Body, ElasticMaterial, FlexibleSettings, Frame, MassProperties
 
 if TYPE_CHECKING:
+    from calmotion.reduction.interfaces.interface_patches import AttachmentFrame
     from calmotion.usd.reading.context import Reading
 
 # of polyamide as printed links are; relative errors of frequencies do not depend on its stiffness and density
@@ -113,3 +114,15 @@ def _frames(reading: Reading, stage: Any) -> tuple[dict[str, Frame], dict[str, l
             else:
                 others.setdefault(body, []).append(frame)
     return carriers, others
+
+
+def frames_of(link: Link) -> tuple[Frame, ...]:
+    """The frames of its joints, that towards the world first."""
+    return (*(() if link.carrier is None else (link.carrier,)), *link.others)
+
+
+def attachments_of(link: Link) -> list[AttachmentFrame]:
+    """The frames of a link's joints, that towards the world first, as the reduction has them."""
+    from calmotion.reduction.interfaces.interface_patches import AttachmentFrame
+
+    return [AttachmentFrame(f"joint {k}", frame, "interface") for k, frame in enumerate(frames_of(link))]

@@ -15,7 +15,7 @@ BENCHMARKS = {
     "compilation": "speed.compilation", "estimates": "accuracy.estimates",
     "extremes": "integrators.extremes", "gradients": "integrators.gradients",
     "integrators": "integrators.integrators",
-    "meshing": "speed.meshing", "motor-commands": "motors.commands",
+    "meshing": "links.meshing", "motor-commands": "motors.commands",
     "motor-cost": "motors.cost", "optimizer": "optimizer.optimizer", "reading": "speed.reading",
     "reduction": "speed.reduction", "reduction-convergence": "accuracy.reduction_convergence",
     "scaling": "speed.scaling", "simplification": "accuracy.simplification", "speed": "speed.stages",

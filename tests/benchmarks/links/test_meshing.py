@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import csv
+from dataclasses import replace
 
 import numpy as np
 import pytest
+from calmotion.benchmarks.links import meshing, survey
 from calmotion.benchmarks.scenes.links import read_links
-from calmotion.benchmarks.speed import meshing
+from calmotion.benchmarks.scenes.mesher import mesher
 from calmotion.errors import ShotError
+from odd_jobs import odd_survey
 from small_shots import ELBOW, FORE, LENGTH, UPPER, WIDTH, write_arm
 
 
@@ -59,7 +62,8 @@ def test_sizes_are_multiples_of_the_automatic_one_or_lengths():
 def test_the_survey_has_a_row_for_each_link_and_says_what_became_of_it(shot, tmp_path, capsys, monkeypatch):
     monkeypatch.setenv("CALMOTION_CACHE", str(tmp_path / "cache"))
     file = tmp_path / "links.csv"
-    assert meshing.main([f"{shot}:fore", "-o", str(file)]) == 0
+    made = tmp_path / "meshing.md"
+    assert meshing.main([f"{shot}:fore", "-o", str(file), "--pictures", "fore", "--page", str(made)]) == 0
     with open(file, newline="") as text:
         (row,) = csv.DictReader(text)
     assert (row["link"], row["source"], row["note"]) == ("fore", "visual surface", "")
@@ -71,13 +75,25 @@ def test_the_survey_has_a_row_for_each_link_and_says_what_became_of_it(shot, tmp
     assert int(row["nodes"]) > 100 and float(row["seconds"]) > 0.0 and float(row["estimate"]) < 5.0
     printed = capsys.readouterr().out
     assert "1 of 1 links are flexible (100%)" in printed and "| fore | visual surface |" in printed
+    text = made.read_text()
+    assert "1 of 1 links are flexible" in text and "calmotion bench meshing arm.usda --pictures fore" in text
+    assert "![arm, fore](meshing/arm_fore.png)" in text
+    assert (tmp_path / "meshing" / "arm_fore.png").read_bytes()[:4] == b"\x89PNG"
 
 
-def test_a_link_that_is_refused_says_why(shot, capsys, monkeypatch):
-    def refuse(*arguments):
-        raise ShotError("encloses no volume", path=FORE, remedy="Close it")
-
-    monkeypatch.setattr(meshing._mesher(), "geometry_of", refuse)
-    assert meshing.main([f"{shot}:fore", "--geometry-only"]) == 1
-    printed = capsys.readouterr().out
-    assert "0 of 1 links have a solid" in printed and "encloses no volume" in printed and "Close it" in printed
+def test_a_link_that_is_refused_says_why_and_one_whose_process_ends_too(shot, tmp_path, capsys, monkeypatch):
+    (fore,) = read_links(f"{shot}:fore")
+    whole = fore.body.surfaces[0]
+    flat = replace(fore, body=replace(fore.body, surfaces=(replace(whole, triangles=whole.triangles[:1]),)))
+    row = survey.survey_row(replace(flat, mass=None), "arm", mesher(), 60.0, True)
+    assert row.source == "refused" and "open surface" in row.note and "Close the mesh" in row.note
+    monkeypatch.setattr(meshing, "survey_link", odd_survey)
+    file = tmp_path / "links.csv"
+    assert meshing.main([str(shot), "--geometry-only", "-o", str(file)]) == 0
+    with open(file, newline="") as text:
+        rows = {row["link"]: row for row in csv.DictReader(text)}
+    assert rows["fore"]["source"] == "fault" and "SIGSEGV" in rows["fore"]["note"]
+    assert "Give a TetMesh" in rows["fore"]["note"] and rows["upper"]["source"] == "visual surface"
+    heard = capsys.readouterr()
+    assert "fault: its process ended (signal SIGSEGV)" in heard.err and "min left" in heard.err
+    assert "arm fore: its process ended" in heard.out

@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from dataclasses import astuple, dataclass, replace
+from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from calmotion.benchmarks.common.tables import markdown
-from calmotion.benchmarks.scenes.links import Link
+from calmotion.benchmarks.links.pictures import draw_link
+from calmotion.benchmarks.scenes.links import Link, attachments_of, frames_of
 from calmotion.errors import ShotError
+from calmotion.shot import FEMesh
+from calmotion.support.processes.workers import Fault
 
 LIMIT = 20.0  # processor time of a link that is wanted [s]
 
@@ -22,7 +25,7 @@ class LinkRow:
 
     Attributes:
         robot, link: Names.
-        source: What its solid was made of; `refused` or `none` (no geometry) where there is none.
+        source: What its solid was made of; `refused`, `fault` or `none` (no geometry) where there is none.
         triangles: Of its visual surfaces.
         volume: Of its solid [cm^3].
         of_hull: Volume over that of the convex hull of the visual surfaces.
@@ -63,8 +66,36 @@ class LinkRow:
         """Whether it can be simulated as flexible."""
         return self.nodes > 0
 
+    @property
+    def outcome(self) -> str:
+        """What became of it, in few words."""
+        if self.flexible:
+            return f"{self.source}, {self.nodes} nodes, {self.seconds:.3g} s, estimate {self.estimate:.2g}%"
+        return self.source if not self.note else f"{self.source}: {self.note}"
 
-def survey_row(link: Link, robot: str, mesher: Any, time_limit: float, geometry_only: bool = False) -> LinkRow:
+
+def survey_link(link: Link, robot: str, time_limit: float, geometry_only: bool, picture: str) -> LinkRow:
+    """`survey_row` with the bundled mesher, for a process of its own."""
+    from calmotion.benchmarks.scenes.mesher import mesher
+
+    return survey_row(link, robot, mesher(), time_limit, geometry_only, picture)
+
+
+def faulty_row(link: Link, robot: str, fault: Fault) -> LinkRow:
+    """The row of a link whose process failed."""
+    note = f"{fault.reason}. Give a TetMesh, or a simpler mesh file, for this link, and report the fault"
+    return LinkRow(robot=robot, link=link.name, source="fault", note=note)
+
+
+def same_row(row: LinkRow, link: Link, robot: str) -> LinkRow:
+    """The row of a link that is the same as that of another row."""
+    note = f"the same as {row.link}" if row.robot == robot else f"the same as {row.link} of {row.robot}"
+    return replace(row, robot=robot, link=link.name, note="; ".join(filter(None, (note, row.note))))
+
+
+def survey_row(
+    link: Link, robot: str, mesher: Any, time_limit: float, geometry_only: bool = False, picture: str = ""
+) -> LinkRow:
     """The row of a link; what is wrong with it is in its note.
 
     Args:
@@ -73,9 +104,10 @@ def survey_row(link: Link, robot: str, mesher: Any, time_limit: float, geometry_
         mesher: The module `body_mesh` of the bundled mesher.
         time_limit: Processor time of its meshes [s].
         geometry_only: Whether its solid is made but not meshed.
+        picture: File of a picture of its mesh and interface patches; empty for none.
     """
     body = replace(link.body, mass=link.mass)
-    frames = (*(() if link.carrier is None else (link.carrier,)), *link.others)
+    frames = frames_of(link)
     visual = [surface for surface in body.surfaces if surface.visible and len(surface.triangles)]
     row = LinkRow(
         robot=robot, link=link.name, triangles=sum(len(surface.triangles) for surface in visual), joints=len(frames),
@@ -89,13 +121,13 @@ def survey_row(link: Link, robot: str, mesher: Any, time_limit: float, geometry_
         geometry = mesher.geometry_of(0, body, options, frames)
         row = _with_solid(row, geometry, visual, frames)
         if not geometry_only:
-            mesh = mesher.mesh_of(0, body, geometry, options, frames)
+            mesh = mesher.mesh_of(0, body, geometry, options, frames, attachments_of(link))
             row = replace(row, seconds=_processor_time() - begin)
-            row = _with_mesh(row, mesh, link, frames)
+            row = _with_mesh(row, mesh, link)
+            if picture:
+                draw_link(Path(picture), f"{robot}, {link.name}", mesh, link)
     except ShotError as problem:
         row = replace(row, note=str(problem), nodes=0)
-    except Exception as fault:
-        row = replace(row, note=repr(fault), nodes=0)
     return row if row.nodes else replace(row, seconds=_processor_time() - begin)
 
 
@@ -121,20 +153,23 @@ def _with_solid(row: LinkRow, geometry: Any, visual: Sequence[Any], frames: Sequ
     )  # fmt: skip
 
 
-def _with_mesh(row: LinkRow, mesh: Any, link: Link, frames: Sequence[Any]) -> LinkRow:
+def _with_mesh(row: LinkRow, mesh: FEMesh, link: Link) -> LinkRow:
     from calmotion.reduction.discretization_error import clamped_modes
     from calmotion.reduction.elements.assembly import assemble
-    from calmotion.reduction.interfaces.interface_patches import AttachmentFrame, interface_patches
+    from calmotion.reduction.interfaces.interface_patches import interface_patches
 
     settings = link.body.flexible
     assert settings is not None
     model = assemble(mesh.points, mesh.tets, settings.material)
-    attachments = [AttachmentFrame(f"joint {k}", frame, "interface") for k, frame in enumerate(frames)]
-    patches = interface_patches(model.mesh, attachments, settings.interface_radius, link.body.path)
+    patches = interface_patches(
+        model.mesh, attachments_of(link), settings.interface_radius, link.body.path, mesh.patches
+    )
     clamped = patches[0].nodes if link.carrier is not None else None
     f1, f2, f3 = clamped_modes(model, 3, clamped)[0]
     error = mesh.quality.frequency_error
-    late = [note for note in mesh.quality.repairs if "too long" in note or "would exceed" in note]
+    late = [
+        note for note in mesh.quality.repairs if "too long" in note or "would exceed" in note or "on a grid" in note
+    ]
     return replace(
         row, source=mesh.quality.source, nodes=len(model.mesh.nodes), volume_error=100.0 * mesh.quality.volume_error,
         f1=float(f1), f2=float(f2), f3=float(f3), estimate=np.nan if error is None else 100.0 * error,
@@ -146,32 +181,3 @@ def _processor_time() -> float:
     """Of this process and its ended children [s]: it does not depend on what else the machine does."""
     spent = os.times()
     return spent.user + spent.system + spent.children_user + spent.children_system
-
-
-def survey_table(rows: Sequence[LinkRow]) -> str:
-    """The rows as a Markdown table."""
-    heads = [
-        "robot", "link", "source", "triangles", "volume cm^3", "of hull", "mass kg", "kg/m^3", "joints", "off", "mm",
-        "nodes", "volume %", "s", "f1 Hz", "f2 Hz", "f3 Hz", "estimate %", "note",
-    ]  # fmt: skip
-    return markdown(heads, ([_cell(value) for value in astuple(row)] for row in rows))
-
-
-def _cell(value: object) -> str:
-    if isinstance(value, float):
-        return "-" if np.isnan(value) else f"{value:.3g}"
-    return str(value).replace("|", "/")
-
-
-def summary(rows: Sequence[LinkRow], geometry_only: bool = False) -> str:
-    """How many links became flexible, and how many of these within the wanted time."""
-    links = [row for row in rows if row.source != "none"]
-    done = [row for row in links if row.flexible or (geometry_only and row.source != "refused")]
-    what = "have a solid" if geometry_only else "are flexible"
-    fast = sum(row.seconds <= LIMIT for row in done)
-    lines = [
-        f"{len(done)} of {len(links)} links {what} ({100.0 * len(done) / max(len(links), 1):.3g}%); "
-        f"{fast} took no more than {LIMIT:g} s of processor time ({100.0 * fast / max(len(done), 1):.3g}%)\n"
-    ]
-    lines += [f"{row.robot} {row.link}: {row.note}\n" for row in links if row not in done]
-    return "".join(lines)

@@ -2,7 +2,8 @@
 
 `calmotion bench meshing ROBOT ... [-o table.md|table.csv]` has a row for each link: what its solid was made of, its
 volume and mass, interface patches, unknowns, processor time, first frequencies, and why it was refused.
-`--geometry-only` ends before the mesh. `FILE:PRIM` names one link.
+`--geometry-only` ends before the mesh. `FILE:PRIM` names one link. Each link is meshed in a process of its own
+(`--jobs`): where that crashes or hangs, this is the outcome of the link. `--page` writes a page with pictures.
 
 With `--sizes 2 1.4 1 0.7` each link is meshed with elements of several sizes, given in metres with a unit (`8mm`) or as
 multiples of the automatic size. Errors of frequencies are relative to the mesh with the most nodes, which itself has an
@@ -11,12 +12,12 @@ error; its estimate is shown too.
 
 from __future__ import annotations
 
+import shlex
 import sys
 import time
 from argparse import Namespace
 from collections.abc import Callable, Sequence
 from dataclasses import astuple, dataclass, replace
-from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -24,9 +25,16 @@ import numpy as np
 
 from calmotion.benchmarks.common.parsers import bench_parser
 from calmotion.benchmarks.common.tables import markdown, write_rows
-from calmotion.benchmarks.scenes.links import Link, read_links
-from calmotion.benchmarks.speed.link_survey import LinkRow, summary, survey_row, survey_table
+from calmotion.benchmarks.links.survey import LinkRow, faulty_row, same_row, survey_link
+from calmotion.benchmarks.links.tables import done, page, summary, survey_table
+from calmotion.benchmarks.scenes.links import Link, attachments_of, frames_of, read_links
+from calmotion.benchmarks.scenes.mesher import mesher
 from calmotion.errors import ShotError
+from calmotion.reduction.cache import cache_key
+from calmotion.support.processes.workers import Fault, results_of
+
+_SAME = 1e-7  # distance of points of links that are the same [m]
+_PATIENCE = 30.0  # of the time limit, that a link may take on a busy machine
 
 
 @dataclass(frozen=True)
@@ -73,15 +81,15 @@ def study(link: Link, sizes: Sequence[str], time_limit: float, say: Callable[[st
     """
     from calmotion.accuracy.element_size import element_size, shape_of
 
-    mesher = _mesher()
-    solid = mesher.solid_of(link.body, link.body.surfaces)
-    shape = shape_of(solid.points, solid.triangles)
-    automatic = element_size(shape)
+    maker = mesher()
+    solid = maker.solid_of(link.body, link.body.surfaces)
+    automatic = element_size(shape_of(solid.points, solid.triangles))
     rows = []
     for size in sorted((_length(text, automatic) for text in sizes), reverse=True):
         try:
             start = time.perf_counter()
-            mesh = mesher.filled(0, link.body, solid, shape, size, mesher.ProcessorTime(time_limit), False)
+            options = maker.MeshOptions(element_size=size, time_limit=time_limit, cache=False)
+            mesh = maker.mesh_body(0, link.body, options, frames_of(link), attachments_of(link))
             meshed = time.perf_counter() - start
             rows.append(_row(link, size, mesh, meshed))
         except ShotError as error:
@@ -92,7 +100,7 @@ def study(link: Link, sizes: Sequence[str], time_limit: float, say: Callable[[st
 def _row(link: Link, size: float, mesh: Any, mesh_time: float) -> Row:
     from calmotion.reduction.discretization_error import frequency_errors
     from calmotion.reduction.elements.assembly import assemble
-    from calmotion.reduction.interfaces.interface_patches import AttachmentFrame, interface_patches
+    from calmotion.reduction.interfaces.interface_patches import interface_patches
     from calmotion.reduction.reduce import reduce_body
 
     settings = link.body.flexible
@@ -100,11 +108,12 @@ def _row(link: Link, size: float, mesh: Any, mesh_time: float) -> Row:
     model = assemble(mesh.points, mesh.tets, settings.material)
     clamped, reduce_time = None, float("nan")
     if link.carrier is not None:
-        anchor = AttachmentFrame(link.body.path, link.carrier, "interface")
+        joints = attachments_of(link)
         try:
-            clamped = interface_patches(model.mesh, [anchor], settings.interface_radius, link.body.path)[0].nodes
+            radius = settings.interface_radius
+            clamped = interface_patches(model.mesh, joints, radius, link.body.path, mesh.patches)[0].nodes
             start = time.perf_counter()
-            reduce_body(mesh, link.body, [anchor], (), 0)
+            reduce_body(mesh, link.body, joints, (), 0)
             reduce_time = time.perf_counter() - start
         except ShotError:
             clamped = None  # a joint off the link's surface is not a property of its mesh
@@ -147,14 +156,6 @@ def _length(text: str, automatic: float) -> float:
         return parse_quantity(text, "m")
 
 
-def _mesher() -> Any:
-    """The module of the bundled mesher that makes meshes."""
-    from calmotion.host import open_host
-
-    operator = open_host().operators["fe.mesh"]
-    return import_module(operator.__module__.rsplit(".", 1)[0] + ".body_mesh")
-
-
 def table(rows: Sequence[Row]) -> str:
     """The rows as a Markdown table."""
     heads = [
@@ -186,40 +187,97 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--sizes", nargs="+", help="multiples of the automatic element size, or lengths (8mm)")
     parser.add_argument("--geometry-only", action="store_true", help="make solids, and no meshes")
     parser.add_argument("--time-limit", type=float, default=60.0, help="processor time of the meshes of a link [s]")
-    parser.add_argument("-o", "--output", help="file of the table, .md or .csv")
+    parser.add_argument("--jobs", type=int, default=1, help="links at a time, each in a process of its own")
+    parser.add_argument("--pictures", nargs="+", default=[], metavar="LINK", help="draw these links beside the table")
+    parser.add_argument("-o", "--output", help="file of the table, .csv or .md; of several rows at any time")
+    parser.add_argument("--page", help="file of a page with the table and the pictures, .md")
     options = parser.parse_args(arguments)
 
     def say(text: str) -> None:
         print(text, file=sys.stderr, flush=True)
 
-    rows: list[Any] = []
+    found: list[tuple[Link, str]] = []
     for source in options.links:
         try:
-            links = read_links(source)
+            found += [(link, Path(_file(source)).stem) for link in read_links(source)]
         except ShotError as error:
             say(str(error))
-            continue
-        for link in links:
-            rows += _rows(link, source, options, say)
-            if options.output and rows:
-                write(rows, options.output)  # after each link: hours of work are not lost with the last of them
     if options.sizes:
-        print(table(rows), end="")
-        return 0 if rows else 1
+        return _study_all([link for link, _ in found], options, say)
+    rows = _survey_all(found, options, say)
     print(survey_table(rows) + "\n" + summary(rows, options.geometry_only), end="")
-    return 0 if any(row.flexible or (options.geometry_only and row.source != "refused") for row in rows) else 1
+    return 0 if done(rows, options.geometry_only) else 1
 
 
-def _rows(link: Link, source: str, options: Namespace, say: Callable[[str], None]) -> list[Any]:
-    if not options.sizes:
-        robot = Path(source.rpartition(":")[0] or source).stem
-        say(f"{robot} {link.name}")
-        return [survey_row(link, robot, _mesher(), options.time_limit, options.geometry_only)]
-    try:
-        return list(study(link, options.sizes, options.time_limit, say))
-    except ShotError as error:
-        say(str(error))
-        return []
+def _file(source: str) -> str:
+    return source.rpartition(":")[0] or source
+
+
+def _study_all(links: Sequence[Link], options: Namespace, say: Callable[[str], None]) -> int:
+    rows: list[Row] = []
+    for link in links:
+        try:
+            rows += study(link, options.sizes, options.time_limit, say)
+        except ShotError as error:
+            say(str(error))
+        if options.output and rows:
+            write(rows, options.output)
+    print(table(rows), end="")
+    return 0 if rows else 1
+
+
+def _survey_all(found: Sequence[tuple[Link, str]], options: Namespace, say: Callable[[str], None]) -> list[LinkRow]:
+    """The rows of all links, written after each: a fault in one link is its own outcome, and loses no other."""
+    folder = Path(options.page or options.output or ".").parent
+    pictures = [
+        str(folder / "meshing" / f"{robot}_{link.name}.png") if link.name in options.pictures else ""
+        for link, robot in found
+    ]
+    if any(pictures):
+        (folder / "meshing").mkdir(parents=True, exist_ok=True)
+    first = _first_of_its_kind([link for link, _ in found])
+    own = sorted(set(first))
+    work = [(found[k][0], found[k][1], options.time_limit, options.geometry_only, pictures[k]) for k in own]
+    rows: dict[int, LinkRow] = {}
+    start, patience = time.monotonic(), _PATIENCE * options.time_limit + 300.0
+    for done_work, (index, result) in enumerate(results_of(survey_link, work, options.jobs, patience), 1):
+        link, robot = found[own[index]]
+        row = faulty_row(link, robot, result) if isinstance(result, Fault) else result
+        for k, same in enumerate(first):
+            if same == own[index]:
+                rows[k] = row if k == same else same_row(row, found[k][0], found[k][1])
+        left = (time.monotonic() - start) / done_work * (len(work) - done_work)
+        say(f"[{len(rows)}/{len(found)}] {robot} {link.name}: {row.outcome}; about {left / 60.0:.0f} min left")
+        if options.output:
+            write([rows[k] for k in sorted(rows)], options.output)
+    whole = [rows[k] for k in sorted(rows)]
+    if options.page:
+        drawn = [
+            (f"{row.robot}, {row.link}", f"meshing/{Path(p).name}")
+            for row, p in zip(whole, pictures, strict=True)
+            if p and Path(p).exists()
+        ]
+        Path(options.page).write_text(page(whole, drawn, _command(options)), encoding="utf-8")
+    return whole
+
+
+def _first_of_its_kind(links: Sequence[Link]) -> list[int]:
+    """For each link the index of the first one with the same geometry, joints and mass: links are meshed once."""
+    kinds: dict[str, int] = {}
+    first = []
+    for index, link in enumerate(links):
+        shapes = [(np.round(s.points / _SAME) + 0.0, s.triangles, s.visible) for s in link.body.surfaces]
+        frames = [(np.round(f.position / _SAME) + 0.0, np.round(f.axis, 6) + 0.0) for f in frames_of(link)]
+        masses = None if link.mass is None else float(f"{link.mass.mass:.5g}")
+        first.append(kinds.setdefault(cache_key((shapes, frames, masses, link.body.tets)), index))
+    return first
+
+
+def _command(options: Namespace) -> str:
+    """The command that makes a page, with the robots by their names."""
+    names = " ".join(shlex.quote(Path(_file(source)).name) for source in options.links)
+    pictures = f" --pictures {' '.join(options.pictures)}" if options.pictures else ""
+    return f"calmotion bench meshing {names}{pictures} --page {options.page}"
 
 
 if __name__ == "__main__":

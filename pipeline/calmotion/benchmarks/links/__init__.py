@@ -1,0 +1,1 @@
+"""What becomes of the links of robots that others made."""

@@ -1,0 +1,116 @@
+"""Tables and a page about what becomes of the links of robots."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import astuple
+
+import numpy as np
+
+from calmotion.benchmarks.common.tables import markdown
+from calmotion.benchmarks.links.survey import LIMIT, LinkRow
+
+_HONEST = 20.0  # estimate from which a link counts as coarse [%]
+
+
+def survey_table(rows: Sequence[LinkRow]) -> str:
+    """The rows as a Markdown table."""
+    heads = [
+        "robot", "link", "source", "triangles", "volume cm^3", "of hull", "mass kg", "kg/m^3", "joints", "off", "mm",
+        "nodes", "volume %", "s", "f1 Hz", "f2 Hz", "f3 Hz", "estimate %", "note",
+    ]  # fmt: skip
+    return markdown(heads, ([_cell(value) for value in astuple(row)] for row in rows))
+
+
+def _cell(value: object) -> str:
+    if isinstance(value, float):
+        return "-" if np.isnan(value) else f"{value:.3g}"
+    return str(value).replace("|", "/").replace("\n", " ")
+
+
+def done(rows: Sequence[LinkRow], geometry_only: bool = False) -> list[LinkRow]:
+    """The links that are flexible, or have a solid."""
+    return [row for row in rows if row.flexible or (geometry_only and row.source not in ("refused", "fault", "none"))]
+
+
+def summary(rows: Sequence[LinkRow], geometry_only: bool = False) -> str:
+    """How many links became flexible, how many of these within the wanted time, and why the others did not."""
+    links = [row for row in rows if row.source != "none"]
+    made = done(links, geometry_only)
+    what = "have a solid" if geometry_only else "are flexible"
+    fast = sum(row.seconds <= LIMIT for row in made)
+    lines = [
+        f"{len(made)} of {len(links)} links {what} ({100.0 * len(made) / max(len(links), 1):.3g}%); "
+        f"{fast} took no more than {LIMIT:g} s of processor time ({100.0 * fast / max(len(made), 1):.3g}%)\n"
+    ]
+    lines += [f"{row.robot} {row.link}: {row.note}\n" for row in links if row not in made]
+    return "".join(lines)
+
+
+def page(rows: Sequence[LinkRow], pictures: Sequence[tuple[str, str]], command: str) -> str:
+    """The page of the documentation.
+
+    Args:
+        rows: Of all robots.
+        pictures: Titles and files, relative to the page.
+        command: That makes the page.
+    """
+    links = [row for row in rows if row.source != "none"]
+    parts = [
+        "# Links that were meshed\n\n"
+        "Each link of robots that others made becomes flexible by itself: what its solid was made of, how fine its "
+        "mesh is, and how exact its first frequencies are. None of the robots is part of this repository. "
+        "The material is polyamide for all (1.8 GPa, 1200 kg/m^3), unless the robot states masses; links are held by "
+        "the joint towards the world. `s` is processor time on one core, from the triangles of the file to a mesh with "
+        "an estimated error; `estimate` is that of the first frequencies.\n\n"
+        f"The page is made by\n\n    {command}\n\n",
+        "\n\n".join(summary(rows).strip().splitlines()) + "\n\n",
+        "## Robots\n\n" + _robots(links) + "\n",
+    ]
+    if pictures:
+        parts.append("## Meshes and what joints hold of them\n\n")
+        parts.append(
+            "The parts that joints hold (interface patches) are coloured: orange towards the world, then blue.\n\n"
+        )
+        parts += [f"![{title}]({file})\n\n" for title, file in pictures]
+    parts.append("## Links\n\n" + _links(links))
+    return "".join(parts)
+
+
+def _robots(links: Sequence[LinkRow]) -> str:
+    """Numbers of each robot."""
+    heads = ["robot", "links", "flexible", "from visual surfaces", "median s", "largest s", "median estimate %"]
+    table = []
+    for robot in dict.fromkeys(row.robot for row in links):
+        own = [row for row in links if row.robot == robot]
+        made = done(own)
+        visual = sum("visual" in row.source for row in made)
+        seconds = [row.seconds for row in made] or [np.nan]
+        estimates = [row.estimate for row in made if not np.isnan(row.estimate)] or [np.nan]
+        table.append(
+            [
+                robot, str(len(own)), str(len(made)), str(visual), _cell(float(np.median(seconds))),
+                _cell(float(max(seconds))), _cell(float(np.median(estimates))),
+            ]
+        )  # fmt: skip
+    return markdown(heads, table)
+
+
+def _links(links: Sequence[LinkRow]) -> str:
+    """The row of each link, in few columns."""
+    heads = ["robot", "link", "source", "cm^3", "kg", "nodes", "s", "f1, f2, f3 Hz", "estimate %", "what to know"]
+    table = []
+    for row in links:
+        frequencies = ", ".join(_cell(f) for f in (row.f1, row.f2, row.f3)) if row.flexible else "-"
+        table.append(
+            [
+                row.robot, row.link, row.source, _cell(1.0 * row.volume), _cell(row.mass), _cell(row.nodes),
+                _cell(row.seconds), frequencies, _cell(row.estimate), _cell(_told(row)),
+            ]
+        )  # fmt: skip
+    return markdown(heads, table)
+
+
+def _told(row: LinkRow) -> str:
+    coarse = f"coarse: {row.estimate:.2g}%" if row.estimate > _HONEST else ""
+    return "; ".join(filter(None, (coarse, row.note)))
