@@ -35,3 +35,12 @@ def test_at_the_ends_it_is_what_is_given():
 
 def test_no_markers_are_no_work():
     assert between(np.zeros((2, 0, 18)), 0.1, 0.5).shape == (0, 18)
+
+
+def test_a_contact_that_comes_in_a_step_holds_in_all_of_it():
+    world = np.zeros((2, 3, 18))
+    world[:, 0] = pack(np.zeros(3), np.ones(3), np.zeros(3), np.eye(3))
+    world[1, 1] = pack(np.array([1.0, 2.0, 3.0]), np.zeros(3), np.zeros(3), np.eye(3))
+    found = between(world, 0.1, 0.25)
+    np.testing.assert_array_equal(found[1], world[1, 1])
+    assert not np.any(found[2]) and np.any(found[0, :3] != 0.0)

@@ -28,10 +28,16 @@ def rooted(world: Array | None, total: int) -> Array:
 
 def between(world: Array, h: float, share: float) -> Array:
     """Markers at a fraction of a step h [s] from its two instants, shape [2, W, 18]; cubic in position and rotation
-    vector."""
-    if world.shape[1] == 0:
-        only: Array = world[0]
-        return only
+    vector. Contacts that do not hold at both instants are as the second one has them, for the whole step."""
+    found: Array = world[1].copy()
+    there = np.all(np.any(world[..., 9:] != 0.0, axis=-1), axis=0)
+    if np.any(there):
+        found[there] = _interpolated(world[:, there], h, share)
+    return found
+
+
+def _interpolated(world: Array, h: float, share: float) -> Array:
+    """`between` of markers that are there at both instants."""
     first, last = world
     start, end = (Rotation.from_matrix(rows[:, 9:].reshape(-1, 3, 3)) for rows in (first, last))
     turn = (start.inv() * end).as_rotvec()
