@@ -2,10 +2,12 @@
 
 import dataclasses
 
+import calmotion as cm
 import numpy as np
 import pytest
 from calmotion.shot import Body, Character, Frame, Joint, RetargetSettings, Target
 from calmotion.shot.tolerance import SMALLEST, reach, tolerance_of
+from steppers import write_stepper
 
 NO_TURN = np.array([1.0, 0.0, 0.0, 0.0])
 
@@ -59,3 +61,9 @@ def test_the_users_tolerance_is_before_that_of_the_shot_and_before_a_thousandth_
     settled = dataclasses.replace(character, retarget=RetargetSettings(tolerance=5e-4))
     assert tolerance_of(settled) == 5e-4 and tolerance_of(settled, 2e-3) == 2e-3
     assert tolerance_of(robot([], [], 1)) == SMALLEST
+
+
+def test_a_robot_that_stands_on_its_feet_reaches_from_them(tmp_path):
+    shot = cm.open_shot(write_stepper(tmp_path / "stepper.usda"))
+    # 4 cm of sole, 0.66 m of leg, 10 cm to the middle of the torso, 20 cm to the head, and the way between the axes
+    assert 1.0 < reach(shot.character) < 1.1

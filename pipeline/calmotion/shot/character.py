@@ -12,10 +12,10 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from calmotion.shot.contact import Contact
 from calmotion.shot.materials.printed import Core
 from calmotion.shot.motor import PRESCRIBED, Motor
 from calmotion.shot.robust.settings import Uncertainty
+from calmotion.shot.standing.contact import Contact
 
 Array = NDArray[np.float64]
 IntArray = NDArray[np.int32]

@@ -18,7 +18,8 @@ def tolerance_of(character: Character, requested: float | None = None) -> float:
 def reach(character: Character) -> float:
     """Length of the longest chain from the base to a target: from joint to joint, and the travel of its sliders [m].
 
-    Joints that close chains do not count. Without targets it is the distance to the farthest joint.
+    Joints that close chains do not count. The base of a robot that floats is its feet. Without targets it is the distance
+    to the farthest joint.
     """
     nodes, far = _distances(character)
     ends = [
@@ -32,8 +33,13 @@ def reach(character: Character) -> float:
 def _distances(character: Character) -> tuple[dict[int, tuple[float, Array]], float]:
     """For each body, the distance from the base to the joint that carries it and that joint's place in the body."""
     ends: dict[int, list[tuple[Joint, int]]] = {}
+    floats = any(joint.kind == "floating" for joint in character.joints)
     for joint in character.joints:
-        if not (joint.closes_chain or joint.redundant):
+        if joint.contact is not None:
+            counts = floats
+        else:
+            counts = not (joint.kind == "floating" or joint.closes_chain or joint.redundant)
+        if counts:
             ends.setdefault(joint.body0, []).append((joint, 0))
             ends.setdefault(joint.body1, []).append((joint, 1))
     nodes: dict[int, tuple[float, Array]] = {}

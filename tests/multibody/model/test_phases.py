@@ -15,8 +15,8 @@ from calmotion.multibody.model.moving_markers import pack
 from calmotion.multibody.model.phases import RESTARTED, changes, held_contacts, phases_of, without_contacts
 from calmotion.multibody.sensitivity.linearization import linearize
 from calmotion.shot import Body, Character, Frame, Joint, MassProperties
-from calmotion.shot.contact import Contact
 from calmotion.shot.run import RunSettings
+from calmotion.shot.standing.contact import Contact
 from calmotion.simulation.compiled_shot import compile_shot
 from calmotion.simulation.forward import run_forward
 from calmotion.simulation.inputs.curves import sample_tracks

@@ -11,8 +11,8 @@ from calmotion.multibody.model.model import Model, start_angles
 from calmotion.multibody.model.moving_markers import pack
 from calmotion.shot import Animation, Character
 from calmotion.shot.character import Array, BoolArray, contact_joints
-from calmotion.shot.contact import Contact
 from calmotion.shot.run import RunSettings
+from calmotion.shot.standing.contact import Contact
 from calmotion.simulation.inputs.curves import sample_tracks
 from calmotion.simulation.inputs.roots import sample_roots
 from calmotion.simulation.inputs.time_grid import TimeGrid

@@ -10,7 +10,7 @@ import numpy as np
 
 from calmotion.errors import ShotError
 from calmotion.shot import Frame
-from calmotion.shot.contact import Contact
+from calmotion.shot.standing.contact import Contact
 from calmotion.usd import schemas
 from calmotion.usd.clock import Clock
 from calmotion.usd.reading.context import Reading, is_rigid_body, prims_of

@@ -11,7 +11,7 @@ import numpy as np
 from calmotion.errors import ShotError
 from calmotion.shot import WORLD, Frame
 from calmotion.shot.character import Array
-from calmotion.shot.contact import Contact
+from calmotion.shot.standing.contact import Contact
 from calmotion.support.naming import nearest
 from calmotion.usd import gf
 from calmotion.usd.reading.context import Reading, prims_of

@@ -1,0 +1,1 @@
+"""What holds a robot on the ground."""
