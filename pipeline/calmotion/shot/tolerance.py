@@ -18,7 +18,7 @@ def tolerance_of(character: Character, requested: float | None = None) -> float:
 def reach(character: Character) -> float:
     """Length of the longest chain from the base to a target: from joint to joint, and the travel of its sliders [m].
 
-    Joints that close chains do not count. The base of a robot that floats is its feet. Without targets it is the distance
+    Joints that close chains do not count. A robot that floats reaches from its feet. Without targets it is the distance
     to the farthest joint.
     """
     nodes, far = _distances(character)

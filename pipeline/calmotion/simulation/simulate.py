@@ -7,10 +7,11 @@ from collections.abc import Callable
 
 import numpy as np
 
+from calmotion.errors import ShotError
 from calmotion.multibody.failure import SimulationFailure
 from calmotion.multibody.integrators.workspace import Workspace
 from calmotion.shot import Result, Track
-from calmotion.shot.character import Array
+from calmotion.shot.character import Array, contact_joints
 from calmotion.shot.run import RunSettings
 from calmotion.simulation.bodies import mode_tables, skins
 from calmotion.simulation.compiled_shot import CompiledShot
@@ -49,8 +50,17 @@ def shape_tracks(shot: CompiledShot, options: RunSettings, kind: str, cutoff: fl
         cutoff: Of the low-pass filter, over the lowest frequency.
 
     Raises:
-        ShotError: There is no such shaper, or nothing to shape for.
+        ShotError: There is no such shaper, nothing to shape for, or contacts that come and go.
     """
+    contacts = contact_joints(shot.character)
+    if contacts:
+        raise ShotError(
+            "a shaper delays the motion, and the contacts with the ground would not be",
+            path=shot.character.joints[contacts[0]].path,
+            attribute="--shaper",
+            found=kind,
+            remedy="Leave it out; calmotion optimize calms the motion without a delay.",
+        )
     prepared = prepare(shot, options)
     grid, curves = prepared.grid, sample_curves(shot.animation.current, prepared.grid)
     found = shaped(curves, grid, kind, *modes_of(prepared), cutoff)

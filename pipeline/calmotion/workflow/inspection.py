@@ -120,7 +120,7 @@ def inspect_report(run: Run, settings: Settings | None = None) -> dict[str, Any]
         "joints": [
             {
                 "path": joint.path,
-                "kind": joint.kind,
+                "kind": joint.kind if joint.contact is None else "contact",
                 "body0": names[joint.body0] if joint.body0 >= 0 else "",
                 "body1": names[joint.body1] if joint.body1 >= 0 else "",
                 "lower_rad": joint.lower,

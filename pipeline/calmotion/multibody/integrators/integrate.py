@@ -11,6 +11,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from calmotion.errors import IntegrationError
 from calmotion.multibody.failure import Reason, SimulationFailure
 from calmotion.multibody.integrators import radau, runge_kutta
 from calmotion.multibody.integrators.coefficients import IMPLICIT
@@ -41,9 +42,14 @@ def integrate(
 
     Between instants `rk4` and `radau` use cubics through angles and rates, which is exact for a cubic spline with
     knots on instants.
+
+    Raises:
+        IntegrationError: Contacts, by another integrator than BDF2.
     """
     if has_contacts(system) and integrator != "bdf2":
-        raise ValueError(f"{integrator} does not support contacts")
+        raise IntegrationError(
+            "only bdf2 simulates contacts", attribute="--integrator", found=integrator, remedy="Leave it out."
+        )
     if integrator in IMPLICIT:
         try:
             return simulate(system, start, angles, rates, h, workspace, progress, from_equilibrium, integrator, world)

@@ -121,7 +121,7 @@ def motor_values(bodies: BodyTree, poses: LocalPoses) -> Array:
                 frames.append(roots.get(motor.joint, still))
         (p0, r0), (p1, r1) = frames
         if motor.linear:
-            values[:, m] = np.einsum("ij,ij->i", p1 - p0, r0.apply(np.broadcast_to([0.0, 0.0, 1.0], p0.shape)))
+            values[:, m] = np.einsum("ij,ij->i", p1 - p0, r0.apply(np.tile([0.0, 0.0, 1.0], (len(p0), 1))))
         else:
             between = (r0.inv() * r1).as_quat()
             values[:, m] = np.unwrap(2.0 * np.arctan2(between[:, 2], between[:, 3]))
