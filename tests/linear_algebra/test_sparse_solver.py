@@ -85,3 +85,11 @@ def test_a_matrix_that_is_not_positive_definite_is_refused(helpers, steel):
         SparseSolver(K)
     with pytest.raises(NotPositiveDefinite):
         SparseSolver(csr_matrix(np.array([[np.nan]])))
+
+
+def test_a_scaled_matrix_has_the_same_factors():
+    K = diags([[-1.0] * 8, [3.0] * 9, [-1.0] * 8], [-1, 0, 1]).tocsr()
+    b = np.arange(18.0).reshape(9, 2)
+    solver = SparseSolver(K)
+    np.testing.assert_allclose(solver.scaled(4.0).solve(b), SparseSolver(4.0 * K).solve(b), rtol=1e-12)
+    np.testing.assert_array_equal(solver.scaled(4.0).scaled(0.25).solve(b), solver.solve(b))

@@ -15,10 +15,10 @@ from calmotion.accuracy.pod_subspace import ProjectedShot, ReferenceRun
 from calmotion.accuracy.reduced_bodies import RunMemory
 from calmotion.accuracy.step_error import StepRun, distance, frames_of, run_or_none, simulate_at
 from calmotion.errors import IntegrationError
+from calmotion.multibody.parallel import in_parallel
 from calmotion.shot import Result
 from calmotion.shot.run import RunSettings
 from calmotion.simulation.compiled_shot import CompiledShot
-from calmotion.simulation.parallel import in_parallel
 from calmotion.simulation.simulate import Progress, simulate_shot
 
 
@@ -46,8 +46,9 @@ def with_last_choices(
     projected, found = memory.projected.of_shot(shot, allowed), dict[str, Any]()
     options = replace(options, integrator=memory.integrator)
     fine = replace(options, step=memory.step)
+    progress(0.0, "simulating")
     tasks: tuple[Callable[[], None], ...] = (
-        lambda: found.update(result=simulate_shot(projected.shot, fine, progress)),
+        lambda: found.update(result=simulate_shot(projected.shot, fine, lambda fraction, message: None)),
         lambda: found.update(coarse=run_or_none(partial(simulate_at, projected.shot, options), 2.0 * memory.step)),
         lambda: found.update(finer=projected.finer_run(memory.step, fine)),
     )

@@ -27,6 +27,7 @@ from calmotion.accuracy.step_error import (
     step_error,
 )
 from calmotion.multibody.integrators.coefficients import IMPLICIT
+from calmotion.multibody.parallel import in_parallel
 from calmotion.reduction.reduced_body import ReducedBody
 from calmotion.shot import Accuracy, Animation, Character, Result, Simplification, Track
 from calmotion.shot.budget import STEP, SUBSPACE
@@ -37,7 +38,6 @@ from calmotion.simulation.bodies import mode_tables
 from calmotion.simulation.compiled_shot import CompiledShot
 from calmotion.simulation.inputs.curves import sample_tracks
 from calmotion.simulation.inputs.time_grid import MAX_STEP, make_grid
-from calmotion.simulation.parallel import in_parallel
 from calmotion.simulation.prepare import prepare
 from calmotion.simulation.simulate import Progress, intended_motion, simulate_shot
 

@@ -17,10 +17,10 @@ from calmotion.identification.parameters import Parameter
 from calmotion.identification.robots import robot_at
 from calmotion.identification.signals import Signals, signals_of
 from calmotion.multibody.failure import SimulationFailure
+from calmotion.multibody.parallel import in_parallel
 from calmotion.shot.character import Array
 from calmotion.shot.run import RunSettings
 from calmotion.simulation.compiled_shot import CompiledShot
-from calmotion.simulation.parallel import in_parallel
 from calmotion.support import interrupts
 
 DIFFERENCE = 0.01  # of the prior's standard deviation

@@ -14,9 +14,9 @@ from calmotion.identification.measurement import Measurement, Sensor
 from calmotion.identification.noise import correlation_time, least_sigma, spread_of
 from calmotion.identification.problem import Calibrated, Measured
 from calmotion.multibody.failure import SimulationFailure
+from calmotion.multibody.parallel import in_parallel
 from calmotion.shot.calibration.estimates import DAMPING, GEAR_STIFFNESS, MODULUS, POSITION_GAIN
 from calmotion.shot.character import Array
-from calmotion.simulation.parallel import in_parallel
 
 STIFF = (MODULUS, POSITION_GAIN, GEAR_STIFFNESS)  # what decides about frequencies
 TRIED = np.linspace(-2.4, 2.4, 17)  # of all of them at once, in standard deviations of their priors

@@ -20,6 +20,7 @@ _LEAF = 48  # largest number of nodes of a piece that is not cut
 _LANDMARKS = 4  # nodes from which distances in the graph are measured
 _SMALLEST_SIDE = 0.3  # least share of the nodes on either side of a cut
 _EQUAL = 1e-9  # relative difference below which lengths of axes, or heights, are equal
+_COVERED = 2  # cuts of a piece of which the smallest separator is worked out
 _DENSE = 0.5  # share of the nodes of a piece above which a separator is not used
 
 
@@ -73,7 +74,7 @@ def dissect(graph: Any, points: Array | None = None) -> Dissection:
             above = len(pieces) - 1
         for side in (left, right):
             below = None if where is None else where[side]
-            stack.append((nodes[side], part[side][:, side], below, above))
+            stack.append((nodes[side], _induced(part, side), below, above))
     count = len(pieces)
     above_of = np.array(parent[::-1], dtype=np.int64)
     return Dissection(
@@ -81,6 +82,22 @@ def dissect(graph: Any, points: Array | None = None) -> Dissection:
         start=np.concatenate([[0], np.cumsum([len(piece) for piece in pieces[::-1]])]).astype(np.int64),
         parent=np.where(above_of < 0, -1, count - 1 - above_of),
     )
+
+
+def _induced(graph: Any, nodes: Any) -> Any:
+    """The subgraph of some nodes, ascending."""
+    from scipy.sparse import csr_matrix
+
+    n, k = graph.shape[0], len(nodes)
+    place = np.full(n, -1, dtype=graph.indices.dtype)
+    place[nodes] = np.arange(k, dtype=place.dtype)
+    row = np.repeat(place, np.diff(graph.indptr))
+    column = place[graph.indices]
+    kept = (row >= 0) & (column >= 0)
+    start = np.zeros(k + 1, dtype=graph.indptr.dtype)
+    np.cumsum(np.bincount(row[kept], minlength=k), out=start[1:])
+    indices = column[kept]
+    return csr_matrix((np.ones(len(indices), dtype=np.int8), indices, start), shape=(k, k))
 
 
 def _levels(graph: Any) -> Array:
@@ -132,32 +149,36 @@ def _cut(graph: Any, heights: Array) -> tuple[Any, Any, Any] | None:
     """Separator and both sides (indices) of a graph, from the best cut at one level of one of several heights.
 
     The nodes of rank below c are on the left of a cut at c. Those of them with a neighbour of rank c or above form the
-    separator; a cumulative sum gives their number for all c at once.
+    separator; a cumulative sum gives their number for all c at once. The smallest separators of the two best cuts
+    follow from minimum vertex covers.
 
     Args:
         heights: Of the nodes along several directions, shape [n, directions].
     """
     n = graph.shape[0]
-    row = np.repeat(np.arange(n), np.diff(graph.indptr))
     low, high = max(1, int(_SMALLEST_SIDE * n)), min(n - 1, int((1.0 - _SMALLEST_SIDE) * n))
     balance = 1.0 + np.abs(np.arange(low, high + 1) / n - 0.5)
-    best: tuple[float, Any, Any] | None = None
+    cuts: list[tuple[float, float, Any]] = []
+    begin = np.flatnonzero(np.diff(graph.indptr))
     for height in heights.T[:3]:
         for sign in (1.0, -1.0):
             rank = np.empty(n, dtype=np.int64)
             rank[np.argsort(sign * height, kind="stable")] = np.arange(n)
             highest = rank.copy()  # rank of the highest neighbour
-            np.maximum.at(highest, row, rank[graph.indices])
+            if len(begin):
+                near = np.maximum.reduceat(rank[graph.indices], graph.indptr[begin])
+                highest[begin] = np.maximum(rank[begin], near)
             # a node of rank p with its highest neighbour at m is in the separator for p < c <= m
             step = np.bincount(rank + 1, minlength=n + 2) - np.bincount(highest + 1, minlength=n + 2)
-            k = int((np.cumsum(step)[low : high + 1] * balance).argmin())
-            left = rank < low + k
-            separator = vertex_cover(graph, left)
-            cost = len(separator) * balance[k]
-            if best is None or cost < best[0]:
-                best = (cost, left, separator)
-    assert best is not None
-    _, left, separator = best
+            costs = np.cumsum(step)[low : high + 1] * balance
+            k = int(costs.argmin())
+            cuts.append((float(costs[k]), float(balance[k]), rank < low + k))
+    cuts.sort(key=lambda cut: cut[0])
+    separator, left, least = np.zeros(0, dtype=np.int64), cuts[0][2], np.inf
+    for _, weight, side in cuts[:_COVERED]:
+        cover = vertex_cover(graph, side)
+        if weight * len(cover) < least:
+            separator, left, least = cover, side, weight * len(cover)
     if len(separator) > _DENSE * n:
         return None
     side = left.astype(np.int8)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from copy import copy
 from typing import Any
 
 import numpy as np
@@ -10,6 +11,7 @@ from calmotion.linear_algebra.blas_threads import one_blas_thread
 from calmotion.linear_algebra.multifrontal import MultifrontalCholesky
 from calmotion.linear_algebra.nested_dissection import dissect
 from calmotion.shot.character import Array
+from calmotion.support import interrupts
 
 
 class SparseSolver:
@@ -27,6 +29,7 @@ class SparseSolver:
     def __init__(self, matrix: Any, points: Array | None = None):
         from scipy.sparse import csr_matrix
 
+        interrupts.check()
         matrix = matrix.tocsr()
         n = matrix.shape[0]
         block = 3 if n % 3 == 0 else 1
@@ -34,7 +37,14 @@ class SparseSolver:
         graph = csr_matrix(
             (np.ones(matrix.nnz, dtype=np.int8), (row, matrix.indices // block)), shape=(n // block, n // block)
         )
+        self._scale = 1.0
         self._factors = MultifrontalCholesky(matrix, graph, dissect(graph, points), block)
+
+    def scaled(self, factor: float) -> SparseSolver:
+        """The solver of the matrix times a positive factor, with the same factors."""
+        other = copy(self)
+        other._scale = self._scale * factor
+        return other
 
     @property
     def entries(self) -> int:
@@ -43,5 +53,7 @@ class SparseSolver:
 
     def solve(self, b: Array) -> Array:
         """x with matrix @ x = b."""
+        interrupts.check()  # in a thread, where no signal arrives
         with one_blas_thread():
-            return self._factors.solve(b.reshape(len(b), -1)).reshape(b.shape)
+            found = self._factors.solve(b.reshape(len(b), -1)).reshape(b.shape)
+        return found if self._scale == 1.0 else found / self._scale

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import itertools
+from typing import Any
+
 import numpy as np
 
 from calmotion.geometry.tetrahedra import Indices
@@ -10,6 +13,8 @@ from calmotion.reduction.elements.assembly import FEModel, QuadraticMesh
 from calmotion.reduction.elements.elastic_forms import GradientRule
 from calmotion.shot.character import Array, ElasticMaterial
 
+_AT_ONCE = 2000  # nodes whose fits are in memory
+_DETERMINED = 1e-12  # least eigenvalue of the normal equations of a fit, of the largest
 _PATCH = 30  # least number of elements around a corner for a fit; else those of its neighbours are added
 
 
@@ -112,17 +117,45 @@ def _recovered(mesh: QuadraticMesh, points: Array, samples: Array) -> Array:
     at = mesh.basis.mapping.F(points).transpose(1, 2, 0)
     touch = csr_matrix((np.ones(4 * e, np.int8), (corners.ravel(), np.repeat(np.arange(e), 4))), shape=(count, e))
     wider = (touch @ touch.T @ touch).tocsr()
-    flat = samples.reshape(*samples.shape[:2], -1)
-    fitted = np.empty((len(mesh.nodes), flat.shape[2]))
-    for node in range(count):
-        near = touch.indices[touch.indptr[node] : touch.indptr[node + 1]]
-        if len(near) < _PATCH:
-            near = wider.indices[wider.indptr[node] : wider.indptr[node + 1]]
-        d = (at[near] - mesh.nodes[node]).reshape(-1, 3)
-        d /= np.abs(d).max()
-        P = np.column_stack([np.ones(len(d)), d, d * d, d[:, 0] * d[:, 1], d[:, 1] * d[:, 2], d[:, 0] * d[:, 2]])
-        # elements in one layer may not determine all coefficients: then the solution of least norm
-        fitted[node] = np.linalg.lstsq(P, flat[near].reshape(len(d), -1), rcond=1e-6)[0][0]
+    few = np.diff(touch.indptr) < _PATCH
+    flat = samples.reshape(e * samples.shape[1], -1)
+    fitted = np.empty((len(mesh.nodes), flat.shape[1]))
+    for near, own in ((touch, np.flatnonzero(~few)), (wider, np.flatnonzero(few))):
+        for nodes in np.split(own, np.arange(_AT_ONCE, len(own), _AT_ONCE)):
+            fitted[nodes] = _weights(near[nodes], at, mesh.nodes[nodes]) @ flat
     first, second = mesh.basis.mesh.edges
     fitted[mesh.basis.edge_dofs[0]] = 0.5 * (fitted[first] + fitted[second])
     return fitted.reshape(len(fitted), 6, -1)
+
+
+def _weights(near: Any, at: Array, places: Array) -> Any:
+    """Weights of samples in the value at a node of the quadratic that is fitted to them by least squares.
+
+    Args:
+        near: The elements with the samples of each of the k nodes, sparse CSR, shape [k, m].
+        at: Where the samples are [m], shape [m, q, 3].
+        places: Where the nodes are [m], shape [k, 3].
+
+    Returns:
+        Sparse, shape [k, m q].
+    """
+    from scipy.sparse import csr_matrix
+
+    q, count = at.shape[1], np.diff(near.indptr)
+    begin = np.concatenate([[0], np.cumsum(q * count)])
+    columns = (q * near.indices[:, None] + np.arange(q)).ravel()
+    row = np.repeat(np.arange(len(places)), q * count)
+    d = at.reshape(-1, 3)[columns] - places[row]
+    d /= np.maximum.reduceat(np.abs(d).max(axis=1), begin[:-1])[row, None] if len(d) else 1.0
+    x, y, z = d.T
+    P = np.stack([np.ones(len(d)), x, y, z, x * x, y * y, z * z, x * y, y * z, x * z], axis=1)
+    normal = np.empty((len(places), 10, 10))
+    for k, (first, last) in enumerate(itertools.pairwise(begin.tolist())):
+        own = P[first:last]
+        np.dot(own.T, own, out=normal[k])
+    # elements in one layer may not determine all coefficients: then the solution of least norm
+    size, vectors = np.linalg.eigh(normal)
+    inverse = np.where(size > _DETERMINED * size[:, -1:], 1.0 / np.maximum(size, np.finfo(float).tiny), 0.0)
+    value = np.einsum("kab,kb->ka", vectors, inverse * vectors[:, 0])
+    weights = np.einsum("ra,ra->r", P, value[row])
+    return csr_matrix((weights, columns, begin), shape=(len(places), q * len(at)))

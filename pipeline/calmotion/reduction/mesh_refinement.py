@@ -22,7 +22,7 @@ from calmotion.reduction.elements.bisection import bisected
 from calmotion.reduction.interfaces.interface_patches import AttachmentFrame, interface_patches
 from calmotion.reduction.load_envelope import LoadEnvelope
 from calmotion.reduction.material_laws.choice import amplitudes
-from calmotion.reduction.reduce import linear_modes
+from calmotion.reduction.reduce import FullBody, linear_modes
 from calmotion.shot.character import Array, Body, Frame, IntArray
 from calmotion.shot.meshes import CutPatch, FEMesh
 
@@ -123,7 +123,7 @@ def _of_volume(mesh: FEMesh) -> float:
 
 def refined_for_loads(
     mesh: FEMesh, body: Body, attachments: Sequence[AttachmentFrame], root: int, loads: LoadEnvelope,
-    tolerance: float, wanted: float, max_nodes: int, by_factor: bool = True,
+    tolerance: float, wanted: float, max_nodes: int, by_factor: bool = True, full: FullBody | None = None,
 ) -> FEMesh:  # fmt: skip
     """The mesh, refined where the deflections of the body under the loads of the shot have their error.
 
@@ -135,16 +135,17 @@ def refined_for_loads(
         tolerance: Of the modes that count, as of `reduce_body` [m].
         wanted, max_nodes: As of `refined`.
         by_factor: `with_finer_stiffness` instead of finer elements.
+        full: `full_body` of the mesh with its own stiffness, where it is known.
 
     Raises:
         ShotError: As `reduce_body`.
     """
     assert body.flexible is not None
     material = body.flexible.material
-    mesh = replace(mesh, quality=replace(mesh.quality, stiffness_factor=1.0))
+    first = replace(mesh, quality=replace(mesh.quality, stiffness_factor=1.0))
 
     def estimate(mesh: FEMesh) -> Estimate:
-        linear = linear_modes(mesh, body, attachments, root, loads, tolerance)
+        linear = linear_modes(mesh, body, attachments, root, loads, tolerance, full if mesh is first else None)
         envelope = linear.load_envelope
         assert envelope is not None
         count = min(_MODES, len(linear.basis.omega_squared))
@@ -155,9 +156,9 @@ def refined_for_loads(
         return Estimate(float(parts.sum()), squares, weights, parts, len(linear.model.mesh.nodes))
 
     given = replace(body, surfaces=())  # skins do not matter
-    key = ("for loads", mesh, given, attachments, root, loads, tolerance, wanted, max_nodes, by_factor)
+    key = ("for loads", first, given, attachments, root, loads, tolerance, wanted, max_nodes, by_factor)
     refine = with_finer_stiffness if by_factor else refined
-    return cached_reduction(key, lambda: refine(mesh, estimate, wanted, max_nodes))
+    return cached_reduction(key, lambda: refine(first, estimate, wanted, max_nodes))
 
 
 def refined_for_frequencies(mesh: FEMesh, body: Body, carrier: Frame | None, wanted: float, max_nodes: int) -> FEMesh:

@@ -107,6 +107,15 @@ class FullBody:
     moving: Sequence[InterfacePatch]
     rims: Sequence[tuple[float, float]]
 
+    def scaled(self, factor: float) -> FullBody:
+        """The same body with its stiffness times a factor, without a new factorisation."""
+        own = self.support
+        support = Support(own.root, own.patches, own.centers)
+        model = replace(self.model, stiffness=factor * self.model.stiffness)
+        return FullBody(
+            model, support.known(model, own.fixed(self.model).scaled(model, factor)), self.moving, self.rims
+        )
+
     @property
     def entries(self) -> int:
         """Number of entries of its matrix factor, most of its memory."""

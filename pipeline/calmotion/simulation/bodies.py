@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import nullcontext
 from dataclasses import replace
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 from calmotion.errors import ShotError
 from calmotion.multibody.model.joint_arrays import BodyAnchors
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
     from calmotion.reduction.interfaces.interface_patches import AttachmentFrame
     from calmotion.reduction.reduce import FullBody, LinearModes
 
+Found = TypeVar("Found")
 _KEPT = 60_000_000  # numbers in factors of full models, half a gigabyte
 
 
@@ -48,30 +50,61 @@ def reduce_bodies(
     """
     mesh_of = {} if meshes is None else {mesh.body: mesh for mesh in meshes.meshes}
     allowed = tolerance_of(character, tolerance)
-    # what bodies along a chain leave out adds up
-    flexible = sum(body.simulated_flexible for body in character.bodies)
-    result = []
-    for index, (body, anchors) in enumerate(zip(character.bodies, body_anchors(character, tree), strict=True)):
-        if progress is not None:
-            progress(index / len(character.bodies), body.path)
-        if not body.simulated_flexible:
-            result.append(rigid_body(body, anchors))
-            continue
+    anchors = body_anchors(character, tree)
+    flexible = [index for index, body in enumerate(character.bodies) if body.simulated_flexible]
+    for index in flexible:
         if index not in mesh_of:
             raise ShotError(
                 "this flexible body has no finite-element mesh",
-                path=body.path,
+                path=character.bodies[index].path,
                 remedy="Enable the plugin that provides meshes, or remove CalmFlexibleBodyAPI.",
             )
+
+    def reduced(index: int) -> ReducedBody:
         from calmotion.reduction.cache import cached_reduction
 
-        frames = fem_anchors(character, body, anchors)
+        body, own = character.bodies[index], anchors[index]
+        frames = fem_anchors(character, body, own)
         load_envelope = None if load_envelopes is None else load_envelopes[index]
         # what has no bearing on the reduction does not make it another one
         body = replace(body, non_rotating=False)
-        parts = (mesh_of[index], body, frames, body.surfaces, anchors.root, load_envelope, allowed / flexible)
-        result.append(cached_reduction(parts, partial(_reduced, full, index, parts)))
-    return _damped(character, tree, result)
+        # what bodies along a chain leave out adds up
+        parts = (mesh_of[index], body, frames, body.surfaces, own.root, load_envelope, allowed / len(flexible))
+        return cached_reduction(parts, partial(_reduced, full, index, parts))
+
+    result = dict(zip(flexible, bodies_in_parallel(reduced, flexible, character, progress), strict=True))
+    rigid = (
+        rigid_body(body, own) if index not in result else result[index]
+        for index, (body, own) in enumerate(zip(character.bodies, anchors, strict=True))
+    )  # fmt: skip
+    return _damped(character, tree, list(rigid))
+
+
+def bodies_in_parallel(
+    work: Callable[[int], Found], bodies: Sequence[int], character: Character,
+    progress: Callable[[float, str], None] | None = None, what: str = "",
+) -> list[Found]:  # fmt: skip
+    """The results of dense and sparse linear algebra on several bodies, in their order; one thread of BLAS for each.
+
+    Args:
+        work: Called for each body, in any thread.
+        bodies: Their indices.
+        character: Whose bodies they are.
+        progress: Called with a fraction and the path of a body at hand.
+        what: Follows the path.
+    """
+    if not bodies:
+        return []
+    from calmotion.linear_algebra.blas_threads import one_blas_thread
+    from calmotion.multibody.parallel import in_parallel
+
+    def done(number: int) -> None:
+        if progress is not None:
+            at = bodies[min(number, len(bodies) - 1)]
+            progress(number / len(bodies), f"{character.bodies[at].path}{what}")
+
+    with one_blas_thread() if len(bodies) > 1 else nullcontext():
+        return in_parallel(work, bodies, done)
 
 
 def _reduced(
@@ -88,7 +121,7 @@ def _reduced(
     mesh, body, anchors, _, root, _, _ = parts
     own = full_body(mesh, body, anchors, root)
     found = reduce_body(*parts, full=own)
-    if own.entries + sum(item.entries for item in full.values()) <= _KEPT:
+    if own.entries + sum(item.entries for item in list(full.values())) <= _KEPT:
         full[index] = own
     return found
 

@@ -13,10 +13,9 @@ from calmotion.reduction.load_envelope import LoadEnvelope
 from calmotion.reduction.reduced_body import ReducedBody
 from calmotion.shot import Animation, Character, FEMeshes
 from calmotion.shot.character import with_settings
-from calmotion.shot.meshes import FEMesh
 from calmotion.shot.run import RunSettings
 from calmotion.shot.tolerance import tolerance_of
-from calmotion.simulation.bodies import fem_anchors, reduce_bodies
+from calmotion.simulation.bodies import bodies_in_parallel, fem_anchors, reduce_bodies
 from calmotion.simulation.compiled_shot import CompiledShot, compile_shot
 from calmotion.simulation.prepare import grid_of
 from calmotion.simulation.rigid_run import shot_load_envelopes
@@ -78,18 +77,28 @@ class BodyReduction:
         from calmotion.reduction.mesh_refinement import refined_for_loads
 
         assert self.meshes is not None and self.loads is not None
-        anchors, meshes = body_anchors(self.character, self._tree), list[FEMesh]()
-        allowed = tolerance_of(self.character, tolerance) / len(self.meshes.meshes)
-        for done, mesh in enumerate(self.meshes.meshes):
-            body, error = self.character.bodies[mesh.body], wanted.get(mesh.body)
-            if error is not None and not (by_factor and mesh.given):
-                progress(done / len(self.meshes.meshes), f"{body.path}: a finer mesh")
-                own = anchors[mesh.body]
-                frames = fem_anchors(self.character, body, own)
-                loads = self.loads[mesh.body]
-                mesh = refined_for_loads(mesh, body, frames, own.root, loads, allowed, error, max_nodes, by_factor)
-            meshes.append(mesh)
-        return BodyReduction(self.character, FEMeshes(tuple(meshes)), self.loads, self._full is not None)
+        anchors, kept = body_anchors(self.character, self._tree), self._full or {}
+        allowed, loads = tolerance_of(self.character, tolerance) / len(self.meshes.meshes), self.loads
+        meshes, full = {mesh.body: mesh for mesh in self.meshes.meshes}, dict(kept)
+
+        def refine(index: int) -> None:
+            mesh, body, own = meshes[index], self.character.bodies[index], anchors[index]
+            frames = fem_anchors(self.character, body, own)
+            known, factor = full.pop(index, None), mesh.quality.stiffness_factor
+            finer = refined_for_loads(
+                mesh, body, frames, own.root, loads[index], allowed, wanted[index], max_nodes, by_factor,
+                known if factor == 1.0 else None,
+            )  # fmt: skip
+            if known is not None and by_factor:  # the same elements
+                full[index] = known.scaled(finer.quality.stiffness_factor / factor)
+            meshes[index] = finer
+
+        refined = [b for b, mesh in meshes.items() if b in wanted and not (by_factor and mesh.given)]
+        bodies_in_parallel(refine, refined, self.character, progress, ": a finer mesh")
+        result = BodyReduction(self.character, FEMeshes(tuple(meshes.values())), loads, self._full is not None)
+        if result._full is not None:
+            result._full |= full
+        return result
 
     def release(self) -> None:
         """Free the full models."""

@@ -2,7 +2,7 @@
 
 Each shot is optimised as by `calmotion optimize`, with the caches as they are. Times are processor times of this
 process and those that it started, as other work on the machine changes them least; compiling is counted by itself.
-A second table tells what `calmotion watch` takes after one key was moved, over the first run, see `edits`.
+A second table tells what `calmotion watch` takes after one key was moved, over the first run, see `watching.edits`.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from typing import Any
 
 from calmotion.benchmarks.common.tables import markdown
 from calmotion.benchmarks.common.timing import processor_time
-from calmotion.benchmarks.speed import edits
+from calmotion.benchmarks.watching import edits
 from calmotion.errors import ShotError
 from calmotion.host import OperatorResult
 from calmotion.shot.run import OutputPaths

@@ -24,7 +24,7 @@ from calmotion.reduction.basis.static_loads import ACCELERATIONS, peak_loads, un
 from calmotion.reduction.elements.assembly import FEModel
 from calmotion.reduction.interfaces.rigid_patch import rigid_patch
 from calmotion.reduction.load_envelope import LoadEnvelope, load_direction_envelope
-from calmotion.shot.character import Array, FlexibleSettings, IntArray
+from calmotion.shot.character import Array, BoolArray, FlexibleSettings, IntArray
 
 __all__ = ["Basis", "mode_signs", "reduced_basis", "rigid_patch"]
 
@@ -135,8 +135,12 @@ class _Outputs:
     load_envelope: LoadEnvelope
     targets: Any
 
+    def at_peaks(self, static: StaticModel) -> StaticModel:
+        """The static behaviour under the peak loads, from that under unit loads."""
+        return replace(static, loads=static.loads * peak_loads(self.load_envelope))
+
     def static_model(self, omega_squared: Array, modes: Array, patch_motion: Array) -> StaticModel:
-        """The static behaviour of a basis of shapes [r], [3n, r] and [p, 6, r] under the peak loads."""
+        """The static behaviour of a basis of shapes [r], [3n, r] and [p, 6, r] under unit loads."""
         mesh, mass = self.fixed.model.mesh, self.fixed.model.mass
         n, r = len(mesh.nodes), len(omega_squared)
         weight = mass @ unit_accelerations(mesh.nodes).reshape(n, 36)
@@ -150,21 +154,25 @@ class _Outputs:
         if sum(map(len, outputs)) == 0:
             surface = mesh.surface_nodes
             outputs.append(nodal[surface[:: max(1, len(surface) // _OUTPUTS)]])
-        return StaticModel(omega_squared, loads * peak_loads(self.load_envelope), np.concatenate(outputs))
+        return StaticModel(omega_squared, loads, np.concatenate(outputs))
 
 
 def _chosen(fixed: FixedInterface, outputs: _Outputs, settings: FlexibleSettings, tolerance: float) -> Basis:
     """The smallest basis within the tolerance."""
     limit = frequency_limit(settings, _BAND * outputs.load_envelope.frequency)
-    columns, U, static = _candidates(fixed, outputs, limit)
+    columns, U, units = _candidates(fixed, outputs, limit)
+    static = outputs.at_peaks(units)
     size = float(np.linalg.norm(np.ptp(fixed.model.mesh.nodes, axis=0)))
+    used = _used(outputs)
     outputs = replace(
         outputs,
         load_envelope=load_direction_envelope(
             outputs.load_envelope, largest_displacement(static.response) / size, size
         ),
     )
-    columns, U, static = _candidates(fixed, outputs, limit)
+    if not np.array_equal(used, _used(outputs)):  # else the same vectors, whatever the sizes of their loads
+        columns, U, units = _candidates(fixed, outputs, limit)
+    static = outputs.at_peaks(units)
     kept = static.omega_squared <= (2.0 * np.pi * limit) ** 2
     if settings.max_frequency < 0.0:
         kept |= largest_displacement_by_mode(static) * _dynamic_part(static.omega_squared, limit) > tolerance
@@ -177,6 +185,11 @@ def _chosen(fixed: FixedInterface, outputs: _Outputs, settings: FlexibleSettings
     omega_squared = np.einsum("ij,i,ij->j", combination, static.omega_squared, combination)
     basis = _basis(fixed, columns, omega_squared, U @ combination, int(residual.sum()))
     return replace(basis, cut_error_m=error, load_envelope=outputs.load_envelope)
+
+
+def _used(outputs: _Outputs) -> BoolArray:
+    """The unit accelerations that act, shape [12]."""
+    return np.asarray(peak_loads(outputs.load_envelope)[:ACCELERATIONS] > 0.0)
 
 
 def _scaled_wrenches(static: StaticModel, tolerance: float) -> StaticModel:
@@ -201,15 +214,15 @@ def _dynamic_part(omega_squared: Array, limit: float) -> Array:
 
 def _with_error(basis: Basis, outputs: _Outputs, limit: float) -> Basis:
     """The basis with the difference between its static responses and the exact ones."""
-    exact = _candidates(outputs.fixed, outputs, limit)[2]
+    exact = outputs.at_peaks(_candidates(outputs.fixed, outputs, limit)[2])
     flat = basis.modes.reshape(-1, len(basis.omega_squared))
-    reduced = outputs.static_model(basis.omega_squared, flat, basis.patch_motion)
+    reduced = outputs.at_peaks(outputs.static_model(basis.omega_squared, flat, basis.patch_motion))
     return replace(basis, cut_error_m=largest_displacement(exact.response - reduced.response))
 
 
 def _candidates(fixed: FixedInterface, outputs: _Outputs, limit: float) -> tuple[Array, Array, StaticModel]:
-    """Columns, their combinations and the static model of all modes up to a frequency [Hz] and above, with all residual
-    vectors: the static response is that of the full model."""
+    """Columns, their combinations and the static model under unit loads of all modes up to a frequency [Hz] and above,
+    with all residual vectors: the static response is that of the full model."""
     columns = fixed.all_needed(limit, peak_loads(outputs.load_envelope)[:ACCELERATIONS])
     omega_squared, U = ritz_modes(fixed.model, columns)
     motion = U[: 6 * len(fixed.patches)].reshape(len(fixed.patches), 6, U.shape[1])

@@ -12,7 +12,7 @@ from calmotion.geometry.tetrahedra import Indices
 from calmotion.linear_algebra.sparse_solver import SparseSolver
 from calmotion.reduction.basis.natural_modes import lowest_modes, vector_mass
 from calmotion.reduction.basis.residual_flexibility import residual_vectors
-from calmotion.reduction.basis.static_loads import UNIFORM, unit_accelerations
+from calmotion.reduction.basis.static_loads import ACCELERATIONS, UNIFORM, unit_accelerations
 from calmotion.reduction.elements.assembly import FEModel
 from calmotion.reduction.interfaces.rigid_patch import rigid_patch
 from calmotion.shot.character import Array, FlexibleSettings, IntArray
@@ -48,6 +48,7 @@ class FixedInterface:
     solver: SparseSolver
     constraint: Array
     _normal: dict[float, tuple[Array, Array]] = field(default_factory=dict, init=False, repr=False)
+    _inertial: list[tuple[Array, Array]] = field(default_factory=list, init=False, repr=False)
 
     @classmethod
     def of(
@@ -72,6 +73,16 @@ class FixedInterface:
             # static response of the interior to a motion of the patches; the interior rows of `flat` were zero
             flat[interior] = -solver.solve((model.stiffness @ flat)[interior])
         return cls(model, patches, interior, K, M, mass, solver, flat)
+
+    def scaled(self, model: FEModel, factor: float) -> FixedInterface:
+        """The same with another stiffness, without a new factorisation.
+
+        Args:
+            model: The full model with its stiffness times the factor, and the same mass.
+            factor: Positive.
+        """
+        K, solver = factor * self.K, self.solver.scaled(factor)
+        return FixedInterface(model, self.patches, self.interior, K, self.M, self.mass, solver, self.constraint)
 
     def lowest(self, count: int) -> Array:
         """Constraint modes and enough normal modes for `count` accurate modes of the body, shape [3n, 6p + k]."""
@@ -149,10 +160,17 @@ class FixedInterface:
         fields = unit_accelerations(self.model.mesh.nodes)[:, :, :count]
         return np.asarray(self.mass @ fields.reshape(len(self.constraint), count))
 
+    def inertial(self) -> tuple[Array, Array]:
+        """Nodal forces of the unit accelerations on the interior, and its static response, shape [i, 12] each."""
+        if not self._inertial:
+            loads = self._weight(ACCELERATIONS)[self.interior]
+            self._inertial.append((loads, self.solver.solve(loads)))
+        return self._inertial[0]
+
     def _residual(self, values: Array, vectors: Array, weight: Array, least: float) -> Array:
-        used = weight > 0.0
-        loads = self._weight(len(weight))[self.interior][:, used]
-        residual, work = residual_vectors(self.K, loads, weight[used], values, vectors, self.solver)
+        used = np.flatnonzero(weight > 0.0)
+        loads, static = (part[:, used] for part in self.inertial())
+        residual, work = residual_vectors(self.K, loads, weight[used], values, vectors, static)
         return residual[:, work > least]
 
     def _work(self, loads: Array) -> Array:

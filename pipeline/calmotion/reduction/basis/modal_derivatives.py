@@ -32,6 +32,7 @@ from calmotion.reduction.interfaces.patch_rotation import (
     squares,
 )
 from calmotion.shot.character import Array, ElasticMaterial, IntArray
+from calmotion.support import interrupts
 
 NEGLIGIBLE = 1e-3  # square root of the negligible share of the largest strain energy among the derivatives
 
@@ -44,6 +45,11 @@ class Support:
     patches: Sequence[IntArray]
     centers: Sequence[Array]
     _fixed: dict[FEModel, FixedInterface] = field(default_factory=dict, init=False, repr=False)
+
+    def known(self, model: FEModel, fixed: FixedInterface) -> Support:
+        """This support, with what `fixed` gives for a model."""
+        self._fixed[model] = fixed
+        return self
 
     def fixed(self, model: FEModel) -> FixedInterface:
         """The body with all interfaces fixed, factorised once.
@@ -110,6 +116,7 @@ def modal_derivatives(
     force = np.zeros((n, 3, pairs + at))
     imposed = np.zeros((n, 3, pairs + at))
     for k, (i, j) in enumerate(zip(first, second, strict=True)):
+        interrupts.check()
         force[:, :, k] = second_order_force(rule, gradients[i], gradients[j], lame, mu, law)
     change_sizes = np.einsum("pms,pmq->sq", changes, squares(basis.patch_motion[:, 3:, :count]))
     for k, (patch, arm) in enumerate(zip(support.patches, arms, strict=True)):

@@ -15,14 +15,13 @@ from typing import Any
 
 import numpy as np
 
-from calmotion.linear_algebra.sparse_solver import SparseSolver
 from calmotion.shot.character import Array, BoolArray
 
 _ROUNDING = 1e-19  # of the work of a load: rounding of the static response
 
 
 def residual_vectors(
-    K: Any, loads: Array, weight: Array, values: Array, modes: Array, solver: SparseSolver
+    K: Any, loads: Array, weight: Array, values: Array, modes: Array, static: Array
 ) -> tuple[Array, Array]:
     """Static responses to loads minus those of modes, as orthogonal vectors by descending work.
 
@@ -31,14 +30,13 @@ def residual_vectors(
         loads: Shape [n, l].
         weight: Factor of each load, shape [l]; it affects only the order.
         values, modes: Eigenpairs of K and the mass matrix, mass-orthonormal, shapes [k] and [n, k].
-        solver: Of K.
+        static: Static response to each load, shape [n, l].
 
     Returns:
         Vectors with V^T K V = E, orthogonal to the modes in stiffness and mass, shape [n, v], v <= l, and the work of
         the weighted loads on each [J], shape [v], descending.
     """
-    loads = loads * weight
-    static = solver.solve(loads)
+    loads, static = loads * weight, static * weight
     work = np.einsum("ij,ij->j", loads, static)
     rest = static - modes @ ((modes.T @ loads) / values[:, None])
     gram = rest.T @ (K @ rest)

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import logging
+import threading
 
 import numpy as np
 
 from calmotion.geometry.tetrahedra import tet_volumes
 from calmotion.shot.character import Array, IntArray
+
+_ONE = threading.Lock()
 
 
 def bisected(points: Array, tets: IntArray, marked: IntArray) -> tuple[Array, IntArray]:
@@ -28,13 +31,14 @@ def bisected(points: Array, tets: IntArray, marked: IntArray) -> tuple[Array, In
     from skfem import MeshTet
 
     log = logging.getLogger("skfem")
-    level = log.level
-    log.setLevel(logging.ERROR)  # it warns about the memory layout of arrays that it makes itself
-    try:
-        mesh = MeshTet(np.ascontiguousarray(points.T), np.ascontiguousarray(tets.T, dtype=np.int64))
-        finer = mesh.refined(np.ascontiguousarray(marked))
-    finally:
-        log.setLevel(level)
+    with _ONE:  # threads share the logger
+        level = log.level
+        log.setLevel(logging.ERROR)  # it warns about the memory layout of arrays that it makes itself
+        try:
+            mesh = MeshTet(np.ascontiguousarray(points.T), np.ascontiguousarray(tets.T, dtype=np.int64))
+            finer = mesh.refined(np.ascontiguousarray(marked))
+        finally:
+            log.setLevel(level)
     new, split = np.ascontiguousarray(finer.p.T), np.ascontiguousarray(finer.t.T).astype(np.int32)
     flipped = tet_volumes(new, split) < 0.0
     split[flipped] = split[flipped][:, [1, 0, 2, 3]]

@@ -13,6 +13,7 @@ import numpy as np
 from calmotion.reduction.elements.assembly import QuadraticMesh, corner_gradients
 from calmotion.reduction.elements.green_strain_fields import green_fields
 from calmotion.shot.character import Array
+from calmotion.support import interrupts
 
 
 class GradientRule:
@@ -136,12 +137,13 @@ def strain_gram(rule: GradientRule, modes: Array, lame: float, mu: float, direct
     size = r + p * (p + 1) // 2
     A = np.zeros((size, size))
     count, points = rule.weights.shape
-    # strain fields of about 64 MB at a time
-    chunk = max(1, 8_000_000 // (7 * points * size))
+    # strain fields of about 16 MB at a time stay in the processor's cache
+    chunk = max(1, 2_000_000 // (7 * points * size))
     # the energy density 2 mu |E|^2 + lame tr(E)^2 as a sum of squares
     shear = np.sqrt(2.0 * mu)
     bulk = (np.sqrt(2.0 * mu + 3.0 * lame) - shear) / 3.0
     for start in range(0, count, chunk):
+        interrupts.check()  # in a thread, where no signal arrives
         elements = slice(start, min(start + chunk, count))
         weights = rule.weights[elements].ravel()
         G = np.ascontiguousarray(rule.gradients(modes, elements).reshape(r, -1, 9).transpose(0, 2, 1))

@@ -11,6 +11,7 @@ import numpy as np
 from calmotion.multibody.analysis.rigid_response import RigidResponse
 from calmotion.multibody.failure import SimulationFailure
 from calmotion.multibody.model.model import Model
+from calmotion.multibody.parallel import in_parallel
 from calmotion.retargeting.problem.limits import LimitTerms
 from calmotion.retargeting.problem.offset_basis import OffsetBasis
 from calmotion.retargeting.problem.offset_space import OffsetSpace
@@ -39,7 +40,6 @@ from calmotion.simulation.forward import ForwardRun, limited_values
 from calmotion.simulation.inputs.curves import Curves
 from calmotion.simulation.inputs.time_grid import TimeGrid
 from calmotion.simulation.motor_limits import QUANTITIES
-from calmotion.simulation.parallel import in_parallel
 from calmotion.simulation.simulator import Simulator
 from calmotion.simulation.target_errors import Objective
 

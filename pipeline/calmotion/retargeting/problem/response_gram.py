@@ -11,11 +11,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from calmotion.multibody.parallel import in_parallel
 from calmotion.multibody.sensitivity.linearization import spare_memory
 from calmotion.retargeting.problem.offset_space import OffsetSpace
 from calmotion.retargeting.problem.robot import Robot
 from calmotion.shot.character import Array, BoolArray, IntArray
-from calmotion.simulation.parallel import in_parallel
 
 COST = 1 / 64  # of a response, in products: half of the instants, at a sixteenth of the time of a sweep
 LEAST = 24  # products: the matrix is not made for less; few robots need its kernels, which take seconds to compile

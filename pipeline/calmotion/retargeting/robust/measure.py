@@ -9,6 +9,7 @@ import numpy as np
 
 from calmotion.errors import ShotError
 from calmotion.multibody.failure import SimulationFailure
+from calmotion.multibody.parallel import in_parallel
 from calmotion.multibody.sensitivity.linearization import processors
 from calmotion.retargeting.robust.scenarios import shot_of
 from calmotion.shot import Track
@@ -17,7 +18,6 @@ from calmotion.shot.robust.robots import Scenario
 from calmotion.shot.run import RunSettings
 from calmotion.simulation.compiled_shot import CompiledShot
 from calmotion.simulation.inputs.curves import sample_tracks
-from calmotion.simulation.parallel import in_parallel
 from calmotion.simulation.prepare import prepare
 from calmotion.simulation.simulate import Progress, intended_motion
 from calmotion.simulation.simulator import Simulator
