@@ -16,6 +16,7 @@ from calmotion.accuracy.element_size import (
     shape_of,
 )
 from calmotion.errors import ShotError
+from calmotion.geometry.congruence import Isometry
 from calmotion.geometry.tetrahedra import (
     connected_parts,
     measure_quality,
@@ -24,7 +25,7 @@ from calmotion.geometry.tetrahedra import (
     welded_tets,
     without_unused_points,
 )
-from calmotion.shot import Body, FEMesh, Frame, TetGeometry
+from calmotion.shot import Body, Character, FEMesh, Frame, TetGeometry
 
 from .accuracy import ENOUGH, mass_note, print_note, remark
 from .filling import DENSE, filled, refuse_loose_parts, refuse_too_many
@@ -33,6 +34,7 @@ from .repair import Solid
 from .sources.beam import equivalent_beam
 from .sources.choice import solid_of
 from .sources.hollow import hollowed
+from .sources.twins import moved
 from .tetwild import OutOfTime, ProcessorTime
 
 if TYPE_CHECKING:
@@ -147,6 +149,23 @@ def _meshed(
     source = geometry.solid.source if isinstance(geometry, Volume) else quality.source
     repairs = (*quality.repairs, *mass_note(body, quality.volume), *print_note(body, mesh))
     return replace(mesh, quality=replace(quality, repairs=repairs, source=source))
+
+
+def twin_mesh(mesh: FEMesh, isometry: Isometry, index: int, character: Character, geometry: FEMesh | Volume) -> FEMesh:
+    """The mesh of a body that has the shape of another one, from the mesh of that.
+
+    Args:
+        mesh: Of the other body.
+        isometry: From the other body to this one.
+        index: Of this body in its character.
+        character: Of both.
+        geometry: Of this body, see `geometry_of`.
+    """
+    body = character.bodies[index]
+    made = moved(mesh, isometry, index, character.bodies[mesh.body].path)
+    own = geometry.solid.repairs if isinstance(geometry, Volume) else ()
+    repairs = (*made.quality.repairs, *own, *mass_note(body, made.quality.volume), *print_note(body, made))
+    return replace(made, quality=replace(made.quality, repairs=repairs))
 
 
 def geometry_of(index: int, body: Body, options: MeshOptions, frames: Sequence[Frame] = ()) -> FEMesh | Volume:

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from calmotion.shot import Body, FEMesh
 
     from .body_mesh import MeshOptions, Volume
+    from .sources.twins import Link
 
 
 class TetrahedralizeFlexibleBodies(Operator):
@@ -55,7 +56,8 @@ class TetrahedralizeFlexibleBodies(Operator):
         """The meshes, in the order of the bodies."""
         # manifold3d takes half a second to load: only for flexible bodies
         from .accuracy import frames_of
-        from .body_mesh import MeshOptions, mesh_of
+        from .body_mesh import MeshOptions, mesh_of, twin_mesh
+        from .sources.twins import twin_of
 
         choices = context.get(ModelChoices)
         character = context.get(Character) if choices is None else choices.character
@@ -67,12 +69,19 @@ class TetrahedralizeFlexibleBodies(Operator):
         flexible = [index for index, body in enumerate(character.bodies) if body.simulated_flexible]
         geometries = _geometries(character, flexible, options)
         attachments = _attachments(character)
-        meshes = []
+        meshes: list[FEMesh] = []
+        links = [_link(character, index, geometries[index]) for index in flexible]
         for done, index in enumerate(flexible):
-            body = character.bodies[index]
+            body, link = character.bodies[index], links[done]
             context.progress(done / len(flexible), body.path)
-            frames = frames_of(character, index)
-            mesh = mesh_of(index, body, geometries[index], options, frames, attachments.get(index, ()))
+            # a link of which another one is the copy or the mirror image is meshed once
+            whole = [k for k in range(done) if links[k] is not None]
+            twin = None if link is None else twin_of(link, [known for k in whole if (known := links[k]) is not None])
+            if twin is not None:
+                mesh = twin_mesh(meshes[whole[twin[0]]], twin[1], index, character, geometries[index])
+            else:
+                frames = frames_of(character, index)
+                mesh = mesh_of(index, body, geometries[index], options, frames, attachments.get(index, ()))
             quality = mesh.quality
             context.report(
                 "info",
@@ -85,6 +94,18 @@ class TetrahedralizeFlexibleBodies(Operator):
             meshes.append(mesh)
         context.progress(1.0, "")
         return (FEMeshes(tuple(meshes)),)
+
+
+def _link(character: Character, index: int, geometry: FEMesh | Volume) -> Link | None:
+    """What decides the mesh of a body; None where its tetrahedra are given."""
+    from .accuracy import frames_of
+    from .body_mesh import Volume
+    from .sources.twins import Link
+
+    if not isinstance(geometry, Volume):
+        return None
+    carried = any(joint.body1 == index for joint in character.joints)
+    return Link(character.bodies[index], geometry.solid, geometry.size, carried, frames_of(character, index))
 
 
 def _refuse_large_elements(body: Body, given: float) -> None:

@@ -28,7 +28,7 @@ def test_a_mesh_that_takes_too_long_is_made_on_a_grid(host, package, monkeypatch
 def test_a_surface_of_too_many_triangles_is_meshed_on_a_grid_at_once(host, package, monkeypatch):
     filling = package("filling")
     monkeypatch.setattr(filling, "_MANY", 100)
-    monkeypatch.setattr(filling, "_DENSE", 100)
+    monkeypatch.setattr(filling, "DENSE", 100)
     monkeypatch.setattr(filling, "_TRIANGLE", 1.0)
     ball = trimesh.creation.icosphere(subdivisions=3, radius=0.03)
     (mesh,) = run(host, link(surface(ball)))

@@ -1,0 +1,100 @@
+"""Links that are meshed once: the left arm of a robot is mostly its mirrored right one, and its fingers are alike."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from calmotion.geometry.congruence import Isometry, isometries
+from calmotion.shot import Body, FEMesh, FlexibleSettings, Frame
+from calmotion.shot.meshes import CutPatch
+
+from ..repair import Solid
+
+_SAME, _ALONG = 1e-4, 1e-4  # distance of frames, of the size; 1 - cosine of axes that are the same
+
+
+@dataclass(frozen=True, eq=False)
+class Link:
+    """What decides the mesh of a flexible body.
+
+    Attributes:
+        body: Its body.
+        solid: Its solid.
+        size: Of its elements [m]; not positive: automatic.
+        carried: Whether the first frame is that of the joint to its parent.
+        frames: Of its joints, body frame, that of the joint to its parent first.
+    """
+
+    body: Body
+    solid: Solid
+    size: float
+    carried: bool
+    frames: tuple[Frame, ...]
+
+
+def twin_of(link: Link, others: Sequence[Link]) -> tuple[int, Isometry] | None:
+    """The first of other links that has the same shape, and the isometry that takes it to the link; None without one.
+
+    Their joints must be at the same places, their settings the same; their densities and masses may differ.
+    """
+    for index, other in enumerate(others):
+        if _settings(link) != _settings(other) or len(link.frames) != len(other.frames):
+            continue
+        solid, shown = other.solid, link.solid
+        for isometry in isometries(solid.points, solid.triangles, shown.points, shown.triangles):
+            if _joints_match(isometry, other, link):
+                return index, isometry
+    return None
+
+
+def _settings(link: Link) -> tuple[object, ...]:
+    """What of the settings decides a mesh; those of named interfaces are never the same."""
+    settings: FlexibleSettings | None = link.body.flexible
+    assert settings is not None
+    named = link.body.path if link.body.interfaces else ""
+    material = settings.material
+    core = None if material.core is None else (material.core.skin, material.core.infill, material.core.stiffness)
+    return (
+        material.poissons_ratio, core, settings.interface_radius, settings.geometry, settings.wall_thickness,
+        settings.section, link.size, link.solid.source, link.carried, named,
+    )  # fmt: skip
+
+
+def _joints_match(isometry: Isometry, link: Link, other: Link) -> bool:
+    """Whether an isometry takes the joints of a link to those of another one: the first to the first, others in any
+    order."""
+    size = float(np.linalg.norm(np.ptp(other.solid.points, axis=0)))
+    left = list(range(len(other.frames)))
+    for number, frame in enumerate(link.frames):
+        place, axis = isometry(frame.position), isometry.turn @ frame.axis
+        for k in [0] if number == 0 and link.carried else left:
+            found = other.frames[k]
+            near = np.linalg.norm(found.position - place) <= _SAME * size
+            if k in left and near and abs(float(found.axis @ axis)) >= 1.0 - _ALONG:
+                left.remove(k)
+                break
+        else:
+            return False
+    return True
+
+
+def moved(mesh: FEMesh, isometry: Isometry, index: int, path: str) -> FEMesh:
+    """A mesh after an isometry, as that of another body.
+
+    Args:
+        mesh: Of a twin.
+        isometry: From the twin to the body.
+        index: Of the body in its character.
+        path: Prim path of the twin, for the message.
+    """
+    tets = mesh.tets[:, [1, 0, 2, 3]] if isometry.mirrors else mesh.tets
+    order = [0, 2, 1] if isometry.mirrors else [0, 1, 2]
+    patches = tuple(
+        CutPatch(isometry(patch.origin), np.ascontiguousarray(isometry(patch.triangles)[:, order]))
+        for patch in mesh.patches
+    )
+    note = f"meshed as {path}, {'mirrored' if isometry.mirrors else 'which has the same shape'}"
+    quality = replace(mesh.quality, repairs=(note,))
+    return FEMesh(index, isometry(mesh.points), np.ascontiguousarray(tets), quality, mesh.given, patches)

@@ -1,0 +1,57 @@
+"""The isometries between surfaces."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import trimesh
+from calmotion.geometry.congruence import isometries
+
+MIRROR = np.diag([1.0, -1.0, 1.0])
+
+
+def bracket():
+    """A part without any symmetry."""
+    base = trimesh.creation.box((0.1, 0.03, 0.01))
+    ear = trimesh.creation.box((0.02, 0.012, 0.03))
+    ear.apply_translation((0.035, 0.006, 0.015))
+    foot = trimesh.creation.box((0.015, 0.02, 0.014))
+    foot.apply_translation((-0.03, -0.012, -0.004))
+    whole = trimesh.boolean.union([base, ear, foot])
+    return np.array(whole.vertices), np.array(whole.faces)
+
+
+def turned(seed=3):
+    turn = np.linalg.qr(np.random.default_rng(seed).normal(size=(3, 3)))[0]
+    return turn if np.linalg.det(turn) > 0.0 else -turn
+
+
+@pytest.mark.parametrize("turn", [np.eye(3), turned(), MIRROR, turned() @ MIRROR])
+def test_the_isometry_of_a_part_is_found_whatever_the_order_of_its_points(turn):
+    points, triangles = bracket()
+    order = np.random.default_rng(1).permutation(len(points))
+    place = np.empty(len(points), dtype=int)
+    place[order] = np.arange(len(points))
+    other = points[order] @ turn.T + [0.3, -0.2, 0.1]
+    others = place[triangles][:, ::-1] if np.linalg.det(turn) < 0.0 else place[triangles]
+    (found,) = isometries(points, triangles, other, others)
+    assert found.turn == pytest.approx(turn, abs=1e-6) and found.mirrors == (np.linalg.det(turn) < 0.0)
+    assert found(points)[order] == pytest.approx(other, abs=1e-6)
+
+
+def test_parts_that_differ_have_none():
+    points, triangles = bracket()
+    assert isometries(points, triangles, 1.001 * points, triangles) == []
+    bent = points.copy()
+    bent[np.argmax(points[:, 0]), 1] += 2e-5
+    assert isometries(points, triangles, bent, triangles) == []
+
+
+def test_a_box_has_eight_and_the_first_is_no_turn():
+    box = trimesh.creation.box((0.1, 0.03, 0.02))
+    points, triangles = np.array(box.vertices), np.array(box.faces)
+    found = isometries(points, triangles, points + 1.0, triangles)
+    assert len(found) == 8 and np.array_equal(found[0].turn, np.eye(3))
+    assert [kept.mirrors for kept in found] == [False] * 4 + [True] * 4
+    cube = np.array(trimesh.creation.box((0.1, 0.1, 0.1)).vertices)
+    assert len(isometries(cube, triangles, cube + 1.0, triangles)) == 1

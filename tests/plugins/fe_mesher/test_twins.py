@@ -1,0 +1,85 @@
+"""Copies and mirror images of links are meshed once."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import trimesh
+from calmotion.geometry.tetrahedra import tet_volumes
+from calmotion.reduction.mesh_refinement import frequency_estimate
+from calmotion.shot import Frame
+from calmotion.shot.meshes import CutPatch
+from mesher_links import link, run, surface
+
+TURN = np.array([1.0, 0.0, 0.0, 0.0])
+ROOT = Frame(np.array([-0.05, 0.0, 0.0]), TURN)
+MIRROR = np.diag([1.0, -1.0, 1.0])
+
+
+def bracket(mirrored=False):
+    base = trimesh.creation.box((0.1, 0.03, 0.01))
+    ear = trimesh.creation.box((0.02, 0.012, 0.03))
+    ear.apply_translation((0.035, 0.006, 0.015))
+    foot = trimesh.creation.box((0.015, 0.02, 0.014))
+    foot.apply_translation((-0.03, -0.012, -0.004))
+    whole = trimesh.boolean.union([base, ear, foot])
+    if mirrored:
+        whole.apply_transform(np.diag([1.0, -1.0, 1.0, 1.0]))
+    return surface(whole)
+
+
+def test_the_mirror_image_of_a_link_is_meshed_once(host, package, monkeypatch):
+    made = package("body_mesh")
+    fill, count = made.filled, []
+
+    def counted(*arguments):
+        count.append(arguments[1].path)
+        return fill(*arguments)
+
+    monkeypatch.setattr(made, "filled", counted)
+    left, right = link(bracket()), replace(link(bracket(mirrored=True)), path="/Arm/right")
+    stiffer = replace(left.flexible, interface_radius=0.02)
+    first, second, third = run(host, left, right, replace(left, path="/Arm/third", flexible=stiffer))
+    assert count == ["/Arm/link", "/Arm/third"]
+    assert second.body == 1 and (tet_volumes(second.points, second.tets) > 0.0).all()
+    assert second.points == pytest.approx(first.points @ MIRROR, abs=1e-9)
+    assert "meshed as /Arm/link, mirrored" in second.quality.repairs and len(third.tets)
+    assert not any("meshed as" in note for note in (*first.quality.repairs, *third.quality.repairs))
+    # its own estimate of its own body agrees
+    one, other = (frequency_estimate(mesh, body, None) for mesh, body in ((first, left), (second, right)))
+    assert other.squares == pytest.approx(one.squares, rel=1e-6)
+
+
+def test_links_are_twins_only_with_their_joints_at_the_same_places(package):
+    twins, solids = package("sources.twins"), package("repair")
+    solid, image = (solids.closed_solid([bracket(m)], "/Arm/link") for m in (False, True))
+    tip, tilted = Frame(np.array([0.04, 0.006, 0.03]), TURN), Frame(np.array([0.04, 0.006, 0.03]), np.eye(4)[1])
+    mirrored_tip = Frame(MIRROR @ tip.position, TURN)
+    left = twins.Link(link(bracket()), solid, -1.0, True, (ROOT, tip))
+    right = twins.Link(link(bracket(True)), image, -1.0, True, (ROOT, mirrored_tip))
+    index, isometry = twins.twin_of(right, [left])
+    assert index == 0 and isometry.mirrors
+    assert twins.twin_of(left, [left])[1].turn == pytest.approx(np.eye(3))
+    assert twins.twin_of(replace(right, frames=(ROOT, tip)), [left]) is None
+    assert twins.twin_of(replace(right, frames=(mirrored_tip, ROOT)), [left]) is None, "the first is the carrier"
+    assert (
+        twins.twin_of(replace(right, frames=(ROOT, replace(tilted, position=mirrored_tip.position))), [left])
+        is not None
+    )
+    sideways = Frame(mirrored_tip.position, np.array([np.sqrt(0.5), np.sqrt(0.5), 0.0, 0.0]))
+    assert twins.twin_of(replace(right, frames=(ROOT, sideways)), [left]) is None, "another axis"
+    assert twins.twin_of(replace(right, size=0.01), [left]) is None
+
+
+def test_patches_are_moved_with_the_mesh(host, package):
+    (mesh,) = run(host, link(bracket(), element_size=0.02))
+    corners = mesh.points[mesh.tets[0, [0, 2, 1]]]
+    mesh = replace(mesh, patches=(CutPatch(ROOT.position, corners[None]),))
+    isometry = package("sources.twins").Isometry(MIRROR, np.array([0.0, 0.5, 0.0]))
+    image = package("sources.twins").moved(mesh, isometry, 3, "/Arm/link")
+    assert image.body == 3 and image.patches[0].origin == pytest.approx([-0.05, 0.5, 0.0])
+    area = np.cross(corners[1] - corners[0], corners[2] - corners[0])
+    found = np.cross(*(image.patches[0].triangles[0, k] - image.patches[0].triangles[0, 0] for k in (1, 2)))
+    assert found == pytest.approx(MIRROR @ area, abs=1e-12), "outward as before"
