@@ -39,8 +39,9 @@ _COARSEST = 0.3  # largest error of the volume of a mesh of a grid, which is rep
 _LOOSE = 0.05  # of the volume: parts that a thin connection, which the mesh did not follow, held
 
 # Largest number of nodes of ten-node tetrahedra: twice as many where walls are
-# thin, for some ten seconds; walls that are thinner than the spacing have gaps
-_GRID_NODES = 16_000
+# thin, for some ten seconds (with 16,000, links took 21 to 34 s and were no more exact); walls that are thinner than
+# the spacing have gaps
+_GRID_NODES = 10_000
 _GRID_WALL = 0.8  # of the thinner walls: spacing with which they have none
 # Factor of the spacing while the volume error is larger than that; largest way of a corner to the surface
 _FINER, _NEAR_VOLUME, _MOVED = 0.8, 0.02, 0.5

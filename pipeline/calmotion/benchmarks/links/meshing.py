@@ -248,17 +248,15 @@ def _survey_all(found: Sequence[tuple[Link, str]], options: Namespace, say: Call
                 rows[k] = row if k == same else same_row(row, found[k][0], found[k][1])
         left = (time.monotonic() - start) / done_work * (len(work) - done_work)
         say(f"[{len(rows)}/{len(found)}] {robot} {link.name}: {row.outcome}; about {left / 60.0:.0f} min left")
+        so_far = {k: rows[k] for k in sorted(rows)}
         if options.output:
-            write([rows[k] for k in sorted(rows)], options.output)
-    whole = [rows[k] for k in sorted(rows)]
-    if options.page:
-        drawn = [
-            (f"{row.robot}, {row.link}", f"meshing/{Path(p).name}")
-            for row, p in zip(whole, pictures, strict=True)
-            if p and Path(p).exists()
-        ]
-        Path(options.page).write_text(page(whole, drawn, _command(options)), encoding="utf-8")
-    return whole
+            write(list(so_far.values()), options.output)
+        if options.page:
+            drawn = [(f"{r.robot}, {r.link}", Path(pictures[k])) for k, r in so_far.items() if pictures[k]]
+            shown = [(title, f"meshing/{file.name}") for title, file in drawn if file.exists()]
+            text = page(list(so_far.values()), shown, _command(options))
+            Path(options.page).write_text(text, encoding="utf-8")
+    return [rows[k] for k in sorted(rows)]
 
 
 def _first_of_its_kind(links: Sequence[Link]) -> list[int]:
