@@ -16,6 +16,7 @@ from calmotion.retargeting.avoided_reversals import count_reversals, play_of
 from calmotion.retargeting.checkpoint import Checkpoint, problem_key
 from calmotion.retargeting.found_curves import found_curves
 from calmotion.retargeting.problem.limit_costs import limit_costs
+from calmotion.retargeting.problem.limits import FIRST_PENALTY
 from calmotion.retargeting.problem.posing import locked_coefficients, pose
 from calmotion.retargeting.problem.problem import RetargetProblem
 from calmotion.retargeting.problem.robot import Robot
@@ -41,8 +42,6 @@ from calmotion.simulation.report import left_out_rows, limit_uses, performed_mot
 from calmotion.simulation.simulate import Progress, intended_motion
 from calmotion.simulation.simulator import Simulator, compile_kernels
 from calmotion.simulation.target_errors import IntendedMotion, Objective
-
-FIRST_PENALTY = 1e3  # of limits, over the objective of the input for each second
 
 
 def _progress_of(search: Search) -> tuple[OptimizerStep, ...]:

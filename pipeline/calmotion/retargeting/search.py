@@ -8,8 +8,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from calmotion.retargeting.checkpoint import Checkpoint
+from calmotion.retargeting.feasible_start import onto_limits, widen_unavoidable, with_moving_end
 from calmotion.retargeting.problem.adaptive_knots import converted, refined_breaks
-from calmotion.retargeting.problem.offset_basis import OffsetBasis, basis_on
+from calmotion.retargeting.problem.offset_basis import OffsetBasis
 from calmotion.retargeting.problem.posing import locked_coefficients
 from calmotion.retargeting.problem.problem import RetargetProblem
 from calmotion.retargeting.search_memory import SearchMemory
@@ -85,8 +86,11 @@ class RetargetSearch:
             start: Shape [n].
             last: What the search of almost the same shot left.
         """
+        self.problem, start = with_moving_end(self.problem, start)
         self.inactive = inactive_intervals(self.problem, start, self.frequency, self.tolerance, self.options.ranges)
-        self.search = Search.start(np.where(self._fixed_on(self.problem.space.basis), 0.0, start))
+        fixed = self._fixed_on(self.problem.space.basis)
+        widen_unavoidable(self.problem, fixed)
+        self.search = Search.start(np.where(fixed, 0.0, start))
         if last is not None:
             self.search = last.begun(self.problem, self.search)
         resumed = self._resume()
@@ -128,7 +132,7 @@ class RetargetSearch:
         if breaks.dtype.kind != "i" or np.any(np.diff(breaks) <= 0) or breaks[0] != first or breaks[-1] != last:
             self.checkpoint.refuse("has other knots than the shot")
             return False
-        basis = basis_on(problem.grid, breaks, problem.space.basis.kept_ends)
+        basis = problem.space.basis.on(problem.grid, breaks)
         if len(x) != basis.count * motors:
             self.checkpoint.refuse("has a wrong number of coefficients")
             return False
@@ -174,6 +178,7 @@ class RetargetSearch:
             WORTH * self.tolerance,
             self.options.max_iterations,
             on_iterate=self._on_iterate,
+            onto_limits=lambda x: onto_limits(self.problem, x, fixed),
         )
 
     def _confirm(self, fixed: BoolArray) -> None:
@@ -209,7 +214,7 @@ class RetargetSearch:
         if breaks is None:
             return False
         space = self.problem.space
-        basis = basis_on(self.problem.grid, breaks, space.basis.kept_ends)
+        basis = space.basis.on(self.problem.grid, breaks)
         # fixed coefficients stay exactly zero
         x = np.where(
             self._fixed_on(basis), 0.0, converted(space.basis, basis, self.search.x, len(space.motors))

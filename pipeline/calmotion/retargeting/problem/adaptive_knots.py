@@ -55,7 +55,7 @@ def refined_breaks(
     breaks = halved(grid, basis.breaks)
     if len(breaks) == len(basis.breaks):
         return None
-    finer = basis_on(grid, breaks, basis.kept_ends)
+    finer = basis.on(grid, breaks)
     fine = problem.on_basis(finer, converted(basis, finer, x, len(problem.space.motors)))
     fixed = fixed_on(fine.space.basis)
     gradient = np.where(fixed, 0.0, fine.gradient())

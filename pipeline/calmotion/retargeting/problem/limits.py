@@ -17,6 +17,7 @@ import numpy as np
 from calmotion.shot.character import Array, BoolArray
 from calmotion.simulation.motor_limits import Bounds
 
+FIRST_PENALTY = 1e3  # over the objective of the input for each second
 MARGIN = 1e-4  # share by which a limit is narrowed
 GROWTH, SLOW = 10.0, 0.25  # the penalty grows by the first if an update leaves more than the second of the violation
 STALLED, PATIENCE = 0.8, 3  # updates end after so many minima in a row that each leave more than this share of it

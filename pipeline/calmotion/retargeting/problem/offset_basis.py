@@ -31,6 +31,7 @@ class OffsetBasis:
             In a cyclic shot it may begin before 0: it then also acts at the end.
         wraps: Whether the last functions are neighbours of the first.
         kept_ends: Whether the offset vanishes at the first and last frame.
+        moving_end: Whether slope and curvature at the end may change, see `basis_on`.
     """
 
     breaks: IntArray
@@ -45,11 +46,16 @@ class OffsetBasis:
     support: Array
     wraps: bool
     kept_ends: bool
+    moving_end: bool
 
     @property
     def count(self) -> int:
         """Number of coefficients of one motor."""
         return int(self.values.shape[1])
+
+    def on(self, grid: TimeGrid, breaks: IntArray) -> OffsetBasis:
+        """The basis with the same ends on other knots."""
+        return basis_on(grid, breaks, self.kept_ends, self.moving_end)
 
 
 def knot_frames(grid: TimeGrid) -> IntArray:
@@ -75,12 +81,13 @@ def make_basis(grid: TimeGrid, spacing: float, kept_ends: bool) -> OffsetBasis:
     return basis_on(grid, uniform_breaks(grid, spacing), kept_ends)
 
 
-def basis_on(grid: TimeGrid, breaks: IntArray, kept_ends: bool) -> OffsetBasis:
+def basis_on(grid: TimeGrid, breaks: IntArray, kept_ends: bool, moving_end: bool = False) -> OffsetBasis:
     """Basis of the offsets on a grid.
 
     Args:
         breaks: Frames that carry a knot, ascending, the first and the last among them.
         kept_ends: Whether the offset vanishes, with its slope, at the first and last frame.
+        moving_end: Whether slope and curvature at the end may change all the same, since limits are exceeded there.
 
     Slope and curvature are zero at the end: errors after the last frame have no weight, so offsets could otherwise
     accelerate motors there. They are zero at the start if there is no pre-roll, because the system starts at rest.
@@ -90,7 +97,7 @@ def basis_on(grid: TimeGrid, breaks: IntArray, kept_ends: bool) -> OffsetBasis:
     wraps = grid.cyclic and not kept_ends and len(knots) > 4
     splines, merge, support = (_periodic if wraps else _open)(knots)
     if not wraps:
-        merge = _ends(merge, kept_ends, grid)
+        merge = _ends(merge, kept_ends, grid, moving_end)
         columns = [np.flatnonzero(merge[:, k]) for k in range(merge.shape[1])]
         support = np.array([[support[rows, 0].min(), support[rows, 1].max()] for rows in columns]).reshape(-1, 2)
 
@@ -112,7 +119,7 @@ def basis_on(grid: TimeGrid, breaks: IntArray, kept_ends: bool) -> OffsetBasis:
     return OffsetBasis(
         breaks, knots, stored, csr_matrix(rates), csr_matrix(accelerations), stored[grid.frames], curvatures,
         csr_matrix(curvature_gram),
-        grid.h * (near.T @ near), support, wraps, kept_ends,
+        grid.h * (near.T @ near), support, wraps, kept_ends, moving_end,
     )  # fmt: skip
 
 
@@ -133,7 +140,7 @@ def _periodic(knots: Array) -> tuple[BSpline, Array, Array]:
     return BSpline(padded, np.eye(count), DEGREE), np.eye(inner)[np.arange(count) % inner], support
 
 
-def _ends(merge: Array, kept_ends: bool, grid: TimeGrid) -> Array:
+def _ends(merge: Array, kept_ends: bool, grid: TimeGrid, moving_end: bool) -> Array:
     """Combinations of open B-splines that satisfy the end conditions, as columns."""
     count = len(merge)
     if grid.joined or grid.continues:
@@ -145,8 +152,9 @@ def _ends(merge: Array, kept_ends: bool, grid: TimeGrid) -> Array:
         # too short for anything but a constant
         return np.ones((count, 1))
     # three equal coefficients at an end: zero slope and curvature there
-    merge = merge[:, :-2]
-    merge[-2:, -1] = 1.0
+    if not moving_end:
+        merge = merge[:, :-2]
+        merge[-2:, -1] = 1.0
     if grid.pre_steps == 0:
         merge = merge[:, 2:]
         merge[:2, 0] = 1.0

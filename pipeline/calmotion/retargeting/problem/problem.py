@@ -327,6 +327,11 @@ class RetargetProblem:
         residuals = sum(np.sqrt(robot.weight) * robot.residuals for robot in self.robots)
         return rigid_gradient(self._rigid(), self.space, self.objective.weights, np.asarray(residuals))
 
+    def rigid_metric(self) -> Array:
+        """Second derivatives of the rigid robot's objective by the angles of the unknowns' motors, shape [T, m, m]."""
+        weighted = self._rigid().targets * self.objective.weights[..., None]
+        return np.asarray(np.einsum("nkia,nkib->nab", weighted, weighted))
+
     def _rigid(self) -> RigidResponse:
         if self._response is None:
             self._response = rigid_response(self.model, self.grid, self.curves, self.world, self.space.coupling)

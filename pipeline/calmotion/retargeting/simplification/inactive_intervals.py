@@ -21,7 +21,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from calmotion.retargeting.problem.adaptive_knots import halved
-from calmotion.retargeting.problem.offset_basis import OffsetBasis, basis_on
+from calmotion.retargeting.problem.offset_basis import OffsetBasis
 from calmotion.retargeting.problem.problem import RetargetProblem
 from calmotion.retargeting.simplification.pruning import UNCHANGED
 from calmotion.retargeting.solver.gauss_newton import Search
@@ -133,7 +133,7 @@ def first_change(grid: TimeGrid, basis: OffsetBasis, fixed_on: FixedOn) -> int:
 
     start = 0.0 if grid.cyclic else start_on(basis)
     if start > 0.0:
-        start = min(start, start_on(basis_on(grid, halved(grid, basis.breaks), basis.kept_ends)))
+        start = min(start, start_on(basis.on(grid, halved(grid, basis.breaks))))
     if not start > 0.0:
         return 0
     return min(int(np.searchsorted(grid.times, start - 0.5 * grid.h)), len(grid.times) - 2)

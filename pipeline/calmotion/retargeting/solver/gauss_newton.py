@@ -135,6 +135,7 @@ def minimize(
     max_iterations: int = 30,
     max_products: int = 60,
     on_iterate: Callable[[Search], None] | None = None,
+    onto_limits: Callable[[Array], Array] | None = None,
 ) -> Search:
     """Minimise over the entries that are not fixed.
 
@@ -145,6 +146,7 @@ def minimize(
         max_iterations: Most iterations, including those of the state.
         max_products: Most products of one iteration.
         on_iterate: Called with the search after every iteration.
+        onto_limits: The point from which to go on where limits begin to act, from that of the minimum without them.
     """
     calls = _Counter(problem, search.evaluations, search.gradients, search.products, fixed)
     x, radius, recycled, history = search.x, search.radius, search.recycled, list(search.history)
@@ -189,7 +191,10 @@ def minimize(
         if better is None:
             if expected >= gain:
                 calls.value(x)  # the point evaluated last is that of a rejected step
+            acted = problem.limits_act
             if problem.tighten():
+                if onto_limits is not None and not acted:
+                    x = _if_finite(calls, x, onto_limits(x))
                 value, radius = problem.merit(), np.inf
                 if on_iterate is not None:
                     on_iterate(here())
@@ -198,6 +203,14 @@ def minimize(
         x, value, radius = better
         if on_iterate is not None:
             on_iterate(here())
+
+
+def _if_finite(calls: _Counter, x: Array, other: Array) -> Array:
+    """Another point, or the same one where the other cannot be evaluated; it is the point evaluated last."""
+    if np.array_equal(other, x) or np.isfinite(calls.value(other)):
+        return other
+    calls.value(x)
+    return x
 
 
 def _last_products(history: list[Iterate]) -> int:

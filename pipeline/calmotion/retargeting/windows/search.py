@@ -10,7 +10,7 @@ import numpy as np
 from calmotion.retargeting.checkpoint import Checkpoint, problem_key
 from calmotion.retargeting.found_curves import found_curves
 from calmotion.retargeting.problem.adaptive_knots import first_breaks
-from calmotion.retargeting.problem.limits import LimitTerms
+from calmotion.retargeting.problem.limits import FIRST_PENALTY, LimitTerms
 from calmotion.retargeting.problem.offset_basis import basis_on, uniform_breaks
 from calmotion.retargeting.problem.offset_space import BaseOffsets, OffsetSpace
 from calmotion.retargeting.problem.posing import SMOOTHNESS, closeness_of, knot_spacing, locked_coefficients
@@ -27,8 +27,6 @@ from calmotion.simulation.inputs.gearing import coupling_of, leaders
 from calmotion.simulation.motor_limits import motor_bounds
 from calmotion.simulation.simulate import Progress
 from calmotion.simulation.target_errors import IntendedMotion, Objective
-
-FIRST_PENALTY = 1e3  # of limits, over the objective of the input for each second
 
 
 @dataclass(frozen=True, eq=False)

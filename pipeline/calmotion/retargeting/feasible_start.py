@@ -1,0 +1,163 @@
+"""Curves within the limits of position, velocity and acceleration, close to others: where a search under limits begins.
+
+These limits are linear in the coefficients of the offsets, and so is the rigid robot's error at its targets at first
+order: the nearest curves within the limits are the minimum of a quadratic program. Where locked intervals or kept ends
+leave no such curves, the limits are widened to what is exceeded least, so that the search has something to keep.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from scipy.sparse import csr_matrix, diags, eye, kron, vstack
+
+from calmotion.retargeting.problem.adaptive_knots import converted
+from calmotion.retargeting.problem.limits import FIRST_PENALTY, MARGIN
+from calmotion.retargeting.problem.offset_basis import basis_on
+from calmotion.retargeting.problem.problem import RetargetProblem
+from calmotion.retargeting.solver.elastic_program import elastic_minimum
+from calmotion.shot.character import Array, BoolArray
+from calmotion.simulation.inputs.curves import Curves
+from calmotion.simulation.motor_limits import Bounds
+
+INSIDE = 1.5 * MARGIN  # share of a limit by which the curves stay within it
+COST = 1e4  # of an excess of a limit by itself, over the objective of an offset of 1 rad for a second
+WIDENED = 1e-3  # smallest excess that counts as unavoidable
+
+
+def with_moving_end(problem: RetargetProblem, start: Array) -> tuple[RetargetProblem, Array]:
+    """The problem and its start with offsets whose slope and curvature may change at the end of the shot, where the
+    point evaluated last exceeds limits there; else as they are."""
+    limits, grid, basis = problem.limits, problem.grid, problem.space.basis
+    if limits is None or basis.wraps or basis.kept_ends or grid.continues:
+        return problem, start
+    late = limits.judged & (grid.times >= basis.knots[-3 if len(basis.knots) > 2 else 0])
+    over = [np.max(_excess(limits.bounds[name], v[late]), initial=0.0) for name, v in problem.limited.items()]
+    if max(over, default=0.0) <= MARGIN:
+        return problem, start
+    moving = basis_on(grid, basis.breaks, basis.kept_ends, moving_end=True)
+    x = converted(basis, moving, start, len(problem.space.motors))
+    return problem.on_basis(moving, x), x
+
+
+def widen_unavoidable(problem: RetargetProblem, fixed: BoolArray) -> None:
+    """Widen the limits of a problem that no offsets can keep, to what is exceeded least.
+
+    Args:
+        fixed: Coefficients that stay zero, shape [n], bool.
+    """
+    limits = problem.limits
+    if limits is None or not np.any(_exceeding(problem, problem.curves)):
+        return
+    x = _nearest(problem, np.zeros(problem.size), fixed)[0]
+    nearest = problem.space.changed(problem.curves, x)
+    wider = {
+        name: _widened(bound, _excess(bound, _values(nearest, name)[limits.judged]))
+        for name, bound in _bounds(problem).items()
+    }
+    limits.bounds = limits.bounds | wider
+
+
+def onto_limits(problem: RetargetProblem, x: Array, fixed: BoolArray) -> Array:
+    """The nearest point whose curves keep the limits; the same one where they do already. The multipliers of the limits
+    become those of the way there.
+
+    Args:
+        x: Shape [n], a minimum without limits.
+        fixed: Coefficients that keep their values, shape [n], bool.
+    """
+    limits, space = problem.limits, problem.space
+    if limits is None or not np.any(_exceeding(problem, space.changed(problem.curves, x))):
+        return x
+    moved, required, multipliers = _nearest(problem, x, fixed)
+    # the robot may have almost no error without limits, so that their penalty follows from the error that they require
+    limits.rho = max(limits.rho, FIRST_PENALTY * required / problem.grid.end)
+    for (name, motor, side), values in multipliers.items():
+        limits.multipliers[name][side, limits.judged, motor] = values / (limits.rho * limits.h)
+    return moved
+
+
+def _bounds(problem: RetargetProblem) -> dict[str, Bounds]:
+    """The limits of the curves themselves."""
+    assert problem.limits is not None
+    return {name: bound for name, bound in problem.limits.bounds.items() if name in problem.space.splines}
+
+
+def _exceeding(problem: RetargetProblem, curves: Curves) -> BoolArray:
+    """Motors whose curves exceed their limits, shape [M]."""
+    assert problem.limits is not None
+    exceeding = np.zeros(len(problem.space.coupling), bool)
+    for name, bound in _bounds(problem).items():
+        exceeding |= _excess(bound, _values(curves, name)[problem.limits.judged]) > MARGIN
+    return exceeding
+
+
+def _nearest(
+    problem: RetargetProblem, x: Array, fixed: BoolArray
+) -> tuple[Array, float, dict[tuple[str, int, int], Array]]:
+    """The point within the limits to which the rigid robot's targets move least from x, the error of the way there, and
+    the multipliers of the limits by quantity, motor and side."""
+    space, curves = problem.space, problem.space.changed(problem.curves, x)
+    # only motors whose limits are exceeded move, and what is geared to them
+    turned = np.any(space.coupling[_exceeding(problem, curves)] != 0.0, axis=0)
+    free = ~fixed & np.tile(turned, space.basis.count)
+    if not np.any(free):
+        return x, 0.0, {}
+    moved = np.flatnonzero(np.any(space.coupling[:, turned] != 0.0, axis=1))
+    sides = [
+        (name, int(motor), side)
+        for name, bound in _bounds(problem).items()
+        for motor in moved
+        for side in (0, 1)
+        if np.isfinite((bound.upper, bound.lower)[side][motor])
+    ]
+    parts = [_constraint(problem, curves, *side) for side in sides]
+    H = csr_matrix(_metric(problem)[free][:, free])
+    scale = float(np.mean(H.diagonal()))
+    H = csr_matrix(H + 1e-9 * scale * eye(H.shape[0]))
+    G, room = csr_matrix(vstack([rows for rows, _ in parts]))[:, free], np.concatenate([room for _, room in parts])
+    solved = elastic_minimum(H, np.zeros(H.shape[0]), G, room, COST * scale)
+    found = x.copy()
+    found[free] += solved.x
+    multipliers = dict(zip(sides, np.split(solved.multipliers, len(sides)), strict=True))
+    return found, 0.5 * float(solved.x @ (H @ solved.x)), multipliers
+
+
+def _values(curves: Curves, name: str) -> Array:
+    return {"position": curves.angles, "velocity": curves.rates, "acceleration": curves.accelerations}[name]
+
+
+def _excess(bound: Bounds, values: Array) -> Array:
+    """Largest excess of each motor, as a share of the scale, shape [M]."""
+    beyond = np.maximum(values - bound.upper, bound.lower - values) / bound.scale
+    return np.asarray(np.max(beyond, axis=0))
+
+
+def _widened(bound: Bounds, excess: Array) -> Bounds:
+    by = np.where(excess > WIDENED, 1.01 * excess, 0.0) * bound.scale
+    return replace(bound, lower=bound.lower - by, upper=bound.upper + by)
+
+
+def _constraint(problem: RetargetProblem, curves: Curves, name: str, motor: int, side: int) -> tuple[csr_matrix, Array]:
+    """`rows x <= room` at all judged instants for the upper (0) or lower side of one limit, as shares of its scale."""
+    space, limits = problem.space, problem.limits
+    assert limits is not None
+    bound, sign = limits.bounds[name], -1.0 if side else 1.0
+    spline, values = space.splines[name][limits.judged], _values(curves, name)[limits.judged, motor]
+    rows = kron(spline, csr_matrix(space.coupling[motor : motor + 1]))
+    room = sign * ((bound.lower if side else bound.upper)[motor] - values) / bound.scale[motor] - INSIDE
+    return csr_matrix(sign / bound.scale[motor] * rows), room
+
+
+def _metric(problem: RetargetProblem) -> csr_matrix:
+    """Second derivatives of the rigid robot's objective by the coefficients, shape [n, n]."""
+    space = problem.space
+    gram = problem.rigid_metric()
+    spline, motors = space.basis.values, gram.shape[1]
+    parts = [
+        kron(spline.T @ diags(gram[:, a, b]) @ spline, csr_matrix(([1.0], ([a], [b])), shape=(motors, motors)))
+        for a in range(motors) for b in range(motors) if np.any(gram[:, a, b])
+    ]  # fmt: skip
+    regularized = kron(space.penalty, eye(motors))
+    return csr_matrix(sum(parts, start=csr_matrix(regularized)))

@@ -1,0 +1,37 @@
+"""The elastic program against SciPy: the minimum where constraints can be kept, the least excess where they cannot."""
+
+import numpy as np
+import pytest
+from calmotion.retargeting.solver.elastic_program import elastic_minimum
+from scipy.optimize import linprog, minimize
+from scipy.sparse import csr_matrix
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_the_minimum_is_that_of_another_method(seed):
+    rng = np.random.default_rng(seed)
+    root = rng.normal(size=(6, 6))
+    H, c, G, b = root @ root.T + np.eye(6), rng.normal(size=6), rng.normal(size=(9, 6)), rng.uniform(-0.2, 1.0, 9)
+    found = elastic_minimum(csr_matrix(H), c, csr_matrix(G), b, 1e4)
+    expected = minimize(
+        lambda x: 0.5 * x @ H @ x + c @ x, np.zeros(6), jac=lambda x: H @ x + c, method="SLSQP",
+        constraints={"type": "ineq", "fun": lambda x: b - G @ x, "jac": lambda x: -G}, options={"ftol": 1e-14},
+    )  # fmt: skip
+    assert expected.success
+    np.testing.assert_allclose(found.x, expected.x, atol=1e-6)
+    # multipliers balance the gradient, and are zero where a constraint does not bind
+    np.testing.assert_allclose(H @ found.x + c + G.T @ found.multipliers, 0.0, atol=1e-7)
+    assert np.max(np.abs(found.multipliers * (b - G @ found.x))) < 1e-7
+
+
+def test_constraints_that_exclude_each_other_are_exceeded_least():
+    rng = np.random.default_rng(5)
+    G, b = rng.normal(size=(8, 3)), np.full(8, -1.0)
+    excess = np.maximum(
+        G @ elastic_minimum(csr_matrix(1e-3 * np.eye(3)), np.zeros(3), csr_matrix(G), b, 1e4).x - b, 0.0
+    )
+    least = linprog(
+        np.r_[np.zeros(3), np.ones(8)], np.c_[G, -np.eye(8)], b, bounds=[(None, None)] * 3 + [(0.0, None)] * 8
+    )  # fmt: skip
+    assert least.fun > 0.1
+    assert excess.sum() == pytest.approx(least.fun, rel=1e-5)
