@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import os
 import time
 from collections.abc import Callable
 from functools import partial
@@ -38,11 +39,13 @@ def run_shot(
     from calmotion.cli.run_report import print_run
 
     shot = opened_shot(args)
+    paths = OutputPaths(layer=args.output, rrd=args.rrd, csv=args.csv, figures=args.figures, video=args.video)
+    _refuse_files(shot, args, paths)
     with ProgressDisplay(args.quiet, args.progress, args.log, args.openjd) as display:
         result = function(
             shot,
             verify=args.verify,
-            outputs=OutputPaths(layer=args.output, rrd=args.rrd, csv=args.csv, figures=args.figures, video=args.video),
+            outputs=paths,
             **simulation_arguments(args),
             **run_arguments(args, display),
             **options,
@@ -55,6 +58,39 @@ def run_shot(
         return INTERRUPTED
     unlike = any(row["unlike_ground"] for row in report["contacts"])
     return FAILED if result.problems or (args.strict and (unlike or not report["tolerance_kept"])) else 0
+
+
+def _refuse_files(shot: Shot, args: argparse.Namespace, paths: OutputPaths) -> None:
+    """Refuse a manifest or a log over what is read or another output, and options of a layer that is not written.
+
+    Raises:
+        SettingError: One is.
+    """
+    from calmotion.host import SettingError
+    from calmotion.workflow.outputs import files_of, refuse_overwriting
+
+    own = {"--manifest": args.manifest, "--log": args.log}
+    refuse_overwriting(shot.inputs, files_of(paths) | {option: path for option, path in own.items() if path})
+    if args.manifest and not _may_be_manifest(args.manifest):
+        raise SettingError(
+            "the file that is there is no manifest, and is never changed", path="--manifest", found=args.manifest,
+            remedy="Choose another.",
+        )  # fmt: skip
+    of_layer = {"--bake": args.bake, "--samples-per-second": args.samples_per_second, "--splines": args.splines}
+    unused = [option for option, value in of_layer.items() if value]
+    if unused and not args.output:
+        raise SettingError(
+            "this option says how the layer is written, and no layer is", path=unused[0],
+            remedy=f"Name one with -o, or leave {unused[0]} out.",
+        )  # fmt: skip
+
+
+def _may_be_manifest(path: str) -> bool:
+    """Whether a file is absent, empty or begins as JSON does: a layer or a mesh of the shot does not."""
+    if not os.path.isfile(path):
+        return True
+    with open(path, "rb") as file:
+        return file.read(64).strip()[:1] in (b"", b"{")
 
 
 def _write_manifest(result: SimulationResult, args: argparse.Namespace) -> str | None:

@@ -242,7 +242,16 @@ def _quantity(value: float | str | None, unit: str) -> float | None:
 
 
 def _forced(keep: Sequence[str], leave_out: Sequence[str]) -> Settings:
-    """Settings of the analysis for what is forced on or off; what is kept wins."""
+    """Settings of the analysis for what is forced on or off; what is kept wins over `all`.
+
+    Raises:
+        SettingError: A kind is both.
+    """
+    for kind in set(keep) & set(leave_out):
+        raise SettingError(
+            "simplifications of one kind cannot be both made and not made", path="--keep, --leave-out", found=kind,
+            remedy="Leave one of them out.",
+        )  # fmt: skip
     forced: dict[str, object] = {}
     for given, choice in ((leave_out, OFF), (keep, ON)):
         forced |= {kind: choice for name in given for kind in (KINDS if name == "all" else (name,))}

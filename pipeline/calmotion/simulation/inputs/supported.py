@@ -16,6 +16,9 @@ from calmotion.simulation.inputs.time_grid import TimeGrid
 
 ROUNDING = 1e-9  # of the reach: no simulation has smaller errors
 FINEST = 1e-9  # shortest step [s]
+LONGEST_PRE_ROLL = 60.0  # [s], unless the shot is longer
+_IN_PRE_ROLL = ", in the pre-roll, which eases the robot from rest into the motion of the first frame"
+_EASE = "Let the motion begin at rest or more slowly, use a shorter --pre-roll,"
 
 
 def refuse_unsupported(character: Character, animation: Animation, options: RunSettings) -> None:
@@ -33,6 +36,12 @@ def refuse_unsupported(character: Character, animation: Animation, options: RunS
                 "this time is out of range", path=character.path, attribute=name, found=f"{value:g} s",
                 remedy=f"Use {least:g} s or more, or leave it out.",
             )  # fmt: skip
+    longest = max(LONGEST_PRE_ROLL, float(animation.frame_times[-1]))
+    if options.pre_roll is not None and options.pre_roll > longest:
+        raise ShotError(
+            "the pre-roll is longer than anything needs to come to rest", path=character.path, attribute="--pre-roll",
+            found=f"{options.pre_roll:g} s", remedy=f"Use {longest:g} s or less, or leave it out.",
+        )  # fmt: skip
     if character.retarget.cyclic:
         refuse_open_loops(character, animation)
         if options.pre_roll:
@@ -72,8 +81,8 @@ def refuse_unsupported(character: Character, animation: Animation, options: RunS
             "a shot of one frame has no motion",
             path=character.path,
             attribute="endTimeCode",
-            remedy="Author startTimeCode and endTimeCode of the stage at least a frame apart, or correct "
-            "framesPerSecond.",
+            found="one frame: startTimeCode and endTimeCode are less than a frame apart",
+            remedy="Author them further apart in the root layer, or correct timeCodesPerSecond and framesPerSecond.",
         )
 
 
@@ -140,7 +149,7 @@ def _refuse_turns(character: Character, turns: Array, times: Array, h: float) ->
                 f"this motor turns by {np.degrees(turns[n, k]):.0f} degrees within one step of {1e3 * h:.3g} ms",
                 path=motor.path,
                 attribute=motor.attribute,
-                found=f"at {times[n]:.3f} s",
-                remedy="Use a smaller --step, slow it down there, or check timeCodesPerSecond and the unit of its "
-                "samples: degrees in a shot, rad in a table of --motion.",
+                found=f"at {times[n]:.3f} s{_IN_PRE_ROLL if times[n] < 0.0 else ''}",
+                remedy=f"{_EASE if times[n] < 0.0 else 'Use a smaller --step, slow it down there,'} or check "
+                "timeCodesPerSecond and the unit of its samples: degrees in a shot, rad in a table of --motion.",
             )

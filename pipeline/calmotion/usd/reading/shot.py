@@ -17,6 +17,7 @@ from calmotion.usd.diagnostics import quiet, with_places
 from calmotion.usd.masks import masked
 from calmotion.usd.reading.animated_transforms import carriers, codes_of
 from calmotion.usd.reading.character import Skeleton, build_character, read_skeleton
+from calmotion.usd.reading.constants import hold_constants
 from calmotion.usd.reading.context import Reading, is_rigid_body, prims_of
 from calmotion.usd.reading.joints import joint_prims
 from calmotion.usd.reading.motors.driven_motors import BODIES, CONSTANT, DRIVE, GIVEN, Drive, to_si
@@ -110,9 +111,11 @@ def read_stage(
     with stages.refused_by_usd(stage):
         raise_all(list(wrong_types(stage)))
         raise_all(list(broken_transforms(stage)))
+        animated = hold_constants(stage)
         units = units_of(stage)
         clock = shot_clock(stage, given)
         reading = Reading(stage, units, clock.start, whole=whole)
+        reading.notes += animated
         skeleton = read_skeleton(reading, clock, still, given_joints(stage, given), measured)
         tracks = motor_tracks(reading, skeleton.drives, clock, given)
         moving = moving_frames(reading, skeleton.joints, skeleton.poses, clock)

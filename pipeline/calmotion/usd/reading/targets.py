@@ -109,8 +109,10 @@ def read_target(reading: Reading, prim: Usd.Prim, body: int, pose: Pose) -> Targ
         ShotError: Weights that are negative, not finite, or both zero; a transform that shears.
     """
     target_pose = pose_from_matrix(reading.world_matrix(prim), str(prim.GetPath()))
+    if _moves_on_body(prim):
+        reading.notes.append(f"{prim.GetPath()}: it moves on its body; its place at the first frame is used")
     weights = [_weight(reading, prim, name) for name in WEIGHTS]
-    if weights == [0.0, 0.0] and not any(_varies(prim, name) for name in WEIGHTS):
+    if weights == [0.0, 0.0] and not any(_counts_later(prim, name) for name in WEIGHTS):
         raise ShotError(
             "both weights of the target are zero",
             path=prim.GetPath(),
@@ -128,6 +130,17 @@ def read_target(reading: Reading, prim: Usd.Prim, body: int, pose: Pose) -> Targ
         position_weight=weights[0],
         rotation_weight=weights[1],
     )
+
+
+def _moves_on_body(prim: Usd.Prim) -> bool:
+    """Whether the transform of a target, or of a prim between it and its body, is animated."""
+    from pxr import UsdGeom
+
+    while prim and not is_rigid_body(prim):
+        if prim.IsA(UsdGeom.Xformable) and UsdGeom.Xformable(prim).TransformMightBeTimeVarying():
+            return True
+        prim = prim.GetParent()
+    return False
 
 
 def outermost_target(body: Body, index: int, joints: tuple[Joint, ...]) -> Target:
@@ -155,6 +168,12 @@ def outermost_target(body: Body, index: int, joints: tuple[Joint, ...]) -> Targe
 def _varies(prim: Usd.Prim, name: str) -> bool:
     attribute = prim.GetAttribute(name)
     return bool(attribute) and len(attribute.GetTimeSamples()) > 1
+
+
+def _counts_later(prim: Usd.Prim, name: str) -> bool:
+    """Whether a weight that varies is not zero at all samples."""
+    attribute = prim.GetAttribute(name)
+    return _varies(prim, name) and any(attribute.Get(code) != 0.0 for code in attribute.GetTimeSamples())
 
 
 def weight_tracks(stage: Usd.Stage, targets: Sequence[Target], clock: Clock) -> tuple[WeightTrack, ...]:

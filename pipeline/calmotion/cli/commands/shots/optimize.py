@@ -56,6 +56,13 @@ def _count(text: str) -> int:
 
 def _run(args: argparse.Namespace, output: Output) -> int:
     from calmotion.cli.run import run_shot
+    from calmotion.host import SettingError
     from calmotion.workflow.commands import optimize
 
+    robust = args.robust or any(text.startswith("retarget.optimize.robust=") for text in args.set) or args.settings
+    if args.scenarios is not None and not robust:
+        raise SettingError(
+            "this is the number of robots of a robust search, and none is requested", path="--scenarios",
+            found=args.scenarios, remedy="Add --robust, or leave it out.",
+        )  # fmt: skip
     return run_shot(optimize, args, output)
