@@ -182,20 +182,20 @@ def draw(view: View) -> tuple[Light, Hits, IntArray]:
     corners, normals, owners = scene(model, view.motion, view.row)
     hits = rasterize(camera.project(corners), *camera.size)
     picture = np.broadcast_to(PAPER, (*hits.triangle.shape, 3)).copy()
-    rows, columns = np.nonzero(hits.filled)
-    triangles = hits.triangle[rows, columns]
-    first, second = hits.shares[rows, columns].astype(float).T
-    shares = np.stack([first, second, 1.0 - first - second], axis=-1)
-    normal = np.einsum("pk,pki->pi", shares, normals[triangles])
-    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
-    light = (
-        AMBIENT
-        + KEY * np.maximum(normal @ key_light(camera), 0.0)
-        + FILL * np.maximum(normal @ fill_light(camera), 0.0)
-    )
+    filled = np.flatnonzero(hits.triangle >= 0)
+    triangles = hits.triangle.reshape(-1)[filled]
+    # single precision throughout: this is most of the time of a video
+    slopes, shares = normals.astype(np.float32)[triangles], hits.shares.reshape(-1, 2)[filled]
+    normal = slopes[:, 2] + shares[:, :1] * (slopes[:, 0] - slopes[:, 2])
+    normal += shares[:, 1:] * (slopes[:, 1] - slopes[:, 2])
+    length = np.sqrt(np.einsum("pi,pi->p", normal, normal))
+    toward = (normal @ np.stack([key_light(camera), fill_light(camera)]).T.astype(np.float32)).T
+    key, fill = np.maximum(toward, 0.0) / np.maximum(length, 1e-12)
+    light = 1.15 * (AMBIENT + KEY * key + FILL * fill)
     # Very dark colors are made slightly lighter; otherwise shading would be invisible.
-    paint = 0.03 + 0.97 * np.clip(model.colors[owners[triangles]], 0.0, 1.0)
-    picture[rows, columns] = np.clip(paint * light[:, None] * 1.15, 0.0, 1.0)
+    paint = (0.03 + 0.97 * np.clip(model.colors, 0.0, 1.0)).astype(np.float32)
+    shaded = np.take(paint, owners[triangles], axis=0) * light[:, None]
+    picture.reshape(-1, 3)[filled] = np.minimum(shaded, 1.0, out=shaded)
     if view.floor is not None:
         cast_shadow(picture, hits, corners, view)
     return picture, hits, visible_surfaces(hits, owners)

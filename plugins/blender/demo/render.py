@@ -16,7 +16,7 @@ import bpy
 from mathutils import Vector
 
 BONES, LENGTH, SIDES, FRAMES = ("foot", "upper", "hand"), 0.42, 20, 48
-SIZE, SAMPLES = (560, 400), 24
+SIZE, SAMPLES, EVERY = (520, 380), 12, 2
 
 
 def extension(folder: Path) -> None:
@@ -84,7 +84,7 @@ def character() -> bpy.types.Object:
         body.vertex_groups[BONES[owner]].add([vertex.index], 1.0, "REPLACE")
     body.parent = rig
     body.modifiers.new("Armature", "ARMATURE").object = rig
-    body.data.materials.append(material("Skin", (0.75, 0.73, 0.68)))
+    body.data.materials.append(material("Skin", (0.55, 0.53, 0.48)))
     rig.animation_data_create()
     rig.animation_data.action = bpy.data.actions.new("Wave")
     for frame in range(1, FRAMES + 1):
@@ -119,22 +119,22 @@ def stage() -> None:
     floor.from_pydata([(-9, -9, 0), (9, -9, 0), (9, 9, 0), (-9, 9, 0)], [], [(0, 1, 2, 3)])
     floor.materials.append(material("Floor", (0.5, 0.52, 0.55)))
     sun = bpy.data.lights.new("Sun", "SUN")
-    sun.energy, sun.angle = 3.0, 0.2
+    sun.energy, sun.angle = 1.8, 0.2
     lamp, camera = bpy.data.objects.new("Sun", sun), bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
     lamp.rotation_euler = (0.6, 0.3, 0.9)
-    camera.location = (2.6, 0.35, 1.0)
-    camera.rotation_euler = (Vector((0.0, 0.0, 0.66)) - camera.location).to_track_quat("-Z", "Y").to_euler()
+    camera.location = (3.3, 0.6, 1.25)
+    camera.rotation_euler = (Vector((0.0, 0.0, 0.74)) - camera.location).to_track_quat("-Z", "Y").to_euler()
     for obj in (bpy.data.objects.new("Floor", floor), lamp, camera):
         scene.collection.objects.link(obj)
     scene.camera, scene.world = camera, bpy.data.worlds.new("World")
     scene.world.use_nodes = True
-    scene.world.node_tree.nodes["Background"].inputs["Color"].default_value = (0.8, 0.85, 0.9, 1.0)
+    scene.world.node_tree.nodes["Background"].inputs["Color"].default_value = (0.55, 0.58, 0.62, 1.0)
     render = scene.render
     render.engine, scene.cycles.samples, scene.cycles.device = "CYCLES", SAMPLES, "CPU"
     scene.cycles.use_denoising = True
     scene.view_settings.view_transform = "Standard"
     render.resolution_x, render.resolution_y = SIZE
-    render.use_stamp, render.use_stamp_note, render.stamp_font_size = True, True, 17
+    render.use_stamp, render.use_stamp_note, render.stamp_font_size = True, True, 15
     for name in ("camera", "date", "frame", "render_time", "scene", "time", "filename", "lens", "memory", "hostname"):
         setattr(render, f"use_stamp_{name}", False)
     render.stamp_background = (0.0, 0.0, 0.0, 0.6)
@@ -153,7 +153,7 @@ def main() -> None:
     stage()
     from calmotion_extension.errors import errors_now
 
-    for frame in range(scene.frame_start, scene.frame_end + 1):
+    for frame in range(scene.frame_start, scene.frame_end + 1, EVERY):
         scene.frame_set(frame)
         before, after = errors_now(scene)
         errors = f"{before:.1f} mm as animated (orange), {after:.1f} mm optimised (blue)"
