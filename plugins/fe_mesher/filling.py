@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from calmotion.accuracy.element_size import Shape, envelope, expected_nodes, smallest_size
 from calmotion.errors import ShotError
-from calmotion.geometry.boundary_fit import fitted
 from calmotion.geometry.closed_surfaces import enclosed_volume
-from calmotion.geometry.grid_tets import GRID, grid_tets
+from calmotion.geometry.grids.boundary_fit import fitted
+from calmotion.geometry.grids.grid_tets import GRID, grid_tets
 from calmotion.geometry.tetrahedra import (
     connected_parts,
     largest_part,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from calmotion.geometry.boundary_fit import fitted
+from calmotion.geometry.grids.boundary_fit import fitted
 from calmotion.geometry.tetrahedra import Indices, measure_quality
 from calmotion.reduction.interfaces.cut_patches import with_rims
 from calmotion.reduction.interfaces.interface_patches import AttachmentFrame

@@ -278,9 +278,8 @@ class RetargetProblem:
         """
         response, acting = self._rigid(), self._acting
         if self.preconditioner is None:
-            self.preconditioner = RigidPreconditioner(
-                response, self.objective.weights, self.space.basis, self.space.penalty
-            )
+            weights, basis = self.objective.weights, self.space.basis
+            self.preconditioner = RigidPreconditioner(response, weights, basis, self.space.penalty)
         curvatures = {}
         if acting is not None:
             curvatures = {name: acting.curvature(name, v) for name, v in (values or self.limited).items()}

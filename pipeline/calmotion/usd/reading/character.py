@@ -15,12 +15,13 @@ from calmotion.shot.tolerance import reach
 from calmotion.usd.clock import Clock
 from calmotion.usd.reading import scene, targets, topology
 from calmotion.usd.reading.animated_transforms import moves, refuse_moving
+from calmotion.usd.reading.bases.contacts import contact_carriers, contact_joints
+from calmotion.usd.reading.bases.roots import on_moving_prim
 from calmotion.usd.reading.bodies import mass
 from calmotion.usd.reading.bodies.flexible import flexible_settings
 from calmotion.usd.reading.bodies.interfaces import interfaces_of
 from calmotion.usd.reading.bodies.scenery import scenery_of
 from calmotion.usd.reading.bodies.shapes import shapes_of, tets_of
-from calmotion.usd.reading.contacts import contact_carriers, contact_joints
 from calmotion.usd.reading.context import Reading, grouped, is_rigid_body, prims_of
 from calmotion.usd.reading.generic_joints.chains import Between, expanded
 from calmotion.usd.reading.joints import (
@@ -33,7 +34,6 @@ from calmotion.usd.reading.joints import (
 )
 from calmotion.usd.reading.motors import driven_motors as motors
 from calmotion.usd.reading.motors.posed_motors import posed_joints
-from calmotion.usd.reading.roots import on_moving_prim
 from calmotion.usd.transforms import Pose
 
 if TYPE_CHECKING:

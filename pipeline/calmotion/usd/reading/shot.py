@@ -16,6 +16,7 @@ from calmotion.usd.clock import Clock, clock_of, still_clock
 from calmotion.usd.diagnostics import quiet, with_places
 from calmotion.usd.masks import masked
 from calmotion.usd.reading.animated_transforms import carriers, codes_of
+from calmotion.usd.reading.bases.roots import moving_frames
 from calmotion.usd.reading.character import Skeleton, build_character, read_skeleton
 from calmotion.usd.reading.constants import hold_constants
 from calmotion.usd.reading.context import Reading, is_rigid_body, prims_of
@@ -28,7 +29,6 @@ from calmotion.usd.reading.motors.skeletal_motors import HingeStack, hinge_stack
 from calmotion.usd.reading.motors.tracks import read_track, sample_codes
 from calmotion.usd.reading.motors.unused_animation import target_positions
 from calmotion.usd.reading.provenance import provenance_of
-from calmotion.usd.reading.roots import moving_frames
 from calmotion.usd.reading.targets import weight_tracks
 from calmotion.usd.reading.well_formed import broken_transforms, wrong_types
 from calmotion.usd.units import units_of

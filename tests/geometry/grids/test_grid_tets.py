@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 import trimesh
-from calmotion.geometry.grid_tets import grid_tets
+from calmotion.geometry.grids.grid_tets import grid_tets
 from calmotion.geometry.tetrahedra import boundary_triangles, connected_parts, min_dihedral_deg, tet_volumes
 
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from calmotion.geometry.boundary_fit import fitted
+from calmotion.geometry.grids.boundary_fit import fitted
 from calmotion.geometry.tetrahedra import boundary_triangles, surface_volume, tet_volumes
 
 RADIUS, LENGTH, SIDES = 0.02, 0.1, 96

@@ -1,0 +1,1 @@
+"""Tetrahedra of a regular grid, and their fit to a surface."""

@@ -1,0 +1,1 @@
+"""What holds a robot: its root, and the ground under its feet."""
