@@ -13,7 +13,7 @@ COLLECTION = "Calmotion Errors"
 BEFORE, AFTER = "as_animated_mm", "optimised_mm"  # properties of the empty that has the values
 COLORS = {"as animated": (0.665, 0.112, 0.0, 1.0), "optimised": (0.0, 0.168, 0.445, 1.0)}  # Okabe and Ito's, linear
 THICK = 0.003  # of the size of the trails: radius of a line
-MARK = 3.5  # radius of a mark, over that of a line
+MARK = 7.0  # radius of a mark, over that of a line
 
 
 def show_errors(context: bpy.types.Context, targets: Sequence[TargetErrors], frames: range) -> None:
