@@ -38,6 +38,9 @@ def export_character(context: bpy.types.Context, character: bpy.types.Object, pa
     """Write a character, with its animation, in metres; the selection stays unchanged."""
     active, selected = context.view_layer.objects.active, list(context.selected_objects)
     parts = parts_of(character)
+    # Before 4.3 the exporter does not convert, and writes the scene's scale as metersPerUnit.
+    converts = "convert_scene_units" in bpy.ops.wm.usd_export.get_rna_type().properties
+    units = {"convert_scene_units": "METERS"} if converts else {}
     try:
         for obj in selected:
             obj.select_set(False)
@@ -46,7 +49,7 @@ def export_character(context: bpy.types.Context, character: bpy.types.Object, pa
         context.view_layer.objects.active = character
         bpy.ops.wm.usd_export(
             filepath=str(path), selected_objects_only=True, export_animation=True, export_armatures=True,
-            export_materials=False, convert_scene_units="METERS", evaluation_mode="RENDER",
+            export_materials=False, evaluation_mode="RENDER", **units,
         )  # fmt: skip
     finally:
         for obj in parts:
