@@ -108,6 +108,7 @@ fuzz: $(INSTALLED_DEV)
 SEED ?= 0
 RUNS ?= 1000
 torture: $(INSTALLED_DEV)
+	$(RUN) tests/hostile/campaign.py
 	$(RUN) tests/torture/campaign.py --runs $(RUNS) --seed $(SEED) $(if $(filter 1000,$(RUNS)),--write)
 
 audit: $(INSTALLED_DEV)

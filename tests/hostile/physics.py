@@ -17,7 +17,13 @@ SLOW = 120.0
 def mass(path: str, value: float) -> Edit:
     """A mass, with the inertia of a box of 0.4 m."""
     turn = value * np.array([0.04**2 / 6, 0.4**2 / 12, 0.4**2 / 12])
-    return both(number(path, "physics:mass", value), vector(path, "physics:diagonalInertia", *map(float, turn)))
+
+    def edit(stage: Usd.Stage) -> None:
+        own = UsdPhysics.MassAPI.Apply(stage.GetPrimAtPath(path))
+        own.CreateMassAttr(value)
+        own.CreateDiagonalInertiaAttr(Gf.Vec3f(*map(float, turn)))
+
+    return edit
 
 
 def motor(**values: float | str) -> Edit:
@@ -131,7 +137,7 @@ CASES: dict[str, Case] = {
     "a ratio of -0.99": simulate(make=arm(material(poissonsRatio=-0.99)), statuses=EITHER),
     "a ratio of -1": simulate(PLASTIC, "poissonsRatio", make=arm(material(poissonsRatio=-1.0))),
     "a density of 1e-6": simulate(make=arm(material(density=1e-6)), statuses=EITHER),
-    "a density of 1e9": simulate(SOFT + "|density", make=arm(material(density=1e9))),
+    "a density of 1e9": simulate("density is", make=arm(material(density=1e9)), statuses=DONE),
     "a density in g/cm3 by mistake": simulate(make=arm(material(density=1.1)), statuses=DONE),
     "an infinite density": simulate(PLASTIC, "density", make=arm(material(density=math.inf))),
     "no damping": simulate(make=arm(damping(ratio=0.0)), statuses=DONE),
@@ -175,7 +181,6 @@ CASES: dict[str, Case] = {
         FORE, "centerOfMass", make=arm(vector(FORE, "physics:centerOfMass", math.nan, 0, 0))
     ),
     "axes of inertia of length zero": simulate(
-        "principalAxes",
         make=arm(lambda s: UsdPhysics.MassAPI(s.GetPrimAtPath(FORE)).CreatePrincipalAxesAttr(Gf.Quatf(0))),
         statuses=EITHER,
     ),
@@ -231,12 +236,12 @@ CASES: dict[str, Case] = {
     "backlash of a turn": simulate(make=arm(motor(backlash=360.0)), statuses=EITHER),
     "negative backlash": simulate(SHOULDER, "backlash", make=arm(motor(backlash=-1.0))),
     "negative friction": simulate(
-        SHOULDER, "friction", make=arm(motor(model="drive", friction=-1.0), drive(stiffness=100.0, damping=1.0))
+        SHOULDER, "friction", make=arm(motor(model="servo", positionGain=100.0, velocityGain=1.0, friction=-1.0))
     ),
     "a friction that holds everything": simulate(
         make=arm(motor(model="drive", friction=1e6), drive(stiffness=100.0, damping=1.0)), statuses=EITHER, seconds=SLOW
     ),
-    "a gear of no stiffness": simulate(SHOULDER, "gearStiffness", make=arm(motor(gearStiffness=0.0)), statuses=EITHER),
+    "a gear of no stiffness": simulate(make=arm(motor(gearStiffness=0.0)), statuses=EITHER),
     "an armature of 1e6": simulate(
         make=arm(motor(model="drive", armature=1e6), drive(stiffness=100.0, damping=1.0)), statuses=EITHER
     ),
@@ -293,7 +298,7 @@ CASES: dict[str, Case] = {
         "tolerance", make=arm(flexible(retarget("tolerance", "Float", 1e-12))), statuses=EITHER, seconds=SLOW
     ),
     "a tolerance of zero": simulate("/Arm", "calm:retarget:tolerance", make=arm(retarget("tolerance", "Float", 0.0))),
-    "a tolerance of a kilometre": simulate(make=arm(flexible(retarget("tolerance", "Float", 1000.0))), statuses=DONE),
+    "a tolerance of a kilometre": simulate("tolerance", make=arm(flexible(retarget("tolerance", "Float", 1000.0)))),
     "an infinite tolerance": simulate("/Arm", "tolerance", make=arm(retarget("tolerance", "Float", math.inf))),
     "a step of a nanosecond": simulate("timeStep", make=arm(retarget("timeStep", "Float", 1e-9))),
     "a step longer than the shot": simulate(make=arm(retarget("timeStep", "Float", 100.0)), statuses=EITHER),

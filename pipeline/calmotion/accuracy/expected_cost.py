@@ -13,6 +13,7 @@ from calmotion.simulation.inputs.time_grid import MAX_STEP, make_grid
 # Measured on the five samples: 1.5 to 2.9 us for a step and a coordinate; a search costs 40 to 300 simulations.
 SECONDS = 3e-6  # for a step and a coordinate
 SEARCH = 200.0  # simulations of a search
+MANY_MODES = 1000  # of a body: more are what costs
 ELASTIC = 10  # elastic coordinates of a flexible body whose modes are not chosen yet
 _FINE = 0.1  # of the usual step: steps that are shorter are what costs
 _SHORTEN = (
@@ -22,6 +23,7 @@ _REMEDIES = {
     "--step": "Use a longer --step, or leave it out",
     "calm:retarget:timeStep": "Author a longer time step, or none",
     "--pre-roll": "Use a shorter --pre-roll, or leave it out",
+    "calm:flexible:modeCount": "Author fewer modes, or -1, so that the tolerance decides",
 }
 COPIES, COPIES_OF_SEARCH = 3, 6  # states of all instants that a simulation and a search have at once
 
@@ -64,6 +66,8 @@ def expected_cost(character: Character, animation: Animation, options: RunSettin
     flexible = [body.flexible for body in character.bodies if body.flexible is not None]
     modes = [settings.mode_count if settings.mode_count > 0 else ELASTIC for settings in flexible]
     coordinates = 6 * len(character.bodies) + sum(modes)
+    if max(modes, default=0) > MANY_MODES:
+        cause = "calm:flexible:modeCount"
     # arrays have a row for each body, as wide as the largest; see `multibody.model.system.State`
     numbers = len(character.bodies) * (16 + 2 * max(modes, default=0)) + 6 * len(character.joints)
     share = _share_in_window(animation, options, character.retarget.cyclic) if searches else 0.0

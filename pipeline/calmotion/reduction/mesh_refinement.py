@@ -182,10 +182,19 @@ def frequency_estimate(mesh: FEMesh, body: Body, carrier: Frame | None) -> Estim
 
     Args:
         mesh, body, carrier: As of `refined_for_frequencies`.
+
+    Raises:
+        ShotError: Nothing of the mesh is free.
     """
     assert body.flexible is not None
     model = assemble(mesh.points, mesh.tets, body.flexible.material)
     frequencies, modes = clamped_modes(model, _COUNT, _clamped_nodes(model.mesh, body, carrier, mesh.patches))
+    if not len(frequencies):
+        raise ShotError(
+            "its parent joint holds all of the mesh, so that nothing of it can bend", path=body.path,
+            attribute="calm:flexible:interfaceRadius", found=f"{len(mesh.tets)} tetrahedra",
+            remedy="Use a finer mesh or a smaller interface, or set calm:flexible:enabled to false.",
+        )  # fmt: skip
     weights = (frequencies[0] / frequencies) ** 2
     errors = element_errors(model.mesh, body.flexible.material, modes)
     total = float((errors * weights).sum(axis=0).max())

@@ -1,0 +1,59 @@
+"""Hostile commands end as they should: a sample of cheap ones here, all with `pytest -m long` and `make torture`."""
+
+from __future__ import annotations
+
+import random
+import sys
+from pathlib import Path
+
+import pytest
+
+sys.path.insert(0, str(Path(__file__).resolve().parent))
+
+import every  # noqa: E402
+import hostile  # noqa: E402
+
+# Cases of which each takes a fraction of a second: most are refused while the shot is read or the options are.
+CHEAP = [name for name, case in every.CASES.items() if 0 not in case.statuses and case.seconds <= 60.0]
+SAMPLE = random.Random(32).sample(sorted(set(CHEAP) - set(every.GROUPS["broken"])), 30)
+
+
+def fault_of(case: hostile.Case, **changed: object) -> list[str]:
+    ending = hostile.Ending(**({"status": 1, "out": "", "err": "", "seconds": 0.1} | changed))
+    return hostile.faults_of(case, ending, {"shot.usda": "a"}, {"shot.usda": "a"})
+
+
+def test_there_are_many_with_names_of_their_own():
+    assert sum(map(len, every.GROUPS.values())) == len(every.CASES) >= 300
+
+
+def test_the_judge_sees_what_must_not_be():
+    case = hostile.Case(lambda folder: None, ("simulate", "shot.usda", "--json"), told=("here|there",))
+    good = '{"error": {"problem": "p", "remedy": "r", "path": "there"}}'
+    assert fault_of(case, out=good) == []
+    assert "a traceback" in fault_of(case, out=good, err="Traceback (most recent call last)")
+    assert "the error has no remedy" in fault_of(case, out=good.replace('"r"', '""'))
+    assert any("does not tell" in fault for fault in fault_of(case, out=good.replace("there", "gone")))
+    assert any("takes" in fault for fault in fault_of(case, out=good, seconds=1e3))
+    assert any("exit status" in fault for fault in fault_of(case, out=good, status=0))
+    left = hostile.faults_of(case, hostile.Ending(1, good, "", 0.0), {"a": "1"}, {"a": "2", "b": "1"})
+    assert left == ["changes ['a']", "leaves ['b']"]
+    use = {"quantity": "velocity", "limit": 1.0, "after": 2.0, "exceeded": False}
+    report = {"targets": [], "max_error_m": 0.0, "simulation_error_m": 2.0, "tolerance_m": 1.0, "tolerance_kept": True,
+              "limits": [use]}  # fmt: skip
+    assert len(hostile.faults_of_verdict(report)) == 2
+    assert hostile.faults_of_verdict(report | {"tolerance_kept": False, "limits": []}) == []
+
+
+@pytest.mark.parametrize("name", SAMPLE)
+def test_a_hostile_command_ends_as_it_should(tmp_path, name):
+    ending, faults = hostile.run(every.CASES[name], tmp_path)
+    assert not faults, f"{faults}\n{ending.out}\n{ending.err}"
+
+
+@pytest.mark.long
+def test_all_hostile_commands_end_as_they_should():
+    import campaign
+
+    _, faults = campaign.campaign(list(every.CASES))
+    assert not faults, faults
