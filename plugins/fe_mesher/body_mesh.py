@@ -16,7 +16,7 @@ from calmotion.accuracy.element_size import (
     shape_of,
 )
 from calmotion.errors import ShotError
-from calmotion.geometry.congruence import Isometry
+from calmotion.geometry.matching.congruence import Isometry
 from calmotion.geometry.tetrahedra import (
     connected_parts,
     measure_quality,

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from calmotion.geometry.congruence import Isometry, isometries
+from calmotion.geometry.matching.congruence import Isometry, isometries
 from calmotion.shot import Body, FEMesh, FlexibleSettings, Frame
 from calmotion.shot.meshes import CutPatch
 

@@ -9,6 +9,7 @@ from calmotion.reduction.elements.assembly import quadratic_mesh
 from calmotion.reduction.interfaces.interface_patches import AttachmentFrame, interface_patches
 from calmotion.reduction.interfaces.seats import seat_radius
 from calmotion.reduction.mesh_shaping import Surface
+from calmotion.shot.meshes import CutPatch
 
 Z, ORIGIN = np.array([0.0, 0.0, 1.0]), np.zeros(3)
 
@@ -62,3 +63,17 @@ def test_a_patch_is_that_of_the_surface_whatever_the_elements_are(helpers):
     (coarse,) = interface_patches(mesh, [joint], -1.0, "/b")
     assert measured.radius == pytest.approx(0.011, rel=0.05)
     assert coarse.radius == pytest.approx(0.012, rel=0.02), "of the elements alone: the depth of the bar"
+
+
+def test_a_cut_patch_whose_nodes_are_all_nearer_to_another_joint_gives_way_to_what_is_left(helpers):
+    """The palm of a hand: joints so near to each other that one has none of what was cut for it."""
+    mesh = quadratic_mesh(*helpers.box((10, 3, 3), (0.1, 0.02, 0.02)))
+    first, second = (
+        AttachmentFrame(f"/j{k}", helpers.frame(x, 0.01, 0.0), "interface") for k, x in enumerate((0.02, 0.08))
+    )
+    corners = mesh.nodes[mesh.surface[:, :3]]
+    at_the_first = corners[np.linalg.norm(corners.mean(axis=1) - first.frame.position, axis=1) < 0.012]
+    assert len(at_the_first)
+    cut = (CutPatch(second.frame.position, at_the_first),)
+    one, other = interface_patches(mesh, [first, second], -1.0, "/b", cut)
+    assert len(one.nodes) >= 6 and len(other.nodes) >= 6 and not np.intersect1d(one.nodes, other.nodes).size

@@ -230,7 +230,7 @@ def _survey_all(found: Sequence[tuple[Link, str]], options: Namespace, say: Call
     """The rows of all links, written after each: a fault in one link is its own outcome, and loses no other."""
     folder = Path(options.page or options.output or ".").parent
     pictures = [
-        str(folder / "meshing" / f"{robot}_{link.name}.png") if link.name in options.pictures else ""
+        str(folder / "meshing" / f"{robot}_{link.name}.png".replace(" ", "_")) if link.name in options.pictures else ""
         for link, robot in found
     ]
     if any(pictures):

@@ -150,7 +150,8 @@ def page(rows: Sequence[Row], titles: Sequence[str], command: str) -> str:
     loaded = sum(bool(row.line) for row in rows)
     summary = (
         f"These are {len(rows)} files of robots and characters that others made; {loaded} of them load. Where one is "
-        "refused, the message names what to change. None of them is part of this repository."
+        "refused, the message names what to change. None of them is part of this repository. "
+        "What becomes of their links is on [another page](meshing.md)."
     )
     paths = f"Paths are those in {', '.join(titles)}. The page is made by"
     return f"# Robots and characters\n\n{summary}\n\n{paths}\n\n    {command}\n\n{table(rows)}"

@@ -127,8 +127,9 @@ def interface_patches(
         free = surface[~taken]
         candidates = surface[(nearest == k) & ~taken]
         known = next((c for c in cut if np.linalg.norm(c.origin - frames[k].position) < 1e-6 * size), None)
-        if known is not None:
-            patches.append(_cut_patch(mesh, candidates, known, group, size))
+        found = None if known is None else _cut_patch(mesh, candidates, known, group, size)
+        if found is not None:
+            patches.append(found)
             continue
         others = np.linalg.norm(np.delete(centers, k, axis=0) - centers[k], axis=1)
         room = float(others.min(initial=np.inf, where=others > _TIE * size))
@@ -141,11 +142,13 @@ def interface_patches(
 
 def _cut_patch(
     mesh: QuadraticMesh, candidates: IntArray, cut: CutPatch, group: list[int], size: float
-) -> InterfacePatch:
-    """The patch of the nodes on the triangles of a cut patch."""
+) -> InterfacePatch | None:
+    """The patch of the nodes on the triangles of a cut patch; None where nearer joints have all of them."""
     corners = np.arange(3 * len(cut.triangles)).reshape(-1, 3)
     near = NearbyTriangles(cut.triangles.reshape(-1, 3), corners, _SAME * size)
     nodes = candidates[np.isfinite(near.closest(mesh.nodes[candidates])[:, 0])]
+    if not spans_a_plane(mesh.nodes[nodes]):
+        return None
     extent = float(np.linalg.norm(mesh.nodes[nodes] - cut.origin, axis=1).max())
     return InterfacePatch(nodes=nodes.astype(np.int32), attachments=tuple(group), radius=extent)
 

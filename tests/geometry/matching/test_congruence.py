@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import trimesh
-from calmotion.geometry.congruence import isometries
+from calmotion.geometry.matching.congruence import isometries
 
 MIRROR = np.diag([1.0, -1.0, 1.0])
 
