@@ -43,6 +43,7 @@ if TYPE_CHECKING:
 # Nodes of the first mesh at most, for some seconds; where the shot needs more, it is refined for its loads.
 _REFINED = 12_000
 _FIT = 4.0  # of the distance to the surface that the mesher is allowed: how far corners are moved to fit it
+FAR = 5.0  # distance of a mesh from all joints of its body, over its size, that nobody means
 _SIMPLE = ("collision surface", "wrapped collision surface", "equivalent beam")
 _WELD = 1e-6  # distance of coincident points, of the diagonal
 
@@ -97,12 +98,34 @@ def mesh_of(
         ShotError: It cannot be meshed.
     """
     try:
-        return _meshed(index, body, geometry, options, frames, attachments)
+        mesh = _meshed(index, body, geometry, options, frames, attachments)
     except OutOfTime as reason:
         for simpler in _simpler(index, body, geometry, options, frames, reason):
             with suppress(OutOfTime):
                 return _meshed(index, body, simpler, options, frames, attachments)
         raise
+        simpler = _simpler(index, body, geometry, options, frames, reason)
+        if simpler is None:
+            raise
+        mesh = _meshed(index, body, simpler, options, frames, attachments)
+    _refuse_far(mesh, body, frames)
+    return mesh
+
+
+def _refuse_far(mesh: FEMesh, body: Body, frames: Sequence[Frame]) -> None:
+    """Refuse a mesh that lies far from all joints of its body.
+
+    Raises:
+        ShotError: It does.
+    """
+    extent = float(np.linalg.norm(np.ptp(mesh.points, axis=0)))
+    away = min((float(np.linalg.norm(mesh.points - f.position, axis=1).min()) for f in frames), default=0.0)
+    if away > FAR * extent:
+        raise ShotError(
+            "the mesh of this body lies far from all of its joints", path=body.path,
+            found=f"{away:.3g} m from the nearest one, {away / extent:.3g} times its size",
+            remedy="Correct the transform, the unit or the points of the mesh, or the positions of the joints.",
+        )  # fmt: skip
 
 
 def _simpler(

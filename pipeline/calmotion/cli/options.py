@@ -238,11 +238,14 @@ def quantity(unit: str, needs_unit: bool = False, positive: bool = False) -> Cal
             bare = needs_unit and has_no_unit(text)
         except SettingError as error:
             raise argparse.ArgumentTypeError(str(error)) from None
-        if not 0.0 <= value < float("inf") or (positive and not value):
-            least = "above zero" if positive else "not negative"
-            raise argparse.ArgumentTypeError(f"{text} is out of range; it must be finite and {least}")
+        least = "above zero" if positive else "not negative"
+        outside = f"{text} is out of range; it must be finite and {least}"
+        if value == float("inf"):
+            raise argparse.ArgumentTypeError(outside)
         if bare:
             raise argparse.ArgumentTypeError(f"{text} has no unit; write {text}{unit} or {text}m{unit}")
+        if not 0.0 <= value or (positive and not value):
+            raise argparse.ArgumentTypeError(outside)
         return value
 
     return read
