@@ -100,16 +100,25 @@ def mesh_of(
     try:
         mesh = _meshed(index, body, geometry, options, frames, attachments)
     except OutOfTime as reason:
-        for simpler in _simpler(index, body, geometry, options, frames, reason):
-            with suppress(OutOfTime):
-                return _meshed(index, body, simpler, options, frames, attachments)
-        raise
-        simpler = _simpler(index, body, geometry, options, frames, reason)
-        if simpler is None:
-            raise
-        mesh = _meshed(index, body, simpler, options, frames, attachments)
+        mesh = _simplest_in_time(index, body, geometry, options, frames, attachments, reason)
     _refuse_far(mesh, body, frames)
     return mesh
+
+
+def _simplest_in_time(
+    index: int, body: Body, geometry: FEMesh | Volume, options: MeshOptions, frames: Sequence[Frame],
+    attachments: Sequence[AttachmentFrame], reason: OutOfTime,
+) -> FEMesh:  # fmt: skip
+    """The first simpler geometry that is meshed in time.
+
+    Raises:
+        OutOfTime: None is.
+        ShotError: It cannot be meshed.
+    """
+    for simpler in _simpler(index, body, geometry, options, frames, reason):
+        with suppress(OutOfTime):
+            return _meshed(index, body, simpler, options, frames, attachments)
+    raise reason
 
 
 def _refuse_far(mesh: FEMesh, body: Body, frames: Sequence[Frame]) -> None:

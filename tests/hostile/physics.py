@@ -313,7 +313,8 @@ CASES: dict[str, Case] = {
     "a soft arm that swings fast": simulate(make=arm(modulus(2e8), FAST), statuses=DONE, seconds=SLOW),
 }
 
-# Not solved yet, and not part of the campaign: the first takes more than 400 s, the second is refused without its reason.
+# Not solved yet, and not part of the campaign: the first takes more than 400 s, the second is refused without its
+# reason.
 OPEN: dict[str, Case] = {
     "a modulus of 1e6": simulate(SOFT, make=arm(modulus(1e6)), statuses=EITHER, seconds=SLOW),
     "an uncertainty of 100": optimize(
