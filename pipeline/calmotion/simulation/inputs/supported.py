@@ -82,7 +82,8 @@ def refuse_unsupported(character: Character, animation: Animation, options: RunS
             path=character.path,
             attribute="endTimeCode",
             found="one frame: startTimeCode and endTimeCode are less than a frame apart",
-            remedy="Author them further apart in the root layer, or correct timeCodesPerSecond and framesPerSecond.",
+            remedy="Author startTimeCode and endTimeCode further apart in the root layer, or correct "
+            "timeCodesPerSecond and framesPerSecond.",
         )
 
 

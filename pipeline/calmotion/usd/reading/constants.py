@@ -17,7 +17,8 @@ if TYPE_CHECKING:
 
 _PREFIXES = ("physics:", "calm:", "drive:", "limit:")
 _ANIMATED = (
-    "physics:targetPosition", "physics:targetVelocity", "calm:motor:optimize", "calm:target:positionWeight",
+    "physics:targetPosition", "physics:targetVelocity", "calm:contact:active", "calm:motor:optimize",
+    "calm:target:positionWeight",
     "calm:target:rotationWeight",
 )  # fmt: skip
 
