@@ -152,11 +152,10 @@ def main() -> None:
     scene.calmotion.flexible, scene.calmotion.material, scene.calmotion.tolerance = "upper, hand", "nylon", 0.001
     assert bpy.ops.calmotion.optimize() == {"FINISHED"}, scene.calmotion.status
     stage()
-    errors = importlib.import_module("calmotion_extension.errors")  # of the folder that was given
-
+    shown = importlib.import_module("calmotion_extension.errors")  # of the folder that was given
     for frame in range(scene.frame_start, scene.frame_end + 1, EVERY):
         scene.frame_set(frame)
-        before, after = errors.errors_now(scene)
+        before, after = shown.errors_now(scene)
         errors = f"{before:.1f} mm (orange), optimised {after:.1f} mm (blue)"
         scene.render.stamp_note_text = f"frame {frame}: {errors}"
         scene.render.filepath = str(frames / f"{frame:03d}.png")
