@@ -72,13 +72,12 @@ class TetrahedralizeFlexibleBodies(Operator):
         meshes: list[FEMesh] = []
         links = [_link(character, index, geometries[index]) for index in flexible]
         for done, index in enumerate(flexible):
-            body, link = character.bodies[index], links[done]
+            body = character.bodies[index]
             context.progress(done / len(flexible), body.path)
             # a link of which another one is the copy or the mirror image is meshed once
-            whole = [k for k in range(done) if links[k] is not None]
-            twin = None if link is None else twin_of(link, [known for k in whole if (known := links[k]) is not None])
+            twin = twin_of(links[done], links[:done])
             if twin is not None:
-                mesh = twin_mesh(meshes[whole[twin[0]]], twin[1], index, character, geometries[index])
+                mesh = twin_mesh(meshes[twin[0]], twin[1], index, character, geometries[index])
             else:
                 frames = frames_of(character, index)
                 mesh = mesh_of(index, body, geometries[index], options, frames, attachments.get(index, ()))

@@ -6,7 +6,7 @@ import sys
 from pathlib import Path
 
 import bpy
-from mathutils import Quaternion
+from mathutils import Quaternion, Vector
 
 BONES, LENGTH, WIDTH = ("root", "upper", "hand"), 0.4, 0.015
 
@@ -16,28 +16,9 @@ def character(folder: Path) -> bpy.types.Object:
     bpy.ops.wm.read_factory_settings(use_empty=True)
     scene = bpy.context.scene
     scene.frame_start, scene.frame_end, scene.render.fps = 1, 25, 24
-    armature = bpy.data.armatures.new("Rig")
-    rig = bpy.data.objects.new("Rig", armature)
-    scene.collection.objects.link(rig)
-    bpy.context.view_layer.objects.active = rig
-    bpy.ops.object.mode_set(mode="EDIT")
-    above = None
-    for k, name in enumerate(BONES):
-        bone = armature.edit_bones.new(name)
-        bone.head, bone.tail, bone.parent = (k * LENGTH, 0, 1), ((k + 1) * LENGTH, 0, 1), above
-        above = bone
-    bpy.ops.object.mode_set(mode="OBJECT")
-    skin = bpy.data.objects.new("Skin", tube())
-    scene.collection.objects.link(skin)
-    for name in BONES:
-        skin.vertex_groups.new(name=name)
-    for vertex in skin.data.vertices:
-        owner = min(len(BONES) - 1, int(vertex.co.x / LENGTH - 1e-6))
-        skin.vertex_groups[BONES[owner]].add([vertex.index], 1.0, "REPLACE")
-    skin.parent = rig
-    skin.modifiers.new("Armature", "ARMATURE").object = rig
-    rig.animation_data_create()
-    rig.animation_data.action = bpy.data.actions.new("Wave")
+    from calmotion_extension.demo.rigged import rigged
+
+    rig = rigged(BONES, Vector((0.0, 0.0, 1.0)), Vector((LENGTH, 0.0, 0.0)), tube())
     for frame in range(1, 26):
         turn = 2.0 * math.pi * (frame - 1) / 24.0
         for name, angle in (("upper", 0.5 * math.sin(turn)), ("hand", 0.6 * (1.0 - math.cos(turn)))):

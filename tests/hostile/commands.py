@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 
 from broken_shots import flexible
@@ -26,11 +27,11 @@ def words(
     return Case(make, tuple(line.split()), statuses, told, outputs, seconds, kept=kept)
 
 
-def simulated(
-    options: str, *told: str, statuses: tuple[int, ...] = FAIL, make=SHOT, outputs: tuple[str, ...] = ()
+def on_shot(
+    command: str, options: str, *told: str, statuses: tuple[int, ...] = FAIL, make=SHOT, outputs: tuple[str, ...] = ()
 ) -> Case:
     return words(
-        f"simulate shot.usda --json {options}",
+        f"{command} shot.usda --json {options}",
         *told,
         statuses=statuses,
         make=make,
@@ -38,16 +39,7 @@ def simulated(
     )
 
 
-def optimized(
-    options: str, *told: str, statuses: tuple[int, ...] = FAIL, make=SHOT, outputs: tuple[str, ...] = ()
-) -> Case:
-    return words(
-        f"optimize shot.usda --json {options}",
-        *told,
-        statuses=statuses,
-        make=make,
-        outputs=("out.usda", "out_root.usda", *outputs),
-    )
+simulated, optimized = partial(on_shot, "simulate"), partial(on_shot, "optimize")
 
 
 def beside(**files: str):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import zipfile
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -99,6 +100,12 @@ def inactive(path: str) -> Edit:
 
 def payload(own: Sdf.Layer) -> None:
     own.GetPrimAtPath(FORE).payloadList.Prepend(Sdf.Payload("./more.usda", "/More"))
+
+
+def shifted(own: Sdf.Layer, offset: float, scale: float) -> None:
+    """A sublayer in another time."""
+    own.subLayerPaths.append("./more.usda")
+    own.subLayerOffsets[0] = Sdf.LayerOffset(offset, scale)
 
 
 def variants(stage: Usd.Stage) -> None:
@@ -241,20 +248,14 @@ CASES: dict[str, Case] = {
     "a payload that is missing at a prim": simulate("payload|more.usda", make=layer(payload)),
     "a sublayer that is muted by its offset": simulate(
         make=layer(
-            lambda own: (
-                own.subLayerPaths.append("./more.usda"),
-                own.subLayerOffsets.__setitem__(0, Sdf.LayerOffset(1000.0, 2.0)),
-            )[0],
+            partial(shifted, offset=1000.0, scale=2.0),
             more='#usda 1.0\nover "Arm"\n{\n    float calm:x = 1\n}\n',
         ),
         statuses=DONE,
     ),
     "a sublayer on a scale of zero": simulate(
         make=layer(
-            lambda own: (
-                own.subLayerPaths.append("./more.usda"),
-                own.subLayerOffsets.__setitem__(0, Sdf.LayerOffset(0.0, 0.0)),
-            )[0],
+            partial(shifted, offset=0.0, scale=0.0),
             more="#usda 1.0\n",
         ),
         statuses=EITHER,

@@ -64,7 +64,7 @@ class ConvergedReduction:
     error_m: float
     known: ReferenceRun
     reduction: BodyReduction | None = None
-    memory: RunMemory = field(default_factory=lambda: RunMemory())
+    memory: RunMemory = field(default_factory=RunMemory)
 
 
 def compiled_in(get: Callable[[type[Any]], Any]) -> CompiledShot:

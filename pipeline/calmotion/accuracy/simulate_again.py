@@ -43,20 +43,19 @@ def with_last_choices(
     """
     if memory.projected is None or not memory.step:
         return None
-    projected, found = memory.projected.of_shot(shot, allowed), dict[str, Any]()
+    projected = memory.projected.of_shot(shot, allowed)
     options = replace(options, integrator=memory.integrator)
     fine = replace(options, step=memory.step)
     progress(0.0, "simulating")
-    tasks: tuple[Callable[[], None], ...] = (
-        lambda: found.update(result=simulate_shot(projected.shot, fine, lambda fraction, message: None)),
-        lambda: found.update(coarse=run_or_none(partial(simulate_at, projected.shot, options), 2.0 * memory.step)),
-        lambda: found.update(finer=projected.finer_run(memory.step, fine)),
+    tasks: tuple[Callable[[], Any], ...] = (
+        lambda: simulate_shot(projected.shot, fine, lambda fraction, message: None),
+        lambda: run_or_none(partial(simulate_at, projected.shot, options), 2.0 * memory.step),
+        lambda: projected.finer_run(memory.step, fine),
     )
     try:
-        in_parallel(lambda task: task(), tasks)
+        result, coarse, finer = in_parallel(lambda task: task(), tasks)
     except IntegrationError:
         return None
-    result, coarse, finer = found["result"], found["coarse"], found["finer"]
     run = replace(frames_of(result, shot.animation.frame_times), integrator=memory.integrator)
     if coarse is None or coarse.step < 1.5 * run.step:
         return None

@@ -109,7 +109,7 @@ def calibrate_shot(
     estimates = _estimates(found)
     fits, curves = _fits(found, *before, recordings)
     spreads = np.array([p.spread for p in _all(found.problem)])
-    notes = tuple(_notes(found, estimates, settings))
+    notes = tuple(_notes(found, estimates, fits, settings))
     estimates, covariance = of_each_motor(parameters, estimates, spreads[:, None] * found.covariance * spreads)
     return Calibration(
         estimates, covariance, {r.file: r.sha256 for r in recordings}, fits, curves,
@@ -239,14 +239,16 @@ def _rms(values: Array) -> float:
     return float(np.sqrt(np.mean(values**2))) if len(values) else float("nan")
 
 
-def _notes(found: Found, estimates: Sequence[Estimate], settings: CalibrationSettings) -> list[str]:
+def _notes(
+    found: Found, estimates: Sequence[Estimate], fits: Sequence[ChannelFit], settings: CalibrationSettings
+) -> list[str]:
     """What the user must know."""
     notes = []
     if not found.solution.converged:
         notes.append("the search did not converge: the estimates may be far from the best ones")
     if settings.halvings and found.shift > 1.0:
         notes.append("the estimates still depend on the time step: give a smaller one with --step")
-    notes += _missed(found)
+    notes += _missed(found, fits)
     deviations = np.sqrt(np.diag(found.covariance))
     correlations = found.covariance / np.outer(deviations, deviations)
     robot = [k for k, item in enumerate(estimates) if item.of_robot]
@@ -267,17 +269,15 @@ def _notes(found: Found, estimates: Sequence[Estimate], settings: CalibrationSet
     return notes
 
 
-def _missed(found: Found) -> list[str]:
+def _missed(found: Found, fits: Sequence[ChannelFit]) -> list[str]:
     """Sensors that measured something which no robot of this kind does: more than noise is left, and not at random."""
-    measurement, y, notes = found.problem.measurement, found.z[len(found.problem.parameters) :], []
-    signals = found.problem.signals(found.z)
-    for sensor in measurement.sensors:
+    notes = []
+    for sensor, fit in zip(found.problem.measurement.sensors, fits, strict=True):
         channel = sensor.channel
         noise = channel.sigma if channel.sigma is not None else noise_of(channel.values[sensor.used])
-        left = _rms((channel.values - measurement.predicted(signals, sensor, y))[sensor.fitted])
-        if left > MISSED * noise and sensor.count > TOGETHER:
+        if fit.rms > MISSED * noise and sensor.count > TOGETHER:
             notes.append(
-                f"{channel.name} still differs by {left / noise:.2g} times its noise, and not at random: the model "
+                f"{channel.name} still differs by {fit.rms / noise:.2g} times its noise, and not at random: the model "
                 "misses something, and the estimates may be wrong by more than their standard deviations. Try a finer "
                 "model (a smaller --tolerance), or more --parameters"
             )

@@ -102,7 +102,8 @@ def _converged(problem: Calibrated, solution: Solution, iterations: int, halving
         if shift <= SHIFT:
             break
     problem = problem.with_measurement(correlated(problem, solution.z))
-    return Found(limit, problem, solution, covariance_of(problem, solution), iterations, shift)
+    covariance = posterior(solution.jacobian, solution.residuals, problem.counts)
+    return Found(limit, problem, solution, covariance, iterations, shift)
 
 
 def step_of(problem: Calibrated) -> float:

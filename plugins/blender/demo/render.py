@@ -65,29 +65,10 @@ def character() -> bpy.types.Object:
     bpy.ops.wm.read_factory_settings(use_empty=True)
     scene = bpy.context.scene
     scene.frame_start, scene.frame_end, scene.render.fps = 1, FRAMES, 24
-    armature = bpy.data.armatures.new("Rig")
-    rig = bpy.data.objects.new("Rig", armature)
-    scene.collection.objects.link(rig)
-    bpy.context.view_layer.objects.active = rig
-    bpy.ops.object.mode_set(mode="EDIT")
-    above = None
-    for k, name in enumerate(BONES):
-        bone = armature.edit_bones.new(name)
-        bone.head, bone.tail, bone.parent = (0, 0, k * LENGTH), (0, 0, (k + 1) * LENGTH), above
-        above = bone
-    bpy.ops.object.mode_set(mode="OBJECT")
-    body = bpy.data.objects.new("Skin", skin())
-    scene.collection.objects.link(body)
-    for name in BONES:
-        body.vertex_groups.new(name=name)
-    for vertex in body.data.vertices:
-        owner = min(len(BONES) - 1, int(vertex.co.z / LENGTH - 1e-6))
-        body.vertex_groups[BONES[owner]].add([vertex.index], 1.0, "REPLACE")
-    body.parent = rig
-    body.modifiers.new("Armature", "ARMATURE").object = rig
-    body.data.materials.append(material("Skin", (0.55, 0.53, 0.48)))
-    rig.animation_data_create()
-    rig.animation_data.action = bpy.data.actions.new("Wave")
+    surface = skin()
+    surface.materials.append(material("Skin", (0.55, 0.53, 0.48)))
+    rigged = importlib.import_module("calmotion_extension.demo.rigged").rigged
+    rig = rigged(BONES, Vector((0.0, 0.0, 0.0)), Vector((0.0, 0.0, LENGTH)), surface)
     for frame in range(1, FRAMES + 1):
         for name, size, start in (("upper", 0.6, 5), ("hand", 0.8, 7)):
             share = smooth((frame - start) / 8.0) - smooth((frame - start - 20) / 8.0)

@@ -34,12 +34,15 @@ class Link:
     frames: tuple[Frame, ...]
 
 
-def twin_of(link: Link, others: Sequence[Link]) -> tuple[int, Isometry] | None:
+def twin_of(link: Link | None, others: Sequence[Link | None]) -> tuple[int, Isometry] | None:
     """The first of other links that has the same shape, and the isometry that takes it to the link; None without one.
 
-    Their joints must be at the same places, their settings the same; their densities and masses may differ.
+    Their joints must be at the same places, their settings the same; their densities and masses may differ. Where the
+    tetrahedra of a link are given, it is None, and like no other.
     """
     for index, other in enumerate(others):
+        if link is None or other is None:
+            continue
         if _settings(link) != _settings(other) or len(link.frames) != len(other.frames):
             continue
         solid, shown = other.solid, link.solid

@@ -6,19 +6,13 @@ import numpy as np
 import pytest
 import trimesh
 from calmotion.geometry.matching.congruence import isometries
+from mesher_links import bracket
 
 MIRROR = np.diag([1.0, -1.0, 1.0])
 
 
-def bracket():
-    """A part without any symmetry."""
-    base = trimesh.creation.box((0.1, 0.03, 0.01))
-    ear = trimesh.creation.box((0.02, 0.012, 0.03))
-    ear.apply_translation((0.035, 0.006, 0.015))
-    foot = trimesh.creation.box((0.015, 0.02, 0.014))
-    foot.apply_translation((-0.03, -0.012, -0.004))
-    whole = trimesh.boolean.union([base, ear, foot])
-    return np.array(whole.vertices), np.array(whole.faces)
+def surface_of(part):
+    return np.array(part.vertices), np.array(part.faces)
 
 
 def turned(seed=3):
@@ -28,7 +22,7 @@ def turned(seed=3):
 
 @pytest.mark.parametrize("turn", [np.eye(3), turned(), MIRROR, turned() @ MIRROR])
 def test_the_isometry_of_a_part_is_found_whatever_the_order_of_its_points(turn):
-    points, triangles = bracket()
+    points, triangles = surface_of(bracket())
     order = np.random.default_rng(1).permutation(len(points))
     place = np.empty(len(points), dtype=int)
     place[order] = np.arange(len(points))
@@ -40,7 +34,7 @@ def test_the_isometry_of_a_part_is_found_whatever_the_order_of_its_points(turn):
 
 
 def test_parts_that_differ_have_none():
-    points, triangles = bracket()
+    points, triangles = surface_of(bracket())
     assert isometries(points, triangles, 1.001 * points, triangles) == []
     bent = points.copy()
     bent[np.argmax(points[:, 0]), 1] += 2e-5

@@ -26,6 +26,16 @@ def box(extents=(0.2, 0.02, 0.02), at=(0.0, 0.0, 0.0)):
     return mesh
 
 
+def bracket():
+    """A part without any symmetry."""
+    base = trimesh.creation.box((0.1, 0.03, 0.01))
+    ear = trimesh.creation.box((0.02, 0.012, 0.03))
+    ear.apply_translation((0.035, 0.006, 0.015))
+    foot = trimesh.creation.box((0.015, 0.02, 0.014))
+    foot.apply_translation((-0.03, -0.012, -0.004))
+    return trimesh.boolean.union([base, ear, foot])
+
+
 def link(*surfaces, **fields):
     return Body("/Arm/link", REST, None, tuple(surfaces), flexible=replace(FLEXIBLE, **fields))
 

@@ -6,25 +6,19 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-import trimesh
 from calmotion.geometry.tetrahedra import tet_volumes
 from calmotion.reduction.mesh_refinement import frequency_estimate
 from calmotion.shot import Frame
 from calmotion.shot.meshes import CutPatch
-from mesher_links import link, run, surface
+from mesher_links import bracket, link, run, surface
 
 TURN = np.array([1.0, 0.0, 0.0, 0.0])
 ROOT = Frame(np.array([-0.05, 0.0, 0.0]), TURN)
 MIRROR = np.diag([1.0, -1.0, 1.0])
 
 
-def bracket(mirrored=False):
-    base = trimesh.creation.box((0.1, 0.03, 0.01))
-    ear = trimesh.creation.box((0.02, 0.012, 0.03))
-    ear.apply_translation((0.035, 0.006, 0.015))
-    foot = trimesh.creation.box((0.015, 0.02, 0.014))
-    foot.apply_translation((-0.03, -0.012, -0.004))
-    whole = trimesh.boolean.union([base, ear, foot])
+def bracket_surface(mirrored=False):
+    whole = bracket()
     if mirrored:
         whole.apply_transform(np.diag([1.0, -1.0, 1.0, 1.0]))
     return surface(whole)
@@ -39,7 +33,7 @@ def test_the_mirror_image_of_a_link_is_meshed_once(host, package, monkeypatch):
         return fill(*arguments)
 
     monkeypatch.setattr(made, "filled", counted)
-    left, right = link(bracket()), replace(link(bracket(mirrored=True)), path="/Arm/right")
+    left, right = link(bracket_surface()), replace(link(bracket_surface(mirrored=True)), path="/Arm/right")
     stiffer = replace(left.flexible, interface_radius=0.02)
     first, second, third = run(host, left, right, replace(left, path="/Arm/third", flexible=stiffer))
     assert count == ["/Arm/link", "/Arm/third"]
@@ -54,11 +48,11 @@ def test_the_mirror_image_of_a_link_is_meshed_once(host, package, monkeypatch):
 
 def test_links_are_twins_only_with_their_joints_at_the_same_places(package):
     twins, solids = package("sources.twins"), package("repair")
-    solid, image = (solids.closed_solid([bracket(m)], "/Arm/link") for m in (False, True))
+    solid, image = (solids.closed_solid([bracket_surface(m)], "/Arm/link") for m in (False, True))
     tip, tilted = Frame(np.array([0.04, 0.006, 0.03]), TURN), Frame(np.array([0.04, 0.006, 0.03]), np.eye(4)[1])
     mirrored_tip = Frame(MIRROR @ tip.position, TURN)
-    left = twins.Link(link(bracket()), solid, -1.0, True, (ROOT, tip))
-    right = twins.Link(link(bracket(True)), image, -1.0, True, (ROOT, mirrored_tip))
+    left = twins.Link(link(bracket_surface()), solid, -1.0, True, (ROOT, tip))
+    right = twins.Link(link(bracket_surface(True)), image, -1.0, True, (ROOT, mirrored_tip))
     index, isometry = twins.twin_of(right, [left])
     assert index == 0 and isometry.mirrors
     assert twins.twin_of(left, [left])[1].turn == pytest.approx(np.eye(3))
@@ -74,7 +68,7 @@ def test_links_are_twins_only_with_their_joints_at_the_same_places(package):
 
 
 def test_patches_are_moved_with_the_mesh(host, package):
-    (mesh,) = run(host, link(bracket(), element_size=0.02))
+    (mesh,) = run(host, link(bracket_surface(), element_size=0.02))
     corners = mesh.points[mesh.tets[0, [0, 2, 1]]]
     mesh = replace(mesh, patches=(CutPatch(ROOT.position, corners[None]),))
     isometry = package("sources.twins").Isometry(MIRROR, np.array([0.0, 0.5, 0.0]))

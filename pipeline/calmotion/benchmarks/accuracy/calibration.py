@@ -3,10 +3,10 @@
 `calmotion bench calibration [--trials N] [--first K] [--finer-mesh] [--csv FILE]` draws arms of one or two flexible
 links with a load, half of them with a motor that gives. The parameters of the real arm differ from the model by a
 standard deviation of their priors. It is simulated by another integrator (Newmark's method, steps of 1/7680 s,
-extrapolated) and, with `--finer-mesh`, with another mesh and more modes. A marker, an accelerometer and the encoders
-record it, each with its own clock, noise, bias, gaps and outliers. The table has, for each kind of parameter, how often
-the 95% interval covers the truth, the median error, the median standard deviation, and in how many trials it was
-identifiable. Trial number K is the same on every machine.
+extrapolated; the generalized-alpha method where that diverges) and, with `--finer-mesh`, with another mesh and more
+modes. A marker, an accelerometer and the encoders record it, each with its own clock, noise, bias, gaps and outliers.
+The table has, for each kind of parameter, how often the 95% interval covers the truth, the median error, the median
+standard deviation, and in how many trials it was identifiable. Trial number K is the same on every machine.
 """
 
 from __future__ import annotations

@@ -29,6 +29,6 @@ def median_time(action: Callable[[], object], repeats: int = 5, *, warm: bool = 
 
 
 def processor_time() -> float:
-    """That of this process and of those that it started and that have ended [s]."""
+    """That of this process and of those that it started and that have ended [s]: other work changes it little."""
     times = os.times()
     return times.user + times.system + times.children_user + times.children_system

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -10,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from calmotion.benchmarks.common.timing import processor_time
 from calmotion.benchmarks.links.pictures import draw_link
 from calmotion.benchmarks.scenes.links import Link, attachments_of, frames_of
 from calmotion.errors import ShotError
@@ -115,20 +115,20 @@ def survey_row(
     )  # fmt: skip
     if not body.surfaces and body.tets is None and not frames:
         return replace(row, source="none", note="no geometry and no joints")
-    begin = _processor_time()
+    begin = processor_time()
     try:
         options = mesher.MeshOptions(time_limit=time_limit, cache=False)
         geometry = mesher.geometry_of(0, body, options, frames)
         row = _with_solid(row, geometry, visual, frames)
         if not geometry_only:
             mesh = mesher.mesh_of(0, body, geometry, options, frames, attachments_of(link))
-            row = replace(row, seconds=_processor_time() - begin)
+            row = replace(row, seconds=processor_time() - begin)
             row = _with_mesh(row, mesh, link)
             if picture:
                 draw_link(Path(picture), f"{robot}, {link.name}", mesh, link)
     except ShotError as problem:
         row = replace(row, note=str(problem), nodes=0)
-    return row if row.nodes else replace(row, seconds=_processor_time() - begin)
+    return row if row.nodes else replace(row, seconds=processor_time() - begin)
 
 
 def _with_solid(row: LinkRow, geometry: Any, visual: Sequence[Any], frames: Sequence[Any]) -> LinkRow:
@@ -175,9 +175,3 @@ def _with_mesh(row: LinkRow, mesh: FEMesh, link: Link) -> LinkRow:
         f1=float(f1), f2=float(f2), f3=float(f3), estimate=np.nan if error is None else 100.0 * error,
         note="; ".join(filter(None, (row.note, *late))),
     )  # fmt: skip
-
-
-def _processor_time() -> float:
-    """Of this process and its ended children [s]: it does not depend on what else the machine does."""
-    spent = os.times()
-    return spent.user + spent.system + spent.children_user + spent.children_system

@@ -104,7 +104,7 @@ def _links(links: Sequence[LinkRow]) -> str:
         frequencies = ", ".join(_cell(f) for f in (row.f1, row.f2, row.f3)) if row.flexible else "-"
         table.append(
             [
-                row.robot, row.link, row.source, _cell(1.0 * row.volume), _cell(row.mass), _cell(row.nodes),
+                row.robot, row.link, row.source, _cell(row.volume), _cell(row.mass), _cell(row.nodes),
                 _cell(row.seconds), frequencies, _cell(row.estimate), _cell(_told(row)),
             ]
         )  # fmt: skip

@@ -28,6 +28,7 @@ from calmotion.workflow.shot import Shot
 from calmotion.workflow.watch import Watch
 
 COMMANDS: dict[str, Callable[..., SimulationResult]] = {"simulate": simulate, "optimize": optimize}
+SEARCH = "retarget.optimize"
 MOVED, REACH = np.radians(3.0), 0.33  # how far a key is moved [rad] or [m / 10], and to where its neighbours are [s]
 
 
@@ -56,10 +57,16 @@ class Edit:
     errors_mm: tuple[float, float]
 
     @property
+    def compared(self) -> tuple[float, float]:
+        """Processor time of the first run and of the second [s]; of their searches where they have one."""
+        if self.command == "optimize":
+            return self.first.get(SEARCH, 0.0), self.again.get(SEARCH, 0.0)
+        return sum(self.first.values()), sum(self.again.values())
+
+    @property
     def ratio(self) -> float:
-        """Processor time of the second run, or of its search, over that of the first."""
-        own = "retarget.optimize" if self.command == "optimize" else None
-        first, again = (sum(used.values()) if own is None else used.get(own, 0.0) for used in (self.first, self.again))
+        """That of the second run over that of the first."""
+        first, again = self.compared
         return again / first
 
 
@@ -135,10 +142,7 @@ def table(edits: Sequence[Edit]) -> str:
     rows = []
     for edit in edits:
         what = "search" if edit.command == "optimize" else "whole run"
-        first, again = (
-            used.get("retarget.optimize", 0.0) if edit.command == "optimize" else sum(used.values())
-            for used in (edit.first, edit.again)
-        )
+        first, again = edit.compared
         numbers = [f"{first:.2f}", f"{again:.2f}", f"{edit.ratio:.2f}", f"{edit.first_s:.2f}", f"{edit.again_s:.2f}"]
         counts = [str(count) if count else "" for count in edit.sweeps]
         errors = [f"{error:.2f}" for error in edit.errors_mm]

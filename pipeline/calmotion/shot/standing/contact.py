@@ -24,4 +24,10 @@ class Contact:
 
     def holds_at(self, time: float) -> bool:
         """Whether it holds from a time [s] on."""
-        return bool(self.active[max(int(np.searchsorted(self.times, time + 1e-9, "right")) - 1, 0)])
+        return bool(self.held(np.array([time + 1e-9]))[0])
+
+    def held(self, times: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """Whether it holds at each of some times [s], none of which is one at which it comes or goes."""
+        at = np.maximum(np.searchsorted(self.times, times, "right") - 1, 0)
+        held: NDArray[np.bool_] = self.active[at]
+        return held

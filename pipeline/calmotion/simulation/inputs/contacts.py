@@ -47,9 +47,7 @@ def sample_world(character: Character, animation: Animation, model: Model, grid:
 def held_steps(contact: Contact, grid: TimeGrid) -> BoolArray:
     """Whether a contact holds in the step to each instant, shape [T]; at the first instant in the step from it."""
     starts = np.maximum(np.concatenate([grid.times[:1], grid.times[:-1]]) + 0.5 * grid.h, 0.0)
-    at = np.maximum(np.searchsorted(contact.times, starts, "right") - 1, 0)
-    held: BoolArray = contact.active[at]
-    return held
+    return contact.held(starts)
 
 
 def refuse_unsupported_contacts(character: Character, options: RunSettings) -> None:

@@ -60,8 +60,7 @@ def held_feet(character: Character, motion: Motion) -> list[HeldFoot]:
         assert contact is not None
         times = motion.times
         middles = np.maximum(0.5 * (times[1:] + times[:-1]), 0.0)
-        at = np.maximum(np.searchsorted(contact.times, middles, "right") - 1, 0)
-        held = np.concatenate([[False], contact.active[at], [False]])  # in the step to instant n, and none beyond
+        held = np.concatenate([[False], contact.held(middles), [False]])  # in the step to instant n, and none beyond
         starts, ends = np.flatnonzero(held[1:] & ~held[:-1]), np.flatnonzero(held[:-1] & ~held[1:])
         first = motion.judged.start
         for start, end in zip(starts, ends, strict=True):

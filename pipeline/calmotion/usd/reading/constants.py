@@ -18,8 +18,7 @@ if TYPE_CHECKING:
 _PREFIXES = ("physics:", "calm:", "drive:", "limit:")
 _ANIMATED = (
     "physics:targetPosition", "physics:targetVelocity", "calm:contact:active", "calm:motor:optimize",
-    "calm:target:positionWeight",
-    "calm:target:rotationWeight",
+    "calm:target:positionWeight", "calm:target:rotationWeight",
 )  # fmt: skip
 
 

@@ -129,11 +129,36 @@ def body_on(stage: Usd.Stage, prim: Usd.Prim, side: int) -> str:
     """Path of the body on a side of a joint's prim, as authored; empty for the world."""
     relationship = prim.GetRelationship(f"physics:body{side}")
     for target in relationship.GetForwardedTargets() if relationship else []:
-        body = stage.GetPrimAtPath(target)
-        while body and not is_rigid_body(body):
-            body = body.GetParent()
+        body = carrying_body(stage.GetPrimAtPath(target))
         return str(body.GetPath()) if body else ""
     return ""
+
+
+def carrying_body(prim: Usd.Prim) -> Usd.Prim:
+    """The body that a prim is or lies below; an invalid prim where there is none."""
+    while prim and not is_rigid_body(prim):
+        prim = prim.GetParent()
+    return prim
+
+
+def refuse_without_transform(prim: Usd.Prim, what: str) -> None:
+    """Refuse a prim that has no transform.
+
+    Args:
+        what: It stands for, such as `a target`.
+
+    Raises:
+        ShotError: It is no UsdGeomXformable.
+    """
+    from pxr import UsdGeom
+
+    if not prim.IsA(UsdGeom.Xformable):
+        raise ShotError(
+            f"{what} needs a transform",
+            path=prim.GetPath(),
+            found=prim.GetTypeName() or "a prim without a type",
+            remedy="Make it an Xform",
+        )
 
 
 def is_rigid_body(prim: Usd.Prim) -> bool:

@@ -13,7 +13,7 @@ from calmotion.shot import Body, Frame, Joint, Target, WeightTrack
 from calmotion.support.naming import nearest
 from calmotion.usd import schemas
 from calmotion.usd.clock import Clock
-from calmotion.usd.reading.context import Reading, is_rigid_body, prims_of
+from calmotion.usd.reading.context import Reading, carrying_body, is_rigid_body, prims_of, refuse_without_transform
 from calmotion.usd.transforms import Pose, pose_from_matrix, quaternion_from_rotation
 
 if TYPE_CHECKING:
@@ -66,11 +66,7 @@ def _is_prim_path(path: str) -> bool:
 
 
 def _carrier(prim: Usd.Prim, what: str = "a target") -> str:
-    from pxr import UsdGeom
-
-    body = prim
-    while body and not is_rigid_body(body):
-        body = body.GetParent()
+    body = carrying_body(prim)
     if not body and what != "a target":
         raise ShotError(
             f"{what} must be on a body",
@@ -86,13 +82,7 @@ def _carrier(prim: Usd.Prim, what: str = "a target") -> str:
             found=_SCHEMA,
             remedy="Move the prim below a prim with PhysicsRigidBodyAPI, or remove CalmTargetAPI",
         )
-    if not prim.IsA(UsdGeom.Xformable):
-        raise ShotError(
-            f"{what} needs a transform",
-            path=prim.GetPath(),
-            found=prim.GetTypeName() or "a prim without a type",
-            remedy="Make it an Xform",
-        )
+    refuse_without_transform(prim, what)
     return str(body.GetPath())
 
 

@@ -13,7 +13,7 @@ from calmotion.shot import Frame
 from calmotion.shot.standing.contact import Contact
 from calmotion.usd import schemas
 from calmotion.usd.clock import Clock
-from calmotion.usd.reading.context import Reading, is_rigid_body, prims_of
+from calmotion.usd.reading.context import Reading, carrying_body, prims_of, refuse_without_transform
 from calmotion.usd.reading.joints import JointPrim
 from calmotion.usd.transforms import Pose, pose_from_matrix, quaternion_from_rotation
 
@@ -37,11 +37,7 @@ def contact_carriers(reading: Reading) -> dict[str, str]:
 
 
 def _carrier(prim: Usd.Prim) -> str:
-    from pxr import UsdGeom
-
-    body = prim
-    while body and not is_rigid_body(body):
-        body = body.GetParent()
+    body = carrying_body(prim)
     if not body:
         raise ShotError(
             "a contact must be carried by a body",
@@ -50,13 +46,7 @@ def _carrier(prim: Usd.Prim) -> str:
             found=_SCHEMA,
             remedy="Move the prim below a prim with PhysicsRigidBodyAPI (the foot), or remove CalmContactAPI",
         )
-    if not prim.IsA(UsdGeom.Xformable):
-        raise ShotError(
-            "a contact needs a transform",
-            path=prim.GetPath(),
-            found=prim.GetTypeName() or "a prim without a type",
-            remedy="Make it an Xform",
-        )
+    refuse_without_transform(prim, "a contact")
     return str(body.GetPath())
 
 
