@@ -26,11 +26,17 @@ def _with_budget(context: RunContext, result: Result) -> Result:
     from calmotion.accuracy.error_budget import with_budget
     from calmotion.accuracy.motors.backlash import with_lost_motion
     from calmotion.accuracy.motors.motor_effects import with_error_shares
+    from calmotion.retargeting.found_curves import best_so_far
 
     shot, tolerance = compiled_in(context.get), context.get(Source).settings.tolerance
-    if not result.interrupted:
-        result = with_error_shares(shot, result, _options(context), context.progress)
-        result = with_lost_motion(shot, result, _options(context))
+    try:
+        if not result.interrupted:
+            result = with_error_shares(shot, result, _options(context), context.progress)
+            result = with_lost_motion(shot, result, _options(context))
+    except KeyboardInterrupt:
+        if result.after is None:  # of a simulation: it is soon done again
+            raise
+        result = best_so_far(result)
     return with_budget(with_choices(result, context.get(ModelChoices)), shot.character, tolerance)
 
 

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from calmotion.retargeting.problem.adaptive_knots import useful_knots
 from calmotion.retargeting.problem.problem import RetargetProblem
 from calmotion.retargeting.simplification.pruning import UNCHANGED
-from calmotion.shot import MotorCurve
+from calmotion.shot import MotorCurve, Result
 from calmotion.shot.character import Array
+from calmotion.support import interrupts
 
 
 def found_curves(problem: RetargetProblem, motors: int, x: Array) -> tuple[tuple[MotorCurve, ...], Array]:
@@ -27,3 +30,9 @@ def found_curves(problem: RetargetProblem, motors: int, x: Array) -> tuple[tuple
         knots = useful_knots(basis, by_motor[:, motor]) if changed else basis.knots[[0, -1]]
         curves.append(MotorCurve(motor, changed, knots, values, float(largest[motor])))
     return tuple(curves), coefficients.ravel()
+
+
+def best_so_far(result: Result) -> Result:
+    """The result of a search after which the user stopped the run; answers the interrupt."""
+    interrupts.answer()
+    return replace(result, interrupted=True, stopped="interrupted")

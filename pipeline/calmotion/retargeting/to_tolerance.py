@@ -34,6 +34,7 @@ from calmotion.accuracy.step_error import (
     largest_step,
     simulate_at,
 )
+from calmotion.retargeting.found_curves import best_so_far
 from calmotion.retargeting.optimize import optimize_shot, refuse_other_integrators
 from calmotion.retargeting.robust.retarget import retarget_robustly
 from calmotion.retargeting.search_progress import SuccessiveSearches
@@ -94,21 +95,27 @@ def optimize_to_tolerance(
             memory.search = None  # a search that goes on from a checkpoint is to find the same
         reduced = projected.shot.with_tracks(tracks)
         of_step = replace(options, step=step) if chooses else options
-        latest = _searched(reduced, of_step, searches, checkpoint, stored, memory)
-        searches.ended()
-        result = with_modes(latest if result is None else _continued(result, latest), shot.bodies)
-        if result.interrupted:
-            break
-        tracks = found_tracks(result, animation)
-        left_out = omitted_error(reduced.bodies)
-        result = with_accuracy(result, reduced.with_tracks(tracks), options, left_out)
-        assert result.accuracy is not None
-        allowed = allowed_step_error(character, options, left_out) if chooses else np.inf
-        fine = result.accuracy.step_m <= allowed or step <= LAST
-        iterations = max((row.iterations for row in latest.windows), default=latest.iterations)
-        ended = iterations >= options.max_iterations  # a new POD subspace would allow no further iteration
-        if fine and (ended or _is_accurate(projected, tracks, result, options, again)):
-            memory.projected, memory.step = projected, result.step_s
+        try:
+            latest = _searched(reduced, of_step, searches, checkpoint, stored, memory)
+            searches.ended()
+            result = with_modes(latest if result is None else _continued(result, latest), shot.bodies)
+            if result.interrupted:
+                break
+            tracks = found_tracks(result, animation)
+            left_out = omitted_error(reduced.bodies)
+            result = with_accuracy(result, reduced.with_tracks(tracks), options, left_out)
+            assert result.accuracy is not None
+            allowed = allowed_step_error(character, options, left_out) if chooses else np.inf
+            fine = result.accuracy.step_m <= allowed or step <= LAST
+            iterations = max((row.iterations for row in latest.windows), default=latest.iterations)
+            ended = iterations >= options.max_iterations  # a new POD subspace would allow no further iteration
+            if fine and (ended or _is_accurate(projected, tracks, result, options, again)):
+                memory.projected, memory.step = projected, result.step_s
+                break
+        except KeyboardInterrupt:
+            if result is None:
+                raise
+            result = best_so_far(result)
             break
         if not fine:
             step = max(LAST, MARGIN * result.step_s * (allowed / result.accuracy.step_m) ** (1.0 / ORDER))
@@ -117,11 +124,22 @@ def optimize_to_tolerance(
         return result
     searches.ended()
     of_step = replace(options, step=result.step_s if chooses else options.step)
-    robust = retarget_robustly(projected.shot.with_tracks(animation.tracks), of_step, result, _continued, searches)
+    return with_modes(_robustly(projected.shot, of_step, options, result, searches), shot.bodies)
+
+
+def _robustly(
+    shot: CompiledShot, of_step: RunSettings, options: RunSettings, nominal: Result, searches: SuccessiveSearches
+) -> Result:
+    """The result for a set of robots, begun from that for the nominal one."""
+    animation = shot.animation
+    robust = retarget_robustly(shot.with_tracks(animation.tracks), of_step, nominal, _continued, searches)
     if robust.interrupted:
         return robust
-    reduced = projected.shot.with_tracks(found_tracks(robust, animation))
-    return with_accuracy(with_modes(robust, shot.bodies), reduced, options, omitted_error(reduced.bodies))
+    reduced = shot.with_tracks(found_tracks(robust, animation))
+    try:
+        return with_accuracy(robust, reduced, options, omitted_error(reduced.bodies))
+    except KeyboardInterrupt:
+        return best_so_far(robust)
 
 
 def _is_accurate(

@@ -9,6 +9,7 @@ import numpy as np
 
 from calmotion.accuracy.simulate_to_tolerance import found_tracks
 from calmotion.errors import ShotError
+from calmotion.retargeting.found_curves import best_so_far
 from calmotion.retargeting.optimize import optimize_shot
 from calmotion.retargeting.robust.choice import chosen_scenarios
 from calmotion.retargeting.robust.measure import errors_on
@@ -20,7 +21,6 @@ from calmotion.shot.robust.settings import WORST
 from calmotion.shot.run import RunSettings
 from calmotion.simulation.compiled_shot import CompiledShot
 from calmotion.simulation.simulate import Progress
-from calmotion.support import interrupts
 
 ROUNDS = 6  # most searches with other weights
 FALLING = 0.98  # of the largest error: a smaller gain ends them
@@ -69,8 +69,7 @@ def retarget_robustly(
         draws = random_scenarios(parameters, robust.draws)
         return replace(best, robustness=_robustness(shot, options, nominal, best, used, draws, progress))
     except KeyboardInterrupt:
-        interrupts.answer()
-        return replace(best, interrupted=True, stopped="interrupted")
+        return best_so_far(best)
 
 
 def uncertainties_of(shot: CompiledShot) -> tuple[Parameter, ...]:

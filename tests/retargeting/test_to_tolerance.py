@@ -1,0 +1,48 @@
+"""An interrupt after a search keeps what the search found, on a small arm."""
+
+import pytest
+from calmotion.retargeting import to_tolerance
+from calmotion.retargeting.to_tolerance import optimize_to_tolerance
+from calmotion.shot.run import RunSettings
+from calmotion.simulation.compiled_shot import compile_shot
+from calmotion.support import interrupts
+from posed import ignore_progress
+
+OPTIONS = RunSettings(step=1 / 120)
+
+
+@pytest.mark.parametrize("where", ["with_accuracy", "_is_accurate"])
+def test_an_interrupt_after_the_search_keeps_its_curves(arm, animation, bodies, monkeypatch, where):
+    def interrupt(*args):
+        interrupts.request()
+
+    monkeypatch.setattr(to_tolerance, where, interrupt)
+    found = optimize_to_tolerance(compile_shot(arm, animation, bodies), OPTIONS, ignore_progress)
+    assert found.interrupted and found.stopped == "interrupted"
+    assert found.objective_after < 0.1 * found.objective_before
+    interrupts.check()  # it was answered
+
+
+def test_an_interrupt_of_a_second_search_keeps_the_curves_of_the_first(arm, animation, bodies, monkeypatch):
+    searched, searches = to_tolerance._searched, []
+
+    def once(*args):
+        if searches:
+            interrupts.request()
+        searches.append(searched(*args))
+        return searches[-1]
+
+    monkeypatch.setattr(to_tolerance, "_searched", once)
+    monkeypatch.setattr(to_tolerance, "_is_accurate", lambda *args: False)
+    found = optimize_to_tolerance(compile_shot(arm, animation, bodies), OPTIONS, ignore_progress)
+    assert len(searches) == 1 and found.interrupted
+    assert found.objective_after == searches[0].objective_after
+
+
+def test_an_interrupt_before_there_is_a_result_ends_the_run(arm, animation, bodies, monkeypatch):
+    def interrupt(*args):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(to_tolerance, "_searched", interrupt)
+    with pytest.raises(KeyboardInterrupt):
+        optimize_to_tolerance(compile_shot(arm, animation, bodies), OPTIONS, ignore_progress)
