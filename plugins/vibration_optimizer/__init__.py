@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from calmotion.accuracy.reduced_bodies import ConvergedReduction, compiled_in
+from calmotion.errors import ShotError
 from calmotion.host import NotAsked, Operator, Property, RunContext, registration
 from calmotion.shot import Animation, Character, ModelChoices, Result
 from calmotion.shot.model_choice import run_settings, simplified_character, with_choices
@@ -195,7 +196,7 @@ class OptimizeShot(Operator):
             check_search(character, animation, self._search_options(context))
 
     def execute(self, context: RunContext) -> Sequence[object]:
-        from calmotion.retargeting.checkpoint import checkpoint_path
+        from calmotion.retargeting.checkpoint import checkpoint_path, remove_checkpoint
         from calmotion.retargeting.to_tolerance import optimize_to_tolerance
         from calmotion.retargeting.windows.store import windows_path
 
@@ -206,7 +207,12 @@ class OptimizeShot(Operator):
         converged = context.get(ConvergedReduction)
         known, memory = (None, None) if converged is None else (converged.known, converged.memory)
         shot = compiled_in(context.get)
-        result = optimize_to_tolerance(shot, options, context.progress, kept, known, stored, memory)
+        try:
+            result = optimize_to_tolerance(shot, options, context.progress, kept, known, stored, memory)
+        except ShotError:
+            if kept:  # the same command would resume only to be refused again
+                remove_checkpoint(kept)
+            raise
         if result.interrupted:
             context.report(
                 "warning", "interrupted: these are the best curves so far; the same command resumes from them"

@@ -68,12 +68,7 @@ def _directions(
     runs = [robot[""] for robot in deviations_on(shot, options, {"": tracks}, scenarios, _flat)]
     for scenario, run in zip(scenarios, runs, strict=True):
         if not len(run):
-            raise ShotError(
-                f"a robot with {_described(scenario)} cannot be simulated",
-                path=shot.character.path,
-                attribute="calm:retarget:uncertainty",
-                remedy="Set a smaller uncertainty: the model is near buckling, or near another limit of what stands.",
-            )
+            raise beyond_simulation(shot, scenario)
     derivatives = np.array([0.5 * (up - down) for up, down in zip(runs[::2], runs[1::2], strict=True)])
     values, vectors = np.linalg.eigh(derivatives @ derivatives.T)
     order = np.argsort(-values)
@@ -82,6 +77,17 @@ def _directions(
     axes = vectors[:, order].T
     signs = np.sign(axes[np.arange(len(axes)), np.argmax(np.abs(axes), axis=1)])
     return np.asarray(signs[:, None] * axes), np.asarray(sizes)
+
+
+def beyond_simulation(shot: CompiledShot, scenario: Scenario, reason: str = "") -> ShotError:
+    """The error that says that a robot is too different from the model to be simulated, and the reason."""
+    different = ", ".join(f"{name} times {factor:.3g}" for name, factor in scenario.factors.items() if factor != 1.0)
+    return ShotError(
+        f"a robot with {different} cannot be simulated" + (f": {reason}" if reason else ""),
+        path=shot.character.path,
+        attribute="calm:retarget:uncertainty",
+        remedy="Set a smaller uncertainty: the model is near buckling, or near another limit of what stands.",
+    )
 
 
 def _flat(deviations: Array | None) -> Array:
@@ -94,7 +100,3 @@ def _shared(pairs: int, sizes: Array) -> list[int]:
     for _ in range(pairs):
         shares[int(np.argmax(sizes / (shares + 1)))] += 1
     return shares.tolist()
-
-
-def _described(scenario: Scenario) -> str:
-    return ", ".join(f"{name} times {factor:.3g}" for name, factor in scenario.factors.items() if factor != 1.0)

@@ -11,7 +11,7 @@ from calmotion.accuracy.simulate_to_tolerance import found_tracks
 from calmotion.errors import ShotError
 from calmotion.retargeting.found_curves import best_so_far
 from calmotion.retargeting.optimize import optimize_shot
-from calmotion.retargeting.robust.choice import chosen_scenarios
+from calmotion.retargeting.robust.choice import beyond_simulation, chosen_scenarios
 from calmotion.retargeting.robust.measure import errors_on
 from calmotion.retargeting.robust.scenarios import Parameter, random_scenarios, uncertain_parameters
 from calmotion.shot import Result
@@ -58,7 +58,7 @@ def retarget_robustly(
         least = np.inf
         for number in range(rounds):
             begun = shot.with_tracks(found_tracks(best, animation))
-            latest = optimize_shot(begun, options, _part(progress, number, rounds), None, scenarios)
+            latest = _searched(begun, options, _part(progress, number, rounds), scenarios)
             if latest.interrupted:
                 return continued(best, latest)
             errors = errors_on(shot, options, {"": found_tracks(latest, animation)}, scenarios)[""].max(axis=1)
@@ -70,6 +70,15 @@ def retarget_robustly(
         return replace(best, robustness=_robustness(shot, options, nominal, best, used, draws, progress))
     except KeyboardInterrupt:
         return best_so_far(best)
+
+
+def _searched(shot: CompiledShot, options: RunSettings, progress: Progress, scenarios: tuple[Scenario, ...]) -> Result:
+    """A search for a set of robots; where it fails, the error tells on which of them."""
+    try:
+        return optimize_shot(shot, options, progress, None, scenarios)
+    except ShotError as error:
+        off = errors_on(shot, options, {"": shot.animation.tracks}, scenarios)[""].max(axis=1)
+        raise beyond_simulation(shot, scenarios[int(np.argmax(off))], error.problem) from error
 
 
 def uncertainties_of(shot: CompiledShot) -> tuple[Parameter, ...]:
