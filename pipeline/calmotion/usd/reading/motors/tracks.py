@@ -9,6 +9,7 @@ import numpy as np
 from calmotion.errors import ShotError
 from calmotion.shot import Track
 from calmotion.shot.character import Array
+from calmotion.shot.curves import interpolate
 from calmotion.usd.clock import Clock
 from calmotion.usd.reading.context import Reading
 from calmotion.usd.reading.motors.splines import read_spline, value_at
@@ -17,6 +18,9 @@ if TYPE_CHECKING:
     from pxr import Sdf, Usd
 
 MOST = 1_000_000  # samples of one motor
+_SPARSE = 2.0  # frames: samples further apart are keys rather than a sampled curve
+_SWING = 0.1  # of the range of a track: a smaller swing beyond two neighbouring samples is not noted
+_LOOKED_AT = 33  # points between two samples
 _CLOSE = 1e-4  # samples closer than this share of a frame count as simultaneous
 
 
@@ -59,7 +63,33 @@ def read_track(attribute: Usd.Attribute, clock: Clock, reading: Reading, to_si: 
         notes.append(f"{path}: its samples do not span the shot; the first and last value are held, as USD does")
     codes = np.concatenate([frames[held[0]], codes, frames[held[1]]])
     values = np.concatenate([np.full(held[0].sum(), values[0]), values, np.full(held[1].sum(), values[-1])])
-    return Track(clock.seconds(codes), to_si * values)
+    track = Track(clock.seconds(codes), to_si * values)
+    notes.extend(_swings(path, track, codes, to_si, frames))
+    return track
+
+
+def _swings(path: Sdf.Path, track: Track, codes: Array, to_si: float, frames: Array) -> list[str]:
+    """A note where the smooth curve swings far beyond two samples between which frames have none."""
+    span = np.ptp(track.values)
+    if len(frames) < 2 or span == 0.0:
+        return []
+    wide = np.nonzero(np.diff(codes) > _SPARSE * (frames[1] - frames[0]))[0]
+    curve = interpolate(track, float(track.times[-1]))
+    worst = (0.0, 0, 0.0)
+    for k in wide:
+        low, high = np.sort(track.values[k : k + 2])
+        between = curve(np.linspace(track.times[k], track.times[k + 1], _LOOKED_AT))
+        for extreme, by in ((between.max(), between.max() - high), (between.min(), low - between.min())):
+            worst = max(worst, (float(by), int(k), float(extreme)))
+    by, at, extreme = worst
+    if by <= _SWING * span:
+        return []
+    first, second, reached = (f"{value / to_si:.4g}" for value in (*track.values[at : at + 2], extreme))
+    return [
+        f"{path}: between its samples at time codes {codes[at]:.6g} and {codes[at + 1]:.6g} ({first} and {second}) the "
+        f"smooth curve through all samples reaches {reached}; author a sample at every frame, or a spline, if that is "
+        "not meant"
+    ]
 
 
 def _refuse_too_many(attribute: Usd.Attribute) -> None:
