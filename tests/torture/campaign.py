@@ -10,6 +10,7 @@ from __future__ import annotations
 import argparse
 import os
 import random
+import shutil
 import signal
 import sys
 import tempfile
@@ -45,37 +46,47 @@ def main() -> int:
     parser.add_argument("--folder", type=Path, help="where to run (default: a temporary folder)")
     parser.add_argument("--write", action="store_true", help="write the counts into docs/reliability.md")
     options = parser.parse_args()
-    chosen = options.only or list(KINDS)
-    with tempfile.TemporaryDirectory(prefix="torture-") as temporary:
-        space = Workspace((options.folder or Path(temporary)).resolve())
-        os.environ.update(space.environment())  # before the program is loaded, which reads them
-        runs.load_program()
-        space.prepare(keep_caches=options.folder is not None)
-        seconds = undisturbed(space)
-        print(f"an undisturbed run takes {seconds:.1f} s", flush=True)
-        tallies = {}
-        where: Counter[str] = Counter()
-        stopped = False
-        signal.signal(signal.SIGTERM, signal.default_int_handler)  # ends the campaign with the counts so far
-        for kind in chosen:
-            begin, count = time.monotonic(), max(1, round(KINDS[kind] * options.runs))
-            rng, tally = random.Random(f"{options.seed} {kind}"), verdicts.Tally()
-            tallies[kind] = tally
-            try:
-                if kind == "kills":
-                    kills.campaign(space, rng, count, tally, seconds, where)
-                else:
-                    _CAMPAIGNS[kind](space, rng, count, tally)
-            except KeyboardInterrupt:
-                stopped = True
-            print(f"{kind}: {tally.counts}, {len(tally.faults)} faults, {time.monotonic() - begin:.0f} s", flush=True)
-            if stopped:
-                break
+    # no TemporaryDirectory: the exit of a forked run would remove it
+    folder = options.folder or Path(tempfile.mkdtemp(prefix="torture-"))
+    try:
+        tallies, where = disturbed(Workspace(folder.resolve()), options)
+    finally:
+        if options.folder is None:
+            shutil.rmtree(folder, ignore_errors=True)
     table = report.text(tallies, where, options.seed)
     if options.write:
         report.insert(REPOSITORY / "docs" / "reliability.md", table)
     print(table)
     return int(any(tally.faults for tally in tallies.values()))
+
+
+def disturbed(space: Workspace, options: argparse.Namespace) -> tuple[dict[str, verdicts.Tally], Counter[str]]:
+    """Run the campaign; its counts by the kind of fault, and the kills by where they were."""
+    chosen = options.only or list(KINDS)
+    os.environ.update(space.environment())  # before the program is loaded, which reads them
+    runs.load_program()
+    space.prepare(keep_caches=options.folder is not None)
+    seconds = undisturbed(space)
+    print(f"an undisturbed run takes {seconds:.1f} s", flush=True)
+    tallies = {}
+    where: Counter[str] = Counter()
+    stopped = False
+    signal.signal(signal.SIGTERM, signal.default_int_handler)  # ends the campaign with the counts so far
+    for kind in chosen:
+        begin, count = time.monotonic(), max(1, round(KINDS[kind] * options.runs))
+        rng, tally = random.Random(f"{options.seed} {kind}"), verdicts.Tally()
+        tallies[kind] = tally
+        try:
+            if kind == "kills":
+                kills.campaign(space, rng, count, tally, seconds, where)
+            else:
+                _CAMPAIGNS[kind](space, rng, count, tally)
+        except KeyboardInterrupt:
+            stopped = True
+        print(f"{kind}: {tally.counts}, {len(tally.faults)} faults, {time.monotonic() - begin:.0f} s", flush=True)
+        if stopped:
+            break
+    return tallies, where
 
 
 def undisturbed(space: Workspace) -> float:
