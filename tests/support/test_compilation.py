@@ -1,10 +1,13 @@
 """The key of compiled kernels covers all that ends up in machine code."""
 
+from typing import ClassVar
+
 import numba
 import numpy as np
 import pytest
-from calmotion.support import compilation
+from calmotion.support import compilation, interrupts
 from calmotion.support.compilation import kernel, kernel_folder, kernel_key
+from calmotion.support.kernel_compiler import with_entrance_for_python
 
 
 @pytest.fixture
@@ -54,3 +57,23 @@ def test_a_kernel_computes():
         return 2.0 * x
 
     assert doubled(np.float64(1.5)) == 3.0
+
+
+def test_an_interrupt_waits_until_a_kernel_is_loaded():
+    done = []
+
+    class Dispatcher:
+        overloads: ClassVar = {}
+
+        def compile(self, signature):
+            interrupts.request()
+            done.append(signature)
+
+        def add_overload(self, result):
+            pass
+
+    dispatcher = with_entrance_for_python(Dispatcher())
+    with pytest.raises(KeyboardInterrupt):
+        dispatcher.compile((numba.float64,))
+    interrupts.answer()
+    assert done == [(numba.float64,)]

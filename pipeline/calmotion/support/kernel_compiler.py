@@ -35,6 +35,8 @@ from numba.core.typed_passes import InlineOverloads, NopythonRewrites
 from numba.core.types.functions import BaseFunction
 from numba.core.untyped_passes import InlineClosureLikes
 
+from calmotion.support import interrupts
+
 _BUILTIN = {"_operator", "builtins", "math"}  # modules of functions whose types depend on nothing but their arguments
 _NOT_NEEDED = {InlineClosureLikes, InlineOverloads, NopythonRewrites}
 _resolve = BaseFunction.get_call_type
@@ -99,7 +101,8 @@ def with_entrance_for_python(dispatcher: Any) -> Any:
     without: set[Any] = set()
 
     def compile_for(signature: Any) -> Any:
-        with global_compiler_lock:
+        # numba and LLVM keep half of a kernel that is interrupted, and the process ends at its next use
+        with global_compiler_lock, interrupts.deferred():
             arguments, _ = normalize_signature(signature)
             if arguments in without and not is_called_by_kernel():
                 without.remove(arguments)
