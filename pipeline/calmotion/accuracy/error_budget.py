@@ -43,8 +43,10 @@ def _budget(result: Result, tolerance: float) -> tuple[BudgetEntry, ...]:
         return BudgetEntry(source, share * tolerance, estimated, choice or "nothing is left out", reason)
 
     reduction = accuracy.left_out_m - accuracy.subspace_m - accuracy.choices_m
+    besides = simulate_to_tolerance.besides_step(accuracy)
+    for_step = simulate_to_tolerance.step_allowance(tolerance, besides) / tolerance
     entries = [
-        entry(STEP, simulate_to_tolerance.SHARE, accuracy.step_m),
+        entry(STEP, for_step, accuracy.step_m),
         entry(REDUCTION, converged_reduction.SHARE, max(reduction, 0.0)),
         entry(SUBSPACE, simulate_to_tolerance.HELD, accuracy.subspace_m),
         entry(CHOICES, simulate_to_tolerance.HELD, accuracy.choices_m),

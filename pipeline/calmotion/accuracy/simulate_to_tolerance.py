@@ -41,8 +41,10 @@ from calmotion.simulation.inputs.time_grid import MAX_STEP, make_grid
 from calmotion.simulation.prepare import prepare
 from calmotion.simulation.simulate import Progress, intended_motion, simulate_shot
 
-SHARE = 0.35  # of the tolerance, that the time step may take in any case
-WHOLE = 0.75  # of the tolerance, that it may take together with what the bodies do without
+# Of the tolerance, that the time step may take: the least and the most where the tolerance can be kept, with all else,
+# as estimates of another step differ, and where it cannot: smaller steps would be in vain
+LEAST, MOST, WHOLE, MISSED = 0.1, 0.75, 0.9, 0.35
+_ANEW = 0.3  # step over that by which the other errors were estimated, below which they are again
 FIRST, LAST = 1.0 / 60.0, 1.0 / 30720.0  # steps that are tried [s]
 OF_SHAKE = 0.05  # of the input's own error: how well that need be known before it is taken away
 HELD = 0.1  # of the tolerance (and of how well the shake need be known), that holding bodies to directions may take
@@ -99,10 +101,11 @@ def _simulated_again(
         return None
     result, projected, run, coarse = found
     error, left_out = step_error(coarse, run), left_out_m + projected.error_m
-    if error > allowed_step_error(character, options, left_out):
-        return None
     options = replace(options, integrator=memory.integrator)
     accuracy = _accuracy(error, left_out, projected.shot, options, coarse)  # differences of runs need no fine step
+    kept = accuracy.estimated_m <= tolerance_of(character, options.tolerance)
+    if not kept and error > allowed_step_error(character, options, besides_step(accuracy)):
+        return None
     result = with_modes(result, shot.bodies)
     return with_step(result, character, options, replace(accuracy, efforts=effort_errors(run, coarse)))
 
@@ -221,7 +224,14 @@ def chosen_step(
             trials[:] = [*trials[-1:], run]  # of each only what two frames hold
         return run
 
-    step, error = largest_step(trial, FIRST, LAST, lambda run: allowed_step_error(shot.character, options, left_out))
+    def allowed(run: StepRun) -> float:
+        """What the meshes and patches leave; they cost about the same by any step."""
+        if not known or run.step < _ANEW * known[0]:
+            known[:] = run.step, mesh_and_patches(shot, options, run)
+        return allowed_step_error(shot.character, options, left_out + known[1])
+
+    known: list[float] = []  # the step by which they were estimated, and what they cost
+    step, error = largest_step(trial, FIRST, LAST, allowed)
     if not np.isfinite(error):
         trial(step)
     whole = make_grid(shot.animation.frame_times, step, 0.0).h
@@ -235,10 +245,28 @@ def chooses_step(character: Character, options: RunSettings) -> bool:
     return options.scheme in IMPLICIT and not character.retarget.cyclic
 
 
-def allowed_step_error(character: Character, options: RunSettings, left_out: float) -> float:
-    """Error that the time step may cause beside what the bodies do without [m]."""
-    tolerance = tolerance_of(character, options.tolerance)
-    return max(SHARE * tolerance, WHOLE * tolerance - left_out)
+def allowed_step_error(character: Character, options: RunSettings, others: float) -> float:
+    """Error that the time step may cause beside all other errors [m].
+
+    It takes what they leave of the tolerance: half the step costs less than a finer mesh or reduction.
+    """
+    return step_allowance(tolerance_of(character, options.tolerance), others)
+
+
+def step_allowance(tolerance: float, others: float) -> float:
+    """The same by the tolerance [m]."""
+    left = WHOLE * tolerance - others
+    return min(MOST * tolerance, left) if left >= LEAST * tolerance else MISSED * tolerance
+
+
+def besides_step(accuracy: Accuracy) -> float:
+    """Estimated errors of all but the time step [m], as far as they are known."""
+    return accuracy.left_out_m + (accuracy.mesh_m or 0.0) + accuracy.patches_m
+
+
+def mesh_and_patches(shot: CompiledShot, options: RunSettings, run: StepRun) -> float:
+    """Estimated error of the meshes and interface patches at the targets [m], as far as it is known."""
+    return (mesh_error(shot, options, run) or 0.0) + patch_error(shot, options, run)
 
 
 def omitted_error(bodies: Sequence[ReducedBody]) -> float:

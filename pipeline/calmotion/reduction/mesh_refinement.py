@@ -8,7 +8,7 @@ error is estimated to arise reduce it several times faster for the same number o
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 
 import numpy as np
@@ -32,6 +32,7 @@ _GAIN = 1.2  # least ratio of estimates that are compared
 # extrapolated, and of the difference of the extrapolations from two coarser meshes
 _LEFT, _APART = 0.2, 1.5
 _LEAST = 0.1  # of the estimate of the finer mesh: the least error that is claimed
+_STIFFEST = 0.05  # excess of the stiffness of an interface in any direction that is extrapolated
 _MODES, _COUNT = 12, 3  # modes of a load estimate; frequencies that a motion excites
 _ASYMPTOTIC = 0.05  # largest estimate that is in proportion to the error
 _ROUNDS = 12
@@ -47,6 +48,8 @@ class Estimate:
         weights: Share of each mode in the deflection, in sum one, shape [k].
         indicators: Part of each element in the error, shape [m].
         nodes: Number of nodes of the quadratic tetrahedra.
+        interfaces: Static stiffness of its p moving interfaces, shape [6p, 6p].
+        wrenches: Largest loads on these, shape [6p].
     """
 
     error: float
@@ -54,6 +57,8 @@ class Estimate:
     weights: Array
     indicators: Array
     nodes: int
+    interfaces: Array = field(default_factory=lambda: np.zeros((0, 0)))
+    wrenches: Array = field(default_factory=lambda: np.zeros(0))
 
 
 def refined(
@@ -70,21 +75,28 @@ def refined(
     """
     finest, estimates = _bisected(mesh, estimate, wanted, max_nodes)
     excess, error = extrapolation(estimates)
-    if not extrapolates:
+    factors = None
+    if extrapolates:
+        factors, error = _interface_factors(estimates[-1], estimates, error)
+    else:
         excess, error = 0.0, min(excess + error, estimates[-1].error)
     error += _of_volume(mesh)
-    quality = replace(mesh.quality, frequency_error=0.5 * error, stiffness_factor=1.0 - excess)
+    quality = replace(
+        mesh.quality, frequency_error=0.5 * error, stiffness_factor=1.0 - excess, interface_factors=factors
+    )
     if finest is not mesh:
         quality = replace(quality, min_dihedral_deg=min_dihedral_deg(finest.points, finest.tets))
     return replace(finest, quality=quality)
 
 
 def with_finer_stiffness(mesh: FEMesh, estimate: Callable[[FEMesh], Estimate], wanted: float, max_nodes: int) -> FEMesh:
-    """The mesh with the stiffness that ever finer ones have: the same elements, and one factor for the stiffness.
+    """The mesh with the stiffness that ever finer ones have: the same elements, and factors for their stiffness.
 
-    A mesh that is too coarse makes a body too stiff, nearly in proportion in all modes that the loads excite. Finer
-    meshes are needed for a few linear modes only, where the reduction of a nonlinear body on them takes ten times as
-    long. The remaining error is that of the extrapolation, and the spread of the factor over the modes.
+    A mesh that is too coarse makes a body too stiff, by one share in bending and by another in twist:
+    `interface_factors` are for the static response to wrenches on the interfaces, and one factor for all else. Finer
+    meshes are needed for these and a few linear modes only, where the reduction of a nonlinear body on them takes ten
+    times as long. The remaining error is that of the extrapolation; of a body without moving interfaces, also the
+    deviation of the modes from one factor.
 
     Args:
         mesh, estimate, wanted, max_nodes: As of `refined`.
@@ -93,9 +105,11 @@ def with_finer_stiffness(mesh: FEMesh, estimate: Callable[[FEMesh], Estimate], w
     excess, error = extrapolation(estimates)
     ratios, weights = _ratios(estimates[0], estimates[-1])
     factor = float(weights @ ratios)
-    error += float(weights @ np.abs(ratios - factor)) + _of_volume(mesh)
+    factors, error = _interface_factors(estimates[0], estimates, error)
+    error += (_deviation(ratios, weights) if factors is None else 0.0) + _of_volume(mesh)
     factor *= 1.0 - excess
-    return replace(mesh, quality=replace(mesh.quality, frequency_error=0.5 * error, stiffness_factor=factor))
+    quality = replace(mesh.quality, frequency_error=0.5 * error, stiffness_factor=factor, interface_factors=factors)
+    return replace(mesh, quality=quality)
 
 
 def _bisected(
@@ -142,7 +156,7 @@ def refined_for_loads(
     """
     assert body.flexible is not None
     material = body.flexible.material
-    first = replace(mesh, quality=replace(mesh.quality, stiffness_factor=1.0))
+    first = replace(mesh, quality=replace(mesh.quality, stiffness_factor=1.0, interface_factors=None))
 
     def estimate(mesh: FEMesh) -> Estimate:
         linear = linear_modes(mesh, body, attachments, root, loads, tolerance, full if mesh is first else None)
@@ -153,7 +167,10 @@ def refined_for_loads(
         energy = squares * amplitudes(linear.model, linear.basis, envelope, count) ** 2
         weights = energy / max(energy.sum(), np.finfo(float).tiny)
         parts = element_errors(linear.model.mesh, material, linear.basis.modes[:, :, :count]) @ weights
-        return Estimate(float(parts.sum()), squares, weights, parts, len(linear.model.mesh.nodes))
+        stiffness = linear.support.fixed(linear.model).patch_stiffness()
+        wrenches = np.hstack([envelope.force, envelope.moment]).ravel()
+        nodes = len(linear.model.mesh.nodes)
+        return Estimate(float(parts.sum()), squares, weights, parts, nodes, stiffness, wrenches)
 
     given = replace(body, surfaces=())  # skins do not matter
     key = ("for loads", first, given, attachments, root, loads, tolerance, wanted, max_nodes, by_factor)
@@ -212,13 +229,10 @@ def extrapolation(estimates: Sequence[Estimate]) -> tuple[float, float]:
 
     Source: Richardson's extrapolation, by the estimated error in place of the element size.
     """
-    fine = estimates[-1]
-    usable = [e for e in estimates[:-1] if _GAIN * fine.error <= e.error <= _ASYMPTOTIC]
-    excesses = []
-    for coarse in usable[-2:]:
+    fine, excesses = estimates[-1], []
+    for coarse, gain in _compared(estimates):
         ratios, weights = _ratios(coarse, fine)
-        change = float(weights @ (1.0 - ratios))
-        excesses.append(change / (coarse.error / max(fine.error, np.finfo(float).tiny) - 1.0))
+        excesses.append(float(weights @ (1.0 - ratios)) / gain)
     if not excesses or min(excesses) <= 0.0:  # a finer mesh that is not softer tells nothing
         return 0.0, fine.error
     excess = min(excesses[0], fine.error)
@@ -226,11 +240,60 @@ def extrapolation(estimates: Sequence[Estimate]) -> tuple[float, float]:
     return excess, min(max(left, _LEAST * fine.error), fine.error)
 
 
+def _compared(estimates: Sequence[Estimate]) -> list[tuple[Estimate, float]]:
+    """The last two coarser meshes that tell about the last, and how much larger their estimates are, less one."""
+    fine = estimates[-1]
+    usable = [e for e in estimates[:-1] if _GAIN * fine.error <= e.error <= _ASYMPTOTIC]
+    return [(e, e.error / max(fine.error, np.finfo(float).tiny) - 1.0) for e in usable[-2:]]
+
+
+def _interface_factors(own: Estimate, estimates: Sequence[Estimate], error: float) -> tuple[Array | None, float]:
+    """`MeshQuality.interface_factors` of a mesh by ever finer ones, extrapolated, and the error of the compliance.
+
+    Args:
+        own: Of the mesh.
+        estimates: Of it and finer ones.
+        error: Of the compliance by the modes alone.
+    """
+    from scipy.linalg import eigh
+
+    fine, compared = estimates[-1], _compared(estimates)
+    K = fine.interfaces
+    if not len(K):
+        return None, error
+    if compared:
+        first, *more = [(coarse.interfaces - K) / gain for coarse, gain in compared]
+        excess, G = eigh(first, K)  # each of the motions G has an energy of one half
+        excess = np.clip(excess, 0.0, max(fine.error, _STIFFEST))
+        apart = [np.abs(np.einsum("ik,ij,jk->k", G, other - first, G)) for other in more]
+        left = np.maximum(_LEFT * excess, _APART * apart[0]) if apart else excess
+        shares = (np.abs(G).T @ fine.wrenches) ** 2
+        error = max(error, float(left @ shares) / max(float(shares.sum()), np.finfo(float).tiny))
+        wrenches = K @ G
+        K = K - (wrenches * excess) @ wrenches.T
+    return np.asarray(np.linalg.solve(own.interfaces, K)), error
+
+
 def _ratios(coarse: Estimate, fine: Estimate) -> tuple[Array, Array]:
     """Stiffness of the modes of the finer mesh over that of the coarse one, and the weights of the modes."""
     count = min(len(coarse.squares), len(fine.squares))
     weights = fine.weights[:count]
     return fine.squares[:count] / coarse.squares[:count], weights / max(weights.sum(), np.finfo(float).tiny)
+
+
+def _deviation(ratios: Array, weights: Array) -> float:
+    """How far the common factor of the stiffness is off where loads excite some modes more than others.
+
+    It is the mean over all modes. A motion may excite those that are above it, or those below, not at all or twice as
+    much as was assumed: by either, what the heavier of the two groups deviates by is missing.
+
+    Args:
+        ratios: Stiffness of the modes over that of a coarser mesh, shape [k].
+        weights: Share of each in the deflection, in sum one, shape [k].
+    """
+    off = ratios - weights @ ratios
+    above = float(weights[off > 0.0].sum())
+    return 0.5 * float(weights @ np.abs(off)) / max(above, 1.0 - above)
 
 
 def _largest(indicators: Array) -> IntArray:

@@ -18,6 +18,7 @@ from calmotion.reduction.interfaces.interface_patches import AttachmentFrame, In
 from calmotion.reduction.interfaces.rim_error import compliance_error, rim_error
 from calmotion.reduction.load_envelope import LoadEnvelope, patch_load_envelope
 from calmotion.reduction.reduced_body import Elasticity, Marker, ReducedBody
+from calmotion.reduction.scaled_stiffness import with_interface_stiffness
 from calmotion.shot.budget import REDUCTION
 from calmotion.shot.character import DEFAULT_TOLERANCE, Body, ElasticMaterial, SurfaceMesh
 from calmotion.shot.meshes import FEMesh
@@ -88,7 +89,17 @@ def reduce_body(
         mesh_error=mesh_error,
         patch_error=patch_error,
     )
-    return damped(reduced, material)
+    return damped(_with_finer_interfaces(reduced, mesh, linear), material)
+
+
+def _with_finer_interfaces(body: ReducedBody, mesh: FEMesh, linear: LinearModes) -> ReducedBody:
+    """The body with the static stiffness of its interfaces on a finer mesh, where that is known."""
+    factors = mesh.quality.interface_factors
+    if factors is None or len(factors) != 6 * len(linear.moving):
+        return body
+    own = linear.support.fixed(linear.model).patch_stiffness()
+    first = [patch.attachments[0] for patch in linear.moving]
+    return with_interface_stiffness(body, first, own, factors / mesh.quality.stiffness_factor)
 
 
 @dataclass(frozen=True, eq=False)

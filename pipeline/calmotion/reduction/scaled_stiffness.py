@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from calmotion.reduction.reduced_body import Elasticity, Invariants, ReducedBody
-from calmotion.reduction.subspace import projected_body
+from calmotion.reduction.subspace import projected_body, projected_law
+from calmotion.shot.character import Array
+
+_SOFTEST = 0.1  # share of a stiffness: a mesh that is off by more is of no use
 
 
 def with_scaled_stiffness(body: ReducedBody, factor: float) -> ReducedBody:
@@ -39,6 +43,39 @@ def with_graded_stiffness(body: ReducedBody, exponent: float) -> ReducedBody:
         data[: r * r] += np.diag((factors - 1.0) * body.stiffness).ravel()
         law = replace(law, data=data)
     return replace(body, stiffness=factors * body.stiffness, elasticity=law)
+
+
+def with_interface_stiffness(body: ReducedBody, patches: Sequence[int], own: Array, factors: Array) -> ReducedBody:
+    """The body with the static stiffness of its interfaces that a finer mesh has.
+
+    Coarse elements are too stiff by another share in bending than in twist, so that no common factor is right. The
+    energy E(q) of the body becomes E(S q), where S stretches the static response q to wrenches on the interfaces, by
+    the root of the share of each. Terms that cancel in a bent body, such as those of its stretching, still do; a change
+    of the linear stiffness alone would leave a part of them.
+
+    Args:
+        body: Undamped, with diagonal mass and stiffness.
+        patches: A marker of each of the p moving interfaces.
+        own: Static stiffness of the interfaces on its mesh, shape [6p, 6p].
+        factors: `MeshQuality.interface_factors` over `stiffness_factor`: the inverse of `own` times the stiffness of
+            the finer mesh, shape [6p, 6p].
+    """
+    from scipy.linalg import eigh
+
+    if not len(body.stiffness) or not len(patches):
+        return body
+    motion = np.vstack([np.vstack([body.markers[i].Phi, body.markers[i].Psi]) for i in patches])
+    finer = own @ factors
+    shares, wrenches = eigh(0.5 * (finer + finer.T), own)
+    # response of the coordinates to the wrenches own @ wrenches, of energy one half each
+    response = (motion / body.stiffness).T @ (own @ wrenches)
+    stretch = np.sqrt(np.maximum(shares, _SOFTEST)) - 1.0
+    S = np.eye(len(response)) + (response * stretch) @ (response.T * body.stiffness)
+    K = S.T @ (body.stiffness[:, None] * S)
+    values, T = np.linalg.eigh(0.5 * (K + K.T))  # the mass is the identity
+    T = T * np.where(T[np.abs(T).argmax(axis=0), np.arange(len(T))] < 0.0, -1.0, 1.0)
+    law = None if body.elasticity is None else projected_law(body.elasticity, S @ T)
+    return replace(projected_body(replace(body, elasticity=None), T), stiffness=values, elasticity=law)
 
 
 def with_scaled_density(body: ReducedBody, factor: float) -> ReducedBody:

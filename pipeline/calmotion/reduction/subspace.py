@@ -64,11 +64,12 @@ def projected_body(body: ReducedBody, T: Array) -> ReducedBody:
         damping=T.T @ body.damping @ T,
         markers=tuple(replace(marker, Phi=marker.Phi @ T, Psi=marker.Psi @ T) for marker in body.markers),
         skin=tuple(field @ T for field in body.skin),
-        elasticity=None if body.elasticity is None else _projected_law(body.elasticity, T),
+        elasticity=None if body.elasticity is None else projected_law(body.elasticity, T),
     )  # fmt: skip
 
 
-def _projected_law(law: Elasticity, T: Array) -> Elasticity:
+def projected_law(law: Elasticity, T: Array) -> Elasticity:
+    """The law of `projected_body`: its energy for coordinates T w, shape of T [r, s]."""
     r, s = T.shape
     if law.law == "stvk":
         projection = T if law.strain_projection is None else law.strain_projection @ T

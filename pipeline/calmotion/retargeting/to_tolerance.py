@@ -17,6 +17,7 @@ from calmotion.accuracy.simulate_to_tolerance import (
     LAST,
     allowed_by_subspaces,
     allowed_step_error,
+    besides_step,
     chooses_step,
     found_tracks,
     intended_positions,
@@ -104,9 +105,10 @@ def optimize_to_tolerance(
             tracks = found_tracks(result, animation)
             left_out = omitted_error(reduced.bodies)
             result = with_accuracy(result, reduced.with_tracks(tracks), options, left_out)
-            assert result.accuracy is not None
-            allowed = allowed_step_error(character, options, left_out) if chooses else np.inf
-            fine = result.accuracy.step_m <= allowed or step <= LAST
+            accuracy = result.accuracy
+            assert accuracy is not None
+            allowed = allowed_step_error(character, options, besides_step(accuracy)) if chooses else np.inf
+            fine = accuracy.step_m <= allowed or step <= LAST
             iterations = max((row.iterations for row in latest.windows), default=latest.iterations)
             ended = iterations >= options.max_iterations  # a new POD subspace would allow no further iteration
             if fine and (ended or _is_accurate(projected, tracks, result, options, again)):
@@ -118,7 +120,7 @@ def optimize_to_tolerance(
             result = best_so_far(result)
             break
         if not fine:
-            step = max(LAST, MARGIN * result.step_s * (allowed / result.accuracy.step_m) ** (1.0 / ORDER))
+            step = max(LAST, MARGIN * result.step_s * (allowed / accuracy.step_m) ** (1.0 / ORDER))
     assert result is not None
     if options.robust is None or result.interrupted:
         return result

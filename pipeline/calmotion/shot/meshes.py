@@ -19,6 +19,8 @@ class MeshQuality:
         frequency_error: Estimated relative error of the first frequencies; None where it is not known.
         source: What the body's solid was made of, such as `visual surface`.
         stiffness_factor: Of the stiffness of a finer mesh over that of this one, by which its elements are softer.
+        interface_factors: Static stiffness of its p moving interfaces that a finer mesh has: the inverse of its own,
+            without the factor above, times that of the finer one, shape [6p, 6p]; None where that is not known.
     """
 
     min_dihedral_deg: float
@@ -28,6 +30,7 @@ class MeshQuality:
     frequency_error: float | None = None
     stiffness_factor: float = 1.0
     source: str = ""
+    interface_factors: Array | None = None
 
 
 @dataclass(frozen=True, eq=False)

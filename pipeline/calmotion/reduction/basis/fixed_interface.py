@@ -139,9 +139,14 @@ class FixedInterface:
             result += self.constraint @ motion
         return result, motion.reshape(len(self.patches), 6, load.shape[1])
 
+    def patch_stiffness(self) -> Array:
+        """Static stiffness of the patches, root clamped: their wrenches by their motions, shape [6p, 6p]."""
+        K = self.constraint.T @ (self.model.stiffness @ self.constraint)
+        return np.asarray(0.5 * (K + K.T))
+
     def _by_patches(self, work: Array) -> Array:
         """Motions of the patches under generalised loads, both of shape [6p, k]."""
-        K_r = self.constraint.T @ (self.model.stiffness @ self.constraint)
+        K_r = self.patch_stiffness()
         scale = 1.0 / np.sqrt(np.diag(K_r))
         motion = np.linalg.solve(K_r * np.outer(scale, scale), scale[:, None] * work)
         return np.asarray(scale[:, None] * motion)
