@@ -1,13 +1,17 @@
 """The error of a step, from two of them: on a motion that is known, and on the arm against a far finer one; joints stay
 closed."""
 
+from functools import partial
+
 import numpy as np
 import pytest
 from calmotion.accuracy.step_error import (
     CLOSED_GAP,
     StepRun,
+    distance,
     effort_errors,
     largest_step,
+    order_of,
     simulate_at,
     step_error,
     step_gaps,
@@ -15,6 +19,8 @@ from calmotion.accuracy.step_error import (
 from calmotion.errors import IntegrationError, ShotError
 from calmotion.shot.run import RunSettings
 from calmotion.simulation.compiled_shot import compile_shot
+from calmotion.usd.reading import read_shot
+from steppers import giving, walk, write_stepper
 
 
 def of_second_order(step):
@@ -128,3 +134,15 @@ def test_the_estimate_is_near_the_error_against_a_far_finer_step(arm, animation,
     }
     error = np.linalg.norm(runs[1 / 960].positions - runs[1 / 7680].positions, axis=2).max()
     assert step_error(runs[1 / 480], runs[1 / 960]) == pytest.approx(error, rel=0.2)
+
+
+@pytest.mark.parametrize(("stride", "lift", "step"), [(0.1, 0.03, 1 / 96), (0.2, 0.06, 1 / 192)])
+def test_the_error_of_a_walk_is_not_underestimated(tmp_path, stride, lift, step):
+    """By steps that are as long as a tolerance allows, the two steps after a change of contacts count."""
+    path = write_stepper(tmp_path / "stepper.usda", giving, walking=partial(walk, stride=stride, lift=lift))
+    character, animation, _ = read_shot(str(path))
+    coarse, own, fine = (
+        simulate_at(compile_shot(character, animation), RunSettings(), h) for h in (2.0 * step, step, step / 8.0)
+    )
+    assert order_of(character) == own.order == 1
+    assert 0.2 < distance(own.positions, fine.positions) / step_error(coarse, own) < 1.0

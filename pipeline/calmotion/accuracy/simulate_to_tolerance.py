@@ -17,11 +17,11 @@ from calmotion.accuracy.pod_subspace import ProjectedShot, ReferenceRun, project
 from calmotion.accuracy.reduced_bodies import RunMemory
 from calmotion.accuracy.simulate_again import with_last_choices
 from calmotion.accuracy.step_error import (
-    ORDER,
     StepRun,
     effort_errors,
     frames_of,
     largest_step,
+    order_of,
     run_or_none,
     simulate_at,
     step_error,
@@ -235,7 +235,7 @@ def chosen_step(
     if not np.isfinite(error):
         trial(step)
     whole = make_grid(shot.animation.frame_times, step, 0.0).h
-    return whole, (whole / step) ** ORDER * error
+    return whole, (whole / step) ** order_of(shot.character) * error
 
 
 def chooses_step(character: Character, options: RunSettings) -> bool:

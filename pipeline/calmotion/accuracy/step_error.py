@@ -14,7 +14,7 @@ from calmotion.multibody.failure import SimulationFailure
 from calmotion.multibody.integrators.workspace import Workspace
 from calmotion.multibody.model.system import State
 from calmotion.shot import Result
-from calmotion.shot.character import Array
+from calmotion.shot.character import Array, Character, contact_joints
 from calmotion.shot.run import RunSettings
 from calmotion.simulation.compiled_shot import CompiledShot
 from calmotion.simulation.cyclic import SteadyState
@@ -41,6 +41,7 @@ class StepRun:
         integrator: By which it was simulated; empty where that does not matter.
         gap: Largest position gap of a joint at any step [m].
         efforts: Of the motors [N m] or [N], shape [f, M]; None where they are not known.
+        order: Power of the step with which its error goes at least.
     """
 
     step: float
@@ -49,6 +50,16 @@ class StepRun:
     integrator: str = ""
     gap: float = 0.0
     efforts: Array | None = None
+    order: int = ORDER
+
+
+def order_of(character: Character) -> int:
+    """Power of the step with which the error of a simulation goes at least.
+
+    After a change of contacts two steps are of first order; they count less with the number of steps, but the order
+    shows its two only by steps that are shorter than those that keep a tolerance.
+    """
+    return 1 if contact_joints(character) else ORDER
 
 
 def simulate_at(shot: CompiledShot, options: RunSettings, step: float) -> StepRun:
@@ -68,7 +79,9 @@ def simulate_at(shot: CompiledShot, options: RunSettings, step: float) -> StepRu
         raise failure_error(prepared, failure) from failure
     elastic = elastic_by_body(model, run.trajectory.states.u)
     gap, efforts = run.trajectory.max_joint_gap, _efforts(prepared, run)
-    return StepRun(grid.h, run.target_positions[grid.frames], elastic, options.scheme, gap, efforts)
+    return StepRun(
+        grid.h, run.target_positions[grid.frames], elastic, options.scheme, gap, efforts, order_of(shot.character)
+    )
 
 
 def _efforts(prepared: Prepared, run: ForwardRun) -> Array:
@@ -98,7 +111,7 @@ def distance(one: Array, other: Array) -> float:
 
 def step_error(coarse: StepRun, fine: StepRun) -> float:
     """Error of the finer of two runs at any target [m], by Richardson's extrapolation."""
-    ratio = (coarse.step / fine.step) ** ORDER - 1.0
+    ratio = (coarse.step / fine.step) ** _least_order(coarse, fine) - 1.0
     return distance(coarse.positions, fine.positions) / ratio
 
 
@@ -119,7 +132,7 @@ def step_gaps(coarse: StepRun, fine: StepRun) -> tuple[float, float]:
 
     The rest is that of closed chains whose joints do not fit together exactly: no step closes it.
     """
-    ratio = (coarse.step / fine.step) ** ORDER - 1.0
+    ratio = (coarse.step / fine.step) ** _least_order(coarse, fine) - 1.0
     by_fine = min(fine.gap, max(0.0, coarse.gap - fine.gap) / ratio)
     return max(0.0, coarse.gap - (fine.gap - by_fine)), by_fine
 
@@ -155,13 +168,13 @@ def largest_step(
                 return step, np.inf
         elif coarse is not None and coarse.step > fine.step:  # a frame may be shorter than both
             error, enough = step_error(coarse, fine), allowed(fine)
-            by_coarse = (coarse.step / fine.step) ** ORDER * error
+            by_coarse = (coarse.step / fine.step) ** _least_order(coarse, fine) * error
             coarse_closed, fine_closed = (gap <= CLOSED_GAP for gap in step_gaps(coarse, fine))
             if by_coarse <= enough and coarse_closed:
                 return coarse.step, by_coarse
             if error <= enough and fine_closed:
                 # between the two the gap is not known
-                return _between(fine.step, error, enough) if coarse_closed else (fine.step, error)
+                return _between(fine, error, enough) if coarse_closed else (fine.step, error)
             if by_coarse <= enough and fine.integrator not in ("", SAFE):
                 raise open_joints(fine.gap, fine.integrator, fine.step)
             if step <= last:
@@ -171,12 +184,16 @@ def largest_step(
         coarse = fine
 
 
-def _between(step: float, error: float, enough: float) -> tuple[float, float]:
-    """A step [s] up to twice as long as one whose error is allowed, and its error."""
-    longer = MARGIN * np.sqrt(enough / error) if error > 0.0 else 2.0
+def _between(run: StepRun, error: float, enough: float) -> tuple[float, float]:
+    """A step [s] up to twice as long as that of a run whose error is allowed, and its error."""
+    longer = MARGIN * (enough / error) ** (1.0 / run.order) if error > 0.0 else 2.0
     if longer <= WORTH:
-        return step, error
-    return longer * step, longer**ORDER * error
+        return run.step, error
+    return longer * run.step, longer**run.order * error
+
+
+def _least_order(one: StepRun, other: StepRun) -> int:
+    return min(one.order, other.order)
 
 
 def run_or_none(run: Callable[[float], StepRun], step: float) -> StepRun | None:

@@ -28,11 +28,11 @@ from calmotion.accuracy.simulate_to_tolerance import (
     with_modes,
 )
 from calmotion.accuracy.step_error import (
-    ORDER,
     StepRun,
     distance,
     frames_of,
     largest_step,
+    order_of,
     simulate_at,
 )
 from calmotion.retargeting.found_curves import best_so_far
@@ -120,7 +120,7 @@ def optimize_to_tolerance(
             result = best_so_far(result)
             break
         if not fine:
-            step = max(LAST, MARGIN * result.step_s * (allowed / accuracy.step_m) ** (1.0 / ORDER))
+            step = max(LAST, MARGIN * result.step_s * (allowed / accuracy.step_m) ** (1.0 / order_of(character)))
     assert result is not None
     if options.robust is None or result.interrupted:
         return result
