@@ -38,17 +38,17 @@ def attempt(fields: Mapping[str, Any], cores: tuple[int, ...] = ()) -> dict[str,
 
     Returns:
         `outcome` (`done`, `failed` for a reason that another attempt would meet too, or `died`), `problem`, `report`
-        (the object of `--json`, or None), `wall_s`, `host`.
+        (the object of `--json`, or None), `wall_s`, `processor_s` (of its process; None where that is unknown), `host`.
     """
-    job, begin = Job.of(fields), time.perf_counter()
+    job, begin, used = Job.of(fields), time.perf_counter(), None
     os.makedirs(os.path.dirname(job.log), exist_ok=True)
     with _locked(job.lock) as descriptor:
         if is_done(job):  # by a worker that was thought to be dead
             found: dict[str, Any] = {"outcome": DONE, "problem": None, "report": _read(job.report)}
         else:
-            status, text = _run(job, cores, descriptor)
+            status, text, used = _run(job, cores, descriptor)
             found = _judged(job, status, text)
-    return found | {"wall_s": time.perf_counter() - begin, "host": platform.node()}
+    return found | {"wall_s": time.perf_counter() - begin, "processor_s": used, "host": platform.node()}
 
 
 def kill_running() -> None:
@@ -59,8 +59,8 @@ def kill_running() -> None:
                 process.kill()
 
 
-def _run(job: Job, cores: tuple[int, ...], lock: int | None) -> tuple[int, str]:
-    """Exit status of the command line, and what it printed on stdout."""
+def _run(job: Job, cores: tuple[int, ...], lock: int | None) -> tuple[int, str, float | None]:
+    """Exit status of the command line, what it printed on stdout, and its processor time [s]."""
     environment = {**os.environ, **job.environment}
     if cores:
         environment[child.CORES] = ",".join(map(str, cores))
@@ -73,7 +73,7 @@ def _run(job: Job, cores: tuple[int, ...], lock: int | None) -> tuple[int, str]:
         try:
             assert process.stdout is not None and process.stdin is not None
             text = process.stdout.read()  # stdin stays open: its end ends the process
-            status = process.wait()
+            status, used = _ended(process)
         finally:
             with _GUARD:
                 _RUNNING.discard(process)
@@ -82,7 +82,17 @@ def _run(job: Job, cores: tuple[int, ...], lock: int | None) -> tuple[int, str]:
             for stream in (process.stdin, process.stdout):
                 if stream is not None:
                     stream.close()
-    return status, text
+    return status, text, used
+
+
+def _ended(process: subprocess.Popen[str]) -> tuple[int, float | None]:
+    """Wait for a process: its exit status, and its processor time with that of what it started [s]."""
+    if hasattr(os, "wait4"):
+        with contextlib.suppress(ChildProcessError):  # whoever ended it has waited for it
+            _, status, usage = os.wait4(process.pid, 0)
+            process.returncode = os.waitstatus_to_exitcode(status)
+            return process.returncode, usage.ru_utime + usage.ru_stime
+    return process.wait(), None
 
 
 def _started(job: Job, environment: dict[str, str], log: IO[str], lock: int | None) -> subprocess.Popen[str]:

@@ -25,6 +25,8 @@ class JobResult:
         problem: Why it failed or died, or None: `problem`, `path`, `attribute`, `found`, `remedy`.
         report: The object of `--json`, or None.
         host: Where it ran, or empty.
+        processor_s: Processor time of its last attempt [s]; None where that is unknown.
+        worker: The worker of a cluster that ran it, or empty.
     """
 
     job: Job
@@ -34,6 +36,8 @@ class JobResult:
     problem: dict[str, Any] | None = None
     report: dict[str, Any] | None = None
     host: str = ""
+    processor_s: float | None = None
+    worker: str = ""
 
     @property
     def has_result(self) -> bool:
@@ -57,11 +61,13 @@ class JobResult:
             "outcome": self.outcome,
             "attempts": self.attempts,
             "wall_s": self.wall_s,
+            "processor_s": self.processor_s,
             "layer": self.job.layer if self.has_result else None,
             "root_layer": report.get("root_layer") if self.has_result else None,
             "manifest": self.job.manifest if self.has_result else None,
             "log": self.job.log,
             "host": self.host,
+            "worker": self.worker,
             "tolerance_kept": report.get("tolerance_kept") if self.has_result else None,
             **{key: value for key, value in errors.items() if value is not None},
             "problem": self.problem,

@@ -214,7 +214,7 @@ def _why(future: Future[dict[str, Any]]) -> str:
 def _result(job: Job, found: Mapping[str, Any], attempts: int) -> JobResult:
     return JobResult(
         job, found["outcome"], attempts, found.get("wall_s", 0.0), found.get("problem"), found.get("report"),
-        found.get("host", ""),
+        found.get("host", ""), found.get("processor_s"), found.get("worker", ""),
     )  # fmt: skip
 
 

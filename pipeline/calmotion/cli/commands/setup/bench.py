@@ -11,16 +11,16 @@ if TYPE_CHECKING:
     from calmotion.cli.output import Output
 
 BENCHMARKS = {
-    "baselines": "optimizer.baselines", "calibration": "accuracy.calibration",
+    "baselines": "optimizer.baselines", "batch": "shows.batches", "calibration": "accuracy.calibration",
     "compilation": "speed.compilation", "estimates": "accuracy.estimates",
     "extremes": "integrators.extremes", "gradients": "integrators.gradients",
     "integrators": "integrators.integrators",
     "meshing": "links.meshing", "motor-commands": "motors.commands",
     "motor-cost": "motors.cost", "optimizer": "optimizer.optimizer", "reading": "speed.reading",
     "reduction": "speed.reduction", "reduction-convergence": "accuracy.reduction_convergence",
-    "scaling": "speed.scaling", "simplification": "accuracy.simplification", "speed": "speed.stages",
-    "stability": "integrators.stability",
-    "tolerances": "accuracy.tolerances", "windows": "speed.windows", "work-precision": "accuracy.work_precision",
+    "scaling": "speed.scaling", "sequence": "shows.repertoires", "simplification": "accuracy.simplification",
+    "speed": "speed.stages", "stability": "integrators.stability",
+    "tolerances": "accuracy.tolerances", "windows": "shows.windows", "work-precision": "accuracy.work_precision",
 }  # fmt: skip
 
 

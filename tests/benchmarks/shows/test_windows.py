@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from calmotion.benchmarks.speed.windows import LongRun, apart, exponent, performance, table, write_performance
+from calmotion.benchmarks.shows.windows import LongRun, apart, exponent, performance, table, write_performance
 from calmotion.workflow.shot import Shot
 from one_hinge import HINGE, ONE_HINGE
 

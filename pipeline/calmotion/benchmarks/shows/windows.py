@@ -58,18 +58,19 @@ class LongRun:
     kept: bool
 
 
-def performance(shot: Shot, seconds: float) -> dict[str, Array]:
+def performance(shot: Shot, seconds: float, seed: int = SEED) -> dict[str, Array]:
     """Columns of a motion: times [s] and the value of each motor [rad or m].
 
     Args:
         shot: Whose poses it is made of.
         seconds: Its length [s].
+        seed: Another one is another performance.
     """
     animation = shot.animation
     frames = animation.frame_times
     poses = np.stack([held_curve(track, frames[-1])(frames, 0) for track in animation.tracks], axis=1)
     times = np.arange(round(seconds / frames[1]) + 1) * frames[1]
-    random, values = np.random.default_rng(SEED), np.tile(poses[0], (len(times), 1))
+    random, values = np.random.default_rng(seed), np.tile(poses[0], (len(times), 1))
     pose, start = poses[0], 0.3
     while start < seconds - MOVE[1]:
         length, following = random.uniform(*MOVE), poses[random.integers(len(poses))]

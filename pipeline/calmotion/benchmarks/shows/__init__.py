@@ -1,0 +1,1 @@
+"""The benchmarks of long performances, batches and repertoires."""
