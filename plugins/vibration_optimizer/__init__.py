@@ -9,6 +9,7 @@ from calmotion.accuracy.reduced_bodies import ConvergedReduction, compiled_in
 from calmotion.errors import ShotError
 from calmotion.host import NotAsked, Operator, Property, RunContext, registration
 from calmotion.shot import Animation, Character, ModelChoices, Result
+from calmotion.shot.budget import SEARCH_SHARE
 from calmotion.shot.model_choice import run_settings, simplified_character, with_choices
 from calmotion.shot.outputs import ShapedTracks
 from calmotion.shot.result import is_exceeded, is_reached
@@ -22,7 +23,7 @@ def _options(context: RunContext, **more: Any) -> Any:
     return run_settings(context.get(Source), context.get(ModelChoices), **more)
 
 
-def _with_budget(context: RunContext, result: Result) -> Result:
+def _with_budget(context: RunContext, result: Result, **more: float) -> Result:
     """The result with the decisions on the model, its error budget, and the parts of motors and links in its error."""
     from calmotion.accuracy.error_budget import with_budget
     from calmotion.accuracy.motors.backlash import with_lost_motion
@@ -38,7 +39,7 @@ def _with_budget(context: RunContext, result: Result) -> Result:
         if result.after is None:  # of a simulation: it is soon done again
             raise
         result = best_so_far(result)
-    return with_budget(with_choices(result, context.get(ModelChoices)), shot.character, tolerance)
+    return with_budget(with_choices(result, context.get(ModelChoices)), shot.character, tolerance, **more)
 
 
 def _input(context: RunContext) -> tuple[Character | None, Animation | None]:
@@ -128,6 +129,14 @@ class OptimizeShot(Operator):
     checks = (Character, Animation, Source, ModelChoices)
     properties = (
         Property("max_iterations", int, 30, minimum=1, description="Largest number of Gauss-Newton iterations"),
+        Property(
+            "least_gain",
+            float,
+            SEARCH_SHARE,
+            minimum=1e-6,
+            maximum=1.0,
+            description="A smaller predicted gain ends the search: a part of the tolerance, by root mean squares",
+        ),
         Property(
             "knot_spacing",
             float,
@@ -230,7 +239,7 @@ class OptimizeShot(Operator):
                 "warning",
                 f"the new curves are worse than the animated ones: objective {before} -> {after}; {reason}",
             )
-        return [_with_budget(context, result)]
+        return [_with_budget(context, result, least_gain=context.properties.least_gain)]
 
     @staticmethod
     def _search_options(context: RunContext) -> Any:
@@ -238,6 +247,7 @@ class OptimizeShot(Operator):
         return _options(
             context,
             max_iterations=values.max_iterations,
+            least_gain=values.least_gain,
             knot_spacing=values.knot_spacing if values.knot_spacing > 0.0 else None,
             smoothness=values.smoothness if values.smoothness >= 0.0 else None,
             adjoint=values.adjoint,

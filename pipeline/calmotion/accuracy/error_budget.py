@@ -20,17 +20,20 @@ from calmotion.shot.budget import (
 from calmotion.shot.tolerance import tolerance_of
 
 
-def with_budget(result: Result, character: Character, requested: float | None) -> Result:
+def with_budget(
+    result: Result, character: Character, requested: float | None, least_gain: float = SEARCH_SHARE
+) -> Result:  # fmt: skip
     """The result with its tolerance and its error budget.
 
     Args:
         requested: The user's tolerance [m], or None.
+        least_gain: As of `RunSettings`.
     """
     tolerance = tolerance_of(character, requested)
-    return replace(result, tolerance_m=tolerance, budget=_budget(result, tolerance))
+    return replace(result, tolerance_m=tolerance, budget=_budget(result, tolerance, least_gain))
 
 
-def _budget(result: Result, tolerance: float) -> tuple[BudgetEntry, ...]:
+def _budget(result: Result, tolerance: float, least_gain: float) -> tuple[BudgetEntry, ...]:
     accuracy = result.accuracy
     if accuracy is None:
         return ()
@@ -63,7 +66,7 @@ def _budget(result: Result, tolerance: float) -> tuple[BudgetEntry, ...]:
     if result.after is not None:
         ended = result.stopped == "converged"
         why = "a smaller gain is not pursued" if ended else f"the search ended before: {result.stopped}"
-        entries.append(entry(SEARCH, SEARCH_SHARE, SEARCH_SHARE * tolerance if ended else None, result.stopped, why))
+        entries.append(entry(SEARCH, least_gain, least_gain * tolerance if ended else None, result.stopped, why))
     return tuple(sorted(entries, key=lambda e: -(e.estimated_m or 0.0)))
 
 

@@ -29,15 +29,13 @@ from calmotion.retargeting.solver.damping_homotopy import damping_homotopy
 from calmotion.retargeting.solver.gauss_newton import Search, minimize
 from calmotion.retargeting.solver.recycling import Recycled
 from calmotion.shot import Animation, Character
-from calmotion.shot.budget import SEARCH_SHARE
 from calmotion.shot.character import Array, BoolArray
 from calmotion.shot.model_choice import OFF
 from calmotion.shot.run import RunSettings
 from calmotion.simulation.simulate import Progress
 from calmotion.support import interrupts
 
-WORTH = SEARCH_SHARE  # of the tolerance: a smaller predicted gain ends the search
-MISSED = 0.5 * WORTH  # share of the tolerance that changes in the inactive intervals may gain together
+MISSED = 0.5  # share of the least gain that changes in the inactive intervals may gain together
 
 
 @dataclass(eq=False)
@@ -77,7 +75,8 @@ class RetargetSearch:
     _unconfirmed: bool = False  # whether the state is that of a file
 
     def __post_init__(self) -> None:
-        self._done = SearchProgress(WORTH * self.tolerance)
+        self._least = self.options.least_gain * self.tolerance  # a smaller predicted gain ends the search [m]
+        self._done = SearchProgress(self._least)
 
     def run(self, start: Array, last: SearchMemory | None = None) -> None:
         """Search from a point, or resume from the checkpoint; an interrupt (Ctrl-C) ends the search.
@@ -164,7 +163,7 @@ class RetargetSearch:
                 if self.inactive:
                     self.inactive, self.search = with_gains(self.problem, self.search, self.inactive, self.locked_on)
                 missed = sum(interval.gain for interval in self.inactive)
-                if self.options.ranges == OFF or missed <= MISSED * self.tolerance:
+                if self.options.ranges == OFF or missed <= MISSED * self._least:
                     return
                 self.inactive, self.search = (), _restarted(self.search, self.search.x)
             self._done.next_pass(len(self.search.history))
@@ -175,7 +174,7 @@ class RetargetSearch:
             self.problem,
             search,
             fixed,
-            WORTH * self.tolerance,
+            self._least,
             self.options.max_iterations,
             on_iterate=self._on_iterate,
             onto_limits=lambda x: onto_limits(self.problem, x, fixed),
@@ -210,7 +209,7 @@ class RetargetSearch:
         """Continue on finer knots if these gain enough; whether they do."""
         if not self.problem.linearized_at(self.search.x):
             self._linearize()
-        breaks = refined_breaks(self.problem, self.search.x, self._fixed_on, FINER * self.tolerance)
+        breaks = refined_breaks(self.problem, self.search.x, self._fixed_on, FINER * self._least)
         if breaks is None:
             return False
         space = self.problem.space
@@ -239,7 +238,7 @@ class RetargetSearch:
         problem, search, motors = self.problem, self.search, len(self.problem.space.motors)
         value = problem.value(search.x)
         problem.linearize()
-        budget = problem.merit_of_gain(PRUNED * self.tolerance)
+        budget = problem.merit_of_gain(PRUNED * self._least)
         energy = block_energies(search.x, motors, problem.product(search.x))
         dropped = negligible_coefficients(search.x, motors, energy, budget) & ~fixed
         if not np.any(search.x[dropped]):
@@ -247,7 +246,7 @@ class RetargetSearch:
         fixed = fixed | dropped
         begin = replace(search, x=np.where(fixed, 0.0, search.x), reason="", radius=np.inf)
         pruned = minimize(
-            problem, begin, fixed, WORTH * self.tolerance, max_iterations=self.options.max_iterations + 3
+            problem, begin, fixed, self._least, max_iterations=self.options.max_iterations + 3
         )  # fmt: skip
         after = problem.value(pruned.x)
         limits = problem.limits

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+from calmotion.shot.budget import SEARCH_SHARE
 from calmotion.shot.robust.settings import RobustSettings
 
 
@@ -19,6 +20,7 @@ class RunSettings:
         knot_spacing: Distance of the knots of the offsets [s].
         smoothness: Weight of the second derivative of the offsets.
         max_iterations: Largest number of Gauss-Newton iterations.
+        least_gain: A smaller predicted gain ends the search, a part of the tolerance.
         adjoint: `discrete` or `continuous`.
         ranges: `auto`, `on` (the whole shot is searched) or `off` (inactive intervals are not checked at the end).
         motors: `auto`, `on` (every motor may change) or `off` (idle motors are not checked at the end).
@@ -37,6 +39,7 @@ class RunSettings:
     knot_spacing: float | None = None
     smoothness: float | None = None
     max_iterations: int = 30
+    least_gain: float = SEARCH_SHARE
     adjoint: str = "discrete"
     ranges: str = "auto"
     motors: str = "auto"

@@ -13,8 +13,8 @@ from calmotion.shot import Character, MotorCurve, Simplification
 from calmotion.shot.run import RunSettings
 from calmotion.shot.tolerance import tolerance_of
 
-FINER = 0.01  # share of the tolerance that finer knots must gain
-PRUNED = 0.02  # share of the tolerance that the removed offsets may cost together
+FINER = 0.1  # share of the least gain of a search that finer knots must gain
+PRUNED = 0.2  # share of it that the removed offsets may cost together
 
 
 def search_rows(
@@ -31,6 +31,7 @@ def search_rows(
         idle_gain_m: Gain that idle motors would bring [m]; None where there are none.
     """
     tolerance = tolerance_of(character, options.tolerance)
+    pruned = PRUNED * options.least_gain
     idle = idle_motors(character)
     rows = [*interval_rows(inactive), _knots_row(problem, character, options)]
     rows += [
@@ -42,8 +43,8 @@ def search_rows(
     rows += [
         Simplification(
             character.motors[curve.motor].path + ": curve unchanged",
-            f"a change would gain less than {PRUNED:.0%} of the tolerance",
-            PRUNED * tolerance,
+            f"a change would gain less than {100.0 * pruned:.3g}% of the tolerance",
+            pruned * tolerance,
         )
         for curve in curves
         if not curve.changed and curve.motor in problem.space.motors
@@ -60,4 +61,6 @@ def _knots_row(problem: RetargetProblem, character: Character, options: RunSetti
     if character.retarget.knot_spacing:
         return Simplification(what, "given by calm:retarget:knotSpacing")
     tolerance = tolerance_of(character, options.tolerance)
-    return Simplification(what, f"finer knots would gain less than {FINER:.0%} of the tolerance", FINER * tolerance)
+    finer = FINER * options.least_gain
+    why = f"finer knots would gain less than {100.0 * finer:.3g}% of the tolerance"
+    return Simplification(what, why, finer * tolerance)

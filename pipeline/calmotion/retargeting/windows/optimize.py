@@ -10,6 +10,8 @@ import numpy as np
 
 from calmotion.multibody.failure import SimulationFailure
 from calmotion.multibody.integrators.workspace import Workspace
+from calmotion.retargeting.problem.adaptive_knots import FIRST
+from calmotion.retargeting.problem.posing import knot_spacing
 from calmotion.retargeting.windows.assembly import Done, result_of
 from calmotion.retargeting.windows.continued import Beginning, needed_instants
 from calmotion.retargeting.windows.parts import (
@@ -21,7 +23,7 @@ from calmotion.retargeting.windows.parts import (
     performed,
     piece_of,
 )
-from calmotion.retargeting.windows.plan import Window, overlap_time, plan_windows
+from calmotion.retargeting.windows.plan import FEWEST, Window, overlap_time, plan_windows
 from calmotion.retargeting.windows.search import Found, Setting, search_window
 from calmotion.retargeting.windows.store import WindowStore, window_keys
 from calmotion.shot import Result, WindowRow
@@ -38,6 +40,8 @@ from calmotion.simulation.simulate import Progress, intended_motion
 from calmotion.simulation.simulator import compile_kernels
 from calmotion.simulation.target_errors import IntendedMotion
 from calmotion.support import interrupts
+
+TAIL = 8.0  # distances of knots over which offsets fade out at least
 
 
 def optimize_windows(
@@ -126,8 +130,7 @@ class _Windows:
             if searched:
                 if not self.done.searched and k - 1 == self.store.after:
                     after = self.store.beginning or after  # to the last bit that of the search that is resumed
-                part = part_of(whole, window.first, window.last, known)
-                found = self._searched(k, part, offsets, after)
+                found = self._searched(k, offsets, after, known)
                 if found is not None:
                     offsets = offsets.copy()
                     offsets[window.first : window.last + 1] += found.offsets
@@ -142,16 +145,26 @@ class _Windows:
             self._count(window, searched, found, time.perf_counter() - begin)
         self.done.offsets = offsets
 
-    def _searched(self, k: int, part: Part, offsets: Array, beginning: Beginning | None) -> Found | None:
-        """The search of one window; an interrupt leaves the others as they are."""
-        count = len(self.windows)
+    def _searched(self, k: int, offsets: Array, beginning: Beginning | None, known: int) -> Found | None:
+        """The search of one window; an interrupt leaves the others as they are.
+
+        Offsets that vanish at its end would have to leave what is right there; so they do only where the next window
+        is not searched, or the overlap is short.
+        """
+        count, window = len(self.windows), self.windows[k]
+        times = self.whole.grid.frame_times
+        spacing = knot_spacing(self.whole.character, self.setting.options) or FIRST
+        long = times[window.last] - times[window.kept] >= max(FEWEST * times[1], TAIL * spacing)
+        ends = bool(long) and not window.is_last and not self.store.done[k + 1]
+        part = part_of(self.whole, window.first, window.last, known, ends)
+        kept = float(times[window.kept - window.first])
 
         def progress(fraction: float, message: str) -> None:
             self.progress((k + fraction) / count, f"window {k + 1} of {count}: {message}")
 
         try:
             base = offset_curves(offsets, self.whole.grid)
-            found = search_window(part, self.curves, base, self.intended, beginning, self.setting, progress)
+            found = search_window(part, kept, self.curves, base, self.intended, beginning, self.setting, progress)
         except KeyboardInterrupt:
             interrupts.answer()
             self.done.interrupted = True

@@ -50,12 +50,13 @@ class Part:
         return IntendedMotion(*(part[self.rows] for part in parts))
 
 
-def part_of(whole: Prepared, first: int, last: int, known: int) -> Part:
+def part_of(whole: Prepared, first: int, last: int, known: int, ends: bool = False) -> Part:
     """The part between two frames of a shot.
 
     Args:
         first, last: Frames.
         known: Number of known instants up to the first frame, where the part does not begin the shot.
+        ends: Whether offsets may end in it as at the end of a shot, though the shot goes on.
     """
     grid = whole.grid
     joined = first > 0
@@ -63,7 +64,9 @@ def part_of(whole: Prepared, first: int, last: int, known: int) -> Part:
     start = grid.pre_steps + grid.substeps * first - pre
     stop = grid.pre_steps + grid.substeps * last + 1
     times = grid.frame_times[: last - first + 1]
-    own = TimeGrid(times, grid.substeps, pre, grid.h, joined=joined, continues=last < len(grid.frame_times) - 1)
+    own = TimeGrid(
+        times, grid.substeps, pre, grid.h, joined=joined, continues=not ends and last < len(grid.frame_times) - 1
+    )
     animation = _later(whole.shot.animation, float(grid.frame_times[first]), times)
     shot = replace(whole.shot, animation=animation)
     rows = slice(start, stop)

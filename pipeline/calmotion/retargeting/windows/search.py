@@ -11,7 +11,7 @@ from calmotion.retargeting.checkpoint import Checkpoint, problem_key
 from calmotion.retargeting.found_curves import found_curves
 from calmotion.retargeting.problem.adaptive_knots import first_breaks
 from calmotion.retargeting.problem.limits import FIRST_PENALTY, LimitTerms
-from calmotion.retargeting.problem.offset_basis import basis_on, uniform_breaks
+from calmotion.retargeting.problem.offset_basis import OffsetBasis, basis_on, uniform_breaks
 from calmotion.retargeting.problem.offset_space import BaseOffsets, OffsetSpace
 from calmotion.retargeting.problem.posing import SMOOTHNESS, closeness_of, knot_spacing, locked_coefficients
 from calmotion.retargeting.problem.problem import RetargetProblem
@@ -68,13 +68,15 @@ class Found:
 
 
 def search_window(
-    part: Part, curves: Curves, base: Curves, intended: IntendedMotion, beginning: Beginning | None, setting: Setting,
-    progress: Progress,
+    part: Part, kept: float, curves: Curves, base: Curves, intended: IntendedMotion, beginning: Beginning | None,
+    setting: Setting, progress: Progress,
 ) -> Found | None:  # fmt: skip
     """Search a window; None where nothing in it may change.
 
     Args:
         part: From its first frame to its last one.
+        kept: Time to which its offsets are kept [s]; where they end in the part but the shot goes on, they fade out
+            from there.
         curves: The animator's, of the whole shot.
         base: Offsets that are there, of the whole shot.
         intended: Of the whole shot.
@@ -108,10 +110,26 @@ def search_window(
     x = found_curves(final, len(character.motors), searched.search.x)[1]
     basis = final.space.basis
     coefficients = x.reshape(basis.count, len(final.space.motors)) @ final.space.coupling.T
+    if kept < part.prepared.grid.end and not part.prepared.grid.continues:
+        coefficients *= fading(basis, kept)[:, None]
     return Found(
         np.asarray(basis.at_frames @ coefficients), searched.search, final.size, searched.interrupted,
         searched.idle_gain, searched.resumed_iterations,
     )  # fmt: skip
+
+
+def fading(basis: OffsetBasis, kept: float) -> Array:
+    """Factors of coefficients with which offsets stay as they are up to a time, then fade out, shape [P].
+
+    They vanish at the last knot with slope and curvature, on the knots that there are.
+
+    Args:
+        kept: [s].
+    """
+    starts, last = basis.support[:, 0], basis.knots[-1]
+    ending = float(np.min(starts[basis.support[:, 1] >= last], initial=last))
+    s = np.clip((starts - kept) / max(ending - kept, 1e-9), 0.0, 1.0)
+    return np.asarray(1.0 - s**3 * (10.0 - 15.0 * s + 6.0 * s * s))
 
 
 def _posed(
