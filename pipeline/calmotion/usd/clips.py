@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from pxr import Sdf
 
 MOST_CLIPS = 100_000  # of one template: USD looks for each of them
-CLIPS, _VARIANT_SETS = "clips", "variantSetNames"  # metadata of a prim
+CLIPS, _VARIANT_SETS, _CHILDREN = "clips", "variantSetNames", "primChildren"  # metadata of a prim
 
 
 def clip_assets(layer: Sdf.Layer) -> list[str]:
@@ -40,8 +40,10 @@ def _prims(prim: Sdf.PrimSpec) -> Iterator[Sdf.PrimSpec]:
     while waiting:
         one = waiting.pop()
         yield one
-        waiting += one.nameChildren.values()
-        if one.HasInfo(_VARIANT_SETS):  # asking for the sets themselves takes as long as all else
+        # asking for children and sets themselves takes several times as long as all else
+        if one.HasInfo(_CHILDREN) or one == prim:
+            waiting += one.nameChildren.values()
+        if one.HasInfo(_VARIANT_SETS):
             for variants in one.variantSets.values():
                 waiting += [variant.primSpec for variant in variants.variants.values()]
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable
-from functools import cache
+from functools import cache, lru_cache
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -71,9 +71,14 @@ def _outermost(prim: Usd.Prim) -> Usd.Prim:
 def _is_anchor(prim: Usd.Prim) -> bool:
     info = prim.GetPrimTypeInfo()
     schemas = info.GetAppliedAPISchemas()
-    if _is_type(str(info.GetTypeName())) or (schemas and any(schema.startswith(_SCHEMAS) for schema in schemas)):
+    if _is_type(info.GetTypeName()) or (schemas and any(schema.startswith(_SCHEMAS) for schema in schemas)):
         return True
-    return _ATTRIBUTE.search("\n".join(prim.GetAuthoredPropertyNames())) is not None
+    return _has_physics("\n".join(prim.GetAuthoredPropertyNames()))
+
+
+@lru_cache(4096)  # most prims of a set have the same names
+def _has_physics(names: str) -> bool:
+    return _ATTRIBUTE.search(names) is not None
 
 
 @cache

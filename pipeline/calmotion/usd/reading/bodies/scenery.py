@@ -16,7 +16,7 @@ from calmotion.usd.reading.context import Reading, is_rigid_body
 from calmotion.views.playback import rotation_matrices
 
 if TYPE_CHECKING:
-    from pxr import Usd, UsdGeom
+    from pxr import Gf, Usd, UsdGeom
 
 NEAR = 1.5  # sizes of the robot: what lies farther from its middle is not read
 LARGEST = 5.0  # sizes of the robot: a larger prim is a sky or a landscape
@@ -81,16 +81,16 @@ def _still_geometry(reading: Reading, middle: Array, size: float) -> Iterator[Us
     What is far is left out by its box, models as a whole by their extents hints. Of a set of hundreds of thousands of
     prims only the first ones are looked at.
     """
-    from pxr import Usd, UsdGeom
+    from pxr import Gf, Usd, UsdGeom
 
     boxes, scale = UsdGeom.BBoxCache(reading.start, list(SHOWN), useExtentsHint=True), reading.units.length(1.0)
-    stage = reading.whole or reading.stage
+    stage, place = reading.whole or reading.stage, Gf.Vec3d(*(middle / scale))
     walk = iter(stage.Traverse(Usd.TraverseInstanceProxies(Usd.PrimDefaultPredicate)))
     for count, prim in enumerate(walk):
         if count > MOST_PRIMS:
             reading.note(f"the stage is large: scenery is shown of its first {MOST_PRIMS:,} prims alone")
             return
-        if not _box_is_near(boxes, prim, middle / scale, size / scale):
+        if not _box_is_near(boxes, prim, place, size / scale, UsdGeom.Boundable):
             walk.PruneChildren()
             continue
         kind = str(prim.GetTypeName())
@@ -101,19 +101,19 @@ def _still_geometry(reading: Reading, middle: Array, size: float) -> Iterator[Us
                 yield prim
 
 
-def _box_is_near(boxes: UsdGeom.BBoxCache, prim: Usd.Prim, middle: Array, size: float) -> bool:
+def _box_is_near(
+    boxes: UsdGeom.BBoxCache, prim: Usd.Prim, middle: Gf.Vec3d, size: float, boundable: type[UsdGeom.Boundable]
+) -> bool:  # fmt: skip
     """Whether a prim may be near the robot, all in stage units; True where that is not known without its children."""
-    from pxr import Gf, Tf, UsdGeom
-
-    if not prim.IsA(UsdGeom.Boundable) and not prim.HasAttribute("extentsHint"):
+    if not prim.IsA(boundable) and not prim.HasAttribute("extentsHint"):
         return True
     try:
         box = boxes.ComputeWorldBound(prim).ComputeAlignedRange()
-    except Tf.ErrorException:
+    except RuntimeError:  # of USD; tens of thousands of prims pass here, and an import takes as long as all of this
         return True
     if box.IsEmpty():
         return False
-    squared = box.GetDistanceSquared(Gf.Vec3d(*middle))
+    squared = box.GetDistanceSquared(middle)
     return squared == np.inf or bool(squared < (NEAR * size) ** 2)
 
 
