@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from dataclasses import replace
 from functools import cache, partial
 from pathlib import Path
@@ -183,10 +184,12 @@ def _search(
     stored: Path | None, memory: RunMemory,
 ) -> Result:  # fmt: skip
     """One search over the shot, or in windows where it is long."""
-    length = window_length(shot.character, shot.animation, options)
+    length, begin = window_length(shot.character, shot.animation, options), time.process_time()
     if length is None:
-        return optimize_shot(shot, options, progress, checkpoint, memory=memory)
-    return optimize_windows(shot, options, length, progress, checkpoint, stored)
+        found = optimize_shot(shot, options, progress, checkpoint, memory=memory)
+    else:
+        found = optimize_windows(shot, options, length, progress, checkpoint, stored)
+    return replace(found, processor_s=time.process_time() - begin)
 
 
 def _continued(first: Result, second: Result) -> Result:
@@ -207,5 +210,6 @@ def _continued(first: Result, second: Result) -> Result:
         forward_simulations=first.forward_simulations + second.forward_simulations,
         iterations=first.iterations + second.iterations,
         wall_s=first.wall_s + second.wall_s,
+        processor_s=(first.processor_s or 0.0) + (second.processor_s or 0.0),
         resumed_iterations=first.resumed_iterations + second.resumed_iterations,
     )

@@ -282,6 +282,7 @@ class Result:
         objective_before, objective_after: Value of the objective.
         gradients, linearized_sweeps, forward_simulations, iterations, parameters: Counts.
         wall_s: The optimisation alone (or the simulation, for `simulate`) [s].
+        processor_s: Processor time of the optimisation alone [s]; None for `simulate`.
         step_s: Time step [s].
         pre_roll_s: Length of the pre-roll [s].
         dof: Number of position coordinates (6 a body, and the elastic ones).
@@ -337,3 +338,4 @@ class Result:
     lost_motion: tuple[LostMotion, ...] = ()
     robustness: Robustness | None = None
     windows: tuple[WindowRow, ...] = ()
+    processor_s: float | None = None

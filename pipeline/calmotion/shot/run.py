@@ -56,8 +56,8 @@ class RunSettings:
 
 
 LONG_SHOT = 60.0  # a longer one is searched in windows unless the user says otherwise [s]
-WINDOW = 20.0  # length of a window's kept part [s]
-WINDOW_OVERLAP = 0.5  # most, of the length of a window
+WINDOW = 10.0  # length of a window's kept part [s]
+WINDOW_OVERLAP = 0.25  # most, of the length of a window
 INTEGRATORS = ("bdf2", "newmark", "generalized-alpha", "rk4", "radau")
 SHAPERS = ("zv", "zvd", "zv2", "zvd2", "lowpass")  # input shapers and a filter
 

@@ -111,6 +111,7 @@ def run_report(run: Run, character: Character, result: Result, command: str, tot
     report |= _optimized(character, result) if result.after else _simulated(character, result)
     report |= {
         "wall_s": result.wall_s,
+        "processor_s": result.processor_s,
         "total_wall_s": total_wall_s,
         "peak_memory_gb": peak if math.isfinite(peak := peak_memory()) else None,
         "steps": len(final.motion.times),

@@ -31,13 +31,15 @@ def test_a_performance_is_a_shot_of_its_length(shot, tmp_path):
 
 
 def run(seconds, search):
-    return LongRun(seconds, 1, search, search, 0.5, 60.0, 1.0, 0.5, True)
+    return LongRun(seconds, 1, search, search, search, search, 0.5, 60.0, 1.0, 0.5, True)
 
 
 def test_growth_and_tables():
     runs = [run(10.0, 2.0), run(100.0, 20.0)]
     assert exponent(runs) == pytest.approx(1.0) and np.isnan(exponent(runs[:1]))
-    assert "| 100 s | 1 | 20.0 s | 20.0 s | 0.50 GB | 60.0 mm | 1.00 mm | 0.50 mm | kept |" in table(runs)
+    assert "| 100 s | 1 | 20.0 s | 20.0 s | 20.0 s | 20.0 s | 0.50 GB | 60.0 mm | 1.00 mm | 0.50 mm | kept |" in table(
+        runs
+    )
 
 
 def test_tables_of_two_runs_are_compared_at_the_same_times(tmp_path):

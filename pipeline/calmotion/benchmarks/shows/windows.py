@@ -3,7 +3,12 @@
 A performance of a robot's shot is made of its own poses: at random times it moves from one pose of the shot to another,
 with short rests. It is varied, not repeated, and a longer one begins as a shorter one does. Each is optimised by
 `calmotion optimize` in a process of its own, whose memory is measured. With `--compare SECONDS` a performance of that
-length is also optimised by one long search, and the distance of the targets between both is printed.
+length is also optimised by one long search, and the distance of the targets between both is printed. Both end where
+they would gain less than `retarget.optimize.least_gain` of the tolerance; a distance below a tenth of it needs searches
+that are exact to that (`--set retarget.optimize.least_gain=0.0003`). With `--single` one search over as many seconds as
+a window has is the measure of the longest performance: its processor time times the number of windows.
+
+Processor times are those to look at where others use the machine.
 """
 
 from __future__ import annotations
@@ -11,6 +16,7 @@ from __future__ import annotations
 import csv
 import json
 import os
+import resource
 import subprocess  # nosec B404  # runs this program
 import sys
 import tempfile
@@ -41,6 +47,7 @@ class LongRun:
         seconds: Its length [s].
         windows: Number of its windows.
         search_s, total_s: Time of the search, and of the whole run [s].
+        search_processor_s, processor_s: Processor time of both [s].
         memory_gb: Most that its process had [GB].
         before_mm, after_mm: Largest error of a target.
         rms_mm: Root mean square of the error after, of the target with the largest one.
@@ -51,6 +58,8 @@ class LongRun:
     windows: int
     search_s: float
     total_s: float
+    search_processor_s: float
+    processor_s: float
     memory_gb: float
     before_mm: float
     after_mm: float
@@ -112,11 +121,14 @@ def optimized(root: Path, motion: Path, options: Sequence[str], folder: Path, na
     """
     line = [sys.executable, "-m", "calmotion", "optimize", str(root), "-o", str(folder / f"{name}.usda")]
     line += ["--motion", str(motion), "--csv", str(folder / f"{name}.csv"), "--json", "--quiet", *options]
+    begin = resource.getrusage(resource.RUSAGE_CHILDREN)
     done = subprocess.run(line, capture_output=True, text=True, env=dict(os.environ))  # nosec B603  # no shell
     try:
         report: dict[str, Any] = json.loads(done.stdout)
     except ValueError:
         report = {"error": {"problem": done.stderr.strip() or f"status {done.returncode}"}}
+    end = resource.getrusage(resource.RUSAGE_CHILDREN)
+    report["total_processor_s"] = end.ru_utime - begin.ru_utime + end.ru_stime - begin.ru_stime
     if "error" in report:
         raise ShotError(report["error"]["problem"], path=str(root), found=report["error"].get("found") or None)
     return report
@@ -127,6 +139,7 @@ def run_of(seconds: float, report: dict[str, Any]) -> LongRun:
     worst = max(report["targets"], key=lambda row: float(row["max_error_after_m"]))
     return LongRun(
         seconds, max(1, len(report["windows"])), report["wall_s"], report["total_wall_s"],
+        report["processor_s"], report["total_processor_s"],
         report["peak_memory_gb"] or float("nan"),
         1e3 * max(row["max_error_before_m"] for row in report["targets"]), 1e3 * worst["max_error_after_m"],
         1e3 * worst["rms_error_after_m"], report["tolerance_kept"],
@@ -134,18 +147,22 @@ def run_of(seconds: float, report: dict[str, Any]) -> LongRun:
 
 
 def exponent(runs: Sequence[LongRun]) -> float:
-    """Slope of log(time of the search) over log(length); NaN of one run."""
+    """Slope of log(processor time of the search) over log(length); NaN of one run."""
     if len(runs) < 2:
         return float("nan")
-    return float(np.polyfit(np.log([run.seconds for run in runs]), np.log([run.search_s for run in runs]), 1)[0])
+    return float(
+        np.polyfit(np.log([run.seconds for run in runs]), np.log([run.search_processor_s for run in runs]), 1)[0]
+    )
 
 
 def table(runs: Sequence[LongRun]) -> str:
     """The runs as Markdown."""
-    heads = ["length", "windows", "search", "whole run", "memory", "error before", "after", "rms after", "tolerance"]
+    heads = ["length", "windows", "search", "its processor time", "whole run", "processor time", "memory"]
+    heads += ["error before", "after", "rms after", "tolerance"]
     rows = [
         [
-            f"{run.seconds:g} s", str(run.windows), f"{run.search_s:.1f} s", f"{run.total_s:.1f} s",
+            f"{run.seconds:g} s", str(run.windows), f"{run.search_s:.1f} s", f"{run.search_processor_s:.1f} s",
+            f"{run.total_s:.1f} s", f"{run.processor_s:.1f} s",
             f"{run.memory_gb:.2f} GB", f"{run.before_mm:.1f} mm", f"{run.after_mm:.2f} mm", f"{run.rms_mm:.2f} mm",
             "kept" if run.kept else "missed",
         ]
@@ -186,6 +203,7 @@ def main(arguments: Sequence[str]) -> int:
     parser.add_argument("--window", default=None, help="length of the windows (default: automatic)")
     parser.add_argument("--tolerance", default="1mm")
     parser.add_argument("--compare", type=float, metavar="SECONDS", help="also compare with one long search")
+    parser.add_argument("--single", action="store_true", help="also search one window's seconds by themselves")
     parser.add_argument("--set", action="append", default=[], metavar="NAME=VALUE", help="property of an operator")
     output_options(parser)
     args = parser.parse_args(arguments)
@@ -198,6 +216,11 @@ def main(arguments: Sequence[str]) -> int:
         for seconds in args.seconds:
             files = write_performance(shot, seconds, folder)
             runs.append(run_of(seconds, optimized(*files, [*options, *windows], folder, f"windows_{seconds:g}")))
+        single = None
+        if args.single:
+            length = max(args.seconds) / max(1, runs[int(np.argmax(args.seconds))].windows)
+            files = write_performance(shot, length, folder)
+            single = run_of(length, optimized(*files, [*options, "--window=0"], folder, "single"))
         if args.compare:
             files = write_performance(shot, args.compare, folder)
             both = [[*options, *windows], [*options, "--window=0"]]
@@ -206,10 +229,18 @@ def main(arguments: Sequence[str]) -> int:
             own = [asdict(run_of(args.compare, report)) for report in reports]
             compared = {"windows": own[0], "one_search": own[1], "distance_m": distance, "profile_m": profile}
     found: dict[str, Any] = {"runs": [asdict(run) for run in runs], "exponent": exponent(runs), "compared": compared}
+    found["single"] = asdict(single) if single else None
     if args.json:
         print(json.dumps(found))
         return 0
     print(table(runs), f"time of the search grows with length to the power {exponent(runs):.2f}", sep="")
+    if single:
+        longest = max(runs, key=lambda run: run.seconds)
+        ratio = longest.search_processor_s / (longest.windows * single.search_processor_s)
+        print(
+            f"one search over {single.seconds:.3g} s takes {single.search_processor_s:.1f} s of processor time; "
+            f"{longest.seconds:g} s in {longest.windows} windows take {ratio:.2f} times as much as all of them alone"
+        )
     if compared:
         print(table([LongRun(**compared["windows"]), LongRun(**compared["one_search"])]), end="")
         print(

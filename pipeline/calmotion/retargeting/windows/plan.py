@@ -1,8 +1,9 @@
 """The windows of a long shot: their lengths, and by how much they overlap.
 
 What a command does dies away like exp(-zeta omega t). A search over a window therefore ends later than the part of it
-that is kept, by the time in which the slowest mode falls to a tenth. It may be less, half a window: the searches that
-follow damp what is left much faster than the robot does (measured: a factor of five in half a second at 4 Hz and 1.2%).
+that is kept, by the time in which the slowest mode falls to a tenth. It may be less, a quarter of a window: searches
+that follow damp what is left much faster than the robot does (measured: a factor of five in half a second at 4 Hz and
+1.2%).
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ from calmotion.shot.character import Array, contact_joints
 from calmotion.shot.run import LONG_SHOT, WINDOW, WINDOW_OVERLAP, RunSettings
 
 FALL = 10.0  # factor by which the slowest mode falls in an overlap
-LEAST = 1.0  # overlap, but not above half a window [s]
+LEAST = 1.0  # overlap, but not above a quarter of a window [s]
 FEWEST = 12  # frames of a window
 
 
