@@ -11,7 +11,7 @@
 # make blender  the extension of Blender as a zip (make blender-test tests it; needs Python 3.11)
 # make clean    remove what was built, and the environment
 #
-# Needs make and Python 3.11 to 3.13 with pip; PYTHON=... chooses one.
+# Needs make and Python 3.11 to 3.14 with pip; PYTHON=... chooses one.
 
 SHELL := /bin/sh
 VENV ?= .venv
@@ -22,8 +22,8 @@ MADE := $(VENV)/.made-$(HERE)
 INSTALLED := $(VENV)/.installed-$(HERE)
 INSTALLED_DEV := $(VENV)/.installed-dev-$(HERE)
 
-CHECK := import sys, venv, ensurepip; sys.exit(not (3, 11) <= sys.version_info[:2] < (3, 14))
-PYTHON ?= $(shell for python in python3 python3.13 python3.12 python3.11 python; do \
+CHECK := import sys, venv, ensurepip; sys.exit(not (3, 11) <= sys.version_info[:2] < (3, 15))
+PYTHON ?= $(shell for python in python3 python3.14 python3.13 python3.12 python3.11 python; do \
 	command -v $$python >/dev/null 2>&1 && $$python -c '$(CHECK)' >/dev/null 2>&1 && echo $$python && break; done)
 
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
@@ -153,7 +153,7 @@ endif
 
 $(MADE):
 	@test -n "$(PYTHON)" || { \
-		echo "error: no Python 3.11, 3.12 or 3.13 with venv and pip was found on the PATH." >&2; \
+		echo "error: no Python 3.11 to 3.14 with venv and pip was found on the PATH." >&2; \
 		echo "Install one (on Debian or Ubuntu also python3-venv), or name it: make PYTHON=/path/to/python3" >&2; \
 		exit 1; }
 	$(PYTHON) -m venv --clear $(VENV)

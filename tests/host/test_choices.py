@@ -72,8 +72,8 @@ def test_the_command_line_keeps_the_choice(calmotion_process, tmp_path):
         return calmotion_process(*arguments, env=env, cwd=os.path.dirname(os.path.dirname(os.path.dirname(__file__))))
 
     assert run("plugins", "disable", "figures").returncode == 0
-    assert "figures 0.1.0: disabled" in run("plugins", "list").stdout
+    assert "figures 1.0.0: disabled" in run("plugins", "list").stdout
     wrong = run("plugins", "disable", "figurs")
     assert wrong.returncode == 2 and "Did you mean figures?" in wrong.stderr
     assert run("plugins", "enable", "figures").returncode == 0
-    assert "figures 0.1.0: registered" in run("plugins", "list").stdout
+    assert "figures 1.0.0: registered" in run("plugins", "list").stdout

@@ -56,8 +56,8 @@ def _versions() -> Iterator[Finding]:
 
     yield Finding("calmotion", OK, __version__)
     version = platform.python_version()
-    right = (3, 11) <= sys.version_info[:2] < (3, 14)
-    yield Finding("Python", OK if right else WRONG, version, "" if right else "Use Python 3.11, 3.12 or 3.13")
+    right = (3, 11) <= sys.version_info[:2] < (3, 15)
+    yield Finding("Python", OK if right else WRONG, version, "" if right else "Use Python 3.11 to 3.14")
     try:
         wanted = metadata.requires("calmotion") or []
     except metadata.PackageNotFoundError:
