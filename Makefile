@@ -6,7 +6,7 @@
 # make fuzz     ten minutes of damage to each of shots, meshes, motions, manifests, settings and caches
 # make torture  hours of kills, full disks, damaged caches and other faults (RUNS=20 SEED=1 for a short one)
 # make audit    known weaknesses of the dependencies (needs the network)
-# make wheel    a wheel with compiled kernels for this platform and version of Python, in dist
+# make wheels   wheels with compiled kernels for each Python here, each tested in an empty folder, in dist
 # make samples  build the sample characters again (make pictures optimises and draws them)
 # make blender  the extension of Blender as a zip (make blender-test tests it; needs Python 3.11)
 # make clean    remove what was built, and the environment
@@ -32,7 +32,7 @@ TESTS ?= tests
 # Two processes test at a time; threads of linear algebra that wait for each other would make that several times slower.
 test: export OPENBLAS_NUM_THREADS := 1
 
-.PHONY: help demo wheel test test-lowest test-portable docs fuzz torture audit samples pictures blender blender-test blender-pictures clean
+.PHONY: help demo wheel wheels test test-lowest test-portable docs fuzz torture audit samples pictures blender blender-test blender-pictures clean
 .DELETE_ON_ERROR:
 
 help:
@@ -57,12 +57,26 @@ test: $(INSTALLED_DEV)
 	check pytest $(RUN) -m pytest -n 2 -q; \
 	echo "== summary"; printf "$$summary"; exit $$status
 
+PYTHONS ?= 3.11 3.12 3.13 3.14
 # The processors of the last ten years; others compile the kernels as they do without this wheel.
 WHEEL_CPU := NUMBA_CPU_NAME=x86-64-v3 NUMBA_CPU_FEATURES=+avx,+avx2,+bmi,+bmi2,+cx16,+f16c,+fma,+lzcnt,+movbe,+popcnt,+sse3,+sse4.1,+sse4.2,+ssse3,+xsave
 wheel: $(INSTALLED)
 	@rm -rf build/wheel && mkdir -p build/wheel dist
 	env CALMOTION_CACHE=$(CURDIR)/build/wheel/cache $(WHEEL_CPU) $(RUN) .ci/wheel_kernels.py build/wheel/kernels
-	env CALMOTION_WHEEL_KERNELS=$(CURDIR)/build/wheel/kernels $(RUN) -m pip wheel --quiet --no-deps -w dist .
+	env CALMOTION_WHEEL_KERNELS=$(CURDIR)/build/wheel/kernels $(RUN) -m pip wheel --quiet --no-deps -w build/wheel .
+	$(RUN) .ci/wheel_test.py build/wheel/calmotion-*.whl samples/bartender
+	@mv build/wheel/calmotion-*.whl dist
+
+# Each version of Python gets an environment of its own, beside those of other versions.
+wheels:
+	@mkdir -p dist; built=; \
+	for version in $(PYTHONS); do \
+		command -v python$$version >/dev/null 2>&1 || { echo "python$$version is not here: no wheel for it"; continue; }; \
+		$(MAKE) --no-print-directory wheel VENV=.venv-wheel-$$version PYTHON=python$$version || exit 1; \
+		built=$$version; \
+	done; \
+	test -n "$$built" || { echo "error: none of Python $(PYTHONS) was found on the PATH" >&2; exit 1; }; \
+	.venv-wheel-$$built/bin/python -m pip wheel --quiet --no-deps -w dist . && ls dist/calmotion-*.whl
 
 docs: $(INSTALLED_DEV)
 	NO_MKDOCS_2_WARNING=1 $(RUN) -m mkdocs build --strict --quiet
@@ -143,7 +157,7 @@ pictures: $(INSTALLED)
 	$(RUN) samples/pictures.py
 
 clean:
-	rm -rf $(VENV) $(LOWEST_VENV) $(BLENDER_VENV) build dist .mypy_cache .pytest_cache .ruff_cache
+	rm -rf $(VENV) .venv-wheel-* $(LOWEST_VENV) $(BLENDER_VENV) build dist .mypy_cache .pytest_cache .ruff_cache
 	find pipeline plugins samples tests -name __pycache__ -type d -prune -exec rm -rf {} +
 
 # The interpreter that the environment was made with may be gone: then it is made again.

@@ -5,12 +5,16 @@ one platform and version of Python.
 """
 
 import os
+import platform
+import sys
 from pathlib import Path
 from typing import Any
 
 from hatchling.builders.hooks.plugin.interface import BuildHookInterface
 
 TARGET = "calmotion/bundled"
+# The kernels are data that numba loads, linked to no library of the system: the wheel runs where numba's own runs.
+LINUX = "manylinux_2_28_x86_64"
 
 
 class BundledFiles(BuildHookInterface):
@@ -26,5 +30,10 @@ class BundledFiles(BuildHookInterface):
             included[f"plugins/{name}"] = f"{TARGET}/plugins/{name}"
         if kernels := os.environ.get("CALMOTION_WHEEL_KERNELS"):
             included[kernels] = f"{TARGET}/kernels"
-            build_data["pure_python"], build_data["infer_tag"] = False, True
+            build_data["pure_python"] = False
+            if sys.platform == "linux" and platform.machine() == "x86_64":
+                python = f"cp{sys.version_info.major}{sys.version_info.minor}"
+                build_data["tag"] = f"{python}-{python}-{LINUX}"
+            else:
+                build_data["infer_tag"] = True
         build_data["force_include"].update(included)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import json
 import os
+import runpy
 import shutil
 import subprocess
 import sys
@@ -113,24 +114,6 @@ def test_every_import_is_declared(repository: Path):
             assert declared & {canonicalize_name(owner) for owner in owners.get(name, [name])}, f"{path}: {name}"
 
 
-COUNTING = """
-import sys
-import calmotion.support.compilation  # before numba, whose options it sets
-from numba.core import event
-
-class Compilations(event.Listener):
-    def on_start(self, happened):
-        print("compiled", happened.data["dispatcher"].py_func.__qualname__, file=sys.stderr)
-
-    def on_end(self, happened):
-        pass
-
-event.register("numba:compile", Compilations())
-from calmotion.cli.main import main
-sys.exit(main(sys.argv[1:]))
-"""
-
-
 @pytest.mark.long
 def test_a_platform_wheel_compiles_nothing(repository: Path, tmp_path: Path):
     shutil.copytree(repository / "samples" / "bartender", tmp_path / "bartender")
@@ -146,13 +129,13 @@ def test_a_platform_wheel_compiles_nothing(repository: Path, tmp_path: Path):
     command = [python, "-m", "pip", "wheel", "--quiet", "--no-deps", "-w", tmp_path, repository]
     subprocess.run(command, env=building, check=True, capture_output=True, timeout=600)
     (wheel,) = tmp_path.glob("calmotion-*.whl")
-    assert not wheel.name.endswith("-none-any.whl")
+    assert not wheel.name.endswith(("-none-any.whl", "-linux_x86_64.whl")), "a tag that package indexes refuse"
     installed = environment_with(wheel, tmp_path)
     for arguments in (
         ["optimize", "bartender/bartender.usda", "-o", "calm.usda", "--json"],
         ["simulate", "bartender/bartender.usda", "--json"],
     ):
-        (tmp_path / "count.py").write_text(COUNTING)
+        (tmp_path / "count.py").write_text(runpy.run_path(str(repository / ".ci" / "wheel_test.py"))["COUNTING"])
         done = run_process(installed, "count.py", *arguments, folder=tmp_path)
         assert [line for line in done.stderr.splitlines() if line.startswith("compiled")] == []
         assert "error" not in json.loads(done.stdout)

@@ -49,3 +49,12 @@ def test_a_command_that_belongs_to_no_task_is_listed_as_well():
     shown = texts.overview({"inspect": "look", "dance": "do something new"})
     assert "  dance " in shown and shown.index("Prepare") < shown.index("dance")
     assert "Remove the shake" not in shown, "no heading without commands"
+
+
+def test_what_a_command_alone_has_comes_before_what_all_have(capsys):
+    with pytest.raises(SystemExit):
+        main(["optimize", "--help"])
+    printed = capsys.readouterr().out
+    heads = ("\n  --verify", "\noutputs:", "\nsimulation:", f"\n{texts.SHARED}:", "\n  --json", "\nexamples:")
+    places = [printed.index(head) for head in heads]
+    assert places == sorted(places)

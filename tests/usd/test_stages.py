@@ -139,3 +139,17 @@ def test_a_link_to_nothing_is_named_as_such(tmp_path, leads_to):
     with pytest.raises(ShotError, match="a symbolic link to a file that does not exist") as caught:
         stages.open_stage(str(tmp_path / "shot.usda"))
     assert caught.value.found == leads_to and "Did you mean" not in caught.value.remedy
+
+
+def test_a_folder_names_the_shots_in_it(tmp_path):
+    with pytest.raises(ShotError, match="this is a folder") as caught:
+        stages.open_layer(str(tmp_path))
+    assert caught.value.remedy.startswith("Name the .usda")
+    for name in ("shot.usda", "shot.png"):
+        (tmp_path / name).write_text("")
+    with pytest.raises(ShotError, match="this is a folder") as caught:
+        stages.open_layer(str(tmp_path))
+    assert caught.value.remedy == f"Name the file of the shot: {tmp_path / 'shot.usda'}"
+    with pytest.raises(ShotError, match="does not exist") as caught:
+        stages.open_layer(str(tmp_path / "shot"))
+    assert str(tmp_path / "shot.usda") in caught.value.remedy

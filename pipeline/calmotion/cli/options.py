@@ -6,6 +6,8 @@ import argparse
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, TypeAlias
 
+from calmotion.cli.parser import SHARED
+
 if TYPE_CHECKING:
     from calmotion.cli.output import Output
     from calmotion.cli.progress import ProgressDisplay
@@ -27,12 +29,12 @@ MEANINGS = {
 KINDS = tuple(MEANINGS)
 
 
-def json_option(command: argparse.ArgumentParser) -> None:
+def json_option(command: argparse.ArgumentParser | argparse._ArgumentGroup) -> None:
     """The option --json."""
     command.add_argument("--json", action="store_true", help="print one JSON object on stdout, and nothing else there")
 
 
-def report_options(command: argparse.ArgumentParser) -> None:
+def report_options(command: argparse.ArgumentParser | argparse._ArgumentGroup) -> None:
     """The options of a command that prints a report: --json and --quiet."""
     json_option(command)
     command.add_argument("--quiet", action="store_true", help="print nothing but errors (and the object of --json)")
@@ -50,25 +52,26 @@ def shot_command(commands: Commands, name: str, function: Command, text: str) ->
     command = commands.add_parser(name, help=text, description=text[0].upper() + text[1:] + ".")
     command.set_defaults(command=function)
     file_argument(command, "shot", metavar="SHOT", help="USD file of the shot")
-    report_options(command)
-    command.add_argument("--progress", action="store_true", help="print machine-readable progress to stderr")
-    command.add_argument(
+    group = command.add_argument_group(SHARED)
+    report_options(group)
+    group.add_argument("--progress", action="store_true", help="print machine-readable progress to stderr")
+    group.add_argument(
         "--openjd", action="store_true", help="print progress to stdout in the words of Open Job Description"
     )
     file_argument(
-        command, "--log", metavar="FILE",
+        group, "--log", metavar="FILE",
         help="add JSON lines to this file: time, stage, fraction, message and memory of the run",
     )  # fmt: skip
-    plugin_option(command)
-    command.add_argument(
+    plugin_option(group)
+    group.add_argument(
         "--run",
         metavar="OPERATOR",
         action="append",
         default=[],
         help="also run this operator of a plugin, such as speed_watch.report; may be repeated",
     )
-    file_argument(command, "--settings", metavar="FILE", help="TOML file with a table for each operator")
-    command.add_argument(
+    file_argument(group, "--settings", metavar="FILE", help="TOML file with a table for each operator")
+    group.add_argument(
         "--set",
         metavar="NAME=VALUE",
         action="append",
@@ -84,7 +87,7 @@ def file_argument(command: argparse.ArgumentParser | argparse._ArgumentGroup, *n
     argument.complete = {"bash": "_shtab_compgen_files", "zsh": "_files", "tcsh": "f"}  # type: ignore[attr-defined]
 
 
-def plugin_option(command: argparse.ArgumentParser) -> None:
+def plugin_option(command: argparse.ArgumentParser | argparse._ArgumentGroup) -> None:
     """Add `--plugins`."""
     file_argument(
         command, "--plugins", metavar="DIR", action="append", default=[],
@@ -136,8 +139,8 @@ def run_options(command: argparse.ArgumentParser) -> None:
     command.add_argument(
         "--strict",
         action="store_true",
-        help="exit with status 1 if the simulation does not keep the tolerance, or a foot asks of the ground what no "
-        "ground does; the outputs are written all the same",
+        help="exit with status 1 if the simulation does not keep the tolerance, or a foot would be pulled, tip or "
+        "slip; the outputs are written all the same",
     )
 
 

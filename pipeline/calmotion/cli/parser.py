@@ -81,6 +81,8 @@ START = (
     ("calmotion inspect shot.usda", "what is in the shot?"),
     ("calmotion optimize shot.usda -o calm.usda", "remove the shake"),
 )
+# The group of options that every command on a shot has.
+SHARED = "reports, plugins and settings"
 WIDTH = 79
 _EXAMPLES = "examples:\n"
 
@@ -134,6 +136,8 @@ def example_lines(examples: Sequence[tuple[str, str]]) -> list[str]:
 
 def add_examples(name: str, command: argparse.ArgumentParser) -> None:
     """Put examples below the options of a command, and what it needs at least into its usage."""
+    # what a command alone has comes before what all have
+    command._action_groups.sort(key=lambda group: group.title == SHARED)
     examples = EXAMPLES.get(name)
     if examples:
         command.formatter_class = _WithExamples

@@ -21,6 +21,8 @@ from calmotion.usd.diagnostics import one_line, quiet
 if TYPE_CHECKING:
     from pxr import Pcp, Sdf, Usd
 
+SUFFIXES = (".usda", ".usdc", ".usd", ".usdz")
+
 METADATA_KEY = "calmotion"
 # roles of the layers that Calmotion writes
 CURVES, MOTION, ROOT, RIG, CALIBRATION = "curves", "motion", "root", "rig", "calibration"
@@ -64,10 +66,24 @@ def _nearest_file(path: str) -> str:
     while not parent.parent.is_dir() and parent != parent.parent:
         parent = parent.parent
     try:
-        near = nearest_name(parent.name, os.listdir(parent.parent))
+        names = os.listdir(parent.parent)
+        shots = [name for name in names if name.endswith(SUFFIXES) or (parent.parent / name).is_dir()]
+        near = nearest_name(parent.name, shots) or nearest_name(parent.name, names)
     except OSError:
         return ""
     return f"Did you mean {parent.with_name(near)}? " if near and near != parent.name else ""
+
+
+def _shots_in(folder: str) -> str:
+    """What to name instead of a folder: the USD files in it, three at most."""
+    try:
+        shots = sorted(name for name in os.listdir(folder) if name.endswith(SUFFIXES))
+    except OSError:
+        shots = []
+    if not shots:
+        return "Name the .usda, .usdc, .usd or .usdz file of the shot"
+    named = ", ".join(os.path.join(folder, name) for name in shots[:3])
+    return f"Name the file of the shot: {named}" + (f", or another of {len(shots)}" if len(shots) > 3 else "")
 
 
 def open_layer(path: str) -> Sdf.Layer:
@@ -88,7 +104,7 @@ def open_layer(path: str) -> Sdf.Layer:
             "the file does not exist", path=path or "SHOT", remedy=f"{_nearest_file(path)}Check the path of the shot"
         )
     if os.path.isdir(path):
-        raise ShotError("this is a folder", path=path, remedy="Name the .usda, .usdc, .usd or .usdz file of the shot")
+        raise ShotError("this is a folder", path=path, remedy=_shots_in(path))
     refuse_special(path)
     if not os.access(path, os.R_OK):
         raise ShotError("the file cannot be read", path=path, remedy="Check its permissions")

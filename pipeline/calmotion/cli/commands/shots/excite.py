@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 def add_to(commands: Commands) -> None:
     """Add the command."""
-    command = shot_command(commands, "excite", _run, "find a test motion that tells the parameters of the robot")
+    command = shot_command(commands, "excite", _run, "design a test motion whose recording suits calibrate")
     file_argument(
         command, "-o", "--output", metavar="LAYER", required=True,
         help="USD layer to write; it opens the shot with the motion",

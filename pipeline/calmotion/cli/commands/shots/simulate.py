@@ -18,7 +18,7 @@ def add_to(commands: Commands) -> None:
     command.add_argument(
         "--shaper",
         metavar="KIND",
-        help="for comparison, filter the tracks: zv, zvd, zv2, zvd2 (input shapers) or lowpass",
+        help="for comparison, filter the motor curves: zv, zvd, zv2, zvd2 (input shapers) or lowpass",
     )
     run_options(command)
     simulation_options(
