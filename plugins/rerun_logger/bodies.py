@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import rerun as rr
-from calmotion.shot import Character, Motion, Result, SurfaceMesh
+from calmotion.shot import Body, Character, Motion, Result, SurfaceMesh
 from calmotion.shot.character import Array
 from calmotion.views.playback import carriers, deformed_points, deviations, modes_of, relative_poses
 from calmotion.views.shading import split_at_creases
@@ -18,6 +18,9 @@ from .layout import REFERENCE, SCENERY, TIME
 
 GHOST = (0, 158, 115, 90)
 INSIDE = 0.02  # of the largest deviation: how far the ghost lies inside the bodies
+# Shares of the largest deviation between which the ghost of a body appears: nearer, its surface would cut through the
+# body's, and show as patches that come and go.
+HIDDEN, SHOWN = 0.05, 0.15
 DEFAULT_COLOR = (0.55, 0.55, 0.57)
 
 
@@ -31,40 +34,72 @@ def log_bodies(
 ) -> None:
     """A transform for each body and frame, its meshes once, the vertices of those that bend, the colors of those off.
 
-    The ghost of the intended motion lies a little inside the bodies, so that it is hidden where they are where they
-    should be, and does not flicker through them.
-
     Args:
+        root: Of a motion that is not the intended one.
         motions: Of all roots, at the shot's frames.
         scale: Deviation that has the whole color change [m].
     """
     motion, intended = motions[root], motions[REFERENCE]
     frames = rr.TimeColumn(TIME, duration=motion.times)
-    depth = INSIDE * scale
-    # transforms add up along the entity tree, which mirrors the prims'
-    for index, (body, carrier) in enumerate(zip(character.bodies, carriers(character.bodies), strict=True)):
-        if body.between:
-            continue
-        positions, rotations = relative_poses(motion, index, carrier)
-        columns = rr.Transform3D.columns(translation=positions, quaternion=rotations[:, [1, 2, 3, 0]])
-        recording.send_columns(root + body.path, [frames], columns)
-        for s, surface in enumerate(body.surfaces):
+    log_poses(recording, root, character, motion)
+    for index, body in enumerate(character.bodies):
+        for s, surface in enumerate(() if body.between else body.surfaces):
+            if surface.drawn:
+                modes = modes_of(result.skins[index], s)
+                color = display_color(surface.color)
+                colors = deviation_colors(color, surface.points, modes, index, motion, intended, scale)
+                points = deformed_points(surface.points, modes, motion.elastic[index])
+                log_mesh(recording, entity_of(root, body, surface), surface, points, color, colors, frames)
+
+
+def log_ghost(
+    recording: rr.RecordingStream,
+    root: str,
+    character: Character,
+    result: Result,
+    motions: Mapping[str, Motion],
+    scale: float,
+) -> None:
+    """The intended motion behind another one: transparent, and only those bodies and times that are off visibly.
+
+    It lies a little inside the bodies, so that it is hidden where they are where they should be.
+
+    Args:
+        root: Of the motion that is in front.
+        motions, scale: As for `log_bodies`.
+    """
+    motion, intended = motions[root], motions[REFERENCE]
+    frames = rr.TimeColumn(TIME, duration=intended.times)
+    tree = f"{REFERENCE}/{root}"
+    log_poses(recording, tree, character, intended)
+    for index, body in enumerate(character.bodies):
+        for s, surface in enumerate(() if body.between else body.surfaces):
+            modes = modes_of(result.skins[index], s)
             if not surface.drawn:
                 continue
-            modes = modes_of(result.skins[index], s)
-            points, color, colors = surface.points, GHOST, None
-            if root == REFERENCE:
-                others = [other for name, other in motions.items() if name != REFERENCE]
-                if max(deviations(points, modes, index, other, intended).max() for other in others) < 2.0 * depth:
-                    continue  # it would never be seen
-                points = moved_inside(surface, depth)
-            else:
-                color = display_color(surface.color)
-                colors = deviation_colors(color, points, modes, index, motion, intended, scale)
-            entity = root + (surface.path if surface.path != body.path else f"{body.path}/mesh")
-            log_mesh(
-                recording, entity, surface, deformed_points(points, modes, motion.elastic[index]), color, colors, frames
-            )
+            share = deviations(surface.points, modes, index, motion, intended).max(axis=1) / max(scale, 1e-12)
+            opacity = np.clip((share - HIDDEN) / (SHOWN - HIDDEN), 0.0, 1.0)
+            if not np.any(opacity):
+                continue
+            tints = np.tile(np.array(GHOST, dtype=np.uint8), (len(opacity), 1))
+            tints[:, 3] = (GHOST[3] * opacity).round()
+            points = deformed_points(moved_inside(surface, INSIDE * scale), modes, intended.elastic[index])
+            log_mesh(recording, entity_of(tree, body, surface), surface, points, tints, None, frames)
+
+
+def log_poses(recording: rr.RecordingStream, root: str, character: Character, motion: Motion) -> None:
+    """A transform for each body and frame; they add up along the entity tree, which mirrors the prims'."""
+    frames = rr.TimeColumn(TIME, duration=motion.times)
+    for index, (body, carrier) in enumerate(zip(character.bodies, carriers(character.bodies), strict=True)):
+        if not body.between:
+            positions, rotations = relative_poses(motion, index, carrier)
+            columns = rr.Transform3D.columns(translation=positions, quaternion=rotations[:, [1, 2, 3, 0]])
+            recording.send_columns(root + body.path, [frames], columns)
+
+
+def entity_of(root: str, body: Body, surface: SurfaceMesh) -> str:
+    """The entity of a surface under a root."""
+    return root + (surface.path if surface.path != body.path else f"{body.path}/mesh")
 
 
 def moved_inside(surface: SurfaceMesh, depth: float) -> Array:
@@ -95,11 +130,17 @@ def log_mesh(
     entity: str,
     surface: SurfaceMesh,
     points: Array,
-    color: tuple[int, int, int, int],
+    color: tuple[int, int, int, int] | NDArray[np.uint8],
     colors: NDArray[np.uint8] | None,
     frames: rr.TimeColumn,
 ) -> None:
-    """One surface; `points` has one row when it does not deform, else one a frame, as `colors` has if there are any."""
+    """One surface.
+
+    Args:
+        points: One row when it does not deform, else one a frame.
+        color: Of the whole surface, or one a frame, shape [f, 4].
+        colors: Of its points, one row a frame, instead.
+    """
     sources, triangles, normals = split_at_creases(surface.points, surface.triangles)
     fixed: dict[str, Any] = {"triangle_indices": triangles, "vertex_normals": normals.astype(np.float32)}
     changing: dict[str, Any] = {}
@@ -108,14 +149,16 @@ def log_mesh(
         fixed["vertex_positions"] = points[0, sources].astype(np.float32)
     else:
         changing["vertex_positions"] = points[:, sources].astype(np.float32).reshape(-1, 3)
-    if colors is None:
-        fixed["albedo_factor"] = color
-    else:
+    if colors is not None:
         changing["vertex_colors"] = colors[:, sources].reshape(-1, 4)
+    elif isinstance(color, tuple):
+        fixed["albedo_factor"] = color
     recording.log(entity, rr.Mesh3D.from_fields(**fixed), static=True)
     if changing:
         count = len(next(iter(changing.values()))) // len(sources)
         recording.send_columns(entity, [frames], rr.Mesh3D.columns(**changing).partition([len(sources)] * count))
+    if not isinstance(color, tuple):
+        recording.send_columns(entity, [frames], rr.Mesh3D.columns(albedo_factor=color))
 
 
 def display_color(color: tuple[float, float, float] | None) -> tuple[int, int, int, int]:

@@ -78,7 +78,7 @@ def spatial_view(name: str, root: str, eye: rrb.EyeControls3D) -> rrb.Spatial3DV
     trails = [f"/trails/{root}/**", f"/trails/{REFERENCE}/{root}/**"]
     return rrb.Spatial3DView(
         origin="/",
-        contents=[f"/{root}/**", f"/{REFERENCE}/**", *trails, f"/{SCENERY}/**"],
+        contents=[f"/{root}/**", f"/{REFERENCE}/{root}/**", *trails, f"/{SCENERY}/**"],
         name=name,
         eye_controls=eye,
         background=rrb.Background(color=BACKGROUND, kind=rrb.BackgroundKind.SolidColor),

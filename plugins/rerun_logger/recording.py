@@ -22,7 +22,7 @@ from calmotion.support.naming import distinct_names
 from calmotion.views.playback import sample_motion
 from calmotion.views.spectrum import error_spectrum, highest_frequency
 
-from .bodies import log_bodies, log_scenery
+from .bodies import log_bodies, log_ghost, log_scenery
 from .deviation import largest_deviation
 from .layout import INPUT, OPTIMIZED, REFERENCE, STYLES, TIME, make_blueprint, motor_plots
 from .summary import describe
@@ -115,8 +115,9 @@ def log_all(
     """Everything, in the order of the entity tree."""
     for count, (root, motion) in enumerate(at_frames.items()):
         progress(count / (len(at_frames) + 1), f"{root} in 3D")
-        log_bodies(recording, root, character, result, at_frames, scale)
         if root != REFERENCE:
+            log_bodies(recording, root, character, result, at_frames, scale)
+            log_ghost(recording, root, character, result, at_frames, scale)
             log_trails(recording, root, character, whole_motion(result, root), result.reference, motion.times, scale)
     log_scenery(recording, character)
     progress(len(at_frames) / (len(at_frames) + 1), "curves")

@@ -50,8 +50,9 @@ def test_every_visible_mesh_is_there_once_for_each_motion_under_its_prim_path(co
     meshes = sorted(entity for entity, name in columns if name == "Mesh3D:triangle_indices")
     moving = ["/Robot/Link/Beam", "/Robot/Tip/Ball"]
     expected = [f"/{root}{mesh}" for root in ("input", "optimized") for mesh in ["/Robot/Base/Box", *moving]]
-    # What never moves has no ghost, and guide geometry is not shown.
-    assert meshes == sorted(expected + [f"/reference{mesh}" for mesh in moving])
+    # What is never off has no ghost, and guide geometry is not shown.
+    ghosts = [f"/reference/{root}{mesh}" for root in ("input", "optimized") for mesh in moving]
+    assert meshes == sorted(expected + ghosts)
     for mesh in meshes:
         times, values = columns[mesh, "Mesh3D:triangle_indices"]
         assert times is None and len(values) == 1 and len(values[0]) == 12
@@ -63,7 +64,8 @@ def test_bodies_move_at_the_frames_of_the_shot_and_never_before_them(columns):
     for root, motion in (
         ("input", result.before.motion),
         ("optimized", result.after.motion),
-        ("reference", result.reference),
+        ("reference/input", result.reference),
+        ("reference/optimized", result.reference),
     ):
         times, places = columns[f"/{root}/Robot/Tip", "Transform3D:translation"]
         np.testing.assert_allclose(times, frames, atol=2e-9)
@@ -202,10 +204,28 @@ def test_the_intended_trail_is_drawn_only_where_it_can_be_told_from_the_other(co
 
 def test_the_ghost_lies_inside_the_body_where_nothing_is_off(columns):
     (own,), (ghost,) = (
-        np.array(columns[f"/{root}/Robot/Tip/Ball", "Mesh3D:vertex_positions"][1]) for root in ("input", "reference")
+        np.array(columns[f"/{root}/Robot/Tip/Ball", "Mesh3D:vertex_positions"][1])
+        for root in ("input", "reference/input")
     )
     assert 0.0 < np.abs(own).max() - np.abs(ghost).max() < 0.1 * np.abs(own).max()
     assert np.all(np.abs(ghost) <= np.abs(own) + 1e-9)
+
+
+@pytest.mark.parametrize("root", ["input", "optimized"])
+def test_the_ghost_is_seen_only_while_its_body_is_off(columns, root):
+    result, frames, character = synthetic.result(), synthetic.animation().frame_times, synthetic.character()
+    run = {"input": result.before, "optimized": result.after}[root]
+    motions = [sample_motion(motion, frames) for motion in (run.motion, result.before.motion, result.reference)]
+    places = [
+        np.array([world_points(character.bodies[2], 2, result.skins[2], motion, k)[0] for k in range(len(frames))])
+        for motion in motions
+    ]
+    off, most = (np.linalg.norm(place - places[2], axis=2).max(axis=1) for place in places[:2])
+    times, colors = columns[f"/reference/{root}/Robot/Tip/Ball", "Mesh3D:albedo_factor"]
+    np.testing.assert_allclose(times, frames, atol=2e-9)
+    opacity = np.array([row[0] & 255 for row in colors])
+    assert np.all(opacity[off < 0.04 * most.max()] == 0) and np.all(opacity[off > 0.16 * most.max()] == 90)
+    assert np.all(np.diff(opacity[np.argsort(off)]) >= 0)
 
 
 def test_curves_can_be_read_on_dark_and_light_themes():
@@ -249,7 +269,7 @@ def test_a_simulation_alone_logs_nothing_as_optimised(tmp_path):
     write(tmp_path / "out.rrd", synthetic.result(optimized=False))
     entities = {entity for entity, _ in read_recording(tmp_path / "out.rrd")}
     assert not [e for e in entities if "optimize" in e or "change" in e]
-    assert "/input/Robot/Link/Beam" in entities and "/reference/Robot/Link/Beam" in entities
+    assert "/input/Robot/Link/Beam" in entities and "/reference/input/Robot/Link/Beam" in entities
 
 
 def test_long_curves_are_thinned_and_the_frames_kept(tmp_path):
