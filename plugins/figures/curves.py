@@ -118,19 +118,36 @@ def draw_limits(axes: Axes, limits: np.ndarray, unit: str) -> None:
 
 
 def plot_convergence(result: Result) -> Figure:
-    """Objective and gradient at each iterate over the work that led to it, from the motion as animated on."""
+    """Objective and gradient at each iterate over the work that led to it, from the motion as animated on.
+
+    An objective that rises is that of the same curves in a finer simulation: a new line begins there.
+    """
     figure = new_figure(WIDTH, 3.2)
     # A step counts the sweeps of its own linear solve as well, which come after its objective is known.
     sweeps = [0, *(step.linearized_sweeps for step in result.steps[:-1])]
     work = [step.forward_simulations + before for step, before in zip(result.steps, sweeps, strict=True)]
+    objectives = [step.objective for step in result.steps]
+    finer = [k for k in range(1, len(objectives)) if objectives[k] > objectives[k - 1]]
     panels = (
         ("objective", "objective [m² s]", AFTER),
         ("gradient_norm", "norm of the projected gradient [m² s/rad]", INTENDED),
     )
     for axes, (name, title, color) in zip(figure.subplots(1, 2), panels, strict=True):
-        axes.semilogy(work, [getattr(step, name) for step in result.steps], color=color, marker="o", markersize=4)
+        values = [getattr(step, name) for step in result.steps]
+        for first, end in zip([0, *finer], [*finer, len(values)], strict=True):
+            axes.semilogy(work[first:end], values[first:end], color=color, marker="o", markersize=4)
+        if name == "objective" and result.objective_before > 1.001 * values[0]:
+            start = [0, work[0]], [result.objective_before, values[0]]
+            axes.semilogy(*start, color=BEFORE, marker="o", markersize=4, linestyle="--", zorder=1.5)
+            axes.annotate("as animated", (0, result.objective_before), (6, -2), textcoords="offset points",
+                          fontsize=SMALL, color=BEFORE, va="top")  # fmt: skip
+        for k in finer[:1]:
+            axes.annotate("finer simulation", (work[k], values[k]), (0, 6), textcoords="offset points",
+                          fontsize=SMALL, color=LIMIT, ha="right" if 2 * work[k] > work[-1] else "left")  # fmt: skip
         tidy(axes, "", title)
         axes.set_xlim(left=0.0)
         axes.set_xlabel("simulations and linearised sweeps (one dot for each iteration)", fontsize=SMALL)
         axes.xaxis.set_major_locator(MaxNLocator(integer=True))
+        axes.tick_params(which="both", labelsize=SMALL)
+        axes.margins(y=0.12)
     return figure

@@ -12,6 +12,7 @@ from .style import LIMIT, SMALL, new_figure, tidy
 
 DECADES = 5.0  # of the vertical axis
 NEAR = 0.05  # of the width: distance below which labels are joined
+LETTER = 0.0065  # of the width: that of a letter of a label
 ROOM = 1.15  # end of the axis over the highest significant frequency
 
 
@@ -39,13 +40,17 @@ def plot_spectra(character: Character, result: Result, modes: SystemModes | None
         for n, frequency in enumerate(marked):
             label = mode_label(modes) if n == 0 else None
             axes.axvline(frequency, color=LIMIT, linewidth=1.0, linestyle=":", label=label)
-        for group in grouped(marked, NEAR * end):
+        for group in grouped(marked, NEAR * end, LETTER * end):
+            inside = group[-1] + LETTER * end * len(label_of(group)) < end
             axes.annotate(
-                ", ".join(f"{frequency:.1f}" for frequency in group), (group[-1], 1.0),
-                xycoords=("data", "axes fraction"), xytext=(2, -2), textcoords="offset points",
-                fontsize=SMALL - 1.0, color=LIMIT, va="top",
+                label_of(group), (group[-1] if inside else group[0], 1.0),
+                xycoords=("data", "axes fraction"), xytext=(2 if inside else -2, -2), textcoords="offset points",
+                fontsize=SMALL - 1.0, color=LIMIT, va="top", ha="left" if inside else "right",
             )  # fmt: skip
-        axes.legend(fontsize=SMALL, loc="lower left", framealpha=0.85, edgecolor="none")
+    # above the axes: inside, it would cover a curve or a mode
+    all_axes[0].legend(
+        fontsize=SMALL, loc="lower right", bbox_to_anchor=(1.0, 0.98), ncols=3, frameon=False, borderaxespad=0.0
+    )
     all_axes[-1].set_xlabel("frequency [Hz]", fontsize=SMALL)
     return figure
 
@@ -57,11 +62,20 @@ def mode_label(modes: SystemModes | None) -> str:
     return f"modes in the pose at {modes.time_s:.2f} s (largest error)"
 
 
-def grouped(values: list[float], gap: float) -> list[list[float]]:
-    """Ascending values in groups, with less than `gap` between successive values of a group."""
+def label_of(group: list[float]) -> str:
+    """The frequencies of a group as a text."""
+    return ", ".join(f"{frequency:.1f}" for frequency in group)
+
+
+def grouped(values: list[float], gap: float, letter: float = 0.0) -> list[list[float]]:
+    """Ascending values in groups, with less than `gap` between successive values of a group.
+
+    A value that the label of a group would cover, which begins at the last of the group, joins it; `letter` is the
+    width of one.
+    """
     groups: list[list[float]] = []
     for value in values:
-        if groups and value - groups[-1][-1] < gap:
+        if groups and value - groups[-1][-1] < max(gap, letter * (2 + len(label_of(groups[-1])))):
             groups[-1].append(value)
         else:
             groups.append([value])

@@ -14,6 +14,7 @@ from calmotion.errors import ShotError
 from calmotion.host import PluginError
 from calmotion.shot.calibration.estimates import Calibration, ChannelCurves, Estimate
 from calmotion.shot.outputs import SystemModes
+from calmotion.shot.result import OptimizerStep
 from calmotion.shot.run import OutputPaths
 from calmotion.testing import check_plugin, host_with, run_operator
 from calmotion.views.rendering import fit_camera
@@ -94,6 +95,9 @@ def test_spectra_are_drawn_in_millimetres_with_the_modes_marked(figures):
 def test_labels_too_near_to_stand_apart_are_written_as_one(figures):
     assert figures.spectra.grouped([1.0, 1.4, 1.9, 5.0], 0.6) == [[1.0, 1.4, 1.9], [5.0]]
     assert figures.spectra.grouped([], 1.0) == []
+    # the label "24.9, 26.0, 27.7" begins at 27.7 and is 16 letters long
+    assert figures.spectra.grouped([24.9, 26.0, 27.7, 30.2], 2.4) == [[24.9, 26.0, 27.7], [30.2]]
+    assert figures.spectra.grouped([24.9, 26.0, 27.7, 30.2], 2.4, 0.3) == [[24.9, 26.0, 27.7, 30.2]]
 
 
 def test_motor_curves_show_limits_and_the_change(figures):
@@ -188,6 +192,16 @@ def test_convergence_begins_with_the_motion_as_animated(figures):
     work, objective = axes.get_lines()[0].get_data()
     assert list(work) == [1, 2, 23, 44], "simulations, and the sweeps that came before each iterate"
     assert list(objective) == [step.objective for step in result.steps] and axes.get_xlim()[0] == 0.0
+
+
+def test_convergence_of_a_search_that_starts_elsewhere_and_goes_on_in_a_finer_simulation(figures):
+    objectives = (4e-7, 3e-7, 6e-7, 3.5e-7)  # the third one is that of the second one's curves, simulated finer
+    steps = tuple(OptimizerStep(value, 1e-3, 10 + k, 20 * k) for k, value in enumerate(objectives))
+    result = dataclasses.replace(synthetic.result(), steps=steps, objective_before=1e-3)
+    axes = figures.curves.plot_convergence(result).axes[0]
+    lines = [list(line.get_ydata()) for line in axes.get_lines()]
+    assert lines == [[4e-7, 3e-7], [6e-7, 3.5e-7], [1e-3, 4e-7]]
+    assert {text.get_text() for text in axes.texts} == {"as animated", "finer simulation"}
 
 
 def test_spectra_name_the_pose_of_the_modes(figures):
