@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 
 from calmotion.support.caching.cache_folder import CACHES, FORMER, cache_folder, folder_of
+from calmotion.support.caching.object_store import fetch, publish
 from calmotion.support.caching.signing import signing_key
 from calmotion.support.caching.verified_files import DamagedFileError, ForeignFileError, read_arrays, write_arrays
 from calmotion.support.files import PREFIX, remove_abandoned
@@ -52,18 +53,24 @@ def stored_arrays(cache: str, key: str) -> dict[str, np.ndarray] | None:
     """
     path = _file(cache, key)
     _tidy(path.parent)
+    arrays = _read(path)
+    if arrays is None and fetch(cache, path, signing_key()):
+        arrays = _read(path)
+    if arrays is not None:
+        mark_used(path)
+    return arrays
+
+
+def _read(path: Path) -> dict[str, np.ndarray] | None:
     try:
-        arrays = read_arrays(path, signing_key())
+        return read_arrays(path, signing_key())
     except ForeignFileError:
         _remove(path)
-        return None
     except DamagedFileError:
         discard(path)
-        return None
     except OSError:
-        return None
-    mark_used(path)
-    return arrays
+        pass
+    return None
 
 
 def store_arrays(cache: str, key: str, arrays: Mapping[str, Any], keep_existing: bool = False) -> None:
@@ -80,6 +87,7 @@ def store_arrays(cache: str, key: str, arrays: Mapping[str, Any], keep_existing:
     path = _file(cache, key)
     with contextlib.suppress(OSError):
         write_arrays(path, arrays, keep_existing, signing_key())
+        publish(cache, path)
         prune(cache)
 
 

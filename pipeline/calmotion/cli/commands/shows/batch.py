@@ -36,8 +36,9 @@ def add_to(commands: Commands) -> None:
         help="most jobs at once (default: one for each processor; elsewhere all)",
     )
     file_argument(
-        group, "--shared-cache", metavar="DIR",
-        help="folder of meshes and reduced bodies that the workers share; compiled kernels are each worker's own",
+        group, "--shared-cache", metavar="PLACE",
+        help="folder or object store (s3://bucket/folder) of meshes and reduced bodies that the workers share; "
+        "compiled kernels are each worker's own",
     )  # fmt: skip
     forwarded_options(command)
 
