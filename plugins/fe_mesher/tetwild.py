@@ -95,11 +95,20 @@ def tetrahedralize(
         "pytetwild": version("pytetwild"),
     }
     key = cache.cache_key(points, triangles, settings)
+    exceeded = cache.cache_key(points, triangles, settings | {"exceeds": True})
+    if use_cache:
+        _refuse_hopeless(exceeded, f"{len(triangles)} triangles", path, time)
     mesh = cache.load(key) if use_cache else None
     if mesh is None or flat_tets(*mesh).any():
         for sequence in range(1, 1 + _TRIES):
             settings["sequence"] = sequence
-            made, tets = _run(points, triangles, settings, path, time)
+            try:
+                made, tets = _run(points, triangles, settings, path, time)
+            except OutOfTime:
+                if use_cache:
+                    taken = time.limit - time.used
+                    cache.store(exceeded, {"seconds": np.array(taken)}, lambda kept: float(kept[0]) >= taken)
+                raise
             mesh = unflattened(made, tets), tets
             if not flat_tets(*mesh).any():
                 break
@@ -107,6 +116,24 @@ def tetrahedralize(
         if use_cache and not flat_tets(*mesh).any():
             mesh = cache.store(key, {"points": mesh[0], "tets": mesh[1]}, lambda kept: not flat_tets(*kept).any())
     return mesh[0], mesh[1]
+
+
+def _refuse_hopeless(key: str, size: str, path: str, time: ProcessorTime) -> None:
+    """Refuse a mesh that has already taken as much time as there is: every shot of a robot would try it again.
+
+    Raises:
+        OutOfTime: It has.
+    """
+    taken = cache.load(key, ("seconds",))
+    if taken is not None and taken[0].shape == () and float(taken[0]) >= time.limit - time.used:
+        raise _out_of_time(size, path, time)
+
+
+def _out_of_time(size: str, path: str, time: ProcessorTime) -> OutOfTime:
+    return OutOfTime(
+        "tetrahedralising exceeded the limit of processor time", path=path, found=f"{size}, {time.limit:g} s",
+        remedy=REMEDY + MORE_TIME.format(4.0 * time.limit),
+    )  # fmt: skip
 
 
 def _run(
@@ -173,8 +200,5 @@ def _limited(command: list[str], folder: Path, time: ProcessorTime, size: str, p
             process.kill()
             raise
         if process.returncode == -signal.SIGXCPU:
-            raise OutOfTime(
-                "tetrahedralising exceeded the limit of processor time", path=path,
-                found=f"{size}, {time.limit:g} s", remedy=REMEDY + MORE_TIME.format(4.0 * time.limit),
-            )  # fmt: skip
+            raise _out_of_time(size, path, time)
         return process.returncode, messages

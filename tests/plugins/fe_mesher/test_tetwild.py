@@ -81,3 +81,18 @@ def test_random_numbers_of_a_file_that_is_no_library_are_left_alone(package, tmp
     for content in (b"", b"\x7fELF\x01\x01" + bytes(100), b"MZ" + bytes(100)):
         file.write_bytes(content)
         assert not worker.fix_random_numbers(str(file), 1)
+
+
+def test_a_mesh_that_took_too_long_is_not_tried_again_unless_it_may_take_longer(package, monkeypatch):
+    tetwild, cube, tries = package("tetwild"), box(), []
+
+    def run(points, triangles, settings, path, time):
+        tries.append(time.limit)
+        raise tetwild._out_of_time("12 triangles", path, time)
+
+    monkeypatch.setattr(tetwild, "_run", run)
+    for limit in (5.0, 5.0, 4.0, 9.0, 9.0):
+        time = tetwild.ProcessorTime(limit)
+        with pytest.raises(tetwild.OutOfTime, match="limit of processor time"):
+            tetwild.tetrahedralize(np.array(cube.vertices), np.array(cube.faces), 0.01, 1e-3, "/Arm/link", time, True)
+    assert tries == [5.0, 9.0]
