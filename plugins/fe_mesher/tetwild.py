@@ -106,8 +106,7 @@ def tetrahedralize(
                 made, tets = _run(points, triangles, settings, path, time)
             except OutOfTime:
                 if use_cache:
-                    taken = time.limit - time.used
-                    cache.store(exceeded, {"seconds": np.array(taken)}, lambda kept: float(kept[0]) >= taken)
+                    _keep_hopeless(exceeded, time.limit - time.used)
                 raise
             mesh = unflattened(made, tets), tets
             if not flat_tets(*mesh).any():
@@ -127,6 +126,11 @@ def _refuse_hopeless(key: str, size: str, path: str, time: ProcessorTime) -> Non
     taken = cache.load(key, ("seconds",))
     if taken is not None and taken[0].shape == () and float(taken[0]) >= time.limit - time.used:
         raise _out_of_time(size, path, time)
+
+
+def _keep_hopeless(key: str, taken: float) -> None:
+    """Store that a mesh takes longer than a time [s]."""
+    cache.store(key, {"seconds": np.array(taken)}, lambda kept: float(kept[0]) >= taken)
 
 
 def _out_of_time(size: str, path: str, time: ProcessorTime) -> OutOfTime:

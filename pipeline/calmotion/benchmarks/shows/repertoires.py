@@ -29,7 +29,7 @@ from calmotion.usd.writing.performances import write_performance
 from calmotion.workflow.shot import Shot
 
 
-def clip_of(shot: Shot, start: float, length: float) -> tuple[Array, Array]:
+def clip_of(shot: Shot, start: float, length: float, slower: float = 1.0) -> tuple[Array, Array]:
     """A part of a shot that begins and ends at rest for two frames: its time is eased by a quintic, and nearly
     twice as fast in the middle.
 
@@ -37,12 +37,13 @@ def clip_of(shot: Shot, start: float, length: float) -> tuple[Array, Array]:
         shot: Animated by drives.
         start: Where it begins [s].
         length: Of the part [s]; the clip is four frames longer.
+        slower: How many times as long the clip takes: its middle is nearly twice as fast as the shot.
 
     Returns:
         Times [s], shape [f], and values of the motors [rad or m], shape [f, M].
     """
     frames = shot.animation.frame_times
-    moving = max(4, round(length / frames[1]))
+    moving = max(4, round(slower * length / frames[1]))
     times = np.arange(moving + 5) * frames[1]
     s = np.clip((times / frames[1] - 2.0) / moving, 0.0, 1.0)
     within = start + length * s**3 * (10.0 - 15.0 * s + 6.0 * s * s)
@@ -50,13 +51,14 @@ def clip_of(shot: Shot, start: float, length: float) -> tuple[Array, Array]:
     return times, np.stack(values, axis=1)
 
 
-def write_clips(shots: Sequence[Shot], count: int, length: float, folder: Path) -> Path:
+def write_clips(shots: Sequence[Shot], count: int, length: float, folder: Path, slower: float = 1.0) -> Path:
     """Write clips of shots, and the file that lists them.
 
     Args:
         shots: Of one robot.
         count: Number of clips; each shot has as many as the others, or one more.
-        length: Of a clip [s].
+        length: Of the part of the shot that a clip is [s].
+        slower: As of `clip_of`.
 
     Raises:
         ShotError: A shot is too short.
@@ -72,7 +74,7 @@ def write_clips(shots: Sequence[Shot], count: int, length: float, folder: Path) 
         provenance = replace(shot.provenance, shot=os.path.abspath(shot.path))
         for n, start in enumerate(np.linspace(0.0, end - length, own)):
             name = f"{chr(ord('a') + k)}{n}"
-            motion = clip_of(shot, float(start), length)
+            motion = clip_of(shot, float(start), length, slower)
             write_performance(str(folder / f"{name}.usda"), provenance, shot.character, motion, {})
             lines.append(f'{name} = "{name}.usda"')
     path = folder / "clips.toml"
@@ -126,7 +128,8 @@ def main(arguments: Sequence[str]) -> int:
     parser = bench_parser("sequence", __doc__)
     parser.add_argument("shots", metavar="SHOTS", nargs="+", help="USD files of one robot, animated by drives")
     parser.add_argument("--clips", type=int, default=10, help="number of clips (default: 10)")
-    parser.add_argument("--seconds", type=float, default=1.0, help="their length (default: 1)")
+    parser.add_argument("--seconds", type=float, default=1.0, help="length of their parts of the shots (default: 1)")
+    parser.add_argument("--slower", type=float, default=1.0, help="how many times as long a clip takes (default: 1)")
     parser.add_argument("--workers", type=int, default=2, help="of `calmotion sequence` (default: 2)")
     parser.add_argument("--tolerance", default="1mm")
     parser.add_argument("--step", help="fixed time step, such as 5ms (default: automatic)")
@@ -140,7 +143,7 @@ def main(arguments: Sequence[str]) -> int:
     with nullcontext(args.keep) if args.keep else tempfile.TemporaryDirectory() as place:
         folder = Path(place)
         folder.mkdir(parents=True, exist_ok=True)
-        report = made(write_clips(shots, args.clips, args.seconds, folder), folder / "repertoire", options)
+        report = made(write_clips(shots, args.clips, args.seconds, folder, args.slower), folder / "repertoire", options)
     if args.json:
         print(json.dumps({key: value for key, value in report.items() if key != "page"}))
     else:
