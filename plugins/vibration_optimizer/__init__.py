@@ -178,7 +178,7 @@ class OptimizeShot(Operator):
             -1.0,
             unit="s",
             description="Length of the windows in which a long shot is searched; -1: 10 s where it is longer than "
-            "60 s; 0: one search",
+            "30 s; 0: one search",
         ),
         Property(
             "avoid_reversals",

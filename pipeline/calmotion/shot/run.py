@@ -55,7 +55,7 @@ class RunSettings:
         return self.integrator or "bdf2"
 
 
-LONG_SHOT = 60.0  # a longer one is searched in windows unless the user says otherwise [s]
+LONG_SHOT = 30.0  # a longer one is searched in windows unless the user says otherwise [s]
 WINDOW = 10.0  # length of a window's kept part [s]
 WINDOW_OVERLAP = 0.25  # most, of the length of a window
 INTEGRATORS = ("bdf2", "newmark", "generalized-alpha", "rk4", "radau")

@@ -21,8 +21,8 @@ def add_to(commands: Commands) -> None:
         "--window",
         metavar="TIME",
         type=quantity("s"),
-        help="length of the windows in which a long shot is searched, each going on from the one before (default: 20 s "
-        "where the shot is longer than 60 s; 0: one search)",
+        help="length of the windows in which a long shot is searched, each going on from the one before (default: 10 s "
+        "where the shot is longer than 30 s; 0: one search)",
     )
     command.add_argument(
         "--avoid-reversals",
