@@ -13,8 +13,8 @@ from calmotion.multibody.analysis.reactions import reactions
 from calmotion.multibody.failure import SimulationFailure
 from calmotion.multibody.integrators.workspace import Workspace
 from calmotion.multibody.model.system import State
-from calmotion.shot import Result
-from calmotion.shot.character import Array, Character, contact_joints
+from calmotion.shot import Character, Result
+from calmotion.shot.character import Array, contact_joints
 from calmotion.shot.run import RunSettings
 from calmotion.simulation.compiled_shot import CompiledShot
 from calmotion.simulation.cyclic import SteadyState
@@ -26,6 +26,7 @@ from calmotion.simulation.report import elastic_by_body
 
 CLOSED_GAP = 1e-6  # largest position gap of a joint that counts as none [m]
 ORDER = 2  # of BDF2; the global error goes with this power of the step
+ORDER_AT_IMPACTS = 1  # a change of contacts excites vibration that no step resolves, as sharply as steps allow
 MARGIN, WORTH = 0.9, 1.1  # of a step between two that were tried; how much longer it must be than the shorter of them
 
 
@@ -41,7 +42,7 @@ class StepRun:
         integrator: By which it was simulated; empty where that does not matter.
         gap: Largest position gap of a joint at any step [m].
         efforts: Of the motors [N m] or [N], shape [f, M]; None where they are not known.
-        order: Power of the step with which its error goes at least.
+        order: With which power of the step its error goes.
     """
 
     step: float
@@ -54,12 +55,10 @@ class StepRun:
 
 
 def order_of(character: Character) -> int:
-    """Power of the step with which the error of a simulation goes at least.
-
-    After a change of contacts two steps are of first order; they count less with the number of steps, but the order
-    shows its two only by steps that are shorter than those that keep a tolerance.
-    """
-    return 1 if contact_joints(character) else ORDER
+    """With which power of the step the error of a simulation goes: the first where contacts come and go."""
+    contacts = [character.joints[joint].contact for joint in contact_joints(character)]
+    switched = any(contact is not None and len(set(contact.active.tolist())) > 1 for contact in contacts)
+    return ORDER_AT_IMPACTS if switched else ORDER
 
 
 def simulate_at(shot: CompiledShot, options: RunSettings, step: float) -> StepRun:
@@ -79,9 +78,8 @@ def simulate_at(shot: CompiledShot, options: RunSettings, step: float) -> StepRu
         raise failure_error(prepared, failure) from failure
     elastic = elastic_by_body(model, run.trajectory.states.u)
     gap, efforts = run.trajectory.max_joint_gap, _efforts(prepared, run)
-    return StepRun(
-        grid.h, run.target_positions[grid.frames], elastic, options.scheme, gap, efforts, order_of(shot.character)
-    )
+    order = order_of(shot.character)
+    return StepRun(grid.h, run.target_positions[grid.frames], elastic, options.scheme, gap, efforts, order)
 
 
 def _efforts(prepared: Prepared, run: ForwardRun) -> Array:
@@ -111,7 +109,7 @@ def distance(one: Array, other: Array) -> float:
 
 def step_error(coarse: StepRun, fine: StepRun) -> float:
     """Error of the finer of two runs at any target [m], by Richardson's extrapolation."""
-    ratio = (coarse.step / fine.step) ** _least_order(coarse, fine) - 1.0
+    ratio = (coarse.step / fine.step) ** _order(coarse, fine) - 1.0
     return distance(coarse.positions, fine.positions) / ratio
 
 
@@ -132,7 +130,7 @@ def step_gaps(coarse: StepRun, fine: StepRun) -> tuple[float, float]:
 
     The rest is that of closed chains whose joints do not fit together exactly: no step closes it.
     """
-    ratio = (coarse.step / fine.step) ** _least_order(coarse, fine) - 1.0
+    ratio = (coarse.step / fine.step) ** _order(coarse, fine) - 1.0
     by_fine = min(fine.gap, max(0.0, coarse.gap - fine.gap) / ratio)
     return max(0.0, coarse.gap - (fine.gap - by_fine)), by_fine
 
@@ -168,7 +166,7 @@ def largest_step(
                 return step, np.inf
         elif coarse is not None and coarse.step > fine.step:  # a frame may be shorter than both
             error, enough = step_error(coarse, fine), allowed(fine)
-            by_coarse = (coarse.step / fine.step) ** _least_order(coarse, fine) * error
+            by_coarse = (coarse.step / fine.step) ** _order(coarse, fine) * error
             coarse_closed, fine_closed = (gap <= CLOSED_GAP for gap in step_gaps(coarse, fine))
             if by_coarse <= enough and coarse_closed:
                 return coarse.step, by_coarse
@@ -184,15 +182,16 @@ def largest_step(
         coarse = fine
 
 
-def _between(run: StepRun, error: float, enough: float) -> tuple[float, float]:
+def _between(fine: StepRun, error: float, enough: float) -> tuple[float, float]:
     """A step [s] up to twice as long as that of a run whose error is allowed, and its error."""
-    longer = MARGIN * (enough / error) ** (1.0 / run.order) if error > 0.0 else 2.0
+    longer = MARGIN * (enough / error) ** (1.0 / fine.order) if error > 0.0 else 2.0
     if longer <= WORTH:
-        return run.step, error
-    return longer * run.step, longer**run.order * error
+        return fine.step, error
+    return longer * fine.step, longer**fine.order * error
 
 
-def _least_order(one: StepRun, other: StepRun) -> int:
+def _order(one: StepRun, other: StepRun) -> int:
+    """Of two runs of a shot, one of which may not know it."""
     return min(one.order, other.order)
 
 

@@ -22,7 +22,7 @@ from calmotion.accuracy.integrator_choice import by_fast_scheme
 from calmotion.accuracy.mesh_budget import mesh_error
 from calmotion.accuracy.pod_subspace import project_to_subspace
 from calmotion.accuracy.simulate_to_tolerance import simulate_to_tolerance
-from calmotion.accuracy.step_error import ORDER, StepRun, distance, frames_of, simulate_at
+from calmotion.accuracy.step_error import StepRun, distance, frames_of, simulate_at
 from calmotion.benchmarks.common.finer_meshes import with_more_nodes
 from calmotion.benchmarks.common.parsers import bench_parser, output_options
 from calmotion.benchmarks.common.tables import markdown, write_rows
@@ -133,7 +133,7 @@ def _reference(shot: Drawn, reduction: BodyReduction, options: RunSettings, step
         return by_fast_scheme(options, lambda options: simulate_at(fine, options, part * step))
 
     runs = [run(part) for part in STEPS]
-    factor = (runs[0].step / runs[1].step) ** ORDER - 1.0
+    factor = (runs[0].step / runs[1].step) ** runs[0].order - 1.0
     limit = runs[1].positions + (runs[1].positions - runs[0].positions) / factor
     return limit, mesh_error(fine, options, runs[1]) or 0.0, _nodes(fine)
 

@@ -17,8 +17,8 @@ CACHES = {
 # Folders of earlier versions, which nothing reads any more; they go when the cache that replaces them is pruned.
 FORMER = {MESHES: "tetrahedra", REDUCTIONS: "reduced"}
 
-# A folder, or the address of an object store (`object_store`), of meshes and reduced bodies that machines share. Compiled
-# kernels stay in each one's own: they fit one processor, and are unpickled.
+# A folder, or the address of an object store (`object_store`), of meshes and reduced bodies that machines share.
+# Compiled kernels stay in each one's own: they fit one processor, and are unpickled.
 SHARED_VARIABLE = "CALMOTION_SHARED_CACHE"
 SHARED = (MESHES, REDUCTIONS)
 
