@@ -10,6 +10,7 @@ import ast
 import importlib.util
 import os
 import re
+import shlex
 import subprocess
 import sys
 import time
@@ -233,3 +234,21 @@ def test_blender_accepts_and_installs_the_package(tmp_path):
     user = tmp_path / "user"
     printed = blender(HERE / "in_blender.py", EXTENSION, tmp_path, archive, BLENDER_USER_RESOURCES=str(user))
     assert "all is well" in printed
+
+
+@needs_blender
+@pytest.mark.long
+def test_the_commands_of_the_page_optimise_what_blender_exports(repository, tmp_path):
+    page = (repository / "docs" / "tutorials" / "blender.md").read_text()
+    commands = re.findall(r"^ {4}calmotion (.*)$", page, re.MULTILINE)
+    assert [line.split()[0] for line in commands] == ["rig", "optimize"]
+    blender(HERE / "by_hand.py", EXTENSION, tmp_path, "export")
+    for line in commands:
+        done = subprocess.run(
+            [sys.executable, "-m", "calmotion", *shlex.split(line)], cwd=tmp_path, capture_output=True, text=True
+        )
+        assert done.returncode == 0, done.stdout + done.stderr
+    before, after = map(float, re.search(r"falls from ([\d.]+) mm to ([\d.]+) mm", done.stdout).groups())
+    assert after < 0.2 * before
+    printed = blender(HERE / "by_hand.py", EXTENSION, tmp_path, "import")
+    assert 1e-4 < float(printed.split("largest change:")[1].split()[0]) < 0.2
