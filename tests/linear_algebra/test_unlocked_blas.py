@@ -4,7 +4,6 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
-
 from calmotion.linear_algebra.unlocked_blas import add_gram, divide_right, factor_cholesky
 
 
@@ -35,10 +34,11 @@ def test_the_upper_triangle_of_a_divisor_is_not_read(transposed: bool) -> None:
 
 
 @pytest.mark.parametrize("lower", [False, True])
-def test_one_triangle_of_a_gram_matrix_is_added(lower: bool) -> None:
+@pytest.mark.parametrize("of_columns", [False, True])
+def test_one_triangle_of_a_gram_matrix_is_added(lower: bool, of_columns: bool) -> None:
     _, _, B = _matrices()
     C = np.asfortranarray(np.ones((23, 23)))
-    add_gram(C, B, -2.0, lower)
+    add_gram(C, np.asfortranarray(B.T) if of_columns else B, -2.0, lower, of_columns)
     changed = np.tril(np.ones_like(C)) if lower else np.triu(np.ones_like(C))
     assert np.abs(C - (1.0 - 2.0 * changed * (B @ B.T))).max() < 1e-12
 

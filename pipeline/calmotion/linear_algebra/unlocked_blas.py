@@ -49,16 +49,17 @@ def divide_right(B: _Dense, L: _Dense, transposed: bool) -> None:
         )  # fmt: skip
 
 
-def add_gram(C: _Dense, A: _Dense, factor: float, lower: bool) -> None:
-    """One triangle of C += factor A A^T; C of shape [m, m], A of shape [m, k]."""
+def add_gram(C: _Dense, A: _Dense, factor: float, lower: bool, of_columns: bool = False) -> None:
+    """One triangle of C += factor A A^T, or factor A^T A of the columns; C of shape [m, m], A [m, k] or [k, m]."""
     _check(C)
     _check(A)
-    if C.shape != (len(A), len(A)):
+    m, k = A.shape[::-1] if of_columns else A.shape
+    if C.shape != (m, m):
         raise ValueError(f"shapes {C.shape} and {A.shape} do not fit")
     if A.size:
         _function("cython_blas", "dsyrk", 10)(
-            _LOWER if lower else _UPPER, _PLAIN, _size(len(A)), _size(A.shape[1]), _number(factor), A.ctypes.data,
-            _stride(A), _number(1.0), C.ctypes.data, _stride(C),
+            _LOWER if lower else _UPPER, _TRANSPOSED if of_columns else _PLAIN, _size(m), _size(k), _number(factor),
+            A.ctypes.data, _stride(A), _number(1.0), C.ctypes.data, _stride(C),
         )  # fmt: skip
 
 

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from calmotion.linear_algebra.unlocked_blas import add_gram
 from calmotion.reduction.elements.assembly import QuadraticMesh, corner_gradients
 from calmotion.reduction.elements.green_strain_fields import green_fields
 from calmotion.shot.character import Array
@@ -130,12 +131,10 @@ def strain_gram(rule: GradientRule, modes: Array, lame: float, mu: float, direct
     Source: Barbic and James, Real-Time Subspace Integration for St. Venant-Kirchhoff Deformable Models, 2005 (the
     cubic polynomial), in the form of a Gram matrix.
     """
-    from scipy.linalg.blas import dsyrk
-
     r = modes.shape[2]
     p = r if directions is None else directions.shape[1]
     size = r + p * (p + 1) // 2
-    A = np.zeros((size, size))
+    A = np.zeros((size, size), order="F")  # its upper triangle
     count, points = rule.weights.shape
     # strain fields of about 16 MB at a time stay in the processor's cache
     chunk = max(1, 2_000_000 // (7 * points * size))
@@ -155,8 +154,8 @@ def strain_gram(rule: GradientRule, modes: Array, lame: float, mu: float, direct
                 green_fields(
                     G[:, :, selected], H[:, :, selected], np.sqrt(np.abs(weights[selected])), shear, bulk, fields
                 )
-                A += dsyrk(factor, fields.reshape(size, -1).T, trans=1)  # the upper triangle
-    return A + np.triu(A, 1).T
+                add_gram(A, fields.reshape(size, -1).T, factor, lower=False, of_columns=True)
+    return np.ascontiguousarray(A + np.triu(A, 1).T)
 
 
 def pair_index(r: int) -> Any:
