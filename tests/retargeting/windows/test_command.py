@@ -42,7 +42,7 @@ def test_inspect_tells_windows_memory_and_time(shot, calmotion):
     assert report["windows"] == 1 and report["memory_gb"] > 0.0 and report["hours"] > 0.0
     run = calmotion("inspect", shot, "--json", "--set", "retarget.optimize.window=0.5s")
     report = json.loads(run.stdout)["expected"]
-    assert report["windows"] == 2 and report["window_s"] == 0.5 and report["overlap_s"] == 0.125
+    assert report["windows"] == 2 and report["window_s"] == 0.5 and report["overlap_s"] == 0.25
     run = calmotion("inspect", shot, "--set", "retarget.optimize.window=0.5s")
     text = " ".join(run.stdout.split())  # lines break where the terminal ends
     assert "in 2 windows of 0.5 s" in text and "of memory" in text

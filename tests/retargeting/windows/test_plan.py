@@ -28,6 +28,8 @@ def test_the_overlap_is_the_time_in_which_the_slowest_mode_falls_to_a_tenth():
     rate = 2.0 * np.pi * 9.0 * 0.005
     assert np.exp(-rate * overlap_time(frequencies, damping, 100.0)) == pytest.approx(0.1)
     assert overlap_time(frequencies, damping, 10.0) == 2.5  # a quarter of a window at most
+    assert overlap_time(frequencies, damping, 5.0) == 1.5  # or what suffices
+    assert overlap_time(frequencies, damping, 2.0) == 1.0  # but half a window at most
     assert overlap_time(np.array([100.0]), np.array([0.5]), 20.0) == 1.0
     assert overlap_time(np.zeros(0), np.zeros(0), 20.0) == 1.0
 

@@ -19,7 +19,8 @@ from calmotion.shot.character import Array, contact_joints
 from calmotion.shot.run import LONG_SHOT, WINDOW, WINDOW_OVERLAP, RunSettings
 
 FALL = 10.0  # factor by which the slowest mode falls in an overlap
-LEAST = 1.0  # overlap, but not above a quarter of a window [s]
+LEAST = 1.0  # overlap, but not above half a window [s]
+SUFFICIENT = 1.5  # overlap that is not shortened to a quarter of a window, but to half of one [s]
 FEWEST = 12  # frames of a window
 
 
@@ -100,7 +101,7 @@ def overlap_time(frequencies: Array, damping: Array, length: float) -> float:
     rates = 2.0 * np.pi * np.asarray(frequencies) * np.asarray(damping)  # amplitudes fall like exp(-rate t)
     slowest = float(np.min(rates[rates > 0.0], initial=math.inf))
     falling = math.log(FALL) / slowest if math.isfinite(slowest) else LEAST
-    return min(max(LEAST, falling), WINDOW_OVERLAP * length)
+    return min(max(LEAST, falling), max(WINDOW_OVERLAP * length, min(SUFFICIENT, 0.5 * length)))
 
 
 def plan_windows(frame_times: Array, length: float, overlap: float) -> tuple[Window, ...]:
