@@ -15,6 +15,7 @@ from calmotion.multibody.integrators.workspace import Workspace
 from calmotion.retargeting.avoided_reversals import count_reversals, play_of
 from calmotion.retargeting.checkpoint import Checkpoint, problem_key
 from calmotion.retargeting.found_curves import found_curves
+from calmotion.retargeting.kept_feet import keep_feet
 from calmotion.retargeting.problem.limit_costs import limit_costs
 from calmotion.retargeting.problem.limits import FIRST_PENALTY
 from calmotion.retargeting.problem.posing import locked_coefficients, pose
@@ -121,6 +122,7 @@ def _optimized(
     refuse_open_joints(character, prepared.model, prepared.grid, problem.run, options)
     if options.avoid_reversals:
         count_reversals(problem, play_of(character), options.avoid_reversals)
+    keep_feet(prepared, problem)
     before, before_value, used_before = problem.run, problem.objective_value(), _used(problem, character)
     if problem.limits is not None:
         problem.limits.rho = (

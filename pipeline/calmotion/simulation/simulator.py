@@ -132,23 +132,27 @@ class Simulator:
             continuous=continuous, begin=begin,
         )  # fmt: skip
 
-    def tangent(self, values: Array, rates: Array, efforts: bool) -> tuple[Array, Array]:
+    def tangent(self, values: Array, rates: Array, efforts: bool, d_load: Array | None = None) -> tuple[Array, Array]:
         """Change of the components' coordinates, shape [T, B, N], and where wanted of the motors' efforts, [T, M], with
-        the motors' values and rates, shape [T, M]."""
+        the motors' values and rates, shape [T, M].
+
+        Args:
+            d_load: Filled with the change of the joints' multipliers, shape [T, J, 6], of a shot that plays once.
+        """
         assert self._linearization is not None
         given = *followed(self.model, values, rates, self.h, self._steady is not None), efforts
         if self._monodromy is None:
-            motion, effort = tangent(self._linearization, *given)
+            motion, effort = tangent(self._linearization, *given, d_load)
         else:
             motion, effort = periodic_tangent(self._linearization, self._monodromy, *given)
         return motion, self.model.motor_values(effort)
 
-    def adjoint(self, gradient: Array, effort: Array | None) -> tuple[Array, Array]:
+    def adjoint(self, gradient: Array, effort: Array | None, load: Array | None = None) -> tuple[Array, Array]:
         """The transpose of `tangent`: derivatives by the motors' values and rates, shape [T, M] each."""
         assert self._linearization is not None
         given = gradient, None if effort is None else self.model.joint_angles(effort)
         if self._monodromy is None:
-            found = adjoint(self._linearization, *given)
+            found = adjoint(self._linearization, *given, load)
         else:
             found = periodic_adjoint(self._linearization, self._monodromy, *given)
         return self._on_curves(*found)

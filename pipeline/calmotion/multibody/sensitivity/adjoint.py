@@ -11,7 +11,7 @@ import numpy as np
 from calmotion.multibody.kernels.so3 import exponential, inverse_right_jacobian, right_jacobian
 from calmotion.multibody.linear_solver.closed_chains import solve_system_transposed
 from calmotion.multibody.linear_solver.step_matrix import matrix_at
-from calmotion.multibody.model.system import System
+from calmotion.multibody.model.system import JOINT_ROWS, System
 from calmotion.multibody.sensitivity.linearization import Linearization
 from calmotion.multibody.sensitivity.sweep import (
     SweepMemory,
@@ -124,8 +124,8 @@ def _add_to_history(
 
 @kernel
 def _adjoint(
-    system: System, window: Window, effort_bar: Array, memory: SweepMemory, Xbar: Array, g_angle: Array, g_rate: Array,
-    scratch: SweepScratch,
+    system: System, window: Window, effort_bar: Array, load_bar: Array, memory: SweepMemory, Xbar: Array,
+    g_angle: Array, g_rate: Array, scratch: SweepScratch,
 ) -> None:  # fmt: skip
     """Transpose of `tangent._tangent`; Xbar (body axes) and the memory, of all instants, are overwritten."""
     x, lam, solution = scratch.x, scratch.lam, scratch.solution
@@ -134,6 +134,10 @@ def _adjoint(
         matrix = matrix_at(window.steps.matrix, at)
         _right_hand_side(system, window, n, memory, Xbar, scratch)
         lam[:] = 0.0
+        if len(load_bar):
+            for j in range(len(system.rows)):
+                for i in range(JOINT_ROWS):
+                    lam[j, i] = load_bar[n, j, i]
         if len(effort_bar):
             for j in range(len(system.rows)):
                 effort_adjoint(system, j, window.axes[n], window.lam[n], matrix.Jp, effort_bar[n, j], x, lam)
@@ -152,34 +156,43 @@ def _adjoint(
             memory.turn[0] = 0.0
 
 
-def adjoint(lin: Linearization, gradient: Array, effort_gradient: Array | None = None) -> tuple[Array, Array]:
+def adjoint(
+    lin: Linearization, gradient: Array, effort_gradient: Array | None = None, load_gradient: Array | None = None
+) -> tuple[Array, Array]:
     """Gradient of an objective by the joint angles.
 
     Args:
         gradient: Its derivative by (R^T dc, dphi, du) of each component at each instant, shape [T, B, N].
         effort_gradient: Its derivative by the efforts of the joints, shape [T, J]; None where it has none.
+        load_gradient: That by the joints' multipliers, shape [T, J, 6], zero where a row is absent; None where it
+            has none.
 
     Returns:
         Its derivatives by angle and rate of each joint's motor, shape [T, J] each; zero before the linearisation
         begins.
     """
-    return sweep_adjoint(lin, gradient.copy(), effort_gradient, allocate_memory(lin.system, len(gradient)))
+    return sweep_adjoint(
+        lin, gradient.copy(), effort_gradient, allocate_memory(lin.system, len(gradient)), load_gradient
+    )
 
 
 def sweep_adjoint(
-    lin: Linearization, Xbar: Array, effort_gradient: Array | None, memory: SweepMemory
-) -> tuple[Array, Array]:
+    lin: Linearization, Xbar: Array, effort_gradient: Array | None, memory: SweepMemory,
+    load_gradient: Array | None = None,
+) -> tuple[Array, Array]:  # fmt: skip
     """The transpose of `tangent.sweep_tangent`; derivatives by angle and rate of each joint's motor, shape [T, J] each.
 
     Args:
         Xbar: Derivative by the components' coordinates, shape [T, B, N]; overwritten.
         memory: Derivatives by translation, velocity and rotation vector of all instants; overwritten.
+        load_gradient: As of `adjoint`.
     """
     total, joints = len(Xbar), len(lin.system.rows)
     efforts, scratch = effort_gradient is not None, allocate_sweep(lin.system)
     effort_bar = np.zeros((0, joints)) if effort_gradient is None else effort_gradient
+    load_bar = np.zeros((0, joints, JOINT_ROWS)) if load_gradient is None else load_gradient
     g_angle, g_rate = np.zeros((total, joints)), np.zeros((total, joints))
     for first, last in reversed(lin.windows()):
         for system, window in reversed(parts_of(lin, first, last, efforts)):
-            _adjoint(system, window, effort_bar, memory, Xbar, g_angle, g_rate, scratch)
+            _adjoint(system, window, effort_bar, load_bar, memory, Xbar, g_angle, g_rate, scratch)
     return g_angle, g_rate

@@ -12,7 +12,7 @@ from calmotion.multibody.kernels.sliders import has_row
 from calmotion.multibody.kernels.so3 import exponential, inverse_right_jacobian, right_jacobian
 from calmotion.multibody.linear_solver.closed_chains import solve_system
 from calmotion.multibody.linear_solver.step_matrix import matrix_at
-from calmotion.multibody.model.system import System
+from calmotion.multibody.model.system import JOINT_ROWS, System
 from calmotion.multibody.sensitivity.linearization import Linearization
 from calmotion.multibody.sensitivity.sweep import (
     SweepMemory,
@@ -137,7 +137,7 @@ def _remember(system: System, window: Window, n: int, memory: SweepMemory, dX: A
 @kernel
 def _tangent(
     system: System, window: Window, d_angle: Array, d_rate: Array, memory: SweepMemory, dX: Array, d_effort: Array,
-    scratch: SweepScratch,
+    d_load: Array, scratch: SweepScratch,
 ) -> None:  # fmt: skip
     """The instants of a window; instant n is entry n % 3 of the memory."""
     x, lam, solution = scratch.x, scratch.lam, scratch.solution
@@ -155,35 +155,45 @@ def _tangent(
         if len(d_effort):
             for j in range(len(system.rows)):
                 d_effort[n, j] = effort_tangent(system, j, window.axes[n], window.lam[n], matrix.Jp, x, lam)
+        if len(d_load):
+            for j in range(len(system.rows)):
+                for i in range(JOINT_ROWS):
+                    d_load[n, j, i] = lam[j, i]
         _remember(system, window, n, memory, dX, scratch)
 
 
-def tangent(lin: Linearization, d_angle: Array, d_rate: Array, efforts: bool = False) -> tuple[Array, Array]:
+def tangent(
+    lin: Linearization, d_angle: Array, d_rate: Array, efforts: bool = False, d_load: Array | None = None
+) -> tuple[Array, Array]:
     """Change of the motion by a change of the joint angles.
 
     Args:
         d_angle, d_rate: Change of angle [rad] (or length [m]) and rate of each joint's motor, shape [T, J]; those
             before the linearisation begins are not read.
         efforts: Whether to compute the change of the motors' efforts.
+        d_load: As of `sweep_tangent`.
 
     Returns:
         (R^T dc, dphi, du) of each component, shape [T, B, N], and the change of what driven joints transmit
         (`reactions.transmitted`), shape [T, J], or [0, J] without `efforts`.
     """
     dX = np.zeros((len(d_angle), len(lin.system.parent), lin.system.size))
-    return dX, sweep_tangent(lin, d_angle, d_rate, efforts, allocate_memory(lin.system, 3), dX)
+    return dX, sweep_tangent(lin, d_angle, d_rate, efforts, allocate_memory(lin.system, 3), dX, d_load)
 
 
 def sweep_tangent(
-    lin: Linearization, d_angle: Array, d_rate: Array, efforts: bool, memory: SweepMemory, dX: Array
-) -> Array:
+    lin: Linearization, d_angle: Array, d_rate: Array, efforts: bool, memory: SweepMemory, dX: Array,
+    d_load: Array | None = None,
+) -> Array:  # fmt: skip
     """The tangent over all windows, into dX, shape [T, B, N]; the change of the efforts, as `tangent` returns it.
 
     Args:
         memory: Three instants, n at n % 3; those before the first window on entry, the last ones on return.
+        d_load: Filled with the change of the joints' multipliers, shape [T, J, 6]; None where it is not wanted.
     """
+    loads = np.zeros((0, len(lin.system.rows), JOINT_ROWS)) if d_load is None else d_load
     d_effort, scratch = np.zeros((len(d_angle) if efforts else 0, len(lin.system.rows))), allocate_sweep(lin.system)
     for first, last in lin.windows():
         for system, window in parts_of(lin, first, last, efforts):
-            _tangent(system, window, d_angle, d_rate, memory, dX, d_effort, scratch)
+            _tangent(system, window, d_angle, d_rate, memory, dX, d_effort, loads, scratch)
     return d_effort

@@ -12,6 +12,7 @@ from calmotion.multibody.analysis.rigid_response import RigidResponse
 from calmotion.multibody.failure import SimulationFailure
 from calmotion.multibody.model.model import Model
 from calmotion.multibody.parallel import in_parallel
+from calmotion.retargeting.problem.ground import GROUND
 from calmotion.retargeting.problem.limits import LimitTerms
 from calmotion.retargeting.problem.offset_basis import OffsetBasis
 from calmotion.retargeting.problem.offset_space import OffsetSpace
@@ -29,6 +30,7 @@ from calmotion.retargeting.problem.several_robots import (
     continuous_adjoints,
     further_efforts,
     joined_residuals,
+    on_ground,
     reversal_curvatures,
     squared_errors,
     tangents,
@@ -102,8 +104,7 @@ class RetargetProblem:
         """
         other = self._copy()
         other.space, other.preconditioner, other._sharpened_x = self.space.on_basis(basis), None, np.zeros(0)
-        other.x = x
-        other._linearized_x = np.zeros(0)
+        other.x, other._linearized_x = x, np.zeros(0)
         return other
 
     def over_motors(self, motors: IntArray, coupling: Array) -> RetargetProblem:
@@ -159,10 +160,10 @@ class RetargetProblem:
         """Values of the limited quantities at the point evaluated last, shape [T, M] each."""
         if self._limited is None:
             bounds = {} if self.limits is None else self.limits.bounds
-            own = [name for name in bounds if name in QUANTITIES]
-            self._limited = limited_values(self.model, own, self.changed_curves, self.run)
+            self._limited = limited_values(self.model, bounds.keys() & set(QUANTITIES), self.changed_curves, self.run)
             if EFFORT in bounds:
                 self._limited |= further_efforts(self.robots, self.changed_curves)
+            self._limited |= on_ground(self.robots)
         return self._limited
 
     def hold(self, first: int) -> None:
@@ -247,7 +248,7 @@ class RetargetProblem:
     def jvp(self, direction: Array) -> tuple[Array, dict[str, Array]]:
         """Change of the weighted residuals along a direction, shape [S T, R], and of the limited quantities."""
         bounds, space = {} if self._acting is None else self._acting.bounds, self.space
-        residuals, efforts = tangents(self.robots, *space.offsets(direction), EFFORT in bounds)
+        residuals, efforts = tangents(self.robots, *space.offsets(direction), EFFORT in bounds, GROUND in bounds)
         changes = {name: space.spread(spline, direction) for name, spline in space.splines.items() if name in bounds}
         return residuals, changes | efforts
 

@@ -8,6 +8,7 @@ from scipy.sparse import csr_matrix
 from calmotion.multibody.analysis.rigid_response import RigidResponse
 from calmotion.multibody.model.model import Model, rigid_model
 from calmotion.multibody.model.moving_markers import rooted
+from calmotion.retargeting.problem.ground import GROUND
 from calmotion.retargeting.problem.offset_space import OffsetSpace
 from calmotion.shot.character import Array
 from calmotion.simulation.inputs.curves import Curves
@@ -64,7 +65,7 @@ def limit_metrics(inertia: Array, space: OffsetSpace, curvatures: dict[str, Arra
     """
     metrics = []
     for name, weight in curvatures.items():
-        if not np.any(weight):
+        if not np.any(weight) or name.startswith(GROUND):  # feet have few limits that act
             continue
         if name.startswith(EFFORT):
             metrics.append((space.basis.accelerations, np.einsum("nma,nm,nmb->nab", inertia, weight, inertia)))

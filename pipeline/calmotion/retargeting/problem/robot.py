@@ -5,10 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from calmotion.multibody.model.model import Model, with_damping
+from calmotion.retargeting.problem.ground import GroundSlopes, ground_values
 from calmotion.retargeting.problem.reversals import ReversalTerms, transmitted_by
 from calmotion.shot.character import Array
 from calmotion.simulation.forward import ForwardRun
 from calmotion.simulation.simulator import Simulator
+from calmotion.simulation.standing.ground_limits import GroundLimits
 from calmotion.simulation.target_errors import Objective
 
 
@@ -25,6 +27,8 @@ class Robot:
         self.simulator, self.objective, self.weight = simulator, objective, weight
         self.residuals = self._inverse = self._jacobian = np.zeros(0)
         self.reversals: ReversalTerms | None = None  # of the play of its gears, where reversals are to be avoided
+        self.ground: GroundLimits | None = None  # of what ground can do to its feet
+        self._ground_slopes: GroundSlopes | None = None  # where it was linearised last
         self._efforts = np.zeros(0)  # transmitted by its gears, where they count
         self._run: ForwardRun | None = None
 
@@ -76,6 +80,11 @@ class Robot:
         found[:, self.reversals.motors] = self.weight * self.reversals.slopes(self._efforts) ** 2
         return found
 
+    def on_ground(self) -> Array:
+        """The limited quantities of its feet, `ground.ground_values`, for the curves performed last."""
+        assert self.ground is not None
+        return ground_values(self.ground, self.run, self.simulator.h)
+
     def linearize(self) -> None:
         """Linearise about the curves performed last."""
         self.simulator.linearize(self.run)
@@ -85,19 +94,25 @@ class Robot:
         states = self.run.trajectory.states
         self._jacobian = self.objective.jacobian(states.c, states.q, states.u, self._inverse)
         self._jacobian *= np.sqrt(self.weight)
+        if self.ground is not None:
+            self._ground_slopes = GroundSlopes.about(self.ground, self.run, self.simulator.h)
 
-    def tangent(self, values: Array, rates: Array, efforts: bool) -> tuple[Array, Array]:
-        """Change of the residuals, shape [T, R], and where wanted of the motors' efforts, with the motor curves, shape
-        [T, M] each."""
-        motion, effort = self.simulator.tangent(values, rates, efforts or self.reversals is not None)
+    def tangent(self, values: Array, rates: Array, efforts: bool, ground: bool = False) -> tuple[Array, Array, Array]:
+        """Change of the residuals, shape [T, R], and where wanted of the motors' efforts and of the quantities of its
+        feet, with the motor curves, shape [T, M] each."""
+        slopes, on_ground = self._ground_slopes if ground else None, np.zeros((len(values), 0))
+        loads = None if slopes is None else np.zeros_like(self.run.trajectory.states.lam)
+        motion, effort = self.simulator.tangent(values, rates, efforts or self.reversals is not None, loads)
+        if slopes is not None and loads is not None:
+            on_ground = slopes.tangent(motion, loads)
         errors = self.objective.gather(self._jacobian, motion)
         errors = errors.reshape(len(errors), -1)
         if self.reversals is None:
-            return errors, effort
-        slopes = np.sqrt(self.weight) * self.reversals.slopes(self._efforts)
-        return np.concatenate([errors, slopes * effort[:, self.reversals.motors]], axis=1), effort
+            return errors, effort, on_ground
+        by_effort = np.sqrt(self.weight) * self.reversals.slopes(self._efforts)
+        return np.concatenate([errors, by_effort * effort[:, self.reversals.motors]], axis=1), effort, on_ground
 
-    def adjoint(self, residuals: Array, effort: Array | None) -> tuple[Array, Array]:
+    def adjoint(self, residuals: Array, effort: Array | None, ground: Array | None = None) -> tuple[Array, Array]:
         """The transpose of `tangent`: derivatives by the motors' values and rates, shape [T, M] each."""
         count = int(np.prod(self.residuals.shape[1:]))
         if self.reversals is not None:
@@ -105,7 +120,11 @@ class Robot:
             effort = np.zeros(self._efforts.shape) if effort is None else effort.copy()
             effort[:, self.reversals.motors] += slopes * residuals[:, count:]
         errors = residuals[:, :count].reshape(self.residuals.shape)
-        return self.simulator.adjoint(self.objective.scatter(self._jacobian, errors), effort)
+        gradient, loads = self.objective.scatter(self._jacobian, errors), None
+        if ground is not None and self._ground_slopes is not None:
+            loads = np.zeros_like(self.run.trajectory.states.lam)
+            self._ground_slopes.adjoint(ground, gradient, loads)
+        return self.simulator.adjoint(gradient, effort, loads)
 
     def continuous_adjoint(self) -> tuple[Array, Array]:
         """Derivatives of half the squared residuals by the continuous adjoint."""

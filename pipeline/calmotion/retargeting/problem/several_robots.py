@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from calmotion.multibody.parallel import in_parallel
+from calmotion.retargeting.problem.ground import ground_of
 from calmotion.retargeting.problem.rigid_approximation import EFFORT, effort_of
 from calmotion.retargeting.problem.robot import Robot
 from calmotion.shot.character import Array
@@ -24,12 +25,16 @@ def squared_errors(robots: Sequence[Robot]) -> float:
     return float(sum(np.sum(robot.residuals**2) for robot in robots))
 
 
-def tangents(robots: Sequence[Robot], values: Array, rates: Array, efforts: bool) -> tuple[Array, dict[str, Array]]:
-    """Changes of all residuals, shape [S T, R], and where wanted of each robot's efforts, with the motor curves, shape
-    [T, M] each."""
-    found = in_parallel(lambda robot: robot.tangent(values, rates, efforts), robots)
-    changes = {effort_of(k): effort for k, (_, effort) in enumerate(found)} if efforts else {}
-    return found[0][0] if len(found) == 1 else np.concatenate([residuals for residuals, _ in found]), changes
+def tangents(
+    robots: Sequence[Robot], values: Array, rates: Array, efforts: bool, ground: bool
+) -> tuple[Array, dict[str, Array]]:
+    """Changes of all residuals, shape [S T, R], and where wanted of each robot's efforts and the quantities of its
+    feet, with the motor curves, shape [T, M] each."""
+    found = in_parallel(lambda robot: robot.tangent(values, rates, efforts, ground), robots)
+    changes = {effort_of(k): effort for k, (_, effort, _) in enumerate(found)} if efforts else {}
+    if ground:
+        changes |= {ground_of(k): own for k, (_, _, own) in enumerate(found) if robots[k].ground is not None}
+    return found[0][0] if len(found) == 1 else np.concatenate([residuals for residuals, _, _ in found]), changes
 
 
 def adjoints(robots: Sequence[Robot], residuals: Array, limited: dict[str, Array]) -> tuple[Array, Array]:
@@ -37,7 +42,7 @@ def adjoints(robots: Sequence[Robot], residuals: Array, limited: dict[str, Array
     parts = np.split(residuals, len(robots))
 
     def pulled(k: int) -> tuple[Array, Array]:
-        return robots[k].adjoint(parts[k], limited.get(effort_of(k)))
+        return robots[k].adjoint(parts[k], limited.get(effort_of(k)), limited.get(ground_of(k)))
 
     return _summed(in_parallel(pulled, range(len(parts))))
 
@@ -53,6 +58,11 @@ def further_efforts(robots: Sequence[Robot], curves: Curves) -> dict[str, Array]
         effort_of(k): limited_values(robot.model, (EFFORT,), curves, robot.run)[EFFORT]
         for k, robot in enumerate(robots[1:], 1)
     }
+
+
+def on_ground(robots: Sequence[Robot]) -> dict[str, Array]:
+    """The limited quantities of the feet of all robots that have any, by the name of their limit."""
+    return {ground_of(k): robot.on_ground() for k, robot in enumerate(robots) if robot.ground is not None}
 
 
 def reversal_curvatures(robots: Sequence[Robot]) -> dict[str, Array]:

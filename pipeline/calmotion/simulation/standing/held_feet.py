@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 
 from calmotion.shot import Character, Frame, Motion
 from calmotion.shot.character import Array, contact_joints
-from calmotion.simulation.standing.soles import centres_of_pressure, margins, points_of, sole_of
+from calmotion.simulation.standing.soles import centres_of_pressure, margins, points_of, sole_of, vertical, weight_of
 
 _NOTHING = 1e-6  # of the weight: a force that is rounding
 _LIGHT = 1e-2  # of the weight: a foot that carries less has no centre of pressure that matters
@@ -96,7 +96,7 @@ def _held(character: Character, motion: Motion, joint: int, start: int, end: int
         return foot
     up, times = -character.gravity / gravity, motion.times[steady]
     lift = forces[steady] @ up
-    least, pushed = int(np.argmin(lift)), lift > _LIGHT * _weight(character)
+    least, pushed = int(np.argmin(lift)), lift > _LIGHT * weight_of(character)
     foot = replace(foot, normal=(float(lift[least]), float(times[least])))
     if not np.any(pushed):
         return foot
@@ -109,20 +109,7 @@ def _held(character: Character, motion: Motion, joint: int, start: int, end: int
     points = points_of(character.bodies[body], Frame(motion.positions[start, body], motion.rotations[start, body]))
     axes = (turns[start] * Rotation.from_quat(frame.rotation, scalar_first=True)).as_matrix()
     rows = np.flatnonzero(pushed) + steady.start
-    return replace(foot, margin=_least_margin(points, motion, places, forces, moments, rows, up, _vertical(axes, up)))
-
-
-def _weight(character: Character) -> float:
-    """Of the whole robot, flexible bodies without an authored mass left out [N]."""
-    masses = [body.mass.mass for body in character.bodies if body.mass is not None]
-    return float(np.linalg.norm(character.gravity)) * float(sum(masses))
-
-
-def _vertical(axes: Array, up: Array) -> Array:
-    """The axis of a frame, of either sign, that is nearest to up: feet that give way land tilted."""
-    along = axes.T @ up
-    nearest = int(np.argmax(np.abs(along)))
-    return np.asarray(np.sign(along[nearest]) * axes[:, nearest])
+    return replace(foot, margin=_least_margin(points, motion, places, forces, moments, rows, up, vertical(axes, up)))
 
 
 def _least_margin(
@@ -147,7 +134,7 @@ def unlike_ground(character: Character, foot: HeldFoot) -> list[str]:
     contact = character.joints[foot.joint].contact
     assert contact is not None
     found = []
-    if foot.normal is not None and foot.normal[0] < -_NOTHING * _weight(character):
+    if foot.normal is not None and foot.normal[0] < -_NOTHING * weight_of(character):
         found.append("pulls")
     if foot.margin is not None and foot.margin[0] < 0.0:
         found.append("tips")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from calmotion.shot.character import Array, Body, Frame
+from calmotion.shot.character import Array, Body, Character, Frame
 
 STANDS = 5e-3  # points of a body that are higher above its lowest one, over its extent, do not stand on the ground
 
@@ -46,16 +46,36 @@ def centres_of_pressure(forces: Array, moments: Array, places: Array, up: Array,
 
 def margins(sole: Array, places: Array, up: Array) -> Array | None:
     """How far places are inside of the outline of a sole, seen from above, shape [T]; None where it has no area."""
-    from scipy.spatial import ConvexHull, QhullError
-
-    if len(sole) < 3:
-        return None
     across = np.cross(up, np.eye(3)[int(np.argmin(np.abs(up)))])
     across /= np.linalg.norm(across)
     plane = np.stack([across, np.cross(up, across)], axis=1)
+    edges = outline(sole @ plane)
+    return None if edges is None else np.asarray(-(places @ plane @ edges[:, :2].T + edges[:, 2]).max(axis=1))
+
+
+def outline(points: Array) -> Array | None:
+    """Edges of the convex hull of points of shape [n, 2]: rows (n, c) with n.x + c <= 0 inside, shape [e, 3]; None
+    where they have no area."""
+    from scipy.spatial import ConvexHull, QhullError
+
+    if len(points) < 3:
+        return None
     try:
-        hull = ConvexHull(sole @ plane)
+        rows: Array = ConvexHull(points).equations
     except QhullError:
         return None
-    # rows (n, c) with n.x + c <= 0 inside
-    return np.asarray(-(places @ plane @ hull.equations[:, :2].T + hull.equations[:, 2]).max(axis=1))
+    # triangles of a sole share its edges
+    return rows[np.sort(np.unique(np.round(rows, 9), axis=0, return_index=True)[1])]
+
+
+def vertical(axes: Array, up: Array) -> Array:
+    """The axis of a frame, of either sign, that is nearest to up: feet that give way land tilted."""
+    along = axes.T @ up
+    nearest = int(np.argmax(np.abs(along)))
+    return np.asarray(np.sign(along[nearest]) * axes[:, nearest])
+
+
+def weight_of(character: Character) -> float:
+    """Of the whole robot, flexible bodies without an authored mass left out [N]."""
+    masses = [body.mass.mass for body in character.bodies if body.mass is not None]
+    return float(np.linalg.norm(character.gravity)) * float(sum(masses))
