@@ -116,8 +116,7 @@ class RetargetProblem:
         other = self._copy()
         other.space = replace(self.space, motors=motors, coupling=coupling)
         other.limits, other._response, other.preconditioner = None, None, None
-        other._sharpened_x = np.zeros(0)
-        other.x = np.zeros(other.space.size)
+        other._sharpened_x, other.x = np.zeros(0), np.zeros(other.space.size)
         return other
 
     @property

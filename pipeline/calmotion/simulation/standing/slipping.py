@@ -14,10 +14,12 @@ from calmotion.multibody.analysis.kinematics import rigid_state
 from calmotion.multibody.model.model import Model, start_angles
 from calmotion.multibody.model.phases import held_contacts
 from calmotion.shot import Character
+from calmotion.shot.character import Array, BoolArray
 from calmotion.shot.tolerance import tolerance_of
 from calmotion.simulation.forward import ForwardRun
 from calmotion.simulation.inputs.time_grid import TimeGrid
 
+ABOVE = 1.1  # of a slip: the tolerance that lets it be
 TOPPLED = 0.2  # turn of a base at rest that is no sag [rad]
 
 
@@ -41,27 +43,36 @@ def refuse_slipping(
         body = system.side[joint, 1]
         turns = Rotation.from_quat(states.q[:, body], scalar_first=True)
         places = states.c[:, body] + turns.apply(system.position[joint, 1])
-        anchor = 0
-        for n in range(1, len(places)):
-            if not held[n, column]:
-                anchor = n
-                continue
-            far = float(np.linalg.norm(places[n] - places[anchor]))
-            if far > allowed:
-                others = [
-                    character.joints[order[other]].path
-                    for k, other in enumerate(joints)
-                    if other != joint and held[n, k]
-                ]
-                raise ShotError(
-                    f"this contact slips by {1e3 * far:.3g} mm while it is held, at {grid.times[n]:.3f} s: the curves "
-                    f"of the motors between it and {', '.join(others) or 'the world'} contradict each other",
-                    path=character.joints[order[joint]].path,
-                    attribute="calm:contact:active",
-                    found=True,
-                    remedy="Hold one foot at a time (let one contact end when the other begins), correct the curves so "
-                    "that feet stay where they are held, or raise the tolerance above the slip",
-                )
+        far, worst = _largest_slip(places, held[:, column])
+        if far > allowed:
+            others = [
+                character.joints[order[other]].path
+                for k, other in enumerate(joints)
+                if other != joint and held[worst, k]
+            ]
+            when = f"at {grid.times[worst]:.3f} s" + (", in the pre-roll" if grid.times[worst] < 0.0 else "")
+            raise ShotError(
+                f"this contact slips by up to {1e3 * far:.3g} mm while it is held, {when}: the curves of the motors "
+                f"between it and {', '.join(others) or 'the world'} contradict each other",
+                path=character.joints[order[joint]].path,
+                attribute="calm:contact:active",
+                found=True,
+                remedy="Hold one foot at a time (let one contact end when the other begins), correct the curves so "
+                f"that feet stay where they are held, or accept the slip with --tolerance {1e3 * far * ABOVE:.2g}mm",
+            )
+
+
+def _largest_slip(places: Array, held: BoolArray) -> tuple[float, int]:
+    """How far a frame at places of shape [T, 3] moves at most from where it was when it came [m], and when."""
+    far, worst, anchor = 0.0, 0, 0
+    for n in range(1, len(places)):
+        if not held[n]:
+            anchor = n
+            continue
+        moved = float(np.linalg.norm(places[n] - places[anchor]))
+        if moved > far:
+            far, worst = moved, n
+    return far, worst
 
 
 def _refuse_toppled(character: Character, model: Model, run: ForwardRun) -> None:
