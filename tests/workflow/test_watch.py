@@ -1,13 +1,18 @@
 """A watched shot is run again when it is saved, and keeps what its change leaves as it was."""
 
+import argparse
 import os
 import re
+import sys
 from dataclasses import replace
 from functools import partial
 
 import numpy as np
 import pytest
+from calmotion.accuracy.reduced_bodies import ConvergedReduction, RunMemory
 from calmotion.cli.main import main
+from calmotion.cli.output import Output
+from calmotion.cli.run import _tell
 from calmotion.errors import ShotError
 from calmotion.host import Operator
 from calmotion.host.plan import Plan
@@ -121,6 +126,32 @@ def test_loads_are_compared_component_by_component():
     assert _growth(replace(load, force=np.ones((3, 3))), load) == np.inf
     still = replace(load, angular_velocity=np.zeros(3))
     assert _growth(load, still) == np.inf and _growth(still, load) == pytest.approx(1.0)
+
+
+def test_what_a_run_took_over_and_what_it_made_are_told(shot_file, capsys):
+    """The report alone: the meshes and the memory of a flexible robot beside the values of this one."""
+    memory = RunMemory()
+    converged = ConvergedReduction(None, 0.0, None, memory=memory)
+
+    def run(shot):
+        result = simulate(shot, step=STEP)
+        result.outcome.run.data.update({FEMeshes: FEMeshes((None,)), ConvergedReduction: converged})
+        memory.projected, memory.step = "subspaces", 1e-3
+        return result
+
+    watch = Watch(Shot(shot_file), run)
+    watch.run()
+    assert (watch.reused, watch.made) == ([], ["meshes", "reduction", "subspaces", "time step"])
+    memory.taken += ["time step", "time step"]
+    watch._last = {}  # else it would be forgotten, as that of the run before
+    result = watch.run()
+    assert (watch.reused, watch.made) == (["time step"], ["meshes", "reduction", "subspaces"])
+    args = argparse.Namespace(quiet=False, optimize=False)
+    _tell(result, watch, 1.0, args, Output(sys.stdout, False))
+    assert "; reused time step; made meshes, reduction, subspaces" in capsys.readouterr().out
+    watch._last = {ConvergedReduction: converged}
+    watch.run()
+    assert watch.reused == []
 
 
 def test_an_operator_whose_values_are_known_does_not_run():

@@ -30,6 +30,9 @@ class ReducedBodies:
     reduction: BodyReduction | None = None
 
 
+SUBSPACES, TIME_STEP, DIRECTIONS = "subspaces", "time step", "search directions"  # what a run may take over
+
+
 @dataclass(eq=False)
 class RunMemory:
     """What the last run of a shot with the same bodies found, for a run of almost the same motion.
@@ -39,12 +42,14 @@ class RunMemory:
         step: Its time step [s]; 0 where it was not chosen.
         integrator: By which it was simulated.
         search: What its search leaves to the next, see `retargeting.search_memory`.
+        taken: Names of what the latest run took over of this.
     """
 
     projected: ProjectedShot | None = None
     step: float = 0.0
     integrator: str = ""
     search: Any = None
+    taken: list[str] = field(default_factory=list)
 
 
 @dataclass(frozen=True, eq=False)

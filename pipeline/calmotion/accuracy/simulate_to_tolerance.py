@@ -14,7 +14,7 @@ import numpy as np
 from calmotion.accuracy.integrator_choice import by_fast_scheme
 from calmotion.accuracy.mesh_budget import mesh_error, patch_error
 from calmotion.accuracy.pod_subspace import ProjectedShot, ReferenceRun, project_to_subspace
-from calmotion.accuracy.reduced_bodies import RunMemory
+from calmotion.accuracy.reduced_bodies import SUBSPACES, TIME_STEP, RunMemory
 from calmotion.accuracy.simulate_again import with_last_choices
 from calmotion.accuracy.step_error import (
     StepRun,
@@ -107,6 +107,7 @@ def _simulated_again(
     if not kept and error > allowed_step_error(character, options, besides_step(accuracy)):
         return None
     result = with_modes(result, shot.bodies)
+    memory.taken += [SUBSPACES, TIME_STEP]
     return with_step(result, character, options, replace(accuracy, efforts=effort_errors(run, coarse)))
 
 

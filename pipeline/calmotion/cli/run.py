@@ -156,7 +156,7 @@ def _tell(result: SimulationResult, watch: Watch, seconds: float, args: argparse
 
     report: dict[str, Any] = result.report()
     if output.json:
-        output.object(report | {"reused": watch.reused, "seconds": seconds})
+        output.object(report | {"reused": watch.reused, "made": watch.made, "seconds": seconds})
         return
     if args.quiet:
         return
@@ -164,6 +164,7 @@ def _tell(result: SimulationResult, watch: Watch, seconds: float, args: argparse
     verdict = "tolerance kept" if report["tolerance_kept"] else "tolerance missed"
     what = "optimised" if args.optimize else "simulated"
     reused = f"; reused {', '.join(watch.reused)}" if watch.reused else ""
+    reused += f"; made {', '.join(watch.made)}" if watch.made else ""
     print(
         f"{time.strftime('%H:%M:%S')} {what} in {seconds:.2f} s: largest error {length(error)} of {path} at "
         f"{moment:.2f} s, {verdict}{reused}",

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from calmotion.accuracy.reduced_bodies import RunMemory
+from calmotion.accuracy.reduced_bodies import DIRECTIONS, RunMemory
 from calmotion.errors import ShotError
 from calmotion.multibody.failure import SimulationFailure
 from calmotion.multibody.integrators.workspace import Workspace
@@ -138,6 +138,7 @@ def _optimized(
     problem, search = searched.problem, searched.search
     if memory is not None:
         memory.search = SearchMemory.of(problem, search)
+        memory.taken += [DIRECTIONS] if searched.took_over else []
     fixed = searched.hold()
     curves, x = found_curves(problem, len(character.motors), search.x)
     problem.forget()

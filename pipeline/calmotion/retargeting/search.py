@@ -55,6 +55,7 @@ class RetargetSearch:
         idle_gain: Gain that idle motors would bring at the end [m]; None where there are none.
         interrupted: Whether the user ended it.
         resumed_iterations: Iterations of the checkpoint from which it resumed.
+        took_over: Whether it began with the directions of the search before.
     """
 
     problem: RetargetProblem
@@ -71,6 +72,7 @@ class RetargetSearch:
     idle_gain: float | None = None
     interrupted: bool = False
     resumed_iterations: int = 0
+    took_over: bool = False
 
     _unconfirmed: bool = False  # whether the state is that of a file
 
@@ -91,7 +93,8 @@ class RetargetSearch:
         widen_unavoidable(self.problem, fixed)
         self.search = Search.start(np.where(fixed, 0.0, start))
         if last is not None:
-            self.search = last.begun(self.problem, self.search)
+            begun = last.begun(self.problem, self.search)
+            self.took_over, self.search = begun is not self.search, begun
         resumed = self._resume()
         fixed = self.hold()
         try:

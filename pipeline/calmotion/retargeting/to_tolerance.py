@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from calmotion.accuracy.pod_subspace import ProjectedShot, ReferenceRun
-from calmotion.accuracy.reduced_bodies import RunMemory
+from calmotion.accuracy.reduced_bodies import SUBSPACES, TIME_STEP, RunMemory
 from calmotion.accuracy.simulate_to_tolerance import (
     FINDING,
     FIRST,
@@ -113,6 +113,8 @@ def optimize_to_tolerance(
             iterations = max((row.iterations for row in latest.windows), default=latest.iterations)
             ended = iterations >= options.max_iterations  # a new POD subspace would allow no further iteration
             if fine and (ended or _is_accurate(projected, tracks, result, options, again)):
+                if again and not number:
+                    memory.taken += [SUBSPACES, *([TIME_STEP] if chooses and memory.step else [])]
                 memory.projected, memory.step = projected, result.step_s
                 break
         except KeyboardInterrupt:

@@ -15,6 +15,7 @@ from calmotion.shot.run import Source
 from calmotion.workflow.shot import Shot
 
 if TYPE_CHECKING:
+    from calmotion.accuracy.reduced_bodies import RunMemory
     from calmotion.reduction.load_envelope import LoadEnvelope
     from calmotion.workflow.results import SimulationResult
 
@@ -34,7 +35,8 @@ class Watch:
         run: `simulate` or `optimize`, with all arguments but the shot.
 
     Attributes:
-        reused: What the last run took over: `meshes`, `reduction`, `curves`.
+        reused: What the last run took over: `meshes`, `reduction`, `curves`, and what a `RunMemory` names.
+        made: What it made anew, of the same, where the shot has it.
     """
 
     def __init__(self, shot: Shot, run: Callable[[Shot], SimulationResult]):
@@ -44,6 +46,7 @@ class Watch:
         self._files: dict[str, object] = {}
         self._error, self._growth = 0.0, 1.0  # of the reduction for its loads [m], and of the loads since then
         self.reused: list[str] = []
+        self.made: list[str] = []
         shot.reuse = self._reuse
 
     def run(self) -> SimulationResult:
@@ -55,8 +58,13 @@ class Watch:
         self._files = self._watched()
         self.shot.forget()
         self.reused = []
+        if (memory := _memory(self._last)) is not None:
+            memory.taken.clear()
         result = self._run(self.shot)
         data = result.outcome.run.data
+        if (memory := _memory(data)) is not None:
+            self.reused += dict.fromkeys(memory.taken)
+        self.made = [name for name in _parts(data) if name not in self.reused]
         if "reduction" not in self.reused:
             self._error = _error_of_reduction(data)
         self._last, self._key = data, _key(simplified_character(data[Character], data.get(ModelChoices)))
@@ -166,6 +174,29 @@ def _error_of_reduction(data: Mapping[type, Any]) -> float:
     from calmotion.accuracy.reduced_bodies import ConvergedReduction
 
     return data[ConvergedReduction].error_m if ConvergedReduction in data else 0.0
+
+
+def _memory(data: Mapping[type, Any]) -> RunMemory | None:
+    """What runs with the same bodies leave to each other."""
+    from calmotion.accuracy.reduced_bodies import ConvergedReduction
+
+    found: ConvergedReduction | None = data.get(ConvergedReduction)
+    return None if found is None else found.memory
+
+
+def _parts(data: Mapping[type, Any]) -> list[str]:
+    """What a run of a shot could take over from the one before, of those that took time."""
+    from calmotion.accuracy.reduced_bodies import DIRECTIONS, SUBSPACES, TIME_STEP
+
+    if FEMeshes not in data or not data[FEMeshes].meshes:
+        return []
+    memory, result = _memory(data), data.get(Result)
+    names = ["meshes", "reduction"]
+    if memory is not None and memory.projected is not None:
+        names += [SUBSPACES, *([TIME_STEP] if memory.step else [])]
+    if memory is not None and result is not None and result.after is not None:
+        names.append(DIRECTIONS)
+    return names
 
 
 def _same_times(one: Animation, other: Animation) -> bool:
