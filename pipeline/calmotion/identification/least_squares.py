@@ -111,7 +111,7 @@ def minimize(problem: Problem, start: Array, lower: Array, most: int = MOST) -> 
                 damping = max(damping * (0.1 if gain > 0.75 else 1.0 if gain > 0.25 else 4.0), 1e-12)
                 z = then
                 break
-            damping = max(10.0 * damping, FIRST)
+            damping *= 10.0  # not back to the first: along a narrow bent valley steps need little of it
             if damping > LARGEST:
                 return Solution(z, r, J, cost, iteration, False)
         if small:
