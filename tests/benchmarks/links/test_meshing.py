@@ -31,22 +31,40 @@ def test_links_are_named_by_path_or_name_or_taken_all(shot):
         read_links(f"{shot}:foot")
 
 
+@pytest.mark.long
 def test_the_table_shows_errors_that_decrease_towards_the_finest_mesh(shot, tmp_path, capsys):
     file = tmp_path / "table.csv"
-    assert meshing.main([f"{shot}:fore", "--sizes", "40mm", "16mm", "-o", str(file)]) == 0
+    assert meshing.main([f"{shot}:fore", "--sizes", "40mm", "16mm", "auto", "-o", str(file)]) == 0
     with open(file, newline="") as text:
-        coarse, fine = csv.DictReader(text)
+        auto, coarse, fine = csv.DictReader(text)
+    assert np.isnan(float(auto["size"])) and float(auto["f1"]) == pytest.approx(float(fine["f1"]), rel=0.02)
     assert [float(row["size"]) for row in (coarse, fine)] == pytest.approx([40.0, 16.0])
     assert coarse["held"] == fine["held"] == "joint"
     assert int(coarse["nodes"]) < int(fine["nodes"])
     # a clamped beam: f1 = 3.516 / (2 pi) sqrt(E I / (rho A L^4))
     beam = 3.516 / (2.0 * np.pi) * np.sqrt(1.8e9 * WIDTH**2 / 12.0 / 1200.0) / LENGTH**2
     assert float(fine["f1"]) == pytest.approx(beam, rel=0.03)
-    assert float(coarse["error"]) > 0.0 and np.isnan(float(fine["error"]))
+    assert float(coarse["error"]) > 0.0 and np.isnan(float(max(auto, fine, key=lambda r: int(r["nodes"]))["error"]))
     assert float(coarse["estimate"]) > float(fine["estimate"]) > 0.0
     assert all(float(fine[name]) > 0.0 for name in ("mesh_time", "reduce_time"))
     lines = capsys.readouterr().out.splitlines()
-    assert len(lines) == 4 and lines[2].startswith("| fore | 40 |") and "| - |" in lines[3]
+    assert lines[2].startswith("| fore | auto |") and lines[3].startswith("| fore | 40 |")
+    assert lines[-1].startswith("fore: ") and lines[-1].endswith("% over 3 meshes")
+
+
+def test_the_automatic_mesh_is_judged_by_the_finest_one():
+    rows = [
+        meshing.Row("fore", size, nodes, 1.0, 1.0, f1, 2.0 * f1, 3.0 * f1, np.nan, 9.0, 0.1, "joint")
+        for size, nodes, f1 in ((np.nan, 900, 103.0), (8.0, 500, 110.0), (2.0, 50_000, 100.0))
+    ]
+    rows = meshing._compared(rows)
+    assert [row.error for row in rows] == pytest.approx([3.0, 10.0, np.nan], nan_ok=True)
+    assert meshing.verdicts(rows) == (
+        "fore: the automatic mesh is 3% off the finest one (50000 nodes), 9% are estimated; the first frequency "
+        "spreads by 10% over 3 meshes\n"
+    )
+    assert meshing.verdicts(rows[:1]) == ""
+    assert meshing.table(rows).splitlines()[2].startswith("| fore | auto | 900 |")
 
 
 def test_links_that_cannot_be_meshed_are_reported_and_the_others_are_measured(shot, tmp_path, capsys):
@@ -59,6 +77,7 @@ def test_sizes_are_multiples_of_the_automatic_one_or_lengths():
     assert meshing._length("8mm", 0.01) == pytest.approx(0.008)
 
 
+@pytest.mark.long
 def test_the_survey_has_a_row_for_each_link_and_says_what_became_of_it(shot, tmp_path, capsys, monkeypatch):
     monkeypatch.setenv("CALMOTION_CACHE", str(tmp_path / "cache"))
     file = tmp_path / "links.csv"
