@@ -253,6 +253,8 @@ def print_files(console: Console, report: dict[str, Any]) -> None:
         say(console, f"next: open {unbroken(report['root_layer'])}, which shows the shot with {shown_with}")
     if report["rrd"]:
         say(console, f"next: rerun {unbroken(report['rrd'])}")
+    if not _last(report):
+        say(console, "next: calmotion optimize SHOT -o LAYER removes the shake")
     if not any(report[name] for name in ("layer", "rrd", "video")):
         say(console, "next: --rrd FILE records the motion for the rerun viewer, --video FILE makes a video of it")
 
