@@ -8,8 +8,8 @@ import numpy as np
 from calmotion.shot import Animation, Character, Motion, Result, Simulation
 from calmotion.shot.character import Array
 from calmotion.views.playback import sample_motion
-from calmotion.views.rendering import Camera, Model, View, draw_over_ghost, fit_camera, floor_below, pose, prepare
-from calmotion.views.viewpoint import choose_viewpoint
+from calmotion.views.rendering import Camera, Model, View, draw_over_ghost, fit_camera, floor_below, prepare
+from calmotion.views.viewpoint import choose_viewpoint, moving_cloud
 from PIL import Image, ImageDraw
 
 from .timeline import Moment, Worst
@@ -74,10 +74,7 @@ def set_stage(
     reference = sample_motion(result.reference, times)
     runs = [sample_motion(run.motion, times) for run in (result.before, result.after) if run is not None]
     view = choose_viewpoint(character, result.skins, runs[0])
-    cloud = np.concatenate(
-        [pose(model, motion, row)[0].reshape(-1, 3) for motion in (reference, *runs) for row in range(len(times))]
-        + [motion.target_positions.reshape(-1, 3) for motion in (reference, *runs)]
-    )
+    cloud = np.concatenate([moving_cloud(character, result.skins, motion, ROWS) for motion in (reference, *runs)])
     floor = floor_below(model, reference)
     if floor is not None:  # the shadow below the character is part of the picture
         cloud = np.concatenate([cloud, cloud - np.maximum(cloud @ model.up - floor, 0.0)[:, None] * model.up])

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from calmotion.shot.character import Array, Character
+from calmotion.shot.character import Array, Character, IntArray
 from calmotion.shot.result import Motion, Skin
-from calmotion.views.playback import world_points
+from calmotion.views.playback import deformed_points, modes_of, rotation_matrices, world_points
 
 SIDE = np.radians(38.0)
 ELEVATION = np.radians(17.0)
@@ -72,13 +72,32 @@ def choose_viewpoint(character: Character, skins: tuple[Skin | None, ...], motio
 
 
 def moving_cloud(character: Character, skins: tuple[Skin | None, ...], motion: Motion, rows: int = 40) -> Array:
-    """Points of all visible surfaces and targets at instants of a motion, shape [n, 3]."""
+    """Targets, and the corners of the convex hulls of all drawn surfaces, at instants of a motion, shape [n, 3].
+
+    A picture that has the corners of a hull has all of its surface; robots have surfaces of a hundred thousand points.
+    """
     clouds = [motion.target_positions.reshape(-1, 3)]
-    for row in np.unique(np.linspace(0, len(motion.times) - 1, rows).astype(int)):
-        for index, body in enumerate(character.bodies):
-            points = world_points(body, index, skins[index], motion, row)
-            clouds += [p for p, surface in zip(points, body.surfaces, strict=True) if surface.visible]
+    instants = np.unique(np.linspace(0, len(motion.times) - 1, rows).astype(int))
+    matrices = rotation_matrices(motion.rotations[instants])
+    for index, body in enumerate(character.bodies):
+        for s, surface in enumerate(body.surfaces):
+            if surface.drawn:
+                corners, modes = hull_corners(surface.points), modes_of(skins[index], s)
+                own = None if modes is None else modes[corners]
+                points = deformed_points(surface.points[corners], own, motion.elastic[index][instants])
+                turned = points @ np.swapaxes(matrices[:, index], 1, 2)
+                clouds.append((turned + motion.positions[instants, index][:, None]).reshape(-1, 3))
     return np.concatenate(clouds)
+
+
+def hull_corners(points: Array) -> IntArray:
+    """Indices of the points, shape [n, 3], that are corners of their convex hull; of all, where they are flat."""
+    from scipy.spatial import ConvexHull, QhullError
+
+    try:
+        return np.asarray(ConvexHull(points).vertices, dtype=np.int32)
+    except (QhullError, ValueError):  # flat, or fewer than four
+        return np.arange(len(points), dtype=np.int32)
 
 
 def eye_that_sees(view: Viewpoint, cloud: Array, half_angle: float, aspect: float) -> tuple[Array, Array]:
