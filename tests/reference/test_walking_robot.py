@@ -1,4 +1,8 @@
-"""A published robot with closed chains in its legs walks on its feet, where the shot has it hang on a stand."""
+"""Published robots on their feet.
+
+One with closed chains in its legs walks, where its shot has it hang on a stand. A quadruped whose motors have the gains
+of its own file gets commands with which it shifts its weight, and takes a step.
+"""
 
 from __future__ import annotations
 
@@ -13,6 +17,7 @@ from calmotion.simulation.inputs.curves import sample_tracks
 from calmotion.simulation.prepare import prepare
 from pxr import Usd, UsdGeom
 from scipy.spatial.transform import Rotation
+from standing_barkour import LEGS, RATE, ease, stand
 from steppers import TORSO  # registers the schemas
 
 ROBOT, LAST, SWITCH = "/DR_Legs/RigidBodies", 200, 152
@@ -71,3 +76,66 @@ def test_a_robot_with_closed_chains_walks_as_its_legs_have_it(tmp_path, shared_d
         here, there = (of(poses["pelvis"], poses[foot]) for poses in (on_feet, on_stand))
         np.testing.assert_allclose(here[0][held], there[0][held], atol=1e-6)
         assert (here[1].inv() * there[1])[held].magnitude().max() < 1e-5
+
+
+@pytest.fixture
+def barkour(shared_data):
+    source = shared_data / "converted" / "barkour" / "barkour v0.usda"
+    if not source.exists():
+        pytest.skip("the shared Barkour is not here")
+    return source
+
+
+def found(path, **options):
+    """The shot as animated, and the commands that were found, simulated from what was written."""
+    animated = cm.simulate(path, step=0.01)
+    result = cm.optimize(path, step=0.01, **options)
+    result.write(path.parent / "calm.usda")
+    calm = cm.simulate(path.parent / "calm_root.usda", step=0.01)
+    for target, was in result.targets.items():
+        assert calm.targets[target].error.max() == pytest.approx(was.error.max(), rel=0.05, abs=2e-5)
+    return animated, calm
+
+
+def largest(result):
+    return max(target.error.max() for target in result.targets.values())
+
+
+def on_ground(result):
+    """What each foot would do that ground cannot have it do, by foot and time."""
+    rows = result.report()["contacts"]
+    return {(row["path"].split("/")[-2], row["from_s"]): row["unlike_ground"] for row in rows}
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("flexible", [(), ("lower_leg_1to1_front_right=nylon",)], ids=["rigid", "flexible"])
+def test_a_quadruped_shifts_its_weight(tmp_path, barkour, flexible):
+    # all feet held, as balls; the springs of the motors give 4 cm under its weight
+    shift = ease(0.04, 0.40, 31) * np.array([0.0, 0.03, -0.02])
+    animated, calm = found(stand(barkour, tmp_path, shift, flexible=flexible))
+    assert largest(animated) > 0.03 and largest(calm) < 0.02 * largest(animated)
+    assert len(on_ground(calm)) == len(LEGS) and not any(on_ground(calm).values())
+    weight = 9.81 * sum(body.mass.mass for body in calm.shot.character.bodies)
+    assert sum(row["max_force_n"] for row in calm.report()["contacts"]) > weight
+
+
+@pytest.mark.long
+def test_a_quadruped_takes_a_step(tmp_path, barkour):
+    # its weight goes from the front left foot, which then is 3 cm high and lands 3 cm ahead
+    frames, away = 56, (25, 43)
+    s = np.clip((np.arange(frames)[:, None] / RATE - 0.5) / 0.36, 0.0, 1.0)
+    foot = 0.03 * 64.0 * (s * (1.0 - s)) ** 3 * np.array([0.0, 0.0, 1.0])
+    foot = foot + ease(0.5, 0.86, frames) * np.array([0.03, 0.0, 0.0])
+    shift = ease(0.0, 0.44, frames) * np.array([-0.04, -0.035, 0.0])
+    path = stand(barkour, tmp_path, shift, {"front_left": foot}, {"front_left": away})
+    animated, calm = found(path)
+    assert largest(animated) > 0.05 and largest(calm) < 0.02 * largest(animated)
+    # as animated, feet pull at the ground; now none does
+    assert sum("pulls" in faults for faults in on_ground(animated).values()) > 1
+    assert not any("pulls" in faults for faults in on_ground(calm).values())
+    was, now = (
+        next(row["landing_speed_m_s"] for row in result.report()["contacts"] if row["landing_speed_m_s"] is not None)
+        for result in (animated, calm)
+    )
+    print({"before": largest(animated), "after": largest(calm), "landing": (was, now), "feet": on_ground(calm)})
+    assert now < 0.2 * was

@@ -73,6 +73,13 @@ def test_links_without_inertia_have_that_of_their_geometry(make):
     assert refused.value.found == "fore.arm" and "--solid" in refused.value.remedy
 
 
+def test_a_flexible_link_without_inertia_has_the_mass_of_its_material(make):
+    character, _, notes = make(flexible=(FlexibleLinks("fore*", "abs", ABS, 0.003),), solid=None)
+    fore = next(body for body in character.bodies if body.path == FORE)
+    assert fore.mass is None and fore.flexible.material.density == pytest.approx(ABS.density)
+    assert any("of their material: fore.arm" in note for note in notes)
+
+
 def test_links_of_no_mass_are_frames_of_almost_none(make):
     character, _, notes = make(
         lambda text: text.replace("physics:mass = 0.1", "physics:mass = 0"), massless=("finger",)

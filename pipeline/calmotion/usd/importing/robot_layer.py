@@ -164,6 +164,10 @@ class _Author:
         without = [prim for prim in self._bodies if named(prim) in self._options.without_mass]
         if self._options.solid is not None:
             without += [prim for prim in self._bodies if prim not in without and _has_no_mass(prim)]
+        bending = [prim for prim in without if self._is_flexible(prim)]
+        if bending:
+            self.notes.append(f"links without inertia have that of their material: {', '.join(map(named, bending))}")
+        without = [prim for prim in without if prim not in bending]
         if not without:
             return
         names = ", ".join(map(named, without))
@@ -247,9 +251,13 @@ class _Author:
                     prim = UsdGeom.Xform.Define(self._stage, prim.GetPath().AppendChild("CalmTarget")).GetPrim()
                 prim.AddAppliedSchema("CalmTargetAPI")
 
+    def _is_flexible(self, body: Usd.Prim) -> bool:
+        """Whether a pattern of flexible links names a link, whose material then gives its mass."""
+        return any(_is_named(body, given.pattern) for given in self._options.flexible)
+
     def _matching(self, pattern: str, prims: Iterable[Usd.Prim], option: str) -> list[Usd.Prim]:
         candidates = list(prims)
-        found = [prim for prim in candidates if fnmatch.fnmatchcase(named(prim).lower(), pattern.lower())]
+        found = [prim for prim in candidates if _is_named(prim, pattern)]
         if not found:
             names = sorted({named(prim) for prim in self._bodies})
             raise ShotError(
@@ -257,6 +265,10 @@ class _Author:
                 remedy=f"{nearest(pattern.strip('*'), names)}Its links are {', '.join(names)}",
             )  # fmt: skip
         return found
+
+
+def _is_named(prim: Usd.Prim, pattern: str) -> bool:
+    return fnmatch.fnmatchcase(named(prim).lower(), pattern.lower())
 
 
 def _has_no_mass(body: Usd.Prim) -> bool:

@@ -117,7 +117,7 @@ class Export:
                 "rate_hz": self.rate,
                 "start_delay_s": self.start_delay,
                 "interpolation": self.written.read.interpolation,
-                "commands": len(self.written.read.times),
+                "commands": len(self.written.exact.times),
                 "motors": self.motors,
                 "loss_m": self.loss_m,
                 "targets": rows,

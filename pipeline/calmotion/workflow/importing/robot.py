@@ -66,6 +66,7 @@ class ImportedRobot:
                 "bodies": sum(not body.between for body in character.bodies),
                 "flexible": [body.path for body in character.bodies if body.flexible is not None],
                 "mass_kg": sum(body.mass.mass for body in character.bodies if body.mass is not None),
+                "mass_of_material": [body.path for body in character.bodies if body.flexible and body.mass is None],
                 "joints": len(character.joints),
                 "motors": [motor.path for motor in character.motors],
                 "targets": [target.path for target in character.targets],

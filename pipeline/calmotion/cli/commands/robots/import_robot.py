@@ -76,11 +76,12 @@ def _print(report: dict[str, Any], stream: TextIO) -> None:
     from calmotion.cli.tables import console_on, say
 
     console = console_on(stream)
+    besides = " besides links whose material gives their mass" if report["mass_of_material"] else ""
     say(
         console,
         f"{report['robot']}: {counted(report['bodies'], 'body').replace('bodys', 'bodies')}, "
         f"{len(report['flexible'])} of them flexible, {counted(len(report['motors']), 'motor')}, "
-        f"{counted(len(report['targets']), 'target')}, {report['mass_kg']:.4g} kg",
+        f"{counted(len(report['targets']), 'target')}, {report['mass_kg']:.4g} kg{besides}",
     )
     if report["frames"] > 1:
         say(console, f"motion: {report['frames']} frames, {report['duration_s']:.4g} s")
@@ -92,3 +93,21 @@ def _print(report: dict[str, Any], stream: TextIO) -> None:
         say(console, f"note: {note}")
     beside = f", and {report['folder']} with the converted robot" if report["folder"] else ""
     say(console, f"wrote {report['layer']}{beside}")
+    say(console, f"next: {_next(report)}")
+
+
+def _next(report: dict[str, Any]) -> str:
+    """What makes curves of the robot, or what it lacks for that."""
+    import shlex
+
+    from calmotion.cli.sentences import unbroken
+
+    layer = unbroken(shlex.quote(str(report["layer"])))
+    if report["frames"] < 2:
+        return f"import again with --motion FILE, or animate the motors; calmotion inspect {layer} shows them"
+    if not report["flexible"]:
+        return (
+            'import again with --flexible "PATTERN=MATERIAL" for links that bend, or give motors a model that gives; '
+            f"calmotion inspect {layer} shows the gains that the robot's file has"
+        )
+    return f"calmotion inspect {layer} shows how stiff it is, calmotion optimize {layer} -o LAYER makes calm curves"

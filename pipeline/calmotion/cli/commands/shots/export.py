@@ -73,7 +73,7 @@ def _run(args: argparse.Namespace, output: Output) -> int:
 
 
 def _print(report: dict[str, Any], stream: TextIO) -> None:
-    from calmotion.cli.quantities import length
+    from calmotion.cli.quantities import counted, length
     from calmotion.cli.tables import console_on, print_table, say
 
     console = console_on(stream)
@@ -88,8 +88,8 @@ def _print(report: dict[str, Any], stream: TextIO) -> None:
     way = ways.get(report["interpolation"], "is followed along quintics")
     say(
         console,
-        f"{report['commands']} commands at {report['rate_hz']:g} Hz for {len(report['motors'])} motors; each {way}; "
-        f"{report['simulations']} simulations with steps of {1e3 * report['step_s']:.3g} ms",
+        f"{report['commands']} commands at {report['rate_hz']:g} Hz for {counted(len(report['motors']), 'motor')}; "
+        f"each {way}; {report['simulations']} simulations with steps of {1e3 * report['step_s']:.3g} ms",
     )
     slowest = max((row["delay_cost_m_per_s"] for row in report["targets"]), default=0.0)
     say(console, f"each millisecond by which the controller starts late costs up to {length(1e-3 * slowest)}")
