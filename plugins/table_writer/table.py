@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import csv
-import io
 from collections.abc import Mapping
 
 import numpy as np
 from calmotion.errors import ShotError
 from calmotion.shot.character import Array
-from calmotion.support.files import write_text
+from calmotion.support.files import replaced
+
+AT_ONCE = 4096  # rows that are in memory at once
 
 
 def write_table(path: str, table: Mapping[str, Array]) -> None:
@@ -18,12 +19,15 @@ def write_table(path: str, table: Mapping[str, Array]) -> None:
     Raises:
         ShotError: When the file cannot be written.
     """
-    text = io.StringIO(newline="")
-    writer = csv.writer(text)
-    writer.writerow(table)
-    writer.writerows([f"{value:.12g}" for value in row] for row in np.column_stack(list(table.values())))
+    columns = list(table.values())
+    rows = len(columns[0]) if columns else 0
     try:
-        write_text(path, text.getvalue())
+        with replaced(path) as temporary, open(temporary, "w", encoding="utf-8", newline="") as file:
+            writer = csv.writer(file)
+            writer.writerow(table)
+            for start in range(0, rows, AT_ONCE):  # the text of a long shot has hundreds of megabytes
+                part = np.column_stack([column[start : start + AT_ONCE] for column in columns])
+                writer.writerows([f"{value:.12g}" for value in row] for row in part)
     except OSError as error:
         raise ShotError(
             "the table cannot be written", path=path, found=error.strerror, remedy="Choose another file for --csv."

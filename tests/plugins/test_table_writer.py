@@ -1,4 +1,5 @@
 import csv
+import importlib.util
 import stat
 
 import numpy as np
@@ -76,3 +77,15 @@ def test_a_table_that_cannot_be_written_is_refused_by_name(host, tmp_path):
     with pytest.raises(ShotError) as refused:
         written(host, path, synthetic.result())
     assert refused.value.path == str(path) and "--csv" in refused.value.remedy
+
+
+def test_a_table_that_is_written_in_parts_is_whole(repository, tmp_path):
+    path = repository / "plugins" / "table_writer" / "table.py"
+    spec = importlib.util.spec_from_file_location("table_of_parts", path)
+    table = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(table)
+    values = {"a": np.arange(2.0 * table.AT_ONCE + 1.0), "b": np.zeros(2 * table.AT_ONCE + 1)}
+    table.write_table(str(tmp_path / "long.csv"), values)
+    lines = (tmp_path / "long.csv").read_bytes().decode().split("\r\n")
+    assert lines[0] == "a,b" and lines[-1] == "" and len(lines) == 2 * table.AT_ONCE + 3
+    assert lines[1:-1] == [f"{k},0" for k in range(2 * table.AT_ONCE + 1)]

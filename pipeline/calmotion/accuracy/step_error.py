@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -14,11 +14,11 @@ from calmotion.multibody.failure import SimulationFailure
 from calmotion.multibody.integrators.workspace import Workspace
 from calmotion.multibody.model.system import State
 from calmotion.shot import Character, Result
-from calmotion.shot.character import Array, contact_joints
+from calmotion.shot.character import Array, IntArray, contact_joints
 from calmotion.shot.run import RunSettings
 from calmotion.simulation.compiled_shot import CompiledShot
 from calmotion.simulation.cyclic import SteadyState
-from calmotion.simulation.forward import ForwardRun, run_forward
+from calmotion.simulation.forward import ForwardRun, run_forward, run_in_pieces
 from calmotion.simulation.inputs.curves import sample_tracks
 from calmotion.simulation.inputs.open_chains import open_joints
 from calmotion.simulation.prepare import Prepared, failure_error, prepare
@@ -28,6 +28,7 @@ CLOSED_GAP = 1e-6  # largest position gap of a joint that counts as none [m]
 ORDER = 2  # of BDF2; the global error goes with this power of the step
 ORDER_AT_IMPACTS = 1  # a change of contacts excites vibration that no step resolves, as sharply as steps allow
 MARGIN, WORTH = 0.9, 1.1  # of a step between two that were tried; how much longer it must be than the shorter of them
+AT_ONCE = 8192  # instants of a simulation that are held at once
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,18 +74,33 @@ def simulate_at(shot: CompiledShot, options: RunSettings, step: float) -> StepRu
     angles, rates = sample_tracks(shot.animation.current, grid)
     steady = SteadyState(model, prepared.world, grid.h, workspace) if grid.cyclic else None
     try:
-        run = run_forward(model, workspace, angles, rates, grid.h, prepared.world, None, options.scheme, steady)
+        if steady is not None:
+            whole = run_forward(model, workspace, angles, rates, grid.h, prepared.world, None, options.scheme, steady)
+            return _at_frames(prepared, [(slice(0, len(angles)), whole)], options.scheme)
+        pieces = run_in_pieces(model, workspace, angles, rates, grid.h, prepared.world, options.scheme, AT_ONCE)
+        return _at_frames(prepared, pieces, options.scheme)
     except SimulationFailure as failure:
         raise failure_error(prepared, failure) from failure
-    elastic = elastic_by_body(model, run.trajectory.states.u)
-    gap, efforts = run.trajectory.max_joint_gap, _efforts(prepared, run)
-    order = order_of(shot.character)
-    return StepRun(grid.h, run.target_positions[grid.frames], elastic, options.scheme, gap, efforts, order)
 
 
-def _efforts(prepared: Prepared, run: ForwardRun) -> Array:
-    """Efforts of the motors at the frames [N m] or [N], shape [f, M]."""
-    model, frames, whole = prepared.model, prepared.grid.frames, run.trajectory
+def _at_frames(prepared: Prepared, pieces: Iterable[tuple[slice, ForwardRun]], integrator: str) -> StepRun:
+    """What counts of a simulation, from its pieces."""
+    grid, positions, efforts, elastic, gap = prepared.grid, [], [], [], 0.0
+    for rows, run in pieces:
+        frames = grid.frames[(grid.frames >= rows.start) & (grid.frames < rows.stop)] - rows.start
+        positions.append(run.target_positions[frames])
+        efforts.append(_efforts(prepared, run, frames))
+        elastic.append(elastic_by_body(prepared.model, run.trajectory.states.u))
+        gap = max(gap, run.trajectory.max_joint_gap)
+    return StepRun(
+        grid.h, np.concatenate(positions), tuple(np.concatenate(parts) for parts in zip(*elastic, strict=True)),
+        integrator, gap, np.concatenate(efforts), order_of(prepared.character),
+    )  # fmt: skip
+
+
+def _efforts(prepared: Prepared, run: ForwardRun, frames: IntArray) -> Array:
+    """Efforts of the motors at some instants [N m] or [N], shape [f, M]."""
+    model, whole = prepared.model, run.trajectory
     states = State(*[part[frames] for part in whole.states])
     at_frames = replace(whole, states=states, world=whole.world[frames])
     found = reactions(model.system, at_frames, run.joint_angles[frames], run.joint_rates[frames])

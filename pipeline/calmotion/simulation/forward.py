@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass
 
 from calmotion.multibody.analysis.kinematics import rigid_state, target_frames
 from calmotion.multibody.analysis.reactions import reactions
 from calmotion.multibody.integrators.integrate import integrate
+from calmotion.multibody.integrators.pieces import integrate_in_pieces
 from calmotion.multibody.integrators.trajectory import Trajectory
 from calmotion.multibody.integrators.workspace import Workspace
 from calmotion.multibody.model.model import Model, start_angles
@@ -61,6 +62,30 @@ def run_forward(
     positions, rotations = target_frames(model, states.c, states.q, states.u)
     floquet_multiplier = 0.0 if steady is None else steady.floquet_multiplier
     return ForwardRun(trajectory, joint_angles, joint_rates, positions, rotations, angles, floquet_multiplier)
+
+
+def run_in_pieces(
+    model: Model, workspace: Workspace, angles: Array, rates: Array, h: float, world: Array | None,
+    integrator: str, size: int,
+) -> Iterator[tuple[slice, ForwardRun]]:  # fmt: skip
+    """`run_forward` from rest, to the last bit, of which only a piece is held at once.
+
+    Args:
+        workspace: Nobody else may use it before the last piece.
+        size: Largest number of instants of a piece.
+
+    Yields:
+        The instants of a piece, and the run over them.
+    """
+    joint_angles, joint_rates = followed(model, angles, rates, h, False)
+    start = rigid_state(model, start_angles(model, joint_angles[0]), None if world is None else world[0])
+    pieces = integrate_in_pieces(
+        model.system, start, joint_angles, joint_rates, h, workspace, integrator, world, size
+    )  # fmt: skip
+    for rows, trajectory in pieces:
+        states = trajectory.states
+        positions, rotations = target_frames(model, states.c, states.q, states.u)
+        yield rows, ForwardRun(trajectory, joint_angles[rows], joint_rates[rows], positions, rotations, angles[rows])
 
 
 def followed(model: Model, angles: Array, rates: Array, h: float, cyclic: bool) -> tuple[Array, Array]:

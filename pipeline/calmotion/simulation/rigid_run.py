@@ -13,6 +13,7 @@ from calmotion.multibody.analysis.reactions import reactions
 from calmotion.multibody.failure import SimulationFailure
 from calmotion.multibody.integrators.workspace import Workspace
 from calmotion.multibody.model.model import Model, body_anchors, compile_model, moves_freely, rigid_body
+from calmotion.multibody.model.system import State
 from calmotion.multibody.model.topology import Tree, chain_members
 from calmotion.reduction.load_envelope import LoadEnvelope
 from calmotion.reduction.reduced_body import ReducedBody
@@ -26,6 +27,7 @@ from calmotion.simulation.inputs.time_grid import TimeGrid
 from calmotion.simulation.standing.slipping import refuse_slipping
 
 _POWER_LEFT = 1e-3  # of a signal's power may lie above the highest frequency that matters: 3% of its amplitude
+AT_ONCE = 8192  # instants whose reactions are worked out at once
 _NOTHING = 1e-9  # of gravity, or of it over a metre: an acceleration that is rounding
 
 
@@ -141,41 +143,53 @@ def rigid_bodies(character: Character, tree: Tree, meshes: FEMeshes | None) -> l
 def excitation_of(character: Character, model: Model, run: ForwardRun, h: float) -> tuple[LoadEnvelope, ...]:
     """LoadEnvelope of every body in a simulation of the rigid robot with step h [s]; see `shot_load_envelopes`."""
     system, tree, states = model.system, model.tree, run.trajectory.states
-    R = _matrices(states.q)
     omega = states.V[:, :, 3:6]
     acceleration = np.gradient(states.V[:, :, :3], h, axis=0) if len(states.c) > 1 else np.zeros_like(states.c)
     angular = np.gradient(omega, h, axis=0) if len(states.c) > 1 else np.zeros_like(omega)
-    felt = np.einsum("tbji,tbj->tbi", R, acceleration - system.gravity)
-    reach = _reach(model, run, R)
-    found = reactions(system, run.trajectory, run.joint_angles, run.joint_rates)
-    force, moment = found.forces, found.moments
+    reach = _reach(model, run)
+    force, moment = _joint_loads(model, run)
     closed = _in_loops(model)
     component_of = {body: k for k, body in enumerate(tree.body)}
     number = {joint: k for k, joint in enumerate((*tree.joint, *tree.closing))}
     result = []
     for index, anchors in enumerate(body_anchors(character, tree)):
         b = component_of[index]
+        R = _matrices(states.q[:, b])
+        felt = np.einsum("tji,tj->ti", R, acceleration[:, b] - system.gravity)
         peaks = np.zeros((len(anchors.joints), 6))
         far = np.zeros(len(anchors.joints))
         own = [number.get(joint, -1) for joint in anchors.joints]
         for row, k in enumerate(own):
             if row == anchors.root or k < 0:
                 continue  # a redundant joint carries nothing
-            peaks[row, :3] = _peak(np.einsum("tji,tj->ti", R[:, b], force[:, k]))
-            peaks[row, 3:] = _peak(np.einsum("tji,tj->ti", R[:, b], moment[:, k]))
+            peaks[row, :3] = _peak(np.einsum("tji,tj->ti", R, force[:, k]))
+            peaks[row, 3:] = _peak(np.einsum("tji,tj->ti", R, moment[:, k]))
             far[row] = reach[k] if k < len(reach) else 0.0
             if b in closed:
                 # what is beyond it closes the loop: a turn moves it about the body's other end
                 ends = [system.position[j, int(system.side[j, 1] == b)] for j in (k, own[anchors.root])]
                 far[row] = max(far[row], float(np.linalg.norm(ends[0] - ends[1])))
-        center = acceleration[:, b] + _carried_center(system.s[b] / system.mass[b], R[:, b], omega[:, b], angular[:, b])
+        center = acceleration[:, b] + _carried_center(system.s[b] / system.mass[b], R, omega[:, b], angular[:, b])
         result.append(
             LoadEnvelope(
-                _peak(felt[:, b]), _peak(angular[:, b]), _peak(omega[:, b]), peaks[:, :3], peaks[:, 3:],
+                _peak(felt), _peak(angular[:, b]), _peak(omega[:, b]), peaks[:, :3], peaks[:, 3:],
                 max(highest_frequency(center, h), highest_frequency(angular[:, b], h)), far, b in closed,
             )
         )  # fmt: skip
     return tuple(result)
+
+
+def _joint_loads(model: Model, run: ForwardRun) -> tuple[Array, Array]:
+    """Forces [N] and moments [N m] of all joints, shape [T, J, 3] each; see `Reactions`."""
+    total, whole = len(run.joint_angles), run.trajectory
+    parts = []
+    for start in range(0, total, AT_ONCE):
+        rows = slice(start, start + AT_ONCE)
+        piece = replace(whole, states=State(*[part[rows] for part in whole.states]), world=whole.world[rows])
+        found = reactions(model.system, piece, run.joint_angles[rows], run.joint_rates[rows])
+        parts.append((found.forces, found.moments))
+    forces, moments = (np.concatenate(own) for own in zip(*parts, strict=True))
+    return forces, moments
 
 
 def _in_loops(model: Model) -> set[int]:
@@ -202,14 +216,14 @@ def _carried_center(center: Array, R: Array, omega: Array, angular: Array) -> Ar
     return np.asarray(np.einsum("tij,tj->ti", R, local))
 
 
-def _reach(model: Model, run: ForwardRun, R: Array) -> Array:
+def _reach(model: Model, run: ForwardRun) -> Array:
     """Longest distance of each component's joint to a target that it carries, over the shot [m], shape [B]."""
     system, states = model.system, run.trajectory.states
     reach = np.zeros(len(system.parent))
     for target, b in enumerate(model.targets.component):
         k = int(b)
         while k >= 0:
-            joint = states.c[:, k] + R[:, k] @ system.position[k, 1]
+            joint = states.c[:, k] + _matrices(states.q[:, k]) @ system.position[k, 1]
             distance = np.linalg.norm(run.target_positions[:, target] - joint, axis=1)
             reach[k] = max(reach[k], float(distance.max()))
             k = int(system.parent[k])

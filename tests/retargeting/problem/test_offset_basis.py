@@ -1,5 +1,7 @@
 """Splines of the offsets: what they keep at the ends, and that samples at the frames hold them."""
 
+import tracemalloc
+
 import numpy as np
 import pytest
 from calmotion.retargeting.problem.offset_basis import basis_on, make_basis
@@ -106,3 +108,19 @@ def test_knots_lie_where_they_are_wanted(cyclic):
     jumps = np.flatnonzero(np.abs(np.diff(third)) > 1e-3 * np.abs(third).max()) + 1
     inner = set(np.round(FRAMES[breaks[1:-1]] / grid.h).astype(int))
     assert inner <= set(jumps) <= inner | {j + 1 for j in inner} | {j - 1 for j in inner}
+
+
+def test_a_basis_of_ten_minutes_takes_memory_by_its_length_alone():
+    """Dense, its values alone would have 5 GB; those within are those of a short shot at the same distance."""
+    tracemalloc.start()
+    try:
+        grid = make_grid(np.arange(14401) / 24.0, 1 / 72, 0.0)
+        basis = make_basis(grid, 0.05, False)
+        peak = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    assert basis.count > 14_000 and peak < 200e6
+    short = make_basis(make_grid(np.arange(241) / 24.0, 1 / 72, 0.0), 0.05, False)
+    for one, other in ((basis.values, short.values), (basis.rates, short.rates)):
+        np.testing.assert_allclose(one[:300].toarray()[:, :100], other[:300].toarray()[:, :100], atol=1e-9)
+    assert np.allclose(basis.values.sum(axis=1), 1.0)

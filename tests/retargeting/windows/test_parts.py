@@ -1,10 +1,12 @@
 """Parts of a shot: offsets that frames hold exactly, and bases whose splines vanish where windows meet."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from calmotion.retargeting.problem.offset_basis import basis_on, uniform_breaks
 from calmotion.retargeting.problem.offset_space import BaseOffsets, OffsetSpace
-from calmotion.retargeting.windows.parts import offset_curves
+from calmotion.retargeting.windows.parts import Part, offset_curves, offsets_in
 from calmotion.simulation.inputs.time_grid import TimeGrid, make_grid
 
 TIMES = np.arange(49) / 24.0
@@ -54,6 +56,21 @@ def test_frames_hold_offsets_of_successive_windows_exactly():
     np.testing.assert_allclose(found.angles[whole.judged, 0], exact[whole.judged], atol=1e-11)
     rates = np.gradient(found.angles[whole.judged, 0], whole.h)[2:-2]
     np.testing.assert_allclose(found.rates[whole.judged, 0][2:-2], rates, atol=2e-2 * np.abs(rates).max())
+
+
+@pytest.mark.parametrize("pre_roll", [0.0, 0.1])
+def test_offsets_sampled_in_a_part_are_those_of_the_whole_to_the_last_bit(pre_roll):
+    whole = make_grid(np.arange(97) / 24.0, 1 / 120, pre_roll)
+    offsets = np.random.default_rng(6).normal(size=(97, 2))
+    for first, joined in ((0, False), (36, True)):
+        pre = 4 if joined else whole.pre_steps
+        grid = TimeGrid(whole.frame_times[:25], whole.substeps, pre, whole.h, joined=joined, continues=True)
+        start = whole.pre_steps + first * whole.substeps - pre
+        part = Part(SimpleNamespace(grid=grid), slice(start, start + len(grid.times)), first)
+        for given in (offsets, 0.0 * offsets):
+            found, expected = offsets_in(part, given, whole), part.curves_of(offset_curves(given, whole))
+            for one, other in zip(vars(found).values(), vars(expected).values(), strict=True):
+                assert np.array_equal(one, other) and len(one) == len(grid.times)
 
 
 def test_the_regulariser_counts_the_offsets_that_are_there():

@@ -132,7 +132,7 @@ def simulate(
     margins, costs = np.zeros(total), np.zeros((total, 3))
     costs[0, 0] = solved
     inputs, record = Inputs(angles, rates, world), Record(earlier, states, margins, costs)
-    return _march(system, integrator, h, 1, inputs, record, ws, begin, progress)
+    return march(system, integrator, h, 1, inputs, record, ws, begin, progress)
 
 
 def simulate_on(
@@ -157,7 +157,7 @@ def simulate_on(
         part[0], part[1] = first, second
     ws.scratch.memory[:] = (before.V - before2.V) / h
     record = Record(before2, states, np.zeros(total), np.zeros((total, 3)))
-    return _march(system, "bdf2", h, 2, Inputs(angles, rates, rooted(world, total)), record, ws, begin)
+    return march(system, "bdf2", h, 2, Inputs(angles, rates, rooted(world, total)), record, ws, begin)
 
 
 def simulate_from(
@@ -187,16 +187,14 @@ def simulate_from(
     record = Record(copy_of_instant(states, 0), states, margins, costs)
     _recall(system, known.h, record, first - 1, ws.scratch)
     refined = [n for n in known.refined if n < first]
-    return _march(
-        system, "bdf2", known.h, first, Inputs(angles, rates, known.world), record, ws, begin, refined=refined
-    )
+    return march(system, "bdf2", known.h, first, Inputs(angles, rates, known.world), record, ws, begin, refined=refined)
 
 
-def _march(
+def march(
     system: System, integrator: str, h: float, done: int, inputs: Inputs, record: Record, ws: Workspace, begin: float,
     progress: Callable[[float], None] | None = None, refined: Sequence[int] = (),
 ) -> Trajectory:  # fmt: skip
-    """All steps from instant `done` on, into the record.
+    """All steps from instant `done` on, into the record, with what the workspace remembers of those before.
 
     Args:
         begin: Time when the simulation was started [s].

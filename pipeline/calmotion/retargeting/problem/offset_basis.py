@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.interpolate import BSpline
-from scipy.sparse import csr_matrix, diags
+from scipy.sparse import csc_matrix, csr_matrix, diags, eye_array, hstack, vstack
 
 from calmotion.shot.character import Array, IntArray
-from calmotion.simulation.inputs.time_grid import TimeGrid, over_grid
+from calmotion.simulation.inputs.time_grid import TimeGrid, pre_roll_weights
 
 DEGREE = 3
+AT_ONCE = 512  # times at which splines are evaluated at once: all but those that act there are left out
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,54 +97,93 @@ def basis_on(grid: TimeGrid, breaks: IntArray, kept_ends: bool, moving_end: bool
     """
     knots = grid.frame_times[breaks]
     wraps = grid.cyclic and not kept_ends and len(knots) > 4
-    splines, merge, support = (_periodic if wraps else _open)(knots)
+    padded, merge, support = (_periodic if wraps else _open)(knots)
     if not wraps:
         merge = _ends(merge, kept_ends, grid, moving_end)
-        columns = [np.flatnonzero(merge[:, k]) for k in range(merge.shape[1])]
+        columns = [merge.indices[start:stop] for start, stop in zip(merge.indptr[:-1], merge.indptr[1:], strict=True)]
         support = np.array([[support[rows, 0].min(), support[rows, 1].max()] for rows in columns]).reshape(-1, 2)
 
-    def sample(times: Array, order: int) -> Array:
+    def sample(times: Array, order: int) -> csr_matrix:
         inside = np.mod(times, grid.end) if grid.cyclic else np.clip(times, knots[0], knots[-1])
-        return np.asarray(splines(inside, nu=order) @ merge)
+        return _merged(_evaluated(padded, inside, order), merge)
 
-    values, rates, accelerations = over_grid(grid, sample)
+    stored, rates, accelerations = _over_grid(grid, sample)
     # two Gauss points integrate the squared second derivative of a cubic exactly
     width = np.diff(knots)[:, None]
     points = (0.5 * (knots[:-1] + knots[1:])[:, None] + 0.5 * width * np.array([-1, 1]) / math.sqrt(3)).ravel()
-    curvatures = csr_matrix(sample(points, 2))
+    curvatures = sample(points, 2)
     curvature_gram = curvatures.T @ diags(np.repeat(0.5 * width.ravel(), 2)) @ curvatures
-    stored = csr_matrix(values)
     near = stored[grid.judged] if grid.cyclic else stored
     if not grid.cyclic and grid.pre_steps:
-        before = csr_matrix(accelerations[: grid.pre_steps])
+        before = accelerations[: grid.pre_steps]
         curvature_gram = curvature_gram + grid.h * (before.T @ before)
     return OffsetBasis(
-        breaks, knots, stored, csr_matrix(rates), csr_matrix(accelerations), stored[grid.frames], curvatures,
-        csr_matrix(curvature_gram),
+        breaks, knots, stored, rates, accelerations, stored[grid.frames], curvatures, csr_matrix(curvature_gram),
         grid.h * (near.T @ near), support, wraps, kept_ends, moving_end,
     )  # fmt: skip
 
 
-def _open(knots: Array) -> tuple[BSpline, Array, Array]:
-    """B-splines between the first and the last knot, the identity, and where each acts."""
+def _evaluated(padded: Array, times: Array, order: int) -> csr_matrix:
+    """Splines on knots of shape [n + 4], or derivatives of them, at times of shape [T]; shape [T, n].
+
+    Successive times are evaluated together, with those splines alone that act there: memory and time grow with the
+    length of a shot, not with its square.
+    """
+    count = len(padded) - DEGREE - 1
+    interval = np.clip(np.searchsorted(padded, times, side="right") - 1, DEGREE, count - 1)
+    parts = []
+    for start in range(0, len(times), AT_ONCE):
+        near = interval[start : start + AT_ONCE]
+        first, last = int(near.min()) - DEGREE, int(near.max()) + 1
+        splines = BSpline(padded[first : last + DEGREE + 1], np.eye(last - first), DEGREE)
+        part = csr_matrix(splines(times[start : start + AT_ONCE], nu=order))
+        parts.append(csr_matrix((part.data, part.indices + first, part.indptr), (part.shape[0], count)))
+    return csr_matrix(vstack(parts)) if parts else csr_matrix((0, count))
+
+
+def _merged(values: csr_matrix, merge: csc_matrix) -> csr_matrix:
+    """Combinations of columns, without entries that are zero."""
+    found = csr_matrix(values @ merge)
+    found.eliminate_zeros()
+    found.sort_indices()
+    return found
+
+
+def _over_grid(grid: TimeGrid, sample: Callable[[Array, int], csr_matrix]) -> tuple[csr_matrix, csr_matrix, csr_matrix]:
+    """As `time_grid.over_grid`, sparse."""
+    pre, times = 0 if grid.cyclic else grid.pre_steps, grid.times
+    parts = [sample(times[pre:], order) for order in range(3)]
+    if pre:
+        meet = np.concatenate([part[:1].toarray() for part in parts])
+        columns = np.flatnonzero(np.any(meet, axis=0))  # a few act where the pre-roll ends
+        weights = pre_roll_weights(times[:pre], grid.pre_roll)
+        for k, rows in enumerate(weights):
+            dense = csr_matrix(rows @ meet[:, columns])
+            before = csr_matrix((dense.data, columns[dense.indices], dense.indptr), (pre, meet.shape[1]))
+            parts[k] = csr_matrix(vstack([before, parts[k]]))
+    return parts[0], parts[1], parts[2]
+
+
+def _open(knots: Array) -> tuple[Array, csc_matrix, Array]:
+    """Knots of the B-splines between the first and the last knot, the identity, and where each acts."""
     padded = np.concatenate([np.repeat(knots[0], DEGREE), knots, np.repeat(knots[-1], DEGREE)])
     count = len(padded) - DEGREE - 1
     support = np.stack([padded[:count], padded[DEGREE + 1 :]], axis=1)
-    return BSpline(padded, np.eye(count), DEGREE), np.eye(count), support
+    return padded, csc_matrix(eye_array(count)), support
 
 
-def _periodic(knots: Array) -> tuple[BSpline, Array, Array]:
+def _periodic(knots: Array) -> tuple[Array, csc_matrix, Array]:
     """The same for a cyclic shot: functions that extend beyond the end continue at the start."""
     length, inner = knots[-1] - knots[0], len(knots) - 1
     padded = np.concatenate([knots[inner - DEGREE : -1] - length, knots, knots[1 : DEGREE + 1] + length])
     count = inner + DEGREE
     support = np.stack([padded[:inner], padded[DEGREE + 1 : inner + DEGREE + 1]], axis=1)
-    return BSpline(padded, np.eye(count), DEGREE), np.eye(inner)[np.arange(count) % inner], support
+    return padded, csc_matrix(csr_matrix(eye_array(inner))[np.arange(count) % inner]), support
 
 
-def _ends(merge: Array, kept_ends: bool, grid: TimeGrid, moving_end: bool) -> Array:
-    """Combinations of open B-splines that satisfy the end conditions, as columns."""
-    count = len(merge)
+def _ends(merge: csc_matrix, kept_ends: bool, grid: TimeGrid, moving_end: bool) -> csc_matrix:
+    """Combinations of open B-splines that satisfy the end conditions, as columns of the identity and sums of them."""
+    count = merge.shape[0]
     if grid.joined or grid.continues:
         return _ends_of_window(merge, kept_ends, grid)
     if kept_ends:
@@ -150,26 +191,30 @@ def _ends(merge: Array, kept_ends: bool, grid: TimeGrid, moving_end: bool) -> Ar
         return merge[:, order:-order]
     if count <= 4 or grid.cyclic:
         # too short for anything but a constant
-        return np.ones((count, 1))
-    # three equal coefficients at an end: zero slope and curvature there
+        return csc_matrix(np.ones((count, 1)))
     if not moving_end:
-        merge = merge[:, :-2]
-        merge[-2:, -1] = 1.0
+        merge = _level_end(merge)
     if grid.pre_steps == 0:
-        merge = merge[:, 2:]
-        merge[:2, 0] = 1.0
+        merge = _level_start(merge)
     return merge
 
 
-def _ends_of_window(merge: Array, kept_ends: bool, grid: TimeGrid) -> Array:
+def _level_start(merge: csc_matrix) -> csc_matrix:
+    """Three equal coefficients at the start: zero slope and curvature there."""
+    return csc_matrix(hstack([csc_matrix(merge[:, :3].sum(axis=1)), merge[:, 3:]]))
+
+
+def _level_end(merge: csc_matrix) -> csc_matrix:
+    """The same at the end."""
+    return csc_matrix(hstack([merge[:, :-3], csc_matrix(merge[:, -3:].sum(axis=1))]))
+
+
+def _ends_of_window(merge: csc_matrix, kept_ends: bool, grid: TimeGrid) -> csc_matrix:
     """The same for a window of a longer shot: value, slope and curvature of the offset vanish where windows meet."""
     if grid.joined or kept_ends:
         merge = merge[:, 3 if grid.joined else 2 :]
     elif grid.pre_steps == 0:
-        merge = merge[:, 2:]
-        merge[:2, 0] = 1.0
+        merge = _level_start(merge)
     if grid.continues or kept_ends:
         return merge[:, : -3 if grid.continues else -2]
-    merge = merge[:, :-2]
-    merge[-2:, -1] = 1.0
-    return merge
+    return _level_end(merge)

@@ -18,7 +18,7 @@ from calmotion.retargeting.windows.parts import (
     Part,
     Piece,
     added,
-    offset_curves,
+    offsets_in,
     part_of,
     performed,
     piece_of,
@@ -136,10 +136,10 @@ class _Windows:
                     offsets[window.first : window.last + 1] += found.offsets
                 self.done.searched = True
             kept = part_of(whole, window.first, window.kept, known)
-            before = self._simulated(kept, self.curves, before, self.done.before, known)
-            after = self._simulated(
-                kept, added(self.curves, offset_curves(offsets, whole.grid)), after, self.done.after, known
-            )
+            own = kept.curves_of(self.curves)
+            before = self._simulated(kept, own, before, self.done.before, known)
+            changed = added(own, offsets_in(kept, offsets, whole.grid))
+            after = self._simulated(kept, changed, after, self.done.after, known)
             if searched and not self.done.interrupted:
                 self.store.keep(k, offsets, None if window.is_last else after)
             self._count(window, searched, found, time.perf_counter() - begin)
@@ -163,7 +163,7 @@ class _Windows:
             self.progress((k + fraction) / count, f"window {k + 1} of {count}: {message}")
 
         try:
-            base = offset_curves(offsets, self.whole.grid)
+            base = offsets_in(part, offsets, self.whole.grid)
             found = search_window(part, kept, self.curves, base, self.intended, beginning, self.setting, progress)
         except KeyboardInterrupt:
             interrupts.answer()
@@ -176,8 +176,8 @@ class _Windows:
     def _simulated(
         self, part: Part, curves: Curves, beginning: Beginning | None, pieces: list[Piece], known: int
     ) -> Beginning:
-        """Simulate the kept part of a window, and the states in which it ends."""
-        run = performed(part, part.curves_of(curves), beginning)
+        """Simulate the kept part of a window by curves of its motors, and the states in which it ends."""
+        run = performed(part, curves, beginning)
         options = self.setting.options
         if pieces is self.done.before and run.trajectory.max_joint_gap > CLOSED * self.setting.tolerance:
             self._refuse_open_joints(options)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -95,13 +95,34 @@ def offset_curves(offsets: Array, grid: TimeGrid) -> Curves:
     """
     if not offsets.shape[1] or not np.any(offsets):
         return Curves(*[np.zeros((len(grid.times), offsets.shape[1]))] * 3)
+    return Curves(*over_grid(grid, _sampling(offsets, grid)))
+
+
+def offsets_in(part: Part, offsets: Array, grid: TimeGrid) -> Curves:
+    """`Part.curves_of` those of `offset_curves`, which are sampled in the part alone.
+
+    Args:
+        offsets: Of the shot, at its frames, shape [f, M].
+        grid: Of the shot.
+    """
+    times = grid.times[part.rows]
+    if not offsets.shape[1] or not np.any(offsets):
+        return Curves(*[np.zeros((len(times), offsets.shape[1]))] * 3)
+    sample = _sampling(offsets, grid)
+    if not part.first:  # with a pre-roll, perhaps
+        return Curves(*over_grid(part.prepared.grid, sample))
+    return Curves(*(sample(times, order) for order in range(3)))
+
+
+def _sampling(offsets: Array, grid: TimeGrid) -> Callable[[Array, int], Array]:
+    """Offsets and their derivatives by time [s]."""
     spline = CubicSpline(grid.frame_times, offsets, bc_type="not-a-knot")
     end = grid.end
 
     def sample(times: Array, order: int) -> Array:
         return np.asarray(spline(np.clip(times, 0.0, end), order))
 
-    return Curves(*over_grid(grid, sample))
+    return sample
 
 
 def added(curves: Curves, offsets: Curves) -> Curves:
@@ -158,13 +179,15 @@ def _sliced(motion: Motion, rows: slice) -> Motion:
     )  # fmt: skip
 
 
-def joined(pieces: Sequence[Piece], times: Array) -> Simulation:
+def joined(pieces: list[Piece], times: Array) -> Simulation:
     """Successive pieces as one simulation.
 
     Args:
+        pieces: They are taken: nobody else needs their motions beside it.
         times: Of all instants [s], shape [T].
     """
-    parts = [piece.simulation for piece in pieces]
+    taken, pieces[:] = list(pieces), []
+    parts = [piece.simulation for piece in taken]
     motions = [part.motion for part in parts]
 
     def whole(name: str) -> Array:
@@ -187,5 +210,5 @@ def joined(pieces: Sequence[Piece], times: Array) -> Simulation:
         wall_s=sum(part.wall_s for part in parts),
         sag=parts[0].sag,
         refined_steps=sum(part.refined_steps for part in parts),
-        dead_centres=np.concatenate([piece.simulation.dead_centres + piece.time for piece in pieces]),
+        dead_centres=np.concatenate([piece.simulation.dead_centres + piece.time for piece in taken]),
     )

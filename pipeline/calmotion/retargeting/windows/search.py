@@ -78,7 +78,7 @@ def search_window(
         kept: Time to which its offsets are kept [s]; where they end in the part but the shot goes on, they fade out
             from there.
         curves: The animator's, of the whole shot.
-        base: Offsets that are there, of the whole shot.
+        base: Offsets that are there, of the part.
         intended: Of the whole shot.
         beginning: The states from which it goes on; None for the window that begins the shot.
         setting: Of the shot.
@@ -148,11 +148,10 @@ def _posed(
     coupling = coupling_of(character, motors)
     bounds = motor_bounds(character, np.any(coupling, axis=1))
     smoothness = next(v for v in (options.smoothness, settings.smoothness, SMOOTHNESS) if v is not None)
-    own = part.curves_of(base)
-    there = BaseOffsets(own.angles, own.accelerations, grid.h) if np.any(own.angles) else None
+    there = BaseOffsets(base.angles, base.accelerations, grid.h) if np.any(base.angles) else None
     objective = Objective.over(model, part.intended_of(intended), grid, prepared.shot.animation.weights)
     problem = RetargetProblem(
-        model, grid, added(part.curves_of(curves), own), objective,
+        model, grid, added(part.curves_of(curves), base), objective,
         OffsetSpace(basis, motors, coupling, smoothness, closeness_of(character), there), prepared.world,
         LimitTerms(bounds, grid.judged, grid.h, 1.0) if bounds else None,
     )  # fmt: skip
