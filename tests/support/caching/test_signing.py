@@ -38,6 +38,14 @@ def test_processes_that_start_at_once_have_one_key(folder):
     assert keys == {signing_key().hex().encode() + b"\n"}
 
 
+def test_the_key_of_a_faster_process_is_kept(folder):
+    folder.mkdir()
+    key = b"k" * 32
+    (folder / FILE_NAME).write_bytes(key)
+    (folder / FILE_NAME).chmod(0o600)
+    assert signing._made(folder / FILE_NAME) == key, "it was made after this process found none"
+
+
 @pytest.mark.parametrize("damage", ["readable", "short", "link", "folder"])
 def test_a_key_that_others_can_read_or_that_is_damaged_is_replaced(folder, damage):
     first, path = signing_key(), folder / FILE_NAME

@@ -54,10 +54,11 @@ def _read(path: Path) -> bytes:
 def _made(path: Path) -> bytes:
     """A new key in a file; that of another process, where one was faster."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    if os.path.lexists(path):  # others can read it, or it is damaged
-        path.unlink()
     with new_file(path) as temporary:  # only this user can read it
         temporary.write_bytes(secrets.token_bytes(_LENGTH))
-        with contextlib.suppress(FileExistsError):
+        try:
             os.link(temporary, path)
+        except FileExistsError:  # of a faster process, whose key counts, or damaged, or open to others
+            if not _read(path):
+                os.replace(temporary, path)
     return _read(path)
