@@ -14,12 +14,11 @@ from calmotion.shot import MotorTracks
 from calmotion.support.naming import nearest
 from calmotion.usd import schemas
 from calmotion.usd.dialects import GEARS
-from calmotion.usd.reading.context import body_on, prims_of
+from calmotion.usd.reading.context import body_on
 from calmotion.usd.reading.generic_joints import freedoms
 from calmotion.usd.reading.joints import joint_prims
+from calmotion.usd.reading.motors.coupling_joints import COUPLED, coupled, coupling_prims
 from calmotion.usd.reading.motors.driven_motors import actuated_joints
-from calmotion.usd.reading.motors.gear_joints import HINGES
-from calmotion.usd.reading.motors.gear_joints import TYPE as GEAR
 from calmotion.usd.units import StageUnits
 
 if TYPE_CHECKING:
@@ -178,13 +177,11 @@ def _by_default(stage: Usd.Stage, axes: Sequence[Axis], moved: Mapping[str, Moto
 
 def _free(axes: Sequence[Axis]) -> list[Axis]:
     """Those that follow no other joint and close no chain."""
-    stage = axes[0].prim.GetStage() if axes else None
-    geared = {
-        str(target)
-        for prim in (prims_of(stage) if stage is not None else ())
-        if prim.GetTypeName() == GEAR
-        for target in prim.GetRelationship(HINGES[1]).GetForwardedTargets()
-    }
+    driven = {str(axis.prim.GetPath()) for axis in axes if _is_driven(axis)}
+    geared = set()
+    for prim in coupling_prims(axes[0].prim.GetStage()) if axes else ():
+        first, second = (coupled(prim, name) for name in COUPLED[str(prim.GetTypeName())])
+        geared.add(first if second in driven and first not in driven else second)
     return [
         axis
         for axis in axes
