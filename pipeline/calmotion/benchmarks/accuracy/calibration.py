@@ -7,15 +7,18 @@ extrapolated; the generalized-alpha method where that diverges) and, with `--fin
 the modes. A marker, an accelerometer and the encoders record it, each with its own clock, noise, bias, gaps and
 outliers. The table has, for each kind of parameter, how often the 95% interval covers the truth, the median error, the
 median standard deviation, and in how many trials it was identifiable. Trial number K is the same on every machine.
+With `--workers`, also on other machines (`--on`), trials are independent jobs.
 """
 
 from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
 
 import numpy as np
 
@@ -26,6 +29,8 @@ from calmotion.errors import ShotError
 from calmotion.identification.calibrate import CalibrationSettings, calibrate_shot
 from calmotion.shot.calibration.estimates import HIGHER_MODES
 from calmotion.shot.run import RunSettings
+from calmotion.workflow.batch.backends import LOCAL, backend_for
+from calmotion.workflow.batch.calls import results_on
 
 WITHIN = 1.96  # standard deviations of a 95% interval
 GRADED = 0.001  # prior of `higher_modes`: the error of the frequencies that `recorded_arm`'s mesh has
@@ -99,6 +104,26 @@ def tried(number: int, finer: bool = False) -> list[Recovered]:
     return rows
 
 
+def outcomes(numbers: Sequence[int], finer: bool, on: str, workers: int) -> Iterator[tuple[int, Any]]:
+    """Trials in the order in which they are done, each with its number: its rows, or why there are none.
+
+    Args:
+        on: Where they run, as of `calmotion batch`; on this machine one worker is this process.
+        workers: Most trials at once.
+    """
+    if on == LOCAL and workers == 1:
+        for number in numbers:
+            try:
+                yield number, tried(number, finer)
+            except ShotError as error:
+                yield number, error
+        return
+    with TemporaryDirectory() as logs:
+        work = [(number, finer) for number in numbers]
+        for index, found in results_on(backend_for(on, workers, logs), tried, work):
+            yield numbers[index], found
+
+
 def table_of(rows: Sequence[Recovered]) -> list[list[str]]:
     """Rows of the table."""
     out = []
@@ -131,16 +156,18 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--trials", type=int, default=20, help="number of trials (default: 20)")
     parser.add_argument("--first", type=int, default=0, metavar="K", help="number of the first trial (default: 0)")
     parser.add_argument("--finer-mesh", action="store_true", help="the real arm has a finer mesh and more modes")
+    parser.add_argument("--on", default=LOCAL, help="where trials run, as of `calmotion batch` (default: local)")
+    parser.add_argument("--workers", type=int, default=1, help="most trials at once (default: 1)")
     output_options(parser, csv="a row for each parameter of each trial", markdown=True)
     options = parser.parse_args(arguments)
     rows: list[Recovered] = []
-    for number in range(options.first, options.first + options.trials):
-        try:
-            own = tried(number, options.finer_mesh)
-        except ShotError as problem:
-            print(f"trial {number} is refused: {problem.problem}", file=sys.stderr, flush=True)
+    numbers = range(options.first, options.first + options.trials)
+    for number, own in outcomes(numbers, options.finer_mesh, options.on, max(1, options.workers)):
+        if not isinstance(own, list):
+            why = f"is refused: {own.problem}" if isinstance(own, ShotError) else f"has no result: {own.reason}"
+            print(f"trial {number} {why}", file=sys.stderr, flush=True)
             continue
-        rows += own
+        rows = sorted([*rows, *own], key=lambda row: row.trial)
         print(
             f"trial {number}, {own[0].wall_s:.1f} s: "
             + ", ".join(f"{row.kind} {100.0 * row.error:+.2g}% ({row.pull:+.1f} sd)" for row in own),

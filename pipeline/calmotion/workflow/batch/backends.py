@@ -7,6 +7,7 @@ import queue
 import threading
 import time
 from abc import ABC, abstractmethod
+from collections.abc import Callable
 from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from contextlib import suppress
 from typing import Any
@@ -14,6 +15,7 @@ from urllib.parse import parse_qsl
 
 from calmotion.errors import ShotError
 from calmotion.host import SettingError
+from calmotion.support.processes.workers import Fault, results_of
 from calmotion.version import __version__
 from calmotion.workflow.batch.attempt import attempt, kill_running
 
@@ -39,6 +41,10 @@ class Backend(ABC):
             fields: Of the job.
             avoid: The worker on which an attempt died (`worker` of what an attempt returned), or empty.
         """
+
+    @abstractmethod
+    def call(self, function: Callable[..., Any], *arguments: Any) -> Future[Any]:
+        """Call a function of a module somewhere; the future has an exception where its worker is lost, or its own."""
 
     def revive(self) -> bool:
         """Open it again after futures were lost with it; whether that was possible."""
@@ -73,6 +79,19 @@ class LocalBackend(Backend):
             return attempt(fields, cores)
         finally:
             self._shares.put(cores)
+
+    def call(self, function: Callable[..., Any], *arguments: Any) -> Future[Any]:
+        return self._executor.submit(self._called_in_share, function, arguments)
+
+    def _called_in_share(self, function: Callable[..., Any], arguments: tuple[Any, ...]) -> Any:
+        cores = self._shares.get()
+        try:
+            ((_, found),) = results_of(_bound, [(cores, function, arguments)])
+        finally:
+            self._shares.put(cores)
+        if isinstance(found, Fault):
+            raise RuntimeError(found.reason)
+        return found
 
     def close(self) -> None:
         self._executor.shutdown(wait=False, cancel_futures=True)
@@ -114,6 +133,10 @@ class DaskBackend(Backend):
         where = {"workers": others, "allow_other_workers": True} if avoid and others else {}
         executor: Executor = self._client.get_executor(pure=False, retries=0, **where)
         return executor.submit(_on_dask, fields)
+
+    def call(self, function: Callable[..., Any], *arguments: Any) -> Future[Any]:
+        executor: Executor = self._client.get_executor(pure=False, retries=0)
+        return executor.submit(function, *arguments)
 
     def revive(self) -> bool:
         end = time.monotonic() + _PATIENCE
@@ -181,6 +204,9 @@ class SlurmBackend(Backend):
 
     def submit(self, fields: dict[str, Any], avoid: str) -> Future[dict[str, Any]]:
         return self._executor.submit(attempt, fields)
+
+    def call(self, function: Callable[..., Any], *arguments: Any) -> Future[Any]:
+        return self._executor.submit(function, *arguments)
 
     def close(self) -> None:
         self._executor.shutdown(wait=False, cancel_futures=True)
@@ -255,6 +281,13 @@ def backend_for(on: str, workers: int | None, folder: str) -> Backend:
 
 def _version() -> str:
     return __version__
+
+
+def _bound(cores: tuple[int, ...], function: Callable[..., Any], arguments: tuple[Any, ...]) -> Any:
+    """A call in a process that uses these processors alone; none: all."""
+    if cores and hasattr(os, "sched_setaffinity"):
+        os.sched_setaffinity(0, set(cores))
+    return function(*arguments)
 
 
 def _on_dask(fields: dict[str, Any]) -> dict[str, Any]:
