@@ -118,7 +118,8 @@ fuzz: $(INSTALLED_DEV)
 		echo "== $$target"; $(RUN) tests/fuzz/guided.py $$target $${CALMOTION_FUZZ:-600} || status=1; \
 	done; exit $$status
 
-# A thousand kills, and other faults in proportion; the counts go into docs/reliability.md.
+# A thousand kills, and other faults in proportion; the counts go into docs/reliability.md. A campaign that was stopped
+# goes on (`--anew` in place of that: python tests/torture/campaign.py --write --anew).
 SEED ?= 0
 RUNS ?= 1000
 torture: $(INSTALLED_DEV)

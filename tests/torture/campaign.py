@@ -3,6 +3,9 @@
 Every run of the program on a tiny shot is disturbed: killed, short of disk or memory, with damaged caches, among others
 or with a clock that jumps. It must end with the same result as an undisturbed run, with a clear refusal, or with exit
 status 130, and the next run must end with the result and leave no file that nothing uses.
+
+With --write, each piece of the campaign is kept in tests/torture/counts.json as soon as it has ended, and what is there
+counts as done: a campaign that was stopped goes on, and the page tells all of it.
 """
 
 from __future__ import annotations
@@ -24,6 +27,7 @@ import report
 import runs
 import storage
 import verdicts
+from record import PATH, Record
 from workspace import REPOSITORY, Workspace
 
 # Kinds of fault, and their share of the runs.
@@ -31,6 +35,7 @@ KINDS = {
     "kills": 1.0, "full disks": 0.15, "folders": 0.1, "damaged files": 0.3, "together": 0.01, "clocks": 0.05,
     "memory": 0.1,
 }  # fmt: skip
+PIECE = 20  # runs after which the counts are kept
 _CAMPAIGNS = {
     "full disks": storage.full_disks, "folders": storage.folders, "damaged files": storage.damaged_files,
     "together": machine.together, "clocks": machine.clocks, "memory": machine.memory,
@@ -44,49 +49,56 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--only", choices=tuple(KINDS), action="append", help="kinds of fault (default: all)")
     parser.add_argument("--folder", type=Path, help="where to run (default: a temporary folder)")
-    parser.add_argument("--write", action="store_true", help="write the counts into docs/reliability.md")
+    parser.add_argument("--write", action="store_true", help="keep the counts, and write them into docs/reliability.md")
+    parser.add_argument("--anew", action="store_true", help="with --write: forget the counts of earlier campaigns")
     options = parser.parse_args()
+    record = Record.read(PATH if options.write and not options.anew else None)
+    record.path = PATH if options.write else None
     # no TemporaryDirectory: the exit of a forked run would remove it
     folder = options.folder or Path(tempfile.mkdtemp(prefix="torture-"))
+    found = 0
     try:
-        tallies, where = disturbed(Workspace(folder.resolve()), options)
+        found = disturbed(Workspace(folder.resolve()), options, record)
     finally:
         if options.folder is None:
             shutil.rmtree(folder, ignore_errors=True)
-    table = report.text(tallies, where, options.seed)
-    if options.write:
-        report.insert(REPOSITORY / "docs" / "reliability.md", table)
-    print(table)
-    return int(any(tally.faults for tally in tallies.values()))
+    print(report.text(*record.sums(), record.about()))
+    return int(found > 0)
 
 
-def disturbed(space: Workspace, options: argparse.Namespace) -> tuple[dict[str, verdicts.Tally], Counter[str]]:
-    """Run the campaign; its counts by the kind of fault, and the kills by where they were."""
-    chosen = options.only or list(KINDS)
+def disturbed(space: Workspace, options: argparse.Namespace, record: Record) -> int:
+    """Run what is missing of the campaign, and add its counts to a record; the number of faults that it found."""
+    wanted = {kind: max(1, round(KINDS[kind] * options.runs)) for kind in options.only or KINDS}
     os.environ.update(space.environment())  # before the program is loaded, which reads them
     runs.load_program()
     space.prepare(keep_caches=options.folder is not None)
     seconds = undisturbed(space)
     print(f"an undisturbed run takes {seconds:.1f} s", flush=True)
-    tallies = {}
-    where: Counter[str] = Counter()
-    stopped = False
     signal.signal(signal.SIGTERM, signal.default_int_handler)  # ends the campaign with the counts so far
-    for kind in chosen:
-        begin, count = time.monotonic(), max(1, round(KINDS[kind] * options.runs))
-        rng, tally = random.Random(f"{options.seed} {kind}"), verdicts.Tally()
-        tallies[kind] = tally
+    found, stopped = 0, False
+    while not stopped:
+        # the kind that is furthest behind, so that a campaign that is stopped has something of each
+        kind = min(wanted, key=lambda kind: record.runs(kind) / wanted[kind])
+        first = record.runs(kind)
+        count = min(max(1, round(PIECE * KINDS[kind])), wanted[kind] - first)
+        if count <= 0:
+            break
+        begin, tally, where = time.monotonic(), verdicts.Tally(), Counter[str]()
+        rng = random.Random(f"{options.seed} {kind} {first}")
         try:
             if kind == "kills":
-                kills.campaign(space, rng, count, tally, seconds, where)
+                kills.campaign(space, rng, count, tally, seconds, where, first)
             else:
                 _CAMPAIGNS[kind](space, rng, count, tally)
         except KeyboardInterrupt:
             stopped = True
-        print(f"{kind}: {tally.counts}, {len(tally.faults)} faults, {time.monotonic() - begin:.0f} s", flush=True)
-        if stopped:
-            break
-    return tallies, where
+        record.add(kind, tally, where)
+        if options.write:
+            report.insert(REPOSITORY / "docs" / "reliability.md", report.text(*record.sums(), record.about()))
+        found += len(tally.faults)
+        done = f"{kind}: {record.runs(kind)} of {wanted[kind]}"
+        print(f"{done}, {tally.counts}, {len(tally.faults)} faults, {time.monotonic() - begin:.0f} s", flush=True)
+    return found
 
 
 def undisturbed(space: Workspace) -> float:

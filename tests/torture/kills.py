@@ -10,6 +10,7 @@ import random
 import signal
 import time
 from collections import Counter
+from functools import cache
 
 import events
 import runs
@@ -45,6 +46,12 @@ class Writes:
         return name, rng.randint(1, self.counts[name])
 
 
+@cache
+def writes_of(space: Workspace) -> Writes:
+    """The writes of a workspace, found once."""
+    return Writes(space)
+
+
 def draw_signal(rng: random.Random) -> int:
     """A signal: half of them SIGKILL, a third those that the program answers."""
     share = rng.random()
@@ -52,22 +59,23 @@ def draw_signal(rng: random.Random) -> int:
 
 
 def campaign(
-    space: Workspace, rng: random.Random, kills: int, tally: verdicts.Tally, seconds: float, where: Counter[str]
-) -> None:
+    space: Workspace, rng: random.Random, kills: int, tally: verdicts.Tally, seconds: float, where: Counter[str],
+    first: int = 0,
+) -> None:  # fmt: skip
     """Kill runs.
 
     Args:
-        kills: How many.
+        kills: How many; the last series goes on to its end.
         tally: Takes the outcomes.
         seconds: Duration of an undisturbed run.
         where: Takes the numbers of kills by stage and signal, and by write.
+        first: Number of the first kill in the descriptions of faults.
     """
-    writes = Writes(space)
-    done = 0
-    while done < kills:
+    writes = writes_of(space)
+    while tally.runs < kills:
         space.reset(old_outputs=rng.random() < 0.3)
         figures = rng.random() < 0.15
-        about = f"series at kill {done}"
+        about = f"series at kill {first + tally.runs}"
         for _ in range(rng.randint(1, 4)):
             parts = {space.cool(rng), "layer", "root layer", "table", "recording", "checkpoint", "temporary files"}
             parts |= {"figures"} if figures else set()
@@ -86,7 +94,7 @@ def campaign(
                 cold, limit = False, number
                 fault = events.strike(space, name, count, lambda limit=limit: os.kill(os.getpid(), limit))
                 ending = runs.run(space, figures, fault)
-            done += 1
+            tally.runs += 1
             text = f"{about}, {signal.Signals(number).name} {'at a moment' if timed else f'at {name} {count}'}"
             where[f"stage\t{ending.stage}\t{signal.Signals(number).name}"] += 1
             if not timed:

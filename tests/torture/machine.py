@@ -29,6 +29,7 @@ def together(space: Workspace, rng: random.Random, count: int, tally: verdicts.T
             if faults:
                 print(about, *faults, sep="\n  ", flush=True)
         faults = [*verdicts.result_faults(space, False), *verdicts.leftovers(space)]
+        tally.runs += 1
         tally.add("sets of files compared", about, faults)
         if faults:
             print(about, *faults, sep="\n  ", flush=True)
@@ -47,6 +48,7 @@ def clocks(space: Workspace, rng: random.Random, count: int, tally: verdicts.Tal
         faults = [f"exit status {ending.status}", *verdicts.refusal_faults(ending)]
         if ending.status == 0:
             faults = [*verdicts.result_faults(space, False), *verdicts.leftovers(space)]
+        tally.runs += 1
         tally.add("same result" if ending.status == 0 else "other", about, faults)
         if faults:
             print(about, *faults, sep="\n  ", flush=True)
@@ -97,6 +99,7 @@ def memory(space: Workspace, rng: random.Random, count: int, tally: verdicts.Tal
         after = [f"the next run: exit status {again.status}", *verdicts.refusal_faults(again)]
         if again.status == 0:
             after = [*verdicts.result_faults(space, figures), *verdicts.leftovers(space)]
+        tally.runs += 1
         tally.add("same result by the next run" if not after else "no result by the next run", about, after)
         if faults or after:
             print(about, *faults, *after, sep="\n  ", flush=True)

@@ -11,26 +11,27 @@ import verdicts
 BEGIN, END = "<!-- counts of make torture -->", "<!-- end of the counts -->"
 
 
-def text(tallies: Mapping[str, verdicts.Tally], where: Counter[str], seed: int) -> str:
+def text(tallies: Mapping[str, verdicts.Tally], where: Counter[str], about: str) -> str:
     """The counts of a campaign as Markdown.
 
     Args:
         tallies: By kind of fault.
         where: Numbers of kills: `stage<tab>name<tab>signal` and `write<tab>label`.
-        seed: Of the campaign.
+        about: When and on what it ran, a sentence.
     """
     rows = [
         [
             kind,
+            str(tally.runs),
             ", ".join(f"{outcome} {count}" for outcome, count in sorted(tally.counts.items(), key=_by_count)),
             str(len(tally.faults)),
         ]
         for kind, tally in tallies.items()
     ]
     parts = [
-        f"Seed {seed}. A fault is a result that is lost or differs, a half-written or left file, a traceback, a crash, "
+        f"{about} A fault is a result that is lost or differs, a half-written or left file, a traceback, a crash, "
         "or a run that does not end.",
-        _table(["disturbance", "runs by outcome", "faults"], rows),
+        _table(["disturbance", "runs", "outcomes, also of the next runs", "faults"], rows),
     ]
     if where:
         parts += ["Kills by stage and signal:", _by_stage(where), "Kills just before a write:", _by_write(where)]

@@ -15,7 +15,7 @@ from pathlib import Path
 import events
 import runs
 import verdicts
-from kills import CACHED, Writes
+from kills import CACHED, writes_of
 from workspace import CHECKPOINT, Workspace, empty
 
 ROOM = 1_500_000  # an undisturbed run writes less [bytes] into each of its folders
@@ -67,7 +67,7 @@ def full_disks(space: Workspace, rng: random.Random, count: int, tally: verdicts
 
 def folders(space: Workspace, rng: random.Random, count: int, tally: verdicts.Tally) -> None:
     """Folders that cannot be written, are files, or vanish while the run writes."""
-    writes = Writes(space)
+    writes = writes_of(space)
     for number in range(count):
         space.reset(old_outputs=rng.random() < 0.3)
         part = space.cool(rng)
@@ -206,6 +206,7 @@ def _judge(
     if again.status == 0:
         left = [text for text in verdicts.leftovers(space) if not unused or not text.startswith(unused)]
         after = [*verdicts.result_faults(space, figures), *left]
+    tally.runs += 1
     tally.add("same result by the next run" if not after else "no result by the next run", about, after)
     if faults or after:
         print(about, *faults, *after, sep="\n  ", flush=True)

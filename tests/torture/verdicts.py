@@ -22,10 +22,12 @@ class Tally:
     Attributes:
         counts: By outcome.
         faults: Descriptions of what must not happen.
+        runs: How many runs were disturbed; the runs after them, which nothing disturbs, are not in it.
     """
 
     counts: dict[str, int] = field(default_factory=dict)
     faults: list[str] = field(default_factory=list)
+    runs: int = 0
 
     def add(self, outcome: str, about: str = "", faults: Iterable[str] = ()) -> None:
         """Count an outcome, and the faults that were found with it."""
