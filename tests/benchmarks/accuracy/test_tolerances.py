@@ -51,7 +51,7 @@ def test_the_command_reports_whether_tolerances_are_kept(shot, rows, monkeypatch
     arguments = [
         "arm.usda",
         "--tolerances",
-        "0.01",
+        "10mm",
         "0.001",
         "--optimize",
         "--json",

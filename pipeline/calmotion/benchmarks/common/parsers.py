@@ -7,7 +7,7 @@ import re
 from collections.abc import Sequence
 
 from calmotion.benchmarks.common.shots import MADE
-from calmotion.cli.options import json_option
+from calmotion.cli.options import json_option, quantity
 
 
 class _Paragraphs(argparse.HelpFormatter):
@@ -56,6 +56,8 @@ def table_parser(
     """The arguments of a benchmark that simulates shots with several tolerances and prints a table."""
     parser = bench_parser(name, description)
     parser.add_argument("shots", metavar="SHOT", nargs="*", default=list(shots), help="USD file (default: samples)")
-    parser.add_argument("--tolerances", metavar="METRES", nargs="+", type=float, default=list(tolerances))
+    parser.add_argument(
+        "--tolerances", metavar="LENGTH", nargs="+", type=quantity("m", positive=True), default=list(tolerances)
+    )
     output_options(parser, csv="a table", markdown=True)
     return parser
