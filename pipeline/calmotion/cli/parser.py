@@ -159,10 +159,10 @@ def needed(action: argparse.Action) -> str:
 
 
 class _WithExamples(argparse.HelpFormatter):
-    """Help whose examples keep their lines; descriptions are wrapped."""
+    """Help whose examples and indented lists keep their lines; descriptions are wrapped."""
 
     def _fill_text(self, text: str, width: int, indent: str) -> str:
-        return text if text.startswith(_EXAMPLES) else super()._fill_text(text, width, indent)
+        return text if text.startswith((_EXAMPLES, "  ")) else super()._fill_text(text, width, indent)
 
 
 class Parser(argparse.ArgumentParser):

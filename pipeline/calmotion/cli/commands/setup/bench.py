@@ -6,32 +6,50 @@ import argparse
 from typing import TYPE_CHECKING
 
 from calmotion.cli.options import Commands
+from calmotion.cli.parser import entry
 
 if TYPE_CHECKING:
     from calmotion.cli.output import Output
 
-BENCHMARKS = {
-    "baselines": "optimizer.baselines", "batch": "shows.batches", "calibration": "accuracy.calibration",
-    "compilation": "speed.compilation", "estimates": "accuracy.estimates",
-    "extremes": "integrators.extremes", "gradients": "integrators.gradients",
-    "integrators": "integrators.integrators",
-    "meshing": "links.meshing", "motor-commands": "motors.commands",
-    "motor-cost": "motors.cost", "optimizer": "optimizer.optimizer", "reading": "speed.reading",
-    "reduction": "speed.reduction", "reduction-convergence": "accuracy.reduction_convergence",
-    "scaling": "speed.scaling", "sequence": "shows.repertoires", "simplification": "accuracy.simplification",
-    "speed": "speed.stages", "stability": "integrators.stability",
-    "tolerances": "accuracy.tolerances", "windows": "shows.windows", "work-precision": "accuracy.work_precision",
+WHAT = {
+    "tolerances": ("accuracy.tolerances", "measured error of shots that are simulated or optimised to a tolerance"),
+    "estimates": ("accuracy.estimates", "estimated against measured error, on random shots"),
+    "work-precision": ("accuracy.work_precision", "error against run time of every setting"),
+    "reduction-convergence": ("accuracy.reduction_convergence", "what a finer reduction changes"),
+    "simplification": ("accuracy.simplification", "gain and error of each model simplification"),
+    "calibration": ("accuracy.calibration", "known parameters of random arms, found from noisy recordings"),
+    "meshing": ("links.meshing", "links of robots: their solids, meshes, frequencies and errors"),
+    "integrators": ("integrators.integrators", "orders and numerical damping of the integrators"),
+    "stability": ("integrators.stability", "stiff and extreme scenes"),
+    "extremes": ("integrators.extremes", "hard scenes, growth of the cost, energy and momentum in long runs"),
+    "gradients": ("integrators.gradients", "both adjoints against differences"),
+    "speed": ("speed.stages", "where the time of a run goes"),
+    "scaling": ("speed.scaling", "growth of the run time; a sparse solver and Exudyn"),
+    "reduction": ("speed.reduction", "time, memory and accuracy of a reduction"),
+    "compilation": ("speed.compilation", "what a first run compiles"),
+    "reading": ("speed.reading", "which robots of a folder load"),
+    "optimizer": ("optimizer.optimizer", "Gauss-Newton and a quasi-Newton method"),
+    "baselines": ("optimizer.baselines", "input shapers, a filter and the optimised curves"),
+    "motor-commands": ("motors.commands", "optimised commands of servos, replayed in MuJoCo"),
+    "motor-cost": ("motors.cost", "time of a step with motors that give"),
+    "windows": ("shows.windows", "time and memory of long performances"),
+    "sequence": ("shows.repertoires", "clips with all their transitions"),
+    "batch": ("shows.batches", "shots on a Dask cluster of this machine"),
 }  # fmt: skip
+BENCHMARKS = {name: module for name, (module, _) in WHAT.items()}
 
 
 def add_to(commands: Commands) -> None:
     """Add the command."""
     command = commands.add_parser(
         "bench",
-        help="measure error against run time",
-        description="Measure error against run time. `calmotion bench NAME --help` lists the arguments of a benchmark.",
+        help="measure errors, estimates and run times",
+        description="Measure errors, estimates and run times. `calmotion bench NAME --help` lists the arguments of a "
+        "benchmark.",
     )
-    command.add_argument("name", metavar="NAME", choices=tuple(BENCHMARKS), help=", ".join(BENCHMARKS))
+    command.add_argument("name", metavar="NAME", choices=tuple(BENCHMARKS), help="a benchmark, see below")
+    lines = [line for name, (_, text) in WHAT.items() for line in entry(name, text, max(map(len, WHAT)) + 4)]
+    command.add_argument_group("benchmarks", "\n".join(lines))
     command.add_argument("arguments", nargs=argparse.REMAINDER, help="arguments of the benchmark")
     command.set_defaults(command=_run, json=False)
 
