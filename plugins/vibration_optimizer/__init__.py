@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 from calmotion.accuracy.reduced_bodies import ConvergedReduction, compiled_in
 from calmotion.errors import ShotError
 from calmotion.host import NotAsked, Operator, Property, RunContext, registration
 from calmotion.shot import Animation, Character, ModelChoices, Result
-from calmotion.shot.budget import SEARCH_SHARE
 from calmotion.shot.model_choice import run_settings, simplified_character, with_choices
 from calmotion.shot.outputs import ShapedTracks
 from calmotion.shot.result import is_exceeded, is_reached
@@ -132,10 +132,10 @@ class OptimizeShot(Operator):
         Property(
             "least_gain",
             float,
-            SEARCH_SHARE,
-            minimum=1e-6,
+            -1.0,
             maximum=1.0,
-            description="A smaller predicted gain ends the search: a part of the tolerance, by root mean squares",
+            description="A smaller predicted gain ends the search: a part of the tolerance, by root mean squares; "
+            "-1: a tenth, but less where the shot is searched in windows",
         ),
         Property(
             "knot_spacing",
@@ -207,6 +207,7 @@ class OptimizeShot(Operator):
     def execute(self, context: RunContext) -> Sequence[object]:
         from calmotion.retargeting.checkpoint import checkpoint_path, remove_checkpoint
         from calmotion.retargeting.to_tolerance import optimize_to_tolerance
+        from calmotion.retargeting.windows.plan import least_gain
         from calmotion.retargeting.windows.store import windows_path
 
         options = self._search_options(context)
@@ -216,6 +217,8 @@ class OptimizeShot(Operator):
         converged = context.get(ConvergedReduction)
         known, memory = (None, None) if converged is None else (converged.known, converged.memory)
         shot = compiled_in(context.get)
+        if not context.properties.least_gain > 0.0:
+            options = replace(options, least_gain=least_gain(shot.character, shot.animation, options))
         try:
             result = optimize_to_tolerance(shot, options, context.progress, kept, known, stored, memory)
         except ShotError:
@@ -239,15 +242,16 @@ class OptimizeShot(Operator):
                 "warning",
                 f"the new curves are worse than the animated ones: objective {before} -> {after}; {reason}",
             )
-        return [_with_budget(context, result, least_gain=context.properties.least_gain)]
+        return [_with_budget(context, result, least_gain=options.least_gain)]
 
     @staticmethod
     def _search_options(context: RunContext) -> Any:
         values = context.properties
+        given = {"least_gain": values.least_gain} if values.least_gain > 0.0 else {}
         return _options(
             context,
+            **given,
             max_iterations=values.max_iterations,
-            least_gain=values.least_gain,
             knot_spacing=values.knot_spacing if values.knot_spacing > 0.0 else None,
             smoothness=values.smoothness if values.smoothness >= 0.0 else None,
             adjoint=values.adjoint,

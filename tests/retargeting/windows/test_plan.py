@@ -5,7 +5,8 @@ import dataclasses
 import numpy as np
 import pytest
 from calmotion.errors import ShotError
-from calmotion.retargeting.windows.plan import FEWEST, overlap_time, plan_windows, window_length
+from calmotion.retargeting.windows.plan import EXACT, FEWEST, least_gain, overlap_time, plan_windows, window_length
+from calmotion.shot.budget import SEARCH_SHARE
 from calmotion.shot.robust.settings import RobustSettings
 from calmotion.shot.run import LONG_SHOT, WINDOW, RunSettings
 
@@ -48,6 +49,15 @@ def test_long_shots_have_windows_unless_the_user_says_otherwise(arm, animation):
     assert window_length(cyclic, long, RunSettings()) is None
     assert window_length(arm, long, RunSettings(robust=RobustSettings())) is None
     assert window_length(arm, long, RunSettings(adjoint="continuous")) is None
+
+
+def test_what_is_found_of_a_long_shot_does_not_depend_on_its_windows(arm, animation):
+    short, long = of_length(animation, LONG_SHOT), of_length(animation, LONG_SHOT + 1)
+    for window in (None, 0.0, 7.0):
+        assert least_gain(arm, long, RunSettings(window=window)) == EXACT
+    assert least_gain(arm, short, RunSettings(window=7.0)) == EXACT
+    assert least_gain(arm, short, RunSettings(window=0.0)) == least_gain(arm, short, RunSettings()) == SEARCH_SHARE
+    assert least_gain(arm, long, RunSettings(robust=RobustSettings())) == SEARCH_SHARE  # one search, of many robots
 
 
 def test_windows_that_cannot_be_are_refused(arm, animation):
