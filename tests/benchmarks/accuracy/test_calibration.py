@@ -2,19 +2,51 @@
 
 import numpy as np
 import pytest
+from calmotion.benchmarks.accuracy import calibration
 from calmotion.benchmarks.accuracy.calibration import HEADS, Recovered, main, table_of
+from calmotion.benchmarks.common.tables import read_rows, write_rows
 from calmotion.benchmarks.scenes.recorded_arm import recorded_arm
+from calmotion.errors import ShotError
 
 
 def row(trial, kind, error, deviation, identifiable=True):
-    return Recovered(trial, kind, error, deviation, error / deviation, identifiable, True, 100, 1.0)
+    return Recovered(trial, True, kind, error, deviation, error / deviation, identifiable, True, 100, 1.0)
 
 
 def test_the_table_counts_intervals_that_cover_the_truth():
     rows = [row(0, "modulus", 0.01, 0.01), row(1, "modulus", -0.03, 0.01), row(0, "delay", 1e-3, 2e-3, False)]
     modulus, delay = table_of(rows)
-    assert modulus == ["modulus", "2", "50%", "2%", "3%", "1%", "2"] and len(modulus) == len(HEADS)
-    assert delay == ["delay", "1", "100%", "1 ms", "1 ms", "2 ms", "0"]
+    assert modulus == ["modulus", "2", "50%", "2%", "3%", "1%", "2", "1%: 1 of 2"] and len(modulus) == len(HEADS)
+    assert delay == ["delay", "1", "100%", "1 ms", "1 ms", "2 ms", "0", "1 ms: 0 of 0"]
+
+
+def test_trials_are_resumed_from_the_table_of_the_same_real_arm(tmp_path, monkeypatch, capsys):
+    ran = []
+    monkeypatch.setattr(
+        calibration, "tried", lambda number, finer: [row(number, "modulus", 0.01, 0.01)] * (ran.append(number) or 1)
+    )
+    table = str(tmp_path / "rows.csv")
+    assert main(["--trials", "2", "--finer-mesh", "--csv", table]) == 0
+    assert main(["--trials", "4", "--finer-mesh", "--csv", table, "--resume"]) == 0
+    assert ran == [0, 1, 2, 3]
+    assert read_rows(table, Recovered) == [row(number, "modulus", 0.01, 0.01) for number in range(4)]
+    with pytest.raises(ShotError, match="finer mesh"):
+        main(["--trials", "5", "--csv", table, "--resume"])
+    with pytest.raises(SystemExit):
+        main(["--resume"])
+    assert "--csv FILE" in capsys.readouterr().err
+
+
+def test_a_table_with_other_columns_or_values_is_refused(tmp_path):
+    table = tmp_path / "rows.csv"
+    table.write_text("trial,kind\n0,modulus\n")
+    with pytest.raises(ShotError, match="columns"):
+        read_rows(str(table), Recovered)
+    write_rows(str(table), Recovered, [row(0, "modulus", 0.01, 0.01)])
+    table.write_text(table.read_text().replace("True", "yes", 1))
+    with pytest.raises(ShotError, match="line 2") as refused:
+        read_rows(str(table), Recovered)
+    assert refused.value.attribute == "finer_mesh"
 
 
 @pytest.mark.long

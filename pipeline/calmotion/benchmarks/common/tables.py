@@ -5,7 +5,10 @@ from __future__ import annotations
 import csv
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict, fields
-from typing import Any
+from pathlib import Path
+from typing import Any, get_type_hints
+
+from calmotion.errors import ShotError
 
 
 def write_rows(path: str, kind: type[Any], rows: Iterable[Any]) -> None:
@@ -14,6 +17,41 @@ def write_rows(path: str, kind: type[Any], rows: Iterable[Any]) -> None:
         writer = csv.DictWriter(file, [field.name for field in fields(kind)])
         writer.writeheader()
         writer.writerows(asdict(row) for row in rows)
+
+
+def read_rows(path: str, kind: type[Any]) -> list[Any]:
+    """The rows that `write_rows` wrote, of one kind of dataclass with numbers, texts and truth values; none of no file.
+
+    Raises:
+        ShotError: The file has other columns, or a value that is none of its column.
+    """
+    if not Path(path).exists():
+        return []
+    hints = get_type_hints(kind)
+    names = [field.name for field in fields(kind)]
+    with open(path, newline="", encoding="utf-8") as file:
+        reader = csv.DictReader(file)
+        if list(reader.fieldnames or []) != names:
+            raise ShotError(
+                "the table has other columns than those of this benchmark", path=path,
+                found=", ".join(reader.fieldnames or ["nothing"]), remedy="Name another file with --csv",
+            )  # fmt: skip
+        rows = list(reader)
+    found = []
+    for number, row in enumerate(rows, 2):
+        values = {}
+        for name in names:
+            try:
+                values[name] = (
+                    {"True": True, "False": False}[row[name]] if hints[name] is bool else hints[name](row[name])
+                )
+            except (KeyError, TypeError, ValueError):
+                raise ShotError(
+                    f"line {number} of the table has no value of its column", path=path, attribute=name,
+                    found=row[name], remedy="Repair or remove the line: what it held is measured again",
+                ) from None  # fmt: skip
+        found.append(kind(**values))
+    return found
 
 
 def markdown(heads: Sequence[str], rows: Iterable[Sequence[str]], rule: str = "---") -> str:

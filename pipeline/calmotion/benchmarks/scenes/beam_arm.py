@@ -33,14 +33,29 @@ def _at(x: float, rotation: Array = IDENTITY) -> Frame:
     return Frame(np.array([x, 0.0, 0.0]), rotation)
 
 
-def beam_mesh(length: float, thickness: float, cells: int, across: int = 2) -> tuple[Array, IntArray]:
-    """A square beam along x of so many cells along and across; points [m], shape [n, 3], and tetrahedra."""
+def beam_mesh(
+    length: float, thickness: float, cells: int, across: int = 2, grading: tuple[float, float] = (1.0, 1.0)
+) -> tuple[Array, IntArray]:
+    """A square beam along x of so many cells along and across; points [m], shape [n, 3], and tetrahedra.
+
+    Args:
+        length, thickness: [m].
+        cells, across: Elements along the beam, and across it.
+        grading: Exponents by which they become smaller towards the ends, and towards the edges, where strains are
+            singular; 1: equal ones.
+    """
     from skfem import MeshTet
 
-    side = np.linspace(-0.5, 0.5, across + 1) * thickness
-    mesh = MeshTet.init_tensor(np.linspace(0.0, length, cells + 1), side, side)
+    side = 0.5 * thickness * _graded(across, grading[1])
+    mesh = MeshTet.init_tensor(0.5 * length * (1.0 + _graded(cells, grading[0])), side, side)
     points = np.ascontiguousarray(mesh.p.T)
     return points, oriented_tets(points, mesh.t.T)[0]
+
+
+def _graded(count: int, exponent: float) -> Array:
+    """Bounds of so many cells from -1 to 1, which are smaller towards both ends, shape [count + 1]."""
+    even = np.linspace(-1.0, 1.0, count + 1)
+    return np.asarray(np.sign(even) * (1.0 - (1.0 - np.abs(even)) ** exponent))
 
 
 # parameters: dimensions, material and discretisation in SI units; a benchmark names the few in which its arm differs
@@ -48,6 +63,7 @@ def beam_arm(
     links: int = 1, length: float = 0.6, thickness: float = 0.02, youngs_modulus: float = 1.8e9,
     density: float = 1200.0, payload: float = 0.2, damping: float = 0.01, gravity: float = 9.81,
     elasticity: str = "auto", modes: int = -1, cells: int = 12, across: int = 2,
+    grading: tuple[float, float] = (1.0, 1.0),
 ) -> tuple[Character, FEMeshes]:  # fmt: skip
     """An arm along x of flexible links, each on a motor that lifts it, with a rigid load welded to the end.
 
@@ -61,7 +77,7 @@ def beam_arm(
         damping: Ratio of critical.
         gravity: Down the z axis [m/s^2].
         elasticity, modes: See `FlexibleSettings`.
-        cells, across: Elements along a link, and across it.
+        cells, across, grading: Of the mesh of a link, as of `beam_mesh`.
     """
     material = ElasticMaterial("/Arm/Plastic", youngs_modulus, 0.35, density, damping)
     settings = FlexibleSettings(material, mode_count=modes, elasticity=elasticity)
@@ -76,7 +92,7 @@ def beam_arm(
     joints.append(Joint("/Arm/Weld", "fixed", links - 1, links, _at(length), _at(0.0)))
     motors = tuple(Motor(k, joints[k].path, "drive:angular:physics:targetPosition") for k in range(links))
     target = Target("/Arm/Load", links, _at(0.0))
-    points, tets = beam_mesh(length, thickness, cells, across)
+    points, tets = beam_mesh(length, thickness, cells, across, grading)
     meshes = FEMeshes(tuple(FEMesh(k, points, tets, MeshQuality(0.0, 0.0, 0.0)) for k in range(links)))
     down = np.array([0.0, 0.0, -gravity])
     return Character("/Arm", tuple(bodies), tuple(joints), motors, (target,), down), meshes
