@@ -22,6 +22,15 @@ def test_a_disabled_plugin_is_remembered_and_enabled_again(environment):
     assert [path.name for path in file.parent.iterdir()] == [FILE_NAME]
 
 
+def test_choices_that_are_made_at_once_are_all_kept(environment):
+    from concurrent.futures import ThreadPoolExecutor
+
+    names = [f"plugin{k}" for k in range(12)]
+    with ThreadPoolExecutor(6) as pool:
+        list(pool.map(lambda name: choose(name, False, environment), names))
+    assert disabled_plugins(environment) == set(names)
+
+
 def test_a_disabled_plugin_is_not_imported_and_its_operators_are_not_there(environment, make_plugin):
     make_plugin("anvil", "raise SystemExit('imported')")
     folder = make_plugin("smithy", "raise SystemExit('imported')").parent

@@ -52,3 +52,21 @@ def test_nothing_is_written_over(tmp_path):
     write_template("speed_watch", tmp_path)
     with pytest.raises(PluginError, match="exists already"):
         write_template("speed_watch", tmp_path)
+
+
+def test_a_plugin_that_cannot_be_written_leaves_no_half_of_it(tmp_path, monkeypatch):
+    write, count = type(tmp_path).write_text, []
+
+    def full(path, *arguments, **more):
+        count.append(path)
+        if len(count) == 3:
+            raise OSError(28, "No space left on device")
+        return write(path, *arguments, **more)
+
+    monkeypatch.setattr(type(tmp_path), "write_text", full)
+    with pytest.raises(PluginError, match="cannot be made"):
+        write_template("speed_watch", tmp_path)
+    assert len(count) == 3 and list(tmp_path.iterdir()) == []
+    write_template("speed_watch", tmp_path)
+    with pytest.raises(PluginError, match="exists already"):
+        write_template("speed_watch", tmp_path)

@@ -12,6 +12,7 @@ import pytest
 from calmotion.support.files import (
     PREFIX,
     _machine,
+    locked,
     remove_abandoned,
     replaced,
     temporary_folder,
@@ -165,3 +166,16 @@ def test_what_is_no_file_is_not_replaced(tmp_path, make):
         with pytest.raises(OSError, match="Not a file"):
             write(path)
     assert os.lstat(path) == before and names(tmp_path) == ["table.csv"]
+
+
+@pytest.mark.skipif(os.name == "nt", reason="folders are not locked there")
+def test_a_folder_is_locked_for_one_process_at_a_time_and_nothing_is_left(tmp_path):
+    code = (
+        "import pathlib, sys, time\nfrom calmotion.support.files import locked\nfolder = pathlib.Path(sys.argv[1])\n"
+        "with locked(folder):\n    count = len(list(folder.iterdir()))\n    time.sleep(0.05)\n"
+        "    (folder / str(count)).write_text('')\n"
+    )
+    started = [subprocess.Popen([sys.executable, "-c", code, str(tmp_path)]) for _ in range(4)]
+    assert [process.wait() for process in started] == [0] * 4 and names(tmp_path) == ["0", "1", "2", "3"]
+    with locked(tmp_path / "missing"):
+        pass

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from calmotion.host.errors import SettingError
 from calmotion.support.caching.cache_folder import CONFIGURATION_VARIABLE, configuration_folder
-from calmotion.support.files import write_text
+from calmotion.support.files import locked, write_text
 from calmotion.support.reading import read_toml
 
 FILE_NAME = "plugins.toml"
@@ -48,13 +48,15 @@ def choose(plugin_id: str, enabled: bool, environment: Mapping[str, str] | None 
     Raises:
         SettingError: The file cannot be read or written.
     """
-    kept = disabled_plugins(environment)
-    kept = kept - {plugin_id} if enabled else kept | {plugin_id}
     file = configuration_folder(environment) / FILE_NAME
-    names = ", ".join(f'"{name}"' for name in sorted(kept))
     head = "# Plugins that are not loaded; `calmotion plugins enable ID` removes one from the list.\n"
     try:
-        write_text(file, f"{head}disabled = [{names}]\n")
+        file.parent.mkdir(parents=True, exist_ok=True)
+        with locked(file.parent):  # two that choose at once are both kept
+            kept = disabled_plugins(environment)
+            kept = kept - {plugin_id} if enabled else kept | {plugin_id}
+            names = ", ".join(f'"{name}"' for name in sorted(kept))
+            write_text(file, f"{head}disabled = [{names}]\n")
     except OSError as error:
         raise SettingError(
             "the list of disabled plugins cannot be saved",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import shutil
 from pathlib import Path
 
 from calmotion.host.errors import PluginError
@@ -156,12 +157,16 @@ def write_template(name: str, parent: Path) -> Path:
     }
     try:
         folder.mkdir(parents=True)
+    except FileExistsError:
+        raise PluginError("the folder exists already", path=str(folder), remedy="Choose another name.") from None
+    except OSError as error:
+        raise PluginError("the folder cannot be made", path=str(folder), found=error.strerror) from error
+    try:
         for file, text in _FILES.items():
             path = folder / file.format(**values)
             path.parent.mkdir(exist_ok=True)
             path.write_text(text.format(**values), encoding="utf-8")
-    except FileExistsError:
-        raise PluginError("the folder exists already", path=str(folder), remedy="Choose another name.") from None
     except OSError as error:
+        shutil.rmtree(folder, ignore_errors=True)  # a half-made plugin would be found, and be in the way of the next
         raise PluginError("the folder cannot be made", path=str(folder), found=error.strerror) from error
     return folder

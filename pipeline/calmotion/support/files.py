@@ -155,6 +155,26 @@ def remove_abandoned(folder: Path) -> None:
                 path.unlink()
 
 
+@contextlib.contextmanager
+def locked(folder: Path) -> Iterator[None]:
+    """Wait until no other process is in such a block with the same folder, which is there.
+
+    The lock is of the folder itself, so that no file of it is left, and ends with the process. Systems and file systems
+    that cannot lock a folder run the block at once.
+    """
+    descriptor = None
+    try:
+        with contextlib.suppress(ImportError, OSError):
+            import fcntl
+
+            descriptor = os.open(folder, os.O_RDONLY)
+            fcntl.flock(descriptor, fcntl.LOCK_EX)
+        yield
+    finally:
+        if descriptor is not None:
+            os.close(descriptor)
+
+
 def _own_prefix() -> str:
     """What the names of temporary files of this process begin with."""
     return f"{PREFIX}{_machine()}-{os.getpid()}-"

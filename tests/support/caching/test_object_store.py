@@ -90,3 +90,25 @@ def test_a_missing_fsspec_is_named_with_its_extra(monkeypatch):
     monkeypatch.setitem(__import__("sys").modules, "fsspec", None)
     with pytest.raises(ShotError, match=r"pip install 'calmotion\[store\]'"):
         check_store("s3://bucket/folder")
+
+
+def test_workers_with_one_process_number_write_apart_and_leave_nothing(worker, monkeypatch):
+    """Containers number their processes alike: what one had half written was moved into place by the other."""
+    store, root = worker("a")
+    parts, kind = [], type(store)
+    write = kind.pipe_file
+
+    def writing(self, path, value, **more):
+        parts.append(path)
+        write(self, path, value, **more)
+        if len(parts) == 3:
+            raise OSError("the disk is full")
+
+    monkeypatch.setattr(kind, "pipe_file", writing)
+    for name in ("abc", "abd", "abe"):
+        store_arrays(MESHES, name, ARRAYS)
+    unique = {part.removesuffix(".part").rpartition(".")[2] for part in parts}
+    assert len(unique) == 3, "the same process, and the same number in another container"
+    assert sorted(path.rpartition("/")[2] for path in store.ls(f"{root}/{MESHES}", detail=False)) == [
+        "abc.npz", "abd.npz"
+    ]  # fmt: skip

@@ -46,6 +46,27 @@ def test_the_key_of_a_faster_process_is_kept(folder):
     assert signing._made(folder / FILE_NAME) == key, "it was made after this process found none"
 
 
+def test_processes_that_find_a_damaged_key_replace_it_by_one(folder):
+    """Each replaced it, and kept signing with a key that another one had replaced."""
+    from concurrent.futures import ThreadPoolExecutor
+
+    folder.mkdir()
+    for _ in range(20):
+        (folder / FILE_NAME).write_bytes(b"short")
+        with ThreadPoolExecutor(4) as pool:
+            keys = set(pool.map(lambda _: signing._made(folder / FILE_NAME), range(4)))
+        assert keys == {(folder / FILE_NAME).read_bytes()}
+
+
+def test_a_file_system_without_hard_links_keeps_a_key(folder, monkeypatch):
+    def none(*arguments):
+        raise PermissionError(1, "Operation not permitted")
+
+    monkeypatch.setattr(os, "link", none)
+    key = signing_key()
+    assert len(key) == 32 and signing._made(folder / FILE_NAME) == key
+
+
 @pytest.mark.parametrize("damage", ["readable", "short", "link", "folder"])
 def test_a_key_that_others_can_read_or_that_is_damaged_is_replaced(folder, damage):
     first, path = signing_key(), folder / FILE_NAME

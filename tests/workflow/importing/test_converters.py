@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import stat
 import sys
+import time
 from pathlib import Path
 
 import pytest
@@ -115,3 +116,23 @@ def test_without_a_supported_python_it_says_which(monkeypatch, tmp_path):
     monkeypatch.setattr(converters.shutil, "which", lambda name: None)
     with pytest.raises(ShotError, match="Python 3.8 to 3.9"):
         converter_python(None, lambda text: None)
+
+
+def test_imports_that_begin_at_once_make_one_environment(tmp_path, monkeypatch):
+    """The second one removed what the first one was making."""
+    from concurrent.futures import ThreadPoolExecutor
+
+    folder, made = tmp_path / "deep" / "environment", []
+
+    def make(place):
+        made.append(place)
+        place.mkdir()
+        time.sleep(0.1)
+        (place / "ready").write_text("")
+
+    monkeypatch.delenv(converters.VARIABLE, raising=False)
+    monkeypatch.setattr(converters, "environment_folder", lambda: folder)
+    monkeypatch.setattr(converters, "_make", make)
+    with ThreadPoolExecutor(3) as pool:
+        found = list(pool.map(lambda _: converter_python(None, lambda text: None), range(3)))
+    assert made == [folder] and len(set(found)) == 1

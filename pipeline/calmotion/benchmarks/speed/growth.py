@@ -20,7 +20,6 @@ from calmotion.simulation.bodies import reduce_bodies
 
 STEP = 1.0 / 480.0
 BODIES, DURATIONS, MODES = (4, 8, 16, 32, 64, 128), (1_000, 10_000, 100_000), (4, 8, 16, 32, 64)
-BODIES, DURATIONS, MODES = (4, 8, 16, 32, 64, 128), (1_000, 10_000, 100_000), (4, 8, 16, 32, 64)
 
 
 @dataclass(frozen=True)

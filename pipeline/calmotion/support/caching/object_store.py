@@ -6,10 +6,12 @@ who can write to the store can neither forge a mesh nor damage one unseen. Compi
 
 from __future__ import annotations
 
+import contextlib
 import functools
 import logging
 import os
 import posixpath
+import secrets
 from pathlib import Path
 from typing import Any
 
@@ -101,10 +103,15 @@ def publish(cache: str, path: Path) -> None:
         if store[0].exists(name) and name not in _DAMAGED:
             return
         # not in place: a store that is a folder shows what is half written
-        part = f"{name}.{os.getpid()}.part"
+        part = f"{name}.{secrets.token_hex(8)}.part"  # workers in containers have the same process numbers
         store[0].makedirs(posixpath.dirname(name), exist_ok=True)
-        store[0].pipe_file(part, path.read_bytes())
-        store[0].mv(part, name)
+        try:
+            store[0].pipe_file(part, path.read_bytes())
+            store[0].mv(part, name)
+        except Exception:  # of any kind of store
+            with contextlib.suppress(Exception):
+                store[0].rm_file(part)
+            raise
         _DAMAGED.discard(name)
     except Exception as error:  # as above
         _tell(f"cannot be written: {error}")

@@ -15,7 +15,7 @@ from functools import cache
 from pathlib import Path
 
 from calmotion.support.caching.cache_folder import configuration_folder
-from calmotion.support.files import new_file, remove_abandoned
+from calmotion.support.files import locked, new_file, remove_abandoned
 
 VARIABLE = "CALMOTION_CACHE_KEY"
 FILE_NAME = "cache_key"
@@ -54,11 +54,12 @@ def _read(path: Path) -> bytes:
 def _made(path: Path) -> bytes:
     """A new key in a file; that of another process, where one was faster."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    with new_file(path) as temporary:  # only this user can read it
+    # two processes that replace a damaged key would each sign with its own
+    with locked(path.parent), new_file(path) as temporary:  # only this user can read it
         temporary.write_bytes(secrets.token_bytes(_LENGTH))
         try:
             os.link(temporary, path)
-        except FileExistsError:  # of a faster process, whose key counts, or damaged, or open to others
+        except OSError:  # of a faster process, whose key counts; or damaged, or open to others; or no hard links here
             if not _read(path):
                 os.replace(temporary, path)
     return _read(path)

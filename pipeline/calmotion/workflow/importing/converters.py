@@ -69,7 +69,10 @@ def converter_python(named: str | None, tell: Callable[[str], None]) -> str:
     folder = environment_folder()
     if not (folder / _READY).is_file():
         tell(f"making an environment for the converters of URDF and MJCF in {folder} (once, about a minute)")
-        _make(folder)
+        folder.parent.mkdir(parents=True, exist_ok=True)
+        with files.locked(folder.parent):  # the environment is not removed while another import makes it
+            if not (folder / _READY).is_file():
+                _make(folder)
     return str(_python_of(folder))
 
 
@@ -127,7 +130,6 @@ def _make(folder: Path) -> None:
             f"the converters need Python {versions}, and there is none", found=sys.version.split()[0],
             remedy=f"Install one, and {' and '.join(PACKAGES)} into an environment of it; name that with --converters",
         )  # fmt: skip
-    folder.parent.mkdir(parents=True, exist_ok=True)
     shutil.rmtree(folder, ignore_errors=True)
     for command in (
         [python, "-m", "venv", str(folder)],

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import shutil
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path as FilePath
 from typing import Any
@@ -241,15 +242,14 @@ class _Import:
             return *convert(description, parts, python), changes
 
     def _move(self, parts: str, draft: str) -> None:
-        former = None
-        if os.path.isdir(self._folder):
-            former = os.path.join(os.path.dirname(draft), "former")
-            os.rename(self._folder, former)
+        former = os.path.join(os.path.dirname(draft), "former")
         try:
+            with suppress(FileNotFoundError):  # the first import, or another one that runs at once has moved it
+                os.rename(self._folder, former)
             os.rename(parts, self._folder)
             os.replace(draft, self._layer)
         except OSError as error:
-            if former is not None and not os.path.isdir(self._folder):
+            if os.path.isdir(former) and not os.path.isdir(self._folder):
                 os.rename(former, self._folder)
             raise ShotError(
                 "the robot cannot be written", path=self._layer, found=error.strerror, remedy="Choose another output."
