@@ -4,6 +4,7 @@ import os
 import pickle
 import subprocess
 import sys
+import time
 
 import numpy as np
 import pytest
@@ -46,16 +47,22 @@ def test_the_key_of_a_faster_process_is_kept(folder):
     assert signing._made(folder / FILE_NAME) == key, "it was made after this process found none"
 
 
-def test_processes_that_find_a_damaged_key_replace_it_by_one(folder):
+def test_processes_that_find_a_damaged_key_replace_it_by_one(folder, monkeypatch):
     """Each replaced it, and kept signing with a key that another one had replaced."""
     from concurrent.futures import ThreadPoolExecutor
 
+    waits, replace = [0.0, 0.05, 0.1], os.replace
+
+    def slow(source, target):
+        time.sleep(waits.pop(0))
+        replace(source, target)
+
     folder.mkdir()
-    for _ in range(20):
-        (folder / FILE_NAME).write_bytes(b"short")
-        with ThreadPoolExecutor(4) as pool:
-            keys = set(pool.map(lambda _: signing._made(folder / FILE_NAME), range(4)))
-        assert keys == {(folder / FILE_NAME).read_bytes()}
+    (folder / FILE_NAME).write_bytes(b"short")
+    monkeypatch.setattr(os, "replace", slow)
+    with ThreadPoolExecutor(3) as pool:
+        keys = set(pool.map(lambda _: signing._made(folder / FILE_NAME), range(3)))
+    assert keys == {(folder / FILE_NAME).read_bytes()} and len(waits) == 2
 
 
 def test_a_file_system_without_hard_links_keeps_a_key(folder, monkeypatch):
