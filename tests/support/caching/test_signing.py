@@ -51,7 +51,7 @@ def test_processes_that_find_a_damaged_key_replace_it_by_one(folder, monkeypatch
     """Each replaced it, and kept signing with a key that another one had replaced."""
     from concurrent.futures import ThreadPoolExecutor
 
-    waits, replace = [0.0, 0.05, 0.1], os.replace
+    waits, replace = [0.1, 0.2, 0.3], os.replace
 
     def slow(source, target):
         time.sleep(waits.pop(0))
