@@ -53,7 +53,7 @@ def test_a_tighter_error_keeps_more_and_one_that_cannot_be_kept_all(nonlinear, k
     counts = [sum(count(item.shot.bodies)) for item in kept]
     assert counts[0] < counts[1] < counts[2] == sum(count(nonlinear.bodies))
     assert kept[2].shot is nonlinear and kept[2].error_m == 0.0
-    assert kept[2].is_accurate_for(known.animation.current, STEP)
+    assert kept[2].is_accurate_for(kept[2].complete_run(known.animation.current, STEP))
 
 
 def test_simplifications_are_reported(nonlinear, known):
@@ -70,13 +70,13 @@ def test_a_pod_subspace_is_extended_by_curves_that_deflect_bodies_differently(no
     still = Track(animation.frame_times, np.zeros(len(animation.frame_times)))
     swing, lift = ((animation.tracks[0], still), (still, animation.tracks[1]))
     found = held(nonlinear, reference_run(nonlinear.with_tracks(swing), RunSettings(), STEP))
-    assert found.is_accurate_for(swing, STEP)
+    assert found.is_accurate_for(found.complete_run(swing, STEP))
     first = found.shot
-    assert off(nonlinear, first, lift, STEP) > ALLOWED and not found.is_accurate_for(lift, STEP)
+    assert off(nonlinear, first, lift, STEP) > ALLOWED and not found.is_accurate_for(found.complete_run(lift, STEP))
     assert sum(count(found.shot.bodies)) > sum(count(first.bodies))
     for tracks in (swing, lift):
         assert off(nonlinear, found.shot, tracks, STEP) <= ALLOWED
-    assert found.is_accurate_for(lift, STEP) and 0.0 < found.error_m <= ALLOWED
+    assert found.is_accurate_for(found.complete_run(lift, STEP)) and 0.0 < found.error_m <= ALLOWED
 
 
 def test_linear_bodies_and_those_of_the_users_choice_keep_theirs(arm, nonlinear, bodies, animation, known):
@@ -104,7 +104,7 @@ def test_either_can_be_forced(nonlinear, known):
     fewest = ProjectedShot(nonlinear, RunSettings(directions="off"), lambda item: 0.0, [known])
     loosely = held(nonlinear, known, 1.0).shot.bodies
     assert count(fewest.shot.bodies) == count(loosely) != count(nonlinear.bodies)
-    assert fewest.error_m > 0.0 and fewest.is_accurate_for(known.animation.current, STEP)
+    assert fewest.error_m > 0.0 and fewest.is_accurate_for(fewest.complete_run(known.animation.current, STEP))
 
 
 def test_more_directions_tell_whether_a_motion_leaves_the_subspaces(nonlinear, animation, known):

@@ -206,9 +206,9 @@ def test_a_search_continues_where_the_pod_subspace_does_not_fit(arm, animation, 
     asked, parts = [], []
     plain_hold, plain_search = ProjectedShot.is_accurate_for, retarget.optimize_shot
 
-    def is_accurate_for(self, tracks, step):
-        asked.append(tracks)
-        return plain_hold(self, tracks, step) and len(asked) > 1
+    def is_accurate_for(self, more):
+        asked.append(more.animation.current)
+        return plain_hold(self, more) and len(asked) > 1
 
     def search(shot, *more, **named):
         parts.append(shot)

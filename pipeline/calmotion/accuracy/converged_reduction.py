@@ -16,6 +16,7 @@ from calmotion.accuracy.pod_subspace import ReferenceRun, reference_run
 from calmotion.accuracy.reduced_bodies import ConvergedReduction
 from calmotion.accuracy.simulate_to_tolerance import OF_SHAKE, intended_positions
 from calmotion.accuracy.step_error import distance
+from calmotion.multibody.parallel import in_parallel
 from calmotion.reduction.reduced_body import ReducedBody
 from calmotion.shot.run import RunSettings
 from calmotion.shot.tolerance import tolerance_of
@@ -47,17 +48,15 @@ def converged_reduction(
     """
     tolerance = requested = tolerance_of(shot.character, options.tolerance)
 
-    def simulated(shot: CompiledShot, options: RunSettings) -> ReferenceRun:
-        return reference_run(shot, options, options.step or MAX_STEP)
+    def simulated(*shots: CompiledShot) -> list[ReferenceRun]:
+        return in_parallel(lambda shot: reference_run(shot, options, options.step or MAX_STEP), shots)
 
-    found = None if retargeted else simulated(shot, options)
+    found = None if retargeted else simulated(shot)[0]
     known = None if found is None else found.run
     meshed, reduction = meshes_to_tolerance(shot, reduction, options, known, progress)
-    if found is None or meshed is not shot:
-        shot, found = meshed, simulated(meshed, options)
+    if meshed is not shot:
+        shot, found = meshed, None
     off, allowed = 0.0, SHARE * requested
-    if retargeted:
-        allowed = max(allowed, OF_SHAKE * distance(found.run.positions, intended_positions(shot, options)))
     for k in range(MOST):
         progress((k + 1) / (MOST + 1), f"a reduction to {1e3 * tolerance:.2g} mm")
         tolerance *= FINER
@@ -66,16 +65,18 @@ def converged_reduction(
         if _same(shot.bodies, bodies):
             continue
         finer = shot.with_bodies(bodies)
-        then = simulated(finer, options)
-        if then.run.integrator != found.run.integrator:  # it gave way for one of them, which differs by more
+        before, then = simulated(shot, finer) if found is None else (found, *simulated(finer))
+        if then.run.integrator != before.run.integrator:  # it gave way for one of them, which differs by more
             options = replace(options, integrator=options.scheme)
-            found, then = simulated(shot, options), simulated(finer, options)
-        off = distance(then.run.positions, found.run.positions)
+            before, then = simulated(shot, finer)
+        off = distance(then.run.positions, before.run.positions)
+        if retargeted and found is None:
+            allowed = max(allowed, OF_SHAKE * distance(before.run.positions, intended_positions(shot, options)))
         shot, found = finer, then
         if off <= allowed or (k and not retargeted and off <= OF_MESH * (mesh_error(shot, options, found.run) or 0.0)):
             break
     reduction.release()
-    return ConvergedReduction(shot, off, found, reduction)
+    return ConvergedReduction(shot, off, found or simulated(shot)[0], reduction)
 
 
 def _same(one: Sequence[ReducedBody], other: Sequence[ReducedBody]) -> bool:

@@ -130,21 +130,24 @@ class ProjectedShot:
             return np.inf
         return distance(run.positions, known.run.positions)
 
-    def is_accurate_for(self, tracks: Sequence[Track], step: float) -> bool:
-        """Whether the bodies are accurate for other curves; if not, they are projected anew.
-
-        This takes one simulation with all coordinates.
+    def complete_run(self, tracks: Sequence[Track], step: float) -> ReferenceRun | None:
+        """Other curves, simulated with all coordinates; None where the shot has all of them.
 
         Args:
             tracks: The motors' current curves.
-            step: Of that simulation [s].
+            step: [s].
 
         Raises:
             ShotError: The simulation is not possible.
         """
         if self.shot is self._complete:
+            return None
+        return reference_run(self._complete.with_tracks(tracks), self._options, step)
+
+    def is_accurate_for(self, more: ReferenceRun | None) -> bool:
+        """Whether the bodies are accurate for other curves, from `complete_run`; if not, they are projected anew."""
+        if more is None:
             return True
-        more = reference_run(self._complete.with_tracks(tracks), self._options, step)
         off = self._off(self.shot, more)
         if off <= self._allowed(more) or self._options.directions == OFF:
             self.error_m = off

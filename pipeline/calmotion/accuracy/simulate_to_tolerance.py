@@ -27,7 +27,7 @@ from calmotion.accuracy.step_error import (
     step_error,
 )
 from calmotion.multibody.integrators.coefficients import IMPLICIT
-from calmotion.multibody.parallel import in_parallel
+from calmotion.multibody.parallel import at_once
 from calmotion.reduction.reduced_body import ReducedBody
 from calmotion.shot import Accuracy, Animation, Character, Result, Simplification, Track
 from calmotion.shot.budget import STEP, SUBSPACE
@@ -122,9 +122,13 @@ def with_accuracy(result: Result, shot: CompiledShot, options: RunSettings, left
         left_out: Error of what the bodies do without [m].
     """
     own = replace(frames_of(result, shot.animation.frame_times), integrator=options.scheme)
-    fine = simulate_at(shot, options, 0.5 * result.step_s)
+    fine, mesh, patch = at_once(
+        partial(simulate_at, shot, options, 0.5 * result.step_s),
+        partial(mesh_error, shot, options, own),
+        partial(patch_error, shot, options, own),
+    )
     ratio = (own.step / fine.step) ** order_of(shot.character)
-    accuracy = _accuracy(ratio * step_error(own, fine), left_out, shot, options, own)
+    accuracy = _estimates(ratio * step_error(own, fine), left_out, shot, mesh, patch)
     accuracy = replace(accuracy, efforts=effort_errors(own, fine))
     return with_step(result, shot.character, options, accuracy)
 
@@ -278,10 +282,15 @@ def omitted_error(bodies: Sequence[ReducedBody]) -> float:
 
 def _accuracy(step: float, left_out: float, shot: CompiledShot, options: RunSettings, run: StepRun) -> Accuracy:
     """The estimates for a run: of its step, of what its bodies do without, of their meshes and patches [m]."""
+    mesh, patch = at_once(partial(mesh_error, shot, options, run), partial(patch_error, shot, options, run))
+    return _estimates(step, left_out, shot, mesh, patch)
+
+
+def _estimates(step: float, left_out: float, shot: CompiledShot, mesh: float | None, patch: float) -> Accuracy:
+    """The same, those of meshes and patches known."""
     rows = [row for body in shot.bodies for row in body.left_out]
     subspace = sum(row.estimated_error_m or 0.0 for row in rows if row.source == SUBSPACE)
-    mesh, patch = in_parallel(lambda error: error(shot, options, run), (mesh_error, patch_error))
-    return Accuracy(step, left_out, mesh, subspace, patch or 0.0)
+    return Accuracy(step, left_out, mesh, subspace, patch)
 
 
 def intended_positions(shot: CompiledShot, options: RunSettings) -> Array:

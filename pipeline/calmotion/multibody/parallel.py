@@ -6,7 +6,7 @@ import threading
 from collections.abc import Callable, Sequence
 from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait
 from functools import cache
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from calmotion.multibody.sensitivity.linearization import processors
 
@@ -52,6 +52,11 @@ def in_parallel(
         raise
     finally:
         wait(futures)  # after a failure or an interrupt, too: nobody else may use what they work on
+
+
+def at_once(*calls: Callable[[], Any]) -> list[Any]:
+    """The results of some independent calls, in their order; raises as `in_parallel`."""
+    return in_parallel(lambda call: call(), calls)
 
 
 def _begin() -> None:

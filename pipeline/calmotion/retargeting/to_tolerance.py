@@ -36,6 +36,7 @@ from calmotion.accuracy.step_error import (
     order_of,
     simulate_at,
 )
+from calmotion.multibody.parallel import at_once
 from calmotion.retargeting.found_curves import best_so_far
 from calmotion.retargeting.optimize import optimize_shot, refuse_other_integrators
 from calmotion.retargeting.robust.retarget import retarget_robustly
@@ -104,15 +105,14 @@ def optimize_to_tolerance(
             if result.interrupted:
                 break
             tracks = found_tracks(result, animation)
-            left_out = omitted_error(reduced.bodies)
-            result = with_accuracy(result, reduced.with_tracks(tracks), options, left_out)
+            iterations = max((row.iterations for row in latest.windows), default=latest.iterations)
+            ended = iterations >= options.max_iterations  # a new POD subspace would allow no further iteration
+            result, complete = _with_accuracy(result, reduced, projected, tracks, options, not again and not ended)
             accuracy = result.accuracy
             assert accuracy is not None
             allowed = allowed_step_error(character, options, besides_step(accuracy)) if chooses else np.inf
             fine = accuracy.step_m <= allowed or step <= LAST
-            iterations = max((row.iterations for row in latest.windows), default=latest.iterations)
-            ended = iterations >= options.max_iterations  # a new POD subspace would allow no further iteration
-            if fine and (ended or _is_accurate(projected, tracks, result, options, again)):
+            if fine and (ended or _is_accurate(projected, tracks, result, options, complete)):
                 if again and not number:
                     memory.taken += [SUBSPACES, *([TIME_STEP] if chooses and memory.step else [])]
                 memory.projected, memory.step = projected, result.step_s
@@ -147,22 +147,43 @@ def _robustly(
         return best_so_far(robust)
 
 
+def _with_accuracy(
+    result: Result, shot: CompiledShot, projected: ProjectedShot, tracks: tuple[Track, ...], options: RunSettings,
+    complete: bool,
+) -> tuple[Result, ReferenceRun | None]:  # fmt: skip
+    """The result with its accuracy, and, where wanted, its curves simulated with all coordinates, at the same time."""
+    told = partial(with_accuracy, result, shot.with_tracks(tracks), options, omitted_error(shot.bodies))
+    if not complete:
+        return told(), None
+    with_all, known = at_once(told, partial(_complete_run, projected, tracks, result, options))
+    return with_all, known
+
+
+def _complete_run(
+    projected: ProjectedShot, tracks: tuple[Track, ...], result: Result, options: RunSettings
+) -> ReferenceRun | None:
+    return projected.complete_run(tracks, max(result.step_s, own_step(projected.shot.character, options)))
+
+
 def _is_accurate(
-    projected: ProjectedShot, tracks: tuple[Track, ...], result: Result, options: RunSettings, again: bool
-) -> bool:
+    projected: ProjectedShot, tracks: tuple[Track, ...], result: Result, options: RunSettings,
+    complete: ReferenceRun | None,
+) -> bool:  # fmt: skip
     """Whether the subspaces do for the curves that were found; if not, they are chosen anew.
 
     Args:
-        again: Whether they are those of almost the same shot: then more directions tell, else all of them.
+        complete: The curves with all coordinates; None where the subspaces are those of almost the same shot: then
+            more directions tell, and all of them only where these do not do.
     """
-    animation, character = projected.shot.animation, projected.shot.character
-    if again:
+    if complete is None:
+        animation, character = projected.shot.animation, projected.shot.character
         finer = projected.finer_run(result.step_s, options, tracks)
         run = frames_of(result, animation.frame_times)
         off = 0.0 if finer is None else distance(finer.positions, run.positions)
         if off <= HELD * tolerance_of(character, options.tolerance):
             return True
-    return projected.is_accurate_for(tracks, max(result.step_s, own_step(character, options)))
+        complete = _complete_run(projected, tracks, result, options)
+    return projected.is_accurate_for(complete)
 
 
 def _searched(
