@@ -19,7 +19,7 @@ _REMEDY = (
     "'# units: angle deg') or m"
 )
 _EXPANSION = 12.0  # memory of the lines and numbers of a file, by its size
-_WITHOUT = "--set motion.read.rate=60Hz --set motion.read.joints=NAME,NAME,..."
+_WITHOUT = "--set motion.read.rate=60Hz --set motion.read.joints=NAME,-,... with a name, or -, for each column"
 
 
 def read_motion(path: str, *, angles: str, rate: float, names: Sequence[str]) -> MotorTracks:
