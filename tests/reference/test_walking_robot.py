@@ -1,7 +1,8 @@
 """Published robots on their feet.
 
-One with closed chains in its legs walks, where its shot has it hang on a stand. A quadruped whose motors have the gains
-of its own file gets commands with which it shifts its weight, and takes a step.
+One with closed chains in its legs walks, where its shot has it hang on a stand, and gets commands where its motors
+give. A quadruped whose motors have the gains of its own file gets commands with which it shifts its weight, and takes a
+step.
 """
 
 from __future__ import annotations
@@ -24,8 +25,8 @@ ROBOT, LAST, SWITCH = "/DR_Legs/RigidBodies", 200, 152
 assert TORSO
 
 
-def walking(path, source, feet):
-    """The shot's first two seconds; on its feet, or on its stand."""
+def shot_on(path, source, feet, last=LAST):
+    """The beginning of the shot, on its feet or on its stand."""
     stage = Usd.Stage.CreateNew(str(path))
     stage.GetRootLayer().subLayerPaths.append(str(source))
     UsdGeom.SetStageMetersPerUnit(stage, 1.0)
@@ -34,7 +35,7 @@ def walking(path, source, feet):
     stage.SetTimeCodesPerSecond(100)
     stage.SetFramesPerSecond(100)
     stage.SetStartTimeCode(0)
-    stage.SetEndTimeCode(LAST)
+    stage.SetEndTimeCode(last)
     if feet:
         next(prim for prim in stage.Traverse() if prim.GetName() == "Stand").SetActive(False)
         for side in "lr":
@@ -44,6 +45,12 @@ def walking(path, source, feet):
             active.Set(side == "r", 0)
             active.Set(side == "l", SWITCH)
     stage.GetRootLayer().Save()
+    return stage
+
+
+def walking(path, source, feet):
+    """Two seconds of rigid motors; on its feet, or on its stand."""
+    shot_on(path, source, feet)
     shot = cm.open_shot(path)
     found = prepare(compile_shot(shot.character, shot.animation), RunSettings(step=0.01, pre_roll=0.0))
     angles, rates = sample_tracks(shot.animation.tracks, found.grid)
@@ -78,6 +85,26 @@ def test_a_robot_with_closed_chains_walks_as_its_legs_have_it(tmp_path, shared_d
         assert (here[1].inv() * there[1])[held].magnitude().max() < 1e-5
 
 
+@pytest.mark.long
+def test_legs_with_closed_chains_get_commands(tmp_path, shared_data):
+    # on one foot, while the other leg swings; motors of 5 N m a degree, of which the pelvis would swing by 19 mm
+    source = shared_data / "shots" / "dr_legs_walk.usda"
+    if not source.exists():
+        pytest.skip("the shared walk is not here")
+    stage = shot_on(tmp_path / "legs.usda", source, True, 60)
+    for prim in stage.Traverse():
+        if prim.GetAttribute("drive:angular:physics:targetPosition").GetNumTimeSamples():
+            prim.ApplyAPI("CalmMotorAPI")
+            for name, value in (("model", "drive"), ("positionGain", 5.0), ("velocityGain", 0.1)):
+                prim.GetAttribute(f"calm:motor:{name}").Set(value)
+    UsdGeom.Xform.Define(stage, f"{ROBOT}/pelvis/Mark").GetPrim().ApplyAPI("CalmTargetAPI")
+    stage.GetRootLayer().Save()
+    animated, calm = found(tmp_path / "legs.usda", pre_roll=0.0)
+    assert largest(animated) > 0.015 and largest(calm) < 0.15 * largest(animated)
+    was, now = (run.report()["contacts"][0]["min_normal_force_n"] for run in (animated, calm))
+    assert now > was - 0.3
+
+
 @pytest.fixture
 def barkour(shared_data):
     source = shared_data / "converted" / "barkour" / "barkour v0.usda"
@@ -86,12 +113,13 @@ def barkour(shared_data):
     return source
 
 
-def found(path, **options):
+def found(path, pre_roll=None):
     """The shot as animated, and the commands that were found, simulated from what was written."""
-    animated = cm.simulate(path, step=0.01)
+    options = {} if pre_roll is None else {"pre_roll": pre_roll}
+    animated = cm.simulate(path, step=0.01, **options)
     result = cm.optimize(path, step=0.01, **options)
     result.write(path.parent / "calm.usda")
-    calm = cm.simulate(path.parent / "calm_root.usda", step=0.01)
+    calm = cm.simulate(path.parent / "calm_root.usda", step=0.01, **options)
     for target, was in result.targets.items():
         assert calm.targets[target].error.max() == pytest.approx(was.error.max(), rel=0.05, abs=2e-5)
     return animated, calm
