@@ -89,8 +89,8 @@ def notes_on(commands: Commands) -> tuple[str, ...]:
     if commands.velocities is None or np.max(np.abs(commands.velocities[-1]), initial=0.0) <= _REST:
         return ()
     return (
-        "the motors still move at the last frame; joint_trajectory_controller refuses that unless its parameter "
-        "allow_nonzero_velocity_at_trajectory_end is true",
+        "the motors still move at the last frame, which joint_trajectory_controller refuses: set its parameter "
+        "allow_nonzero_velocity_at_trajectory_end to true",
     )
 
 

@@ -1,7 +1,7 @@
 import math
 
 import pytest
-from calmotion.cli.quantities import angle, counted, length, measured, memory, quantity_in
+from calmotion.cli.quantities import about, angle, counted, frequency, length, measured, memory, quantity_in
 
 
 @pytest.mark.parametrize(
@@ -65,3 +65,8 @@ def test_an_estimate_has_the_digits_of_its_standard_deviation(value, deviation, 
 )
 def test_a_quantity_has_the_unit_that_suits_its_size(value, unit, text):
     assert quantity_in(value, unit) == text
+
+
+def test_estimates_have_two_digits_and_frequencies_no_powers_of_ten():
+    assert (about(3.825e-4), about(None), about(0.0)) == ("0.38 mm", "-", "0 mm")
+    assert [frequency(value) for value in (7.80213, 2160.4, 46123.0)] == ["7.802", "2160", "46120"]

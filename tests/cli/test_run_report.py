@@ -19,6 +19,7 @@ def report(**values):
     budget = [{"source": "mesh", "allowed_m": 4e-4, "estimated_m": None}]
     budget = [{"source": "time step", "allowed_m": 5e-4, "estimated_m": 3e-4}, *budget]
     known = {"error_budget": budget, "tolerance_m": 1e-3, "tolerance_kept": True, "tolerance_missed_by": None}
+    known |= {"shot": "shot.usda", "limits": [], "objective_before": 2.0, "interrupted": False}
     return known | {"simulation_error_m": 3e-4, "verified_error_m": None, "targets": []} | values
 
 
@@ -73,6 +74,7 @@ def test_figures_of_a_folder_are_named_on_one_line():
     files = dict.fromkeys(("layer", "root_layer", "rrd", "video", "csv"))
     print_files(console_on(stream), report(**files, figures=["out/errors.png", "out/motors.png"]))
     assert "wrote errors.png, motors.png in out" in stream.getvalue()
+    assert "next: calmotion optimize shot.usda -o LAYER" in stream.getvalue()
 
 
 def test_the_answer_comes_first():

@@ -6,7 +6,7 @@ import shlex
 from operator import itemgetter
 from typing import TYPE_CHECKING, Any, TextIO
 
-from calmotion.cli.quantities import angle, counted, length, memory
+from calmotion.cli.quantities import angle, counted, frequency, length, memory
 from calmotion.cli.run_report import print_left_out, print_notes
 from calmotion.cli.sentences import unbroken
 from calmotion.cli.tables import console_on, print_table, say
@@ -78,7 +78,7 @@ def _print_contents(console: Console, report: dict[str, Any]) -> None:
     )
     if report["system_frequencies_hz"]:
         modes = zip(report["system_frequencies_hz"], report["system_damping_ratios"], strict=True)
-        shown = ", ".join(f"{frequency:.4g} Hz ({ratio:.2g})" for frequency, ratio in modes)
+        shown = ", ".join(f"{frequency(hertz)} Hz ({ratio:.2g})" for hertz, ratio in modes)
         say(console, f"natural frequencies of the character in its first pose (damping ratios): {shown}, ...")
     _print_gains(console, report)
     print_left_out(console, report["left_out"])
@@ -97,6 +97,13 @@ def _print_answer(console: Console, report: dict[str, Any]) -> None:
     parts += [counted(len(report["joints"]), "joint"), counted(len(motors), "motor") + held]
     say(console, f"{', '.join(parts)} and {counted(len(report['targets']), 'target')}")
     say(console, _expected(report["expected"]))
+    if not flexible and all(motor["model"] == PRESCRIBED for motor in motors):
+        say(console, "nothing shakes: all bodies are rigid and all motors ideal")
+        say(
+            console,
+            "next: apply CalmFlexibleBodyAPI to links that bend, and CalmTargetAPI to what should stay calm",
+        )
+        return
     say(console, f"next: calmotion simulate {unbroken(shlex.quote(report['shot']))} shows how much it shakes")
 
 
@@ -162,7 +169,7 @@ def _servo_row(motor: dict[str, Any]) -> list[str]:
 
 
 def _body_row(body: dict[str, Any]) -> list[str]:
-    frequencies = [f"{value:.4g}" for value in body.get("frequencies_hz", ())]
+    frequencies = [frequency(value) for value in body.get("frequencies_hz", ())]
     shown = ", ".join(frequencies[:6]) + (", ..." if len(frequencies) > 6 else "")
     return [
         body["path"],
@@ -186,10 +193,11 @@ def _motor_row(motor: dict[str, Any]) -> list[str]:
     shown, unit = (length, "m") if linear else (angle, "rad")
     effort, newtons = (motor["max_force_n"], "N") if linear else (motor["max_torque_n_m"], "N m")
     speed = motor[f"max_velocity_{unit}_s"]  # None where there is no limit
+    lower, upper = shown(motor[f"lower_{unit}"]), shown(motor[f"upper_{unit}"])
     return [
         motor["path"],
         f"{shown(motor[f'min_{unit}'])} .. {shown(motor[f'max_{unit}'])}",
-        f"{shown(motor[f'lower_{unit}'])} .. {shown(motor[f'upper_{unit}'])}",
+        "-" if motor[f"lower_{unit}"] is None is motor[f"upper_{unit}"] else f"{lower} .. {upper}",
         f"{shown(motor[f'peak_velocity_{unit}_s'])}/s",
         "-" if speed is None else f"{shown(speed)}/s",
         "-" if effort is None else f"{effort:.4g} {newtons}",

@@ -17,6 +17,16 @@ def length(meters: float | None) -> str:
     return f"{1000.0 * meters:.4g} mm" if abs(meters) < 9.9995 else f"{meters:.4g} m"
 
 
+def about(meters: float | None) -> str:
+    """An estimated length or error as text, to two digits."""
+    return length(meters if meters is None or not math.isfinite(meters) else float(f"{meters:.2g}"))
+
+
+def frequency(hertz: float) -> str:
+    """A frequency in Hz to four digits, without its unit and without powers of ten."""
+    return f"{float(f'{hertz:.4g}'):.10g}"
+
+
 def angle(radians: float | None) -> str:
     """An angle as text in degrees; `-` when there is none."""
     if radians is None or not math.isfinite(radians):

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, TextIO
 
 from rich.console import Console
 
-from calmotion.cli.quantities import angle, length
+from calmotion.cli.quantities import about, angle, length
 from calmotion.cli.reports.feet import print_contacts, print_support
+from calmotion.cli.reports.limits import print_limits, print_reason
 from calmotion.cli.sentences import unbroken
 from calmotion.cli.tables import console_on, print_table, say
 from calmotion.shot.budget import CHOICES, MEASURED, MESH, PATCHES, REDUCTION, STEP, SUBSPACE
@@ -33,7 +35,7 @@ def print_left_out(console: Console, rows: Sequence[dict[str, Any]]) -> None:
     """The simplifications, each with its reason and estimated error."""
     for row in rows:
         error = row["estimated_error_m"]
-        cost = "" if error is None else f"; estimated error {length(error)}"
+        cost = "" if error is None else f"; estimated error {about(error)}"
         say(console, f"simplified: {row['what']} ({row['why']}){cost}")
 
 
@@ -41,20 +43,6 @@ def print_notes(console: Console, notes: Sequence[str]) -> None:
     """The notes of the reader in a file; on a terminal they were printed when the shot was read."""
     for note in () if console.is_terminal else notes:
         say(console, f"note: {note}")
-
-
-def print_limits(console: Console, limits: Sequence[dict[str, Any]], optimized: bool) -> None:
-    """Limits of motors that are exceeded, or that keep the targets from their motion."""
-    rows = []
-    for row in limits:
-        if not row["exceeded"] and row["cost_m"] is None:
-            continue
-        limit, before, after = row["shown"]
-        verdict = "exceeded" if row["exceeded"] else f"costs {length(row['cost_m'])} rms"
-        values = [limit, before, after] if optimized else [limit, after]
-        rows.append([row["path"], row["quantity"], *values, f"{row['time_s']:.3f} s", verdict])
-    heads = ["limit", "before", "after"] if optimized else ["limit", "reached"]
-    print_table(console, "Active limits of motors", ["motor", "quantity", *heads, "at", ""], rows, texts=2)
 
 
 def print_shares(console: Console, shares: Sequence[dict[str, Any]]) -> None:
@@ -134,6 +122,7 @@ def print_verdict(console: Console, report: dict[str, Any]) -> None:
             say(console, f"The largest error stays at {now}.")
         else:
             say(console, f"The largest error {'falls' if after < before else 'rises'} from {length(before)} to {now}.")
+        print_reason(console, report)
     elif worst is not None:
         shaper, motion = report.get("shaper"), "As animated"
         if shaper:
@@ -144,13 +133,13 @@ def print_verdict(console: Console, report: dict[str, Any]) -> None:
             say(console, f"It delays the motion by {said}.")
     tolerance = length(report["tolerance_m"])
     if report["tolerance_kept"]:
-        error = length(report["simulation_error_m"])
+        error = about(report["simulation_error_m"])
         say(console, f"The simulation keeps the tolerance of {tolerance}: these numbers are accurate to {error}.")
     elif report["simulation_error_m"] is None:
         say(console, f"The error of the simulation was not estimated; the tolerance is {tolerance}.")
     else:
         source = report["tolerance_missed_by"]
-        error = length(report["simulation_error_m"])
+        error = about(report["simulation_error_m"])
         say(
             console,
             f"The simulation does not keep the tolerance of {tolerance}: error {error}, mostly of the {source}. "
@@ -161,7 +150,11 @@ def print_verdict(console: Console, report: dict[str, Any]) -> None:
 def print_budget(console: Console, report: dict[str, Any]) -> None:
     """The error budget of the simulation itself, and its measured error."""
     rows = [
-        [entry["source"], length(entry["allowed_m"]), _length_or_unknown(entry["estimated_m"])]
+        [
+            entry["source"],
+            about(entry["allowed_m"]),
+            "unknown" if entry["estimated_m"] is None else about(entry["estimated_m"]),
+        ]
         for entry in report["error_budget"]
     ]
     print_table(console, "Error budget", ["source", "allowed", "estimated"], rows)
@@ -177,10 +170,6 @@ def print_budget(console: Console, report: dict[str, Any]) -> None:
 def _last(report: dict[str, Any]) -> str:
     """Suffix of the numbers of the motion that results."""
     return "_after" if "objective_after" in report else ""
-
-
-def _length_or_unknown(metres: float | None) -> str:
-    return "unknown" if metres is None else length(metres)
 
 
 def print_robustness(console: Console, report: dict[str, Any]) -> None:
@@ -254,7 +243,7 @@ def print_files(console: Console, report: dict[str, Any]) -> None:
     if report["rrd"]:
         say(console, f"next: rerun {unbroken(report['rrd'])}")
     if not _last(report):
-        say(console, "next: calmotion optimize SHOT -o LAYER removes the shake")
+        say(console, f"next: calmotion optimize {unbroken(shlex.quote(report['shot']))} -o LAYER removes the shake")
     if not any(report[name] for name in ("layer", "rrd", "video")):
         say(console, "next: --rrd FILE records the motion for the rerun viewer, --video FILE makes a video of it")
 
@@ -268,15 +257,17 @@ def print_warnings(console: Console, report: dict[str, Any]) -> None:
             f"resumed from the checkpoint of an interrupted run, after {report['resumed_iterations']} iterations",
         )
     if suffix and report["stopped"] not in ("converged", ""):
-        gain = report["expected_further_gain_m"]
-        more = "" if gain is None else f", {length(gain)} expected gain of one more iteration"
+        gain, left = report["expected_further_gain_m"], max(t["max_error_after_m"] for t in report["targets"])
+        # far from the limits, a step of the search promises more than there is
+        more = f", {about(gain)} expected gain of one more iteration" if gain is not None and gain < left else ""
         say(console, f"stopped: {report['stopped']}{more}")
     print_shares(console, report["error_shares"])
     print_lost_motion(console, report["lost_motion"], suffix)
     print_limits(console, report["limits"], bool(suffix))
-    sag = max((target[f"sag{suffix}_m"] or 0.0 for target in report["targets"]), default=0.0)
-    if sag > 1e-6:
-        say(console, f"largest sag of a target at rest: {length(sag)}")
+    sags = {target["path"]: target[f"sag{suffix}_m"] or 0.0 for target in report["targets"]}
+    hanging = max(sags, key=sags.__getitem__, default="")
+    if hanging and sags[hanging] > 1e-6:
+        say(console, f"at rest, gravity moves {hanging} by {about(sags[hanging])} (sag)")
     seams = [target[f"seam{suffix}_m"] for target in report["targets"]]
     if seams and seams[0] is not None:
         say(console, f"largest distance of a target between start and end of a cycle: {length(max(seams))}")

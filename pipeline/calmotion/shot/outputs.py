@@ -43,6 +43,7 @@ class Rig:
         bodies: Number of bodies, servos included.
         mass: Of all of them [kg].
         targets: Prim paths.
+        flexible: Prim paths of the flexible bodies.
     """
 
     layer: str
@@ -51,6 +52,7 @@ class Rig:
     bodies: int
     mass: float
     targets: tuple[str, ...]
+    flexible: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)

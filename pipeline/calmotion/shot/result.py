@@ -58,7 +58,7 @@ class Simulation:
         newton_iterations: In all.
         max_joint_gap: Largest position gap of any joint at any step [m].
         wall_s: Time of this forward simulation alone [s].
-        sag: How far each target hangs below (or beside) the reference at rest, before it moves [m], shape [K].
+        sag: Distance of each target at rest, before it moves, to that of a rigid robot on the same commands [m], [K].
         refined_steps: Steps that only smaller ones reached.
         dead_centres: Times at which closed chains pass a singular pose [s], shape [n].
         seam: Gap of each target between start and end of a cycle [m], shape [K]; empty for a shot that is not cyclic.

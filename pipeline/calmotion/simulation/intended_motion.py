@@ -37,6 +37,16 @@ def rigid_motion(
     return IntendedMotion(c, q, positions, rotations)
 
 
+def rigid_targets(model: Model, angles: Array, world: Array | None = None) -> Array | None:
+    """Where a rigid robot has the targets at some instants [m], shape [T, K, 3]; None where joints move freely."""
+    rigid = rigid_model(model)
+    if np.any(moves_freely(rigid)):
+        return None
+    c, q = rigid_poses(rigid, model.joint_angles(angles), world)
+    positions, _ = target_frames(rigid, c, q, np.zeros(c.shape[:2] + (0,)))
+    return positions
+
+
 def static_motion(
     model: Model, rigid: IntendedMotion, angles: Array, judged: BoolArray, world: Array | None = None
 ) -> IntendedMotion:

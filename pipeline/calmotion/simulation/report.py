@@ -16,7 +16,7 @@ from calmotion.shot.character import Array
 from calmotion.simulation.forward import ForwardRun
 from calmotion.simulation.inputs.curves import Curves, sample_tracks
 from calmotion.simulation.inputs.time_grid import TimeGrid
-from calmotion.simulation.intended_motion import rigid_motion
+from calmotion.simulation.intended_motion import rigid_motion, rigid_targets
 from calmotion.simulation.motor_limits import Excess
 from calmotion.simulation.prepare import Prepared
 from calmotion.simulation.target_errors import IntendedMotion, rotation_errors
@@ -98,12 +98,22 @@ def simulation_of(prepared: Prepared, run: ForwardRun, intended: IntendedMotion)
         newton_iterations=run.trajectory.newton_iterations,
         max_joint_gap=run.trajectory.max_joint_gap,
         wall_s=run.trajectory.wall_s,
-        sag=np.zeros(0) if grid.cyclic else errors[0].copy(),
+        sag=np.zeros(0) if grid.cyclic else _sag(prepared, run, errors[0]),
         refined_steps=len(run.trajectory.refined),
         dead_centres=grid.times[dead_centres(run.trajectory.margins)],
         floquet_multiplier=run.floquet_multiplier,
         seam=np.linalg.norm(off[-1] - off[shown][0], axis=1) if grid.cyclic else np.zeros(0),
     )
+
+
+def _sag(prepared: Prepared, run: ForwardRun, errors: Array) -> Array:
+    """How far the targets of the robot at rest are from those of a rigid one on the same commands [m], shape [K].
+
+    Args:
+        errors: Distances to the reference, which are taken for it where joints move freely [m], shape [K].
+    """
+    rigid = rigid_targets(prepared.model, run.commands[:1], prepared.world[:1])
+    return errors.copy() if rigid is None else np.linalg.norm(run.target_positions[0] - rigid[0], axis=1)
 
 
 def left_out_rows(prepared: Prepared) -> list[Simplification]:

@@ -136,6 +136,7 @@ def run_report(run: Run, character: Character, result: Result, command: str, tot
         "frequencies_hz": {character.bodies[table.body].path: table.frequencies for table in result.modes},
     }
     source = run.get(Source)
+    report["shot"] = source.path if source is not None else None
     if source is not None and source.shaper:
         report |= _shaped(source.shaper, result)
     layer, recording, table, figures = run.get(WrittenLayer), run.get(Recording), run.get(CsvFile), run.get(Figures)
@@ -310,4 +311,5 @@ def rig_report(made: Rig) -> dict[str, Any]:
             {"joint": j.joint, "body": j.body, "motors": j.motors, "angle_error_rad": j.off} for j in made.joints
         ],
         "targets": made.targets,
+        "flexible": made.flexible,
     }

@@ -98,7 +98,8 @@ def rig_shot(path: str, output: str, options: RigOptions | None = None) -> Rig:
         for k, link in enumerate(links)
         if link.parent >= 0
     )
-    return Rig(output, layer.robot, joints, layer.body_count, layer.mass, tuple(layer.targets))
+    bending = tuple(layer.body(k) for k, name in enumerate(names) if name in flexible)
+    return Rig(output, layer.robot, joints, layer.body_count, layer.mass, tuple(layer.targets), bending)
 
 
 def _animated_skeleton(stage: Usd.Stage, path: str) -> tuple[BoundSkeleton, Clock]:

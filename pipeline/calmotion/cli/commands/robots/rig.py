@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import shlex
 from typing import TYPE_CHECKING, Any, TextIO
 
 from calmotion.cli.options import Commands, file_argument, opened_shot, run_arguments, shot_command
@@ -41,6 +42,7 @@ def _run(args: argparse.Namespace, output: Output) -> int:
 
 def _print(report: dict[str, Any], stream: TextIO) -> None:
     from calmotion.cli.quantities import angle
+    from calmotion.cli.sentences import unbroken
     from calmotion.cli.tables import console_on, print_table, say
 
     console = console_on(stream)
@@ -56,8 +58,7 @@ def _print(report: dict[str, Any], stream: TextIO) -> None:
     )
     for target in report["targets"]:
         say(console, f"target: {target}")
-    say(
-        console,
-        f"{report['layer']} is a shot; for flexible links apply CalmFlexibleBodyAPI or run again with "
-        "--set rig.skeleton.flexible=all",
-    )
+    say(console, f"wrote {unbroken(report['layer'])}, which is a shot")
+    if not report["flexible"]:
+        say(console, "all links are rigid: apply CalmFlexibleBodyAPI, or add --set rig.skeleton.flexible=all")
+    say(console, f"next: calmotion inspect {unbroken(shlex.quote(report['layer']))} shows how stiff it is")

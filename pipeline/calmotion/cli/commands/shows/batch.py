@@ -12,6 +12,10 @@ if TYPE_CHECKING:
     from calmotion.cli.output import Output
 
 
+# Outcomes in words, where the word of the JSON object says too little.
+SAID = {"kept": "done before, nothing has changed"}
+
+
 def add_to(commands: Commands) -> None:
     """Add the command."""
     text = "optimise or simulate many shots, also on a cluster"
@@ -66,12 +70,12 @@ def _run(args: argparse.Namespace, output: Output) -> int:
 
 
 def _print(report: dict[str, Any], stream: TextIO) -> None:
-    from calmotion.cli.quantities import length
+    from calmotion.cli.quantities import counted, length
 
-    counts = ", ".join(f"{count} {name}" for name, count in report["outcomes"].items())
-    print(f"{len(report['jobs'])} shots in {report['wall_s']:.1f} s: {counts}", file=stream)
+    counts = ", ".join(f"{count} {SAID.get(name, name)}" for name, count in report["outcomes"].items())
+    print(f"{counted(len(report['jobs']), 'shot')} in {report['wall_s']:.1f} s: {counts}", file=stream)
     for job in report["jobs"]:
-        line = f"  {job['name']}: {job['outcome']}"
+        line = f"  {job['name']}: {SAID.get(job['outcome'], job['outcome'])}"
         before, after = job.get("max_error_before_m", job.get("max_error_m")), job.get("max_error_after_m")
         if before is not None:
             line += f", largest error {length(before)}" + ("" if after is None else f" to {length(after)}")
@@ -86,3 +90,8 @@ def _print(report: dict[str, Any], stream: TextIO) -> None:
             print(f"    {place + ': ' if place else ''}{problem['problem']}", file=stream)
             print(f"    log: {job['log']}", file=stream)
     print(f"report: {report['folder']}/batch.md", file=stream)
+    roots = [job["root_layer"] for job in report["jobs"] if job["root_layer"]]
+    if roots:
+        print(f"next: open {roots[0]}{' (one for each shot)' if len(roots) > 1 else ''}", file=stream)
+    if len(roots) < len(report["jobs"]):
+        print("next: the same command runs only what is not done", file=stream)

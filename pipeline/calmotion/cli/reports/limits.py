@@ -1,0 +1,82 @@
+"""What a report says of the limits of motors: which are exceeded or cost something, and why curves became worse."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from rich.console import Console
+
+from calmotion.cli.quantities import length
+from calmotion.cli.tables import print_table, say
+
+# What raises a limit, by its quantity.
+RAISED_BY = {
+    "position": "the limits of the joint",
+    "velocity": "calm:motor:maxVelocity",
+    "acceleration": "calm:motor:maxAcceleration",
+    "effort": "calm:motor:maxTorque",
+}
+
+
+def print_limits(console: Console, limits: Sequence[dict[str, Any]], optimized: bool) -> None:
+    """Limits of motors that are exceeded, or that keep the targets from their motion."""
+    rows = []
+    for row in limits:
+        if not row["exceeded"] and row["cost_m"] is None:
+            continue
+        limit, before, after = row["shown"]
+        verdict = "exceeded" if row["exceeded"] else f"costs {length(row['cost_m'])} rms"
+        values = [limit, before, after] if optimized else [limit, after]
+        rows.append([row["path"], row["quantity"], *values, f"{row['time_s']:.3f} s", verdict])
+    heads = ["limit", "before", "after"] if optimized else ["limit", "reached"]
+    print_table(console, "Active limits of motors", ["motor", "quantity", *heads, "at", ""], rows, texts=2)
+
+
+def print_reason(console: Console, report: dict[str, Any]) -> None:
+    """Why the curves of `optimize` exceed limits or are worse than the animation, and what to do; else nothing."""
+    limits, worse = report["limits"], not report["objective_after"] <= report["objective_before"]
+    exceeded = [row for row in limits if row["exceeded"]]
+    if exceeded:
+        asked = [row for row in limits if _excess(row, "before") > 0.0]
+        if asked:
+            say(console, f"The animation asks for more than the motors may do: {_worst(asked, 'before')}.")
+        cost = " and follow the animation less well" if worse else ""
+        say(console, f"The new curves ask for less{cost}, but still exceed {_counted(exceeded)}: {_worst(exceeded)}.")
+        names = " and ".join(dict.fromkeys(RAISED_BY[row["quantity"]] for row in exceeded))
+        times = ", ".join(dict.fromkeys(f"{row['time_s']:.2f} s" for row in _by_excess(exceeded)[:3]))
+        say(console, f"Slow the animation down around {times}, or raise {names} if the motors can do more.")
+    elif worse and any(row["cost_m"] is not None for row in limits):
+        say(console, "The new curves keep limits that the animation exceeds; the table of limits says what each costs.")
+        say(console, "Slow the animation down there, or raise these limits, to come nearer to it.")
+    elif worse:
+        how = "was interrupted" if report["interrupted"] else "ended"
+        say(console, f"The search {how} before it improved on the animation: keep the shot as it is, or go on.")
+
+
+def _counted(rows: Sequence[dict[str, Any]]) -> str:
+    return f"{len(rows)} limit{'s' if len(rows) > 1 else ''}"
+
+
+def _excess(row: dict[str, Any], when: str) -> float:
+    """By how much a value exceeds its limit, over the size of the limit; only those of positions have sides."""
+    limit, value = row["limit"], row[when]
+    if row["quantity"] == "position":
+        beyond = value - limit if row["after"] >= limit else limit - value  # the side that the new curves exceed
+    else:
+        beyond = abs(value) - abs(limit)
+    return float(beyond) / max(abs(limit), 1e-12)
+
+
+def _by_excess(rows: Sequence[dict[str, Any]], when: str = "after") -> list[dict[str, Any]]:
+    return sorted(rows, key=lambda row: -_excess(row, when))
+
+
+def _worst(rows: Sequence[dict[str, Any]], when: str = "after") -> str:
+    """The row that exceeds its limit most, in words."""
+    row = _by_excess(rows, when)[0]
+    limit, value = row["shown"][0], row["shown"][1 if when == "before" else 2]
+    if row["quantity"] != "position":
+        limit, value = limit.removeprefix("-"), value.removeprefix("-")
+    more = f", and {len(rows) - 1} more" if len(rows) > 1 else ""
+    return f"{row['path']} has {row['quantity']} {value} where {limit} is allowed{more}"

@@ -1,0 +1,60 @@
+import io
+
+import pytest
+from calmotion.cli.reports.limits import print_limits, print_reason
+from calmotion.cli.tables import console_on
+
+
+def row(path, limit, before, after, quantity="effort", cost=None, time=0.5):
+    shown = [f"{value:g} N m" for value in (limit, before, after)]
+    exceeded = abs(after) > abs(limit)
+    values = {"limit": limit, "before": before, "after": after, "shown": shown, "exceeded": exceeded}
+    return values | {"path": path, "quantity": quantity, "cost_m": cost, "time_s": time}
+
+
+def told(limits, before=1.0, after=2.0, interrupted=False):
+    stream = io.StringIO()
+    report = {"limits": limits, "objective_before": before, "objective_after": after, "interrupted": interrupted}
+    print_reason(console_on(stream), report)
+    return " ".join(stream.getvalue().split())
+
+
+def test_curves_that_still_exceed_limits_come_with_cause_and_remedy():
+    rows = [row("/Shoulder", -25.0, -62.0, -43.0, time=0.085), row("/Wrist", -5.0, 8.0, -6.0, time=5.8)]
+    text = told([*rows, row("/Calm", 25.0, 3.0, 4.0)])
+    assert text.startswith(
+        "The animation asks for more than the motors may do: /Shoulder has effort 62 N m where 25 N m is allowed, "
+        "and 1 more. The new curves ask for less and follow the animation less well, but still exceed 2 limits: "
+        "/Shoulder has effort 43 N m where 25 N m is allowed, and 1 more."
+    )
+    assert text.endswith(
+        "Slow the animation down around 0.09 s, 5.80 s, or raise calm:motor:maxTorque if the motors can do more."
+    )
+    assert "less well" not in told(rows, after=0.5)
+
+
+@pytest.mark.parametrize(
+    ("rows", "after", "interrupted", "said"),
+    [
+        ([row("/Arm", 2.0, 3.0, 2.0, cost=1e-3)], 2.0, False, "The new curves keep limits that the animation exceeds;"),
+        ([row("/Arm", 2.0, 3.0, 2.0, cost=1e-3)], 0.5, False, ""),
+        ([row("/Arm", 2.0, 1.0, 1.0)], 2.0, True, "The search was interrupted before it improved on the animation"),
+        ([], float("nan"), False, "The search ended before it improved on the animation"),
+        ([], 0.5, False, ""),
+    ],
+)
+def test_worse_curves_come_with_a_reason_and_better_ones_without(rows, after, interrupted, said):
+    text = told(rows, after=after, interrupted=interrupted)
+    assert text.startswith(said) and bool(text) == bool(said)
+
+
+def test_the_side_of_a_position_counts():
+    text = told([row("/Hinge", -1.0, 0.4, -1.5, "position")])
+    assert "asks for more" not in text and "/Hinge has position -1.5" in text and "limits of the joint" in text
+    assert "asks for more" in told([row("/Hinge", -1.0, -1.4, -1.5, "position")])
+
+
+def test_limits_that_cost_nothing_are_not_listed():
+    stream = io.StringIO()
+    print_limits(console_on(stream), [row("/Arm", 2.0, 1.0, 1.0), row("/Leg", 2.0, 3.0, 2.0, cost=2e-3)], True)
+    assert "/Arm" not in stream.getvalue() and "costs 2 mm rms" in stream.getvalue()
