@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from calmotion.retargeting.robust.choice import _directions, _shared, chosen_scenarios
+from calmotion.retargeting.robust.choice import REACH, _directions, _shared, chosen_scenarios
 from calmotion.retargeting.robust.scenarios import uncertain_parameters
 from calmotion.shot.run import RunSettings
 from calmotion.simulation.compiled_shot import compile_shot
@@ -39,6 +39,9 @@ def test_the_nominal_robot_is_first_and_others_are_opposite_pairs(shot):
     assert [s.weight for s in found] == pytest.approx([0.2] * 5)
     logs = np.array([np.log(list(s.factors.values())) for s in found[1:]])
     assert np.allclose(logs.sum(axis=0), 0.0)
+    # in standard deviations
+    away = np.linalg.norm(logs / [p.spread for p in uncertain_parameters(shot)], axis=1)
+    assert sorted(away) == pytest.approx([REACH / 2, REACH / 2, REACH, REACH])
 
 
 def test_a_mean_over_the_robots_is_that_of_their_distribution(shot):

@@ -17,6 +17,7 @@ from calmotion.shot.robust.settings import WORST
 from calmotion.shot.run import RunSettings
 from calmotion.simulation.compiled_shot import CompiledShot
 
+REACH = 2.5  # standard deviations of the farthest robots of a worst case: one of 80 is farther along a direction
 LEAST = 0.05  # weight of the nominal robot in a mean, where the rule would give it less
 
 
@@ -28,7 +29,9 @@ def chosen_scenarios(
 
     The motion of the targets is differentiated by each parameter, by central differences over a standard deviation; the
     eigenvectors of the Gram matrix of these derivatives are the directions. Pairs are shared among them in proportion
-    to the motion that they cause, and stand at the nodes of the Gauss-Hermite rule.
+    to the motion that they cause. For a mean they stand at the nodes of the Gauss-Hermite rule; for the largest error
+    at equal distances up to `REACH`: the outer nodes of that rule (3.75 standard deviations for three pairs) are robots
+    that hardly ever are, for whose sake all others would be worse.
 
     Args:
         shot: The shot.
@@ -36,7 +39,7 @@ def chosen_scenarios(
         tracks: Curves about which the derivatives are taken.
         parameters: What is uncertain.
         count: Number of robots.
-        kind: `mean`: weights of the Gauss-Hermite rules; `worst`: equal ones, for which others follow.
+        kind: `mean`: nodes and weights of the Gauss-Hermite rules; `worst`: equal ones, for which other weights follow.
 
     Raises:
         ShotError: One of the robots that differ by a standard deviation cannot be simulated.
@@ -45,16 +48,27 @@ def chosen_scenarios(
     pairs = _shared((count - 1) // 2, sizes)
     points, weights = [np.zeros(len(parameters))], [1.0]
     for direction, number in zip(directions, pairs, strict=True):
-        nodes, shares = hermegauss(2 * number + 1)
-        for node, share in zip(nodes, shares / np.sqrt(2.0 * np.pi), strict=True):
-            if abs(node) > 1e-12:
-                points.append(node * direction)
-                weights.append(float(share))
-    weights[0] = max(1.0 - sum(weights[1:]), LEAST)
-    given = np.ones(len(points)) if kind == WORST else np.array(weights)
+        nodes, shares = _equal(number) if kind == WORST else _gauss(number)
+        points += [node * direction for node in nodes]
+        weights += shares.tolist()
+    weights[0] = 1.0 if kind == WORST else max(1.0 - sum(weights[1:]), LEAST)
+    given = np.array(weights)
     return tuple(
         scenario_at(parameters, x, float(weight)) for x, weight in zip(points, given / given.sum(), strict=True)
     )
+
+
+def _equal(pairs: int) -> tuple[Array, Array]:
+    """So many pairs at equal distances up to `REACH`, and equal weights."""
+    ahead = REACH * np.arange(1, pairs + 1) / max(pairs, 1)
+    return np.concatenate([-ahead[::-1], ahead]), np.ones(2 * pairs)
+
+
+def _gauss(pairs: int) -> tuple[Array, Array]:
+    """The nodes of the Gauss-Hermite rule with so many pairs but that at zero, and their weights."""
+    nodes, shares = hermegauss(2 * pairs + 1)
+    away = np.abs(nodes) > 1e-12
+    return nodes[away], shares[away] / np.sqrt(2.0 * np.pi)
 
 
 def _directions(
