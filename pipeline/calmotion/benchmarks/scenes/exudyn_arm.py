@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import sys
 import time
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -45,16 +46,49 @@ def installed() -> bool:
     return find_spec("exudyn") is not None
 
 
-class Exudyn:
-    """The arm in Exudyn, reduced once."""
+@dataclass(frozen=True, eq=False)
+class Performance:
+    """What the load of the arm did.
 
-    def __init__(self) -> None:
+    Attributes:
+        times: [s], shape [s].
+        positions, accelerations: World [m], [m/s^2], shape [s, 3].
+        rotations: Rotation matrices, shape [s, 3, 3].
+        wall_s: Run time [s].
+    """
+
+    times: Array
+    positions: Array
+    accelerations: Array
+    rotations: Array
+    wall_s: float
+
+
+def quarter_turn(t: float) -> float:
+    """The motion of the comparison [rad]."""
+    s = min(2.0 * t, 1.0)
+    return 0.5 * np.pi * s * s * s * (10.0 - 15.0 * s + 6.0 * s * s)
+
+
+class Exudyn:
+    """The arm in Exudyn, reduced once.
+
+    Args:
+        material: With damping in proportion to stiffness.
+        payload: [kg].
+        mesh: Elements along the arm and across it, and their grading, as of `beam_mesh`.
+    """
+
+    def __init__(
+        self, material: ElasticMaterial = MATERIAL, payload: float = PAYLOAD,
+        mesh: tuple[int, int, tuple[float, float]] = (CELLS, 2, (1.0, 1.0)),
+    ) -> None:  # fmt: skip
         sys.exudynFast = True  # type: ignore[attr-defined]  # its build without range checks
         import exudyn
         from exudyn.FEM import FEMinterface, HCBstaticModeSelection, ObjectFFRFreducedOrderInterface
         from scipy.sparse import csr_matrix, identity, kron
 
-        model: FEModel = assemble(*beam_mesh(LENGTH, THICKNESS, CELLS), MATERIAL)
+        model: FEModel = assemble(*beam_mesh(LENGTH, THICKNESS, *mesh), material)
         nodes = model.mesh.nodes
         self.ends = [np.flatnonzero(np.abs(nodes[:, 0] - x) < 1e-9) for x in (0.0, LENGTH)]
         fem = FEMinterface()
@@ -63,16 +97,31 @@ class Exudyn:
         fem.stiffnessMatrix = csr_matrix(model.stiffness)
         ends = [[int(node) for node in end] for end in self.ends]
         fem.ComputeHurtyCraigBamptonModes(ends, FIXED_MODES, True, HCBstaticModeSelection.RBE2)
-        self.exu, self.body = exudyn, ObjectFFRFreducedOrderInterface(fem)
+        self.exu, self.body, self.payload = exudyn, ObjectFFRFreducedOrderInterface(fem), payload
+        assert material.rayleigh is not None
+        self.retardation = material.rayleigh[1]
 
     def run(self, steps: int) -> tuple[Array, float]:
         """Tip at the samples [m], shape [s, 3], and the run time [s]."""
+        done = self.performed(steps, quarter_turn, DURATION, SAMPLES)
+        return done.positions, done.wall_s
+
+    # long: one model of another code, from top to bottom
+    def performed(self, steps: int, motion: Callable[[float], float], seconds: float, samples: int) -> Performance:
+        """The arm in a motion.
+
+        Args:
+            steps: Number of time steps.
+            motion: Angle [rad] at a time [s].
+            seconds: [s].
+            samples: Number of samples, the last one at the end.
+        """
         import exudyn.utilities as eu
 
         exu = self.exu
         container = exu.SystemContainer()
         mbs = container.AddSystem()
-        flexible = self.body.AddObjectFFRFreducedOrder(mbs, stiffnessProportionalDamping=RETARDATION)
+        flexible = self.body.AddObjectFFRFreducedOrder(mbs, stiffnessProportionalDamping=self.retardation)
         root, tip = (
             mbs.AddMarker(
                 eu.MarkerSuperElementRigid(
@@ -89,8 +138,7 @@ class Exudyn:
         ground = mbs.AddMarker(eu.MarkerNodeCoordinate(nodeNumber=mbs.AddNode(eu.NodePointGround()), coordinate=0))
 
         def turned(_: Any, t: float, __: int, ___: float) -> float:
-            s = min(2.0 * t, 1.0)
-            return 0.5 * np.pi * s * s * s * (10.0 - 15.0 * s + 6.0 * s * s)
+            return motion(t)
 
         for k in range(3):
             markers = [ground, mbs.AddMarker(eu.MarkerNodeCoordinate(nodeNumber=node, coordinate=k))]
@@ -98,29 +146,39 @@ class Exudyn:
             mbs.AddObject(eu.CoordinateConstraint(markerNumbers=markers, **driven))
         mbs.AddObject(eu.GenericJoint(markerNumbers=[on_hub, root], constrainedAxes=[1] * 6))
         edge = 2.0 * THICKNESS
-        inertia = eu.RigidBodyInertia(mass=PAYLOAD, com=[0.0] * 3, inertiaTensor=PAYLOAD * edge**2 / 6.0 * np.eye(3))
+        inertia = eu.RigidBodyInertia(
+            mass=self.payload, com=[0.0] * 3, inertiaTensor=PAYLOAD * edge**2 / 6.0 * np.eye(3)
+        )
         load = mbs.CreateRigidBody(inertia=inertia, referencePosition=[LENGTH, 0.0, 0.0], returnDict=True)
         on_load = mbs.AddMarker(eu.MarkerBodyRigid(bodyNumber=load["bodyNumber"]))
         mbs.AddObject(eu.GenericJoint(markerNumbers=[tip, on_load], constrainedAxes=[1] * 6))
-        sensor = mbs.AddSensor(
-            eu.SensorBody(
-                bodyNumber=load["bodyNumber"], outputVariableType=exu.OutputVariableType.Position, storeInternal=True,
-                writeToFile=False,
+        outputs = exu.OutputVariableType
+        sensors = [
+            mbs.AddSensor(
+                eu.SensorBody(
+                    bodyNumber=load["bodyNumber"], outputVariableType=output, storeInternal=True, writeToFile=False
+                )
             )
-        )  # fmt: skip
+            for output in (outputs.Position, outputs.Acceleration, outputs.RotationMatrix)
+        ]  # fmt: skip
         mbs.Assemble()
         settings = exu.SimulationSettings()
-        settings.timeIntegration.numberOfSteps, settings.timeIntegration.endTime = steps, DURATION
+        settings.timeIntegration.numberOfSteps, settings.timeIntegration.endTime = steps, seconds
         settings.timeIntegration.verboseMode = 0
         settings.timeIntegration.newton.useModifiedNewton = True
         settings.timeIntegration.generalizedAlpha.spectralRadius = 0.9
         settings.linearSolver.solverType = exu.LinearSolverType.EigenDense
         settings.solution.file.write = False
-        settings.solution.sensors.writePeriod = DURATION / SAMPLES
+        settings.solution.sensors.writePeriod = seconds / samples
         begin = time.perf_counter()
         mbs.SolveDynamic(settings)
         wall = time.perf_counter() - begin
-        return np.asarray(mbs.GetSensorStoredData(sensor))[-SAMPLES:, 1:], wall
+        positions, accelerations, rotations = (
+            np.asarray(mbs.GetSensorStoredData(sensor))[-samples:] for sensor in sensors
+        )
+        return Performance(
+            positions[:, 0], positions[:, 1:], accelerations[:, 1:], rotations[:, 1:].reshape(-1, 3, 3), wall
+        )
 
 
 class Ours:

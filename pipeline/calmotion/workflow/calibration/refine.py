@@ -150,7 +150,7 @@ def refine(
     improved.forget()
     optimized = optimize(improved, outputs=OutputPaths(layer=target), **common)
     return RefinedShot(
-        calibrated, played, optimized, _takes(root), _expected(optimized), time.perf_counter() - begin
+        calibrated, played, optimized, _takes(root), expected_errors(optimized), time.perf_counter() - begin
     )  # fmt: skip
 
 
@@ -170,10 +170,18 @@ def _takes(root: str) -> int:
     return count(root)
 
 
-def _expected(optimized: OptimizationResult) -> Array:
-    """The new curves on robots within the error of the calibration."""
+def expected_errors(optimized: OptimizationResult, draws: int = DRAWS) -> Array:
+    """Largest errors of the targets with the new curves on robots within the error of the calibration [m].
+
+    Args:
+        optimized: Of a shot with a calibration.
+        draws: Number of robots.
+
+    Returns:
+        Shape [draws, K].
+    """
     shot = compiled_in(optimized.outcome.run.get)
     tracks = found_tracks(optimized.result, shot.animation)
-    draws = random_scenarios(uncertain_parameters(shot), DRAWS)
+    robots = random_scenarios(uncertain_parameters(shot), draws)
     options = RunSettings(step=optimized.result.step_s, pre_roll=optimized.result.pre_roll_s)
-    return errors_on(shot, options, {"found": tracks}, draws)["found"]
+    return errors_on(shot, options, {"found": tracks}, robots)["found"]

@@ -18,6 +18,7 @@ WHAT = {
     "reduction-convergence": ("accuracy.reduction_convergence", "what a finer reduction changes"),
     "simplification": ("accuracy.simplification", "gain and error of each model simplification"),
     "calibration": ("accuracy.calibration", "known parameters of random arms, found from noisy recordings"),
+    "takes": ("accuracy.takes", "a robot that is not the model, recorded and refined, take by take"),
     "meshing": ("links.meshing", "links of robots: their solids, meshes, frequencies and errors"),
     "integrators": ("integrators.integrators", "orders and numerical damping of the integrators"),
     "stability": ("integrators.stability", "stiff and extreme scenes"),
