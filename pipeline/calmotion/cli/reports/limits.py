@@ -65,7 +65,7 @@ def _excess(row: dict[str, Any], when: str) -> float:
         beyond = value - limit if row["after"] >= limit else limit - value  # the side that the new curves exceed
     else:
         beyond = abs(value) - abs(limit)
-    return float(beyond) / max(abs(limit), 1e-12)
+    return float(beyond / max(abs(limit), 1e-12))
 
 
 def _by_excess(rows: Sequence[dict[str, Any]], when: str = "after") -> list[dict[str, Any]]:
