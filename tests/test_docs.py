@@ -85,6 +85,11 @@ def test_every_calmotion_command_on_a_page_is_accepted(page, capsys):
             assert stop.code == 0, f"{line}: {capsys.readouterr().err}"
 
 
+def test_every_video_is_small():
+    videos = [*REPOSITORY.glob("samples/*/*.webp"), *REPOSITORY.glob("docs/**/*.webp")]
+    assert len(videos) >= 8 and [video.name for video in videos if video.stat().st_size >= 1_000_000] == []
+
+
 def test_every_message_of_the_troubleshooting_page_is_one_of_the_program():
     page = (REPOSITORY / "docs" / "troubleshooting.md").read_text()
     messages = [row.split("|")[1].strip() for row in re.findall(r"^\| [^-].*$", page, re.MULTILINE)]

@@ -29,6 +29,10 @@ def result(arm, animation, bodies, progress):
     return optimize_shot(compile_shot(arm, animation, bodies), OPTIONS, lambda *state: progress.append(state))
 
 
+def test_the_sag_is_that_of_the_robot_not_that_of_the_curves(result):
+    assert result.after.sag == pytest.approx(result.before.sag, rel=0.1) and result.before.sag.max() > 1e-5
+
+
 def test_progress_rises_steadily_with_the_search(result, progress):
     fractions = [fraction for fraction, _ in progress]
     assert fractions == sorted(fractions) and 0.0 <= fractions[0] and fractions[-1] <= 1.0
