@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 from calmotion.accuracy.reduced_bodies import ConvergedReduction, ReducedBodies, compiled_in
@@ -11,7 +12,7 @@ from calmotion.shot import Animation, Character, ModelChoices, Result
 from calmotion.shot.model_choice import AUTO, KINDS, OFF, ON, no_flexible_bodies, run_settings
 from calmotion.shot.motor import PRESCRIBED
 from calmotion.shot.outputs import MotorEffects, PlannedStep, ShapedTracks, Verification
-from calmotion.shot.run import OutputPaths, Source
+from calmotion.shot.run import LONG_SHOT, OutputPaths, Source
 from calmotion.simulation.compiled_shot import CompiledShot
 
 _FORCED = {
@@ -127,7 +128,19 @@ class PlanStep(Operator):
 
         context.progress(0.0, "simulating the shot as animated")
         options = run_settings(context.get(Source), context.get(ModelChoices))
-        return [PlannedStep(planned_step(context.get(CompiledShot), options))]
+        return [PlannedStep(planned_step(_representative(context), options))]
+
+
+def _representative(context: RunContext) -> CompiledShot:
+    """The shot, or of a long one its busiest part: `inspect` tells beforehand, and is not to take as long as a run."""
+    from calmotion.simulation.inputs.excerpts import busiest
+
+    shot: CompiledShot = context.get(CompiledShot)
+    part = busiest(shot.animation, LONG_SHOT)
+    if part is shot.animation or shot.character.retarget.cyclic:
+        return shot
+    context.report("note", f"the shot is long: what is simulated of it are its busiest {LONG_SHOT:g} s")
+    return replace(shot, animation=part)
 
 
 class EstimateMotorEffects(Operator):
@@ -164,7 +177,7 @@ class EstimateMotorEffects(Operator):
 
         context.progress(0.0, "simulating the robot on motors that give")
         options = run_settings(context.get(Source), context.get(ModelChoices))
-        found = effects_of_gains(context.get(CompiledShot), options)
+        found = effects_of_gains(_representative(context), options)
         if found is None:
             context.report("warning", "by the gains that the shot carries its motors could not hold the robot")
             return []

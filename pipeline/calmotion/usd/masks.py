@@ -20,6 +20,11 @@ _SCHEMAS = (
     "PhysicsVolumeDeformableMaterialAPI", "PhysicsMaterialAPI", "Calm", "Mjc", "Newton", "Physx", "SkelBindingAPI",
 )  # fmt: skip
 _TYPES = ("SkelRoot", "Skeleton", "SkelAnimation", "PhysicsScene", "Mjc", "Newton")
+# what a set consists of: without a schema it is no body, and what is said of bodies lies on these or above it
+_GEOMETRY = frozenset((
+    "Mesh", "Cube", "Sphere", "Cylinder", "Capsule", "Cone", "Plane", "BasisCurves", "NurbsCurves", "NurbsPatch",
+    "Points", "GeomSubset", "Shader",
+))  # fmt: skip
 _ATTRIBUTE = re.compile(  # one search in all names of a prim: most of the time goes into this
     "^(?:calm:|drive:|mjc:|newton:|physx|physics:mass|physics:density|physics:rigidBody)", re.MULTILINE
 )
@@ -70,9 +75,11 @@ def _outermost(prim: Usd.Prim) -> Usd.Prim:
 
 def _is_anchor(prim: Usd.Prim) -> bool:
     info = prim.GetPrimTypeInfo()
-    schemas = info.GetAppliedAPISchemas()
-    if _is_type(info.GetTypeName()) or (schemas and any(schema.startswith(_SCHEMAS) for schema in schemas)):
+    schemas, kind = info.GetAppliedAPISchemas(), info.GetTypeName()
+    if _is_type(kind) or (schemas and any(schema.startswith(_SCHEMAS) for schema in schemas)):
         return True
+    if not schemas and kind in _GEOMETRY:
+        return False
     return _has_physics("\n".join(prim.GetAuthoredPropertyNames()))
 
 

@@ -10,10 +10,11 @@ from scipy.interpolate import CubicSpline
 
 from calmotion.multibody.integrators.workspace import Workspace
 from calmotion.retargeting.windows.continued import Beginning, ContinuedSimulator
-from calmotion.shot import Animation, FreeTrack, Motion, Simulation
+from calmotion.shot import Motion, Simulation
 from calmotion.shot.character import Array
 from calmotion.simulation.forward import ForwardRun, run_forward
 from calmotion.simulation.inputs.curves import Curves
+from calmotion.simulation.inputs.excerpts import later
 from calmotion.simulation.inputs.time_grid import TimeGrid, over_grid
 from calmotion.simulation.prepare import Prepared
 from calmotion.simulation.report import simulation_of
@@ -67,23 +68,10 @@ def part_of(whole: Prepared, first: int, last: int, known: int, ends: bool = Fal
     own = TimeGrid(
         times, grid.substeps, pre, grid.h, joined=joined, continues=not ends and last < len(grid.frame_times) - 1
     )
-    animation = _later(whole.shot.animation, float(grid.frame_times[first]), times)
+    animation = later(whole.shot.animation, float(grid.frame_times[first]), times)
     shot = replace(whole.shot, animation=animation)
     rows = slice(start, stop)
     return Part(Prepared(shot, own, whole.world[rows]), rows, first)
-
-
-def _later(animation: Animation, start: float, frame_times: Array) -> Animation:
-    """An animation from a time on, for what a search reads of it besides its curves."""
-    if start == 0.0:
-        return replace(animation, frame_times=frame_times)
-    tracks = tuple(
-        replace(track, times=track.times - start, corners=track.corners - start) for track in animation.tracks
-    )
-    weights = tuple(replace(weight, times=weight.times - start) for weight in animation.weights)
-    free = tuple(FreeTrack(track.motor, track.times - start, track.free) for track in animation.free)
-    moving = tuple(replace(frame, times=frame.times - start) for frame in animation.moving)
-    return Animation(frame_times, tracks, tracks, moving, weights, free)
 
 
 def offset_curves(offsets: Array, grid: TimeGrid) -> Curves:
