@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+import time
 from collections import Counter
 from pathlib import Path
 
@@ -16,6 +17,7 @@ sys.path.insert(0, str(HERE))
 import events  # noqa: E402
 import record  # noqa: E402
 import report  # noqa: E402
+import runs  # noqa: E402
 import verdicts  # noqa: E402
 from runs import Ending  # noqa: E402
 from workspace import Workspace, empty  # noqa: E402
@@ -99,10 +101,10 @@ def test_counts_are_written_between_the_marks(tmp_path):
 
 def test_campaigns_add_up_by_commit(tmp_path, monkeypatch):
     where = Counter({"stage\tMesh\tSIGKILL": 2})
-    for commit, runs in (("one", 3), ("one", 4), ("two", 5)):
+    for commit, count in (("one", 3), ("one", 4), ("two", 5)):
         monkeypatch.setattr(record, "_commit", lambda commit=commit: commit)
         kept = record.Record.read(tmp_path / "counts.json")
-        tally = verdicts.Tally(runs=runs)
+        tally = verdicts.Tally(runs=count)
         tally.add("killed", "kill", ["lost"] if commit == "two" else [])
         kept.add("kills", tally, where)
     kept = record.Record.read(tmp_path / "counts.json")
@@ -110,6 +112,20 @@ def test_campaigns_add_up_by_commit(tmp_path, monkeypatch):
     assert kept.runs("kills") == tallies["kills"].runs == 12 and kept.runs("clocks") == 0 and len(kept.entries) == 2
     assert tallies["kills"].counts == {"killed": 3} and where["stage\tMesh\tSIGKILL"] == 6
     assert tallies["kills"].faults == ["kill: lost (at two)"] and "commits one, two" in kept.about()
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="processes are looked at in /proc")
+@pytest.mark.parametrize(("work", "stuck"), [("pass", False), ("time.sleep(60)", True)])
+def test_a_run_is_stuck_when_it_does_not_work_however_slow_the_machine_is(work, stuck, monkeypatch):
+    monkeypatch.setattr(runs, "_IDLE", 0.02)
+    pipes = [os.pipe() for _ in range(2)]
+    code = f"import time\n{work}\nwhile time.process_time() < 0.6: pass"
+    process = subprocess.Popen([sys.executable, "-c", code], start_new_session=True)
+    process.returncode = 0  # it is awaited by its number
+    ending = runs.Started(process.pid, time.monotonic(), (pipes[0][0], pipes[1][0])).wait(1.0)
+    for pipe in pipes:
+        os.close(pipe[1])
+    assert ending.status == (None if stuck else 0)
 
 
 @pytest.mark.long
