@@ -110,12 +110,12 @@ test-portable: $(INSTALLED_DEV)
 		NPY_DISABLE_CPU_FEATURES=X86_V3; \
 	echo "== summary"; printf "$$summary"; exit $$status
 
-FUZZED := shot splines meshes bvh manifests settings caches checkpoints
+FUZZED := shot splines meshes bvh recordings motions manifests settings caches checkpoints
 fuzz: $(INSTALLED_DEV)
 	CALMOTION_FUZZ=$${CALMOTION_FUZZ:-600} $(RUN) -m pytest -q -x tests/fuzz
 	@$(RUN) -m pip install --quiet --editable '.[fuzz]' || echo "Atheris has no wheel for this Python; inputs are random"
 	@status=0; for target in $(FUZZED); do \
-		echo "== $$target"; $(RUN) tests/fuzz/guided.py $$target $${CALMOTION_FUZZ:-600} || status=1; \
+		echo "== $$target"; $(RUN) tests/fuzz/guided.py $$target $${CALMOTION_FUZZ:-600} --write || status=1; \
 	done; exit $$status
 
 # A thousand kills, and other faults in proportion; the counts go into docs/reliability.md. A campaign that was stopped

@@ -2,12 +2,21 @@
 
 Atheris guides where it is installed (`pip install 'calmotion[fuzz]'`); elsewhere inputs are mutated at random. An input
 that raises anything but an error for users is written to `tests/fuzz/cases/TARGET/`, which tests then run for ever.
+
+Hours add up over runs: inputs that reach new code stay in `build/fuzz/TARGET`, and with --write the processor time and
+the inputs of a run are added to `tests/fuzz/counts.json`, from which the table in docs/reliability.md is made.
 """
 
 from __future__ import annotations
 
+import argparse
 import hashlib
+import json
+import os
 import random
+import re
+import resource
+import subprocess
 import sys
 import time
 import traceback
@@ -16,8 +25,12 @@ from pathlib import Path
 
 import targets
 
-CASES = Path(__file__).resolve().parent / "cases"
-_PACKAGES = ("calmotion", "fe_mesher", "bvh_reader")
+HERE = Path(__file__).resolve().parent
+CASES, COUNTS, CORPUS = HERE / "cases", HERE / "counts.json", HERE.parents[1] / "build" / "fuzz"
+PAGE = HERE.parents[1] / "docs" / "reliability.md"
+BEGIN, END = "<!-- counts of make fuzz -->", "<!-- end of the counts of make fuzz -->"
+_PACKAGES = ("calmotion", "fe_mesher", "bvh_reader", "recording_readers", "motion_table")
+_DONE, _PULSE = re.compile(r"Done (\d+) runs"), re.compile(r"^#(\d+)", re.MULTILINE)
 
 
 def kept(name: str, function: Callable[[bytes], None]) -> Callable[[bytes], None]:
@@ -45,10 +58,10 @@ def by_atheris(name: str, seconds: float) -> None:
         run = kept(name, targets.TARGETS[name])
         for seed in targets.SEEDS[name]:  # imports what is instrumented
             run(seed)
-    corpus = targets.FOLDER / "corpus"
-    corpus.mkdir()
+    corpus = CORPUS / name
+    corpus.mkdir(parents=True, exist_ok=True)
     for k, seed in enumerate(targets.SEEDS[name]):
-        (corpus / str(k)).write_bytes(seed)
+        (corpus / f"seed{k}").write_bytes(seed)
     options = [f"-max_total_time={int(seconds)}", "-timeout=60", "-rss_limit_mb=4000", "-max_len=4096"]
     atheris.Setup([sys.argv[0], *options, f"-artifact_prefix={targets.FOLDER}/", str(corpus)], run)
     atheris.Fuzz()
@@ -80,13 +93,75 @@ def mutated(data: bytes, rng: random.Random) -> bytes:
     return bytes(values)
 
 
+def added(counts: dict[str, dict], name: str, seconds: float, inputs: int, found: int, guided: bool) -> dict[str, dict]:
+    """Counts of all runs, with those of one more."""
+    before = counts.get(name, {"processor_s": 0.0, "guided_s": 0.0, "inputs": 0, "findings": 0})
+    now = {
+        "processor_s": round(before["processor_s"] + seconds, 1),
+        "guided_s": round(before["guided_s"] + guided * seconds, 1),
+        "inputs": before["inputs"] + inputs, "findings": before["findings"] + found,
+    }  # fmt: skip
+    return dict(sorted((counts | {name: now}).items()))
+
+
+def table(counts: dict[str, dict]) -> str:
+    """The counts as Markdown."""
+    rows = [["target", "processor time [min]", "of it guided by coverage", "inputs", "findings"], ["---"] * 5]
+    for name in targets.TARGETS:
+        if name in counts:
+            row = counts[name]
+            minutes = [f"{row[key] / 60.0:.1f}" for key in ("processor_s", "guided_s")]
+            rows.append([name, *minutes, f"{row['inputs']:,}", str(row["findings"])])
+    return "\n".join("| " + " | ".join(row) + " |" for row in rows)
+
+
+def write(name: str, seconds: float, inputs: int, found: int, guided: bool) -> None:
+    """Add a run to the counts, and make the table of the page anew."""
+    counts = added(json.loads(COUNTS.read_text()) if COUNTS.is_file() else {}, name, seconds, inputs, found, guided)
+    temporary = COUNTS.with_suffix(".part")
+    temporary.write_text(json.dumps(counts, indent=1) + "\n")
+    os.replace(temporary, COUNTS)
+    before, _, rest = PAGE.read_text().partition(BEGIN)
+    PAGE.write_text(f"{before}{BEGIN}\n\n{table(counts)}\n\n{END}{rest.partition(END)[2]}")
+
+
+def supervised(name: str, seconds: float) -> tuple[int, float, int, int, bool]:
+    """Fuzz in a process of its own; exit status, processor time [s], inputs, findings, whether it was guided."""
+    folder = CASES / name
+    before = len(list(folder.glob("*")))
+    command = [sys.executable, str(HERE / "guided.py"), name, str(seconds), "--here"]
+    process = subprocess.Popen(command, stderr=subprocess.STDOUT, stdout=subprocess.PIPE, text=True, errors="replace")
+    assert process.stdout is not None
+    lines = []
+    for line in process.stdout:
+        lines.append(line)
+        print(line, end="", flush=True)
+    status = process.wait()
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    text = "".join(lines[-2000:])
+    done = _DONE.search(text)
+    inputs = int(done[1]) if done else max(map(int, _PULSE.findall(text)), default=0)
+    return status, used.ru_utime + used.ru_stime, inputs, len(list(folder.glob("*"))) - before, "INFO:" in text
+
+
 def main() -> int:
-    """The command."""
-    name, seconds = sys.argv[1], float(sys.argv[2])
+    """The command: exit status 1 after a finding."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("target", choices=tuple(targets.TARGETS))
+    parser.add_argument("seconds", type=float)
+    parser.add_argument("--write", action="store_true", help="add the run to the counts and to docs/reliability.md")
+    parser.add_argument("--here", action="store_true", help="in this process, which Atheris ends")
+    options = parser.parse_args()
+    name, seconds = options.target, options.seconds
+    if not options.here:
+        status, *counts = supervised(name, seconds)
+        if options.write:
+            write(name, *counts)
+        return int(status != 0)
     try:
         import atheris  # noqa: F401
     except ImportError:
-        print(f"{name}: {by_chance(name, seconds)} inputs at random; Atheris is not installed")
+        print(f"Done {by_chance(name, seconds)} runs at random of {name}; Atheris is not installed")
         return 0
     by_atheris(name, seconds)
     return 0

@@ -165,6 +165,51 @@ def bvh(data: bytes) -> None:
         assert error.problem
 
 
+def recordings(data: bytes) -> None:
+    """A recording of a format that the first byte names, and its map after a line of equals signs."""
+    import warnings
+
+    from calmotion.errors import ShotError
+    from calmotion.shot.calibration.recording import RecordingRequest
+
+    kind, (content, _, table) = data[0] % 3 if data else 0, data[1:].partition(b"\n====\n")
+    path = _file(f"take{('.csv', '.csv', '.mcap')[kind]}", content)
+    beside = path.with_suffix(".toml")
+    beside.unlink(missing_ok=True)
+    if table:
+        beside.write_bytes(table)
+    request = RecordingRequest(str(path), "/Arm/hand")
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        try:
+            if kind == 0:
+                found = _plugin("recording_readers", "tables").read_table(request, "")
+            elif kind == 1:
+                found = _plugin("recording_readers", "printers").read_log(request, "", "x, y, z", "mm/s^2")
+            else:
+                found = _plugin("recording_readers", "bags").read_bag(request, "")
+        except ShotError as error:
+            assert error.problem
+            return
+    for channel in found.channels:
+        assert len(channel.times) == len(channel.values) > 0 and channel.path.startswith("/")
+        assert all(later > earlier for earlier, later in zip(channel.times, channel.times[1:], strict=False))
+
+
+def motions(data: bytes) -> None:
+    """A motion as a table or an archive of arrays."""
+    from calmotion.errors import ShotError
+
+    try:
+        tracks = _plugin("motion_table", "tables").read_motion(
+            str(_file(f"motion{'.npz' if data[:1] == b'P' else '.csv'}", data)), angles="auto", rate=60.0, names=()
+        )
+    except ShotError as error:
+        assert error.problem
+        return
+    assert len(tracks.times) > 0 and all(len(values) == len(tracks.times) for values in tracks.values.values())
+
+
 def manifests(data: bytes) -> None:
     """The manifest of a plugin."""
     from calmotion.host import PluginError
@@ -241,8 +286,35 @@ def checkpoints(data: bytes) -> None:
 
 TARGETS: dict[str, Callable[[bytes], None]] = {
     one.__name__: one
-    for one in (shot, splines, meshes, bvh, manifests, settings, caches, checkpoints)
+    for one in (shot, splines, meshes, bvh, recordings, motions, manifests, settings, caches, checkpoints)
 }  # fmt: skip
+
+
+def _bag() -> bytes:
+    """A bag with a state of a joint; no more than its first bytes without the library that writes it."""
+    try:
+        from mcap_ros2.writer import Writer
+    except ImportError:
+        return b"\x89MCAP0\r\n"
+    stream = io.BytesIO()
+    writer = Writer(stream)
+    time = "int32 sec\nuint32 nanosec"
+    header = f"builtin_interfaces/Time stamp\nstring frame_id\n{'=' * 80}\nMSG: builtin_interfaces/Time\n{time}"
+    text = (
+        "std_msgs/Header header\nstring[] name\nfloat64[] position\nfloat64[] velocity\nfloat64[] effort\n"
+        f"{'=' * 80}\nMSG: std_msgs/Header\n{header}\n"
+    )
+    schema = writer.register_msgdef("sensor_msgs/msg/JointState", text)
+    for k in range(3):
+        stamp = {"sec": k, "nanosec": 5}
+        message = {
+            "header": {"stamp": stamp, "frame_id": ""}, "name": ["elbow"], "position": [0.1 * k], "velocity": [],
+            "effort": [1.0],
+        }  # fmt: skip
+        writer.write_message("/joint_states", schema, message, log_time=k * 10**9, publish_time=k * 10**9)
+    writer.finish()
+    return stream.getvalue()
+
 
 _TETRAHEDRON = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n"
 SEEDS: dict[str, tuple[bytes, ...]] = {
@@ -259,6 +331,18 @@ SEEDS: dict[str, tuple[bytes, ...]] = {
     "bvh": (
         b"HIERARCHY\nROOT Hips\n{\nOFFSET 0 0 0\nCHANNELS 3 Xrotation Yrotation Zrotation\n}\nMOTION\nFrames: 2\n"
         b"Frame Time: 0.04\n1 2 3\n4 5 6\n",
+    ),
+    "recordings": (
+        b"\0time_s,/Arm/hand.x,/Arm/hand.y,/Arm/hand.z,/Arm/joints/elbow.angle\n0,0,0,1,0\n0.01,0,0.1,1,2\n0.02,,,,3\n",
+        b'\0t;a;b\n0;1;2\n1;3;4\n\n====\n[time]\ncolumn = "t"\nunit = "ms"\n[[channel]]\nprim = "/Arm/joints/elbow"\n'
+        b'kind = "angle"\ncolumns = ["-a"]\nunit = "deg"\nnoise = 0.1\n',
+        b'\1#time,accel_x,accel_y,accel_z\n0,1,2,3\n0.001,2,3,4\n\n====\nprim = "/Arm/hand"\naxes = "y, -x, z"\n'
+        b'unit = "g"\n',
+        b"\2" + _bag() + b'\n====\n[joints]\nelbow = "/Arm/joints/elbow"\n',
+    ),
+    "motions": (
+        b"time_s,/Arm/joints/elbow\n0,1\n0.1,2\n0.2,3\n",
+        b"/Arm/joints/elbow;/Arm/joints/shoulder\n1;2\n3;4\n",
     ),
     "manifests": (
         b'id = "anvil"\nversion = "0.1.0"\nname = "Anvil"\ntagline = "Hits"\nmaintainer = "Smith"\nlicense = "MIT"\n'

@@ -31,6 +31,19 @@ def test_seeds_and_damaged_seeds_are_read_or_refused(name):
             targets.TARGETS[name](guided.mutated(seed, rng))
 
 
+def test_seeds_of_recordings_are_recordings(monkeypatch):
+    """Random damage to what is refused anyway would find little."""
+    pytest.importorskip("mcap_ros2")
+    found = []
+    for module, name in (("tables", "read_table"), ("printers", "read_log"), ("bags", "read_bag")):
+        module = targets._plugin("recording_readers", module)
+        read = getattr(module, name)
+        monkeypatch.setattr(module, name, lambda *given, read=read: found.append(read(*given)) or found[-1])
+    for seed in targets.SEEDS["recordings"]:
+        targets.recordings(seed)
+    assert [len(recording.channels) for recording in found] == [2, 1, 1, 2]
+
+
 def test_a_failure_is_kept_and_raised(tmp_path, monkeypatch):
     monkeypatch.setattr(guided, "CASES", tmp_path)
 
@@ -46,3 +59,16 @@ def test_a_failure_is_kept_and_raised(tmp_path, monkeypatch):
 def test_bytes_drive_random_choices():
     rng = targets.Bytes(b"\x05\x00\xff\xff")
     assert rng.getrandbits(8) == 5 and rng.getrandbits(8) == 0 and rng.random() > 0.999 and rng.random() == 0.0
+
+
+def test_runs_add_up_and_make_the_table(tmp_path, monkeypatch):
+    page = tmp_path / "page.md"
+    page.write_text(f"before\n{guided.BEGIN}\nold\n{guided.END}\nafter\n")
+    monkeypatch.setattr(guided, "COUNTS", tmp_path / "counts.json")
+    monkeypatch.setattr(guided, "PAGE", page)
+    guided.write("bvh", 90.0, 1000, 0, True)
+    guided.write("bvh", 30.0, 500, 1, False)
+    guided.write("shot", 6.0, 7, 0, True)
+    text = page.read_text()
+    assert text.startswith("before") and text.endswith("after\n") and "old" not in text
+    assert "| bvh | 2.0 | 1.5 | 1,500 | 1 |" in text and "| shot | 0.1 | 0.1 | 7 | 0 |" in text
