@@ -41,8 +41,8 @@ def read_c3d(request: RecordingRequest, map_file: str) -> SensorRecording:
             "this is not a C3D file, or it is damaged", path=file, found=error, remedy="Export it again"
         ) from error
     parameters = content["parameters"]["POINT"]
-    labels, rates = (np.ravel(parameters.get(name, {}).get("value", ())) for name in ("LABELS", "RATE"))
-    labels = [str(label).strip() for label in labels]
+    names, rates = (np.ravel(parameters.get(name, {}).get("value", ())) for name in ("LABELS", "RATE"))
+    labels = [str(name).strip() for name in names]
     unit = str((parameters.get("UNITS", {}).get("value") or ["mm"])[0]).strip() or "mm"
     rate = float(rates[0]) if len(rates) else 0.0
     if unit not in LENGTHS or not rate > 0.0:

@@ -60,12 +60,12 @@ def _counted(rows: Sequence[dict[str, Any]]) -> str:
 
 def _excess(row: dict[str, Any], when: str) -> float:
     """By how much a value exceeds its limit, over the size of the limit; only those of positions have sides."""
-    limit, value = row["limit"], row[when]
+    limit, value = float(row["limit"]), float(row[when])
     if row["quantity"] == "position":
         beyond = value - limit if row["after"] >= limit else limit - value  # the side that the new curves exceed
     else:
         beyond = abs(value) - abs(limit)
-    return float(beyond / max(abs(limit), 1e-12))
+    return beyond / max(abs(limit), 1e-12)
 
 
 def _by_excess(rows: Sequence[dict[str, Any]], when: str = "after") -> list[dict[str, Any]]:
