@@ -183,9 +183,9 @@ def build_character(reading: Reading, skeleton: Skeleton) -> Character:
         joints_as_authored = list(dict.fromkeys(joint.whole or joint for joint in lasting))
         outer = topology.leaves([path for path in skeleton.bodies if path not in skeleton.between], joints_as_authored)
         chosen = tuple(targets.outermost_target(bodies[numbers[b]], numbers[b], joints) for b in outer)
-        names = ", ".join(body.rsplit("/", 1)[-1] for body in outer)
-        points = "outermost points" if len(outer) > 1 else "outermost point"
-        reading.note(f"no CalmTargetAPI: targets are the {points} of {names}")
+        names = outer if len(outer) == 1 else [body.rsplit("/", 1)[-1] for body in outer]
+        what = "the target is the outermost point" if len(outer) == 1 else "targets are the outermost points"
+        reading.note(f"no CalmTargetAPI: {what} of {', '.join(names)}")
     default = reading.stage.GetDefaultPrim()
     whole = default and all(b.startswith(f"{default.GetPath()}/") for b in skeleton.bodies if b not in skeleton.between)
     character = Character(
