@@ -139,7 +139,7 @@ def _representative(context: RunContext) -> CompiledShot:
     part = busiest(shot.animation, LONG_SHOT)
     if part is shot.animation or shot.character.retarget.cyclic:
         return shot
-    context.report("note", f"the shot is long: what is simulated of it are its busiest {LONG_SHOT:g} s")
+    context.report("info", f"the shot is long: what is simulated of it are its busiest {LONG_SHOT:g} s")
     return replace(shot, animation=part)
 
 

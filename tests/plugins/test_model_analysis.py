@@ -1,12 +1,15 @@
 """The analysis in the pipeline: what it simplifies is not run, and everything can be forced."""
 
+import sys
+
 import pytest
 from calmotion.benchmarks.scenes.simplification_shots import clevis_arm, mixed_arm
 from calmotion.host import NotAsked
-from calmotion.shot import Character, FEMeshes, ModelChoices, Result
+from calmotion.shot import Character, FEMeshes, ModelChoices, Result, Simplification
 from calmotion.shot.model_choice import ON
 from calmotion.shot.outputs import PlannedStep
 from calmotion.shot.run import OutputPaths, RunSettings, Source
+from calmotion.simulation.compiled_shot import compile_shot
 from calmotion.testing import host_with, run_operator, small_shot
 
 
@@ -80,6 +83,20 @@ def test_an_inspection_plans_the_step_where_one_matters(host):
     character, _ = small_shot()
     assert "motors alone" in poll({Character: character, Source: _source("inspect")})
     assert isinstance(poll({Source: _source("simulate")}), NotAsked)
+
+
+def test_of_a_long_shot_an_inspection_simulates_the_busiest_part(host, monkeypatch):
+    shot, seen = mixed_arm(), []
+    monkeypatch.setattr(sys.modules[host.operators["accuracy.step"].__module__], "LONG_SHOT", 0.25)
+    monkeypatch.setattr(
+        "calmotion.accuracy.simulate_to_tolerance.planned_step",
+        lambda shot, options: seen.append(shot) or Simplification("time step 2 ms", "planned"),
+    )
+    given = [shot.character, shot.animation, compile_shot(shot.character, shot.animation), _source("inspect")]
+    (step,) = run_operator(host, "accuracy.step", given)
+    assert step.row.why == "planned" and len(seen) == 1
+    assert seen[0].animation.frame_times[-1] == pytest.approx(0.25, abs=0.05)
+    assert shot.animation.frame_times[-1] > 0.5
 
 
 def test_unknown_kinds_are_wrong_usage(calmotion):
