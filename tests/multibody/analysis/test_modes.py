@@ -5,6 +5,7 @@ import pytest
 from arms import chain, compiled
 from calmotion.benchmarks.scenes.beam_arm import beam_arm
 from calmotion.benchmarks.scenes.four_bar import four_bar
+from calmotion.multibody.analysis.kinematics import rigid_state
 from calmotion.multibody.analysis.modes import elastic_modes, system_modes
 from calmotion.multibody.integrators.workspace import Workspace
 from calmotion.multibody.model.model import compile_model
@@ -82,3 +83,35 @@ def test_what_hangs_free_has_no_elastic_frequency():
     slow = omega < 1e-12 * omega[-1]
     assert np.flatnonzero(slow).tolist() == [0, 1, 2, 3, 4], "the hinges turn without a force, to rounding"
     assert max(np.abs(shape[:, slow]).max(initial=0.0) for shape in shapes) < 1e-9
+
+
+def test_motions_along_a_tree_span_those_that_joints_allow(monkeypatch):
+    """`null_space` takes time with the cube of the number of bodies."""
+    from calmotion.benchmarks.speed.growth import branches, prepared
+    from calmotion.multibody.analysis import modes
+
+    model, found, spans = prepared(*branches()), [], []
+    along = modes._tree_motions
+    for motions in (along, lambda *arguments: None):
+        monkeypatch.setattr(modes, "_tree_motions", motions)
+        found.append((modes.elastic_modes(model)[0], *modes.system_modes(model, model.rest_angles)))
+        angles, workspace = model.rest_angles, Workspace.for_system(model.system)
+        spans.append(modes._matrices(model.system, rigid_state(model, angles), angles, workspace)[3])
+    for one, other in zip(*found, strict=True):
+        np.testing.assert_allclose(one, other, rtol=1e-6)
+    by_tree, orthonormal = spans
+    assert by_tree.shape == orthonormal.shape
+    rest = by_tree - orthonormal @ (orthonormal.T @ by_tree)
+    assert np.abs(rest).max() < 1e-9 * np.abs(by_tree).max()
+
+
+def test_joints_that_form_a_loop_or_leave_a_child_free_are_not_a_tree_of_welds():
+    from calmotion.benchmarks.speed.growth import branches, prepared
+    from calmotion.multibody.analysis import modes
+
+    model = prepared(*branches())
+    system, offset = model.system, np.concatenate([[0], np.cumsum(6 + model.system.elastic)])
+    rows = np.zeros((6 * len(system.rows), int(offset[-1])))
+    assert modes._tree_motions(system, rows, offset) is None, "no row tells anything of a child"
+    loop = system._replace(side=np.concatenate([system.side, system.side[:1]]))
+    assert modes._tree_motions(loop, rows, offset) is None
