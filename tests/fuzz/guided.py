@@ -132,16 +132,17 @@ def supervised(name: str, seconds: float) -> tuple[int, float, int, int, bool]:
     command = [sys.executable, str(HERE / "guided.py"), name, str(seconds), "--here"]
     process = subprocess.Popen(command, stderr=subprocess.STDOUT, stdout=subprocess.PIPE, text=True, errors="replace")
     assert process.stdout is not None
-    lines = []
+    lines, guided = [], False
     for line in process.stdout:
         lines.append(line)
+        guided = guided or line.startswith("INFO:")
         print(line, end="", flush=True)
     status = process.wait()
     used = resource.getrusage(resource.RUSAGE_CHILDREN)
     text = "".join(lines[-2000:])
     done = _DONE.search(text)
     inputs = int(done[1]) if done else max(map(int, _PULSE.findall(text)), default=0)
-    return status, used.ru_utime + used.ru_stime, inputs, len(list(folder.glob("*"))) - before, "INFO:" in text
+    return status, used.ru_utime + used.ru_stime, inputs, len(list(folder.glob("*"))) - before, guided
 
 
 def main() -> int:
