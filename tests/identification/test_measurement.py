@@ -36,7 +36,18 @@ def measurement(shot, recordings):
 
 def test_clocks_are_found_with_the_parameters_of_the_shot(shot, recordings, signals):
     for recording in recordings:
-        assert clock_of(recording, shot.character, signals) == pytest.approx(CLOCKS[recording.file], abs=0.012)
+        assert clock_of(recording, shot.character, [signals]) == pytest.approx(CLOCKS[recording.file], abs=0.012)
+
+
+def test_the_clock_is_that_of_the_robot_which_is_most_like_the_recording(shot, recordings, signals):
+    unlike = dataclasses.replace(
+        signals, positions=signals.positions[::-1], angles=signals.angles[::-1], rotations=signals.rotations[::-1],
+        _splines={},
+    )  # fmt: skip
+    for recording in recordings:
+        right = pytest.approx(CLOCKS[recording.file], abs=0.012)
+        assert clock_of(recording, shot.character, [unlike]) != right
+        assert clock_of(recording, shot.character, [unlike, signals]) == right
 
 
 def test_the_parameters_are_clocks_places_and_biases(measurement):

@@ -17,8 +17,8 @@ from calmotion.identification.motor_groups import grouped, of_each_motor
 from calmotion.identification.noise import noise_of
 from calmotion.identification.parameters import DEFAULT, Parameter, robot_parameters
 from calmotion.identification.problem import Calibrated
-from calmotion.identification.robots import robot_with
-from calmotion.identification.search import HALVINGS, Found, profiled, search, step_of
+from calmotion.identification.robots import robot_at, robot_with
+from calmotion.identification.search import HALVINGS, STIFF, Found, profiled, search, step_of
 from calmotion.identification.signals import Signals, ends_at_rest, refuse_cyclic, signals_of
 from calmotion.multibody.failure import SimulationFailure
 from calmotion.multibody.integrators.coefficients import IMPLICIT
@@ -40,6 +40,7 @@ from calmotion.simulation.prepare import failure_error, prepare
 
 AFTER = 1.0  # what a recording holds after the end of the shot is used up to here [s]
 SCHEME = "generalized-alpha"  # a quarter of BDF2's error, and no damping to speak of
+STIFFER = 30.0  # times as stiff as the shot's: a robot that hardly shakes, by which clocks are found
 STRONG = 0.9  # correlation that is worth a note
 MISSED, TOGETHER = 1.5, 3.0  # residuals over the noise, and samples that count as one: the model misses something
 
@@ -94,7 +95,8 @@ def calibrate_shot(
     options, nominal = simulable(shot, options, settings.after)
     progress(0.02, "finding the clocks of the recordings")
     known = CLOCK_OFFSET in settings.priors  # then time 0 is the first frame, within this standard deviation
-    clocks = [0.0 if known else clock_of(recording, shot.character, nominal) for recording in recordings]
+    robots = [nominal] if known else [nominal, *_hardly_shaking(shot, parameters, options, settings.after)]
+    clocks = [0.0 if known else clock_of(recording, shot.character, robots) for recording in recordings]
     first, last = (0.0 if nominal.times[0] < 0.0 else -np.inf), float(nominal.times[-1])
     measurement = Measurement(
         tuple(recording.file for recording in recordings),
@@ -116,6 +118,19 @@ def calibrate_shot(
         found.solution.converged, found.iterations, told.count, step_of(found.problem), found.shift,
         time.perf_counter() - begin, notes,
     )  # fmt: skip
+
+
+def _hardly_shaking(
+    shot: CompiledShot, parameters: Sequence[Parameter], options: RunSettings, after: float
+) -> list[Signals]:
+    """Signals of a robot of which all that is estimated and gives is far stiffer; none where it cannot be simulated."""
+    x = np.array([np.log(STIFFER) / p.spread if p.kind in STIFF else 0.0 for p in parameters])
+    if not x.any():
+        return []
+    try:
+        return [signals_of(robot_at(shot, parameters, x), options, after)]
+    except (SimulationFailure, ShotError):
+        return []
 
 
 class _Told:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from calmotion.identification.noise import noise_of
@@ -15,8 +17,8 @@ SAMPLES = 600  # of a channel that are compared, at most
 COVERED = 0.5  # share of the motion that a recording must hold
 
 
-def clock_of(recording: SensorRecording, character: Character, signals: Signals) -> float:
-    """The clock [s] at which what was recorded is most like what a simulated robot shows.
+def clock_of(recording: SensorRecording, character: Character, robots: Sequence[Signals]) -> float:
+    """The clock [s] at which what was recorded is most like what one of some simulated robots shows.
 
     All shifts at which half of the motion is recorded are tried, then finer ones about the best. Constants are taken
     off each component, so that biases do not matter.
@@ -24,17 +26,24 @@ def clock_of(recording: SensorRecording, character: Character, signals: Signals)
     Args:
         recording: The recording; channels that the robot does not have are not looked at.
         character: Its targets and motors.
-        signals: Of a simulated robot.
+        robots: Signals of each: a robot that shakes more than the real one may be most like its recording at a wrong
+            clock, where one that hardly shakes tells the right one.
     """
+    found = [_clock_by(recording, character, signals) for signals in robots]
+    return min(found, key=lambda item: item[1])[0]
+
+
+def _clock_by(recording: SensorRecording, character: Character, signals: Signals) -> tuple[float, float]:
+    """The clock by one robot, and how unlike it the recording is."""
     length = float(signals.times[-1])
     first, last = recording.start - (1.0 - COVERED) * length, recording.end - COVERED * length
     compared = _compared(recording, character)
     if not compared or last <= first:
-        return recording.start
+        return recording.start, np.inf
     candidates = np.arange(first, last + STEP, STEP, dtype=np.float64)
     best = _best(candidates, compared, signals)
     for step in (STEP / 10.0, STEP / 100.0):
-        best = _best(best + step * np.arange(-12.0, 13.0), compared, signals)
+        best = _best(best[0] + step * np.arange(-12.0, 13.0), compared, signals)
     return best
 
 
@@ -57,7 +66,7 @@ def _compared(recording: SensorRecording, character: Character) -> list[_Compare
     return found
 
 
-def _best(candidates: Array, compared: list[_Compared], signals: Signals) -> float:
+def _best(candidates: Array, compared: list[_Compared], signals: Signals) -> tuple[float, float]:
     costs = []
     for clock in candidates:
         cost = 0.0
@@ -67,4 +76,5 @@ def _best(candidates: Array, compared: list[_Compared], signals: Signals) -> flo
             off = np.clip(off - np.nanmedian(off, axis=0), -2.0, 2.0)
             cost += float(np.nanmean(off**2))
         costs.append(cost)
-    return float(candidates[int(np.argmin(costs))])
+    least = int(np.argmin(costs))
+    return float(candidates[least]), float(costs[least])
