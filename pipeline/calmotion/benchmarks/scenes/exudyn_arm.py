@@ -52,14 +52,13 @@ class Performance:
 
     Attributes:
         times: [s], shape [s].
-        positions, accelerations: World [m], [m/s^2], shape [s, 3].
+        positions: World [m], shape [s, 3].
         rotations: Rotation matrices, shape [s, 3, 3].
         wall_s: Run time [s].
     """
 
     times: Array
     positions: Array
-    accelerations: Array
     rotations: Array
     wall_s: float
 
@@ -159,7 +158,7 @@ class Exudyn:
                     bodyNumber=load["bodyNumber"], outputVariableType=output, storeInternal=True, writeToFile=False
                 )
             )
-            for output in (outputs.Position, outputs.Acceleration, outputs.RotationMatrix)
+            for output in (outputs.Position, outputs.RotationMatrix)
         ]  # fmt: skip
         mbs.Assemble()
         settings = exu.SimulationSettings()
@@ -173,12 +172,8 @@ class Exudyn:
         begin = time.perf_counter()
         mbs.SolveDynamic(settings)
         wall = time.perf_counter() - begin
-        positions, accelerations, rotations = (
-            np.asarray(mbs.GetSensorStoredData(sensor))[-samples:] for sensor in sensors
-        )
-        return Performance(
-            positions[:, 0], positions[:, 1:], accelerations[:, 1:], rotations[:, 1:].reshape(-1, 3, 3), wall
-        )
+        positions, rotations = (np.asarray(mbs.GetSensorStoredData(sensor))[-samples:] for sensor in sensors)
+        return Performance(positions[:, 0], positions[:, 1:], rotations[:, 1:].reshape(-1, 3, 3), wall)
 
 
 class Ours:
