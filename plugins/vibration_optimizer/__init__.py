@@ -233,10 +233,7 @@ class OptimizeShot(Operator):
         if after is None or not after <= before:
             reason = f"the search ended: {result.stopped}"
             if any(map(is_exceeded, result.limits)):
-                reason = (
-                    "the animation exceeds limits of motors, and so do they. Slow the animation down there, or raise "
-                    "the limits"
-                )
+                reason = "limits of motors are still exceeded. Slow the animation down there, or raise the limits"
             elif any(map(is_reached, result.limits)):
                 reason = "the limits of the motors require it"
             context.report(

@@ -134,7 +134,7 @@ def test_frequencies_are_sought_only_where_something_shows_them(host):
     [
         (-0.4, None, "the search ended: iteration limit"),
         (-1e-9, None, "the limits of the motors require it"),
-        (0.2, None, "exceeds limits of motors, and so do they. Slow the animation down there, or raise the limits"),
+        (0.2, None, "limits of motors are still exceeded. Slow the animation down there, or raise the limits"),
         (-0.4, 1e-3, "the limits of the motors require it"),
     ],
 )

@@ -24,7 +24,7 @@ def test_curves_that_still_exceed_limits_come_with_cause_and_remedy():
     text = told([*rows, row("/Calm", 25.0, 3.0, 4.0)])
     assert text.startswith(
         "The animation asks for more than the motors may do: /Shoulder has effort 62 N m where 25 N m is allowed, "
-        "and 1 more. The new curves ask for less and follow the animation less well, but still exceed 2 limits: "
+        "and 1 more. The new curves follow it less well and still exceed 2 limits: "
         "/Shoulder has effort 43 N m where 25 N m is allowed, and 1 more."
     )
     assert text.endswith(

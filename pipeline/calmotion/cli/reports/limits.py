@@ -41,8 +41,9 @@ def print_reason(console: Console, report: dict[str, Any]) -> None:
         asked = [row for row in limits if _excess(row, "before") > 0.0]
         if asked:
             say(console, f"The animation asks for more than the motors may do: {_worst(asked, 'before')}.")
-        cost = " and follow the animation less well" if worse else ""
-        say(console, f"The new curves ask for less{cost}, but still exceed {_counted(exceeded)}: {_worst(exceeded)}.")
+        cost = " follow it less well and" if worse else ""
+        still = " still" if asked else ""
+        say(console, f"The new curves{cost}{still} exceed {_counted(exceeded)}: {_worst(exceeded)}.")
         names = " and ".join(dict.fromkeys(RAISED_BY[row["quantity"]] for row in exceeded))
         times = ", ".join(dict.fromkeys(f"{row['time_s']:.2f} s" for row in _by_excess(exceeded)[:3]))
         say(console, f"Slow the animation down around {times}, or raise {names} if the motors can do more.")
