@@ -92,3 +92,19 @@ def test_a_link_to_itself_in_the_place_of_a_file_stops_nobody(run, tmp_path):
         path.unlink()
         path.symlink_to(path.name)
     assert run()[0] == 0 and run()[0] == 1
+
+
+def test_processes_that_save_at_once_lose_nothing(make, tmp_path):
+    code = (
+        "import sys\n"
+        "from calmotion.support.kernel_cache import VerifiedCacheFile\n"
+        "for number in range(20):\n"
+        f"    file = VerifiedCacheFile({str(tmp_path)!r}, 'name', (1.0, 2))\n"
+        "    file.save((sys.argv[1], number), [sys.argv[1], number])\n"
+    )
+    started = [subprocess.Popen([sys.executable, "-c", code, name]) for name in ("one", "two", "three")]
+    assert [process.wait(120) for process in started] == [0, 0, 0]
+    found = make()
+    for name in ("one", "two", "three"):
+        for number in range(20):
+            assert found.load((name, number)) == [name, number]

@@ -19,7 +19,7 @@ from calmotion.support.caching.bundled_kernels import FOLDER, BundledKernels
 from calmotion.support.caching.caches import discard
 from calmotion.support.caching.signing import signing_key
 from calmotion.support.caching.verified_files import DamagedFileError, ForeignFileError, read_verified, sealed
-from calmotion.support.files import replaced
+from calmotion.support.files import locked, replaced
 from calmotion.support.kernel_compiler import is_called_by_kernel
 
 _FOR_KERNELS = "without an entrance for Python"
@@ -47,8 +47,13 @@ class VerifiedCacheFile(IndexDataCacheFile):  # type: ignore[misc]
         return found
 
     def save(self, key: Any, data: Any) -> None:
-        """Save data for a key."""
-        super().save((key, _FOR_KERNELS) if is_called_by_kernel() else key, data)
+        """Save data for a key.
+
+        numba reads the index, adds to it, and writes it: of two processes that compile at once one would lose its
+        entry, or both would give different data the same name.
+        """
+        with locked(Path(self._index_path).parent):
+            super().save((key, _FOR_KERNELS) if is_called_by_kernel() else key, data)
 
     def _load_index(self) -> dict[Any, str]:
         content = _content(Path(self._index_path))
