@@ -82,7 +82,7 @@ def performed(real, animation):
 
 def recorded(done, path, rng):
     """A marker and an accelerometer on the load, each on its own clock, with bias and noise."""
-    # of its positions: constraints make Exudyn's own accelerations rough
+    # of its positions, as an accelerometer on the load would feel them
     accelerations = make_interp_spline(done.times, done.positions, k=5).derivative(2)(done.times)
     forces = np.einsum("tki,tk->ti", done.rotations, accelerations)  # without gravity
     channels = (

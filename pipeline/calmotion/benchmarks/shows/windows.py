@@ -4,8 +4,8 @@ A performance of a robot's shot is made of its own poses: at random times it mov
 with short rests. It is varied, not repeated, and a longer one begins as a shorter one does. Each is optimised by
 `calmotion optimize` in a process of its own, whose memory is measured. With `--compare SECONDS` a performance of that
 length is also optimised by one long search, and the distance of the targets between both is printed. Both end where
-they would gain less than `retarget.optimize.least_gain` of the tolerance; a distance below a tenth of it needs searches
-that are exact to that (`--set retarget.optimize.least_gain=0.0003`). With `--single` one search over as many seconds as
+they would gain less than 0.0003 of the tolerance (`--set retarget.optimize.least_gain`), so that what is found does not
+depend on the windows. With `--single` one search over as many seconds as
 a window has is the measure of the longest performance: its processor time times the number of windows.
 
 Processor times are those to look at where others use the machine.
