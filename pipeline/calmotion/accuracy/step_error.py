@@ -9,16 +9,14 @@ import numpy as np
 
 from calmotion.accuracy.integrator_choice import SAFE
 from calmotion.errors import IntegrationError
-from calmotion.multibody.analysis.reactions import reactions
 from calmotion.multibody.failure import SimulationFailure
 from calmotion.multibody.integrators.workspace import Workspace
-from calmotion.multibody.model.system import State
 from calmotion.shot import Character, Result
 from calmotion.shot.character import Array, IntArray, contact_joints
 from calmotion.shot.run import RunSettings
 from calmotion.simulation.compiled_shot import CompiledShot
 from calmotion.simulation.cyclic import SteadyState
-from calmotion.simulation.forward import ForwardRun, run_forward, run_in_pieces
+from calmotion.simulation.forward import AT_ONCE, ForwardRun, reactions_at, run_forward, run_in_pieces
 from calmotion.simulation.inputs.curves import sample_tracks
 from calmotion.simulation.inputs.open_chains import open_joints
 from calmotion.simulation.prepare import Prepared, failure_error, prepare
@@ -28,7 +26,6 @@ CLOSED_GAP = 1e-6  # largest position gap of a joint that counts as none [m]
 ORDER = 2  # of BDF2; the global error goes with this power of the step
 ORDER_AT_IMPACTS = 1  # a change of contacts excites vibration that no step resolves, as sharply as steps allow
 MARGIN, WORTH = 0.9, 1.1  # of a step between two that were tried; how much longer it must be than the shorter of them
-AT_ONCE = 8192  # instants of a simulation that are held at once
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,10 +97,7 @@ def _at_frames(prepared: Prepared, pieces: Iterable[tuple[slice, ForwardRun]], i
 
 def _efforts(prepared: Prepared, run: ForwardRun, frames: IntArray) -> Array:
     """Efforts of the motors at some instants [N m] or [N], shape [f, M]."""
-    model, whole = prepared.model, run.trajectory
-    states = State(*[part[frames] for part in whole.states])
-    at_frames = replace(whole, states=states, world=whole.world[frames])
-    found = reactions(model.system, at_frames, run.joint_angles[frames], run.joint_rates[frames])
+    model, found = prepared.model, reactions_at(prepared.model, run, frames)
     efforts = np.zeros((len(frames), len(prepared.character.motors)))
     driven = model.motor >= 0
     efforts[:, model.motor[driven]] = found.efforts[:, driven] * model.sign[driven]

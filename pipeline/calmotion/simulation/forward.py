@@ -3,19 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from calmotion.multibody.analysis.kinematics import rigid_state, target_frames
-from calmotion.multibody.analysis.reactions import reactions
+from calmotion.multibody.analysis.reactions import Reactions, reactions
 from calmotion.multibody.integrators.integrate import integrate
 from calmotion.multibody.integrators.pieces import integrate_in_pieces
 from calmotion.multibody.integrators.trajectory import Trajectory
 from calmotion.multibody.integrators.workspace import Workspace
 from calmotion.multibody.model.model import Model, start_angles
-from calmotion.shot.character import Array
+from calmotion.multibody.model.system import State
+from calmotion.shot.character import Array, IntArray
 from calmotion.simulation.cyclic import SteadyState
 from calmotion.simulation.inputs.curves import Curves
 from calmotion.simulation.inputs.delays import CommandDelay
+
+AT_ONCE = 8192  # instants of a simulation, or of what follows from it, that are held at once
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,6 +38,14 @@ class ForwardRun:
     target_rotations: Array
     commands: Array
     floquet_multiplier: float = 0.0
+
+
+def reactions_at(model: Model, run: ForwardRun, instants: IntArray | slice) -> Reactions:
+    """What the joints transmit at some instants of a run."""
+    whole = run.trajectory
+    states = State(*[part[instants] for part in whole.states])
+    there = replace(whole, states=states, world=whole.world[instants])
+    return reactions(model.system, there, run.joint_angles[instants], run.joint_rates[instants])
 
 
 def run_forward(

@@ -9,17 +9,15 @@ import numpy as np
 
 from calmotion.geometry.mesh_mass import mass_of_tets
 from calmotion.multibody.analysis import kinematics
-from calmotion.multibody.analysis.reactions import reactions
 from calmotion.multibody.failure import SimulationFailure
 from calmotion.multibody.integrators.workspace import Workspace
 from calmotion.multibody.model.model import Model, body_anchors, compile_model, moves_freely, rigid_body
-from calmotion.multibody.model.system import State
 from calmotion.multibody.model.topology import Tree, chain_members
 from calmotion.reduction.load_envelope import LoadEnvelope
 from calmotion.reduction.reduced_body import ReducedBody
 from calmotion.shot import Animation, Character, FEMeshes
 from calmotion.shot.character import Array, with_ideal_motors
-from calmotion.simulation.forward import ForwardRun, run_forward
+from calmotion.simulation.forward import AT_ONCE, ForwardRun, reactions_at, run_forward
 from calmotion.simulation.inputs.contacts import sample_world
 from calmotion.simulation.inputs.curves import sample_tracks
 from calmotion.simulation.inputs.open_chains import refuse_open_chains, refuse_open_failure
@@ -27,7 +25,6 @@ from calmotion.simulation.inputs.time_grid import TimeGrid
 from calmotion.simulation.standing.slipping import refuse_slipping
 
 _POWER_LEFT = 1e-3  # of a signal's power may lie above the highest frequency that matters: 3% of its amplitude
-AT_ONCE = 8192  # instants whose reactions are worked out at once
 _NOTHING = 1e-9  # of gravity, or of it over a metre: an acceleration that is rounding
 
 
@@ -181,12 +178,9 @@ def excitation_of(character: Character, model: Model, run: ForwardRun, h: float)
 
 def _joint_loads(model: Model, run: ForwardRun) -> tuple[Array, Array]:
     """Forces [N] and moments [N m] of all joints, shape [T, J, 3] each; see `Reactions`."""
-    total, whole = len(run.joint_angles), run.trajectory
     parts = []
-    for start in range(0, total, AT_ONCE):
-        rows = slice(start, start + AT_ONCE)
-        piece = replace(whole, states=State(*[part[rows] for part in whole.states]), world=whole.world[rows])
-        found = reactions(model.system, piece, run.joint_angles[rows], run.joint_rates[rows])
+    for start in range(0, len(run.joint_angles), AT_ONCE):
+        found = reactions_at(model, run, slice(start, start + AT_ONCE))
         parts.append((found.forces, found.moments))
     forces, moments = (np.concatenate(own) for own in zip(*parts, strict=True))
     return forces, moments
