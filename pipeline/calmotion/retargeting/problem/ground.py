@@ -25,7 +25,7 @@ def ground_of(robot: int) -> str:
 
 
 def ground_bounds(limits: GroundLimits) -> Bounds:
-    """Bounds of `GroundValues.values`."""
+    """Bounds of `ground_values`."""
     speeds = np.concatenate([np.zeros(0), *[landing.speeds for landing in limits.landings]]) / SPEED
     count = len(limits.joints)
     upper = np.concatenate([np.full(count, np.inf), speeds])
