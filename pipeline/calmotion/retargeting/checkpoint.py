@@ -22,7 +22,7 @@ from calmotion.support.sources import source_digest
 
 # The state of a search belongs to the code that computed it.
 _ROOMS = ("linear_algebra", "multibody", "retargeting", "simulation", "support")
-_OF_LIMITS = ("rho", "left", "reached", "stalled", "on")
+_OF_LIMITS = ("rho", "first", "left", "reached", "stalled", "on")
 SAME = 1e-4  # largest relative difference of the merit when a stored point is simulated again
 LOG = logging.getLogger("calmotion")
 
@@ -164,7 +164,7 @@ def _check_kinds(values: dict[str, np.ndarray], state: dict[str, Any], limits: L
     if breaks.dtype.kind != "i" or breaks.ndim != 1 or len(breaks) < 2:
         raise ValueError("its knots are no frames")
     counts = ["evaluations", "gradients", "products", *(["stalled"] if limits is not None else [])]
-    sizes = ["radius", *(["rho", "left"] if limits is not None else [])]
+    sizes = ["radius", *(["rho", "first", "left"] if limits is not None else [])]
     # limits that are kept are exceeded by less than 0
     numbers = ["merit", *(["reached"] if limits is not None else [])]
     for name in counts:

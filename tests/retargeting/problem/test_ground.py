@@ -7,11 +7,14 @@ import calmotion as cm
 import numpy as np
 import pytest
 from calmotion.retargeting.kept_feet import keep_feet
-from calmotion.retargeting.problem.ground import GROUND, SPEED, ground_bounds
+from calmotion.retargeting.problem import ground
+from calmotion.retargeting.problem.ground import GROUND, SPEED, ground_bounds, with_ground_rows
+from calmotion.retargeting.problem.limits import LimitTerms
 from calmotion.retargeting.problem.posing import locked_coefficients, pose
 from calmotion.shot.run import RunSettings
 from calmotion.simulation.compiled_shot import compile_shot
 from calmotion.simulation.inputs.curves import sample_curves
+from calmotion.simulation.motor_limits import Bounds
 from calmotion.simulation.prepare import prepare
 from calmotion.simulation.simulate import intended_motion
 from calmotion.simulation.standing.held_feet import held_feet
@@ -91,3 +94,42 @@ def test_bounds_let_landings_be_as_fast_as_animated(posed):
     limits = problem.robots[0].ground
     bounds = ground_bounds(limits)
     assert np.all(bounds.upper[-3:] == limits.landings[0].speeds / SPEED) and np.all(np.isinf(bounds.upper[:-3]))
+
+
+def limits_of(columns):
+    """Limits of feet from zero up, and of a motor's position, at four instants of a tenth of a second."""
+    ground = Bounds(np.zeros(columns), np.full(columns, np.inf), np.ones(columns))
+    motor = Bounds(np.array([-1.0]), np.array([1.0]), np.ones(1))
+    return LimitTerms({"position": motor, "ground": ground}, np.ones(4, bool), 0.1, 50.0, on=True)
+
+
+def test_rows_that_act_are_part_of_the_inverse_and_worked_out_once():
+    rng, limits = np.random.default_rng(0), limits_of(2)
+    J, fixed, asked = rng.normal(size=(4, 2, 6)), np.arange(6) == 3, []
+    values = {"position": np.full((4, 1), 3.0), "ground": np.ones((4, 2))}
+    values["ground"][[1, 3], [0, 1]] = -0.2
+
+    def pull(pulls):
+        asked.append(pulls)
+        return np.einsum("nr,nrx->x", pulls["ground"], J)
+
+    known = {}
+    solve = with_ground_rows(lambda x: x, limits, values, fixed, known, pull)
+    rows = np.where(fixed, 0.0, J[[1, 3], [0, 1]])
+    whole = np.eye(6) + 50.0 * 0.1 * rows.T @ rows
+    assert np.allclose(solve(np.ones(6)), np.linalg.solve(whole, np.ones(6)))
+    with_ground_rows(lambda x: x, limits, values, fixed, known, pull)
+    assert len(asked) == 2 and set(known) == {("ground", 1, 0), ("ground", 3, 1)}
+
+
+def test_of_many_rows_those_that_pull_most_are_taken(monkeypatch):
+    monkeypatch.setattr(ground, "MOST", 1)
+    values = {"ground": -np.arange(1.0, 9.0).reshape(4, 2)}
+    known = {}
+    with_ground_rows(lambda x: x, limits_of(2), values, np.zeros(3, bool), known, lambda pulls: np.ones(3))
+    assert set(known) == {("ground", 3, 1)}
+
+
+def test_without_limits_that_act_the_inverse_stays():
+    values = {"ground": -np.ones((4, 2))}
+    assert with_ground_rows(np.negative, None, values, np.zeros(3, bool), {}, np.sum) is np.negative

@@ -123,6 +123,13 @@ def test_terms_have_the_derivatives_that_they_say(terms):
     assert np.all(limits.gradient("velocity", values["velocity"])[:2] == 0.0), "nothing counts before the shot"
 
 
+def test_the_penalty_grows_no_further_than_rounding_allows(terms):
+    limits, values = terms
+    for _ in range(30):  # an excess that stays
+        assert limits.update(values)
+    assert 1e7 < limits.rho / 7.0 < 1e9
+
+
 def test_multipliers_grow_where_limits_are_exceeded_and_off_terms_are_nothing(terms):
     limits, values = terms
     before = {name: y.copy() for name, y in limits.multipliers.items()}

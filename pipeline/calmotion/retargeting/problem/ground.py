@@ -3,12 +3,15 @@ the velocities with which feet land (`simulation.standing.ground_limits`)."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
 from calmotion.multibody.kernels.so3 import matrix_of
-from calmotion.shot.character import Array
+from calmotion.retargeting.problem.limits import LimitTerms
+from calmotion.retargeting.solver.few_rows import with_rows
+from calmotion.shot.character import Array, BoolArray
 from calmotion.simulation.forward import ForwardRun
 from calmotion.simulation.motor_limits import Bounds
 from calmotion.simulation.standing.ground_limits import GroundLimits, Landing, landing_velocity
@@ -16,7 +19,10 @@ from calmotion.simulation.standing.ground_limits import GroundLimits, Landing, l
 GROUND = "ground"
 MARGIN = 0.01  # of the weight, or of the weight times the sole, by which limits are narrowed
 SPEED = 0.1  # what velocities are measured by [m/s]
+MOST = 64  # rows in a preconditioner; each costs an adjoint sweep, half a product, once where the problem is linearised
 _NOWHERE = 1.0  # the value of a row at instants at which it does not count
+
+Place = tuple[str, int, int]
 
 
 def ground_of(robot: int) -> str:
@@ -81,6 +87,39 @@ class GroundSlopes:
             own = values[n, count + 3 * k : count + 3 * k + 3]
             gradient[n - 1, b, :6] += own @ by[0]
             gradient[n, b, :6] += own @ by[1]
+
+
+def with_ground_rows(
+    inverse: Callable[[Array], Array], limits: LimitTerms | None, values: dict[str, Array], fixed: BoolArray,
+    known: dict[Place, Array], pull: Callable[[dict[str, Array]], Array],
+) -> Callable[[Array], Array]:  # fmt: skip
+    """A preconditioner with the limits of feet that act; of many, those that pull most.
+
+    Few of these limits act, but they are far stiffer than all else, and no matrix that is banded in time knows them:
+    what a foot asks follows from all that the motors did before. Conjugate gradients without them took hundreds of
+    products and did not keep the limits.
+
+    Args:
+        inverse: The preconditioner without them.
+        limits: With terms that act, or None.
+        values: Limited quantities, which say which limits act, by name, shape [T, R] each.
+        fixed: Unknowns that keep their values, shape [n], bool.
+        known: Rows of this linearisation by quantity, instant and column, shape [n] each; those missing are added.
+        pull: Derivatives of the limited quantities by the unknowns, times values of the same shapes.
+    """
+    found: list[tuple[float, Place, float]] = []
+    for name, v in values.items():
+        if limits is not None and name.startswith(GROUND):
+            pulls, weights = np.abs(limits.gradient(name, v)), limits.curvature(name, v)
+            found += [(pulls[n, i], (name, int(n), int(i)), weights[n, i]) for n, i in np.argwhere(weights > 0.0)]
+    found = sorted(found, key=lambda each: -each[0])[:MOST]
+    for _, place, _ in found:
+        if place not in known:
+            one = np.zeros_like(values[place[0]])
+            one[place[1:]] = 1.0
+            known[place] = pull({place[0]: one})
+    rows = [np.where(fixed, 0.0, known[place]) for _, place, _ in found]
+    return with_rows(inverse, np.array(rows), np.array([weight for _, _, weight in found]))
 
 
 def _by_motion(landing: Landing, run: ForwardRun, h: float) -> Array:

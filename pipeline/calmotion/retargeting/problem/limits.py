@@ -20,6 +20,7 @@ from calmotion.simulation.motor_limits import Bounds
 FIRST_PENALTY = 1e3  # over the objective of the input for each second
 MARGIN = 1e-4  # share by which a limit is narrowed
 GROWTH, SLOW = 10.0, 0.25  # the penalty grows by the first if an update leaves more than the second of the violation
+MOST = 1e8  # of the first penalty, which it may reach: rounding of larger ones hides the objective
 STALLED, PATIENCE = 0.8, 3  # updates end after so many minima in a row that each leave more than this share of it
 
 
@@ -36,6 +37,7 @@ class LimitTerms:
         left: Largest excess at the last update.
         reached: Largest excess at the last minimum of the problem.
         stalled: Number of minima in a row that hardly reduced it.
+        first: The penalty at the first update; 0 before.
         on: Whether the terms are part of the merit. They are once a minimum without them violates limits; that minimum
             is a better start than the input, which may violate them by far.
     """
@@ -48,6 +50,7 @@ class LimitTerms:
     left: float = np.inf
     reached: float = np.inf
     stalled: int = 0
+    first: float = 0.0
     on: bool = False
 
     def __post_init__(self) -> None:
@@ -84,6 +87,10 @@ class LimitTerms:
         second: Array = active * (self.rho * self.h / self.bounds[name].scale ** 2)
         return second
 
+    def curvatures(self, values: dict[str, Array]) -> dict[str, Array]:
+        """Second derivatives of the terms by quantity, shape [T, M] each."""
+        return {name: self.curvature(name, v) for name, v in values.items()}
+
     def excess(self, values: dict[str, Array]) -> float:
         """Largest excess over the narrowed limits; at most 0 if all are kept."""
         return max(float(np.max(self._sides(name, values[name]))) for name in self.bounds)
@@ -109,7 +116,8 @@ class LimitTerms:
             return False
         for name, y in self.multipliers.items():
             self.multipliers[name] = np.maximum(0.0, self._sides(name, values[name]) + y)
-        if excess > SLOW * self.left:
+        self.first = self.first or self.rho
+        if excess > SLOW * self.left and self.rho < MOST * self.first:
             self.rho *= GROWTH
             for name in self.multipliers:
                 self.multipliers[name] /= GROWTH  # y rho stays the same

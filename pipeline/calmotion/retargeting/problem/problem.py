@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from copy import copy
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -12,7 +13,7 @@ from calmotion.multibody.analysis.rigid_response import RigidResponse
 from calmotion.multibody.failure import SimulationFailure
 from calmotion.multibody.model.model import Model
 from calmotion.multibody.parallel import in_parallel
-from calmotion.retargeting.problem.ground import GROUND
+from calmotion.retargeting.problem.ground import GROUND, with_ground_rows
 from calmotion.retargeting.problem.limits import LimitTerms
 from calmotion.retargeting.problem.offset_basis import OffsetBasis
 from calmotion.retargeting.problem.offset_space import OffsetSpace
@@ -75,6 +76,7 @@ class RetargetProblem:
         self._sharpened_x = np.zeros(0)  # point of the preconditioner's responses; empty for that of the rigid robot
         self._held = 0  # instant before which curves are fixed
         self._response: RigidResponse | None = None
+        self._ground_rows: dict[tuple[str, int, int], Array] = {}  # where it was linearised last
         # twice the objective of an error of one metre at every instant
         self._unit = max(float(np.sum(objective.weights**2)) / max(1, 3 * len(model.targets.component)), 1e-300)
 
@@ -104,7 +106,7 @@ class RetargetProblem:
         """
         other = self._copy()
         other.space, other.preconditioner, other._sharpened_x = self.space.on_basis(basis), None, np.zeros(0)
-        other.x, other._linearized_x = x, np.zeros(0)
+        other.x, other._linearized_x, other._ground_rows = x, np.zeros(0), {}
         return other
 
     def over_motors(self, motors: IntArray, coupling: Array) -> RetargetProblem:
@@ -209,7 +211,7 @@ class RetargetProblem:
     def linearize(self) -> Array:
         """Linearise at the point evaluated last, and the gradient there."""
         in_parallel(Robot.linearize, self.robots)
-        self._linearized_x = self.x
+        self._linearized_x, self._ground_rows = self.x, {}
         return self.gradient()
 
     def linearized_at(self, x: Array) -> bool:
@@ -280,12 +282,11 @@ class RetargetProblem:
         if self.preconditioner is None:
             weights, basis = self.objective.weights, self.space.basis
             self.preconditioner = RigidPreconditioner(response, weights, basis, self.space.penalty)
-        curvatures = {}
-        if acting is not None:
-            curvatures = {name: acting.curvature(name, v) for name, v in (values or self.limited).items()}
+        curvatures = {} if acting is None else acting.curvatures(values or self.limited)
         curvatures |= reversal_curvatures(self.robots)
         self.preconditioner.factor(fixed, limit_metrics(response.inertia, self.space, curvatures))
-        return self.preconditioner.solve
+        of_feet = self._ground_rows, partial(self.vjp, np.zeros_like(self.residuals))
+        return with_ground_rows(self.preconditioner.solve, acting, values or self.limited, fixed, *of_feet)
 
     @property
     def patience(self) -> int | None:
@@ -306,8 +307,7 @@ class RetargetProblem:
     def sharpen(self) -> None:
         """Precondition with the Gauss-Newton matrix of the flexible robots where they are linearised, from now on."""
         gram = response_gram(self.robots, self.space)
-        self.preconditioner = DensePreconditioner(gram, self.space.penalty, self.space.basis.wraps)
-        self._sharpened_x = self.x
+        self.take(DensePreconditioner(gram, self.space.penalty, self.space.basis.wraps), self.x)
 
     def damped(self, ratio: float, frequency: float) -> RetargetProblem:
         """The same problem without limits on a robot with more damping, see `model.with_damping`."""
@@ -318,8 +318,7 @@ class RetargetProblem:
 
     def lever(self) -> float:
         """Largest lever arm of a motor: weighted root-mean-square motion of the targets per angle [m/rad]."""
-        weighted = self._rigid().targets * self.objective.weights[..., None]
-        return float(np.sqrt(np.max(np.sum(weighted**2, axis=(0, 1, 2))) / self._unit))
+        return float(np.sqrt(np.max(np.einsum("naa->a", self.rigid_metric())) / self._unit))
 
     def rigid_gradient(self) -> Array:
         """Gradient of the errors at the point evaluated last if the robot were rigid: each is answered as it occurs."""

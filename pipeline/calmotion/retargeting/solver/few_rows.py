@@ -1,0 +1,30 @@
+"""A preconditioner with a few more rows, each of which may be far stiffer than all else."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from scipy.linalg import cho_factor, cho_solve
+
+from calmotion.shot.character import Array
+
+
+def with_rows(inverse: Callable[[Array], Array], rows: Array, weights: Array) -> Callable[[Array], Array]:
+    """The inverse of P + A^T W A from that of P (Woodbury 1950).
+
+    Args:
+        inverse: P^-1 times a vector of shape [n]; P is symmetric and positive definite.
+        rows: A, shape [k, n].
+        weights: Diagonal of W, positive, shape [k].
+    """
+    if not len(rows):
+        return inverse
+    solved = np.array([inverse(row) for row in rows])
+    factor = cho_factor(np.diag(1.0 / weights) + 0.5 * (rows @ solved.T + solved @ rows.T), lower=True)
+
+    def solve(x: Array) -> Array:
+        own = inverse(x)
+        return np.asarray(own - cho_solve(factor, rows @ own) @ solved)
+
+    return solve
