@@ -1,8 +1,10 @@
 """The matrix of all responses against single tangent sweeps, and what it is worth."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
-from calmotion.retargeting.problem.response_gram import products_worth, response_gram
+from calmotion.retargeting.problem.response_gram import LARGE, LEAST, products_worth, response_gram
 from calmotion.retargeting.solver.truncated_cg import conjugate_gradients
 from posed import looped, make_problem
 
@@ -51,6 +53,15 @@ def test_a_sharpened_preconditioner_solves_the_system_at_once(problem):
     problem.sharpen()
     assert products() <= 2 < before
     assert problem.patience is None and np.array_equal(problem.sharpened_at, problem.x)
+
+
+def test_many_unknowns_begin_with_the_matrix_unless_it_costs_more_than_it_saves(problem):
+    robots, space = problem.robots, problem.space
+    many, most, too_many = (replace(space, motors=np.arange(n // space.basis.count + 1)) for n in (LARGE, 1400, 3000))
+    assert products_worth(robots, space, first=True) == products_worth(robots, space) == LEAST
+    assert products_worth(robots, many, first=True) == products_worth(robots, most, first=True) == 0
+    assert products_worth(robots, many) == LEAST
+    assert products_worth(robots, too_many, first=True) == products_worth(robots, too_many) > LEAST
 
 
 def test_no_matrix_where_responses_cannot_be_worked_out_together(arm, bodies, animation):

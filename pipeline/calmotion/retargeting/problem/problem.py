@@ -293,7 +293,7 @@ class RetargetProblem:
         """Number of products of one system from which `sharpen` pays; None where it is of no use here."""
         if np.array_equal(self._sharpened_x, self.x):
             return None
-        return products_worth(self.robots, self.space)
+        return products_worth(self.robots, self.space, first=not len(self._sharpened_x))
 
     @property
     def sharpened_at(self) -> Array:

@@ -19,19 +19,27 @@ from calmotion.shot.character import Array, BoolArray, IntArray
 
 COST = 1 / 64  # of a response, in products: half of the instants, at a sixteenth of the time of a sweep
 LEAST = 24  # products: the matrix is not made for less; few robots need its kernels, which take seconds to compile
+LARGE = 800  # unknowns from which the kernels are worth their compiling; of all samples, first systems need 15 or more
 _BLOCK = 64  # responses at once
 _LARGEST = 6000  # unknowns: the factor takes seconds
 _SHARE = 0.5  # of the memory for a linearisation
 
 
-def products_worth(robots: Sequence[Robot], space: OffsetSpace) -> int | None:
-    """Number of products that the matrix costs; None where it cannot be made, or not be stored."""
+def products_worth(robots: Sequence[Robot], space: OffsetSpace, first: bool = False) -> int | None:
+    """Number of products of one system from which the matrix pays; None where it cannot be made, or not be stored.
+
+    Args:
+        first: Whether there is none yet. Many unknowns then need it before the first product, unless it costs more than
+            the products that would be tried.
+    """
     if space.size > _LARGEST or not all(robot.simulator.can_be_blocked() for robot in robots):
         return None
     # robots follow one after the other: the responses of one are in memory at a time
     rows = len(robots[0].residuals) * np.count_nonzero(_varying(robots[0]))
     if 8.0 * space.size * (rows + 3 * space.size) > _SHARE * spare_memory():
         return None
+    if first and space.size >= LARGE and COST * space.size <= LEAST:
+        return 0
     return max(LEAST, round(COST * space.size))
 
 
