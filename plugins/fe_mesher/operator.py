@@ -83,13 +83,13 @@ class TetrahedralizeFlexibleBodies(Operator):
                 mesh = mesh_of(index, body, geometries[index], options, frames, attachments.get(index, ()))
             quality = mesh.quality
             context.report(
-                "info",
+                "detail",
                 f"{body.path}: {quality.source}, {len(mesh.tets)} tetrahedra, {len(mesh.points)} points, "
                 f"{1e6 * quality.volume:.4g} cm^3, "
                 f"volume error {quality.volume_error:.2%}, smallest dihedral angle {quality.min_dihedral_deg:.1f} deg",
             )
             for repair in quality.repairs:
-                context.report("info", f"{body.path}: {repair}")
+                context.report("info" if twin is None else "detail", f"{body.path}: {repair}")
             meshes.append(mesh)
         context.progress(1.0, "")
         return (FEMeshes(tuple(meshes)),)

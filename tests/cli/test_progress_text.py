@@ -13,3 +13,15 @@ from calmotion.cli.progress import time_left
 )  # fmt: skip
 def test_the_remaining_time_has_the_unit_of_its_size(seconds, text):
     assert time_left(seconds) == text
+
+
+@pytest.mark.parametrize("verbose", [False, True])
+def test_details_are_for_those_who_ask(verbose, capsys):
+    from calmotion.cli.progress import ProgressDisplay
+    from calmotion.host import OperatorResult, Outcome
+    from calmotion.host.operators import Record
+
+    records = (Record("detail", "413 points"), Record("info", "no target"))
+    ProgressDisplay(False, verbose=verbose).done(OperatorResult("a.b", "Make it", "a", Outcome.DONE, records=records))
+    told = capsys.readouterr().err
+    assert "note: no target" in told and ("note: 413 points" in told) == verbose

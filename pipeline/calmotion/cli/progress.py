@@ -29,13 +29,16 @@ class ProgressDisplay:
         machine: Show lines for a program.
         log: File of the log; None for none.
         openjd: Print lines of Open Job Description to stdout.
+        verbose: Show details as well.
 
     Raises:
         SettingError: The log cannot be written.
     """
 
-    def __init__(self, quiet: bool, machine: bool = False, log: str | None = None, openjd: bool = False):
-        self._quiet, self._machine = quiet, machine
+    def __init__(
+        self, quiet: bool, machine: bool = False, log: str | None = None, openjd: bool = False, verbose: bool = False
+    ):
+        self._quiet, self._machine, self._verbose = quiet, machine, verbose
         self._farm = FarmProgress() if openjd else None
         self._log: RunLog | None = None
         if log is not None:
@@ -90,6 +93,8 @@ class ProgressDisplay:
         if self._bars is None and result.outcome in (Outcome.DONE, Outcome.FAILED):
             self._tell(f"{result.label}: {result.outcome} in {result.duration:.2f} s")
         for record in result.records:
+            if record.level == "detail" and not self._verbose:
+                continue
             self._tell(f"{'warning' if record.level == 'warning' else 'note'}: {record.text}")
 
     def _tell(self, line: str) -> None:

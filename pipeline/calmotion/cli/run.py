@@ -41,7 +41,7 @@ def run_shot(
     shot = opened_shot(args)
     paths = OutputPaths(layer=args.output, rrd=args.rrd, csv=args.csv, figures=args.figures, video=args.video)
     _refuse_files(shot, args, paths)
-    with ProgressDisplay(args.quiet, args.progress, args.log, args.openjd) as display:
+    with ProgressDisplay(args.quiet, args.progress, args.log, args.openjd, args.verbose) as display:
         result = function(
             shot,
             verify=args.verify,

@@ -12,12 +12,12 @@ from calmotion.host.errors import PluginError
 from calmotion.host.properties import Property, PropertyValues
 
 T = TypeVar("T")
-LEVELS = ("info", "warning")
+LEVELS = ("detail", "info", "warning")
 
 
 @dataclass(frozen=True)
 class Record:
-    """Something an operator reports to the user; `level` is `info` or `warning`."""
+    """Something an operator reports to the user; `level` is `detail` (shown with `--verbose`), `info` or `warning`."""
 
     level: str
     text: str
@@ -64,7 +64,7 @@ class RunContext:
         self.on_progress(self.fraction, message)
 
     def report(self, level: str, text: str) -> None:
-        """Report a message to the user; `level` is `info` or `warning`."""
+        """Report a message to the user; `level` is `detail` (shown with `--verbose`), `info` or `warning`."""
         if level not in LEVELS:
             raise PluginError("unknown level of a report", found=level, remedy=f"Use one of {', '.join(LEVELS)}.")
         self.records.append(Record(level, text))

@@ -85,12 +85,22 @@ class Repertoire:
         """Whether every clip may follow every other one."""
         return all(member.good for member in (*self.clips, *self.transitions))
 
+    @property
+    def verdict(self) -> str:
+        """That, as a sentence."""
+        return _TOLD[self.good]
+
     def report(self) -> dict[str, Any]:
         """The object of `--json`."""
         rows = {"clips": self.clips, "transitions": self.transitions}
-        listed = {key: [asdict(member) | {"good": member.good} for member in value] for key, value in rows.items()}
+        listed = {
+            key: [asdict(member) | {"good": member.good, "may_be_played": _verdict(member)} for member in value]
+            for key, value in rows.items()
+        }
         head = {"command": "sequence", "version": __version__, "folder": self.folder, "wall_s": self.wall_s}
-        made: dict[str, Any] = plain(head | {"interrupted": self.interrupted, "good": self.good} | listed)
+        made: dict[str, Any] = plain(
+            head | {"interrupted": self.interrupted, "good": self.good, "verdict": self.verdict} | listed
+        )
         return made
 
     def page(self) -> str:
@@ -99,7 +109,7 @@ class Repertoire:
         by_pair = {(member.start, member.end): member for member in self.transitions}
         lines = [f"# Repertoire of {len(names)} clips", ""]
         lines += [
-            _TOLD[self.good],
+            self.verdict,
             "",
             "| clip | length | largest error | may be played |",
             "| --- | --- | --- | --- |",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import shlex
 from typing import TYPE_CHECKING, Any, TextIO
 
 from calmotion.cli.commands.shows.batch import worker_count
@@ -43,15 +44,46 @@ def _run(args: argparse.Namespace, output: Output) -> int:
             args.clips, args.output, arguments=forwarded(args), plugins=args.plugins, on=args.on, workers=args.workers,
             progress=display,
         )  # fmt: skip
-    conclude(found.report() | {"page": found.page()}, [], output, None if args.quiet else _print)
+    conclude(found.report(), [], output, None if args.quiet else _print)
     if found.interrupted:
         return INTERRUPTED
     return 0 if found.good else FAILED
 
 
 def _print(report: dict[str, Any], stream: TextIO) -> None:
-    print(report["page"], end="", file=stream)
-    for member in (*report["clips"], *report["transitions"]):
+    from calmotion.cli.quantities import length
+    from calmotion.cli.sentences import unbroken
+    from calmotion.cli.tables import console_on, print_table, say
+
+    console, members = console_on(stream), [*report["clips"], *report["transitions"]]
+    say(console, report["verdict"])
+    heads = ("length", "max before", "max after", "may be played")
+    for title, rows in (("Clips", report["clips"]), ("Transitions", report["transitions"])):
+        cells = [
+            [
+                _name(row), f"{row['seconds']:.2f} s",
+                *("" if row[key] is None else length(row[key]) for key in ("error_before_m", "error_m")),
+                row["may_be_played"],
+            ]
+            for row in rows
+        ]  # fmt: skip
+        print_table(console, title, ["name", *heads], cells)
+    for member in members:
         if member["problem"]:
-            print(f"{member['name']}: {member['problem']['problem']}", file=stream)
-    print(f"report: {report['folder']}/sequence.md", file=stream)
+            say(console, f"{member['name']}: {member['problem']['problem']}")
+    say(console, f"wrote {unbroken(report['folder'] + '/sequence.md')}")
+    layers = [member["layer"] for member in members if member["good"] and member["layer"]]
+    if not report["good"]:
+        say(
+            console,
+            "next: where limits are exceeded or the tolerance is missed, a longer shortest_transition in the file of "
+            "clips or a larger --tolerance helps; the same command makes again only what has changed",
+        )
+    if layers:
+        several = " (one for each clip and transition)" if len(layers) > 1 else ""
+        command = f"calmotion export {shlex.quote(layers[0])} --to csv --rate 100 -o FILE"
+        say(console, f"next: {unbroken(command)} writes commands for a controller{several}")
+
+
+def _name(row: dict[str, Any]) -> str:
+    return row["start"] if row["start"] == row["end"] else f"{row['start']} to {row['end']}"
