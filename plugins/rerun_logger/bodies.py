@@ -20,7 +20,7 @@ GHOST = (0, 158, 115, 90)
 INSIDE = 0.02  # of the largest deviation: how far the ghost lies inside the bodies
 # Shares of the largest deviation between which the ghost of a body appears: nearer, its surface would cut through the
 # body's, and show as patches that come and go.
-HIDDEN, SHOWN = 0.05, 0.15
+HIDDEN, SHOWN = 0.12, 0.3
 DEFAULT_COLOR = (0.55, 0.55, 0.57)
 
 

@@ -13,6 +13,7 @@ from .colors import BACKGROUND, Style
 
 INPUT, OPTIMIZED, REFERENCE = "input", "optimized", "reference"
 TIME = "time"  # the timeline of the shot
+ALONE = "as animated"  # name of curves that have none to be compared with
 SCENERY = "scenery"
 MOTOR_TABS = 16
 # Of rerun's eye, and of the narrowest 3D view of a usual window, with a margin for titles and buttons.

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -23,8 +24,9 @@ from calmotion.views.playback import sample_motion
 from calmotion.views.spectrum import error_spectrum, highest_frequency
 
 from .bodies import log_bodies, log_ghost, log_scenery
+from .colors import Style
 from .deviation import largest_deviation
-from .layout import INPUT, OPTIMIZED, REFERENCE, STYLES, TIME, make_blueprint, motor_plots
+from .layout import ALONE, INPUT, OPTIMIZED, REFERENCE, STYLES, TIME, make_blueprint, motor_plots
 from .summary import describe
 from .trails import log_trails
 
@@ -121,16 +123,19 @@ def log_all(
             log_trails(recording, root, character, whole_motion(result, root), result.reference, motion.times, scale)
     log_scenery(recording, character)
     progress(len(at_frames) / (len(at_frames) + 1), "curves")
-    log_errors(recording, character, INPUT, result.before, samples_per_plot)
-    log_motors(recording, character, INPUT, result.before, samples_per_plot)
-    log_reactions(recording, character, INPUT, result.before, samples_per_plot)
+    for root, simulation in simulations_of(result).items():
+        style = STYLES[root] if result.after is not None else replace(STYLES[root], label=ALONE)
+        for log in (log_errors, log_motors, log_reactions):
+            log(recording, character, root, simulation, samples_per_plot, style)
     log_spectra(recording, character, result)
     if result.after is not None:
-        log_errors(recording, character, OPTIMIZED, result.after, samples_per_plot)
-        log_motors(recording, character, OPTIMIZED, result.after, samples_per_plot)
-        log_reactions(recording, character, OPTIMIZED, result.after, samples_per_plot)
         log_changes(recording, character, result, samples_per_plot)
     log_progress(recording, result)
+
+
+def simulations_of(result: Result) -> dict[str, Simulation]:
+    """The simulations by their roots."""
+    return {INPUT: result.before} | ({OPTIMIZED: result.after} if result.after is not None else {})
 
 
 def whole_motion(result: Result, root: str) -> Motion:
@@ -158,10 +163,10 @@ def log_curve(
 
 
 def log_errors(
-    recording: rr.RecordingStream, character: Character, root: str, simulation: Simulation, samples: int
+    recording: rr.RecordingStream, character: Character, root: str, simulation: Simulation, samples: int, style: Style
 ) -> None:
     """Position errors [mm] of all targets, rotation errors [deg] of those whose rotation counts."""
-    rows, style = thinned(simulation, samples), STYLES[root]
+    rows = thinned(simulation, samples)
     times = simulation.motion.times[rows]
     names = distinct_names([target.path for target in character.targets])
     for k, target in enumerate(character.targets):
@@ -176,7 +181,7 @@ def log_errors(
 
 def log_spectra(recording: rr.RecordingStream, character: Character, result: Result) -> None:
     """Amplitude of each target's error [mm] by frequency [Hz], as far as something happens in the input."""
-    simulations = {INPUT: result.before} | ({OPTIMIZED: result.after} if result.after else {})
+    simulations = simulations_of(result)
     for k, target in enumerate(character.targets):
         spectra = {root: error_spectrum(run.motion, result.reference, k) for root, run in simulations.items()}
         end = highest_frequency(*spectra[INPUT])
@@ -194,10 +199,10 @@ def log_spectra(recording: rr.RecordingStream, character: Character, result: Res
 
 
 def log_motors(
-    recording: rr.RecordingStream, character: Character, root: str, simulation: Simulation, samples: int
+    recording: rr.RecordingStream, character: Character, root: str, simulation: Simulation, samples: int, style: Style
 ) -> None:
     """Angle [deg] and torque [N m], or length [mm] and force [N], of each motor."""
-    rows, style = thinned(simulation, samples), STYLES[root]
+    rows = thinned(simulation, samples)
     motion = simulation.motion
     for m, motor in enumerate(character.motors):
         measure = measure_of(motor)
@@ -211,10 +216,10 @@ def log_motors(
 
 
 def log_reactions(
-    recording: rr.RecordingStream, character: Character, root: str, simulation: Simulation, samples: int
+    recording: rr.RecordingStream, character: Character, root: str, simulation: Simulation, samples: int, style: Style
 ) -> None:
     """Size of the force [N] and the moment [N m] that each joint transmits."""
-    rows, style, motion = thinned(simulation, samples), STYLES[root], simulation.motion
+    rows, motion = thinned(simulation, samples), simulation.motion
     names = distinct_names([joint.path for joint in character.joints])
     for kind, values in (("force_N", motion.joint_forces), ("moment_Nm", motion.joint_moments)):
         if values is None:

@@ -12,9 +12,6 @@ from calmotion.shot.character import Array
 from calmotion.shot.outputs import SystemModes
 from calmotion.support.naming import distinct_names
 
-HEAD = "| target | largest before | largest after | rms before | rms after |\n|---|---:|---:|---:|---:|"
-
-
 SHOWN_MODES = 6
 
 
@@ -44,20 +41,20 @@ def describe(
 def errors_table(character: Character, result: Result) -> str:
     """One row for each target."""
     names = distinct_names([target.path for target in character.targets])
-    rows = []
+    runs = {" before": result.before, " after": result.after} if result.after is not None else {"": result.before}
+    heads = [f"{measure}{when}" for measure in ("largest", "rms") for when in runs]
+    rows = [f"| target | {' | '.join(heads)} |", f"|---|{'---:|' * len(heads)}"]
     for k, target in enumerate(character.targets):
         cells = []
         for measure in (np.max, lambda e: np.sqrt(np.mean(e**2))):
-            for simulation in (result.before, result.after):
+            for simulation in runs.values():
                 cells.append(error_cell(simulation, k, target.rotation_weight > 0.0, measure))
         rows.append(f"| `{names[target.path]}` | " + " | ".join(cells) + " |")
-    return "## Errors at the targets\n" + "\n".join([HEAD, *rows])
+    return "## Errors at the targets\n" + "\n".join(rows)
 
 
-def error_cell(simulation: Simulation | None, target: int, rotation: bool, measure: Callable[[Array], float]) -> str:
+def error_cell(simulation: Simulation, target: int, rotation: bool, measure: Callable[[Array], float]) -> str:
     """Position error, and rotation error where it counts."""
-    if simulation is None:
-        return "-"
     rows = simulation.motion.judged
     text = f"{1e3 * measure(simulation.position_errors[rows, target]):.2f} mm"
     if rotation:

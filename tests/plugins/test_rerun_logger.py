@@ -6,6 +6,7 @@ import dataclasses
 import os
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -224,7 +225,7 @@ def test_the_ghost_is_seen_only_while_its_body_is_off(columns, root):
     times, colors = columns[f"/reference/{root}/Robot/Tip/Ball", "Mesh3D:albedo_factor"]
     np.testing.assert_allclose(times, frames, atol=2e-9)
     opacity = np.array([row[0] & 255 for row in colors])
-    assert np.all(opacity[off < 0.04 * most.max()] == 0) and np.all(opacity[off > 0.16 * most.max()] == 90)
+    assert np.all(opacity[off < 0.11 * most.max()] == 0) and np.all(opacity[off > 0.31 * most.max()] == 90)
     assert np.all(np.diff(opacity[np.argsort(off)]) >= 0)
 
 
@@ -247,6 +248,15 @@ def test_the_summary_lists_simplifications_and_errors(columns):
     assert "modes above 40 Hz" in text and "0.02 mm" in text
     assert f"{1e3 * result.before.position_errors.max():.2f} mm" in text
     assert f"{1e3 * result.after.position_errors.max():.2f} mm" in text
+
+
+def test_a_simulation_alone_has_neither_before_nor_after(tmp_path):
+    write(tmp_path / "out.rrd", replace(synthetic.result(), after=None, steps=()))
+    columns = read_recording(tmp_path / "out.rrd")
+    text = columns["/summary", "TextDocument:text"][1][0][0]
+    assert "| target | largest | rms |" in text and "before" not in text
+    names = [str(values[0]) for (_, name), (_, values) in columns.items() if name == "SeriesLines:names"]
+    assert any("as animated [mm]" in name for name in names) and not any("before" in name for name in names)
 
 
 def test_the_summary_names_the_characters_frequencies_where_they_are_known(tmp_path):
