@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import ast
+import html
 import os
 import re
 import shlex
 import subprocess
 import sys
 from pathlib import Path
+from urllib.parse import urljoin
 
 import pytest
 from floors import FLOORS
@@ -139,19 +141,70 @@ def test_the_floors_are_those_that_are_checked():
     assert [floor[name] for name in order] == sorted(floor[name] for name in order)
 
 
-def test_the_documentation_builds_without_a_warning(tmp_path):
+@pytest.fixture(scope="module")
+def site(tmp_path_factory):
+    """The site as `make docs` builds it."""
+    folder = tmp_path_factory.mktemp("site")
     done = subprocess.run(
-        [sys.executable, "-m", "mkdocs", "build", "--strict", "--quiet", "--site-dir", tmp_path],
+        [sys.executable, "-m", "mkdocs", "build", "--strict", "--quiet", "--site-dir", folder],
         cwd=REPOSITORY, env=os.environ | {"NO_MKDOCS_2_WARNING": "1"}, capture_output=True, text=True,
     )  # fmt: skip
-    assert done.returncode == 0, done.stderr
-    schemas = (tmp_path / "reference" / "schemas" / "index.html").read_text()
+    assert done.returncode == 0 and not done.stderr, done.stderr
+    return folder
+
+
+def test_the_documentation_builds_without_a_warning(site):
+    schemas = (site / "reference" / "schemas" / "index.html").read_text()
     assert (
         "calm:target:rotationWeight" in schemas
-        and "usage: calmotion optimize" in (tmp_path / "reference" / "commands" / "index.html").read_text()
+        and "usage: calmotion optimize" in (site / "reference" / "commands" / "index.html").read_text()
     )
-    assert "open_shot" in (tmp_path / "reference" / "python" / "index.html").read_text()
-    formulas = (tmp_path / "formulation" / "index.html").read_text()
+    assert "open_shot" in (site / "reference" / "python" / "index.html").read_text()
+    formulas = (site / "formulation" / "index.html").read_text()
     assert formulas.count("<math") > 50 and "arithmatex" not in formulas
-    pages = "".join(path.read_text() for path in tmp_path.rglob("*.html"))
+    pages = "".join(path.read_text() for path in site.rglob("*.html"))
     assert re.findall(r'<(?:script|link|img)[^>]+(?:src|href)="(?:https?:)?//[^"]*"', pages) == []
+
+
+# What newcomers asked, the clicks from the front page, and words of the answer where the last click leads.
+QUESTIONS = (
+    ("In which unit is Young's modulus in a stage in centimetres?", ("reference/schemas/#units",), "2.1e7"),
+    ("Why a rotation weight of 0.05?", ("reference/schemas/#which-weight",), "lever arm from the wrist"),
+    ("In which unit are the columns of the CSV table?", ("reference/outputs/#csv-csv",), "N m"),
+    ("What does 'sag' mean?", ("glossary/",), "offset of a target at rest, under gravity"),
+    ("How do I keep a motor as it is?", ("how_to/#keep-a-motor-as-it-is",), "calm:motor:optimize"),
+    ("How do I bring my URDF?", ("tutorials/", "tutorials/urdf/"), "calmotion import arm.urdf"),
+    (
+        "Which command of my robot's controller plays the result?",
+        ("exporting/#formats",),
+        "joint_trajectory_controller",
+    ),
+    (
+        "The simulation does not keep the tolerance. And now?",
+        ("troubleshooting/",),
+        "The report names the largest part",
+    ),
+    ("How do I stop a long run and go on later?", ("how_to/#stop-a-run-and-go-on",), "Press Ctrl-C once"),
+    ("Does it run on Windows?", ("installation/#systems",), "it has not been tested there"),
+    ("What will it not do?", ("concepts/limits/",), "collision"),
+    ("What does maxTorque do, and what is its default?", ("reference/schemas/",), "calm:motor:maxTorque"),
+)
+
+
+@pytest.mark.parametrize(("clicks", "words"), [row[1:] for row in QUESTIONS], ids=[row[0] for row in QUESTIONS])
+def test_a_question_of_a_newcomer_is_answered_within_two_clicks(site, clicks, words):
+    assert len(clicks) <= 2
+    page = site / "index.html"
+    for click in clicks:
+        article = re.search(r"<article.*?</article>", page.read_text(), re.DOTALL).group()  # not the menus
+        target, _, anchor = click.partition("#")
+        links = {
+            urljoin(str(page.parent) + "/", link.partition("#")[0]) for link in re.findall(r'href="([^"]+)"', article)
+        }
+        assert str(site / target) + "/" in links, f"{click} is not linked from {page.relative_to(site)}"
+        page = site / target / "index.html"
+    text = page.read_text()
+    if anchor:
+        level, start = re.search(rf'<h(\d) id="{anchor}">(?s:.*)', text).group(1), text.index(f'id="{anchor}"')
+        text = re.split(rf"<h[1-{level}] id=", text[start:])[0]
+    assert words in html.unescape(re.sub(r"<[^>]+>", "", text))

@@ -1,17 +1,17 @@
 """Run by Blender's Python: what the page on Blender does by hand, with its menus' operators.
 
-`by_hand.py EXTENSION FOLDER export` makes an animated arm and exports it as FOLDER/character.usda;
+`by_hand.py EXTENSION FOLDER export` runs the page's script of an animated arm and exports it as FOLDER/character.usda;
 `by_hand.py EXTENSION FOLDER import` imports FOLDER/calm_root.usda and prints the largest change of a bone.
 """
 
-import os
+import runpy
 import sys
 from pathlib import Path
 
 import bpy
 
 EXTENSION, FOLDER, STEP = Path(sys.argv[1]), Path(sys.argv[2]), sys.argv[3]
-FRAMES = range(1, 26)
+FRAMES = range(1, 49)
 
 
 def poses(rig: bpy.types.Object) -> list[list[tuple[float, ...]]]:
@@ -31,11 +31,7 @@ def poses(rig: bpy.types.Object) -> list[list[tuple[float, ...]]]:
 
 def export() -> None:
     """File > Export > Universal Scene Description, with Animation and Armatures."""
-    sys.path[:0] = [str(FOLDER), str(Path(__file__).parent)]
-    os.symlink(EXTENSION, FOLDER / "calmotion_extension")
-    import in_blender
-
-    in_blender.character(FOLDER)
+    runpy.run_path(str(EXTENSION / "demo" / "arm.py"), run_name="__main__")
     bpy.ops.wm.usd_export(filepath=str(FOLDER / "character.usda"), export_animation=True, export_armatures=True)
 
 

@@ -16,7 +16,7 @@ def character(folder: Path) -> bpy.types.Object:
     bpy.ops.wm.read_factory_settings(use_empty=True)
     scene = bpy.context.scene
     scene.frame_start, scene.frame_end, scene.render.fps = 1, 25, 24
-    from calmotion_extension.demo.rigged import rigged
+    from calmotion_extension.demo.arm import rigged
 
     rig = rigged(BONES, Vector((0.0, 0.0, 1.0)), Vector((LENGTH, 0.0, 0.0)), tube())
     for frame in range(1, 26):

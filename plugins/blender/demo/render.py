@@ -9,14 +9,12 @@ from __future__ import annotations
 
 import importlib
 import importlib.util
-import math
 import sys
 from pathlib import Path
 
 import bpy
 from mathutils import Vector
 
-BONES, LENGTH, SIDES, FRAMES = ("foot", "upper", "hand"), 0.42, 20, 48
 SIZE, SAMPLES, EVERY = (520, 380), 10, 3
 
 
@@ -31,59 +29,11 @@ def extension(folder: Path) -> None:
     module.register()
 
 
-def radius(x: float) -> float:
-    """Radius of the skin at a distance from the foot [m]."""
-    tip, ball = len(BONES) * LENGTH, 0.05
-    if x > tip - 2.0 * ball:
-        return math.sqrt(max(ball**2 - (x - tip + ball) ** 2, 0.018**2 if x < tip - ball else 0.0))
-    return 0.055 if x < 0.12 else 0.030 if abs(x - LENGTH) < 0.035 or abs(x - 2 * LENGTH) < 0.03 else 0.018
-
-
-def skin() -> bpy.types.Mesh:
-    """A closed surface of revolution along z."""
-    tip = len(BONES) * LENGTH
-    round_tip = (tip - 0.05 + 0.05 * math.sin(0.13 * k) for k in range(-12, 13))
-    heights = sorted({*(tip * k / 60 for k in range(61)), *round_tip})
-    points = [(0.0, 0.0, 0.0)]
-    for z in heights[:-1]:
-        size = max(radius(z), 0.004)
-        points += [(size * math.cos(a), size * math.sin(a), z) for a in (2 * math.pi * k / SIDES for k in range(SIDES))]
-    points.append((0.0, 0.0, tip))
-    rings, last = len(heights) - 1, len(points) - 1
-    sides = [(r * SIDES + 1 + k, r * SIDES + 1 + (k + 1) % SIDES) for r in range(rings) for k in range(SIDES)]
-    faces = [(a, b, b + SIDES, a + SIDES) for a, b in sides[: (rings - 1) * SIDES]]
-    faces += [(0, 1 + (k + 1) % SIDES, 1 + k) for k in range(SIDES)]
-    faces += [(a, b, last) for a, b in sides[(rings - 1) * SIDES :]]
-    mesh = bpy.data.meshes.new("Skin")
-    mesh.from_pydata(points, [], faces)
-    mesh.shade_smooth()
-    return mesh
-
-
-def character() -> bpy.types.Object:
-    """An armature with a skin that swings to the side and stops, twice."""
+def character() -> None:
+    """The arm that waves, alone in the scene."""
     bpy.ops.wm.read_factory_settings(use_empty=True)
-    scene = bpy.context.scene
-    scene.frame_start, scene.frame_end, scene.render.fps = 1, FRAMES, 24
-    surface = skin()
-    surface.materials.append(material("Skin", (0.55, 0.53, 0.48)))
-    rigged = importlib.import_module("calmotion_extension.demo.rigged").rigged
-    rig = rigged(BONES, Vector((0.0, 0.0, 0.0)), Vector((0.0, 0.0, LENGTH)), surface)
-    for frame in range(1, FRAMES + 1):
-        for name, size, start in (("upper", 0.6, 5), ("hand", 0.8, 7)):
-            share = smooth((frame - start) / 8.0) - smooth((frame - start - 20) / 8.0)
-            bone = rig.pose.bones[name]
-            bone.rotation_mode = "XYZ"
-            bone.rotation_euler = (size * (share - 0.5), 0.0, 0.0)
-            bone.keyframe_insert("rotation_euler", frame=frame)
-    rig.select_set(True)
-    return rig
-
-
-def smooth(share: float) -> float:
-    """A step without corners."""
-    share = min(max(share, 0.0), 1.0)
-    return share * share * (3.0 - 2.0 * share)
+    importlib.import_module("calmotion_extension.demo.arm").waving_arm()
+    bpy.data.objects["Skin"].data.materials.append(material("Skin", (0.55, 0.53, 0.48)))
 
 
 def material(name: str, color: tuple[float, float, float]) -> bpy.types.Material:
