@@ -31,7 +31,7 @@ def test_a_performance_is_a_shot_of_its_length(shot, tmp_path):
 
 
 def run(seconds, search):
-    return LongRun(seconds, 1, search, search, search, search, 0.5, 60.0, 1.0, 0.5, True)
+    return LongRun(seconds, 1, search, search, search, search, 0.5, 60.0, 1.0, 0.5, True, "converged")
 
 
 def test_growth_and_tables():
@@ -46,4 +46,6 @@ def test_tables_of_two_runs_are_compared_at_the_same_times(tmp_path):
     head = "time_s,/T.x,/T.y,/T.z,/T.error,/T.rotation_error\n"
     (tmp_path / "a.csv").write_text(head + "-0.1,9,9,9,9,0\n0,0,0,0,0.1,0\n0.1,0.003,0,0,0.2,0\n")
     (tmp_path / "b.csv").write_text(head + "0,0,0,0,0.1,0\n0.05,0,0,0,0.1,0\n0.1,0,0.004,0,0.1,0\n")
-    assert apart(tmp_path / "a.csv", tmp_path / "b.csv") == pytest.approx((0.005, 0.1))
+    found = apart(tmp_path / "a.csv", tmp_path / "b.csv")
+    assert (found.distance_m, found.profile_m, found.profile_s) == pytest.approx((0.005, 0.1, 0.1))
+    assert found.profile_rms_m == pytest.approx(np.sqrt(0.01 / 2))

@@ -3,7 +3,8 @@
 A performance of a robot's shot is made of its own poses: at random times it moves from one pose of the shot to another,
 with short rests. It is varied, not repeated, and a longer one begins as a shorter one does. Each is optimised by
 `calmotion optimize` in a process of its own, whose memory is measured. With `--compare SECONDS` a performance of that
-length is also optimised by one long search, and the distance of the targets between both is printed. Both end where
+length is also optimised by one long search, and the distance of the targets between both is printed, and where it is
+largest; a search that did not end by itself is told, as it says nothing about windows. Both end where
 they would gain less than 0.0003 of the tolerance (`--set retarget.optimize.least_gain`), so that what is found does not
 depend on the windows. With `--single` one search over as many seconds as
 a window has is the measure of the longest performance: its processor time times the number of windows.
@@ -21,7 +22,7 @@ import subprocess  # nosec B404  # runs this program
 import sys
 import tempfile
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -52,6 +53,7 @@ class LongRun:
         before_mm, after_mm: Largest error of a target.
         rms_mm: Root mean square of the error after, of the target with the largest one.
         kept: Whether the simulation keeps the tolerance.
+        stopped: Why the search ended: `converged`, or what ended it before.
     """
 
     seconds: float
@@ -65,6 +67,7 @@ class LongRun:
     after_mm: float
     rms_mm: float
     kept: bool
+    stopped: str
 
 
 def performance(shot: Shot, seconds: float, seed: int = SEED) -> dict[str, Array]:
@@ -142,7 +145,7 @@ def run_of(seconds: float, report: dict[str, Any]) -> LongRun:
         report["processor_s"], report["total_processor_s"],
         report["peak_memory_gb"] or float("nan"),
         1e3 * max(row["max_error_before_m"] for row in report["targets"]), 1e3 * worst["max_error_after_m"],
-        1e3 * worst["rms_error_after_m"], report["tolerance_kept"],
+        1e3 * worst["rms_error_after_m"], report["tolerance_kept"], report["stopped"],
     )  # fmt: skip
 
 
@@ -171,17 +174,36 @@ def table(runs: Sequence[LongRun]) -> str:
     return markdown(heads, rows)
 
 
-def apart(one: Path, two: Path) -> tuple[float, float]:
-    """Largest distance between a target in two tables, and largest difference of its errors [m]; steps may differ."""
+@dataclass(frozen=True)
+class Apart:
+    """How far two results of the same performance are from each other.
+
+    Attributes:
+        distance_m: Largest distance between a target in the one and in the other [m].
+        profile_m: Largest difference of the errors of a target [m].
+        profile_s: When that is [s].
+        profile_rms_m: Root mean square of the difference, of the target with the largest one [m].
+    """
+
+    distance_m: float
+    profile_m: float
+    profile_s: float
+    profile_rms_m: float
+
+
+def apart(one: Path, two: Path) -> Apart:
+    """How far two tables are from each other; their steps may differ."""
     first, second = _columns(one), _columns(two)
     at = first["time_s"][first["time_s"] >= -1e-9]
-    distance = profile = 0.0
+    distance, found = 0.0, Apart(0.0, 0.0, 0.0, 0.0)
     for name in (name for name in first if name.endswith(".error") and not name.endswith("rotation_error")):
         parts = [f"{name.removesuffix('.error')}{axis}" for axis in (".x", ".y", ".z")]
         gaps = [_at(first, part, at) - _at(second, part, at) for part in parts]
         distance = max(distance, float(np.linalg.norm(gaps, axis=0).max()))
-        profile = max(profile, float(np.abs(_at(first, name, at) - _at(second, name, at)).max()))
-    return distance, profile
+        profile = np.abs(_at(first, name, at) - _at(second, name, at))
+        k, rms = int(np.argmax(profile)), float(np.sqrt(np.mean(profile**2)))
+        found = max(found, Apart(0.0, float(profile[k]), float(at[k]), rms), key=lambda part: part.profile_m)
+    return replace(found, distance_m=distance)
 
 
 def _at(columns: dict[str, Array], name: str, times: Array) -> Array:
@@ -225,9 +247,9 @@ def main(arguments: Sequence[str]) -> int:
             files = write_performance(shot, args.compare, folder)
             both = [[*options, *windows], [*options, "--window=0"]]
             reports = [optimized(*files, o, folder, f"compare_{k}") for k, o in enumerate(both)]
-            distance, profile = apart(folder / "compare_0.csv", folder / "compare_1.csv")
+            gap = apart(folder / "compare_0.csv", folder / "compare_1.csv")
             own = [asdict(run_of(args.compare, report)) for report in reports]
-            compared = {"windows": own[0], "one_search": own[1], "distance_m": distance, "profile_m": profile}
+            compared = {"windows": own[0], "one_search": own[1], **asdict(gap)}
     found: dict[str, Any] = {"runs": [asdict(run) for run in runs], "exponent": exponent(runs), "compared": compared}
     found["single"] = asdict(single) if single else None
     if args.json:
@@ -245,7 +267,11 @@ def main(arguments: Sequence[str]) -> int:
         print(table([LongRun(**compared["windows"]), LongRun(**compared["one_search"])]), end="")
         print(
             f"{args.compare:g} s in windows and in one search: targets are up to {1e3 * compared['distance_m']:.3f} mm "
-            f"apart, their errors differ by up to {1e3 * compared['profile_m']:.3f} mm; searches of "
+            f"apart, their errors differ by up to {1e3 * compared['profile_m']:.3f} mm (at "
+            f"{compared['profile_s']:.2f} s), by {1e3 * compared['profile_rms_m']:.3f} mm rms; searches of "
             f"{compared['windows']['search_s']:.1f} s and {compared['one_search']['search_s']:.1f} s"
         )
+        for name, row in (("in windows", "windows"), ("over all", "one_search")):
+            if (stopped := compared[row]["stopped"]) != "converged":
+                print(f"the search {name} did not end by itself ({stopped}): the comparison says little")
     return 0

@@ -8,6 +8,7 @@ twenty products, and their matrix serves for many iterations: it hardly changes 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -52,27 +53,58 @@ def response_gram(robots: Sequence[Robot], space: OffsetSpace) -> Array:
     """
     gram = np.zeros((space.size, space.size))
     for robot in robots:
-        responses = _responses(robot, space)
-        gram += responses.T @ responses
+        _add_products(gram, _responses(robot, space))
     return gram
 
 
-def _responses(robot: Robot, space: OffsetSpace) -> Array:
-    """Changes of the weighted residuals that are not always zero, by all unknowns, shape [T r, n]."""
+@dataclass(frozen=True, eq=False)
+class _Responses:
+    """Changes of the weighted residuals that are not always zero, by some unknowns.
+
+    Attributes:
+        unknowns: Which.
+        first: Instant before which nothing changes; the rest alone is held, half of all in the mean.
+        changes: Shape [T - first, r, unknowns].
+    """
+
+    unknowns: slice
+    first: int
+    changes: Array
+
+    def since(self, instant: int) -> Array:
+        """The changes from an instant on, not before the first one, shape [n, unknowns]."""
+        return self.changes[instant - self.first :].reshape(-1, self.changes.shape[2])
+
+
+def _responses(robot: Robot, space: OffsetSpace) -> list[_Responses]:
+    """The responses to all unknowns, in blocks."""
     component, jacobian = _rows(robot)
     motors, basis = len(space.motors), space.basis
     values, rates = basis.values.tocsc(), basis.rates.tocsc()
-    made = np.zeros((len(jacobian), len(component), space.size))
     step = max(1, _BLOCK // max(motors, 1))
 
-    def fill(start: int) -> None:
-        functions = slice(start, min(start + step, basis.count))
-        curves = values[:, functions].toarray(), rates[:, functions].toarray()
+    def made(start: int) -> _Responses:
+        stop = min(start + step, basis.count)
+        curves = values[:, start:stop].toarray(), rates[:, start:stop].toarray()
         first, found = robot.simulator.responses(*curves, space.coupling, component, jacobian)
-        made[first:, :, functions.start * motors : functions.stop * motors] = found
+        return _Responses(slice(start * motors, stop * motors), first, found)
 
-    in_parallel(fill, range(0, basis.count, step))
-    return made.reshape(-1, space.size)
+    return in_parallel(made, range(0, basis.count, step))
+
+
+def _add_products(gram: Array, blocks: Sequence[_Responses]) -> None:
+    """Add the products of all responses with each other to a matrix."""
+
+    def add(k: int) -> None:
+        one = blocks[k]
+        for other in blocks[: k + 1]:
+            first = max(one.first, other.first)
+            product = one.since(first).T @ other.since(first)
+            gram[one.unknowns, other.unknowns] += product
+            if other is not one:
+                gram[other.unknowns, one.unknowns] += product.T
+
+    in_parallel(add, range(len(blocks)))
 
 
 def _rows(robot: Robot) -> tuple[IntArray, Array]:

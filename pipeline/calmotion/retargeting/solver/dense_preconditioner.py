@@ -24,7 +24,8 @@ class DensePreconditioner:
     def __init__(self, gram: Array, penalty: csr_matrix, wraps: bool):
         motors = len(gram) // penalty.shape[0]
         self._shape = penalty.shape[0], motors, wraps
-        self._matrix = gram + kron(penalty, identity(motors)).toarray()
+        self._matrix = kron(penalty, identity(motors)).toarray()
+        self._matrix += gram
 
     def factor(self, fixed: BoolArray, terms: list[tuple[csr_matrix, Array]] | None = None) -> None:
         """Factorise with the unknowns where `fixed` (shape [P * m], bool) is true excluded.

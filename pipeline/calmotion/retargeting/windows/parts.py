@@ -167,6 +167,10 @@ def _sliced(motion: Motion, rows: slice) -> Motion:
     )  # fmt: skip
 
 
+_NO = np.zeros(0)
+_NOTHING = Motion(_NO, _NO, _NO, (), _NO, _NO, _NO, _NO)
+
+
 def joined(pieces: list[Piece], times: Array) -> Simulation:
     """Successive pieces as one simulation.
 
@@ -174,20 +178,24 @@ def joined(pieces: list[Piece], times: Array) -> Simulation:
         pieces: They are taken: nobody else needs their motions beside it.
         times: Of all instants [s], shape [T].
     """
-    taken, pieces[:] = list(pieces), []
-    parts = [piece.simulation for piece in taken]
-    motions = [part.motion for part in parts]
+    starts, parts = [piece.time for piece in pieces], [piece.simulation for piece in pieces]
+    pieces.clear()
+    # each array of a piece is let go when it is in that of the shot: both together would be the most that a show takes
+    motions = [vars(part.motion) | {"elastic": list(part.motion.elastic)} for part in parts]
+    parts = [replace(part, motion=_NOTHING) for part in parts]
 
     def whole(name: str) -> Array:
-        return np.concatenate([getattr(motion, name) for motion in motions])
+        return np.concatenate([motion.pop(name) for motion in motions])
 
-    first = motions[0]
+    def forces(name: str) -> Array | None:
+        return None if motions[0][name] is None else whole(name)
+
+    bodies = range(len(motions[0]["elastic"]))
     motion = Motion(
         times, whole("positions"), whole("rotations"),
-        tuple(np.concatenate([m.elastic[b] for m in motions]) for b in range(len(first.elastic))),
+        tuple(np.concatenate([each["elastic"].pop(0) for each in motions]) for _ in bodies),
         whole("motor_values"), whole("motor_efforts"), whole("target_positions"), whole("target_rotations"),
-        None if first.joint_forces is None else whole("joint_forces"),
-        None if first.joint_moments is None else whole("joint_moments"),
+        forces("joint_forces"), forces("joint_moments"),
     )  # fmt: skip
     return Simulation(
         motion=motion,
@@ -198,5 +206,5 @@ def joined(pieces: list[Piece], times: Array) -> Simulation:
         wall_s=sum(part.wall_s for part in parts),
         sag=parts[0].sag,
         refined_steps=sum(part.refined_steps for part in parts),
-        dead_centres=np.concatenate([piece.simulation.dead_centres + piece.time for piece in taken]),
+        dead_centres=np.concatenate([part.dead_centres + start for part, start in zip(parts, starts, strict=True)]),
     )
