@@ -23,7 +23,7 @@ FALL = 10.0  # factor by which the slowest mode falls in an overlap
 LEAST = 1.0  # overlap, but not above half a window [s]
 SUFFICIENT = 1.5  # overlap that is not shortened to a quarter of a window, but to half of one [s]
 FEWEST = 12  # frames of a window
-EXACT = 0.0003  # of the tolerance: the least gain at which windows and one search agree within a tenth of it everywhere
+EXACT = 0.0003  # of the tolerance: the least gain of a window at which it agrees with one search within a tenth of it
 
 
 @dataclass(frozen=True)
@@ -98,11 +98,13 @@ def least_gain(character: Character, animation: Animation, options: RunSettings)
 
     Searches that gain less than a tenth of the tolerance by root mean squares may still be several times as far from
     the optimum, each elsewhere. What is found of a long shot is not to depend on its windows, so searches in windows
-    end later, and so does the one search of a long shot (`--window 0`); measured: a tenth more processor time.
+    end later; measured: a tenth more processor time. The one search of a long shot (`--window 0`) ends where what it
+    would gain in all is what a window may leave: a mean over two minutes hides what is wrong in a tenth of a second.
     """
     length = float(animation.frame_times[-1])
-    one_long = options.window == 0.0 and length > LONG_SHOT
-    return EXACT if one_long or window_length(character, animation, options) is not None else SEARCH_SHARE
+    if window_length(character, animation, options) is not None:
+        return EXACT
+    return EXACT * WINDOW / length if options.window == 0.0 and length > LONG_SHOT else SEARCH_SHARE
 
 
 def overlap_time(frequencies: Array, damping: Array, length: float) -> float:
