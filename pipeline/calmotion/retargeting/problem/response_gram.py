@@ -63,8 +63,8 @@ class _Responses:
 
     Attributes:
         unknowns: Which.
-        first: Instant before which nothing changes; the rest alone is held, half of all in the mean.
-        changes: Shape [T - first, r, unknowns].
+        first: Instant before which nothing changes.
+        changes: Shape [T, r, unknowns].
     """
 
     unknowns: slice
@@ -72,8 +72,8 @@ class _Responses:
     changes: Array
 
     def since(self, instant: int) -> Array:
-        """The changes from an instant on, not before the first one, shape [n, unknowns]."""
-        return self.changes[instant - self.first :].reshape(-1, self.changes.shape[2])
+        """The changes from an instant on, shape [n, unknowns]."""
+        return self.changes[instant:].reshape(-1, self.changes.shape[2])
 
 
 def _responses(robot: Robot, space: OffsetSpace) -> list[_Responses]:
@@ -82,14 +82,19 @@ def _responses(robot: Robot, space: OffsetSpace) -> list[_Responses]:
     motors, basis = len(space.motors), space.basis
     values, rates = basis.values.tocsc(), basis.rates.tocsc()
     step = max(1, _BLOCK // max(motors, 1))
+    # of zeros that nobody writes, before the first instant of a block, the system holds no memory: half of all
+    rows = jacobian.shape[:2]
+    held = np.zeros((-(-basis.count // step), rows[0] * rows[1] * step * motors))
 
-    def made(start: int) -> _Responses:
-        stop = min(start + step, basis.count)
+    def made(k: int) -> _Responses:
+        start, stop = k * step, min((k + 1) * step, basis.count)
         curves = values[:, start:stop].toarray(), rates[:, start:stop].toarray()
         first, found = robot.simulator.responses(*curves, space.coupling, component, jacobian)
-        return _Responses(slice(start * motors, stop * motors), first, found)
+        changes = held[k, : rows[0] * rows[1] * found.shape[2]].reshape(*rows, -1)
+        changes[first:] = found
+        return _Responses(slice(start * motors, stop * motors), first, changes)
 
-    return in_parallel(made, range(0, basis.count, step))
+    return in_parallel(made, range(len(held)))
 
 
 def _add_products(gram: Array, blocks: Sequence[_Responses]) -> None:
