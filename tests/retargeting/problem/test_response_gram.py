@@ -21,7 +21,7 @@ def test_its_columns_are_the_products_of_the_residuals_part(problem):
     gram = response_gram(problem.robots, problem.space)
     for d in np.random.default_rng(1).normal(size=(3, problem.size)):
         expected = problem.product(d) - problem.penalty_gradient(d)
-        assert np.abs(gram @ d - expected).max() < 1e-9 * np.abs(expected).max()
+        assert np.abs(gram @ d - expected).max() < 1e-7 * np.abs(expected).max()
 
 
 def test_curves_that_are_held_at_the_beginning_change_nothing_before(arm, bodies, animation):
@@ -37,7 +37,7 @@ def test_curves_that_are_held_at_the_beginning_change_nothing_before(arm, bodies
     gram = response_gram(problem.robots, problem.space)
     d = np.where(held, 0.0, np.random.default_rng(1).normal(size=problem.size))
     expected = (problem.product(d) - problem.penalty_gradient(d))[~held]
-    assert np.abs((gram @ d)[~held] - expected).max() < 1e-9 * np.abs(expected).max()
+    assert np.abs((gram @ d)[~held] - expected).max() < 1e-7 * np.abs(expected).max()
 
 
 def test_a_sharpened_preconditioner_solves_the_system_at_once(problem):

@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from calmotion.multibody.parallel import in_parallel
 from calmotion.multibody.sensitivity.linearization import spare_memory
@@ -64,16 +65,17 @@ class _Responses:
     Attributes:
         unknowns: Which.
         first: Instant before which nothing changes.
-        changes: Shape [T, r, unknowns].
+        changes: Shape [T, r, unknowns], of single precision: the matrix of products of rounded responses is as definite
+            as any, and near enough for a preconditioner.
     """
 
     unknowns: slice
     first: int
-    changes: Array
+    changes: NDArray[np.float32]
 
     def since(self, instant: int) -> Array:
         """The changes from an instant on, shape [n, unknowns]."""
-        return self.changes[instant:].reshape(-1, self.changes.shape[2])
+        return self.changes[instant:].reshape(-1, self.changes.shape[2]).astype(float)
 
 
 def _responses(robot: Robot, space: OffsetSpace) -> list[_Responses]:
@@ -84,7 +86,7 @@ def _responses(robot: Robot, space: OffsetSpace) -> list[_Responses]:
     step = max(1, _BLOCK // max(motors, 1))
     # of zeros that nobody writes, before the first instant of a block, the system holds no memory: half of all
     rows = jacobian.shape[:2]
-    held = np.zeros((-(-basis.count // step), rows[0] * rows[1] * step * motors))
+    held = np.zeros((-(-basis.count // step), rows[0] * rows[1] * step * motors), np.float32)
 
     def made(k: int) -> _Responses:
         start, stop = k * step, min((k + 1) * step, basis.count)
@@ -102,9 +104,10 @@ def _add_products(gram: Array, blocks: Sequence[_Responses]) -> None:
 
     def add(k: int) -> None:
         one = blocks[k]
+        own = one.since(one.first)
         for other in blocks[: k + 1]:
-            first = max(one.first, other.first)
-            product = one.since(first).T @ other.since(first)
+            others = other.since(max(one.first, other.first))
+            product = own[len(own) - len(others) :].T @ others
             gram[one.unknowns, other.unknowns] += product
             if other is not one:
                 gram[other.unknowns, one.unknowns] += product.T
