@@ -57,8 +57,13 @@ class ShotError(Exception):
 _EXHAUSTED = ("can't start new thread", "cannot allocate memory", "failed to map segment", "std::bad_alloc")
 
 
-def failure_of_machine(error: BaseException) -> ShotError | None:
-    """The error that a user sees where memory or files of the machine failed; None for any other exception."""
+def failure_of_machine(error: BaseException, short: bool = False) -> ShotError | None:
+    """The error that a user sees where memory or files of the machine failed; None for any other exception.
+
+    Args:
+        error: The exception.
+        short: Whether memory was short: libraries then raise anything.
+    """
     if isinstance(error, ShotError):
         return None
     text = str(error)
@@ -68,6 +73,12 @@ def failure_of_machine(error: BaseException) -> ShotError | None:
             "there is not enough memory",
             found=text or None,
             remedy="End other programs, raise the limit of memory, or choose a larger tolerance or element size",
+        )
+    if number is None and short:
+        return ShotError(
+            "there is not enough memory",
+            found=f"{type(error).__name__}: {text}",
+            remedy="Raise the limit of memory (ulimit -v)",
         )
     if number is not None:
         return ShotError(

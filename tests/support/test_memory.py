@@ -34,3 +34,31 @@ def test_a_limit_of_the_address_space_counts():
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert 0 < float(done.stdout) < 2**30
+
+
+def test_what_does_not_fit_into_the_limit_of_the_address_space_is_refused():
+    code = """
+import resource; resource.setrlimit(resource.RLIMIT_AS, (2**30, 2**30))
+from calmotion.errors import ShotError, failure_of_machine
+from calmotion.support import memory
+memory.require_address_space(1e8, "a stage")
+assert not memory.was_short() and memory.address_limit() == 2**30
+try:
+    memory.require_address_space(2e9, "a stage")
+except ShotError as error:
+    print(error)
+kept = bytearray(int(2**30 - memory._status("VmSize") - 5e7))
+del kept
+assert memory.was_short()
+print(failure_of_machine(TypeError("'frame' object is not callable"), memory.was_short()).problem)
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    refusal, failure = done.stdout.splitlines()
+    assert "a stage takes 2.00 GB" in refusal and "limit of 1.07 GB" in refusal and "ulimit -v" in refusal
+    assert failure == "there is not enough memory"
+
+
+def test_without_a_limit_nothing_is_refused(monkeypatch):
+    monkeypatch.setattr(memory, "address_limit", lambda: math.inf)
+    memory.require_address_space(1e18, "a stage")
+    assert not memory.was_short()

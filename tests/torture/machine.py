@@ -80,7 +80,7 @@ def memory(space: Workspace, rng: random.Random, count: int, tally: verdicts.Tal
     """Address spaces that end a random number of bytes beyond what the program's libraries take."""
     for number in range(count):
         space.reset(old_outputs=rng.random() < 0.3)
-        room = int(8e8 * rng.random() ** 2)
+        room = int(1.5e9 * rng.random())
         part, figures = space.cool(rng), rng.random() < 0.2
         about = f"memory {number}, {room / 1e6:.0f} MB, without {part}"
 

@@ -12,6 +12,7 @@ from calmotion.cli.commands.shows import batch, sequence, submit
 from calmotion.cli.parser import Parser, add_examples, overview
 from calmotion.cli.signals import as_interrupts, ignore
 from calmotion.errors import ShotError, failure_of_machine
+from calmotion.support.memory import was_short
 from calmotion.version import __version__
 
 FAILED, WRONG_USAGE, INTERRUPTED = 1, 2, 130
@@ -63,7 +64,7 @@ def _run(given: list[str]) -> int:
         except Exception as error:
             from calmotion.cli.diagnostics.crash_report import crash
 
-            print_error(failure_of_machine(error) or crash(error, given), output)
+            print_error(failure_of_machine(error, was_short()) or crash(error, given), output)
             return FAILED
 
 

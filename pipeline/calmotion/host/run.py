@@ -15,6 +15,7 @@ from calmotion.host.plan import Plan
 from calmotion.host.polling import can_check, find_rivals, poll, will_run
 from calmotion.host.properties import PropertyValues
 from calmotion.support import interrupts
+from calmotion.support.memory import RESERVE, require_address_space
 
 if TYPE_CHECKING:
     from calmotion.shot import Simplification
@@ -183,6 +184,7 @@ class Run:
                     made = (self._made[kind],) if kind in self._made else ()
                     raise self._rivalry(kind, (*made, cls))
             self._progress(cls.label, 0.0, "")
+            require_address_space(RESERVE, "a stage")
             found = self._reuse(cls, self.data)
             values = _checked(cls, cls().execute(context) if found is None else found)
             self._progress(cls.label, 1.0, "")

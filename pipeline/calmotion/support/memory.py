@@ -6,12 +6,17 @@ import os
 import sys
 from pathlib import Path
 
+from calmotion.errors import ShotError
+
 # Files with the limit and the use of memory [bytes] of a control group, of the second and the first version.
 _GROUPS = (
     ("/sys/fs/cgroup/memory.max", "/sys/fs/cgroup/memory.current"),
     ("/sys/fs/cgroup/memory/memory.limit_in_bytes", "/sys/fs/cgroup/memory/memory.usage_in_bytes"),
 )
 _MEMINFO = "/proc/meminfo"
+# What native libraries may ask for inside a stage [bytes]: buffers of OpenBLAS, which asks for ever where it gets none,
+# machine code, and stacks of threads.
+RESERVE = 128e6
 
 
 def peak_memory() -> float:
@@ -70,16 +75,54 @@ def _group_memory(limit: str, use: str) -> float:
     return max(0.0, float(allowed) - float(used)) if allowed.isdigit() and used.isdigit() else float("inf")
 
 
-def _address_space() -> float:
+def address_limit() -> float:
+    """The limit of this process's address space (`ulimit -v`) [bytes]; infinite where there is none."""
     try:
         import resource
     except ImportError:
         return float("inf")
     limit = resource.getrlimit(resource.RLIMIT_AS)[0]
-    if limit == resource.RLIM_INFINITY:
-        return float("inf")
-    pages = _read("/proc/self/statm").split()[:1]
-    return max(0.0, float(limit) - (float(pages[0]) * resource.getpagesize() if pages else 0.0))
+    return float("inf") if limit == resource.RLIM_INFINITY else float(limit)
+
+
+def require_address_space(wanted: float, what: str) -> None:
+    """Refuse what would not fit into the limit of the address space: native code does not survive that.
+
+    Args:
+        wanted: Address space that it takes [bytes].
+        what: It, as the subject of a sentence in the singular.
+
+    Raises:
+        ShotError: Less is left.
+    """
+    left = _address_space()
+    if left < wanted:
+        raise ShotError(
+            f"there is not enough memory: {what} takes {wanted / 1e9:.2f} GB of address space",
+            found=f"{left / 1e9:.2f} GB left of a limit of {address_limit() / 1e9:.2f} GB",
+            remedy="Raise the limit (ulimit -v), or lift it: ulimit -v unlimited",
+        )
+
+
+def was_short() -> bool:
+    """Whether this process has come near the limit of its address space: what failed since may have failed by that."""
+    limit = address_limit()
+    return limit < float("inf") and limit - _status("VmPeak") < RESERVE
+
+
+def _address_space() -> float:
+    limit = address_limit()
+    if limit == float("inf"):
+        return limit
+    return max(0.0, limit - _status("VmSize"))
+
+
+def _status(name: str) -> float:
+    """A size of this process [bytes]; 0 where the system does not tell."""
+    for line in _read("/proc/self/status").splitlines():
+        if line.startswith(f"{name}:"):
+            return 1024.0 * float(line.split()[1])
+    return 0.0
 
 
 def _read(path: str) -> str:

@@ -6,10 +6,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from calmotion.errors import ShotError
+from calmotion.support.memory import require_address_space
 
 if TYPE_CHECKING:
     from pxr import Usd
 
+_LIBRARIES = 0.6e9  # address space of the libraries that USD loads here, and of its threads on two cores [bytes]
+_REGISTERED: set[str] = set()
 NAMES = ("CalmFlexibleBodyAPI", "CalmDampingAPI", "CalmMotorAPI", "CalmTargetAPI", "CalmRetargetAPI")
 
 
@@ -48,6 +51,9 @@ def register() -> None:
     """
     from pxr import Plug, Usd
 
+    if not _REGISTERED:
+        require_address_space(_LIBRARIES, "USD")  # which crashes where it does not get it
+    _REGISTERED.add(plugin_path())
     Plug.Registry().RegisterPlugins(plugin_path())
     registry = Usd.SchemaRegistry()
     missing = [name for name in NAMES if registry.FindAppliedAPIPrimDefinition(name) is None]

@@ -8,6 +8,7 @@ from typing import TypeVar
 
 from calmotion.errors import ShotError, ShotErrors, each, failure_of_machine
 from calmotion.host import HostError, OperatorResult, Run
+from calmotion.support.memory import was_short
 
 T = TypeVar("T")
 
@@ -99,7 +100,7 @@ def _problems(result: OperatorResult) -> list[Problem]:
     # The user can solve a ShotError and what the machine lacks; anything else is the plugin's, with the traceback.
     if isinstance(error, ShotError):
         return [Problem(one, result.idname, result.plugin) for one in each(error)]
-    failure = None if error is None else failure_of_machine(error)
+    failure = None if error is None else failure_of_machine(error, was_short())
     if failure is not None:
         return [Problem(failure, result.idname, result.plugin)]
     raised = HostError(
