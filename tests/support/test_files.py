@@ -12,6 +12,7 @@ import pytest
 from calmotion.support.files import (
     PREFIX,
     _machine,
+    exchange,
     locked,
     remove_abandoned,
     replaced,
@@ -179,3 +180,15 @@ def test_a_folder_is_locked_for_one_process_at_a_time_and_nothing_is_left(tmp_pa
     assert [process.wait() for process in started] == [0] * 4 and names(tmp_path) == ["0", "1", "2", "3"]
     with locked(tmp_path / "missing"):
         pass
+
+
+def test_folders_are_exchanged_at_once_or_nothing_is_changed(tmp_path):
+    for name in ("one", "other"):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / name).touch()
+    moved = exchange(tmp_path / "one", tmp_path / "other")
+    assert names(tmp_path / "one") == (["other"] if moved else ["one"])
+    if moved:
+        with pytest.raises(FileNotFoundError):
+            exchange(tmp_path / "one", tmp_path / "missing")
+    assert moved or sys.platform != "linux"

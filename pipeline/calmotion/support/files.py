@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import ctypes
 import errno
 import hashlib
 import os
@@ -17,6 +18,7 @@ from functools import cache
 from pathlib import Path
 
 PREFIX = ".calmotion-"  # of the names of temporary files
+_HERE, _EXCHANGE = -100, 2  # AT_FDCWD of fcntl.h, RENAME_EXCHANGE of stdio.h
 _ABANDONED = 3600.0  # a temporary file of another machine of that age [s] was left by a process that was killed
 _NAME = re.compile(re.escape(PREFIX) + r"([0-9a-f]{8})-(\d+)-")
 
@@ -103,6 +105,27 @@ def write_text(path: str | Path, text: str) -> None:
     """
     with replaced(path) as temporary:
         temporary.write_text(text, encoding="utf-8", newline="")
+
+
+def exchange(one: str | Path, other: str | Path) -> bool:
+    """Exchange the names of two folders or files of one file system, at once: no kill can come between.
+
+    Returns:
+        False where the system or the file system cannot do that; nothing is changed then.
+
+    Raises:
+        OSError: One of them is missing, or may not be moved.
+    """
+    try:
+        rename = ctypes.CDLL(None, use_errno=True).renameat2
+    except (AttributeError, OSError, TypeError):  # no Linux
+        return False
+    if rename(_HERE, os.fsencode(one), _HERE, os.fsencode(other), _EXCHANGE) == 0:
+        return True
+    number = ctypes.get_errno()
+    if number in (errno.ENOSYS, errno.EINVAL, errno.ENOTSUP):
+        return False
+    raise OSError(number, os.strerror(number), str(one))
 
 
 def try_writing(path: str | Path) -> None:

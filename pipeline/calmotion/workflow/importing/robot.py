@@ -17,7 +17,7 @@ from calmotion.host import Host, SettingError, has_no_unit, open_host, parse_qua
 from calmotion.rigging.materials import Material, material_named
 from calmotion.shot import Animation, Character, MotorTracks
 from calmotion.shot.run import Source
-from calmotion.support.files import try_writing
+from calmotion.support.files import exchange, try_writing
 from calmotion.usd.importing.robot_layer import FlexibleLinks, RobotOptions, robot_layer
 from calmotion.usd.layers import EXTENSIONS, refuse_input_as_output, write_layer
 from calmotion.usd.reading.shot import read_shot
@@ -242,18 +242,29 @@ class _Import:
             return *convert(description, parts, python), changes
 
     def _move(self, parts: str, draft: str) -> None:
-        former = os.path.join(os.path.dirname(draft), "former")
+        former, exchanged = os.path.join(os.path.dirname(draft), "former"), False
         try:
-            with suppress(FileNotFoundError):  # the first import, or another one that runs at once has moved it
-                os.rename(self._folder, former)
-            os.rename(parts, self._folder)
+            exchanged = self._exchanged(parts)
+            if not exchanged:
+                with suppress(FileNotFoundError):  # the first import, or another one that runs at once has moved it
+                    os.rename(self._folder, former)
+                os.rename(parts, self._folder)
             os.replace(draft, self._layer)
         except OSError as error:
-            if os.path.isdir(former) and not os.path.isdir(self._folder):
+            if exchanged:
+                exchange(parts, self._folder)
+            elif os.path.isdir(former) and not os.path.isdir(self._folder):
                 os.rename(former, self._folder)
             raise ShotError(
                 "the robot cannot be written", path=self._layer, found=error.strerror, remedy="Choose another output."
             ) from error
+
+    def _exchanged(self, parts: str) -> bool:
+        """Put the converted robot in the place of a former one, so that a kill leaves either of them there."""
+        try:
+            return exchange(parts, self._folder)
+        except FileNotFoundError:  # the first import
+            return False
 
     def _refuse_foreign_folder(self) -> None:
         if os.path.lexists(self._folder) and not os.path.isfile(os.path.join(self._folder, _MARKER)):
