@@ -92,7 +92,7 @@ def test_a_robot_from_urdf(tmp_path):
     printed = follow("urdf", tmp_path)
     (before, after), *_ = errors_of(printed)
     assert 4.0 < before < 9.0 and after < 2.0
-    assert "lowest rate that keeps it" in printed
+    assert "The lowest rate that keeps it: " in printed
     assert "joint_names: ['turn', 'lift']" in (tmp_path / "work" / "trajectory.yaml").read_text()
 
 

@@ -74,9 +74,30 @@ def _run(args: argparse.Namespace, output: Output) -> int:
 
 def _print(report: dict[str, Any], stream: TextIO) -> None:
     from calmotion.cli.quantities import counted, length
+    from calmotion.cli.sentences import unbroken
     from calmotion.cli.tables import console_on, print_table, say
 
     console = console_on(stream)
+    tolerance, kept, lowest = length(report["tolerance_m"]), report["tolerance_kept"], report["lowest_rate_hz"]
+    say(
+        console,
+        f"The commands {'keep' if kept else 'do not keep'} the tolerance of {tolerance}: playing them costs up to "
+        f"{length(report['max_loss_m'])}.",
+    )
+    if report["searched"] and lowest:
+        say(console, f"The lowest rate that keeps it: {lowest} Hz.")
+    for file in report["files"]:
+        say(console, f"wrote {unbroken(file)}")
+    if kept:
+        say(console, "next: the page 'Exporting for a controller' of the documentation tells how the file is played")
+    elif lowest:
+        say(console, f"next: the same command with --rate {lowest}")
+    elif report["searched"]:
+        say(
+            console,
+            "next: no rate keeps it; see the columns of rounding and start delay: servos with more ticks, smaller "
+            "steps or an earlier start would help",
+        )
     heads = ["target", "rate", "rounding", "start delay", "in all"]
     rows = [
         [row["path"], *(length(row[key]) for key in ("rate_loss_m", "rounding_loss_m", "start_loss_m", "loss_m"))]
@@ -93,22 +114,5 @@ def _print(report: dict[str, Any], stream: TextIO) -> None:
     )
     slowest = max((row["delay_cost_m_per_s"] for row in report["targets"]), default=0.0)
     say(console, f"each millisecond by which the controller starts late costs up to {length(1e-3 * slowest)}")
-    tolerance, kept = length(report["tolerance_m"]), report["tolerance_kept"]
-    say(
-        console,
-        f"the commands {'keep' if kept else 'do not keep'} the tolerance of {tolerance}: they cost "
-        f"{length(report['max_loss_m'])}",
-    )
-    if report["searched"]:
-        lowest = report["lowest_rate_hz"]
-        say(
-            console,
-            f"lowest rate that keeps it: {lowest} Hz"
-            if lowest
-            else "no rate keeps it: see the columns of rounding "
-            "and start delay; servos with more ticks, smaller steps or an earlier start would help",
-        )
     for note in report["notes"]:
         say(console, f"note: {note}")
-    for file in report["files"]:
-        say(console, f"wrote {file}")
