@@ -46,16 +46,16 @@ def _print(report: dict[str, Any], stream: TextIO) -> None:
     from calmotion.cli.tables import console_on, print_table, say
 
     console = console_on(stream)
-    rows = [
-        [j["joint"].split("/")[-1], j["body"], str(len(j["motors"])), angle(j["angle_error_rad"])]
-        for j in report["joints"]
-    ]
-    print_table(console, "Rotating joints", ["joint", "body", "hinges", "residual angle"], rows, texts=2)
     say(
         console,
         f"{report['robot']}: {report['bodies']} bodies, {report['motors']} motors, {report['mass_kg']:.4g} kg; "
         f"largest residual angle {angle(report['max_angle_error_rad'])}",
     )
+    rows = [
+        [j["joint"].split("/")[-1], j["body"], str(len(j["motors"])), angle(j["angle_error_rad"])]
+        for j in report["joints"]
+    ]
+    print_table(console, "Rotating joints", ["joint", "body", "hinges", "residual angle"], rows, texts=2)
     for target in report["targets"]:
         say(console, f"target: {target}")
     say(console, f"wrote {unbroken(report['layer'])}, which is a shot")

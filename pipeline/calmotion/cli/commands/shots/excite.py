@@ -62,10 +62,13 @@ def _run(args: argparse.Namespace, output: Output) -> int:
 
 
 def _print(report: dict[str, Any], stream: TextIO) -> None:
-    from calmotion.cli.quantities import quantity_in
+    from calmotion.cli.quantities import counted, quantity_in
+    from calmotion.cli.sentences import unbroken
     from calmotion.cli.tables import console_on, print_table, say
 
     console = console_on(stream)
+    told = sum(row["identifiable"] for row in report["parameters"])
+    say(console, f"A recording of this motion would tell {told} of {counted(len(report['parameters']), 'parameter')}.")
     rows = [
         [
             row["kind"], row["path"], quantity_in(row["value"], row["unit"]),
@@ -91,4 +94,9 @@ def _print(report: dict[str, Any], stream: TextIO) -> None:
         ["motor", "excursion", "velocity", "acceleration", "effort", "of its limits"], rows,
     )  # fmt: skip
     say(console, f"{report['motions']} motions tried in {report['wall_s']:.3g} s; collisions are not checked")
-    say(console, f"wrote {report['layer']}")
+    say(console, f"wrote {unbroken(report['layer'])}")
+    say(
+        console,
+        f"next: play it on the robot (calmotion export {unbroken(report['layer'])} writes commands), record it, and "
+        f"calmotion calibrate {unbroken(report['layer'])} --recording FILE -o LAYER",
+    )

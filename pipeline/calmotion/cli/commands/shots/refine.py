@@ -54,9 +54,19 @@ def _run(args: argparse.Namespace, output: Output) -> int:
 
 def _print(report: dict[str, Any], stream: TextIO) -> None:
     from calmotion.cli.quantities import length, measured, quantity_in
+    from calmotion.cli.sentences import unbroken
     from calmotion.cli.tables import console_on, print_table, say
 
     console = console_on(stream)
+    played, expected = (
+        max((row[name] for row in report["targets"]), default=0.0)
+        for name in ("max_error_played_m", "expected_max_error_m")
+    )
+    say(
+        console,
+        f"The largest error of take {report['take']} is {length(played)}; {length(expected)} is to expect of the new "
+        f"curves.",
+    )
     rows = [
         [
             row["name"], quantity_in(row["prior"]["value"], row["unit"]),
@@ -82,4 +92,8 @@ def _print(report: dict[str, Any], stream: TextIO) -> None:
     )  # fmt: skip
     for note in report["notes"]:
         say(console, f"note: {note}")
-    say(console, f"play {report['root']} in take {report['take'] + 1}, and refine it with its recording")
+    say(
+        console,
+        f"next: play {unbroken(report['root'])} in take {report['take'] + 1}, record it, and run calmotion refine "
+        f"again",
+    )
