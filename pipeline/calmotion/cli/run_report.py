@@ -32,8 +32,12 @@ IDLE_EFFORT = 0.01  # of that of the strongest motor
 
 
 def print_left_out(console: Console, rows: Sequence[dict[str, Any]]) -> None:
-    """The simplifications, each with its reason and estimated error."""
+    """The simplifications, each with its reason and estimated error, and the steps that were not needed."""
     for row in rows:
+        step, _, skipped = row["what"].rpartition(": skipped")
+        if step and not skipped:
+            say(console, f"skipped: {step} ({row['why']})")
+            continue
         error = row["estimated_error_m"]
         cost = "" if error is None else f"; estimated error {about(error)}"
         say(console, f"simplified: {row['what']} ({row['why']}){cost}")
