@@ -12,6 +12,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from calmotion.errors import ShotError
 from calmotion.support.files import replaced
 from PIL import Image
@@ -63,28 +64,59 @@ def encode(path: str, draw: Draw, count: int, rate: float, quality: int) -> None
 
 
 class _Following:
-    """The frames after the first, as Pillow asks for them: a picture with frames that are drawn when it is sought."""
+    """The frames after the first, as Pillow asks for them: a picture with frames that are drawn when it is sought.
+
+    Args:
+        draw, count: As for `encode`; the first frame is not counted.
+        first: Frame.
+        unseen: Differences of levels that the encoder leaves out.
+    """
 
     mode = "RGB"
 
-    def __init__(self, draw: Draw, count: int):
-        self._draw, self.n_frames = draw, count
-        self._frame: Image.Image | None = None
+    def __init__(self, draw: Draw, count: int, first: Image.Image, unseen: int):
+        self._draw, self.n_frames, self._unseen = draw, count, unseen
+        self._frame = first
 
     def seek(self, frame: int) -> None:
         """Draw a frame; the one before is dropped."""
-        self._frame = self._draw(frame + 1)
+        self._frame = steady(self._draw(frame + 1), self._frame, self._unseen)
 
     def getim(self) -> Any:
         """Pixels of the frame."""
-        assert self._frame is not None
         return self._frame.getim()
 
 
+def steady(frame: Image.Image, shown: Image.Image, unseen: int) -> Image.Image:
+    """A frame that keeps pixels as they are shown until they are off by more than what the encoder leaves out.
+
+    The encoder compares each frame with the one before, and leaves out small differences. Those of slow motion are all
+    small: they would add up unseen, and leave blocks of old shades in what moves.
+
+    Args:
+        frame: As drawn.
+        shown: The frame before, as returned by this function.
+        unseen: Levels (of 255) of any channel.
+    """
+    new, old = np.asarray(frame, dtype=np.int16), np.asarray(shown, dtype=np.int16)
+    changed = np.abs(new - old).max(axis=2, keepdims=True) > unseen
+    return Image.fromarray(np.where(changed, new, old).astype(np.uint8))
+
+
+def unseen_levels(quality: int) -> int:
+    """Differences of levels that WebP's encoder of animations takes for none.
+
+    Source: libwebp 1.5, src/mux/anim_encode.c, QualityToMaxDiff.
+    """
+    share = (quality / 100.0) ** 0.5
+    return int(31.0 * (1.0 - share) + share + 0.5)
+
+
 def _write_webp(path: Path, draw: Draw, count: int, rate: float, quality: int) -> None:
-    following: list[Any] = [_Following(draw, count - 1)] if count > 1 else []
+    first = draw(0)
+    following: list[Any] = [_Following(draw, count - 1, first, unseen_levels(quality))] if count > 1 else []
     near, far = BETWEEN_KEYS
-    draw(0).save(
+    first.save(
         path, format="WEBP", save_all=True, append_images=following, duration=round(1000.0 / rate), loop=0,
         quality=quality, method=METHOD, kmin=near, kmax=far,
     )  # fmt: skip

@@ -189,3 +189,18 @@ def test_it_is_skipped_when_no_video_is_requested():
     values = [synthetic.character(), synthetic.animation(), synthetic.result(), OutputPaths()]
     with pytest.raises(PluginError, match="--video"):
         run_operator(host_with(PLUGIN), "video.write", values)
+
+
+def test_slow_changes_are_not_left_out_for_long(tmp_path, video):
+    across = np.arange(96)
+
+    def draw(number):  # a shade that moves by less between two frames than what the encoder takes for a difference
+        shade = 128.0 + 90.0 * np.sin(2.0 * np.pi * (across - 0.5 * number) / 96.0)
+        return Image.fromarray(np.repeat(np.tile(shade.astype(np.uint8), (64, 1))[:, :, None], 3, axis=2))
+
+    quality, count = 60, 40
+    video.encoding.encode(str(tmp_path / "shade.webp"), draw, count, 25.0, quality)
+    with Image.open(tmp_path / "shade.webp") as shown:
+        shown.seek(shown.n_frames - 1)  # frames that differ in nothing are one
+        off = np.abs(np.asarray(shown.convert("RGB"), dtype=int) - np.asarray(draw(count - 1), dtype=int))
+    assert np.quantile(off, 0.99) < 3 * video.encoding.unseen_levels(quality)
