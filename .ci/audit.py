@@ -1,7 +1,7 @@
 """Known weaknesses of the installed dependencies, by pip-audit: `python .ci/audit.py`, or `make audit`.
 
-pip-audit ends with exit status 0 also where its database knows none of the dependencies, as behind a mirror without that
-data. Here each dependency must have been looked up: exit status 1 after a weakness, 2 where something was not audited.
+pip-audit ends with exit status 0 also where it has data on none of the dependencies, as behind a mirror without them.
+Here each dependency must have been looked up: exit status 1 after a weakness, 2 where something was not audited.
 """
 
 from __future__ import annotations
@@ -24,7 +24,8 @@ def judged(dependencies: list[dict[str, Any]]) -> tuple[int, list[str]]:
     skipped = [one for one in dependencies if "skip_reason" in one and one["skip_reason"] != _OWN]
     audited = [one for one in dependencies if "skip_reason" not in one]
     lines = [
-        f"{one['name']} {one['version']}: {weakness['id']}, mended in {', '.join(weakness['fix_versions']) or 'no version'}"
+        f"{one['name']} {one['version']}: {weakness['id']}, mended in "
+        + (", ".join(weakness["fix_versions"]) or "no version")
         for one in audited
         for weakness in one["vulns"]
     ]
@@ -39,7 +40,7 @@ def judged(dependencies: list[dict[str, Any]]) -> tuple[int, list[str]]:
 def main() -> int:
     """The command."""
     command = [sys.executable, "-m", "pip_audit", "--skip-editable", "--format", "json", "--progress-spinner", "off"]
-    done = subprocess.run(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    done = subprocess.run(command, capture_output=True, text=True)
     try:
         dependencies = json.loads(done.stdout)["dependencies"]
     except (ValueError, KeyError):
