@@ -153,3 +153,14 @@ def test_a_folder_names_the_shots_in_it(tmp_path):
     with pytest.raises(ShotError, match="does not exist") as caught:
         stages.open_layer(str(tmp_path / "shot"))
     assert str(tmp_path / "shot.usda") in caught.value.remedy
+
+
+def test_a_layer_that_was_opened_and_is_damaged_since_is_refused(tmp_path):
+    path = tmp_path / "shot.usda"
+    path.write_text('#usda 1.0\ndef Xform "A"\n{\n}\n')
+    kept = stages.open_stage(str(path))
+    path.write_text('#usda 1.0\n(\n    framesPerSecond = "no"\n)\ndef Xform "A"\n{\n}\n')
+    with pytest.raises(ShotError, match="damaged") as caught:
+        stages.open_stage(str(path))
+    assert caught.value.path == str(path) and "shot.usda:3" in str(caught.value.found)
+    del kept

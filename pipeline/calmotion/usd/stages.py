@@ -152,12 +152,29 @@ def open_stage(path: str, *, muted: tuple[str, ...] = ()) -> Usd.Stage:
         # USD keeps layers that were opened earlier in this process; take what is on disk now.
         for used in stage.GetUsedLayers():
             if not used.anonymous and not used.dirty:
-                used.Reload()
+                _reload(used)
         if muted:
             stage.MuteAndUnmuteLayers(list(muted), [])
         errors = stage.GetCompositionErrors()
     raise_all(_merged([refusal for error in errors if (refusal := _refusal(error, path))]))
     return stage
+
+
+def _reload(layer: Sdf.Layer) -> None:
+    """Take what is on disk now of a layer that may have been opened earlier in this process.
+
+    Raises:
+        ShotError: It is damaged now.
+    """
+    from pxr import Tf
+
+    try:
+        layer.Reload()
+    except Tf.ErrorException as error:
+        raise ShotError(
+            "this is not a USD file any more, or it is damaged", path=layer.realPath,
+            found=one_line(_message(str(error))) or None, remedy="Correct the file, or write it again",
+        ) from error  # fmt: skip
 
 
 def _merged(errors: list[ShotError]) -> list[ShotError]:
