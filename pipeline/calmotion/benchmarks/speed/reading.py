@@ -151,6 +151,7 @@ def page(rows: Sequence[Row], titles: Sequence[str], command: str) -> str:
     summary = (
         f"These are {len(rows)} files of robots and characters that others made; {loaded} of them load. Where one is "
         "refused, the message names what to change. None of them is part of this repository. "
+        "Two of them move in the [gallery](gallery.md#robots-that-others-built). "
         "What becomes of their links is on [another page](meshing.md)."
     )
     paths = f"Paths are those in {', '.join(titles)}. The page is made by"
