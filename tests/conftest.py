@@ -32,6 +32,12 @@ MANIFEST = {
 }
 
 
+@pytest.fixture(scope="session", autouse=True)
+def no_width() -> None:
+    """Reports are wrapped where a test says so alone: workers of pytest-xdist have the width of the terminal."""
+    os.environ.pop("COLUMNS", None)
+
+
 @pytest.fixture(scope="session")
 def repository() -> Path:
     """The checkout."""
