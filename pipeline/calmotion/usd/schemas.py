@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,7 +13,6 @@ if TYPE_CHECKING:
     from pxr import Usd
 
 _LIBRARIES = 0.6e9  # address space of the libraries that USD loads here, and of its threads on two cores [bytes]
-_REGISTERED: set[str] = set()
 NAMES = ("CalmFlexibleBodyAPI", "CalmDampingAPI", "CalmMotorAPI", "CalmTargetAPI", "CalmRetargetAPI")
 
 
@@ -40,6 +40,12 @@ def plugin_path() -> str:
     )
 
 
+@cache
+def _require_room() -> None:
+    """Refuse, until it was there once, a limit of memory that leaves too little for USD, which would crash."""
+    require_address_space(_LIBRARIES, "USD")
+
+
 def register() -> None:
     """Register the schemas in USD; calling it again does nothing.
 
@@ -51,9 +57,7 @@ def register() -> None:
     """
     from pxr import Plug, Usd
 
-    if not _REGISTERED:
-        require_address_space(_LIBRARIES, "USD")  # which crashes where it does not get it
-    _REGISTERED.add(plugin_path())
+    _require_room()
     Plug.Registry().RegisterPlugins(plugin_path())
     registry = Usd.SchemaRegistry()
     missing = [name for name in NAMES if registry.FindAppliedAPIPrimDefinition(name) is None]

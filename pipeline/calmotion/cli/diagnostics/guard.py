@@ -7,7 +7,6 @@ that loads nothing, passes signals on, and tells how the child ended. Elsewhere 
 
 from __future__ import annotations
 
-import ctypes
 import os
 import signal
 import sys
@@ -82,6 +81,8 @@ def _refuse(arguments: Sequence[str], problem: str, found: str, remedy: str) -> 
 
 def _become_child(parent: int) -> None:
     """End with the parent, get signals from it alone, and take less address space for the same memory."""
+    import ctypes  # 4 ms, which runs without a limit do not need
+
     os.setpgid(0, 0)  # a terminal's Ctrl-C would come twice
     with suppress(AttributeError, OSError):
         library = ctypes.CDLL(None)

@@ -13,7 +13,7 @@ from calmotion.multibody.analysis.rigid_response import RigidResponse
 from calmotion.multibody.failure import SimulationFailure
 from calmotion.multibody.model.model import Model
 from calmotion.multibody.parallel import in_parallel
-from calmotion.retargeting.problem.ground import GROUND, with_ground_rows
+from calmotion.retargeting.problem.ground import GROUND, Place, with_ground_rows
 from calmotion.retargeting.problem.limits import LimitTerms
 from calmotion.retargeting.problem.offset_basis import OffsetBasis
 from calmotion.retargeting.problem.offset_space import OffsetSpace
@@ -76,7 +76,7 @@ class RetargetProblem:
         self._sharpened_x = np.zeros(0)  # point of the preconditioner's responses; empty for that of the rigid robot
         self._held = 0  # instant before which curves are fixed
         self._response: RigidResponse | None = None
-        self._ground_rows: dict[tuple[str, int, int], Array] = {}  # where it was linearised last
+        self._ground_rows: dict[Place, Array] = {}  # where it was linearised last
         # twice the objective of an error of one metre at every instant
         self._unit = max(float(np.sum(objective.weights**2)) / max(1, 3 * len(model.targets.component)), 1e-300)
 
@@ -318,7 +318,8 @@ class RetargetProblem:
 
     def lever(self) -> float:
         """Largest lever arm of a motor: weighted root-mean-square motion of the targets per angle [m/rad]."""
-        return float(np.sqrt(np.max(np.einsum("naa->a", self.rigid_metric())) / self._unit))
+        weighted = self._rigid().targets * self.objective.weights[..., None]
+        return float(np.sqrt(np.max(np.sum(weighted**2, axis=(0, 1, 2))) / self._unit))
 
     def rigid_gradient(self) -> Array:
         """Gradient of the errors at the point evaluated last if the robot were rigid: each is answered as it occurs."""

@@ -44,7 +44,7 @@ def _run(args: argparse.Namespace, output: Output) -> int:
             args.clips, args.output, arguments=forwarded(args), plugins=args.plugins, on=args.on, workers=args.workers,
             progress=display,
         )  # fmt: skip
-    conclude(found.report(), [], output, None if args.quiet else _print)
+    conclude(found.report() | {"page": found.page()}, [], output, None if args.quiet else _print)
     if found.interrupted:
         return INTERRUPTED
     return 0 if found.good else FAILED
