@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import nullcontext
 from dataclasses import replace
-from functools import partial
 from typing import TYPE_CHECKING, TypeVar
 
 from calmotion.errors import ShotError
@@ -14,17 +13,17 @@ from calmotion.multibody.model.model import body_anchors, compile_model, rigid_b
 from calmotion.multibody.model.topology import Tree, span_tree
 from calmotion.reduction.load_envelope import LoadEnvelope
 from calmotion.reduction.reduced_body import ReducedBody
-from calmotion.shot import Body, Character, FEMeshes, ModeTable, Skin, SurfaceMesh
+from calmotion.shot import Body, Character, FEMeshes, ModeTable, Skin
 from calmotion.shot.character import ElasticMaterial, with_ideal_motors, with_settings
 from calmotion.shot.meshes import FEMesh
 from calmotion.shot.tolerance import tolerance_of
 
 if TYPE_CHECKING:
+    from calmotion.reduction.full_models import FullModels, Member
     from calmotion.reduction.interfaces.interface_patches import AttachmentFrame
-    from calmotion.reduction.reduce import FullBody, LinearModes
+    from calmotion.reduction.reduce import LinearModes
 
 Found = TypeVar("Found")
-_KEPT = 60_000_000  # numbers in factors of full models, half a gigabyte
 
 
 def reduce_bodies(
@@ -34,7 +33,7 @@ def reduce_bodies(
     progress: Callable[[float, str], None] | None = None,
     load_envelopes: Sequence[LoadEnvelope | None] | None = None,
     tolerance: float | None = None,
-    full: dict[int, FullBody] | None = None,
+    full: FullModels | None = None,
 ) -> list[ReducedBody]:
     """Every body of a character as the dynamics needs it; finite elements are loaded only for flexible ones.
 
@@ -43,7 +42,7 @@ def reduce_bodies(
         progress: Called with a fraction and the body at hand.
         load_envelopes: Loads on each body in the shot, for what is chosen automatically.
         tolerance: Error that does not matter [m]; None: the shot's own, or 1 mm.
-        full: Full models by body, for who reduces the same ones again; what is made and is not too large is added.
+        full: Full models, for who reduces the same bodies again; what is made is added.
 
     Raises:
         ShotError: A flexible body without a mesh, or one that cannot be reduced.
@@ -60,17 +59,26 @@ def reduce_bodies(
                 remedy="Enable the plugin that provides meshes, or remove CalmFlexibleBodyAPI.",
             )
 
+    members = {index: full_model_of(character, mesh_of[index], anchors[index]) for index in flexible}
+    models = models_for(members.values()) if full is None and flexible else full
+
     def reduced(index: int) -> ReducedBody:
         from calmotion.reduction.cache import cached_reduction
 
-        body, own = character.bodies[index], anchors[index]
-        frames = fem_anchors(character, body, own)
+        own = members[index]
         load_envelope = None if load_envelopes is None else load_envelopes[index]
         # what has no bearing on the reduction does not make it another one
-        body = replace(body, non_rotating=False)
+        body = replace(own.body, non_rotating=False)
         # what bodies along a chain leave out adds up
-        parts = (mesh_of[index], body, frames, body.surfaces, own.root, load_envelope, allowed / len(flexible))
-        return cached_reduction(parts, partial(_reduced, full, index, parts))
+        parts = (own.mesh, body, own.attachments, body.surfaces, own.root, load_envelope, allowed / len(flexible))
+
+        def reduce() -> ReducedBody:
+            from calmotion.reduction.reduce import reduce_body
+
+            assert models is not None
+            return reduce_body(*parts, full=models.of(own))
+
+        return cached_reduction(parts, reduce)
 
     result = dict(zip(flexible, bodies_in_parallel(reduced, flexible, character, progress), strict=True))
     rigid = (
@@ -107,25 +115,6 @@ def bodies_in_parallel(
         return in_parallel(work, bodies, done)
 
 
-def _reduced(
-    full: dict[int, FullBody] | None, index: int,
-    parts: tuple[FEMesh, Body, list[AttachmentFrame], Sequence[SurfaceMesh], int, LoadEnvelope | None, float],
-) -> ReducedBody:  # fmt: skip
-    """`reduce_body` of the parts, with the full model that is known, or will be."""
-    from calmotion.reduction.reduce import full_body, reduce_body
-
-    if full is None:
-        return reduce_body(*parts)
-    if index in full:
-        return reduce_body(*parts, full=full[index])
-    mesh, body, anchors, _, root, _, _ = parts
-    own = full_body(mesh, body, anchors, root)
-    found = reduce_body(*parts, full=own)
-    if own.entries + sum(item.entries for item in list(full.values())) <= _KEPT:
-        full[index] = own
-    return found
-
-
 def _damped(character: Character, tree: Tree, bodies: Sequence[ReducedBody]) -> list[ReducedBody]:
     """The bodies, damped so that the character's modes have the ratios of their materials."""
     if all(material.rayleigh is not None for material in _materials(character).values()):
@@ -157,6 +146,23 @@ def _materials(character: Character) -> dict[int, ElasticMaterial]:
         for k, b in enumerate(character.bodies)
         if b.flexible is not None and b.simulated_flexible
     }
+
+
+def models_for(members: Iterable[Member]) -> FullModels:
+    """Full models that are kept until the last of some bodies that are alike is reduced."""
+    from calmotion.reduction.full_models import FullModels
+
+    models = FullModels(keeps=False)
+    models.expect(members)
+    return models
+
+
+def full_model_of(character: Character, mesh: FEMesh, anchors: BodyAnchors) -> Member:
+    """What the full model of a flexible body is made of."""
+    from calmotion.reduction.full_models import Member
+
+    body = character.bodies[mesh.body]
+    return Member(mesh, body, fem_anchors(character, body, anchors), anchors.root)
 
 
 def fem_anchors(character: Character, body: Body, anchors: BodyAnchors) -> list[AttachmentFrame]:

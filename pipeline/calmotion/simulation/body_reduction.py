@@ -15,13 +15,13 @@ from calmotion.shot import Animation, Character, FEMeshes
 from calmotion.shot.character import with_settings
 from calmotion.shot.run import RunSettings
 from calmotion.shot.tolerance import tolerance_of
-from calmotion.simulation.bodies import bodies_in_parallel, fem_anchors, reduce_bodies
+from calmotion.simulation.bodies import bodies_in_parallel, full_model_of, reduce_bodies
 from calmotion.simulation.compiled_shot import CompiledShot, compile_shot
 from calmotion.simulation.prepare import grid_of
 from calmotion.simulation.rigid_run import shot_load_envelopes
 
 if TYPE_CHECKING:
-    from calmotion.reduction.reduce import FullBody
+    from calmotion.reduction.full_models import FullModels
 
 
 class BodyReduction:
@@ -39,7 +39,8 @@ class BodyReduction:
     ):
         self.character, self.meshes, self.loads = character, meshes, loads
         self._tree = span_tree(character)
-        self._full: dict[int, FullBody] | None = {} if repeats else None
+        self._repeats = repeats
+        self._full: FullModels | None = None
 
     def bodies(
         self, tolerance: float | None, pairs_share: float = 1.0, progress: Callable[[float, str], None] | None = None
@@ -55,7 +56,14 @@ class BodyReduction:
             ShotError: A flexible body without a mesh, or one that cannot be reduced.
         """
         character = with_settings(self.character, lambda own: replace(own, pairs_share=pairs_share * own.pairs_share))
-        return reduce_bodies(character, self._tree, self.meshes, progress, self.loads, tolerance, self._full)
+        return reduce_bodies(character, self._tree, self.meshes, progress, self.loads, tolerance, self._models())
+
+    def _models(self) -> FullModels | None:
+        if self._full is None and self._repeats and self.meshes is not None:
+            from calmotion.reduction.full_models import FullModels
+
+            self._full = FullModels(keeps=True)
+        return self._full
 
     def with_finer_meshes(
         self, tolerance: float | None, wanted: Mapping[int, float], max_nodes: int,
@@ -77,32 +85,32 @@ class BodyReduction:
         from calmotion.reduction.mesh_refinement import refined_for_loads
 
         assert self.meshes is not None and self.loads is not None
-        anchors, kept = body_anchors(self.character, self._tree), self._full or {}
+        anchors, models = body_anchors(self.character, self._tree), self._models()
         allowed, loads = tolerance_of(self.character, tolerance) / len(self.meshes.meshes), self.loads
-        meshes, full = {mesh.body: mesh for mesh in self.meshes.meshes}, dict(kept)
+        members = {mesh.body: full_model_of(self.character, mesh, anchors[mesh.body]) for mesh in self.meshes.meshes}
+        finer = dict(members)
 
         def refine(index: int) -> None:
-            mesh, body, own = meshes[index], self.character.bodies[index], anchors[index]
-            frames = fem_anchors(self.character, body, own)
-            known, factor = full.pop(index, None), mesh.quality.stiffness_factor
-            finer = refined_for_loads(
-                mesh, body, frames, own.root, loads[index], allowed, wanted[index], max_nodes, by_factor,
-                known if factor == 1.0 else None,
+            own = members[index]
+            known = None if models is None or own.mesh.quality.stiffness_factor != 1.0 else models.known(own)
+            mesh = refined_for_loads(
+                own.mesh, own.body, own.attachments, own.root, loads[index], allowed, wanted[index], max_nodes,
+                by_factor, known,
             )  # fmt: skip
-            if known is not None and by_factor:  # the same elements
-                full[index] = known.scaled(finer.quality.stiffness_factor / factor)
-            meshes[index] = finer
+            finer[index] = replace(own, mesh=mesh)
 
-        refined = [b for b, mesh in meshes.items() if b in wanted and not (by_factor and mesh.given)]
+        refined = [b for b, own in members.items() if b in wanted and not (by_factor and own.mesh.given)]
         bodies_in_parallel(refine, refined, self.character, progress, ": a finer mesh")
-        result = BodyReduction(self.character, FEMeshes(tuple(meshes.values())), loads, self._full is not None)
-        if result._full is not None:
-            result._full |= full
+        meshes = FEMeshes(tuple(own.mesh for own in finer.values()))
+        result = BodyReduction(self.character, meshes, loads, self._repeats and models is not None)
+        if models is not None:
+            same = (b for b in members if by_factor or b not in refined)  # the same elements
+            result._full = models.scaled((members[b], finer[b]) for b in same)
         return result
 
     def release(self) -> None:
-        """Free the full models."""
-        self._full = None
+        """Free the full models, and keep no more."""
+        self._full, self._repeats = None, False
 
 
 def load_envelopes(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -49,6 +50,8 @@ class FixedInterface:
     constraint: Array
     _normal: dict[float, tuple[Array, Array]] = field(default_factory=dict, init=False, repr=False)
     _inertial: list[tuple[Array, Array]] = field(default_factory=list, init=False, repr=False)
+    # links that are alike are reduced in several threads
+    _lock: threading.RLock = field(default_factory=threading.RLock, init=False, repr=False)
 
     @classmethod
     def of(
@@ -113,9 +116,11 @@ class FixedInterface:
         Args:
             peaks: Of the twelve unit accelerations, shape [12]; those of peak zero are omitted.
         """
-        if limit not in self._normal:  # kept for other loads on the same body
-            below, least = (2.0 * 2.0 * np.pi * limit) ** 2, min(_MOST, len(self.interior))
-            self._normal[limit] = lowest_modes(self.K, self.M, least, solver=self.solver, below=below, most=_CANDIDATES)
+        with self._lock:
+            if limit not in self._normal:  # kept for other loads on the same body
+                below, least = (2.0 * 2.0 * np.pi * limit) ** 2, min(_MOST, len(self.interior))
+                found = lowest_modes(self.K, self.M, least, solver=self.solver, below=below, most=_CANDIDATES)
+                self._normal[limit] = found
         values, vectors = self._normal[limit]
         return self._columns(vectors, self._residual(values, vectors, peaks, 0.0))
 
@@ -167,9 +172,10 @@ class FixedInterface:
 
     def inertial(self) -> tuple[Array, Array]:
         """Nodal forces of the unit accelerations on the interior, and its static response, shape [i, 12] each."""
-        if not self._inertial:
-            loads = self._weight(ACCELERATIONS)[self.interior]
-            self._inertial.append((loads, self.solver.solve(loads)))
+        with self._lock:
+            if not self._inertial:
+                loads = self._weight(ACCELERATIONS)[self.interior]
+                self._inertial.append((loads, self.solver.solve(loads)))
         return self._inertial[0]
 
     def _residual(self, values: Array, vectors: Array, weight: Array, least: float) -> Array:

@@ -11,6 +11,7 @@ James 2005 (the choice by amplitude).
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -45,6 +46,7 @@ class Support:
     patches: Sequence[IntArray]
     centers: Sequence[Array]
     _fixed: dict[FEModel, FixedInterface] = field(default_factory=dict, init=False, repr=False)
+    _lock: threading.Lock = field(default_factory=threading.Lock, init=False, repr=False)
 
     def known(self, model: FEModel, fixed: FixedInterface) -> Support:
         """This support, with what `fixed` gives for a model."""
@@ -57,7 +59,9 @@ class Support:
         Raises:
             NotPositiveDefinite: The root patch does not constrain all rigid motions of the body.
         """
-        if model not in self._fixed:
+        with self._lock:  # links that are alike are reduced in several threads
+            if model in self._fixed:
+                return self._fixed[model]
             with one_blas_thread():
                 self._fixed[model] = FixedInterface.of(model, self.root, self.patches, self.centers)
         return self._fixed[model]

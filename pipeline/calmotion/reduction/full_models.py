@@ -1,0 +1,113 @@
+"""Full models of flexible bodies, kept for who reduces the same ones again; links that are alike have one."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+from calmotion.reduction.cache import cache_key
+from calmotion.shot.character import Body
+from calmotion.shot.meshes import FEMesh
+
+if TYPE_CHECKING:
+    from calmotion.reduction.interfaces.interface_patches import AttachmentFrame
+    from calmotion.reduction.reduce import FullBody
+
+_KEPT = 60_000_000  # numbers in factors of full models, half a gigabyte
+
+
+@dataclass(frozen=True, eq=False)
+class Member:
+    """What a full model is made of; arguments of `full_body`."""
+
+    mesh: FEMesh
+    body: Body
+    attachments: Sequence[AttachmentFrame]
+    root: int
+
+    @cached_property
+    def key(self) -> str:
+        """Hash of what decides the model: elements, material, mass and interfaces, and no prim path."""
+        settings, mass = self.body.flexible, self.body.mass
+        assert settings is not None
+        frames = [
+            (own.frame, own.kind, None if own.surface is None else own.surface.triangles) for own in self.attachments
+        ]
+        mesh = (self.mesh.points, self.mesh.tets, self.mesh.patches, self.mesh.quality.stiffness_factor)
+        material = replace(settings.material, path="")
+        return cache_key(
+            (mesh, material, settings.interface_radius, None if mass is None else mass.mass, frames, self.root)
+        )
+
+
+class FullModels:
+    """Full models by what they are made of.
+
+    Their factors and normal modes do not depend on loads or tolerances, and are most of a small body's reduction. A
+    robot often has many links that are alike.
+
+    Args:
+        keeps: Whether to keep every model that has room; otherwise those that another body needs as well.
+    """
+
+    def __init__(self, keeps: bool):
+        self._keeps = keeps
+        self._models: dict[str, FullBody] = {}
+        self._wanted: dict[str, int] = {}
+        self._making: dict[str, threading.Lock] = {}
+        self._lock = threading.Lock()
+
+    def expect(self, members: Iterable[Member]) -> None:
+        """Announce bodies: a model that is not kept for ever is kept until the last of them has it."""
+        for member in members:
+            key = member.key
+            self._wanted[key] = self._wanted.get(key, 0) + 1
+
+    def of(self, member: Member) -> FullBody:
+        """The model of a body, made at the first call; any thread may call.
+
+        Raises:
+            ShotError: As `full_body`.
+        """
+        key = member.key
+        with self._lock:
+            making = self._making.setdefault(key, threading.Lock())
+        with making:  # others that are alike wait for it
+            found = self._models.get(key)
+            if found is None:
+                from calmotion.reduction.reduce import full_body  # finite elements, for none that is in the cache
+
+                found = full_body(member.mesh, member.body, member.attachments, member.root)
+            with self._lock:
+                self._wanted[key] = self._wanted.get(key, 0) - 1
+                if self._keeps or self._wanted[key] > 0:
+                    self._keep(key, found)
+                else:
+                    self._models.pop(key, None)
+        return found
+
+    def known(self, member: Member) -> FullBody | None:
+        """The model of a body, if it is kept."""
+        return self._models.get(member.key)
+
+    def scaled(self, members: Iterable[tuple[Member, Member]]) -> FullModels:
+        """Models of bodies whose stiffness alone has changed, as far as these are kept here.
+
+        Args:
+            members: Bodies as they were and as they are.
+        """
+        result = FullModels(self._keeps)
+        for before, after in members:
+            found = self.known(before)
+            if found is not None:
+                factor = after.mesh.quality.stiffness_factor / before.mesh.quality.stiffness_factor
+                result._models[after.key] = found.scaled(factor)
+        return result
+
+    def _keep(self, key: str, model: FullBody) -> None:
+        taken = sum(own.entries for name, own in self._models.items() if name != key)
+        if taken + model.entries <= _KEPT:
+            self._models[key] = model

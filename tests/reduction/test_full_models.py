@@ -1,0 +1,111 @@
+"""Full models: links that are alike have one, and only what decides a model tells them apart."""
+
+from __future__ import annotations
+
+import threading
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from calmotion.geometry.tetrahedra import measure_quality
+from calmotion.reduction import full_models as module
+from calmotion.reduction.full_models import FullModels, Member
+from calmotion.reduction.interfaces.interface_patches import AttachmentFrame
+from calmotion.shot import Body, FEMesh, FlexibleSettings, MassProperties
+
+
+@pytest.fixture
+def member(helpers, plastic):
+    points, tets = helpers.box((4, 2, 2), (0.2, 0.04, 0.04))
+    points = np.asarray(points) - [0.0, 0.02, 0.02]
+    mesh = FEMesh(0, points, tets, measure_quality(points, tets))
+    body = Body("/Arm/link", helpers.frame(0, 0, 0), None, flexible=FlexibleSettings(plastic))
+    frames = [
+        AttachmentFrame("/Arm/tip", helpers.frame(0.2, 0.0, 0.0), "interface"),
+        AttachmentFrame("/Arm/root", helpers.frame(0.0, 0.0, 0.0), "interface"),
+    ]
+    return Member(mesh, body, frames, 1)
+
+
+def alike(member):
+    """The same link elsewhere in a robot."""
+    frames = [replace(frame, path=f"/Other{frame.path}") for frame in member.attachments]
+    rest = replace(member.body.rest, position=member.body.rest.position + 1.0)
+    return Member(replace(member.mesh, body=5), replace(member.body, path="/Other/link", rest=rest), frames, 1)
+
+
+def with_flexible(member, **changes):
+    return replace(member, body=replace(member.body, flexible=replace(member.body.flexible, **changes)))
+
+
+def test_links_that_are_alike_have_one_model(member):
+    models = FullModels(keeps=True)
+    assert models.known(member) is None
+    assert models.of(member) is models.of(alike(member)) is models.known(member)
+
+
+def test_what_decides_a_model_tells_links_apart(member, helpers, plastic):
+    mesh, quality = member.mesh, member.mesh.quality
+    moved = replace(member.attachments[0], frame=helpers.frame(0.19, 0.0, 0.0))
+    others = [
+        replace(member, mesh=replace(mesh, points=mesh.points * 1.001)),
+        replace(member, mesh=replace(mesh, quality=replace(quality, stiffness_factor=0.9))),
+        replace(member, attachments=[moved, member.attachments[1]]),
+        replace(member, root=0),
+        with_flexible(member, interface_radius=0.01),
+        with_flexible(member, material=replace(plastic, youngs_modulus=1.1 * plastic.youngs_modulus)),
+        replace(member, body=replace(member.body, mass=MassProperties(0.4, np.zeros(3), np.eye(3)))),
+    ]
+    assert len({own.key for own in (member, *others)}) == 1 + len(others)
+
+
+def test_a_model_is_kept_until_the_last_link_has_it(member):
+    models, other = FullModels(keeps=False), with_flexible(member, interface_radius=0.01)
+    models.expect([member, alike(member), other])
+    first = models.of(member)
+    assert models.known(alike(member)) is first
+    assert models.of(alike(member)) is first and models.known(member) is None
+    models.of(other)
+    assert models.known(other) is None, "it has no other link"
+
+
+def test_no_more_are_kept_than_fit(member, monkeypatch):
+    models, other = FullModels(keeps=True), with_flexible(member, interface_radius=0.01)
+    monkeypatch.setattr(module, "_KEPT", models.of(member).entries)
+    models.of(other)
+    assert models.known(member) is not None and models.known(other) is None
+
+
+def test_threads_that_need_one_model_make_it_once(member, monkeypatch):
+    from calmotion.reduction import reduce
+
+    made, begun, own = [], threading.Event(), reduce.full_body
+
+    def slow(*args):
+        made.append(args)
+        begun.wait(30.0)
+        return own(*args)
+
+    monkeypatch.setattr(reduce, "full_body", slow)
+    models, found = FullModels(keeps=True), []
+    threads = [threading.Thread(target=lambda: found.append(models.of(alike(member)))) for _ in range(3)]
+    for thread in threads:
+        thread.start()
+    begun.set()
+    for thread in threads:
+        thread.join()
+    assert len(made) == 1 and found[0] is found[1] is found[2]
+
+
+def test_models_are_scaled_where_the_stiffness_alone_has_changed(member):
+    models = FullModels(keeps=True)
+    own = models.of(member)
+    softer = replace(member, mesh=replace(member.mesh, quality=replace(member.mesh.quality, stiffness_factor=0.8)))
+    scaled = models.scaled([(member, softer)]).known(softer)
+    fresh = FullModels(keeps=True).of(softer)
+    for found in (scaled, fresh):
+        stiffness = found.support.fixed(found.model).patch_stiffness()
+        np.testing.assert_allclose(
+            stiffness, 0.8 * own.support.fixed(own.model).patch_stiffness(), rtol=1e-9, atol=1e-6
+        )
+    assert models.scaled([(softer, member)]).known(member) is None
