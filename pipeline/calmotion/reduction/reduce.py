@@ -9,6 +9,7 @@ import numpy as np
 
 from calmotion.errors import ShotError
 from calmotion.reduction.basis.craig_bampton import Basis, reduced_basis
+from calmotion.reduction.basis.fixed_interface import FixedInterface
 from calmotion.reduction.basis.modal_derivatives import Support
 from calmotion.reduction.damping import damped
 from calmotion.reduction.elements.assembly import FEModel, QuadraticMesh, assemble
@@ -20,7 +21,7 @@ from calmotion.reduction.load_envelope import LoadEnvelope, patch_load_envelope
 from calmotion.reduction.reduced_body import Elasticity, Marker, ReducedBody
 from calmotion.reduction.scaled_stiffness import with_interface_stiffness
 from calmotion.shot.budget import REDUCTION
-from calmotion.shot.character import DEFAULT_TOLERANCE, Body, ElasticMaterial, SurfaceMesh
+from calmotion.shot.character import DEFAULT_TOLERANCE, Array, Body, ElasticMaterial, SurfaceMesh
 from calmotion.shot.meshes import FEMesh
 from calmotion.shot.result import Simplification
 
@@ -126,6 +127,12 @@ class FullBody:
         return FullBody(
             model, support.known(model, own.fixed(self.model).scaled(model, factor)), self.moving, self.rims
         )
+
+    def take(self, other: FullBody, turn: Array) -> None:
+        """Take the factors and normal modes of another body, which a turn makes this one; see `likeness`."""
+        own = self.support
+        like = other.support.fixed(other.model), turn
+        own.known(self.model, FixedInterface.of(self.model, own.root, own.patches, own.centers, like))
 
     @property
     def entries(self) -> int:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import nullcontext
 from dataclasses import replace
 from typing import TYPE_CHECKING, TypeVar
@@ -60,7 +60,12 @@ def reduce_bodies(
             )
 
     members = {index: full_model_of(character, mesh_of[index], anchors[index]) for index in flexible}
-    models = models_for(members.values()) if full is None and flexible else full
+    models = full
+    if flexible:
+        from calmotion.reduction.full_models import FullModels
+
+        models = models or FullModels(keeps=False)
+        models.expect(members.values())
 
     def reduced(index: int) -> ReducedBody:
         from calmotion.reduction.cache import cached_reduction
@@ -146,15 +151,6 @@ def _materials(character: Character) -> dict[int, ElasticMaterial]:
         for k, b in enumerate(character.bodies)
         if b.flexible is not None and b.simulated_flexible
     }
-
-
-def models_for(members: Iterable[Member]) -> FullModels:
-    """Full models that are kept until the last of some bodies that are alike is reduced."""
-    from calmotion.reduction.full_models import FullModels
-
-    models = FullModels(keeps=False)
-    models.expect(members)
-    return models
 
 
 def full_model_of(character: Character, mesh: FEMesh, anchors: BodyAnchors) -> Member:

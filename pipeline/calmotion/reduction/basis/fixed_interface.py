@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from calmotion.geometry.tetrahedra import Indices
-from calmotion.linear_algebra.sparse_solver import SparseSolver
+from calmotion.linear_algebra.sparse_solver import SparseSolver, turned
 from calmotion.reduction.basis.natural_modes import lowest_modes, vector_mass
 from calmotion.reduction.basis.residual_flexibility import residual_vectors
 from calmotion.reduction.basis.static_loads import ACCELERATIONS, UNIFORM, unit_accelerations
@@ -22,6 +22,7 @@ _DEPENDENT = 1e-12  # mass of a combination of columns of unit mass below which 
 _FEWEST = 4  # least number of fixed-interface modes: two bending pairs, or bending and twist of a plate
 _MOST = 8  # largest number when it is chosen automatically
 _CANDIDATES = 64  # largest number when the loads are known
+_GRID = 1.5  # ratio of squared frequencies up to which modes are computed, so that a softer body has them too
 _FREQUENCY_RATIO = 3.0  # of the highest mode to the first
 _COMPLIANCE_LEFT = 1e-3  # of the work of uniform accelerations that may be missing
 
@@ -48,6 +49,7 @@ class FixedInterface:
     mass: Any
     solver: SparseSolver
     constraint: Array
+    _like: Likeness | None = field(default=None, repr=False)
     _normal: dict[float, tuple[Array, Array]] = field(default_factory=dict, init=False, repr=False)
     _inertial: list[tuple[Array, Array]] = field(default_factory=list, init=False, repr=False)
     # links that are alike are reduced in several threads
@@ -55,9 +57,16 @@ class FixedInterface:
 
     @classmethod
     def of(
-        cls, model: FEModel, root: IntArray, patches: Sequence[IntArray], centers: Sequence[Array]
-    ) -> FixedInterface:
-        """Factorise the interior and solve for the constraint modes; arguments as of `reduced_basis`."""
+        cls, model: FEModel, root: IntArray, patches: Sequence[IntArray], centers: Sequence[Array],
+        like: tuple[FixedInterface, Array] | None = None,
+    ) -> FixedInterface:  # fmt: skip
+        """Factorise the interior and solve for the constraint modes.
+
+        Args:
+            model, root, patches, centers: As of `reduced_basis`.
+            like: A body with the same nodes, and the matrix that turns it to this one (see `SparseSolver.turned`): its
+                factors and modes are taken.
+        """
         nodes = model.mesh.nodes
         n = len(nodes)
         free = np.ones(n, dtype=bool)
@@ -67,7 +76,7 @@ class FixedInterface:
         interior = np.flatnonzero(np.repeat(free, 3))
         mass = vector_mass(model.mass)
         K, M = model.stiffness[interior][:, interior], mass[interior][:, interior]
-        solver = SparseSolver(K, nodes[free])
+        solver = SparseSolver(K, nodes[free]) if like is None else like[0].solver.turned(like[1])
         constraint = np.zeros((n, 3, 6 * len(patches)))
         for k, (patch, center) in enumerate(zip(patches, centers, strict=True)):
             constraint[patch, :, 6 * k : 6 * k + 6] = rigid_patch(nodes[patch], center)
@@ -75,7 +84,8 @@ class FixedInterface:
         if len(patches):
             # static response of the interior to a motion of the patches; the interior rows of `flat` were zero
             flat[interior] = -solver.solve((model.stiffness @ flat)[interior])
-        return cls(model, patches, interior, K, M, mass, solver, flat)
+        likeness = None if like is None else Likeness(*like)
+        return cls(model, patches, interior, K, M, mass, solver, flat, likeness)
 
     def scaled(self, model: FEModel, factor: float) -> FixedInterface:
         """The same with another stiffness, without a new factorisation.
@@ -84,8 +94,8 @@ class FixedInterface:
             model: The full model with its stiffness times the factor, and the same mass.
             factor: Positive.
         """
-        K, solver = factor * self.K, self.solver.scaled(factor)
-        return FixedInterface(model, self.patches, self.interior, K, self.M, self.mass, solver, self.constraint)
+        K, solver, like = factor * self.K, self.solver.scaled(factor), Likeness(self, factor=factor)
+        return FixedInterface(model, self.patches, self.interior, K, self.M, self.mass, solver, self.constraint, like)
 
     def lowest(self, count: int) -> Array:
         """Constraint modes and enough normal modes for `count` accurate modes of the body, shape [3n, 6p + k]."""
@@ -116,13 +126,22 @@ class FixedInterface:
         Args:
             peaks: Of the twelve unit accelerations, shape [12]; those of peak zero are omitted.
         """
-        with self._lock:
-            if limit not in self._normal:  # kept for other loads on the same body
-                below, least = (2.0 * 2.0 * np.pi * limit) ** 2, min(_MOST, len(self.interior))
-                found = lowest_modes(self.K, self.M, least, solver=self.solver, below=below, most=_CANDIDATES)
-                self._normal[limit] = found
-        values, vectors = self._normal[limit]
+        values, vectors = self._up_to((2.0 * 2.0 * np.pi * limit) ** 2)
         return self._columns(vectors, self._residual(values, vectors, peaks, 0.0))
+
+    def _up_to(self, below: float) -> tuple[Array, Array]:
+        """Normal modes up to a squared frequency [1/s^2] and one above, some at least; kept for other loads."""
+        if self._like is not None:
+            return self._like.modes(below)
+        bound = _GRID ** np.ceil(np.log(below) / np.log(_GRID)) if below > 0.0 else 0.0
+        least = min(_MOST, len(self.interior))
+        with self._lock:
+            if bound not in self._normal:
+                found = lowest_modes(self.K, self.M, least, solver=self.solver, below=bound, most=_CANDIDATES)
+                self._normal[bound] = found
+        values, vectors = self._normal[bound]
+        count = max(least, int(np.count_nonzero(values <= below)) + 1)
+        return values[:count], vectors[:, :count]
 
     def balance(self, force: Array, imposed: Array) -> tuple[Array, Array]:
         """Static equilibrium under forces, with displacements imposed on the patches besides their rigid motions.
@@ -218,6 +237,26 @@ class FixedInterface:
         below = int(np.count_nonzero(values <= _FREQUENCY_RATIO**2 * first))
         count = max(below, _FEWEST, int(enough[0]) + 1 if len(enough) else len(values))
         return min(count, len(values))
+
+
+@dataclass(frozen=True, eq=False)
+class Likeness:
+    """That a body is another one, turned, or with another stiffness.
+
+    Attributes:
+        other: The other one.
+        turn: Orthogonal matrix that takes its displacements to those of the body, shape [3, 3]; None: they are equal.
+        factor: Of its stiffness.
+    """
+
+    other: FixedInterface
+    turn: Array | None = None
+    factor: float = 1.0
+
+    def modes(self, below: float) -> tuple[Array, Array]:
+        """As of the body, from those of the other one."""
+        values, vectors = self.other._up_to(below / self.factor)
+        return self.factor * values, vectors if self.turn is None else turned(vectors, self.turn)
 
 
 def frequency_limit(settings: FlexibleSettings, excited: float) -> float:
