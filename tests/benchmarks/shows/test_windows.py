@@ -2,7 +2,8 @@
 
 import numpy as np
 import pytest
-from calmotion.benchmarks.shows.windows import LongRun, apart, exponent, performance, table, write_performance
+from calmotion.benchmarks.shows.profiles import TargetErrors
+from calmotion.benchmarks.shows.windows import LongRun, exponent, performance, table, write_performance
 from calmotion.workflow.shot import Shot
 from one_hinge import HINGE, ONE_HINGE
 
@@ -31,21 +32,12 @@ def test_a_performance_is_a_shot_of_its_length(shot, tmp_path):
 
 
 def run(seconds, search):
-    return LongRun(seconds, 1, search, search, search, search, 0.5, 60.0, 1.0, 0.5, True, "converged")
+    errors = TargetErrors("/T/Elbow", 20.0, 1.0, 0.4, 0.5), TargetErrors("/T/Cup", 60.0, 0.9, 0.7, 0.3)
+    return LongRun(seconds, 1, search, search, search, search, 0.5, errors, True, "converged")
 
 
 def test_growth_and_tables():
     runs = [run(10.0, 2.0), run(100.0, 20.0)]
     assert exponent(runs) == pytest.approx(1.0) and np.isnan(exponent(runs[:1]))
-    assert "| 100 s | 1 | 20.0 s | 20.0 s | 20.0 s | 20.0 s | 0.50 GB | 60.0 mm | 1.00 mm | 0.50 mm | kept |" in table(
-        runs
-    )
-
-
-def test_tables_of_two_runs_are_compared_at_the_same_times(tmp_path):
-    head = "time_s,/T.x,/T.y,/T.z,/T.error,/T.rotation_error\n"
-    (tmp_path / "a.csv").write_text(head + "-0.1,9,9,9,9,0\n0,0,0,0,0.1,0\n0.1,0.003,0,0,0.2,0\n")
-    (tmp_path / "b.csv").write_text(head + "0,0,0,0,0.1,0\n0.05,0,0,0,0.1,0\n0.1,0,0.004,0,0.1,0\n")
-    found = apart(tmp_path / "a.csv", tmp_path / "b.csv")
-    assert (found.distance_m, found.profile_m, found.profile_s) == pytest.approx((0.005, 0.1, 0.1))
-    assert found.profile_rms_m == pytest.approx(np.sqrt(0.01 / 2))
+    row = "| 100 s | 1 | 20.0 s | 20.0 s | 20.0 s | 20.0 s | 0.50 GB | 20.0 mm | 1.00 mm | 0.50 mm | Elbow | kept |"
+    assert row in table(runs)

@@ -14,7 +14,6 @@ Processor times are those to look at where others use the machine.
 
 from __future__ import annotations
 
-import csv
 import json
 import os
 import resource
@@ -22,7 +21,7 @@ import subprocess  # nosec B404  # runs this program
 import sys
 import tempfile
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -30,6 +29,7 @@ import numpy as np
 
 from calmotion.benchmarks.common.parsers import bench_parser, output_options
 from calmotion.benchmarks.common.tables import markdown
+from calmotion.benchmarks.shows.profiles import TargetErrors, apart, errors_table, target_errors
 from calmotion.errors import ShotError
 from calmotion.shot.character import Array
 from calmotion.shot.curves import held_curve
@@ -50,8 +50,7 @@ class LongRun:
         search_s, total_s: Time of the search, and of the whole run [s].
         search_processor_s, processor_s: Processor time of both [s].
         memory_gb: Most that its process had [GB].
-        before_mm, after_mm: Largest error of a target.
-        rms_mm: Root mean square of the error after, of the target with the largest one.
+        targets: Their errors.
         kept: Whether the simulation keeps the tolerance.
         stopped: Why the search ended: `converged`, or what ended it before.
     """
@@ -63,11 +62,14 @@ class LongRun:
     search_processor_s: float
     processor_s: float
     memory_gb: float
-    before_mm: float
-    after_mm: float
-    rms_mm: float
+    targets: tuple[TargetErrors, ...]
     kept: bool
     stopped: str
+
+    @property
+    def worst(self) -> TargetErrors:
+        """The target with the largest error after."""
+        return max(self.targets, key=lambda target: target.after_mm)
 
 
 def performance(shot: Shot, seconds: float, seed: int = SEED) -> dict[str, Array]:
@@ -137,15 +139,13 @@ def optimized(root: Path, motion: Path, options: Sequence[str], folder: Path, na
     return report
 
 
-def run_of(seconds: float, report: dict[str, Any]) -> LongRun:
-    """What is measured of a run."""
-    worst = max(report["targets"], key=lambda row: float(row["max_error_after_m"]))
+def run_of(seconds: float, report: dict[str, Any], csv_file: Path) -> LongRun:
+    """What is measured of a run, by its report and the table that it wrote."""
     return LongRun(
         seconds, max(1, len(report["windows"])), report["wall_s"], report["total_wall_s"],
         report["processor_s"], report["total_processor_s"],
         report["peak_memory_gb"] or float("nan"),
-        1e3 * max(row["max_error_before_m"] for row in report["targets"]), 1e3 * worst["max_error_after_m"],
-        1e3 * worst["rms_error_after_m"], report["tolerance_kept"], report["stopped"],
+        target_errors(report, csv_file), report["tolerance_kept"], report["stopped"],
     )  # fmt: skip
 
 
@@ -159,62 +159,24 @@ def exponent(runs: Sequence[LongRun]) -> float:
 
 
 def table(runs: Sequence[LongRun]) -> str:
-    """The runs as Markdown."""
+    """The runs as Markdown, with the target that is farthest off."""
     heads = ["length", "windows", "search", "its processor time", "whole run", "processor time", "memory"]
-    heads += ["error before", "after", "rms after", "tolerance"]
+    heads += ["error before", "after", "rms after", "target", "tolerance"]
     rows = [
         [
             f"{run.seconds:g} s", str(run.windows), f"{run.search_s:.1f} s", f"{run.search_processor_s:.1f} s",
-            f"{run.total_s:.1f} s", f"{run.processor_s:.1f} s",
-            f"{run.memory_gb:.2f} GB", f"{run.before_mm:.1f} mm", f"{run.after_mm:.2f} mm", f"{run.rms_mm:.2f} mm",
-            "kept" if run.kept else "missed",
+            f"{run.total_s:.1f} s", f"{run.processor_s:.1f} s", f"{run.memory_gb:.2f} GB",
+            f"{run.worst.before_mm:.1f} mm", f"{run.worst.after_mm:.2f} mm", f"{run.worst.rms_mm:.2f} mm",
+            run.worst.path.rpartition("/")[2], "kept" if run.kept else "missed",
         ]
         for run in runs
     ]  # fmt: skip
     return markdown(heads, rows)
 
 
-@dataclass(frozen=True)
-class Apart:
-    """How far two results of the same performance are from each other.
-
-    Attributes:
-        distance_m: Largest distance between a target in the one and in the other [m].
-        profile_m: Largest difference of the errors of a target [m].
-        profile_s: When that is [s].
-        profile_rms_m: Root mean square of the difference, of the target with the largest one [m].
-    """
-
-    distance_m: float
-    profile_m: float
-    profile_s: float
-    profile_rms_m: float
-
-
-def apart(one: Path, two: Path) -> Apart:
-    """How far two tables are from each other; their steps may differ."""
-    first, second = _columns(one), _columns(two)
-    at = first["time_s"][first["time_s"] >= -1e-9]
-    distance, found = 0.0, Apart(0.0, 0.0, 0.0, 0.0)
-    for name in (name for name in first if name.endswith(".error") and not name.endswith("rotation_error")):
-        parts = [f"{name.removesuffix('.error')}{axis}" for axis in (".x", ".y", ".z")]
-        gaps = [_at(first, part, at) - _at(second, part, at) for part in parts]
-        distance = max(distance, float(np.linalg.norm(gaps, axis=0).max()))
-        profile = np.abs(_at(first, name, at) - _at(second, name, at))
-        k, rms = int(np.argmax(profile)), float(np.sqrt(np.mean(profile**2)))
-        found = max(found, Apart(0.0, float(profile[k]), float(at[k]), rms), key=lambda part: part.profile_m)
-    return replace(found, distance_m=distance)
-
-
-def _at(columns: dict[str, Array], name: str, times: Array) -> Array:
-    return np.interp(times, columns["time_s"], columns[name])
-
-
-def _columns(path: Path) -> dict[str, Array]:
-    with open(path, encoding="utf-8", newline="") as file:
-        rows = list(csv.reader(file))
-    values = np.array(rows[1:], float)
-    return {name: values[:, k] for k, name in enumerate(rows[0])}
+def longest_of(runs: Sequence[LongRun]) -> LongRun:
+    """The run of the longest performance."""
+    return max(runs, key=lambda run: run.seconds)
 
 
 def main(arguments: Sequence[str]) -> int:
@@ -232,46 +194,45 @@ def main(arguments: Sequence[str]) -> int:
     options = [f"--tolerance={args.tolerance}", *(f"--set={text}" for text in args.set)]
     windows = [] if args.window is None else [f"--window={args.window}"]
     shot = Shot(args.shot).read()
-    compared: dict[str, Any] | None = None
+    single, compared, gap = None, [], None
     with tempfile.TemporaryDirectory() as temporary:
-        folder, runs = Path(temporary), []
-        for seconds in args.seconds:
+        folder = Path(temporary)
+
+        def measured(seconds: float, name: str, own: Sequence[str]) -> LongRun:
             files = write_performance(shot, seconds, folder)
-            runs.append(run_of(seconds, optimized(*files, [*options, *windows], folder, f"windows_{seconds:g}")))
-        single = None
+            report = optimized(*files, [*options, *own], folder, name)
+            return run_of(seconds, report, folder / f"{name}.csv")
+
+        runs = [measured(seconds, f"windows_{seconds:g}", windows) for seconds in args.seconds]
+        longest = longest_of(runs)
         if args.single:
-            length = max(args.seconds) / max(1, runs[int(np.argmax(args.seconds))].windows)
-            files = write_performance(shot, length, folder)
-            single = run_of(length, optimized(*files, [*options, "--window=0"], folder, "single"))
+            single = measured(longest.seconds / longest.windows, "single", ["--window=0"])
         if args.compare:
-            files = write_performance(shot, args.compare, folder)
-            both = [[*options, *windows], [*options, "--window=0"]]
-            reports = [optimized(*files, o, folder, f"compare_{k}") for k, o in enumerate(both)]
-            gap = apart(folder / "compare_0.csv", folder / "compare_1.csv")
-            own = [asdict(run_of(args.compare, report)) for report in reports]
-            compared = {"windows": own[0], "one_search": own[1], **asdict(gap)}
-    found: dict[str, Any] = {"runs": [asdict(run) for run in runs], "exponent": exponent(runs), "compared": compared}
-    found["single"] = asdict(single) if single else None
+            compared = [measured(args.compare, *one) for one in (("parts", windows), ("whole", ["--window=0"]))]
+            gap = apart(folder / "parts.csv", folder / "whole.csv")
     if args.json:
-        print(json.dumps(found))
+        found: dict[str, Any] = {"runs": [asdict(run) for run in runs], "exponent": exponent(runs)}
+        found["single"] = asdict(single) if single else None
+        pair = dict(zip(("windows", "one_search"), map(asdict, compared), strict=True)) if gap else {}
+        print(json.dumps(found | {"compared": pair | asdict(gap) if gap else None}))
         return 0
     print(table(runs), f"time of the search grows with length to the power {exponent(runs):.2f}", sep="")
+    print(f"errors over {longest.seconds:g} s:", errors_table(longest.targets), sep="\n", end="")
     if single:
-        longest = max(runs, key=lambda run: run.seconds)
         ratio = longest.search_processor_s / (longest.windows * single.search_processor_s)
         print(
             f"one search over {single.seconds:.3g} s takes {single.search_processor_s:.1f} s of processor time; "
             f"{longest.seconds:g} s in {longest.windows} windows take {ratio:.2f} times as much as all of them alone"
         )
-    if compared:
-        print(table([LongRun(**compared["windows"]), LongRun(**compared["one_search"])]), end="")
+    if gap:
+        print(table(compared), end="")
         print(
-            f"{args.compare:g} s in windows and in one search: targets are up to {1e3 * compared['distance_m']:.3f} mm "
-            f"apart, their errors differ by up to {1e3 * compared['profile_m']:.3f} mm (at "
-            f"{compared['profile_s']:.2f} s), by {1e3 * compared['profile_rms_m']:.3f} mm rms; searches of "
-            f"{compared['windows']['search_s']:.1f} s and {compared['one_search']['search_s']:.1f} s"
+            f"{args.compare:g} s in windows and in one search: targets are up to {1e3 * gap.distance_m:.3f} mm apart, "
+            f"their errors differ by up to {1e3 * gap.profile_m:.3f} mm (at {gap.profile_s:.2f} s), by "
+            f"{1e3 * gap.profile_rms_m:.3f} mm rms; searches of {compared[0].search_s:.1f} s and "
+            f"{compared[1].search_s:.1f} s"
         )
-        for name, row in (("in windows", "windows"), ("over all", "one_search")):
-            if (stopped := compared[row]["stopped"]) != "converged":
-                print(f"the search {name} did not end by itself ({stopped}): the comparison says little")
+        for name, run in zip(("in windows", "over all"), compared, strict=True):
+            if run.stopped != "converged":
+                print(f"the search {name} did not end by itself ({run.stopped}): the comparison says little")
     return 0
