@@ -9,6 +9,7 @@ import numpy as np
 from calmotion.retargeting.problem.problem import RetargetProblem
 from calmotion.retargeting.solver.dense_preconditioner import DensePreconditioner
 from calmotion.retargeting.solver.gauss_newton import Search
+from calmotion.retargeting.solver.preconditioner import BandedPreconditioner
 from calmotion.retargeting.solver.recycling import Recycled
 from calmotion.shot.character import Array, IntArray
 
@@ -26,13 +27,13 @@ class SearchMemory:
     breaks: IntArray
     motors: IntArray
     recycled: Recycled
-    sharpened: tuple[DensePreconditioner, Array] | None
+    sharpened: tuple[BandedPreconditioner | DensePreconditioner, Array] | None
 
     @classmethod
     def of(cls, problem: RetargetProblem, search: Search) -> SearchMemory:
         """What the search of a problem leaves."""
         space, own = problem.space, problem.preconditioner
-        sharpened = (own, problem.sharpened_at) if isinstance(own, DensePreconditioner) else None
+        sharpened = (own, problem.sharpened_at) if own is not None and len(problem.sharpened_at) else None
         return cls(space.basis.breaks, space.motors, search.recycled, sharpened)
 
     def begun(self, problem: RetargetProblem, search: Search) -> Search:

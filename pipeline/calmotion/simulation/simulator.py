@@ -162,28 +162,30 @@ class Simulator:
         return self._linearization is not None and self._monodromy is None and can_be_blocked(self._linearization)
 
     def responses(
-        self, values: Array, rates: Array, coupling: Array, component: IntArray, jacobian: Array
+        self, values: Array, rates: Array, begin: int, coupling: Array, component: IntArray, jacobian: Array
     ) -> tuple[int, Array]:
         """Changes of quantities by many curves at once.
 
         Args:
-            values, rates: Curves, shape [T, F].
+            values, rates: Curves over n instants, before which they are zero, shape [n, F].
+            begin: The first of these instants; from 1 on the curves are still zero there.
             coupling: Of each motor with each of m unknowns, shape [M, m]: each curve is tried with each of these.
             component, jacobian: The quantities, as of `block_tangent`.
 
         Returns:
-            The first instant at which anything changes, and the changes from there on, shape [T - first, r, F m].
+            The first instant at which anything changes, and the changes from there to the last of these instants, shape
+            [begin + n - first, r, F m].
         """
         assert self._linearization is not None
         columns = [self._joint_columns(*curve, coupling) for curve in zip(values.T, rates.T, strict=True)]
         angles, speeds = (np.concatenate([column[k] for column in columns], axis=2) for k in (0, 1))
         acts = np.any(angles, axis=(1, 2)) | np.any(speeds, axis=(1, 2))
-        first = max(self._linearization.windows()[0][0], int(np.argmax(acts)))
-        found = block_tangent(self._linearization, first, angles[first:], speeds[first:], component, jacobian)
-        return first, found
+        first = max(self._linearization.windows()[0][0], begin + int(np.argmax(acts)))
+        given = angles[first - begin :], speeds[first - begin :]
+        return first, block_tangent(self._linearization, first, *given, component, jacobian)
 
     def _joint_columns(self, values: Array, rates: Array, coupling: Array) -> tuple[Array, Array]:
-        """What the joints follow by one curve of shape [T] with each unknown, shape [T, J, m]."""
+        """What the joints follow by one curve of shape [n] with each unknown, shape [n, J, m]."""
         motors = np.ones((1, len(coupling)))
         late = CommandDelay(self.model.delays, self.h, False).apply(values[:, None] * motors, rates[:, None] * motors)
         angles, speeds = (self.model.joint_angles(part[:, None] * coupling.T) for part in late)

@@ -213,7 +213,7 @@ def test_derivatives_over_a_landing_agree_with_differences(tmp_path, edit):
     forwards = np.sum(weights * motion) + np.sum(by_effort * efforts)
     assert np.sum(by_value * values) + np.sum(by_rate * speeds) == pytest.approx(forwards, rel=1e-11)
     one, row = np.eye(angles.shape[1]), np.ascontiguousarray(jacobian[:, :, 2])
-    first, block = simulator.responses(values[:, :1], speeds[:, :1], one, model.targets.component, row)
+    first, block = simulator.responses(values[:, :1], speeds[:, :1], 0, one, model.targets.component, row)
     single, _ = simulator.tangent(values[:, :1] * one[2], speeds[:, :1] * one[2], False)
     expected = np.einsum("tka,tka->tk", row, single[:, model.targets.component])
     np.testing.assert_allclose(block[:, :, 2], expected[first:], atol=1e-10 * np.abs(expected).max())

@@ -4,7 +4,15 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from calmotion.retargeting.problem.response_gram import LARGE, LEAST, products_worth, response_gram
+from calmotion.retargeting.problem import response_gram as module
+from calmotion.retargeting.problem.response_gram import (
+    LARGE,
+    LEAST,
+    products_worth,
+    response_bands,
+    response_gram,
+)
+from calmotion.retargeting.solver.preconditioner import BandedPreconditioner
 from calmotion.retargeting.solver.truncated_cg import conjugate_gradients
 from posed import looped, make_problem
 
@@ -69,3 +77,51 @@ def test_no_matrix_where_responses_cannot_be_worked_out_together(arm, bodies, an
     cyclic.value(np.zeros(cyclic.size))
     cyclic.linearize()
     assert products_worth(cyclic.robots, cyclic.space) is None
+
+
+def whole_of(bands):
+    """The symmetric matrix of lower bands."""
+    size = bands.shape[1]
+    lower = sum(np.diag(band[: size - d], -d) for d, band in enumerate(bands))
+    return lower + np.tril(lower, -1).T
+
+
+def test_bands_of_responses_that_are_followed_to_the_end_are_the_whole_matrix(problem):
+    gram = response_gram(problem.robots, problem.space)
+    bands = response_bands(problem.robots, problem.space, len(problem.residuals))
+    assert len(bands) == problem.size
+    assert np.abs(whole_of(bands) - gram).max() < 1e-12 * np.abs(gram).max()
+
+
+def test_cut_responses_have_few_bands_and_a_matrix_that_is_as_definite(problem, monkeypatch):
+    monkeypatch.setattr(module, "_BLOCK", 2 * len(problem.space.motors))  # several blocks
+    gram, lasting = response_gram(problem.robots, problem.space), len(problem.residuals) // 8
+    bands = response_bands(problem.robots, problem.space, lasting)
+    assert len(bands) < problem.size
+    cut = whole_of(bands)
+    values = np.linalg.eigvalsh(cut)
+    assert values[0] > -1e-9 * values[-1]
+    # responses that are cut by the end of the shot are whole in both
+    values = problem.space.basis.values.tocsc()
+    ends = values.indices[values.indptr[1:] - 1] + 1 + lasting
+    late = np.repeat(ends >= values.shape[0], len(problem.space.motors))
+    assert np.any(late) and not np.all(late)
+    assert np.abs((cut - gram)[np.ix_(late, late)]).max() < 1e-9 * np.abs(gram).max()
+
+
+def test_a_search_with_too_many_unknowns_for_the_whole_matrix_takes_the_bands(problem, monkeypatch):
+    free = np.zeros(problem.size, bool)
+    gradient = problem.gradient()
+
+    def products():
+        path = conjugate_gradients(problem.product, gradient, problem.precondition(free), np.inf, 1e-6, 0.0, 60)
+        return len(path.p)
+
+    before = products()
+    monkeypatch.setattr(module, "_LARGEST", problem.size - 1)
+    monkeypatch.setattr(module, "LASTING", 0.45 * problem.grid.end)
+    assert problem.patience == 0
+    problem.sharpen()
+    assert isinstance(problem.preconditioner, BandedPreconditioner) and products() < before
+    monkeypatch.setattr(module, "LASTING", 0.6 * problem.grid.end)
+    assert products_worth(problem.robots, problem.space) is None

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from calmotion.multibody.analysis.rigid_response import RigidResponse
 from calmotion.retargeting.problem.offset_basis import make_basis
-from calmotion.retargeting.solver.preconditioner import BandedGram, RigidPreconditioner
+from calmotion.retargeting.solver.preconditioner import BandedGram, rigid_preconditioner
 from calmotion.simulation.inputs.time_grid import make_grid
 
 FRAMES = np.arange(37) / 24.0
@@ -44,7 +44,7 @@ def test_bands_contain_the_sum_over_instants(parts):
 def test_preconditioner_inverts_the_rigid_gauss_newton_matrix(parts):
     basis, response, weights = parts
     penalty = 1e-6 * basis.curvature_gram + 1e-4 * basis.closeness
-    pre = RigidPreconditioner(response, weights, basis, penalty)
+    pre = rigid_preconditioner(response, weights, basis, penalty)
     J = response.targets * weights[..., None]
     H = dense(basis.values, np.einsum("nkia,nkib->nab", J, J)) + np.kron(penalty.toarray(), np.eye(3))
     more = np.einsum("nab,ncb->nac", response.inertia, response.inertia)

@@ -250,13 +250,13 @@ def block_tangent(
     Args:
         lin: See `can_be_blocked`.
         first: Instant before which nothing changes; the linearisation begins there or earlier.
-        d_angle, d_rate: Changes of angle [rad] (or length [m]) and rate of each joint's motor from that instant on,
-            shape [T - first, J, Q].
+        d_angle, d_rate: Changes of angle [rad] (or length [m]) and rate of each joint's motor at the n instants from
+            that one on, shape [n, J, Q].
         component: On whose coordinates each quantity depends, shape [r].
         jacobian: Derivatives of the quantities by (R^T c, phi, u) of their component, shape [T, r, N].
 
     Returns:
-        Shape [T - first, r, Q].
+        Shape [n, r, Q].
     """
     system, count = lin.system, d_angle.shape[2]
     bodies, size, joints = len(system.parent), system.size, len(system.rows)
@@ -275,6 +275,8 @@ def block_tangent(
         single=allocate_sweep(system),
     )
     out = np.empty((len(d_angle), len(component), count))
+    end = first + len(d_angle)
     for held, window in parts_of(lin, *lin.windows()[0], False):
+        window = window._replace(last=min(window.last, end))
         _block_tangent(held, window, first, d_angle, d_rate, component, jacobian, scratch, out)
     return out

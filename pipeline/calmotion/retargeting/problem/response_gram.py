@@ -3,6 +3,9 @@
 The rigid robot's matrix knows neither the vibration that an offset leaves nor what it does where many motors move few
 targets; there a system takes a hundred products. The responses to all unknowns, many at once, cost as much as some
 twenty products, and their matrix serves for many iterations: it hardly changes with the curves.
+
+Of a long shot the matrix of all unknowns with all others would be too large. What an unknown changes dies away, so its
+response is followed for some seconds alone, and the matrix of these has a band of entries.
 """
 
 from __future__ import annotations
@@ -20,10 +23,14 @@ from calmotion.retargeting.problem.robot import Robot
 from calmotion.shot.character import Array, BoolArray, IntArray
 
 COST = 1 / 64  # of a response, in products: half of the instants, at a sixteenth of the time of a sweep
+OF_PART = 1 / 22  # the same of one that is followed for a part of the shot, over that part
+LASTING = 8.0  # for which responses of long shots are followed [s]: over 40 s, 14 products; with 4 s more than 60
 LEAST = 24  # products: the matrix is not made for less; few robots need its kernels, which take seconds to compile
 LARGE = 800  # unknowns from which the kernels are worth their compiling; of all samples, first systems need 15 or more
 _BLOCK = 64  # responses at once
-_LARGEST = 6000  # unknowns: the factor takes seconds
+_TOGETHER = 8  # blocks that are worked out before their products
+_LARGEST = 6000  # unknowns up to which responses are followed to the end: the factor takes seconds
+_OPERATIONS = 7e10  # of the factor of a matrix with bands: as many as with the most unknowns without
 _SHARE = 0.5  # of the memory for a linearisation
 
 
@@ -34,15 +41,25 @@ def products_worth(robots: Sequence[Robot], space: OffsetSpace, first: bool = Fa
         first: Whether there is none yet. Many unknowns then need it before the first product, unless it costs more than
             the products that would be tried.
     """
-    if space.size > _LARGEST or not all(robot.simulator.can_be_blocked() for robot in robots):
+    if not all(robot.simulator.can_be_blocked() for robot in robots):
         return None
+    if is_whole(robots, space):
+        cost = COST * space.size
+        return 0 if first and space.size >= LARGE and cost <= LEAST else max(LEAST, round(cost))
+    instants, lasting = len(robots[0].residuals), _lasting(robots[0])
+    bands = _bandwidth(space, lasting)
+    slow = space.size * bands**2 > _OPERATIONS
+    if 2 * lasting > instants or slow or 24.0 * space.size * bands > _SHARE * spare_memory():
+        return None
+    # without it each system of a long shot takes as many products as it may
+    return 0 if first else max(LEAST, round(OF_PART * space.size * lasting / instants))
+
+
+def is_whole(robots: Sequence[Robot], space: OffsetSpace) -> bool:
+    """Whether the matrix may hold the entries of all unknowns with all others."""
     # robots follow one after the other: the responses of one are in memory at a time
     rows = len(robots[0].residuals) * np.count_nonzero(_varying(robots[0]))
-    if 8.0 * space.size * (rows + 3 * space.size) > _SHARE * spare_memory():
-        return None
-    if first and space.size >= LARGE and COST * space.size <= LEAST:
-        return 0
-    return max(LEAST, round(COST * space.size))
+    return space.size <= _LARGEST and 8.0 * space.size * (rows + 3 * space.size) <= _SHARE * spare_memory()
 
 
 def response_gram(robots: Sequence[Robot], space: OffsetSpace) -> Array:
@@ -58,6 +75,49 @@ def response_gram(robots: Sequence[Robot], space: OffsetSpace) -> Array:
     return gram
 
 
+def response_bands(robots: Sequence[Robot], space: OffsetSpace, lasting: int | None = None) -> Array:
+    """The same where each response ends some time after its unknown has acted, as lower bands, shape [bands, n].
+
+    It is as definite as the whole matrix, since it is that of changes, although these are cut.
+
+    Args:
+        robots, space: As of `response_gram`.
+        lasting: Instants for which responses are followed; None: for `LASTING`.
+    """
+    lasting = lasting or _lasting(robots[0])
+    bands = np.zeros((_bandwidth(space, lasting), space.size))
+    for robot in robots:
+        _add_bands(bands, robot, space, lasting)
+    return bands
+
+
+def _lasting(robot: Robot) -> int:
+    """Instants for which responses of long shots are followed."""
+    return round(LASTING / robot.simulator.h)
+
+
+def _spans(space: OffsetSpace, lasting: int) -> tuple[IntArray, IntArray]:
+    """First instant at which each function acts, and the one after the last to which its response is followed."""
+    values = space.basis.values.tocsc()
+    starts, last = values.indices[values.indptr[:-1]], values.indices[values.indptr[1:] - 1]
+    return starts, np.minimum(last + 1 + lasting, values.shape[0])
+
+
+def _bandwidth(space: OffsetSpace, lasting: int) -> int:
+    """Number of bands of the unknowns whose responses overlap; those of a block end together."""
+    starts, ends = _spans(space, lasting)
+    step = _step(space)
+    apart = 0
+    for k in range(0, len(starts), step):
+        apart = max(apart, int(np.searchsorted(starts, ends[k : k + step].max())) - k)
+    return min(apart, len(starts)) * len(space.motors)
+
+
+def _step(space: OffsetSpace) -> int:
+    """Functions of a block."""
+    return max(1, _BLOCK // max(len(space.motors), 1))
+
+
 @dataclass(frozen=True, eq=False)
 class _Responses:
     """Changes of the weighted residuals that are not always zero, by some unknowns.
@@ -65,17 +125,23 @@ class _Responses:
     Attributes:
         unknowns: Which.
         first: Instant before which nothing changes.
-        changes: Shape [T, r, unknowns], of single precision: the matrix of products of rounded responses is as definite
-            as any, and near enough for a preconditioner.
+        changes: From there on, shape [n, r, unknowns], of single precision: the matrix of products of rounded responses
+            is as definite as any, and near enough for a preconditioner.
     """
 
     unknowns: slice
     first: int
     changes: NDArray[np.float32]
 
-    def since(self, instant: int) -> Array:
-        """The changes from an instant on, shape [n, unknowns]."""
-        return self.changes[instant:].reshape(-1, self.changes.shape[2]).astype(float)
+    @property
+    def end(self) -> int:
+        """The instant after the last at which the changes are known."""
+        return self.first + len(self.changes)
+
+    def between(self, begin: int, end: int) -> Array:
+        """The changes from an instant to before another one, shape [(end - begin) r, unknowns]; none before `first`."""
+        part = self.changes[begin - self.first : max(begin, end) - self.first]
+        return part.reshape(-1, self.changes.shape[2]).astype(float)
 
 
 def _responses(robot: Robot, space: OffsetSpace) -> list[_Responses]:
@@ -83,7 +149,7 @@ def _responses(robot: Robot, space: OffsetSpace) -> list[_Responses]:
     component, jacobian = _rows(robot)
     motors, basis = len(space.motors), space.basis
     values, rates = basis.values.tocsc(), basis.rates.tocsc()
-    step = max(1, _BLOCK // max(motors, 1))
+    step = _step(space)
     # of zeros that nobody writes, before the first instant of a block, the system holds no memory: half of all
     rows = jacobian.shape[:2]
     held = np.zeros((-(-basis.count // step), rows[0] * rows[1] * step * motors), np.float32)
@@ -91,9 +157,9 @@ def _responses(robot: Robot, space: OffsetSpace) -> list[_Responses]:
     def made(k: int) -> _Responses:
         start, stop = k * step, min((k + 1) * step, basis.count)
         curves = values[:, start:stop].toarray(), rates[:, start:stop].toarray()
-        first, found = robot.simulator.responses(*curves, space.coupling, component, jacobian)
-        changes = held[k, : rows[0] * rows[1] * found.shape[2]].reshape(*rows, -1)
-        changes[first:] = found
+        first, found = robot.simulator.responses(*curves, 0, space.coupling, component, jacobian)
+        changes = held[k, : rows[0] * rows[1] * found.shape[2]].reshape(*rows, -1)[first:]
+        changes[:] = found
         return _Responses(slice(start * motors, stop * motors), first, changes)
 
     return in_parallel(made, range(len(held)))
@@ -104,15 +170,48 @@ def _add_products(gram: Array, blocks: Sequence[_Responses]) -> None:
 
     def add(k: int) -> None:
         one = blocks[k]
-        own = one.since(one.first)
         for other in blocks[: k + 1]:
-            others = other.since(max(one.first, other.first))
-            product = own[len(own) - len(others) :].T @ others
+            both = max(one.first, other.first), one.end
+            product = one.between(*both).T @ other.between(*both)
             gram[one.unknowns, other.unknowns] += product
             if other is not one:
                 gram[other.unknowns, one.unknowns] += product.T
 
     in_parallel(add, range(len(blocks)))
+
+
+def _add_bands(bands: Array, robot: Robot, space: OffsetSpace, lasting: int) -> None:
+    """Add the products of responses that are followed for a time with each other to lower bands.
+
+    A few blocks are worked on at once, and blocks that have ended are forgotten: memory does not grow with the shot.
+    """
+    component, jacobian = _rows(robot)
+    motors, basis, step = len(space.motors), space.basis, _step(space)
+    values, rates = basis.values.tocsc(), basis.rates.tocsc()
+    starts, ends = _spans(space, lasting)
+
+    def made(start: int) -> _Responses:
+        stop = min(start + step, basis.count)
+        begin, end = max(0, int(starts[start:stop].min()) - 1), int(ends[start:stop].max())
+        curves = [part[:, start:stop][begin:end].toarray() for part in (values, rates)]
+        first, found = robot.simulator.responses(*curves, begin, space.coupling, component, jacobian)
+        return _Responses(slice(start * motors, stop * motors), first, found.astype(np.float32))
+
+    def add(pair: tuple[_Responses, _Responses]) -> None:
+        earlier, later = pair
+        begin, end = max(earlier.first, later.first), min(earlier.end, later.end)
+        product = later.between(begin, end).T @ earlier.between(begin, end)
+        rows, columns = (np.arange(part.unknowns.start, part.unknowns.stop) for part in (later, earlier))
+        apart, at = np.broadcast_arrays(rows[:, None] - columns, columns)
+        lower = (apart >= 0) & (apart < len(bands))  # beyond, a response ends before the other begins
+        bands[apart[lower], at[lower]] += product[lower]
+
+    active: list[_Responses] = []
+    blocks = range(0, basis.count, step)
+    for k in range(0, len(blocks), _TOGETHER):
+        new = in_parallel(made, blocks[k : k + _TOGETHER])
+        active = [*(part for part in active if part.end > new[0].first), *new]
+        in_parallel(add, [(one, part) for part in new for one in active if one.unknowns.start <= part.unknowns.start])
 
 
 def _rows(robot: Robot) -> tuple[IntArray, Array]:

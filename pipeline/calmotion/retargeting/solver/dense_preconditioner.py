@@ -31,7 +31,7 @@ class DensePreconditioner:
         """Factorise with the unknowns where `fixed` (shape [P * m], bool) is true excluded.
 
         Args:
-            terms: As of `RigidPreconditioner.factor`.
+            terms: As of `BandedPreconditioner.factor`.
         """
         matrix = self._matrix.copy()
         if terms:

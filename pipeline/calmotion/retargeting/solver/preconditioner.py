@@ -1,4 +1,4 @@
-"""The Gauss-Newton matrix of the rigid robot, banded in time: a preconditioner for that of the flexible one."""
+"""Gauss-Newton matrices that are banded in time, such as that of the rigid robot, as preconditioners."""
 
 from __future__ import annotations
 
@@ -79,25 +79,18 @@ def _rows(basis: csr_matrix) -> tuple[IntArray, Array]:
     return functions, weights
 
 
-class RigidPreconditioner:
-    """Banded Cholesky factor of `B^T (J^T W J) B + penalty`, plus the terms of the limits."""
+class BandedPreconditioner:
+    """Banded Cholesky factor of a matrix over all unknowns, plus the terms of the limits.
 
-    def __init__(self, response: RigidResponse, weights: Array, basis: OffsetBasis, penalty: csr_matrix):
-        """
-        Args:
-            response: Of the rigid robot.
-            weights: Square roots of the residuals' weights, shape [T, K, 6].
-            basis: Offset basis.
-            penalty: Matrix of the regulariser for one motor, shape [P, P].
-        """
-        weighted = response.targets * weights[..., None]
-        self._shape = basis.count, weighted.shape[3], basis.wraps
-        gram = BandedGram(*self._shape)
-        self._order = gram.order
-        gram.add(basis.values, np.einsum("nkia,nkib->nab", weighted, weighted))
-        gram.add_matrix(penalty)
-        self._banded = gram.banded()
-        self._scale = float(np.max(self._banded[0]))
+    Args:
+        banded: Lower bands of the matrix, see `BandedGram.banded`.
+        shape: Functions, motors, and whether the functions are periodic: the arguments of `BandedGram`.
+        least: Of the largest diagonal entry, added to all: the factor exists for directions that move no target.
+    """
+
+    def __init__(self, banded: Array, shape: tuple[int, int, bool], least: float):
+        self._banded, self._shape, self._order = banded, shape, BandedGram(*shape).order
+        self._least = least * float(np.max(banded[0]))
 
     def factor(self, fixed: BoolArray, terms: list[tuple[csr_matrix, Array]] | None = None) -> None:
         """Factorise with the unknowns where `fixed` (shape [P * M], bool) is true excluded.
@@ -110,18 +103,53 @@ class RigidPreconditioner:
             gram = BandedGram(*self._shape)
             for basis, metric in terms:
                 gram.add(basis, metric)
-            banded += gram.banded()
+            of_limits = gram.banded()
+            banded[: len(of_limits)] += of_limits
         fixed = fixed[self._order]
         for d in range(1, len(banded)):
             banded[d, : banded.shape[1] - d] *= ~fixed[d:]
         banded[:, fixed] = 0.0
-        # a small diagonal, so that the factor exists for directions that move no target
-        banded[0] += max(1e-9 * self._scale, 1e-12 * float(np.max(banded[0])))
+        banded[0] += max(self._least, 1e-12 * float(np.max(banded[0])))
         banded[0, fixed] = 1.0
-        self._factor = cholesky_banded(banded, lower=True)
+        self._factor = cholesky_banded(banded, overwrite_ab=True, lower=True)
 
     def solve(self, x: Array) -> Array:
         """The factor's inverse applied to a vector of shape [P * M]."""
         solved = np.empty_like(x)
         solved[self._order] = cho_solve_banded((self._factor, True), x[self._order])
         return solved
+
+
+def rigid_preconditioner(
+    response: RigidResponse, weights: Array, basis: OffsetBasis, penalty: csr_matrix
+) -> BandedPreconditioner:
+    """That of the rigid robot, `B^T (J^T W J) B + penalty`.
+
+    Args:
+        response: Of the rigid robot.
+        weights: Square roots of the residuals' weights, shape [T, K, 6].
+        basis: Offset basis.
+        penalty: Matrix of the regulariser for one motor, shape [P, P].
+    """
+    weighted = response.targets * weights[..., None]
+    shape = basis.count, weighted.shape[3], basis.wraps
+    gram = BandedGram(*shape)
+    gram.add(basis.values, np.einsum("nkia,nkib->nab", weighted, weighted))
+    gram.add_matrix(penalty)
+    return BandedPreconditioner(gram.banded(), shape, 1e-9)
+
+
+def response_preconditioner(bands: Array, basis: OffsetBasis, penalty: csr_matrix) -> BandedPreconditioner:
+    """That of responses which end some time after their unknowns have acted.
+
+    Args:
+        bands: Lower bands of the matrix of their products, at least as many as the penalty has; they are taken.
+        basis: Offset basis, not periodic.
+        penalty: As of `rigid_preconditioner`.
+    """
+    shape = basis.count, bands.shape[1] // basis.count, False
+    gram = BandedGram(*shape)
+    gram.add_matrix(penalty)
+    more = gram.banded()
+    bands[: len(more)] += more
+    return BandedPreconditioner(bands, shape, 1e-12)
