@@ -5,7 +5,7 @@ with short rests. It is varied, not repeated, and a longer one begins as a short
 `calmotion optimize` in a process of its own, whose memory is measured. With `--compare SECONDS` a performance of that
 length is also optimised by one long search, and the distance of the targets between both is printed, and where it is
 largest; a search that did not end by itself is told, as it says nothing about windows. Both end where
-a window would gain less than 0.0003 of the tolerance (the one search by a mean over the whole performance, so that it
+a window would gain less than 0.0001 of the tolerance (the one search by a mean over the whole performance, so that it
 leaves as little in any second), and what is found does not depend on the windows. With `--single` one search over as
 many seconds as a window has is the measure of the longest performance: its processor time times the number of windows.
 

@@ -59,7 +59,7 @@ def is_whole(robots: Sequence[Robot], space: OffsetSpace) -> bool:
     """Whether the matrix may hold the entries of all unknowns with all others."""
     # robots follow one after the other: the responses of one are in memory at a time
     rows = len(robots[0].residuals) * np.count_nonzero(_varying(robots[0]))
-    return space.size <= _LARGEST and 8.0 * space.size * (rows + 3 * space.size) <= _SHARE * spare_memory()
+    return space.size <= _LARGEST and bool(8.0 * space.size * (rows + 3 * space.size) <= _SHARE * spare_memory())
 
 
 def response_gram(robots: Sequence[Robot], space: OffsetSpace) -> Array:
@@ -193,8 +193,8 @@ def _add_bands(bands: Array, robot: Robot, space: OffsetSpace, lasting: int) -> 
     def made(start: int) -> _Responses:
         stop = min(start + step, basis.count)
         begin, end = max(0, int(starts[start:stop].min()) - 1), int(ends[start:stop].max())
-        curves = [part[:, start:stop][begin:end].toarray() for part in (values, rates)]
-        first, found = robot.simulator.responses(*curves, begin, space.coupling, component, jacobian)
+        curves = tuple(part[:, start:stop][begin:end].toarray() for part in (values, rates))
+        first, found = robot.simulator.responses(curves[0], curves[1], begin, space.coupling, component, jacobian)
         return _Responses(slice(start * motors, stop * motors), first, found.astype(np.float32))
 
     def add(pair: tuple[_Responses, _Responses]) -> None:

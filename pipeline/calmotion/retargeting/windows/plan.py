@@ -23,7 +23,7 @@ FALL = 10.0  # factor by which the slowest mode falls in an overlap
 LEAST = 1.0  # overlap, but not above half a window [s]
 SUFFICIENT = 1.5  # overlap that is not shortened to a quarter of a window, but to half of one [s]
 FEWEST = 12  # frames of a window
-EXACT = 0.0003  # of the tolerance: the least gain of a window at which it agrees with one search within a tenth of it
+EXACT = 0.0001  # of the tolerance: the least gain of a window at which it agrees with one search within a tenth of it
 
 
 @dataclass(frozen=True)
