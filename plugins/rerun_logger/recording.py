@@ -27,6 +27,7 @@ from .bodies import log_bodies, log_ghost, log_scenery
 from .colors import Style
 from .deviation import largest_deviation
 from .layout import ALONE, INPUT, OPTIMIZED, REFERENCE, STYLES, TIME, make_blueprint, motor_plots
+from .stream import saved
 from .summary import describe
 from .trails import log_trails
 
@@ -74,23 +75,19 @@ def write_recording(
     scale = largest_deviation(character, result, at_frames[INPUT], at_frames[REFERENCE])
     try:
         with replaced(target) as temporary:
-            recording.save(str(temporary))
-            # active: also where the viewer remembers the layout of an earlier recording of this shot
-            blueprint = make_blueprint(character, animation, result, scale)
-            recording.send_blueprint(blueprint, make_active=True, make_default=True)
-            summary = rr.TextDocument(describe(character, result, operators, system), media_type="text/markdown")
-            recording.log("summary", summary, static=True)
-            log_all(recording, character, at_frames, result, scale, samples_per_plot, progress)
-            recording.flush()
-            recording.disconnect()
+            with saved(recording, temporary):
+                # active: also where the viewer remembers the layout of an earlier recording of this shot
+                blueprint = make_blueprint(character, animation, result, scale)
+                recording.send_blueprint(blueprint, make_active=True, make_default=True)
+                summary = rr.TextDocument(describe(character, result, operators, system), media_type="text/markdown")
+                recording.log("summary", summary, static=True)
+                log_all(recording, character, at_frames, result, scale, samples_per_plot, progress)
             _refuse_cut(temporary)
-    except (OSError, RuntimeError) as error:  # the second one is that of rerun's thread, such as on a full disk
+    except (OSError, RuntimeError) as error:  # the second one is that of rerun's threads
         raise ShotError(
             "the recording cannot be written", path=path, found=str(error) or None,
             remedy="Check the free space of the disk, or choose another --rrd.",
         ) from error  # fmt: skip
-    finally:
-        recording.disconnect()
 
 
 def _refuse_cut(file: Path) -> None:

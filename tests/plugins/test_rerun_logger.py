@@ -303,31 +303,46 @@ def test_a_folder_that_cannot_be_written_is_reported_and_nothing_is_left(tmp_pat
     assert [path.name for path in tmp_path.iterdir()] == ["file"]
 
 
-def test_a_full_disk_is_reported_and_leaves_the_old_recording(tmp_path, monkeypatch):
+@pytest.mark.skipif(os.name == "nt", reason="no limit of the size of files")
+@pytest.mark.parametrize("size", [0, 96, 20_000])
+def test_a_full_disk_is_reported_and_leaves_the_old_recording(tmp_path, size):
+    """At once or later, where rerun by itself waits for ever in some of the runs."""
+    path = tmp_path / "out.rrd"
+    path.write_bytes(b"old")
+    code = (
+        "import resource, sys; sys.path[:0] = sys.argv[1:4]\n"
+        "import test_rerun_logger as t, synthetic\n"
+        "from calmotion.errors import ShotError\n"
+        "resource.setrlimit(resource.RLIMIT_FSIZE, (int(sys.argv[5]),) * 2)\n"
+        "try:\n"
+        "    t.write(sys.argv[4], synthetic.result())\n"
+        "except ShotError as error:\n"
+        "    print(error)\n"
+    )
+    folders = [str(ROOT / "pipeline"), str(Path(__file__).parent), str(ROOT / "tests" / "helpers" / "plugins")]
+    done = subprocess.run([sys.executable, "-c", code, *folders, str(path), str(size)], capture_output=True, text=True)
+    assert "cannot be written" in done.stdout and "File too large" in done.stdout, done.stderr
+    assert path.read_bytes() == b"old" and [p.name for p in tmp_path.iterdir()] == ["out.rrd"]
+
+
+def test_a_failure_of_rerun_is_reported_and_leaves_the_old_recording(tmp_path, monkeypatch):
     path = tmp_path / "out.rrd"
     path.write_bytes(b"old")
 
-    def full(stream):
+    def fail(stream):
         raise RuntimeError("File-writer thread shut down prematurely")  # what rerun's thread then raises
 
-    monkeypatch.setattr("rerun.RecordingStream.flush", full)
+    monkeypatch.setattr("rerun.RecordingStream.flush", fail)
     with pytest.raises(ShotError, match="cannot be written"):
         write(path, synthetic.result())
     assert path.read_bytes() == b"old" and [p.name for p in tmp_path.iterdir()] == ["out.rrd"]
 
 
 def test_a_recording_without_its_end_is_refused(tmp_path, monkeypatch):
-    path = tmp_path / "out.rrd"
-
-    def cut(stream):  # as by a disk that becomes full after the last flush, of which rerun only prints a message
-        disconnect(stream)
-        for temporary in tmp_path.glob(".calmotion-*"):
-            os.truncate(temporary, temporary.stat().st_size - 40)
-
-    disconnect = rr.RecordingStream.disconnect
-    monkeypatch.setattr("rerun.RecordingStream.disconnect", cut)
-    with pytest.raises(ShotError, match="cannot be written"):
-        write(path, synthetic.result())
+    save = rr.RecordingStream.save
+    monkeypatch.setattr("rerun.RecordingStream.save", lambda stream, path: save(stream, os.devnull))
+    with pytest.raises(ShotError, match="its end could not be written"):
+        write(tmp_path / "out.rrd", synthetic.result())
     assert list(tmp_path.iterdir()) == []
 
 

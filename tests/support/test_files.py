@@ -7,6 +7,7 @@ import stat
 import subprocess
 import sys
 import tempfile
+from pathlib import Path
 
 import pytest
 from calmotion.support.files import (
@@ -16,6 +17,7 @@ from calmotion.support.files import (
     locked,
     remove_abandoned,
     replaced,
+    system_temporary,
     temporary_folder,
     try_writing,
     write_text,
@@ -139,6 +141,41 @@ with temporary_folder() as folder:
         if os.name == "posix":
             assert folder.stat().st_mode & 0o077 == 0
     assert names(tmp_path) == []
+
+
+def test_the_folder_for_temporary_files_is_one_that_takes_files_and_keeps_none(tmp_path, monkeypatch):
+    chosen = tmp_path / "chosen"
+    chosen.mkdir()
+    monkeypatch.setattr(tempfile, "tempdir", None)
+    monkeypatch.setenv("TMPDIR", str(tmp_path / "missing"))
+    monkeypatch.setenv("TEMP", str(chosen))
+    assert system_temporary() == Path(tempfile.gettempdir()) == chosen and names(tmp_path) == ["chosen"]
+    assert names(chosen) == []
+
+
+def test_what_ends_a_process_that_tries_the_folder_leaves_nothing_for_ever(tmp_path, monkeypatch):
+    """An interrupt, and a kill, just after a file is made there."""
+    monkeypatch.setattr(tempfile, "tempdir", None)
+    monkeypatch.setenv("TMPDIR", str(tmp_path))
+
+    def interrupt(path, data):
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch, pytest.raises(KeyboardInterrupt):
+        patch.setattr(Path, "write_bytes", interrupt)
+        system_temporary()
+    assert names(tmp_path) == []
+    code = """
+import os
+from pathlib import Path
+from calmotion.support.files import system_temporary
+Path.write_bytes = lambda path, data: os._exit(9)
+system_temporary()
+"""
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 9
+    assert len(names(tmp_path)) == 1
+    with temporary_folder() as folder:
+        assert names(tmp_path) == [folder.name]
 
 
 def test_temporary_files_of_other_users_are_left_alone(tmp_path, monkeypatch):

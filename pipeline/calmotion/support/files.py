@@ -91,10 +91,25 @@ def temporary_folder(parent: Path | None = None) -> Iterator[Path]:
     Raises:
         OSError: It cannot be made.
     """
-    parent = parent or Path(tempfile.gettempdir())
+    parent = parent or system_temporary()
     remove_abandoned(parent)
     with tempfile.TemporaryDirectory(prefix=_own_prefix(), dir=parent, ignore_cleanup_errors=True) as folder:
         yield Path(folder)
+
+
+def system_temporary() -> Path:
+    """The system's folder for temporary files: the first of those that `tempfile` tries which takes a file.
+
+    `tempfile` tries them by files without a name of ours, one of which stays where the process is ended meanwhile.
+    """
+    if tempfile.tempdir is None:
+        for name in filter(None, (*map(os.environ.get, ("TMPDIR", "TEMP", "TMP")), "/tmp")):
+            folder = Path(name).absolute()
+            with contextlib.suppress(OSError), new_file(folder / "tried") as tried:
+                tried.write_bytes(b"x")
+                tempfile.tempdir = str(folder)
+                break
+    return Path(tempfile.gettempdir())
 
 
 def write_text(path: str | Path, text: str) -> None:

@@ -7,7 +7,6 @@ import platform
 import re
 import sys
 import sysconfig
-import tempfile
 import traceback
 from collections.abc import Sequence
 from dataclasses import replace
@@ -18,7 +17,7 @@ from pathlib import Path
 from calmotion.errors import ShotError
 from calmotion.host.discovery import bundled_folder
 from calmotion.support.caching.cache_folder import cache_folder
-from calmotion.support.files import write_text
+from calmotion.support.files import system_temporary, write_text
 from calmotion.version import __version__
 from calmotion.workflow.problems import Problem
 
@@ -71,7 +70,7 @@ def write_crash_report(error: BaseException, arguments: Sequence[str]) -> Path |
     """
     text = report_text(error, arguments)
     name = f"crash-{datetime.now(UTC):%Y%m%d-%H%M%S}-{os.getpid()}.txt"
-    for folder in (cache_folder() / "crashes", Path(tempfile.gettempdir())):
+    for folder in (cache_folder() / "crashes", system_temporary()):
         try:
             write_text(folder / name, text)
         except OSError:

@@ -7,13 +7,13 @@ import platform
 import shutil
 import subprocess
 import sys
-import tempfile
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from importlib import metadata
 from pathlib import Path
 
 from calmotion.support.caching.cache_folder import CACHES, cache_folder
+from calmotion.support.files import system_temporary, try_writing
 from calmotion.version import __version__
 
 OK, NOTE, WRONG = "ok", "note", "wrong"
@@ -112,8 +112,6 @@ def _caches() -> Iterator[Finding]:
 
 def _unwritable(folder: Path) -> str:
     """Why a folder cannot be written; empty where it can."""
-    from calmotion.support.files import try_writing
-
     try:
         try_writing(folder / "file")
     except OSError as error:
@@ -162,7 +160,7 @@ def _memory() -> Iterator[Finding]:
 def _disk() -> Iterator[Finding]:
     for name, folder in (
         ("cache", cache_folder()),
-        ("temporary files", Path(tempfile.gettempdir())),
+        ("temporary files", system_temporary()),
         ("here", Path.cwd()),
     ):
         there = next((path for path in (folder, *folder.parents) if path.is_dir()), None)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import tempfile
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -24,6 +23,7 @@ from calmotion.shot.tolerance import tolerance_of
 from calmotion.simulation.compiled_shot import CompiledShot
 from calmotion.simulation.playing.lowest_rate import lowest_rate
 from calmotion.simulation.playing.playback import Loss, Playback
+from calmotion.support.files import temporary_folder
 from calmotion.version import __version__
 from calmotion.workflow.exporting.controller_files import curves_of, format_named, write_commands
 from calmotion.workflow.exporting.given import GivenExport, given_export, refuse_beyond_format, refuse_beyond_shot
@@ -281,13 +281,13 @@ class _Exporter:
         """The lowest rate that keeps the tolerance, from files that are written for the purpose and removed."""
         given, tried = self._given, 0
         known = {int(given.rate): loss.largest} if float(given.rate).is_integer() else {}
-        with tempfile.TemporaryDirectory(prefix="calmotion-export-") as folder:
+        with temporary_folder() as folder:
 
             def at(rate: int) -> float:
                 nonlocal tried
                 tried += 1
                 self._tell(min(0.95, 0.3 + 0.07 * tried), f"playing {rate} commands a second")
-                written = self.written(float(rate), os.path.join(folder, f"at_{rate}"))
+                written = self.written(float(rate), str(folder / f"at_{rate}"))
                 step = self._playback.step_for(1.0 / rate) / self._finer
                 return self._loss(written.read, step, given.delay).largest
 
