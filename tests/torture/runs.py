@@ -1,6 +1,7 @@
 """Runs of the program: forked from a process that has imported it, or started anew; what ended them is recorded.
 
-A fork spares the seconds of imports, so that a thousand runs take less than an hour. Faults are installed in the child.
+A fork spares the seconds of imports, which are most of a run, so that a thousand runs take less than an hour. Runs that
+are started anew are killed while they import, too. Faults are installed in the child.
 """
 
 from __future__ import annotations
@@ -57,10 +58,28 @@ class Ending:
 
 
 def load_program() -> None:
-    """Import what a run imports, but nothing that starts threads."""
+    """Import the parts of the program that all commands import."""
     sys.path.insert(0, str(REPOSITORY / "pipeline"))
     for name in _PROGRAM:
         importlib.import_module(name)
+
+
+def load_modules(file: Path) -> None:
+    """Import the modules that a run has listed, so that later runs are forked with them; each loads plugins anew."""
+    for name in file.read_text().split():
+        with suppress(ImportError):  # a plugin, or made by another module
+            importlib.import_module(name)
+
+
+def list_modules(file: Path) -> Callable[[], None]:
+    """A fault that does no harm but lists the modules that a run has imported at its end."""
+
+    def install() -> None:
+        import atexit
+
+        atexit.register(lambda: file.write_text("\n".join(sys.modules)))
+
+    return install
 
 
 @dataclass
