@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import argparse
 import multiprocessing
+import os
 import sys
 import tempfile
 import time
@@ -15,18 +16,23 @@ from collections import Counter
 from multiprocessing.connection import Connection
 from pathlib import Path
 
-sys.path.insert(0, str(Path(__file__).resolve().parent))
+HERE = Path(__file__).resolve().parent
+sys.path[:0] = [str(HERE), str(HERE.parent / "helpers" / "processes")]
 
 import every  # noqa: E402
 import hostile  # noqa: E402
+from stuck import Watch  # noqa: E402
 
 
 def worker(pipe: Connection) -> None:
     """Run the cases whose names come through a pipe; their endings and faults go back."""
+    if hasattr(os, "setsid"):
+        os.setsid()  # its own processor time is measured
     while (name := pipe.recv()) is not None:
         with tempfile.TemporaryDirectory(prefix="hostile-") as folder:
             try:
-                pipe.send(hostile.run(every.CASES[name], Path(folder)))
+                ending, faults = hostile.run(every.CASES[name], Path(folder))
+                pipe.send((ending, faults + hostile.faults_of_time(every.CASES[name], ending)))
             except BaseException as error:
                 pipe.send((hostile.Ending(-1, "", "", 0.0), [f"raises {type(error).__name__}: {error}"]))
 
@@ -46,13 +52,16 @@ class Worker:
 
     def run(self, name: str) -> tuple[hostile.Ending, list[str]]:
         """The ending and the faults of a case."""
+        assert self._process.pid is not None
         limit = 10.0 * every.CASES[name].seconds
+        watch = Watch(self._process.pid, limit)
         self._pipe.send(name)
         try:
-            if self._pipe.poll(limit):
-                ending, faults = self._pipe.recv()
-                return ending, faults
-            fault = f"does not end in {limit:.0f} s"
+            while not watch.stuck():
+                if self._pipe.poll(1.0):
+                    ending, faults = self._pipe.recv()
+                    return ending, faults
+            fault = f"does not end in {limit:.0f} s of processor time, or waits"
         except EOFError:
             self._process.join()
             fault = f"ends the process ({self._process.exitcode})"

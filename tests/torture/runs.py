@@ -21,13 +21,16 @@ from pathlib import Path
 
 from workspace import REPOSITORY, Workspace
 
+sys.path.insert(0, str(REPOSITORY / "tests" / "helpers" / "processes"))
+
+from stuck import Watch  # noqa: E402
+
 _PROGRAM = (
     "calmotion.cli.main", "calmotion.simulation.simulate", "calmotion.usd.reading", "calmotion.workflow.commands",
     "matplotlib.figure", "numba", "pxr.Usd", "pxr.UsdPhysics", "rerun", "scipy.sparse.linalg",
 )  # fmt: skip
 _PIPE = 2**20  # size of a pipe [bytes]
 LIMIT = 300.0  # a run that takes more processor time [s] is stuck, and one that takes none for as long by the clock
-_IDLE = 1.0  # less processor time [s] than a run takes in that time, but where it waits for a processor all the time
 
 
 @dataclass(frozen=True)
@@ -106,36 +109,20 @@ class Started:
     def wait(self, limit: float = LIMIT) -> Ending:
         """Wait for its end, and end it when it is stuck."""
         status: int | None = None
-        looked, before = self.begin, 0.0
+        watch = Watch(self.pid, limit)
         while True:
             pid, code = os.waitpid(self.pid, os.WNOHANG)
             if pid:
                 status = os.waitstatus_to_exitcode(code)
                 break
-            if time.monotonic() - looked > limit:
-                looked, (used, ready) = time.monotonic(), _work(self.pid)
-                if used > limit or (used - before < _IDLE and not ready):
-                    os.kill(self.pid, signal.SIGKILL)
-                    os.waitpid(self.pid, 0)
-                    break
-                before = used
+            if watch.stuck():
+                os.kill(self.pid, signal.SIGKILL)
+                os.waitpid(self.pid, 0)
+                break
             time.sleep(0.005)
         seconds = time.monotonic() - self.begin
         out, err = map(_drained, self.pipes)
         return Ending(status, out, err, seconds)
-
-
-def _work(session: int) -> tuple[float, bool]:
-    """Processor time of the processes of a session and of those that they have awaited [s], and whether one of them
-    works or waits for a processor: many programs may share the machine, and this one be the least of them."""
-    ticks, ready = 0, False
-    for file in Path("/proc").glob("[0-9]*/stat"):
-        with suppress(OSError, ValueError, IndexError):  # it has ended
-            fields = file.read_text().rpartition(")")[2].split()
-            if int(fields[3]) == session:
-                ticks += sum(map(int, fields[11:15]))
-                ready = ready or fields[0] == "R"
-    return ticks / os.sysconf("SC_CLK_TCK"), ready
 
 
 def _drained(pipe: int) -> str:

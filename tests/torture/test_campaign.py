@@ -117,7 +117,7 @@ def test_campaigns_add_up_by_commit(tmp_path, monkeypatch):
 @pytest.mark.skipif(sys.platform != "linux", reason="processes are looked at in /proc")
 @pytest.mark.parametrize(("work", "stuck"), [("pass", False), ("time.sleep(60)", True)])
 def test_a_run_is_stuck_when_it_does_not_work_however_slow_the_machine_is(work, stuck, monkeypatch):
-    monkeypatch.setattr(runs, "_IDLE", 0.02)
+    monkeypatch.setattr("stuck.IDLE", 0.02)
     pipes = [os.pipe() for _ in range(2)]
     code = f"import time\n{work}\nwhile time.process_time() < 0.6: pass"
     process = subprocess.Popen([sys.executable, "-c", code], start_new_session=True)
