@@ -140,7 +140,7 @@ print("progress\\tMesh\\t0.5\\tlink 3", file=sys.stderr, flush=True)
 print(json.dumps({"max_error_after_m": 0.001}))
 """)  # fmt: skip
     run = pipeline.PipelineRun(job(pipeline, command, tmp_path)).start()
-    run.wait(30.0)
+    run.wait(600.0)
     assert run.outcome == "done" and run.fraction == 1.0 and run.report == {"max_error_after_m": 0.001}
 
 
@@ -150,27 +150,27 @@ print(json.dumps({"errors": [{"path": "/a", "attribute": "b", "problem": "is wro
 sys.exit(1)
 """)  # fmt: skip
     run = pipeline.PipelineRun(job(pipeline, command, tmp_path)).start()
-    run.wait(30.0)
+    run.wait(600.0)
     assert run.outcome == "failed" and run.errors == ["/a.b: is wrong. Mend it"]
 
 
 def test_a_program_that_ends_without_a_message_is_reported(pipeline, tmp_path):
     run = pipeline.PipelineRun(job(pipeline, script(tmp_path, "sys.exit(3)"), tmp_path)).start()
-    run.wait(30.0)
+    run.wait(600.0)
     assert run.outcome == "failed" and "status 3" in run.errors[0]
     run = pipeline.PipelineRun(job(pipeline, ["/no/such/program"], tmp_path)).start()
-    run.wait(30.0)
+    run.wait(600.0)
     assert run.outcome == "failed" and "cannot be started" in run.errors[0]
 
 
 def test_cancelling_stops_the_program(pipeline, tmp_path):
-    command = script(tmp_path, "print('progress\\t\\t0.1\\t', file=sys.stderr, flush=True)\ntime.sleep(60)\n")
+    command = script(tmp_path, "print('progress\\t\\t0.1\\t', file=sys.stderr, flush=True)\ntime.sleep(600)\n")
     run = pipeline.PipelineRun(job(pipeline, command, tmp_path)).start()
-    end = time.monotonic() + 30.0
+    end = time.monotonic() + 600.0
     while run.fraction == 0.0 and time.monotonic() < end:
         time.sleep(0.05)
     run.cancel()
-    run.wait(30.0)
+    run.wait(600.0)
     assert run.outcome == "cancelled" and not run.running
 
 

@@ -4,7 +4,14 @@ import threading
 import time
 
 import pytest
+from calmotion.multibody import parallel
 from calmotion.multibody.parallel import in_parallel
+
+
+@pytest.fixture(autouse=True)
+def two_processors(monkeypatch):
+    """On one, there are no threads."""
+    monkeypatch.setattr(parallel, "processors", lambda: 2)
 
 
 def test_results_keep_the_order_of_the_items():
@@ -42,8 +49,8 @@ def test_progress_is_reported_in_the_thread_that_waits_and_may_end_the_work():
 
     begun = []
     with pytest.raises(KeyboardInterrupt):
-        in_parallel(lambda n: begun.append(n) or time.sleep(0.02), range(50), stop)
-    assert len(begun) < 50, "what had not begun is left out"
+        in_parallel(lambda n: begun.append(n) or time.sleep(0.02), range(10_000), stop)
+    assert len(begun) < 10_000, "what had not begun is left out"
 
 
 def test_work_within_work_does_not_wait_for_itself():

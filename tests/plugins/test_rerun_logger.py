@@ -366,7 +366,7 @@ def test_writing_a_recording_leaves_no_trace_in_the_home_folder(tmp_path):
     folders = [str(ROOT / "pipeline"), str(Path(__file__).parent), str(ROOT / "tests" / "helpers" / "plugins")]
     environment = {key: value for key, value in os.environ.items() if not key.startswith("XDG_")} | {"HOME": str(home)}
     subprocess.run(
-        [sys.executable, "-c", code, *folders, str(tmp_path / "out.rrd")], env=environment, check=True, timeout=120
+        [sys.executable, "-c", code, *folders, str(tmp_path / "out.rrd")], env=environment, check=True, timeout=600
     )
     assert (tmp_path / "out.rrd").is_file() and not list(home.rglob("*rerun*"))
 

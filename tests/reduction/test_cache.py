@@ -233,7 +233,7 @@ def test_several_processes_at_once_never_see_half_a_file(folder, repository):
         )  # fmt: skip
         for k in range(4)
     ]
-    results = [(process.communicate(timeout=120), process.returncode) for process in running]
+    results = [(process.communicate(timeout=600), process.returncode) for process in running]
     for (out, err), code in results:
         assert code == 0, err
         assert int(out) < 40

@@ -27,7 +27,7 @@ def run(tmp_path, repository):
 
     def run():
         command = [sys.executable, str(tmp_path / "module.py")]
-        done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=120)
+        done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=600)
         assert done.returncode == 0, done.stderr
         value, hits = done.stdout.split()
         assert float(value) == 3.0
@@ -103,7 +103,7 @@ def test_processes_that_save_at_once_lose_nothing(make, tmp_path):
         "    file.save((sys.argv[1], number), [sys.argv[1], number])\n"
     )
     started = [subprocess.Popen([sys.executable, "-c", code, name]) for name in ("one", "two", "three")]
-    assert [process.wait(120) for process in started] == [0, 0, 0]
+    assert [process.wait(600) for process in started] == [0, 0, 0]
     found = make()
     for name in ("one", "two", "three"):
         for number in range(20):

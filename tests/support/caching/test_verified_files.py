@@ -88,7 +88,7 @@ def test_another_key_or_version_is_told_from_damage():
 def test_a_named_pipe_stops_nobody(tmp_path):
     os.mkfifo(tmp_path / "x.npz")
     code = "import sys; from calmotion.support.caching.verified_files import read_verified; read_verified(sys.argv[1])"
-    done = subprocess.run([sys.executable, "-c", code, tmp_path / "x.npz"], capture_output=True, text=True, timeout=60)
+    done = subprocess.run([sys.executable, "-c", code, tmp_path / "x.npz"], capture_output=True, text=True, timeout=600)
     assert "DamagedFileError" in done.stderr
 
 

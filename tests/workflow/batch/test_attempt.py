@@ -45,11 +45,11 @@ def test_a_process_ends_with_the_worker_that_holds_its_input():
     code = f"import time\nfrom {child.__name__} import *\nfrom {child.__name__} import _end_with_worker\n"
     code += "threading.Thread(target=_end_with_worker, args=(0,), daemon=True).start()\nprint('on', flush=True)\n"
     process = subprocess.Popen(
-        [sys.executable, "-c", f"{code}time.sleep(60)"], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+        [sys.executable, "-c", f"{code}time.sleep(600)"], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
     )
     assert process.stdout.readline() == "on\n" and process.poll() is None
     process.stdin.close()
-    assert process.wait(timeout=30) == child.ORPHANED
+    assert process.wait(timeout=600) == child.ORPHANED
     process.stdout.close()
 
 
@@ -60,6 +60,6 @@ def test_a_job_is_locked_while_a_process_runs_it_also_when_its_worker_is_killed(
         process = subprocess.Popen([sys.executable, "-c", "input()"], stdin=subprocess.PIPE, pass_fds=(descriptor,))
     with open(path) as file, pytest.raises(BlockingIOError):  # the worker has let go of it
         fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    process.communicate(b"\n", timeout=30)
+    process.communicate(b"\n", timeout=600)
     with open(path) as file:
         fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)

@@ -40,7 +40,7 @@ def test_jobs_of_submitit_are_futures(tmp_path, monkeypatch):
     submitit = pytest.importorskip("submitit")
     monkeypatch.setattr(backends, "_POLL", 0.02)
     executor = SubmititExecutor(submitit.AutoExecutor(folder=tmp_path, cluster="debug"))
-    assert executor.submit(divmod, 7, 2).result(timeout=60) == (3, 1)
+    assert executor.submit(divmod, 7, 2).result(timeout=600) == (3, 1)
     executor.shutdown()
 
 
@@ -64,5 +64,5 @@ def test_a_job_of_submitit_that_is_lost_is_a_future_with_an_error(monkeypatch):
 
     executor = SubmititExecutor(Lost())
     with pytest.raises(RuntimeError, match="the node is gone"):
-        executor.submit(divmod, 7, 2).result(timeout=60)
+        executor.submit(divmod, 7, 2).result(timeout=600)
     executor.shutdown(cancel_futures=True)

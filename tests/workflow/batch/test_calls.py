@@ -67,5 +67,5 @@ def test_calls_on_this_machine_are_processes_of_their_own():
     assert len({*found.values(), os.getpid()}) == 3
     backend = LocalBackend(1)
     with pytest.raises(RuntimeError, match="exit status 3"):
-        backend.call(os._exit, 3).result(timeout=120)
+        backend.call(os._exit, 3).result(timeout=600)
     backend.close()
