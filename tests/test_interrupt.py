@@ -15,18 +15,32 @@ import pytest
 fcntl, termios = pytest.importorskip("fcntl"), pytest.importorskip("termios")
 
 OPTIONS = ("--step", "4ms")
+# The search waits after its first checkpoint: on a busy machine it would end before the signal.
+WAITING = """
+import sys, time
+from calmotion.__main__ import main
+from calmotion.retargeting.checkpoint import Checkpoint
+
+def save_and_wait(*arguments):
+    save(*arguments)
+    time.sleep(600.0)
+
+save, Checkpoint.save = Checkpoint.save, save_and_wait
+sys.exit(main())
+"""
 
 
-def command(repository, layer):
+def command(repository, layer, waits):
     shot = repository / "samples" / "bartender" / "bartender.usda"
-    return [sys.executable, "-m", "calmotion", "optimize", str(shot), "-o", str(layer), "--json", *OPTIONS]
+    program = ["-c", WAITING] if waits else ["-m", "calmotion"]
+    return [sys.executable, *program, "optimize", str(shot), "-o", str(layer), "--json", *OPTIONS]
 
 
-def started(repository, layer):
+def started(repository, layer, waits=False):
     environment = os.environ | {"PYTHONPATH": str(repository / "pipeline")}
     # a shell that runs the tests in the background ignores interrupts, and so would its children
     return subprocess.Popen(
-        command(repository, layer),
+        command(repository, layer, waits),
         env=environment,
         stdout=subprocess.PIPE,
         stderr=subprocess.DEVNULL,
@@ -42,7 +56,7 @@ def kept(layer):
 @pytest.mark.parametrize("number", [signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.long)])
 def test_a_signal_writes_the_best_so_far_and_the_same_command_resumes(repository, tmp_path, number):
     layer = tmp_path / "calm.usda"
-    process = started(repository, layer)
+    process = started(repository, layer, waits=True)
     while not kept(layer).exists() and process.poll() is None:
         time.sleep(0.01)
     process.send_signal(number)
@@ -134,7 +148,7 @@ def test_a_closed_terminal_writes_the_best_so_far(repository, tmp_path):
     layer = tmp_path / "calm.usda"
     environment = os.environ | {"PYTHONPATH": str(repository / "pipeline")}
     ours, theirs = os.openpty()
-    line = [arg for arg in command(repository, layer) if arg != "--json"]
+    line = [arg for arg in command(repository, layer, waits=True) if arg != "--json"]
     process = subprocess.Popen(
         line,
         env=environment,
