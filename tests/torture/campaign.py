@@ -73,7 +73,7 @@ def disturbed(space: Workspace, options: argparse.Namespace, record: Record) -> 
     runs.load_program()
     space.prepare(keep_caches=options.folder is not None)
     seconds = undisturbed(space)
-    print(f"an undisturbed run takes {seconds:.1f} s", flush=True)
+    print(f"an undisturbed run takes {seconds:.1f} s of processor time", flush=True)
     signal.signal(signal.SIGTERM, signal.default_int_handler)  # ends the campaign with the counts so far
     found, stopped = 0, False
     while not stopped:
@@ -102,7 +102,7 @@ def disturbed(space: Workspace, options: argparse.Namespace, record: Record) -> 
 
 
 def undisturbed(space: Workspace) -> float:
-    """Run with empty and with warm caches, and keep the result; the duration of a warm run [s]."""
+    """Run with empty and with warm caches, and keep the result; the processor time of a warm run [s]."""
     modules = space.root / "modules"
     for figures in (True, True, False):  # the first one compiles for minutes
         ending = runs.start(space, space.arguments(figures), runs.list_modules(modules)).wait(3600.0)

@@ -67,7 +67,7 @@ def campaign(
     Args:
         kills: How many; the last series goes on to its end.
         tally: Takes the outcomes.
-        seconds: Duration of an undisturbed run.
+        seconds: Processor time of an undisturbed run [s].
         where: Takes the numbers of kills by stage and signal, and by write.
         first: Number of the first kill in the descriptions of faults.
     """
@@ -87,7 +87,8 @@ def campaign(
             if timed:
                 cold = rng.random() < COLD / 0.4
                 run = runs.start(space, space.arguments(figures), cold=cold)
-                time.sleep(rng.uniform(0.0, (6.0 if figures else 1.0) * (2.0 if cold else 1.1) * seconds))
+                run.wait_for(rng.uniform(0.0, (4.0 if figures else 1.0) * (4.0 if cold else 1.1) * seconds))
+                time.sleep(rng.uniform(0.0, 0.02))  # also where the run waits
                 run.send(number)
                 ending = run.wait()
             else:

@@ -10,6 +10,7 @@ import fcntl
 import importlib
 import os
 import random
+import resource
 import signal
 import subprocess
 import sys
@@ -23,7 +24,7 @@ from workspace import REPOSITORY, Workspace
 
 sys.path.insert(0, str(REPOSITORY / "tests" / "helpers" / "processes"))
 
-from stuck import Watch  # noqa: E402
+from stuck import Watch, work  # noqa: E402
 
 _PROGRAM = (
     "calmotion.cli.main", "calmotion.simulation.simulate", "calmotion.usd.reading", "calmotion.workflow.commands",
@@ -40,7 +41,7 @@ class Ending:
     Attributes:
         status: Exit status; minus the number of the signal that ended it; None when it was stuck.
         out, err: What it printed.
-        seconds: Its duration.
+        seconds: Processor time of it and of the processes that it started [s].
     """
 
     status: int | None
@@ -91,12 +92,10 @@ class Started:
 
     Attributes:
         pid: Its process.
-        begin: When it began.
         pipes: Where its output is read: a file would be short where files are, and be filled by a full disk.
     """
 
     pid: int
-    begin: float
     pipes: tuple[int, int]
 
     def send(self, number: int) -> None:
@@ -106,10 +105,16 @@ class Started:
         except ProcessLookupError:
             pass
 
+    def wait_for(self, seconds: float) -> None:
+        """Wait until it has taken some processor time [s], or has ended."""
+        ended = os.WEXITED | os.WNOHANG | os.WNOWAIT
+        while work(self.pid)[0] < seconds and os.waitid(os.P_PID, self.pid, ended) is None:
+            time.sleep(0.02)
+
     def wait(self, limit: float = LIMIT) -> Ending:
         """Wait for its end, and end it when it is stuck."""
         status: int | None = None
-        watch = Watch(self.pid, limit)
+        watch, before = Watch(self.pid, limit), _awaited()
         while True:
             pid, code = os.waitpid(self.pid, os.WNOHANG)
             if pid:
@@ -120,9 +125,15 @@ class Started:
                 os.waitpid(self.pid, 0)
                 break
             time.sleep(0.005)
-        seconds = time.monotonic() - self.begin
+        seconds = _awaited() - before
         out, err = map(_drained, self.pipes)
         return Ending(status, out, err, seconds)
+
+
+def _awaited() -> float:
+    """Processor time of the processes that this one has awaited [s]."""
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return used.ru_utime + used.ru_stime
 
 
 def _drained(pipe: int) -> str:
@@ -156,7 +167,6 @@ def start(
     """
     pipes = _pipe(), _pipe()
     written = pipes[0][1], pipes[1][1]
-    begin = time.monotonic()
     if cold:
         environment = os.environ | space.environment() | {"PYTHONPATH": str(REPOSITORY / "pipeline")}
         process = subprocess.Popen(
@@ -171,7 +181,7 @@ def start(
             _child(space, arguments, fault, written)
     for end in written:
         os.close(end)
-    return Started(pid, begin, (pipes[0][0], pipes[1][0]))
+    return Started(pid, (pipes[0][0], pipes[1][0]))
 
 
 def run(space: Workspace, figures: bool = False, fault: Callable[[], None] | None = None, cold: bool = False) -> Ending:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
-import time
 from collections import Counter
 from pathlib import Path
 
@@ -122,7 +121,7 @@ def test_a_run_is_stuck_when_it_does_not_work_however_slow_the_machine_is(work, 
     code = f"import time\n{work}\nwhile time.process_time() < 0.6: pass"
     process = subprocess.Popen([sys.executable, "-c", code], start_new_session=True)
     process.returncode = 0  # it is awaited by its number
-    ending = runs.Started(process.pid, time.monotonic(), (pipes[0][0], pipes[1][0])).wait(1.0)
+    ending = runs.Started(process.pid, (pipes[0][0], pipes[1][0])).wait(1.0)
     for pipe in pipes:
         os.close(pipe[1])
     assert ending.status == (None if stuck else 0)

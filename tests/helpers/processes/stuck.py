@@ -27,18 +27,18 @@ class Watch:
     _before: float = field(init=False)
 
     def __post_init__(self) -> None:
-        self._first = self._before = _work(self.session)[0]
+        self._first = self._before = work(self.session)[0]
 
     def stuck(self) -> bool:
         """Whether it is stuck; to be asked again and again."""
         if time.monotonic() - self._looked < self.limit:
             return False
-        self._looked, (used, ready) = time.monotonic(), _work(self.session)
+        self._looked, (used, ready) = time.monotonic(), work(self.session)
         idle, self._before = used - self._before < IDLE and not ready, used
         return idle or used - self._first > self.limit
 
 
-def _work(session: int) -> tuple[float, bool]:
+def work(session: int) -> tuple[float, bool]:
     """Processor time of the processes of a session and of those that they have awaited [s], and whether one of them
     works or waits for a processor: many programs may share the machine, and this one be the least of them."""
     ticks, ready = 0, False
