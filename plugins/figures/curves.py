@@ -12,7 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, MaxNLocator
 
-from .style import AFTER, BEFORE, INTENDED, LIMIT, SMALL, TEXT, new_figure, tidy
+from .style import AFTER, BEFORE, INTENDED, LIMIT, SMALL, TEXT, new_figure, tidy, titles
 
 MOST_TARGETS = 8
 WIDTH = 9.0
@@ -36,6 +36,7 @@ def plot_errors(character: Character, result: Result) -> Figure:
     shown = worst_targets(result)
     panels = [(k, False) for k in shown]
     panels += [(k, True) for k in shown if character.targets[k].rotation_weight > 0.0]
+    names = titles([target.path for target in character.targets])
     figure = new_figure(WIDTH, 0.6 + 1.9 * len(panels))
     all_axes = figure.subplots(len(panels), 1, sharex=True, squeeze=False)[:, 0]
     for axes, (k, rotation) in zip(all_axes, panels, strict=True):
@@ -46,7 +47,7 @@ def plot_errors(character: Character, result: Result) -> Figure:
             unit = "deg" if rotation else "mm"
             text = f"{name}: largest {values.max():.2f} {unit}, rms {np.sqrt(np.mean(values**2)):.2f} {unit}"
             axes.plot(simulation.motion.times[rows], values, line, color=color, linewidth=1.5, label=text)
-        tidy(axes, "rotation error [deg]" if rotation else "position error [mm]", character.targets[k].path)
+        tidy(axes, "rotation error [deg]" if rotation else "position error [mm]", names[character.targets[k].path])
         scale_errors(axes, result.after is not None)
         axes.margins(x=0.0)
         axes.legend(fontsize=SMALL, loc="upper right", framealpha=0.85, edgecolor="none")
@@ -75,6 +76,7 @@ def scale_errors(axes: Axes, optimized: bool) -> None:
 def plot_motors(character: Character, result: Result, motors: Sequence[int]) -> Figure:
     """Angle of each motor [deg], or length [mm], with its limits, and the change by the optimiser."""
     columns = 2 if result.after else 1
+    names = titles([motor.path for motor in character.motors])
     figure = new_figure(WIDTH, 0.6 + 1.75 * len(motors))
     grid = figure.subplots(len(motors), columns, sharex=True, squeeze=False)
     for row, m in zip(grid, motors, strict=True):
@@ -85,7 +87,7 @@ def plot_motors(character: Character, result: Result, motors: Sequence[int]) -> 
             values = measure.factor * simulation.motion.motor_values[rows, m]
             row[0].plot(simulation.motion.times[rows], values, line, color=color, linewidth=1.5, label=name)
         joint = character.joints[motor.joint]
-        tidy(row[0], f"{measure.name} [{measure.unit}]", motor.path)
+        tidy(row[0], f"{measure.name} [{measure.unit}]", names[motor.path])
         draw_limits(row[0], measure.factor * np.array([joint.lower, joint.upper]), measure.unit)
         if result.after is None:
             continue

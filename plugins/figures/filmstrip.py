@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from calmotion.geometry.tetrahedra import Indices
 from calmotion.shot import Animation, Character, Motion, Result, Simulation
@@ -20,6 +22,7 @@ PANEL = 340  # pixels across a panel, before it is drawn into the figure
 SMOOTH = 2  # factor of the rendering, which is then averaged
 TRAIL_S = 0.5
 WIDTH = 12.0
+LETTERS = 150  # of titles that stand beside each other
 
 
 def choose_instants(animation: Animation, result: Result, count: int) -> Array:
@@ -53,18 +56,20 @@ def draw_filmstrip(character: Character, animation: Animation, result: Result, c
     cloud = np.concatenate(
         [pose(model, m, row)[0].reshape(-1, 3) for m in [reference, *motions] for row in range(len(times))]
     )
-    cloud = np.concatenate([cloud, reference.target_positions.reshape(-1, 3)])
+    tails = [
+        trail_of(motion, time) for motion in (result.reference, *(run.motion for run, _, _ in runs)) for time in times
+    ]
+    cloud = np.concatenate([cloud, *(tail.reshape(-1, 3) for tail in tails)])
     probe = fit_camera(view, cloud, PANEL, PANEL, 0.0).project(cloud)[:, :2]
     aspect = float(np.clip(np.ptp(probe[:, 1]) / max(np.ptp(probe[:, 0]), 1e-9), 0.35, 1.8))
     camera = fit_camera(view, cloud, SMOOTH * PANEL, round(SMOOTH * PANEL * aspect))
     floor = floor_below(model, reference)
     targets = farthest_targets(result.before, times)
-    paths = [target.path for target in character.targets]
-    names = distinct_names(paths)
+    heads = panel_titles(character, [run for run, _, _ in runs], targets, times)
     magnifier = choose_magnifier(reference, motions, targets, camera)
-    figure = new_figure(WIDTH, 0.55 + len(runs) * (0.22 + aspect * WIDTH / len(times)))
+    figure = new_figure(WIDTH, 0.55 + len(runs) * (0.22 * heads[0][0].count("\n") + 0.22 + aspect * WIDTH / len(times)))
     grid = figure.subplots(len(runs), len(times), squeeze=False)
-    for row, (run, color, name), motion in zip(grid, runs, motions, strict=True):
+    for row, (run, color, name), motion, titles in zip(grid, runs, motions, heads, strict=True):
         for column, axes in enumerate(row):
             panel = View(model, motion, reference, column, camera, SMOOTH, floor=floor)
             picture = draw_over_ghost(panel)
@@ -76,11 +81,7 @@ def draw_filmstrip(character: Character, animation: Animation, result: Result, c
             axes.set_axis_off()
             axes.set_xlim(0, camera.size[0])
             axes.set_ylim(camera.size[1], 0)
-            title = f"{times[column]:.2f} s"
-            if len(targets):
-                error = error_at(run, int(targets[column]), times[column])
-                title += f", {names[paths[targets[column]]]} {1e3 * error:.{1 if error > 1e-3 else 2}f} mm"
-            axes.set_title(title, fontsize=SMALL, color=color, pad=2)
+            axes.set_title(titles[column], fontsize=SMALL, color=color, pad=2)
         place = {"ha": "right", "va": "center", "transform": row[0].transAxes, "rotation": 90}
         row[0].text(0.0, 0.5, name, fontsize=NORMAL, color=color, fontweight="bold", **place)
     text = "Simulated motion over the intended motion (green) at the largest errors of the input"
@@ -88,6 +89,28 @@ def draw_filmstrip(character: Character, animation: Animation, result: Result, c
         text += f"; insets: the target named above, enlarged {magnifier.factor:g} times"
     figure.suptitle(text, fontsize=NORMAL, color=TEXT)
     return figure
+
+
+def panel_titles(character: Character, runs: Sequence[Simulation], targets: Indices, times: Array) -> list[list[str]]:
+    """Above each panel of each run its time [s], target and error; in two lines where one would be too long."""
+    if not len(targets):
+        return [[f"{time:.2f} s" for time in times] for _ in runs]
+    paths = [target.path for target in character.targets]
+    short = distinct_names(paths)
+    names = [short[paths[target]] for target in targets]
+    found = []
+    for run in runs:
+        errors = [error_at(run, int(target), time) for target, time in zip(targets, times, strict=True)]
+        values = [f"{1e3 * error:.{1 if error > 1e-3 else 2}f} mm" for error in errors]
+        found.append([(f"{time:.2f} s", name, value) for time, name, value in zip(times, names, values, strict=True)])
+    if max(len(f"{time}, {name} {value}") for row in found for time, name, value in row) * len(times) <= LETTERS:
+        return [[f"{time}, {name} {value}" for time, name, value in row] for row in found]
+    return [[f"{time}, {value}\n{name}" for time, name, value in row] for row in found]
+
+
+def trail_of(motion: Motion, time: float) -> Array:
+    """Places of the targets in the last moments before a time [m], shape [60, K, 3]."""
+    return sample_motion(motion, np.linspace(max(time - TRAIL_S, 0.0), time, 60)).target_positions
 
 
 def farthest_targets(run: Simulation, times: Array) -> Indices:
@@ -108,11 +131,10 @@ def draw_trails(
     axes: Axes, character: Character, motion: Motion, time: float, camera: Camera, color: str, width: float
 ) -> list[Array]:
     """The path of each target up to a time [s]; its pixels, shape [n, 2] for each target."""
-    start = max(time - TRAIL_S, 0.0)
-    trail = sample_motion(motion, np.linspace(start, time, 60))
+    trail = trail_of(motion, time)
     drawn = []
     for k in range(len(character.targets)):
-        pixels = camera.project(trail.target_positions[:, k])[:, :2]
+        pixels = camera.project(trail[:, k])[:, :2]
         axes.plot(pixels[:, 0], pixels[:, 1], color=color, linewidth=width, solid_capstyle="round")
         axes.plot(pixels[-1:, 0], pixels[-1:, 1], "o", color=color, markersize=2.5)
         drawn.append(pixels)

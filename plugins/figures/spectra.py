@@ -8,7 +8,7 @@ from calmotion.views.spectrum import error_spectrum, highest_frequency
 from matplotlib.figure import Figure
 
 from .curves import WIDTH, runs_of, worst_targets
-from .style import LIMIT, SMALL, new_figure, tidy
+from .style import LIMIT, SMALL, new_figure, tidy, titles
 
 DECADES = 5.0  # of the vertical axis
 NEAR = 0.05  # of the width: distance below which labels are joined
@@ -19,6 +19,7 @@ ROOM = 1.15  # end of the axis over the highest significant frequency
 def plot_spectra(character: Character, result: Result, modes: SystemModes | None) -> Figure:
     """Amplitude of the position error of each target [mm] by frequency [Hz]."""
     shown = worst_targets(result)
+    names = titles([target.path for target in character.targets])
     figure = new_figure(WIDTH, 0.7 + 2.1 * len(shown))
     all_axes = figure.subplots(len(shown), 1, sharex=True, squeeze=False)[:, 0]
     end = 1.0
@@ -30,7 +31,7 @@ def plot_spectra(character: Character, result: Result, modes: SystemModes | None
             largest = max(largest, 1e3 * float(amplitudes.max(initial=0.0)))
             if simulation is result.before:
                 end = max(end, ROOM * highest_frequency(frequencies, amplitudes))
-        tidy(axes, "amplitude [mm]", character.targets[k].path)
+        tidy(axes, "amplitude [mm]", names[character.targets[k].path])
         if largest > 0.0:
             axes.set_ylim(largest * 10.0**-DECADES, 3.0 * largest)
         axes.margins(x=0.0)

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 from calmotion.support.files import replaced
+from calmotion.support.naming import distinct_names
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
@@ -14,6 +16,7 @@ BEFORE, AFTER, INTENDED = "#d55e00", "#0072b2", "#009e73"
 LIMIT = "#7f7f7f"
 TEXT = "#222222"
 SMALL, NORMAL = 8.0, 9.5
+LONGEST = 40  # letters of a title that leave room for what is beside it
 
 
 def new_figure(width: float, height: float) -> Figure:
@@ -33,6 +36,11 @@ def tidy(axes: Axes, label: str, title: str = "") -> None:
     axes.set_axisbelow(True)
     for side in ("top", "right"):
         axes.spines[side].set_visible(False)
+
+
+def titles(paths: Sequence[str]) -> dict[str, str]:
+    """What stands above the panel of each prim path: the path, or where one is long, the ends that tell them apart."""
+    return {path: path for path in paths} if max(map(len, paths), default=0) <= LONGEST else distinct_names(paths)
 
 
 def save(figure: Figure, path: Path, dpi: int) -> str:

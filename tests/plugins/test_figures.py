@@ -235,3 +235,41 @@ def test_a_calibration_is_drawn_with_what_was_measured_and_the_intervals(tmp_pat
     assert ticks == ["modulus A", "modulus B"]
     frequencies, amplitudes = module._spectrum(times, 0.3 * np.sin(20.0 * np.pi * times)[:, None])
     assert frequencies[np.argmax(amplitudes)] == pytest.approx(10.0, abs=1.1)
+
+
+def long_paths(character):
+    """The character with a second target; both have long paths, and the same name."""
+    target = character.targets[0]
+    deep = "/Robot/" + "/".join(f"link_of_the_arm_{k}" for k in range(6))
+    two = tuple(dataclasses.replace(target, path=f"{deep}/{side}/Hand") for side in ("left_wrist", "right_wrist"))
+    return dataclasses.replace(character, targets=two)
+
+
+def test_titles_are_whole_paths_where_they_fit_and_ends_that_differ_where_not(figures):
+    assert figures.style.titles(["/Arm/Hand", "/Arm/Elbow"]) == {"/Arm/Hand": "/Arm/Hand", "/Arm/Elbow": "/Arm/Elbow"}
+    paths = [target.path for target in long_paths(synthetic.character()).targets]
+    assert list(figures.style.titles(paths).values()) == ["left_wrist/Hand", "right_wrist/Hand"]
+    assert figures.style.titles([]) == {}
+
+
+def test_titles_of_the_filmstrip_that_would_meet_take_two_lines(figures):
+    result, times = synthetic.result(), np.linspace(0.1, 0.9, 5)
+    runs = [result.before, result.after]
+    short, _ = figures.filmstrip.panel_titles(synthetic.character(), runs, np.zeros(5, dtype=int), times)
+    assert short[0].startswith("0.10 s, Target ") and short[0].endswith(" mm")
+    wide = long_paths(synthetic.character())
+    titles = figures.filmstrip.panel_titles(wide, runs, np.zeros(5, dtype=int), times)
+    assert len(titles) == 2 and all(title.endswith(" mm\nleft_wrist/Hand") for row in titles for title in row)
+    assert figures.filmstrip.panel_titles(wide, runs[:1], np.empty(0, dtype=int), times)[0][0] == "0.10 s"
+
+
+def test_the_filmstrip_has_the_whole_trails(figures, monkeypatch):
+    monkeypatch.setattr(figures.filmstrip, "choose_instants", lambda animation, result, count: np.array([0.6]))
+    character, animation, result = synthetic.character(), synthetic.animation(), synthetic.result()
+    figure = figures.filmstrip.draw_filmstrip(character, animation, result, 1)
+    trails = [line for axes in figure.axes for line in axes.get_lines() if len(line.get_xdata()) > 1]
+    assert len(trails) == 4  # two in the panel of each row
+    for line in trails:
+        (left, right), (bottom, top) = line.axes.get_xlim(), line.axes.get_ylim()
+        assert np.all((line.get_xdata() >= left) & (line.get_xdata() <= right))
+        assert np.all((line.get_ydata() >= top) & (line.get_ydata() <= bottom))
