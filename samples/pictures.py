@@ -1,7 +1,8 @@
 """Optimises samples, and keeps the filmstrip and a small video of each beside it.
 
 `python samples/pictures.py [NAME ...]`, or all samples. A real robot, which is not part of this repository, is drawn by
-`python samples/pictures.py --robot SHOT VIDEO`, and rendered frames become a video by `--frames FOLDER VIDEO`.
+`python samples/pictures.py --robot SHOT VIDEO [OPTIONS of optimize]`; rendered frames become a video by
+`--frames FOLDER VIDEO`.
 """
 
 from __future__ import annotations
@@ -50,8 +51,8 @@ if __name__ == "__main__":
         case ["--frames", folder, video]:
             join(Path(folder), Path(video))
             sys.exit()
-        case ["--robot", shot, video]:
-            film(Path(shot), Path(video))
+        case ["--robot", shot, video, *options]:
+            film(Path(shot), Path(video), *options)
             sys.exit()
     for wanted in sys.argv[1:] or sorted(path.parent.name for path in HERE.glob("*/motion.py")):
         picture(wanted)

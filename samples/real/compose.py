@@ -1,4 +1,4 @@
-"""Puts a layer of ours over a shot that somebody else made: `python compose.py OVERS SHOT OUT`.
+"""Puts a layer of ours over a shot that somebody else made: `python compose.py OVERS SHOT OUT [--seconds N]`.
 
 OUT gets the shot's time range and units (those of OVERS where the motion is there), and sublayers OVERS over SHOT with
 paths relative to it. The robots that such layers are for are not part of this repository; `g1_arms.usda` is for a
@@ -19,8 +19,8 @@ schemas.register()
 from pxr import Sdf, Usd, UsdGeom, UsdPhysics  # noqa: E402  (schemas register before USD is used)
 
 
-def compose(overs: Path, shot: Path, out: Path) -> Path:
-    """Write OUT; returns its path."""
+def compose(overs: Path, shot: Path, out: Path, seconds: float | None = None) -> Path:
+    """Write OUT, with the first so many seconds of the motion or all of it; returns its path."""
     stage = Usd.Stage.Open(str(shot))
     layer = Sdf.Layer.CreateAnonymous(".usda")
     layer.defaultPrim = stage.GetRootLayer().defaultPrim
@@ -28,6 +28,8 @@ def compose(overs: Path, shot: Path, out: Path) -> Path:
     timed = own if own.HasAuthoredTimeCodeRange() else stage
     layer.startTimeCode, layer.endTimeCode = timed.GetStartTimeCode(), timed.GetEndTimeCode()
     layer.timeCodesPerSecond, layer.framesPerSecond = timed.GetTimeCodesPerSecond(), timed.GetFramesPerSecond()
+    if seconds is not None:
+        layer.endTimeCode = min(layer.endTimeCode, layer.startTimeCode + round(seconds * layer.timeCodesPerSecond))
     composed = Usd.Stage.Open(layer)
     UsdGeom.SetStageMetersPerUnit(composed, UsdGeom.GetStageMetersPerUnit(stage))
     UsdPhysics.SetStageKilogramsPerUnit(composed, UsdPhysics.GetStageKilogramsPerUnit(stage))
@@ -44,5 +46,6 @@ if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__)
     for name in ("overs", "shot", "out"):
         parser.add_argument(name, type=Path)
+    parser.add_argument("--seconds", type=float, help="only the first so many seconds of the motion")
     arguments = parser.parse_args()
-    print(compose(arguments.overs, arguments.shot, arguments.out))
+    print(compose(arguments.overs, arguments.shot, arguments.out, arguments.seconds))
