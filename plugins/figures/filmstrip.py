@@ -11,7 +11,7 @@ from calmotion.shot.character import Array
 from calmotion.support.naming import distinct_names
 from calmotion.views.playback import sample_motion
 from calmotion.views.rendering import Camera, View, draw_over_ghost, fit_camera, floor_below, pose, prepare
-from calmotion.views.viewpoint import choose_viewpoint
+from calmotion.views.viewpoint import choose_viewpoint, near_scenery
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
@@ -59,7 +59,7 @@ def draw_filmstrip(character: Character, animation: Animation, result: Result, c
     tails = [
         trail_of(motion, time) for motion in (result.reference, *(run.motion for run, _, _ in runs)) for time in times
     ]
-    cloud = np.concatenate([cloud, *(tail.reshape(-1, 3) for tail in tails)])
+    cloud = np.concatenate([cloud, near_scenery(character, cloud), *(tail.reshape(-1, 3) for tail in tails)])
     probe = fit_camera(view, cloud, PANEL, PANEL, 0.0).project(cloud)[:, :2]
     aspect = float(np.clip(np.ptp(probe[:, 1]) / max(np.ptp(probe[:, 0]), 1e-9), 0.35, 1.8))
     camera = fit_camera(view, cloud, SMOOTH * PANEL, round(SMOOTH * PANEL * aspect))

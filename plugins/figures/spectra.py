@@ -64,7 +64,9 @@ def mode_label(modes: SystemModes | None) -> str:
 
 
 def label_of(group: list[float]) -> str:
-    """The frequencies of a group as a text."""
+    """The frequencies of a group as a text: each of up to two, and of more the range and their number."""
+    if len(group) > 2:
+        return f"{group[0]:.1f}–{group[-1]:.1f} ({len(group)})"
     return ", ".join(f"{frequency:.1f}" for frequency in group)
 
 

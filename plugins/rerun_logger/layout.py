@@ -7,7 +7,7 @@ import rerun.blueprint as rrb
 from calmotion.shot import Animation, Character, Motor, Result
 from calmotion.shot.motor import measure_of
 from calmotion.views.playback import sample_motion
-from calmotion.views.viewpoint import choose_viewpoint, eye_that_sees, moving_cloud
+from calmotion.views.viewpoint import choose_viewpoint, eye_that_sees, moving_cloud, near_scenery
 
 from .colors import BACKGROUND, Style
 
@@ -70,6 +70,7 @@ def choose_eye(character: Character, animation: Animation, result: Result) -> rr
     motions = [sample_motion(motion, times) for motion in runs]
     view = choose_viewpoint(character, result.skins, motions[1])
     cloud = np.concatenate([moving_cloud(character, result.skins, motion) for motion in motions])
+    cloud = np.concatenate([cloud, near_scenery(character, cloud)])
     eye, look = eye_that_sees(view, cloud, HALF_ANGLE, ASPECT)
     return rrb.EyeControls3D(kind=rrb.Eye3DKind.Orbital, position=eye, look_target=look, eye_up=view.up)
 

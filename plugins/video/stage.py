@@ -9,7 +9,7 @@ from calmotion.shot import Animation, Character, Motion, Result, Simulation
 from calmotion.shot.character import Array
 from calmotion.views.playback import sample_motion
 from calmotion.views.rendering import Camera, Model, View, draw_over_ghost, fit_camera, floor_below, prepare
-from calmotion.views.viewpoint import choose_viewpoint, moving_cloud
+from calmotion.views.viewpoint import choose_viewpoint, moving_cloud, near_scenery
 from PIL import Image, ImageDraw
 
 from .timeline import Moment, Worst
@@ -78,6 +78,7 @@ def set_stage(
     floor = floor_below(model, reference)
     if floor is not None:  # the shadow below the character is part of the picture
         cloud = np.concatenate([cloud, cloud - np.maximum(cloud @ model.up - floor, 0.0)[:, None] * model.up])
+    cloud = np.concatenate([cloud, near_scenery(character, cloud)])
     probe = fit_camera(view, cloud, width, width, 0.0).project(cloud)[:, :2]
     aspect = float(np.clip(1.08 * np.ptp(probe[:, 1]) / max(np.ptp(probe[:, 0]), 1e-9), *shape))
     camera = fit_camera(view, cloud, SMOOTH * width, SMOOTH * round(width * aspect), 0.06)

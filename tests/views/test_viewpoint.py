@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import synthetic
 from calmotion.views.playback import world_points
-from calmotion.views.viewpoint import choose_viewpoint, eye_that_sees, hull_corners, moving_cloud
+from calmotion.views.viewpoint import choose_viewpoint, eye_that_sees, hull_corners, moving_cloud, near_scenery
 
 
 def test_the_sphere_contains_every_target_but_not_the_hidden_guide():
@@ -77,3 +77,20 @@ def test_of_a_flat_surface_all_points_are_taken():
     assert hull_corners(flat).tolist() == [0, 1, 2, 3, 4]
     cube = np.array([[x, y, z] for x in (0.0, 1.0) for y in (0.0, 1.0) for z in (0.0, 1.0)] + [[0.5, 0.5, 0.5]])
     assert sorted(hull_corners(cube)) == list(range(8))
+
+
+def test_scenery_near_the_character_belongs_into_the_picture_and_a_stage_does_not():
+    character = synthetic.character()
+    surface = next(surface for body in character.bodies for surface in body.surfaces if surface.drawn)
+    cloud = np.array([[0.0, 0.0, 0.0], [1.0, 1.0, 1.0]])
+
+    def box(low, high):
+        points = np.array(np.meshgrid(*zip(low, high, strict=True))).reshape(3, -1).T
+        return dataclasses.replace(surface, points=points)
+
+    head, stage = box((0.4, 0.4, 1.0), (0.6, 0.6, 1.2)), box((-3.0, -3.0, -0.1), (3.0, 3.0, 0.0))
+    lamp = box((0.4, 0.4, 1.3), (0.6, 0.6, 1.6))  # no longer fits beside the head
+    hidden = dataclasses.replace(box((0.0, 0.0, 0.0), (0.1, 0.1, 0.1)), visible=False)
+    near = near_scenery(dataclasses.replace(character, scenery=(stage, lamp, head, hidden)), cloud)
+    np.testing.assert_array_equal(np.sort(near, axis=0), np.sort(head.points, axis=0))
+    assert near_scenery(dataclasses.replace(character, scenery=()), cloud).shape == (0, 3)

@@ -12,6 +12,7 @@ from calmotion.views.playback import deformed_points, modes_of, rotation_matrice
 
 SIDE = np.radians(38.0)
 ELEVATION = np.radians(17.0)
+ROOM = 1.2  # largest growth of a picture for the scenery
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,6 +89,35 @@ def moving_cloud(character: Character, skins: tuple[Skin | None, ...], motion: M
                 turned = points @ np.swapaxes(matrices[:, index], 1, 2)
                 clouds.append((turned + motion.positions[instants, index][:, None]).reshape(-1, 3))
     return np.concatenate(clouds)
+
+
+def near_scenery(character: Character, cloud: Array) -> Array:
+    """Corners of the hulls of the still surfaces that belong into a picture: a robot's head and feet, what it hits.
+
+    Not those, such as a stage, for which the picture would have to be much larger than for the character.
+
+    Args:
+        character: With its scenery.
+        cloud: What the picture has to contain [m], shape [n, 3].
+
+    Returns:
+        [m], shape [k, 3]; empty where there are none.
+    """
+    low, high = cloud.min(axis=0), cloud.max(axis=0)
+    limit = ROOM * float(np.linalg.norm(high - low))
+
+    def grown(piece: Array) -> tuple[float, Array, Array]:
+        lower, upper = np.minimum(low, piece.min(axis=0)), np.maximum(high, piece.max(axis=0))
+        return float(np.linalg.norm(upper - lower)), lower, upper
+
+    pieces = [surface.points[hull_corners(surface.points)] for surface in character.scenery if surface.drawn]
+    kept = [np.zeros((0, 3))]
+    for piece in sorted(pieces, key=lambda piece: grown(piece)[0]):
+        diagonal, lower, upper = grown(piece)
+        if diagonal <= limit:
+            low, high = lower, upper
+            kept.append(piece)
+    return np.concatenate(kept)
 
 
 def hull_corners(points: Array) -> IntArray:
