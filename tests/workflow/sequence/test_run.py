@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 from calmotion.errors import ShotError
 from calmotion.shot.curves import held_curve
-from calmotion.workflow.sequence.run import Member, Repertoire, sequence
+from calmotion.workflow.sequence.run import Repertoire, sequence
 from calmotion.workflow.shot import Shot
+from repertoires import member
 from small_shots import ELBOW, FRAMES, HAND, SHOULDER, TARGET_POSITION, make_flexible, make_target, write_arm
 
 ARGUMENTS = ("--tolerance=0.002m", "--step=0.008s")
@@ -48,12 +49,12 @@ def test_every_clip_may_follow_every_other_one(plan_file, tmp_path, calmotion):
         "up_to_down", "down_to_up",
     ]  # fmt: skip
     ends = {}
-    for member in (*made.clips, *made.transitions):
-        assert member.outcome == "done" and member.error_m <= 2e-3 and Path(member.layer).exists()
-        animation = Shot(f"{Path(member.layer).with_suffix('')}_root.usda").read().animation
-        assert animation.frame_times[-1] == pytest.approx(member.seconds)
-        span = np.array([0.0, member.seconds])
-        ends[member.name] = np.array([held_curve(track, span[1])(span, 0) for track in animation.current]).T
+    for one in (*made.clips, *made.transitions):
+        assert one.outcome == "done" and one.error_m <= 2e-3 and Path(one.layer).exists()
+        animation = Shot(f"{Path(one.layer).with_suffix('')}_root.usda").read().animation
+        assert animation.frame_times[-1] == pytest.approx(one.seconds)
+        span = np.array([0.0, one.seconds])
+        ends[one.name] = np.array([held_curve(track, span[1])(span, 0) for track in animation.current]).T
     for name, (one, two) in {"up_to_down": ("up", "down"), "down_to_up": ("down", "up")}.items():
         np.testing.assert_allclose(ends[name][0], ends[one][1], atol=1e-6)
         np.testing.assert_allclose(ends[name][1], ends[two][0], atol=1e-6)
@@ -64,14 +65,6 @@ def test_every_clip_may_follow_every_other_one(plan_file, tmp_path, calmotion):
     )
     rows = json.loads(again.stdout)
     assert again.returncode == 0 and {row["outcome"] for row in (*rows["clips"], *rows["transitions"])} == {"kept"}
-
-
-def member(name, one, two, **changes):
-    values = {
-        "seconds": 1.0, "outcome": "done", "error_before_m": 0.02, "error_m": 0.001, "within_tolerance": True,
-        "exceeded_limits": (), "joined": True, "layer": f"{name}.usda",
-    }  # fmt: skip
-    return Member(name, one, two, **(values | changes))
 
 
 @pytest.mark.parametrize(

@@ -3,15 +3,8 @@
 import io
 
 from calmotion.cli.commands.shows.sequence import _print
-from calmotion.workflow.sequence.run import Member, Repertoire
-
-
-def member(name, one, two, **changes):
-    values = {
-        "seconds": 1.0, "outcome": "done", "error_before_m": 0.02, "error_m": 0.001, "within_tolerance": True,
-        "exceeded_limits": (), "joined": True, "layer": f"out/{name}.usda",
-    }  # fmt: skip
-    return Member(name, one, two, **(values | changes))
+from calmotion.workflow.sequence.run import Repertoire
+from repertoires import member
 
 
 def printed(*transitions):
