@@ -3,7 +3,7 @@
 import io
 
 import pytest
-from calmotion.cli.tables import print_table, short_paths
+from calmotion.cli.tables import console_on, paths_in, print_table, say, short_paths
 from rich.console import Console
 
 HEADS = ["motor", "limits", "peak speed", "may change"]
@@ -51,6 +51,17 @@ def test_cells_are_wrapped_after_commas_alone():
     rows = [["/A/b", "49.84, 49.89, 385.1, 430.1, ... Hz"]]
     lines = printed(24, rows, ["body", "frequencies"])
     assert [line.strip() for line in lines[3:]] == ["/A/b       49.84, 49.89,", "385.1, 430.1,", "... Hz"]
+
+
+def test_long_paths_in_sentences_are_shortened_where_they_stay_distinct():
+    stream = io.StringIO()
+    file = "wrote /home/somebody/a/very/long/folder/of/results/calm.usda"
+    hands = [f"{DEEP}left/hand: rigid", f"{DEEP}right/hand: rigid", f"/x/y and {DEEP}left/handle"]
+    console = console_on(stream, paths_in([*hands[:2], "/x/y"]))
+    for sentence in (*hands, file):
+        say(console, sentence)
+    lines = ["…/left/hand: rigid", "…/right/hand: rigid", hands[2], file]
+    assert stream.getvalue().splitlines() == lines
 
 
 def test_nothing_is_printed_without_rows():

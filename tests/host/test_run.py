@@ -92,7 +92,7 @@ def test_what_a_poll_refuses_is_left_out_with_the_reason_and_its_users_run_witho
     alloy = operator("smithy.alloy", requires=[Ore], uses=[Coal], provides=[Steel])
     run = host_of(DIG, burn, alloy).run([], [Steel]).finish()
     assert run.get(Steel) == Steel()
-    assert [(row.what, row.why) for row in run.left_out()] == [("wood burn: skipped", "the wood is wet")]
+    assert [(row.what, row.why, row.skipped) for row in run.left_out()] == [("wood burn", "the wood is wet", True)]
 
 
 def test_a_used_value_whose_making_failed_stops_its_users():

@@ -7,7 +7,7 @@ from operator import itemgetter
 from typing import TYPE_CHECKING, Any, TextIO
 
 from calmotion.cli.quantities import angle, counted, frequency, length, memory
-from calmotion.cli.run_report import print_left_out, print_notes
+from calmotion.cli.run_report import prim_paths, print_left_out, print_notes
 from calmotion.cli.sentences import unbroken
 from calmotion.cli.tables import console_on, print_table, say
 from calmotion.shot.motor import PRESCRIBED
@@ -19,8 +19,10 @@ if TYPE_CHECKING:
 
 def print_inspection(report: dict[str, Any], stream: TextIO) -> None:
     """Print the content of a shot, or the findings of a check."""
-    console = console_on(stream)
-    (_print_findings if "findings" in report else _print_contents)(console, report)
+    if "findings" in report:
+        _print_findings(console_on(stream), report)
+    else:
+        _print_contents(console_on(stream, prim_paths(report)), report)
 
 
 def _print_findings(console: Console, report: dict[str, Any]) -> None:

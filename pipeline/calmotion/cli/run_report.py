@@ -13,7 +13,7 @@ from calmotion.cli.quantities import about, angle, length
 from calmotion.cli.reports.feet import print_contacts, print_support
 from calmotion.cli.reports.limits import print_limits, print_reason
 from calmotion.cli.sentences import unbroken
-from calmotion.cli.tables import console_on, print_table, say
+from calmotion.cli.tables import console_on, paths_in, print_table, say
 from calmotion.shot.budget import CHOICES, MEASURED, MESH, PATCHES, REDUCTION, STEP, SUBSPACE
 
 # What helps where an entry of the error budget is too large.
@@ -34,13 +34,10 @@ IDLE_EFFORT = 0.01  # of that of the strongest motor
 def print_left_out(console: Console, rows: Sequence[dict[str, Any]]) -> None:
     """The simplifications, each with its reason and estimated error, and the steps that were not needed."""
     for row in rows:
-        step, _, skipped = row["what"].rpartition(": skipped")
-        if step and not skipped:
-            say(console, f"skipped: {step} ({row['why']})")
-            continue
         error = row["estimated_error_m"]
         cost = "" if error is None else f"; estimated error {about(error)}"
-        say(console, f"simplified: {row['what']} ({row['why']}){cost}")
+        kind = "skipped" if row["skipped"] else "simplified"
+        say(console, f"{kind}: {row['what']} ({row['why']}){cost}")
 
 
 def print_notes(console: Console, notes: Sequence[str]) -> None:
@@ -202,7 +199,7 @@ def print_run(report: dict[str, Any], stream: TextIO, verbose: bool = False) -> 
         stream: Where it is printed.
         verbose: Whether the search, the steps, the error budget and the notes are printed as well.
     """
-    console = console_on(stream)
+    console = console_on(stream, prim_paths(report))
     print_verdict(console, report)
     print_errors(console, report, verbose)
     print_robustness(console, report)
@@ -214,6 +211,12 @@ def print_run(report: dict[str, Any], stream: TextIO, verbose: bool = False) -> 
         print_work(console, report)
         print_notes(console, report["notes"])
     print_left_out(console, report["left_out"])
+
+
+def prim_paths(report: dict[str, Any]) -> list[str]:
+    """The prims that sentences of a report name."""
+    named = [row["path"] for kind in ("targets", "motors", "bodies") for row in report.get(kind, ())]
+    return named + paths_in([row["what"] for row in report["left_out"]])
 
 
 def print_errors(console: Console, report: dict[str, Any], verbose: bool = False) -> None:

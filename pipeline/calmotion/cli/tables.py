@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import textwrap
 from collections.abc import Sequence
 from typing import TextIO
@@ -13,17 +14,43 @@ from calmotion.support.naming import distinct_names
 
 _FILE_WIDTH = 200  # characters of a line in a file, where nothing needs to be folded
 _GAP = "  "
+_PATH = re.compile(r"(?<![\w./])(?:/\w+)+")
+_LONGEST_PATH = 40  # letters of a prim path in a sentence
 _SHORTENED = "(… stands for the start of a prim path; --json has whole paths)"
 
 
-def console_on(stream: TextIO) -> Console:
-    """A console on a stream; as wide as the terminal, and wide in a file."""
-    return Console(file=stream, highlight=False, markup=False, width=width_of(stream) or _FILE_WIDTH)
+class ReportConsole(Console):
+    """A console whose sentences name prims by short paths.
+
+    Attributes:
+        names: Long prim paths and what stands for them in sentences.
+    """
+
+    names: dict[str, str]
+
+
+def console_on(stream: TextIO, paths: Sequence[str] = ()) -> Console:
+    """A console on a stream; as wide as the terminal, and wide in a file.
+
+    Args:
+        stream: Where to print.
+        paths: Prim paths that sentences may name; long ones are shortened to what tells them apart from the others.
+    """
+    console = ReportConsole(file=stream, highlight=False, markup=False, width=width_of(stream) or _FILE_WIDTH)
+    console.names = {path: name for path, name in short_paths(paths).items() if len(path) > _LONGEST_PATH}
+    return console
 
 
 def say(console: Console, text: str) -> None:
     """Print a sentence, wrapped between words."""
+    if isinstance(console, ReportConsole):
+        text = _PATH.sub(lambda found: console.names.get(found[0], found[0]), text)
     console.print(wrapped(text, console.width), soft_wrap=True)
+
+
+def paths_in(sentences: Sequence[str]) -> list[str]:
+    """The prim paths in sentences."""
+    return [path for sentence in sentences for path in _PATH.findall(sentence)]
 
 
 def short_paths(paths: Sequence[str]) -> dict[str, str]:

@@ -233,7 +233,7 @@ class Run:
 
         made = {cls.idname: all(kind in self.data for kind in cls.provides) for cls in self.plan.operators}
         return tuple(
-            Simplification(f"{result.label}: skipped", result.reason)
+            Simplification(result.label, result.reason, skipped=True)
             for result in self.results
             if result.outcome == Outcome.LEFT_OUT
             and not made[result.idname]

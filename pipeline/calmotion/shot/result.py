@@ -115,19 +115,21 @@ class MotorCurve:
 
 @dataclass(frozen=True, eq=False)
 class Simplification:
-    """A model simplification.
+    """A model simplification, or a step of the pipeline that was not needed.
 
     Attributes:
-        what: What was left out.
+        what: What was left out; the label of the step.
         why: The reason.
         estimated_error_m: What it costs at the targets [m]; None: nothing, or not known.
         source: Entry of the error budget that it is part of, one of `shot.budget`, or empty.
+        skipped: Whether it is a step.
     """
 
     what: str
     why: str
     estimated_error_m: float | None = None
     source: str = ""
+    skipped: bool = False
 
 
 @dataclass(frozen=True, eq=False)

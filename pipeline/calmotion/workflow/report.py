@@ -56,7 +56,7 @@ def target_errors(character: Character, simulation: Simulation, suffix: str) -> 
 
 def left_out_row(row: Simplification) -> dict[str, Any]:
     """One row of `left_out`."""
-    return {"what": row.what, "why": row.why, "estimated_error_m": row.estimated_error_m}
+    return {"what": row.what, "why": row.why, "estimated_error_m": row.estimated_error_m, "skipped": row.skipped}
 
 
 def limit_row(character: Character, limit: LimitUse) -> dict[str, Any]:
