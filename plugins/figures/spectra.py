@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numpy as np
 from calmotion.shot import Character, Result
 from calmotion.shot.outputs import SystemModes
 from calmotion.views.spectrum import error_spectrum, highest_frequency
@@ -41,7 +42,7 @@ def plot_spectra(character: Character, result: Result, modes: SystemModes | None
         for n, frequency in enumerate(marked):
             label = mode_label(modes) if n == 0 else None
             axes.axvline(frequency, color=LIMIT, linewidth=1.0, linestyle=":", label=label)
-        for group in grouped(marked, NEAR * end, LETTER * end):
+        for group in grouped(marked, NEAR * end, LETTER * end, end):
             inside = group[-1] + LETTER * end * len(label_of(group)) < end
             axes.annotate(
                 label_of(group), (group[-1] if inside else group[0], 1.0),
@@ -70,11 +71,11 @@ def label_of(group: list[float]) -> str:
     return ", ".join(f"{frequency:.1f}" for frequency in group)
 
 
-def grouped(values: list[float], gap: float, letter: float = 0.0) -> list[list[float]]:
+def grouped(values: list[float], gap: float, letter: float = 0.0, end: float = np.inf) -> list[list[float]]:
     """Ascending values in groups, with less than `gap` between successive values of a group.
 
     A value that the label of a group would cover, which begins at the last of the group, joins it; `letter` is the
-    width of one.
+    width of one. The label of the last group stands before it where it would reach beyond `end`.
     """
     groups: list[list[float]] = []
     for value in values:
@@ -82,4 +83,9 @@ def grouped(values: list[float], gap: float, letter: float = 0.0) -> list[list[f
             groups[-1].append(value)
         else:
             groups.append([value])
+    if len(groups) > 1:
+        before, last = groups[-2:]
+        wide = letter * len(label_of(last))
+        if last[-1] + wide >= end and before[-1] + letter * (1 + len(label_of(before))) > last[0] - wide:
+            groups[-2:] = [before + last]
     return groups

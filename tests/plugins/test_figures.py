@@ -95,9 +95,14 @@ def test_spectra_are_drawn_in_millimetres_with_the_modes_marked(figures):
 def test_labels_too_near_to_stand_apart_are_written_as_one(figures):
     assert figures.spectra.grouped([1.0, 1.4, 1.9, 5.0], 0.6) == [[1.0, 1.4, 1.9], [5.0]]
     assert figures.spectra.grouped([], 1.0) == []
-    # the label "24.9, 26.0, 27.7" begins at 27.7 and is 16 letters long
+    # the label "24.9–27.7 (3)" begins at 27.7 and is 13 letters long
     assert figures.spectra.grouped([24.9, 26.0, 27.7, 30.2], 2.4) == [[24.9, 26.0, 27.7], [30.2]]
     assert figures.spectra.grouped([24.9, 26.0, 27.7, 30.2], 2.4, 0.3) == [[24.9, 26.0, 27.7, 30.2]]
+    # there is no room for "24.7" behind its line, and none between the lines for both labels
+    assert figures.spectra.grouped([6.0, 23.2, 24.7], 1.0, 0.2, 25.3) == [[6.0], [23.2, 24.7]]
+    assert figures.spectra.grouped([6.0, 20.2, 24.7], 1.0, 0.2, 25.3) == [[6.0], [20.2], [24.7]]
+    assert figures.spectra.label_of([18.6, 18.7]) == "18.6, 18.7"
+    assert figures.spectra.label_of([3.2, 3.4, 9.4]) == "3.2–9.4 (3)"
 
 
 def test_motor_curves_show_limits_and_the_change(figures):
