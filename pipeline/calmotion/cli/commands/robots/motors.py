@@ -85,21 +85,24 @@ def _cell(motor: MotorType, name: str) -> str:
     return f"{motor.in_table(name):.4g} {motor.unit(name)}".strip() if name in motor.values else "-"
 
 
+def _speed_of(motor: MotorType) -> str:
+    """Which speed of a motor is known: without load, or else the largest."""
+    return "no_load_speed" if "no_load_speed" in motor.values else "max_speed"
+
+
 def _print(known: Mapping[str, MotorType], output: Output) -> None:
     from calmotion.cli.tables import console_on, print_table, say
 
-    console, shown = console_on(output.stream), ("max_torque", "no_load_speed", "position_gain", "gear_stiffness")
-    cells = [
-        [
-            name, motor.title, motor.group, _cell(motor, shown[0]),
-            _cell(motor, shown[1] if shown[1] in motor.values else "max_speed"),
-            *(_cell(motor, quantity) for quantity in shown[2:]),
+    console = console_on(output.stream)
+    for group in dict.fromkeys(motor.group for motor in known.values()):
+        cells = [
+            [name, motor.title, _cell(motor, "max_torque"), _cell(motor, _speed_of(motor))]
+            for name, motor in known.items()
+            if motor.group == group
         ]
-        for name, motor in known.items()
-    ]  # fmt: skip
-    heads = ["name", "motor", "kind", "largest torque", "speed", "position gain", "gear"]
-    print_table(console, "Motors", heads, cells, texts=3)
+        print_table(console, f"{group}s".capitalize(), ["name", "motor", "largest torque", "speed"], cells, texts=2)
     say(console, "calmotion motors NAME shows all values of a motor with their sources")
+    say(console, "next: name the motor of a joint in calm:motor:type, with calm:motor:model = servo")
 
 
 def _print_one(motor: MotorType, output: Output) -> None:

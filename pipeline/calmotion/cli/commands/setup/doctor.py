@@ -31,15 +31,17 @@ def _run(args: argparse.Namespace, output: Output) -> int:
     if output.json:
         output.object({"findings": [asdict(one) for one in findings], "wrong": wrong})
         return int(wrong > 0)
+    from calmotion.cli.quantities import counted
     from calmotion.cli.tables import console_on, say
 
     console = console_on(output.stream)
+    notes = sum(one.state == NOTE for one in findings)
+    verdict = f"{counted(wrong, 'thing')} wrong (X)" if wrong else "nothing is wrong"
+    say(console, f"{verdict}, {counted(notes, 'thing')} to note (!)" if notes else verdict)
     width = max(len(one.name) for one in findings)
-    for one in findings:
+    for one in sorted(findings, key=lambda one: (WRONG, NOTE, OK).index(one.state)):
         mark = {OK: "  ", NOTE: "! ", WRONG: "X "}[one.state]
         say(console, f"{mark}{one.name:{width}}  {one.found}")
         if one.remedy:
             say(console, f"  {'':{width}}  do: {one.remedy}")
-    notes = sum(one.state == NOTE for one in findings)
-    say(console, f"{wrong} wrong (X), {notes} to note (!)" if wrong or notes else "all is well")
     return int(wrong > 0)
