@@ -8,6 +8,10 @@ from typing import TYPE_CHECKING, Any, TextIO
 from calmotion.cli.options import Commands, assignments, file_argument, opened_shot, quantity, shot_command
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from rich.console import Console
+
     from calmotion.cli.output import Output
 
 
@@ -98,11 +102,14 @@ def _run(args: argparse.Namespace, output: Output) -> int:
 
 
 def _print(report: dict[str, Any], stream: TextIO) -> None:
-    from calmotion.cli.quantities import measured, quantity_in
+    from calmotion.cli.quantities import counted, quantity_in
     from calmotion.cli.sentences import unbroken
-    from calmotion.cli.tables import console_on, print_table, say
+    from calmotion.cli.tables import console_on, say
 
     console = console_on(stream)
+    of_robot = [row for row in report["parameters"] if row["of_robot"]]
+    told = sum(row["identifiable"] for row in of_robot)
+    say(console, f"The recordings tell {told} of {counted(len(of_robot), 'parameter')} of the robot.")
     for row in report["channels"]:
         held_out = row["validation_rms"]
         before, after, noise = (quantity_in(row[name], row["unit"], 3) for name in ("rms_before", "rms", "noise"))
@@ -112,34 +119,40 @@ def _print(report: dict[str, Any], stream: TextIO) -> None:
             f"{row['name']}: the difference of recording and robot falls from {before} to {after}{others} "
             f"(root mean square; noise {noise}).",
         )
-    for of_robot, title in ((True, "Parameters of the robot"), (False, "Parameters of the model and the measurement")):
-        rows = []
-        for row in report["parameters"]:
-            if row["of_robot"] == of_robot:
-                value, deviation = measured(row["value"], row["standard_deviation"], row["unit"])
-                rows.append([
-                    row["kind"], row["name"].partition(" ")[2], quantity_in(row["prior"]["value"], row["unit"]), value,
-                    deviation + _share(row), "yes" if row["identifiable"] else "no",
-                ])  # fmt: skip
-        print_table(
-            console, title, ["parameter", "of", "in the shot", "estimated", "standard deviation", "identifiable"], rows,
-            texts=2,
-        )  # fmt: skip
+    _print_parameters(console, "Parameters of the robot", of_robot)
     for row in report["parameters"]:
         if row["advice"]:
             say(console, f"{row['name']} is not identifiable from these recordings: {row['advice']}")
+    for file in (report["layer"], report["root"], *report["figures"]):
+        if file:
+            say(console, f"wrote {unbroken(file)}")
+    if report["root"]:
+        say(console, f"next: calmotion optimize {unbroken(report['root'])} -o LAYER makes curves for this robot")
     for note in report["notes"]:
         say(console, f"note: {note}")
+    others = [row for row in report["parameters"] if not row["of_robot"]]
+    _print_parameters(console, "Parameters of the model and the measurement", others)
     say(
         console,
         f"{report['simulations']} simulations in {report['wall_s']:.3g} s; steps of {1e3 * report['step_s']:.3g} ms, "
         f"whose error is {report['step_shift']:.2g} standard deviations of the estimates",
     )
-    for file in (report["layer"], report["root"], *report["figures"]):
-        if file:
-            say(console, f"wrote {file}")
-    if report["root"]:
-        say(console, f"next: calmotion optimize {unbroken(report['root'])} -o LAYER makes curves for this robot")
+
+
+def _print_parameters(console: Console, title: str, parameters: Sequence[dict[str, Any]]) -> None:
+    """A table of parameters; nothing without any."""
+    from calmotion.cli.quantities import measured, quantity_in
+    from calmotion.cli.tables import print_table
+
+    rows = []
+    for row in parameters:
+        value, deviation = measured(row["value"], row["standard_deviation"], row["unit"])
+        rows.append([
+            row["kind"], row["name"].partition(" ")[2], quantity_in(row["prior"]["value"], row["unit"]), value,
+            deviation + _share(row), "yes" if row["identifiable"] else "no",
+        ])  # fmt: skip
+    heads = ["parameter", "of", "in the shot", "estimated", "standard deviation", "identifiable"]
+    print_table(console, title, heads, rows, texts=2)
 
 
 def _share(row: dict[str, Any]) -> str:

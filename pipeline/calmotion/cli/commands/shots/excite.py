@@ -84,6 +84,12 @@ def _print(report: dict[str, Any], stream: TextIO) -> None:
         ["parameter", "of", "in the shot", "before", "after a chirp", "after this motion", "identifiable"], rows,
         texts=2,
     )  # fmt: skip
+    say(console, f"wrote {unbroken(report['layer'])}")
+    say(
+        console,
+        f"next: play it on the robot (calmotion export {unbroken(report['layer'])} writes commands), record it, and "
+        f"calmotion calibrate {unbroken(report['layer'])} --recording FILE -o LAYER",
+    )
     rows = [
         [row["path"], *(f"{row[name]:.3g}" for name in ("excursion", "velocity", "acceleration", "effort")),
          f"{max(row[f'{name}_share'] for name in ('range', 'velocity', 'acceleration', 'effort')):.0%}"]
@@ -94,9 +100,3 @@ def _print(report: dict[str, Any], stream: TextIO) -> None:
         ["motor", "excursion", "velocity", "acceleration", "effort", "of its limits"], rows,
     )  # fmt: skip
     say(console, f"{report['motions']} motions tried in {report['wall_s']:.3g} s; collisions are not checked")
-    say(console, f"wrote {unbroken(report['layer'])}")
-    say(
-        console,
-        f"next: play it on the robot (calmotion export {unbroken(report['layer'])} writes commands), record it, and "
-        f"calmotion calibrate {unbroken(report['layer'])} --recording FILE -o LAYER",
-    )

@@ -69,6 +69,17 @@ def _print(report: dict[str, Any], stream: TextIO) -> None:
     )
     rows = [
         [
+            row["path"], length(row["max_error_played_m"]), length(row["max_error_m"]),
+            length(row["expected_max_error_m"]), length(row["expected_p95_max_error_m"]),
+        ]
+        for row in report["targets"]
+    ]  # fmt: skip
+    print_table(
+        console, "Largest error at the targets",
+        ["target", f"of take {report['take']}", "of the new curves", "to expect (median)", "95%"], rows,
+    )  # fmt: skip
+    rows = [
+        [
             row["name"], quantity_in(row["prior"]["value"], row["unit"]),
             *measured(row["value"], row["standard_deviation"], row["unit"]), "yes" if row["identifiable"] else "no",
         ]
@@ -79,21 +90,13 @@ def _print(report: dict[str, Any], stream: TextIO) -> None:
         console, f"The robot after take {report['take']}",
         ["parameter", "before", "now", "standard deviation", "identifiable"], rows,
     )  # fmt: skip
-    rows = [
-        [
-            row["path"], length(row["max_error_played_m"]), length(row["max_error_m"]),
-            length(row["expected_max_error_m"]), length(row["expected_p95_max_error_m"]),
-        ]
-        for row in report["targets"]
-    ]  # fmt: skip
-    print_table(
-        console, "Largest error at the targets",
-        ["target", f"of take {report['take']}", "of the new curves", "to expect (median)", "95%"], rows,
-    )  # fmt: skip
-    for note in report["notes"]:
-        say(console, f"note: {note}")
+    for file in (report["layer"], report["root"], report["model"], report["model_root"]):
+        if file:
+            say(console, f"wrote {unbroken(file)}")
     say(
         console,
         f"next: play {unbroken(report['root'])} in take {report['take'] + 1}, record it, and run calmotion refine "
         f"again",
     )
+    for note in report["notes"]:
+        say(console, f"note: {note}")
