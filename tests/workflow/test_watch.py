@@ -146,9 +146,13 @@ def test_what_a_run_took_over_and_what_it_made_are_told(shot_file, capsys):
     watch._last = {}  # else it would be forgotten, as that of the run before
     result = watch.run()
     assert (watch.reused, watch.made) == (["time step"], ["meshes", "reduction", "subspaces"])
-    args = argparse.Namespace(quiet=False, optimize=False)
+    args = argparse.Namespace(quiet=False, optimize=False, verbose=True)
     _tell(result, watch, 1.0, args, Output(sys.stdout, False))
-    assert "; reused time step; made meshes, reduction, subspaces" in capsys.readouterr().out
+    told = capsys.readouterr().out
+    assert told.endswith("; reused time step; made meshes, reduction, subspaces\n")
+    args.verbose = False
+    _tell(result, watch, 1.0, args, Output(sys.stdout, False))
+    assert f"{capsys.readouterr().out.strip()}; reused" in told
     watch._last = {ConvergedReduction: converged}
     watch.run()
     assert watch.reused == []

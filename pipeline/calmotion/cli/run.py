@@ -163,11 +163,13 @@ def _tell(result: SimulationResult, watch: Watch, seconds: float, args: argparse
     path, error, moment = largest_error(result)
     verdict = "tolerance kept" if report["tolerance_kept"] else "tolerance missed"
     what = "optimised" if args.optimize else "simulated"
+    before = report.get("max_error_before_m")
+    largest = length(error) if before is None else f"{length(before)} to {length(error)}"
     reused = f"; reused {', '.join(watch.reused)}" if watch.reused else ""
     reused += f"; made {', '.join(watch.made)}" if watch.made else ""
     print(
-        f"{time.strftime('%H:%M:%S')} {what} in {seconds:.2f} s: largest error {length(error)} of {path} at "
-        f"{moment:.2f} s, {verdict}{reused}",
+        f"{time.strftime('%H:%M:%S')} {what} in {seconds:.2f} s: largest error {largest} of {path} at "
+        f"{moment:.2f} s, {verdict}{reused if args.verbose else ''}",
         file=output.stream, flush=True,
     )  # fmt: skip
     for problem in result.problems:
