@@ -72,7 +72,7 @@ def _print(report: dict[str, Any], stream: TextIO) -> None:
     rows = [
         [
             row["kind"], row["path"], quantity_in(row["value"], row["unit"]),
-            *(f"{value:.2g}" for value in (
+            *(quantity_in(value, row["unit"], 3) for value in (
                 row["prior"]["standard_deviation"], row["standard_deviation_chirp"], row["standard_deviation"]
             )),
             "yes" if row["identifiable"] else "no",
