@@ -108,7 +108,7 @@ def test_a_shaper_is_printed_with_its_delay_and_the_error_without_it(run):
     assert "delays the motion" not in run("simulate", "shot.usda")[1]
 
 
-def test_optimize_reports_what_the_contract_names(run, tmp_path):
+def test_optimize_reports_what_the_contract_names(run, tmp_path, repository):
     layer, table = tmp_path / "new" / "calm.usda", tmp_path / "table.csv"
     status, out, _ = run("optimize", "shot.usda", "-o", layer, "--csv", table, "--json")
     report = json.loads(out)
@@ -130,12 +130,16 @@ def test_optimize_reports_what_the_contract_names(run, tmp_path):
         "skipped": False,
     }
     assert table.is_file() and layer.parent.is_dir()
+    page = (repository / "docs" / "reference" / "outputs.md").read_text()
+    assert [key for key in report if f"`{key}`" not in page] == []
 
 
-def test_simulate_reports_without_before_and_after(run):
+def test_simulate_reports_without_before_and_after(run, repository):
     status, out, _ = run("simulate", "shot.usda", "--json")
     report = json.loads(out)
     assert status == 0 and not [key for key in report if "before" in key or "after" in key]
+    page = (repository / "docs" / "reference" / "outputs.md").read_text()
+    assert [key for key in report if f"`{key}`" not in page] == []
     assert {
         "path",
         "max_error_m",
