@@ -113,10 +113,10 @@ def _print(report: dict[str, Any], stream: TextIO) -> None:
     for row in report["channels"]:
         held_out = row["validation_rms"]
         before, after, noise = (quantity_in(row[name], row["unit"], 3) for name in ("rms_before", "rms", "noise"))
-        others = "" if held_out is None else f", {quantity_in(held_out, row['unit'], 3)} in samples not fitted"
+        checked = "" if held_out is None else f", {quantity_in(held_out, row['unit'], 3)} in samples not fitted"
         say(
             console,
-            f"{row['name']}: the difference of recording and robot falls from {before} to {after}{others} "
+            f"{row['name']}: the difference of recording and robot falls from {before} to {after}{checked} "
             f"(root mean square; noise {noise}).",
         )
     _print_parameters(console, "Parameters of the robot", of_robot)
