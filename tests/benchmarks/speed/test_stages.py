@@ -17,6 +17,7 @@ def test_the_stages_of_a_run_are_all_of_it(tmp_path):
     path.write_text(ONE_HINGE)
     run = measure(str(path))
     assert run.shot == "hinge" and run.used["read"] > 0.0 and run.used["search"] > 0.0 and run.simulations > 0
+    assert run.single_s > 0.0 and run.singles == run.used["search"] / run.single_s
     assert min(run.used.values()) > -0.05
 
 
@@ -44,8 +45,8 @@ def test_compiling_is_counted_by_itself():
 
 
 def test_the_table_has_a_row_for_each_shot():
-    text = table([Stages("one", {"read": 1.0, "search": 2.0, "other": 0.5}, 4.0, 7)])
-    assert "| one | 1.00 | 0.00 | 0.00 | 0.00 | 2.00 | 0.00 | 0.00 | 0.50 | 3.50 | 4.00 | 7 |" in text
+    text = table([Stages("one", {"read": 1.0, "search": 2.0, "other": 0.5}, 4.0, 7, 0.05)])
+    assert "| one | 1.00 | 0.00 | 0.00 | 0.00 | 2.00 | 0.00 | 0.00 | 0.50 | 3.50 | 4.00 | 7 | 40 |" in text
 
 
 def test_a_shot_that_cannot_be_read_ends_with_its_error(capsys):

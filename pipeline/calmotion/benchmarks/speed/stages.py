@@ -2,6 +2,7 @@
 
 Each shot is optimised as by `calmotion optimize`, with the caches as they are. Times are processor times of this
 process and those that it started, as other work on the machine changes them least; compiling is counted by itself.
+`single simulations` is the time of the search over that of one simulation by the same step.
 A second table tells what `calmotion watch` takes after one key was moved, over the first run, see `watching.edits`.
 """
 
@@ -17,18 +18,21 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
+from calmotion.accuracy.step_error import simulate_at
 from calmotion.benchmarks.common.tables import markdown
 from calmotion.benchmarks.common.timing import processor_time
 from calmotion.benchmarks.watching import edits
 from calmotion.errors import ShotError
-from calmotion.host import OperatorResult
-from calmotion.shot.run import OutputPaths
+from calmotion.host import OperatorResult, open_host
+from calmotion.shot.run import OutputPaths, RunSettings, Source
+from calmotion.simulation.compiled_shot import CompiledShot
 from calmotion.workflow.commands import optimize
 
 import_module("calmotion.support")  # sets options of numba that it reads once
 event: Any = import_module("numba.core.event")
 SHOTS = [f"samples/{name}/{name}.usda" for name in ("bartender", "dancer", "rapper", "drummer", "boxer")]
 STAGES = ("read", "analyse", "mesh", "reduce", "search", "write", "compile")
+_TIMES = 3
 # what is named nowhere here is `other`
 OPERATORS = {
     "bvh.read": "read", "motion.read": "read", "usd.read": "read", "accuracy.analyse": "analyse", "fe.mesh": "mesh",
@@ -46,12 +50,19 @@ class Stages:
         used: Time of each stage, without compiling.
         wall_s: The whole run by the clock.
         simulations: Simulated and linearised sweeps of the search.
+        single_s: Processor time of one simulation by the step of the search, with all coordinates.
     """
 
     shot: str
     used: Mapping[str, float]
     wall_s: float
     simulations: int
+    single_s: float
+
+    @property
+    def singles(self) -> float:
+        """The search in single simulations."""
+        return self.used.get("search", 0.0) / self.single_s
 
 
 def measure(path: str) -> Stages:
@@ -78,7 +89,23 @@ def measure(path: str) -> Stages:
         event.unregister("numba:compile", compiling)
     used["compile"] = compiling.seconds
     sweeps = found.forward_simulations + found.linearized_sweeps
-    return Stages(Path(path).stem, dict(used), time.perf_counter() - begin, sweeps)
+    wall = time.perf_counter() - begin
+    return Stages(Path(path).stem, dict(used), wall, sweeps, _single_simulation(path, found.step_s))
+
+
+def _single_simulation(path: str, step: float) -> float:
+    """Processor time of a simulation of a shot as it is searched, the least of three [s]."""
+    run = open_host([]).run([Source(path=path, command="optimize")], [CompiledShot])
+    for result in run:
+        if result.error is not None:
+            raise result.error
+    shot, times = run.get(CompiledShot), []
+    assert shot is not None
+    for _ in range(1 + _TIMES):  # the first one may compile
+        begin = time.process_time()
+        simulate_at(shot, RunSettings(), step)
+        times.append(time.process_time() - begin)
+    return min(times[1:])
 
 
 class _Compiling(event.Listener):  # type: ignore[misc]
@@ -102,12 +129,12 @@ class _Compiling(event.Listener):  # type: ignore[misc]
 
 def table(runs: Sequence[Stages]) -> str:
     """The runs as Markdown."""
-    heads = ["shot", *STAGES, "other", "processor time [s]", "by the clock [s]", "sweeps"]
+    heads = ["shot", *STAGES, "other", "processor time [s]", "by the clock [s]", "sweeps", "single simulations"]
     rows = []
     for run in runs:
         times = [run.used.get(stage, 0.0) for stage in (*STAGES, "other")]
         numbers = [*times, sum(times), run.wall_s]
-        rows.append([run.shot, *(f"{value:.2f}" for value in numbers), str(run.simulations)])
+        rows.append([run.shot, *(f"{value:.2f}" for value in numbers), str(run.simulations), f"{run.singles:.0f}"])
     return markdown(heads, rows, "---:")
 
 
