@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import os
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 from calmotion.accuracy.reduced_bodies import ConvergedReduction, ReducedBodies, compiled_in
@@ -192,6 +194,15 @@ class VerifyResult(Operator):
     requires = (CompiledShot, Source, Result)
     uses = (ReducedBodies, ConvergedReduction, ShapedTracks, ModelChoices)
     provides = (Verification,)
+    properties = (
+        Property(
+            "on", str, "",
+            description="Where parts of a long shot are simulated independently: local, dask://HOST:PORT, or slurm, as "
+            "of `calmotion batch --on`; empty: in one piece, here",
+        ),
+        Property("workers", int, 0, minimum=1, description="Most parts at once; 0: one for each processor, or all"),
+        Property("part", float, 60.0, unit="s", minimum=1.0, description="Length of these parts at least [s]"),
+    )  # fmt: skip
 
     @classmethod
     def poll(cls, data: Mapping[type, Any]) -> str | None:
@@ -199,6 +210,7 @@ class VerifyResult(Operator):
         return NotAsked("no --verify is requested") if source is None or not source.verify else None
 
     def execute(self, context: RunContext) -> Sequence[object]:
+        from calmotion.accuracy.parts_in_time import Elsewhere
         from calmotion.accuracy.verify import verify
 
         shot, shaped, reduced = compiled_in(context.get), context.get(ShapedTracks), context.get(ReducedBodies)
@@ -207,8 +219,28 @@ class VerifyResult(Operator):
         converged = context.get(ConvergedReduction)
         reduction = None if reduced is None else reduced.reduction
         reduction = reduction if converged is None else converged.reduction
-        options = run_settings(context.get(Source), context.get(ModelChoices))
-        return [Verification(*verify(shot, reduction, context.get(Result), options, context.progress))]
+        source = context.get(Source)
+        options = run_settings(source, context.get(ModelChoices))
+        elsewhere = None
+        if context.properties.on:
+            elsewhere = Elsewhere(
+                partial(self._performed, context, os.path.dirname(source.path)), context.properties.part
+            )
+        return [verify(shot, reduction, context.get(Result), options, context.progress, elsewhere)]
+
+    @staticmethod
+    def _performed(
+        context: RunContext, folder: str, function: Callable[..., Any], work: Sequence[tuple[Any, ...]]
+    ) -> Iterator[tuple[int, Any]]:
+        """The parts on the backend that the properties name, with the progress of their number."""
+        from calmotion.workflow.batch.backends import backend_for
+        from calmotion.workflow.batch.calls import results_on
+
+        chosen = context.properties
+        backend = backend_for(chosen.on, chosen.workers or None, os.path.abspath(folder))
+        for done, found in enumerate(results_on(backend, function, work), 1):
+            context.progress(0.5 + 0.5 * done / len(work), f"{done} of {len(work)} parts are simulated")
+            yield found
 
 
 register, unregister = registration(AnalyseShot, RefineReduction, PlanStep, EstimateMotorEffects, VerifyResult)

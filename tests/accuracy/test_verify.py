@@ -5,7 +5,6 @@ import dataclasses
 import pytest
 from calmotion.accuracy.simulate_to_tolerance import simulate_to_tolerance
 from calmotion.accuracy.verify import verify
-from calmotion.shot.outputs import Verification
 from calmotion.shot.run import RunSettings
 from calmotion.simulation.body_reduction import reduction_for
 from calmotion.simulation.compiled_shot import compile_shot
@@ -19,14 +18,14 @@ def test_verifying_measures_the_distance_to_a_finer_run(arm, animation, meshes, 
     options = RunSettings(tolerance=1e-3)
     result = simulate_to_tolerance(compile_shot(arm, animation, bodies), options, quiet)
     shot, reduction = compile_shot(arm, animation, bodies), reduction_for(arm, animation, meshes, options)
-    error, step, modes, _ = verify(shot, reduction, result, options, quiet)
-    assert step == pytest.approx(result.step_s / 4) and modes > 6
-    assert 0.3 * result.accuracy.step_m < error < 5e-3
+    found = verify(shot, reduction, result, options, quiet)
+    assert found.step_s == pytest.approx(result.step_s / 4) and found.modes > 6
+    assert 0.3 * result.accuracy.step_m < found.error_m < 5e-3
     moved = dataclasses.replace(
         result.before.motion, target_positions=result.before.motion.target_positions + [0.02, 0.0, 0.0]
     )
     wrong = dataclasses.replace(result, before=dataclasses.replace(result.before, motion=moved))
-    assert verify(shot, reduction, wrong, options, quiet)[0] == pytest.approx(0.02, abs=1.1 * error)
+    assert verify(shot, reduction, wrong, options, quiet).error_m == pytest.approx(0.02, abs=1.1 * found.error_m)
 
 
 def test_meshes_that_cannot_be_finer_are_still_counted(arm, animation, bodies):
@@ -35,6 +34,6 @@ def test_meshes_that_cannot_be_finer_are_still_counted(arm, animation, bodies):
     coarse = [dataclasses.replace(body, mesh_error=0.02 if len(body.stiffness) else None) for body in bodies]
     shot = compile_shot(arm, animation, coarse)
     result = simulate_to_tolerance(shot, options, quiet)
-    error, step, modes, meshes = verify(shot, None, result, options, quiet)
-    assert meshes == pytest.approx(result.accuracy.mesh_m, rel=0.1) and meshes > 1e-4
-    assert Verification(error, step, modes, meshes).bound_m == error + meshes
+    found = verify(shot, None, result, options, quiet)
+    assert found.mesh_m == pytest.approx(result.accuracy.mesh_m, rel=0.1) and found.mesh_m > 1e-4
+    assert found.bound_m == found.error_m + found.mesh_m

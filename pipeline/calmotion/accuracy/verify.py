@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 from calmotion.accuracy.integrator_choice import by_fast_scheme
 from calmotion.accuracy.mesh_budget import mesh_error
+from calmotion.accuracy.parts_in_time import Elsewhere, in_parts, joined_positions, lead_time, parts_in_time
 from calmotion.accuracy.pod_subspace import project_to_subspace
 from calmotion.accuracy.simulate_to_tolerance import found_tracks
-from calmotion.accuracy.step_error import distance, frames_of, simulate_at
+from calmotion.accuracy.step_error import StepRun, distance, frames_of, simulate_at
 from calmotion.reduction.reduced_body import ReducedBody
 from calmotion.shot import Result
+from calmotion.shot.character import contact_joints
+from calmotion.shot.outputs import Verification
 from calmotion.shot.run import RunSettings
 from calmotion.shot.tolerance import tolerance_of
 from calmotion.simulation.body_reduction import BodyReduction
@@ -26,8 +30,9 @@ FINER, MOST = 0.1, 4  # a reduction that is no finer than the result's is tried 
 
 
 def verify(
-    shot: CompiledShot, reduction: BodyReduction | None, result: Result, options: RunSettings, progress: Progress
-) -> tuple[float, float, int, float]:
+    shot: CompiledShot, reduction: BodyReduction | None, result: Result, options: RunSettings, progress: Progress,
+    elsewhere: Elsewhere | None = None,
+) -> Verification:  # fmt: skip
     """Largest distance of any target, at any frame, to where a finer run has it.
 
     Args:
@@ -35,10 +40,7 @@ def verify(
         reduction: Makes its bodies again, finer; None where all are rigid.
         result: Of `simulate` or `optimize`.
         options: Those of the result.
-
-    Returns:
-        The distance [m], the step of the finer run [s], its elastic coordinates, and the estimated error of its own
-        meshes at the targets [m], by which the distance may be too small: 0 where that is not known.
+        elsewhere: Where parts of a long shot are simulated independently; None: in one piece, here.
 
     Raises:
         ShotError: The finer run is not possible.
@@ -48,13 +50,25 @@ def verify(
     if reduction is not None:
         shot = shot.with_bodies(_finer(shot, reduction, options, progress))
     progress(0.5, "simulating with a finer step")
+    step, frame_times = STEP * result.step_s, shot.animation.frame_times
+    own, modes = frames_of(result, frame_times), _coordinates(shot.bodies)
+    parts = () if elsewhere is None else parts_in_time(shot.animation, elsewhere.length, lead_time(shot))
+    if elsewhere is None or len(parts) < 2 or shot.character.retarget.cyclic or contact_joints(shot.character):
+        fine, meshes = finer_run(shot, options, step)
+        return Verification(distance(own.positions, fine.positions), fine.step, modes, meshes)
+    runs = in_parts(shot, parts, elsewhere.perform, finer_run, options, step)
+    positions, gap = joined_positions(parts, [run.positions for run, _ in runs], float(frame_times[1]))
+    error = distance(own.positions, positions)
+    return Verification(error, runs[0][0].step, modes, max(meshes for _, meshes in runs), len(parts), gap)
+
+
+def finer_run(shot: CompiledShot, options: RunSettings, step: float) -> tuple[StepRun, float]:
+    """A shot with its finer bodies, and a part of it the same, by a step [s]; the estimated error of its meshes [m]."""
     least = PROJECTION * tolerance_of(shot.character, options.tolerance)
     projected = project_to_subspace(shot, options, MAX_STEP, lambda known: least)
-    step = STEP * result.step_s
     fine = by_fast_scheme(options, lambda options: simulate_at(projected.shot, options, step))
-    own = frames_of(result, shot.animation.frame_times)
     meshes = mesh_error(projected.shot, options, fine) or 0.0
-    return distance(own.positions, fine.positions), fine.step, _coordinates(shot.bodies), meshes
+    return replace(fine, elastic=(), efforts=None), meshes
 
 
 def _finer(shot: CompiledShot, reduction: BodyReduction, options: RunSettings, progress: Progress) -> list[ReducedBody]:

@@ -280,8 +280,13 @@ class SimulationResult:
         written = write_commands(self._outcome, curves, ExportRequest(to, rate, os.fspath(path)), chosen)
         return written.files[0]
 
-    def verify(self) -> Verification:
+    def verify(self, on: str = "", workers: int | None = None) -> Verification:
         """Measure the error of the result against a finer run of the same curves: takes several times as long.
+
+        Args:
+            on: Where parts of a long shot are simulated independently: `local`, `dask://HOST:PORT` or `slurm`, as of
+                `batch`; empty: in one piece, here.
+            workers: Most parts at once; None: one for each processor (local), or all.
 
         Raises:
             RunError: The finer run failed.
@@ -290,8 +295,10 @@ class SimulationResult:
 
         from calmotion.shot.run import Source
 
-        source = self._outcome.require(Source)
-        return again(self._outcome, Verification, replace(source, verify=True))
+        source, chosen = self._outcome.require(Source), {"on": on, "workers": workers or 0}
+        return again(
+            self._outcome, Verification, replace(source, verify=True), settings={"retarget.verify": chosen}
+        )  # fmt: skip
 
     def _motion_of(self, simulation: Simulation) -> RobotMotion:
         motion, reference, rows = simulation.motion, self.result.reference, simulation.motion.judged
