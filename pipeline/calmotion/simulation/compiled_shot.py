@@ -64,6 +64,10 @@ class _System:
     def __init__(self, character: Character, moving: Sequence[int], bodies: Sequence[ReducedBody] | None):
         self._character, self._moving, self._bodies = character, moving, bodies
 
+    def __getstate__(self) -> dict[str, object]:
+        """What another process compiles it from: a compiled model holds addresses of this one's memory."""
+        return {"_character": self._character, "_moving": self._moving, "_bodies": self._bodies}
+
     @cached_property
     def tree(self) -> Tree:
         from calmotion.multibody.model.topology import span_tree
