@@ -193,7 +193,7 @@ def _candidates(shot: CompiledShot, options: RunSettings) -> list[int]:
 
 def reference_run(shot: CompiledShot, options: RunSettings, step: float) -> ReferenceRun:
     """The shot by its current curves, simulated with all coordinates; arguments as of `simulate_at`."""
-    run = by_fast_scheme(options, lambda options: simulate_at(shot, options, step))
+    run = by_fast_scheme(options, lambda options: simulate_at(shot, options, step, elastic=True))
     return ReferenceRun(shot.animation, run)
 
 

@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from calmotion.accuracy.integrator_choice import SAFE
 from calmotion.errors import IntegrationError
@@ -35,8 +36,8 @@ class StepRun:
     Attributes:
         step: [s].
         positions: [m], shape [f, K, 3]; infinite where the simulation failed.
-        elastic: Elastic coordinates of each body of the character at every step, shape [T, r]; empty for a motion that
-            is known at the frames alone.
+        elastic: Elastic coordinates of each body of the character at every step, shape [T, r], of single precision: of
+            a long shot they take most of the memory; empty where nobody asked for them.
         integrator: By which it was simulated; empty where that does not matter.
         gap: Largest position gap of a joint at any step [m].
         efforts: Of the motors [N m] or [N], shape [f, M]; None where they are not known.
@@ -45,7 +46,7 @@ class StepRun:
 
     step: float
     positions: Array
-    elastic: tuple[Array, ...] = ()
+    elastic: tuple[NDArray[np.float32], ...] = ()
     integrator: str = ""
     gap: float = 0.0
     efforts: Array | None = None
@@ -59,8 +60,12 @@ def order_of(character: Character) -> int:
     return ORDER_AT_IMPACTS if switched else ORDER
 
 
-def simulate_at(shot: CompiledShot, options: RunSettings, step: float) -> StepRun:
-    """One simulation of a shot's current curves by a time step [s].
+def simulate_at(shot: CompiledShot, options: RunSettings, step: float, elastic: bool = False) -> StepRun:
+    """One simulation of a shot's current curves.
+
+    Args:
+        step: [s].
+        elastic: Whether the elastic coordinates are wanted.
 
     Raises:
         ShotError: The shot cannot be simulated by this step.
@@ -73,21 +78,26 @@ def simulate_at(shot: CompiledShot, options: RunSettings, step: float) -> StepRu
     try:
         if steady is not None:
             whole = run_forward(model, workspace, angles, rates, grid.h, prepared.world, None, options.scheme, steady)
-            return _at_frames(prepared, [(slice(0, len(angles)), whole)], options.scheme)
+            return _at_frames(prepared, [(slice(0, len(angles)), whole)], options.scheme, elastic)
         pieces = run_in_pieces(model, workspace, angles, rates, grid.h, prepared.world, options.scheme, AT_ONCE)
-        return _at_frames(prepared, pieces, options.scheme)
+        return _at_frames(prepared, pieces, options.scheme, elastic)
     except SimulationFailure as failure:
         raise failure_error(prepared, failure) from failure
 
 
-def _at_frames(prepared: Prepared, pieces: Iterable[tuple[slice, ForwardRun]], integrator: str) -> StepRun:
+def _at_frames(
+    prepared: Prepared, pieces: Iterable[tuple[slice, ForwardRun]], integrator: str, wanted: bool
+) -> StepRun:
     """What counts of a simulation, from its pieces."""
-    grid, positions, efforts, elastic, gap = prepared.grid, [], [], [], 0.0
+    grid, positions, efforts, gap = prepared.grid, [], [], 0.0
+    elastic: list[tuple[NDArray[np.float32], ...]] = []
     for rows, run in pieces:
         frames = grid.frames[(grid.frames >= rows.start) & (grid.frames < rows.stop)] - rows.start
         positions.append(run.target_positions[frames])
         efforts.append(_efforts(prepared, run, frames))
-        elastic.append(elastic_by_body(prepared.model, run.trajectory.states.u))
+        if wanted:
+            parts = elastic_by_body(prepared.model, run.trajectory.states.u)
+            elastic.append(tuple(part.astype(np.float32) for part in parts))
         gap = max(gap, run.trajectory.max_joint_gap)
     return StepRun(
         grid.h, np.concatenate(positions), tuple(np.concatenate(parts) for parts in zip(*elastic, strict=True)),

@@ -68,7 +68,7 @@ def finer_run(shot: CompiledShot, options: RunSettings, step: float) -> tuple[St
     projected = project_to_subspace(shot, options, MAX_STEP, lambda known: least)
     fine = by_fast_scheme(options, lambda options: simulate_at(projected.shot, options, step))
     meshes = mesh_error(projected.shot, options, fine) or 0.0
-    return replace(fine, elastic=(), efforts=None), meshes
+    return replace(fine, efforts=None), meshes
 
 
 def _finer(shot: CompiledShot, reduction: BodyReduction, options: RunSettings, progress: Progress) -> list[ReducedBody]:

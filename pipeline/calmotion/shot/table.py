@@ -38,7 +38,9 @@ def columns(character: Character, result: Result) -> dict[str, Array]:
     if result.after is not None:
         before = target_columns(character, result.before)
         times = result.before.motion.times[result.before.motion.judged]
-        table |= {f"{name}_before": np.interp(table["time_s"], times, values) for name, values in before.items()}
+        if not np.array_equal(times, table["time_s"]):
+            before = {name: np.interp(table["time_s"], times, values) for name, values in before.items()}
+        table |= {f"{name}_before": values for name, values in before.items()}
     return table
 
 

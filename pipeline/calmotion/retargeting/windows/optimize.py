@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import time
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -162,6 +163,7 @@ class _Windows:
         def progress(fraction: float, message: str) -> None:
             self.progress((k + fraction) / count, f"window {k + 1} of {count}: {message}")
 
+        gc.collect()  # the search before, whose parts refer to each other, would stay in memory beside this one
         try:
             base = offsets_in(part, offsets, self.whole.grid)
             found = search_window(part, kept, self.curves, base, self.intended, beginning, self.setting, progress)
