@@ -104,7 +104,7 @@ class ProjectedShot:
         """The bodies in the directions of the known simulations, but for a share of their energy."""
         few = list(self._complete.bodies)
         for b in self._chosen:
-            motion = np.vstack([item.run.elastic[b] for item in self._known])
+            motion = np.vstack([item.run.elastic[b] for item in self._known]).astype(float)
             few[b] = projected_body(few[b], principal_subspace(few[b], motion, missing))
         return few
 
