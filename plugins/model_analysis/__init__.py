@@ -210,8 +210,8 @@ class VerifyResult(Operator):
         return NotAsked("no --verify is requested") if source is None or not source.verify else None
 
     def execute(self, context: RunContext) -> Sequence[object]:
-        from calmotion.accuracy.parts_in_time import Elsewhere
-        from calmotion.accuracy.verify import verify
+        from calmotion.accuracy.verification.parts_in_time import Elsewhere
+        from calmotion.accuracy.verification.verify import verify
 
         shot, shaped, reduced = compiled_in(context.get), context.get(ShapedTracks), context.get(ReducedBodies)
         if shaped is not None:

@@ -7,9 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from calmotion.retargeting.problem.problem import RetargetProblem
-from calmotion.retargeting.solver.dense_preconditioner import DensePreconditioner
 from calmotion.retargeting.solver.gauss_newton import Search
-from calmotion.retargeting.solver.preconditioner import BandedPreconditioner
+from calmotion.retargeting.solver.preconditioner import Preconditioner
 from calmotion.retargeting.solver.recycling import Recycled
 from calmotion.shot.character import Array, IntArray
 
@@ -27,7 +26,7 @@ class SearchMemory:
     breaks: IntArray
     motors: IntArray
     recycled: Recycled
-    sharpened: tuple[BandedPreconditioner | DensePreconditioner, Array] | None
+    sharpened: tuple[Preconditioner, Array] | None
 
     @classmethod
     def of(cls, problem: RetargetProblem, search: Search) -> SearchMemory:

@@ -17,7 +17,7 @@ from calmotion.retargeting.problem.ground import GROUND, Place, with_ground_rows
 from calmotion.retargeting.problem.limits import LimitTerms
 from calmotion.retargeting.problem.offset_basis import OffsetBasis
 from calmotion.retargeting.problem.offset_space import OffsetSpace
-from calmotion.retargeting.problem.response_gram import is_whole, products_worth, response_bands, response_gram
+from calmotion.retargeting.problem.response_gram import products_worth, response_preconditioner
 from calmotion.retargeting.problem.rigid_approximation import (
     EFFORT,
     effort_of,
@@ -36,12 +36,7 @@ from calmotion.retargeting.problem.several_robots import (
     squared_errors,
     tangents,
 )
-from calmotion.retargeting.solver.dense_preconditioner import DensePreconditioner
-from calmotion.retargeting.solver.preconditioner import (
-    BandedPreconditioner,
-    response_preconditioner,
-    rigid_preconditioner,
-)
+from calmotion.retargeting.solver.preconditioner import Preconditioner, rigid_preconditioner
 from calmotion.shot.character import Array, BoolArray, IntArray
 from calmotion.simulation.forward import ForwardRun, limited_values
 from calmotion.simulation.inputs.curves import Curves
@@ -76,7 +71,7 @@ class RetargetProblem:
         self._continuous = continuous
         self._limited: dict[str, Array] | None = None
         self.x = self._linearized_x = np.zeros(0)  # points evaluated and linearised last
-        self.preconditioner: BandedPreconditioner | DensePreconditioner | None = None
+        self.preconditioner: Preconditioner | None = None
         self._sharpened_x = np.zeros(0)  # point of the preconditioner's responses; empty for that of the rigid robot
         self._held = 0  # instant before which curves are fixed
         self._response: RigidResponse | None = None
@@ -304,19 +299,13 @@ class RetargetProblem:
         """The point at which `sharpen` was called last; empty if it was not."""
         return self._sharpened_x
 
-    def take(self, preconditioner: BandedPreconditioner | DensePreconditioner, point: Array) -> None:
+    def take(self, preconditioner: Preconditioner, point: Array) -> None:
         """Precondition with a matrix of `sharpen` of almost the same problem, at a point."""
         self.preconditioner, self._sharpened_x = preconditioner, point
 
     def sharpen(self) -> None:
         """Precondition with the Gauss-Newton matrix of the flexible robots where they are linearised, from now on."""
-        space = self.space
-        if is_whole(self.robots, space):
-            gram = response_gram(self.robots, space)
-            self.take(DensePreconditioner(gram, space.penalty, space.basis.wraps), self.x)
-        else:
-            bands = response_bands(self.robots, space)
-            self.take(response_preconditioner(bands, space.basis, space.penalty), self.x)
+        self.take(response_preconditioner(self.robots, self.space), self.x)
 
     def damped(self, ratio: float, frequency: float) -> RetargetProblem:
         """The same problem without limits on a robot with more damping, see `model.with_damping`."""

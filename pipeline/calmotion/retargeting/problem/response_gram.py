@@ -20,6 +20,8 @@ from calmotion.multibody.parallel import in_parallel
 from calmotion.multibody.sensitivity.linearization import spare_memory
 from calmotion.retargeting.problem.offset_space import OffsetSpace
 from calmotion.retargeting.problem.robot import Robot
+from calmotion.retargeting.solver.dense_preconditioner import DensePreconditioner
+from calmotion.retargeting.solver.preconditioner import Preconditioner, banded_preconditioner
 from calmotion.shot.character import Array, BoolArray, IntArray
 
 COST = 1 / 64  # of a response, in products: half of the instants, at a sixteenth of the time of a sweep
@@ -53,6 +55,14 @@ def products_worth(robots: Sequence[Robot], space: OffsetSpace, first: bool = Fa
         return None
     # without it each system of a long shot takes as many products as it may
     return 0 if first else max(LEAST, round(OF_PART * space.size * lasting / instants))
+
+
+def response_preconditioner(robots: Sequence[Robot], space: OffsetSpace) -> Preconditioner:
+    """The preconditioner from the responses, with all entries of their matrix or with bands of them."""
+    basis = space.basis
+    if is_whole(robots, space):
+        return DensePreconditioner(response_gram(robots, space), space.penalty, basis.wraps)
+    return banded_preconditioner(response_bands(robots, space), basis, space.penalty)
 
 
 def is_whole(robots: Sequence[Robot], space: OffsetSpace) -> bool:

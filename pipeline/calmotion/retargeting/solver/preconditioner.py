@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Protocol
+
 import numpy as np
 from scipy.linalg import cho_solve_banded, cholesky_banded
 from scipy.sparse import csr_matrix
@@ -79,6 +81,16 @@ def _rows(basis: csr_matrix) -> tuple[IntArray, Array]:
     return functions, weights
 
 
+class Preconditioner(Protocol):
+    """An approximate inverse over all unknowns but those that are fixed; see `BandedPreconditioner`."""
+
+    def factor(self, fixed: BoolArray, terms: list[tuple[csr_matrix, Array]] | None = None) -> None:
+        """Factorise."""
+
+    def solve(self, x: Array) -> Array:
+        """The factor's inverse applied to a vector."""
+
+
 class BandedPreconditioner:
     """Banded Cholesky factor of a matrix over all unknowns, plus the terms of the limits.
 
@@ -139,8 +151,8 @@ def rigid_preconditioner(
     return BandedPreconditioner(gram.banded(), shape, 1e-9)
 
 
-def response_preconditioner(bands: Array, basis: OffsetBasis, penalty: csr_matrix) -> BandedPreconditioner:
-    """That of responses which end some time after their unknowns have acted.
+def banded_preconditioner(bands: Array, basis: OffsetBasis, penalty: csr_matrix) -> BandedPreconditioner:
+    """That of responses which end some time after their unknowns have acted, by the bands of their matrix.
 
     Args:
         bands: Lower bands of the matrix of their products, at least as many as the penalty has; they are taken.

@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
-from calmotion.accuracy.parts_in_time import Elsewhere, TimePart, in_parts, joined_positions, parts_in_time
 from calmotion.accuracy.simulate_to_tolerance import simulate_to_tolerance
-from calmotion.accuracy.verify import verify
+from calmotion.accuracy.verification.parts_in_time import Elsewhere, TimePart, in_parts, joined_positions, parts_in_time
+from calmotion.accuracy.verification.verify import verify
 from calmotion.errors import ShotError
 from calmotion.shot.run import RunSettings
 from calmotion.simulation.compiled_shot import compile_shot

@@ -7,10 +7,16 @@ from dataclasses import replace
 
 from calmotion.accuracy.integrator_choice import by_fast_scheme
 from calmotion.accuracy.mesh_budget import mesh_error
-from calmotion.accuracy.parts_in_time import Elsewhere, in_parts, joined_positions, lead_time, parts_in_time
 from calmotion.accuracy.pod_subspace import project_to_subspace
 from calmotion.accuracy.simulate_to_tolerance import found_tracks
 from calmotion.accuracy.step_error import StepRun, distance, frames_of, simulate_at
+from calmotion.accuracy.verification.parts_in_time import (
+    Elsewhere,
+    in_parts,
+    joined_positions,
+    lead_time,
+    parts_in_time,
+)
 from calmotion.reduction.reduced_body import ReducedBody
 from calmotion.shot import Result
 from calmotion.shot.character import contact_joints

@@ -4,7 +4,7 @@ import dataclasses
 
 import pytest
 from calmotion.accuracy.simulate_to_tolerance import simulate_to_tolerance
-from calmotion.accuracy.verify import verify
+from calmotion.accuracy.verification.verify import verify
 from calmotion.shot.run import RunSettings
 from calmotion.simulation.body_reduction import reduction_for
 from calmotion.simulation.compiled_shot import compile_shot
