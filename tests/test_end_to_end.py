@@ -54,7 +54,7 @@ def test_report_has_the_keys_of_the_contract(run):
         error_budget""".split()
     assert not [key for key in keys if key not in run[1]]
     assert all(set(row) == {"source", "allowed_m", "estimated_m", "choice", "reason"} for row in run[1]["error_budget"])
-    assert all(set(row) == {"what", "why", "estimated_error_m"} for row in run[1]["left_out"])
+    assert all(set(row) == {"what", "why", "estimated_error_m", "skipped"} for row in run[1]["left_out"])
 
 
 def test_root_layer_simulated_again_reproduces_the_errors_after(run, calmotion_process):

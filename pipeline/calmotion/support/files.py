@@ -103,7 +103,8 @@ def system_temporary() -> Path:
     `tempfile` tries them by files without a name of ours, one of which stays where the process is ended meanwhile.
     """
     if tempfile.tempdir is None:
-        for name in filter(None, (*map(os.environ.get, ("TMPDIR", "TEMP", "TMP")), "/tmp")):
+        # where everybody may write: names are random
+        for name in filter(None, (*map(os.environ.get, ("TMPDIR", "TEMP", "TMP")), "/tmp")):  # nosec B108
             folder = Path(name).absolute()
             with contextlib.suppress(OSError), new_file(folder / "tried") as tried:
                 tried.write_bytes(b"x")

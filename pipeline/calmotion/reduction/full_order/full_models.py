@@ -107,7 +107,9 @@ class FullModels:
         return found
 
     def _made(self, member: Member, like: FullBody | None = None) -> FullBody:
-        from calmotion.reduction.likeness import turn_between  # finite elements, for none that is in the cache
+        from calmotion.reduction.full_order.likeness import (
+            turn_between,  # finite elements, for none that is in the cache
+        )
         from calmotion.reduction.reduce import full_body
 
         made = full_body(member.mesh, member.body, member.attachments, member.root)

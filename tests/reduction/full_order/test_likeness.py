@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from calmotion.geometry.tetrahedra import measure_quality
+from calmotion.reduction.full_order.likeness import turn_between
 from calmotion.reduction.interfaces.interface_patches import AttachmentFrame
-from calmotion.reduction.likeness import turn_between
 from calmotion.reduction.reduce import full_body, reduce_body
 from calmotion.shot import Body, FEMesh, FlexibleSettings, Frame
 

@@ -1,0 +1,1 @@
+"""Full models of flexible bodies before their reduction, and which of them are alike."""
