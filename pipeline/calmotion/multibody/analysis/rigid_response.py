@@ -49,10 +49,12 @@ class RigidResponse:
         c, q = np.ascontiguousarray(c[few]), np.ascontiguousarray(q[few])
         motions, inertia = motor_responses(rigid, c, q, joint_angles[few].copy(), motors, world[few].copy(), times[few])
         J = target_jacobians(rigid, c, q, np.zeros(c.shape[:2] + (0,)))
-        targets = np.einsum("nkia,nkam->nkim", J, motions[:, rigid.targets.component])
+        targets = J @ motions[:, rigid.targets.component]
         nearest = np.minimum(np.arange(len(joint_angles)) // stride, len(c) - 1)
         return cls(targets[nearest], inertia[nearest])
 
     def coupled(self, coupling: Array) -> RigidResponse:
         """The response to motors with others geared to them; `coupling` of shape [m, leaders]."""
+        if np.array_equal(coupling, np.eye(len(coupling))):
+            return self
         return RigidResponse(self.targets @ coupling, self.inertia @ coupling)

@@ -36,7 +36,7 @@ from calmotion.retargeting.problem.several_robots import (
     squared_errors,
     tangents,
 )
-from calmotion.retargeting.solver.preconditioner import Preconditioner, rigid_preconditioner
+from calmotion.retargeting.solver.preconditioner import Preconditioner, RigidPreconditioner
 from calmotion.shot.character import Array, BoolArray, IntArray
 from calmotion.simulation.forward import ForwardRun, limited_values
 from calmotion.simulation.inputs.curves import Curves
@@ -280,7 +280,7 @@ class RetargetProblem:
         response, acting = self._rigid(), self._acting
         if self.preconditioner is None:
             weights, basis = self.objective.weights, self.space.basis
-            self.preconditioner = rigid_preconditioner(response, weights, basis, self.space.penalty)
+            self.preconditioner = RigidPreconditioner(response, weights, basis, self.space.penalty)
         curvatures = {} if acting is None else acting.curvatures(values or self.limited)
         curvatures |= reversal_curvatures(self.robots)
         self.preconditioner.factor(fixed, limit_metrics(response.inertia, self.space, curvatures))

@@ -7,10 +7,13 @@ from typing import Protocol
 import numpy as np
 from scipy.linalg import cho_solve_banded, cholesky_banded
 from scipy.sparse import csr_matrix
+from scipy.sparse.csgraph import connected_components
 
 from calmotion.multibody.analysis.rigid_response import RigidResponse
 from calmotion.retargeting.problem.offset_basis import DEGREE, OffsetBasis
 from calmotion.shot.character import Array, BoolArray, IntArray
+
+_NOTHING = 1e-12  # of the largest entry, and a motor does not move a target
 
 
 class BandedGram:
@@ -117,38 +120,14 @@ class BandedPreconditioner:
                 gram.add(basis, metric)
             of_limits = gram.banded()
             banded[: len(of_limits)] += of_limits
-        fixed = fixed[self._order]
-        for d in range(1, len(banded)):
-            banded[d, : banded.shape[1] - d] *= ~fixed[d:]
-        banded[:, fixed] = 0.0
-        banded[0] += max(self._least, 1e-12 * float(np.max(banded[0])))
-        banded[0, fixed] = 1.0
-        self._factor = cholesky_banded(banded, overwrite_ab=True, lower=True)
+        least = max(self._least, 1e-12 * float(np.max(banded[0])))
+        self._factor = _factored(banded, fixed[self._order], least)
 
     def solve(self, x: Array) -> Array:
         """The factor's inverse applied to a vector of shape [P * M]."""
         solved = np.empty_like(x)
         solved[self._order] = cho_solve_banded((self._factor, True), x[self._order])
         return solved
-
-
-def rigid_preconditioner(
-    response: RigidResponse, weights: Array, basis: OffsetBasis, penalty: csr_matrix
-) -> BandedPreconditioner:
-    """That of the rigid robot, `B^T (J^T W J) B + penalty`.
-
-    Args:
-        response: Of the rigid robot.
-        weights: Square roots of the residuals' weights, shape [T, K, 6].
-        basis: Offset basis.
-        penalty: Matrix of the regulariser for one motor, shape [P, P].
-    """
-    weighted = response.targets * weights[..., None]
-    shape = basis.count, weighted.shape[3], basis.wraps
-    gram = BandedGram(*shape)
-    gram.add(basis.values, np.einsum("nkia,nkib->nab", weighted, weighted))
-    gram.add_matrix(penalty)
-    return BandedPreconditioner(gram.banded(), shape, 1e-9)
 
 
 def banded_preconditioner(bands: Array, basis: OffsetBasis, penalty: csr_matrix) -> BandedPreconditioner:
@@ -165,3 +144,88 @@ def banded_preconditioner(bands: Array, basis: OffsetBasis, penalty: csr_matrix)
     more = gram.banded()
     bands[: len(more)] += more
     return BandedPreconditioner(bands, shape, 1e-12)
+
+
+class RigidPreconditioner:
+    """Banded Cholesky factors of `B^T (J^T W J) B + penalty`, plus the terms of the limits.
+
+    Motors that move no target together and share no limit, as those of several arms on one base, have factors of their
+    own: the cost of a band grows with the cube of its motors.
+    """
+
+    def __init__(self, response: RigidResponse, weights: Array, basis: OffsetBasis, penalty: csr_matrix):
+        """
+        Args:
+            response: Of the rigid robot.
+            weights: Square roots of the residuals' weights, shape [T, K, 6].
+            basis: Offset basis.
+            penalty: Matrix of the regulariser for one motor, shape [P, P].
+        """
+        self._targets, self._weights, self._basis, self._penalty = response.targets, weights, basis, penalty
+        largest = np.maximum(response.targets.max(axis=(0, 2)), -response.targets.min(axis=(0, 2)))
+        self._moves = largest > _NOTHING * np.max(largest, initial=0.0)
+        self._banded: dict[tuple[int, ...], Array] = {}
+        self._factors: list[tuple[IntArray, Array]] = []
+
+    def factor(self, fixed: BoolArray, terms: list[tuple[csr_matrix, Array]] | None = None) -> None:
+        """Factorise with the unknowns where `fixed` (shape [P * M], bool) is true excluded.
+
+        Args:
+            terms: Spline matrices and metrics of the limits, as `BandedGram.add` takes them.
+        """
+        parts, scale = [], 0.0
+        for group in self._groups(terms or []):
+            banded = self._band_of(group)
+            scale = max(scale, float(np.max(banded[0])))
+            gram = self._gram(group)
+            order = gram.order
+            order = (order // len(group)) * self._moves.shape[1] + group[order % len(group)]
+            for basis, metric in terms or []:
+                gram.add(basis, metric[:, group[:, None], group])
+            parts.append((order, banded + gram.banded() if terms else banded.copy()))
+        # a small diagonal, so that the factor exists for directions that move no target
+        least = max(1e-9 * scale, 1e-12 * max(float(np.max(banded[0])) for _, banded in parts))
+        self._factors = [(order, _factored(banded, fixed[order], least)) for order, banded in parts]
+
+    def solve(self, x: Array) -> Array:
+        """The factor's inverse applied to a vector of shape [P * M]."""
+        solved = np.empty_like(x)
+        for order, factor in self._factors:
+            solved[order] = cho_solve_banded((factor, True), x[order])
+        return solved
+
+    def _groups(self, terms: list[tuple[csr_matrix, Array]]) -> list[IntArray]:
+        """Motors that move targets or share limits with each other, and with no others."""
+        moves = self._moves.astype(np.int32)
+        linked = moves.T @ moves
+        for _, metric in terms:
+            largest = np.abs(metric).max(axis=0)
+            linked += largest > _NOTHING * np.max(largest)
+        labels = connected_components(csr_matrix(linked), directed=False)[1]
+        return [np.flatnonzero(labels == label).astype(np.int32) for label in range(labels.max() + 1)]
+
+    def _gram(self, group: IntArray) -> BandedGram:
+        return BandedGram(self._basis.count, len(group), self._basis.wraps)
+
+    def _band_of(self, group: IntArray) -> Array:
+        """The matrix of some motors without limits, as bands."""
+        name = tuple(group.tolist())
+        if name not in self._banded:
+            moved = np.flatnonzero(self._moves[:, group].any(axis=1))
+            weighted = self._targets[:, moved][..., group] * self._weights[:, moved, :, None]
+            weighted = weighted.reshape(len(weighted), 6 * len(moved), len(group))
+            gram = self._gram(group)
+            gram.add(self._basis.values, weighted.transpose(0, 2, 1) @ weighted)
+            gram.add_matrix(self._penalty)
+            self._banded[name] = gram.banded()
+        return self._banded[name]
+
+
+def _factored(banded: Array, fixed: BoolArray, least: float) -> Array:
+    """The Cholesky factor of bands, with what is fixed excluded and a small number added to the diagonal."""
+    for d in range(1, len(banded)):
+        banded[d, : banded.shape[1] - d] *= ~fixed[d:]
+    banded[:, fixed] = 0.0
+    banded[0] += least
+    banded[0, fixed] = 1.0
+    return np.asarray(cholesky_banded(banded, overwrite_ab=True, lower=True))
