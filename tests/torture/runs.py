@@ -108,7 +108,7 @@ class Started:
     def wait_for(self, seconds: float) -> None:
         """Wait until it has taken some processor time [s], or has ended."""
         ended = os.WEXITED | os.WNOHANG | os.WNOWAIT
-        while work(self.pid)[0] < seconds and os.waitid(os.P_PID, self.pid, ended) is None:
+        while work(self.pid) < seconds and os.waitid(os.P_PID, self.pid, ended) is None:
             time.sleep(0.02)
 
     def wait(self, limit: float = LIMIT) -> Ending:

@@ -118,7 +118,7 @@ def test_campaigns_add_up_by_commit(tmp_path, monkeypatch):
 def test_a_run_is_stuck_when_it_does_not_work_however_slow_the_machine_is(work, stuck, monkeypatch):
     monkeypatch.setattr("stuck.IDLE", 0.02)
     pipes = [os.pipe() for _ in range(2)]
-    code = f"import time\n{work}\nwhile time.process_time() < 0.6: pass"
+    code = f"import time\n{work}\nwhile time.process_time() < 0.3: pass"
     process = subprocess.Popen([sys.executable, "-c", code], start_new_session=True)
     process.returncode = 0  # it is awaited by its number
     ending = runs.Started(process.pid, (pipes[0][0], pipes[1][0])).wait(1.0)

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import os
 import time
+from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 
-IDLE = 1.0  # less processor time [s] than a run takes in that time, but where it waits for a processor all the time
+IDLE = 1.0  # less time [s] in which a thread works or waits for a processor than any run has between two looks
 
 
 @dataclass
@@ -17,7 +18,8 @@ class Watch:
 
     Attributes:
         session: Number of its first process.
-        limit: More processor time [s] than it may take, or none in as much time by the clock, and it is stuck.
+        limit: More processor time [s] than it may take; it is also stuck when no thread of it works, or waits for a
+            processor, for as long by the clock.
     """
 
     session: int
@@ -25,27 +27,42 @@ class Watch:
     _looked: float = field(init=False, default_factory=time.monotonic)
     _first: float = field(init=False)
     _before: float = field(init=False)
+    _threads: dict[str, float] = field(init=False)
 
     def __post_init__(self) -> None:
-        self._first = self._before = work(self.session)[0]
+        self._first = self._before = work(self.session)
+        self._threads = _wanted(self.session)
 
     def stuck(self) -> bool:
         """Whether it is stuck; to be asked again and again."""
         if time.monotonic() - self._looked < self.limit:
             return False
-        self._looked, (used, ready) = time.monotonic(), work(self.session)
-        idle, self._before = used - self._before < IDLE and not ready, used
-        return idle or used - self._first > self.limit
+        used, threads = work(self.session), _wanted(self.session)
+        grown = [used - self._before, *(time - self._threads.get(name, 0.0) for name, time in threads.items())]
+        self._looked, self._before, self._threads = time.monotonic(), used, threads
+        return max(grown) < IDLE or used - self._first > self.limit
 
 
-def work(session: int) -> tuple[float, bool]:
-    """Processor time of the processes of a session and of those that they have awaited [s], and whether one of them
-    works or waits for a processor: many programs may share the machine, and this one be the least of them."""
-    ticks, ready = 0, False
-    for file in Path("/proc").glob("[0-9]*/stat"):
+def work(session: int) -> float:
+    """Processor time of the processes of a session and of those that they have awaited [s]."""
+    return sum(sum(map(int, fields[11:15])) for _, fields in _processes(session)) / os.sysconf("SC_CLK_TCK")
+
+
+def _wanted(session: int) -> dict[str, float]:
+    """Time in which each thread of a session worked or waited for a processor [s]: many programs may share the machine,
+    and this one be the least of them."""
+    found = {}
+    for process, _ in _processes(session):
+        for file in process.glob("task/*/schedstat"):
+            with suppress(OSError, ValueError):  # it has ended
+                found[file.parent.name] = 1e-9 * sum(map(int, file.read_text().split()[:2]))
+    return found
+
+
+def _processes(session: int) -> Iterator[tuple[Path, list[str]]]:
+    """Folders and states of the processes of a session, see `man 5 proc`, from the third field on."""
+    for process in Path("/proc").glob("[0-9]*"):
         with suppress(OSError, ValueError, IndexError):  # it has ended
-            fields = file.read_text().rpartition(")")[2].split()
+            fields = (process / "stat").read_text().rpartition(")")[2].split()
             if int(fields[3]) == session:
-                ticks += sum(map(int, fields[11:15]))
-                ready = ready or fields[0] == "R"
-    return ticks / os.sysconf("SC_CLK_TCK"), ready
+                yield process, fields
