@@ -130,8 +130,8 @@ def _print(report: dict[str, Any], stream: TextIO) -> None:
         say(console, f"next: calmotion optimize {unbroken(report['root'])} -o LAYER makes curves for this robot")
     for note in report["notes"]:
         say(console, f"note: {note}")
-    others = [row for row in report["parameters"] if not row["of_robot"]]
-    _print_parameters(console, "Parameters of the model and the measurement", others)
+    measurement = [row for row in report["parameters"] if not row["of_robot"]]
+    _print_parameters(console, "Parameters of the model and the measurement", measurement)
     say(
         console,
         f"{report['simulations']} simulations in {report['wall_s']:.3g} s; steps of {1e3 * report['step_s']:.3g} ms, "
