@@ -37,7 +37,7 @@ for path in sys.argv[1:]:
     try:
         stages.open_stage(path)
     except ShotError as error:
-        print(error.path, error.found)
+        print(error.path, error.found, sep="\t")
 """
 
 
@@ -57,7 +57,7 @@ def test_a_named_pipe_is_refused_wherever_it_is_named(tmp_path):
         (tmp_path / name).write_text(f"#usda 1.0\n{text}\n")
     command = [sys.executable, "-c", SPECIAL, str(pipe), *(str(tmp_path / name) for name in contents), "/dev/null"]
     done = subprocess.run(command, capture_output=True, text=True, timeout=600)
-    lines = [line.rsplit(" ", 1) for line in done.stdout.splitlines()]
+    lines = [line.rsplit("\t", 1) for line in done.stdout.splitlines()]
     named = [str(pipe), *(str(tmp_path / n) for n in ("sublayer.usda", "reference.usda", "payload.usda"))]
     named += [str(tmp_path / "variant.usda"), str(tmp_path / "reference.usda"), "/dev/null"]
     assert [path for path, _ in lines] == named, done.stderr
