@@ -25,7 +25,7 @@ def saved(recording: rr.RecordingStream, file: Path) -> Iterator[None]:
     Raises:
         OSError, RuntimeError: It cannot be written.
     """
-    if os.name == "nt":  # pipes have no names there
+    if not os.path.isdir("/dev/fd"):  # pipes have no names here
         recording.save(str(file))
         yield
         recording.flush()
