@@ -1,6 +1,8 @@
 """Signals that end a run."""
 
 import signal
+import subprocess
+import sys
 import threading
 
 import pytest
@@ -45,6 +47,26 @@ def test_a_signal_is_an_interrupt_inside_and_what_it_was_outside(number):
     with pytest.raises(KeyboardInterrupt), as_interrupts():
         signal.raise_signal(number)
     assert signal.getsignal(number) is before is signal.SIG_DFL
+
+
+@pytest.mark.parametrize("number", NUMBERS)
+def test_a_signal_after_the_last_command_of_a_process_is_ignored(number):
+    with as_interrupts(ends=True):
+        pass
+    signal.raise_signal(number)
+    assert signal.getsignal(number) is signal.SIG_IGN
+
+
+@pytest.mark.parametrize("number", NUMBERS)
+def test_a_signal_at_the_end_of_the_process_does_not_take_its_status(number):
+    code = f"""import atexit, signal, sys
+from calmotion.__main__ import main
+signal.signal({int(number)}, signal.SIG_DFL)
+atexit.register(signal.raise_signal, {int(number)})
+sys.exit(main())"""
+    for arguments, status in ((["--version"], 0), ([], 2)):
+        done = subprocess.run([sys.executable, "-c", code, *arguments], capture_output=True, text=True)
+        assert done.returncode == status, done.stderr
 
 
 @pytest.mark.parametrize("handler", [signal.SIG_IGN, lambda number, frame: None])

@@ -23,13 +23,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run a command.
 
     Args:
-        arguments: Those after the program's name; of this process when None.
+        arguments: Those after the program's name; None: those of this process, which ends with the command.
 
     Returns:
         0 done, 1 the shot cannot be processed, 2 wrong usage, 130 interrupted.
     """
     given = sys.argv[1:] if arguments is None else list(arguments)
-    with as_interrupts():
+    with as_interrupts(ends=arguments is None):
         try:
             return _run(given)
         except KeyboardInterrupt:

@@ -18,11 +18,15 @@ _DEFAULTS = (signal.SIG_DFL, signal.default_int_handler)
 
 
 @contextmanager
-def as_interrupts() -> Iterator[None]:
+def as_interrupts(ends: bool = False) -> Iterator[None]:
     """Raise KeyboardInterrupt on the signals that ask a process to end, so that the best result so far is written.
 
     A signal that the caller ignores (`nohup`) or handles already is left alone. An interrupt that Python cannot raise,
     such as in a callback of a weak reference, is raised at the next step of the host.
+
+    Args:
+        ends: Whether the process ends afterwards: what was handled is ignored then, so that a signal does not take its
+            exit status, when all is written.
     """
     before: dict[int, Any] = {}
     if threading.current_thread() is threading.main_thread():  # elsewhere Python sets no handlers
@@ -37,7 +41,7 @@ def as_interrupts() -> Iterator[None]:
         interrupts.answer()
         sys.unraisablehook = hook
         for number, handler in before.items():
-            signal.signal(number, handler)
+            signal.signal(number, signal.SIG_IGN if ends else handler)
 
 
 def ignore() -> None:
