@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from calmotion.accuracy.mesh_budget import mesh_error
-from calmotion.accuracy.pod_subspace import ProjectedShot, ReferenceRun
+from calmotion.accuracy.pod_subspace import ProjectedShot, ReferenceRun, reference_run
 from calmotion.accuracy.step_error import StepRun, distance, simulate_at
 from calmotion.benchmarks.common.finer_meshes import with_more_nodes
 from calmotion.benchmarks.common.shots import Unreduced
@@ -93,9 +93,13 @@ class Bench:
         """One simulation of the shot as animated."""
         return simulate_at(self.compiled(bodies), RunSettings(integrator=integrator), step)
 
+    def _whole_run(self, bodies: Sequence[ReducedBody]) -> ReferenceRun:
+        """The same with its elastic coordinates, by which bodies are held to directions."""
+        return reference_run(self.compiled(bodies), RunSettings(integrator="bdf2"), MAX_STEP)
+
     def held(self, bodies: Sequence[ReducedBody], allowed: float) -> Sequence[ReducedBody]:
         """Bodies of the reduction `BASE` held to directions, which may change this much [m]."""
-        self._known = self._known or ReferenceRun(self.shot.animation, self.run(bodies, MAX_STEP))
+        self._known = self._known or self._whole_run(bodies)
         return ProjectedShot(self.compiled(bodies), RunSettings(), lambda item: allowed, [self._known]).shot.bodies
 
     def reference(self, finest: float = FINEST) -> Reference:
@@ -109,8 +113,8 @@ class Bench:
         Args:
             finest: Tolerance of the reduction [m].
         """
-        shot, bodies = self.shot, self.bodies(finest, pairs_share=10.0)
-        known = ReferenceRun(shot.animation, self.run(bodies, MAX_STEP))
+        bodies = self.bodies(finest, pairs_share=10.0)
+        known = self._whole_run(bodies)
         other = self.run(self.bodies(10.0 * finest), MAX_STEP)
         held = ProjectedShot(self.compiled(bodies), RunSettings(), lambda item: finest, [known])
         limit, left = self._limit(held.shot.bodies, 10.0 * finest)
