@@ -4,7 +4,7 @@ import json
 
 import numpy as np
 import pytest
-from calmotion.benchmarks.scenes import exudyn_arm
+from calmotion.benchmarks.scenes import exudyn_arm, mujoco_arm
 from calmotion.benchmarks.scenes.exudyn_arm import Run, time_at
 from calmotion.benchmarks.speed import scaling
 from calmotion.benchmarks.speed.growth import STEP, Growth, branches, links, motion, prepared
@@ -42,6 +42,16 @@ def test_run_times_are_compared_at_equal_error():
     assert time_at(runs, "a", 1e-4) == pytest.approx(0.1) and time_at(runs, "b", 1e-4) == pytest.approx(0.02)
 
 
+def test_each_other_code_is_compared_with_ours():
+    runs = [
+        Run(code, n, slow / n**2, slow * n) for code, slow in (("mujoco", 4.0), ("ours, bdf2", 1.0)) for n in (9, 99)
+    ]
+    report = scaling._report([Growth("bodies", (4, 8), (1e-4, 2e-4))], against_splu(1), runs)
+    # at equal error four times as slow a step, and twice as many of them
+    assert [row["ratio"] for row in report["times_faster_than_mujoco"]] == pytest.approx([8.0, 8.0])
+    assert report["times_faster_than_exudyn"] == [] and {row["code"] for row in report["exudyn"]} == {"ours, bdf2"}
+
+
 def test_the_simulated_arm_converges_at_second_order():
     code = exudyn_arm.Ours("bdf2")
     exact, _ = code.run(3840)
@@ -49,8 +59,9 @@ def test_the_simulated_arm_converges_at_second_order():
     assert 1.7 < np.log2(errors[0] / errors[1]) < 2.3
 
 
-def test_without_exudyn_the_command_says_so_and_goes_on(capsys, monkeypatch, tmp_path):
-    monkeypatch.setattr(exudyn_arm, "installed", lambda: False)
+def test_without_the_others_the_command_says_so_and_goes_on(capsys, monkeypatch, tmp_path):
+    for module in (exudyn_arm, mujoco_arm):
+        monkeypatch.setattr(module, "installed", lambda: False)
     monkeypatch.setattr(scaling, "growths", lambda *sizes: [Growth("bodies", (4, 8), (1e-4, 2e-4))])
     assert scaling.main(["--figures", str(tmp_path)]) == 0
     out = capsys.readouterr().out
@@ -58,6 +69,14 @@ def test_without_exudyn_the_command_says_so_and_goes_on(capsys, monkeypatch, tmp
     assert (tmp_path / "scaling.png").read_bytes()[:4] == b"\x89PNG"
     assert scaling.main(["--json", "--quick"]) == 0
     report = json.loads(capsys.readouterr().out)
-    assert set(report) == {"growth", "sparse", "exudyn", "times_faster_than_exudyn", "figures"}
+    assert set(report) == {
+        "growth",
+        "sparse",
+        "exudyn",
+        "times_faster_than_exudyn",
+        "mujoco",
+        "times_faster_than_mujoco",
+        "figures",
+    }
     sparse = report["sparse"]
     assert sparse["times_faster"] == sparse["splu_s"] / sparse["ours_s"] and report["exudyn"] == []

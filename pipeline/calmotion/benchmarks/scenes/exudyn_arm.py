@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -77,6 +77,8 @@ class Exudyn:
         payload: [kg].
         mesh: Elements along the arm and across it, and their grading, as of `beam_mesh`.
     """
+
+    steps, fine = STEPS, FINE
 
     def __init__(
         self, material: ElasticMaterial = MATERIAL, payload: float = PAYLOAD,
@@ -179,6 +181,8 @@ class Exudyn:
 class Ours:
     """The arm here, by one integrator."""
 
+    steps, fine = STEPS, FINE
+
     def __init__(self, integrator: str):
         character, meshes = beam_arm(
             length=LENGTH, thickness=THICKNESS, payload=PAYLOAD, modes=6 + FIXED_MODES, elasticity="linear",
@@ -199,17 +203,13 @@ class Ours:
         return run.target_positions[:: steps // SAMPLES, 0][1:], run.trajectory.wall_s
 
 
-def compare(codes: dict[str, Any] | None = None, repeats: int = 3) -> list[Run]:
-    """Work and precision of both."""
+def compare(peers: Mapping[str, Any], repeats: int = 3) -> list[Run]:
+    """Work and precision of other codes, by name, and of ours; nothing without others."""
     results = []
-    chosen = codes or {
-        "exudyn": Exudyn(),
-        "ours, bdf2": Ours("bdf2"),
-        "ours, generalized-alpha": Ours("generalized-alpha"),
-    }
-    for name, code in chosen.items():
-        exact, _ = code.run(FINE)
-        for steps in STEPS:
+    ours = {f"ours, {name}": Ours(name) for name in ("bdf2", "generalized-alpha")} if peers else {}
+    for name, code in {**peers, **ours}.items():
+        exact, _ = code.run(code.fine)
+        for steps in code.steps:
             runs = [code.run(steps) for _ in range(repeats)]
             error = float(np.linalg.norm(runs[0][0] - exact, axis=1).max())
             results.append(Run(name, steps, error, float(np.median([wall for _, wall in runs]))))

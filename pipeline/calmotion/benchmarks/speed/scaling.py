@@ -1,12 +1,12 @@
-"""Growth of the run time with bodies, duration and modes, and comparison with a sparse solver and with Exudyn.
+"""Growth of the run time with bodies, duration and modes, and comparison with a sparse solver, Exudyn and MuJoCo.
 
 `calmotion bench scaling [--quick] [--figures DIR] [--json]` measures, in one run and with one thread,
 
 - time per step of chains of 4 to 128 flexible links, of 1,000 to 100,000 steps, and of 4 to 64 modes in a link, with
   the exponents of their growth;
 - for a tree of 14 flexible bodies of 10 modes, a step against SuperLU (scipy's `splu`) of the same matrix;
-- where `exudyn` is installed (the optional extra `bench`), the swung arm against its reduced flexible bodies at equal
-  error.
+- where they are installed (the optional extra `bench`), the swung arm against Exudyn's reduced flexible bodies and
+  against a chain of as many rigid segments in MuJoCo, at equal error.
 """
 
 from __future__ import annotations
@@ -25,6 +25,7 @@ from calmotion.benchmarks.speed.growth import STEP, Growth, branches, growths, m
 from calmotion.linear_algebra.blas_threads import one_blas_thread
 from calmotion.multibody.integrators.workspace import Workspace
 
+NAMES = {"exudyn": "Exudyn's reduced body", "mujoco": "MuJoCo's chain"}
 INSIDE = 20  # solutions in one call of the kernel, as many steps are taken in one call of a simulation
 
 
@@ -95,9 +96,7 @@ def main(arguments: list[str] | None = None) -> int:
     options = parser.parse_args(arguments)
     measured = growths((4, 8, 16, 32), (1_000, 5_000), (4, 8, 16, 32)) if options.quick else growths()
     sparse = against_splu()
-    from calmotion.benchmarks.scenes import exudyn_arm
-
-    peers = exudyn_arm.compare() if exudyn_arm.installed() and not options.quick else []
+    peers = [] if options.quick else _peers()
     figures = []
     if options.figures:
         from calmotion.benchmarks.speed.scaling_figure import draw
@@ -112,19 +111,39 @@ def main(arguments: list[str] | None = None) -> int:
     return 0
 
 
-def _report(measured: Sequence[Growth], sparse: Sparse, peers: list[Any]) -> dict[str, Any]:
+def _peers() -> list[Any]:
+    """The swung arm by the codes that are installed, and by ours."""
+    from calmotion.benchmarks.scenes import exudyn_arm, mujoco_arm
+
+    codes: dict[str, Any] = {}
+    if exudyn_arm.installed():
+        codes["exudyn"] = exudyn_arm.Exudyn()
+    if mujoco_arm.installed():
+        codes["mujoco"] = mujoco_arm.MujocoChain()
+    return exudyn_arm.compare(codes)
+
+
+def _times_faster(peers: list[Any], peer: str) -> list[dict[str, Any]]:
+    """Run time of a peer over that of each of our integrators, at equal errors; empty without the peer."""
     from calmotion.benchmarks.scenes.exudyn_arm import LEVELS, time_at
 
-    codes = [code for code in dict.fromkeys(run.code for run in peers) if code != "exudyn"]
+    codes = list(dict.fromkeys(run.code for run in peers))
+    return [
+        {"code": code, "error_m": level, "ratio": time_at(peers, peer, level) / time_at(peers, code, level)}
+        for code in codes
+        if code not in NAMES and peer in codes
+        for level in LEVELS
+    ]
+
+
+def _report(measured: Sequence[Growth], sparse: Sparse, peers: list[Any]) -> dict[str, Any]:
     return {
         "growth": [asdict(growth) | {"exponent": growth.exponent} for growth in measured],
         "sparse": asdict(sparse) | {"times_faster": sparse.splu_s / sparse.ours_s},
-        "exudyn": [asdict(run) for run in peers],
-        "times_faster_than_exudyn": [
-            {"code": code, "error_m": level, "ratio": time_at(peers, "exudyn", level) / time_at(peers, code, level)}
-            for code in codes
-            for level in LEVELS
-        ],
+        "exudyn": [asdict(run) for run in peers if run.code != "mujoco"],
+        "times_faster_than_exudyn": _times_faster(peers, "exudyn"),
+        "mujoco": [asdict(run) for run in peers if run.code == "mujoco"],
+        "times_faster_than_mujoco": _times_faster(peers, "mujoco"),
     }
 
 
@@ -145,15 +164,18 @@ def _print(measured: Sequence[Growth], sparse: Sparse, peers: list[Any]) -> None
         f"SuperLU {1e6 * sparse.splu_s:.0f} us ({sparse.splu_s / sparse.ours_s:.1f} times as long; solutions agree to "
         f"{sparse.difference:.0e}); a whole step {1e6 * sparse.step_s:.0f} us"
     )
+    missing = [title for code, title in NAMES.items() if code not in {run.code for run in peers}]
+    if missing:
+        console.print(f"not compared: {', '.join(missing)}; install the extra `bench`, and leave out --quick")
     if not peers:
-        console.print("Exudyn is not compared: install the extra `bench`, and leave out --quick")
         return
     shown = [[run.code, str(run.steps), f"{run.error:.1e}", f"{run.wall_s:.4f}"] for run in peers]
-    print_table(console, "The swung arm, 14 modes", ["code", "steps", "error [m]", "time [s]"], shown)
-    for row in report["times_faster_than_exudyn"]:
-        console.print(
-            f"{row['code']}: {row['ratio']:.1f} times faster than Exudyn at an error of {row['error_m']:.0e} m"
-        )
+    print_table(console, "The swung arm, 14 coordinates", ["code", "steps", "error [m]", "time [s]"], shown)
+    for code, title in NAMES.items():
+        for row in report[f"times_faster_than_{code}"]:
+            console.print(
+                f"{row['code']}: {row['ratio']:.3g} times as fast as {title} at an error of {row['error_m']:.0e} m"
+            )
 
 
 if __name__ == "__main__":

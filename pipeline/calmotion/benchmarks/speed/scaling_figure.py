@@ -1,4 +1,4 @@
-"""The figure of `scaling`: laws of growth, and run time against error beside Exudyn."""
+"""The figure of `scaling`: laws of growth, and run time against error beside Exudyn and MuJoCo."""
 
 from __future__ import annotations
 
@@ -11,7 +11,8 @@ if TYPE_CHECKING:
     from calmotion.benchmarks.scenes.exudyn_arm import Run
     from calmotion.benchmarks.speed.growth import Growth
 
-BLUE, COLORS = "#0072b2", {"exudyn": "#d55e00", "ours, bdf2": "#0072b2", "ours, generalized-alpha": "#e69f00"}
+BLUE = "#0072b2"
+COLORS = {"exudyn": "#d55e00", "mujoco": "#009e73", "ours, bdf2": BLUE, "ours, generalized-alpha": "#e69f00"}
 
 
 def draw(folder: str, measured: Sequence[Growth], peers: Sequence[Run]) -> str:
@@ -34,7 +35,7 @@ def draw(folder: str, measured: Sequence[Growth], peers: Sequence[Run]) -> str:
         times, errors = [run.wall_s for run in selected], [run.error for run in selected]
         axes[-1].loglog(times, errors, "o-", color=COLORS[code], lw=1.2, ms=4, label=code)
     if peers:
-        axes[-1].set_title("the swung arm, 14 modes", loc="left", fontsize=10)
+        axes[-1].set_title("the swung arm, 14 coordinates", loc="left", fontsize=10)
         axes[-1].set_xlabel("run time [s]")
         axes[-1].set_ylabel("largest error of the tip [m]")
         axes[-1].legend(frameon=False, fontsize=8)

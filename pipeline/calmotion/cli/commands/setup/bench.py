@@ -25,7 +25,7 @@ WHAT = {
     "extremes": ("integrators.extremes", "hard scenes, growth of the cost, energy and momentum in long runs"),
     "gradients": ("integrators.gradients", "both adjoints against differences"),
     "speed": ("speed.stages", "where the time of a run goes"),
-    "scaling": ("speed.scaling", "growth of the run time; a sparse solver and Exudyn"),
+    "scaling": ("speed.scaling", "growth of the run time; a sparse solver, Exudyn, MuJoCo"),
     "sizes": ("speed.sizes", "growth of whole runs with bodies, motors and frames"),
     "reduction": ("speed.reduction", "time, memory and accuracy of a reduction"),
     "compilation": ("speed.compilation", "what a first run compiles"),
