@@ -7,7 +7,8 @@ from operator import itemgetter
 from typing import TYPE_CHECKING, Any, TextIO
 
 from calmotion.cli.quantities import angle, counted, frequency, length, memory
-from calmotion.cli.run_report import prim_paths, print_left_out, print_notes
+from calmotion.cli.reports.left_out import print_left_out
+from calmotion.cli.run_report import prim_paths, print_notes
 from calmotion.cli.sentences import unbroken
 from calmotion.cli.tables import console_on, print_table, say
 from calmotion.shot.motor import PRESCRIBED

@@ -11,6 +11,7 @@ from rich.console import Console
 
 from calmotion.cli.quantities import about, angle, length
 from calmotion.cli.reports.feet import print_contacts, print_support
+from calmotion.cli.reports.left_out import print_left_out
 from calmotion.cli.reports.limits import print_limits, print_reason
 from calmotion.cli.sentences import unbroken
 from calmotion.cli.tables import console_on, paths_in, print_table, say
@@ -29,15 +30,6 @@ REMEDIES = {
 }
 COARSE_EFFORT = 0.05  # of the largest effort of a motor, from which on its error is told
 IDLE_EFFORT = 0.01  # of that of the strongest motor
-
-
-def print_left_out(console: Console, rows: Sequence[dict[str, Any]]) -> None:
-    """The simplifications, each with its reason and estimated error, and the steps that were not needed."""
-    for row in rows:
-        error = row["estimated_error_m"]
-        cost = "" if error is None else f"; estimated error {about(error)}"
-        kind = "skipped" if row["skipped"] else "simplified"
-        say(console, f"{kind}: {row['what']} ({row['why']}){cost}")
 
 
 def print_notes(console: Console, notes: Sequence[str]) -> None:
@@ -215,7 +207,7 @@ def print_run(report: dict[str, Any], stream: TextIO, verbose: bool = False) -> 
     if verbose:
         print_work(console, report)
         print_notes(console, report["notes"])
-    print_left_out(console, report["left_out"])
+    print_left_out(console, report["left_out"], verbose)
 
 
 def prim_paths(report: dict[str, Any]) -> list[str]:
