@@ -134,6 +134,10 @@ class FullBody:
         like = other.support.fixed(other.model), turn
         own.known(self.model, FixedInterface.of(self.model, own.root, own.patches, own.centers, like))
 
+    def factorize(self) -> None:
+        """Factorise its matrix now, not when it is needed."""
+        self.support.fixed(self.model)
+
     @property
     def entries(self) -> int:
         """Number of entries of its matrix factor, most of its memory."""

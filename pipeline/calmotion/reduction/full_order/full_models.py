@@ -102,20 +102,21 @@ class FullModels:
         found = self.known(first)
         if found is None:
             found = self._made(first)
-            if not self._keep(first, found):
-                self._large.add(member.kind)
+            with self._lock:
+                if not self._keep(first, found):
+                    self._large.add(member.kind)
         return found
 
     def _made(self, member: Member, like: FullBody | None = None) -> FullBody:
-        from calmotion.reduction.full_order.likeness import (
-            turn_between,  # finite elements, for none that is in the cache
-        )
+        # finite elements are loaded for none that is in the cache
+        from calmotion.reduction.full_order.likeness import turn_between
         from calmotion.reduction.reduce import full_body
 
         made = full_body(member.mesh, member.body, member.attachments, member.root)
         turn = None if like is None else turn_between(like, made)
         if like is not None and turn is not None:
             made.take(like, turn)
+        made.factorize()  # here, where no other kind waits
         return made
 
     def known(self, member: Member) -> FullBody | None:
