@@ -48,18 +48,17 @@ def test_curves_that_are_held_at_the_beginning_change_nothing_before(arm, bodies
     assert np.abs((gram @ d)[~held] - expected).max() < 1e-7 * np.abs(expected).max()
 
 
+def products(problem):
+    """Number of products by which the system of the first iteration is solved, with no unknown fixed."""
+    preconditioned = problem.precondition(np.zeros(problem.size, bool))
+    return len(conjugate_gradients(problem.product, problem.gradient(), preconditioned, np.inf, 1e-6, 0.0, 60).p)
+
+
 def test_a_sharpened_preconditioner_solves_the_system_at_once(problem):
-    free = np.zeros(problem.size, bool)
-    gradient = problem.gradient()
-
-    def products():
-        path = conjugate_gradients(problem.product, gradient, problem.precondition(free), np.inf, 1e-6, 0.0, 60)
-        return len(path.p)
-
-    before = products()
+    before = products(problem)
     assert problem.patience is not None and len(problem.sharpened_at) == 0
     problem.sharpen()
-    assert products() <= 2 < before
+    assert products(problem) <= 2 < before
     assert problem.patience is None and np.array_equal(problem.sharpened_at, problem.x)
 
 
@@ -110,18 +109,11 @@ def test_cut_responses_have_few_bands_and_a_matrix_that_is_as_definite(problem, 
 
 
 def test_a_search_with_too_many_unknowns_for_the_whole_matrix_takes_the_bands(problem, monkeypatch):
-    free = np.zeros(problem.size, bool)
-    gradient = problem.gradient()
-
-    def products():
-        path = conjugate_gradients(problem.product, gradient, problem.precondition(free), np.inf, 1e-6, 0.0, 60)
-        return len(path.p)
-
-    before = products()
+    before = products(problem)
     monkeypatch.setattr(module, "_LARGEST", problem.size - 1)
     monkeypatch.setattr(module, "LASTING", 0.45 * problem.grid.end)
     assert problem.patience == 0
     problem.sharpen()
-    assert isinstance(problem.preconditioner, BandedPreconditioner) and products() < before
+    assert isinstance(problem.preconditioner, BandedPreconditioner) and products(problem) < before
     monkeypatch.setattr(module, "LASTING", 0.6 * problem.grid.end)
     assert products_worth(problem.robots, problem.space) is None
