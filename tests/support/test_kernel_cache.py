@@ -5,6 +5,7 @@ import subprocess
 import sys
 
 import pytest
+from calmotion.support import kernel_cache
 from calmotion.support.kernel_cache import VerifiedCacheFile
 
 MODULE = """
@@ -79,11 +80,43 @@ def test_any_damage_to_any_file_is_seen(make, tmp_path, caplog, name):
         assert make().load("key") == list(range(100))
 
 
+def test_a_file_in_the_place_of_another_one_is_not_taken(make, tmp_path):
+    for name in ("name", "other"):
+        VerifiedCacheFile(str(tmp_path), name, (1.0, 2)).save("key", f"code of {name}")
+    for suffix in ("1.nbc", "nbi"):
+        own, other = tmp_path / f"name.{suffix}", tmp_path / f"other.{suffix}"
+        whole = own.read_bytes()
+        own.write_bytes(other.read_bytes())
+        assert make().load("key") is None
+        own.write_bytes(whole)
+        assert make().load("key") == "code of name"
+
+
+def test_data_that_could_not_be_written_are_in_no_index(make, tmp_path, monkeypatch):
+    make().save("key", "former")
+    (tmp_path / "name.nbi").unlink()  # so that its name is free again
+    write = kernel_cache._write
+    monkeypatch.setattr(kernel_cache, "_write", lambda path, value: path.suffix != ".nbc" and write(path, value))
+    make().save("other", "code for other types")
+    assert make().load("other") is None
+
+
 def test_a_folder_that_cannot_be_written_is_no_error(tmp_path):
     (tmp_path / "file").write_text("")
     cache = VerifiedCacheFile(str(tmp_path / "file" / "folder"), "name", (1.0, 2))
     cache._save_index({})
-    cache._save_data("name.1.nbc", 1)
+    cache.save("key", 1)
+    assert cache.load("key") is None
+
+
+def test_a_kernel_in_the_place_of_another_one_is_compiled_again(tmp_path, run):
+    source = MODULE.replace("\nprint", "\n@kernel\ndef tripled(x, y):\n    return 3.0 * x[0] + y[1]\n\nprint")
+    source += "print(tripled(np.ones(1), np.ones(2)), file=sys.stderr)\n"
+    (tmp_path / "module.py").write_text("import sys\n" + source)
+    assert run() == (0, "4.0\n") and run() == (1, "4.0\n")
+    doubled, tripled = sorted((tmp_path / "cache").rglob("*.nbc"))
+    doubled.write_bytes(tripled.read_bytes())
+    assert run() == (0, "4.0\n") and run() == (1, "4.0\n")
 
 
 def test_a_link_to_itself_in_the_place_of_a_file_stops_nobody(run, tmp_path):

@@ -2,20 +2,22 @@
 
 numba believes what lies in its cache: a file that a power cut has emptied or changed ends every later run with an error
 inside numba or LLVM, or in wrong machine code. Here such a file is removed with a notice, and its function compiled
-again. Files are signed with the key of the user, so that those of others are never unpickled.
+again. Files are signed with the key of the user and their names, so that those of others are never unpickled, and
+machine code is never taken for that of another function.
 """
 
 from __future__ import annotations
 
 import contextlib
 import pickle
+from itertools import count, filterfalse
 from pathlib import Path
 from typing import Any
 
 from numba.core.caching import IndexDataCacheFile
 from numba.core.serialize import dumps
 
-from calmotion.support.caching.bundled_kernels import FOLDER, BundledKernels
+from calmotion.support.caching.bundled_kernels import FOLDER, BundledKernels, name_of
 from calmotion.support.caching.caches import discard
 from calmotion.support.caching.signing import signing_key
 from calmotion.support.caching.verified_files import DamagedFileError, ForeignFileError, read_verified, sealed
@@ -50,10 +52,15 @@ class VerifiedCacheFile(IndexDataCacheFile):  # type: ignore[misc]
         """Save data for a key.
 
         numba reads the index, adds to it, and writes it: of two processes that compile at once one would lose its
-        entry, or both would give different data the same name.
+        entry, or both would give different data the same name. It also writes the index before the data: where the
+        run ends between them, the index would name what an earlier one had called so.
         """
+        key = (key, _FOR_KERNELS) if is_called_by_kernel() else key
         with locked(Path(self._index_path).parent):
-            super().save((key, _FOR_KERNELS) if is_called_by_kernel() else key, data)
+            names = self._load_index()
+            name = names.get(key) or next(filterfalse(set(names.values()).__contains__, map(self._data_name, count(1))))
+            if _write(Path(self._data_path(name)), data) and key not in names:
+                self._save_index(names | {key: name})
 
     def _load_index(self) -> dict[Any, str]:
         content = _content(Path(self._index_path))
@@ -71,9 +78,6 @@ class VerifiedCacheFile(IndexDataCacheFile):  # type: ignore[misc]
             raise FileNotFoundError(name)  # numba then compiles the function
         return pickle.loads(content)  # nosec B301  # signed
 
-    def _save_data(self, name: str, data: Any) -> None:
-        _write(Path(self._data_path(name)), data)
-
 
 def verified(dispatcher: Any) -> Any:
     """A function that numba compiles and caches, with verified files."""
@@ -89,7 +93,7 @@ def verified(dispatcher: Any) -> Any:
 
 def _content(path: Path) -> bytes | None:
     try:
-        return read_verified(path, signing_key())
+        return read_verified(path, signing_key(), name_of(path))
     except ForeignFileError:  # it is compiled and written again
         pass
     except DamagedFileError:
@@ -99,7 +103,9 @@ def _content(path: Path) -> bytes | None:
     return None
 
 
-def _write(path: Path, value: Any) -> None:
-    """Write a file; a full disk or a folder that cannot be written only means that it is compiled again."""
+def _write(path: Path, value: Any) -> bool:
+    """Write a file; whether it is written. After a full disk, or in a folder of others, it is compiled again."""
     with contextlib.suppress(OSError), replaced(path, flush=False) as temporary:
-        temporary.write_bytes(sealed(dumps(value), signing_key()))
+        temporary.write_bytes(sealed(dumps(value), signing_key(), name_of(path)))
+        return True
+    return False

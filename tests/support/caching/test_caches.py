@@ -33,6 +33,13 @@ def test_what_is_stored_comes_back_and_damage_is_removed_with_a_notice(folder, c
         assert len(caplog.messages) == 1 and str(path) in caplog.messages[0]
 
 
+def test_what_was_stored_under_another_key_is_not_taken(folder):
+    store_arrays(MESHES, "one", {"a": np.zeros(1)})
+    store_arrays(MESHES, "other", {"a": np.ones(1)})
+    (folder / MESHES / "one.npz").write_bytes((folder / MESHES / "other.npz").read_bytes())
+    assert stored_arrays(MESHES, "one") is None and stored_arrays(MESHES, "other")["a"] == 1.0
+
+
 def test_a_folder_in_place_of_a_file_is_replaced(folder, caplog):
     path = folder / MESHES / "key.npz"
     (path / "inside").mkdir(parents=True)

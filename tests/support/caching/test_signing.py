@@ -115,8 +115,8 @@ def test_files_of_others_are_neither_used_nor_called_damaged(folder, caplog, tmp
     store_arrays("meshes", "0" * 64, {"points": np.ones(3)})
     assert stored_arrays("meshes", "0" * 64) is not None
     (entry,) = entries("meshes")
-    content = unsealed(entry.path.read_bytes(), signing_key())
-    entry.path.write_bytes(sealed(content, b"of an attacker"))
+    content = unsealed(entry.path.read_bytes(), signing_key(), entry.path.name)
+    entry.path.write_bytes(sealed(content, b"of an attacker", entry.path.name))
     assert stored_arrays("meshes", "0" * 64) is None and entries("meshes") == [] and not caplog.records
 
 

@@ -74,6 +74,11 @@ def test_arrays_that_are_larger_than_their_file_are_refused(tmp_path, bomb):
 def test_another_key_or_version_is_told_from_damage():
     data = sealed(b"content", b"key")
     assert unsealed(data, b"key") == b"content"
+    named = sealed(b"content", b"key", "name")
+    assert unsealed(named, b"key", "name") == b"content"
+    for name in ("", "other"):
+        with pytest.raises(ForeignFileError, match="name"):
+            unsealed(named, b"key", name)
     for key in (b"", b"another"):
         with pytest.raises(ForeignFileError):
             unsealed(data, key)

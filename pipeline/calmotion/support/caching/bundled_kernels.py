@@ -55,9 +55,15 @@ class BundledKernels:
 
     def _read(self, name: str) -> Any:
         try:
-            return pickle.loads(read_verified(self._folder / name))  # nosec B301  # of the installation
+            path = self._folder / name
+            return pickle.loads(read_verified(path, name=name_of(path)))  # nosec B301  # of the installation
         except (DamagedFileError, OSError):
             return None
+
+
+def name_of(path: Path) -> str:
+    """The name by which a file of kernels is signed: key of the sources, package and function."""
+    return "/".join(path.parts[-3:])
 
 
 def runs_on(built_for: tuple[str, str, str], processor: tuple[str, str, str]) -> bool:
@@ -82,6 +88,7 @@ def export(source: Path, target: Path) -> int:
         for file in sorted(folder.glob("*.nb?")):
             place = target / source.name / ".".join(("calmotion", *package.relative_to(PACKAGE).parts))
             place.mkdir(parents=True, exist_ok=True)
-            (place / file.name).write_bytes(sealed(read_verified(file, signing_key())))
+            content = read_verified(file, signing_key(), name_of(file))
+            (place / file.name).write_bytes(sealed(content, name=name_of(place / file.name)))
             count += file.suffix == ".nbc"
     return count

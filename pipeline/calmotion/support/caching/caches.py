@@ -45,7 +45,7 @@ class Entry:
 def stored_arrays(cache: str, key: str) -> dict[str, np.ndarray] | None:
     """The arrays that are stored under a key, by name; None where there are none.
 
-    A damaged file is removed with a notice, one of another key or version without.
+    A damaged file is removed with a notice, one of another key, name or version without.
 
     Args:
         cache: A name in `CACHES`.
@@ -63,7 +63,7 @@ def stored_arrays(cache: str, key: str) -> dict[str, np.ndarray] | None:
 
 def _read(path: Path) -> dict[str, np.ndarray] | None:
     try:
-        return read_arrays(path, signing_key())
+        return read_arrays(path, signing_key(), path.name)
     except ForeignFileError:
         _remove(path)
     except DamagedFileError:
@@ -86,7 +86,7 @@ def store_arrays(cache: str, key: str, arrays: Mapping[str, Any], keep_existing:
     """
     path = _file(cache, key)
     with contextlib.suppress(OSError):
-        write_arrays(path, arrays, keep_existing, signing_key())
+        write_arrays(path, arrays, keep_existing, signing_key(), path.name)
         publish(cache, path)
         prune(cache)
 

@@ -54,7 +54,7 @@ def check_store(address: str) -> None:
 def fetch(cache: str, path: Path, key: bytes) -> bool:
     """Fetch the object of a file that is not there into its place; whether it is there now.
 
-    An object that is damaged, signed with another key, or too large is left where it is, and not used.
+    An object that is damaged, signed with another key or name, or too large is left where it is, and not used.
 
     Args:
         cache: A name in `CACHES`.
@@ -69,14 +69,14 @@ def fetch(cache: str, path: Path, key: bytes) -> bool:
         if int(store[0].info(name)["size"]) > LARGEST:
             raise DamagedFileError("it is larger than any that is written")
         data = bytes(store[0].cat_file(name))
-        unsealed(data, key)
+        unsealed(data, key, path.name)
         path.parent.mkdir(parents=True, exist_ok=True)
         with replaced(path) as temporary:
             temporary.write_bytes(data)
     except FileNotFoundError:
         return False
     except ForeignFileError:
-        _tell("holds files that are signed with another key: give all workers the same CALMOTION_CACHE_KEY")
+        _tell("holds files that are signed with another key or name: give all workers the same CALMOTION_CACHE_KEY")
         return False
     except DamagedFileError as error:
         LOG.warning("An object of the shared cache is not used, and made again: %s: %s", path.name, error)

@@ -1,7 +1,9 @@
 """Files whose content is verified when they are read: a damaged one is never taken for a good one.
 
-The content is followed by its length, its SHA-256, the HMAC-SHA-256 of that with a key (RFC 2104) and a mark. Files are
-read whole, and only if they are regular files, so that a named pipe in their place stops nobody.
+The content is followed by its length, its SHA-256, the HMAC-SHA-256 of that and the file's name with a key (RFC 2104)
+and a mark. A whole file in the place of another one is so no good one either: machine code of another function would
+end the program, and the mesh of another body would change its results unseen. Files are read whole, and only if they
+are regular files, so that a named pipe in their place stops nobody.
 """
 
 from __future__ import annotations
@@ -30,39 +32,46 @@ class DamagedFileError(ValueError):
 
 
 class ForeignFileError(DamagedFileError):
-    """A file is whole, but was written with another key or by an earlier version."""
+    """A file is whole, but was written with another key, under another name or by an earlier version."""
 
 
-def sealed(content: bytes, key: bytes = b"") -> bytes:
-    """Content with what `unsealed` verifies; an empty key protects against damage, not against others."""
+def sealed(content: bytes, key: bytes = b"", name: str = "") -> bytes:
+    """Content with what `unsealed` verifies; an empty key protects against damage, not against others.
+
+    Args:
+        content: What is kept.
+        key: Of the signature.
+        name: What the content is, where another one could be taken for it.
+    """
     digest = hashlib.sha256(content).digest()
-    return content + len(content).to_bytes(8, "little") + digest + hmac.digest(key, digest, "sha256") + _MARK
+    signature = hmac.digest(key, digest + name.encode(), "sha256")
+    return content + len(content).to_bytes(8, "little") + digest + signature + _MARK
 
 
-def unsealed(data: bytes, key: bytes = b"") -> bytes:
-    """The content of `sealed` with the same key.
+def unsealed(data: bytes, key: bytes = b"", name: str = "") -> bytes:
+    """The content of `sealed` with the same key and name.
 
     Raises:
         DamagedFileError: The data are not those of `sealed`.
-        ForeignFileError: They are those with another key, or of an earlier version.
+        ForeignFileError: They are those with another key or name, or of an earlier version.
     """
     if data.endswith(_FORMER_MARK):
         raise ForeignFileError("the file is of an earlier version")
     content, tail, size = data[:-_TAIL], data[-_TAIL:], hashlib.sha256().digest_size
-    expected = sealed(content, key)[-_TAIL:]
+    expected = sealed(content, key, name)[-_TAIL:]
     if len(data) < _TAIL or tail[: 8 + size] != expected[: 8 + size] or not tail.endswith(_MARK):
         raise DamagedFileError("the file is damaged")
     if not hmac.compare_digest(tail, expected):
-        raise ForeignFileError("the file was written with another key")
+        raise ForeignFileError("the file was written with another key or under another name")
     return content
 
 
-def read_verified(path: str | Path, key: bytes = b"") -> bytes:
-    """The content of a file that was written as `sealed` with the same key.
+def read_verified(path: str | Path, key: bytes = b"", name: str = "") -> bytes:
+    """The content of a file that was written as `sealed` with the same key and name.
 
     Raises:
         FileNotFoundError: There is no file.
-        ForeignFileError: It was written with another key.
+        ForeignFileError: It was written with another key or under another name.
         DamagedFileError: The file is damaged, or no regular file.
         OSError: It cannot be read.
     """
@@ -75,13 +84,15 @@ def read_verified(path: str | Path, key: bytes = b"") -> bytes:
         if status.st_size > LARGEST:  # it would fill the memory
             raise DamagedFileError("it is larger than any that is written")
         with open(descriptor, "rb", closefd=False) as file:
-            return unsealed(file.read(), key)
+            return unsealed(file.read(), key, name)
     finally:
         os.close(descriptor)
 
 
-def write_arrays(path: str | Path, arrays: Mapping[str, Any], keep_existing: bool = False, key: bytes = b"") -> None:
-    """Write arrays to one verified file, signed with a key, see `files.replaced`.
+def write_arrays(
+    path: str | Path, arrays: Mapping[str, Any], keep_existing: bool = False, key: bytes = b"", name: str = ""
+) -> None:
+    """Write arrays to one verified file, signed with a key, see `sealed` and `files.replaced`.
 
     Raises:
         OSError: The file cannot be written; what was at `path` is still there.
@@ -89,22 +100,22 @@ def write_arrays(path: str | Path, arrays: Mapping[str, Any], keep_existing: boo
     archive = io.BytesIO()
     np.savez(archive, **arrays)
     with replaced(path, keep_existing) as temporary:
-        temporary.write_bytes(sealed(archive.getvalue(), key))
+        temporary.write_bytes(sealed(archive.getvalue(), key, name))
 
 
-def read_arrays(path: str | Path, key: bytes = b"") -> dict[str, np.ndarray]:
-    """The arrays of a file that `write_arrays` wrote with the same key, by name.
+def read_arrays(path: str | Path, key: bytes = b"", name: str = "") -> dict[str, np.ndarray]:
+    """The arrays of a file that `write_arrays` wrote with the same key and name, by their names.
 
     A file with an empty key may be anybody's: its arrays take no more memory than the file.
 
     Raises:
         FileNotFoundError: There is no file.
-        ForeignFileError: It was written with another key.
+        ForeignFileError: It was written with another key or under another name.
         DamagedFileError: The file is damaged, or no regular file.
         OSError: It cannot be read.
     """
     try:
-        content = read_verified(path, key)
+        content = read_verified(path, key, name)
         with np.load(io.BytesIO(content), allow_pickle=False) as archive:
             members = archive.zip.infolist()
             whole = sum(member.file_size for member in members) <= len(content)
