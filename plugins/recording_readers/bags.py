@@ -160,14 +160,12 @@ def _check(
 def _mcap(file: str) -> Iterator[Message]:
     """All messages of an MCAP file."""
     reader = _library(lambda: __import__("mcap_ros2.reader", fromlist=["reader"]), file, "mcap-ros2-support", "mcap")
-    try:
-        with open(file, "rb") as stream:
+    with open(file, "rb") as stream:
+        try:
             for found in reader.read_ros2_messages(stream):
                 yield found.channel.topic, _kind(found.schema.name), 1e-9 * found.log_time_ns, found.ros_msg
-    except OSError:
-        raise
-    except Exception as error:  # of two libraries
-        raise _damaged(file, error) from error
+        except Exception as error:  # of two libraries, which also seek where no file can have a byte
+            raise _damaged(file, error) from error
 
 
 def _sqlite(file: str) -> Iterator[Message]:
