@@ -63,7 +63,7 @@ def _csv(path: str, names: Sequence[str]) -> tuple[dict[str, Array], bool]:
     if not lines:
         raise ShotError("the motion is empty", path=path, remedy=_REMEDY)
     try:
-        rows = list(csv.reader((line for _, line in lines), strict=True))
+        rows = [next(csv.reader([line], strict=True)) for _, line in lines]  # no row goes on in the next line
     except csv.Error as error:
         raise ShotError("this is no table", path=path, found=error, remedy=_REMEDY) from None
     head = [cell.strip() for cell in rows[0]]

@@ -52,8 +52,8 @@ def read_columns(file: str) -> tuple[dict[str, Array], bool]:
     if repeated is not None:
         raise ShotError("two columns have the same name", path=file, found=repeated, remedy="Rename one of them")
     values = np.full((len(body), len(names)), np.nan)
-    cells = csv.reader((line for _, line in body), delimiter=separator)
-    for k, ((number, line), row) in enumerate(zip(body, cells, strict=True)):
+    for k, (number, line) in enumerate(body):
+        row = next(csv.reader([line], delimiter=separator))  # no row goes on in the next line
         try:
             if len(row) != len(names):
                 raise ValueError
