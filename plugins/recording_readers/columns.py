@@ -47,6 +47,10 @@ def read_columns(file: str) -> tuple[dict[str, Array], bool]:
                 remedy="Write a first line with their names, such as time_s,/Arm/Hand/cup.x",
             )  # fmt: skip
         head, body = comments[-1].lstrip("# "), rows
+    if not body:
+        raise ShotError(
+            "the recording has no row below its head", path=file, found=head[:60], remedy="Record the performance again"
+        )
     names = [cell.strip() for cell in next(csv.reader([head], delimiter=separator))]
     repeated = next((name for k, name in enumerate(names) if name in names[:k]), None)
     if repeated is not None:
