@@ -1,4 +1,4 @@
-"""What the machine lacks is an error for the user, not a fault of the program."""
+"""Errors for users: where they are, and what the machine lacks, which is no fault of the program."""
 
 import errno
 
@@ -28,3 +28,14 @@ def test_a_failure_of_the_machine_has_a_problem_and_a_remedy(error, problem):
 @pytest.mark.parametrize("error", [ValueError("x"), OSError("without a number"), ShotError("a shot"), ImportError("x")])
 def test_other_exceptions_are_none(error):
     assert failure_of_machine(error) is None
+
+
+@pytest.mark.parametrize(
+    ("path", "attribute", "place"),
+    [
+        ("/Arm", "physics:mass", "/Arm.physics:mass"), ("/Arm", "", "/Arm"), ("", "--rate", "--rate"),
+        ("/Arm", "--pre-roll", "--pre-roll, for /Arm"),
+    ],
+)  # fmt: skip
+def test_the_place_of_an_option_is_no_attribute_of_a_prim(path, attribute, place):
+    assert ShotError("a problem", path=path, attribute=attribute).place == place

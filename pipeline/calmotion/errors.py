@@ -32,7 +32,9 @@ class ShotError(Exception):
 
     @property
     def place(self) -> str:
-        """Where: prim path and attribute, as far as they are known."""
+        """Where: prim path and attribute, as far as they are known; an option of the command stands first."""
+        if self.path and self.attribute.startswith("--"):
+            return f"{self.attribute}, for {self.path}"
         return ".".join(filter(None, (self.path, self.attribute)))
 
     def message(self) -> str:
