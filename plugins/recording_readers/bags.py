@@ -57,8 +57,12 @@ def read_bag(request: RecordingRequest, map_file: str) -> SensorRecording:
         if kind not in (JOINTS, IMU, POSE):
             continue
         seen[topic] = kind
-        stamp = _stamp(message, stored)
-        for of, path, row in _values(kind, topic, message, joints, topics, request.prim):
+        try:
+            stamp = _stamp(message, stored)
+            rows = list(_values(kind, topic, message, joints, topics, request.prim))
+        except (AttributeError, LookupError, TypeError, ValueError) as error:  # the bag itself says what fields it has
+            raise _damaged(file, f"a message of {topic} is no {kind}: {error}") from error
+        for of, path, row in rows:
             samples = found.setdefault((of, path), _Samples())
             samples.times.append(stamp)
             samples.values.append(row)
@@ -199,7 +203,7 @@ def _kind(name: str) -> str:
     return name.replace("/msg/", "/")
 
 
-def _damaged(file: str, error: Exception) -> ShotError:
+def _damaged(file: str, error: object) -> ShotError:
     return ShotError("this is not a bag of ROS 2, or it is damaged", path=file, found=error, remedy="Record it again")
 
 
