@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 from calmotion.accuracy import mesh_budget
-from calmotion.accuracy.mesh_budget import mesh_error, meshes_to_tolerance, patch_error
+from calmotion.accuracy.mesh_budget import locking_error, mesh_error, meshes_to_tolerance, patch_error
 from calmotion.accuracy.step_error import distance, simulate_at
 from calmotion.reduction.scaled_stiffness import with_scaled_stiffness
 from calmotion.shot.run import RunSettings
@@ -28,10 +28,10 @@ class Refining:
     """A reduction that notes which errors are wanted and gives the bodies as they are."""
 
     def __init__(self, bodies):
-        self.given, self.wanted, self.released = bodies, None, False
+        self.given, self.wanted, self.elements, self.released = bodies, None, None, False
 
-    def with_finer_meshes(self, tolerance, wanted, max_nodes, progress):
-        self.wanted = dict(wanted)
+    def with_finer_meshes(self, tolerance, wanted, max_nodes, progress, elements):
+        self.wanted, self.elements = dict(wanted), dict(elements)
         return self
 
     def bodies(self, tolerance, progress=None):
@@ -83,6 +83,20 @@ def test_errors_at_the_targets_count_in_place_of_deflections_where_they_are_know
     total = mesh_error(shot, OPTIONS, run)
     ratio = by_motion.wanted[0] / by_deflection.wanted[0]
     assert ratio == pytest.approx(2e-3 / total, rel=1e-6)  # deflections: two bodies of a millimetre each
+
+
+def test_finer_elements_are_wanted_where_quadratic_strain_needs_them(arm, animation, bodies, monkeypatch):
+    errors = [replace(body, element_error=0.02) for body in with_mesh_errors(bodies, 1e-4, 1e-4)]
+    shot = compile_shot(arm, animation, errors)
+    run = simulate_at(shot, OPTIONS, STEP)
+    assert locking_error(shot, OPTIONS, run) == 0.0, "these bodies are linear"
+    allowed = mesh_budget.SHARE * OPTIONS.tolerance
+    for locked, wanted in ((0.4 * allowed, None), (2.0 * allowed, 0.2 * 0.02)):
+        reduction = Refining(list(shot.bodies))
+        monkeypatch.setattr(mesh_budget, "locking_error", lambda *arguments, error=locked: error)
+        meshes_to_tolerance(shot, reduction, OPTIONS, run)
+        flexible = [b for b, body in enumerate(shot.bodies) if len(body.stiffness)]
+        assert reduction.elements == (None if wanted is None else pytest.approx({b: wanted for b in flexible}))
 
 
 def test_patches_cost_what_softer_bodies_do_whether_the_mesh_is_known_or_not(arm, animation, bodies):

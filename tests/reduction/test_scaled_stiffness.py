@@ -10,7 +10,7 @@ from calmotion.geometry.tetrahedra import measure_quality
 from calmotion.reduction.interfaces.interface_patches import AttachmentFrame
 from calmotion.reduction.load_envelope import LoadEnvelope
 from calmotion.reduction.reduce import reduce_body
-from calmotion.reduction.scaled_stiffness import with_graded_stiffness, with_scaled_stiffness
+from calmotion.reduction.scaled_stiffness import with_graded_stiffness, with_scaled_stiffness, with_scaled_strain
 from calmotion.shot import Body, FEMesh, FlexibleSettings
 
 
@@ -44,6 +44,7 @@ def test_the_stiffness_is_that_of_another_material(helpers, plastic, law):
         assert np.array_equal(scaled.elasticity.data[: r * r], 0.9 * body.elasticity.data[: r * r])
         assert np.array_equal(scaled.elasticity.data[r * r :], body.elasticity.data[r * r :])
     check_grading(body)
+    check_strain(body)
 
 
 def check_grading(body):
@@ -64,3 +65,18 @@ def check_grading(body):
     else:
         change = (law.data - before.data)[: r * r].reshape(r, r)
         assert change == pytest.approx(np.diag(graded.stiffness - body.stiffness), abs=1e-9 * body.stiffness.max())
+
+
+def check_strain(body):
+    """The quadratic part of the strain alone is scaled, so the energy of small deflections stays."""
+    scaled, law = with_scaled_strain(body, 0.9), body.elasticity
+    if law is None or law.law != "stvk":
+        assert scaled is body
+        return
+    assert with_scaled_strain(body, 1.0) is body and scaled.stiffness is body.stiffness
+    size, r = round(np.sqrt(len(law.data))), len(body.stiffness)
+    before, after = (one.elasticity.data.reshape(size, size) for one in (body, scaled))
+    assert np.array_equal(after[:r, :r], before[:r, :r])
+    assert after[:r, r:] == pytest.approx(0.9 * before[:r, r:]) and after[r:, r:] == pytest.approx(
+        0.81 * before[r:, r:]
+    )

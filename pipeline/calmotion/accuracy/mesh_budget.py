@@ -11,7 +11,8 @@ from dataclasses import replace
 
 from calmotion.accuracy.step_error import StepRun, distance, simulate_at
 from calmotion.errors import ShotError
-from calmotion.reduction.scaled_stiffness import with_scaled_stiffness
+from calmotion.reduction.reduced_body import ReducedBody
+from calmotion.reduction.scaled_stiffness import with_interface_stiffness, with_scaled_stiffness, with_scaled_strain
 from calmotion.shot.run import RunSettings
 from calmotion.shot.tolerance import tolerance_of
 from calmotion.simulation.body_reduction import BodyReduction
@@ -20,6 +21,7 @@ from calmotion.simulation.compiled_shot import CompiledShot
 SHARE = 0.25  # of the tolerance, that the meshes may take
 NODES = 20_000  # of a mesh that only linear modes are computed on: some seconds
 _MARGIN = 0.8  # of the wanted error: estimates of two meshes differ
+_LOCKED = 8.0  # error of what quadratic strain changes, over that of the compliance of the elements
 _SOFTEST = 0.5  # factor of a stiffness; a mesh that is off by more is of no use
 
 
@@ -43,16 +45,20 @@ def meshes_to_tolerance(
     bound = sum(known.values())
     if not bound:
         return shot, reduction
-    total = bound if run is None else mesh_error(shot, options, run) or bound
+    total = bound if run is None else stiffness_error(shot, options, run) or bound
+    locked = 0.0 if run is None else locking_error(shot, options, run)
     allowed = SHARE * tolerance_of(shot.character, options.tolerance)
-    if total <= allowed:
+    if total + locked <= allowed:
         return shot, reduction
     costs = {b: total / bound * error for b, error in known.items()}
-    wanted = {}
-    for b, share in _shares(costs, _MARGIN * allowed).items():
+    wanted, elements, left = {}, {}, max(allowed - locked, 0.5 * allowed)
+    for b, share in _shares(costs, _MARGIN * left).items():
         if share < costs[b]:
             wanted[b] = (shot.bodies[b].mesh_error or 0.0) * share / costs[b]
-    finer = reduction.with_finer_meshes(options.tolerance, wanted, NODES, progress)
+    if locked > 0.5 * allowed:
+        elements = {b: 0.5 * _MARGIN * allowed / locked * shot.bodies[b].element_error for b in known}
+        wanted = {b: shot.bodies[b].mesh_error or 0.0 for b in known} | wanted
+    finer = reduction.with_finer_meshes(options.tolerance, wanted, NODES, progress, elements=elements)
     reduction.release()
     return shot.with_bodies(finer.bodies(options.tolerance, progress=progress)), finer
 
@@ -64,11 +70,31 @@ def mesh_error(shot: CompiledShot, options: RunSettings, run: StepRun) -> float 
         shot: With the curves of the run.
         run: A run of it.
     """
+    found = stiffness_error(shot, options, run)
+    return None if found is None else found + locking_error(shot, options, run)
+
+
+def stiffness_error(shot: CompiledShot, options: RunSettings, run: StepRun) -> float | None:
+    """The part of it of the stiffness: elements are too stiff, in each direction by its own share."""
     flexible = [body for body in shot.bodies if len(body.stiffness)]
     if not flexible or any(body.mesh_error is None for body in flexible):
         return None
-    off = _if_softer(shot, options, run, [body.mesh_error or 0.0 for body in shot.bodies])
+    off = _if_other(shot, options, run, [_softest(body) for body in shot.bodies])
     return sum(body.mesh_error_m or 0.0 for body in flexible) if off is None else off
+
+
+def locking_error(shot: CompiledShot, options: RunSettings, run: StepRun) -> float:
+    """The part of it of the quadratic strain, which finer meshes tell nothing about by their linear modes [m].
+
+    Quadratic elements cannot follow the stretching that bending far causes, and make up for it by more stiffness
+    (membrane locking). Measured on slender arms with one element across: what quadratic strain changes is off by three
+    to ten times the error of the compliance of the elements.
+    """
+    errors = [_LOCKED * body.element_error for body in shot.bodies]
+    off = [with_scaled_strain(body, max(1.0 - error, 0.5)) for body, error in zip(shot.bodies, errors, strict=True)]
+    if all(one is body for one, body in zip(off, shot.bodies, strict=True)):
+        return 0.0
+    return _if_other(shot, options, run, off) or 0.0
 
 
 def patch_error(shot: CompiledShot, options: RunSettings, run: StepRun) -> float:
@@ -79,21 +105,31 @@ def patch_error(shot: CompiledShot, options: RunSettings, run: StepRun) -> float
     errors = [body.patch_error if len(body.stiffness) else 0.0 for body in shot.bodies]
     if not any(errors):
         return 0.0
-    off = _if_softer(shot, options, run, errors)
+    softer = [_softened(body, error) for body, error in zip(shot.bodies, errors, strict=True)]
+    off = _if_other(shot, options, run, softer)
     bent = [
         body.mesh_error_m / body.mesh_error if body.mesh_error_m and body.mesh_error else 0.0 for body in shot.bodies
     ]
     return sum(error * by for error, by in zip(errors, bent, strict=True)) if off is None else off
 
 
-def _if_softer(shot: CompiledShot, options: RunSettings, run: StepRun, errors: Sequence[float]) -> float | None:
-    """How far targets move where bodies are softer by relative errors [m]; None where they buckle then."""
-    softer = [
-        with_scaled_stiffness(body, max(1.0 - error, _SOFTEST)) for body, error in zip(shot.bodies, errors, strict=True)
-    ]
+def _softest(body: ReducedBody) -> ReducedBody:
+    """A body as soft as it may be on ever finer meshes."""
+    known = body.interfaces
+    if known is None:
+        return _softened(body, body.mesh_error or 0.0)
+    return with_interface_stiffness(body, known.patches, known.own, known.softest)
+
+
+def _softened(body: ReducedBody, error: float) -> ReducedBody:
+    return with_scaled_stiffness(body, max(1.0 - error, _SOFTEST))
+
+
+def _if_other(shot: CompiledShot, options: RunSettings, run: StepRun, others: Sequence[ReducedBody]) -> float | None:
+    """How far targets move with other bodies [m]; None where these buckle."""
     options = replace(options, integrator=run.integrator or options.integrator)
     try:
-        other = simulate_at(shot.with_bodies(softer), options, run.step)
+        other = simulate_at(shot.with_bodies(others), options, run.step)
     except ShotError:
         return None
     return distance(run.positions, other.positions)

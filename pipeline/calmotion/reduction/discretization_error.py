@@ -13,7 +13,7 @@ from calmotion.reduction.elements.assembly import FEModel, QuadraticMesh
 from calmotion.reduction.elements.elastic_forms import GradientRule
 from calmotion.shot.character import Array, ElasticMaterial
 
-_AT_ONCE = 2000  # nodes whose fits are in memory
+_AT_ONCE = 2000  # nodes whose fits, or elements whose strains, are in memory
 _DETERMINED = 1e-12  # least eigenvalue of the normal equations of a fit, of the largest
 _PATCH = 30  # least number of elements around a corner for a fit; else those of its neighbours are added
 
@@ -68,7 +68,19 @@ def energy_errors(mesh: QuadraticMesh, material: ElasticMaterial, u: Array) -> A
 
 
 def element_errors(mesh: QuadraticMesh, material: ElasticMaterial, u: Array) -> Array:
-    """The part of each element in `energy_errors`, shape [m, k]; arguments as there.
+    """The part of each element in `energy_errors`, shape [m, k]; arguments as there."""
+    return errors_and_form(mesh, material, u)[0]
+
+
+def errors_and_form(mesh: QuadraticMesh, material: ElasticMaterial, u: Array) -> tuple[Array, Array]:
+    """The part of each element in `energy_errors`, and the energy of the error of combinations of the displacements.
+
+    Args:
+        mesh, material, u: As of `energy_errors`.
+
+    Returns:
+        Shape [m, k]; and a symmetric matrix Q, shape [k, k]: the displacements u x have an error of the energy x^T Q x,
+        where that of the first of them is one.
 
     Source: Zienkiewicz and Zhu 1992.
     """
@@ -78,20 +90,24 @@ def element_errors(mesh: QuadraticMesh, material: ElasticMaterial, u: Array) -> 
     # both fields at the points of a degree-4 rule; strains of the elements are linear, the recovered ones quadratic
     integration = GradientRule(mesh, 4, solid=True)
     shapes = np.stack([mesh.basis.elem.lbasis(integration.points, a)[0] for a in range(10)])
-    exact = np.einsum("aq,eack->eqck", shapes, recovered[mesh.tets], optimize=True)
     strains = _strains(integration, u)
     weights = integration.weights
     if mesh.filling is not None:
         weights = weights * mesh.filling.weights.sum(axis=1)[:, None]
-    lame = material.poissons_ratio / (1.0 - 2.0 * material.poissons_ratio)
-
-    def energy(e: Array) -> Array:
-        # mu = 1: 2 e:e + lambda tr(e)^2, shear strains being doubled
-        dense = 2.0 * (e[:, :, :3] ** 2).sum(axis=2) + (e[:, :, 3:] ** 2).sum(axis=2)
-        dense += 2.0 * lame * e[:, :, :3].sum(axis=2) ** 2
-        return np.asarray(np.einsum("eq,eqk->ek", weights, dense))
-
-    return np.asarray(energy(exact - strains) / energy(strains).sum(axis=0))
+    # mu = 1: 2 e:e + lambda tr(e)^2, shear strains being doubled
+    law = np.diag([2.0, 2.0, 2.0, 1.0, 1.0, 1.0])
+    law[:3, :3] += 2.0 * material.poissons_ratio / (1.0 - 2.0 * material.poissons_ratio)
+    count = u.shape[2]
+    own, form, parts = np.zeros(count), np.zeros((count, count)), np.empty((len(mesh.tets), count))
+    for first in range(0, len(mesh.tets), _AT_ONCE):
+        some = slice(first, first + _AT_ONCE)
+        weight, strain = weights[some, :, None, None], strains[some]
+        off = np.einsum("aq,eack->eqck", shapes, recovered[mesh.tets[some]], optimize=True) - strain
+        forces = weight * np.einsum("ij,eqjk->eqik", law, off, optimize=True)
+        parts[some] = np.einsum("eqik,eqik->ek", forces, off)
+        form += forces.reshape(-1, count).T @ off.reshape(-1, count)
+        own += np.einsum("eqik,eqik->k", weight * np.einsum("ij,eqjk->eqik", law, strain, optimize=True), strain)
+    return parts / own, 0.5 * (form + form.T) / own[:1]
 
 
 def _strains(rule: GradientRule, u: Array) -> Array:

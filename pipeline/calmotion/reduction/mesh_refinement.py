@@ -8,7 +8,7 @@ error is estimated to arise reduce it several times faster for the same number o
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -16,49 +16,28 @@ import numpy as np
 from calmotion.errors import ShotError
 from calmotion.geometry.tetrahedra import min_dihedral_deg
 from calmotion.reduction.cache import cached_reduction
-from calmotion.reduction.discretization_error import clamped_modes, element_errors
+from calmotion.reduction.discretization_error import clamped_modes, element_errors, errors_and_form
 from calmotion.reduction.elements.assembly import QuadraticMesh, assemble
 from calmotion.reduction.elements.bisection import bisected
+from calmotion.reduction.full_order.mesh_extrapolation import (
+    Estimate,
+    deviation,
+    extrapolation,
+    interface_factors,
+    ratios_of,
+)
 from calmotion.reduction.interfaces.interface_patches import AttachmentFrame, interface_patches
 from calmotion.reduction.load_envelope import LoadEnvelope
 from calmotion.reduction.material_laws.choice import amplitudes
-from calmotion.reduction.reduce import FullBody, linear_modes
+from calmotion.reduction.reduce import FullBody, LinearModes, linear_modes
 from calmotion.shot.character import Array, Body, Frame, IntArray
-from calmotion.shot.meshes import CutPatch, FEMesh
+from calmotion.shot.meshes import CutPatch, FEMesh, MeshQuality
 
 MARKED = 0.8  # share of the error in the elements that are bisected: halves the error with 1.7 times the nodes
-_GAIN = 1.2  # least ratio of estimates that are compared
-# Error that is left by an extrapolation, measured on four beams and plates with patches, three modes each: of what was
-# extrapolated, and of the difference of the extrapolations from two coarser meshes
-_LEFT, _APART = 0.2, 1.5
-_LEAST = 0.1  # of the estimate of the finer mesh: the least error that is claimed
-_STIFFEST = 0.05  # excess of the stiffness of an interface in any direction that is extrapolated
 _MODES, _COUNT = 12, 3  # modes of a load estimate; frequencies that a motion excites
-_ASYMPTOTIC = 0.05  # largest estimate that is in proportion to the error
 _ROUNDS = 12
-
-
-@dataclass(frozen=True, eq=False)
-class Estimate:
-    """The estimated error of a mesh.
-
-    Attributes:
-        error: Of the compliance, relative.
-        squares: Squares of the frequencies of its modes [1/s^2], ascending, shape [k].
-        weights: Share of each mode in the deflection, in sum one, shape [k].
-        indicators: Part of each element in the error, shape [m].
-        nodes: Number of nodes of the quadratic tetrahedra.
-        interfaces: Static stiffness of its p moving interfaces, shape [6p, 6p].
-        wrenches: Largest loads on these, shape [6p].
-    """
-
-    error: float
-    squares: Array
-    weights: Array
-    indicators: Array
-    nodes: int
-    interfaces: Array = field(default_factory=lambda: np.zeros((0, 0)))
-    wrenches: Array = field(default_factory=lambda: np.zeros(0))
+_KEPT = 0.005  # of their own error, what elements leave with the statics of finer ones: they have their own mass
+_FEW = 6_000  # nodes of elements on which a nonlinear body is reduced within a minute
 
 
 def refined(
@@ -73,23 +52,21 @@ def refined(
         max_nodes: No mesh has many more nodes.
         extrapolates: Whether the mesh takes the stiffness that ever finer ones would have, as far as it is known.
     """
-    finest, estimates = _bisected(mesh, estimate, wanted, max_nodes)
+    meshes, estimates = _bisected(mesh, estimate, wanted, max_nodes)
     excess, error = extrapolation(estimates)
-    factors = None
     if extrapolates:
-        factors, error = _interface_factors(estimates[-1], estimates, error)
+        quality = _quality(mesh, estimates[-1], estimates, 1.0 - excess, error)
     else:
-        excess, error = 0.0, min(excess + error, estimates[-1].error)
-    error += _of_volume(mesh)
-    quality = replace(
-        mesh.quality, frequency_error=0.5 * error, stiffness_factor=1.0 - excess, interface_factors=factors
-    )
-    if finest is not mesh:
-        quality = replace(quality, min_dihedral_deg=min_dihedral_deg(finest.points, finest.tets))
-    return replace(finest, quality=quality)
+        error = min(excess + error, estimates[-1].error) + _of_volume(mesh)
+        quality = replace(
+            mesh.quality, frequency_error=0.5 * error, element_error=estimates[-1].error, stiffness_factor=1.0
+        )
+    return _with_quality(meshes[-1], quality)
 
 
-def with_finer_stiffness(mesh: FEMesh, estimate: Callable[[FEMesh], Estimate], wanted: float, max_nodes: int) -> FEMesh:
+def with_finer_stiffness(
+    mesh: FEMesh, estimate: Callable[[FEMesh], Estimate], wanted: float, max_nodes: int, elements: float = np.inf
+) -> FEMesh:
     """The mesh with the stiffness that ever finer ones have: the same elements, and factors for their stiffness.
 
     A mesh that is too coarse makes a body too stiff, by one share in bending and by another in twist:
@@ -100,34 +77,63 @@ def with_finer_stiffness(mesh: FEMesh, estimate: Callable[[FEMesh], Estimate], w
 
     Args:
         mesh, estimate, wanted, max_nodes: As of `refined`.
+        elements: Relative error of the compliance that the elements may have by themselves; finer ones are taken for
+            less, as far as they are few.
     """
-    _, estimates = _bisected(mesh, estimate, wanted, max_nodes)
+    meshes, estimates = _bisected(mesh, estimate, wanted, max_nodes)
     excess, error = extrapolation(estimates)
-    ratios, weights = _ratios(estimates[0], estimates[-1])
+    few = max(1, sum(one.nodes <= _FEW for one in estimates))
+    kept = next((k for k, one in enumerate(estimates[:few]) if one.error <= elements), few - 1)
+    own = estimates[kept]
+    ratios, weights = ratios_of(own, estimates[-1])
     factor = float(weights @ ratios)
-    factors, error = _interface_factors(estimates[0], estimates, error)
-    error += (_deviation(ratios, weights) if factors is None else 0.0) + _of_volume(mesh)
-    factor *= 1.0 - excess
-    quality = replace(mesh.quality, frequency_error=0.5 * error, stiffness_factor=factor, interface_factors=factors)
-    return replace(mesh, quality=quality)
+    if not len(estimates[-1].interfaces):
+        error += deviation(ratios, weights)
+    return _with_quality(meshes[kept], _quality(mesh, own, estimates, factor * (1.0 - excess), error))
+
+
+def _with_quality(mesh: FEMesh, quality: MeshQuality) -> FEMesh:
+    return replace(mesh, quality=replace(quality, min_dihedral_deg=min_dihedral_deg(mesh.points, mesh.tets)))
+
+
+def _quality(mesh: FEMesh, own: Estimate, estimates: Sequence[Estimate], factor: float, error: float) -> MeshQuality:
+    """The quality of elements with the stiffness that ever finer ones have.
+
+    Args:
+        mesh: The first mesh.
+        own: Estimate of the elements.
+        estimates: Of all meshes.
+        factor: Of their stiffness.
+        error: Of the compliance by the modes alone, relative.
+    """
+    rest = _of_volume(mesh) + (_KEPT * own.error if own is not estimates[-1] else 0.0)
+    factors, softest, directed = interface_factors(own, estimates) or (None, None, 0.0)
+    if factors is not None and softest is not None:
+        softest = softest - rest * factors
+    return replace(
+        mesh.quality, frequency_error=0.5 * (max(error, directed) + rest), element_error=own.error,
+        stiffness_factor=factor, interface_factors=factors, interface_softest=softest,
+    )  # fmt: skip
 
 
 def _bisected(
     mesh: FEMesh, estimate: Callable[[FEMesh], Estimate], wanted: float, max_nodes: int
-) -> tuple[FEMesh, list[Estimate]]:
-    """The refined mesh, and the estimates of all meshes from the given one on."""
-    estimates = [estimate(mesh)]
+) -> tuple[list[FEMesh], list[Estimate]]:
+    """Ever finer meshes from the given one on, and their estimates."""
+    meshes, estimates = [mesh], [estimate(mesh)]
     # elements do not repair the volume, and far below its error they gain nothing
     by_volume = _of_volume(mesh)
     wanted = max(wanted - by_volume, 0.5 * by_volume, 0.3 * wanted)
     for _ in range(_ROUNDS):
         # the last bisection may exceed the limit by its factor of about 1.7
-        if extrapolation(estimates)[1] <= wanted or estimates[-1].nodes > 0.6 * max_nodes:
+        by_interfaces = interface_factors(estimates[-1], estimates)
+        error = max(extrapolation(estimates)[1], by_interfaces[2] if by_interfaces else 0.0)
+        if error <= wanted or estimates[-1].nodes > 0.6 * max_nodes:
             break
-        points, tets = bisected(mesh.points, mesh.tets, _largest(estimates[-1].indicators))
-        mesh = replace(mesh, points=points, tets=tets)
-        estimates.append(estimate(mesh))
-    return mesh, estimates
+        points, tets = bisected(meshes[-1].points, meshes[-1].tets, _largest(estimates[-1].indicators))
+        meshes.append(replace(mesh, points=points, tets=tets))
+        estimates.append(estimate(meshes[-1]))
+    return meshes, estimates
 
 
 def _of_volume(mesh: FEMesh) -> float:
@@ -138,7 +144,8 @@ def _of_volume(mesh: FEMesh) -> float:
 def refined_for_loads(
     mesh: FEMesh, body: Body, attachments: Sequence[AttachmentFrame], root: int, loads: LoadEnvelope,
     tolerance: float, wanted: float, max_nodes: int, by_factor: bool = True, full: FullBody | None = None,
-) -> FEMesh:  # fmt: skip
+    elements: float = np.inf,
+) -> FEMesh:  # fmt: skip  # parameters: all that decide about a cached mesh
     """The mesh, refined where the deflections of the body under the loads of the shot have their error.
 
     Results are stored in the cache of reductions.
@@ -150,32 +157,50 @@ def refined_for_loads(
         wanted, max_nodes: As of `refined`.
         by_factor: `with_finer_stiffness` instead of finer elements.
         full: `full_body` of the mesh with its own stiffness, where it is known.
+        elements: As of `with_finer_stiffness`.
 
     Raises:
         ShotError: As `reduce_body`.
     """
-    assert body.flexible is not None
-    material = body.flexible.material
     first = replace(mesh, quality=replace(mesh.quality, stiffness_factor=1.0, interface_factors=None))
 
     def estimate(mesh: FEMesh) -> Estimate:
-        linear = linear_modes(mesh, body, attachments, root, loads, tolerance, full if mesh is first else None)
-        envelope = linear.load_envelope
-        assert envelope is not None
-        count = min(_MODES, len(linear.basis.omega_squared))
-        squares = linear.basis.omega_squared[:count]
-        energy = squares * amplitudes(linear.model, linear.basis, envelope, count) ** 2
-        weights = energy / max(energy.sum(), np.finfo(float).tiny)
-        parts = element_errors(linear.model.mesh, material, linear.basis.modes[:, :, :count]) @ weights
-        stiffness = linear.support.fixed(linear.model).patch_stiffness()
-        wrenches = np.hstack([envelope.force, envelope.moment]).ravel()
-        nodes = len(linear.model.mesh.nodes)
-        return Estimate(float(parts.sum()), squares, weights, parts, nodes, stiffness, wrenches)
+        known = full if mesh is first else None
+        return load_estimate(linear_modes(mesh, body, attachments, root, loads, tolerance, known), body)
 
     given = replace(body, surfaces=())  # skins do not matter
-    key = ("for loads", first, given, attachments, root, loads, tolerance, wanted, max_nodes, by_factor)
-    refine = with_finer_stiffness if by_factor else refined
+    key = ("for loads", first, given, attachments, root, loads, tolerance, wanted, max_nodes, by_factor, elements)
+    refine = partial(with_finer_stiffness, elements=elements) if by_factor else refined
     return cached_reduction(key, lambda: refine(first, estimate, wanted, max_nodes))
+
+
+def load_estimate(linear: LinearModes, body: Body) -> Estimate:
+    """Error of the modes that the loads excite, and of the static responses of the interfaces.
+
+    Args:
+        linear: The body on a mesh, with its loads.
+        body: With `flexible` settings.
+    """
+    envelope, fixed = linear.load_envelope, linear.support.fixed(linear.model)
+    assert body.flexible is not None and envelope is not None
+    count = min(_MODES, len(linear.basis.omega_squared))
+    squares = linear.basis.omega_squared[:count]
+    energy = squares * amplitudes(linear.model, linear.basis, envelope, count) ** 2
+    weights = energy / max(energy.sum(), np.finfo(float).tiny)
+    stiffness, nodes = fixed.patch_stiffness(), len(linear.model.mesh.nodes)
+    compliance = np.linalg.inv(stiffness)
+    unit = compliance / np.sqrt(np.diag(compliance))  # responses to wrenches, of energy one half each
+    k = len(unit)
+    shapes = [(fixed.constraint @ unit).reshape(nodes, 3, k), linear.basis.modes[:, :, :count]]
+    errors, form = errors_and_form(linear.model.mesh, body.flexible.material, np.concatenate(shapes, axis=2))
+    wrenches = np.hstack([envelope.force, envelope.moment]).ravel()
+    levers = np.hstack([np.ones_like(envelope.force), np.tile(envelope.lever_arm[:, None], 3)]).ravel()
+    moved = (levers @ np.abs(unit)) * wrenches * np.sqrt(np.diag(compliance))  # how far each wrench moves targets
+    parts = errors[:, k:] @ weights
+    indicators = parts + errors[:, :k] @ (moved / max(moved.sum(), np.finfo(float).tiny))
+    to_unit = np.linalg.inv(unit)
+    forms = to_unit.T @ form[:k, :k] @ to_unit
+    return Estimate(float(parts.sum()), squares, weights, indicators, nodes, stiffness, forms, wrenches, levers)
 
 
 def refined_for_frequencies(mesh: FEMesh, body: Body, carrier: Frame | None, wanted: float, max_nodes: int) -> FEMesh:
@@ -217,83 +242,6 @@ def frequency_estimate(mesh: FEMesh, body: Body, carrier: Frame | None) -> Estim
     total = float((errors * weights).sum(axis=0).max())
     squares = (2.0 * np.pi * frequencies) ** 2
     return Estimate(total, squares, weights / weights.sum(), errors @ weights, len(model.mesh.nodes))
-
-
-def extrapolation(estimates: Sequence[Estimate]) -> tuple[float, float]:
-    """How much too stiff the last of ever finer meshes is, relative, and the error of the stiffness without that.
-
-    Recovered strains overestimate the error, but in proportion: where refinement lowers the estimate by a factor, the
-    error of the finer mesh is the change of the stiffness over this factor minus one. Two extrapolations, from coarser
-    meshes with estimates below 5%, show how well that is known; one alone may be wrong by all of it. Estimates of
-    coarser meshes are not in proportion to their errors.
-
-    Source: Richardson's extrapolation, by the estimated error in place of the element size.
-    """
-    fine, excesses = estimates[-1], []
-    for coarse, gain in _compared(estimates):
-        ratios, weights = _ratios(coarse, fine)
-        excesses.append(float(weights @ (1.0 - ratios)) / gain)
-    if not excesses or min(excesses) <= 0.0:  # a finer mesh that is not softer tells nothing
-        return 0.0, fine.error
-    excess = min(excesses[0], fine.error)
-    left = excess if len(excesses) == 1 else max(_LEFT * excess, _APART * abs(excesses[1] - excesses[0]))
-    return excess, min(max(left, _LEAST * fine.error), fine.error)
-
-
-def _compared(estimates: Sequence[Estimate]) -> list[tuple[Estimate, float]]:
-    """The last two coarser meshes that tell about the last, and how much larger their estimates are, less one."""
-    fine = estimates[-1]
-    usable = [e for e in estimates[:-1] if _GAIN * fine.error <= e.error <= _ASYMPTOTIC]
-    return [(e, e.error / max(fine.error, np.finfo(float).tiny) - 1.0) for e in usable[-2:]]
-
-
-def _interface_factors(own: Estimate, estimates: Sequence[Estimate], error: float) -> tuple[Array | None, float]:
-    """`MeshQuality.interface_factors` of a mesh by ever finer ones, extrapolated, and the error of the compliance.
-
-    Args:
-        own: Of the mesh.
-        estimates: Of it and finer ones.
-        error: Of the compliance by the modes alone.
-    """
-    from scipy.linalg import eigh
-
-    fine, compared = estimates[-1], _compared(estimates)
-    K = fine.interfaces
-    if not len(K):
-        return None, error
-    if compared:
-        first, *more = [(coarse.interfaces - K) / gain for coarse, gain in compared]
-        excess, G = eigh(first, K)  # each of the motions G has an energy of one half
-        excess = np.clip(excess, 0.0, max(fine.error, _STIFFEST))
-        apart = [np.abs(np.einsum("ik,ij,jk->k", G, other - first, G)) for other in more]
-        left = np.maximum(_LEFT * excess, _APART * apart[0]) if apart else excess
-        shares = (np.abs(G).T @ fine.wrenches) ** 2
-        error = max(error, float(left @ shares) / max(float(shares.sum()), np.finfo(float).tiny))
-        wrenches = K @ G
-        K = K - (wrenches * excess) @ wrenches.T
-    return np.asarray(np.linalg.solve(own.interfaces, K)), error
-
-
-def _ratios(coarse: Estimate, fine: Estimate) -> tuple[Array, Array]:
-    """Stiffness of the modes of the finer mesh over that of the coarse one, and the weights of the modes."""
-    count = min(len(coarse.squares), len(fine.squares))
-    weights = fine.weights[:count]
-    return fine.squares[:count] / coarse.squares[:count], weights / max(weights.sum(), np.finfo(float).tiny)
-
-
-def _deviation(ratios: Array, weights: Array) -> float:
-    """How far the common factor of the stiffness is off where loads excite some modes more than others.
-
-    It is the mean over all modes. A motion may excite those that are above it, or those below, not at all or twice as
-    much as was assumed: by either, what the heavier of the two groups deviates by is missing.
-
-    Args:
-        ratios: Stiffness of the modes over that of a coarser mesh, shape [k].
-        weights: Share of each in the deflection, in sum one, shape [k].
-    """
-    off = ratios - weights @ ratios
-    above = float(weights[off > 0.0].sum())
-    return 0.5 * float(weights @ np.abs(off)) / max(above, 1.0 - above)
 
 
 def _largest(indicators: Array) -> IntArray:

@@ -18,7 +18,7 @@ from calmotion.reduction.inertia_integrals import inertia_integrals
 from calmotion.reduction.interfaces.interface_patches import AttachmentFrame, InterfacePatch, interface_patches
 from calmotion.reduction.interfaces.rim_error import compliance_error, rim_error
 from calmotion.reduction.load_envelope import LoadEnvelope, patch_load_envelope
-from calmotion.reduction.reduced_body import Elasticity, Marker, ReducedBody
+from calmotion.reduction.reduced_body import Elasticity, InterfaceStiffness, Marker, ReducedBody
 from calmotion.reduction.scaled_stiffness import with_interface_stiffness
 from calmotion.shot.budget import REDUCTION
 from calmotion.shot.character import DEFAULT_TOLERANCE, Array, Body, ElasticMaterial, SurfaceMesh
@@ -89,18 +89,23 @@ def reduce_body(
         mesh_error_m=_mesh_error_at_targets(mesh_error, linear),
         mesh_error=mesh_error,
         patch_error=patch_error,
+        element_error=mesh.quality.element_error,
     )
     return damped(_with_finer_interfaces(reduced, mesh, linear), material)
 
 
 def _with_finer_interfaces(body: ReducedBody, mesh: FEMesh, linear: LinearModes) -> ReducedBody:
     """The body with the static stiffness of its interfaces on a finer mesh, where that is known."""
-    factors = mesh.quality.interface_factors
+    given = mesh.quality
+    factors, softest = given.interface_factors, given.interface_softest
     if factors is None or len(factors) != 6 * len(linear.moving):
         return body
     own = linear.support.fixed(linear.model).patch_stiffness()
-    first = [patch.attachments[0] for patch in linear.moving]
-    return with_interface_stiffness(body, first, own, factors / mesh.quality.stiffness_factor)
+    patches, finer = tuple(patch.attachments[0] for patch in linear.moving), own @ factors / given.stiffness_factor
+    body = with_interface_stiffness(body, patches, own, finer)
+    if softest is None:
+        return body
+    return replace(body, interfaces=InterfaceStiffness(patches, finer, own @ softest / given.stiffness_factor))
 
 
 @dataclass(frozen=True, eq=False)

@@ -83,6 +83,21 @@ class Elasticity:
 
 
 @dataclass(frozen=True, eq=False)
+class InterfaceStiffness:
+    """Static stiffness of p moving interfaces.
+
+    Attributes:
+        patches: A marker of each.
+        own: Of the body, root clamped, shape [6p, 6p].
+        softest: With the estimated error of the mesh in each direction, shape [6p, 6p].
+    """
+
+    patches: tuple[int, ...]
+    own: Array
+    softest: Array
+
+
+@dataclass(frozen=True, eq=False)
 class ReducedBody:
     """A component of the multibody system in its own frame, clamped to its parent-side interface.
 
@@ -98,6 +113,9 @@ class ReducedBody:
         mesh_error_m: Estimated error of its finite-element mesh in the shot [m]; None where it is not known.
         mesh_error: Estimated relative error of its stiffness by the mesh, which makes a body too stiff; likewise.
         patch_error: Estimated relative error of its compliance by the rims of its interface patches.
+        element_error: The same of the elements by themselves, without what finer ones have told.
+        interfaces: Static stiffness of its moving interfaces, and how soft they may be on ever finer meshes; None where
+            `mesh_error` is for all directions.
     """
 
     invariants: Invariants
@@ -112,6 +130,8 @@ class ReducedBody:
     mesh_error_m: float | None = None
     mesh_error: float | None = None
     patch_error: float = 0.0
+    element_error: float = 0.0
+    interfaces: InterfaceStiffness | None = None
 
     @property
     def frequencies(self) -> Array:

@@ -45,7 +45,21 @@ def with_graded_stiffness(body: ReducedBody, exponent: float) -> ReducedBody:
     return replace(body, stiffness=factors * body.stiffness, elasticity=law)
 
 
-def with_interface_stiffness(body: ReducedBody, patches: Sequence[int], own: Array, factors: Array) -> ReducedBody:
+def with_scaled_strain(body: ReducedBody, factor: float) -> ReducedBody:
+    """The body with the part of its strain that is quadratic in the coordinates multiplied by a factor.
+
+    Bodies of another law than `stvk` stay as they are.
+    """
+    law = body.elasticity
+    if law is None or law.law != "stvk" or factor == 1.0:
+        return body
+    size = round(np.sqrt(len(law.data)))
+    scale = np.full(size, factor)
+    scale[: len(body.stiffness)] = 1.0
+    return replace(body, elasticity=replace(law, data=(law.data.reshape(size, size) * np.outer(scale, scale)).ravel()))
+
+
+def with_interface_stiffness(body: ReducedBody, patches: Sequence[int], own: Array, finer: Array) -> ReducedBody:
     """The body with the static stiffness of its interfaces that a finer mesh has.
 
     Coarse elements are too stiff by another share in bending than in twist, so that no common factor is right. The
@@ -54,28 +68,40 @@ def with_interface_stiffness(body: ReducedBody, patches: Sequence[int], own: Arr
     of the linear stiffness alone would leave a part of them.
 
     Args:
-        body: Undamped, with diagonal mass and stiffness.
+        body: With diagonal mass and stiffness.
         patches: A marker of each of the p moving interfaces.
         own: Static stiffness of the interfaces on its mesh, shape [6p, 6p].
-        factors: `MeshQuality.interface_factors` over `stiffness_factor`: the inverse of `own` times the stiffness of
-            the finer mesh, shape [6p, 6p].
+        finer: The same of the finer mesh.
     """
     from scipy.linalg import eigh
 
     if not len(body.stiffness) or not len(patches):
         return body
-    motion = np.vstack([np.vstack([body.markers[i].Phi, body.markers[i].Psi]) for i in patches])
-    finer = own @ factors
-    shares, wrenches = eigh(0.5 * (finer + finer.T), own)
+    shares, wrenches = eigh(_symmetric(finer), _symmetric(own))
     # response of the coordinates to the wrenches own @ wrenches, of energy one half each
-    response = (motion / body.stiffness).T @ (own @ wrenches)
+    response = (_motion(body, patches) / body.stiffness).T @ (own @ wrenches)
     stretch = np.sqrt(np.maximum(shares, _SOFTEST)) - 1.0
     S = np.eye(len(response)) + (response * stretch) @ (response.T * body.stiffness)
-    K = S.T @ (body.stiffness[:, None] * S)
-    values, T = np.linalg.eigh(0.5 * (K + K.T))  # the mass is the identity
-    T = T * np.where(T[np.abs(T).argmax(axis=0), np.arange(len(T))] < 0.0, -1.0, 1.0)
+    values, T = _modes(S.T @ (body.stiffness[:, None] * S), body.invariants.M)
     law = None if body.elasticity is None else projected_law(body.elasticity, S @ T)
     return replace(projected_body(replace(body, elasticity=None), T), stiffness=values, elasticity=law)
+
+
+def _motion(body: ReducedBody, patches: Sequence[int]) -> Array:
+    """Motions of interfaces by the coordinates, shape [6p, r]."""
+    return np.vstack([np.vstack([body.markers[i].Phi, body.markers[i].Psi]) for i in patches])
+
+
+def _modes(K: Array, M: Array) -> tuple[Array, Array]:
+    """Squares of the frequencies of a body, and its modes, of unit mass and a sign that rounding does not decide."""
+    from scipy.linalg import eigh
+
+    values, T = eigh(_symmetric(K), _symmetric(M))
+    return values, T * np.where(T[np.abs(T).argmax(axis=0), np.arange(len(T))] < 0.0, -1.0, 1.0)
+
+
+def _symmetric(A: Array) -> Array:
+    return np.asarray(0.5 * (A + A.T))
 
 
 def with_scaled_density(body: ReducedBody, factor: float) -> ReducedBody:

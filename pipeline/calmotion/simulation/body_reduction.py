@@ -6,6 +6,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from calmotion.multibody.failure import SimulationFailure
 from calmotion.multibody.model.model import body_anchors
 from calmotion.multibody.model.topology import span_tree
@@ -68,6 +70,7 @@ class BodyReduction:
     def with_finer_meshes(
         self, tolerance: float | None, wanted: Mapping[int, float], max_nodes: int,
         progress: Callable[[float, str], None] = lambda fraction, message: None, *, by_factor: bool = True,
+        elements: Mapping[int, float] | None = None,
     ) -> BodyReduction:  # fmt: skip
         """The reduction on finer meshes; loads stay those of the shot.
 
@@ -78,6 +81,7 @@ class BodyReduction:
             progress: Called with a fraction and the body at hand.
             by_factor: Keep the elements and take the stiffness of finer ones; otherwise take the finer elements, also
                 where elements are the user's choice.
+            elements: With `by_factor`, the relative error that the elements of a body may have by themselves.
 
         Raises:
             ShotError: A body that cannot be reduced.
@@ -95,7 +99,7 @@ class BodyReduction:
             known = None if models is None or own.mesh.quality.stiffness_factor != 1.0 else models.known(own)
             mesh = refined_for_loads(
                 own.mesh, own.body, own.attachments, own.root, loads[index], allowed, wanted[index], max_nodes,
-                by_factor, known,
+                by_factor, known, (elements or {}).get(index, np.inf),
             )  # fmt: skip
             finer[index] = replace(own, mesh=mesh)
 
@@ -104,7 +108,7 @@ class BodyReduction:
         meshes = FEMeshes(tuple(own.mesh for own in finer.values()))
         result = BodyReduction(self.character, meshes, loads, self._repeats and models is not None)
         if models is not None:
-            same = (b for b in members if by_factor or b not in refined)  # the same elements
+            same = (b for b in members if len(finer[b].mesh.tets) == len(members[b].mesh.tets))  # the same elements
             result._full = models.scaled((members[b], finer[b]) for b in same)
         return result
 

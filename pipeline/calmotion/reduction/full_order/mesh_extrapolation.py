@@ -1,0 +1,148 @@
+"""What ever finer meshes tell about a body: its stiffness, and the static stiffness of its interfaces.
+
+Source: Richardson's extrapolation, by the estimated error in place of the element size.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from calmotion.shot.character import Array
+
+_GAIN = 1.2  # least ratio of estimates that are compared
+# Error that is left by an extrapolation, measured on four beams and plates with patches, three modes each: of what was
+# extrapolated, and of the difference of the extrapolations from two coarser meshes
+_LEFT, _APART = 0.2, 1.5
+_LEFT_ALONG = 0.3  # the same in one direction of an interface, of a bar and of the links of the bartender
+_LEAST = 0.1  # of the estimate of the finer mesh: the least error that is claimed
+_STIFFEST = 0.05  # excess of the stiffness of an interface in any direction that is extrapolated
+_ASYMPTOTIC = 0.05  # largest estimate that is in proportion to the error
+
+
+@dataclass(frozen=True, eq=False)
+class Estimate:
+    """The estimated error of a mesh.
+
+    Attributes:
+        error: Of the compliance, relative.
+        squares: Squares of the frequencies of its modes [1/s^2], ascending, shape [k].
+        weights: Share of each mode in the deflection, in sum one, shape [k].
+        indicators: Part of each element in the error, shape [m].
+        nodes: Number of nodes of the quadratic tetrahedra.
+        interfaces: Static stiffness of its p moving interfaces, shape [6p, 6p].
+        forms: Error of the static responses to their motions x: it has the energy x^T Q x / 2, shape [6p, 6p].
+        wrenches: Largest loads on the interfaces, shape [6p].
+        levers: How far a unit motion of an interface moves the farthest target at most, shape [6p].
+    """
+
+    error: float
+    squares: Array
+    weights: Array
+    indicators: Array
+    nodes: int
+    interfaces: Array = field(default_factory=lambda: np.zeros((0, 0)))
+    forms: Array = field(default_factory=lambda: np.zeros((0, 0)))
+    wrenches: Array = field(default_factory=lambda: np.zeros(0))
+    levers: Array = field(default_factory=lambda: np.zeros(0))
+
+
+def extrapolation(estimates: Sequence[Estimate]) -> tuple[float, float]:
+    """How much too stiff the last of ever finer meshes is, relative, and the error of the stiffness without that.
+
+    Recovered strains overestimate the error, but in proportion: where refinement lowers the estimate by a factor, the
+    error of the finer mesh is the change of the stiffness over this factor minus one. Two extrapolations, from coarser
+    meshes with estimates below 5%, show how well that is known; one alone may be wrong by all of it. Estimates of
+    coarser meshes are not in proportion to their errors.
+
+    Source: Richardson's extrapolation, by the estimated error in place of the element size.
+    """
+    fine, excesses = estimates[-1], []
+    for coarse, gain in _compared(estimates):
+        ratios, weights = ratios_of(coarse, fine)
+        excesses.append(float(weights @ (1.0 - ratios)) / gain)
+    if not excesses or min(excesses) <= 0.0:  # a finer mesh that is not softer tells nothing
+        return 0.0, fine.error
+    excess = min(excesses[0], fine.error)
+    left = excess if len(excesses) == 1 else max(_LEFT * excess, _APART * abs(excesses[1] - excesses[0]))
+    return excess, min(max(left, _LEAST * fine.error), fine.error)
+
+
+def _compared(estimates: Sequence[Estimate]) -> list[tuple[Estimate, float]]:
+    """The last two coarser meshes that tell about the last, and how much larger their estimates are, less one."""
+    fine = estimates[-1]
+    usable = [e for e in estimates[:-1] if _GAIN * fine.error <= e.error <= _ASYMPTOTIC]
+    return [(e, e.error / max(fine.error, np.finfo(float).tiny) - 1.0) for e in usable[-2:]]
+
+
+def interface_factors(own: Estimate, estimates: Sequence[Estimate]) -> tuple[Array, Array, float] | None:
+    """`MeshQuality.interface_factors` of a mesh by ever finer ones, extrapolated in each direction, and their errors.
+
+    The elements that are bisected lower the error in one direction by another factor than in another: where those at a
+    clamp are bisected, bending gains more than twist.
+
+    Args:
+        own: Of the mesh.
+        estimates: Of it and finer ones.
+
+    Returns:
+        The factors, `MeshQuality.interface_softest`, and the relative error of the compliance as the targets see it;
+        None where nothing moves.
+    """
+    from scipy.linalg import eigh
+
+    fine, compared = estimates[-1], [coarse for coarse, _ in _compared(estimates)]
+    K = fine.interfaces
+    if not len(K):
+        return None
+    first = compared[0].interfaces - K if compared else fine.forms
+    _, G = eigh(first, K)  # each of the motions G has an energy of one half
+    excess, left = np.zeros(len(K)), _along(G, fine.forms)
+    if compared:
+        *more, excess = [_excess(G, coarse, fine) for coarse in compared]  # by the next coarser one
+        apart = [np.abs(other - excess) for other in more]
+        left = np.maximum(_LEFT_ALONG * excess, _APART * apart[0]) if apart else excess
+        left = np.maximum(left, _LEAST * np.minimum(_along(G, fine.forms), fine.error))
+    # how far each of them moves the targets under the largest loads
+    shares = np.abs(G).T @ fine.wrenches * (fine.levers @ np.abs(G))
+    error = float(left @ shares) / max(float(shares.sum()), np.finfo(float).tiny)
+    wrenches = K @ G
+    K = K - (wrenches * excess) @ wrenches.T
+    softest = K - (wrenches * left) @ wrenches.T
+    return np.asarray(np.linalg.solve(own.interfaces, K)), np.asarray(np.linalg.solve(own.interfaces, softest)), error
+
+
+def _along(G: Array, form: Array) -> Array:
+    """The value of a form for each of the columns."""
+    return np.asarray(np.einsum("ik,ij,jk->k", G, form, G))
+
+
+def _excess(G: Array, coarse: Estimate, fine: Estimate) -> Array:
+    """By how much the finer of two meshes is too stiff for each of the motions G, relative."""
+    gain = _along(G, coarse.forms) / np.maximum(_along(G, fine.forms), np.finfo(float).tiny) - 1.0
+    change = _along(G, coarse.interfaces - fine.interfaces)
+    return np.clip(change / np.maximum(gain, _GAIN - 1.0), 0.0, max(fine.error, _STIFFEST))
+
+
+def ratios_of(coarse: Estimate, fine: Estimate) -> tuple[Array, Array]:
+    """Stiffness of the modes of the finer mesh over that of the coarse one, and the weights of the modes."""
+    count = min(len(coarse.squares), len(fine.squares))
+    weights = fine.weights[:count]
+    return fine.squares[:count] / coarse.squares[:count], weights / max(weights.sum(), np.finfo(float).tiny)
+
+
+def deviation(ratios: Array, weights: Array) -> float:
+    """How far the common factor of the stiffness is off where loads excite some modes more than others.
+
+    It is the mean over all modes. A motion may excite those that are above it, or those below, not at all or twice as
+    much as was assumed: by either, what the heavier of the two groups deviates by is missing.
+
+    Args:
+        ratios: Stiffness of the modes over that of a coarser mesh, shape [k].
+        weights: Share of each in the deflection, in sum one, shape [k].
+    """
+    off = ratios - weights @ ratios
+    above = float(weights[off > 0.0].sum())
+    return 0.5 * float(weights @ np.abs(off)) / max(above, 1.0 - above)

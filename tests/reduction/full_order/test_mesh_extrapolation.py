@@ -1,0 +1,64 @@
+"""What ever finer meshes tell about a body: one stiffness, and that of interfaces in each direction."""
+
+import numpy as np
+import pytest
+from calmotion.reduction.full_order.mesh_extrapolation import Estimate, extrapolation, interface_factors
+
+
+def estimate(error, stiffness, nodes=1000):
+    weights = np.array([0.75, 0.25])
+    return Estimate(error, np.asarray(stiffness, dtype=float), weights, np.zeros(4), nodes)
+
+
+def test_stiffness_is_extrapolated_in_proportion_to_the_estimated_error():
+    exact, excess = np.array([4.0, 9.0]), 0.6
+    meshes = [estimate(error, exact * (1.0 + excess * error)) for error in (0.04, 0.02, 0.01)]
+    found, left = extrapolation(meshes)
+    assert found == pytest.approx(0.006, rel=0.03) and left == pytest.approx(0.2 * found, rel=0.1)
+    found, left = extrapolation(meshes[1:])
+    assert found == pytest.approx(0.006, rel=0.03) and left == found  # one comparison alone
+    assert extrapolation(meshes[:1]) == (0.0, 0.04)
+    stiffer = estimate(0.005, exact * 1.02)  # than the coarser mesh, which refinement does not do
+    assert extrapolation([meshes[2], stiffer]) == (0.0, 0.005)
+    too_coarse = estimate(0.2, exact * 1.01)
+    assert extrapolation([too_coarse, meshes[2]]) == (0.0, 0.01)
+
+
+def test_extrapolations_that_differ_are_less_certain():
+    meshes = [estimate(0.04, [4.12, 9.27]), estimate(0.02, [4.08, 9.18]), estimate(0.01, [4.02, 9.045])]
+    found, left = extrapolation(meshes)
+    assert left > 0.3 * found and left <= 0.01
+
+
+def with_interfaces(error, stiffness, forms):
+    none = np.zeros(0)
+    wrenches, levers = np.array([1.0, 2.0]), np.array([1.0, 0.5])
+    return Estimate(error, none, none, none, 1000, stiffness, forms, wrenches, levers)
+
+
+def test_interfaces_are_extrapolated_in_each_direction_by_its_own_error():
+    exact, T = np.diag([4.0, 9.0]), np.array([[1.0, 0.3], [-0.2, 1.0]])
+    # the error of one direction falls by half where that of the other falls by a fifth, and neither is the common one
+    along = [np.array([0.04, 0.05]), np.array([0.02, 0.04]), np.array([0.01, 0.032])]
+    meshes = [
+        with_interfaces(error, T.T @ (exact * (1.0 + 0.6 * own)) @ T, T.T @ (exact * own) @ T)
+        for error, own in zip((0.04, 0.021, 0.011), along, strict=True)
+    ]
+    factors, softest, error = interface_factors(meshes[0], meshes)
+    limit = T.T @ exact @ T
+    assert meshes[0].interfaces @ factors == pytest.approx(limit, rel=1e-9)
+    left = limit - meshes[0].interfaces @ softest
+    assert np.linalg.eigvalsh(left).min() > 0.0
+    # three tenths of what was extrapolated: 0.6 and 1.92 per cent
+    shares = np.linalg.eigvals(np.linalg.solve(meshes[2].interfaces, left)).real
+    assert sorted(shares) == pytest.approx([0.3 * 0.006, 0.3 * 0.0192], rel=0.05)
+    assert min(shares) < error < max(shares)
+
+
+def test_one_mesh_tells_its_own_error_and_a_body_without_interfaces_nothing():
+    stiffness = np.diag([4.0, 9.0])
+    mesh = with_interfaces(0.04, stiffness, 0.03 * stiffness)
+    factors, softest, error = interface_factors(mesh, [mesh])
+    assert factors == pytest.approx(np.eye(2)) and softest == pytest.approx(0.97 * np.eye(2))
+    assert error == pytest.approx(0.03)
+    assert interface_factors(estimate(0.04, [4.0, 9.0]), [estimate(0.04, [4.0, 9.0])]) is None
