@@ -10,6 +10,7 @@ from calmotion.accuracy.step_error import (
     distance,
     effort_errors,
     largest_step,
+    observed_order,
     order_of,
     simulate_at,
     step_error,
@@ -36,6 +37,31 @@ def test_the_largest_step_that_is_allowed_is_chosen(allowed):
     step, error = largest_step(of_second_order, 0.1, 1e-3, lambda run: allowed)
     best = min(0.1, np.sqrt(allowed / 3.0))
     assert 0.85 * best < step <= best * (1.0 + 1e-9) and error == pytest.approx(3.0 * step**2, rel=1e-9)
+
+
+def vibrating(step):
+    """A target on a decaying vibration, whose period is off as that of generalised-alpha, at a dozen frames."""
+    t = np.linspace(0.0, 0.5, 13)
+    phase = 2.0 * np.arctan(np.pi * 30.0 * step) / step * t
+    places = np.exp(-8.0 * t)[:, None] * np.stack([np.sin(phase), np.cos(phase), 0.0 * t], axis=1)
+    return StepRun(step, places[:, None])
+
+
+def test_the_order_is_that_which_three_steps_show():
+    runs = [of_second_order(h) for h in (0.1, 0.06, 0.03)]
+    assert observed_order(*runs) == pytest.approx(2.0) and observed_order(None, *runs[1:]) == 2.0
+    linear = [StepRun(h, np.array([[[h**1.5, 0.0, 0.0]]])) for h in (0.1, 0.06, 0.03)]
+    assert observed_order(*linear) == pytest.approx(1.5, abs=0.01)
+    flat = [StepRun(h, np.array([[[x, 0.0, 0.0]]])) for h, x in ((0.1, 0.0), (0.06, 0.1), (0.03, 0.5))]
+    assert observed_order(*flat) == 1.0
+
+
+def test_an_estimate_of_steps_that_do_not_resolve_the_vibration_is_not_too_small():
+    exact = vibrating(1e-7).positions
+    for allowed in (0.3, 0.1, 0.03, 0.01):
+        step, estimate = largest_step(vibrating, 1 / 60, 1e-5, lambda run, allowed=allowed: allowed)
+        error = distance(vibrating(step).positions, exact)
+        assert 0.5 * estimate <= error <= 1.5 * estimate and estimate <= allowed
 
 
 def test_the_error_of_efforts_goes_with_the_step():

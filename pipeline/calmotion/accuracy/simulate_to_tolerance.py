@@ -226,7 +226,7 @@ def chosen_step(
 
     def trial(step: float) -> StepRun:
         run = simulate_at(shot, options, step)
-        if trials is not None:
+        if trials is not None and step <= FIRST:
             trials[:] = [*trials[-1:], run]  # of each only what two frames hold
         return run
 

@@ -42,3 +42,20 @@ def test_the_command_fails_where_an_error_is_far_above_its_estimate(monkeypatch,
     with open(tmp_path / "rows.csv", newline="") as file:
         assert [int(r["shot"]) for r in csv.DictReader(file)] == [0, 2]
     assert (tmp_path / "table.md").read_text().startswith("| error over estimate | shots | share |")
+
+
+def test_a_campaign_goes_on_with_the_shots_that_its_table_does_not_have(monkeypatch, tmp_path):
+    measured = []
+
+    def judged(number):
+        measured.append(number)
+        return row(number, 0.5)
+
+    monkeypatch.setattr(estimates, "judged", judged)
+    resumed = ["--csv", str(tmp_path / "rows.csv"), "--resume"]
+    assert estimates.main(["--first", "2", "--count", "2", *resumed]) == 0
+    assert estimates.main(["--count", "4", *resumed]) == 0 and measured == [2, 3, 0, 1]
+    with open(tmp_path / "rows.csv", newline="") as file:
+        assert [int(r["shot"]) for r in csv.DictReader(file)] == [0, 1, 2, 3]
+    with pytest.raises(SystemExit):
+        estimates.main(["--resume"])

@@ -25,7 +25,7 @@ from typing import Any
 import numpy as np
 
 from calmotion.benchmarks.common.parsers import bench_parser, output_options
-from calmotion.benchmarks.common.tables import markdown, read_rows, write_rows
+from calmotion.benchmarks.common.tables import markdown, resumed_rows, write_rows
 from calmotion.benchmarks.scenes.recorded_arm import recorded_arm
 from calmotion.errors import ShotError
 from calmotion.identification.calibrate import CalibrationSettings, calibrate_shot
@@ -169,11 +169,7 @@ def _resumed(parser: argparse.ArgumentParser, options: argparse.Namespace) -> li
     Raises:
         ShotError: They are of another real arm, or the file is no such table.
     """
-    if not options.resume:
-        return []
-    if not options.csv:
-        parser.error("--resume needs --csv FILE, with the trials that are kept")
-    rows: list[Recovered] = read_rows(options.csv, Recovered)
+    rows: list[Recovered] = resumed_rows(parser, options, Recovered)
     if any(row.finer_mesh != options.finer_mesh for row in rows):
         raise ShotError(
             "the table has trials " + ("without" if options.finer_mesh else "with") + " a finer mesh of the real arm",

@@ -1,10 +1,11 @@
 """How honest the estimated errors are: random shots, each simulated to a tolerance and compared with a finer run.
 
-`calmotion bench estimates [--count N] [--first K] [--csv FILE]` draws arms of one or two slender links with a load, of
-random size, material and motion, simulates each to a random tolerance with the choices of the program, and measures the
-result against a simulation with meshes of eight times the nodes, a reduction to a thirtieth of the tolerance, and a
-step that is extrapolated to zero. Shot number K is the same on every machine. The table counts the shots by their
-error over their estimate: below one the estimate is on the safe side.
+`calmotion bench estimates [--count N] [--first K] [--csv FILE [--resume]]` draws arms of one or two slender links with
+a load, of random size, material and motion, simulates each to a random tolerance as the program chooses, and
+measures the result against a simulation with meshes of eight times the nodes or more, until these are known to a fifth
+of the estimate, a reduction to a thirtieth of the tolerance, and a step that is extrapolated to zero. Shot number K is
+the same on every machine; `--resume` goes on with the shots that the CSV file does not have. The table counts the shots
+by their error over their estimate: below one the estimate is on the safe side.
 """
 
 from __future__ import annotations
@@ -23,9 +24,9 @@ from calmotion.accuracy.mesh_budget import mesh_error
 from calmotion.accuracy.pod_subspace import project_to_subspace
 from calmotion.accuracy.simulate_to_tolerance import simulate_to_tolerance
 from calmotion.accuracy.step_error import StepRun, distance, frames_of, simulate_at
-from calmotion.benchmarks.common.finer_meshes import with_more_nodes
+from calmotion.benchmarks.common.finer_meshes import TIMES, with_more_nodes
 from calmotion.benchmarks.common.parsers import bench_parser, output_options
-from calmotion.benchmarks.common.tables import markdown, write_rows
+from calmotion.benchmarks.common.tables import markdown, resumed_rows, write_rows
 from calmotion.benchmarks.scenes.beam_arm import beam_arm, quintic, shot_of
 from calmotion.errors import ShotError
 from calmotion.reduction.mesh_refinement import refined_for_frequencies
@@ -40,6 +41,8 @@ FINER = 1.0 / 30.0  # tolerance of the reference's reduction over that of the re
 MESH_ACCURACY, MAX_NODES = 0.01, 15_000  # of the first meshes, as of the mesher
 HELD = 1e-3  # of the tolerance: what POD subspaces of the reference may change
 STEPS = (0.25, 0.125)  # of the reference over that of the result
+KNOWN, MORE, MOST = 0.2, 3.0, 20_000  # error of the reference's meshes over the estimate; by how many times the nodes
+# they are refined until then, and from how many on no more
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,19 +116,29 @@ def judged(number: int) -> Judged:
     quiet = lambda fraction, message: None  # noqa: E731  (a callback)
     result = simulate_to_tolerance(converged.shot, options, quiet, converged.error_m, converged.known)
     assert result.accuracy is not None and result.accuracy.mesh_m is not None
-    positions, own_error, nodes = _reference(shot, reduction, options, result.step_s)
+    estimated = result.accuracy.estimated_m + result.accuracy.mesh_m
+    times, own_error, nodes = TIMES, np.inf, 0
+    while own_error > KNOWN * estimated and nodes < MOST / MORE:
+        positions, own_error, nodes = _reference(shot, reduction, options, result.step_s, times)
+        times *= MORE
     found = frames_of(result, shot.animation.frame_times).positions
     return Judged(
-        number, shot.tolerance, result.accuracy.estimated_m + result.accuracy.mesh_m, result.accuracy.mesh_m,
+        number, shot.tolerance, estimated, result.accuracy.mesh_m,
         distance(found, positions), own_error, sum(body.nodes for body in converged.shot.bodies), nodes,
     )  # fmt: skip
 
 
-def _reference(shot: Drawn, reduction: BodyReduction, options: RunSettings, step: float) -> tuple[Array, float, int]:
-    """Positions of a far finer run [m], the estimated error of its meshes [m], and their nodes."""
+def _reference(
+    shot: Drawn, reduction: BodyReduction, options: RunSettings, step: float, times: float
+) -> tuple[Array, float, int]:
+    """Positions of a far finer run [m], the estimated error of its meshes [m], and their nodes.
+
+    Args:
+        times: Their nodes over those of the shot.
+    """
     first = BodyReduction(shot.character, shot.meshes, reduction.loads)
     # to the finer tolerance, since a link that hardly bends has no modes by which its mesh would be refined
-    finer = with_more_nodes(first, tolerance=FINER * shot.tolerance)
+    finer = with_more_nodes(first, times, FINER * shot.tolerance)
     complete = compile_shot(shot.character, shot.animation, finer.bodies(FINER * shot.tolerance))
     fine = project_to_subspace(complete, options, step, lambda item: HELD * shot.tolerance).shot
 
@@ -159,16 +172,20 @@ def main(arguments: list[str] | None = None) -> int:
     parser = bench_parser("estimates", __doc__)
     parser.add_argument("--count", type=int, default=200, help="number of shots (default: 200)")
     parser.add_argument("--first", type=int, default=0, metavar="K", help="number of the first shot (default: 0)")
+    parser.add_argument("--resume", action="store_true", help="keep the shots that the file of --csv has")
     output_options(parser, csv="a row for each shot", markdown=True)
     options = parser.parse_args(arguments)
-    rows: list[Judged] = []
+    rows: list[Judged] = resumed_rows(parser, options, Judged)
+    known = {row.shot for row in rows}
     for number in range(options.first, options.first + options.count):
+        if number in known:
+            continue
         try:
             row = judged(number)
         except ShotError as problem:
             print(f"shot {number} is refused: {problem.problem}", file=sys.stderr, flush=True)
             continue
-        rows.append(row)
+        rows = sorted([*rows, row], key=lambda row: row.shot)
         print(
             f"shot {number}, {1e3 * row.tolerance_m:.2g} mm: {1e3 * row.error_m:.2g} mm off, "
             f"{1e3 * row.estimated_m:.2g} mm estimated", file=sys.stderr, flush=True,

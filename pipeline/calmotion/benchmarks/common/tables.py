@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import argparse
 import csv
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict, fields
@@ -52,6 +53,19 @@ def read_rows(path: str, kind: type[Any]) -> list[Any]:
                 ) from None  # fmt: skip
         found.append(kind(**values))
     return found
+
+
+def resumed_rows(parser: argparse.ArgumentParser, options: argparse.Namespace, kind: type[Any]) -> list[Any]:
+    """The rows of the file that is to be resumed (`--resume` with `--csv FILE`); none otherwise.
+
+    Raises:
+        ShotError: As `read_rows`.
+    """
+    if not options.resume:
+        return []
+    if not options.csv:
+        parser.error("--resume needs --csv FILE, with the rows that are kept")
+    return read_rows(options.csv, kind)
 
 
 def markdown(heads: Sequence[str], rows: Iterable[Sequence[str]], rule: str = "---") -> str:
