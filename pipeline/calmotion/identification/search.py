@@ -9,8 +9,9 @@ import numpy as np
 
 from calmotion.errors import ShotError
 from calmotion.identification.free_decay import decay_factors
-from calmotion.identification.least_squares import Solution, chord, loss_of, minimize, posterior
+from calmotion.identification.least_squares import Solution, chord, loss_of, minimize, posterior, weights_of
 from calmotion.identification.measurement import Measurement, Sensor
+from calmotion.identification.model_error import covariance_of_model
 from calmotion.identification.noise import correlation_time, least_sigma, spread_of
 from calmotion.identification.problem import Calibrated, Measured
 from calmotion.multibody.failure import SimulationFailure
@@ -82,7 +83,7 @@ def _converged(problem: Calibrated, solution: Solution, iterations: int, halving
 
     Derivatives are those of the first step: a minimum with another step is near, and its residuals alone decide where.
     """
-    deviations = np.sqrt(np.diag(covariance_of(problem, solution)))
+    deviations, of_model = _deviations(problem, solution)
     earlier, limit, shift, extrapolated = solution.z, solution.z, 0.0, False
     for _ in range(halvings):
         problem = problem.with_options(replace(problem.options, step=0.5 * step_of(problem)))
@@ -95,14 +96,14 @@ def _converged(problem: Calibrated, solution: Solution, iterations: int, halving
         shift = float(np.max(np.abs(off) / deviations, initial=0.0))
         if shift > FAR:  # derivatives there are others
             solution = minimize(problem, solution.z, problem.lower, FIRST_ITERATIONS)
-            deviations = np.sqrt(np.diag(covariance_of(problem, solution)))
+            deviations, of_model = _deviations(problem, solution)
             earlier, limit, extrapolated, iterations = solution.z, solution.z, False, iterations + solution.iterations
             continue
         earlier, limit, extrapolated = solution.z, then, True
         if shift <= SHIFT:
             break
     problem = problem.with_measurement(correlated(problem, solution.z))
-    covariance = posterior(solution.jacobian, solution.residuals, problem.counts)
+    covariance = posterior(solution.jacobian, solution.residuals, problem.counts) + of_model
     return Found(limit, problem, solution, covariance, iterations, shift)
 
 
@@ -112,9 +113,16 @@ def step_of(problem: Calibrated) -> float:
     return problem.options.step
 
 
-def covariance_of(problem: Calibrated, solution: Solution) -> Array:
-    """Of z about a solution; residuals that are correlated in time count as fewer."""
-    return posterior(solution.jacobian, solution.residuals, correlated(problem, solution.z).counts)
+def _deviations(problem: Calibrated, solution: Solution) -> tuple[Array, Array]:
+    """Standard deviations of z about a solution, and the covariance by what the model has wrong.
+
+    Residuals that are correlated in time count as fewer.
+    """
+    counts = correlated(problem, solution.z).counts
+    weights = weights_of(solution.residuals) / counts
+    of_model = covariance_of_model(problem, solution.z, solution.jacobian, weights)
+    covariance = posterior(solution.jacobian, solution.residuals, counts) + of_model
+    return np.sqrt(np.diag(covariance)), of_model
 
 
 def correlated(problem: Calibrated, z: Array) -> Measurement:

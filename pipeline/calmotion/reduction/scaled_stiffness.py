@@ -31,7 +31,12 @@ def with_graded_stiffness(body: ReducedBody, exponent: float) -> ReducedBody:
     """
     if exponent == 0.0 or not len(body.stiffness) or body.stiffness.min() <= 0.0:
         return body
-    factors = (body.stiffness / body.stiffness.min()) ** (0.5 * exponent)
+    return with_mode_stiffness(body, (body.stiffness / body.stiffness.min()) ** (0.5 * exponent))
+
+
+def with_mode_stiffness(body: ReducedBody, factors: Array) -> ReducedBody:
+    """The body with the stiffness of each coordinate multiplied by a factor of its own, shape [r]; its damping is the
+    same."""
     law = body.elasticity
     if law is not None and law.law == "stvk":
         # the strain of each mode grows, that of pairs of modes does not: the energy is still a sum of squares

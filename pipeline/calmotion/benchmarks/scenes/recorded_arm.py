@@ -15,7 +15,9 @@ from calmotion.identification.robots import Robot, robot_with
 from calmotion.identification.signals import Signals, signals_of
 from calmotion.multibody.failure import SimulationFailure
 from calmotion.multibody.model.topology import span_tree
-from calmotion.shot import Body, Character
+from calmotion.reduction.discretization_error import frequency_errors
+from calmotion.reduction.elements.assembly import assemble
+from calmotion.shot import Body, Character, FEMeshes
 from calmotion.shot.calibration.estimates import HIGHER_MODES
 from calmotion.shot.calibration.recording import ACCELEROMETER, ANGLE, MARKER, Channel, SensorRecording
 from calmotion.shot.character import Array
@@ -86,11 +88,24 @@ def _arm(size: Mapping[str, object], animation: object, gives: bool, fine: bool)
     character, meshes = beam_arm(**size, cells=cells, across=across, grading=grading)  # type: ignore[arg-type]
     if fine:  # the lowest modes alone would lack static responses, and be 1 to 2% too stiff
         character = replace(character, bodies=tuple(_with_more_modes(body) for body in character.bodies))
+    else:
+        meshes = _with_error(character, meshes)
     if gives:
         last = replace(character.motors[-1], model=DRIVE, position_gain=150.0, velocity_gain=1.5)
         character = replace(character, motors=(*character.motors[:-1], last))
     bodies = reduce_bodies(character, span_tree(character), meshes)
     return compile_shot(character, animation, bodies)  # type: ignore[arg-type]
+
+
+def _with_error(character: Character, meshes: FEMeshes) -> FEMeshes:
+    """The meshes with the estimated error of their first frequency, as that of a shot has it."""
+    settings, mesh = character.bodies[0].flexible, meshes.meshes[0]  # all links are alike
+    assert settings is not None
+    model = assemble(mesh.points, mesh.tets, settings.material)
+    clamped = np.flatnonzero(model.mesh.nodes[:, 0] < 1e-9)
+    error = float(frequency_errors(model, settings.material, 1, clamped)[1][0])
+    own = (replace(m, quality=replace(m.quality, frequency_error=error)) for m in meshes.meshes)
+    return replace(meshes, meshes=tuple(own))
 
 
 def _with_more_modes(body: Body) -> Body:
