@@ -58,7 +58,7 @@ def test_the_report_has_the_distribution_of_each_target(result):
 
 
 def test_a_robot_without_uncertainty_is_refused(arm, animation, bodies):
-    known = dataclasses.replace(arm.retarget, uncertainty=Uncertainty(0.0, 0.0, 0.0))
+    known = dataclasses.replace(arm.retarget, uncertainty=Uncertainty(0.0, 0.0, 0.0, 0.0))
     shot = compile_shot(dataclasses.replace(arm, retarget=known), animation, bodies)
     with pytest.raises(ShotError, match="calm:retarget:uncertainty"):
         check_search(shot.character, animation, OPTIONS)  # before any mesh

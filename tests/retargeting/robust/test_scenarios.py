@@ -114,6 +114,21 @@ def test_robots_of_a_calibrated_shot_have_its_covariance(shot):
     assert np.cov(logs.T) == pytest.approx(covariance[:2, :2], rel=0.1)
 
 
+def test_the_gains_of_a_motor_that_gives_have_a_common_factor_unless_they_are_known(shot):
+    first, second = shot.character.motors
+    driven = dataclasses.replace(first, model=DRIVE, position_gain=100.0, velocity_gain=2.0)
+    gives = shot.with_character(dataclasses.replace(shot.character, motors=(driven, second)))
+    (gains,) = [p for p in uncertain_parameters(gives) if p.name.startswith("position_gain")]
+    assert gains.name.endswith(first.path) and gains.spread == pytest.approx(np.log(1.2))
+    motor = shot_of(gives, scenario_at((gains,), np.array([2.0]))).character.motors[0]
+    assert (motor.position_gain, motor.velocity_gain) == (pytest.approx(144.0), pytest.approx(2.88))
+    known = calibrated(gives, (f"position_gain {first.path}",), [[1e-4]])
+    told = {p.name: p.spread for p in uncertain_parameters(known)}
+    assert told[f"position_gain {first.path}"] == pytest.approx(0.01)
+    assert told[f"velocity_gain {first.path}"] == pytest.approx(np.log(1.2))
+    assert not any("gain" in p.name for p in uncertain_parameters(uncertain(gives, gains=0.0)))
+
+
 def test_a_robot_of_a_calibrated_shot_has_other_masses_and_gains(shot):
     first, second = shot.character.motors
     driven = dataclasses.replace(first, model=DRIVE, position_gain=100.0, velocity_gain=2.0, delay=0.01)

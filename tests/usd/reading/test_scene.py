@@ -80,9 +80,9 @@ def test_what_is_uncertain_of_the_robot_is_read(tmp_path):
     assert read(tmp_path).retarget.uncertainty == Uncertainty()
 
     def edit(stage):
-        retarget(stage, "/Arm", **{"uncertainty:modulus": 0.25, "uncertainty:payload": 0.0})
+        retarget(stage, "/Arm", **{"uncertainty:modulus": 0.25, "uncertainty:payload": 0.0, "uncertainty:gains": 0.5})
 
-    assert read(tmp_path, edit).retarget.uncertainty == Uncertainty(modulus=0.25, payload=0.0)
+    assert read(tmp_path, edit).retarget.uncertainty == Uncertainty(modulus=0.25, payload=0.0, gains=0.5)
 
 
 def test_the_settings_are_those_above_the_character_not_those_below(tmp_path):

@@ -19,6 +19,7 @@ from calmotion.identification.advice import IDENTIFIABLE
 from calmotion.identification.calibrate import simulable
 from calmotion.identification.excitation.waveforms import MARGIN, Family, bounds_of, family_of
 from calmotion.identification.measurement import Measurement, measurement_parameters, sensors_of
+from calmotion.identification.model_error import covariance_of_model
 from calmotion.identification.motor_groups import grouped
 from calmotion.identification.parameters import DEFAULT, Parameter, robot_parameters
 from calmotion.identification.problem import Calibrated
@@ -116,7 +117,7 @@ def excite_shot(
             own <= IDENTIFIABLE,
         )
         for p, own, other in zip(
-            [p for p in parameters if p.kind in ROBOT_KINDS], best.deviations, chirp.deviations, strict=True
+            [parameters[k] for k in _wanted(parameters)], best.deviations(), chirp.deviations(), strict=True
         )
     )
     return Excitation(
@@ -150,13 +151,26 @@ def _searched(
 
 @dataclass(frozen=True, eq=False)
 class _Rated:
-    """A motion: its values, its simulation, the standard deviations of the parameters over those of their priors, and
-    half the logarithm of the determinant of their covariance."""
+    """A motion: its values, its simulation, what a recording would tell, and half the logarithm of the determinant of
+    the covariance that it would leave of the wanted parameters by noise alone."""
 
     values: Array
     signals: Signals
-    deviations: Array
+    problem: Calibrated
+    jacobian: Array
     score: float
+
+    def deviations(self) -> Array:
+        """Standard deviations of the wanted parameters over those of their priors, with what the meshes have wrong."""
+        J, start = self.jacobian, np.zeros(self.jacobian.shape[1])
+        of_model = covariance_of_model(self.problem, start, J, np.ones(len(J)))
+        variances = np.diag(np.linalg.inv(J.T @ J + np.eye(len(start))) + of_model)
+        return np.sqrt(variances[_wanted(self.problem.parameters)])
+
+
+def _wanted(parameters: Sequence[Parameter]) -> list[int]:
+    """Those of the robot: what the model has wrong is estimated beside them, and not wanted."""
+    return [k for k, p in enumerate(parameters) if p.kind in ROBOT_KINDS]
 
 
 class _Trial:
@@ -193,10 +207,9 @@ class _Trial:
             values = start + LESS * (values - start)
         else:
             return None
-        # what the model has wrong is estimated beside the robot's parameters, and not wanted
-        wanted = [k for k, p in enumerate(self.parameters) if p.kind in ROBOT_KINDS]
+        wanted = _wanted(self.parameters)
         covariance = np.linalg.inv(J.T @ J + np.eye(J.shape[1]))[np.ix_(wanted, wanted)]
-        return _Rated(values, signals, np.sqrt(np.diag(covariance)), 0.5 * float(np.linalg.slogdet(covariance)[1]))
+        return _Rated(values, signals, problem, J, 0.5 * float(np.linalg.slogdet(covariance)[1]))
 
     def _kept(self, signals: Signals) -> bool:
         """Whether the simulated motors stay within their efforts, and their joints within their ranges."""

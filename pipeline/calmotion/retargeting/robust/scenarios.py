@@ -6,7 +6,7 @@ reduction is made anew (docs/formulation.md, "Robust retargeting").
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -20,7 +20,8 @@ from calmotion.shot.robust.robots import Scenario
 from calmotion.simulation.compiled_shot import CompiledShot, compile_shot
 
 MODULUS, DAMPING, MASS, PAYLOAD = "modulus", "damping", "mass", "payload"
-OF_MOTOR, OF_ROTOR = ("position_gain", "velocity_gain", "delay"), (
+GAINS = ("position_gain", "velocity_gain")
+OF_MOTOR, OF_ROTOR = (*GAINS, "delay"), (
     "gear_stiffness", "armature", "friction", "viscous_friction",
 )  # fmt: skip
 _SEED = 20190704  # of the draws, which are the same in every run
@@ -56,7 +57,18 @@ def uncertain_parameters(shot: CompiledShot) -> tuple[Parameter, ...]:
     if any(f"{MASS} {character.bodies[k].path}" not in names for k in payload_bodies(shot)):
         found[PAYLOAD] = float(np.log1p(given.payload))
     free = (Parameter(name, spread) for name, spread in found.items() if spread > 0.0 and name not in names)
-    return (*free, *known)
+    return (*free, *_gains(character, names), *known)
+
+
+def _gains(character: Character, known: Collection[str]) -> Iterator[Parameter]:
+    """The gains of each motor that gives, which have a common factor, but for those that a calibration tells."""
+    spread = float(np.log1p(character.retarget.uncertainty.gains))
+    for motor in character.motors:
+        if spread > 0.0 and motor.model != PRESCRIBED and motor.follows is None:
+            own = [f"{gain} {motor.path}" for gain in GAINS if 0.0 < getattr(motor, gain) < np.inf]
+            own = [name for name in own if name not in known]
+            if own:
+                yield Parameter(own[0], spread, tuple((name, spread) for name in own[1:]))
 
 
 def _calibrated(shot: CompiledShot) -> tuple[Parameter, ...]:

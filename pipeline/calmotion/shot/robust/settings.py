@@ -18,12 +18,14 @@ class Uncertainty:
         modulus: Of Young's modulus of each material.
         damping: Of the damping of each material.
         payload: Of the masses of the rigid bodies at the ends of the chains, all by the same factor.
+        gains: Of the gains of each motor that gives, position and velocity by the same factor.
         calibrated: Of the parameters that a calibration tells, which count instead.
     """
 
     modulus: float = 0.1
     damping: float = 1.0
     payload: float = 0.1
+    gains: float = 0.2
     calibrated: KnownFactors = KnownFactors()
 
 

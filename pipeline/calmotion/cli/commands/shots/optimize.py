@@ -34,7 +34,8 @@ def add_to(commands: Commands) -> None:
         "weight of the way across the play over that of the error (default: 10)",
     )
     group = command.add_argument_group(
-        "robust curves", "Robots differ from their model: calm:retarget:uncertainty:modulus, :damping and :payload."
+        "robust curves",
+        "Robots differ from their model: calm:retarget:uncertainty:modulus, :damping, :payload and :gains.",
     )
     group.add_argument(
         "--robust",
