@@ -23,8 +23,8 @@ def covariance(shot, recordings, error):
 
 def test_a_modulus_is_not_known_better_than_the_stiffness_of_the_mesh(recorded_shot, recordings):
     found, parameters = covariance(recorded_shot, recordings, ERROR)
-    (modulus,) = [k for k, p in enumerate(parameters) if p.kind == "modulus"]
-    deviation = parameters[modulus].spread * np.sqrt(found[modulus, modulus])
+    assert parameters[0].kind == "modulus"
+    deviation = parameters[0].spread * np.sqrt(found[0, 0])
     assert ERROR < 1.02 * deviation < 2.0 * ERROR  # the modes' own errors come on top
     assert np.linalg.eigvalsh(found).min() > -1e-9 * found.trace()
 
@@ -32,5 +32,5 @@ def test_a_modulus_is_not_known_better_than_the_stiffness_of_the_mesh(recorded_s
 def test_errors_of_the_model_add_up_in_proportion_and_vanish_with_it(recorded_shot, recordings):
     small, _ = covariance(recorded_shot, recordings, 0.1 * ERROR)
     large, _ = covariance(recorded_shot, recordings, ERROR)
-    assert np.diag(large)[:3] == pytest.approx(100.0 * np.diag(small)[:3], rel=0.1)
+    assert large[0, 0] == pytest.approx(100.0 * small[0, 0], rel=0.1) and large[0, 0] > 0.0
     assert not np.any(covariance(recorded_shot, recordings, None)[0]) and 0.0 < OWN < 1.0
