@@ -191,6 +191,14 @@ class OptimizeShot(Operator):
         Property(
             "draws", int, 200, minimum=20, maximum=100_000, description="Random robots on which the curves are measured"
         ),
+        Property(
+            "tradeoff",
+            int,
+            0,
+            minimum=0,
+            maximum=99,
+            description="Number of compromises between curves for the model and robust ones that are searched and told",
+        ),
     )
 
     @classmethod
@@ -255,7 +263,9 @@ class OptimizeShot(Operator):
             adjoint=values.adjoint,
             avoid_reversals=values.avoid_reversals,
             window=values.window if values.window >= 0.0 else None,
-            robust=None if values.robust == "off" else RobustSettings(values.robust, values.scenarios, values.draws),
+            robust=None
+            if values.robust == "off"
+            else RobustSettings(values.robust, values.scenarios, values.draws, values.tradeoff),
         )
 
 

@@ -15,11 +15,11 @@ from calmotion.shot.character import Array
 from calmotion.shot.motor import measure_of
 from calmotion.shot.outputs import CsvFile, Figures, Recording, Rig, Verification, Video, WrittenLayer
 from calmotion.shot.result import is_exceeded
-from calmotion.shot.robust.robots import CURVES
 from calmotion.shot.run import Source
 from calmotion.support.memory import peak_memory
 from calmotion.version import __version__
 from calmotion.workflow.reactions import contact_rows, reaction_rows
+from calmotion.workflow.robustness import robustness_report, robustness_row
 
 
 def error_norms(errors: Array) -> tuple[Array, Array]:
@@ -236,7 +236,7 @@ def _optimized(character: Character, result: Result) -> dict[str, Any]:
         "targets": [
             one | other | robustness_row(result, k) for k, (one, other) in enumerate(zip(before, after, strict=True))
         ],
-        **_scenarios(result),
+        **robustness_report(result),
         **_overall(before, "_before"),
         **_overall(after, "_after"),
         "objective_before": result.objective_before,
@@ -259,35 +259,6 @@ def _optimized(character: Character, result: Result) -> dict[str, Any]:
             }
             for curve in result.curves
         ],
-    }
-
-
-def robustness_row(result: Result, target: int) -> dict[str, Any]:
-    """The errors of a target on robots that differ from the model, for each set of curves; empty without `--robust`."""
-    found = result.robustness
-    if found is None:
-        return {}
-    rows = {}
-    for name in CURVES:
-        drawn = found.drawn[name][:, target]
-        rows[name] = {
-            "nominal_max_error_m": float(found.nominal[name][target]),
-            "median_max_error_m": float(np.median(drawn)),
-            "p95_max_error_m": float(np.quantile(drawn, 0.95, method="higher")),
-            "worst_max_error_m": float(drawn.max()),
-        }
-    return {"robustness": rows}
-
-
-def _scenarios(result: Result) -> dict[str, Any]:
-    found = result.robustness
-    if found is None:
-        return {}
-    return {
-        "robust": found.kind,
-        "scenarios": [{"parameters": dict(s.factors), "weight": s.weight} for s in found.scenarios],
-        "draws": len(found.drawn["robust"]),
-        "failed_draws": {name: int(np.sum(~np.isfinite(found.drawn[name]).all(axis=1))) for name in CURVES},
     }
 
 

@@ -10,10 +10,10 @@ from calmotion.retargeting.to_tolerance import optimize_to_tolerance
 from calmotion.shot.robust.settings import RobustSettings, Uncertainty
 from calmotion.shot.run import RunSettings
 from calmotion.simulation.compiled_shot import compile_shot
-from calmotion.workflow.report import robustness_row
+from calmotion.workflow.robustness import robustness_row
 from posed import ignore_progress
 
-OPTIONS = RunSettings(step=1 / 120, robust=RobustSettings("worst", 3, 20))
+OPTIONS = RunSettings(step=1 / 120, robust=RobustSettings("worst", 3, 20, 2))
 
 
 @pytest.fixture(scope="module")
@@ -26,6 +26,16 @@ def test_the_largest_error_over_the_robots_is_smaller_than_that_of_nominal_curve
     assert len(found.scenarios) == 3 and len(found.drawn["robust"]) == 20
     before, nominal, robust = (found.drawn[name].max() for name in ("before", "nominal", "robust"))
     assert robust < 0.9 * nominal < before
+
+
+def test_compromises_lie_between_robust_and_nominal_curves(result):
+    found = result.robustness
+    weights = [row.weight for row in found.compromises]
+    assert len(weights) == 2 and found.scenarios[0].weight < weights[0] < weights[1] < 1.0
+    on_model = [found.nominal["robust"].max(), *(row.nominal.max() for row in found.compromises)]
+    worst = [found.drawn["robust"].max(), *(row.drawn.max() for row in found.compromises)]
+    assert on_model[0] > on_model[1] > on_model[2] and worst[0] < worst[2]
+    assert all(row.drawn.shape == found.drawn["robust"].shape for row in found.compromises)
 
 
 def test_what_is_measured_on_the_nominal_robot_is_what_the_result_has(result):

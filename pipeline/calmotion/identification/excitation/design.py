@@ -194,8 +194,9 @@ class _Trial:
         start = self.family.start
         for _ in range(TIMES):
             problem = Calibrated(
-                _performing(self.shot, self.family, values), self.parameters, self._measurement, self.options, AFTER
-            )
+                _performing(self.shot, self.family, values), self.parameters, self._measurement, self.options, AFTER,
+                central=False,
+            )  # fmt: skip
             z = np.zeros(len(self.parameters) + len(self._measurement.parameters))
             try:
                 signals = problem.signals(z)

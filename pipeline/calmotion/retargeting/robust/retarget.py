@@ -16,15 +16,17 @@ from calmotion.retargeting.robust.measure import errors_on
 from calmotion.retargeting.robust.scenarios import Parameter, random_scenarios, uncertain_parameters
 from calmotion.shot import Result
 from calmotion.shot.character import Array
-from calmotion.shot.robust.robots import Robustness, Scenario
+from calmotion.shot.robust.robots import Compromise, Robustness, Scenario
 from calmotion.shot.robust.settings import WORST
 from calmotion.shot.run import RunSettings
 from calmotion.simulation.compiled_shot import CompiledShot
 from calmotion.simulation.simulate import Progress
+from calmotion.support import interrupts
 
 ROUNDS = 6  # most searches with other weights
 FALLING = 0.98  # of the largest error: a smaller gain ends them
 _SEARCHED = 0.6  # share of the searches in the progress
+OTHERS = 0.25  # weight of the other robots in each compromise, over that in the one before
 LEAST = 1e-3  # smallest weight of a robot, over the mean
 Continued = Callable[[Result, Result], Result]
 
@@ -67,7 +69,8 @@ def retarget_robustly(
             best, used, least = continued(best, latest), scenarios, float(errors.max())
             scenarios = _reweighted(scenarios, errors)
         draws = random_scenarios(parameters, robust.draws)
-        return replace(best, robustness=_robustness(shot, options, nominal, best, used, draws, progress))
+        measured = replace(best, robustness=_robustness(shot, options, nominal, best, used, draws, progress))
+        return _with_compromises(shot, options, measured, draws, progress)
     except KeyboardInterrupt:
         return best_so_far(best)
 
@@ -128,6 +131,38 @@ def _robustness(
 
     drawn = errors_on(shot, options, curves, draws, measured)
     return Robustness(options.robust.kind, scenarios, {name: rows[0] for name, rows in on_nominal.items()}, drawn)
+
+
+def _with_compromises(
+    shot: CompiledShot, options: RunSettings, robust: Result, draws: tuple[Scenario, ...], progress: Progress
+) -> Result:  # fmt: skip
+    """The robust result with as many compromises as wanted: searches in which the nominal robot weighs ever more.
+
+    An interrupt (Ctrl-C) ends them.
+    """
+    found, asked, curves = robust.robustness, options.robust, found_tracks(robust, shot.animation)
+    assert found is not None and asked is not None
+    compromises: list[Compromise] = []
+    try:
+        for number in range(asked.tradeoff):
+            scenarios = _rather_nominal(found.scenarios, OTHERS ** (number + 1))
+            latest = _searched(
+                shot.with_tracks(curves), options, _part(progress, number, asked.tradeoff), scenarios
+            )  # fmt: skip
+            if latest.interrupted:
+                break
+            curves = found_tracks(latest, shot.animation)
+            errors = errors_on(shot, options, {"": curves}, (*scenarios[:1], *draws))[""]
+            compromises.append(Compromise(scenarios[0].weight, errors[0], errors[1:]))
+    except KeyboardInterrupt:
+        interrupts.answer()
+    return replace(robust, robustness=replace(found, compromises=tuple(compromises)))
+
+
+def _rather_nominal(scenarios: Sequence[Scenario], share: float) -> tuple[Scenario, ...]:
+    """The robots, the nominal one first, with the weights of all others multiplied by a share."""
+    others = tuple(replace(s, weight=share * s.weight) for s in scenarios[1:])
+    return (replace(scenarios[0], weight=1.0 - sum(s.weight for s in others)), *others)
 
 
 def _part(progress: Progress, number: int, rounds: int) -> Progress:

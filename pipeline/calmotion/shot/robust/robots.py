@@ -24,6 +24,21 @@ class Scenario:
 
 
 @dataclass(frozen=True, eq=False)
+class Compromise:
+    """Curves between those for the model and those for all robots.
+
+    Attributes:
+        weight: Of the nominal robot in their search; those of all robots add up to 1.
+        nominal: Largest error of each target on the nominal robot [m], shape [K].
+        drawn: The same on random robots, shape [draws, K].
+    """
+
+    weight: float
+    nominal: Array
+    drawn: Array
+
+
+@dataclass(frozen=True, eq=False)
 class Robustness:
     """Motor curves on robots that differ from the model.
 
@@ -33,9 +48,11 @@ class Robustness:
         nominal: Largest error of each target on the nominal robot [m], shape [K], by name of the curves (`CURVES`).
         drawn: The same on random robots that the optimisation did not see, shape [draws, K]; infinite where a robot
             could not be simulated.
+        compromises: Between nominal and robust curves, from the robust ones on.
     """
 
     kind: str
     scenarios: tuple[Scenario, ...]
     nominal: Mapping[str, Array]
     drawn: Mapping[str, Array]
+    compromises: tuple[Compromise, ...] = ()

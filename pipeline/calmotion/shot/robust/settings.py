@@ -37,8 +37,10 @@ class RobustSettings:
         kind: `mean`: the mean of the objective over the robots; `worst`: the robot with the largest error counts most.
         scenarios: Number of robots, the nominal one among them.
         draws: Number of random robots on which the curves are measured afterwards.
+        tradeoff: Number of compromises between the nominal and the robust curves that are searched and measured.
     """
 
     kind: str = WORST
     scenarios: int = 7
     draws: int = 200
+    tradeoff: int = 0
