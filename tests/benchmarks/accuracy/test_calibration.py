@@ -14,9 +14,11 @@ def row(trial, kind, error, deviation, identifiable=True):
 
 
 def test_the_table_counts_intervals_that_cover_the_truth():
-    rows = [row(0, "modulus", 0.01, 0.01), row(1, "modulus", -0.03, 0.01), row(0, "delay", 1e-3, 2e-3, False)]
+    rows = [row(0, "modulus", 0.004, 0.004), row(1, "modulus", -0.03, 0.005), row(2, "modulus", 0.02, 0.02)]
+    rows.append(row(0, "delay", 1e-3, 2e-3, False))
     modulus, delay = table_of(rows)
-    assert modulus == ["modulus", "2", "50%", "2%", "3%", "1%", "2", "1%: 1 of 2"] and len(modulus) == len(HEADS)
+    # the interval of the third does not tell 1%
+    assert modulus == ["modulus", "3", "67%", "2%", "3%", "0.5%", "3", "1%: 1 of 2"] and len(modulus) == len(HEADS)
     assert delay == ["delay", "1", "100%", "1 ms", "1 ms", "2 ms", "0", "1 ms: 0 of 0"]
 
 

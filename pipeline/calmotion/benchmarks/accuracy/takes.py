@@ -4,7 +4,8 @@
 a shot and lets another robot perform the curves: with F times the modulus, damping and payload, and a quarter of the
 time step. Markers, accelerometers and encoders record it, with noise, bias, gaps, outliers and clocks of their own;
 `calmotion refine` improves model and curves, which the robot performs next. The table has, for each take, the largest
-error on its model and on the robot, and the largest on robots that are drawn from the error of its calibration.
+error on its model and on the robot, and the largest on robots that are drawn from the error of its calibration. All are
+those of the target that the first curves bring closest to its intended motion: what others keep is not the model's.
 """
 
 from __future__ import annotations
@@ -47,7 +48,7 @@ class Take:
 
     Attributes:
         take: Its number.
-        on_model: Largest error of the targets on the model of which the curves are [m].
+        on_model: Largest error of the target on the model of which the curves are [m].
         on_robot: On the robot [m].
         median, largest: Over robots drawn from the error of the calibration [m]; NaN of the first take.
         off: Estimate over truth minus one, by the name of the parameter.
@@ -91,19 +92,21 @@ def performed(
     optimized = optimize(path, outputs=OutputPaths(layer=str(folder / "take1.usda")))
     model = compiled_in(optimized.outcome.run.get)
     scenario = real_robot(model, *factors)
-    truth = _truth(model, scenario)
-    found = [Take(1, optimized.max_error, _on_robot(model, scenario, optimized), np.nan, np.nan, {})]
+    truth, target = _truth(model, scenario), int(np.argmin(_errors(optimized)))
+    on_robot = _on_robot(model, scenario, optimized)[target]
+    found = [Take(1, _errors(optimized)[target], on_robot, np.nan, np.nan, {})]
     _tell(found[-1])
     for number in range(1, takes):
         files = _recorded(model, scenario, optimized, rng, folder, number)
         refined = refine(folder / f"take{number}_root.usda", files, layer=folder / f"take{number + 1}.usda")
         optimized = refined.optimized
-        drawn = expected_errors(optimized, draws).max(axis=1)
+        drawn = expected_errors(optimized, draws)[:, target]
         estimates = {item.name: item.value for item in refined.calibrated.calibration.estimates}
         found.append(
             Take(
-                number + 1, optimized.max_error, _on_robot(model, scenario, optimized), float(np.median(drawn)),
-                float(drawn.max()), {n: estimates[n] / value - 1.0 for n, value in truth.items() if n in estimates},
+                number + 1, _errors(optimized)[target], _on_robot(model, scenario, optimized)[target],
+                float(np.median(drawn)), float(drawn.max()),
+                {n: estimates[n] / value - 1.0 for n, value in truth.items() if n in estimates},
             )
         )  # fmt: skip
         _tell(found[-1])
@@ -127,12 +130,17 @@ def _truth(shot: CompiledShot, scenario: Scenario) -> dict[str, float]:
     return found
 
 
-def _on_robot(model: CompiledShot, scenario: Scenario, optimized: OptimizationResult) -> float:
-    """Largest error of the targets with the curves on the robot [m]."""
+def _errors(optimized: OptimizationResult) -> list[float]:
+    """Largest error of each target on the model [m]."""
+    return [target.max_error for target in optimized.targets.values()]
+
+
+def _on_robot(model: CompiledShot, scenario: Scenario, optimized: OptimizationResult) -> list[float]:
+    """Largest error of each target with the curves on the robot [m]."""
     result, animation = optimized.result, model.animation
     options = RunSettings(step=result.step_s / FINER, pre_roll=result.pre_roll_s)
     shot = model.with_tracks(animation.tracks)
-    return float(errors_on(shot, options, {"": found_tracks(result, animation)}, [scenario])[""].max())
+    return [float(e) for e in errors_on(shot, options, {"": found_tracks(result, animation)}, [scenario])[""][0]]
 
 
 def _recorded(
