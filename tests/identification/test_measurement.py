@@ -5,8 +5,8 @@ import dataclasses
 import numpy as np
 import pytest
 from calmotion import ShotError
-from calmotion.identification.clocks import clock_of
 from calmotion.identification.measurement import Measurement, measurement_parameters, sensors_of
+from calmotion.identification.recordings.clocks import clock_of
 from calmotion.identification.robots import robot_with
 from calmotion.identification.signals import signals_of
 from calmotion.shot.run import RunSettings

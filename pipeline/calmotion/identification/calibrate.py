@@ -11,12 +11,12 @@ import numpy as np
 
 from calmotion.errors import ShotError
 from calmotion.identification.advice import IDENTIFIABLE, advised
-from calmotion.identification.clocks import clock_of
 from calmotion.identification.measurement import Measurement, measurement_parameters, sensors_of
 from calmotion.identification.motor_groups import grouped, of_each_motor
-from calmotion.identification.noise import noise_of
 from calmotion.identification.parameters import DEFAULT, Parameter, robot_parameters
 from calmotion.identification.problem import Calibrated
+from calmotion.identification.recordings.clocks import clock_of
+from calmotion.identification.recordings.noise import noise_of
 from calmotion.identification.robots import robot_at, robot_with
 from calmotion.identification.search import HALVINGS, STIFF, Found, profiled, search, step_of
 from calmotion.identification.signals import Signals, ends_at_rest, refuse_cyclic, signals_of

@@ -13,8 +13,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from calmotion.errors import ShotError, raise_all
-from calmotion.identification.noise import noise_of
 from calmotion.identification.parameters import PRIORS, Parameter
+from calmotion.identification.recordings.noise import noise_of
 from calmotion.identification.signals import Signals
 from calmotion.shot import Character
 from calmotion.shot.calibration.estimates import BIAS, CLOCK_DRIFT, CLOCK_OFFSET, PLACE

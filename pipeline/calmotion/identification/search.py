@@ -8,12 +8,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from calmotion.errors import ShotError
-from calmotion.identification.free_decay import decay_factors
 from calmotion.identification.least_squares import Solution, chord, loss_of, minimize, posterior, weights_of
 from calmotion.identification.measurement import Measurement, Sensor
 from calmotion.identification.model_error import covariance_of_model
-from calmotion.identification.noise import correlation_time, least_sigma, spread_of
 from calmotion.identification.problem import Calibrated, Measured
+from calmotion.identification.recordings.free_decay import decay_factors
+from calmotion.identification.recordings.noise import correlation_time, least_sigma, spread_of
 from calmotion.multibody.failure import SimulationFailure
 from calmotion.multibody.parallel import in_parallel
 from calmotion.shot.calibration.estimates import DAMPING, GEAR_STIFFNESS, MODULUS, POSITION_GAIN

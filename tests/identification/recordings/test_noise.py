@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from calmotion.identification.noise import correlation_time, least_sigma, noise_of, spread_of
+from calmotion.identification.recordings.noise import correlation_time, least_sigma, noise_of, spread_of
 
 T = np.linspace(0.0, 2.0, 2000)
 RNG = np.random.default_rng(3)

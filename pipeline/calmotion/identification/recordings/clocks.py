@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from calmotion.identification.noise import noise_of
+from calmotion.identification.recordings.noise import noise_of
 from calmotion.identification.signals import Signals
 from calmotion.shot import Character
 from calmotion.shot.calibration.recording import ANGLE, EFFORT, SensorRecording
