@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
+import numpy as np
 from calmotion.accuracy.element_size import ACCURACY
 from calmotion.geometry.tetrahedra import tet_volumes
 from calmotion.shot import Body, Character, FEMesh, Frame
+from calmotion.shot.materials.parts import Part
 from calmotion.shot.meshes import MeshQuality
 
 # The estimate is 1.2 to 3 times the true error of clamped beams and plates on meshes that are nearly fine enough, and
 # larger for links with many edges (see `calmotion bench meshing`). Twice the wanted error is therefore accepted.
 ENOUGH = 2.0 * ACCURACY
+_PLACES = 4  # along an edge of an element, at which volumes of parts are counted
 _SAME_MASS, _HOLLOW = 0.05, 0.7  # difference that is reported; ratio below which a body may be hollow
 
 
@@ -19,14 +24,14 @@ def frames_of(character: Character, index: int) -> tuple[Frame, ...]:
     return (*carrying, *(joint.frame0 for joint in character.joints if joint.body0 == index))
 
 
-def mass_note(body: Body, volume: float) -> tuple[str, ...]:
+def mass_note(body: Body, mesh: FEMesh) -> tuple[str, ...]:
     """Message about a stated mass that is not that of the solid and its material; the density follows the mass."""
     if body.mass is None or body.flexible is None:
         return ()
     material = body.flexible.material
-    if material.core is not None:
-        return ()  # see `print_note`
-    ratio = body.mass.mass / (material.density * volume)
+    if material.core is not None or material.parts:
+        return ()  # see `makeup_note`
+    ratio = body.mass.mass / (material.density * mesh.quality.volume)
     if abs(ratio - 1.0) <= _SAME_MASS:
         return ()
     note = (
@@ -36,25 +41,40 @@ def mass_note(body: Body, volume: float) -> tuple[str, ...]:
     return (note + ("; if it is hollow, author calm:flexible:wallThickness" if ratio < _HOLLOW else ""),)
 
 
-def print_note(body: Body, mesh: FEMesh) -> tuple[str, ...]:
-    """Message about what a printed part is taken for, and about a stated mass that is not that of the print."""
-    from calmotion.geometry.print_core import skin_share
+def makeup_note(body: Body, mesh: FEMesh) -> tuple[str, ...]:
+    """Message about what a body of several materials is taken for, and about a stated mass that is not that of it."""
+    from calmotion.geometry.makeup import makeup_of
 
-    if body.flexible is None or body.flexible.material.core is None:
+    makeup = None if body.flexible is None else makeup_of(mesh.points, mesh.tets, body.flexible.material)
+    if body.flexible is None or makeup is None:
         return ()
     material, core = body.flexible.material, body.flexible.material.core
-    share = skin_share(mesh.points, mesh.tets, core).relative(core.infill)
-    mass = float(material.density * (tet_volumes(mesh.points, mesh.tets) @ share))
-    note = (
+    mass = float(material.density * (tet_volumes(mesh.points, mesh.tets) @ makeup.density))
+    note = parts_note(material.parts, mesh) if core is None else (
         f"printed: a solid skin of {1e3 * core.skin:.3g} mm around {100.0 * core.infill:.3g}% infill with "
         f"{100.0 * core.stiffness:.2g}% of the modulus (Hashin-Shtrikman); its mass is "
         f"{100.0 * mass / (material.density * mesh.quality.volume):.3g}% of that of a solid part, {mass:.3g} kg"
-    )
+    )  # fmt: skip
     if body.mass is not None and abs(body.mass.mass / mass - 1.0) > _SAME_MASS:
         note += (
             f", where the shot states {body.mass.mass:.3g} kg: densities are {body.mass.mass / mass:.3g} times those"
         )
     return (note,)
+
+
+def parts_note(parts: Sequence[Part], mesh: FEMesh) -> str:
+    """What of a body is of which material."""
+    from calmotion.geometry.part_places import part_of_places
+    from calmotion.geometry.print_core import places_of
+
+    held = part_of_places(mesh.points, mesh.tets, parts, places_of(_PLACES))
+    volumes = tet_volumes(mesh.points, mesh.tets) / held.shape[1]
+    shares = np.bincount(held.ravel(), np.repeat(volumes, held.shape[1]), len(parts)) / mesh.quality.volume
+    by_material: dict[str, float] = {}
+    for part, share in zip(parts, shares, strict=True):
+        by_material[part.material] = by_material.get(part.material, 0.0) + float(share)
+    told = ", ".join(f"{100.0 * share:.3g}% {path}" for path, share in by_material.items())
+    return f"{len(parts)} parts of {len(by_material)} materials: {told} of its volume"
 
 
 def remark(quality: MeshQuality) -> tuple[str, ...]:

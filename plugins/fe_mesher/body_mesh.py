@@ -27,7 +27,7 @@ from calmotion.geometry.tetrahedra import (
 )
 from calmotion.shot import Body, Character, FEMesh, Frame, TetGeometry
 
-from .accuracy import ENOUGH, mass_note, print_note, remark
+from .accuracy import ENOUGH, makeup_note, mass_note, remark
 from .filling import DENSE, filled, refuse_loose_parts, refuse_too_many
 from .mesh_file import read_mesh_file
 from .repair import Solid
@@ -179,7 +179,7 @@ def _meshed(
         mesh = _accurate(index, body, geometry, options, carrier, attachments)
     quality = mesh.quality
     source = geometry.solid.source if isinstance(geometry, Volume) else quality.source
-    repairs = (*quality.repairs, *mass_note(body, quality.volume), *print_note(body, mesh))
+    repairs = (*quality.repairs, *mass_note(body, mesh), *makeup_note(body, mesh))
     return replace(mesh, quality=replace(quality, repairs=repairs, source=source))
 
 
@@ -196,7 +196,7 @@ def twin_mesh(mesh: FEMesh, isometry: Isometry, index: int, character: Character
     body = character.bodies[index]
     made = moved(mesh, isometry, index, character.bodies[mesh.body].path)
     own = geometry.solid.repairs if isinstance(geometry, Volume) else ()
-    repairs = (*made.quality.repairs, *own, *mass_note(body, made.quality.volume), *print_note(body, made))
+    repairs = (*made.quality.repairs, *own, *mass_note(body, made), *makeup_note(body, made))
     return replace(made, quality=replace(made.quality, repairs=repairs))
 
 

@@ -40,8 +40,8 @@ _LOOSE = 0.05  # of the volume: parts that a thin connection, which the mesh did
 
 # Largest number of nodes of ten-node tetrahedra: twice as many where walls are
 # thin, for some ten seconds (with 16,000, links took 21 to 34 s and were no more exact); walls that are thinner than
-# the spacing have gaps
-_GRID_NODES = 10_000
+# the spacing have gaps. A longer limit of time allows more.
+_GRID_NODES, _GRID_TIME = 10_000, 60.0
 _GRID_WALL = 0.8  # of the thinner walls: spacing with which they have none
 # Factor of the spacing while the volume error is larger than that; largest way of a corner to the surface
 _FINER, _NEAR_VOLUME, _MOVED = 0.8, 0.02, 0.5
@@ -150,11 +150,13 @@ def _on_grid(
     index: int, body: Body, solid: Solid, shape: Shape, size: float, reason: ShotError, time: ProcessorTime
 ) -> FEMesh | None:  # fmt: skip
     """The tetrahedra of a grid, for a reason; None where it does not resolve thin walls."""
-    mesh = on_grid(index, body, solid, shape, size)
+    nodes = int(_GRID_NODES * max(time.limit / _GRID_TIME, 1.0))
+    mesh = on_grid(index, body, solid, shape, size, nodes)
     dense = len(solid.triangles) > DENSE or time.used >= time.limit
     if mesh is None or mesh.quality.volume_error > (_COARSEST if dense else _ACCEPTED):
         return None
-    note = grid_note(mesh, shape, size, f"{reason.problem} ({reason.found})")
+    followed = expected_nodes(shape, size) <= nodes
+    note = grid_note(mesh, f"{reason.problem} ({reason.found})", followed)
     return replace(mesh, quality=replace(mesh.quality, repairs=(*mesh.quality.repairs, note)))
 
 
@@ -227,7 +229,7 @@ def refuse_loose_parts(tets: np.ndarray, path: str) -> None:
         )  # fmt: skip
 
 
-def on_grid(index: int, body: Body, solid: Solid, shape: Shape, size: float) -> FEMesh | None:
+def on_grid(index: int, body: Body, solid: Solid, shape: Shape, size: float, nodes: int) -> FEMesh | None:
     """A mesh of a grid, as close to a solid as a number of nodes allows; None where no grid is fine enough for any.
 
     Args:
@@ -236,8 +238,9 @@ def on_grid(index: int, body: Body, solid: Solid, shape: Shape, size: float) -> 
         solid: Closed.
         shape: Of the solid.
         size: Wanted edge length of the elements [m].
+        nodes: Of ten-node tetrahedra at most, on walls that are not thin.
     """
-    least = smallest_size(shape, _GRID_NODES) / GRID
+    least = smallest_size(shape, nodes) / GRID
     spacing = max(min(size / GRID, _GRID_WALL * shape.thickness), least)
     best: FEMesh | None = None
     while True:
@@ -255,15 +258,11 @@ def on_grid(index: int, body: Body, solid: Solid, shape: Shape, size: float) -> 
         spacing = max(_FINER * spacing, least)
 
 
-def grid_note(mesh: FEMesh, shape: Shape, size: float, reason: str) -> str:
-    """Message about a mesh of a grid."""
+def grid_note(mesh: FEMesh, reason: str, followed: bool) -> str:
+    """Message about a mesh of a grid; `followed`: whether elements of the wanted size were possible."""
     edges = mesh.points[mesh.tets[:, [0, 0, 0, 1, 1, 2]]] - mesh.points[mesh.tets[:, [1, 2, 3, 2, 3, 3]]]
     length = float(np.median(np.linalg.norm(edges, axis=2)))
-    finer = (
-        ""
-        if expected_nodes(shape, size) > _GRID_NODES
-        else "; author a smaller calm:flexible:elementSize to follow more"
-    )
+    finer = "; author a smaller calm:flexible:elementSize to follow more" if followed else ""
     return (
         f"meshed on a grid with elements of {1e3 * length:.2g} mm, since {reason}: details and walls that are thinner "
         f"are missing, {100.0 * mesh.quality.volume_error:.2g}% of its volume{finer}"

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from calmotion.cli.inspect_tables import _solid_row
 from calmotion.shot import Body, ElasticMaterial, FEMesh, FlexibleSettings, Frame
+from calmotion.shot.materials.parts import Part
 from calmotion.shot.meshes import MeshQuality
 from calmotion.workflow.inspection import _body
 from one_hinge import ONE_HINGE
@@ -28,6 +29,21 @@ def test_a_meshed_body_says_what_its_solid_is_made_of_and_how_good_its_mesh_is()
     unknown = replace(QUALITY, frequency_error=None)
     mesh = FEMesh(0, np.zeros((4, 3)), np.zeros((1, 4), np.int32), unknown)
     assert _solid_row(_body(BODY, None, mesh, True))[3] == "-"
+
+
+def test_parts_have_their_own_materials():
+    parts = tuple(
+        Part(
+            f"/Arm/fore/{name}", f"/Looks/{name}", np.zeros((0, 3)), np.zeros((0, 3), np.int32), modulus, density, 0.02
+        )
+        for name, modulus, density in (("shell", 1.0, 1.0), ("insert", 100.0, 6.5))
+    )
+    settings = BODY.flexible
+    material = replace(settings.material, parts=parts)
+    shell, insert = _body(replace(BODY, flexible=replace(settings, material=material)), None, None, True)["parts"]
+    assert (shell["path"], shell["material"], shell["youngs_modulus_pa"]) == ("/Arm/fore/shell", "/Looks/shell", 1.8e9)
+    assert (insert["youngs_modulus_pa"], insert["density_kg_m3"], insert["damping_ratio"]) == (1.8e11, 7800.0, 0.02)
+    assert "parts" not in _body(BODY, None, None, True)
 
 
 @pytest.mark.parametrize("body", [BODY, replace(BODY, flexible=None)])

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from calmotion.geometry.print_core import skin_share
+from calmotion.geometry.makeup import Makeup
 from calmotion.geometry.tetrahedra import tet_volumes
 from calmotion.shot.character import Array, IntArray, MassProperties
-from calmotion.shot.materials.printed import Core
 
 
 def mass_of_tets(
-    points: Array, tets: IntArray, density: float, mass: float | None = None, core: Core | None = None
+    points: Array, tets: IntArray, density: float, mass: float | None = None, makeup: Makeup | None = None
 ) -> MassProperties:  # fmt: skip
     """Mass properties of homogeneous tetrahedra, exact.
 
@@ -20,13 +19,13 @@ def mass_of_tets(
         tets: Shape [m, 4], of either orientation.
         density: [kg/m^3].
         mass: Total mass to which the density is scaled [kg]; None keeps the density.
-        core: Of a printed part; the density is then that of its skin, and each tetrahedron has its mean.
+        makeup: Of a body of several materials; each tetrahedron has its mean density.
 
     Source: int x x^T over a tetrahedron is V (sum x_i x_i^T + (sum x_i)(sum x_i)^T) / 20.
     """
     volume = np.abs(tet_volumes(points, tets))
-    if core is not None:
-        volume = volume * skin_share(points, tets, core).relative(core.infill)
+    if makeup is not None:
+        volume = volume * makeup.density
     if mass is not None:
         density = mass / float(volume.sum())
     weight = density * volume

@@ -30,10 +30,6 @@ class SkinShare:
     places: Array
     shares: Array
 
-    def relative(self, core: float) -> Array:
-        """Mean of a property that is 1 in the skin and `core` inside, for each tetrahedron, shape [e]."""
-        return np.asarray(core + (1.0 - core) * self.shares.mean(axis=1))
-
 
 def skin_share(points: Array, tets: IntArray, core: Core) -> SkinShare:
     """The skin of tetrahedra, below their boundary.
@@ -48,7 +44,7 @@ def skin_share(points: Array, tets: IntArray, core: Core) -> SkinShare:
     edge = float(np.cbrt(np.quantile(volumes, 0.9) / _REGULAR))
     most = min(_MOST, int(np.cbrt(_SAMPLES / len(tets))))
     parts = max(min(int(np.ceil(_FINE * edge / core.skin)), most), _FEWEST)
-    places = _places(parts)
+    places = places_of(parts)
     extents = _EXTENT * np.cbrt(volumes) / parts
     boundary = NearbyTriangles(points, boundary_triangles(tets), core.skin + float(extents.max()))
     shares = np.zeros((len(tets), len(places)))
@@ -63,7 +59,7 @@ def skin_share(points: Array, tets: IntArray, core: Core) -> SkinShare:
     return SkinShare(places, shares)
 
 
-def _places(parts: int) -> Array:
+def places_of(parts: int) -> Array:
     """Barycentric coordinates of the centers of the equal parts of a tetrahedron, shape [parts^3, 4].
 
     The tetrahedron 1 >= x >= y >= z >= 0 consists of all of its like in the cells of a grid that are within it.

@@ -11,6 +11,8 @@ from dataclasses import replace
 
 import numpy as np
 
+from calmotion.reduction.elements.assembly import QuadraticMesh
+from calmotion.reduction.elements.elastic_forms import GradientRule, lame_constants, linear_stress
 from calmotion.reduction.reduced_body import ReducedBody
 from calmotion.shot.character import Array, ElasticMaterial
 
@@ -47,12 +49,36 @@ def damped(
         elastic = omega > 1e-9 * omega.max(initial=0.0)
         energy = np.zeros_like(omega)
         energy[elastic] = (shapes * forces).sum(axis=0)[elastic] / omega[elastic] ** 2
-        retardation = _retardation(material.damping_ratio, omega[energy > SIGNIFICANT]) if nonlinear else 0.0
-        missing = np.maximum(2.0 * material.damping_ratio - retardation * omega[elastic], 0.0)
+        ratio = material.damping_ratio if body.damping_ratio is None else body.damping_ratio
+        retardation = _retardation(ratio, omega[energy > SIGNIFICANT]) if nonlinear else 0.0
+        missing = np.maximum(2.0 * ratio - retardation * omega[elastic], 0.0)
         damping = (forces[:, elastic] * (missing / omega[elastic] ** 3)) @ forces[:, elastic].T
     if body.elasticity is None:
         return replace(body, damping=damping)
     return replace(body, damping=damping, elasticity=replace(body.elasticity, retardation=retardation))
+
+
+def ratio_of_parts(mesh: QuadraticMesh, material: ElasticMaterial, modes: Array) -> float | None:
+    """Fraction of critical damping of a body of several materials; None where all parts are damped alike.
+
+    Each part is weighted by its share of the strain energy, and the lowest modes by the same.
+
+    Args:
+        mesh: Of the body.
+        material: Of the body.
+        modes: Ascending, shape [n, 3, r].
+
+    Source: Ungar and Kerwin 1962, Loss factors of viscoelastic systems in terms of energy concepts.
+    """
+    makeup = None if mesh.filling is None else mesh.filling.makeup
+    if makeup is None or makeup.damping is None or not modes.shape[2]:
+        return None
+    rule = GradientRule(mesh, 2)
+    gradients = rule.gradients(modes[:, :, :EXACT_MODES])
+    stress = linear_stress(gradients, *lame_constants(material.youngs_modulus, material.poissons_ratio))
+    energy = np.einsum("reqij,reqij,eq->re", stress, gradients, rule.weights, optimize=True)
+    own = (makeup.moduli * makeup.damping).sum(axis=1) / makeup.moduli.sum(axis=1)
+    return float(((energy / energy.sum(axis=1, keepdims=True)) @ own).mean())
 
 
 def _retardation(ratio: float, omega: Array) -> float:

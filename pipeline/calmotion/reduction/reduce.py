@@ -11,7 +11,7 @@ from calmotion.errors import ShotError
 from calmotion.reduction.basis.craig_bampton import Basis, reduced_basis
 from calmotion.reduction.basis.fixed_interface import FixedInterface
 from calmotion.reduction.basis.modal_derivatives import Support
-from calmotion.reduction.damping import damped
+from calmotion.reduction.damping import damped, ratio_of_parts
 from calmotion.reduction.elements.assembly import FEModel, QuadraticMesh, assemble
 from calmotion.reduction.elements.embedding import Embedding, embed
 from calmotion.reduction.inertia_integrals import inertia_integrals
@@ -90,6 +90,7 @@ def reduce_body(
         mesh_error=mesh_error,
         patch_error=patch_error,
         element_error=mesh.quality.element_error,
+        damping_ratio=ratio_of_parts(model.mesh, material, linear.basis.modes),
     )
     return damped(_with_finer_interfaces(reduced, mesh, linear), material)
 

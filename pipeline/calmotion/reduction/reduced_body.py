@@ -116,6 +116,7 @@ class ReducedBody:
         element_error: The same of the elements by themselves, without what finer ones have told.
         interfaces: Static stiffness of its moving interfaces, and how soft they may be on ever finer meshes; None where
             `mesh_error` is for all directions.
+        damping_ratio: Fraction of critical damping of a body of several materials; None: that of its material.
     """
 
     invariants: Invariants
@@ -132,6 +133,7 @@ class ReducedBody:
     patch_error: float = 0.0
     element_error: float = 0.0
     interfaces: InterfaceStiffness | None = None
+    damping_ratio: float | None = None
 
     @property
     def frequencies(self) -> Array:

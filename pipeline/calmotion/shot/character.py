@@ -12,6 +12,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from calmotion.shot.materials.parts import Part
 from calmotion.shot.materials.printed import Core
 from calmotion.shot.motor import PRESCRIBED, Motor
 from calmotion.shot.robust.settings import Uncertainty
@@ -75,6 +76,7 @@ class ElasticMaterial:
         damping_ratio: Fraction of critical damping of each mode of the character, used when `rayleigh` is None.
         rayleigh: (mass [1/s], stiffness [s]) coefficients, or None.
         core: Of a printed body, whose skin is of this material; None: it is solid.
+        parts: Of a body that is made of several materials; all is in one of them. Empty: all is of this material.
     """
 
     path: str
@@ -84,6 +86,7 @@ class ElasticMaterial:
     damping_ratio: float = 0.01
     rayleigh: tuple[float, float] | None = None
     core: Core | None = None
+    parts: tuple[Part, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)

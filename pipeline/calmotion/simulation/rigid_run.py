@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from calmotion.geometry.makeup import makeup_of
 from calmotion.geometry.mesh_mass import mass_of_tets
 from calmotion.multibody.analysis import kinematics
 from calmotion.multibody.failure import SimulationFailure
@@ -131,7 +132,8 @@ def rigid_bodies(character: Character, tree: Tree, meshes: FEMeshes | None) -> l
         if body.flexible is not None and body.simulated_flexible and index in mesh_of:
             mesh, own = mesh_of[index], None if body.mass is None else body.mass.mass
             material = body.flexible.material
-            found = mass_of_tets(mesh.points, mesh.tets, material.density, own, material.core)
+            makeup = makeup_of(mesh.points, mesh.tets, material)
+            found = mass_of_tets(mesh.points, mesh.tets, material.density, own, makeup)
             body = replace(body, mass=found)
         result.append(rigid_body(body, anchors))
     return result

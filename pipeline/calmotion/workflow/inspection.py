@@ -204,6 +204,17 @@ def _body(body: Body, table: ModeTable | None, mesh: FEMesh | None, flexible: bo
             "poissons_ratio": material.poissons_ratio,
             "density_kg_m3": material.density,
         }
+        if material.parts:
+            report["parts"] = [
+                {
+                    "path": part.path,
+                    "material": part.material,
+                    "youngs_modulus_pa": part.modulus * material.youngs_modulus,
+                    "density_kg_m3": part.density * material.density,
+                    "damping_ratio": part.damping,
+                }
+                for part in material.parts
+            ]
     if table:
         report |= {"frequencies_hz": table.frequencies, "nodes": table.nodes, "elements": table.elements}
     if mesh:

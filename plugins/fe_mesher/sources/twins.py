@@ -53,11 +53,12 @@ def twin_of(link: Link | None, others: Sequence[Link | None]) -> tuple[int, Isom
 
 
 def _settings(link: Link) -> tuple[object, ...]:
-    """What of the settings decides a mesh; those of named interfaces are never the same."""
+    """What of the settings decides a mesh; those of named interfaces and of several materials
+    are never the same."""
     settings: FlexibleSettings | None = link.body.flexible
     assert settings is not None
-    named = link.body.path if link.body.interfaces else ""
     material = settings.material
+    named = link.body.path if link.body.interfaces or material.parts else ""
     core = None if material.core is None else (material.core.skin, material.core.infill, material.core.stiffness)
     return (
         material.poissons_ratio, core, settings.interface_radius, settings.geometry, settings.wall_thickness,

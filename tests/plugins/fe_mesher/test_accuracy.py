@@ -5,9 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from calmotion.shot import FEMesh, MassProperties, TetGeometry
+from calmotion.shot.materials.parts import Part
 from calmotion.shot.materials.printed import core_of
 from calmotion.shot.meshes import MeshQuality
 from mesher_links import box, link, run, surface
+
+NO_TETS = np.zeros((0, 4), np.int32)
 
 
 def test_the_mesh_is_refined_to_the_accuracy_and_is_the_same_from_the_cache(host, package, own_cache, monkeypatch):
@@ -43,17 +46,18 @@ def test_an_error_that_remains_is_reported(package):
 def test_a_stated_mass_that_the_material_does_not_give_is_reported(package):
     mass_note = package("accuracy").mass_note
     stated = MassProperties(0.5 * 1200.0 * 8e-5, np.zeros(3), np.eye(3))
-    (note,) = mass_note(replace(link(), mass=stated), 8e-5)
+    mesh, small = (FEMesh(0, np.zeros((4, 3)), NO_TETS, MeshQuality(20.0, volume, 0.0)) for volume in (8e-5, 4e-5))
+    (note,) = mass_note(replace(link(), mass=stated), mesh)
     assert "0.5 times" in note and "600 instead of 1200 kg/m^3" in note and "wallThickness" in note
-    assert mass_note(replace(link(), mass=stated), 4.0e-5) == ()
-    assert mass_note(link(), 8e-5) == ()
+    assert mass_note(replace(link(), mass=stated), small) == ()
+    assert mass_note(link(), mesh) == ()
 
 
 def test_a_print_is_described_and_a_mass_that_is_not_its_own_is_reported(package, helpers):
     points, tets = helpers.box((16, 2, 2), (0.2, 0.02, 0.02))
     mesh = FEMesh(0, np.asarray(points), tets, MeshQuality(20.0, 8e-5, 0.0))
     body = link()
-    note = package("accuracy").print_note
+    note = package("accuracy").makeup_note
     assert note(body, mesh) == ()
     material = replace(body.flexible.material, core=core_of(0.2, 0.9e-3))
     body = replace(body, flexible=replace(body.flexible, material=material))
@@ -64,4 +68,25 @@ def test_a_print_is_described_and_a_mass_that_is_not_its_own_is_reported(package
     assert "states" not in text
     heavy = replace(body, mass=MassProperties(2.0 * mass, np.zeros(3), np.eye(3)))
     assert "densities are 2" in note(heavy, mesh)[0] or "densities are 1.9" in note(heavy, mesh)[0]
-    assert package("accuracy").mass_note(heavy, 8e-5) == ()
+    assert package("accuracy").mass_note(heavy, mesh) == ()
+
+
+def test_parts_are_described_by_material_and_share_and_have_the_mass_of_each(package, helpers):
+    points, tets = helpers.box((8, 2, 2), (0.2, 0.02, 0.02))
+    mesh = FEMesh(0, np.asarray(points), tets, MeshQuality(20.0, 8e-5, 0.0))
+
+    def part(name, low, high, density):
+        made = box((high - low, 0.02, 0.02), at=(0.5 * (low + high), 0.01, 0.01))
+        faces = np.asarray(made.faces, np.int32)
+        return Part(f"/Arm/link/{name}", f"/Looks/{name}", np.asarray(made.vertices), faces, 1.0, density, 0.01)
+
+    body = link()
+    parts = (part("Steel", 0.0, 0.05, 6.0), part("Nylon", 0.05, 0.2, 1.0))
+    material = replace(body.flexible.material, parts=parts)
+    body = replace(body, flexible=replace(body.flexible, material=material))
+    note = package("accuracy").makeup_note
+    (text,) = note(body, mesh)
+    assert "2 parts of 2 materials" in text and "25% /Looks/Steel" in text and "75% /Looks/Nylon" in text
+    mass = 1200.0 * 8e-5 * (0.25 * 6.0 + 0.75)
+    heavy = replace(body, mass=MassProperties(2.0 * mass, np.zeros(3), np.eye(3)))
+    assert "densities are 2 times" in note(heavy, mesh)[0] and package("accuracy").mass_note(heavy, mesh) == ()

@@ -69,7 +69,9 @@ class Row:
     held: str
 
 
-def study(link: Link, sizes: Sequence[str], time_limit: float, say: Callable[[str], None]) -> list[Row]:
+def study(
+    link: Link, sizes: Sequence[str], time_limit: float, say: Callable[[str], None], finest_limit: float | None = None
+) -> list[Row]:
     """One row for each element size, coarse to fine.
 
     Args:
@@ -77,6 +79,7 @@ def study(link: Link, sizes: Sequence[str], time_limit: float, say: Callable[[st
         sizes: Multiples of the automatic size, lengths with a unit, or `auto` for the automatic mesh.
         time_limit: Processor time of one mesh [s].
         say: Told what could not be done.
+        finest_limit: The same for meshes of given sizes; None: as of the automatic one.
 
     Raises:
         ShotError: The surfaces enclose no volume.
@@ -92,7 +95,8 @@ def study(link: Link, sizes: Sequence[str], time_limit: float, say: Callable[[st
         try:
             start = time.perf_counter()
             asked = -1.0 if np.isnan(size) else size
-            options = maker.MeshOptions(element_size=asked, time_limit=time_limit, cache=False)
+            limit = time_limit if np.isnan(size) or finest_limit is None else finest_limit
+            options = maker.MeshOptions(element_size=asked, time_limit=limit, cache=False)
             mesh = maker.mesh_body(0, link.body, options, frames_of(link), attachments_of(link))
             meshed = time.perf_counter() - start
             row, told = _row(link, size, mesh, meshed), mesh.quality.frequency_error
@@ -217,6 +221,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--sizes", nargs="+", help="multiples of the automatic element size, lengths (8mm), auto")
     parser.add_argument("--geometry-only", action="store_true", help="make solids, and no meshes")
     parser.add_argument("--time-limit", type=float, default=60.0, help="processor time of the meshes of a link [s]")
+    parser.add_argument("--finest-limit", type=float, help="the same for the meshes of given --sizes; grids get finer")
     parser.add_argument("--jobs", type=int, default=1, help="links at a time, each in a process of its own")
     parser.add_argument("--pictures", nargs="+", default=[], metavar="LINK", help="draw these links beside the table")
     parser.add_argument("-o", "--output", help="file of the table, .csv or .md; of several rows at any time")
@@ -247,7 +252,7 @@ def _study_all(links: Sequence[Link], options: Namespace, say: Callable[[str], N
     rows: list[Row] = []
     for link in links:
         try:
-            rows += study(link, options.sizes, options.time_limit, say)
+            rows += study(link, options.sizes, options.time_limit, say, options.finest_limit)
         except ShotError as error:
             say(str(error))
         if options.output and rows:

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from calmotion.geometry.print_core import skin_share
+from calmotion.geometry.makeup import makeup_of
 from calmotion.geometry.tetrahedra import boundary_triangles, tet_volumes, without_unused_points
 from calmotion.reduction.elements.filling import Filling, element_masses, filling_of
 from calmotion.shot.character import Array, ElasticMaterial, IntArray
@@ -23,7 +23,7 @@ class QuadraticMesh:
             edges 01, 12, 02, 03, 13, 23.
         surface: Outward boundary triangles, shape [k, 6]: three corners, then the midpoints of edges 01, 12, 20.
         basis: scikit-fem's scalar basis.
-        filling: The material in the elements of a printed part; None: all are solid.
+        filling: The materials in the elements of a body of several; None: all is of one.
     """
 
     nodes: Array
@@ -83,7 +83,7 @@ def quadratic_mesh(points: Array, tets: IntArray) -> QuadraticMesh:
 
 
 def assemble_mass(mesh: QuadraticMesh, density: float) -> Any:
-    """Scalar consistent mass matrix [kg], CSR, shape [n, n]; density (of the skin of a printed part) in kg/m^3."""
+    """Scalar consistent mass matrix [kg], CSR, shape [n, n]; density (of the body's material) in kg/m^3."""
     from skfem.models.poisson import mass
 
     if mesh.filling is not None:
@@ -92,13 +92,13 @@ def assemble_mass(mesh: QuadraticMesh, density: float) -> Any:
 
 
 def _mass_of_filling(mesh: QuadraticMesh, filling: Filling) -> Any:
-    """`assemble_mass` of a printed part, for a density of 1."""
+    """`assemble_mass` of a body of several materials, for a density of 1."""
     from scipy.sparse import coo_matrix
 
     n, tets = len(mesh.nodes), mesh.tets.astype(np.int64)
     values = np.stack([mesh.basis.elem.lbasis(mesh.basis.X, a)[0] for a in range(10)])
     exact = np.einsum("aq,bq,q->ab", values, values, mesh.basis.W) / mesh.basis.W.sum()
-    places = filling.skin.places[:, 1:].T
+    places = filling.makeup.places[:, 1:].T
     shapes = np.stack([mesh.basis.elem.lbasis(places, a)[0] for a in range(10)], axis=1)
     blocks = element_masses(filling, shapes, exact) * mesh.basis.dx.sum(axis=1)[:, None, None]
     rows, columns = np.repeat(tets, 10, axis=1), np.tile(tets, (1, 10))
@@ -160,15 +160,16 @@ def assemble(points: Array, tets: IntArray, material: ElasticMaterial, mass: flo
     Args:
         points: Corners [m], shape [n, 3].
         tets: Shape [m, 4], positive volumes.
-        material: Young's modulus [Pa], Poisson's ratio, density [kg/m^3]; that of the skin where it has a core.
+        material: Young's modulus [Pa], Poisson's ratio, density [kg/m^3]; that of the skin where it has a core, and
+            what its parts refer to.
         mass: Total mass [kg] that the density is scaled to; None keeps the material's density.
     """
     mesh = quadratic_mesh(*without_unused_points(points, tets))
     density, volume = material.density, tet_volumes(points, tets)
-    if material.core is not None:
-        skin = skin_share(mesh.nodes, mesh.tets[:, :4], material.core)
-        mesh = replace(mesh, filling=filling_of(material.core, skin))
-        volume = volume * skin.relative(material.core.infill)
+    makeup = makeup_of(mesh.nodes, mesh.tets[:, :4], material)
+    if makeup is not None:
+        mesh = replace(mesh, filling=filling_of(makeup))
+        volume = volume * makeup.density
     if mass is not None:
         density = mass / float(volume.sum())
     return FEModel(

@@ -28,16 +28,13 @@ def elastic_material(reading: Reading, body_prim: Usd.Prim) -> ElasticMaterial:
     Raises:
         ShotError: No elastic material is bound, or one of its values is out of range.
     """
-    from pxr import UsdShade
-
     bound = None
     for prim in prims_below(body_prim, is_rigid_body):
-        material, _ = UsdShade.MaterialBindingAPI(prim).ComputeBoundMaterial("physics")
-        if not material:
-            continue
-        bound = bound or material.GetPrim()
-        if schemas.is_applied(material.GetPrim(), _SCHEMA) or material.GetPrim().GetAttribute("physics:youngsModulus"):
-            return _material(reading, material.GetPrim())
+        material = _bound(prim)
+        if material is not None:
+            bound = bound or material
+            if _is_elastic(material):
+                return _material(reading, material)
     raise ShotError(
         "a flexible body without an elastic material",
         path=body_prim.GetPath(),
@@ -45,6 +42,27 @@ def elastic_material(reading: Reading, body_prim: Usd.Prim) -> ElasticMaterial:
         found=f"{bound.GetPath()}, which is not elastic" if bound else None,
         remedy=_REMEDY,
     )
+
+
+def bound_elastic_material(reading: Reading, prim: Usd.Prim) -> ElasticMaterial | None:
+    """The elastic material bound for physics to one prim, itself or above it; None where there is none.
+
+    Raises:
+        ShotError: One of its values is out of range.
+    """
+    material = _bound(prim)
+    return None if material is None or not _is_elastic(material) else _material(reading, material)
+
+
+def _bound(prim: Usd.Prim) -> Usd.Prim | None:
+    from pxr import UsdShade
+
+    material, _ = UsdShade.MaterialBindingAPI(prim).ComputeBoundMaterial("physics")
+    return material.GetPrim() if material else None
+
+
+def _is_elastic(material: Usd.Prim) -> bool:
+    return schemas.is_applied(material, _SCHEMA) or bool(material.GetAttribute("physics:youngsModulus"))
 
 
 def _material(reading: Reading, prim: Usd.Prim) -> ElasticMaterial:
