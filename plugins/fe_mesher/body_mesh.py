@@ -42,6 +42,8 @@ if TYPE_CHECKING:
 
 # Nodes of the first mesh at most, for some seconds; where the shot needs more, it is refined for its loads.
 _REFINED = 12_000
+# Estimated error of the frequencies, some three times the true one, from which more nodes are spent
+_POOR, _POOR_REFINED = 0.04, 20_000
 _FIT = 4.0  # of the distance to the surface that the mesher is allowed: how far corners are moved to fit it
 FAR = 5.0  # distance of a mesh from all joints of its body, over its size, that nobody means
 _SIMPLE = ("collision surface", "wrapped collision surface", "equivalent beam")
@@ -252,11 +254,11 @@ def _authored(index: int, geometry: TetGeometry, repairs: tuple[str, ...]) -> FE
 
 def _judged(mesh: FEMesh, body: Body, carrier: Frame | None) -> FEMesh:
     """A mesh whose elements are given, with its estimated error; a mesh that is too large for the estimate without."""
-    from calmotion.reduction.mesh_refinement import refined_for_frequencies
+    from calmotion.reduction.mesh_refinement import Effort, refined_for_frequencies
 
     if len(mesh.points) > MAX_NODES:
         return replace(mesh, given=True)
-    return replace(refined_for_frequencies(mesh, body, carrier, np.inf, 0), given=True)
+    return replace(refined_for_frequencies(mesh, body, carrier, Effort(np.inf, 0)), given=True)
 
 
 def _shaped(mesh: FEMesh, body: Body, volume: Volume, size: float, attachments: Sequence[AttachmentFrame]) -> FEMesh:
@@ -274,12 +276,12 @@ def _accurate(
     attachments: Sequence[AttachmentFrame],
 ) -> FEMesh:  # fmt: skip
     """Tetrahedra fine enough for the first frequencies; where the shot needs more, they are refined for its loads."""
-    from calmotion.reduction.mesh_refinement import refined_for_frequencies
+    from calmotion.reduction.mesh_refinement import Effort, refined_for_frequencies
 
     solid, shape, size = volume.solid, volume.shape, element_size(volume.shape)
     time = ProcessorTime(options.time_limit)
     mesh = filled(index, body, solid, shape, size, time, options.cache)
     mesh = _shaped(mesh, body, volume, size, attachments)
-    mesh = refined_for_frequencies(mesh, body, carrier, ENOUGH, _REFINED)
+    mesh = refined_for_frequencies(mesh, body, carrier, Effort(2.0 * ENOUGH, _REFINED, 2.0 * _POOR, _POOR_REFINED))
     repairs = (*mesh.quality.repairs, *remark(mesh.quality))
     return replace(mesh, quality=replace(mesh.quality, repairs=repairs))

@@ -12,6 +12,7 @@ from calmotion.reduction.elements.assembly import assemble
 from calmotion.reduction.interfaces.interface_patches import AttachmentFrame
 from calmotion.reduction.load_envelope import LoadEnvelope
 from calmotion.reduction.mesh_refinement import (
+    Effort,
     frequency_estimate,
     refined_for_frequencies,
     refined_for_loads,
@@ -61,7 +62,7 @@ def finest(helpers, beam, frames, loads):
 
 def test_the_first_frequencies_are_refined_to_the_wanted_error(helpers, beam, frames):
     coarse, carrier = mesh_of(helpers, (4, 1, 1)), frames[1].frame
-    fine = refined_for_frequencies(coarse, beam, carrier, 0.01, 15_000)
+    fine = refined_for_frequencies(coarse, beam, carrier, Effort(0.02, 15_000))
     assert len(fine.tets) > len(coarse.tets) and fine.quality.frequency_error <= 0.01
     assert fine.quality.volume == pytest.approx(tet_volumes(fine.points, fine.tets).sum(), rel=1e-9)
     one, half, whole = (
@@ -69,14 +70,23 @@ def test_the_first_frequencies_are_refined_to_the_wanted_error(helpers, beam, fr
         for mesh in (fine, mesh_of(helpers, (12, 2, 2)), mesh_of(helpers, (24, 4, 4)))
     )
     assert abs(np.sqrt(one / (whole - (half - whole) / 2.2)) - 1.0) < 0.01
-    kept = refined_for_frequencies(coarse, beam, carrier, 0.01, 0)  # no nodes are allowed
+    kept = refined_for_frequencies(coarse, beam, carrier, Effort(0.02, 0))  # no nodes are allowed
     assert np.array_equal(kept.tets, coarse.tets)
+
+
+def test_more_nodes_are_spent_on_meshes_with_a_poor_estimate():
+    effort = Effort(0.02, 12_000, 0.08, 20_000)
+    assert effort.ends(0.01, [500]) and not effort.ends(0.03, [500])
+    assert effort.ends(0.07, [8_000]) and not effort.ends(0.09, [8_000])  # poor: one more, of some 13,600 nodes
+    assert effort.ends(0.09, [12_000])
+    assert not effort.ends(0.09, [10_000, 12_000]) and effort.ends(0.09, [10_000, 15_000])  # grown as before
+    assert Effort(0.02, 12_000).ends(0.5, [8_000])
 
 
 def test_local_refinement_needs_fewer_nodes_than_a_uniform_one(helpers, beam, frames):
     coarse, uniform = mesh_of(helpers, (8, 2, 2)), mesh_of(helpers, (16, 4, 4))
     target = frequency_estimate(uniform, beam, frames[1].frame)
-    fine = refined_for_frequencies(coarse, beam, frames[1].frame, 0.5 * target.error, 15_000)
+    fine = refined_for_frequencies(coarse, beam, frames[1].frame, Effort(target.error, 15_000))
     assert frequency_estimate(fine, beam, frames[1].frame).nodes < 0.7 * target.nodes
 
 
@@ -143,7 +153,7 @@ def test_finer_elements_are_taken_instead_for_a_reference(helpers, beam, frames,
 def test_the_volume_is_part_of_the_error(helpers, beam, frames):
     mesh = mesh_of(helpers, (8, 2, 2))
     smaller = replace(mesh, quality=replace(mesh.quality, volume_error=0.01))
-    judged = [refined_for_frequencies(m, beam, frames[1].frame, np.inf, 0) for m in (mesh, smaller)]
+    judged = [refined_for_frequencies(m, beam, frames[1].frame, Effort(np.inf, 0)) for m in (mesh, smaller)]
     assert judged[1].quality.frequency_error - judged[0].quality.frequency_error == pytest.approx(0.01)
 
 

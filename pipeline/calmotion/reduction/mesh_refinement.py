@@ -8,7 +8,7 @@ error is estimated to arise reduce it several times faster for the same number o
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -23,8 +23,9 @@ from calmotion.reduction.full_order.mesh_extrapolation import (
     Estimate,
     deviation,
     extrapolation,
+    far_extrapolation,
     interface_factors,
-    ratios_of,
+    mode_ratios,
 )
 from calmotion.reduction.interfaces.interface_patches import AttachmentFrame, interface_patches
 from calmotion.reduction.load_envelope import LoadEnvelope
@@ -36,36 +37,62 @@ from calmotion.shot.meshes import CutPatch, FEMesh, MeshQuality
 MARKED = 0.8  # share of the error in the elements that are bisected: halves the error with 1.7 times the nodes
 _MODES, _COUNT = 12, 3  # modes of a load estimate; frequencies that a motion excites
 _ROUNDS = 12
+_GROWTH = 1.7  # of the nodes by one bisection of all that is marked, before it is known
 _KEPT = 0.005  # of their own error, what elements leave with the statics of finer ones: they have their own mass
 _FEW = 6_000  # nodes of elements on which a nonlinear body is reduced within a minute
 
 
-def refined(
-    mesh: FEMesh, estimate: Callable[[FEMesh], Estimate], wanted: float, max_nodes: int, extrapolates: bool = True
-) -> FEMesh:
+@dataclass(frozen=True)
+class Effort:
+    """How far meshes are refined.
+
+    Attributes:
+        wanted: Relative error of the compliance that may be, with that of the volume.
+        max_nodes: No mesh has many more nodes.
+        poor: An error for which more nodes are spent; infinite: none.
+        poor_nodes: Largest number of nodes of a mesh with a larger error.
+    """
+
+    wanted: float
+    max_nodes: int
+    poor: float = np.inf
+    poor_nodes: int = 0
+
+    def ends(self, error: float, nodes: Sequence[int]) -> bool:
+        """Whether ever finer meshes with these numbers of nodes, the last with an error, are enough."""
+        # the next bisection may exceed the limit by its factor
+        if error <= self.wanted or nodes[-1] <= 0.6 * self.max_nodes:
+            return error <= self.wanted
+        growth = nodes[-1] / nodes[-2] if len(nodes) > 1 else _GROWTH
+        return error <= self.poor or growth * nodes[-1] > self.poor_nodes
+
+
+def refined(mesh: FEMesh, estimate: Callable[[FEMesh], Estimate], effort: Effort, extrapolates: bool = True) -> FEMesh:
     """The mesh, bisected until its estimated error is small enough; its quality holds the error.
 
     Args:
         mesh: To refine.
         estimate: Estimates the error of a mesh.
-        wanted: Relative error of the compliance that may be, with that of the volume.
-        max_nodes: No mesh has many more nodes.
-        extrapolates: Whether the mesh takes the stiffness that ever finer ones would have, as far as it is known.
+        effort: How far.
+        extrapolates: Whether the mesh takes the stiffness that ever finer ones would have, as far as it is known;
+            otherwise only where its error is poor.
     """
-    meshes, estimates = _bisected(mesh, estimate, wanted, max_nodes)
+    meshes, estimates = _bisected(mesh, estimate, effort)
     excess, error = extrapolation(estimates)
     if extrapolates:
         quality = _quality(mesh, estimates[-1], estimates, 1.0 - excess, error)
     else:
-        error = min(excess + error, estimates[-1].error) + _of_volume(mesh)
+        poor = error > effort.poor
+        excess, error = far_extrapolation(estimates) if poor else (0.0, min(excess + error, estimates[-1].error))
         quality = replace(
-            mesh.quality, frequency_error=0.5 * error, element_error=estimates[-1].error, stiffness_factor=1.0
-        )
+            mesh.quality, frequency_error=0.5 * (error + _of_volume(mesh)), element_error=estimates[-1].error,
+            stiffness_factor=1.0 - excess,
+        )  # fmt: skip
     return _with_quality(meshes[-1], quality)
 
 
 def with_finer_stiffness(
-    mesh: FEMesh, estimate: Callable[[FEMesh], Estimate], wanted: float, max_nodes: int, elements: float = np.inf
+    mesh: FEMesh, estimate: Callable[[FEMesh], Estimate], effort: Effort, elements: float = np.inf
 ) -> FEMesh:
     """The mesh with the stiffness that ever finer ones have: the same elements, and factors for their stiffness.
 
@@ -76,16 +103,16 @@ def with_finer_stiffness(
     deviation of the modes from one factor.
 
     Args:
-        mesh, estimate, wanted, max_nodes: As of `refined`.
+        mesh, estimate, effort: As of `refined`.
         elements: Relative error of the compliance that the elements may have by themselves; finer ones are taken for
             less, as far as they are few.
     """
-    meshes, estimates = _bisected(mesh, estimate, wanted, max_nodes)
+    meshes, estimates = _bisected(mesh, estimate, effort)
     excess, error = extrapolation(estimates)
     few = max(1, sum(one.nodes <= _FEW for one in estimates))
     kept = next((k for k, one in enumerate(estimates[:few]) if one.error <= elements), few - 1)
     own = estimates[kept]
-    ratios, weights = ratios_of(own, estimates[-1])
+    ratios, weights = mode_ratios(own, estimates[-1])
     factor = float(weights @ ratios)
     if not len(estimates[-1].interfaces):
         error += deviation(ratios, weights)
@@ -117,18 +144,17 @@ def _quality(mesh: FEMesh, own: Estimate, estimates: Sequence[Estimate], factor:
 
 
 def _bisected(
-    mesh: FEMesh, estimate: Callable[[FEMesh], Estimate], wanted: float, max_nodes: int
+    mesh: FEMesh, estimate: Callable[[FEMesh], Estimate], effort: Effort
 ) -> tuple[list[FEMesh], list[Estimate]]:
     """Ever finer meshes from the given one on, and their estimates."""
     meshes, estimates = [mesh], [estimate(mesh)]
     # elements do not repair the volume, and far below its error they gain nothing
     by_volume = _of_volume(mesh)
-    wanted = max(wanted - by_volume, 0.5 * by_volume, 0.3 * wanted)
+    effort = replace(effort, wanted=max(effort.wanted - by_volume, 0.5 * by_volume, 0.3 * effort.wanted))
     for _ in range(_ROUNDS):
-        # the last bisection may exceed the limit by its factor of about 1.7
         by_interfaces = interface_factors(estimates[-1], estimates)
         error = max(extrapolation(estimates)[1], by_interfaces[2] if by_interfaces else 0.0)
-        if error <= wanted or estimates[-1].nodes > 0.6 * max_nodes:
+        if effort.ends(error, [one.nodes for one in estimates]):
             break
         points, tets = bisected(meshes[-1].points, meshes[-1].tets, _largest(estimates[-1].indicators))
         meshes.append(replace(mesh, points=points, tets=tets))
@@ -154,7 +180,7 @@ def refined_for_loads(
         mesh, body, attachments, root: As of `reduce_body`.
         loads: Of the body.
         tolerance: Of the modes that count, as of `reduce_body` [m].
-        wanted, max_nodes: As of `refined`.
+        wanted, max_nodes: As of `Effort`.
         by_factor: `with_finer_stiffness` instead of finer elements.
         full: `full_body` of the mesh with its own stiffness, where it is known.
         elements: As of `with_finer_stiffness`.
@@ -171,7 +197,7 @@ def refined_for_loads(
     given = replace(body, surfaces=())  # skins do not matter
     key = ("for loads", first, given, attachments, root, loads, tolerance, wanted, max_nodes, by_factor, elements)
     refine = partial(with_finer_stiffness, elements=elements) if by_factor else refined
-    return cached_reduction(key, lambda: refine(first, estimate, wanted, max_nodes))
+    return cached_reduction(key, lambda: refine(first, estimate, Effort(wanted, max_nodes)))
 
 
 def load_estimate(linear: LinearModes, body: Body) -> Estimate:
@@ -203,20 +229,19 @@ def load_estimate(linear: LinearModes, body: Body) -> Estimate:
     return Estimate(float(parts.sum()), squares, weights, indicators, nodes, stiffness, forms, wrenches, levers)
 
 
-def refined_for_frequencies(mesh: FEMesh, body: Body, carrier: Frame | None, wanted: float, max_nodes: int) -> FEMesh:
+def refined_for_frequencies(mesh: FEMesh, body: Body, carrier: Frame | None, effort: Effort) -> FEMesh:
     """The mesh, refined where the first modes of the body, clamped at its parent joint, have their error.
 
     Args:
         mesh: Of the body.
         body: With `flexible` settings.
         carrier: Frame of the parent joint on the body; None for a free body.
-        wanted: Relative error of the first frequencies.
-        max_nodes: As of `refined`.
+        effort: How far; errors are those of the compliance, twice those of the frequencies.
     """
     estimate = partial(frequency_estimate, body=body, carrier=carrier)
-    key = ("for frequencies", mesh, replace(body, surfaces=()), carrier, wanted, max_nodes)
+    key = ("for frequencies", mesh, replace(body, surfaces=()), carrier, effort)
     # the stiffness is that for the loads of the shot, which are not known yet
-    return cached_reduction(key, lambda: refined(mesh, estimate, 2.0 * wanted, max_nodes, extrapolates=False))
+    return cached_reduction(key, lambda: refined(mesh, estimate, effort, extrapolates=False))
 
 
 def frequency_estimate(mesh: FEMesh, body: Body, carrier: Frame | None) -> Estimate:

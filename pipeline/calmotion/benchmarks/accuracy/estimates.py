@@ -29,7 +29,7 @@ from calmotion.benchmarks.common.parsers import bench_parser, output_options
 from calmotion.benchmarks.common.tables import markdown, resumed_rows, write_rows
 from calmotion.benchmarks.scenes.beam_arm import beam_arm, quintic, shot_of
 from calmotion.errors import ShotError
-from calmotion.reduction.mesh_refinement import refined_for_frequencies
+from calmotion.reduction.mesh_refinement import Effort, refined_for_frequencies
 from calmotion.shot import Animation, Character, FEMeshes
 from calmotion.shot.character import Array
 from calmotion.shot.run import RunSettings
@@ -98,7 +98,7 @@ def drawn(number: int) -> Drawn:
     for mesh in meshes.meshes:
         body = character.bodies[mesh.body]
         carrier = next(joint.frame1 for joint in character.joints if joint.body1 == mesh.body)
-        judged.append(refined_for_frequencies(mesh, body, carrier, MESH_ACCURACY, MAX_NODES))
+        judged.append(refined_for_frequencies(mesh, body, carrier, Effort(2.0 * MESH_ACCURACY, MAX_NODES)))
     return Drawn(character, animation, FEMeshes(tuple(judged)), 10.0 ** rng.uniform(-4.0, -2.3))
 
 

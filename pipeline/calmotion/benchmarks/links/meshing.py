@@ -128,6 +128,7 @@ def _row(link: Link, size: float, mesh: Any, mesh_time: float) -> Row:
         except ShotError:
             clamped = None  # a joint off the link's surface is not a property of its mesh
     frequencies, errors = frequency_errors(model, settings.material, 3, clamped)
+    frequencies = np.sqrt(mesh.quality.stiffness_factor) * frequencies
     return Row(
         link=link.name,
         size=1e3 * size,

@@ -165,7 +165,7 @@ def _with_mesh(row: LinkRow, mesh: FEMesh, link: Link) -> LinkRow:
         model.mesh, attachments_of(link), settings.interface_radius, link.body.path, mesh.patches
     )
     clamped = patches[0].nodes if link.carrier is not None else None
-    f1, f2, f3 = clamped_modes(model, 3, clamped)[0]
+    f1, f2, f3 = np.sqrt(mesh.quality.stiffness_factor) * clamped_modes(model, 3, clamped)[0]
     error = mesh.quality.frequency_error
     late = [
         note for note in mesh.quality.repairs if "too long" in note or "would exceed" in note or "on a grid" in note
