@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
-if TYPE_CHECKING:
-    from calmotion.shot.character import Array, IntArray
+import numpy as np
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,8 +23,8 @@ class Part:
 
     path: str
     material: str
-    points: Array
-    triangles: IntArray
+    points: np.ndarray
+    triangles: np.ndarray
     modulus: float
     density: float
     damping: float
