@@ -55,6 +55,8 @@ class TetrahedralizeFlexibleBodies(Operator):
     def execute(self, context: RunContext) -> Sequence[object]:
         """The meshes, in the order of the bodies."""
         # manifold3d takes half a second to load: only for flexible bodies
+        from calmotion.simulation.bodies import bodies_in_parallel
+
         from .accuracy import frames_of
         from .body_mesh import MeshOptions, mesh_of, twin_mesh
         from .sources.twins import twin_of
@@ -69,18 +71,22 @@ class TetrahedralizeFlexibleBodies(Operator):
         flexible = [index for index, body in enumerate(character.bodies) if body.simulated_flexible]
         geometries = _geometries(character, flexible, options)
         attachments = _attachments(character)
-        meshes: list[FEMesh] = []
         links = [_link(character, index, geometries[index]) for index in flexible]
-        for done, index in enumerate(flexible):
+        # a link of which another one is the copy or the mirror image is meshed once
+        twins = {index: twin_of(links[k], links[:k]) for k, index in enumerate(flexible)}
+        own = [index for index in flexible if twins[index] is None]
+
+        def mesh_one(index: int) -> FEMesh:
+            frames = frames_of(character, index)
             body = character.bodies[index]
-            context.progress(done / len(flexible), body.path)
-            # a link of which another one is the copy or the mirror image is meshed once
-            twin = twin_of(links[done], links[:done])
+            return mesh_of(index, body, geometries[index], options, frames, attachments.get(index, ()))
+
+        made = dict(zip(own, bodies_in_parallel(mesh_one, own, character, context.progress), strict=True))
+        for index in flexible:
+            body, twin = character.bodies[index], twins[index]
             if twin is not None:
-                mesh = twin_mesh(meshes[twin[0]], twin[1], index, character, geometries[index])
-            else:
-                frames = frames_of(character, index)
-                mesh = mesh_of(index, body, geometries[index], options, frames, attachments.get(index, ()))
+                made[index] = twin_mesh(made[flexible[twin[0]]], twin[1], index, character, geometries[index])
+            mesh = made[index]
             quality = mesh.quality
             context.report(
                 "detail",
@@ -90,9 +96,8 @@ class TetrahedralizeFlexibleBodies(Operator):
             )
             for repair in quality.repairs:
                 context.report("info" if twin is None else "detail", f"{body.path}: {repair}")
-            meshes.append(mesh)
         context.progress(1.0, "")
-        return (FEMeshes(tuple(meshes)),)
+        return (FEMeshes(tuple(made[index] for index in flexible)),)
 
 
 def _link(character: Character, index: int, geometry: FEMesh | Volume) -> Link | None:

@@ -75,3 +75,18 @@ def test_nothing_is_left_behind(host, own_cache, tmp_path, monkeypatch):
     run(host, link(surface(box((0.05, 0.02, 0.02))), element_size=0.01), cache=False)
     assert os.listdir(work) == []
     assert os.listdir(scratch) == [] and not own_cache.exists()
+
+
+def test_links_are_meshed_beside_each_other_with_the_meshes_of_one_after_the_other(host, monkeypatch):
+    bodies = [
+        replace(link(surface(box((0.1 + 0.02 * k, 0.02, 0.02))), element_size=0.02), path=f"/Arm/link{k}")
+        for k in range(4)
+    ]
+    bodies.insert(2, replace(bodies[0], path="/Arm/copy"))
+    together = run(host, *bodies)
+    monkeypatch.setattr("calmotion.multibody.parallel.processors", lambda: 1)
+    for mesh, alone in zip(together, run(host, *bodies, cache=False), strict=True):
+        assert mesh.body == alone.body and np.array_equal(mesh.tets, alone.tets)
+        assert mesh.points == pytest.approx(alone.points, abs=1e-12) and mesh.quality.repairs == alone.quality.repairs
+    assert [mesh.body for mesh in together] == [0, 1, 2, 3, 4]
+    assert any("meshed as /Arm/link0" in note for note in together[2].quality.repairs)
