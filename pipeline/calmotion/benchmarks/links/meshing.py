@@ -123,7 +123,7 @@ def _refined(link: Link, mesh: Any, nodes: int) -> Row:
     effort = Effort(_FINEST, int(nodes / 0.6), 0.0)
     finer = refined_for_frequencies(mesh, link.body, link.carrier, effort)
     row = _row(link, 0.0, finer, time.perf_counter() - start, False)
-    return replace(row, estimate=100.0 * finer.quality.frequency_error)
+    return replace(row, estimate=100.0 * (finer.quality.frequency_error or 0.0))
 
 
 def _row(link: Link, size: float, mesh: Any, mesh_time: float, reduces: bool = True) -> Row:
