@@ -141,6 +141,18 @@ def test_finer_elements_are_kept_where_their_own_error_matters(helpers, beam, fr
     assert first_frequencies[0] == pytest.approx(first_frequencies[1], rel=0.01), "with the same statics"
 
 
+def test_a_link_that_hardly_bends_keeps_its_stiffness(helpers, beam, frames, loads):
+    """It has no modes by which the stiffness of two meshes could be compared."""
+    idle = replace(loads, force=1e-9 * loads.force)
+    coarse = mesh_of(helpers, (12, 2, 2))
+    assert not len(linear_modes(coarse, beam, frames, 1, idle, 1e-2).basis.omega_squared)
+    found = refined_for_loads(coarse, beam, frames, 1, idle, 1e-2, 0.0, 3000)
+    assert found.quality.stiffness_factor == pytest.approx(1.0, abs=0.05)
+    bent = reduce_body(found, beam, frames, [], 1, loads, 1e-4)
+    known = reduce_body(coarse, beam, frames, [], 1, loads, 1e-4)
+    assert bent.stiffness[:2] == pytest.approx(known.stiffness[:2], rel=0.05)
+
+
 def test_finer_elements_are_taken_instead_for_a_reference(helpers, beam, frames, loads, finest):
     coarse = mesh_of(helpers, (4, 1, 1))
     marked = replace(coarse, quality=replace(coarse.quality, stiffness_factor=0.9))  # of an earlier refinement

@@ -113,7 +113,7 @@ def with_finer_stiffness(
     kept = next((k for k, one in enumerate(estimates[:few]) if one.error <= elements), few - 1)
     own = estimates[kept]
     ratios, weights = mode_ratios(own, estimates[-1])
-    factor = float(weights @ ratios)
+    factor = float(weights @ ratios) if weights.any() else 1.0  # a link that hardly bends has no modes
     if not len(estimates[-1].interfaces):
         error += deviation(ratios, weights)
     return _with_quality(meshes[kept], _quality(mesh, own, estimates, factor * (1.0 - excess), error))
