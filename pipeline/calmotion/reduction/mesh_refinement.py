@@ -75,15 +75,15 @@ def refined(mesh: FEMesh, estimate: Callable[[FEMesh], Estimate], effort: Effort
         estimate: Estimates the error of a mesh.
         effort: How far.
         extrapolates: Whether the mesh takes the stiffness that ever finer ones would have, as far as it is known;
-            otherwise only where its error is poor.
+            otherwise only where its error is larger than wanted.
     """
     meshes, estimates = _bisected(mesh, estimate, effort)
     excess, error = extrapolation(estimates)
     if extrapolates:
         quality = _quality(mesh, estimates[-1], estimates, 1.0 - excess, error)
     else:
-        poor = error > effort.poor
-        excess, error = far_extrapolation(estimates) if poor else (0.0, min(excess + error, estimates[-1].error))
+        missed = error > effort.wanted
+        excess, error = far_extrapolation(estimates) if missed else (0.0, min(excess + error, estimates[-1].error))
         quality = replace(
             mesh.quality, frequency_error=0.5 * (error + _of_volume(mesh)), element_error=estimates[-1].error,
             stiffness_factor=1.0 - excess,

@@ -72,6 +72,15 @@ def test_links_that_cannot_be_meshed_are_reported_and_the_others_are_measured(sh
     assert "no such link" in capsys.readouterr().err
 
 
+def test_a_refined_row_is_named_and_judges_the_automatic_mesh(shot, tmp_path):
+    (fore,) = read_links(f"{shot}:fore")
+    auto, refined = meshing.study(fore, ["auto"], 60.0, print, refine=6_000)
+    assert np.isnan(auto.size) and refined.size == 0.0 and np.isnan(refined.reduce_time)
+    assert refined.nodes > auto.nodes and 0.0 < auto.error < 2.0 and refined.estimate < auto.estimate
+    assert "| fore | refined |" in meshing.table([auto, refined])
+    assert "the automatic mesh" in meshing.verdicts([auto, refined])
+
+
 def test_sizes_are_multiples_of_the_automatic_one_or_lengths():
     assert meshing._length("1.4", 0.01) == pytest.approx(0.014)
     assert meshing._length("8mm", 0.01) == pytest.approx(0.008)

@@ -20,6 +20,8 @@ _LEFT_ALONG = 0.3  # the same in one direction of an interface, of a bar and of 
 _LEAST = 0.1  # of the estimate of the finer mesh: the least error that is claimed
 _STIFFEST = 0.05  # excess of the stiffness of an interface in any direction that is extrapolated
 _ASYMPTOTIC = 0.05  # largest estimate that is in proportion to the error
+# Largest estimate from which one comparison is used, and the error that it leaves, of what was extrapolated
+_NEARLY, _ALONE = 0.15, 1.0
 _AGREE = 1.6  # ratio of two extrapolations from large estimates that are used
 
 
@@ -72,20 +74,25 @@ def extrapolation(estimates: Sequence[Estimate]) -> tuple[float, float]:
 
 
 def far_extrapolation(estimates: Sequence[Estimate]) -> tuple[float, float]:
-    """As `extrapolation`, from estimates that are too large to be in proportion to the error: the last three.
+    """As `extrapolation`, from estimates that are too large to be in proportion to the error: the last three, or two
+    where the coarser one is nearly fine enough.
 
     Two extrapolations that agree show that they nearly are. A link whose first frequencies were 731, 694, 672, 661 and
     653 Hz on meshes with estimates of 18, 14, 9.9, 6.8 and 4.7% is extrapolated to 635 Hz from the fourth, to 638 Hz
     from the fifth.
     """
     fine, excesses, apart = estimates[-1], [], 0.0
-    for coarse in [e for e in estimates[:-1] if e.error >= _GAIN * fine.error][-2:]:
+    coarser = [e for e in estimates[:-1] if e.error >= _GAIN * fine.error][-2:]
+    for coarse in coarser:
         ratios, weights = mode_ratios(coarse, fine)
         each = (1.0 / ratios - 1.0) / (coarse.error / fine.error - 1.0)
         excesses.append(float(weights @ each))
         apart = float(weights @ np.abs(each - excesses[-1]))  # of the modes: there is one factor for all
-    if len(excesses) < 2 or min(excesses) <= 0.0 or max(excesses) > _AGREE * min(excesses):
+    if not excesses or excesses[-1] <= 0.0:
         return 0.0, fine.error
+    if len(excesses) < 2 or min(excesses) <= 0.0 or max(excesses) > _AGREE * min(excesses):
+        excess = min(excesses[-1], fine.error)
+        return (excess, min(_ALONE * excess + apart, fine.error)) if coarser[-1].error <= _NEARLY else (0.0, fine.error)
     left = max(_LEFT * excesses[1], _APART * abs(excesses[1] - excesses[0])) + apart
     return min(excesses[1], fine.error), min(left, fine.error)
 
