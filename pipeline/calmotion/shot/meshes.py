@@ -17,12 +17,12 @@ class MeshQuality:
         volume_error: Relative difference to the volume of the (repaired) input surface; 0 for authored tetrahedra.
         repairs: What was repaired, as sentences.
         frequency_error: Estimated relative error of the first frequencies; None where it is not known.
-        element_error: Estimated relative error of the compliance of its elements, without the factors below.
         source: What the body's solid was made of, such as `visual surface`.
         stiffness_factor: Of the stiffness of a finer mesh over that of this one, by which its elements are softer.
         interface_factors: Static stiffness of its p moving interfaces that a finer mesh has: the inverse of its own,
             without the factor above, times that of the finer one, shape [6p, 6p]; None where that is not known.
         interface_softest: The same of the least stiffness that its estimated error allows.
+        element_error: Estimated relative error of the compliance of its elements, without the factors above.
     """
 
     min_dihedral_deg: float
@@ -30,11 +30,11 @@ class MeshQuality:
     volume_error: float
     repairs: tuple[str, ...] = ()
     frequency_error: float | None = None
-    element_error: float = 0.0
     stiffness_factor: float = 1.0
     source: str = ""
     interface_factors: Array | None = None
     interface_softest: Array | None = None
+    element_error: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)

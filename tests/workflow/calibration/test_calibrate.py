@@ -23,7 +23,7 @@ def take(tmp_path_factory):
     """A shot, and what a robot of other parameters does, as `simulate --csv` writes it, with noise."""
     folder = tmp_path_factory.mktemp("take")
     truth = shot_at(folder / "truth.usda", TRUTH["youngsModulus"], TRUTH["damping"])
-    result = cm.simulate(truth, step="0.5ms", integrator="newmark", settings={"fe.mesh.element_size": "40mm"})
+    result = cm.simulate(truth, step="0.5ms", integrator="newmark")
     columns = result.columns()
     rng = np.random.default_rng(4)
     names = ["time_s", *(f"{HAND}.{axis}" for axis in "xyz")]
@@ -38,7 +38,7 @@ def test_the_command_writes_a_layer_with_the_parameters_of_the_robot(calmotion, 
     shot, recording = take
     done = calmotion(
         "calibrate", shot, "--recording", recording, "-o", tmp_path / "robot.usda", "--json", "--parameters", "modulus",
-        "damping", "--figures", tmp_path / "figures", "--set", "fe.mesh.element_size=40mm",
+        "damping", "--figures", tmp_path / "figures",
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
     report = json.loads(done.stdout)

@@ -27,8 +27,7 @@ def test_the_layer_is_a_shot_with_the_motion(calmotion, tmp_path):
     shot = moving(tmp_path / "shot.usda")
     done = calmotion(
         "excite", shot, "-o", tmp_path / "test.usda", "--sensor", f"marker@{HAND}=0.2mm", "--sensor", "angle",
-        "--parameters", "modulus", "damping", "--duration", "1.5s", "--tries", "2", "--json", "--set",
-        "fe.mesh.element_size=40mm",
+        "--parameters", "modulus", "damping", "--duration", "1.5s", "--tries", "2", "--json",
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
     report = json.loads(done.stdout)
