@@ -136,7 +136,7 @@ def _mapped(file: str, columns: Mapping[str, Array], map_file: str) -> tuple[lis
                     remedy=f"{nearest(key, KNOWN)}Use {', '.join(KNOWN)}",
                 )  # fmt: skip
         kind, path, given = table.get("kind"), table.get("prim"), table.get("columns")
-        if kind not in COMPONENTS:
+        if not isinstance(kind, str) or kind not in COMPONENTS:
             raise ShotError(
                 "there is no such kind of channel", path=map_file, attribute=f"{place}.kind", found=kind,
                 remedy=f"{nearest(str(kind), COMPONENTS)}Use {', '.join(COMPONENTS)}",
