@@ -22,7 +22,7 @@ SHARE = 0.25  # of the tolerance, that the meshes may take
 NODES = 20_000  # of a mesh that only linear modes are computed on: some seconds
 _MARGIN = 0.8  # of the wanted error: estimates of two meshes differ
 _LOCKED = 8.0  # error of what quadratic strain changes, over that of the compliance of the elements
-_SOFTEST = 0.5  # factor of a stiffness; a mesh that is off by more is of no use
+_SOFTEST = 0.5  # factor of a stiffness or a strain; a mesh that is off by more is of no use
 
 
 def meshes_to_tolerance(
@@ -91,7 +91,7 @@ def locking_error(shot: CompiledShot, options: RunSettings, run: StepRun) -> flo
     to ten times the error of the compliance of the elements.
     """
     errors = [_LOCKED * body.element_error for body in shot.bodies]
-    off = [with_scaled_strain(body, max(1.0 - error, 0.5)) for body, error in zip(shot.bodies, errors, strict=True)]
+    off = [with_scaled_strain(body, _left(error)) for body, error in zip(shot.bodies, errors, strict=True)]
     if all(one is body for one, body in zip(off, shot.bodies, strict=True)):
         return 0.0
     return _if_other(shot, options, run, off) or 0.0
@@ -122,7 +122,12 @@ def _softest(body: ReducedBody) -> ReducedBody:
 
 
 def _softened(body: ReducedBody, error: float) -> ReducedBody:
-    return with_scaled_stiffness(body, max(1.0 - error, _SOFTEST))
+    return with_scaled_stiffness(body, _left(error))
+
+
+def _left(error: float) -> float:
+    """What a relative error leaves of a stiffness or a strain."""
+    return max(1.0 - error, _SOFTEST)
 
 
 def _if_other(shot: CompiledShot, options: RunSettings, run: StepRun, others: Sequence[ReducedBody]) -> float | None:

@@ -40,9 +40,7 @@ def with_mode_stiffness(body: ReducedBody, factors: Array) -> ReducedBody:
     law = body.elasticity
     if law is not None and law.law == "stvk":
         # the strain of each mode grows, that of pairs of modes does not: the energy is still a sum of squares
-        size = round(np.sqrt(len(law.data)))
-        scale = np.concatenate([np.sqrt(factors), np.ones(size - len(factors))])
-        law = replace(law, data=(law.data.reshape(size, size) * np.outer(scale, scale)).ravel())
+        law = _with_strains(law, np.sqrt(factors), 1.0)
     elif law is not None:
         data, r = law.data.copy(), len(factors)
         data[: r * r] += np.diag((factors - 1.0) * body.stiffness).ravel()
@@ -58,10 +56,14 @@ def with_scaled_strain(body: ReducedBody, factor: float) -> ReducedBody:
     law = body.elasticity
     if law is None or law.law != "stvk" or factor == 1.0:
         return body
+    return replace(body, elasticity=_with_strains(law, np.ones(len(body.stiffness)), factor))
+
+
+def _with_strains(law: Elasticity, linear: Array, quadratic: float) -> Elasticity:
+    """A `stvk` law with the strain of each coordinate multiplied by a factor, shape [r], and that of pairs by one."""
     size = round(np.sqrt(len(law.data)))
-    scale = np.full(size, factor)
-    scale[: len(body.stiffness)] = 1.0
-    return replace(body, elasticity=replace(law, data=(law.data.reshape(size, size) * np.outer(scale, scale)).ravel()))
+    scale = np.concatenate([linear, np.full(size - len(linear), quadratic)])
+    return replace(law, data=(law.data.reshape(size, size) * np.outer(scale, scale)).ravel())
 
 
 def with_interface_stiffness(body: ReducedBody, patches: Sequence[int], own: Array, finer: Array) -> ReducedBody:
