@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 from calmotion.accuracy.element_size import ACCURACY
@@ -11,10 +12,12 @@ from calmotion.shot import Body, Character, FEMesh, Frame
 from calmotion.shot.materials.parts import Part
 from calmotion.shot.meshes import MeshQuality
 
+if TYPE_CHECKING:
+    from calmotion.geometry.makeup import Makeup
+
 # The estimate is 1.2 to 3 times the true error of clamped beams and plates on meshes that are nearly fine enough, and
 # larger for links with many edges (see `calmotion bench meshing`). Twice the wanted error is therefore accepted.
 ENOUGH = 2.0 * ACCURACY
-_PLACES = 4  # along an edge of an element, at which volumes of parts are counted
 _SAME_MASS, _HOLLOW = 0.05, 0.7  # difference that is reported; ratio below which a body may be hollow
 
 
@@ -50,7 +53,7 @@ def makeup_note(body: Body, mesh: FEMesh) -> tuple[str, ...]:
         return ()
     material, core = body.flexible.material, body.flexible.material.core
     mass = float(material.density * (tet_volumes(mesh.points, mesh.tets) @ makeup.density))
-    note = parts_note(material.parts, mesh) if core is None else (
+    note = parts_note(material.parts, mesh, makeup) if core is None else (
         f"printed: a solid skin of {1e3 * core.skin:.3g} mm around {100.0 * core.infill:.3g}% infill with "
         f"{100.0 * core.stiffness:.2g}% of the modulus (Hashin-Shtrikman); its mass is "
         f"{100.0 * mass / (material.density * mesh.quality.volume):.3g}% of that of a solid part, {mass:.3g} kg"
@@ -62,12 +65,10 @@ def makeup_note(body: Body, mesh: FEMesh) -> tuple[str, ...]:
     return (note,)
 
 
-def parts_note(parts: Sequence[Part], mesh: FEMesh) -> str:
+def parts_note(parts: Sequence[Part], mesh: FEMesh, makeup: Makeup) -> str:
     """What of a body is of which material."""
-    from calmotion.geometry.part_places import part_of_places
-    from calmotion.geometry.print_core import places_of
-
-    held = part_of_places(mesh.points, mesh.tets, parts, places_of(_PLACES))
+    held = makeup.parts
+    assert held is not None
     volumes = tet_volumes(mesh.points, mesh.tets) / held.shape[1]
     shares = np.bincount(held.ravel(), np.repeat(volumes, held.shape[1]), len(parts)) / mesh.quality.volume
     by_material: dict[str, float] = {}

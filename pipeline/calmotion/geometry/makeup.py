@@ -8,6 +8,7 @@ import numpy as np
 
 from calmotion.geometry.part_places import part_of_places
 from calmotion.geometry.print_core import places_of, skin_share
+from calmotion.geometry.tetrahedra import Indices
 from calmotion.shot.character import Array, ElasticMaterial, IntArray
 
 _PARTS = 6  # along an edge of an element, of which each is in one part of the body
@@ -22,12 +23,14 @@ class Makeup:
         moduli: Young's modulus there, shape [e, p].
         densities: Shape [e, p].
         damping: Fraction of critical damping there, absolute, shape [e, p]; None where it is that of the body.
+        parts: Index of the part of the body there, shape [e, p]; None of a body without parts.
     """
 
     places: Array
     moduli: Array
     densities: Array
     damping: Array | None = None
+    parts: Indices | None = None
 
     @property
     def density(self) -> Array:
@@ -45,10 +48,11 @@ def makeup_of(points: Array, tets: IntArray, material: ElasticMaterial) -> Makeu
     """
     if material.core is not None:
         core, skin = material.core, skin_share(points, tets, material.core)
-        return Makeup(skin.places, *(low + (1.0 - low) * skin.shares for low in (core.stiffness, core.infill)))
+        moduli, densities = (low + (1.0 - low) * skin.shares for low in (core.stiffness, core.infill))
+        return Makeup(skin.places, moduli, densities)
     if not material.parts:
         return None
     places = places_of(_PARTS)
     part = part_of_places(points, tets, material.parts, places)
     moduli, densities, damping = np.array([(p.modulus, p.density, p.damping) for p in material.parts]).T
-    return Makeup(places, moduli[part], densities[part], damping[part])
+    return Makeup(places, moduli[part], densities[part], damping[part], part)
