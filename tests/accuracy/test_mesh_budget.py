@@ -6,6 +6,7 @@ import pytest
 from calmotion.accuracy import mesh_budget
 from calmotion.accuracy.mesh_budget import locking_error, mesh_error, meshes_to_tolerance, patch_error
 from calmotion.accuracy.step_error import distance, simulate_at
+from calmotion.errors import ShotError
 from calmotion.reduction.scaled_stiffness import with_scaled_stiffness
 from calmotion.shot.run import RunSettings
 from calmotion.simulation.compiled_shot import compile_shot
@@ -111,3 +112,28 @@ def test_patches_cost_what_softer_bodies_do_whether_the_mesh_is_known_or_not(arm
     given = [replace(body, mesh_error=None, mesh_error_m=None) for body in with_rims]
     assert mesh_error(shot.with_bodies(given), OPTIONS, run) is None
     assert patch_error(shot.with_bodies(given), OPTIONS, run) == found
+
+
+def test_bodies_that_buckle_with_the_whole_error_tell_it_by_a_part(arm, animation, bodies, monkeypatch):
+    shot = compile_shot(arm, animation, [replace(b, patch_error=0.1) for b in with_mesh_errors(bodies, 0.02, 0.01)])
+    run, simulated = simulate_at(shot, OPTIONS, STEP), []
+
+    def buckling(least):
+        def simulate(other, options, step):
+            left = min(
+                o.stiffness[0] / b.stiffness[0] for o, b in zip(other.bodies, bodies, strict=True) if len(b.stiffness)
+            )
+            simulated.append(left)
+            if left < least:
+                raise ShotError("it buckles")
+            return simulate_at(other, options, step)
+
+        return simulate
+
+    monkeypatch.setattr(mesh_budget, "simulate_at", buckling(0.0))
+    whole = patch_error(shot, OPTIONS, run)
+    monkeypatch.setattr(mesh_budget, "simulate_at", buckling(0.95))
+    part = patch_error(shot, OPTIONS, run)
+    assert simulated == pytest.approx([0.9, 0.9, 0.975]) and part == pytest.approx(whole, rel=0.2)
+    monkeypatch.setattr(mesh_budget, "simulate_at", buckling(2.0))
+    assert patch_error(shot, OPTIONS, run) == pytest.approx(2 * 0.1 * 0.1), "by its deflections of a tenth of a metre"

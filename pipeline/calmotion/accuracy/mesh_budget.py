@@ -6,7 +6,7 @@ are softer by the estimated error of their stiffness. Where the shake will be re
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import replace
 
 from calmotion.accuracy.step_error import StepRun, distance, simulate_at
@@ -22,6 +22,7 @@ SHARE = 0.25  # of the tolerance, that the meshes may take
 NODES = 20_000  # of a mesh that only linear modes are computed on: some seconds
 _MARGIN = 0.8  # of the wanted error: estimates of two meshes differ
 _LOCKED = 8.0  # error of what quadratic strain changes, over that of the compliance of the elements
+_PARTS = (1.0, 0.25, 0.05)  # of an error that are tried until a shot can be simulated with it
 _SOFTEST = 0.5  # factor of a stiffness or a strain; a mesh that is off by more is of no use
 
 
@@ -79,7 +80,7 @@ def stiffness_error(shot: CompiledShot, options: RunSettings, run: StepRun) -> f
     flexible = [body for body in shot.bodies if len(body.stiffness)]
     if not flexible or any(body.mesh_error is None for body in flexible):
         return None
-    off = _if_other(shot, options, run, [_softest(body) for body in shot.bodies])
+    off = _if_other(shot, options, run, _softest)
     return sum(body.mesh_error_m or 0.0 for body in flexible) if off is None else off
 
 
@@ -90,11 +91,14 @@ def locking_error(shot: CompiledShot, options: RunSettings, run: StepRun) -> flo
     (membrane locking). Measured on slender arms with one element across: what quadratic strain changes is off by three
     to ten times the error of the compliance of the elements.
     """
-    errors = [_LOCKED * body.element_error for body in shot.bodies]
-    off = [with_scaled_strain(body, _left(error)) for body, error in zip(shot.bodies, errors, strict=True)]
-    if all(one is body for one, body in zip(off, shot.bodies, strict=True)):
+
+    def unlocked(body: ReducedBody, share: float) -> ReducedBody:
+        return with_scaled_strain(body, _left(share * _LOCKED * body.element_error))
+
+    if all(unlocked(body, 1.0) is body for body in shot.bodies):
         return 0.0
-    return _if_other(shot, options, run, off) or 0.0
+    off = _if_other(shot, options, run, unlocked)
+    return sum(_LOCKED * body.element_error * _bent(body) for body in shot.bodies) if off is None else off
 
 
 def patch_error(shot: CompiledShot, options: RunSettings, run: StepRun) -> float:
@@ -102,23 +106,23 @@ def patch_error(shot: CompiledShot, options: RunSettings, run: StepRun) -> float
 
     The error of the meshes does not contain it: finer meshes have the same rims.
     """
-    errors = [body.patch_error if len(body.stiffness) else 0.0 for body in shot.bodies]
-    if not any(errors):
+    if not any(body.patch_error for body in shot.bodies if len(body.stiffness)):
         return 0.0
-    softer = [_softened(body, error) for body, error in zip(shot.bodies, errors, strict=True)]
-    off = _if_other(shot, options, run, softer)
-    bent = [
-        body.mesh_error_m / body.mesh_error if body.mesh_error_m and body.mesh_error else 0.0 for body in shot.bodies
-    ]
-    return sum(error * by for error, by in zip(errors, bent, strict=True)) if off is None else off
+    off = _if_other(shot, options, run, lambda body, share: _softened(body, share * body.patch_error))
+    return sum(body.patch_error * _bent(body) for body in shot.bodies) if off is None else off
 
 
-def _softest(body: ReducedBody) -> ReducedBody:
-    """A body as soft as it may be on ever finer meshes."""
+def _bent(body: ReducedBody) -> float:
+    """How far a body bends under its loads [m], as far as that is known."""
+    return body.mesh_error_m / body.mesh_error if body.mesh_error_m and body.mesh_error else 0.0
+
+
+def _softest(body: ReducedBody, share: float) -> ReducedBody:
+    """A body as soft as it may be on ever finer meshes, or a share of the way there."""
     known = body.interfaces
     if known is None:
-        return _softened(body, body.mesh_error or 0.0)
-    return with_interface_stiffness(body, known.patches, known.own, known.softest)
+        return _softened(body, share * (body.mesh_error or 0.0))
+    return with_interface_stiffness(body, known.patches, known.own, known.own + share * (known.softest - known.own))
 
 
 def _softened(body: ReducedBody, error: float) -> ReducedBody:
@@ -130,14 +134,24 @@ def _left(error: float) -> float:
     return max(1.0 - error, _SOFTEST)
 
 
-def _if_other(shot: CompiledShot, options: RunSettings, run: StepRun, others: Sequence[ReducedBody]) -> float | None:
-    """How far targets move with other bodies [m]; None where these buckle."""
+def _if_other(
+    shot: CompiledShot, options: RunSettings, run: StepRun, other: Callable[[ReducedBody, float], ReducedBody]
+) -> float | None:
+    """How far targets move with other bodies [m]; None where even slightly other ones buckle.
+
+    Where a body buckles that is off by its whole error, a smaller part of it is tried, and counts the more often.
+
+    Args:
+        other: A body off by a share of its error.
+    """
     options = replace(options, integrator=run.integrator or options.integrator)
-    try:
-        other = simulate_at(shot.with_bodies(others), options, run.step)
-    except ShotError:
-        return None
-    return distance(run.positions, other.positions)
+    for share in _PARTS:
+        others = shot.with_bodies([other(body, share) for body in shot.bodies])
+        try:
+            return distance(run.positions, simulate_at(others, options, run.step).positions) / share
+        except ShotError:
+            continue
+    return None
 
 
 def _shares(costs: dict[int, float], allowed: float) -> dict[int, float]:
