@@ -10,8 +10,8 @@ from calmotion.benchmarks.accuracy.estimates import Judged, counts, drawn
 from calmotion.errors import ShotError
 
 
-def row(number, ratio):
-    return Judged(number, 1e-3, 1e-3, 2e-4, ratio * 1e-3, 1e-5, 600, 5000)
+def row(number, ratio, reference=1e-5):
+    return Judged(number, 1e-3, 1e-3, 2e-4, ratio * 1e-3, reference, 600, 5000)
 
 
 def test_a_shot_is_known_by_its_number():
@@ -21,18 +21,37 @@ def test_a_shot_is_known_by_its_number():
     assert all(mesh.quality.frequency_error <= estimates.MESH_ACCURACY for mesh in one.meshes.meshes)
 
 
+def test_meshes_of_a_reference_are_regular_and_of_the_same_links():
+    shot = drawn(3)
+    for own, finer in zip(shot.meshes.meshes, shot.regular_meshes(2, 2).meshes, strict=True):
+        assert np.ptp(finer.points, axis=0) == pytest.approx(np.ptp(own.points, axis=0)) and finer.body == own.body
+        assert len(np.unique(finer.points[:, 0].round(9))) == 2 * shot.cells + 1
+        assert len(np.unique(finer.points[:, 1].round(9))) == 3
+
+
 def test_every_shot_is_counted_once():
-    table = counts([0.01, 0.3, 0.4, 0.9, 1.2, 7.0])
-    assert [int(n) for _, n, _ in table] == [1, 0, 0, 2, 1, 1, 1]
-    assert table[0][0] == "0 to 0.05" and table[-1] == ["above 1.5", "1", "17%"]
+    table = counts([row(k, ratio) for k, ratio in enumerate([0.01, 0.3, 0.4, 0.9, 1.2, 7.0])])
+    assert [int(n) for _, n, _ in table[:-1]] == [1, 0, 0, 2, 1, 1, 1, 0, 3]
+    assert table[0][0] == "0 to 0.05" and table[6] == ["above 1.5", "1", "17%"]
+    assert table[-2:] == [["0.05 to 1", "3", "50.0%"], ["largest", "7.00", "-"]]
 
 
-@pytest.mark.parametrize(("ratio", "status"), [(0.4, 0), (1.6, 1)])
-def test_the_command_fails_where_an_error_is_far_above_its_estimate(monkeypatch, capsys, tmp_path, ratio, status):
+def test_a_reference_known_to_half_of_what_it_judges_decides():
+    rows = [row(0, 0.2, 4e-4), row(1, 0.2, 6e-4), row(2, 3.0, 1e-3), row(3, 3.0, 2e-3)]
+    assert [one.decides for one in rows] == [True, False, True, False]
+    table = dict((name, number) for name, number, _ in counts(rows))
+    assert table["undecided"] == "2" and table["above 1.5"] == "1" and table["0.05 to 1"] == "1"
+    assert counts([rows[1]])[-1] == ["largest", "0.00", "-"]
+
+
+@pytest.mark.parametrize(("ratio", "reference", "status"), [(0.4, 1e-5, 0), (1.6, 1e-5, 1), (1.6, 1e-3, 0)])
+def test_the_command_fails_where_an_error_is_far_above_its_estimate(
+    monkeypatch, capsys, tmp_path, ratio, reference, status
+):
     def judged(number):
         if number == 1:
             raise ShotError("it bends too far", path="/Arm")
-        return row(number, ratio)
+        return row(number, ratio, reference)
 
     monkeypatch.setattr(estimates, "judged", judged)
     files = ["--csv", str(tmp_path / "rows.csv"), "--markdown", str(tmp_path / "table.md")]
