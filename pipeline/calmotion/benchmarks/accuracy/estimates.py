@@ -43,7 +43,7 @@ MESH_ACCURACY, MAX_NODES = 0.01, 15_000  # of the first meshes, as of the mesher
 MESHES = ((3, 2), (4, 3))  # of references: cells along a link over those of the first mesh, and across; the last counts
 DECIDES = 0.5  # largest error of a reference over the larger of error and estimate
 FINER, MOST = 1.0 / 30.0, 3  # tolerance of its first reduction over that of the result; reductions, each to a tenth
-REDUCED = 0.1  # of the estimate: what the last of these may change
+REDUCED = 0.1  # of the estimate: what the last of these may change, and what the stiffness of the meshes may cost
 HELD = 0.02  # of the estimate: what POD subspaces of the reference may change
 STEPS = (0.5, 0.25)  # of the reference over that of the result
 
@@ -142,7 +142,9 @@ def judged(number: int) -> Judged:
     result = simulate_to_tolerance(converged.shot, options, quiet, converged.error_m, converged.known)
     assert result.accuracy is not None and result.accuracy.mesh_m is not None
     estimated = result.accuracy.estimated_m + result.accuracy.mesh_m
-    positions, own_error = _reference(shot, reduction.loads, options, result.step_s, estimated)
+    share = REDUCED * estimated / max(result.accuracy.mesh_m, np.finfo(float).tiny)
+    wanted = {b: share * (body.mesh_error or 0.0) for b, body in enumerate(converged.shot.bodies)}
+    positions, own_error = _reference(shot, reduction.loads, options, result.step_s, estimated, wanted)
     found = frames_of(result, shot.animation.frame_times).positions
     nodes, finer = sum(body.nodes for body in converged.shot.bodies), _nodes(shot.regular_meshes(*MESHES[-1]))
     return Judged(
@@ -152,7 +154,12 @@ def judged(number: int) -> Judged:
 
 
 def _reference(
-    shot: Drawn, loads: Sequence[LoadEnvelope] | None, options: RunSettings, step: float, estimated: float
+    shot: Drawn,
+    loads: Sequence[LoadEnvelope] | None,
+    options: RunSettings,
+    step: float,
+    estimated: float,
+    wanted: dict[int, float],
 ) -> tuple[Array, float]:
     """Positions of a far finer run [m], and how far it may be from its limit [m], as of `Judged`.
 
@@ -160,10 +167,23 @@ def _reference(
         loads: Of the bodies.
         step: Of the result [s].
         estimated: Error of the result [m].
+        wanted: Relative error of the stiffness of each body that would cost a tenth of it.
     """
-    coarse, fine = (_converged(shot, shot.regular_meshes(*cells), loads, options, step, estimated) for cells in MESHES)
-    complete, known, changed = fine
-    by_meshes = distance(coarse[1].run.positions, known.run.positions)
+    coarse, fine = (_stiffened(shot, shot.regular_meshes(*cells), loads, wanted) for cells in MESHES)
+
+    def reduced(meshes: BodyReduction, k: int) -> tuple[CompiledShot, ReferenceRun]:
+        # what quadratic strain does not see stays bounded as by the first, since to see all takes most of the time
+        bodies = meshes.bodies(FINER * 0.1**k * shot.tolerance, 10.0**k)
+        complete = compile_shot(shot.character, shot.animation, bodies)
+        return complete, reference_run(complete, options, step)
+
+    (complete, known), changed = reduced(fine, 0), np.inf
+    for k in range(1, MOST):
+        last, (complete, known) = known, reduced(fine, k)
+        changed = distance(last.run.positions, known.run.positions)
+        if changed <= REDUCED * estimated:
+            break
+    by_meshes = distance(reduced(coarse, k)[1].run.positions, known.run.positions)
     few = project_to_subspace(complete, options, step, lambda item: HELD * estimated, known)
 
     def run(part: float) -> StepRun:
@@ -175,29 +195,12 @@ def _reference(
     return limit, by_meshes + changed + few.error_m
 
 
-def _converged(
-    shot: Drawn, meshes: FEMeshes, loads: Sequence[LoadEnvelope] | None, options: RunSettings, step: float,
-    estimated: float,
-) -> tuple[CompiledShot, ReferenceRun, float]:  # fmt: skip
-    """The shot on some meshes, reduced until that moves no target, its run, and what the last reduction changed [m]."""
-    # the elements as they are, with the stiffness of finer ones
-    wanted = {mesh.body: 0.0 for mesh in meshes.meshes}
-    finer = BodyReduction(shot.character, meshes, loads, repeats=True)
-    finer = finer.with_finer_meshes(shot.tolerance, wanted, MAX_NODES)
-
-    def reduced(k: int) -> tuple[CompiledShot, ReferenceRun]:
-        # what quadratic strain does not see stays bounded as by the first, since to see all takes most of the time
-        bodies = finer.bodies(FINER * 0.1**k * shot.tolerance, 10.0**k)
-        complete = compile_shot(shot.character, shot.animation, bodies)
-        return complete, reference_run(complete, options, step)
-
-    (complete, known), changed = reduced(0), np.inf
-    for k in range(1, MOST):
-        last, (complete, known) = known, reduced(k)
-        changed = distance(last.run.positions, known.run.positions)
-        if changed <= REDUCED * estimated:
-            break
-    return complete, known, changed
+def _stiffened(
+    shot: Drawn, meshes: FEMeshes, loads: Sequence[LoadEnvelope] | None, wanted: dict[int, float]
+) -> BodyReduction:
+    """The reduction on some meshes as they are, with the stiffness of finer ones; arguments as of `_reference`."""
+    reduction = BodyReduction(shot.character, meshes, loads, repeats=True)
+    return reduction.with_finer_meshes(shot.tolerance, wanted, MAX_NODES)
 
 
 def _nodes(meshes: FEMeshes) -> int:
