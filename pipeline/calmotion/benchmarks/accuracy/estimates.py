@@ -1,13 +1,14 @@
 """How honest the estimated errors are: random shots, each simulated to a tolerance and compared with a finer run.
 
-`calmotion bench estimates [--count N] [--first K] [--csv FILE [--resume]]` draws arms of one or two slender links with
-a load, of random size, material and motion, simulates each to a random tolerance as the program chooses, and
-measures the result against a simulation with regular meshes of eight times the nodes or more, a reduction that is
-refined until it moves no target by more than a tenth of the estimate, and a step that is extrapolated to zero. How well
-that is known is measured too, by coarser regular meshes and by the last refinement of its reduction. Shot number K is
-the same on every machine; `--resume` goes on with the shots that the CSV file does not have. The table counts the shots
-by their error over their estimate: below one the estimate is on the safe side. A reference that is known to no better
-than half of the error and half of the estimate decides nothing, and its shot is counted apart.
+`calmotion bench estimates [--count N] [--first K] [--csv FILE [--resume]] [--figures DIR]` draws arms of one or two
+slender links with a load, of random size, material and motion, simulates each to a random tolerance as the program
+chooses, and measures the result against a simulation with regular meshes of eight times the nodes or more, a reduction
+that is refined until it moves no target by more than a tenth of the estimate, and a step that is extrapolated to zero.
+How well that is known is measured too, by coarser regular meshes and by the last refinement of its reduction. Shot
+number K is the same on every machine; `--resume` goes on with the shots that the CSV file does not have. The table and
+the histogram count the shots by their error over their estimate: below one the estimate is on the safe side. A
+reference that is known to no better than half of the error and half of the estimate decides nothing, and its shot is
+counted apart.
 """
 
 from __future__ import annotations
@@ -25,6 +26,7 @@ from calmotion.accuracy.integrator_choice import by_fast_scheme
 from calmotion.accuracy.pod_subspace import ReferenceRun, project_to_subspace, reference_run
 from calmotion.accuracy.simulate_to_tolerance import simulate_to_tolerance
 from calmotion.accuracy.step_error import StepRun, distance, frames_of, simulate_at
+from calmotion.benchmarks.accuracy.estimates_figure import draw_estimates
 from calmotion.benchmarks.common.parsers import bench_parser, output_options
 from calmotion.benchmarks.common.tables import markdown, resumed_rows, write_rows
 from calmotion.benchmarks.scenes.beam_arm import beam_arm, beam_mesh, quintic, shot_of
@@ -230,6 +232,7 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--count", type=int, default=200, help="number of shots (default: 200)")
     parser.add_argument("--first", type=int, default=0, metavar="K", help="number of the first shot (default: 0)")
     parser.add_argument("--resume", action="store_true", help="keep the shots that the file of --csv has")
+    parser.add_argument("--figures", metavar="DIR", help="also draw the histogram to DIR/estimates.png")
     output_options(parser, csv="a row for each shot", markdown=True)
     options = parser.parse_args(arguments)
     rows: list[Judged] = resumed_rows(parser, options, Judged)
@@ -254,6 +257,8 @@ def main(arguments: list[str] | None = None) -> int:
     table = counts(rows)
     if options.markdown:
         Path(options.markdown).write_text(markdown(HEADS, table), encoding="utf-8")
+    if options.figures:
+        draw_estimates(options.figures, [row.ratio for row in rows], [row.decides for row in rows])
     if options.json:
         print(json.dumps({"rows": [asdict(row) | {"ratio": row.ratio, "decides": row.decides} for row in rows]}))
     else:
