@@ -42,8 +42,9 @@ if TYPE_CHECKING:
 
 # Nodes of the first mesh at most, for some seconds; where the shot needs more, it is refined for its loads.
 _REFINED = 12_000
-# Estimated error of the frequencies, 0.8 to 2 times the true one of real links, from which more nodes are spent
-_POOR, _POOR_REFINED = 0.02, 20_000
+# Error that the extrapolation of the frequencies is estimated to leave, 1.1 to 4 times the true one of six real links,
+# from which more nodes are spent
+_POOR, _POOR_REFINED = 0.0125, 20_000
 _FIT = 4.0  # of the distance to the surface that the mesher is allowed: how far corners are moved to fit it
 FAR = 5.0  # distance of a mesh from all joints of its body, over its size, that nobody means
 _SIMPLE = ("collision surface", "wrapped collision surface", "equivalent beam")

@@ -69,9 +69,11 @@ def test_the_first_frequencies_are_refined_to_the_wanted_error(helpers, beam, fr
         frequency_estimate(mesh, beam, carrier).squares[0]
         for mesh in (fine, mesh_of(helpers, (12, 2, 2)), mesh_of(helpers, (24, 4, 4)))
     )
-    assert abs(np.sqrt(one / (whole - (half - whole) / 2.2)) - 1.0) < 0.01
+    exact = whole - (half - whole) / 2.2
+    off, left = (abs(np.sqrt(square / exact) - 1.0) for square in (one, fine.quality.stiffness_factor * one))
+    assert off < 0.02 and left < 0.5 * off and left < fine.quality.frequency_error
     kept = refined_for_frequencies(coarse, beam, carrier, Effort(0.02, 0))  # no nodes are allowed
-    assert np.array_equal(kept.tets, coarse.tets)
+    assert np.array_equal(kept.tets, coarse.tets) and kept.quality.stiffness_factor == 1.0
 
 
 def test_more_nodes_are_spent_on_meshes_with_a_poor_estimate():

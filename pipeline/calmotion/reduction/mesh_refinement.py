@@ -67,23 +67,22 @@ class Effort:
         return error <= self.poor or growth * nodes[-1] > self.poor_nodes
 
 
-def refined(mesh: FEMesh, estimate: Callable[[FEMesh], Estimate], effort: Effort, extrapolates: bool = True) -> FEMesh:
+def refined(mesh: FEMesh, estimate: Callable[[FEMesh], Estimate], effort: Effort, far: bool = False) -> FEMesh:
     """The mesh, bisected until its estimated error is small enough; its quality holds the error.
 
     Args:
         mesh: To refine.
         estimate: Estimates the error of a mesh.
         effort: How far.
-        extrapolates: Whether the mesh takes the stiffness that ever finer ones would have, as far as it is known;
-            otherwise only where its error is larger than wanted.
+        far: Whether the stiffness is extrapolated from estimates that are not yet in proportion to the error
+            (`far_extrapolation`), that of the interfaces not at all.
     """
-    meshes, estimates = _bisected(mesh, estimate, effort)
-    excess, error = extrapolation(estimates)
-    if extrapolates:
+    extrapolated = far_extrapolation if far else extrapolation
+    meshes, estimates = _bisected(mesh, estimate, effort, extrapolated)
+    excess, error = extrapolated(estimates)
+    if not far:
         quality = _quality(mesh, estimates[-1], estimates, 1.0 - excess, error)
     else:
-        missed = error > effort.wanted
-        excess, error = far_extrapolation(estimates) if missed else (0.0, min(excess + error, estimates[-1].error))
         quality = replace(
             mesh.quality, frequency_error=0.5 * (error + _of_volume(mesh)), element_error=estimates[-1].error,
             stiffness_factor=1.0 - excess,
@@ -144,16 +143,17 @@ def _quality(mesh: FEMesh, own: Estimate, estimates: Sequence[Estimate], factor:
 
 
 def _bisected(
-    mesh: FEMesh, estimate: Callable[[FEMesh], Estimate], effort: Effort
-) -> tuple[list[FEMesh], list[Estimate]]:
-    """Ever finer meshes from the given one on, and their estimates."""
+    mesh: FEMesh, estimate: Callable[[FEMesh], Estimate], effort: Effort,
+    extrapolated: Callable[[Sequence[Estimate]], tuple[float, float]] = extrapolation,
+) -> tuple[list[FEMesh], list[Estimate]]:  # fmt: skip
+    """Ever finer meshes from the given one on, until what an extrapolation leaves is small enough; their estimates."""
     meshes, estimates = [mesh], [estimate(mesh)]
     # elements do not repair the volume, and far below its error they gain nothing
     by_volume = _of_volume(mesh)
     effort = replace(effort, wanted=max(effort.wanted - by_volume, 0.5 * by_volume, 0.3 * effort.wanted))
     for _ in range(_ROUNDS):
         by_interfaces = interface_factors(estimates[-1], estimates)
-        error = max(extrapolation(estimates)[1], by_interfaces[2] if by_interfaces else 0.0)
+        error = max(extrapolated(estimates)[1], by_interfaces[2] if by_interfaces else 0.0)
         if effort.ends(error, [one.nodes for one in estimates]):
             break
         points, tets = bisected(meshes[-1].points, meshes[-1].tets, _largest(estimates[-1].indicators))
@@ -240,8 +240,8 @@ def refined_for_frequencies(mesh: FEMesh, body: Body, carrier: Frame | None, eff
     """
     estimate = partial(frequency_estimate, body=body, carrier=carrier)
     key = ("for frequencies", mesh, replace(body, surfaces=()), carrier, effort)
-    # the stiffness is that for the loads of the shot, which are not known yet
-    return cached_reduction(key, lambda: refined(mesh, estimate, effort, extrapolates=False))
+    # the estimates of many links are still large with as many nodes; what the loads need is not known yet
+    return cached_reduction(key, lambda: refined(mesh, estimate, effort, far=True))
 
 
 def frequency_estimate(mesh: FEMesh, body: Body, carrier: Frame | None) -> Estimate:

@@ -93,3 +93,8 @@ def test_modes_that_differ_are_less_certain():
     excess, left = far_extrapolation(alike)
     assert excess == pytest.approx(0.2 / 1.2) and left == pytest.approx(0.2 * excess)
     assert far_extrapolation(apart)[1] > 2.0 * left
+    # one factor leaves each mode as far off as it is from the mean of all
+    meshes = [estimate(e, [100.0 * (1.0 + 0.5 * e), 400.0 * (1.0 + 1.5 * e)]) for e in (0.16, 0.12, 0.08)]
+    excess, left = far_extrapolation(meshes)
+    off = np.abs(meshes[-1].squares * (1.0 - excess) / [100.0, 400.0] - 1.0)
+    assert 0.03 < off.max() < left < 2.0 * off.max()

@@ -87,7 +87,7 @@ def far_extrapolation(estimates: Sequence[Estimate]) -> tuple[float, float]:
         ratios, weights = mode_ratios(coarse, fine)
         each = (1.0 / ratios - 1.0) / (coarse.error / fine.error - 1.0)
         excesses.append(float(weights @ each))
-        apart = float(weights @ np.abs(each - excesses[-1]))  # of the modes: there is one factor for all
+        apart = float(np.abs(each - excesses[-1]).max())  # of the modes: there is one factor for all
     if not excesses or excesses[-1] <= 0.0:
         return 0.0, fine.error
     if len(excesses) < 2 or min(excesses) <= 0.0 or max(excesses) > _AGREE * min(excesses):
