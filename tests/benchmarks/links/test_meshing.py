@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 import csv
-from dataclasses import replace
 
 import numpy as np
 import pytest
-from calmotion.benchmarks.links import meshing, survey
+from calmotion.benchmarks.links import meshing
 from calmotion.benchmarks.scenes.links import read_links
-from calmotion.benchmarks.scenes.mesher import mesher
 from calmotion.errors import ShotError
-from odd_jobs import odd_survey
 from small_shots import ELBOW, FORE, LENGTH, UPPER, WIDTH, write_arm
 
 
@@ -84,44 +81,3 @@ def test_a_refined_row_is_named_and_judges_the_automatic_mesh(shot, tmp_path):
 def test_sizes_are_multiples_of_the_automatic_one_or_lengths():
     assert meshing._length("1.4", 0.01) == pytest.approx(0.014)
     assert meshing._length("8mm", 0.01) == pytest.approx(0.008)
-
-
-@pytest.mark.long
-def test_the_survey_has_a_row_for_each_link_and_says_what_became_of_it(shot, tmp_path, capsys, monkeypatch):
-    monkeypatch.setenv("CALMOTION_CACHE", str(tmp_path / "cache"))
-    file = tmp_path / "links.csv"
-    made = tmp_path / "meshing.md"
-    assert meshing.main([f"{shot}:fore", "-o", str(file), "--pictures", "fore", "--page", str(made)]) == 0
-    with open(file, newline="") as text:
-        (row,) = csv.DictReader(text)
-    assert (row["link"], row["source"], row["note"]) == ("fore", "visual surface", "")
-    assert float(row["volume"]) == pytest.approx(1e6 * LENGTH * WIDTH**2, rel=1e-6)
-    assert float(row["of_hull"]) == pytest.approx(1.0) and int(row["off"]) == 0 and int(row["joints"]) >= 1
-    assert float(row["density"]) == pytest.approx(1e6 * float(row["mass"]) / float(row["volume"]))
-    beam = 3.516 / (2.0 * np.pi) * np.sqrt(1.8e9 * WIDTH**2 / 12.0 / 1200.0) / LENGTH**2
-    assert float(row["f1"]) == pytest.approx(beam, rel=0.03)
-    assert int(row["nodes"]) > 100 and float(row["seconds"]) > 0.0 and float(row["estimate"]) < 5.0
-    printed = capsys.readouterr().out
-    assert "1 of 1 links are flexible (100%)" in printed and "| fore | visual surface |" in printed
-    text = made.read_text()
-    assert "1 of 1 links are flexible" in text and "calmotion bench meshing arm.usda --pictures fore" in text
-    assert "![arm, fore](meshing/arm_fore.png)" in text
-    assert (tmp_path / "meshing" / "arm_fore.png").read_bytes()[:4] == b"\x89PNG"
-
-
-def test_a_link_that_is_refused_says_why_and_one_whose_process_ends_too(shot, tmp_path, capsys, monkeypatch):
-    (fore,) = read_links(f"{shot}:fore")
-    whole = fore.body.surfaces[0]
-    flat = replace(fore, body=replace(fore.body, surfaces=(replace(whole, triangles=whole.triangles[:1]),)))
-    row = survey.survey_row(replace(flat, mass=None), "arm", mesher(), 60.0, True)
-    assert row.source == "refused" and "open surface" in row.note and "Close the mesh" in row.note
-    monkeypatch.setattr(meshing, "survey_link", odd_survey)
-    file = tmp_path / "links.csv"
-    assert meshing.main([str(shot), "--geometry-only", "-o", str(file)]) == 0
-    with open(file, newline="") as text:
-        rows = {row["link"]: row for row in csv.DictReader(text)}
-    assert rows["fore"]["source"] == "fault" and "SIGSEGV" in rows["fore"]["note"]
-    assert "Give a TetMesh" in rows["fore"]["note"] and rows["upper"]["source"] == "visual surface"
-    heard = capsys.readouterr()
-    assert "fault: its process ended (signal SIGSEGV)" in heard.err and "min left" in heard.err
-    assert "arm fore: its process ended" in heard.out

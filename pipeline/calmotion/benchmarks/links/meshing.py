@@ -3,7 +3,8 @@
 `calmotion bench meshing ROBOT ... [-o table.md|table.csv]` has a row for each link: what its solid was made of, its
 volume and mass, interface patches, unknowns, processor time, first frequencies, and why it was refused.
 `--geometry-only` ends before the mesh. `FILE:PRIM` names one link. Each link is meshed in a process of its own
-(`--jobs`): where that crashes or hangs, this is the outcome of the link. `--page` writes a page with pictures.
+(`--jobs`): where that crashes or hangs, this is the outcome of the link. `--page` writes a page with pictures. With
+`--resume` links that the CSV file has are not meshed again.
 
 With `--sizes 2 1.4 1 0.7` each link is meshed with elements of several sizes, given in metres with a unit (`8mm`) or as
 multiples of the automatic size; `auto` is the mesh that a shot gets, refined for its first frequencies. Errors of
@@ -15,7 +16,6 @@ each link, how far the automatic mesh is off, and how far the first frequency sp
 
 from __future__ import annotations
 
-import shlex
 import sys
 import time
 from argparse import Namespace
@@ -28,19 +28,15 @@ import numpy as np
 
 from calmotion.benchmarks.common.parsers import bench_parser
 from calmotion.benchmarks.common.tables import markdown, write_rows
-from calmotion.benchmarks.links.survey import LinkRow, faulty_row, same_row, survey_link
-from calmotion.benchmarks.links.tables import done, page, summary, survey_table
+from calmotion.benchmarks.links.robots import file_of, survey_robots
+from calmotion.benchmarks.links.tables import done, summary, survey_table
 from calmotion.benchmarks.scenes.links import Link, attachments_of, frames_of, read_links
 from calmotion.benchmarks.scenes.mesher import mesher
 from calmotion.errors import ShotError
-from calmotion.reduction.cache import cache_key
-from calmotion.support.processes.workers import Fault, results_of
 
 _REFINED = "refined"  # word for a row of it
 _AUTO = "auto"  # word for the automatic mesh among element sizes
 _FINEST = 1e-3  # relative error of the compliance that ends a refinement
-_SAME = 1e-7  # distance of points of links that are the same [m]
-_PATIENCE = 30.0  # of the time limit, that a link may take on a busy machine
 
 
 @dataclass(frozen=True)
@@ -227,13 +223,12 @@ def _cell(value: object) -> str:
     return str(value)
 
 
-def write(rows: Sequence[Any], path: str) -> None:
-    """The rows, of one kind, as CSV or Markdown, by the suffix of the file."""
+def write(rows: Sequence[Row], path: str) -> None:
+    """The rows as CSV or Markdown, by the suffix of the file."""
     if path.lower().endswith(".csv"):
-        write_rows(path, type(rows[0]), rows)
+        write_rows(path, Row, rows)
     else:
-        shown = survey_table(rows) if isinstance(rows[0], LinkRow) else table(rows)
-        Path(path).write_text(shown, encoding="utf-8")
+        Path(path).write_text(table(rows), encoding="utf-8")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -250,8 +245,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--jobs", type=int, default=1, help="links at a time, each in a process of its own")
     parser.add_argument("--pictures", nargs="+", default=[], metavar="LINK", help="draw these links beside the table")
     parser.add_argument("-o", "--output", help="file of the table, .csv or .md; of several rows at any time")
+    parser.add_argument("--resume", action="store_true", help="keep the links that the .csv file of --output has")
     parser.add_argument("--page", help="file of a page with the table and the pictures, .md")
     options = parser.parse_args(arguments)
+    if options.resume and not str(options.output).lower().endswith(".csv"):
+        parser.error("--resume needs --output FILE.csv, with the links that are kept")
 
     def say(text: str) -> None:
         print(text, file=sys.stderr, flush=True)
@@ -259,18 +257,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
     found: list[tuple[Link, str]] = []
     for source in options.links:
         try:
-            found += [(link, Path(_file(source)).stem) for link in read_links(source)]
+            found += [(link, Path(file_of(source)).stem) for link in read_links(source)]
         except ShotError as error:
             say(str(error))
     if options.sizes:
         return _study_all([link for link, _ in found], options, say)
-    rows = _survey_all(found, options, say)
+    rows = survey_robots(found, options, say)
     print(survey_table(rows) + "\n" + summary(rows, options.geometry_only), end="")
     return 0 if done(rows, options.geometry_only) else 1
-
-
-def _file(source: str) -> str:
-    return source.rpartition(":")[0] or source
 
 
 def _study_all(links: Sequence[Link], options: Namespace, say: Callable[[str], None]) -> int:
@@ -285,58 +279,6 @@ def _study_all(links: Sequence[Link], options: Namespace, say: Callable[[str], N
     lines = verdicts(rows)
     print(table(rows) + (f"\n{lines}" if lines else ""), end="")
     return 0 if rows else 1
-
-
-def _survey_all(found: Sequence[tuple[Link, str]], options: Namespace, say: Callable[[str], None]) -> list[LinkRow]:
-    """The rows of all links, written after each: a fault in one link is its own outcome, and loses no other."""
-    folder = Path(options.page or options.output or ".").parent
-    pictures = [
-        str(folder / "meshing" / f"{robot}_{link.name}.png".replace(" ", "_")) if link.name in options.pictures else ""
-        for link, robot in found
-    ]
-    if any(pictures):
-        (folder / "meshing").mkdir(parents=True, exist_ok=True)
-    first = _first_of_its_kind([link for link, _ in found])
-    own = sorted(set(first))
-    work = [(found[k][0], found[k][1], options.time_limit, options.geometry_only, pictures[k]) for k in own]
-    rows: dict[int, LinkRow] = {}
-    start, patience = time.monotonic(), _PATIENCE * options.time_limit + 300.0
-    for done_work, (index, result) in enumerate(results_of(survey_link, work, options.jobs, patience), 1):
-        link, robot = found[own[index]]
-        row = faulty_row(link, robot, result) if isinstance(result, Fault) else result
-        for k, same in enumerate(first):
-            if same == own[index]:
-                rows[k] = row if k == same else same_row(row, found[k][0], found[k][1])
-        left = (time.monotonic() - start) / done_work * (len(work) - done_work)
-        say(f"[{len(rows)}/{len(found)}] {robot} {link.name}: {row.outcome}; about {left / 60.0:.0f} min left")
-        so_far = {k: rows[k] for k in sorted(rows)}
-        if options.output:
-            write(list(so_far.values()), options.output)
-        if options.page:
-            drawn = [(f"{r.robot}, {r.link}", Path(pictures[k])) for k, r in so_far.items() if pictures[k]]
-            shown = [(title, f"meshing/{file.name}") for title, file in drawn if file.exists()]
-            text = page(list(so_far.values()), shown, _command(options))
-            Path(options.page).write_text(text, encoding="utf-8")
-    return [rows[k] for k in sorted(rows)]
-
-
-def _first_of_its_kind(links: Sequence[Link]) -> list[int]:
-    """For each link the index of the first one with the same geometry, joints and mass: links are meshed once."""
-    kinds: dict[str, int] = {}
-    first = []
-    for index, link in enumerate(links):
-        shapes = [(np.round(s.points / _SAME) + 0.0, s.triangles, s.visible) for s in link.body.surfaces]
-        frames = [(np.round(f.position / _SAME) + 0.0, np.round(f.axis, 6) + 0.0) for f in frames_of(link)]
-        masses = None if link.mass is None else float(f"{link.mass.mass:.5g}")
-        first.append(kinds.setdefault(cache_key((shapes, frames, masses, link.body.tets)), index))
-    return first
-
-
-def _command(options: Namespace) -> str:
-    """The command that makes a page, with the robots by their names."""
-    names = " ".join(shlex.quote(Path(_file(source)).name) for source in options.links)
-    pictures = f" --pictures {' '.join(options.pictures)}" if options.pictures else ""
-    return f"calmotion bench meshing {names}{pictures} --page {options.page}"
 
 
 if __name__ == "__main__":
