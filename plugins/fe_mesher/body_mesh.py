@@ -44,7 +44,8 @@ if TYPE_CHECKING:
 _REFINED = 12_000
 # Error that the extrapolation of the frequencies is estimated to leave, 1.1 to 4 times the true one of six real links,
 # from which more nodes are spent
-_POOR, _POOR_REFINED = 0.0125, 20_000
+_POOR, _POOR_REFINED = 0.0125, 22_000
+_LONGER = 1.5  # factor of the element size where a surface has many details: they are refined where it matters
 _FIT = 4.0  # of the distance to the surface that the mesher is allowed: how far corners are moved to fit it
 FAR = 5.0  # distance of a mesh from all joints of its body, over its size, that nobody means
 _SIMPLE = ("collision surface", "wrapped collision surface", "equivalent beam")
@@ -179,7 +180,7 @@ def _meshed(
         mesh = filled(index, body, geometry.solid, geometry.shape, geometry.size, time, options.cache)
         mesh = _judged(_shaped(mesh, body, geometry, geometry.size, attachments), body, carrier)
     else:
-        mesh = _accurate(index, body, geometry, options, carrier, attachments)
+        mesh = accurate(index, body, geometry, element_size(geometry.shape), options, carrier, attachments)
     quality = mesh.quality
     source = geometry.solid.source if isinstance(geometry, Volume) else quality.source
     repairs = (*quality.repairs, *mass_note(body, mesh), *makeup_note(body, mesh))
@@ -272,16 +273,23 @@ def _shaped(mesh: FEMesh, body: Body, volume: Volume, size: float, attachments: 
     return shaped(mesh, body, Surface(solid.points, solid.triangles, solid.volume, limit), attachments)
 
 
-def _accurate(
-    index: int, body: Body, volume: Volume, options: MeshOptions, carrier: Frame | None,
+def accurate(
+    index: int, body: Body, volume: Volume, size: float, options: MeshOptions, carrier: Frame | None,
     attachments: Sequence[AttachmentFrame],
 ) -> FEMesh:  # fmt: skip
-    """Tetrahedra fine enough for the first frequencies; where the shot needs more, they are refined for its loads."""
+    """Tetrahedra fine enough for the first frequencies; where the shot needs more, they are refined for its loads.
+
+    Args:
+        index, body, options, attachments: As of `mesh_of`.
+        volume: To fill.
+        size: Of the elements before they are refined [m].
+        carrier: Frame of the joint to the parent, body frame.
+    """
     from calmotion.reduction.mesh_refinement import Effort, refined_for_frequencies
 
-    solid, shape, size = volume.solid, volume.shape, element_size(volume.shape)
+    solid, shape = volume.solid, volume.shape
     time = ProcessorTime(options.time_limit)
-    mesh = filled(index, body, solid, shape, size, time, options.cache)
+    mesh = filled(index, body, solid, shape, size, time, options.cache, _LONGER)
     mesh = _shaped(mesh, body, volume, size, attachments)
     mesh = refined_for_frequencies(mesh, body, carrier, Effort(2.0 * ENOUGH, _REFINED, 2.0 * _POOR, _POOR_REFINED))
     repairs = (*mesh.quality.repairs, *remark(mesh.quality))

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
 from calmotion.accuracy.element_size import Shape, envelope, expected_nodes, smallest_size
 from calmotion.errors import ShotError
 from calmotion.geometry.closed_surfaces import enclosed_volume
-from calmotion.geometry.grids.boundary_fit import fitted
-from calmotion.geometry.grids.grid_tets import GRID, grid_tets
+from calmotion.geometry.decimation import decimated
 from calmotion.geometry.tetrahedra import (
     connected_parts,
     largest_part,
@@ -20,49 +20,57 @@ from calmotion.geometry.tetrahedra import (
 )
 from calmotion.shot import Body, FEMesh
 
+from .gridded import gridded
 from .repair import Solid, simplified
-from .tetwild import MORE_TIME, REMEDY, OutOfTime, ProcessorTime, tetrahedralize
+from .tetwild import MORE_TIME, OutOfTime, ProcessorTime, tetrahedralize
 
 # Wanted and largest allowed error. An error of half a percent of volume in thin walls is larger than that in a
 # frequency. Where a better mesh would take too long, a larger error is accepted and reported.
 _GOOD_VOLUME, MAX_VOLUME_ERROR, _ACCEPTED = 0.005, 0.01, 0.05
-# Detail that is removed, of the envelope, which the mesh does not resolve; more of it on dense surfaces, until they
-# have few enough triangles: fTetWild takes 1.5 ms for each.
-_DETAIL, _DENSE_DETAILS, DENSE, _MANY = 0.1, (0.5, 1.0), 2_500, 8_000
+# Detail that is removed, of the envelope, which the mesh does not resolve; more of it from surfaces that are dense
+# still: fTetWild takes some 2 ms for each triangle, and many times as much where the envelope is narrow.
+_DETAIL, _DENSE_DETAIL, DENSE = 0.1, 0.5, 2_500
+# What is more detailed gets as many triangles, and a wider envelope: of that which others have, and of the thickness of
+# walls. The boundary of the mesh is fitted to the surface afterwards.
+_TRIANGLES, _WIDER, _OF_WALL = 3_000, 4.0, 0.4
 _ATTEMPTS = 3
 # Share of the time for the first mesh: what is left is for a coarser one, or that of a grid, which is made in seconds
-_FIRST, _FIRST_DENSE = 0.6, 0.2
+_FIRST, _FIRST_DENSE = 0.6, 0.3
 _COARSER = 1.6  # factor of size and envelope of a mesh that took too long
-_SOON = 1 / 3  # share of the time that a surface with many details may take
-_TRIANGLE = 2.5e-3  # least processor time for a triangle of a surface with many details [s]
-_COARSEST = 0.3  # largest error of the volume of a mesh of a grid, which is reported
+# Largest error of the volume of a grid for a dense surface, which is reported: where it loses more, so many walls have
+# gaps that its frequencies tell nothing (a link of the G1 that lost 29% was five times too stiff)
+_COARSEST = 0.1
 _LOOSE = 0.05  # of the volume: parts that a thin connection, which the mesh did not follow, held
 
-# Largest number of nodes of ten-node tetrahedra: twice as many where walls are
-# thin, for some ten seconds (with 16,000, links took 21 to 34 s and were no more exact); walls that are thinner than
-# the spacing have gaps. A longer limit of time allows more.
-_GRID_NODES, _GRID_TIME = 10_000, 60.0
-_GRID_WALL = 0.8  # of the thinner walls: spacing with which they have none
-# Factor of the spacing while the volume error is larger than that; largest way of a corner to the surface
-_FINER, _NEAR_VOLUME, _MOVED = 0.8, 0.02, 0.5
 
-
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _Attempt:
-    """Size of the elements and distance to the surface of a mesh [m]."""
+    """The surface that is meshed, and how.
 
+    Attributes:
+        points: [m], shape [n, 3].
+        triangles: Shape [m, 3].
+        size: Of the elements [m].
+        distance: Of the mesh to the surface [m].
+        detailed: Whether the surface has less detail than such a mesh could resolve.
+    """
+
+    points: np.ndarray
+    triangles: np.ndarray
     size: float
     distance: float
+    detailed: bool = False
 
 
 def filled(
-    index: int, body: Body, solid: Solid, shape: Shape, size: float, time: ProcessorTime, use_cache: bool = True
-) -> FEMesh:
+    index: int, body: Body, solid: Solid, shape: Shape, size: float, time: ProcessorTime, use_cache: bool = True,
+    longer: float = 1.0,
+) -> FEMesh:  # fmt: skip
     """Tetrahedra of uniform size that fill a solid.
 
-    A mesh that takes, or would take, most of the time is replaced by one of a regular grid. A mesh with an error of its
-    volume is followed by one that is closer to the surface as long as there is time; the best one counts, with its
-    error.
+    A surface with many details is simplified. A mesh that takes most of the time is replaced by one of a regular grid.
+    A mesh with an error of its volume is followed by one that is closer to the surface as long as there is time; the
+    best one counts, with its error.
 
     Args:
         index: Of the body in its character.
@@ -72,6 +80,7 @@ def filled(
         size: Edge length [m].
         time: Processor time of the body.
         use_cache: Whether the cache folder is used.
+        longer: Factor of the edge length on a surface with many details.
 
     Raises:
         OutOfTime: It cannot be meshed in time, not even on a grid.
@@ -82,25 +91,35 @@ def filled(
     best: FEMesh | None = None
     notes: tuple[str, ...] = ()
     begun, dense = time.used, len(solid.triangles) > DENSE
-    diagonal = float(np.linalg.norm(np.ptp(solid.points, axis=0)))
     for number in range(_ATTEMPTS):
-        attempt = _Attempt(size, envelope(size, diagonal, shape.thickness, len(solid.triangles), number))
+        attempt = _attempt(solid, shape, size, number, longer)
+        if best is not None and attempt.detailed:
+            break
         try:
-            share = _FIRST_DENSE if dense else _FIRST
-            points, tets = _meshed(solid, attempt, body.path, time, share, use_cache)
+            points, tets = _meshed(attempt, body.path, time, _FIRST_DENSE if dense else _FIRST, use_cache)
         except OutOfTime as reason:
             if best is not None:
                 break
-            gridded = _on_grid(index, body, solid, shape, size, reason, time)
-            if gridded is not None:
-                return gridded
-            if dense:  # as hopeless
-                raise
-            # as far from the surface as one of many triangles is followed
-            wide = envelope(_COARSER * size, diagonal, shape.thickness, DENSE, 0)
-            coarser = _Attempt(_COARSER * attempt.size, max(_COARSER * attempt.distance, wide))
-            points, tets = _meshed(solid, coarser, body.path, time, 1.0, use_cache)
-            notes = (f"meshed with elements {_COARSER:g} times as large, since smaller ones took too long",)
+            made = None
+            if dense and not attempt.detailed:
+                attempt = _detailed(solid, shape, size, longer, len(attempt.triangles) // 2)
+                with suppress(OutOfTime):
+                    made = _meshed(attempt, body.path, time, 0.5, use_cache)
+            if made is None:
+                lost = _COARSEST if dense or time.used >= time.limit else _ACCEPTED
+                found = gridded(index, body, solid, shape, size, reason, time, lost)
+                if found is not None:
+                    return found
+                if dense:  # as hopeless
+                    raise
+                made = _meshed(_coarser(solid, shape, attempt), body.path, time, 1.0, use_cache)
+                notes = (f"meshed with elements {_COARSER:g} times as large, since smaller ones took too long",)
+            points, tets = made
+        if attempt.detailed:
+            notes = (
+                f"simplified to {len(attempt.triangles)} triangles, since all {len(solid.triangles)} would take too "
+                f"long: details of less than {1e3 * attempt.distance:.2g} mm are missing",
+            )
         quality = measure_quality(points, tets, surface_volume=solid.volume, repairs=(*solid.repairs, *notes))
         volumes.append(quality.volume)
         if best is None or quality.volume_error < best.quality.volume_error:
@@ -108,66 +127,73 @@ def filled(
         # a mesh that is closer to the surface takes about twice as long
         late = time.used - begun > 0.25 * time.limit and best.quality.volume_error <= _ACCEPTED
         enough = MAX_VOLUME_ERROR if number or dense else _GOOD_VOLUME
-        if best.quality.volume_error <= enough or notes or late:
+        if best.quality.volume_error <= enough or notes or late or attempt.detailed:
             break
         size *= 0.8 if best.quality.volume_error > MAX_VOLUME_ERROR else 1.0
     assert best is not None
     try:
         accepted = _accepted(best, solid, volumes, body.path)
     except ShotError as error:
-        gridded = _on_grid(index, body, solid, shape, size, error, time)
-        if gridded is None:
+        found = gridded(index, body, solid, shape, size, error, time, _COARSEST if dense else _ACCEPTED)
+        if found is None:
             raise
-        return gridded
+        return found
     return _whole(accepted, body.path)
 
 
+def _attempt(solid: Solid, shape: Shape, size: float, number: int, longer: float) -> _Attempt:
+    """The surface of a solid without the detail that a mesh does not resolve, and how close a mesh comes to it.
+
+    Args:
+        number: 0 first; further ones come closer.
+        solid, shape, size, longer: As of `filled`.
+    """
+    distance = envelope(size, _diagonal(solid), shape.thickness, len(solid.triangles), number)
+    points, triangles = simplified(solid, _DETAIL * distance)
+    if len(triangles) > DENSE:
+        points, triangles = decimated(points, triangles, DENSE, _DENSE_DETAIL * distance)
+    if len(triangles) > DENSE:
+        return _detailed(solid, shape, size, longer, _TRIANGLES)
+    return _Attempt(points, triangles, (longer if len(solid.triangles) > DENSE else 1.0) * size, distance)
+
+
+def _detailed(solid: Solid, shape: Shape, size: float, longer: float, count: int) -> _Attempt:
+    """That of a surface whose details would take too long, with a number of triangles; the others as of `filled`."""
+    narrow = envelope(size, _diagonal(solid), shape.thickness, len(solid.triangles), 0)
+    distance = max(min(_WIDER * narrow, _OF_WALL * shape.thickness), narrow)
+    points, triangles = decimated(*simplified(solid, _DETAIL * narrow), count, distance)
+    return _Attempt(points, triangles, longer * size, distance, detailed=True)
+
+
+def _coarser(solid: Solid, shape: Shape, attempt: _Attempt) -> _Attempt:
+    """That of a mesh that took too long, as far from the surface as one of many triangles is followed."""
+    size = _COARSER * attempt.size
+    distance = max(_COARSER * attempt.distance, envelope(size, _diagonal(solid), shape.thickness, DENSE, 0))
+    points, triangles = simplified(solid, _DETAIL * distance)
+    return _Attempt(points, triangles, size, distance)
+
+
+def _diagonal(solid: Solid) -> float:
+    return float(np.linalg.norm(np.ptp(solid.points, axis=0)))
+
+
 def _meshed(
-    solid: Solid, attempt: _Attempt, path: str, time: ProcessorTime, share: float, use_cache: bool
+    attempt: _Attempt, path: str, time: ProcessorTime, share: float, use_cache: bool
 ) -> tuple[np.ndarray, np.ndarray]:
     """Tetrahedra that take no more than a share of what is left of the time."""
-    diagonal = float(np.linalg.norm(np.ptp(solid.points, axis=0)))
-    points, triangles = _simplified(solid, attempt.distance)
     part = time.part(share)
-    if len(triangles) > _MANY and _TRIANGLE * len(triangles) > _SOON * time.limit:
-        raise OutOfTime(
-            "tetrahedralising would exceed the limit of processor time", path=path,
-            found=f"{len(triangles)} triangles, {time.limit:g} s", remedy=REMEDY + MORE_TIME.format(4.0 * time.limit),
-        )  # fmt: skip
+    # fTetWild measures distances by the diagonal of what it is given
+    diagonal = float(np.linalg.norm(np.ptp(attempt.points, axis=0)))
     try:
         made, tets = tetrahedralize(
-            points, triangles, attempt.size, attempt.distance / diagonal, path, part, use_cache
-        )  # fmt: skip
+            attempt.points, attempt.triangles, attempt.size, attempt.distance / diagonal, path, part, use_cache
+        )
     except OutOfTime:
         time.used = part.limit
         raise
     time.used = part.used
     tets, _ = oriented_tets(made, tets, path)
     return without_unused_points(made, tets)
-
-
-def _on_grid(
-    index: int, body: Body, solid: Solid, shape: Shape, size: float, reason: ShotError, time: ProcessorTime
-) -> FEMesh | None:  # fmt: skip
-    """The tetrahedra of a grid, for a reason; None where it does not resolve thin walls."""
-    nodes = int(_GRID_NODES * max(time.limit / _GRID_TIME, 1.0))
-    mesh = on_grid(index, body, solid, shape, size, nodes)
-    dense = len(solid.triangles) > DENSE or time.used >= time.limit
-    if mesh is None or mesh.quality.volume_error > (_COARSEST if dense else _ACCEPTED):
-        return None
-    followed = expected_nodes(shape, size) <= nodes
-    note = grid_note(mesh, f"{reason.problem} ({reason.found})", followed)
-    return replace(mesh, quality=replace(mesh.quality, repairs=(*mesh.quality.repairs, note)))
-
-
-def _simplified(solid: Solid, distance: float) -> tuple[np.ndarray, np.ndarray]:
-    """The surface without detail that a mesh at a distance does not resolve."""
-    surface = solid.points, solid.triangles
-    for detail in (_DETAIL,) if len(solid.triangles) <= DENSE else _DENSE_DETAILS:
-        surface = simplified(solid, detail * distance)
-        if len(surface[1]) <= _MANY:
-            break
-    return surface
 
 
 def _accepted(mesh: FEMesh, solid: Solid, volumes: list[float], path: str) -> FEMesh:
@@ -196,9 +222,9 @@ def _accepted(mesh: FEMesh, solid: Solid, volumes: list[float], path: str) -> FE
 
 def _whole(mesh: FEMesh, path: str) -> FEMesh:
     """The mesh without small parts that a connection thinner than the distance to the surface held."""
-    if connected_parts(mesh.tets) == 1:
-        return mesh
     kept = largest_part(mesh.points, mesh.tets)
+    if len(kept) == len(mesh.tets):
+        return mesh
     volume = float(tet_volumes(mesh.points, kept).sum())
     lost = 1.0 - volume / mesh.quality.volume
     if lost > _LOOSE:
@@ -227,43 +253,3 @@ def refuse_loose_parts(tets: np.ndarray, path: str) -> None:
             "its tetrahedra are not connected", path=path, found=f"{count} separate parts",
             remedy="Make the parts overlap or touch, or split them into several bodies",
         )  # fmt: skip
-
-
-def on_grid(index: int, body: Body, solid: Solid, shape: Shape, size: float, nodes: int) -> FEMesh | None:
-    """A mesh of a grid, as close to a solid as a number of nodes allows; None where no grid is fine enough for any.
-
-    Args:
-        index: Of the body in its character.
-        body: For the path in messages.
-        solid: Closed.
-        shape: Of the solid.
-        size: Wanted edge length of the elements [m].
-        nodes: Of ten-node tetrahedra at most, on walls that are not thin.
-    """
-    least = smallest_size(shape, nodes) / GRID
-    spacing = max(min(size / GRID, _GRID_WALL * shape.thickness), least)
-    best: FEMesh | None = None
-    while True:
-        try:
-            points, tets = grid_tets(solid.points, solid.triangles, spacing)
-            points = fitted(points, tets, solid.points, solid.triangles, _MOVED * spacing)  # with its edges
-        except ValueError:
-            pass
-        else:
-            quality = measure_quality(points, tets, surface_volume=solid.volume, repairs=solid.repairs)
-            if best is None or quality.volume_error < best.quality.volume_error:
-                best = FEMesh(index, points, tets, quality)
-        if spacing <= least or (best is not None and best.quality.volume_error <= _NEAR_VOLUME):
-            return best
-        spacing = max(_FINER * spacing, least)
-
-
-def grid_note(mesh: FEMesh, reason: str, followed: bool) -> str:
-    """Message about a mesh of a grid; `followed`: whether elements of the wanted size were possible."""
-    edges = mesh.points[mesh.tets[:, [0, 0, 0, 1, 1, 2]]] - mesh.points[mesh.tets[:, [1, 2, 3, 2, 3, 3]]]
-    length = float(np.median(np.linalg.norm(edges, axis=2)))
-    finer = "; author a smaller calm:flexible:elementSize to follow more" if followed else ""
-    return (
-        f"meshed on a grid with elements of {1e3 * length:.2g} mm, since {reason}: details and walls that are thinner "
-        f"are missing, {100.0 * mesh.quality.volume_error:.2g}% of its volume{finer}"
-    )

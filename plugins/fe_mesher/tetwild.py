@@ -25,7 +25,7 @@ MORE_TIME = ", or allow more with --set fe.mesh.time_limit={:.0f}"
 _TRIES = 3  # attempts at a mesh without flat elements
 # Number of passes that improve the elements, and the energy of the worst element at which they end. On dense surfaces
 # more passes hardly improve the smallest angles and take most of the time.
-_NORMAL, _QUICK, _DENSE = (80, 10.0), (5, 30.0), 6_000
+_NORMAL, _QUICK, _DENSE = (80, 10.0), (5, 30.0), 2_000
 # A process that takes no processor time, such as one that is blocked, ends after this many times its limit.
 _PATIENCE = 100.0
 # Processor time of a node [s]: a quarter of that measured with 4,000 to 130,000 nodes, for faster machines

@@ -45,6 +45,11 @@ def test_the_largest_part_is_that_of_the_largest_volume(helpers):
     more, smaller = helpers.box((3, 3, 3), (0.9, 0.9, 0.9))
     both = np.vstack([more, points + 5.0]), np.vstack([smaller, tets + len(more)])
     assert np.array_equal(t.largest_part(*both), tets + len(more))
+    joined, welded, _ = t.welded_tets(
+        np.vstack([points, points + [1.0, 1.0, 0.0]]), np.vstack([tets, tets + len(points)]), 1e-9
+    )
+    assert t.connected_parts(welded) == 1  # by an edge, which is a hinge
+    assert len(t.largest_part(joined, welded)) == len(tets)
 
 
 def test_points_in_one_place_become_one(helpers):

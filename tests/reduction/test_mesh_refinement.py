@@ -78,11 +78,11 @@ def test_the_first_frequencies_are_refined_to_the_wanted_error(helpers, beam, fr
 
 def test_more_nodes_are_spent_on_meshes_with_a_poor_estimate():
     effort = Effort(0.02, 12_000, 0.08, 20_000)
-    assert effort.ends(0.01, [500]) and not effort.ends(0.03, [500])
-    assert effort.ends(0.07, [8_000]) and not effort.ends(0.09, [8_000])  # poor: one more, of some 13,600 nodes
-    assert effort.ends(0.09, [12_000])
-    assert not effort.ends(0.09, [10_000, 12_000]) and effort.ends(0.09, [10_000, 15_000])  # grown as before
-    assert Effort(0.02, 12_000).ends(0.5, [8_000])
+    assert effort.ends(0.01, 500) and not effort.ends(0.03, 500)
+    assert effort.ends(0.07, 8_000) and not effort.ends(0.09, 8_000)
+    assert effort.allows(8_000, 19_000) and not effort.allows(8_000, 21_000)
+    assert effort.allows(7_000, 21_000)  # few as they are, whatever one bisection makes of them
+    assert not Effort(0.02, 12_000).allows(8_000, 8_100)
 
 
 def test_local_refinement_needs_fewer_nodes_than_a_uniform_one(helpers, beam, frames):

@@ -189,8 +189,16 @@ def connected_parts(tets: IntArray) -> int:
 
 
 def largest_part(points: Array, tets: IntArray) -> IntArray:
-    """The tetrahedra of the part with the largest volume; parts share no point."""
-    part = _parts(tets)
+    """The tetrahedra of the part with the largest volume; parts share no side: what hangs at an edge is a hinge."""
+    from scipy.sparse import coo_matrix
+    from scipy.sparse.csgraph import connected_components
+
+    sides = np.sort(tets[:, [[1, 2, 3], [0, 2, 3], [0, 1, 3], [0, 1, 2]]].reshape(-1, 3), axis=1)
+    side = np.unique(sides, axis=0, return_inverse=True)[1].ravel()
+    owner, order = np.repeat(np.arange(len(tets)), 4), np.argsort(side, kind="stable")
+    twice = np.flatnonzero(side[order][1:] == side[order][:-1])
+    graph = coo_matrix((np.ones(len(twice)), (owner[order][twice], owner[order][twice + 1])), shape=(len(tets),) * 2)
+    part = connected_components(graph, directed=False)[1]
     volumes = np.bincount(part, np.abs(tet_volumes(points, tets)))
     return np.asarray(tets[part == volumes.argmax()])
 

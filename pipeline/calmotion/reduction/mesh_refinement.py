@@ -17,7 +17,7 @@ from calmotion.errors import ShotError
 from calmotion.geometry.tetrahedra import min_dihedral_deg
 from calmotion.reduction.cache import cached_reduction
 from calmotion.reduction.discretization_error import clamped_modes, element_errors, errors_and_form
-from calmotion.reduction.elements.assembly import QuadraticMesh, assemble
+from calmotion.reduction.elements.assembly import QuadraticMesh, assemble, quadratic_nodes
 from calmotion.reduction.elements.bisection import bisected
 from calmotion.reduction.full_order.mesh_extrapolation import (
     Estimate,
@@ -37,7 +37,6 @@ from calmotion.shot.meshes import CutPatch, FEMesh, MeshQuality
 MARKED = 0.8  # share of the error in the elements that are bisected: halves the error with 1.7 times the nodes
 _MODES, _COUNT = 12, 3  # modes of a load estimate; frequencies that a motion excites
 _ROUNDS = 12
-_GROWTH = 1.7  # of the nodes by one bisection of all that is marked, before it is known
 _KEPT = 0.005  # of their own error, what elements leave with the statics of finer ones: they have their own mass
 _FEW = 6_000  # nodes of elements on which a nonlinear body is reduced within a minute
 
@@ -58,13 +57,16 @@ class Effort:
     poor: float = np.inf
     poor_nodes: int = 0
 
-    def ends(self, error: float, nodes: Sequence[int]) -> bool:
-        """Whether ever finer meshes with these numbers of nodes, the last with an error, are enough."""
-        # the next bisection may exceed the limit by its factor
-        if error <= self.wanted or nodes[-1] <= 0.6 * self.max_nodes:
-            return error <= self.wanted
-        growth = nodes[-1] / nodes[-2] if len(nodes) > 1 else _GROWTH
-        return error <= self.poor or growth * nodes[-1] > self.poor_nodes
+    def ends(self, error: float, nodes: int) -> bool:
+        """Whether a mesh with an error is enough."""
+        return error <= self.wanted or (not self._few(nodes) and error <= self.poor)
+
+    def allows(self, nodes: int, finer: int) -> bool:
+        """Whether a mesh may be followed by one with so many nodes."""
+        return self._few(nodes) or finer <= self.poor_nodes
+
+    def _few(self, nodes: int) -> bool:
+        return nodes <= 0.6 * self.max_nodes  # the next bisection may exceed the limit by its factor
 
 
 def refined(mesh: FEMesh, estimate: Callable[[FEMesh], Estimate], effort: Effort, far: bool = False) -> FEMesh:
@@ -154,9 +156,11 @@ def _bisected(
     for _ in range(_ROUNDS):
         by_interfaces = interface_factors(estimates[-1], estimates)
         error = max(extrapolated(estimates)[1], by_interfaces[2] if by_interfaces else 0.0)
-        if effort.ends(error, [one.nodes for one in estimates]):
+        if effort.ends(error, estimates[-1].nodes):
             break
         points, tets = bisected(meshes[-1].points, meshes[-1].tets, _largest(estimates[-1].indicators))
+        if not effort.allows(estimates[-1].nodes, quadratic_nodes(points, tets)):
+            break
         meshes.append(replace(mesh, points=points, tets=tets))
         estimates.append(estimate(meshes[-1]))
     return meshes, estimates

@@ -24,15 +24,39 @@ def test_a_mesh_that_takes_too_long_is_made_on_a_grid(host, package, monkeypatch
     assert mesh.quality.volume == pytest.approx(8e-5, rel=3e-2) and mesh.quality.frequency_error > 0.0
 
 
-@pytest.mark.long
-def test_a_surface_of_too_many_triangles_is_meshed_on_a_grid_at_once(host, package, monkeypatch):
-    filling = package("filling")
-    monkeypatch.setattr(filling, "_MANY", 100)
-    monkeypatch.setattr(filling, "DENSE", 100)
-    monkeypatch.setattr(filling, "_TRIANGLE", 1.0)
-    ball = trimesh.creation.icosphere(subdivisions=3, radius=0.03)
+def rough_box():
+    """A box whose faces are covered with bumps of half a millimetre."""
+    rough = trimesh.creation.box((0.2, 0.02, 0.02))
+    for _ in range(5):
+        rough = rough.subdivide()
+    waves = np.sin(2.0 * np.pi * rough.vertices @ [[300.0, 410.0, 0.0], [350.0, 0.0, 420.0], [0.0, 380.0, 330.0]])
+    rough.vertices += 5e-4 * waves.prod(axis=1)[:, None] * rough.vertex_normals
+    return rough
+
+
+def test_a_surface_of_too_many_details_is_simplified(host, package):
+    rough = rough_box()
+    (mesh,) = run(host, link(surface(rough)))
+    (note,) = (text for text in mesh.quality.repairs if "simplified to" in text)
+    assert f"all {len(rough.faces)} would take too long" in note and "are missing" in note
+    assert not any("on a grid" in text for text in mesh.quality.repairs)
+    assert mesh.quality.volume == pytest.approx(float(rough.volume), rel=1e-2)
+
+
+def test_details_are_left_out_where_following_them_takes_too_long(host, package, monkeypatch):
+    filling, mesh_of, tried = package("filling"), package("filling").tetrahedralize, []
+
+    def slow(points, triangles, size, *rest):
+        tried.append((len(triangles), size))
+        if len(tried) == 1:
+            raise package("tetwild").OutOfTime("took too long", path="/x")
+        return mesh_of(points, triangles, size, *rest)
+
+    monkeypatch.setattr(filling, "tetrahedralize", slow)
+    ball = trimesh.creation.icosphere(subdivisions=4, radius=0.03)
     (mesh,) = run(host, link(surface(ball)))
-    assert any("would exceed the limit" in text for text in mesh.quality.repairs)
+    assert len(tried) == 2 and tried[1][0] < tried[0][0]
+    assert any("simplified to" in text for text in mesh.quality.repairs)
     assert mesh.quality.volume == pytest.approx(float(ball.volume), rel=1e-2)
 
 
@@ -41,7 +65,7 @@ def test_a_solid_that_a_grid_does_not_resolve_is_refused_with_the_reason(host, p
         raise package("tetwild").OutOfTime("took too long", path=path)
 
     monkeypatch.setattr(package("filling"), "tetrahedralize", stuck)
-    monkeypatch.setattr(package("filling"), "on_grid", lambda *given: None)
+    monkeypatch.setattr(package("gridded"), "on_grid", lambda *given: None)
     with pytest.raises(ShotError, match="too long"):
         run(host, link(surface(box())))
 

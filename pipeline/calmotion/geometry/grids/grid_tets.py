@@ -13,7 +13,7 @@ from __future__ import annotations
 import numpy as np
 
 from calmotion.geometry.nearby_triangles import NearbyTriangles
-from calmotion.geometry.tetrahedra import Indices, tet_volumes, without_unused_points
+from calmotion.geometry.tetrahedra import Indices, largest_part, tet_volumes, without_unused_points
 from calmotion.shot.character import Array, BoolArray, IntArray
 from calmotion.support.compilation import kernel
 
@@ -117,22 +117,10 @@ def _cut(at: Array, depth: Array, tets: IntArray) -> tuple[Array, IntArray]:
 
 
 def _in_one_piece(points: Array, tets: IntArray) -> tuple[Array, IntArray]:
-    """The largest part of tetrahedra that are connected by sides: what hangs at an edge would be a hinge."""
-    from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import connected_components
-
-    sides = np.sort(tets[:, [[1, 2, 3], [0, 2, 3], [0, 1, 3], [0, 1, 2]]].reshape(-1, 3), axis=1)
-    _, side = np.unique(sides, axis=0, return_inverse=True)
-    owner = np.repeat(np.arange(len(tets)), 4)
-    order = np.argsort(side, kind="stable")
-    twice = np.flatnonzero(side[order][1:] == side[order][:-1])
-    a, b = owner[order][twice], owner[order][twice + 1]
-    graph = coo_matrix((np.ones(len(a)), (a, b)), shape=(len(tets), len(tets)))
-    label = connected_components(graph, directed=False)[1]
-    volume = tet_volumes(points, tets)
-    kept = label == np.bincount(label, np.abs(volume)).argmax()
-    tets, volume = tets[kept], volume[kept]
-    tets[volume < 0.0] = tets[volume < 0.0][:, [1, 0, 2, 3]]
+    """The largest part of the tetrahedra, with positive volumes."""
+    tets = largest_part(points, tets)
+    inverted = tet_volumes(points, tets) < 0.0
+    tets[inverted] = tets[inverted][:, [1, 0, 2, 3]]
     return without_unused_points(points, tets)
 
 

@@ -82,6 +82,12 @@ def quadratic_mesh(points: Array, tets: IntArray) -> QuadraticMesh:
     )
 
 
+def quadratic_nodes(points: Array, tets: IntArray) -> int:
+    """Number of nodes of the ten-node tetrahedra: corners and midpoints of edges."""
+    ends = np.sort(tets[:, [0, 0, 0, 1, 1, 2, 1, 2, 3, 2, 3, 3]].reshape(-1, 2, 6), axis=1).astype(np.int64)
+    return len(points) + len(np.unique(ends[:, 0] * len(points) + ends[:, 1]))
+
+
 def assemble_mass(mesh: QuadraticMesh, density: float) -> Any:
     """Scalar consistent mass matrix [kg], CSR, shape [n, n]; density (of the body's material) in kg/m^3."""
     from skfem.models.poisson import mass

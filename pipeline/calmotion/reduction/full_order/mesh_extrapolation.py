@@ -21,7 +21,7 @@ _LEAST = 0.1  # of the estimate of the finer mesh: the least error that is claim
 _STIFFEST = 0.05  # excess of the stiffness of an interface in any direction that is extrapolated
 _ASYMPTOTIC = 0.05  # largest estimate that is in proportion to the error
 # Largest estimate from which one comparison is used, and the error that it leaves, of what was extrapolated
-_NEARLY, _ALONE = 0.15, 1.0
+_NEARLY, _ALONE = 0.25, 1.0
 _AGREE = 1.6  # ratio of two extrapolations from large estimates that are used
 
 

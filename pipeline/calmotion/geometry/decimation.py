@@ -1,0 +1,198 @@
+"""A closed surface with fewer triangles, which stays as close as it can to what it was.
+
+CAD surfaces of printed parts and motors have tens of thousands of triangles, most of them in fillets, threads and
+letters. Edges are collapsed, the cheapest first, into the point that is closest to the planes of all triangles that
+have been merged there: flat walls keep their thickness, edges and corners their place.
+
+Source: Garland and Heckbert 1997, Surface Simplification Using Quadric Error Metrics; the link condition of Dey,
+Edelsbrunner, Guha and Nekhayev 1999 keeps the surface closed.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from calmotion.geometry.tetrahedra import Indices
+from calmotion.shot.character import Array, BoolArray
+
+_PASSES = 200
+_CHEAPEST = 0.5  # share of the edges among which those of a pass are
+_SHORT = 1e-6  # of the length of an edge: what it counts beside its distance, for edges in planes
+_AHEAD = 1e-3  # of the trace of a quadric: how firmly the point stays at the middle where planes do not determine it
+_TURNED = 0.2  # least cosine of the angle by which a triangle turns
+_SLIVER = 2e-3  # least ratio of the height of a triangle to its longest side, unless it was as bad before
+
+
+@dataclass(eq=False)
+class _Surface:
+    """A surface that is being decimated.
+
+    Attributes:
+        points: Shape [n, 3].
+        triangles: Shape [m, 3].
+        normal, offset, weight: The quadric of each point, sum of w (n.x)^2 over its planes: their sum of w n n^T, of
+            w d n and of w d^2, with d = -n.x of the plane, and of w; shapes [n, 3, 3], [n, 3] and [n, 2].
+    """
+
+    points: Array
+    triangles: Indices
+    normal: Array
+    offset: Array
+    weight: Array
+
+
+def decimated(points: Array, triangles: Indices, count: int, distance: float) -> tuple[Array, Indices]:
+    """Points [m], shape [k, 3], and triangles, shape [l, 3], of a coarser surface.
+
+    Args:
+        points: [m], shape [n, 3].
+        triangles: Shape [m, 3], closed; edges of more than two triangles stay as they are.
+        count: Number of triangles that is wanted.
+        distance: From the planes of the triangles that are merged in a point, root mean square [m]: no point is merged
+            farther away, however many triangles are left.
+    """
+    low, high = points.min(axis=0), points.max(axis=0)
+    center, scale = 0.5 * (low + high), float(np.linalg.norm(high - low))
+    surface = _with_quadrics((points - center) / scale, np.asarray(triangles, np.int32))
+    none = np.zeros(0, np.int64)
+    refused, collapsed = none, True
+    for _ in range(_PASSES):
+        excess = (len(surface.triangles) - count + 1) // 2
+        if excess <= 0:
+            break
+        edges, places, costs = _candidates(surface, distance / scale, refused)
+        if not len(edges):
+            if not collapsed:
+                break
+            refused, collapsed = none, False  # what was refused may do where others have been collapsed
+            continue
+        chosen = _apart(surface.triangles, edges, np.argsort(np.argsort(costs, kind="stable")), len(surface.points))
+        chosen = chosen[np.argsort(costs[chosen], kind="stable")][:excess]
+        good = _keeps_triangles(surface, edges[chosen], places[chosen])
+        refused = np.union1d(refused, _keys(edges[chosen[~good]], len(surface.points)))
+        _collapse(surface, edges[chosen[good]], places[chosen[good]])
+        collapsed |= bool(good.any())
+    used, number = np.unique(surface.triangles, return_inverse=True)
+    return surface.points[used] * scale + center, number.reshape(-1, 3).astype(np.int32)
+
+
+def _with_quadrics(points: Array, triangles: Indices) -> _Surface:
+    x = points[triangles]
+    n = np.cross(x[:, 1] - x[:, 0], x[:, 2] - x[:, 0])
+    area = np.linalg.norm(n, axis=1)
+    n /= np.maximum(area, np.finfo(float).tiny)[:, None]
+    d = -np.einsum("tx,tx->t", n, x.mean(axis=1))
+    surface = _Surface(
+        points.copy(), triangles, np.zeros((len(points), 3, 3)), np.zeros((len(points), 3)), np.zeros((len(points), 2))
+    )
+    parts = (area[:, None, None] * n[:, :, None] * n[:, None], area[:, None] * d[:, None] * n)
+    for corner in triangles.T:
+        np.add.at(surface.normal, corner, parts[0])
+        np.add.at(surface.offset, corner, parts[1])
+        np.add.at(surface.weight, corner, np.stack([area * d * d, area], axis=1))
+    return surface
+
+
+def _candidates(surface: _Surface, distance: float, refused: Indices) -> tuple[Indices, Array, Array]:
+    """The cheapest edges that may be collapsed, shape [k, 2], where to, shape [k, 3], and their costs, shape [k]."""
+    n = len(surface.points)
+    keys, repeated = np.unique(_keys(_edges(surface.triangles), n), return_counts=True)
+    edges = np.stack([keys // n, keys % n], axis=1)
+    # points on an edge of more than two triangles stay
+    free = np.ones(n, dtype=bool)
+    free[edges[repeated != 2]] = False
+    edges = edges[free[edges].all(axis=1) & ~np.isin(keys, refused)]
+    places, squares, costs = _places(surface, edges)
+    kept = squares <= distance**2
+    kept &= costs <= np.quantile(costs, _CHEAPEST) if len(costs) else True
+    kept[kept] = _closed_after(surface, edges[kept])
+    return edges[kept], places[kept], costs[kept]
+
+
+def _edges(triangles: Indices) -> Indices:
+    return np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
+
+
+def _keys(edges: Indices, count: int) -> Indices:
+    return np.asarray(edges[:, 0].astype(np.int64) * count + edges[:, 1])
+
+
+def _places(surface: _Surface, edges: Indices) -> tuple[Array, Array, Array]:
+    """Where edges are collapsed to, mean square of the distance to their planes there, and costs."""
+    a, b = edges.T
+    N, o = surface.normal[a] + surface.normal[b], surface.offset[a] + surface.offset[b]
+    square, weight = (surface.weight[a] + surface.weight[b]).T
+    middle = 0.5 * (surface.points[a] + surface.points[b])
+    ahead = _AHEAD * np.trace(N, axis1=1, axis2=2) + np.finfo(float).tiny
+    gradient = np.einsum("exy,ey->ex", N, middle) + o
+    best = middle - np.linalg.solve(N + ahead[:, None, None] * np.eye(3), gradient[:, :, None])[:, :, 0]
+    tried = np.stack([best, surface.points[a], surface.points[b]])  # corners stay where they are
+    sums = np.einsum("kex,exy,key->ke", tried, N, tried) + 2.0 * np.einsum("ex,kex->ke", o, tried) + square
+    least = sums.argmin(axis=0)
+    places, sums = tried[least, np.arange(len(edges))], np.maximum(sums.min(axis=0), 0.0)
+    length = np.linalg.norm(surface.points[a] - surface.points[b], axis=1)
+    return places, sums / np.maximum(weight, np.finfo(float).tiny), sums + _SHORT * weight * length**2
+
+
+def _closed_after(surface: _Surface, edges: Indices) -> BoolArray:
+    """Whether the ends of an edge have two neighbours in common: more would be merged into a fin."""
+    from scipy.sparse import coo_matrix
+
+    n, all_edges = len(surface.points), _edges(surface.triangles)
+    both = np.concatenate([all_edges, all_edges[:, ::-1]])
+    near = coo_matrix((np.ones(len(both), np.int32), both.T), shape=(n, n)).tocsr()
+    near.data[:] = 1
+    common = near[edges[:, 0]].multiply(near[edges[:, 1]]).sum(axis=1)
+    return np.asarray(np.asarray(common).ravel() == 2)
+
+
+def _apart(triangles: Indices, edges: Indices, rank: Indices, count: int) -> Indices:
+    """Edges that come before all others around the neighbours of their ends: no triangle has points of two of them."""
+    first = np.full(count, len(edges), np.int64)
+    for end in edges.T:
+        np.minimum.at(first, end, rank)
+    around = first.copy()
+    for corner in range(3):
+        np.minimum.at(around, triangles[:, corner], first[triangles].min(axis=1))
+    return np.flatnonzero((around[edges[:, 0]] == rank) & (around[edges[:, 1]] == rank))
+
+
+def _keeps_triangles(surface: _Surface, edges: Indices, places: Array) -> BoolArray:
+    """Whether no triangle around an edge turns over or becomes a sliver, for edges that are apart."""
+    owner = np.full(len(surface.points), -1)
+    moved = surface.points.copy()
+    for end in edges.T:
+        owner[end] = np.arange(len(edges))
+        moved[end] = places
+    owners = owner[surface.triangles]
+    of = owners.max(axis=1)
+    changed = np.flatnonzero((of >= 0) & ((owners >= 0).sum(axis=1) == 1))
+    before, after = (x[surface.triangles[changed]] for x in (surface.points, moved))
+    n0, n1 = (np.cross(x[:, 1] - x[:, 0], x[:, 2] - x[:, 0]) for x in (before, after))
+    a0, a1 = np.linalg.norm(n0, axis=1), np.linalg.norm(n1, axis=1)
+    bad = np.einsum("tx,tx->t", n0, n1) < _TURNED * a0 * a1
+    bad |= _slimness(after, a1) < np.minimum(_SLIVER, 0.5 * _slimness(before, a0))
+    good = np.ones(len(edges), dtype=bool)
+    good[of[changed[bad]]] = False
+    return good
+
+
+def _slimness(x: Array, doubled: Array) -> Array:
+    """Height over longest side of triangles with twice an area."""
+    sides = x[:, [1, 2, 0]] - x
+    longest = np.einsum("tsx,tsx->ts", sides, sides).max(axis=1)
+    return np.asarray(doubled / np.maximum(longest, np.finfo(float).tiny))
+
+
+def _collapse(surface: _Surface, edges: Indices, places: Array) -> None:
+    kept, gone = edges.T
+    surface.points[kept] = places
+    for quadric in (surface.normal, surface.offset, surface.weight):
+        quadric[kept] += quadric[gone]
+    number = np.arange(len(surface.points), dtype=np.int32)
+    number[gone] = kept
+    triangles = number[surface.triangles]
+    a, b, c = triangles.T
+    surface.triangles = triangles[(a != b) & (b != c) & (c != a)]
