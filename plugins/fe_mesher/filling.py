@@ -22,7 +22,7 @@ from calmotion.shot import Body, FEMesh
 
 from .gridded import gridded
 from .repair import Solid, simplified
-from .tetwild import MORE_TIME, OutOfTime, ProcessorTime, tetrahedralize
+from .tetwild import MORE_TIME, REMEDY, OutOfTime, ProcessorTime, tetrahedralize
 
 # Wanted and largest allowed error. An error of half a percent of volume in thin walls is larger than that in a
 # frequency. Where a better mesh would take too long, a larger error is accepted and reported.
@@ -35,7 +35,8 @@ _DETAIL, _DENSE_DETAIL, DENSE = 0.1, 0.5, 2_500
 _TRIANGLES, _WIDER, _OF_WALL = 3_000, 4.0, 0.4
 _ATTEMPTS = 3
 # Share of the time for the first mesh: what is left is for a coarser one, or that of a grid, which is made in seconds
-_FIRST, _FIRST_DENSE = 0.6, 0.3
+_FIRST, _FIRST_DENSE = 0.6, 0.4
+_TRIANGLE = 3e-3  # least processor time for a triangle of a surface with many details [s]
 _COARSER = 1.6  # factor of size and envelope of a mesh that took too long
 # Largest error of the volume of a grid for a dense surface, which is reported: where it loses more, so many walls have
 # gaps that its frequencies tell nothing (a link of the G1 that lost 29% was five times too stiff)
@@ -96,13 +97,15 @@ def filled(
         if best is not None and attempt.detailed:
             break
         try:
+            _refuse_hopeless(attempt, body.path, time)
             points, tets = _meshed(attempt, body.path, time, _FIRST_DENSE if dense else _FIRST, use_cache)
         except OutOfTime as reason:
             if best is not None:
                 break
             made = None
             if dense and not attempt.detailed:
-                attempt = _detailed(solid, shape, size, longer, len(attempt.triangles) // 2)
+                count = len(attempt.triangles) // 2
+                attempt = _detailed(attempt, solid, shape, size, longer, count)
                 with suppress(OutOfTime):
                     made = _meshed(attempt, body.path, time, 0.5, use_cache)
             if made is None:
@@ -149,20 +152,36 @@ def _attempt(solid: Solid, shape: Shape, size: float, number: int, longer: float
         solid, shape, size, longer: As of `filled`.
     """
     distance = envelope(size, _diagonal(solid), shape.thickness, len(solid.triangles), number)
-    points, triangles = simplified(solid, _DETAIL * distance)
-    if len(triangles) > DENSE:
-        points, triangles = decimated(points, triangles, DENSE, _DENSE_DETAIL * distance)
-    if len(triangles) > DENSE:
-        return _detailed(solid, shape, size, longer, _TRIANGLES)
-    return _Attempt(points, triangles, (longer if len(solid.triangles) > DENSE else 1.0) * size, distance)
+    attempt = _Attempt(*simplified(solid, _DETAIL * distance), size, distance)
+    if len(attempt.triangles) > DENSE:
+        points, triangles = decimated(attempt.points, attempt.triangles, DENSE, _DENSE_DETAIL * distance)
+        attempt = _Attempt(points, triangles, longer * size, distance)
+    if len(attempt.triangles) > DENSE:
+        return _detailed(attempt, solid, shape, size, longer, _TRIANGLES)
+    return attempt
 
 
-def _detailed(solid: Solid, shape: Shape, size: float, longer: float, count: int) -> _Attempt:
+def _detailed(attempt: _Attempt, solid: Solid, shape: Shape, size: float, longer: float, count: int) -> _Attempt:
     """That of a surface whose details would take too long, with a number of triangles; the others as of `filled`."""
     narrow = envelope(size, _diagonal(solid), shape.thickness, len(solid.triangles), 0)
     distance = max(min(_WIDER * narrow, _OF_WALL * shape.thickness), narrow)
-    points, triangles = decimated(*simplified(solid, _DETAIL * narrow), count, distance)
+    points, triangles = decimated(attempt.points, attempt.triangles, count, distance)
     return _Attempt(points, triangles, longer * size, distance, detailed=True)
+
+
+def _refuse_hopeless(attempt: _Attempt, path: str, time: ProcessorTime) -> None:
+    """Refuse a surface that is too detailed still, before the time is spent.
+
+    Raises:
+        OutOfTime: It is.
+    """
+    least = _TRIANGLE * len(attempt.triangles)
+    if attempt.detailed and least > _FIRST_DENSE * time.limit:
+        raise OutOfTime(
+            "tetrahedralising would exceed the limit of processor time", path=path,
+            found=f"{len(attempt.triangles)} triangles, {time.limit:g} s",
+            remedy=REMEDY + MORE_TIME.format(np.ceil(least / _FIRST_DENSE)),
+        )  # fmt: skip
 
 
 def _coarser(solid: Solid, shape: Shape, attempt: _Attempt) -> _Attempt:

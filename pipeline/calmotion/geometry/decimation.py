@@ -18,6 +18,7 @@ from calmotion.geometry.tetrahedra import Indices
 from calmotion.shot.character import Array, BoolArray
 
 _PASSES = 200
+_FEW, _PATIENCE = 3e-4, 15  # share of the triangles, and passes in a row with fewer collapses that end it
 _CHEAPEST = 0.5  # share of the edges among which those of a pass are
 _SHORT = 1e-6  # of the length of an edge: what it counts beside its distance, for edges in planes
 _AHEAD = 1e-3  # of the trace of a quadric: how firmly the point stays at the middle where planes do not determine it
@@ -57,7 +58,7 @@ def decimated(points: Array, triangles: Indices, count: int, distance: float) ->
     center, scale = 0.5 * (low + high), float(np.linalg.norm(high - low))
     surface = _with_quadrics((points - center) / scale, np.asarray(triangles, np.int32))
     none = np.zeros(0, np.int64)
-    refused, collapsed = none, True
+    refused, collapsed, slow = none, True, 0
     for _ in range(_PASSES):
         excess = (len(surface.triangles) - count + 1) // 2
         if excess <= 0:
@@ -74,6 +75,9 @@ def decimated(points: Array, triangles: Indices, count: int, distance: float) ->
         refused = np.union1d(refused, _keys(edges[chosen[~good]], len(surface.points)))
         _collapse(surface, edges[chosen[good]], places[chosen[good]])
         collapsed |= bool(good.any())
+        slow = slow + 1 if good.sum() < _FEW * len(surface.triangles) else 0
+        if slow == _PATIENCE:
+            break
     used, number = np.unique(surface.triangles, return_inverse=True)
     return surface.points[used] * scale + center, number.reshape(-1, 3).astype(np.int32)
 
