@@ -49,3 +49,10 @@ def test_a_unit_that_is_misspelt_gets_the_nearest(text, unit, meant):
 )
 def test_a_number_without_a_unit_is_told_from_what_is_no_number(text, bare):
     assert has_no_unit(text) == bare
+
+
+@pytest.mark.parametrize("text", ["1e9999999999999999999", "8" * 90 + "E" + "8" * 300, "-1e99999999999999999999mm"])
+def test_a_number_that_no_computer_holds_is_refused_briefly(text):
+    with pytest.raises(SettingError, match="beyond what can be represented|not a number") as error:
+        parse_quantity(text, "m")
+    assert len(str(error.value)) < 400

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from decimal import Decimal
+from decimal import Decimal, InvalidOperation, Overflow
 
 from calmotion.host.errors import SettingError
 from calmotion.support.naming import nearest
@@ -26,6 +26,7 @@ _UNITS = {
     "MPa": ("Pa", Decimal(10**6)),
     "GPa": ("Pa", Decimal(10**9)),
 }
+_LONGEST = 60  # characters of what is no number that an error shows
 _QUANTITY = re.compile(r"\s*([+-]?(?:(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|inf))\s*([A-Za-z]*)\s*")
 
 
@@ -59,8 +60,17 @@ def parse_quantity(text: str, unit: str = "") -> float:
     remedy = f"Write a number, or one with a unit ({alike})." if alike else "Write a number without a unit."
     likely = match and nearest(match[2], [name for name, (kind, _) in _UNITS.items() if kind == base and name])
     if not match:
-        raise SettingError("this is not a number", found=repr(text), remedy=remedy)
+        raise SettingError("this is not a number", found=_short(text), remedy=remedy)
     number, written = match.groups()
     if written not in _UNITS or (written and _UNITS[written][0] != base):
-        raise SettingError("this unit does not fit", found=repr(text), remedy=f"{likely}{remedy}")
-    return float(Decimal(number) * _UNITS[written or unit][1] / size)
+        raise SettingError("this unit does not fit", found=_short(text), remedy=f"{likely}{remedy}")
+    try:
+        return float(Decimal(number) * _UNITS[written or unit][1] / size)
+    except (InvalidOperation, Overflow) as error:
+        raise SettingError(
+            "this number is beyond what can be represented", found=_short(text), remedy=remedy
+        ) from error
+
+
+def _short(text: str) -> str:
+    return repr(text) if len(text) <= _LONGEST else f"{text[:_LONGEST]!r}, and {len(text) - _LONGEST} more characters"
