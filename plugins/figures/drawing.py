@@ -11,6 +11,7 @@ from calmotion.shot.outputs import SystemModes
 
 from .curves import plot_convergence, plot_errors, plot_motors
 from .filmstrip import draw_filmstrip
+from .robustness import plot_robustness
 from .spectra import plot_spectra
 from .style import save
 
@@ -64,6 +65,9 @@ def draw_figures(
         if len(result.steps) > 1:
             progress(0.4, "convergence")
             written.append(save(plot_convergence(result), target / "convergence.png", dpi))
+        if result.robustness is not None and character.targets:
+            progress(0.45, "robustness")
+            written.append(save(plot_robustness(character, result.robustness), target / "robustness.png", dpi))
         progress(0.5, "filmstrip")
         written.append(save(draw_filmstrip(character, animation, result, instants), target / "filmstrip.png", dpi))
     except OSError as error:

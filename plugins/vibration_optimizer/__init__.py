@@ -192,12 +192,21 @@ class OptimizeShot(Operator):
             "draws", int, 200, minimum=20, maximum=100_000, description="Random robots on which the curves are measured"
         ),
         Property(
+            "nominal_error",
+            float,
+            2.0,
+            minimum=0.0,
+            description="Largest error that robust curves may have on the model, over the tolerance; the smaller, the "
+            "larger it is on other robots",
+        ),
+        Property(
             "tradeoff",
             int,
             0,
             minimum=0,
             maximum=99,
-            description="Number of compromises between curves for the model and robust ones that are searched and told",
+            description="Number of further robust curves that are told, each of which may be twice as far off on the "
+            "model as the one before",
         ),
     )
 
@@ -265,7 +274,7 @@ class OptimizeShot(Operator):
             window=values.window if values.window >= 0.0 else None,
             robust=None
             if values.robust == "off"
-            else RobustSettings(values.robust, values.scenarios, values.draws, values.tradeoff),
+            else RobustSettings(values.robust, values.scenarios, values.draws, values.nominal_error, values.tradeoff),
         )
 
 

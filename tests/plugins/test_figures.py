@@ -15,6 +15,7 @@ from calmotion.host import PluginError
 from calmotion.shot.calibration.estimates import Calibration, ChannelCurves, Estimate
 from calmotion.shot.outputs import SystemModes
 from calmotion.shot.result import OptimizerStep
+from calmotion.shot.robust.robots import Compromise, Robustness
 from calmotion.shot.run import OutputPaths
 from calmotion.testing import check_plugin, host_with, run_operator
 from calmotion.views.rendering import fit_camera
@@ -207,6 +208,28 @@ def test_convergence_of_a_search_that_starts_elsewhere_and_goes_on_in_a_finer_si
     lines = [list(line.get_ydata()) for line in axes.get_lines()]
     assert lines == [[4e-7, 3e-7], [6e-7, 3.5e-7], [1e-3, 4e-7]]
     assert {text.get_text() for text in axes.texts} == {"as animated", "finer simulation"}
+
+
+def robustness():
+    """One target; a robot in ten could not be simulated with the nominal curves."""
+    drawn = {name: scale * np.linspace(1e-3, 20e-3, 20)[:, None] for name, scale in (("before", 5.0), ("robust", 0.5))}
+    drawn["nominal"] = np.where(np.arange(20)[:, None] % 10 == 9, np.inf, np.linspace(1e-3, 20e-3, 20)[:, None])
+    nominal = {name: np.array([v]) for name, v in (("before", 60e-3), ("nominal", 1e-3), ("robust", 2e-3))}
+    return Robustness("worst", (), nominal, drawn, (Compromise(0.5, 4e-3, np.array([3.8e-3]), 0.4 * drawn["before"]),))
+
+
+def test_robustness_is_drawn_as_shares_of_robots_and_as_what_the_model_pays(figures, tmp_path):
+    found = robustness()
+    shares, paid = figures.drawing.plot_robustness(synthetic.character(), found).axes
+    errors, share = lines_of(shares)["robust"].get_data()
+    assert np.allclose(errors, 1e3 * found.drawn["robust"][:, 0]) and share[-1] == 100.0 and share[0] == 5.0
+    errors, share = lines_of(shares)["optimised for the model"].get_data()
+    assert len(errors) == 18 and share[-1] == 90.0  # two robots are missing
+    points = {tuple(np.round(line.get_xydata()[0], 9)) for line in paid.get_lines() if len(line.get_xdata()) == 1}
+    assert points == {(1.0, 19.0), (2.0, 10.0), (3.8, 40.0)}
+    assert [text.get_text() for text in paid.texts] == ["within 4 mm"]
+    result = dataclasses.replace(synthetic.result(), robustness=found)
+    assert "robustness.png" in [Path(path).name for path in draw(tmp_path, result, {"figures.plot": {"dpi": 60}})]
 
 
 def test_spectra_name_the_pose_of_the_modes(figures):

@@ -183,7 +183,7 @@ def print_robustness(console: Console, report: dict[str, Any]) -> None:
         for row in report["tradeoff"]:
             values = [row[f"{head}_max_error_m"][index] for head in ("nominal", "p95", "worst")]
             told = [_length_or_failed(value) for value in values]
-            rows.append([target["path"], f"model weighs {row['nominal_weight']:.0%}", told[0], "", *told[1:]])
+            rows.append([target["path"], f"model within {length(row['nominal_allowed_m'])}", told[0], "", *told[1:]])
     title = f"Largest error on {report['draws']} random robots"
     print_table(console, title, ["target", "curves", "model", "median", "95%", "worst"], rows, texts=2)
 

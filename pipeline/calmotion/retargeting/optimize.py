@@ -20,8 +20,7 @@ from calmotion.retargeting.problem.limit_costs import limit_costs
 from calmotion.retargeting.problem.limits import FIRST_PENALTY
 from calmotion.retargeting.problem.posing import locked_coefficients, pose
 from calmotion.retargeting.problem.problem import RetargetProblem
-from calmotion.retargeting.problem.robot import Robot
-from calmotion.retargeting.robust.scenarios import shot_of
+from calmotion.retargeting.robust.robots import robots_of
 from calmotion.retargeting.search import RetargetSearch
 from calmotion.retargeting.search_memory import SearchMemory
 from calmotion.retargeting.simplification.report_rows import search_rows
@@ -41,8 +40,8 @@ from calmotion.simulation.motor_limits import Excess, excesses, motor_bounds
 from calmotion.simulation.prepare import Prepared, failure_error, lowest_frequency, prepare
 from calmotion.simulation.report import left_out_rows, limit_uses, performed_motion, reference_motion, simulation_of
 from calmotion.simulation.simulate import Progress, intended_motion
-from calmotion.simulation.simulator import Simulator, compile_kernels
-from calmotion.simulation.target_errors import IntendedMotion, Objective
+from calmotion.simulation.simulator import compile_kernels
+from calmotion.simulation.target_errors import IntendedMotion
 
 
 def _progress_of(search: Search) -> tuple[OptimizerStep, ...]:
@@ -75,7 +74,7 @@ def optimize_shot(
         intended = intended_motion(prepared, curves.angles, curves.rates)
         problem, start, adaptive = pose(prepared, curves, intended, options)
         if scenarios:
-            problem = problem.for_robots([_robot(prepared, problem, scenario, options) for scenario in scenarios])
+            problem = problem.for_robots(robots_of(prepared, problem, scenarios, options))
         progress(0.0, "loading kernels (compiled in the first run)")
         compile_kernels(
             model, Workspace.for_system(model.system), curves.angles, curves.rates, grid.h, prepared.world
@@ -83,17 +82,6 @@ def optimize_shot(
         return _optimized(prepared, (problem, start, adaptive), intended, options, progress, checkpoint, memory)
     except SimulationFailure as failure:
         raise failure_error(prepared, failure) from failure
-
-
-def _robot(prepared: Prepared, problem: RetargetProblem, scenario: Scenario, options: RunSettings) -> Robot:
-    """The robot of a scenario, with its own static sag where that is what is intended."""
-    if not scenario.factors:
-        return Robot(problem.robots[0].simulator, problem.objective, scenario.weight)
-    other = prepare(shot_of(prepared.shot, scenario), options)
-    intended = intended_motion(other, problem.curves.angles, problem.curves.rates)
-    objective = Objective.over(other.model, intended, other.grid, prepared.shot.animation.weights)
-    simulator = Simulator(other.model, other.grid.h, other.world, other.grid.cyclic)
-    return Robot(simulator, objective, scenario.weight)
 
 
 def refuse_other_integrators(options: RunSettings) -> None:

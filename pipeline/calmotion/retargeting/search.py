@@ -35,6 +35,7 @@ from calmotion.shot.run import RunSettings
 from calmotion.simulation.simulate import Progress
 from calmotion.support import interrupts
 
+AS_THEY_ARE = "converged"  # reason of the end where nothing is searched: another search has found the curves
 MISSED = 0.5  # share of the least gain that changes in the inactive intervals may gain together
 
 
@@ -83,6 +84,8 @@ class RetargetSearch:
     def run(self, start: Array, last: SearchMemory | None = None) -> None:
         """Search from a point, or resume from the checkpoint; an interrupt (Ctrl-C) ends the search.
 
+        Without any iteration allowed, the curves stay as they are.
+
         Args:
             start: Shape [n].
             last: What the search of almost the same shot left.
@@ -92,6 +95,9 @@ class RetargetSearch:
         fixed = self._fixed_on(self.problem.space.basis)
         widen_unavoidable(self.problem, fixed)
         self.search = Search.start(np.where(fixed, 0.0, start))
+        if not self.options.max_iterations:
+            self.inactive, self.search = (), replace(self.search, reason=AS_THEY_ARE)
+            return
         if last is not None:
             begun = last.begun(self.problem, self.search)
             self.took_over, self.search = begun is not self.search, begun

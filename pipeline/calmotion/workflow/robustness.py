@@ -39,6 +39,7 @@ def robustness_report(result: Result) -> dict[str, Any]:
         "tradeoff": [
             {
                 "nominal_weight": row.weight,
+                "nominal_allowed_m": row.allowed,
                 "nominal_max_error_m": row.nominal.tolist(),
                 "p95_max_error_m": np.quantile(row.drawn, 0.95, axis=0, method="higher").tolist(),
                 "worst_max_error_m": row.drawn.max(axis=0).tolist(),

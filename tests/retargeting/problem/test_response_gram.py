@@ -8,6 +8,7 @@ from calmotion.retargeting.problem import response_gram as module
 from calmotion.retargeting.problem.response_gram import (
     LARGE,
     LEAST,
+    dense_responses,
     products_worth,
     response_bands,
     response_gram,
@@ -30,6 +31,15 @@ def test_its_columns_are_the_products_of_the_residuals_part(problem):
     for d in np.random.default_rng(1).normal(size=(3, problem.size)):
         expected = problem.product(d) - problem.penalty_gradient(d)
         assert np.abs(gram @ d - expected).max() < 1e-7 * np.abs(expected).max()
+
+
+def test_dense_responses_are_the_products_of_single_directions(problem):
+    instants = np.arange(3, len(problem.residuals), 7, dtype=np.int32)
+    dense = dense_responses(problem.robots[0], problem.space, instants)
+    d = np.random.default_rng(2).normal(size=problem.size)
+    expected, _ = problem.jvp(d)
+    found = (dense @ d).reshape(len(instants), -1)
+    assert np.abs(found - expected[instants]).max() < 1e-5 * np.abs(expected).max()
 
 
 def test_curves_that_are_held_at_the_beginning_change_nothing_before(arm, bodies, animation):

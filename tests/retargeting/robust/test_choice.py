@@ -2,8 +2,10 @@
 
 import numpy as np
 import pytest
-from calmotion.retargeting.robust.choice import REACH, _directions, _shared, chosen_scenarios
-from calmotion.retargeting.robust.scenarios import uncertain_parameters
+from calmotion.retargeting.robust.choice import REACH, _directions, _shared, chosen_scenarios, with_worse_robots
+from calmotion.retargeting.robust.measure import errors_on
+from calmotion.retargeting.robust.scenarios import scenario_at, uncertain_parameters
+from calmotion.shot.robust.robots import Scenario
 from calmotion.shot.run import RunSettings
 from calmotion.simulation.compiled_shot import compile_shot
 
@@ -56,3 +58,15 @@ def test_a_mean_over_the_robots_is_that_of_their_distribution(shot):
     weights = [s.weight for s in found]
     assert sum(weights) == pytest.approx(1.0)
     assert sum(w * v**2 for w, v in zip(weights, values, strict=True)) == pytest.approx(1.0)
+
+
+def test_robots_with_larger_errors_are_added(shot):
+    tracks, parameters = shot.animation.tracks, uncertain_parameters(shot)
+    axis = np.eye(len(parameters))[0]
+    near = tuple(scenario_at(parameters, 0.1 * k * axis) for k in (0, 1, 2))
+    found = with_worse_robots(shot, OPTIONS, tracks, parameters, near)
+    assert found is not None and found[:3] == near and len(found) == 5
+    errors = errors_on(shot, OPTIONS, {"": tracks}, found[1:])[""].max(axis=1)
+    assert errors[2:].min() > 1.05 * errors[:2].max()
+    far = (Scenario(), *(scenario_at(parameters, 6.0 * k * axis) for k in (-1, 1)))
+    assert with_worse_robots(shot, OPTIONS, tracks, parameters, far) is None

@@ -85,6 +85,18 @@ def response_gram(robots: Sequence[Robot], space: OffsetSpace) -> Array:
     return gram
 
 
+def dense_responses(robot: Robot, space: OffsetSpace, instants: IntArray) -> NDArray[np.float32]:
+    """Changes of the weighted residuals by the unknowns at some instants, shape [t, K, 6, n]."""
+    places = _varying(robot)
+    changes = np.zeros((len(instants), *places.shape, space.size), np.float32)
+    for part in _responses(robot, space):
+        after = np.flatnonzero(instants >= part.first)
+        begun = np.zeros((len(after), *places.shape, part.changes.shape[2]), np.float32)
+        begun[:, places] = part.changes[instants[after] - part.first]
+        changes[after[:, None], :, :, np.arange(part.unknowns.start, part.unknowns.stop)] = np.moveaxis(begun, 3, 1)
+    return changes
+
+
 def response_bands(robots: Sequence[Robot], space: OffsetSpace, lasting: int | None = None) -> Array:
     """The same where each response ends some time after its unknown has acted, as lower bands, shape [bands, n].
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.polynomial.hermite_e import hermegauss
 
 from calmotion.errors import ShotError
-from calmotion.retargeting.robust.measure import deviations_on
+from calmotion.retargeting.robust.measure import deviations_on, errors_on
 from calmotion.retargeting.robust.scenarios import Parameter, scenario_at
 from calmotion.shot import Track
 from calmotion.shot.character import Array
@@ -17,7 +17,11 @@ from calmotion.shot.robust.settings import WORST
 from calmotion.shot.run import RunSettings
 from calmotion.simulation.compiled_shot import CompiledShot
 
-REACH = 2.5  # standard deviations of the farthest robots of a worst case: one of 80 is farther along a direction
+REACH = 3.0  # standard deviations of the farthest robots of a worst case: one of 370 is farther along a direction
+TRIED, STRETCH = 48, 1.25  # robots that are tried, so far off that their farthest ones are as far as those of 200
+ADDED = 2  # most of them that are added
+LARGER, ALIKE = 1.05, 0.5  # least error of those added over the largest known, and least distance over their own
+_SEED = 20190705
 LEAST = 0.05  # weight of the nominal robot in a mean, where the rule would give it less
 
 
@@ -56,6 +60,35 @@ def chosen_scenarios(
     return tuple(
         scenario_at(parameters, x, float(weight)) for x, weight in zip(points, given / given.sum(), strict=True)
     )
+
+
+def with_worse_robots(
+    shot: CompiledShot, options: RunSettings, tracks: Sequence[Track], parameters: Sequence[Parameter],
+    scenarios: Sequence[Scenario],
+) -> tuple[Scenario, ...] | None:  # fmt: skip
+    """The robots and some random ones on which curves leave larger errors; None where there are none.
+
+    The random ones are not those on which curves are measured.
+
+    Args:
+        shot, options, parameters: As of `chosen_scenarios`.
+        tracks: Curves with the smallest largest error on the robots.
+        scenarios: The robots, the nominal one first.
+    """
+    points = STRETCH * np.random.default_rng(_SEED).standard_normal((TRIED, len(parameters)))
+    tried = [scenario_at(parameters, x) for x in points]
+    weights = np.sqrt([target.position_weight for target in shot.character.targets])
+    errors = (errors_on(shot, options, {"": tracks}, (*scenarios[1:], *tried))[""] * weights).max(axis=1)
+    known, found = errors[: len(scenarios) - 1], errors[len(scenarios) - 1 :]
+    picked: list[int] = []
+    for k in np.argsort(-np.where(np.isfinite(found), found, 0.0)):
+        if found[k] <= LARGER * known.max() or len(picked) == ADDED:
+            break
+        if all(np.linalg.norm(points[k] - points[j]) > ALIKE * np.linalg.norm(points[j]) for j in picked):
+            picked.append(int(k))
+    if not picked:
+        return None
+    return (*scenarios, *(tried[k] for k in picked))
 
 
 def _equal(pairs: int) -> tuple[Array, Array]:

@@ -11,14 +11,16 @@ from calmotion.accuracy.simulate_to_tolerance import found_tracks
 from calmotion.errors import ShotError
 from calmotion.retargeting.found_curves import best_so_far
 from calmotion.retargeting.optimize import optimize_shot
-from calmotion.retargeting.robust.choice import beyond_simulation, chosen_scenarios
+from calmotion.retargeting.robust.choice import beyond_simulation, chosen_scenarios, with_worse_robots
 from calmotion.retargeting.robust.measure import errors_on
 from calmotion.retargeting.robust.scenarios import Parameter, random_scenarios, uncertain_parameters
-from calmotion.shot import Result
+from calmotion.retargeting.robust.worst_case import WorstCase
+from calmotion.shot import Result, Track
 from calmotion.shot.character import Array
 from calmotion.shot.robust.robots import Compromise, Robustness, Scenario
 from calmotion.shot.robust.settings import WORST
 from calmotion.shot.run import RunSettings
+from calmotion.shot.tolerance import tolerance_of
 from calmotion.simulation.compiled_shot import CompiledShot
 from calmotion.simulation.simulate import Progress
 from calmotion.support import interrupts
@@ -26,7 +28,8 @@ from calmotion.support import interrupts
 ROUNDS = 6  # most searches with other weights
 FALLING = 0.98  # of the largest error: a smaller gain ends them
 _SEARCHED = 0.6  # share of the searches in the progress
-OTHERS = 0.25  # weight of the other robots in each compromise, over that in the one before
+SEARCHES = 3  # most for the largest error, each with more robots than the one before
+FARTHER = 2.0  # error that each compromise allows on the nominal robot, over that of the one before
 LEAST = 1e-3  # smallest weight of a robot, over the mean
 Continued = Callable[[Result, Result], Result]
 
@@ -38,7 +41,8 @@ def retarget_robustly(
 
     An interrupt (Ctrl-C) ends both; the result then has the best curves so far.
 
-    For the largest error, the weights of the robots with large errors are raised until the largest stops falling.
+    The largest error is minimised as `WorstCase` does. Where that is not possible, as for loops and very long shots,
+    the weights of the robots with large errors are raised until the largest stops falling.
 
     Args:
         shot: The shot as animated.
@@ -53,26 +57,87 @@ def retarget_robustly(
     robust = options.robust
     assert robust is not None
     parameters, animation, best = uncertainties_of(shot), shot.animation, nominal
-    rounds = ROUNDS if robust.kind == WORST else 1
+    allowed = robust.nominal_error * tolerance_of(shot.character, options.tolerance)
     try:
         tracks = found_tracks(nominal, animation)
-        used = scenarios = chosen_scenarios(shot, options, tracks, parameters, robust.scenarios, robust.kind)
-        least = np.inf
-        for number in range(rounds):
-            begun = shot.with_tracks(found_tracks(best, animation))
-            latest = _searched(begun, options, _part(progress, number, rounds), scenarios)
-            if latest.interrupted:
-                return continued(best, latest)
-            errors = errors_on(shot, options, {"": found_tracks(latest, animation)}, scenarios)[""].max(axis=1)
-            if errors.max() > FALLING * least:
-                break
-            best, used, least = continued(best, latest), scenarios, float(errors.max())
-            scenarios = _reweighted(scenarios, errors)
+        used = chosen_scenarios(shot, options, tracks, parameters, robust.scenarios, robust.kind)
+        worst = WorstCase(shot, options, tracks, used) if robust.kind == WORST else None
+        if worst is None or not worst.possible:
+            worst = None
+            best, used = _by_weights(shot, options, nominal, used, continued, progress)
+        else:
+            worst = _minimized(shot, options, worst, allowed, _part(progress, 0, 1))
+            best, used = _of_least_maximum(shot, options, nominal, worst, continued), worst.scenarios
+            worst = worst if robust.tradeoff else None  # it is large
+        if best.interrupted:
+            return best
         draws = random_scenarios(parameters, robust.draws)
         measured = replace(best, robustness=_robustness(shot, options, nominal, best, used, draws, progress))
-        return _with_compromises(shot, options, measured, draws, progress)
+        return measured if worst is None else _with_compromises(shot, options, measured, draws, worst)
     except KeyboardInterrupt:
         return best_so_far(best)
+
+
+def _minimized(
+    shot: CompiledShot, options: RunSettings, worst: WorstCase, allowed: float, progress: Progress
+) -> WorstCase:  # fmt: skip
+    """The smallest largest error over some robots, and those on which it turns out larger."""
+    parameters = uncertainties_of(shot)
+    worst.minimize(allowed, progress)
+    for _ in range(SEARCHES - 1):
+        others = with_worse_robots(shot, options, worst.tracks, parameters, worst.scenarios)
+        if others is None:
+            break
+        further = WorstCase(shot, options, worst.tracks, others, worst)
+        if not further.possible:
+            break
+        worst = further
+        worst.minimize(allowed, progress)
+    return worst
+
+
+def _of_least_maximum(
+    shot: CompiledShot, options: RunSettings, nominal: Result, worst: WorstCase, continued: Continued
+) -> Result:  # fmt: skip
+    """The result with the curves of the smallest largest error."""
+    as_they_are = replace(options, max_iterations=0)
+    found = optimize_shot(shot.with_tracks(worst.tracks), as_they_are, _silent, None, worst.scenarios)
+    return continued(
+        nominal,
+        replace(
+            found,
+            iterations=worst.work.evaluations,
+            gradients=worst.work.linearizations,
+            linearized_sweeps=worst.work.sweeps,
+            forward_simulations=found.forward_simulations + worst.work.evaluations + worst.work.linearizations,
+            wall_s=worst.work.wall_s,
+            processor_s=worst.work.processor_s,
+        ),
+    )
+
+
+def _by_weights(
+    shot: CompiledShot, options: RunSettings, nominal: Result, scenarios: tuple[Scenario, ...], continued: Continued,
+    progress: Progress,
+) -> tuple[Result, tuple[Scenario, ...]]:  # fmt: skip
+    """The result of searches for weighted sums of squares, and their robots."""
+    assert options.robust is not None
+    best, used, least, rounds = nominal, scenarios, np.inf, ROUNDS if options.robust.kind == WORST else 1
+    for number in range(rounds):
+        begun = shot.with_tracks(found_tracks(best, shot.animation))
+        latest = _searched(begun, options, _part(progress, number, rounds), scenarios)
+        if latest.interrupted:
+            return continued(best, latest), used
+        errors = _largest_on(shot, options, found_tracks(latest, shot.animation), scenarios)
+        if errors.max() > FALLING * least:
+            break
+        best, used, least = continued(best, latest), scenarios, float(errors.max())
+        scenarios = _reweighted(scenarios, errors)
+    return best, used
+
+
+def _silent(fraction: float, message: str) -> None:
+    pass
 
 
 def _searched(shot: CompiledShot, options: RunSettings, progress: Progress, scenarios: tuple[Scenario, ...]) -> Result:
@@ -80,8 +145,15 @@ def _searched(shot: CompiledShot, options: RunSettings, progress: Progress, scen
     try:
         return optimize_shot(shot, options, progress, None, scenarios)
     except ShotError as error:
-        off = errors_on(shot, options, {"": shot.animation.tracks}, scenarios)[""].max(axis=1)
+        off = _largest_on(shot, options, shot.animation.tracks, scenarios)
         raise beyond_simulation(shot, scenarios[int(np.argmax(off))], error.problem) from error
+
+
+def _largest_on(
+    shot: CompiledShot, options: RunSettings, tracks: Sequence[Track], scenarios: Sequence[Scenario]
+) -> Array:  # fmt: skip
+    """The largest error of any target on each robot [m], shape [S]."""
+    return np.asarray(errors_on(shot, options, {"": tracks}, scenarios)[""].max(axis=1))
 
 
 def uncertainties_of(shot: CompiledShot) -> tuple[Parameter, ...]:
@@ -134,35 +206,24 @@ def _robustness(
 
 
 def _with_compromises(
-    shot: CompiledShot, options: RunSettings, robust: Result, draws: tuple[Scenario, ...], progress: Progress
-) -> Result:  # fmt: skip
-    """The robust result with as many compromises as wanted: searches in which the nominal robot weighs ever more.
+    shot: CompiledShot, options: RunSettings, robust: Result, draws: tuple[Scenario, ...], worst: WorstCase
+) -> Result:
+    """The robust result with as many compromises as wanted, which may be farther and farther off on the nominal robot.
 
     An interrupt (Ctrl-C) ends them.
     """
-    found, asked, curves = robust.robustness, options.robust, found_tracks(robust, shot.animation)
+    found, asked, compromises = robust.robustness, options.robust, list[Compromise]()
     assert found is not None and asked is not None
-    compromises: list[Compromise] = []
+    allowed = asked.nominal_error * tolerance_of(shot.character, options.tolerance)
     try:
-        for number in range(asked.tradeoff):
-            scenarios = _rather_nominal(found.scenarios, OTHERS ** (number + 1))
-            latest = _searched(
-                shot.with_tracks(curves), options, _part(progress, number, asked.tradeoff), scenarios
-            )  # fmt: skip
-            if latest.interrupted:
-                break
-            curves = found_tracks(latest, shot.animation)
-            errors = errors_on(shot, options, {"": curves}, (*scenarios[:1], *draws))[""]
-            compromises.append(Compromise(scenarios[0].weight, errors[0], errors[1:]))
+        for _ in range(asked.tradeoff):
+            allowed *= FARTHER
+            worst = _minimized(shot, options, worst, allowed, _silent)
+            errors = errors_on(shot, options, {"": worst.tracks}, (*found.scenarios[:1], *draws))[""]
+            compromises.append(Compromise(worst.scenarios[0].weight, allowed, errors[0], errors[1:]))
     except KeyboardInterrupt:
         interrupts.answer()
     return replace(robust, robustness=replace(found, compromises=tuple(compromises)))
-
-
-def _rather_nominal(scenarios: Sequence[Scenario], share: float) -> tuple[Scenario, ...]:
-    """The robots, the nominal one first, with the weights of all others multiplied by a share."""
-    others = tuple(replace(s, weight=share * s.weight) for s in scenarios[1:])
-    return (replace(scenarios[0], weight=1.0 - sum(s.weight for s in others)), *others)
 
 
 def _part(progress: Progress, number: int, rounds: int) -> Progress:

@@ -25,15 +25,17 @@ class Scenario:
 
 @dataclass(frozen=True, eq=False)
 class Compromise:
-    """Curves between those for the model and those for all robots.
+    """Curves that may be farther off on the nominal robot than the robust ones, so that others are less.
 
     Attributes:
-        weight: Of the nominal robot in their search; those of all robots add up to 1.
+        weight: Of the nominal robot in the sum of squares that is smallest there; those of all robots add up to 1.
+        allowed: Error that a target may have on the nominal robot [m].
         nominal: Largest error of each target on the nominal robot [m], shape [K].
         drawn: The same on random robots, shape [draws, K].
     """
 
     weight: float
+    allowed: float
     nominal: Array
     drawn: Array
 
@@ -48,7 +50,7 @@ class Robustness:
         nominal: Largest error of each target on the nominal robot [m], shape [K], by name of the curves (`CURVES`).
         drawn: The same on random robots that the optimisation did not see, shape [draws, K]; infinite where a robot
             could not be simulated.
-        compromises: Between nominal and robust curves, from the robust ones on.
+        compromises: Curves of larger and larger errors on the nominal robot.
     """
 
     kind: str

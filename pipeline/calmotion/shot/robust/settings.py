@@ -37,10 +37,14 @@ class RobustSettings:
         kind: `mean`: the mean of the objective over the robots; `worst`: the robot with the largest error counts most.
         scenarios: Number of robots, the nominal one among them.
         draws: Number of random robots on which the curves are measured afterwards.
-        tradeoff: Number of compromises between the nominal and the robust curves that are searched and measured.
+        nominal_error: Error that a target may have on the nominal robot where the largest error is minimised, over the
+            tolerance; curves for the nominal robot alone may have more.
+        tradeoff: Number of further curves, each of which may be twice as far off on the nominal robot as the one
+            before.
     """
 
     kind: str = WORST
     scenarios: int = 7
     draws: int = 200
+    nominal_error: float = 2.0
     tradeoff: int = 0

@@ -1,0 +1,95 @@
+"""The part of the merit that is not errors, about a point: regulariser, limits of the motors, and a trust region."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from scipy.sparse import csr_matrix, diags
+
+from calmotion.retargeting.problem.limits import LimitTerms
+from calmotion.retargeting.problem.offset_space import OffsetSpace
+from calmotion.retargeting.problem.rigid_approximation import EFFORT, limit_metrics
+from calmotion.shot.character import Array
+
+
+@dataclass(frozen=True, eq=False)
+class RestOfMerit:
+    """The rest for changes d of the unknowns from a point; efforts change as those of the rigid robot.
+
+    Attributes:
+        space: The n unknowns.
+        x: The point, shape [n].
+        limits: Terms of the limits; None where there are none.
+        limited: Values of the limited quantities at the point, shape [T, M] each.
+        inertia: Efforts by accelerations of the unknowns' motors, shape [T, M, m].
+        damping: Weight of half the squared change of the offsets: the smaller the trust region, the larger.
+    """
+
+    space: OffsetSpace
+    x: Array
+    limits: LimitTerms | None
+    limited: dict[str, Array]
+    inertia: Array
+    damping: float = 0.0
+
+    def value(self, d: Array) -> float:
+        """The rest, without a constant."""
+        value = self.space.penalty_value(self.x + d) + 0.5 * self.damping * self.squared(d)
+        return value if self.limits is None else value + self.limits.value(self._changed(d))
+
+    def derivatives(self, d: Array) -> tuple[Array, Array]:
+        """Gradient, shape [n], and second derivatives, shape [n, n]."""
+        matrix = self._quadratic.copy()
+        gradient = self.space.penalty_gradient(self.x + d) + self.damping * self._close(d)
+        if self.limits is not None:
+            changed = self._changed(d)
+            for name, v in changed.items():
+                gradient += self._pulled(name, self.limits.gradient(name, v))
+            for spline, metric in limit_metrics(self.inertia, self.space, self.limits.curvatures(changed)):
+                _add(matrix, spline, metric)
+        return gradient, matrix
+
+    def squared(self, d: Array) -> float:
+        """The squared change of the offsets over time [rad^2 s]."""
+        return float(d @ self._close(d))
+
+    @cached_property
+    def _quadratic(self) -> Array:
+        motors = len(self.space.motors)
+        return np.kron((self.space.penalty + self.damping * self.space.basis.closeness).toarray(), np.eye(motors))
+
+    def _close(self, d: Array) -> Array:
+        return np.asarray(self.space.basis.closeness @ d.reshape(self.space.basis.count, -1)).ravel()
+
+    def _changed(self, d: Array) -> dict[str, Array]:
+        """The limited quantities at a change."""
+        coefficients, found = d.reshape(self.space.basis.count, -1), {}
+        for name, v in self.limited.items():
+            if name in self.space.splines:
+                v = v + self.space.spread(self.space.splines[name], d)
+            elif name.startswith(EFFORT):
+                accelerations = self.space.basis.accelerations @ coefficients
+                v = v + np.einsum("nMa,na->nM", self.inertia, accelerations)
+            found[name] = v
+        return found
+
+    def _pulled(self, name: str, by_value: Array) -> Array:
+        """The transpose of the change of a limited quantity."""
+        if name in self.space.splines:
+            return self.space.gather(self.space.splines[name], by_value)
+        if name.startswith(EFFORT):
+            pulled = np.einsum("nMa,nM->na", self.inertia, by_value)
+            return np.asarray(self.space.basis.accelerations.T @ pulled).ravel()
+        return np.zeros(self.space.size)
+
+
+def _add(matrix: Array, spline: csr_matrix, metric: Array) -> None:
+    """Add sum_n b_n b_n^T (x) W_n over rows b_n of a spline matrix to a matrix, unknowns by function, then motor."""
+    motors = metric.shape[1]
+    acts = np.flatnonzero(np.any(metric, axis=(1, 2)))
+    rows = spline[acts]
+    for a in range(motors):
+        for b in range(motors):
+            matrix[a::motors, b::motors] += (rows.T @ diags(metric[acts, a, b]) @ rows).toarray()

@@ -1,0 +1,257 @@
+"""Curves with the smallest largest error over some robots, where the nominal one is not far off.
+
+Each round linearises the robots, finds the smallest p-norm of the linear errors (`least_maximum`), and simulates. An
+error of the nominal robot counts f times, so that it comes to what is allowed where the largest one of the others is f
+times as large; f follows from a few such minima.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from calmotion.multibody.parallel import in_parallel
+from calmotion.multibody.sensitivity.linearization import spare_memory
+from calmotion.retargeting.found_curves import found_curves
+from calmotion.retargeting.problem.limits import FIRST_PENALTY
+from calmotion.retargeting.problem.posing import locked_coefficients, pose
+from calmotion.retargeting.problem.response_gram import COST, dense_responses
+from calmotion.retargeting.problem.rigid_approximation import rigid_response
+from calmotion.retargeting.problem.robot import Robot
+from calmotion.retargeting.robust.least_maximum import ORDERS, LinearErrors, least_maximum, lengths, merit, weights_of
+from calmotion.retargeting.robust.rest_of_merit import RestOfMerit
+from calmotion.retargeting.robust.robots import robots_of
+from calmotion.retargeting.robust.weighted_errors import WeightedErrors
+from calmotion.shot import Track
+from calmotion.shot.character import Array
+from calmotion.shot.robust.robots import Scenario
+from calmotion.shot.run import RunSettings
+from calmotion.simulation.compiled_shot import CompiledShot
+from calmotion.simulation.inputs.curves import sample_curves
+from calmotion.simulation.prepare import prepare
+from calmotion.simulation.simulate import Progress, intended_motion
+from calmotion.support import interrupts
+
+ROUNDS = 16  # most linear models and trust regions for one allowed error
+FACTORS, MET = 5, (0.9, 1.05)  # most minima by which f is found, and what they have to meet of the allowed error
+FIRST_FACTOR = 0.4  # of the largest error over the allowed one: the others' errors fall as well
+FALLING, AS_PREDICTED = 0.1, 0.25  # a smaller relative decrease of the merit ends, a smaller share of it is refused
+DAMPED = 10.0  # growth of the damping after a refused step
+_LARGEST, _SHARE = 3000, 0.5  # most unknowns, and most of the free memory
+
+
+@dataclass
+class Work:
+    """What was done to find the curves.
+
+    Attributes:
+        evaluations, linearizations: Of all robots.
+        sweeps: Linearised sweeps whose cost the responses of a robot had.
+        wall_s, processor_s: Time [s].
+    """
+
+    evaluations: int = 0
+    linearizations: int = 0
+    sweeps: int = 0
+    wall_s: float = 0.0
+    processor_s: float = 0.0
+
+
+class WorstCase:
+    """The robots of some scenarios, and the curves found so far.
+
+    Args:
+        shot: The shot as animated.
+        options: Of the search, with its time step.
+        tracks: Where it begins.
+        scenarios: The robots, the nominal one first.
+        last: Goes on from this one, whose curves these are.
+    """
+
+    def __init__(
+        self, shot: CompiledShot, options: RunSettings, tracks: Sequence[Track], scenarios: Sequence[Scenario],
+        last: WorstCase | None = None,
+    ):  # fmt: skip
+        prepared = prepare(shot.with_tracks(tracks), options)
+        curves = sample_curves(prepared.shot.animation.tracks, prepared.grid)
+        intended = intended_motion(prepared, curves.angles, curves.rates)
+        problem, self._x, _ = pose(prepared, curves, intended, options)
+        self._scenarios, self._animation = tuple(scenarios), shot.animation
+        self._motors = len(shot.character.motors)
+        alike = [Scenario(scenario.factors) for scenario in scenarios]
+        self._problem = problem.for_robots(robots_of(prepared, problem, alike, options))
+        self._fixed = locked_coefficients(
+            shot.animation, problem.space.basis, problem.space.motors, prepared.grid.end
+        )  # fmt: skip
+        self._inertia = rigid_response(
+            problem.model, problem.grid, curves, problem.world, problem.space.coupling
+        ).inertia  # fmt: skip
+        self._weighted = WeightedErrors.of_objective(
+            problem.objective, problem.grid, len(scenarios), problem.size
+        )  # fmt: skip
+        self._factors = np.ones((len(scenarios), len(self._weighted.places)))
+        self._linear: tuple[LinearErrors, RestOfMerit] | None = None
+        self.work: Work = Work() if last is None else last.work
+        # errors of the nominal robot where the search began, shape [G]
+        self._own: Array = np.zeros(0) if last is None else last._own
+        if last is not None:
+            last._linear = None  # its memory is needed
+
+    @cached_property
+    def possible(self) -> bool:
+        """Whether derivatives of all errors by all unknowns can be made and stored."""
+        size = self._problem.size
+        fits = 24.0 * self._factors.size * len(self._weighted.at) * size <= _SHARE * spare_memory()
+        if not (
+            fits and size <= _LARGEST and self._weighted.dense_enough and np.isfinite(self._problem.value(self._x))
+        ):
+            return False
+        self._problem.linearize()
+        return all(robot.simulator.can_be_blocked() for robot in self._problem.robots)
+
+    def minimize(self, allowed: float, progress: Progress) -> None:
+        """Minimise the largest error while the nominal robot's targets are off by at most so much.
+
+        Args:
+            allowed: Error of the position of a target on the nominal robot [m]; where it began with more, as much.
+            progress: Called with a fraction and a message.
+        """
+        begin, processor = time.perf_counter(), time.process_time()
+        self._minimize(allowed, progress)
+        self.work.wall_s += time.perf_counter() - begin
+        self.work.processor_s += time.process_time() - processor
+
+    def _minimize(self, allowed: float, progress: Progress) -> None:
+        damping, eased = 0.0, 1.0 / DAMPED  # the next model has a smaller damping unless this one needed it
+        orders: tuple[int, ...] = ORDERS
+        linear, rest = self._linearized()
+        if not len(self._own):
+            self._own = _largest(linear.errors[0])
+        most = np.where(self._weighted.of_position, np.maximum(allowed, self._own), np.inf)
+        largest = float(np.linalg.norm(linear.errors[1:], axis=3).max(initial=0.0))
+        self._factors[0] = np.maximum(FIRST_FACTOR * largest / most, 1.0)
+        for number in range(ROUNDS):
+            interrupts.check()
+            largest = 1e3 * float(np.linalg.norm(linear.errors, axis=3).max())
+            progress(number / ROUNDS, f"largest weighted error on {len(self._scenarios)} robots: {largest:.3f} mm")
+            rest = replace(rest, damping=damping)
+            d = self._minimum(linear, rest, most, orders)
+            before, predicted = (self._merit(linear, linear.at(c), rest.value(c)) for c in (np.zeros_like(d), d))
+            if not np.any(d) or before - predicted < FALLING * before and self._keeps(rest.limited):
+                break
+            gained = 0.0
+            self.work.evaluations += 1
+            if np.isfinite(self._problem.value(self._x + d)):
+                gained = before - self._merit(linear, self._errors(), self._rest(damping, d))
+            if gained < AS_PREDICTED * (before - predicted) or gained <= 0.0:
+                damping, eased = max(DAMPED * damping, before / max(rest.squared(d), 1e-300)), 1.0
+                continue
+            self._x, small = self._x + d, gained < FALLING * before
+            if small and np.all(_largest(self._errors()[0]) <= MET[1] * most) and not self._tightened():
+                break
+            damping, eased, orders = damping * eased, 1.0 / DAMPED, ORDERS[-1:]
+            linear, rest = self._moved(linear) if small else self._linearized()
+
+    @property
+    def tracks(self) -> tuple[Track, ...]:
+        """The curves found so far."""
+        curves, _ = found_curves(self._problem, self._motors, self._x)
+        times = self._animation.frame_times
+        return tuple(
+            Track(times, curve.frame_values) if curve.changed else track
+            for curve, track in zip(curves, self._animation.tracks, strict=True)
+        )
+
+    @property
+    def scenarios(self) -> tuple[Scenario, ...]:
+        """The robots with the weights of their squared errors in the sum that is smallest for the curves found."""
+        self._problem.value(self._x)
+        m = lengths(self._errors(), self._factors)
+        totals = weights_of(m, self._factors, ORDERS[-1]).sum(axis=(1, 2))
+        return tuple(
+            replace(scenario, weight=float(total))
+            for scenario, total in zip(self._scenarios, totals / totals.sum(), strict=True)
+        )
+
+    def _minimum(self, linear: LinearErrors, rest: RestOfMerit, most: Array, orders: tuple[int, ...]) -> Array:
+        """The least maximum of the linear model, and the factors with which it keeps the allowed error."""
+        d = np.zeros_like(self._x)
+        for _ in range(FACTORS):
+            d = least_maximum(linear, self._factors, rest, self._fixed, d, orders)
+            nominal = _largest(linear.at(d)[0])
+            free = np.all(self._factors[0] <= 1.0) or np.any(nominal >= MET[0] * most)
+            if np.all(nominal <= MET[1] * most) and free:
+                break
+            self._factors[0] = np.maximum(self._factors[0] * np.clip(nominal / most, 0.6, 1.6), 1.0)
+            orders = ORDERS[-1:]
+        return d
+
+    def _merit(self, linear: LinearErrors, errors: Array, rest: float) -> float:
+        return merit(linear.scale, lengths(errors, self._factors), ORDERS[-1], rest)
+
+    def _errors(self) -> Array:
+        """The errors of all robots at the point evaluated last, shape [S, t, G, 3] [m]."""
+        return np.array([self._weighted.of(robot.residuals) for robot in self._problem.robots])
+
+    def _rest(self, damping: float, d: Array) -> float:
+        """The rest of the merit at the point evaluated last, a change d from the one before."""
+        problem = self._problem
+        here = RestOfMerit(problem.space, problem.x, problem.limits, problem.limited, self._inertia, damping)
+        return here.value(np.zeros_like(d)) + 0.5 * damping * here.squared(d)
+
+    def _linearized(self) -> tuple[LinearErrors, RestOfMerit]:
+        """The errors and the rest of the merit about the curves found so far."""
+        problem = self._problem
+        if self._linear is None or not np.array_equal(self._linear[1].x, self._x):
+            self._linear = None  # its memory is needed
+            if not problem.linearized_at(self._x):
+                problem.value(self._x)
+                problem.linearize()
+            self.work.linearizations += 1
+            self.work.sweeps += round(2.0 * COST * problem.size)
+            shape = (len(problem.robots), len(self._weighted.at), len(self._weighted.places), 3, problem.size)
+            changes = np.empty(shape, np.float32)
+
+            def responded(k: int) -> None:
+                robot: Robot = problem.robots[k]
+                found = dense_responses(robot, problem.space, self._weighted.at)
+                changes[k] = self._weighted.thinned(found)
+
+            in_parallel(responded, range(len(problem.robots)))
+            linear = LinearErrors(self._errors(), changes, self._weighted.scale)
+            self._start_limits(linear)
+            return self._moved(linear)
+        return self._linear
+
+    def _moved(self, linear: LinearErrors) -> tuple[LinearErrors, RestOfMerit]:
+        """The errors and the rest of the merit at the point evaluated last, with the derivatives of a model near it."""
+        problem = self._problem
+        rest = RestOfMerit(problem.space, self._x, problem.limits, problem.limited, self._inertia)
+        self._linear = replace(linear, errors=self._errors()), rest
+        return self._linear
+
+    def _start_limits(self, linear: LinearErrors) -> None:
+        """Limits act from the beginning, with a penalty in proportion to the errors."""
+        limits, grid = self._problem.limits, self._problem.grid
+        if limits is not None and not limits.on:
+            limits.on = True
+            limits.rho = FIRST_PENALTY * self._merit(linear, linear.errors, 0.0) / grid.end
+
+    def _keeps(self, limited: dict[str, Array]) -> bool:
+        """Whether values keep all limits."""
+        limits = self._problem.limits
+        return limits is None or limits.kept(limited)
+
+    def _tightened(self) -> bool:
+        """Update the multipliers of limits that are not kept at the point evaluated last; whether there are any."""
+        limits = self._problem.limits
+        return limits is not None and limits.update(self._problem.limited)
+
+
+def _largest(errors: Array) -> Array:
+    """The largest error of each group of a robot, of shape [t, G, 3]."""
+    return np.asarray(np.linalg.norm(errors, axis=2).max(axis=0))
