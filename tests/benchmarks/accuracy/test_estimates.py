@@ -1,4 +1,4 @@
-"""Random shots by error over estimate: drawn alike every time, measured against meshes of eight times the nodes."""
+"""Random shots by error over estimate: drawn alike every time, measured against regular meshes."""
 
 import csv
 import json

@@ -2,7 +2,7 @@
 
 `calmotion bench estimates [--count N] [--first K] [--csv FILE [--resume]] [--figures DIR]` draws arms of one or two
 slender links with a load, of random size, material and motion, simulates each to a random tolerance as the program
-chooses, and measures the result against a simulation with regular meshes of eight times the nodes or more, a reduction
+chooses, and measures the result against a simulation with regular meshes of some ten times the nodes, a reduction
 that is refined until it moves no target by more than a tenth of the estimate, and a step that is extrapolated to zero.
 How well that is known is measured too, by coarser regular meshes and by the last refinement of its reduction. Shot
 number K is the same on every machine; `--resume` goes on with the shots that the CSV file does not have. The table and
