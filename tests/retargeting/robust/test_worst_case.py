@@ -92,3 +92,8 @@ def test_a_loop_has_no_derivatives_of_this_kind(arm, animation, bodies):
     shot = compile_shot(character, cyclic, bodies)
     scenarios = chosen_scenarios(shot, OPTIONS, cyclic.tracks, uncertain_parameters(shot), 3, "worst")
     assert not WorstCase(shot, OPTIONS, cyclic.tracks, scenarios).possible
+
+
+def test_the_play_of_gears_is_left_to_the_search_for_sums_of_squares(started):
+    asked = dataclasses.replace(OPTIONS, avoid_reversals=10.0)
+    assert not WorstCase(started[0], asked, *started[1:]).possible

@@ -41,8 +41,8 @@ def retarget_robustly(
 
     An interrupt (Ctrl-C) ends both; the result then has the best curves so far.
 
-    The largest error is minimised as `WorstCase` does. Where that is not possible, as for loops and very long shots,
-    the weights of the robots with large errors are raised until the largest stops falling.
+    The largest error is minimised as `WorstCase` does. Where that is not possible, as for loops, feet on the ground and
+    very long shots, the weights of the robots with large errors are raised until the largest stops falling.
 
     Args:
         shot: The shot as animated.

@@ -17,6 +17,7 @@ import numpy as np
 from calmotion.multibody.parallel import in_parallel
 from calmotion.multibody.sensitivity.linearization import spare_memory
 from calmotion.retargeting.found_curves import found_curves
+from calmotion.retargeting.kept_feet import keep_feet
 from calmotion.retargeting.problem.limits import FIRST_PENALTY
 from calmotion.retargeting.problem.posing import locked_coefficients, pose
 from calmotion.retargeting.problem.response_gram import COST, dense_responses
@@ -81,6 +82,7 @@ class WorstCase:
         intended = intended_motion(prepared, curves.angles, curves.rates)
         problem, self._x, _ = pose(prepared, curves, intended, options)
         self._scenarios, self._animation = tuple(scenarios), shot.animation
+        self._prepared, self._reversals = prepared, bool(options.avoid_reversals)
         self._motors = len(shot.character.motors)
         alike = [Scenario(scenario.factors) for scenario in scenarios]
         self._problem = problem.for_robots(robots_of(prepared, problem, alike, options))
@@ -103,15 +105,21 @@ class WorstCase:
 
     @cached_property
     def possible(self) -> bool:
-        """Whether derivatives of all errors by all unknowns can be made and stored."""
-        size = self._problem.size
-        fits = 24.0 * self._factors.size * len(self._weighted.at) * size <= _SHARE * spare_memory()
-        if not (
-            fits and size <= _LARGEST and self._weighted.dense_enough and np.isfinite(self._problem.value(self._x))
-        ):
+        """Whether derivatives of all errors by all unknowns can be made and stored, and nothing else is asked for.
+
+        What feet ask of the ground, and the play of gears, have no such derivatives.
+        """
+        size, problem = self._problem.size, self._problem
+        if self._reversals or not np.isfinite(problem.value(self._x)):
             return False
-        self._problem.linearize()
-        return all(robot.simulator.can_be_blocked() for robot in self._problem.robots)
+        keep_feet(self._prepared, problem)
+        if any(robot.ground is not None for robot in problem.robots):
+            return False
+        fits = 24.0 * self._factors.size * len(self._weighted.at) * size <= _SHARE * spare_memory()
+        if not (fits and size <= _LARGEST and self._weighted.dense_enough):
+            return False
+        problem.linearize()
+        return all(robot.simulator.can_be_blocked() for robot in problem.robots)
 
     def minimize(self, allowed: float, progress: Progress) -> None:
         """Minimise the largest error while the nominal robot's targets are off by at most so much.
@@ -136,8 +144,8 @@ class WorstCase:
         self._factors[0] = np.maximum(FIRST_FACTOR * largest / most, 1.0)
         for number in range(ROUNDS):
             interrupts.check()
-            largest = 1e3 * float(np.linalg.norm(linear.errors, axis=3).max())
-            progress(number / ROUNDS, f"largest weighted error on {len(self._scenarios)} robots: {largest:.3f} mm")
+            now = 1e3 * float(np.linalg.norm(linear.errors, axis=3).max())
+            progress(number / ROUNDS, f"largest weighted error on {len(self._scenarios)} robots: {now:.3f} mm")
             rest = replace(rest, damping=damping)
             d = self._minimum(linear, rest, most, orders)
             before, predicted = (self._merit(linear, linear.at(c), rest.value(c)) for c in (np.zeros_like(d), d))
