@@ -9,7 +9,7 @@ import numpy as np
 from calmotion.accuracy.element_size import Shape, envelope, expected_nodes, smallest_size
 from calmotion.errors import ShotError
 from calmotion.geometry.closed_surfaces import enclosed_volume
-from calmotion.geometry.decimation import decimated
+from calmotion.geometry.surfaces.decimation import decimated
 from calmotion.geometry.tetrahedra import (
     connected_parts,
     largest_part,
@@ -20,7 +20,7 @@ from calmotion.geometry.tetrahedra import (
 )
 from calmotion.shot import Body, FEMesh
 
-from .gridded import gridded
+from .grids.gridded import gridded
 from .repair import Solid, simplified
 from .tetwild import MORE_TIME, REMEDY, OutOfTime, ProcessorTime, tetrahedralize
 

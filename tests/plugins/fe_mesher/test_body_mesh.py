@@ -79,7 +79,7 @@ def test_tetrahedra_that_do_not_fill_the_surface_are_refused_where_a_grid_does_n
         return corners, tets
 
     monkeypatch.setattr(package("filling"), "tetrahedralize", shrunken)
-    monkeypatch.setattr(package("gridded"), "on_grid", lambda *given: None)
+    monkeypatch.setattr(package("grids.gridded"), "on_grid", lambda *given: None)
     with pytest.raises(ShotError, match="do not fill"):
         run(host, link(surface(box())))
     assert len(calls) == 3 and calls == sorted(calls, reverse=True)

@@ -65,7 +65,7 @@ def test_a_solid_that_a_grid_does_not_resolve_is_refused_with_the_reason(host, p
         raise package("tetwild").OutOfTime("took too long", path=path)
 
     monkeypatch.setattr(package("filling"), "tetrahedralize", stuck)
-    monkeypatch.setattr(package("gridded"), "on_grid", lambda *given: None)
+    monkeypatch.setattr(package("grids.gridded"), "on_grid", lambda *given: None)
     with pytest.raises(ShotError, match="too long"):
         run(host, link(surface(box())))
 

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 import trimesh
 from calmotion.geometry.closed_surfaces import winding_numbers
-from calmotion.geometry.decimation import decimated
 from calmotion.geometry.nearby_triangles import NearbyTriangles
+from calmotion.geometry.surfaces.decimation import decimated
 from calmotion.geometry.tetrahedra import surface_volume
 
 TUBE = trimesh.creation.annulus(r_min=0.017, r_max=0.02, height=0.1, sections=256).subdivide()

@@ -12,8 +12,8 @@ from calmotion.geometry.grids.grid_tets import GRID, grid_tets
 from calmotion.geometry.tetrahedra import measure_quality
 from calmotion.shot import Body, FEMesh
 
-from .repair import Solid
-from .tetwild import ProcessorTime
+from ..repair import Solid
+from ..tetwild import ProcessorTime
 
 # Largest number of nodes of ten-node tetrahedra: twice as many where walls are
 # thin, for some ten seconds (with 16,000, links took 21 to 34 s and were no more exact); walls that are thinner than

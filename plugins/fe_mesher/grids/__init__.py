@@ -1,0 +1,1 @@
+"""Tetrahedra of regular grids."""
