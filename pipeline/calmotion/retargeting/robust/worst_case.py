@@ -255,9 +255,8 @@ class WorstCase:
         return limits is None or limits.kept(limited)
 
     def _tightened(self) -> bool:
-        """Update the multipliers of limits that are not kept at the point evaluated last; whether there are any."""
-        limits = self._problem.limits
-        return limits is not None and limits.update(self._problem.limited)
+        """Update the multipliers of limits that are not kept at the point evaluated last; whether that helps."""
+        return self._problem.tighten()
 
 
 def _largest(errors: Array) -> Array:
