@@ -151,7 +151,7 @@ def _attempt(solid: Solid, shape: Shape, size: float, number: int, longer: float
         number: 0 first; further ones come closer.
         solid, shape, size, longer: As of `filled`.
     """
-    distance = envelope(size, _diagonal(solid), shape.thickness, len(solid.triangles), number)
+    distance = envelope(size, _diagonal(solid.points), shape.thickness, len(solid.triangles), number)
     attempt = _Attempt(*simplified(solid, _DETAIL * distance), size, distance)
     if len(attempt.triangles) > DENSE:
         points, triangles = decimated(attempt.points, attempt.triangles, DENSE, _DENSE_DETAIL * distance)
@@ -163,7 +163,7 @@ def _attempt(solid: Solid, shape: Shape, size: float, number: int, longer: float
 
 def _detailed(attempt: _Attempt, solid: Solid, shape: Shape, size: float, longer: float, count: int) -> _Attempt:
     """That of a surface whose details would take too long, with a number of triangles; the others as of `filled`."""
-    narrow = envelope(size, _diagonal(solid), shape.thickness, len(solid.triangles), 0)
+    narrow = envelope(size, _diagonal(solid.points), shape.thickness, len(solid.triangles), 0)
     distance = max(min(_WIDER * narrow, _OF_WALL * shape.thickness), narrow)
     points, triangles = decimated(attempt.points, attempt.triangles, count, distance)
     return _Attempt(points, triangles, longer * size, distance, detailed=True)
@@ -187,13 +187,13 @@ def _refuse_hopeless(attempt: _Attempt, path: str, time: ProcessorTime) -> None:
 def _coarser(solid: Solid, shape: Shape, attempt: _Attempt) -> _Attempt:
     """That of a mesh that took too long, as far from the surface as one of many triangles is followed."""
     size = _COARSER * attempt.size
-    distance = max(_COARSER * attempt.distance, envelope(size, _diagonal(solid), shape.thickness, DENSE, 0))
+    distance = max(_COARSER * attempt.distance, envelope(size, _diagonal(solid.points), shape.thickness, DENSE, 0))
     points, triangles = simplified(solid, _DETAIL * distance)
     return _Attempt(points, triangles, size, distance)
 
 
-def _diagonal(solid: Solid) -> float:
-    return float(np.linalg.norm(np.ptp(solid.points, axis=0)))
+def _diagonal(points: np.ndarray) -> float:
+    return float(np.linalg.norm(np.ptp(points, axis=0)))
 
 
 def _meshed(
@@ -202,7 +202,7 @@ def _meshed(
     """Tetrahedra that take no more than a share of what is left of the time."""
     part = time.part(share)
     # fTetWild measures distances by the diagonal of what it is given
-    diagonal = float(np.linalg.norm(np.ptp(attempt.points, axis=0)))
+    diagonal = _diagonal(attempt.points)
     try:
         made, tets = tetrahedralize(
             attempt.points, attempt.triangles, attempt.size, attempt.distance / diagonal, path, part, use_cache

@@ -22,7 +22,7 @@ MOST = 3  # targets in a figure
 def plot_robustness(character: Character, found: Robustness) -> Figure:
     """For each target, the share of random robots by their largest error [mm], and the largest by that on the model."""
     names = titles([target.path for target in character.targets])
-    worst = np.argsort([-_finite(found.drawn["nominal"][:, k]).max(initial=0.0) for k in range(len(names))])[:MOST]
+    worst = np.argsort([-_largest(found.drawn["nominal"], k) for k in range(len(names))])[:MOST]
     figure = new_figure(WIDTH, 0.5 + 2.3 * len(worst))
     rows = figure.subplots(len(worst), 2, squeeze=False)
     for axes, k in zip(rows, sorted(worst), strict=True):
@@ -49,8 +49,8 @@ def _distributions(axes: Axes, found: Robustness, target: int) -> None:
 def _trade_off(axes: Axes, found: Robustness, target: int) -> None:
     """Curves for the model, the robust ones and further ones, joined in the order of their error on the model."""
     names = ("nominal", "robust")
-    points = [(found.nominal[name][target], _finite(found.drawn[name][:, target]).max(initial=0.0)) for name in names]
-    further = [(row.nominal[target], _finite(row.drawn[:, target]).max(initial=0.0)) for row in found.compromises]
+    points = [(found.nominal[name][target], _largest(found.drawn[name], target)) for name in names]
+    further = [(row.nominal[target], _largest(row.drawn, target)) for row in found.compromises]
     line = 1e3 * np.array(sorted([*points, *further]))
     axes.plot(line[:, 0], line[:, 1], color="#bbbbbb", linewidth=1.0, zorder=1)
     for name, (x, y) in zip(names, points, strict=True):
@@ -65,5 +65,7 @@ def _trade_off(axes: Axes, found: Robustness, target: int) -> None:
     axes.set_ylim(bottom=0.0)
 
 
-def _finite(errors: np.ndarray) -> np.ndarray:
-    return np.asarray(errors[np.isfinite(errors)])
+def _largest(drawn: np.ndarray, target: int) -> float:
+    """The largest error of a target on robots that could be simulated [m]."""
+    errors = drawn[:, target]
+    return float(errors[np.isfinite(errors)].max(initial=0.0))

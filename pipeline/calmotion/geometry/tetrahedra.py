@@ -193,7 +193,7 @@ def largest_part(points: Array, tets: IntArray) -> IntArray:
     from scipy.sparse import coo_matrix
     from scipy.sparse.csgraph import connected_components
 
-    sides = np.sort(tets[:, [[1, 2, 3], [0, 2, 3], [0, 1, 3], [0, 1, 2]]].reshape(-1, 3), axis=1)
+    sides = np.sort(tets[:, _FACES].reshape(-1, 3), axis=1)
     side = np.unique(sides, axis=0, return_inverse=True)[1].ravel()
     owner, order = np.repeat(np.arange(len(tets)), 4), np.argsort(side, kind="stable")
     twice = np.flatnonzero(side[order][1:] == side[order][:-1])

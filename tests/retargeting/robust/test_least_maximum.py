@@ -34,7 +34,7 @@ def straight(robots, instants, unknowns, seed=0):
     errors, changes = np.zeros((robots, instants, 1, 3)), np.zeros((robots, instants, 1, 3, unknowns), np.float32)
     errors[..., 0] = rng.normal(size=(robots, instants, 1))
     changes[..., 0, :] = rng.normal(size=(robots, instants, 1, unknowns))
-    return LinearErrors(errors, changes, 1.0)
+    return LinearErrors.of(errors, changes, 1.0)
 
 
 def smallest(linear, factors):
@@ -60,7 +60,7 @@ def test_it_is_near_the_least_maximum_of_a_linear_program(factor):
 
 def test_a_sum_of_squares_with_its_weights_is_smallest_there_too():
     rng = np.random.default_rng(1)
-    linear = LinearErrors(rng.normal(size=(2, 30, 2, 3)), rng.normal(size=(2, 30, 2, 3, 6)).astype(np.float32), 1.0)
+    linear = LinearErrors.of(rng.normal(size=(2, 30, 2, 3)), rng.normal(size=(2, 30, 2, 3, 6)).astype(np.float32), 1.0)
     factors, rest = np.array([[2.0, 1.0], [1.0, 1.0]]), Quadratic(1e-6)
     found = least_maximum(linear, factors, rest, np.zeros(6, bool), np.zeros(6))
     errors = linear.at(found)
@@ -73,7 +73,7 @@ def test_a_sum_of_squares_with_its_weights_is_smallest_there_too():
 
 def test_its_derivatives_are_those_of_differences():
     rng = np.random.default_rng(2)
-    linear = LinearErrors(rng.normal(size=(2, 10, 2, 3)), rng.normal(size=(2, 10, 2, 3, 4)).astype(np.float32), 3.0)
+    linear = LinearErrors.of(rng.normal(size=(2, 10, 2, 3)), rng.normal(size=(2, 10, 2, 3, 4)).astype(np.float32), 3.0)
     factors, rest, d = np.array([[2.0, 1.0], [1.0, 0.5]]), Quadratic(0.3), rng.normal(size=4)
 
     def value(x):
@@ -87,7 +87,7 @@ def test_its_derivatives_are_those_of_differences():
 
 
 def test_errors_that_no_unknown_changes_stay_as_they_are():
-    linear = LinearErrors(np.ones((2, 5, 1, 3)), np.zeros((2, 5, 1, 3, 4), np.float32), 1.0)
+    linear = LinearErrors.of(np.ones((2, 5, 1, 3)), np.zeros((2, 5, 1, 3, 4), np.float32), 1.0)
     found = least_maximum(linear, np.ones((2, 1)), Quadratic(0.0), np.zeros(4, bool), np.zeros(4))
     assert np.array_equal(found, np.zeros(4))
 

@@ -59,9 +59,9 @@ def test_less_error_on_the_nominal_robot_leaves_more_on_the_others(started, wors
 
 def test_curves_are_simulated_as_they_are(started, worst):
     shot = started[0].with_tracks(worst.tracks)
-    assert sum(scenario.weight for scenario in worst.scenarios) == pytest.approx(1.0)
+    assert sum(scenario.weight for scenario in worst.weighted()) == pytest.approx(1.0)
     still = optimize_shot(
-        shot, dataclasses.replace(OPTIONS, max_iterations=0), ignore_progress, None, worst.scenarios
+        shot, dataclasses.replace(OPTIONS, max_iterations=0), ignore_progress, None, worst.weighted()
     )  # fmt: skip
     assert still.iterations == 0 and still.stopped == "converged"
     for track, own in zip(found_tracks(still, started[0].animation), worst.tracks, strict=True):

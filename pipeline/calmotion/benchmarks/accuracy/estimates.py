@@ -26,12 +26,12 @@ from calmotion.accuracy.integrator_choice import by_fast_scheme
 from calmotion.accuracy.pod_subspace import ReferenceRun, project_to_subspace, reference_run
 from calmotion.accuracy.simulate_to_tolerance import simulate_to_tolerance
 from calmotion.accuracy.step_error import StepRun, distance, frames_of, simulate_at
-from calmotion.benchmarks.accuracy.estimates_figure import draw_estimates
+from calmotion.benchmarks.accuracy.estimates_figure import HONEST, LIMIT, draw_estimates
 from calmotion.benchmarks.common.parsers import bench_parser, output_options
 from calmotion.benchmarks.common.tables import markdown, resumed_rows, write_rows
 from calmotion.benchmarks.scenes.beam_arm import beam_arm, beam_mesh, quintic, shot_of
 from calmotion.errors import ShotError
-from calmotion.reduction.elements.assembly import quadratic_mesh
+from calmotion.reduction.elements.assembly import quadratic_nodes
 from calmotion.reduction.load_envelope import LoadEnvelope
 from calmotion.reduction.mesh_refinement import Effort, refined_for_frequencies
 from calmotion.shot import Animation, Character, FEMesh, FEMeshes, MeshQuality
@@ -40,7 +40,7 @@ from calmotion.shot.run import RunSettings
 from calmotion.simulation.body_reduction import BodyReduction, reduction_for
 from calmotion.simulation.compiled_shot import CompiledShot, compile_shot
 
-EDGES = (0.0, 0.05, 0.1, 0.2, 0.5, 1.0, 1.5, np.inf)  # of the classes of error over estimate
+EDGES = (0.0, HONEST[0], 0.1, 0.2, 0.5, HONEST[1], LIMIT, np.inf)  # of the classes of error over estimate
 MESH_ACCURACY, MAX_NODES = 0.01, 15_000  # of the first meshes, as of the mesher
 MESHES = ((3, 2), (4, 3))  # of references: cells along a link over those of the first mesh, and across; the last counts
 DECIDES = 0.5  # largest error of a reference over the larger of error and estimate
@@ -207,7 +207,7 @@ def _stiffened(
 
 def _nodes(meshes: FEMeshes) -> int:
     """Of the quadratic elements of all meshes."""
-    return sum(len(quadratic_mesh(mesh.points, mesh.tets).nodes) for mesh in meshes.meshes)
+    return sum(quadratic_nodes(mesh.points, mesh.tets) for mesh in meshes.meshes)
 
 
 def counts(rows: Sequence[Judged]) -> list[list[str]]:
@@ -215,10 +215,10 @@ def counts(rows: Sequence[Judged]) -> list[list[str]]:
     ratios = [row.ratio for row in rows if row.decides]
     found = [*np.histogram(ratios, EDGES)[0], len(rows) - len(ratios)]
     classes = list(zip(EDGES[:-2], EDGES[1:-1], strict=True))
-    names = [*(f"{low:g} to {high:g}" for low, high in classes), f"above {EDGES[-2]:g}", "undecided"]
+    names = [*(f"{low:g} to {high:g}" for low, high in classes), f"above {LIMIT:g}", "undecided"]
     shares = [*(f"{100.0 * n / max(len(ratios), 1):.0f}%" for n in found[:-1]), "-"]
-    kept = sum(EDGES[1] <= ratio <= 1.0 for ratio in ratios)
-    whole = [f"{EDGES[1]:g} to 1", str(kept), f"{100.0 * kept / max(len(ratios), 1):.1f}%"]
+    kept = sum(HONEST[0] <= ratio <= HONEST[1] for ratio in ratios)
+    whole = [f"{HONEST[0]:g} to {HONEST[1]:g}", str(kept), f"{100.0 * kept / max(len(ratios), 1):.1f}%"]
     largest = ["largest", f"{max(ratios, default=0.0):.2f}", "-"]
     return [[name, str(n), share] for name, n, share in zip(names, found, shares, strict=True)] + [whole, largest]
 
@@ -265,7 +265,7 @@ def main(arguments: list[str] | None = None) -> int:
         from calmotion.cli.tables import console_on, print_table
 
         print_table(console_on(sys.stdout), "Random shots by error over estimate", HEADS, table)
-    return int(any(row.decides and row.ratio > EDGES[-2] for row in rows))
+    return int(any(row.decides and row.ratio > LIMIT for row in rows))
 
 
 if __name__ == "__main__":

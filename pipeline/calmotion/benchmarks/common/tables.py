@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 import csv
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import asdict, fields
 from pathlib import Path
 from typing import Any, get_type_hints
@@ -18,6 +18,14 @@ def write_rows(path: str, kind: type[Any], rows: Iterable[Any]) -> None:
         writer = csv.DictWriter(file, [field.name for field in fields(kind)])
         writer.writeheader()
         writer.writerows(asdict(row) for row in rows)
+
+
+def write_table(path: str, kind: type[Any], rows: Sequence[Any], shown: Callable[[Sequence[Any]], str]) -> None:
+    """Write the rows by the suffix of the file: as CSV, or as the text that shows them."""
+    if path.lower().endswith(".csv"):
+        write_rows(path, kind, rows)
+    else:
+        Path(path).write_text(shown(rows), encoding="utf-8")
 
 
 def read_rows(path: str, kind: type[Any]) -> list[Any]:

@@ -27,7 +27,7 @@ from typing import Any
 import numpy as np
 
 from calmotion.benchmarks.common.parsers import bench_parser
-from calmotion.benchmarks.common.tables import markdown, write_rows
+from calmotion.benchmarks.common.tables import markdown, write_table
 from calmotion.benchmarks.links.robots import file_of, survey_robots
 from calmotion.benchmarks.links.tables import done, summary, survey_table
 from calmotion.benchmarks.scenes.links import Link, attachments_of, frames_of, read_links
@@ -223,14 +223,6 @@ def _cell(value: object) -> str:
     return str(value)
 
 
-def write(rows: Sequence[Row], path: str) -> None:
-    """The rows as CSV or Markdown, by the suffix of the file."""
-    if path.lower().endswith(".csv"):
-        write_rows(path, Row, rows)
-    else:
-        Path(path).write_text(table(rows), encoding="utf-8")
-
-
 def main(arguments: Sequence[str] | None = None) -> int:
     """Command line; exit status 1 when no link could be meshed."""
     parser = bench_parser("meshing", __doc__)
@@ -275,7 +267,7 @@ def _study_all(links: Sequence[Link], options: Namespace, say: Callable[[str], N
         except ShotError as error:
             say(str(error))
         if options.output and rows:
-            write(rows, options.output)
+            write_table(options.output, Row, rows, table)
     lines = verdicts(rows)
     print(table(rows) + (f"\n{lines}" if lines else ""), end="")
     return 0 if rows else 1

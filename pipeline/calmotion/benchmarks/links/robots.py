@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from calmotion.benchmarks.common.tables import read_rows, write_rows
+from calmotion.benchmarks.common.tables import read_rows, write_table
 from calmotion.benchmarks.links.survey import LinkRow, faulty_row, same_row, survey_link
 from calmotion.benchmarks.links.tables import page, survey_table
 from calmotion.benchmarks.scenes.links import Link, frames_of
@@ -49,7 +49,7 @@ def survey_robots(found: Sequence[tuple[Link, str]], options: Namespace, say: Ca
     def keep() -> None:
         so_far = {k: rows[k] for k in sorted(rows)}
         if options.output:
-            write_survey(list(so_far.values()), options.output)
+            write_table(options.output, LinkRow, list(so_far.values()), survey_table)
         if options.page:
             drawn = [(f"{r.robot}, {r.link}", Path(pictures[k])) for k, r in so_far.items() if pictures[k]]
             shown = [(title, f"meshing/{file.name}") for title, file in drawn if file.exists()]
@@ -91,14 +91,6 @@ def _command(options: Namespace) -> str:
     names = " ".join(shlex.quote(Path(file_of(source)).name) for source in options.links)
     pictures = f" --pictures {' '.join(options.pictures)}" if options.pictures else ""
     return f"calmotion bench meshing {names}{pictures} --page {options.page}"
-
-
-def write_survey(rows: Sequence[LinkRow], path: str) -> None:
-    """The rows as CSV or Markdown, by the suffix of the file."""
-    if path.lower().endswith(".csv"):
-        write_rows(path, LinkRow, rows)
-    else:
-        Path(path).write_text(survey_table(rows), encoding="utf-8")
 
 
 def file_of(source: str) -> str:

@@ -15,7 +15,6 @@ steps succeed (Levenberg 1944, Marquardt 1963), keeps the others from growing.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Protocol
 
 import numpy as np
@@ -55,18 +54,19 @@ class LinearErrors:
         errors: r, shape [S, T, G, 3] [m].
         changes: J, shape [S, T, G, 3, n], of single precision.
         scale: c, of half the squared norm in the merit.
+        gram: Second derivatives of c/2 M_2^2 for factors of 1, shape [n, n].
     """
 
     errors: Array
     changes: NDArray[np.float32]
     scale: float
+    gram: Array
 
-    @cached_property
-    def gram(self) -> Array:
-        """Second derivatives of c/2 M_2^2 for factors of 1, shape [n, n]."""
-        flat = self.changes.reshape(-1, self.changes.shape[-1])
-        count = flat.shape[0] // 3
-        return np.asarray((self.scale / count) * (flat.T @ flat), float)
+    @classmethod
+    def of(cls, errors: Array, changes: NDArray[np.float32], scale: float) -> LinearErrors:
+        """The errors with the matrix of their derivatives."""
+        flat = changes.reshape(-1, changes.shape[-1])
+        return cls(errors, changes, scale, np.asarray((scale / (len(flat) // 3)) * (flat.T @ flat), float))
 
     def at(self, d: Array) -> Array:
         """The errors at a change of the unknowns, shape [S, T, G, 3]."""

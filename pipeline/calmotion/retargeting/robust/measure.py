@@ -28,13 +28,13 @@ Found = TypeVar("Found")
 _AT_ONCE = 4  # robots for each processor between two reports of progress
 
 
-def _silent(fraction: float, message: str) -> None:
-    pass
+def silent(fraction: float, message: str) -> None:
+    """Progress that nobody is told."""
 
 
 def errors_on(
     shot: CompiledShot, options: RunSettings, curves: Curves, scenarios: Sequence[Scenario],
-    progress: Progress = _silent,
+    progress: Progress = silent,
 ) -> dict[str, Array]:  # fmt: skip
     """Largest errors of the targets on each robot.
 
@@ -59,7 +59,7 @@ def errors_on(
 
 def deviations_on(
     shot: CompiledShot, options: RunSettings, curves: Curves, scenarios: Sequence[Scenario],
-    of: Callable[[Array | None], Found], progress: Progress = _silent,
+    of: Callable[[Array | None], Found], progress: Progress = silent,
 ) -> list[dict[str, Found]]:  # fmt: skip
     """A function of the targets' deviations from the intended motion, for all curves on each robot.
 

@@ -6,11 +6,11 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy.sparse import csr_matrix, diags
 
 from calmotion.retargeting.problem.limits import LimitTerms
 from calmotion.retargeting.problem.offset_space import OffsetSpace
 from calmotion.retargeting.problem.rigid_approximation import EFFORT, limit_metrics
+from calmotion.retargeting.solver.dense_preconditioner import add_terms, for_each_motor
 from calmotion.shot.character import Array
 
 
@@ -47,8 +47,9 @@ class RestOfMerit:
             changed = self._changed(d)
             for name, v in changed.items():
                 gradient += self._pulled(name, self.limits.gradient(name, v))
-            for spline, metric in limit_metrics(self.inertia, self.space, self.limits.curvatures(changed)):
-                _add(matrix, spline, metric)
+            terms = limit_metrics(self.inertia, self.space, self.limits.curvatures(changed))
+            if terms:
+                add_terms(matrix, (self.space.basis.count, len(self.space.motors), self.space.basis.wraps), terms)
         return gradient, matrix
 
     def squared(self, d: Array) -> float:
@@ -57,8 +58,8 @@ class RestOfMerit:
 
     @cached_property
     def _quadratic(self) -> Array:
-        motors = len(self.space.motors)
-        return np.kron((self.space.penalty + self.damping * self.space.basis.closeness).toarray(), np.eye(motors))
+        penalty = self.space.penalty + self.damping * self.space.basis.closeness
+        return for_each_motor(penalty, len(self.space.motors))
 
     def _close(self, d: Array) -> Array:
         return np.asarray(self.space.basis.closeness @ d.reshape(self.space.basis.count, -1)).ravel()
@@ -83,13 +84,3 @@ class RestOfMerit:
             pulled = np.einsum("nMa,nM->na", self.inertia, by_value)
             return np.asarray(self.space.basis.accelerations.T @ pulled).ravel()
         return np.zeros(self.space.size)
-
-
-def _add(matrix: Array, spline: csr_matrix, metric: Array) -> None:
-    """Add sum_n b_n b_n^T (x) W_n over rows b_n of a spline matrix to a matrix, unknowns by function, then motor."""
-    motors = metric.shape[1]
-    acts = np.flatnonzero(np.any(metric, axis=(1, 2)))
-    rows = spline[acts]
-    for a in range(motors):
-        for b in range(motors):
-            matrix[a::motors, b::motors] += (rows.T @ diags(metric[acts, a, b]) @ rows).toarray()

@@ -12,7 +12,7 @@ from calmotion.errors import ShotError
 from calmotion.retargeting.found_curves import best_so_far
 from calmotion.retargeting.optimize import optimize_shot
 from calmotion.retargeting.robust.choice import beyond_simulation, chosen_scenarios, with_worse_robots
-from calmotion.retargeting.robust.measure import errors_on
+from calmotion.retargeting.robust.measure import errors_on, silent
 from calmotion.retargeting.robust.scenarios import Parameter, random_scenarios, uncertain_parameters
 from calmotion.retargeting.robust.worst_case import WorstCase
 from calmotion.shot import Result, Track
@@ -67,7 +67,8 @@ def retarget_robustly(
             best, used = _by_weights(shot, options, nominal, used, continued, progress)
         else:
             worst = _minimized(shot, options, worst, allowed, _part(progress, 0, 1))
-            best, used = _of_least_maximum(shot, options, nominal, worst, continued), worst.scenarios
+            used = worst.weighted()
+            best = _of_least_maximum(shot, options, nominal, worst, used, continued)
             worst = worst if robust.tradeoff else None  # it is large
         if best.interrupted:
             return best
@@ -97,11 +98,12 @@ def _minimized(
 
 
 def _of_least_maximum(
-    shot: CompiledShot, options: RunSettings, nominal: Result, worst: WorstCase, continued: Continued
+    shot: CompiledShot, options: RunSettings, nominal: Result, worst: WorstCase, scenarios: Sequence[Scenario],
+    continued: Continued,
 ) -> Result:  # fmt: skip
     """The result with the curves of the smallest largest error."""
     as_they_are = replace(options, max_iterations=0)
-    found = optimize_shot(shot.with_tracks(worst.tracks), as_they_are, _silent, None, worst.scenarios)
+    found = optimize_shot(shot.with_tracks(worst.tracks), as_they_are, silent, None, scenarios)
     return continued(
         nominal,
         replace(
@@ -134,10 +136,6 @@ def _by_weights(
         best, used, least = continued(best, latest), scenarios, float(errors.max())
         scenarios = _reweighted(scenarios, errors)
     return best, used
-
-
-def _silent(fraction: float, message: str) -> None:
-    pass
 
 
 def _searched(shot: CompiledShot, options: RunSettings, progress: Progress, scenarios: tuple[Scenario, ...]) -> Result:
@@ -218,9 +216,9 @@ def _with_compromises(
     try:
         for _ in range(asked.tradeoff):
             allowed *= FARTHER
-            worst = _minimized(shot, options, worst, allowed, _silent)
+            worst = _minimized(shot, options, worst, allowed, silent)
             errors = errors_on(shot, options, {"": worst.tracks}, (*found.scenarios[:1], *draws))[""]
-            compromises.append(Compromise(worst.scenarios[0].weight, allowed, errors[0], errors[1:]))
+            compromises.append(Compromise(worst.weighted()[0].weight, allowed, errors[0], errors[1:]))
     except KeyboardInterrupt:
         interrupts.answer()
     return replace(robust, robustness=replace(found, compromises=tuple(compromises)))

@@ -69,7 +69,7 @@ class WorstCase:
         shot: The shot as animated.
         options: Of the search, with its time step.
         tracks: Where it begins.
-        scenarios: The robots, the nominal one first.
+        scenarios: The robots, the nominal one first, kept as `scenarios`.
         last: Goes on from this one, whose curves these are.
     """
 
@@ -81,7 +81,7 @@ class WorstCase:
         curves = sample_curves(prepared.shot.animation.tracks, prepared.grid)
         intended = intended_motion(prepared, curves.angles, curves.rates)
         problem, self._x, _ = pose(prepared, curves, intended, options)
-        self._scenarios, self._animation = tuple(scenarios), shot.animation
+        self.scenarios, self._animation = tuple(scenarios), shot.animation
         self._prepared, self._reversals = prepared, bool(options.avoid_reversals)
         self._motors = len(shot.character.motors)
         alike = [Scenario(scenario.factors) for scenario in scenarios]
@@ -145,7 +145,7 @@ class WorstCase:
         for number in range(ROUNDS):
             interrupts.check()
             now = 1e3 * float(np.linalg.norm(linear.errors, axis=3).max())
-            progress(number / ROUNDS, f"largest weighted error on {len(self._scenarios)} robots: {now:.3f} mm")
+            progress(number / ROUNDS, f"largest weighted error on {len(self.scenarios)} robots: {now:.3f} mm")
             rest = replace(rest, damping=damping)
             d = self._minimum(linear, rest, most, orders)
             before, predicted = (self._merit(linear, linear.at(c), rest.value(c)) for c in (np.zeros_like(d), d))
@@ -174,15 +174,15 @@ class WorstCase:
             for curve, track in zip(curves, self._animation.tracks, strict=True)
         )
 
-    @property
-    def scenarios(self) -> tuple[Scenario, ...]:
-        """The robots with the weights of their squared errors in the sum that is smallest for the curves found."""
+    def weighted(self) -> tuple[Scenario, ...]:
+        """The robots with the weights of their squared errors in the sum that is smallest for the curves found, which
+        are simulated for it."""
         self._problem.value(self._x)
         m = lengths(self._errors(), self._factors)
         totals = weights_of(m, self._factors, ORDERS[-1]).sum(axis=(1, 2))
         return tuple(
             replace(scenario, weight=float(total))
-            for scenario, total in zip(self._scenarios, totals / totals.sum(), strict=True)
+            for scenario, total in zip(self.scenarios, totals / totals.sum(), strict=True)
         )
 
     def _minimum(self, linear: LinearErrors, rest: RestOfMerit, most: Array, orders: tuple[int, ...]) -> Array:
@@ -230,7 +230,7 @@ class WorstCase:
                 changes[k] = self._weighted.thinned(found)
 
             in_parallel(responded, range(len(problem.robots)))
-            linear = LinearErrors(self._errors(), changes, self._weighted.scale)
+            linear = LinearErrors.of(self._errors(), changes, self._weighted.scale)
             self._start_limits(linear)
             return self._moved(linear)
         return self._linear

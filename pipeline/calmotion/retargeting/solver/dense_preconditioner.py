@@ -24,7 +24,7 @@ class DensePreconditioner:
     def __init__(self, gram: Array, penalty: csr_matrix, wraps: bool):
         motors = len(gram) // penalty.shape[0]
         self._shape = penalty.shape[0], motors, wraps
-        self._matrix = kron(penalty, identity(motors)).toarray()
+        self._matrix = for_each_motor(penalty, motors)
         self._matrix += gram
 
     def factor(self, fixed: BoolArray, terms: list[tuple[csr_matrix, Array]] | None = None) -> None:
@@ -35,10 +35,7 @@ class DensePreconditioner:
         """
         matrix = self._matrix.copy()
         if terms:
-            gram = BandedGram(*self._shape)
-            for basis, metric in terms:
-                gram.add(basis, metric)
-            _add_banded(gram, matrix)
+            add_terms(matrix, self._shape, terms)
         matrix[fixed, :] = 0.0
         matrix[:, fixed] = 0.0
         diagonal = np.einsum("ii->i", matrix)
@@ -49,6 +46,24 @@ class DensePreconditioner:
     def solve(self, x: Array) -> Array:
         """The factor's inverse applied to a vector of shape [P * m]."""
         return np.asarray(cho_solve(self._factor, x, check_finite=False))
+
+
+def for_each_motor(matrix: csr_matrix, motors: int) -> Array:
+    """A matrix over the functions, shape [P, P], as one over all unknowns, the same for each motor."""
+    return np.asarray(kron(matrix, identity(motors)).toarray())
+
+
+def add_terms(matrix: Array, shape: tuple[int, int, bool], terms: list[tuple[csr_matrix, Array]]) -> None:
+    """Add terms of limits to a matrix over all unknowns.
+
+    Args:
+        matrix: Shape [P * m, P * m].
+        shape, terms: As of `BandedPreconditioner`.
+    """
+    gram = BandedGram(*shape)
+    for basis, metric in terms:
+        gram.add(basis, metric)
+    _add_banded(gram, matrix)
 
 
 def _add_banded(gram: BandedGram, matrix: Array) -> None:
