@@ -34,6 +34,24 @@ def test_the_boundary_of_a_box_is_closed_outward_and_has_its_area(helpers):
     assert t.surface_area(points, triangles) == pytest.approx(22.0, rel=1e-13)
 
 
+def test_keys_of_edges_and_triangles_are_equal_where_their_corners_are():
+    rng = np.random.default_rng(0)
+    for k in (2, 3):
+        rows = np.vstack([rng.integers(0, 5, (200, k)), t.MOST_POINTS - 1 - rng.integers(0, 5, (200, k))])
+        shuffled = np.array([rng.permutation(row) for row in rows])
+        keys = t.corner_keys(shuffled)
+        assert (keys >= 0).all() and np.array_equal(keys, t.corner_keys(rows))
+        ordered = np.sort(rows, axis=1)
+        _, first = np.unique(ordered, axis=0, return_index=True)
+        assert np.array_equal(np.unique(keys, return_index=True)[1], first)
+
+
+def test_more_points_than_keys_have_room_for_are_refused():
+    points = np.broadcast_to(0.0, (t.MOST_POINTS + 1, 3))
+    with pytest.raises(ShotError, match=r"/A.points: .*too many points"):
+        t.oriented_tets(points, np.array([[0, 1, 2, 3]]), "/A")
+
+
 def test_parts_that_share_no_point_are_counted(helpers):
     points, tets = helpers.box((2, 2, 2), (1, 1, 1))
     assert t.connected_parts(tets) == 1

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from calmotion.geometry.tetrahedra import boundary_triangles, tet_volumes
+from calmotion.geometry.tetrahedra import boundary_triangles, corner_keys, tet_volumes
 from calmotion.shot.character import Array, BoolArray, IntArray
 
 ON = 1e-9  # of the radius: distance from the sphere of points on it
@@ -61,9 +61,8 @@ def inside(corners: Array, center: Array, radius: float) -> BoolArray:
 def _crossing(points: Array, tets: IntArray, center: Array, radius: float) -> tuple[IntArray, Array]:
     """Edges of the surface that cross the sphere, from inside to outside, shape [k, 2], and where, shape [k]."""
     triangles = boundary_triangles(tets)
-    edges = np.unique(
-        np.sort(np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])), axis=0
-    )
+    sides = np.sort(np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]]))
+    edges = sides[np.unique(corner_keys(sides), return_index=True)[1]]
     distance = np.linalg.norm(points - center, axis=1) - radius
     side = np.where(np.abs(distance) <= ON * radius, 0.0, np.sign(distance))[edges]
     edges = edges[side[:, 0] * side[:, 1] < 0.0]

