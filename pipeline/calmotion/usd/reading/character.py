@@ -18,6 +18,7 @@ from calmotion.usd.reading.animated_transforms import moves, refuse_moving
 from calmotion.usd.reading.bases.contacts import contact_carriers, contact_joints
 from calmotion.usd.reading.bases.roots import on_moving_prim
 from calmotion.usd.reading.bodies import mass
+from calmotion.usd.reading.bodies.absent import no_bodies
 from calmotion.usd.reading.bodies.flexible import flexible_settings
 from calmotion.usd.reading.bodies.interfaces import interfaces_of
 from calmotion.usd.reading.bodies.part_materials import with_parts
@@ -82,18 +83,9 @@ def read_skeleton(
         ShotError: No bodies, no joints or no motors. Problems of single prims are added to the reading.
     """
     stage = reading.stage
-    root_file = stage.GetRootLayer().identifier
     prims = {str(p.GetPath()): p for p in prims_of(stage) if is_rigid_body(p)}
     if not prims:
-        skeletons = [p for p in prims_of(stage) if p.GetTypeName() == "Skeleton"]
-        raise ShotError(
-            "no bodies: the shot has no prim with PhysicsRigidBodyAPI",
-            path=skeletons[0].GetPath() if skeletons else root_file,
-            found="a skinned character without physics" if skeletons else None,
-            remedy="Run `calmotion rig` on it, and open the layer that it writes"
-            if skeletons
-            else "Apply PhysicsRigidBodyAPI to the moving parts of the character",
-        )
+        raise no_bodies(reading.whole or stage)
     joints_of_stage = joint_prims(stage)
     if not joints_of_stage:
         raise ShotError(

@@ -17,6 +17,8 @@ from calmotion.usd.units import StageUnits
 if TYPE_CHECKING:
     from pxr import Usd
 
+RIGID_BODY = "PhysicsRigidBodyAPI"
+
 T = TypeVar("T")
 R = TypeVar("R")
 
@@ -163,7 +165,7 @@ def refuse_without_transform(prim: Usd.Prim, what: str) -> None:
 
 def is_rigid_body(prim: Usd.Prim) -> bool:
     """Whether a prim is an enabled rigid body."""
-    if not is_applied(prim, "PhysicsRigidBodyAPI"):
+    if not is_applied(prim, RIGID_BODY):
         return False
     enabled = prim.GetAttribute("physics:rigidBodyEnabled")
     return not enabled or enabled.Get() is not False
