@@ -74,7 +74,19 @@ def test_figures_of_a_folder_are_named_on_one_line():
     files = dict.fromkeys(("layer", "root_layer", "rrd", "video", "csv"))
     print_files(console_on(stream), report(**files, figures=["out/errors.png", "out/motors.png"]))
     assert "wrote errors.png, motors.png in out" in stream.getvalue()
-    assert "next: calmotion optimize shot.usda -o LAYER" in stream.getvalue()
+
+
+@pytest.mark.parametrize(
+    ("error", "turn", "weight", "shakes"),
+    [(2e-3, 0.0, 0.0, True), (5e-4, 0.1, 0.0, False), (5e-4, 0.1, 0.01, True), (5e-4, 5e-3, 0.01, False)],
+)
+def test_a_shot_that_keeps_within_the_tolerance_is_not_said_to_shake(error, turn, weight, shakes):
+    stream = io.StringIO()
+    files = dict.fromkeys(("layer", "root_layer", "rrd", "video", "csv"))
+    target = {"path": "/Cup", "max_error_m": error, "max_rotation_error_rad": turn, "rotation_weight": weight}
+    print_files(console_on(stream), report(**files, figures=[], targets=[target]))
+    assert ("next: calmotion optimize shot.usda -o LAYER removes the shake" in stream.getvalue()) == shakes
+    assert ("off by more than the tolerance" in stream.getvalue()) != shakes
 
 
 def test_the_answer_comes_first():

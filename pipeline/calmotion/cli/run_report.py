@@ -251,9 +251,23 @@ def print_files(console: Console, report: dict[str, Any]) -> None:
     if report["rrd"]:
         say(console, f"next: rerun {unbroken(report['rrd'])}")
     if not _last(report):
-        say(console, f"next: calmotion optimize {unbroken(shlex.quote(report['shot']))} -o LAYER removes the shake")
+        command = f"calmotion optimize {unbroken(shlex.quote(report['shot']))} -o LAYER"
+        if _shakes(report):
+            say(console, f"next: {command} removes the shake")
+        else:
+            done = "no target is off by more than the tolerance"
+            say(console, f"next: {done}; {command} --tolerance LENGTH calms the rest")
     if not any(report[name] for name in ("layer", "rrd", "video")):
         say(console, "next: --rrd FILE records the motion for the rerun viewer, --video FILE makes a video of it")
+
+
+def _shakes(report: dict[str, Any]) -> bool:
+    """Whether a target of a simulation is farther off than the tolerance, in position or in rotation as it counts."""
+    return any(
+        max(target["max_error_m"], target["rotation_weight"] ** 0.5 * target["max_rotation_error_rad"])
+        > report["tolerance_m"]
+        for target in report["targets"]
+    )
 
 
 def print_warnings(console: Console, report: dict[str, Any]) -> None:
