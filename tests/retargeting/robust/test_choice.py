@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from calmotion.retargeting.robust.choice import REACH, _directions, _shared, chosen_scenarios, with_worse_robots
+from calmotion.retargeting.robust.choice import REACH, _directions, _shared, chosen_scenarios, worse_robots
 from calmotion.retargeting.robust.measure import errors_on
 from calmotion.retargeting.robust.scenarios import scenario_at, uncertain_parameters
 from calmotion.shot.robust.robots import Scenario
@@ -64,9 +64,9 @@ def test_robots_with_larger_errors_are_added(shot):
     tracks, parameters = shot.animation.tracks, uncertain_parameters(shot)
     axis = np.eye(len(parameters))[0]
     near = tuple(scenario_at(parameters, 0.1 * k * axis) for k in (0, 1, 2))
-    found = with_worse_robots(shot, OPTIONS, tracks, parameters, near)
-    assert found is not None and found[:3] == near and len(found) == 5
-    errors = errors_on(shot, OPTIONS, {"": tracks}, found[1:])[""].max(axis=1)
+    found = worse_robots(shot, OPTIONS, tracks, parameters, near)
+    assert len(found) == 2
+    errors = errors_on(shot, OPTIONS, {"": tracks}, (*near[1:], *found))[""].max(axis=1)
     assert errors[2:].min() > 1.05 * errors[:2].max()
     far = (Scenario(), *(scenario_at(parameters, 6.0 * k * axis) for k in (-1, 1)))
-    assert with_worse_robots(shot, OPTIONS, tracks, parameters, far) is None
+    assert worse_robots(shot, OPTIONS, tracks, parameters, far) == ()

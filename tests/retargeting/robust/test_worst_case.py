@@ -6,10 +6,12 @@ import numpy as np
 import pytest
 from calmotion.accuracy.simulate_to_tolerance import found_tracks
 from calmotion.retargeting.optimize import optimize_shot
+from calmotion.retargeting.robust import worst_case as module
 from calmotion.retargeting.robust.choice import chosen_scenarios
 from calmotion.retargeting.robust.measure import errors_on
 from calmotion.retargeting.robust.scenarios import uncertain_parameters
 from calmotion.retargeting.robust.worst_case import WorstCase
+from calmotion.shot.robust.robots import Scenario
 from calmotion.shot.run import RunSettings
 from calmotion.simulation.compiled_shot import compile_shot
 from calmotion.simulation.inputs.curves import sample_curves
@@ -55,6 +57,31 @@ def test_less_error_on_the_nominal_robot_leaves_more_on_the_others(started, wors
     nearer.minimize(0.5 * ALLOWED, ignore_progress)
     assert largest(started, nearer.tracks)[0] < 0.75 * ALLOWED
     assert largest(started, nearer.tracks)[1] > 1.3 * largest(started, worst.tracks)[1]
+
+
+def test_robots_that_are_taken_in_give_the_curves_of_a_search_with_all_of_them(started, monkeypatch):
+    made = []
+    dense = module.dense_responses
+    monkeypatch.setattr(module, "dense_responses", lambda robot, *rest: (made.append(robot), dense(robot, *rest))[1])
+    few, every = (WorstCase(started[0], OPTIONS, started[1], started[2][:k]) for k in (2, 3))
+    assert few.possible and every.possible
+    assert few.take_in(started[2][2:])
+    assert few.scenarios == every.scenarios and len(made) == 3  # two robots, and the one that is taken in
+    (own, _), (other, _) = few._linearized(), every._linearized()
+    assert np.array_equal(own.changes, other.changes) and np.allclose(own.errors, other.errors, rtol=0.0, atol=1e-12)
+    assert np.allclose(own.gram, other.gram, rtol=0.0, atol=1e-6 * np.abs(other.gram).max())
+    for found in (few, every):
+        found.minimize(ALLOWED, ignore_progress)
+    for own, other in zip(few.tracks, every.tracks, strict=True):  # sums of single precision in another order
+        assert np.allclose(own.values, other.values, rtol=0.0, atol=1e-4)
+
+
+def test_a_robot_that_cannot_be_simulated_is_not_taken_in(started):
+    found = WorstCase(started[0], OPTIONS, *started[1:])
+    assert found.possible
+    name = next(name for name in started[2][1].factors if name.startswith("modulus"))
+    assert not found.take_in([Scenario({name: 1e-9})])
+    assert found.scenarios == started[2] and sum(robot.weight for robot in found.weighted()) == pytest.approx(1.0)
 
 
 def test_curves_are_simulated_as_they_are(started, worst):

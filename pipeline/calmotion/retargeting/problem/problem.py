@@ -85,9 +85,10 @@ class RetargetProblem:
         other = copy(self)
         other.robots, other._limited = tuple(robots), None
         other.x = other._linearized_x = np.zeros(0)
-        if self.limits is not None and EFFORT in self.limits.bounds:
-            bound, limits = self.limits.bounds[EFFORT], self.limits
-            bounds = limits.bounds | {effort_of(k): bound for k in range(len(robots))}
+        if self.limits is not None:
+            limits, bounds = self.limits, self.limits.bounds
+            if EFFORT in bounds:
+                bounds = bounds | {effort_of(k): bounds[EFFORT] for k in range(len(robots))}
             other.limits = LimitTerms(bounds, limits.judged, limits.h, limits.rho)
         return other
 

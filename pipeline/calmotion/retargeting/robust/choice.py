@@ -62,18 +62,18 @@ def chosen_scenarios(
     )
 
 
-def with_worse_robots(
+def worse_robots(
     shot: CompiledShot, options: RunSettings, tracks: Sequence[Track], parameters: Sequence[Parameter],
     scenarios: Sequence[Scenario],
-) -> tuple[Scenario, ...] | None:  # fmt: skip
-    """The robots and some random ones on which curves leave larger errors; None where there are none.
+) -> tuple[Scenario, ...]:  # fmt: skip
+    """Some random robots on which curves leave larger errors than on the known ones.
 
     The random ones are not those on which curves are measured.
 
     Args:
         shot, options, parameters: As of `chosen_scenarios`.
         tracks: Curves with the smallest largest error on the robots.
-        scenarios: The robots, the nominal one first.
+        scenarios: The known robots, the nominal one first.
     """
     points = STRETCH * np.random.default_rng(_SEED).standard_normal((TRIED, len(parameters)))
     tried = [scenario_at(parameters, x) for x in points]
@@ -86,9 +86,7 @@ def with_worse_robots(
             break
         if all(np.linalg.norm(points[k] - points[j]) > ALIKE * np.linalg.norm(points[j]) for j in picked):
             picked.append(int(k))
-    if not picked:
-        return None
-    return (*scenarios, *(tried[k] for k in picked))
+    return tuple(tried[k] for k in picked)
 
 
 def _equal(pairs: int) -> tuple[Array, Array]:

@@ -65,8 +65,18 @@ class LinearErrors:
     @classmethod
     def of(cls, errors: Array, changes: NDArray[np.float32], scale: float) -> LinearErrors:
         """The errors with the matrix of their derivatives."""
-        flat = changes.reshape(-1, changes.shape[-1])
-        return cls(errors, changes, scale, np.asarray((scale / (len(flat) // 3)) * (flat.T @ flat), float))
+        return cls(errors, changes, scale, scale * _products(changes) / (errors.size // 3))
+
+    def with_robots(self, errors: Array, changes: NDArray[np.float32]) -> LinearErrors:
+        """The errors of these robots and of further ones.
+
+        Args:
+            errors: Of all robots, shape [S', T, G, 3] [m].
+            changes: Of the further ones, shape [S' - S, T, G, 3, n].
+        """
+        before, after = self.errors.size // 3, errors.size // 3
+        gram = (before * self.gram + self.scale * _products(changes)) / after
+        return LinearErrors(errors, np.concatenate([self.changes, changes]), self.scale, gram)
 
     def at(self, d: Array) -> Array:
         """The errors at a change of the unknowns, shape [S, T, G, 3]."""
@@ -75,6 +85,12 @@ class LinearErrors:
     def moved(self, d: Array) -> Array:
         """The change of the errors, shape [S, T, G, 3]."""
         return np.asarray(self.changes @ d.astype(np.float32), float)
+
+
+def _products(changes: NDArray[np.float32]) -> Array:
+    """The sum of the squares of changes of shape [..., n] as a matrix, shape [n, n]."""
+    flat = changes.reshape(-1, changes.shape[-1])
+    return np.asarray(flat.T @ flat, float)
 
 
 def lengths(errors: Array, factors: Array) -> Array:

@@ -11,7 +11,7 @@ from calmotion.accuracy.simulate_to_tolerance import found_tracks
 from calmotion.errors import ShotError
 from calmotion.retargeting.found_curves import best_so_far
 from calmotion.retargeting.optimize import optimize_shot
-from calmotion.retargeting.robust.choice import beyond_simulation, chosen_scenarios, with_worse_robots
+from calmotion.retargeting.robust.choice import beyond_simulation, chosen_scenarios, worse_robots
 from calmotion.retargeting.robust.measure import errors_on, silent
 from calmotion.retargeting.robust.scenarios import Parameter, random_scenarios, uncertain_parameters
 from calmotion.retargeting.robust.worst_case import WorstCase
@@ -66,7 +66,7 @@ def retarget_robustly(
             worst = None
             best, used = _by_weights(shot, options, nominal, used, continued, progress)
         else:
-            worst = _minimized(shot, options, worst, allowed, _part(progress, 0, 1))
+            _minimize(shot, options, worst, allowed, _part(progress, 0, 1))
             used = worst.weighted()
             best = _of_least_maximum(shot, options, nominal, worst, used, continued)
             worst = worst if robust.tradeoff else None  # it is large
@@ -79,22 +79,17 @@ def retarget_robustly(
         return best_so_far(best)
 
 
-def _minimized(
+def _minimize(
     shot: CompiledShot, options: RunSettings, worst: WorstCase, allowed: float, progress: Progress
-) -> WorstCase:  # fmt: skip
+) -> None:  # fmt: skip
     """The smallest largest error over some robots, and those on which it turns out larger."""
     parameters = uncertainties_of(shot)
     worst.minimize(allowed, progress)
     for _ in range(SEARCHES - 1):
-        others = with_worse_robots(shot, options, worst.tracks, parameters, worst.scenarios)
-        if others is None:
+        added = worse_robots(shot, options, worst.tracks, parameters, worst.scenarios)
+        if not (added and worst.take_in(added)):
             break
-        further = WorstCase(shot, options, worst.tracks, others, worst)
-        if not further.possible:
-            break
-        worst = further
         worst.minimize(allowed, progress)
-    return worst
 
 
 def _of_least_maximum(
@@ -216,7 +211,7 @@ def _with_compromises(
     try:
         for _ in range(asked.tradeoff):
             allowed *= FARTHER
-            worst = _minimized(shot, options, worst, allowed, silent)
+            _minimize(shot, options, worst, allowed, silent)
             errors = errors_on(shot, options, {"": worst.tracks}, (*found.scenarios[:1], *draws))[""]
             compromises.append(Compromise(worst.weighted()[0].weight, allowed, errors[0], errors[1:]))
     except KeyboardInterrupt:

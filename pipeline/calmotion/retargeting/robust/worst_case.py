@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
 from calmotion.multibody.parallel import in_parallel
 from calmotion.multibody.sensitivity.linearization import spare_memory
@@ -20,6 +21,7 @@ from calmotion.retargeting.found_curves import found_curves
 from calmotion.retargeting.kept_feet import keep_feet
 from calmotion.retargeting.problem.limits import FIRST_PENALTY
 from calmotion.retargeting.problem.posing import locked_coefficients, pose
+from calmotion.retargeting.problem.problem import RetargetProblem
 from calmotion.retargeting.problem.response_gram import COST, dense_responses
 from calmotion.retargeting.problem.rigid_approximation import rigid_response
 from calmotion.retargeting.problem.robot import Robot
@@ -70,22 +72,19 @@ class WorstCase:
         options: Of the search, with its time step.
         tracks: Where it begins.
         scenarios: The robots, the nominal one first, kept as `scenarios`.
-        last: Goes on from this one, whose curves these are.
     """
 
     def __init__(
-        self, shot: CompiledShot, options: RunSettings, tracks: Sequence[Track], scenarios: Sequence[Scenario],
-        last: WorstCase | None = None,
+        self, shot: CompiledShot, options: RunSettings, tracks: Sequence[Track], scenarios: Sequence[Scenario]
     ):  # fmt: skip
         prepared = prepare(shot.with_tracks(tracks), options)
         curves = sample_curves(prepared.shot.animation.tracks, prepared.grid)
         intended = intended_motion(prepared, curves.angles, curves.rates)
         problem, self._x, _ = pose(prepared, curves, intended, options)
         self.scenarios, self._animation = tuple(scenarios), shot.animation
-        self._prepared, self._reversals = prepared, bool(options.avoid_reversals)
+        self._prepared, self._options = prepared, options
         self._motors = len(shot.character.motors)
-        alike = [Scenario(scenario.factors) for scenario in scenarios]
-        self._problem = problem.for_robots(robots_of(prepared, problem, alike, options))
+        self._problem = problem.for_robots(self._robots(problem, scenarios))
         self._fixed = locked_coefficients(
             shot.animation, problem.space.basis, problem.space.motors, prepared.grid.end
         )  # fmt: skip
@@ -97,11 +96,8 @@ class WorstCase:
         )  # fmt: skip
         self._factors = np.ones((len(scenarios), len(self._weighted.places)))
         self._linear: tuple[LinearErrors, RestOfMerit] | None = None
-        self.work: Work = Work() if last is None else last.work
-        # errors of the nominal robot where the search began, shape [G]
-        self._own: Array = np.zeros(0) if last is None else last._own
-        if last is not None:
-            last._linear = None  # its memory is needed
+        self.work = Work()
+        self._own: Array = np.zeros(0)  # errors of the nominal robot where the search began, shape [G]
 
     @cached_property
     def possible(self) -> bool:
@@ -109,17 +105,54 @@ class WorstCase:
 
         What feet ask of the ground, and the play of gears, have no such derivatives.
         """
-        size, problem = self._problem.size, self._problem
-        if self._reversals or not np.isfinite(problem.value(self._x)):
+        problem = self._problem
+        if self._options.avoid_reversals or not np.isfinite(problem.value(self._x)):
             return False
         keep_feet(self._prepared, problem)
         if any(robot.ground is not None for robot in problem.robots):
             return False
-        fits = 24.0 * self._factors.size * len(self._weighted.at) * size <= _SHARE * spare_memory()
-        if not (fits and size <= _LARGEST and self._weighted.dense_enough):
+        fits = self._fit(len(self.scenarios)) and problem.size <= _LARGEST
+        if not (fits and self._weighted.dense_enough):
             return False
         problem.linearize()
         return all(robot.simulator.can_be_blocked() for robot in problem.robots)
+
+    def take_in(self, scenarios: Sequence[Scenario]) -> bool:
+        """Take in further robots; only their linear models are made. False, without them, where that is not possible.
+
+        Args:
+            scenarios: The robots.
+        """
+        begin, processor = time.perf_counter(), time.process_time()
+        taken = self._take_in(scenarios)
+        self._worked_since(begin, processor)
+        return taken
+
+    def _take_in(self, scenarios: Sequence[Scenario]) -> bool:
+        known, _ = self._linearized()
+        robots = self._robots(self._problem, scenarios)
+        problem = self._problem.for_robots([*self._problem.robots, *robots])
+        if not (self._fit(len(problem.robots)) and np.isfinite(problem.value(self._x))):
+            return False
+        in_parallel(Robot.linearize, robots)
+        if not all(robot.simulator.can_be_blocked() for robot in robots):
+            return False
+        self.scenarios, self._problem = (*self.scenarios, *scenarios), problem
+        self._factors = np.concatenate([self._factors, np.ones((len(robots), self._factors.shape[1]))])
+        linear = known.with_robots(self._errors(), self._changes(robots))
+        self._start_limits(linear)
+        self._moved(linear)
+        return True
+
+    def _robots(self, problem: RetargetProblem, scenarios: Sequence[Scenario]) -> list[Robot]:
+        """The robots of scenarios, of equal weights."""
+        alike = [Scenario(scenario.factors) for scenario in scenarios]
+        return robots_of(self._prepared, problem, alike, self._options)
+
+    def _fit(self, robots: int) -> bool:
+        """Whether the derivatives for so many robots fit in memory."""
+        rows = robots * self._factors.shape[1] * len(self._weighted.at)
+        return 24.0 * rows * self._problem.size <= _SHARE * spare_memory()
 
     def minimize(self, allowed: float, progress: Progress) -> None:
         """Minimise the largest error while the nominal robot's targets are off by at most so much.
@@ -130,6 +163,9 @@ class WorstCase:
         """
         begin, processor = time.perf_counter(), time.process_time()
         self._minimize(allowed, progress)
+        self._worked_since(begin, processor)
+
+    def _worked_since(self, begin: float, processor: float) -> None:
         self.work.wall_s += time.perf_counter() - begin
         self.work.processor_s += time.process_time() - processor
 
@@ -159,10 +195,10 @@ class WorstCase:
                 damping, eased = max(DAMPED * damping, before / max(rest.squared(d), 1e-300)), 1.0
                 continue
             self._x, small = self._x + d, gained < FALLING * before
-            if small and np.all(_largest(self._errors()[0]) <= MET[1] * most) and not self._tightened():
+            linear, rest = self._moved(linear) if small else self._linearized()
+            if small and np.all(_largest(linear.errors[0]) <= MET[1] * most) and not self._tightened():
                 break
             damping, eased, orders = damping * eased, 1.0 / DAMPED, ORDERS[-1:]
-            linear, rest = self._moved(linear) if small else self._linearized()
 
     @property
     def tracks(self) -> tuple[Track, ...]:
@@ -221,19 +257,21 @@ class WorstCase:
                 problem.linearize()
             self.work.linearizations += 1
             self.work.sweeps += round(2.0 * COST * problem.size)
-            shape = (len(problem.robots), len(self._weighted.at), len(self._weighted.places), 3, problem.size)
-            changes = np.empty(shape, np.float32)
-
-            def responded(k: int) -> None:
-                robot: Robot = problem.robots[k]
-                found = dense_responses(robot, problem.space, self._weighted.at)
-                changes[k] = self._weighted.thinned(found)
-
-            in_parallel(responded, range(len(problem.robots)))
-            linear = LinearErrors.of(self._errors(), changes, self._weighted.scale)
+            linear = LinearErrors.of(self._errors(), self._changes(problem.robots), self._weighted.scale)
             self._start_limits(linear)
             return self._moved(linear)
         return self._linear
+
+    def _changes(self, robots: Sequence[Robot]) -> NDArray[np.float32]:
+        """The derivatives of the errors of robots where they are linearised, shape [S, t, G, 3, n]."""
+        weighted, space = self._weighted, self._problem.space
+        changes = np.empty((len(robots), len(weighted.at), len(weighted.places), 3, space.size), np.float32)
+
+        def responded(k: int) -> None:
+            changes[k] = weighted.thinned(dense_responses(robots[k], space, weighted.at))
+
+        in_parallel(responded, range(len(robots)))
+        return changes
 
     def _moved(self, linear: LinearErrors) -> tuple[LinearErrors, RestOfMerit]:
         """The errors and the rest of the merit at the point evaluated last, with the derivatives of a model near it."""
