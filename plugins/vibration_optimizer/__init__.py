@@ -208,6 +208,13 @@ class OptimizeShot(Operator):
             description="Number of further robust curves that are told, each of which may be twice as far off on the "
             "model as the one before",
         ),
+        Property(
+            "bound",
+            bool,
+            False,
+            description="Tell an error below which no curves can bring the largest one on these robots; takes about as "
+            "long as the robust search",
+        ),
     )
 
     @classmethod
@@ -274,7 +281,9 @@ class OptimizeShot(Operator):
             window=values.window if values.window >= 0.0 else None,
             robust=None
             if values.robust == "off"
-            else RobustSettings(values.robust, values.scenarios, values.draws, values.nominal_error, values.tradeoff),
+            else RobustSettings(
+                values.robust, values.scenarios, values.draws, values.nominal_error, values.tradeoff, values.bound
+            ),
         )
 
 

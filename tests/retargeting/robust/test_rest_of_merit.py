@@ -54,3 +54,18 @@ def test_damping_is_half_of_the_squared_change_of_the_offsets(problem):
     squared = problem.grid.h * np.sum(offsets**2)
     assert rest_of(problem).squared(d) == pytest.approx(squared, rel=0.02)
     assert rest_of(problem, 2.0).value(d) - rest_of(problem).value(d) == pytest.approx(rest_of(problem).squared(d))
+
+
+def test_the_excess_times_its_multipliers_is_that_of_the_sides_that_act(problem):
+    rest, d = rest_of(problem), 0.01 * np.random.default_rng(4).normal(size=problem.size)
+    rest.limits.on = True
+    total, gradient = rest.multiplied(d)
+    free = dataclasses.replace(rest, limits=None)
+    assert np.allclose(gradient, rest.derivatives(d)[0] - free.derivatives(d)[0])
+    assert free.multiplied(d)[0] == 0.0 and not np.any(free.multiplied(d)[1])
+    expected = 0.0
+    for name, v in rest._changed(d).items():
+        slope, bound = rest.limits.gradient(name, v), rest.limits.bounds[name]
+        acting = np.where(slope > 0.0, bound.upper, bound.lower)
+        expected += float(np.sum(np.where(slope != 0.0, slope * (v - np.where(np.isfinite(acting), acting, 0.0)), 0.0)))
+    assert total == pytest.approx(expected) and total > 0.0

@@ -84,6 +84,14 @@ def test_a_robot_that_cannot_be_simulated_is_not_taken_in(started):
     assert found.scenarios == started[2] and sum(robot.weight for robot in found.weighted()) == pytest.approx(1.0)
 
 
+def test_no_curves_are_better_than_the_bound(started, worst):
+    bound, found = worst.least_possible(ALLOWED), largest(started, worst.tracks)
+    assert 0.8 * found[1] < bound < found[1]
+    assert found[1] < largest(started, started[1])[1]  # what is bounded is what the search brings down
+    wider = WorstCase(started[0], OPTIONS, worst.tracks, started[2])
+    assert wider.possible and wider.least_possible(1.5 * ALLOWED) < 0.995 * bound
+
+
 def test_curves_are_simulated_as_they_are(started, worst):
     shot = started[0].with_tracks(worst.tracks)
     assert sum(scenario.weight for scenario in worst.weighted()) == pytest.approx(1.0)
@@ -112,6 +120,7 @@ def test_it_keeps_limits_that_act(arm, animation, bodies, started, worst):
     )  # fmt: skip
     assert -1e-2 < max(use.excess for use in result.limits) <= 0.0
     assert largest(started, found.tracks)[1] < largest(started, tracks)[1]
+    assert found.least_possible(ALLOWED) < largest(started, found.tracks)[1]
 
 
 def test_a_loop_has_no_derivatives_of_this_kind(arm, animation, bodies):

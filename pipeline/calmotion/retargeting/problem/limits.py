@@ -79,6 +79,12 @@ class LimitTerms:
         derivative: Array = self.rho * self.h * (upper - lower) / self.bounds[name].scale
         return derivative
 
+    def multiplied(self, name: str, v: Array) -> float:
+        """The excess of a quantity over its limits times the multipliers that it leads to."""
+        sides = self._sides(name, v)
+        multipliers = self.rho * self.h * np.maximum(0.0, sides + self.multipliers[name])
+        return float(np.sum(multipliers * np.where(multipliers > 0.0, sides - MARGIN, 0.0)))
+
     def curvature(self, name: str, v: Array) -> Array:
         """Second derivative of the terms where they act, shape [T, M]."""
         if not self.on:

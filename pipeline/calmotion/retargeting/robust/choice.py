@@ -77,8 +77,7 @@ def worse_robots(
     """
     points = STRETCH * np.random.default_rng(_SEED).standard_normal((TRIED, len(parameters)))
     tried = [scenario_at(parameters, x) for x in points]
-    weights = np.sqrt([target.position_weight for target in shot.character.targets])
-    errors = (errors_on(shot, options, {"": tracks}, (*scenarios[1:], *tried))[""] * weights).max(axis=1)
+    errors = largest_weighted(shot, errors_on(shot, options, {"": tracks}, (*scenarios[1:], *tried))[""])
     known, found = errors[: len(scenarios) - 1], errors[len(scenarios) - 1 :]
     picked: list[int] = []
     for k in np.argsort(-np.where(np.isfinite(found), found, 0.0)):
@@ -87,6 +86,11 @@ def worse_robots(
         if all(np.linalg.norm(points[k] - points[j]) > ALIKE * np.linalg.norm(points[j]) for j in picked):
             picked.append(int(k))
     return tuple(tried[k] for k in picked)
+
+
+def largest_weighted(shot: CompiledShot, errors: Array) -> Array:
+    """The largest error of any target as it weighs, shape [S], of errors of the targets, shape [S, K]."""
+    return np.asarray((errors * np.sqrt([t.position_weight for t in shot.character.targets])).max(axis=1))
 
 
 def _equal(pairs: int) -> tuple[Array, Array]:

@@ -23,8 +23,8 @@ from scipy.linalg import LinAlgError, solve
 
 from calmotion.shot.character import Array, BoolArray
 
-ORDERS = (8, 16)
-_STEPS = 30  # most of each order, with those that fail
+ORDERS: tuple[int, ...] = (8, 16)
+STEPS = 30  # most of each order, with those that fail
 _ENDED = 1e-3  # relative decrease of F_p below which the next order follows
 _COUNTS = 1e-2  # of the largest weight: smaller ones count in the gradient only
 _NOTHING = 1e-12  # of the mean of the matrix's diagonal, added to it
@@ -110,8 +110,9 @@ def weights_of(m: Array, factors: Array, order: int) -> Array:
 
 
 def least_maximum(
-    linear: LinearErrors, factors: Array, rest: Rest, fixed: BoolArray, start: Array, orders: tuple[int, ...] = ORDERS
-) -> Array:
+    linear: LinearErrors, factors: Array, rest: Rest, fixed: BoolArray, start: Array,
+    orders: tuple[int, ...] = ORDERS, steps: int = STEPS,
+) -> Array:  # fmt: skip
     """The change of the unknowns with the smallest F_p, p the last of some orders, shape [n].
 
     Args:
@@ -121,13 +122,14 @@ def least_maximum(
         fixed: Unknowns that do not change, shape [n], bool.
         start: A change, shape [n].
         orders: Of the norms, one after the other.
+        steps: Most of each order, with those that fail.
     """
     d, errors, free = start, linear.at(start), np.flatnonzero(~fixed)
     damping = _DAMPED
     for order in orders:
         before = merit(linear.scale, lengths(errors, factors), order, rest.value(d))
         derivatives = None
-        for _ in range(_STEPS):
+        for _ in range(steps):
             if derivatives is None:
                 derivatives = _derivatives(linear, errors, factors, order, rest.derivatives(d))
             step = np.zeros_like(d)

@@ -52,6 +52,16 @@ class RestOfMerit:
                 add_terms(matrix, (self.space.basis.count, len(self.space.motors), self.space.basis.wraps), terms)
         return gradient, matrix
 
+    def multiplied(self, d: Array) -> tuple[float, Array]:
+        """The excess over the limits times its multipliers, at most zero where all limits are kept, and its gradient,
+        shape [n], where the multipliers are those of a change."""
+        total, gradient = 0.0, np.zeros(self.space.size)
+        if self.limits is not None:
+            for name, v in self._changed(d).items():
+                total += self.limits.multiplied(name, v)
+                gradient += self._pulled(name, self.limits.gradient(name, v))
+        return total, gradient
+
     def squared(self, d: Array) -> float:
         """The squared change of the offsets over time [rad^2 s]."""
         return float(d @ self._close(d))

@@ -7,9 +7,8 @@ times as large; f follows from a few such minima.
 
 from __future__ import annotations
 
-import time
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
@@ -25,10 +24,21 @@ from calmotion.retargeting.problem.problem import RetargetProblem
 from calmotion.retargeting.problem.response_gram import COST, dense_responses
 from calmotion.retargeting.problem.rigid_approximation import rigid_response
 from calmotion.retargeting.problem.robot import Robot
-from calmotion.retargeting.robust.least_maximum import ORDERS, LinearErrors, least_maximum, lengths, merit, weights_of
+from calmotion.retargeting.robust import least_possible as bound
+from calmotion.retargeting.robust.least_maximum import (
+    ORDERS,
+    STEPS,
+    LinearErrors,
+    Rest,
+    least_maximum,
+    lengths,
+    merit,
+    weights_of,
+)
 from calmotion.retargeting.robust.rest_of_merit import RestOfMerit
 from calmotion.retargeting.robust.robots import robots_of
 from calmotion.retargeting.robust.weighted_errors import WeightedErrors
+from calmotion.retargeting.robust.work import Work
 from calmotion.shot import Track
 from calmotion.shot.character import Array
 from calmotion.shot.robust.robots import Scenario
@@ -45,23 +55,6 @@ FIRST_FACTOR = 0.4  # of the largest error over the allowed one: the others' err
 FALLING, AS_PREDICTED = 0.1, 0.25  # a smaller relative decrease of the merit ends, a smaller share of it is refused
 DAMPED = 10.0  # growth of the damping after a refused step
 _LARGEST, _SHARE = 3000, 0.5  # most unknowns, and most of the free memory
-
-
-@dataclass
-class Work:
-    """What was done to find the curves.
-
-    Attributes:
-        evaluations, linearizations: Of all robots.
-        sweeps: Linearised sweeps whose cost the responses of a robot had.
-        wall_s, processor_s: Time [s].
-    """
-
-    evaluations: int = 0
-    linearizations: int = 0
-    sweeps: int = 0
-    wall_s: float = 0.0
-    processor_s: float = 0.0
 
 
 class WorstCase:
@@ -97,7 +90,7 @@ class WorstCase:
         self._factors = np.ones((len(scenarios), len(self._weighted.places)))
         self._linear: tuple[LinearErrors, RestOfMerit] | None = None
         self.work = Work()
-        self._own: Array = np.zeros(0)  # errors of the nominal robot where the search began, shape [G]
+        self._own: Array = np.zeros(0)  # errors of the nominal robot where it began, shape [G]
 
     @cached_property
     def possible(self) -> bool:
@@ -111,8 +104,7 @@ class WorstCase:
         keep_feet(self._prepared, problem)
         if any(robot.ground is not None for robot in problem.robots):
             return False
-        fits = self._fit(len(self.scenarios)) and problem.size <= _LARGEST
-        if not (fits and self._weighted.dense_enough):
+        if not (self._fit(len(self.scenarios)) and problem.size <= _LARGEST and self._weighted.dense_enough):
             return False
         problem.linearize()
         return all(robot.simulator.can_be_blocked() for robot in problem.robots)
@@ -123,26 +115,21 @@ class WorstCase:
         Args:
             scenarios: The robots.
         """
-        begin, processor = time.perf_counter(), time.process_time()
-        taken = self._take_in(scenarios)
-        self._worked_since(begin, processor)
-        return taken
-
-    def _take_in(self, scenarios: Sequence[Scenario]) -> bool:
-        known, _ = self._linearized()
-        robots = self._robots(self._problem, scenarios)
-        problem = self._problem.for_robots([*self._problem.robots, *robots])
-        if not (self._fit(len(problem.robots)) and np.isfinite(problem.value(self._x))):
-            return False
-        in_parallel(Robot.linearize, robots)
-        if not all(robot.simulator.can_be_blocked() for robot in robots):
-            return False
-        self.scenarios, self._problem = (*self.scenarios, *scenarios), problem
-        self._factors = np.concatenate([self._factors, np.ones((len(robots), self._factors.shape[1]))])
-        linear = known.with_robots(self._errors(), self._changes(robots))
-        self._start_limits(linear)
-        self._moved(linear)
-        return True
+        with self.work.timed():
+            known, _ = self._linearized()
+            robots = self._robots(self._problem, scenarios)
+            problem = self._problem.for_robots([*self._problem.robots, *robots])
+            if not (self._fit(len(problem.robots)) and np.isfinite(problem.value(self._x))):
+                return False
+            in_parallel(Robot.linearize, robots)
+            if not all(robot.simulator.can_be_blocked() for robot in robots):
+                return False
+            self.scenarios, self._problem = (*self.scenarios, *scenarios), problem
+            self._factors = np.concatenate([self._factors, np.ones((len(robots), self._factors.shape[1]))])
+            linear = known.with_robots(self._errors(), self._changes(robots))
+            self._start_limits(linear)
+            self._moved(linear)
+            return True
 
     def _robots(self, problem: RetargetProblem, scenarios: Sequence[Scenario]) -> list[Robot]:
         """The robots of scenarios, of equal weights."""
@@ -161,23 +148,16 @@ class WorstCase:
             allowed: Error of the position of a target on the nominal robot [m]; where it began with more, as much.
             progress: Called with a fraction and a message.
         """
-        begin, processor = time.perf_counter(), time.process_time()
-        self._minimize(allowed, progress)
-        self._worked_since(begin, processor)
-
-    def _worked_since(self, begin: float, processor: float) -> None:
-        self.work.wall_s += time.perf_counter() - begin
-        self.work.processor_s += time.process_time() - processor
+        with self.work.timed():
+            self._minimize(allowed, progress)
 
     def _minimize(self, allowed: float, progress: Progress) -> None:
-        damping, eased = 0.0, 1.0 / DAMPED  # the next model has a smaller damping unless this one needed it
-        orders: tuple[int, ...] = ORDERS
+        problem, damping, orders = self._problem, 0.0, ORDERS
+        eased = 1.0 / DAMPED  # the next model has a smaller damping unless this one needed it
         linear, rest = self._linearized()
         if not len(self._own):
             self._own = _largest(linear.errors[0])
-        most = np.where(self._weighted.of_position, np.maximum(allowed, self._own), np.inf)
-        largest = float(np.linalg.norm(linear.errors[1:], axis=3).max(initial=0.0))
-        self._factors[0] = np.maximum(FIRST_FACTOR * largest / most, 1.0)
+        most = self._most(linear, np.maximum(allowed, self._own), FIRST_FACTOR)
         for number in range(ROUNDS):
             interrupts.check()
             now = 1e3 * float(np.linalg.norm(linear.errors, axis=3).max())
@@ -185,20 +165,33 @@ class WorstCase:
             rest = replace(rest, damping=damping)
             d = self._minimum(linear, rest, most, orders)
             before, predicted = (self._merit(linear, linear.at(c), rest.value(c)) for c in (np.zeros_like(d), d))
-            if not np.any(d) or before - predicted < FALLING * before and self._keeps(rest.limited):
+            kept = problem.limits is None or problem.limits.kept(rest.limited)
+            if not np.any(d) or before - predicted < FALLING * before and kept:
                 break
             gained = 0.0
             self.work.evaluations += 1
-            if np.isfinite(self._problem.value(self._x + d)):
+            if np.isfinite(problem.value(self._x + d)):
                 gained = before - self._merit(linear, self._errors(), self._rest(damping, d))
             if gained < AS_PREDICTED * (before - predicted) or gained <= 0.0:
                 damping, eased = max(DAMPED * damping, before / max(rest.squared(d), 1e-300)), 1.0
                 continue
             self._x, small = self._x + d, gained < FALLING * before
             linear, rest = self._moved(linear) if small else self._linearized()
-            if small and np.all(_largest(linear.errors[0]) <= MET[1] * most) and not self._tightened():
+            if small and np.all(_largest(linear.errors[0]) <= MET[1] * most) and not problem.tighten():
                 break
             damping, eased, orders = damping * eased, 1.0 / DAMPED, ORDERS[-1:]
+
+    def least_possible(self, allowed: float) -> float:
+        """A bound below which no curves can bring the largest weighted error on these robots [m] (`least_possible`).
+
+        Args:
+            allowed: As of `minimize`; where the curves found have more, as much.
+        """
+        linear, rest = self._linearized()
+        most = self._most(linear, np.maximum(allowed, _largest(linear.errors[0])), bound.FIRST_FACTOR)
+        even = bound.EvenErrors.of(linear, rest)
+        d = self._minimum(linear, even, most, bound.ORDERS, bound.MET, bound.STEPS)
+        return bound.least_possible(linear, self._factors, most, even, self._fixed, d, self._problem.grid.end)
 
     @property
     def tracks(self) -> tuple[Track, ...]:
@@ -221,17 +214,27 @@ class WorstCase:
             for scenario, total in zip(self.scenarios, totals / totals.sum(), strict=True)
         )
 
-    def _minimum(self, linear: LinearErrors, rest: RestOfMerit, most: Array, orders: tuple[int, ...]) -> Array:
+    def _most(self, linear: LinearErrors, allowed: Array, factor: float) -> Array:
+        """Largest errors of the nominal robot, shape [G]; its first factors are a share of the others' over these."""
+        most = np.where(self._weighted.of_position, allowed, np.inf)
+        largest = float(np.linalg.norm(linear.errors[1:], axis=3).max(initial=0.0))
+        self._factors[0] = np.maximum(factor * largest / most, 1.0)
+        return most
+
+    def _minimum(
+        self, linear: LinearErrors, rest: Rest, most: Array, orders: tuple[int, ...],
+        met: tuple[float, float] = MET, steps: int = STEPS,
+    ) -> Array:  # fmt: skip
         """The least maximum of the linear model, and the factors with which it keeps the allowed error."""
         d = np.zeros_like(self._x)
-        for _ in range(FACTORS):
-            d = least_maximum(linear, self._factors, rest, self._fixed, d, orders)
+        for left in reversed(range(FACTORS)):
+            d = least_maximum(linear, self._factors, rest, self._fixed, d, orders, steps)
             nominal = _largest(linear.at(d)[0])
-            free = np.all(self._factors[0] <= 1.0) or np.any(nominal >= MET[0] * most)
-            if np.all(nominal <= MET[1] * most) and free:
+            free = np.all(self._factors[0] <= 1.0) or np.any(nominal >= met[0] * most)
+            if not left or np.all(nominal <= met[1] * most) and free:
                 break
             self._factors[0] = np.maximum(self._factors[0] * np.clip(nominal / most, 0.6, 1.6), 1.0)
-            orders = ORDERS[-1:]
+            orders = orders[-1:]
         return d
 
     def _merit(self, linear: LinearErrors, errors: Array, rest: float) -> float:
@@ -286,15 +289,6 @@ class WorstCase:
         if limits is not None and not limits.on:
             limits.on = True
             limits.rho = FIRST_PENALTY * self._merit(linear, linear.errors, 0.0) / grid.end
-
-    def _keeps(self, limited: dict[str, Array]) -> bool:
-        """Whether values keep all limits."""
-        limits = self._problem.limits
-        return limits is None or limits.kept(limited)
-
-    def _tightened(self) -> bool:
-        """Update the multipliers of limits that are not kept at the point evaluated last; whether that helps."""
-        return self._problem.tighten()
 
 
 def _largest(errors: Array) -> Array:
