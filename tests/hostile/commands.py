@@ -5,9 +5,9 @@ from __future__ import annotations
 from functools import partial
 from pathlib import Path
 
-from broken_shots import flexible
 from hostile import DONE, USAGE, Case, arm
 from motions import EITHER
+from shot_edits import flexible
 
 SHOT = arm()
 SOFT = arm(flexible(lambda stage: None))

@@ -9,11 +9,11 @@ from functools import partial
 from pathlib import Path
 
 import numpy as np
-from broken_shots import flexible, mesh, mesh_file, tet_mesh
 from commands import words
 from hostile import DONE, USAGE, Case, Edit, arm, layer, simulate
 from motions import EITHER
 from pxr import Gf, Sdf, Usd, UsdGeom, UsdUtils, Vt
+from shot_edits import flexible, mesh, mesh_file, tet_mesh
 from small_shots import BASE, ELBOW, FORE, HAND, SHOULDER, UPPER, make_target
 
 SKIN = f"{FORE}/skin"

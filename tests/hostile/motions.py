@@ -6,9 +6,9 @@ import math
 
 import numpy as np
 import posed_shots
-from broken_shots import applied, attribute, both, retarget, stage_metadata, times
 from hostile import DONE, USAGE, Case, Edit, arm, layer, optimize, simulate
 from pxr import Gf, Sdf, Ts, Usd, UsdGeom, Vt
+from shot_edits import applied, attribute, both, retarget, stage_metadata, times
 from small_shots import ELBOW, FORE, FRAMES, HAND, SHOULDER, TARGET_POSITION
 
 EITHER = (0, 1)

@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from broken_shots import applied, attribute, both, flexible, material, number, retarget, stage_metadata, target, vector
 from hostile import DONE, Case, Edit, arm, optimize, simulate
 from motions import CODES, EITHER, SWING, track
 from pxr import Gf, Sdf, Usd, UsdGeom, UsdPhysics
+from shot_edits import applied, attribute, both, flexible, material, number, retarget, stage_metadata, target, vector
 from small_shots import BASE, ELBOW, FORE, HAND, LENGTH, PLASTIC, SHOULDER, UPPER, make_target
 
 SLOW = 120.0

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from broken_shots import half_turns
 from calmotion import export, optimize, simulate
 from calmotion.errors import ShotError, each
 from calmotion.host import Outcome
 from calmotion.shot.run import OutputPaths
 from pxr import Gf, UsdGeom, UsdPhysics
+from shot_edits import half_turns
 from small_shots import (
     BASE,
     ELBOW,

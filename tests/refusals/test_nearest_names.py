@@ -2,12 +2,12 @@
 
 import numpy as np
 import pytest
-from broken_shots import targets
 from calmotion import open_shot
 from calmotion.errors import ShotError
 from calmotion.shot import MotorTracks
 from calmotion.usd.reading import read_shot
 from pxr import UsdGeom
+from shot_edits import targets
 from small_shots import ELBOW, FORE, SHOULDER, UPPER, make_flexible, write_arm
 
 
