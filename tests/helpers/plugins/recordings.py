@@ -1,6 +1,24 @@
-"""Recordings read back: columns of entities by component."""
+"""Recordings written by the plugin, and read back: columns of entities by component."""
+
+from pathlib import Path
 
 import numpy as np
+import synthetic
+from calmotion.shot.run import OutputPaths
+from calmotion.testing import host_with, run_operator
+
+PLUGIN = Path(__file__).resolve().parents[3] / "plugins" / "rerun_logger"
+
+
+def write(path, result, settings=None):
+    """Write the recording of a result of the synthetic character; the outputs of the operator."""
+    values = [synthetic.character(), synthetic.animation(), result, OutputPaths(rrd=str(path))]
+    return run_operator(host_with(PLUGIN), "rerun.log", values, settings)
+
+
+def tensor_of(cell):
+    """The numbers of a tensor as it stands in a column."""
+    return cell["buffer"]
 
 
 def read_recording(path):

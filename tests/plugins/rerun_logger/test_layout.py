@@ -1,0 +1,43 @@
+"""The layout of the recording in the viewer."""
+
+from __future__ import annotations
+
+import sys
+
+import synthetic
+from calmotion.testing import host_with
+from recordings import PLUGIN, write
+
+
+def test_curves_can_be_read_on_dark_and_light_themes():
+    host = host_with(PLUGIN)
+    package = host.operators["rerun.log"].__module__
+    __import__(f"{package}.layout")
+    module = sys.modules[package]
+    for style in module.layout.STYLES.values():
+        for count in (1, 2, 5, 24):
+            shades = [style.shade(k, count) for k in range(count)]
+            assert len(set(shades)) == count
+            for shade in shades:
+                assert min(module.colors.contrast(shade, other) for other in ((255, 255, 255), (13, 16, 17))) >= 3.0
+
+
+def test_the_recording_contains_its_layout(tmp_path):
+    from rerun.chunk import RrdReader
+
+    write(tmp_path / "out.rrd", synthetic.result())
+    assert len(RrdReader(str(tmp_path / "out.rrd")).blueprints()) == 1
+    assert [path.name for path in tmp_path.iterdir()] == ["out.rrd"]
+
+
+def test_each_shot_has_a_layout_of_its_own(tmp_path):
+    from rerun.chunk import RrdReader
+
+    names = set()
+    for name in ("first", "second"):
+        write(tmp_path / f"{name}.rrd", synthetic.result())
+        reader = RrdReader(str(tmp_path / f"{name}.rrd"))
+        (layout,), (recording,) = reader.blueprints(), reader.recordings()
+        assert layout.application_id == recording.application_id
+        names.add(layout.application_id)
+    assert len(names) == 2, "the viewer keeps one camera for each application"
