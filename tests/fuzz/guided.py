@@ -18,17 +18,20 @@ import re
 import resource
 import subprocess
 import sys
+import tempfile
 import time
 import traceback
 from collections.abc import Callable
 from pathlib import Path
 
 import targets
+from calmotion.support.files import locked
 
 HERE = Path(__file__).resolve().parent
 CASES, COUNTS, CORPUS = HERE / "cases", HERE / "counts.json", HERE.parents[1] / "build" / "fuzz"
 PAGE = HERE.parents[1] / "docs" / "reliability.md"
 BEGIN, END = "<!-- counts of make fuzz -->", "<!-- end of the counts of make fuzz -->"
+MEMORY = "/dev/shm"  # files that are kept in memory, on Linux
 _PACKAGES = ("calmotion", "fe_mesher", "bvh_reader", "recording_readers", "motion_table")
 _DONE, _PULSE = re.compile(r"Done (\d+) runs"), re.compile(r"^#(\d+)", re.MULTILINE)
 
@@ -116,13 +119,14 @@ def table(counts: dict[str, dict]) -> str:
 
 
 def write(name: str, seconds: float, inputs: int, found: int, guided: bool) -> None:
-    """Add a run to the counts, and make the table of the page anew."""
-    counts = added(json.loads(COUNTS.read_text()) if COUNTS.is_file() else {}, name, seconds, inputs, found, guided)
-    temporary = COUNTS.with_suffix(".part")
-    temporary.write_text(json.dumps(counts, indent=1) + "\n")
-    os.replace(temporary, COUNTS)
-    before, _, rest = PAGE.read_text().partition(BEGIN)
-    PAGE.write_text(f"{before}{BEGIN}\n\n{table(counts)}\n\n{END}{rest.partition(END)[2]}")
+    """Add a run to the counts, and make the table of the page anew; several targets may end at the same time."""
+    with locked(COUNTS.parent):
+        counts = added(json.loads(COUNTS.read_text()) if COUNTS.is_file() else {}, name, seconds, inputs, found, guided)
+        temporary = COUNTS.with_suffix(".part")
+        temporary.write_text(json.dumps(counts, indent=1) + "\n")
+        os.replace(temporary, COUNTS)
+        before, _, rest = PAGE.read_text().partition(BEGIN)
+        PAGE.write_text(f"{before}{BEGIN}\n\n{table(counts)}\n\n{END}{rest.partition(END)[2]}")
 
 
 def supervised(name: str, seconds: float) -> tuple[int, float, int, int, bool]:
@@ -130,14 +134,19 @@ def supervised(name: str, seconds: float) -> tuple[int, float, int, int, bool]:
     folder = CASES / name
     before = len(list(folder.glob("*")))
     command = [sys.executable, str(HERE / "guided.py"), name, str(seconds), "--here"]
-    process = subprocess.Popen(command, stderr=subprocess.STDOUT, stdout=subprocess.PIPE, text=True, errors="replace")
-    assert process.stdout is not None
     lines, guided = [], False
-    for line in process.stdout:
-        lines.append(line)
-        guided = guided or line.startswith("INFO:")
-        print(line, end="", flush=True)
-    status = process.wait()
+    # inputs are files, which take most of the time where they are written to a disk
+    with tempfile.TemporaryDirectory(prefix="fuzz-", dir=MEMORY if os.access(MEMORY, os.W_OK) else None) as files:
+        process = subprocess.Popen(
+            command, stderr=subprocess.STDOUT, stdout=subprocess.PIPE, text=True, errors="replace",
+            env=os.environ | {"TMPDIR": files},
+        )  # fmt: skip
+        assert process.stdout is not None
+        for line in process.stdout:
+            lines.append(line)
+            guided = guided or line.startswith("INFO:")
+            print(line, end="", flush=True)
+        status = process.wait()
     used = resource.getrusage(resource.RUSAGE_CHILDREN)
     text = "".join(lines[-2000:])
     done = _DONE.search(text)

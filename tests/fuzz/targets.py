@@ -5,9 +5,11 @@ An input is either the file itself, or drives random edits of a valid one (`Byte
 
 from __future__ import annotations
 
+import atexit
 import io
 import json
 import random
+import shutil
 import sys
 import tempfile
 from collections.abc import Callable
@@ -19,6 +21,7 @@ HERE = Path(__file__).resolve().parent
 sys.path[:0] = [str(HERE.parent / "helpers" / "usd"), str(HERE.parents[1] / "pipeline")]
 
 FOLDER = Path(tempfile.mkdtemp(prefix="fuzz-"))
+atexit.register(shutil.rmtree, FOLDER, ignore_errors=True)
 
 
 class Bytes(random.Random):

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import json
 import random
 import sys
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
@@ -72,3 +74,13 @@ def test_runs_add_up_and_make_the_table(tmp_path, monkeypatch):
     text = page.read_text()
     assert text.startswith("before") and text.endswith("after\n") and "old" not in text
     assert "| bvh | 2.0 | 1.5 | 1,500 | 1 |" in text and "| shot | 0.1 | 0.1 | 7 | 0 |" in text
+
+
+def test_runs_that_end_together_all_count(tmp_path, monkeypatch):
+    page = tmp_path / "page.md"
+    page.write_text(f"{guided.BEGIN}\n{guided.END}\n")
+    monkeypatch.setattr(guided, "COUNTS", tmp_path / "counts.json")
+    monkeypatch.setattr(guided, "PAGE", page)
+    with ThreadPoolExecutor(8) as pool:
+        list(pool.map(lambda _: guided.write("bvh", 1.0, 10, 0, True), range(40)))
+    assert json.loads(guided.COUNTS.read_text())["bvh"]["inputs"] == 400
