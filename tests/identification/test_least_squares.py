@@ -1,5 +1,7 @@
 """The least-squares search, against linear algebra and known minima."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 from calmotion.identification.least_squares import HUBER, Solution, chord, loss_of, minimize, posterior, weights_of
@@ -112,3 +114,10 @@ def test_a_chord_reaches_a_near_minimum_with_other_derivatives():
     assert near.z == pytest.approx([0.302, 0.504], abs=2e-5)
     nowhere = Solution(np.array([0.0, 1.0]), np.zeros(200), known.jacobian, 0.0, 1, True)
     assert chord(Exponential((0.3, 0.5), failing=True), nowhere) is nowhere
+
+
+def test_a_chord_by_derivatives_that_lead_astray_is_none():
+    known = minimize(Exponential((0.3, 0.5)), np.zeros(2), FREE)
+    back = dataclasses.replace(known, jacobian=-known.jacobian)
+    assert chord(Exponential((0.4, 0.6), sigma=1e-3), known) is not None
+    assert chord(Exponential((0.4, 0.6), sigma=1e-3), back) is None

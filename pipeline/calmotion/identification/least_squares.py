@@ -22,6 +22,7 @@ from calmotion.shot.character import Array
 HUBER = 3.0  # standard deviations: few residuals of a normal distribution are larger
 ENOUGH = 1e-2  # change of z, in standard deviations of its posterior, at which a search ends
 MOST = 30  # iterations
+RISEN = 1.0  # loss that a step by another minimum's derivatives may add: less than a standard deviation or two
 FIRST, LARGEST = 1e-3, 1e8  # damping, relative to the diagonal of the Gauss-Newton matrix
 
 
@@ -120,28 +121,35 @@ def minimize(problem: Problem, start: Array, lower: Array, most: int = MOST) -> 
     return Solution(z, r, J, loss_of(r, counts) + 0.5 * float(z @ z), most, False)
 
 
-def chord(problem: Problem, known: Solution, most: int = 4) -> Solution:
-    """The minimum of a problem near that of another one, with the derivatives of the other one.
+def chord(problem: Problem, known: Solution, most: int = 4) -> Solution | None:
+    """The minimum of a problem near that of another one, with the derivatives of the other one; None where these lead
+    to more loss.
 
     Args:
         problem: Its residuals.
-        known: The other minimum, which is returned where the problem has no value near it.
+        known: The other minimum, which is returned where the problem has no value there.
         most: Largest number of steps.
     """
     z, J, r = known.z, known.jacobian, problem.residuals(known.z)
+    if r is None:
+        return known
+    cost = _cost(problem, z, r)
     for _ in range(most):
-        if r is None:
-            return known
         w = weights_of(r) / problem.counts
         H = J.T @ (w[:, None] * J) + np.eye(len(z))
         step = -np.linalg.solve(H, J.T @ (w * r) + z)
         if float(np.sqrt(step @ H @ step)) < ENOUGH:
             break
-        z = z + step
-        r = problem.residuals(z)
-    if r is None:
-        return known
-    return Solution(z, r, J, loss_of(r, problem.counts) + 0.5 * float(z @ z), known.iterations, known.converged)
+        then = problem.residuals(z + step)
+        if then is None or not (after := _cost(problem, z + step, then)) <= cost + RISEN:
+            return None
+        z, r, cost = z + step, then, after
+    return Solution(z, r, J, cost, known.iterations, known.converged)
+
+
+def _cost(problem: Problem, z: Array, residuals: Array) -> float:
+    """Loss and prior."""
+    return loss_of(residuals, problem.counts) + 0.5 * float(z @ z)
 
 
 def posterior(jacobian: Array, residuals: Array, counts: Array) -> Array:

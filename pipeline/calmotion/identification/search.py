@@ -25,6 +25,7 @@ FARTHEST = 5.0  # that the free decay may be away from the shot, in standard dev
 BEST = 3  # of these, from which searches begin until one explains the recordings
 FIRST_ITERATIONS, EXPLAINED = 6, 2.0  # of such a search, and its loss over that of noise alone
 ROUNDS, STEADY = 5, 0.05  # of the noise, and its relative change at which they end
+COARSE = 0.3  # error of a step, over the noise, with which no search begins but for a first guess
 HALVINGS, SHIFT = 5, 0.2  # of the step, and the change of an estimate at which they end, over its standard deviation
 FAR = 1.0  # such a change from which derivatives are computed anew
 ORDER = 2  # of the integrators
@@ -66,6 +67,7 @@ def search(problem: Calibrated, tell: Callable[[float, str], None], halvings: in
         if rough[-1][0] < EXPLAINED * 0.5 * count:
             break
     best, z, iterations = min(rough, key=lambda item: item[0])[1:]
+    best, halvings = _resolved(best, z, halvings)
     for _ in range(ROUNDS):
         solution = minimize(best, z, best.lower)
         z, iterations = solution.z, iterations + solution.iterations
@@ -78,6 +80,19 @@ def search(problem: Calibrated, tell: Callable[[float, str], None], halvings: in
     return _converged(best, solution, iterations, halvings)
 
 
+def _resolved(problem: Calibrated, z: Array, halvings: int) -> tuple[Calibrated, int]:
+    """The problem with a step whose error is small beside what is left at z, and how many halvings are left: a search
+    with a coarse step goes astray where combinations of parameters are hardly known, as modulus and mass together."""
+    left = problem.residuals(z)
+    while halvings and left is not None:
+        finer = problem.with_options(replace(problem.options, step=0.5 * step_of(problem)))
+        then = finer.residuals(z)
+        if then is None or float(np.sqrt(np.mean((then - left) ** 2))) < COARSE:
+            break
+        problem, left, halvings = finer, then, halvings - 1
+    return problem, halvings
+
+
 def _converged(problem: Calibrated, solution: Solution, iterations: int, halvings: int) -> Found:
     """The minimum for ever smaller steps, extrapolated to a step of zero.
 
@@ -87,14 +102,14 @@ def _converged(problem: Calibrated, solution: Solution, iterations: int, halving
     earlier, limit, shift, extrapolated = solution.z, solution.z, 0.0, False
     for _ in range(halvings):
         problem = problem.with_options(replace(problem.options, step=0.5 * step_of(problem)))
-        solution = chord(problem, solution)
-        iterations += 1
+        near = chord(problem, solution)
+        solution, iterations = near or solution, iterations + 1
         change = solution.z - earlier
         then = np.maximum(solution.z + change / (2**ORDER - 1), problem.lower)
         # the first extrapolation is compared with what it extrapolates, the next ones with the one before
         off = then - limit if extrapolated else change / (2**ORDER - 1)
         shift = float(np.max(np.abs(off) / deviations, initial=0.0))
-        if shift > FAR:  # derivatives there are others
+        if near is None or shift > FAR:  # derivatives there are others
             solution = minimize(problem, solution.z, problem.lower, FIRST_ITERATIONS)
             deviations, of_model = _deviations(problem, solution)
             earlier, limit, extrapolated, iterations = solution.z, solution.z, False, iterations + solution.iterations
