@@ -5,6 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 from calmotion.errors import ShotError
+from calmotion.identification.excitation import design
 from calmotion.identification.excitation.design import ExcitationSettings, excite_shot
 from calmotion.identification.excitation.waveforms import bounds_of, family_of
 from calmotion.shot.calibration.excitation import PlannedSensor
@@ -87,3 +88,15 @@ def test_a_torque_that_even_small_motions_exceed_is_refused(limited):
     shot = limited.with_character(dataclasses.replace(limited.character, motors=motors))
     with pytest.raises(ShotError, match="no test motion keeps all limits"):
         excite_shot(shot, dataclasses.replace(SETTINGS, tries=1), RunSettings())
+
+
+def test_motions_in_which_bodies_come_too_near_do_not_count(limited, monkeypatch):
+    asked = []
+    monkeypatch.setattr(design.Clearance, "kept", lambda self, shot: bool(asked.append(shot)))
+    with pytest.raises(ShotError, match="almost touch"):
+        excite_shot(limited, dataclasses.replace(SETTINGS, tries=1), RunSettings())
+    excursions = [
+        np.abs(shot.animation.current[0].values - shot.animation.current[0].values[0]).max() for shot in asked
+    ]
+    assert len(asked) == 2 * design.TIMES  # the chirp and the motion, made smaller and smaller
+    assert np.allclose(np.array(excursions[1 : design.TIMES]) / excursions[: design.TIMES - 1], design.LESS)

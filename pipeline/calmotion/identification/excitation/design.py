@@ -3,7 +3,8 @@
 The covariance of the parameters after a recording, (J^T J + E)^-1 in standard deviations of their priors, has the
 derivatives J of what the sensors will measure, over their noise; clocks, biases and places of sensors are unknown too.
 The motion of a family of tones with the least determinant of the robot's block is looked for (D-optimality), by an
-evolution strategy with one parent and one child; every motion that counts keeps all limits in the simulation.
+evolution strategy with one parent and one child; every motion that counts keeps all limits in the simulation, and the
+bodies of the robot apart.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ import numpy as np
 from calmotion.errors import ShotError
 from calmotion.identification.advice import IDENTIFIABLE
 from calmotion.identification.calibrate import simulable
+from calmotion.identification.excitation.clearance import Clearance
 from calmotion.identification.excitation.waveforms import MARGIN, Family, bounds_of, family_of
 from calmotion.identification.measurement import Measurement, measurement_parameters, sensors_of
 from calmotion.identification.model_error import covariance_of_model
@@ -27,7 +29,7 @@ from calmotion.identification.signals import Signals, refuse_cyclic
 from calmotion.multibody.failure import SimulationFailure
 from calmotion.shot import Animation, Track
 from calmotion.shot.calibration.estimates import ROBOT_KINDS
-from calmotion.shot.calibration.excitation import Excitation, MotorUse, PlannedSensor, Predicted
+from calmotion.shot.calibration.excitation import Clear, Excitation, MotorUse, PlannedSensor, Predicted
 from calmotion.shot.calibration.recording import COMPONENTS, Channel, SensorRecording
 from calmotion.shot.character import Array
 from calmotion.shot.motor import SERVO
@@ -102,7 +104,8 @@ def excite_shot(
     if chirp is None or best is None:
         raise ShotError(
             "no test motion keeps all limits", path=shot.character.path, attribute="calm:motor:maxTorque",
-            found=f"{count} motions tried", remedy="Check the limits: the robot can hardly hold its first pose",
+            found=f"{count} motions tried",
+            remedy="Check the limits, and whether bodies almost touch: the robot can hardly leave its first pose",
         )  # fmt: skip
     predicted = tuple(
         Predicted(
@@ -122,7 +125,7 @@ def excite_shot(
     )
     return Excitation(
         family.times, best.values, predicted, _uses(shot, family, best), settings.sensors, chirp.score - best.score,
-        count, time.perf_counter() - begin,
+        count, time.perf_counter() - begin, _clear(shot, family, trial.clearance, best), trial.clearance.together,
     )  # fmt: skip
 
 
@@ -181,6 +184,7 @@ class _Trial:
         options: RunSettings,
     ):  # fmt: skip
         self.shot, self.family, self.parameters, self.options = shot, family, tuple(parameters), options
+        self.clearance = Clearance(shot, options)
         self._recordings = blank_recordings(settings.sensors, float(family.times[-1]) + AFTER)
         clocks = [0.0] * len(self._recordings)
         self._measurement = Measurement(
@@ -200,7 +204,7 @@ class _Trial:
             z = np.zeros(len(self.parameters) + len(self._measurement.parameters))
             try:
                 signals = problem.signals(z)
-                if self._kept(signals):
+                if self._kept(signals) and self.clearance.kept(problem.shot):
                     J = problem.linearized(z)[1]
                     break
             except (ShotError, SimulationFailure):
@@ -242,6 +246,13 @@ def blank_recordings(sensors: Sequence[PlannedSensor], end: float) -> list[Senso
                 )
         found.append(SensorRecording(kind, "", tuple(channels)))
     return found
+
+
+def _clear(shot: CompiledShot, family: Family, clearance: Clearance, rated: _Rated) -> tuple[Clear, ...]:
+    least = clearance.least(_performing(shot, family, rated.values))
+    return tuple(
+        Clear(pair.first, pair.second, pair.apart, float(own)) for pair, own in zip(clearance.pairs, least, strict=True)
+    )
 
 
 def _uses(shot: CompiledShot, family: Family, rated: _Rated) -> tuple[MotorUse, ...]:

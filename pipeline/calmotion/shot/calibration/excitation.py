@@ -71,6 +71,22 @@ class MotorUse:
     effort_share: float
 
 
+@dataclass(frozen=True)
+class Clear:
+    """Two bodies that no joint connects.
+
+    Attributes:
+        first, second: Their paths.
+        apart: Their distance in the first pose, at least [m].
+        least: The smallest one in the test motion, at least [m].
+    """
+
+    first: str
+    second: str
+    apart: float
+    least: float
+
+
 @dataclass(frozen=True, eq=False)
 class Excitation:
     """A test motion.
@@ -84,6 +100,9 @@ class Excitation:
         information: Gain over the chirp: half the logarithm of the determinant of the covariance, less.
         evaluations: Number of motions that were tried.
         wall_s: Time it took [s].
+        clear: Bodies that stay apart.
+        together: Paths of pairs of bodies that no joint connects, and that are not known to stay apart: they touch in
+            the first pose, or almost.
     """
 
     times: Array
@@ -94,3 +113,5 @@ class Excitation:
     information: float
     evaluations: int
     wall_s: float
+    clear: tuple[Clear, ...] = ()
+    together: tuple[tuple[str, str], ...] = ()

@@ -64,6 +64,11 @@ class ExcitedShot:
                 ],
                 "motors": [vars(row) for row in found.motors],
                 "sensors": [vars(row) for row in found.sensors],
+                "clearances": [
+                    {"bodies": [row.first, row.second], "first_pose_m": row.apart, "least_m": row.least}
+                    for row in found.clear
+                ],
+                "unchecked_pairs": [list(pair) for pair in found.together],
                 "duration_s": float(found.times[-1]),
                 "information": found.information,
                 "motions": found.evaluations,

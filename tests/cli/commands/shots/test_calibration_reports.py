@@ -22,11 +22,18 @@ def printed(module, report):
 def test_a_test_motion_says_what_its_recording_would_tell():
     unknown = PARAMETER | {"path": "/Arm/Hand", "identifiable": False}
     report = {"parameters": [PARAMETER, unknown], "motors": [MOTOR], "motions": 3, "wall_s": 1.0, "layer": "test.usda"}
+    near = {"bodies": ["/Arm/Base", "/Arm/Hand"], "first_pose_m": 0.05, "least_m": 0.021}
+    report |= {"clearances": [near | {"least_m": 0.03}, near], "unchecked_pairs": 4 * [["/Arm/A", "/Arm/B"]]}
     lines = printed(excite, report)
     assert lines[0] == "A recording of this motion would tell 1 of 2 parameters."
     (next_,) = [line for line in lines if line.startswith("next: ")]
     assert next_.startswith("next: play it") and "calmotion calibrate test.usda --recording FILE" in next_
     assert lines.index(next_) < lines.index("What the motors do (rad or m, s, N m or N)")
+    text = " ".join(" ".join(lines).split())
+    assert "stay 21 mm apart or more (/Arm/Base and /Arm/Hand)" in text and "/Arm/A and /Arm/B and 1 more pairs" in text
+    assert "collisions with what is not a body of the robot are not checked" in text
+    alone = " ".join(printed(excite, report | {"clearances": [], "unchecked_pairs": []}))
+    assert "apart or more" not in alone and "look at the motion first" in alone
 
 
 def test_a_calibration_says_what_the_recordings_tell_before_what_they_cost():

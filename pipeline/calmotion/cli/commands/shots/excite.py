@@ -99,4 +99,24 @@ def _print(report: dict[str, Any], stream: TextIO) -> None:
         console, "What the motors do (rad or m, s, N m or N)",
         ["motor", "excursion", "velocity", "acceleration", "effort", "of its limits"], rows,
     )  # fmt: skip
-    say(console, f"{report['motions']} motions tried in {report['wall_s']:.3g} s; collisions are not checked")
+    say(console, f"{report['motions']} motions tried in {report['wall_s']:.3g} s")
+    for text in _collisions(report):
+        say(console, text)
+
+
+def _collisions(report: dict[str, Any]) -> list[str]:
+    """What is known of collisions."""
+    from calmotion.cli.quantities import length
+    from calmotion.cli.sentences import unbroken
+
+    told, unchecked = [], report["unchecked_pairs"]
+    if report["clearances"]:
+        nearest = min(report["clearances"], key=lambda row: row["least_m"])
+        one, other = map(unbroken, nearest["bodies"])
+        least = length(nearest["least_m"])
+        told.append(f"bodies of the robot that no joint connects stay {least} apart or more ({one} and {other})")
+    if unchecked:
+        pairs = ", ".join(f"{unbroken(one)} and {unbroken(other)}" for one, other in unchecked[:3])
+        more = f" and {len(unchecked) - 3} more pairs" if len(unchecked) > 3 else ""
+        told.append(f"not checked for collisions, almost touching in the first pose or in closed chains: {pairs}{more}")
+    return [*told, "collisions with what is not a body of the robot are not checked: look at the motion first"]
