@@ -24,8 +24,9 @@ from calmotion.shot.character import Array, IntArray
 STIFF = 30.0
 # Smallest eigenvalue of a change of shape, of the largest. In a patch that is nearly plane, shearing its normal is
 # nearly a rotation: the springs hardly hold it, and the patch tilts on its ground by more than its joint turns.
-# Links of a KUKA with small seats were 22 to 36% too soft to tilt with 1e-3, by at most 0.4% with this.
-_FLAT = 0.03
+# Links of a KUKA with small seats were 22 to 36% too soft to tilt with 1e-3, by at most 0.4% with this; with 0.03 seats
+# whose depth is a third of their radius were still too soft, by up to three times.
+_FLAT = 0.1
 _ROWS, _COLUMNS = (0, 1, 2, 1, 0, 0), (0, 1, 2, 2, 2, 1)  # of the six entries of a symmetric matrix
 
 
