@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from calmotion.geometry.makeup import makeup_of
-from calmotion.geometry.tetrahedra import boundary_triangles, tet_volumes, without_unused_points
+from calmotion.geometry.tetrahedra import boundary_triangles, corner_keys, tet_volumes, without_unused_points
 from calmotion.reduction.elements.filling import Filling, element_masses, filling_of
 from calmotion.shot.character import Array, ElasticMaterial, IntArray
 
@@ -84,8 +84,8 @@ def quadratic_mesh(points: Array, tets: IntArray) -> QuadraticMesh:
 
 def quadratic_nodes(points: Array, tets: IntArray) -> int:
     """Number of nodes of the ten-node tetrahedra: corners and midpoints of edges."""
-    ends = np.sort(tets[:, [0, 0, 0, 1, 1, 2, 1, 2, 3, 2, 3, 3]].reshape(-1, 2, 6), axis=1).astype(np.int64)
-    return len(points) + len(np.unique(ends[:, 0] * len(points) + ends[:, 1]))
+    edges = tets[:, [[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]]]
+    return len(points) + len(np.unique(corner_keys(edges)))
 
 
 def assemble_mass(mesh: QuadraticMesh, density: float) -> Any:

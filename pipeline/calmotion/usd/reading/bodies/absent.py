@@ -23,8 +23,9 @@ def no_bodies(stage: Usd.Stage) -> ShotError:
             _PROBLEM, path=str(skeletons[0].GetPath()), found="a skinned character without physics",
             remedy="Run `calmotion rig` on it, and open the layer that it writes",
         )  # fmt: skip
-    skipped = [prim for prim in stage.TraverseAll() if is_applied(prim, RIGID_BODY)]
-    inactive = [prim for prim in stage.TraverseAll() if not prim.IsActive()]
+    every = list(stage.TraverseAll())
+    skipped = [prim for prim in every if is_applied(prim, RIGID_BODY)]
+    inactive = [prim for prim in every if not prim.IsActive()]
     overrides = [prim for prim in stage.GetPseudoRoot().GetAllChildren() if prim.IsActive() and not prim.IsDefined()]
     for prim in (*skipped, *inactive, *overrides):
         found = _reason(prim)
