@@ -72,7 +72,7 @@ def test_rotations_without_weight_are_printed_only_on_request(verbose):
 def test_figures_of_a_folder_are_named_on_one_line():
     stream = io.StringIO()
     files = dict.fromkeys(("layer", "root_layer", "rrd", "video", "csv"))
-    print_files(console_on(stream), report(**files, figures=["out/errors.png", "out/motors.png"]))
+    print_files(console_on(stream), report(**files, figures=["out/errors.png", "out/motors.png"], can_shake=True))
     assert "wrote errors.png, motors.png in out" in stream.getvalue()
 
 
@@ -84,9 +84,21 @@ def test_a_shot_that_keeps_within_the_tolerance_is_not_said_to_shake(error, turn
     stream = io.StringIO()
     files = dict.fromkeys(("layer", "root_layer", "rrd", "video", "csv"))
     target = {"path": "/Cup", "max_error_m": error, "max_rotation_error_rad": turn, "rotation_weight": weight}
-    print_files(console_on(stream), report(**files, figures=[], targets=[target]))
+    print_files(console_on(stream), report(**files, figures=[], targets=[target], can_shake=True))
     assert ("next: calmotion optimize shot.usda -o LAYER removes the shake" in stream.getvalue()) == shakes
     assert ("off by more than the tolerance" in stream.getvalue()) != shakes
+
+
+@pytest.mark.parametrize("optimised", [False, True])
+def test_of_a_rigid_robot_with_ideal_motors_is_told_that_nothing_shakes(optimised):
+    stream = io.StringIO()
+    files = dict.fromkeys(("layer", "root_layer", "rrd", "video", "csv"))
+    suffix = "_before" if optimised else ""
+    target = {"path": "/Cup", f"max_error{suffix}_m": 1e-9, f"max_rotation_error{suffix}_rad": 0.0}
+    values = report(**files, figures=[], targets=[target | {"rotation_weight": 1.0}], can_shake=False)
+    print_files(console_on(stream), values | ({"objective_after": 0.0} if optimised else {}))
+    assert "nothing shakes" in stream.getvalue() and "CalmFlexibleBodyAPI" in stream.getvalue()
+    assert "calmotion optimize" not in stream.getvalue()
 
 
 def test_the_answer_comes_first():
@@ -136,3 +148,6 @@ def test_a_motor_that_hardly_works_does_not_decide_how_well_efforts_are_known():
     stream = io.StringIO()
     print_efforts(console_on(stream), [*rows, row("/Elbow", 5.0, 1.0)], True)
     assert "/Elbow by 1 N m of at most 5 N m" in " ".join(stream.getvalue().split())
+    stream = io.StringIO()
+    print_efforts(console_on(stream), [row("/Elbow", 1.0, 2.0)], True)
+    assert "are not known: that of /Elbow changes by 2 N m" in " ".join(stream.getvalue().split())

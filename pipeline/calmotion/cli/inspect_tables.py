@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, TextIO
 
 from calmotion.cli.quantities import angle, counted, frequency, length, memory
 from calmotion.cli.reports.left_out import print_left_out
-from calmotion.cli.run_report import prim_paths, print_notes
+from calmotion.cli.run_report import NOTHING_SHAKES, prim_paths, print_notes
 from calmotion.cli.sentences import unbroken
 from calmotion.cli.tables import console_on, print_table, say
 from calmotion.shot.motor import PRESCRIBED
@@ -99,14 +99,14 @@ def _print_answer(console: Console, report: dict[str, Any]) -> None:
     parts = [f"{len(bodies)} {'body' if len(bodies) == 1 else 'bodies'} ({flexible} flexible)"]
     parts += [counted(len(report["joints"]), "joint"), counted(len(motors), "motor") + held]
     say(console, f"{', '.join(parts)} and {counted(len(report['targets']), 'target')}")
-    say(console, _expected(report["expected"]))
     if not flexible and all(motor["model"] == PRESCRIBED for motor in motors):
-        say(console, "nothing shakes: all bodies are rigid and all motors ideal")
+        say(console, NOTHING_SHAKES)
         say(
             console,
             "next: apply CalmFlexibleBodyAPI to links that bend, and CalmTargetAPI to what should stay calm",
         )
         return
+    say(console, _expected(report["expected"]))
     say(console, f"next: calmotion simulate {unbroken(shlex.quote(report['shot']))} shows how much it shakes")
 
 

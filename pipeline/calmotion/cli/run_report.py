@@ -28,6 +28,7 @@ REMEDIES = {
     CHOICES: "Use --keep all.",
     MEASURED: _SENSITIVE,
 }
+NOTHING_SHAKES = "nothing shakes: all bodies are rigid and all motors ideal"
 COARSE_EFFORT = 0.05  # of the largest effort of a motor, from which on its error is told
 IDLE_EFFORT = 0.01  # of that of the strongest motor
 
@@ -94,12 +95,13 @@ def print_efforts(console: Console, efforts: Sequence[dict[str, Any]], coarse: b
         return
     worst = max(known, key=lambda row: row["estimated_error"] / row["largest"])
     share, unit = worst["estimated_error"] / worst["largest"], worst["unit"]
-    if coarse and share >= COARSE_EFFORT:
-        say(
-            console,
-            f"the efforts of motors depend on the time step: {worst['path']} by {worst['estimated_error']:.3g} {unit} "
-            f"of at most {worst['largest']:.3g} {unit}. Use a shorter --step where they matter.",
-        )
+    error, largest = f"{worst['estimated_error']:.3g} {unit}", f"{worst['largest']:.3g} {unit}"
+    if coarse and share >= 1.0:
+        said = f"are not known: that of {worst['path']} changes by {error} with the time step, and is {largest} at most"
+        say(console, f"the efforts of motors {said}. Smooth its curve, or use a shorter --step, where they matter.")
+    elif coarse and share >= COARSE_EFFORT:
+        said = f"depend on the time step: {worst['path']} by {error} of at most {largest}"
+        say(console, f"the efforts of motors {said}. Use a shorter --step where they matter.")
     elif not coarse and share < COARSE_EFFORT:
         say(console, f"the efforts of motors are known to {max(100.0 * share, 0.1):.1f}% of their largest values")
 
@@ -257,9 +259,13 @@ def print_files(console: Console, report: dict[str, Any]) -> None:
         say(console, f"next: open {unbroken(report['root_layer'])}, which shows the shot with {shown_with}")
     if report["rrd"]:
         say(console, f"next: rerun {unbroken(report['rrd'])}")
-    if not _last(report):
+    shakes = _shakes(report)
+    if not report["can_shake"] and not shakes:
+        say(console, NOTHING_SHAKES)
+        say(console, "next: apply CalmFlexibleBodyAPI to links that bend")
+    elif not _last(report):
         command = f"calmotion optimize {unbroken(shlex.quote(report['shot']))} -o LAYER"
-        if _shakes(report):
+        if shakes:
             say(console, f"next: {command} removes the shake")
         else:
             done = "no target is off by more than the tolerance"
@@ -269,10 +275,11 @@ def print_files(console: Console, report: dict[str, Any]) -> None:
 
 
 def _shakes(report: dict[str, Any]) -> bool:
-    """Whether a target of a simulation is farther off than the tolerance, in position or in rotation as it counts."""
+    """Whether a target is farther off than the tolerance in the input, in position or in rotation as it counts."""
+    before = "_before" if _last(report) else ""
+    position, rotation = f"max_error{before}_m", f"max_rotation_error{before}_rad"
     return any(
-        max(target["max_error_m"], target["rotation_weight"] ** 0.5 * target["max_rotation_error_rad"])
-        > report["tolerance_m"]
+        max(target[position], target["rotation_weight"] ** 0.5 * target[rotation]) > report["tolerance_m"]
         for target in report["targets"]
     )
 

@@ -11,7 +11,7 @@ import numpy as np
 from calmotion.host import OperatorResult, Run
 from calmotion.shot import Character, LimitUse, Result, Simplification, Simulation
 from calmotion.shot.budget import Verdict, verdict_on
-from calmotion.shot.character import Array
+from calmotion.shot.character import Array, motors_give
 from calmotion.shot.motor import measure_of
 from calmotion.shot.outputs import CsvFile, Figures, Recording, Rig, Verification, Video, WrittenLayer
 from calmotion.shot.result import is_exceeded
@@ -118,7 +118,8 @@ def run_report(run: Run, character: Character, result: Result, command: str, tot
         "step_s": result.step_s,
         "pre_roll_s": result.pre_roll_s,
         "dof": result.dof,
-        "modes": sum(elastic.shape[1] for elastic in final.motion.elastic),
+        "modes": (modes := sum(elastic.shape[1] for elastic in final.motion.elastic)),
+        "can_shake": modes > 0 or motors_give(character),
         "parameters": result.parameters,
         "newton_iterations": final.newton_iterations,
         "limits": [limit_row(character, limit) for limit in result.limits],

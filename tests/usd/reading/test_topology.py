@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from calmotion.shot import Frame
 from calmotion.usd.reading.joints import JointPrim
-from calmotion.usd.reading.topology import common_path, components, distances, leaves
+from calmotion.usd.reading.topology import bridges, common_path, components, distances, leaves
 
 
 def joint(body0: str, body1: str) -> JointPrim:
@@ -33,6 +33,37 @@ def test_leaves_are_the_outermost_bodies_also_in_closed_chains():
     assert leaves(["base", "left", "right", "top"], four_bar) == ["top"]
     five_bar = [*four_bar[:3], joint("left", "one"), joint("right", "two"), joint("one", "two")]
     assert leaves(["base", "left", "right", "one", "two"], five_bar) == ["one"], "two are equally far"
+
+
+def test_joints_of_closed_chains_are_no_bridges_also_where_the_world_closes_them():
+    four_bar = [joint("a", "left"), joint("a", "right"), joint("left", "top"), joint("right", "top")]
+    hung = joint("top", "rope")
+    assert bridges([*CHAIN, *four_bar, hung]) == [*CHAIN, hung]
+    assert bridges([*CHAIN, joint("", "d")]) == [CHAIN[2]]
+    assert bridges([joint("", "a"), joint("", "a"), joint("a", "b")])[0].body1 == "b", "two pins are a closed chain"
+    assert bridges([]) == []
+
+
+def test_random_bridges_are_the_joints_whose_removal_parts_the_graph():
+    random = np.random.default_rng(3)
+    for _ in range(30):
+        names = ["", *"abcdefg"]
+        joints = [
+            joint(*(names[k] for k in random.choice(8, 2, replace=False))) for _ in range(int(random.integers(3, 11)))
+        ]
+        parted = [one for one in joints if _parts([j for j in joints if j is not one]) > _parts(joints)]
+        assert bridges(joints) == parted
+
+
+def _parts(joints) -> int:
+    """Number of parts of the graph of eight bodies, by the rank of its Laplacian."""
+    laplacian = np.zeros((8, 8))
+    for one in joints:
+        row = np.zeros(8)
+        row["abcdefg".find(one.body0) if one.body0 else 7] += 1.0
+        row["abcdefg".find(one.body1) if one.body1 else 7] -= 1.0
+        laplacian += np.outer(row, row)
+    return 8 - int(np.linalg.matrix_rank(laplacian))
 
 
 def test_the_common_path_is_the_deepest_that_contains_all():

@@ -36,6 +36,7 @@ from calmotion.usd.reading.joints import (
 )
 from calmotion.usd.reading.motors import driven_motors as motors
 from calmotion.usd.reading.motors.posed_motors import posed_joints
+from calmotion.usd.reading.motors.undriven_joints import tell_what_swings
 from calmotion.usd.transforms import Pose
 
 if TYPE_CHECKING:
@@ -112,6 +113,7 @@ def read_skeleton(
     joints.sort(key=lambda j: max(far.get(j.body0, 0), far.get(j.body1, 0)))  # stable: the shot's order otherwise
     order = {id(joint): k for k, joint in enumerate(joints)}
     drives = sorted((d for d in drives if id(d.joint) in order), key=lambda d: order[id(d.joint)])
+    tell_what_swings(reading, joints, [drive.joint for drive in drives])
     fixed = {j.body1: j.path for j in joints if j.body0 == "" and j.prim is not None and not on_moving_prim(reading, j)}
     roots = {j.body1 for j in joints if j.body0 == ""}
     posing = any(drive.source == motors.BODIES for drive in drives)

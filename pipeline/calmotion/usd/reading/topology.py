@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Sequence
 
 from calmotion.usd.reading.joints import JointPrim
 
@@ -50,6 +51,38 @@ def leaves(bodies: list[str], joints: list[JointPrim]) -> list[str]:
     neighbours = _neighbours(bodies, joints)
     found = [b for b in bodies if all(far[n] < far[b] for n in neighbours[b])]
     return found or [max(bodies, key=lambda body: far[body])]
+
+
+def bridges(joints: Sequence[JointPrim]) -> list[JointPrim]:
+    """The joints that are in no closed chain, the world being a body: the only connection of their two sides."""
+    ends: dict[str, list[tuple[str, int]]] = {}
+    for k, joint in enumerate(joints):
+        ends.setdefault(joint.body0, []).append((joint.body1, k))
+        ends.setdefault(joint.body1, []).append((joint.body0, k))
+    found, order, low = [], dict[str, int](), dict[str, int]()  # low: the earliest body that a closed chain leads to
+    for start in ends:
+        if start in order:
+            continue
+        order[start] = low[start] = len(order)
+        stack = [(start, -1, iter(ends[start]))]
+        while stack:
+            body, by, left = stack[-1]
+            step = next(left, None)
+            if step is not None:
+                other, k = step
+                if k != by and other in order:
+                    low[body] = min(low[body], order[other])
+                elif k != by:
+                    order[other] = low[other] = len(order)
+                    stack.append((other, k, iter(ends[other])))
+                continue
+            stack.pop()
+            if stack:
+                before = stack[-1][0]
+                low[before] = min(low[before], low[body])
+                if low[body] > order[before]:
+                    found.append(by)
+    return [joints[k] for k in sorted(found)]
 
 
 def common_path(paths: list[str]) -> str:

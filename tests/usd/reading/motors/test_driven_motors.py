@@ -72,14 +72,6 @@ def test_a_drive_with_only_a_stiffness_keeps_angle_zero(tmp_path):
     assert np.array_equal(animation.tracks[1].values, [0.0, 0.0])
 
 
-def test_a_joint_without_a_drive_moves_freely(tmp_path):
-    def edit(stage):
-        clear(stage, ELBOW)
-        stage.GetPrimAtPath(ELBOW).RemoveAPI(UsdPhysics.DriveAPI, "angular")
-
-    assert [motor.path for motor in read(tmp_path, edit)[0].motors] == [SHOULDER]
-
-
 def test_an_animated_target_without_the_drive_schema_is_refused(tmp_path):
     with pytest.raises(ShotError, match="no drive") as caught:
         read(tmp_path, lambda stage: stage.GetPrimAtPath(ELBOW).RemoveAPI(UsdPhysics.DriveAPI, "angular"))

@@ -24,6 +24,7 @@ from calmotion.usd.reading.motors.gear_joints import gears_of_joints
 from calmotion.usd.reading.motors.gearing import Gear, read_gear, resolve
 from calmotion.usd.reading.motors.motor_limits import calmotion_limit, effort_limit, velocity_limit
 from calmotion.usd.reading.motors.tracks import sample_codes
+from calmotion.usd.reading.motors.undriven_joints import note_or_refuse_no_motors
 from calmotion.usd.reading.motors.unused_animation import refuse_unused_animation
 from calmotion.usd.units import StageUnits
 
@@ -147,7 +148,7 @@ def read_drives(
     if not found:
         for joint in joints:
             refuse_unsupported(joint)
-        _without_motors(reading, joints, root, still or rooted)
+        note_or_refuse_no_motors(reading, joints, root, still or rooted)
         return found
     if not (still or rooted) and all(drive.source in (CONSTANT, GEARED) for drive in found):
         raise ShotError(
@@ -168,30 +169,6 @@ def read_drives(
                 )
             )
     return found
-
-
-def _without_motors(reading: Reading, joints: Sequence[JointPrim], root: str, passive: bool) -> None:
-    """Note that nothing drives a character, or refuse it: at rest it hangs, and a shot of that has no motion."""
-    free = [joint for joint in joints if joint.kind != "fixed"]
-    if not free:
-        raise ShotError(
-            "nothing of it can move: all its joints are fixed",
-            path=root,
-            found=", ".join(joint.path for joint in joints[:4]) or "no joint between bodies",
-            remedy="Connect its parts by revolute or prismatic joints, with motors",
-        )
-    layer = reading.stage.GetRootLayer()
-    command = f"`calmotion import {layer.GetDisplayName()} -o robot.usda`"
-    if passive:
-        reading.note(f"{root}: no motors: its joints move freely; {command} makes motors of them")
-        return
-    raise ShotError(
-        "no motors: none of its joints is driven",
-        path=root,
-        remedy=f"{command} makes motors of its joints (--motors PATTERN: of some, --motion FILE: with a motion). In "
-        "the shot itself, apply PhysicsDriveAPI:angular to the revolute joints that motors drive, and author time "
-        f"samples of {_TARGET_POSITION.format('angular')}, in degrees",
-    )
 
 
 def _refuse_duplicate_motors(drives: Sequence[Drive], reading: Reading) -> None:
