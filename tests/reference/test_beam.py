@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from beams import timoshenko_frequencies
 from calmotion.geometry.tetrahedra import oriented_tets
 from calmotion.reduction.basis.natural_modes import SparseSolver, frequencies, vector_mass
 from calmotion.reduction.elements.assembly import assemble
@@ -21,42 +22,6 @@ def beam(counts, length, height, material):
     points = np.ascontiguousarray(mesh.p.T)
     model = assemble(points, oriented_tets(points, mesh.t.T)[0], material)
     return model, np.flatnonzero(model.mesh.nodes[:, 0] < 1e-9)
-
-
-def timoshenko_frequencies(material, length, height, count):
-    """Clamped-free Timoshenko beam, first bending frequencies [Hz]: roots of the transfer matrix's determinant.
-
-    State (w, psi, moment M, shear Q): w' = psi + Q / kGA, psi' = M / EI, M' = -Q - rho I omega^2 psi,
-    Q' = -rho A omega^2 w, where psi turns the section. Shear factor of a rectangle by Cowper 1966.
-    """
-    from scipy.linalg import expm
-    from scipy.optimize import brentq
-
-    E, nu, rho = material.youngs_modulus, material.poissons_ratio, material.density
-    A, second = height**2, height**4 / 12.0
-    shear = 10.0 * (1.0 + nu) / (12.0 + 11.0 * nu) * E / (2.0 * (1.0 + nu)) * A
-
-    def end(omega):
-        o2 = omega**2
-        transfer = np.array(
-            [
-                [0.0, 1.0, 0.0, 1.0 / shear],
-                [0.0, 0.0, 1.0 / (E * second), 0.0],
-                [0.0, -rho * second * o2, 0.0, -1.0],
-                [-rho * A * o2, 0.0, 0.0, 0.0],
-            ]
-        )
-        scale = np.array([length, 1.0, E * second / length, E * second / length**2])
-        T = expm(transfer * (scale[None, :] / scale[:, None]) * length)
-        return np.linalg.det(T[2:, 2:])
-
-    base = np.sqrt(E * second / (rho * A * length**4))
-    grid = np.linspace(0.5, 70.0, 700) * base
-    values = [end(omega) for omega in grid]
-    roots = [
-        brentq(end, a, b) for a, b, fa, fb in zip(grid, grid[1:], values, values[1:], strict=False) if fa * fb < 0.0
-    ]
-    return np.array(roots[:count]) / (2.0 * np.pi)
 
 
 def test_the_first_three_bending_frequencies_of_a_steel_beam_of_twenty_to_one():
