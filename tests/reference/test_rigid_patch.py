@@ -22,22 +22,24 @@ def ends(nodes):
     return np.flatnonzero(nodes[:, 0] < 1e-9), np.flatnonzero(nodes[:, 0] > LENGTH * 11 / 12 - 1e-9)
 
 
-@pytest.fixture(scope="module")
-def link():
+@pytest.fixture(scope="module", params=[TIP, TIP + [0.0, 2.0 * WIDE, 0.0]], ids=["at its middle", "beside it"])
+def link(request):
+    """A link, reduced, and its mesh; its last element turns about a point in its middle or outside of it."""
+    center = request.param
     points, tets = box_tets((12, 2, 1), (LENGTH, WIDE, HIGH), (0.0, -WIDE / 2, -HIGH / 2))
     model = assemble(points, tets, MATERIAL)
     root, patch = ends(model.mesh.nodes)
-    support = Support(root, [patch], [TIP])
-    basis = reduced_basis(model, root, [patch], [TIP], FlexibleSettings(MATERIAL, mode_count=16))
+    support = Support(root, [patch], [center])
+    basis = reduced_basis(model, root, [patch], [center], FlexibleSettings(MATERIAL))
     reduced, law = large_deflection(model, support, basis, MATERIAL, "stvk", tolerance=1e-6)
-    return reduced, law.data, FullOrder(points, tets, 2e9, 0.35, 1200.0)
+    return reduced, law.data, FullOrder(points, tets, 2e9, 0.35, 1200.0), center
 
 
 @pytest.mark.parametrize("force", [(0.0, 90.0, 120.0), (300.0, 0.0, 200.0), (-200.0, 60.0, 80.0)])
 def test_a_reduced_link_deflects_like_its_mesh(link, force):
     """Across, under tension and under compression: by 22 to 34 mm of 300 mm."""
-    reduced, data, full = link
-    moved, turn = pull(full, *ends(full.nodes), TIP, force)
+    reduced, data, full, center = link
+    moved, turn = pull(full, *ends(full.nodes), center, force)
     motion = reduced.patch_motion[0]
     r = motion.shape[1]
     u = equilibrium(data.reshape(r + r * (r + 1) // 2, -1), np.asarray(force) @ motion[:3], np.zeros(r), steps=6)

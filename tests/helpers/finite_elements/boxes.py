@@ -16,6 +16,15 @@ def box_tets(counts, size, origin=(0.0, 0.0, 0.0)):
     return points, oriented_tets(points, mesh.t.T)[0]
 
 
+def hollow_shaft(radius, length, counts):
+    """Points and tetrahedra of a shaft along z, hollow up to half of its radius; counts across, around and along."""
+    points, tets = box_tets(counts, (1.0, 2.0 * np.pi, length))
+    r = radius * (0.5 + 0.5 * points[:, 0])
+    points = np.column_stack([r * np.cos(points[:, 1]), r * np.sin(points[:, 1]), points[:, 2]])
+    _, first, same = np.unique(np.round(points / (1e-9 * radius)), axis=0, return_index=True, return_inverse=True)
+    return points[first], oriented_tets(points[first], same.ravel()[tets])[0]
+
+
 def conical_quadrature(points, tets, order=4):
     """Gauss points of a collapsed cube on every element: barycentric [q, 4], weights [m, q] (volume included).
 

@@ -27,6 +27,7 @@ from calmotion.reduction.elements.elastic_forms import GradientRule, lame_consta
 from calmotion.reduction.interfaces.patch_rotation import (
     STIFF,
     shape_changes,
+    spring_gram,
     spring_rows,
     springs,
     square_fields,
@@ -170,6 +171,9 @@ def extended_basis(
     moved = derivatives.motion * weight - shape_motion @ change_sizes
     M, K = vector_mass(model.mass), model.stiffness
     modes = basis.modes.reshape(3 * n, -1)
+    # forces of the modes on the changes of shape, the patches held; and the modes' shares that the others lose below
+    forces = (shapes - support.fixed(model).constraint @ shape_motion.reshape(6 * p, -1)).T @ (K @ modes)
+    shares = modes.T @ (M @ extra), modes.T @ (M @ shapes)
     for _ in range(2):  # the second pass removes the rounding of the first
         extra, moved = _without_modes(modes, basis.patch_motion, M, extra, moved)
         shapes, shape_motion = _without_modes(modes, basis.patch_motion, M, shapes, shape_motion)
@@ -191,11 +195,14 @@ def extended_basis(
     taken = np.linalg.pinv(root) @ strain[:, STIFF * strength**2 > dropped]
     ritz = np.hstack([modes, extra, shapes @ taken])
     motion = np.concatenate([basis.patch_motion, moved, shape_motion @ taken], axis=2)
-    none = np.zeros((p, 6, modes.shape[1] + extra.shape[1]))
+    held = modes.shape[1] + extra.shape[1]  # these do not change the shape of a patch
+    none = np.zeros((p, 6, held))
     shape = np.concatenate([none, derivatives.changes @ taken], axis=2)
-    roots = springs(model.mesh.nodes, support.patches, support.centers, material.youngs_modulus)
+    roots = springs(model.mesh.nodes, support.patches, material.youngs_modulus)
     extension = spring_rows(roots, shape, np.zeros((p, 3, ritz.shape[1])))[:, : ritz.shape[1]]
-    added = extension.T @ extension if law == "stvk" else 0.0
+    linear = np.hstack([np.eye(modes.shape[1]), -(shares[0] * scale) @ keep, -shares[1] @ taken])
+    tension = np.linalg.pinv(extension[:, held:]).T @ (taken.T @ forces @ linear)
+    added = spring_gram(extension, tension) if law == "stvk" else 0.0
     omega_squared, U = _orthonormal(ritz.T @ (M @ ritz), ritz.T @ (K @ ritz) + added)
     result = ritz @ U
     sign = mode_signs(result)
@@ -205,6 +212,7 @@ def extended_basis(
         omega_squared,
         np.ascontiguousarray(motion @ U),
         patch_squares=np.ascontiguousarray(shape @ U),
+        patch_tension=tension @ U,
         first_order=result.T @ (M @ modes),
         second_order=result.T @ (M @ derivatives.fields.reshape(3 * n, -1)),
     )

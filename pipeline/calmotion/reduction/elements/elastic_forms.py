@@ -16,6 +16,8 @@ from calmotion.reduction.elements.green_strain_fields import green_fields
 from calmotion.shot.character import Array
 from calmotion.support import interrupts
 
+_CHUNK = 2_000_000  # numbers: fields of about 16 MB at a time stay in the processor's cache
+
 
 class GradientRule:
     """Displacement gradients at the quadrature points of every element.
@@ -106,9 +108,15 @@ def gradient_gram(rule: GradientRule, modes: Array) -> Array:
         rule: Of order 2, which integrates them exactly.
         modes: Nodal displacements, shape [n, 3, r].
     """
-    G = rule.gradients(modes) * np.sqrt(rule.weights)[:, :, None, None]
-    G = G.reshape(modes.shape[2], -1)
-    return G @ G.T
+    r, (count, points) = modes.shape[2], rule.weights.shape
+    gram, chunk = np.zeros((r, r)), max(1, _CHUNK // (9 * points * max(r, 1)))
+    for start in range(0, count, chunk):
+        interrupts.check()
+        elements = slice(start, start + chunk)
+        G = rule.gradients(modes, elements) * np.sqrt(rule.weights[elements])[:, :, None, None]
+        G = G.reshape(r, -1)
+        gram += G @ G.T
+    return gram
 
 
 def strain_gram(rule: GradientRule, modes: Array, lame: float, mu: float, directions: Array | None = None) -> Array:
@@ -136,8 +144,7 @@ def strain_gram(rule: GradientRule, modes: Array, lame: float, mu: float, direct
     size = r + p * (p + 1) // 2
     A = np.zeros((size, size), order="F")  # its upper triangle
     count, points = rule.weights.shape
-    # strain fields of about 16 MB at a time stay in the processor's cache
-    chunk = max(1, 2_000_000 // (7 * points * size))
+    chunk = max(1, _CHUNK // (7 * points * size))
     # the energy density 2 mu |E|^2 + lame tr(E)^2 as a sum of squares
     shear = np.sqrt(2.0 * mu)
     bulk = (np.sqrt(2.0 * mu + 3.0 * lame) - shear) / 3.0

@@ -7,6 +7,13 @@ one that is clamped to a rigid neighbour: by a thousandth of its deflection, and
 swings. Stiff penalty springs on the Green strain of the patch, (H + H^T + H^T H) / 2 with H the gradient of this
 displacement, keep the patch rigid at any rotation. This strain is linear in z(u) = (u_k; u_k u_l), as the strain of the
 body is, so the springs are additional rows of the Gram matrix and cost nothing in a simulation.
+
+Springs alone give way: a seat that is deep for its radius was up to 87% softer to tilt than a rigid one, a bearing bore
+3%, a shaft in a ring 2%. They are therefore under tension: by the forces with which the linear modes, the patches held,
+change the shape of the patches (the first iterate of an augmented Lagrangian). Under small loads patches then keep their
+shape exactly, at any stiffness of the springs.
+
+Source: Hestenes, Multiplier and gradient methods, 1969 (the augmented Lagrangian).
 """
 
 from __future__ import annotations
@@ -18,14 +25,13 @@ import numpy as np
 from calmotion.reduction.interfaces.rigid_patch import rigid_patch
 from calmotion.shot.character import Array, IntArray
 
-# Stiffness of the springs over Young's modulus times the cube of the patch's radius. With it the bending compliance of
-# a link is 2e-5 too large. Ten times the stiffness costs digits of Newton's method, and three times as many iterations
+# Stiffness of the springs over Young's modulus times the cube of the patch's radius. Without tension the bending
+# compliance of a link is 2e-5 too large with it. Ten times the stiffness costs digits of Newton's method, and three times as many iterations
 # where deflections are large.
 STIFF = 30.0
 # Smallest eigenvalue of a change of shape, of the largest. In a patch that is nearly plane, shearing its normal is
 # nearly a rotation: the springs hardly hold it, and the patch tilts on its ground by more than its joint turns.
-# Links of a KUKA with small seats were 22 to 36% too soft to tilt with 1e-3, by at most 0.4% with this; with 0.03 seats
-# whose depth is a third of their radius were still too soft, by up to three times.
+# Without tension, links of a KUKA with small seats were 22 to 36% too soft to tilt with 1e-3, by at most 0.4% with this.
 _FLAT = 0.1
 _ROWS, _COLUMNS = (0, 1, 2, 1, 0, 0), (0, 1, 2, 2, 2, 1)  # of the six entries of a symmetric matrix
 
@@ -70,13 +76,14 @@ def shape_changes(arms: Array) -> Array:
         arms: Points of the patch from its center, shape [k, 3].
     """
     rigid = rigid_patch(arms, np.zeros(3)).reshape(-1, 6)
+    arms = arms - arms.mean(axis=0)  # a patch moves as a whole by how far it is from its center
     fields = square_fields(arms).reshape(-1, 6)
     changes = fields - rigid @ np.linalg.lstsq(rigid, fields, rcond=None)[0]
     values, vectors = np.linalg.eigh(changes.T @ changes)
     return vectors[:, values > _FLAT * max(float(np.linalg.eigvalsh(fields.T @ fields)[-1]), np.finfo(float).tiny)]
 
 
-def springs(nodes: Array, patches: Sequence[IntArray], centers: Sequence[Array], youngs_modulus: float) -> Array:
+def springs(nodes: Array, patches: Sequence[IntArray], youngs_modulus: float) -> Array:
     """Square roots of the stiffness of the penalty springs, shape [p, 6, 6]: their energy is |root E|^2 / 2 [J].
 
     With W the second moment of the patch's points, of unit trace, the energy is that of W^1/2 E W^1/2. Strains along
@@ -84,15 +91,15 @@ def springs(nodes: Array, patches: Sequence[IntArray], centers: Sequence[Array],
 
     Args:
         nodes: Shape [n, 3] [m].
-        patches, centers: As of `modal_derivatives.Support`.
+        patches: As of `modal_derivatives.Support`.
         youngs_modulus: [Pa].
 
     Returns:
         Columns for the entries 00, 11, 22, 12, 02, 01 of a uniform strain E of each patch.
     """
     roots = np.zeros((len(patches), 6, 6))
-    for root, patch, center in zip(roots, patches, centers, strict=True):
-        arms = nodes[patch] - center
+    for root, patch in zip(roots, patches, strict=True):
+        arms = nodes[patch] - nodes[patch].mean(axis=0)  # its strain does not depend on where its center is
         squared = np.einsum("ki,ki->k", arms, arms)
         if not squared.any():
             continue  # a single point cannot deform
@@ -131,3 +138,16 @@ def spring_rows(roots: Array, second_order: Array, rotation: Array, directions: 
     pairs[:, first == second] *= 0.5  # u_k u_l stands for both orders, u_k^2 for one
     entries = np.concatenate([strain, pairs], axis=1)[:, :, _ROWS, _COLUMNS]
     return np.asarray((roots @ np.swapaxes(entries, 1, 2)).reshape(6 * p, entries.shape[1]))
+
+
+def spring_gram(rows: Array, tension: Array) -> Array:
+    """Gram matrix of springs under tension: their energy is z^T A z / 2 = |w z|^2 / 2 - (t u)^T w z.
+
+    Args:
+        rows: w, as of `spring_rows`; or their first r columns, for a linear body.
+        tension: t, tension of the springs by each of the r coordinates, shape [6 p, r].
+    """
+    A, work = rows.T @ rows, tension.T @ rows
+    A[: len(work)] -= work
+    A[:, : len(work)] -= work.T
+    return np.asarray(A)
