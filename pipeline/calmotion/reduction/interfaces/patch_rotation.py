@@ -25,13 +25,14 @@ import numpy as np
 from calmotion.reduction.interfaces.rigid_patch import rigid_patch
 from calmotion.shot.character import Array, IntArray
 
-# Stiffness of the springs over Young's modulus times the cube of the patch's radius. Without tension the bending
-# compliance of a link is 2e-5 too large with it. Ten times the stiffness costs digits of Newton's method, and three times as many iterations
-# where deflections are large.
+# Stiffness of the springs over Young's modulus times the cube of the patch's radius. Without tension the bending compliance
+# of a link is 2e-5 too large with it. Ten times the stiffness costs digits of Newton's method, and three times as many
+# iterations where deflections are large.
 STIFF = 30.0
 # Smallest eigenvalue of a change of shape, of the largest. In a patch that is nearly plane, shearing its normal is
 # nearly a rotation: the springs hardly hold it, and the patch tilts on its ground by more than its joint turns.
-# Without tension, links of a KUKA with small seats were 22 to 36% too soft to tilt with 1e-3, by at most 0.4% with this.
+# Without tension, links of a KUKA with small seats were 22 to 36% too soft to tilt with 1e-3, by at most 0.4% with
+# this.
 _FLAT = 0.1
 _ROWS, _COLUMNS = (0, 1, 2, 1, 0, 0), (0, 1, 2, 2, 2, 1)  # of the six entries of a symmetric matrix
 
