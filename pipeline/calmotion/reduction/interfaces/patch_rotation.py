@@ -10,8 +10,8 @@ body is, so the springs are additional rows of the Gram matrix and cost nothing 
 
 Springs alone give way: a seat that is deep for its radius was up to 87% softer to tilt than a rigid one, a bearing bore
 3%, a shaft in a ring 2%. They are therefore under tension: by the forces with which the linear modes, the patches held,
-change the shape of the patches (the first iterate of an augmented Lagrangian). Under small loads patches then keep their
-shape exactly, at any stiffness of the springs.
+change the shape of the patches (the first iterate of an augmented Lagrangian). Under small loads patches then keep
+their shape exactly, at any stiffness of the springs.
 
 Source: Hestenes, Multiplier and gradient methods, 1969 (the augmented Lagrangian).
 """
@@ -25,9 +25,9 @@ import numpy as np
 from calmotion.reduction.interfaces.rigid_patch import rigid_patch
 from calmotion.shot.character import Array, IntArray
 
-# Stiffness of the springs over Young's modulus times the cube of the patch's radius. Without tension the bending compliance
-# of a link is 2e-5 too large with it. Ten times the stiffness costs digits of Newton's method, and three times as many
-# iterations where deflections are large.
+# Stiffness of the springs over Young's modulus times the cube of the patch's radius. Without tension the bending
+# compliance of a link is 2e-5 too large with it. Ten times the stiffness costs digits of Newton's method, and three
+# times as many iterations where deflections are large.
 STIFF = 30.0
 # Smallest eigenvalue of a change of shape, of the largest. In a patch that is nearly plane, shearing its normal is
 # nearly a rotation: the springs hardly hold it, and the patch tilts on its ground by more than its joint turns.
