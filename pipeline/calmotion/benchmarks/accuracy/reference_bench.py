@@ -73,11 +73,11 @@ class Bench:
 
     def __init__(self, shot: Unreduced, repeats: int = REPEATS, nodes: float = 1.0):
         self.repeats = repeats
-        own = reduction_for(shot.character, shot.animation, shot.meshes, RunSettings())
+        self._coarse = reduction_for(shot.character, shot.animation, shot.meshes, RunSettings())
         # to a fine tolerance, since a link that hardly bends has no modes by which its mesh would be refined
-        self._reduction = with_more_nodes(own, nodes, BASE)
+        self._reduction = with_more_nodes(self._coarse, nodes, BASE)
         self.shot = replace(shot, meshes=self._reduction.meshes or shot.meshes)
-        self._finer = nodes > 1.0
+        self._finer = self._reduction is not self._coarse
         self._known: ReferenceRun | None = None
 
     def bodies(self, tolerance: float, **settings: Any) -> list[ReducedBody]:
@@ -106,20 +106,24 @@ class Bench:
         """The finest run, its step extrapolated to zero, from steps as small as it takes.
 
         Its bar is what is left of the step's error, which falls by eight where that is halved, what its meshes are
-        estimated to cost where they are finer than the shot's, what ten times the tolerance of the reduction changes,
-        what quadratic strain does not see, as estimated (what a reduction to ten times the tolerance would; to see more
-        takes most of the time), and what holding its bodies to the directions that the shot needs does.
+        estimated to cost where they are finer than the shot's, what another tolerance of the reduction changes (ten
+        times its own, or on the meshes of the shot, where it costs little, a tenth of it), what quadratic strain does
+        not see, as estimated (to see more takes most of the time), and what holding its bodies to the directions that
+        the shot needs does.
 
         Args:
             finest: Tolerance of the reduction [m].
         """
         bodies = self.bodies(finest, pairs_share=10.0)
         known = self._whole_run(bodies)
-        other = self.run(self.bodies(10.0 * finest), MAX_STEP)
+        if self._finer:
+            runs = [self.run(self._coarse.bodies(part * finest, 10.0), MAX_STEP) for part in (1.0, 0.1)]
+        else:
+            runs = [self.run(self.bodies(10.0 * finest), MAX_STEP), known.run]
         held = ProjectedShot(self.compiled(bodies), RunSettings(), lambda item: finest, [known])
         limit, left = self._limit(held.shot.bodies, 10.0 * finest)
         unseen = sum(body.elasticity.strain_error_m for body in bodies if body.elasticity is not None)
-        reduced = distance(other.positions, known.run.positions) + unseen
+        reduced = distance(runs[0].positions, runs[1].positions) + unseen
         meshes = (mesh_error(self.compiled(bodies), RunSettings(), known.run) or 0.0) if self._finer else 0.0
         return Reference(limit, left + reduced + held.error_m + meshes)
 
