@@ -44,7 +44,8 @@ if TYPE_CHECKING:
 _REFINED = 12_000
 # Error that the extrapolation of the frequencies is estimated to leave, 1.1 to 4 times the true one of six real links,
 # from which more nodes are spent
-_POOR, _POOR_REFINED = 0.0125, 22_000
+_POOR, _POOR_REFINED = 0.0125, 60_000
+_KEPT = 22_000  # nodes of the mesh that takes the stiffness of these, where one factor is enough
 _LONGER = 1.5  # factor of the element size where a surface has many details: they are refined where it matters
 _FIT = 4.0  # of the distance to the surface that the mesher is allowed: how far corners are moved to fit it
 FAR = 5.0  # distance of a mesh from all joints of its body, over its size, that nobody means
@@ -291,6 +292,7 @@ def accurate(
     time = ProcessorTime(options.time_limit)
     mesh = filled(index, body, solid, shape, size, time, options.cache, _LONGER)
     mesh = _shaped(mesh, body, volume, size, attachments)
-    mesh = refined_for_frequencies(mesh, body, carrier, Effort(2.0 * ENOUGH, _REFINED, 2.0 * _POOR, _POOR_REFINED))
+    effort = Effort(2.0 * ENOUGH, _REFINED, 2.0 * _POOR, _POOR_REFINED, _KEPT)
+    mesh = refined_for_frequencies(mesh, body, carrier, effort)
     repairs = (*mesh.quality.repairs, *remark(mesh.quality))
     return replace(mesh, quality=replace(mesh.quality, repairs=repairs))

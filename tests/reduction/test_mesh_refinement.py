@@ -9,14 +9,10 @@ import pytest
 from calmotion.geometry.tetrahedra import measure_quality, tet_volumes
 from calmotion.reduction.basis.natural_modes import frequencies
 from calmotion.reduction.elements.assembly import assemble
+from calmotion.reduction.full_order.mesh_estimates import frequency_estimate
 from calmotion.reduction.interfaces.interface_patches import AttachmentFrame
 from calmotion.reduction.load_envelope import LoadEnvelope
-from calmotion.reduction.mesh_refinement import (
-    Effort,
-    frequency_estimate,
-    refined_for_frequencies,
-    refined_for_loads,
-)
+from calmotion.reduction.mesh_refinement import Effort, refined_for_frequencies, refined_for_loads
 from calmotion.reduction.reduce import full_body, linear_modes, reduce_body
 from calmotion.shot import Body, FEMesh, FlexibleSettings
 from scipy.linalg import eigh

@@ -13,12 +13,11 @@ from functools import partial
 
 import numpy as np
 
-from calmotion.errors import ShotError
 from calmotion.geometry.tetrahedra import min_dihedral_deg
 from calmotion.reduction.cache import cached_reduction
-from calmotion.reduction.discretization_error import clamped_modes, element_errors, errors_and_form
-from calmotion.reduction.elements.assembly import QuadraticMesh, assemble, quadratic_nodes
+from calmotion.reduction.elements.assembly import quadratic_nodes
 from calmotion.reduction.elements.bisection import bisected
+from calmotion.reduction.full_order.mesh_estimates import frequency_estimate, load_estimate
 from calmotion.reduction.full_order.mesh_extrapolation import (
     Estimate,
     deviation,
@@ -27,17 +26,18 @@ from calmotion.reduction.full_order.mesh_extrapolation import (
     interface_factors,
     mode_ratios,
 )
-from calmotion.reduction.interfaces.interface_patches import AttachmentFrame, interface_patches
+from calmotion.reduction.full_order.nested_modes import NestedModes
+from calmotion.reduction.interfaces.interface_patches import AttachmentFrame
 from calmotion.reduction.load_envelope import LoadEnvelope
-from calmotion.reduction.material_laws.choice import amplitudes
-from calmotion.reduction.reduce import FullBody, LinearModes, linear_modes
+from calmotion.reduction.reduce import FullBody, linear_modes
 from calmotion.shot.character import Array, Body, Frame, IntArray
-from calmotion.shot.meshes import CutPatch, FEMesh, MeshQuality
+from calmotion.shot.meshes import FEMesh, MeshQuality
 
 MARKED = 0.8  # share of the error in the elements that are bisected: halves the error with 1.7 times the nodes
-_MODES, _COUNT = 12, 3  # modes of a load estimate; frequencies that a motion excites
+_FEWER = 0.6  # the same where that would be too many nodes
 _ROUNDS = 12
 _KEPT = 0.005  # of their own error, what elements leave with the statics of finer ones: they have their own mass
+_APART = 0.01  # relative difference of the stiffness of modes from one factor that finer elements would not leave
 _FEW = 6_000  # nodes of elements on which a nonlinear body is reduced within a minute
 
 
@@ -50,12 +50,14 @@ class Effort:
         max_nodes: No mesh has many more nodes.
         poor: An error for which more nodes are spent; infinite: none.
         poor_nodes: Largest number of nodes of a mesh with a larger error.
+        kept_nodes: Largest number of nodes of the mesh that takes the stiffness of finer ones, if by one factor.
     """
 
     wanted: float
     max_nodes: int
     poor: float = np.inf
     poor_nodes: int = 0
+    kept_nodes: float = np.inf
 
     def ends(self, error: float, nodes: int) -> bool:
         """Whether a mesh with an error is enough."""
@@ -83,13 +85,30 @@ def refined(mesh: FEMesh, estimate: Callable[[FEMesh], Estimate], effort: Effort
     meshes, estimates = _bisected(mesh, estimate, effort, extrapolated)
     excess, error = extrapolated(estimates)
     if not far:
-        quality = _quality(mesh, estimates[-1], estimates, 1.0 - excess, error)
-    else:
-        quality = replace(
-            mesh.quality, frequency_error=0.5 * (error + _of_volume(mesh)), element_error=estimates[-1].error,
-            stiffness_factor=1.0 - excess,
-        )  # fmt: skip
-    return _with_quality(meshes[-1], quality)
+        return _with_quality(meshes[-1], _quality(mesh, estimates[-1], estimates, 1.0 - excess, error))
+    kept, factor, apart = _smallest(estimates, effort.kept_nodes)
+    quality = replace(
+        mesh.quality, frequency_error=0.5 * (error + apart + _of_volume(mesh)), element_error=estimates[kept].error,
+        stiffness_factor=factor * (1.0 - excess),
+    )  # fmt: skip
+    return _with_quality(meshes[kept], quality)
+
+
+def _smallest(estimates: Sequence[Estimate], nodes: float) -> tuple[int, float, float]:
+    """The mesh that takes the stiffness of the last of ever finer ones by a factor; that, and what modes deviate.
+
+    Args:
+        estimates: Of the meshes.
+        nodes: At most so many, if one factor is that of all modes.
+    """
+    few = max([0, *(k for k, one in enumerate(estimates) if one.nodes <= nodes)])
+    for k in range(few, len(estimates)):
+        ratios, weights = mode_ratios(estimates[k], estimates[-1])
+        factor = float(weights @ ratios)
+        apart = float(np.abs(ratios / factor - 1.0).max())
+        if apart <= _APART:
+            break
+    return k, factor, apart
 
 
 def with_finer_stiffness(
@@ -158,8 +177,12 @@ def _bisected(
         error = max(extrapolated(estimates)[1], by_interfaces[2] if by_interfaces else 0.0)
         if effort.ends(error, estimates[-1].nodes):
             break
-        points, tets = bisected(meshes[-1].points, meshes[-1].tets, _largest(estimates[-1].indicators))
-        if not effort.allows(estimates[-1].nodes, quadratic_nodes(points, tets)):
+        for marked in (MARKED, _FEWER):
+            points, tets = bisected(meshes[-1].points, meshes[-1].tets, _largest(estimates[-1].indicators, marked))
+            allowed = effort.allows(estimates[-1].nodes, quadratic_nodes(points, tets))
+            if allowed or not effort.poor_nodes:
+                break
+        if not allowed:
             break
         meshes.append(replace(mesh, points=points, tets=tets))
         estimates.append(estimate(meshes[-1]))
@@ -204,35 +227,6 @@ def refined_for_loads(
     return cached_reduction(key, lambda: refine(first, estimate, Effort(wanted, max_nodes)))
 
 
-def load_estimate(linear: LinearModes, body: Body) -> Estimate:
-    """Error of the modes that the loads excite, and of the static responses of the interfaces.
-
-    Args:
-        linear: The body on a mesh, with its loads.
-        body: With `flexible` settings.
-    """
-    envelope, fixed = linear.load_envelope, linear.support.fixed(linear.model)
-    assert body.flexible is not None and envelope is not None
-    count = min(_MODES, len(linear.basis.omega_squared))
-    squares = linear.basis.omega_squared[:count]
-    energy = squares * amplitudes(linear.model, linear.basis, envelope, count) ** 2
-    weights = energy / max(energy.sum(), np.finfo(float).tiny)
-    stiffness, nodes = fixed.patch_stiffness(), len(linear.model.mesh.nodes)
-    compliance = np.linalg.inv(stiffness)
-    unit = compliance / np.sqrt(np.diag(compliance))  # responses to wrenches, of energy one half each
-    k = len(unit)
-    shapes = [(fixed.constraint @ unit).reshape(nodes, 3, k), linear.basis.modes[:, :, :count]]
-    errors, form = errors_and_form(linear.model.mesh, body.flexible.material, np.concatenate(shapes, axis=2))
-    wrenches = np.hstack([envelope.force, envelope.moment]).ravel()
-    levers = np.hstack([np.ones_like(envelope.force), np.tile(envelope.lever_arm[:, None], 3)]).ravel()
-    moved = (levers @ np.abs(unit)) * wrenches * np.sqrt(np.diag(compliance))  # how far each wrench moves targets
-    parts = errors[:, k:] @ weights
-    indicators = parts + errors[:, :k] @ (moved / max(moved.sum(), np.finfo(float).tiny))
-    to_unit = np.linalg.inv(unit)
-    forms = to_unit.T @ form[:k, :k] @ to_unit
-    return Estimate(float(parts.sum()), squares, weights, indicators, nodes, stiffness, forms, wrenches, levers)
-
-
 def refined_for_frequencies(mesh: FEMesh, body: Body, carrier: Frame | None, effort: Effort) -> FEMesh:
     """The mesh, refined where the first modes of the body, clamped at its parent joint, have their error.
 
@@ -242,50 +236,14 @@ def refined_for_frequencies(mesh: FEMesh, body: Body, carrier: Frame | None, eff
         carrier: Frame of the parent joint on the body; None for a free body.
         effort: How far; errors are those of the compliance, twice those of the frequencies.
     """
-    estimate = partial(frequency_estimate, body=body, carrier=carrier)
+    estimate = partial(frequency_estimate, body=body, carrier=carrier, coarser=NestedModes())
     key = ("for frequencies", mesh, replace(body, surfaces=()), carrier, effort)
     # the estimates of many links are still large with as many nodes; what the loads need is not known yet
     return cached_reduction(key, lambda: refined(mesh, estimate, effort, far=True))
 
 
-def frequency_estimate(mesh: FEMesh, body: Body, carrier: Frame | None) -> Estimate:
-    """Error of the first modes, of which each counts by its compliance relative to that of the first.
-
-    Args:
-        mesh, body, carrier: As of `refined_for_frequencies`.
-
-    Raises:
-        ShotError: Nothing of the mesh is free.
-    """
-    assert body.flexible is not None
-    model = assemble(mesh.points, mesh.tets, body.flexible.material)
-    frequencies, modes = clamped_modes(model, _COUNT, _clamped_nodes(model.mesh, body, carrier, mesh.patches))
-    if not len(frequencies):
-        raise ShotError(
-            "its parent joint holds all of the mesh, so that nothing of it can bend", path=body.path,
-            attribute="calm:flexible:interfaceRadius", found=f"{len(mesh.tets)} tetrahedra",
-            remedy="Use a finer mesh or a smaller interface, or set calm:flexible:enabled to false.",
-        )  # fmt: skip
-    weights = (frequencies[0] / frequencies) ** 2
-    errors = element_errors(model.mesh, body.flexible.material, modes)
-    total = float((errors * weights).sum(axis=0).max())
-    squares = (2.0 * np.pi * frequencies) ** 2
-    return Estimate(total, squares, weights / weights.sum(), errors @ weights, len(model.mesh.nodes))
-
-
-def _largest(indicators: Array) -> IntArray:
-    """The fewest elements that together have the marked share of the error."""
+def _largest(indicators: Array, share: float = MARKED) -> IntArray:
+    """The fewest elements that together have a share of the error."""
     order = np.argsort(-indicators, kind="stable")
     summed = np.cumsum(indicators[order])
-    return np.asarray(order[: 1 + int(np.searchsorted(summed, MARKED * summed[-1]))])
-
-
-def _clamped_nodes(mesh: QuadraticMesh, body: Body, carrier: Frame | None, cut: Sequence[CutPatch]) -> IntArray | None:
-    assert body.flexible is not None
-    if carrier is None:
-        return None
-    try:
-        attachment = AttachmentFrame(body.path, carrier, "interface")
-        return interface_patches(mesh, [attachment], body.flexible.interface_radius, body.path, cut)[0].nodes
-    except ShotError:
-        return None  # the reduction reports the error with the joint
+    return np.asarray(order[: 1 + int(np.searchsorted(summed, share * summed[-1]))])

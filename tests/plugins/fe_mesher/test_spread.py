@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from calmotion.benchmarks.scenes.links import attachments_of, frames_of, read_links
-from calmotion.reduction.mesh_refinement import frequency_estimate
+from calmotion.reduction.full_order.mesh_estimates import frequency_estimate
 
 LINKS = {
     "xarm7/xarm7.usda": "link2",

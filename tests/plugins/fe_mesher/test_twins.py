@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from calmotion.geometry.tetrahedra import tet_volumes
-from calmotion.reduction.mesh_refinement import frequency_estimate
+from calmotion.reduction.full_order.mesh_estimates import frequency_estimate
 from calmotion.shot import Frame
 from calmotion.shot.meshes import CutPatch
 from mesher_links import bracket, link, run, surface

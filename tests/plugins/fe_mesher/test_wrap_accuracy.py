@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import trimesh
 from calmotion.geometry.solid import mass_of_solid
-from calmotion.reduction.mesh_refinement import frequency_estimate
+from calmotion.reduction.full_order.mesh_estimates import frequency_estimate
 from calmotion.shot import Frame
 from mesher_links import FLEXIBLE, box, link, run, solid, surface
 

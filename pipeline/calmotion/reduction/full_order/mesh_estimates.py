@@ -1,0 +1,93 @@
+"""The estimated error of a mesh: of the modes that loads excite, or of its first modes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from calmotion.errors import ShotError
+from calmotion.reduction.discretization_error import clamped_modes, element_errors, errors_and_form
+from calmotion.reduction.elements.assembly import QuadraticMesh, assemble
+from calmotion.reduction.full_order.mesh_extrapolation import Estimate
+from calmotion.reduction.full_order.nested_modes import NestedModes
+from calmotion.reduction.interfaces.interface_patches import AttachmentFrame, interface_patches
+from calmotion.reduction.material_laws.choice import amplitudes
+from calmotion.reduction.reduce import LinearModes
+from calmotion.shot.character import Body, Frame, IntArray
+from calmotion.shot.meshes import CutPatch, FEMesh
+
+_MODES, _COUNT = 12, 3  # modes of a load estimate; frequencies that a motion excites
+_ALGEBRAIC = 3e-5  # relative error of the squares of frequencies whose mesh is wrong by a hundred times that and more
+
+
+def load_estimate(linear: LinearModes, body: Body) -> Estimate:
+    """Error of the modes that the loads excite, and of the static responses of the interfaces.
+
+    Args:
+        linear: The body on a mesh, with its loads.
+        body: With `flexible` settings.
+    """
+    envelope, fixed = linear.load_envelope, linear.support.fixed(linear.model)
+    assert body.flexible is not None and envelope is not None
+    count = min(_MODES, len(linear.basis.omega_squared))
+    squares = linear.basis.omega_squared[:count]
+    energy = squares * amplitudes(linear.model, linear.basis, envelope, count) ** 2
+    weights = energy / max(energy.sum(), np.finfo(float).tiny)
+    stiffness, nodes = fixed.patch_stiffness(), len(linear.model.mesh.nodes)
+    compliance = np.linalg.inv(stiffness)
+    unit = compliance / np.sqrt(np.diag(compliance))  # responses to wrenches, of energy one half each
+    k = len(unit)
+    shapes = [(fixed.constraint @ unit).reshape(nodes, 3, k), linear.basis.modes[:, :, :count]]
+    errors, form = errors_and_form(linear.model.mesh, body.flexible.material, np.concatenate(shapes, axis=2))
+    wrenches = np.hstack([envelope.force, envelope.moment]).ravel()
+    levers = np.hstack([np.ones_like(envelope.force), np.tile(envelope.lever_arm[:, None], 3)]).ravel()
+    moved = (levers @ np.abs(unit)) * wrenches * np.sqrt(np.diag(compliance))  # how far each wrench moves targets
+    parts = errors[:, k:] @ weights
+    indicators = parts + errors[:, :k] @ (moved / max(moved.sum(), np.finfo(float).tiny))
+    to_unit = np.linalg.inv(unit)
+    forms = to_unit.T @ form[:k, :k] @ to_unit
+    return Estimate(float(parts.sum()), squares, weights, indicators, nodes, stiffness, forms, wrenches, levers)
+
+
+def frequency_estimate(
+    mesh: FEMesh, body: Body, carrier: Frame | None, coarser: NestedModes | None = None
+) -> Estimate:  # fmt: skip
+    """Error of the first modes, of which each counts by its compliance relative to that of the first.
+
+    Args:
+        mesh, body, carrier: As of `refined_for_frequencies`.
+        coarser: Modes of the meshes that it is bisected from.
+
+    Raises:
+        ShotError: Nothing of the mesh is free.
+    """
+    assert body.flexible is not None
+    model = assemble(mesh.points, mesh.tets, body.flexible.material)
+    clamped = _clamped_nodes(model.mesh, body, carrier, mesh.patches)
+    if coarser is None or clamped is None or not len(clamped):
+        frequencies, modes = clamped_modes(model, _COUNT, clamped)
+    else:
+        frequencies, modes = coarser.lowest(model, _COUNT, clamped, _ALGEBRAIC)
+    if not len(frequencies):
+        raise ShotError(
+            "its parent joint holds all of the mesh, so that nothing of it can bend", path=body.path,
+            attribute="calm:flexible:interfaceRadius", found=f"{len(mesh.tets)} tetrahedra",
+            remedy="Use a finer mesh or a smaller interface, or set calm:flexible:enabled to false.",
+        )  # fmt: skip
+    weights = (frequencies[0] / frequencies) ** 2
+    errors = element_errors(model.mesh, body.flexible.material, modes)
+    total = float((errors * weights).sum(axis=0).max())
+    squares = (2.0 * np.pi * frequencies) ** 2
+    return Estimate(total, squares, weights / weights.sum(), errors @ weights, len(model.mesh.nodes))
+
+
+def _clamped_nodes(mesh: QuadraticMesh, body: Body, carrier: Frame | None, cut: Sequence[CutPatch]) -> IntArray | None:
+    assert body.flexible is not None
+    if carrier is None:
+        return None
+    try:
+        attachment = AttachmentFrame(body.path, carrier, "interface")
+        return interface_patches(mesh, [attachment], body.flexible.interface_radius, body.path, cut)[0].nodes
+    except ShotError:
+        return None  # the reduction reports the error with the joint
