@@ -45,8 +45,6 @@ class Basis:
         cut_error_m: Bound of the missing static displacement at the targets [m]; None when the loads are not known.
         patch_squares: Second order of the rotation of each patch in each mode (see `patch_rotation`), shape [p, 6, r];
             None where the patches have no coordinates for it.
-        patch_tension: Tension of the springs that hold the shape of the patches in each mode, shape [6 p, r]; None as
-            above.
         load_envelope: The loads for which modes were chosen: the load-direction envelope of the shot.
         first_order: Of a basis with modal derivatives: its c linear modes in its coordinates, shape [r, c].
         second_order: Of a basis with modal derivatives: the derivatives of the pairs in its coordinates, shape
@@ -59,7 +57,6 @@ class Basis:
     residual: int = 0
     cut_error_m: float | None = None
     patch_squares: Array | None = None
-    patch_tension: Array | None = None
     load_envelope: LoadEnvelope | None = None
     first_order: Array | None = None
     second_order: Array | None = None

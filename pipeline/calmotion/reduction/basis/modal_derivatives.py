@@ -25,13 +25,12 @@ from calmotion.reduction.basis.natural_modes import vector_mass
 from calmotion.reduction.elements.assembly import FEModel
 from calmotion.reduction.elements.elastic_forms import GradientRule, lame_constants, second_order_force
 from calmotion.reduction.interfaces.patch_rotation import (
-    STIFF,
     shape_changes,
-    spring_gram,
     spring_rows,
     springs,
     square_fields,
     squares,
+    stiffness_of,
 )
 from calmotion.shot.character import Array, ElasticMaterial, IntArray
 from calmotion.support import interrupts
@@ -171,9 +170,6 @@ def extended_basis(
     moved = derivatives.motion * weight - shape_motion @ change_sizes
     M, K = vector_mass(model.mass), model.stiffness
     modes = basis.modes.reshape(3 * n, -1)
-    # forces of the modes on the changes of shape, the patches held; and the modes' shares that the others lose below
-    forces = (shapes - support.fixed(model).constraint @ shape_motion.reshape(6 * p, -1)).T @ (K @ modes)
-    shares = modes.T @ (M @ extra), modes.T @ (M @ shapes)
     for _ in range(2):  # the second pass removes the rounding of the first
         extra, moved = _without_modes(modes, basis.patch_motion, M, extra, moved)
         shapes, shape_motion = _without_modes(modes, basis.patch_motion, M, shapes, shape_motion)
@@ -192,17 +188,15 @@ def extended_basis(
     # the changes of shape that rotations of the patches cause; a missing one would make the springs resist the rotation
     root = _root(shapes.T @ (K @ shapes))
     strain, strength, _ = np.linalg.svd(root @ change_sizes, full_matrices=False)
-    taken = np.linalg.pinv(root) @ strain[:, STIFF * strength**2 > dropped]
+    most = max((stiffness_of(int(own.any(axis=0).sum())) for own in derivatives.changes), default=0.0)
+    taken = np.linalg.pinv(root) @ strain[:, most * strength**2 > dropped]
     ritz = np.hstack([modes, extra, shapes @ taken])
     motion = np.concatenate([basis.patch_motion, moved, shape_motion @ taken], axis=2)
-    held = modes.shape[1] + extra.shape[1]  # these do not change the shape of a patch
-    none = np.zeros((p, 6, held))
+    none = np.zeros((p, 6, modes.shape[1] + extra.shape[1]))
     shape = np.concatenate([none, derivatives.changes @ taken], axis=2)
     roots = springs(model.mesh.nodes, support.patches, material.youngs_modulus)
     extension = spring_rows(roots, shape, np.zeros((p, 3, ritz.shape[1])))[:, : ritz.shape[1]]
-    linear = np.hstack([np.eye(modes.shape[1]), -(shares[0] * scale) @ keep, -shares[1] @ taken])
-    tension = np.linalg.pinv(extension[:, held:]).T @ (taken.T @ forces @ linear)
-    added = spring_gram(extension, tension) if law == "stvk" else 0.0
+    added = extension.T @ extension if law == "stvk" else 0.0
     omega_squared, U = _orthonormal(ritz.T @ (M @ ritz), ritz.T @ (K @ ritz) + added)
     result = ritz @ U
     sign = mode_signs(result)
@@ -212,7 +206,6 @@ def extended_basis(
         omega_squared,
         np.ascontiguousarray(motion @ U),
         patch_squares=np.ascontiguousarray(shape @ U),
-        patch_tension=tension @ U,
         first_order=result.T @ (M @ modes),
         second_order=result.T @ (M @ derivatives.fields.reshape(3 * n, -1)),
     )

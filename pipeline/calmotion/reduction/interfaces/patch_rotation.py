@@ -7,13 +7,6 @@ one that is clamped to a rigid neighbour: by a thousandth of its deflection, and
 swings. Stiff penalty springs on the Green strain of the patch, (H + H^T + H^T H) / 2 with H the gradient of this
 displacement, keep the patch rigid at any rotation. This strain is linear in z(u) = (u_k; u_k u_l), as the strain of the
 body is, so the springs are additional rows of the Gram matrix and cost nothing in a simulation.
-
-Springs alone give way: a seat that is deep for its radius was up to 87% softer to tilt than a rigid one, a bearing bore
-3%, a shaft in a ring 2%. They are therefore under tension: by the forces with which the linear modes, the patches held,
-change the shape of the patches (the first iterate of an augmented Lagrangian). Under small loads patches then keep
-their shape exactly, at any stiffness of the springs.
-
-Source: Hestenes, Multiplier and gradient methods, 1969 (the augmented Lagrangian).
 """
 
 from __future__ import annotations
@@ -25,14 +18,16 @@ import numpy as np
 from calmotion.reduction.interfaces.rigid_patch import rigid_patch
 from calmotion.shot.character import Array, IntArray
 
-# Stiffness of the springs over Young's modulus times the cube of the patch's radius. Without tension the bending
-# compliance of a link is 2e-5 too large with it. Ten times the stiffness costs digits of Newton's method, and three
-# times as many iterations where deflections are large.
-STIFF = 30.0
+# Stiffness of the springs over Young's modulus times the cube of the patch's radius, of nearly plane patches and of
+# others. With the first the bending compliance of a link with an end face is 2e-5 too large. Deep seats, bearing bores
+# and shafts in rings give way to it by 20, 2 and 0.6% of their compliance, to the second by 0.6, 0.08 and 0.02%. Even
+# stiffer ones cost iterations of Newton's method where deflections are large: 3000 took 4 to 30% more time than 30.
+STIFF, STIFF_DEEP = 30.0, 1000.0
+_DISC = 0.5  # W of a disc in its plane
+_PLANE = 3  # changes of shape of a nearly plane patch, at most
 # Smallest eigenvalue of a change of shape, of the largest. In a patch that is nearly plane, shearing its normal is
 # nearly a rotation: the springs hardly hold it, and the patch tilts on its ground by more than its joint turns.
-# Without tension, links of a KUKA with small seats were 22 to 36% too soft to tilt with 1e-3, by at most 0.4% with
-# this.
+# Links of a KUKA with small seats were 22 to 36% too soft to tilt with 1e-3, by at most 0.4% with this.
 _FLAT = 0.1
 _ROWS, _COLUMNS = (0, 1, 2, 1, 0, 0), (0, 1, 2, 2, 2, 1)  # of the six entries of a symmetric matrix
 
@@ -84,11 +79,17 @@ def shape_changes(arms: Array) -> Array:
     return vectors[:, values > _FLAT * max(float(np.linalg.eigvalsh(fields.T @ fields)[-1]), np.finfo(float).tiny)]
 
 
+def stiffness_of(changes: int) -> float:
+    """Stiffness of the springs of a patch with so many changes of shape, over E R^3."""
+    return STIFF if changes <= _PLANE else STIFF_DEEP
+
+
 def springs(nodes: Array, patches: Sequence[IntArray], youngs_modulus: float) -> Array:
     """Square roots of the stiffness of the penalty springs, shape [p, 6, 6]: their energy is |root E|^2 / 2 [J].
 
     With W the second moment of the patch's points, of unit trace, the energy is that of W^1/2 E W^1/2. Strains along
-    the normal of a plane patch have no energy.
+    the normal of a plane patch have no energy. In other patches the change of shape nearest to a strain in this norm
+    counts, and all changes are equally stiff: those along the normal of a flat seat would be soft.
 
     Args:
         nodes: Shape [n, 3] [m].
@@ -99,18 +100,24 @@ def springs(nodes: Array, patches: Sequence[IntArray], youngs_modulus: float) ->
         Columns for the entries 00, 11, 22, 12, 02, 01 of a uniform strain E of each patch.
     """
     roots = np.zeros((len(patches), 6, 6))
+    entries = np.zeros((6, 3, 3))
+    for m, (i, j) in enumerate(zip(_ROWS, _COLUMNS, strict=True)):
+        entries[m, i, j] = entries[m, j, i] = 1.0
     for root, patch in zip(roots, patches, strict=True):
         arms = nodes[patch] - nodes[patch].mean(axis=0)  # its strain does not depend on where its center is
         squared = np.einsum("ki,ki->k", arms, arms)
-        if not squared.any():
+        changes = shape_changes(arms)
+        if not changes.shape[1]:
             continue  # a single point cannot deform
         W = arms.T @ arms / squared.sum()
-        strains = np.zeros((6, 3, 3))
-        for m, (i, j) in enumerate(zip(_ROWS, _COLUMNS, strict=True)):
-            strains[m, i, j] = strains[m, j, i] = 1.0
-        form = np.einsum("aij,jk,bkl,li->ab", strains, W, strains, W)
-        values, vectors = np.linalg.eigh(STIFF * youngs_modulus * squared.max() ** 1.5 * form)
-        root[:] = np.sqrt(np.maximum(values, 0.0))[:, None] * vectors.T
+        values, vectors = np.linalg.eigh(np.einsum("aij,jk,bkl,li->ab", entries, W, entries, W))
+        norm = np.sqrt(np.maximum(values, 0.0))[:, None] * vectors.T
+        if changes.shape[1] > _PLANE:
+            S = np.tensordot(changes.T, entries, 1)
+            strains = S - np.trace(S, axis1=1, axis2=2)[:, None, None] * np.eye(3)
+            norm = _DISC * np.linalg.pinv(norm @ strains[:, _ROWS, _COLUMNS].T) @ norm
+        stiffness = stiffness_of(changes.shape[1]) * youngs_modulus * squared.max() ** 1.5
+        root[: len(norm)] = np.sqrt(stiffness) * norm
     return roots
 
 
@@ -139,16 +146,3 @@ def spring_rows(roots: Array, second_order: Array, rotation: Array, directions: 
     pairs[:, first == second] *= 0.5  # u_k u_l stands for both orders, u_k^2 for one
     entries = np.concatenate([strain, pairs], axis=1)[:, :, _ROWS, _COLUMNS]
     return np.asarray((roots @ np.swapaxes(entries, 1, 2)).reshape(6 * p, entries.shape[1]))
-
-
-def spring_gram(rows: Array, tension: Array) -> Array:
-    """Gram matrix of springs under tension: their energy is z^T A z / 2 = |w z|^2 / 2 - (t u)^T w z.
-
-    Args:
-        rows: w, as of `spring_rows`; or their first r columns, for a linear body.
-        tension: t, tension of the springs by each of the r coordinates, shape [6 p, r].
-    """
-    A, work = rows.T @ rows, tension.T @ rows
-    A[: len(work)] -= work
-    A[:, : len(work)] -= work.T
-    return np.asarray(A)

@@ -12,7 +12,7 @@ from calmotion.reduction.basis.modal_derivatives import NEGLIGIBLE, Support, ext
 from calmotion.reduction.basis.quadratic_strain_subspace import QuadraticStrainSubspace, quadratic_strain_subspace
 from calmotion.reduction.elements.assembly import FEModel
 from calmotion.reduction.elements.elastic_forms import GradientRule, lame_constants, strain_gram
-from calmotion.reduction.interfaces.patch_rotation import spring_gram, spring_rows, springs
+from calmotion.reduction.interfaces.patch_rotation import spring_rows, springs
 from calmotion.reduction.load_envelope import LoadEnvelope
 from calmotion.reduction.material_laws.choice import work_of_loads
 from calmotion.reduction.reduced_body import Elasticity
@@ -69,10 +69,10 @@ def _stvk(
     lame = lame_constants(material.youngs_modulus, material.poissons_ratio)
     directions = None if subspace is None else subspace.basis
     gram = strain_gram(GradientRule(model.mesh, 4), basis.modes, *lame, directions)
-    if basis.patch_squares is not None and basis.patch_tension is not None:
+    if basis.patch_squares is not None:
         roots = springs(model.mesh.nodes, support.patches, material.youngs_modulus)
         rows = spring_rows(roots, basis.patch_squares, basis.patch_motion[:, 3:], directions)
-        gram += spring_gram(rows, basis.patch_tension)
+        gram += rows.T @ rows
     law = Elasticity("stvk", 0.0, gram.ravel(), 0, lame)
     if subspace is None:
         return law
