@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from calmotion.geometry.tetrahedra import measure_quality, tet_volumes
+from calmotion.reduction import mesh_refinement
 from calmotion.reduction.basis.natural_modes import frequencies
 from calmotion.reduction.elements.assembly import assemble
 from calmotion.reduction.full_order.mesh_estimates import frequency_estimate
@@ -79,6 +80,37 @@ def test_more_nodes_are_spent_on_meshes_with_a_poor_estimate():
     assert effort.allows(8_000, 19_000) and not effort.allows(8_000, 21_000)
     assert effort.allows(7_000, 21_000)  # few as they are, whatever one bisection makes of them
     assert not Effort(0.02, 12_000).allows(8_000, 8_100)
+
+
+def test_a_link_keeps_few_nodes_where_one_factor_is_that_of_finer_meshes(helpers, beam, frames):
+    coarse, carrier = mesh_of(helpers, (6, 1, 1)), frames[1].frame
+    effort = Effort(0.0, 0, 0.0, 9_000)  # as fine as it may be
+    finest, kept = (refined_for_frequencies(coarse, beam, carrier, replace(effort, kept_nodes=n)) for n in (1e9, 1_000))
+    estimates = [frequency_estimate(mesh, beam, carrier) for mesh in (finest, kept)]
+    assert estimates[1].nodes <= 1_000 and 4_000 < estimates[0].nodes <= 9_000
+    assert kept.quality.element_error > 3.0 * finest.quality.element_error
+    fine, own = (mesh.quality.stiffness_factor * e.squares for mesh, e in zip((finest, kept), estimates, strict=True))
+    off = np.abs(np.sqrt(own / fine) - 1.0)
+    assert off.max() < 0.005 and off[0] < 1e-3 < np.abs(estimates[1].squares / fine - 1.0).max()
+    extra = kept.quality.frequency_error - finest.quality.frequency_error
+    assert 0.5 * off.max() < extra < 0.005
+
+
+def test_modes_that_one_factor_does_not_serve_keep_finer_elements(helpers, beam, frames, monkeypatch):
+    monkeypatch.setattr(mesh_refinement, "_APART", 1e-4)
+    effort = Effort(0.0, 0, 0.0, 9_000, 500)
+    kept = refined_for_frequencies(mesh_of(helpers, (6, 1, 1)), replace(beam, path="/Arm/own"), frames[1].frame, effort)
+    assert frequency_estimate(kept, beam, frames[1].frame).nodes > 1_000
+
+
+def test_a_bisection_that_would_be_too_many_nodes_is_smaller(helpers, beam, frames):
+    coarse, carrier = mesh_of(helpers, (6, 1, 1)), frames[1].frame
+    nodes = []
+    for most in range(1_000, 3_000, 250):
+        fine = refined_for_frequencies(coarse, beam, carrier, Effort(0.0, 0, 0.0, most))
+        nodes.append(frequency_estimate(fine, beam, carrier).nodes)
+        assert 0.6 * most < nodes[-1] <= most
+    assert len(set(nodes)) > 3
 
 
 def test_local_refinement_needs_fewer_nodes_than_a_uniform_one(helpers, beam, frames):
