@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 from typing import Any
 
 import numpy as np
@@ -11,7 +10,8 @@ from calmotion.geometry.tetrahedra import Indices
 from calmotion.reduction.basis.natural_modes import lowest_modes, vector_mass
 from calmotion.reduction.elements.assembly import FEModel, QuadraticMesh
 from calmotion.reduction.elements.elastic_forms import GradientRule
-from calmotion.shot.character import Array, ElasticMaterial
+from calmotion.shot.character import Array, ElasticMaterial, IntArray
+from calmotion.support.compilation import kernel
 
 _AT_ONCE = 2000  # nodes whose fits, or elements whose strains, are in memory
 _DETERMINED = 1e-12  # least eigenvalue of the normal equations of a fit, of the largest
@@ -157,21 +157,45 @@ def _weights(near: Any, at: Array, places: Array) -> Any:
     """
     from scipy.sparse import csr_matrix
 
-    q, count = at.shape[1], np.diff(near.indptr)
-    begin = np.concatenate([[0], np.cumsum(q * count)])
-    columns = (q * near.indices[:, None] + np.arange(q)).ravel()
-    row = np.repeat(np.arange(len(places)), q * count)
-    d = at.reshape(-1, 3)[columns] - places[row]
-    d /= np.maximum.reduceat(np.abs(d).max(axis=1), begin[:-1])[row, None] if len(d) else 1.0
-    x, y, z = d.T
-    P = np.stack([np.ones(len(d)), x, y, z, x * x, y * y, z * z, x * y, y * z, x * z], axis=1)
-    normal = np.empty((len(places), 10, 10))
-    for k, (first, last) in enumerate(itertools.pairwise(begin.tolist())):
-        own = P[first:last]
-        np.dot(own.T, own, out=normal[k])
+    q = at.shape[1]
+    begin = q * near.indptr
+    P, normal = np.empty((begin[-1], 10)), np.zeros((len(places), 10, 10))
+    _sample(near.indptr, near.indices, at, places, P, normal)
     # elements in one layer may not determine all coefficients: then the solution of least norm
     size, vectors = np.linalg.eigh(normal)
     inverse = np.where(size > _DETERMINED * size[:, -1:], 1.0 / np.maximum(size, np.finfo(float).tiny), 0.0)
     value = np.einsum("kab,kb->ka", vectors, inverse * vectors[:, 0])
+    row = np.repeat(np.arange(len(places)), np.diff(begin))
+    columns = (q * near.indices[:, None] + np.arange(q)).ravel()
     weights = np.einsum("ra,ra->r", P, value[row])
     return csr_matrix((weights, columns, begin), shape=(len(places), q * len(at)))
+
+
+@kernel
+def _sample(indptr: IntArray, indices: IntArray, at: Array, places: Array, P: Array, normal: Array) -> None:
+    """Monomials at the samples of each node, relative to its place and to the farthest of them, and their products.
+
+    Args:
+        indptr, indices, at, places: As of `_weights`.
+        P: For 1, x, y, z, x^2, y^2, z^2, x y, y z, z x of each sample, shape [samples, 10].
+        normal: Zero, for their products, summed over the samples of each node, shape [k, 10, 10].
+    """
+    for k in range(len(places)):
+        size = 0.0
+        for e in indices[indptr[k] : indptr[k + 1]]:
+            for q in range(at.shape[1]):
+                for i in range(3):
+                    size = max(size, abs(at[e, q, i] - places[k, i]))
+        row = at.shape[1] * indptr[k]
+        for e in indices[indptr[k] : indptr[k + 1]]:
+            for q in range(at.shape[1]):
+                P[row, 0] = 1.0
+                for i in range(3):
+                    P[row, 1 + i] = (at[e, q, i] - places[k, i]) / size
+                for i in range(3):
+                    P[row, 4 + i] = P[row, 1 + i] * P[row, 1 + i]
+                    P[row, 7 + i] = P[row, 1 + i] * P[row, 1 + (i + 1) % 3]
+                for a in range(10):
+                    for b in range(10):
+                        normal[k, a, b] += P[row, a] * P[row, b]
+                row += 1

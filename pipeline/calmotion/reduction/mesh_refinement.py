@@ -37,7 +37,9 @@ MARKED = 0.8  # share of the error in the elements that are bisected: halves the
 _FEWER = 0.6  # the same where that would be too many nodes
 _ROUNDS = 12
 _KEPT = 0.005  # of their own error, what elements leave with the statics of finer ones: they have their own mass
-_APART = 0.01  # relative difference of the stiffness of modes from one factor that finer elements would not leave
+# Relative difference of the stiffness of modes from one factor, and the same of the error that is left: from more on,
+# finer elements are kept
+_APART, _APART_OF_ERROR = 0.01, 0.3
 _FEW = 6_000  # nodes of elements on which a nonlinear body is reduced within a minute
 
 
@@ -86,7 +88,7 @@ def refined(mesh: FEMesh, estimate: Callable[[FEMesh], Estimate], effort: Effort
     excess, error = extrapolated(estimates)
     if not far:
         return _with_quality(meshes[-1], _quality(mesh, estimates[-1], estimates, 1.0 - excess, error))
-    kept, factor, apart = _smallest(estimates, effort.kept_nodes)
+    kept, factor, apart = _smallest(estimates, effort.kept_nodes, max(_APART, _APART_OF_ERROR * error))
     quality = replace(
         mesh.quality, frequency_error=0.5 * (error + apart + _of_volume(mesh)), element_error=estimates[kept].error,
         stiffness_factor=factor * (1.0 - excess),
@@ -94,19 +96,20 @@ def refined(mesh: FEMesh, estimate: Callable[[FEMesh], Estimate], effort: Effort
     return _with_quality(meshes[kept], quality)
 
 
-def _smallest(estimates: Sequence[Estimate], nodes: float) -> tuple[int, float, float]:
+def _smallest(estimates: Sequence[Estimate], nodes: float, enough: float) -> tuple[int, float, float]:
     """The mesh that takes the stiffness of the last of ever finer ones by a factor; that, and what modes deviate.
 
     Args:
         estimates: Of the meshes.
-        nodes: At most so many, if one factor is that of all modes.
+        nodes: At most so many, if modes deviate from one factor by no more than the next.
+        enough: Relative deviation of the stiffness.
     """
     few = max([0, *(k for k, one in enumerate(estimates) if one.nodes <= nodes)])
     for k in range(few, len(estimates)):
         ratios, weights = mode_ratios(estimates[k], estimates[-1])
         factor = float(weights @ ratios)
         apart = float(np.abs(ratios / factor - 1.0).max())
-        if apart <= _APART:
+        if apart <= enough:
             break
     return k, factor, apart
 

@@ -11,6 +11,7 @@ from calmotion.geometry.makeup import makeup_of
 from calmotion.geometry.tetrahedra import boundary_triangles, corner_keys, tet_volumes, without_unused_points
 from calmotion.reduction.elements.filling import Filling, element_masses, filling_of
 from calmotion.shot.character import Array, ElasticMaterial, IntArray
+from calmotion.support.compilation import inlined_kernel, kernel
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,9 +72,10 @@ def quadratic_mesh(points: Array, tets: IntArray) -> QuadraticMesh:
     # degree 4: products of two quadratic fields; this rule of scikit-fem is exact to rounding (tested)
     basis = Basis(mesh, ElementTetP2(), intorder=4)
     corners = boundary_triangles(tets)
-    edge_nodes = {tuple(edge): len(points) + k for k, edge in enumerate(np.sort(mesh.edges, axis=0).T.tolist())}
-    middle = [[edge_nodes[min(a, b), max(a, b)] for a, b in ((i, j), (j, k), (k, i))] for i, j, k in corners.tolist()]
-    surface = np.hstack([corners, np.array(middle).reshape(-1, 3)])
+    keys = corner_keys(mesh.edges.T)
+    order = np.argsort(keys)
+    sides = corner_keys(corners[:, [[0, 1], [1, 2], [2, 0]]])
+    surface = np.hstack([corners, len(points) + order[np.searchsorted(keys, sides, sorter=order)]])
     return QuadraticMesh(
         nodes=np.ascontiguousarray(basis.doflocs.T),
         tets=basis.element_dofs.T.astype(np.int32),
@@ -127,8 +129,8 @@ def corner_gradients(mesh: QuadraticMesh) -> Array:
 def assemble_stiffness(mesh: QuadraticMesh, youngs_modulus: float, poissons_ratio: float) -> Any:
     """Stiffness of linear isotropic elasticity [N/m], CSR, shape [3n, 3n].
 
-    int lambda div(u) div(v) + 2 mu e(u):e(v) needs D[i,a,j,b] = int d_a N_i d_b N_j alone. It is summed over the
-    elements for one (a, b) at a time, on the pattern of nodes: a tenth of the memory of all element matrices.
+    int lambda div(u) div(v) + 2 mu e(u):e(v) needs D[i,a,j,b] = int d_a N_i d_b N_j alone. Elements are summed on the
+    pattern of nodes, of which both halves get the same numbers in the same order: the matrix is exactly symmetric.
     """
     from scipy.sparse import bsr_matrix, csr_matrix
     from skfem import Basis, ElementTetP2
@@ -136,30 +138,62 @@ def assemble_stiffness(mesh: QuadraticMesh, youngs_modulus: float, poissons_rati
 
     lame, mu = lame_parameters(youngs_modulus, poissons_ratio)
     basis = Basis(mesh.basis.mesh, ElementTetP2(), intorder=2)  # gradients are linear on straight-sided elements
-    n, tets = len(mesh.nodes), mesh.tets.astype(np.int64)
-    keys, place = np.unique((n * tets[:, :, None] + tets[:, None, :]).ravel(), return_inverse=True)
-    gradient = [np.stack([np.asarray(field[0].grad[a]) for field in basis.basis], axis=1) for a in range(3)]
-    weights = basis.dx
-    if mesh.filling is not None:
-        at_points = np.einsum("ajec,eqc->jeaq", corner_gradients(mesh), mesh.filling.points, optimize=True)
-        gradient = list(at_points)
+    if mesh.filling is None:
+        gradients = np.stack([np.asarray(field[0].grad) for field in basis.basis])  # [10, 3, e, q]
+        weights = basis.dx
+    else:
+        gradients = np.einsum("ajec,eqc->ajeq", corner_gradients(mesh), mesh.filling.points, optimize=True)
         weights = basis.dx.sum(axis=1)[:, None] * mesh.filling.weights
-    blocks = np.zeros((len(keys), 3, 3))
-    for a in range(3):
-        weighted = gradient[a] * weights[:, None, :]  # [e, 10, q]
-        for b in range(3):
-            D = weighted @ gradient[b].transpose(0, 2, 1)
-            summed = np.bincount(place, weights=D.ravel(), minlength=len(keys))
-            blocks[:, a, b] += lame * summed
-            blocks[:, b, a] += mu * summed
-            if a == b:
-                for c in range(3):
-                    blocks[:, c, c] += mu * summed
-    indptr = np.searchsorted(keys, n * np.arange(n + 1))
-    columns = keys % n
-    opposite = csr_matrix((np.arange(len(keys)), columns, indptr), shape=(n, n)).T.tocsr().data
-    blocks = 0.5 * (blocks + blocks[opposite].transpose(0, 2, 1))  # exactly symmetric, whatever the order of summation
-    return bsr_matrix((blocks, columns, indptr), shape=(3 * n, 3 * n)).tocsr()
+    gradients = np.ascontiguousarray((gradients * np.sqrt(weights)).transpose(2, 0, 3, 1))  # [e, 10, q, 3]
+    n, tets = len(mesh.nodes), mesh.tets
+    touch = csr_matrix((np.ones(tets.size, np.int32), tets.ravel(), np.arange(0, tets.size + 1, 10)), (len(tets), n))
+    pattern = (touch.T @ touch).tocsr()
+    pattern.sort_indices()
+    blocks = np.zeros((pattern.nnz, 3, 3))
+    _add_elements(tets, gradients, lame, mu, pattern.indptr, pattern.indices, blocks)
+    return bsr_matrix((blocks, pattern.indices, pattern.indptr), shape=(3 * n, 3 * n)).tocsr()
+
+
+@kernel
+def _add_elements(
+    tets: IntArray, gradients: Array, lame: float, mu: float, indptr: IntArray, indices: IntArray, blocks: Array
+) -> None:
+    """Add the stiffness of elements, from gradients times roots of weights, to blocks on a pattern with sorted rows."""
+    for e in range(len(tets)):
+        for i in range(10):
+            for j in range(i, 10):
+                row, column = tets[e, i], tets[e, j]
+                at = _place(indptr[row], indptr[row + 1], indices, column)
+                opposite = _place(indptr[column], indptr[column + 1], indices, row)
+                trace = 0.0
+                for a in range(3):
+                    for b in range(3):
+                        d, t = 0.0, 0.0
+                        for q in range(gradients.shape[2]):
+                            d += gradients[e, i, q, a] * gradients[e, j, q, b]
+                            t += gradients[e, i, q, b] * gradients[e, j, q, a]
+                        value = lame * d + mu * t
+                        blocks[at, a, b] += value
+                        if i != j:
+                            blocks[opposite, b, a] += value
+                        if a == b:
+                            trace += d
+                for a in range(3):
+                    blocks[at, a, a] += mu * trace
+                    if i != j:
+                        blocks[opposite, a, a] += mu * trace
+
+
+@inlined_kernel
+def _place(first: int, last: int, indices: IntArray, wanted: int) -> int:
+    """Where a number is among ascending ones."""
+    while last - first > 1:
+        middle = (first + last) // 2
+        if indices[middle] <= wanted:
+            first = middle
+        else:
+            last = middle
+    return first
 
 
 def assemble(points: Array, tets: IntArray, material: ElasticMaterial, mass: float | None = None) -> FEModel:
