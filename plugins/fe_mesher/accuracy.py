@@ -14,11 +14,33 @@ from calmotion.shot.meshes import MeshQuality
 
 if TYPE_CHECKING:
     from calmotion.geometry.makeup import Makeup
+    from calmotion.reduction.mesh_refinement import Effort
 
 # The estimate is 1.2 to 3 times the true error of clamped beams and plates on meshes that are nearly fine enough, and
 # larger for links with many edges (see `calmotion bench meshing`). Twice the wanted error is therefore accepted.
 ENOUGH = 2.0 * ACCURACY
+# Nodes of a mesh at most, for some seconds; where the shot needs more, it is refined for its loads
+_REFINED = 12_000
+# Error that the extrapolation of the frequencies is estimated to leave, 1.1 to 8 times the true one of ten real links,
+# from which more nodes are spent: at least and at most so many, and in between so many that meshing and refinement
+# together take some 20 s (3.3 ms for each triangle of the surface and 0.2 ms for each node)
+_POOR, _POOR_REFINED = 0.0125, (32_000, 60_000)
+_IN_TIME, _OF_TRIANGLE = 100_000, 16.5
+_KEPT = 22_000  # nodes of the mesh that takes the stiffness of these, where one factor is enough
 _SAME_MASS, _HOLLOW = 0.05, 0.7  # difference that is reported; ratio below which a body may be hollow
+
+
+def effort_after(triangles: int) -> Effort:
+    """How far the mesh of a surface is refined for the first frequencies.
+
+    Args:
+        triangles: Of the surfaces that were meshed for it.
+    """
+    from calmotion.reduction.mesh_refinement import Effort
+
+    least, most = _POOR_REFINED
+    poor = int(min(max(_IN_TIME - _OF_TRIANGLE * triangles, least), most))
+    return Effort(2.0 * ENOUGH, _REFINED, 2.0 * _POOR, poor, _KEPT)
 
 
 def frames_of(character: Character, index: int) -> tuple[Frame, ...]:

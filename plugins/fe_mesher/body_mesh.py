@@ -27,7 +27,7 @@ from calmotion.geometry.tetrahedra import (
 )
 from calmotion.shot import Body, Character, FEMesh, Frame, TetGeometry
 
-from .accuracy import ENOUGH, makeup_note, mass_note, remark
+from .accuracy import effort_after, makeup_note, mass_note, remark
 from .filling import DENSE, filled, refuse_loose_parts, refuse_too_many
 from .mesh_file import read_mesh_file
 from .repair import Solid
@@ -40,12 +40,6 @@ from .tetwild import OutOfTime, ProcessorTime
 if TYPE_CHECKING:
     from calmotion.reduction.interfaces.interface_patches import AttachmentFrame
 
-# Nodes of the first mesh at most, for some seconds; where the shot needs more, it is refined for its loads.
-_REFINED = 12_000
-# Error that the extrapolation of the frequencies is estimated to leave, 1.1 to 4 times the true one of six real links,
-# from which more nodes are spent
-_POOR, _POOR_REFINED = 0.0125, 60_000
-_KEPT = 22_000  # nodes of the mesh that takes the stiffness of these, where one factor is enough
 _LONGER = 1.5  # factor of the element size where a surface has many details: they are refined where it matters
 _FIT = 4.0  # of the distance to the surface that the mesher is allowed: how far corners are moved to fit it
 FAR = 5.0  # distance of a mesh from all joints of its body, over its size, that nobody means
@@ -286,13 +280,12 @@ def accurate(
         size: Of the elements before they are refined [m].
         carrier: Frame of the joint to the parent, body frame.
     """
-    from calmotion.reduction.mesh_refinement import Effort, refined_for_frequencies
+    from calmotion.reduction.mesh_refinement import refined_for_frequencies
 
     solid, shape = volume.solid, volume.shape
     time = ProcessorTime(options.time_limit)
     mesh = filled(index, body, solid, shape, size, time, options.cache, _LONGER)
     mesh = _shaped(mesh, body, volume, size, attachments)
-    effort = Effort(2.0 * ENOUGH, _REFINED, 2.0 * _POOR, _POOR_REFINED, _KEPT)
-    mesh = refined_for_frequencies(mesh, body, carrier, effort)
+    mesh = refined_for_frequencies(mesh, body, carrier, effort_after(time.triangles))
     repairs = (*mesh.quality.repairs, *remark(mesh.quality))
     return replace(mesh, quality=replace(mesh.quality, repairs=repairs))

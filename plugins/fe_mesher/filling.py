@@ -201,6 +201,7 @@ def _meshed(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Tetrahedra that take no more than a share of what is left of the time."""
     part = time.part(share)
+    time.triangles += len(attempt.triangles)
     # fTetWild measures distances by the diagonal of what it is given
     diagonal = _diagonal(attempt.points)
     try:
