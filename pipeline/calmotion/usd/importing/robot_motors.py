@@ -17,8 +17,8 @@ from calmotion.usd.dialects import GEARS
 from calmotion.usd.reading.context import body_on
 from calmotion.usd.reading.generic_joints import freedoms
 from calmotion.usd.reading.joints import joint_prims
-from calmotion.usd.reading.motors.coupling_joints import COUPLED, coupled, coupling_prims
 from calmotion.usd.reading.motors.driven_motors import actuated_joints
+from calmotion.usd.reading.motors.gears.coupling_joints import COUPLED, coupled, coupling_prims
 from calmotion.usd.units import StageUnits
 
 if TYPE_CHECKING:

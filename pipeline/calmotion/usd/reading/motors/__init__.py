@@ -1,1 +1,1 @@
-"""Motor tracks: from drives, body transforms, skeletons and files; gears and limits."""
+"""Motor tracks: from drives, body transforms, skeletons and files; limits, and joints without a motor."""

@@ -20,8 +20,8 @@ from calmotion.usd.reading.actuators.rotors import read_backlash, read_delay, re
 from calmotion.usd.reading.context import Reading, prims_of
 from calmotion.usd.reading.joints import JointPrim, refuse_unsupported
 from calmotion.usd.reading.motors.free_ranges import may_change
-from calmotion.usd.reading.motors.gear_joints import gears_of_joints
-from calmotion.usd.reading.motors.gearing import Gear, read_gear, resolve
+from calmotion.usd.reading.motors.gears.gear_joints import gears_of_joints
+from calmotion.usd.reading.motors.gears.gearing import Gear, read_gear, resolve
 from calmotion.usd.reading.motors.motor_limits import calmotion_limit, effort_limit, velocity_limit
 from calmotion.usd.reading.motors.tracks import sample_codes
 from calmotion.usd.reading.motors.undriven_joints import note_or_refuse_no_motors

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from calmotion import ShotError
 from calmotion.usd.reading import read_shot
-from calmotion.usd.reading.motors.gearing import Gear, resolve
+from calmotion.usd.reading.motors.gears.gearing import Gear, resolve
 from pxr import Sdf, UsdPhysics
 from small_shots import ELBOW, FORE, SHOULDER, TARGET_POSITION, Scale, set_float, write_arm
 

@@ -14,7 +14,7 @@ import numpy as np
 from calmotion.errors import ShotError
 from calmotion.usd.reading.context import Reading, body_on
 from calmotion.usd.reading.joints import JointPrim
-from calmotion.usd.reading.motors.coupling_joints import (
+from calmotion.usd.reading.motors.gears.coupling_joints import (
     COUPLED,
     GEAR,
     Coupling,
@@ -22,9 +22,9 @@ from calmotion.usd.reading.motors.coupling_joints import (
     coupling_prims,
     ratio_of,
 )  # fmt: skip
-from calmotion.usd.reading.motors.gearing import Gear
+from calmotion.usd.reading.motors.gears.gearing import Gear
+from calmotion.usd.reading.motors.gears.rack_joints import rack_coupling
 from calmotion.usd.reading.motors.posed_motors import joint_motions
-from calmotion.usd.reading.motors.rack_joints import rack_coupling
 
 if TYPE_CHECKING:
     from pxr import Usd

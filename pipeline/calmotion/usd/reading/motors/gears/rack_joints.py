@@ -18,7 +18,7 @@ from calmotion.shot.character import Array
 from calmotion.usd import gf
 from calmotion.usd.reading.context import Reading, body_on
 from calmotion.usd.reading.joints import JointPrim
-from calmotion.usd.reading.motors.coupling_joints import COUPLED, RACK, Coupling, coupled_joint, ratio_of
+from calmotion.usd.reading.motors.gears.coupling_joints import COUPLED, RACK, Coupling, coupled_joint, ratio_of
 from calmotion.usd.transforms import rotation_from_quaternion
 
 if TYPE_CHECKING:

@@ -1,0 +1,1 @@
+"""Joints that follow others: mimic joints, and gears, racks and pinions of PhysX."""
