@@ -1,7 +1,8 @@
 """Fuzzing guided by coverage: `python tests/fuzz/guided.py TARGET SECONDS`, one target in one process.
 
 Atheris guides where it is installed (`pip install 'calmotion[fuzz]'`); elsewhere inputs are mutated at random. An input
-that raises anything but an error for users is written to `tests/fuzz/cases/TARGET/`, which tests then run for ever.
+that raises anything but an error for users, or ends the process, or takes a minute of processor time, is written to
+`tests/fuzz/cases/TARGET/`, which tests then run for ever.
 
 Hours add up over runs: inputs that reach new code stay in `build/fuzz/TARGET`, and with --write the processor time and
 the inputs of a run are added to `tests/fuzz/counts.json`, from which the table in docs/reliability.md is made.
@@ -21,7 +22,7 @@ import sys
 import tempfile
 import time
 import traceback
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import targets
@@ -32,6 +33,8 @@ CASES, COUNTS, CORPUS = HERE / "cases", HERE / "counts.json", HERE.parents[1] / 
 PAGE = HERE.parents[1] / "docs" / "reliability.md"
 BEGIN, END = "<!-- counts of make fuzz -->", "<!-- end of the counts of make fuzz -->"
 MEMORY = "/dev/shm"  # files that are kept in memory, on Linux
+FOUND = "found-"  # what files begin with that have an input on which Atheris stopped
+LONGEST = 60  # processor time of one input [s]
 _PACKAGES = ("calmotion", "fe_mesher", "bvh_reader", "recording_readers", "motion_table")
 _DONE, _PULSE = re.compile(r"Done (\d+) runs"), re.compile(r"^#(\d+)", re.MULTILINE)
 
@@ -65,8 +68,9 @@ def by_atheris(name: str, seconds: float) -> None:
     corpus.mkdir(parents=True, exist_ok=True)
     for k, seed in enumerate(targets.SEEDS[name]):
         (corpus / f"seed{k}").write_bytes(seed)
-    options = [f"-max_total_time={int(seconds)}", "-timeout=60", "-rss_limit_mb=4000", "-max_len=4096"]
-    atheris.Setup([sys.argv[0], *options, f"-artifact_prefix={targets.FOLDER}/", str(corpus)], run)
+    options = [f"-max_total_time={int(seconds)}", f"-timeout={LONGEST}", "-rss_limit_mb=4000", "-max_len=4096"]
+    found = Path(tempfile.gettempdir()) / FOUND  # not among the files of the target, which are removed
+    atheris.Setup([sys.argv[0], *options, f"-artifact_prefix={found}", str(corpus)], run)
     atheris.Fuzz()
 
 
@@ -129,8 +133,34 @@ def write(name: str, seconds: float, inputs: int, found: int, guided: bool) -> N
         PAGE.write_text(f"{before}{BEGIN}\n\n{table(counts)}\n\n{END}{rest.partition(END)[2]}")
 
 
-def supervised(name: str, seconds: float) -> tuple[int, float, int, int, bool]:
-    """Fuzz in a process of its own; exit status, processor time [s], inputs, findings, whether it was guided."""
+def fails(command: Sequence[str], seconds: int) -> bool:
+    """Whether a process fails by itself, or takes more processor time than that.
+
+    An input is also stopped where other programs leave it no processor, or where the machine sleeps.
+    """
+
+    def limited() -> None:
+        resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds + 1))
+
+    return subprocess.run(command, preexec_fn=limited, capture_output=True, timeout=60 * seconds).returncode != 0
+
+
+def judged(name: str, files: Path) -> tuple[int, int]:
+    """Try the inputs on which a run stopped once more, and keep those that fail; how many were tried, and failed."""
+    inputs = sorted(files.glob(f"{FOUND}*"))
+    failed = 0
+    for path in inputs:
+        if fails([sys.executable, str(HERE / "guided.py"), name, "0", "--replay", str(path)], LONGEST):
+            data, failed = path.read_bytes(), failed + 1
+            (CASES / name).mkdir(parents=True, exist_ok=True)
+            (CASES / name / hashlib.sha256(data).hexdigest()[:12]).write_bytes(data)
+        else:
+            print(f"{path.name}: no finding, it ends as it should in a process of its own", flush=True)
+    return len(inputs), failed
+
+
+def supervised(name: str, seconds: float) -> tuple[bool, float, int, int, bool]:
+    """Fuzz in a process of its own: whether it failed, processor time [s], inputs, findings, whether it was guided."""
     folder = CASES / name
     before = len(list(folder.glob("*")))
     command = [sys.executable, str(HERE / "guided.py"), name, str(seconds), "--here"]
@@ -147,11 +177,13 @@ def supervised(name: str, seconds: float) -> tuple[int, float, int, int, bool]:
             guided = guided or line.startswith("INFO:")
             print(line, end="", flush=True)
         status = process.wait()
-    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+        used = resource.getrusage(resource.RUSAGE_CHILDREN)
+        tried, failed = judged(name, Path(files))
     text = "".join(lines[-2000:])
     done = _DONE.search(text)
     inputs = int(done[1]) if done else max(map(int, _PULSE.findall(text)), default=0)
-    return status, used.ru_utime + used.ru_stime, inputs, len(list(folder.glob("*"))) - before, guided
+    found = len(list(folder.glob("*"))) - before
+    return failed > 0 or bool(status and not tried), used.ru_utime + used.ru_stime, inputs, found, guided
 
 
 def main() -> int:
@@ -161,13 +193,17 @@ def main() -> int:
     parser.add_argument("seconds", type=float)
     parser.add_argument("--write", action="store_true", help="add the run to the counts and to docs/reliability.md")
     parser.add_argument("--here", action="store_true", help="in this process, which Atheris ends")
+    parser.add_argument("--replay", type=Path, metavar="FILE", help="read this input only")
     options = parser.parse_args()
     name, seconds = options.target, options.seconds
+    if options.replay:
+        kept(name, targets.TARGETS[name])(options.replay.read_bytes())
+        return 0
     if not options.here:
-        status, *counts = supervised(name, seconds)
+        failed, *counts = supervised(name, seconds)
         if options.write:
             write(name, *counts)
-        return int(status != 0)
+        return int(failed)
     try:
         import atheris  # noqa: F401
     except ImportError:

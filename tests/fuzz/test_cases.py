@@ -46,6 +46,29 @@ def test_seeds_of_recordings_are_recordings(monkeypatch):
     assert [len(recording.channels) for recording in found] == [2, 1, 1, 2]
 
 
+@pytest.mark.parametrize(
+    ("does", "is_failure"),
+    [
+        ("while True: pass", True),
+        ("import os; os.abort()", True),
+        ("1 / 0", True),
+        ("import time; time.sleep(1.5)", False),
+    ],
+)
+def test_an_input_fails_by_itself_or_by_its_processor_time_and_not_by_waiting(does, is_failure):
+    assert guided.fails([sys.executable, "-c", does], 1) == is_failure
+
+
+def test_an_input_on_which_a_run_stopped_is_tried_again_before_it_is_a_finding(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(guided, "CASES", tmp_path / "cases")
+    (tmp_path / f"{guided.FOUND}timeout-1").write_bytes(targets.SEEDS["settings"][0])
+    assert guided.judged("settings", tmp_path) == (1, 0) and "no finding" in capsys.readouterr().out
+    monkeypatch.setattr(guided, "fails", lambda command, seconds: True)
+    assert guided.judged("settings", tmp_path) == (1, 1)
+    (kept,) = (tmp_path / "cases" / "settings").iterdir()
+    assert kept.read_bytes() == targets.SEEDS["settings"][0]
+
+
 def test_a_failure_is_kept_and_raised(tmp_path, monkeypatch):
     monkeypatch.setattr(guided, "CASES", tmp_path)
 
