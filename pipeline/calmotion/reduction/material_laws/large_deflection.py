@@ -12,7 +12,7 @@ from calmotion.reduction.basis.modal_derivatives import NEGLIGIBLE, Support, ext
 from calmotion.reduction.basis.quadratic_strain_subspace import QuadraticStrainSubspace, quadratic_strain_subspace
 from calmotion.reduction.elements.assembly import FEModel
 from calmotion.reduction.elements.elastic_forms import GradientRule, lame_constants, strain_gram
-from calmotion.reduction.interfaces.patch_rotation import spring_rows, springs
+from calmotion.reduction.interfaces.patch_rotation import spring_rows, springs, stiffer
 from calmotion.reduction.load_envelope import LoadEnvelope
 from calmotion.reduction.material_laws.choice import work_of_loads
 from calmotion.reduction.reduced_body import Elasticity
@@ -47,10 +47,11 @@ def large_deflection(
         basis, deflections = _by_deflection(model, basis, basis.load_envelope or load_envelope)
     size = float(np.ptp(model.mesh.nodes, axis=0).max())
     negligible = float(np.clip(np.sqrt(_NEGLIGIBLE_ENERGY * tolerance / size), _FINEST, NEGLIGIBLE))
-    extended = extended_basis(model, support, basis, PAIRED_MODES, material, law, negligible, deflections)
+    stiff = stiffer(tolerance)
+    extended = extended_basis(model, support, basis, PAIRED_MODES, material, law, negligible, deflections, stiff)
     lame = lame_constants(material.youngs_modulus, material.poissons_ratio)
     if law == "stvk":
-        law_of = partial(_stvk, model, support, extended, material)
+        law_of = partial(_stvk, model, support, extended, material, stiff)
         if load_envelope is None or pairs_share <= 0.0:
             return extended, law_of(None)
         loads, allowed = basis.load_envelope or load_envelope, pairs_share * tolerance
@@ -63,14 +64,19 @@ def large_deflection(
 
 
 def _stvk(
-    model: FEModel, support: Support, basis: Basis, material: ElasticMaterial, subspace: QuadraticStrainSubspace | None
+    model: FEModel,
+    support: Support,
+    basis: Basis,
+    material: ElasticMaterial,
+    stiff: float,
+    subspace: QuadraticStrainSubspace | None,
 ) -> Elasticity:
     """The law in a basis, with the penalty springs of its patches; quadratic strain in a subspace, or in all of it."""
     lame = lame_constants(material.youngs_modulus, material.poissons_ratio)
     directions = None if subspace is None else subspace.basis
     gram = strain_gram(GradientRule(model.mesh, 4), basis.modes, *lame, directions)
     if basis.patch_squares is not None:
-        roots = springs(model.mesh.nodes, support.patches, material.youngs_modulus)
+        roots = springs(model.mesh.nodes, support.patches, stiff * material.youngs_modulus)
         rows = spring_rows(roots, basis.patch_squares, basis.patch_motion[:, 3:], directions)
         gram += rows.T @ rows
     law = Elasticity("stvk", 0.0, gram.ravel(), 0, lame)
