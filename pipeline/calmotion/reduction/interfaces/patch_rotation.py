@@ -22,7 +22,7 @@ from calmotion.shot.character import Array, IntArray
 # others, in reductions to a millimetre. With the first the bending compliance of a link with an end face is 2e-5 too
 # large. Deep seats, bearing bores and shafts in rings gave way to it by 20, 2 and 0.6% of their compliance; they do to
 # the second by 0.6, 0.08 and 0.02%. On the bartender, whose links are held at rounded ends, the first put the cup
-# 8.8 mm off, the second 0.63 mm. It goes with one over the stiffness, so that finer reductions have stiffer springs, and
+# 8.8 mm off, the second 0.63 mm. It goes with one over the stiffness: finer reductions have stiffer springs, and
 # their difference tells it. These cost iterations of Newton's method: ten times the stiffness a fifth more time.
 STIFF, STIFF_DEEP = 30.0, 1000.0
 _ROUGH, _STIFFEST = 1e-3, 30.0  # reduction of these [m]; largest factor, where rounding begins to cost iterations
