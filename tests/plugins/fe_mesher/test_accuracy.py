@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import trimesh
 from calmotion.shot import FEMesh, MassProperties, TetGeometry
 from calmotion.shot.materials.parts import Part
 from calmotion.shot.materials.printed import core_of
@@ -34,6 +35,25 @@ def test_given_elements_are_kept_and_their_error_is_known(host, package, monkeyp
     monkeypatch.setattr(package("body_mesh"), "MAX_NODES", 10)  # an estimate would take too long
     (large,) = run(host, replace(link(surface(box())), tets=tets))
     assert large.given and large.quality.frequency_error is None
+
+
+def test_a_mesh_is_refined_as_far_as_its_surface_left_time(package):
+    efforts = [package("accuracy").effort_after(triangles) for triangles in (12, 2_000, 3_000, 4_500, 50_000)]
+    nodes = [effort.poor_nodes for effort in efforts]
+    assert nodes[0] == nodes[1] > nodes[2] > nodes[3] == nodes[4] > 30_000
+    # by 3.3 ms for each triangle and 0.2 ms for each node
+    assert 3.3e-3 * 3_000 + 2e-4 * nodes[2] == pytest.approx(20.0, rel=0.01)
+    assert all(effort.kept_nodes < effort.poor_nodes and effort.wanted < effort.poor for effort in efforts)
+
+
+def test_the_triangles_that_were_meshed_decide_about_it(host, package, monkeypatch):
+    told, effort_after = [], package("accuracy").effort_after
+    monkeypatch.setattr(package("body_mesh"), "effort_after", lambda count: told.append(count) or effort_after(count))
+    cube, ball = box((0.2, 0.02, 0.02)), trimesh.creation.icosphere(subdivisions=3, radius=0.03)
+    for _ in range(2):  # the second time from the cache
+        for shape in (cube, ball):
+            run(host, link(surface(shape)))
+    assert told[0] == len(cube.faces) < 100 < told[1] <= len(ball.faces) and told[2:] == told[:2]
 
 
 def test_an_error_that_remains_is_reported(package):
