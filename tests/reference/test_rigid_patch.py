@@ -49,6 +49,21 @@ def test_a_reduced_link_deflects_like_its_mesh(link, force):
     assert np.allclose(motion[3:] @ u, np.sin(angle) / angle * turn, rtol=0, atol=2e-3 * angle)
 
 
+def check(points, tets, model, root, patch, center, force):
+    """The reduction moves a patch as the mesh does, by more than three degrees."""
+    basis = reduced_basis(model, root, [patch], [center], FlexibleSettings(MATERIAL))
+    support = Support(root, [patch], [center])
+    reduced, law = large_deflection(model, support, basis, MATERIAL, "stvk", tolerance=1e-6)
+    moved, turn = pull(FullOrder(points, tets, 2e9, 0.35, 1200.0), root, patch, center, force)
+    motion = reduced.patch_motion[0]
+    r = motion.shape[1]
+    u = equilibrium(law.data.reshape(r + r * (r + 1) // 2, -1), np.asarray(force) @ motion[:3], np.zeros(r), steps=6)
+    distance, angle = np.linalg.norm(moved), np.linalg.norm(turn)
+    assert angle > 0.05
+    assert np.allclose(motion[:3] @ u, moved, rtol=0, atol=1e-4 * distance)
+    assert np.allclose(motion[3:] @ u, np.sin(angle) / angle * turn, rtol=0, atol=1e-4 * angle)
+
+
 @pytest.mark.parametrize("force", [(200.0, 0.0, 100.0), (300.0, -300.0, -200.0)])
 def test_a_shaft_in_a_ring_deflects_like_its_mesh(force):
     """By 5 and 10 degrees: what it twists and bends within the ring would be a thousandth of that."""
@@ -58,14 +73,16 @@ def test_a_shaft_in_a_ring_deflects_like_its_mesh(force):
     held = (np.hypot(*nodes[:, :2].T) > 0.9e-2) & (nodes[:, 2] > 0.09 - 1e-9)
     root, patch = np.flatnonzero(nodes[:, 2] < 1e-9), np.unique(surface[held[surface[:, :3]].all(axis=1)])
     center = np.array([0.0, 0.02, 0.095])
-    basis = reduced_basis(model, root, [patch], [center], FlexibleSettings(MATERIAL))
-    support = Support(root, [patch], [center])
-    reduced, law = large_deflection(model, support, basis, MATERIAL, "stvk", tolerance=1e-6)
-    moved, turn = pull(FullOrder(points, tets, 2e9, 0.35, 1200.0), root, patch, center, force)
-    motion = reduced.patch_motion[0]
-    r = motion.shape[1]
-    u = equilibrium(law.data.reshape(r + r * (r + 1) // 2, -1), np.asarray(force) @ motion[:3], np.zeros(r), steps=6)
-    distance, angle = np.linalg.norm(moved), np.linalg.norm(turn)
-    assert angle > 0.07
-    assert np.allclose(motion[:3] @ u, moved, rtol=0, atol=1e-4 * distance)
-    assert np.allclose(motion[3:] @ u, np.sin(angle) / angle * turn, rtol=0, atol=1e-4 * angle)
+    check(points, tets, model, root, patch, center, force)
+
+
+def test_a_link_with_a_rounded_end_deflects_like_its_mesh():
+    """By four degrees. Without the smallest change of shape of the end it would be a four-hundredth too stiff."""
+    points, tets = box_tets((8, 2, 2), (0.2, WIDE, WIDE), (0.0, -WIDE / 2, -WIDE / 2))
+    end, radii = points[:, 0] > 0.2 - 1e-9, np.hypot(points[:, 1], points[:, 2]) / WIDE
+    points[end, 0] += 0.008 - 0.024 * radii[end] ** 2
+    model = assemble(points, tets, MATERIAL)
+    nodes, corners = model.mesh.nodes, model.mesh.surface[:, :3]
+    root = np.flatnonzero(nodes[:, 0] < 1e-9)
+    patch = np.unique(model.mesh.surface[np.isin(corners, np.flatnonzero(end)).all(axis=1)])
+    check(points, tets, model, root, patch, nodes[patch].mean(axis=0), (-300.0, 300.0, 400.0))

@@ -18,20 +18,18 @@ import numpy as np
 from calmotion.reduction.interfaces.rigid_patch import rigid_patch
 from calmotion.shot.character import Array, IntArray
 
-# Stiffness of the springs over Young's modulus times the cube of the patch's radius, of nearly plane patches and of
-# others, in reductions to a millimetre. With the first the bending compliance of a link with an end face is 2e-5 too
-# large. Deep seats, bearing bores and shafts in rings gave way to it by 20, 2 and 0.6% of their compliance; they do to
-# the second by 0.6, 0.08 and 0.02%. On the bartender, whose links are held at rounded ends, the first put the cup
-# 8.8 mm off, the second 0.63 mm. It goes with one over the stiffness: finer reductions have stiffer springs, and
-# their difference tells it. These cost iterations of Newton's method: ten times the stiffness a fifth more time.
+# Stiffness of the springs over Young's modulus times the cube of the patch's radius, of plane patches and of others, in
+# reductions to a millimetre. With the first the bending compliance of a link with an end face is 2e-5 too large; deep
+# seats, bearing bores and shafts in rings give way to it by 20, 2 and 0.6% of their compliance, to the second by 0.6,
+# 0.08 and 0.02%. It goes with one over the stiffness: finer reductions have stiffer springs, and their difference tells
+# it. These cost iterations of Newton's method: ten times the stiffness a fifth more time.
 STIFF, STIFF_DEEP = 30.0, 1000.0
 _ROUGH, _STIFFEST = 1e-3, 30.0  # reduction of these [m]; largest factor, where rounding begins to cost iterations
 _DISC = 0.5  # W of a disc in its plane
-_PLANE = 3  # changes of shape of a nearly plane patch, at most
-# Smallest eigenvalue of a change of shape, of the largest. In a patch that is nearly plane, shearing its normal is
-# nearly a rotation: the springs hardly hold it, and the patch tilts on its ground by more than its joint turns.
-# Links of a KUKA with small seats were 22 to 36% too soft to tilt with 1e-3, by at most 0.4% with this.
-_FLAT = 0.1
+_PLANE = 3  # changes of shape of a plane patch, at most
+# Smallest eigenvalue of a change of shape, of the largest. Without the smaller ones a patch rotates to first order in
+# them, and resists: with 0.1 a link with a rounded end was 0.2 to 0.4% too stiff at four degrees.
+_FLAT = 1e-3
 _ROWS, _COLUMNS = (0, 1, 2, 1, 0, 0), (0, 1, 2, 2, 2, 1)  # of the six entries of a symmetric matrix
 
 
@@ -97,7 +95,8 @@ def springs(nodes: Array, patches: Sequence[IntArray], modulus: float) -> Array:
 
     With W the second moment of the patch's points, of unit trace, the energy is that of W^1/2 E W^1/2. Strains along
     the normal of a plane patch have no energy. In other patches the change of shape nearest to a strain in this norm
-    counts, and all changes are equally stiff: those along the normal of a flat seat would be soft.
+    counts, and all changes are equally stiff. Shearing the normal of a flat seat is nearly a rotation: with little
+    energy, links of a KUKA tilted 22 to 36% too easily there.
 
     Args:
         nodes: Shape [n, 3] [m].
