@@ -108,6 +108,7 @@ def test_the_answer_comes_first():
     ]
     text = printed(report(targets=targets, objective_after=1.0))
     assert text.startswith("The largest error falls from 60 mm to 5 mm (at /Elbow).")
+    assert "the errors after are accurate to 0.3 mm" in text, "those before may be off by a twentieth of the shake"
     targets[0]["max_error_after_m"] = 0.07
     assert "rises from 60 mm to 70 mm" in printed(report(targets=targets, objective_after=1.0))
     alone = printed(report(targets=[{"path": "/Cup", "max_error_m": 0.06}]))

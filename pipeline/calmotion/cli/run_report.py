@@ -129,7 +129,8 @@ def print_verdict(console: Console, report: dict[str, Any]) -> None:
     tolerance = length(report["tolerance_m"])
     if report["tolerance_kept"]:
         error = about(report["simulation_error_m"])
-        say(console, f"The simulation keeps the tolerance of {tolerance}: these numbers are accurate to {error}.")
+        which = "the errors after" if _last(report) else "these numbers"
+        say(console, f"The simulation keeps the tolerance of {tolerance}: {which} are accurate to {error}.")
     elif report["simulation_error_m"] is None:
         say(console, f"The error of the simulation was not estimated; the tolerance is {tolerance}.")
     else:
