@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from calmotion.identification.problem import DIFFERENCE, Calibrated
+from calmotion.identification.problem import DIFFERENCE
 from recorded import problem_of
 
 
@@ -14,7 +14,9 @@ def problem(recorded_shot, recordings):
 def test_differences_are_derivatives(problem):
     count = len(problem.parameters)
     z = np.full(count + len(problem.measurement.parameters), 0.1)
+    before = problem.simulations
     residuals, jacobian = problem.linearized(z)
+    assert problem.simulations == before + 1 + count
     assert problem.residuals(z) == pytest.approx(residuals, abs=1e-12)
     for k in range(count):
 
@@ -22,21 +24,9 @@ def test_differences_are_derivatives(problem):
             unit = h * np.eye(len(z))[k]
             return (problem.residuals(z + unit) - problem.residuals(z - unit)) / (2.0 * h)
 
-        wide, narrow = difference(4.0 * DIFFERENCE), difference(2.0 * DIFFERENCE)
+        wide, narrow = difference(12.0 * DIFFERENCE), difference(6.0 * DIFFERENCE)
         exact = narrow + (narrow - wide) / 3.0  # Richardson: the error is of fourth order
         assert np.linalg.norm(jacobian[:, k] - exact) < 2e-3 * np.linalg.norm(exact)
-
-
-def test_differences_to_one_side_are_half_the_work_and_almost_as_exact(problem):
-    z = np.full(len(problem.parameters) + len(problem.measurement.parameters), 0.1)
-    exact = problem.with_measurement(problem.measurement).linearized(z)[1]
-    other = Calibrated(
-        problem.shot, problem.parameters, problem.measurement, problem.options, problem.after, central=False
-    )
-    found = other.linearized(z)[1]
-    assert other.simulations == 1 + len(problem.parameters)
-    off = np.linalg.norm(found - exact, axis=0)
-    assert np.all(off <= 5e-3 * np.linalg.norm(exact, axis=0))
 
 
 def test_simulations_are_not_repeated_where_only_the_measurement_changes(problem):

@@ -68,11 +68,8 @@ def advised(problem: Calibrated, information: Array, z: Array) -> dict[int, Advi
     best: dict[int, Advice] = {}
     for kind, index, path in candidates:
         noise = NOISE.get(kind) or max(EFFORT_NOISE * float(np.abs(here.at(kind, index, times)).max()), 1e-9)
-        columns = []
-        for up, down, width in zip(differences.ahead, differences.behind, differences.widths, strict=True):
-            change = (up.at(kind, index, times) - down.at(kind, index, times)) / (width * noise)
-            columns.append((change - change.mean(axis=0)).ravel())
-        J = np.stack(columns, axis=1)
+        changes = differences.of(lambda signals, kind=kind, index=index: signals.at(kind, index, times))  # type: ignore[misc]
+        J = np.stack([((change - change.mean(axis=0)) / noise).ravel() for change in changes], axis=1)
         more = information.copy()
         more[:count, :count] += J.T @ J
         sigmas = np.sqrt(np.diag(np.linalg.inv(more)))

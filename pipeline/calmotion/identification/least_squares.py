@@ -73,7 +73,7 @@ def loss_of(residuals: Array, counts: Array | float = 1.0) -> float:
     return float((np.where(size > HUBER, HUBER * (size - 0.5 * HUBER), 0.5 * size**2) / counts).sum())
 
 
-def minimize(problem: Problem, start: Array, lower: Array, most: int = MOST) -> Solution:
+def minimize(problem: Problem, start: Array, lower: Array, most: int = MOST, enough: float = ENOUGH) -> Solution:
     """The minimum that is reached from a start.
 
     Args:
@@ -81,6 +81,7 @@ def minimize(problem: Problem, start: Array, lower: Array, most: int = MOST) -> 
         start: Shape [n]; the residuals have a value there.
         lower: Least value of each entry, shape [n].
         most: Largest number of iterations.
+        enough: Change of z, in standard deviations of its posterior, at which the search ends.
 
     Raises:
         ValueError: The residuals have no value at the start.
@@ -101,7 +102,7 @@ def minimize(problem: Problem, start: Array, lower: Array, most: int = MOST) -> 
             step[free] = -np.linalg.solve(own + damping * np.diag(np.diag(own)), gradient[free])
             then = np.maximum(z + step, lower)
             taken = then - z
-            small = float(np.sqrt(taken @ H @ taken)) < ENOUGH
+            small = float(np.sqrt(taken @ H @ taken)) < enough
             if small:
                 break
             tried = problem.residuals(then)

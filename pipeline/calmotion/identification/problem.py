@@ -1,8 +1,8 @@
 """The residuals of recordings as functions of a robot's parameters, by simulations in parallel.
 
-The derivative by a parameter of the robot is a central difference of two simulations, each 0.03% of the prior's
-standard deviation away, so that the phase of fast modes hardly changes between them at the end of a long recording;
-that by a parameter of the measurement is exact.
+The derivative by a parameter of the robot is the difference to a simulation that is 0.01% of the prior's standard
+deviation away, so that the phase of fast modes hardly changes between them at the end of a long recording; that by a
+parameter of the measurement is exact.
 """
 
 from __future__ import annotations
@@ -24,24 +24,27 @@ from calmotion.shot.run import RunSettings
 from calmotion.simulation.compiled_shot import CompiledShot
 from calmotion.support import interrupts
 
-DIFFERENCE = 3e-4  # of the prior's standard deviation
+DIFFERENCE = 1e-4  # of the prior's standard deviation
 
 
 @dataclass(frozen=True, eq=False)
 class Differences:
-    """Signals at x + `DIFFERENCE` and x - `DIFFERENCE` of each parameter; the first and those at x where differences
-    are not central, or x is a least value.
+    """Signals at x, and at x + `DIFFERENCE` of each parameter.
 
     Attributes:
         at: x, shape [n].
-        ahead, behind: One each for each parameter of the robot.
-        widths: Distance between them in x.
+        here: Signals there.
+        ahead: One for each parameter of the robot.
     """
 
     at: Array
+    here: Signals
     ahead: tuple[Signals, ...]
-    behind: tuple[Signals, ...]
-    widths: Array
+
+    def of(self, values: Callable[[Signals], Array]) -> list[Array]:
+        """Derivatives by the parameters of values of the signals."""
+        here = values(self.here)
+        return [np.asarray((values(ahead) - here) / DIFFERENCE) for ahead in self.ahead]
 
 
 class Calibrated:
@@ -54,15 +57,14 @@ class Calibrated:
         options: With step and integrator.
         after: How long the robot is simulated after the end of the shot [s].
         tell: Called with each simulation.
-        central: Whether differences are central ones; those to one side are half the work, and 0.1% less exact.
     """
 
     def __init__(
         self, shot: CompiledShot, parameters: Sequence[Parameter], measurement: Measurement, options: RunSettings,
-        after: float, tell: Callable[[], None] = lambda: None, central: bool = True,
+        after: float, tell: Callable[[], None] = lambda: None,
     ):  # fmt: skip
         self.shot, self.parameters, self.measurement = shot, tuple(parameters), measurement
-        self.options, self.after, self.tell, self._central = options, after, tell, central
+        self.options, self.after, self.tell = options, after, tell
         self._last: tuple[Array, Signals] | None = None
         self.differences: Differences | None = None
         self._own = False  # whether they were made with these options
@@ -80,18 +82,14 @@ class Calibrated:
 
     def with_measurement(self, measurement: Measurement) -> Calibrated:
         """The same with other noise of the sensors; what was simulated is kept."""
-        other = Calibrated(
-            self.shot, self.parameters, measurement, self.options, self.after, self.tell, self._central
-        )  # fmt: skip
+        other = Calibrated(self.shot, self.parameters, measurement, self.options, self.after, self.tell)
         other._last, other.differences, other._own = self._last, self.differences, self._own
         other.simulations = self.simulations
         return other
 
     def with_options(self, options: RunSettings) -> Calibrated:
         """The same with another step; the differences are kept."""
-        other = Calibrated(
-            self.shot, self.parameters, self.measurement, options, self.after, self.tell, self._central
-        )  # fmt: skip
+        other = Calibrated(self.shot, self.parameters, self.measurement, options, self.after, self.tell)
         other.differences, other.simulations = self.differences, self.simulations
         return other
 
@@ -129,13 +127,13 @@ class Calibrated:
         known = self.differences
         found = known if known is not None and self._own and np.array_equal(known.at, x) else self._differences(x, here)
         self.differences, self._own = found, True
-        columns = []
-        for up, down, width in zip(found.ahead, found.behind, found.widths, strict=True):
-            change = [
-                (measurement.predicted(up, sensor, y) - measurement.predicted(down, sensor, y)) / width
+        columns = [
+            -measurement.weighted(change)
+            for change in zip(*[
+                found.of(lambda signals, sensor=sensor: measurement.predicted(signals, sensor, y))  # type: ignore[misc]
                 for sensor in measurement.sensors
-            ]
-            columns.append(-measurement.weighted(change))
+            ], strict=True)
+        ]  # fmt: skip
         by_measurement = -measurement.weighted(
             [measurement.derivatives(here, sensor, y) for sensor in measurement.sensors]
         )
@@ -143,24 +141,8 @@ class Calibrated:
         return measurement.residuals(here, y), np.concatenate([by_robot, by_measurement], axis=1)
 
     def _differences(self, x: Array, here: Signals) -> Differences:
-        n = len(self.parameters)
-        widths, points = np.zeros(n), []
-        for k in range(n):
-            unit = DIFFERENCE * np.eye(n)[k]
-            points.append(x + unit)
-            if self._central_at(x, k):
-                points.append(x - unit)
-        found = iter(in_parallel(self._simulated, points))
-        ahead, behind = [], []
-        for k in range(n):
-            ahead.append(next(found))
-            central = self._central_at(x, k)
-            behind.append(next(found) if central else here)
-            widths[k] = (2.0 if central else 1.0) * DIFFERENCE
-        return Differences(x.copy(), tuple(ahead), tuple(behind), widths)
-
-    def _central_at(self, x: Array, k: int) -> bool:
-        return self._central and bool(x[k] - DIFFERENCE >= self.parameters[k].least)
+        points = [x + unit for unit in DIFFERENCE * np.eye(len(self.parameters))]
+        return Differences(x.copy(), here, tuple(in_parallel(self._simulated, points)))
 
     def _simulated(self, x: Array) -> Signals:
         self.simulations += 1

@@ -24,6 +24,7 @@ TRIED = np.linspace(-2.4, 2.4, 17)  # of all of them at once, in standard deviat
 FARTHEST = 5.0  # that the free decay may be away from the shot, in standard deviations
 BEST = 3  # of these, from which searches begin until one explains the recordings
 FIRST_ITERATIONS, EXPLAINED = 6, 2.0  # of such a search, and its loss over that of noise alone
+NEAR = 0.3  # change at which it ends, in standard deviations: another one follows
 ROUNDS, STEADY = 5, 0.05  # of the noise, and its relative change at which they end
 COARSE = 0.3  # error of a step, over the noise, with which no search begins but for a first guess
 HALVINGS, SHIFT = 5, 0.2  # of the step, and the change of an estimate at which they end, over its standard deviation
@@ -178,7 +179,7 @@ def _from(problem: Calibrated, start: Array, most: int) -> tuple[float, Calibrat
     free, z, iterations = _without_given_noise(problem), start, 0
     for _ in range(2):
         wide = free.with_measurement(renoised(free, z))
-        found = minimize(wide, z, wide.lower, most)
+        found = minimize(wide, z, wide.lower, most, NEAR)
         free, z, iterations = wide, found.z, iterations + found.iterations
     # compared with the noise that the sensors have
     free = free.with_measurement(renoised(free, z))

@@ -14,7 +14,7 @@ from calmotion.shot.run import RunSettings
 from recorded import LOAD, MOTOR
 
 SENSORS = (PlannedSensor(ACCELEROMETER, LOAD, 0.1, 200.0), PlannedSensor(EFFORT, MOTOR, 0.02, 100.0))
-SETTINGS = ExcitationSettings(SENSORS, duration=2.0, tries=16)
+SETTINGS = ExcitationSettings(SENSORS, duration=2.0, tries=300)
 
 
 @pytest.fixture(scope="module")
@@ -87,16 +87,17 @@ def test_a_torque_that_even_small_motions_exceed_is_refused(limited):
     motors = tuple(dataclasses.replace(m, max_torque=0.3) for m in limited.character.motors)
     shot = limited.with_character(dataclasses.replace(limited.character, motors=motors))
     with pytest.raises(ShotError, match="no test motion keeps all limits"):
-        excite_shot(shot, dataclasses.replace(SETTINGS, tries=1), RunSettings())
+        excite_shot(shot, dataclasses.replace(SETTINGS, tries=3), RunSettings())
 
 
 def test_motions_in_which_bodies_come_too_near_do_not_count(limited, monkeypatch):
     asked = []
     monkeypatch.setattr(design.Clearance, "kept", lambda self, shot: bool(asked.append(shot)))
     with pytest.raises(ShotError, match="almost touch"):
-        excite_shot(limited, dataclasses.replace(SETTINGS, tries=1), RunSettings())
+        excite_shot(limited, dataclasses.replace(SETTINGS, tries=3), RunSettings())
     excursions = [
         np.abs(shot.animation.current[0].values - shot.animation.current[0].values[0]).max() for shot in asked
     ]
-    assert len(asked) == 2 * design.TIMES  # the chirp and the motion, made smaller and smaller
+    # the chirp and the motions with which the searches end, made smaller and smaller
+    assert len(asked) == (1 + design.SEARCHES) * design.TIMES
     assert np.allclose(np.array(excursions[1 : design.TIMES]) / excursions[: design.TIMES - 1], design.LESS)

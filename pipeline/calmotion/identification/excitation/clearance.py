@@ -115,12 +115,16 @@ class Clearance:
     def kept(self, shot: CompiledShot) -> bool:
         """Whether all pairs stay as far apart as they should."""
         wanted = np.minimum(NEAREST, SHARE * np.array([pair.apart for pair in self.pairs]))
-        return not self._pairs or bool(np.all(self.least(shot) >= wanted))
+        if not self._pairs:
+            return True
+        found = self._distances(shot, self._pairs, most=wanted)
+        return found is not None and bool(np.all(found >= wanted))
 
     def _distances(
-        self, shot: CompiledShot, pairs: Sequence[tuple[int, int]], count: int | None = None
+        self, shot: CompiledShot, pairs: Sequence[tuple[int, int]], count: int | None = None, most: Array | float = FAR
     ) -> Array | None:  # fmt: skip
-        """The distances of pairs of components in a motion, or in its first instants; None where it is not known."""
+        """The distances of pairs of components, at the most so much, in a motion or in its first instants; None where
+        its motion is not known."""
         prepared = prepare(shot, self._options)
         model, grid = prepared.model, prepared.grid
         if shot.tree.closing or np.any(moves_freely(model)):
@@ -129,10 +133,13 @@ class Clearance:
         every = max(1, round(1.0 / (RATE * grid.h)))
         c, q = (part[::every][:count] for part in rigid_poses(model, angles, prepared.world))
         turns = [Rotation.from_quat(q[:, k], scalar_first=True) for k in range(q.shape[1])]
-        return np.array([self._distance(a, b, c, turns) for a, b in pairs])
+        return np.array([
+            self._distance(a, b, c, turns, far)
+            for (a, b), far in zip(pairs, np.broadcast_to(most, len(pairs)).tolist(), strict=True)
+        ])  # fmt: skip
 
-    def _distance(self, a: int, b: int, c: Array, turns: Sequence[Rotation]) -> float:
-        """The smallest distance of two components, at least, and at most `FAR`."""
+    def _distance(self, a: int, b: int, c: Array, turns: Sequence[Rotation], far: float) -> float:
+        """The smallest distance of two components, at least, and at most so far."""
         one, other = self._surfaces[a], self._surfaces[b]
         assert one is not None and other is not None
         back = turns[a].inv()
@@ -140,7 +147,7 @@ class Clearance:
         boxes = np.einsum("tij,kj->tki", matrices, other.corners) + away[:, None]
         steps = np.linalg.norm(np.diff(boxes, axis=0), axis=2).max(axis=1, initial=0.0)
         moved = np.maximum(np.append(steps, 0.0), np.insert(steps, 0, 0.0))
-        lost, nearest = 0.5 * moved + one.between + other.between, FAR
+        lost, nearest = 0.5 * moved + one.between + other.between, far
         low, high = one.corners[0], one.corners[-1]
         for box, R, x, less in zip(boxes, matrices, away, lost, strict=True):
             reach = nearest + less  # what is farther does not count

@@ -2,9 +2,9 @@
 
 The covariance of the parameters after a recording, (J^T J + E)^-1 in standard deviations of their priors, has the
 derivatives J of what the sensors will measure, over their noise; clocks, biases and places of sensors are unknown too.
-The motion of a family of tones with the least determinant of the robot's block is looked for (D-optimality), by an
-evolution strategy with one parent and one child; every motion that counts keeps all limits in the simulation, and the
-bodies of the robot apart.
+The motion of a family of tones with the least determinant of the robot's block is looked for (D-optimality): motions
+are compared by sums of responses to pulses (`superposition`), and those with which a few searches end are simulated;
+every one that counts keeps all limits in the simulation, and the bodies of the robot apart.
 """
 
 from __future__ import annotations
@@ -19,6 +19,8 @@ from calmotion.errors import ShotError
 from calmotion.identification.advice import IDENTIFIABLE
 from calmotion.identification.calibrate import simulable
 from calmotion.identification.excitation.clearance import Clearance
+from calmotion.identification.excitation.evolution import least_point
+from calmotion.identification.excitation.superposition import Superposition
 from calmotion.identification.excitation.waveforms import MARGIN, Family, bounds_of, family_of
 from calmotion.identification.measurement import Measurement, measurement_parameters, sensors_of
 from calmotion.identification.model_error import covariance_of_model
@@ -40,8 +42,7 @@ from calmotion.simulation.prepare import pose_modes
 AFTER = 1.0  # of rest after the motion, which is recorded as well [s]
 EXCITED = 4  # natural frequencies that are to be excited
 STEP = 1.0 / 240.0  # of the simulations that compare motions [s]
-AT_RANDOM = 0.3  # of the tries: points of the family that have nothing to do with one another
-CHANGE, GROWN, SHRUNK = 0.6, 1.5, 0.85  # first size of a change, and its factors after a success and a failure
+SEARCHES = 3  # which share the tries, and end with one motion each
 LESS, TIMES = 0.8, 12  # share of a motion that exceeds a limit that is tried next, and how often
 
 
@@ -54,7 +55,7 @@ class ExcitationSettings:
         parameters, priors: As of `calibrate.CalibrationSettings`.
         duration: [s].
         amplitude, travel: Largest excursion of a hinge [rad] and of a slider [m].
-        tries: Number of motions that are tried.
+        tries: Number of motions that are compared.
         seed: Of the search.
         by_motor_type: As of `calibrate.CalibrationSettings`.
     """
@@ -65,7 +66,7 @@ class ExcitationSettings:
     duration: float = 4.0
     amplitude: float = float(np.radians(10.0))
     travel: float = 0.05
-    tries: int = 40
+    tries: int = 1000
     seed: int = 0
     by_motor_type: bool = False
 
@@ -100,11 +101,11 @@ def excite_shot(
     trial = _Trial(shot, family, parameters, settings, chosen)
     progress(0.05, "measuring a chirp")
     chirp = trial.rate(family.chirp())
-    best, count = _searched(trial, settings, progress)
+    best = _searched(trial, settings, progress)
     if chirp is None or best is None:
         raise ShotError(
             "no test motion keeps all limits", path=shot.character.path, attribute="calm:motor:maxTorque",
-            found=f"{count} motions tried",
+            found=f"{SEARCHES} motions simulated",
             remedy="Check the limits, and whether bodies almost touch: the robot can hardly leave its first pose",
         )  # fmt: skip
     predicted = tuple(
@@ -125,31 +126,27 @@ def excite_shot(
     )
     return Excitation(
         family.times, best.values, predicted, _uses(shot, family, best), settings.sensors, chirp.score - best.score,
-        count, time.perf_counter() - begin, _clear(shot, family, trial.clearance, best), trial.clearance.together,
+        settings.tries, time.perf_counter() - begin, _clear(shot, family, trial.clearance, best),
+        trial.clearance.together,
     )  # fmt: skip
 
 
-def _searched(
-    trial: _Trial, settings: ExcitationSettings, progress: Callable[[float, str], None]
-) -> tuple[_Rated | None, int]:
-    """The best motion that was found, and how many were tried."""
-    random, size = np.random.default_rng(settings.seed), trial.family.size
-    half = size // 2
-    point, best, change = np.zeros(size), None, CHANGE
-    for k in range(settings.tries):
-        progress(0.1 + 0.9 * k / settings.tries, "looking for the best motion")
-        local = best is not None and k >= AT_RANDOM * settings.tries
-        if local:
-            then = point + change * random.standard_normal(size) * np.repeat([1.0, np.pi / 2], half)
-        else:
-            then = np.concatenate([random.standard_normal(half), random.uniform(-np.pi, np.pi, size - half)])
-        found = trial.rate(trial.family.tones_of(then))
-        better = found is not None and (best is None or found.score < best.score)
-        if better:
-            point, best = then, found
-        if local:
-            change *= GROWN if better else SHRUNK
-    return best, settings.tries
+def _searched(trial: _Trial, settings: ExcitationSettings, progress: Callable[[float, str], None]) -> _Rated | None:
+    """The best of the motions with which some searches end."""
+    family, wanted = trial.family, _wanted(trial.parameters)
+    progress(0.2, "simulating a pulse of each motor")
+    responses = Superposition(family, trial.problem)
+    best, random = None, np.random.default_rng(settings.seed)
+    for k in range(SEARCHES):
+        progress(0.4 + 0.2 * k, "looking for the best motion")
+        point = least_point(
+            lambda numbers: _score(responses.jacobian(family.tones_of(numbers)), wanted), family.size,
+            max(1, settings.tries // SEARCHES), random,
+        )  # fmt: skip
+        found = trial.rate(family.tones_of(point))
+        if found is not None and (best is None or found.score < best.score):
+            best = found
+    return best
 
 
 @dataclass(frozen=True, eq=False)
@@ -176,6 +173,12 @@ def _wanted(parameters: Sequence[Parameter]) -> list[int]:
     return [k for k, p in enumerate(parameters) if p.kind in ROBOT_KINDS]
 
 
+def _score(jacobian: Array, wanted: Sequence[int]) -> float:
+    """Half the logarithm of the determinant of the covariance of the wanted parameters."""
+    covariance = np.linalg.inv(jacobian.T @ jacobian + np.eye(jacobian.shape[1]))[np.ix_(wanted, wanted)]
+    return 0.5 * float(np.linalg.slogdet(covariance)[1])
+
+
 class _Trial:
     """Rates motions."""
 
@@ -193,15 +196,18 @@ class _Trial:
             measurement_parameters(self._recordings, clocks, settings.priors),
         )  # fmt: skip
 
+    def problem(self, values: Array) -> Calibrated:
+        """The robot and its sensors with a motion."""
+        return Calibrated(
+            _performing(self.shot, self.family, values), self.parameters, self._measurement, self.options, AFTER
+        )
+
     def rate(self, values: Array) -> _Rated | None:
         """A motion, made smaller until it keeps the limits; None where it does not, or cannot be simulated."""
         start = self.family.start
         for _ in range(TIMES):
-            problem = Calibrated(
-                _performing(self.shot, self.family, values), self.parameters, self._measurement, self.options, AFTER,
-                central=False,
-            )  # fmt: skip
-            z = np.zeros(len(self.parameters) + len(self._measurement.parameters))
+            problem = self.problem(values)
+            z = np.zeros(len(problem.lower))
             try:
                 signals = problem.signals(z)
                 if self._kept(signals) and self.clearance.kept(problem.shot):
@@ -212,9 +218,7 @@ class _Trial:
             values = start + LESS * (values - start)
         else:
             return None
-        wanted = _wanted(self.parameters)
-        covariance = np.linalg.inv(J.T @ J + np.eye(J.shape[1]))[np.ix_(wanted, wanted)]
-        return _Rated(values, signals, problem, J, 0.5 * float(np.linalg.slogdet(covariance)[1]))
+        return _Rated(values, signals, problem, J, _score(J, _wanted(self.parameters)))
 
     def _kept(self, signals: Signals) -> bool:
         """Whether the simulated motors stay within their efforts, and their joints within their ranges."""

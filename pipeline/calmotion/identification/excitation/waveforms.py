@@ -124,18 +124,41 @@ class Family:
         phases = 0.5 * np.pi * np.arange(len(self.leading))
         return self.within(np.sin(2.0 * np.pi * swept[:, None] + phases))
 
-    def within(self, waves: Array, share: float = 1.0) -> Array:
+    def within(self, waves: Array) -> Array:
         """Waves of the leading motors, shape [f, m], faded in and out, as large as the bounds allow, in all motors."""
         end = self.times[-1]
         ramp = min(RAMP * end, LONGEST_RAMP)
         s = np.clip(np.minimum(self.times, end - self.times) / ramp, 0.0, 1.0)
-        moved = waves * (s**3 * (10.0 - 15.0 * s + 6.0 * s**2))[:, None]
+        return self._allowed(waves * (s**3 * (10.0 - 15.0 * s + 6.0 * s**2))[:, None])
+
+    def pulse(self, leader: int, frame: int, shape: Array, share: float) -> tuple[Array, float]:
+        """A motion in which a leading motor leaves the pose for some frames.
+
+        Args:
+            leader: Index among the leading motors.
+            frame: In the middle.
+            shape: The excursion, 1 at the most, at an odd number of frames.
+            share: Of what the bounds allow.
+
+        Returns:
+            The motion, shape [f, M], and its largest excursion [rad or m], 0 where the motor may not move.
+        """
+        motor, before, found = self.leading[leader], len(shape) // 2, []
+        for sign in (1.0, -1.0):
+            waves = np.zeros((len(self.times), len(self.leading)))
+            waves[frame - before : frame + before + 1, leader] = sign * shape
+            offsets = share * (self._allowed(waves) - self.start)
+            found.append((self.start + offsets, float(offsets[frame, motor])))
+        return max(found, key=lambda item: abs(item[1]))
+
+    def _allowed(self, moved: Array) -> Array:
+        """Waves of the leading motors, shape [f, m], as large as the bounds allow, in all motors."""
         own = np.stack([self._scaled(moved[:, k], int(motor)) for k, motor in enumerate(self.leading)], axis=1)
         offsets = own @ self.coupling.T
         largest = max(
             (self.uses(offsets[:, k], k)[0] for k in range(len(self.start)) if np.any(offsets[:, k])), default=1.0
         )
-        return np.asarray(self.start + share * offsets / max(largest, 1.0))
+        return np.asarray(self.start + offsets / max(largest, 1.0))
 
     def _scaled(self, wave: Array, motor: int) -> Array:
         used = self.uses(wave, motor)[0]

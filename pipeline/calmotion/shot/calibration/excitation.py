@@ -98,7 +98,7 @@ class Excitation:
         motors: What the motors do in it.
         sensors: By which it will be recorded.
         information: Gain over the chirp: half the logarithm of the determinant of the covariance, less.
-        evaluations: Number of motions that were tried.
+        evaluations: Number of motions that were compared.
         wall_s: Time it took [s].
         clear: Bodies that stay apart.
         together: Paths of pairs of bodies that no joint connects, and that are not known to stay apart: they touch in

@@ -90,7 +90,7 @@ def excite(
     priors: Mapping[str, float] | None = None,
     duration: float | str = 4.0,
     amplitude: float | str = "10deg",
-    tries: int = 40,
+    tries: int = 1000,
     by_motor_type: bool = False,
     step: float | str | None = None,
     operators: Sequence[str] = (),
@@ -109,7 +109,7 @@ def excite(
         parameters, priors: As of `calibrate`.
         duration: [s] or text with a unit.
         amplitude: Largest excursion of a hinge from the first pose, [rad] or text with a unit.
-        tries: Number of motions that are tried.
+        tries: Number of motions that are compared.
         by_motor_type: As of `calibrate`.
         step: Of the simulations, [s] or text with a unit.
         operators, settings, progress, on_operator, cancel: As of `simulate`.

@@ -37,7 +37,7 @@ def add_to(commands: Commands) -> None:
         help="largest excursion of a hinge from the first pose, in rad or with a unit (default: 10deg)",
     )  # fmt: skip
     command.add_argument(
-        "--tries", metavar="N", type=int, default=40, help="number of motions that are tried (default: 40)"
+        "--tries", metavar="N", type=int, default=1000, help="number of motions that are compared (default: 1000)"
     )
     command.add_argument(
         "--step", metavar="TIME", type=quantity("s", positive=True), help="time step of the simulations"
@@ -99,7 +99,7 @@ def _print(report: dict[str, Any], stream: TextIO) -> None:
         console, "What the motors do (rad or m, s, N m or N)",
         ["motor", "excursion", "velocity", "acceleration", "effort", "of its limits"], rows,
     )  # fmt: skip
-    say(console, f"{report['motions']} motions tried in {report['wall_s']:.3g} s")
+    say(console, f"{report['motions']} motions compared in {report['wall_s']:.3g} s")
     for text in _collisions(report):
         say(console, text)
 
