@@ -1,7 +1,7 @@
 """Modes of a clamped body on ever finer meshes, each begun from those of the mesh before.
 
 The first mesh is factorised. Bisected meshes contain the coarser ones, so that a multigrid cycle over all of them
-replaces factors: with 35,000 nodes it takes an eighth of the time, and less the more there are.
+replaces factors: with 35,000 nodes it takes 2 s in place of 7.
 """
 
 from __future__ import annotations
