@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 from calmotion.reduction import cache as reduction_cache
-from calmotion.reduction.cache import cache_key, cached_reduction
+from calmotion.reduction.cache import cache_key, cached_reduction, recomputed
 from calmotion.reduction.reduced_body import Elasticity, Invariants, Marker, ReducedBody
 from calmotion.shot import ElasticMaterial, FlexibleSettings, Simplification
 from calmotion.support.caching.cache_folder import CACHES, REDUCTIONS
@@ -61,6 +61,13 @@ def test_a_body_comes_back_to_the_last_bit(nonlinear):
     again = cached_reduction(("a", 1), never)
     assert again is not body and same(body, again)
     assert again.skin[0].flags.f_contiguous and again.invariants.M.flags.writeable
+
+
+def test_what_is_measured_is_computed_again():
+    assert cached_reduction("key", lambda: 1.0) == 1.0
+    with recomputed():
+        assert cached_reduction("key", lambda: 2.0) == 2.0
+    assert cached_reduction("key", never) == 2.0
 
 
 def test_values_that_json_does_not_know_come_back():

@@ -106,6 +106,8 @@ def survey_row(
         geometry_only: Whether its solid is made but not meshed.
         picture: File of a picture of its mesh and interface patches; empty for none.
     """
+    from calmotion.reduction.cache import recomputed
+
     body = replace(link.body, mass=link.mass)
     frames = frames_of(link)
     visual = [surface for surface in body.surfaces if surface.visible and len(surface.triangles)]
@@ -121,7 +123,8 @@ def survey_row(
         geometry = mesher.geometry_of(0, body, options, frames)
         row = _with_solid(row, geometry, visual, frames)
         if not geometry_only:
-            mesh = mesher.mesh_of(0, body, geometry, options, frames, attachments_of(link))
+            with recomputed():
+                mesh = mesher.mesh_of(0, body, geometry, options, frames, attachments_of(link))
             row = replace(row, seconds=processor_time() - begin)
             row = _with_mesh(row, mesh, link)
             if picture:
