@@ -91,6 +91,7 @@ class WorstCase:
         self._linear: tuple[LinearErrors, RestOfMerit] | None = None
         self.work = Work()
         self._own: Array = np.zeros(0)  # errors of the nominal robot where it began, shape [G]
+        self._performed: Array = np.zeros(0)  # the point that all robots performed last
 
     @cached_property
     def possible(self) -> bool:
@@ -99,7 +100,7 @@ class WorstCase:
         What feet ask of the ground, and the play of gears, have no such derivatives.
         """
         problem = self._problem
-        if self._options.avoid_reversals or not np.isfinite(problem.value(self._x)):
+        if self._options.avoid_reversals or not self._performs(self._x):
             return False
         keep_feet(self._prepared, problem)
         if any(robot.ground is not None for robot in problem.robots):
@@ -110,11 +111,7 @@ class WorstCase:
         return all(robot.simulator.can_be_blocked() for robot in problem.robots)
 
     def take_in(self, scenarios: Sequence[Scenario]) -> bool:
-        """Take in further robots; only their linear models are made. False, without them, where that is not possible.
-
-        Args:
-            scenarios: The robots.
-        """
+        """Take in further robots: only their linear models are made. False, without them, where this cannot be."""
         with self.work.timed():
             known, _ = self._linearized()
             robots = self._robots(self._problem, scenarios)
@@ -125,6 +122,7 @@ class WorstCase:
             if not all(robot.simulator.can_be_blocked() for robot in robots):
                 return False
             self.scenarios, self._problem = (*self.scenarios, *scenarios), problem
+            self._performed = self._x.copy()
             self._factors = np.concatenate([self._factors, np.ones((len(robots), self._factors.shape[1]))])
             linear = known.with_robots(self._errors(), self._changes(robots))
             self._start_limits(linear)
@@ -170,7 +168,7 @@ class WorstCase:
                 break
             gained = 0.0
             self.work.evaluations += 1
-            if np.isfinite(problem.value(self._x + d)):
+            if self._performs(self._x + d):
                 gained = before - self._merit(linear, self._errors(), self._rest(damping, d))
             if gained < AS_PREDICTED * (before - predicted) or gained <= 0.0:
                 damping, eased = max(DAMPED * damping, before / max(rest.squared(d), 1e-300)), 1.0
@@ -206,7 +204,7 @@ class WorstCase:
     def weighted(self) -> tuple[Scenario, ...]:
         """The robots with the weights of their squared errors in the sum that is smallest for the curves found, which
         are simulated for it."""
-        self._problem.value(self._x)
+        self._performs(self._x)
         m = lengths(self._errors(), self._factors)
         totals = weights_of(m, self._factors, ORDERS[-1]).sum(axis=(1, 2))
         return tuple(
@@ -237,6 +235,12 @@ class WorstCase:
             orders = orders[-1:]
         return d
 
+    def _performs(self, x: Array) -> bool:
+        """Whether all robots can perform a point, which they do unless they have just done it."""
+        if not np.array_equal(self._performed, x):
+            self._performed = x.copy() if np.isfinite(self._problem.value(x)) else np.zeros(0)
+        return len(self._performed) > 0
+
     def _merit(self, linear: LinearErrors, errors: Array, rest: float) -> float:
         return merit(linear.scale, lengths(errors, self._factors), ORDERS[-1], rest)
 
@@ -256,7 +260,7 @@ class WorstCase:
         if self._linear is None or not np.array_equal(self._linear[1].x, self._x):
             self._linear = None  # its memory is needed
             if not problem.linearized_at(self._x):
-                problem.value(self._x)
+                self._performs(self._x)
                 problem.linearize()
             self.work.linearizations += 1
             self.work.sweeps += round(2.0 * COST * problem.size)
