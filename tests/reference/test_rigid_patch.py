@@ -77,7 +77,7 @@ def test_a_shaft_in_a_ring_deflects_like_its_mesh(force):
 
 
 def test_a_link_with_a_rounded_end_deflects_like_its_mesh():
-    """By four degrees. Without the smallest change of shape of the end it would be a four-hundredth too stiff."""
+    """By four degrees. Without the smallest change of shape of the end it would be up to a hundredth too stiff."""
     points, tets = box_tets((8, 2, 2), (0.2, WIDE, WIDE), (0.0, -WIDE / 2, -WIDE / 2))
     end, radii = points[:, 0] > 0.2 - 1e-9, np.hypot(points[:, 1], points[:, 2]) / WIDE
     points[end, 0] += 0.008 - 0.024 * radii[end] ** 2

@@ -28,7 +28,7 @@ _ROUGH, _STIFFEST = 1e-3, 30.0  # reduction of these [m]; largest factor, where 
 _DISC = 0.5  # W of a disc in its plane
 _PLANE = 3  # changes of shape of a plane patch, at most
 # Smallest eigenvalue of a change of shape, of the largest. Without the smaller ones a patch rotates to first order in
-# them, and resists: with 0.1 a link with a rounded end was 0.2 to 0.4% too stiff at four degrees.
+# them, and resists: with 0.1 a link with a rounded end was 0.4 to 0.9% too stiff at four degrees.
 _FLAT = 1e-3
 _ROWS, _COLUMNS = (0, 1, 2, 1, 0, 0), (0, 1, 2, 2, 2, 1)  # of the six entries of a symmetric matrix
 
