@@ -149,7 +149,7 @@ def extended_basis(
         count: Number of the first modes that are paired.
         negligible: Square root of the negligible share of the largest strain energy among the derivatives.
         deflections: Amplitude of each mode by the loads; None: not known.
-        stiff: Factor of the stiffness of the springs, `patch_rotation.stiffer`.
+        stiff: As of `patch_rotation.springs`.
 
     Returns:
         The basis: its stiffness, with that of the springs, is diagonal; its lowest modes are nearly those of `basis`.
@@ -189,13 +189,13 @@ def extended_basis(
     # the changes of shape that rotations of the patches cause; a missing one would make the springs resist the rotation
     root = _root(shapes.T @ (K @ shapes))
     strain, strength, _ = np.linalg.svd(root @ change_sizes, full_matrices=False)
-    most = stiff * max((stiffness_of(int(own.any(axis=0).sum())) for own in derivatives.changes), default=0.0)
+    most = max((stiffness_of(int(own.any(axis=0).sum()), stiff) for own in derivatives.changes), default=0.0)
     taken = np.linalg.pinv(root) @ strain[:, most * strength**2 > dropped]
     ritz = np.hstack([modes, extra, shapes @ taken])
     motion = np.concatenate([basis.patch_motion, moved, shape_motion @ taken], axis=2)
     none = np.zeros((p, 6, modes.shape[1] + extra.shape[1]))
     shape = np.concatenate([none, derivatives.changes @ taken], axis=2)
-    roots = springs(model.mesh.nodes, support.patches, stiff * material.youngs_modulus)
+    roots = springs(model.mesh.nodes, support.patches, material.youngs_modulus, stiff)
     extension = spring_rows(roots, shape, np.zeros((p, 3, ritz.shape[1])))[:, : ritz.shape[1]]
     added = extension.T @ extension if law == "stvk" else 0.0
     omega_squared, U = _orthonormal(ritz.T @ (M @ ritz), ritz.T @ (K @ ritz) + added)

@@ -81,16 +81,16 @@ def shape_changes(arms: Array) -> Array:
 
 
 def stiffer(tolerance: float) -> float:
-    """Factor of the stiffness of springs in a reduction to a tolerance [m]."""
+    """Factor of the stiffness of the springs of patches that are not plane, in a reduction to a tolerance [m]."""
     return float(np.clip(_ROUGH / tolerance, 1.0, _STIFFEST))
 
 
-def stiffness_of(changes: int) -> float:
-    """Stiffness of the springs of a patch with so many changes of shape, over E R^3."""
-    return STIFF if changes <= _PLANE else STIFF_DEEP
+def stiffness_of(changes: int, stiff: float = 1.0) -> float:
+    """Stiffness of the springs of a patch with so many changes of shape, over E R^3; `stiff` is that of `stiffer`."""
+    return STIFF if changes <= _PLANE else stiff * STIFF_DEEP
 
 
-def springs(nodes: Array, patches: Sequence[IntArray], modulus: float) -> Array:
+def springs(nodes: Array, patches: Sequence[IntArray], modulus: float, stiff: float = 1.0) -> Array:
     """Square roots of the stiffness of the penalty springs, shape [p, 6, 6]: their energy is |root E|^2 / 2 [J].
 
     With W the second moment of the patch's points, of unit trace, the energy is that of W^1/2 E W^1/2. Strains along
@@ -101,7 +101,8 @@ def springs(nodes: Array, patches: Sequence[IntArray], modulus: float) -> Array:
     Args:
         nodes: Shape [n, 3] [m].
         patches: As of `modal_derivatives.Support`.
-        modulus: Young's modulus, times the factor of `stiffer` [Pa].
+        modulus: Young's modulus [Pa].
+        stiff: As of `stiffness_of`.
 
     Returns:
         Columns for the entries 00, 11, 22, 12, 02, 01 of a uniform strain E of each patch.
@@ -123,7 +124,7 @@ def springs(nodes: Array, patches: Sequence[IntArray], modulus: float) -> Array:
             S = np.tensordot(changes.T, entries, 1)
             strains = S - np.trace(S, axis1=1, axis2=2)[:, None, None] * np.eye(3)
             norm = _DISC * np.linalg.pinv(norm @ strains[:, _ROWS, _COLUMNS].T) @ norm
-        stiffness = stiffness_of(changes.shape[1]) * modulus * squared.max() ** 1.5
+        stiffness = stiffness_of(changes.shape[1], stiff) * modulus * squared.max() ** 1.5
         root[: len(norm)] = np.sqrt(stiffness) * norm
     return roots
 

@@ -76,7 +76,7 @@ def _stvk(
     directions = None if subspace is None else subspace.basis
     gram = strain_gram(GradientRule(model.mesh, 4), basis.modes, *lame, directions)
     if basis.patch_squares is not None:
-        roots = springs(model.mesh.nodes, support.patches, stiff * material.youngs_modulus)
+        roots = springs(model.mesh.nodes, support.patches, material.youngs_modulus, stiff)
         rows = spring_rows(roots, basis.patch_squares, basis.patch_motion[:, 3:], directions)
         gram += rows.T @ rows
     law = Elasticity("stvk", 0.0, gram.ravel(), 0, lame)
