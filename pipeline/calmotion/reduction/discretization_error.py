@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from calmotion.geometry.tetrahedra import Indices
-from calmotion.reduction.basis.natural_modes import lowest_modes, vector_mass
+from calmotion.reduction.basis.natural_modes import lowest_modes, shift_of_free, vector_mass
 from calmotion.reduction.elements.assembly import FEModel, QuadraticMesh
 from calmotion.reduction.elements.elastic_forms import GradientRule
 from calmotion.shot.character import Array, ElasticMaterial, IntArray
@@ -45,10 +45,11 @@ def clamped_modes(model: FEModel, count: int, clamped: Indices | None = None) ->
     n = len(model.mesh.nodes)
     M = vector_mass(model.mass)
     free = np.ones(n, dtype=bool)
-    rigid, shift = 6, 1e-4 * float(model.stiffness.diagonal().sum() / M.diagonal().sum())
     if clamped is not None and len(clamped):
         free[clamped] = False
         rigid, shift = 0, 0.0
+    else:
+        rigid, shift = 6, shift_of_free(model)
     dofs = np.flatnonzero(np.repeat(free, 3))
     values, vectors = lowest_modes(model.stiffness[dofs][:, dofs], M[dofs][:, dofs], rigid + count, shift=shift)
     modes = np.zeros((3 * n, vectors.shape[1]))

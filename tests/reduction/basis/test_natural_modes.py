@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from boxes import box_tets
 from calmotion.reduction.basis.natural_modes import SparseSolver, frequencies, lowest_modes, vector_mass
+from calmotion.reduction.discretization_error import clamped_modes
 from calmotion.reduction.elements.assembly import assemble
+from calmotion.shot import ElasticMaterial
 
 
 @pytest.fixture(scope="module")
@@ -54,3 +57,14 @@ def test_the_solver_solves_many_right_hand_sides(model):
     K, _ = reduced_matrices(model)
     b = np.random.default_rng(0).standard_normal((K.shape[0], 3))
     assert np.abs(K @ SparseSolver(K).solve(b) - b).max() < 1e-8
+
+
+@pytest.mark.parametrize("thinness", [1.0, 1e-4, 1e-8])
+def test_a_flat_element_does_not_change_the_frequencies_of_a_free_body(thinness):
+    points, tets = box_tets((12, 3, 3), (0.3, 0.03, 0.03))
+    inner = np.flatnonzero(np.all((points > 1e-9) & (points < np.array([0.3, 0.03, 0.03]) - 1e-9), axis=1))
+    points[inner[len(inner) // 2], 1] *= thinness  # nearly onto the face
+    model = assemble(points, tets, ElasticMaterial("/Looks/Plastic", 2e9, 0.35, 1200.0))
+    found = frequencies(model, 9)
+    assert np.all(found[:6] < 1.0) and found[6:] == pytest.approx([427.6, 427.7, 1114.5], rel=1e-3)
+    assert clamped_modes(model, 3)[0] == pytest.approx(found[6:], rel=1e-6)

@@ -14,6 +14,8 @@ from calmotion.shot.character import Array
 
 __all__ = ["SparseSolver", "frequencies", "lowest_modes", "vector_mass"]
 
+_RIGID = 6  # modes of a free body without frequency
+_BELOW = 0.01  # shift over the square of a frequency above the first elastic one
 _DENSE = 60  # degrees of freedom up to which a dense solver is as fast
 
 
@@ -60,6 +62,27 @@ def lowest_modes(
     return lowest_by_lanczos(K, M, max(count, 1), shift, solver, below, most)
 
 
+def shift_of_free(model: FEModel) -> float:
+    """A shift [1/s^2] for the modes of a free body: below its first elastic mode, far above the rounding of rigid ones.
+
+    The lowest elastic frequency of displacements that are polynomials of degree 2 is above that of the body. The
+    diagonal of the matrices does not tell it: flat elements make that larger by orders of magnitude, and with such a
+    shift Lanczos' method does not converge, or tells fewer than six rigid modes.
+    """
+    from scipy.linalg import eigh
+
+    x = model.mesh.nodes - model.mesh.nodes.mean(axis=0)
+    x = x / max(float(np.abs(x).max()), np.finfo(float).tiny)
+    i, j = np.triu_indices(3)
+    terms = np.hstack([np.ones((len(x), 1)), x, x[:, i] * x[:, j]])
+    fields = np.einsum("nk,cd->nckd", terms, np.eye(3)).reshape(3 * len(x), -1)
+    fields, _ = np.linalg.qr(fields)  # flat bodies: some of them are nothing
+    values = eigh(
+        fields.T @ (model.stiffness @ fields), fields.T @ (vector_mass(model.mass) @ fields), eigvals_only=True
+    )
+    return _BELOW * float(values[_RIGID])
+
+
 def frequencies(model: FEModel, count: int, clamped: Indices | None = None) -> Array:
     """Lowest natural frequencies of the full model [Hz], shape [count].
 
@@ -73,8 +96,7 @@ def frequencies(model: FEModel, count: int, clamped: Indices | None = None) -> A
     shift = 0.0
     M = vector_mass(model.mass)
     if clamped is None or len(clamped) == 0:
-        # far below the first elastic frequency, far above the rounding of the rigid ones
-        shift = 1e-4 * float(model.stiffness.diagonal().sum() / M.diagonal().sum())
+        shift = shift_of_free(model)
     else:
         free[clamped] = False
     dofs = np.flatnonzero(np.repeat(free, 3))
