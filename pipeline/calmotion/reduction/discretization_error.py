@@ -49,7 +49,7 @@ def clamped_modes(model: FEModel, count: int, clamped: Indices | None = None) ->
         free[clamped] = False
         rigid, shift = 0, 0.0
     else:
-        rigid, shift = 6, shift_of_free(model)
+        rigid, shift = 6, shift_of_free(model, M)
     dofs = np.flatnonzero(np.repeat(free, 3))
     values, vectors = lowest_modes(model.stiffness[dofs][:, dofs], M[dofs][:, dofs], rigid + count, shift=shift)
     modes = np.zeros((3 * n, vectors.shape[1]))

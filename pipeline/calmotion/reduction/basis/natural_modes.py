@@ -62,12 +62,16 @@ def lowest_modes(
     return lowest_by_lanczos(K, M, max(count, 1), shift, solver, below, most)
 
 
-def shift_of_free(model: FEModel) -> float:
+def shift_of_free(model: FEModel, M: Any) -> float:
     """A shift [1/s^2] for the modes of a free body: below its first elastic mode, far above the rounding of rigid ones.
 
     The lowest elastic frequency of displacements that are polynomials of degree 2 is above that of the body. The
     diagonal of the matrices does not tell it: flat elements make that larger by orders of magnitude, and with such a
     shift Lanczos' method does not converge, or tells fewer than six rigid modes.
+
+    Args:
+        model: Its matrices.
+        M: `vector_mass` of its mass.
     """
     from scipy.linalg import eigh
 
@@ -77,9 +81,7 @@ def shift_of_free(model: FEModel) -> float:
     terms = np.hstack([np.ones((len(x), 1)), x, x[:, i] * x[:, j]])
     fields = np.einsum("nk,cd->nckd", terms, np.eye(3)).reshape(3 * len(x), -1)
     fields, _ = np.linalg.qr(fields)  # flat bodies: some of them are nothing
-    values = eigh(
-        fields.T @ (model.stiffness @ fields), fields.T @ (vector_mass(model.mass) @ fields), eigvals_only=True
-    )
+    values = eigh(fields.T @ (model.stiffness @ fields), fields.T @ (M @ fields), eigvals_only=True)
     return _BELOW * float(values[_RIGID])
 
 
@@ -96,7 +98,7 @@ def frequencies(model: FEModel, count: int, clamped: Indices | None = None) -> A
     shift = 0.0
     M = vector_mass(model.mass)
     if clamped is None or len(clamped) == 0:
-        shift = shift_of_free(model)
+        shift = shift_of_free(model, M)
     else:
         free[clamped] = False
     dofs = np.flatnonzero(np.repeat(free, 3))

@@ -61,5 +61,5 @@ def note_or_refuse_no_motors(reading: Reading, joints: Sequence[JointPrim], root
         path=root,
         remedy=f"{command} makes motors of its joints (--motors PATTERN: of some, --motion FILE: with a motion). In "
         "the shot itself, apply PhysicsDriveAPI:angular to the revolute joints that motors drive, and author time "
-        f"samples of drive:angular:physics:targetPosition, in degrees",
+        "samples of drive:angular:physics:targetPosition, in degrees",
     )
