@@ -35,3 +35,13 @@ def test_of_many_those_that_cost_most_are_listed_in_their_order(whole):
         return
     assert [line.split()[2] for line in lines[:-1]] == [str(k) for k in range(8, MOST + 8)]
     assert lines[-1] == "and 9 more with estimated errors of at most 0.008 mm each: --verbose lists all"
+
+
+def test_one_that_would_be_left_out_is_listed():
+    rows = [row(f"link {k}", 1e-6 * k) for k in range(MOST + 1)]
+    assert len(printed(rows, False)) == MOST + 1 and "more" not in printed(rows, False)[-1]
+
+
+def test_those_that_cost_nothing_are_said_to():
+    rows = [row(f"link {k}", 1e-6 if k < MOST else None) for k in range(MOST + 2)]
+    assert printed(rows, False)[-1] == "and 2 more without an error: --verbose lists all"

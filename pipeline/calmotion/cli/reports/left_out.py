@@ -21,7 +21,8 @@ def print_left_out(console: Console, rows: Sequence[dict[str, Any]], whole: bool
         rows: Of `left_out`.
         whole: Whether to print all of them; otherwise of many those that cost most, in the order of the report.
     """
-    shown, rest = (rows, []) if whole or len(rows) <= MOST else _largest(rows)
+    # a line about one that is left out is no shorter than the one itself
+    shown, rest = (rows, []) if whole or len(rows) <= MOST + 1 else _largest(rows)
     for row in shown:
         error = row["estimated_error_m"]
         cost = "" if error is None else f"; estimated error {about(error)}"
@@ -29,7 +30,8 @@ def print_left_out(console: Console, rows: Sequence[dict[str, Any]], whole: bool
         say(console, f"{kind}: {row['what']} ({row['why']}){cost}")
     if rest:
         error = max(_error(row) for row in rest)
-        say(console, f"and {len(rest)} more with estimated errors of at most {about(error)} each: --verbose lists all")
+        cost = f"with estimated errors of at most {about(error)} each" if error else "without an error"
+        say(console, f"and {len(rest)} more {cost}: --verbose lists all")
 
 
 def _largest(rows: Sequence[dict[str, Any]]) -> tuple[list[dict[str, Any]], list[dict[str, Any]]]:
