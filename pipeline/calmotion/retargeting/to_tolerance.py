@@ -38,6 +38,7 @@ from calmotion.accuracy.step_error import (
 )
 from calmotion.multibody.parallel import at_once
 from calmotion.retargeting.found_curves import best_so_far
+from calmotion.retargeting.input_run import with_input_resolved
 from calmotion.retargeting.optimize import optimize_shot, refuse_other_integrators
 from calmotion.retargeting.robust.retarget import retarget_robustly
 from calmotion.retargeting.search_progress import SuccessiveSearches
@@ -63,7 +64,8 @@ def optimize_to_tolerance(
 
     The first search uses a step that resolves the vibration of the input to a fifth of its size. The remaining
     vibration is much smaller, so its error is known afterwards; if it exceeds the tolerance, the search continues with
-    a finer step, and if the deflections have left the POD subspaces, with new ones.
+    a finer step, and if the deflections have left the POD subspaces, with new ones. At the end the input is simulated
+    by steps that resolve it, unless the shot is almost that of the last run, or is searched in windows.
 
     Args:
         stored: File of the windows of a long shot that are done, see `windows`.
@@ -125,11 +127,13 @@ def optimize_to_tolerance(
         if not fine:
             step = max(LAST, MARGIN * result.step_s * (allowed / accuracy.step_m) ** (1.0 / order_of(character)))
     assert result is not None
-    if options.robust is None or result.interrupted:
+    if options.robust is not None and not result.interrupted:
+        searches.ended()
+        reduced, of_step = projected.shot, replace(options, step=result.step_s if chooses else options.step)
+        result = with_modes(_robustly(reduced, of_step, options, result, searches), shot.bodies)
+    if not chooses or again or result.interrupted or result.windows:
         return result
-    searches.ended()
-    of_step = replace(options, step=result.step_s if chooses else options.step)
-    return with_modes(_robustly(projected.shot, of_step, options, result, searches), shot.bodies)
+    return with_input_resolved(result, reduced.with_tracks(animation.tracks), options)
 
 
 def _robustly(

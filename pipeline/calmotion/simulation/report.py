@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -104,6 +105,27 @@ def simulation_of(prepared: Prepared, run: ForwardRun, intended: IntendedMotion)
         floquet_multiplier=run.floquet_multiplier,
         seam=np.linalg.norm(off[-1] - off[shown][0], axis=1) if grid.cyclic else np.zeros(0),
     )
+
+
+def at_instants(simulation: Simulation, rows: slice) -> Simulation:
+    """Some instants of a simulation; what it tells of all its steps remains."""
+    motion = simulation.motion
+
+    def cut(part: Array) -> Array:
+        return part[rows].copy()
+
+    def known(part: Array | None) -> Array | None:
+        return None if part is None else cut(part)
+
+    kept = Motion(
+        cut(motion.times), cut(motion.positions), cut(motion.rotations), tuple(cut(part) for part in motion.elastic),
+        cut(motion.motor_values), cut(motion.motor_efforts), cut(motion.target_positions), cut(motion.target_rotations),
+        known(motion.joint_forces), known(motion.joint_moments),
+    )  # fmt: skip
+    return replace(
+        simulation, motion=kept, position_errors=cut(simulation.position_errors),
+        rotation_errors=cut(simulation.rotation_errors),
+    )  # fmt: skip
 
 
 def _sag(prepared: Prepared, run: ForwardRun, errors: Array) -> Array:

@@ -17,7 +17,7 @@ from calmotion.simulation.inputs.curves import Curves
 from calmotion.simulation.inputs.excerpts import later
 from calmotion.simulation.inputs.time_grid import TimeGrid, over_grid
 from calmotion.simulation.prepare import Prepared
-from calmotion.simulation.report import simulation_of
+from calmotion.simulation.report import at_instants, simulation_of
 from calmotion.simulation.target_errors import IntendedMotion
 
 
@@ -147,24 +147,8 @@ def piece_of(part: Part, run: ForwardRun, intended: IntendedMotion) -> Piece:
     """A run of a part as a value for the user."""
     whole, rows = simulation_of(part.prepared, run, part.intended_of(intended)), slice(part.known, None)
     known = part.prepared.grid.times[part.known] if part.known else -np.inf
-    motion = _sliced(whole.motion, rows)
-    simulation = replace(
-        whole, motion=motion, position_errors=whole.position_errors[rows], rotation_errors=whole.rotation_errors[rows],
-        dead_centres=whole.dead_centres[whole.dead_centres >= known],
-    )  # fmt: skip
+    simulation = replace(at_instants(whole, rows), dead_centres=whole.dead_centres[whole.dead_centres >= known])
     return Piece(simulation, float(part.first * (part.prepared.grid.frame_times[1])))
-
-
-def _sliced(motion: Motion, rows: slice) -> Motion:
-    def cut(part: Array | None) -> Array | None:
-        return None if part is None else part[rows].copy()
-
-    return Motion(
-        motion.times[rows], motion.positions[rows].copy(), motion.rotations[rows].copy(),
-        tuple(part[rows].copy() for part in motion.elastic), motion.motor_values[rows].copy(),
-        motion.motor_efforts[rows].copy(), motion.target_positions[rows].copy(), motion.target_rotations[rows].copy(),
-        cut(motion.joint_forces), cut(motion.joint_moments),
-    )  # fmt: skip
 
 
 _NO = np.zeros(0)

@@ -1,0 +1,51 @@
+"""The input of a search, simulated anew: a search needs a rough model of the shake only, its report more."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from calmotion.accuracy.integrator_choice import by_fast_scheme
+from calmotion.accuracy.step_error import distance, order_of
+from calmotion.errors import ShotError
+from calmotion.retargeting.found_curves import best_so_far
+from calmotion.shot import Result
+from calmotion.shot.run import RunSettings
+from calmotion.shot.tolerance import tolerance_of
+from calmotion.simulation.compiled_shot import CompiledShot
+from calmotion.simulation.report import at_instants
+from calmotion.simulation.simulate import simulate_shot
+
+OF_SHAKE = 0.01  # of the largest error of the input: how well it is told where the tolerance is less
+FINEST = 8  # most steps in one of the search
+_ROUNDED = 1e-9  # relative, for a step that is a whole part of another
+
+
+def with_input_resolved(result: Result, shot: CompiledShot, options: RunSettings) -> Result:
+    """The result of a search with the input as steps show it whose error is within the tolerance, or a hundredth of the
+    input's own error; its instants are those of the search. As the search had it where finer steps fail.
+
+    Args:
+        result: Of the search.
+        shot: With the tracks of the input.
+        options: Of a run whose step is chosen.
+    """
+    before = result.before
+    enough = max(
+        tolerance_of(shot.character, options.tolerance), OF_SHAKE * float(before.position_errors.max(initial=0.0))
+    )
+    parts = 2
+    while parts <= FINEST:
+        step = result.step_s / parts * (1.0 + _ROUNDED)
+        finer = replace(options, step=step, pre_roll=result.pre_roll_s)
+        try:
+            found = by_fast_scheme(finer, lambda own: simulate_shot(shot, own, lambda fraction, message: None)).before
+        except ShotError:
+            break
+        except KeyboardInterrupt:
+            return best_so_far(result)
+        found = at_instants(found, slice(None, None, parts))
+        changed = distance(found.motion.target_positions, before.motion.target_positions)
+        before, parts = found, 2 * parts
+        if changed <= (2.0 ** order_of(shot.character) - 1.0) * enough:  # Richardson's extrapolation
+            break
+    return replace(result, before=before)
