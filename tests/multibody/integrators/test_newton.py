@@ -7,7 +7,8 @@ from calmotion.multibody.analysis.kinematics import rigid_state
 from calmotion.multibody.integrators import newton
 from calmotion.multibody.integrators.coefficients import bdf2_integrator
 from calmotion.multibody.integrators.workspace import Workspace
-from calmotion.multibody.model.system import Instants, allocate_state
+from calmotion.multibody.model.system import STVK, Instants, allocate_state
+from particles import particle_system
 
 
 def fallen(h, rate, predicted=None):
@@ -56,3 +57,45 @@ def test_worst_component_is_the_first_that_is_not_a_number():
     x[1, 3] = np.nan
     assert newton.worst_component(model.system, x) == 1
     assert np.isnan(newton.largest_entry(model.system, x))
+
+
+def valley_run(stiffness, h, steps, rate=2.0):
+    """A clamped body whose second coordinate is held to the square of the first by a stiff spring, as a patch that
+    turns holds its shape, swings freely: (residuals, first coordinate at the end)."""
+    system, _ = particle_system(np.random.default_rng(3), [-1], [2])
+    strain = np.array([0.0, 1.0, -1.0, 0.0, 0.0])  # of (u0, u1, u0 u0, u0 u1, u1 u1)
+    soft = np.array([1.0, 0.0, 0.0, 0.0, 0.0])
+    gram = stiffness * np.outer(strain, strain) + 50.0 * np.outer(soft, soft)
+    system = system._replace(
+        law=np.array([STVK], dtype=np.int32), stvk=np.array([0], dtype=np.int32), stiffness=np.zeros((1, 2)),
+        damping=np.zeros((1, 2, 2)), points=np.array([2]), data_start=np.zeros(1, dtype=np.int64), data=gram.ravel(),
+        gravity=np.zeros(3), position=np.zeros((1, 2, 3)), rotation=np.tile(np.eye(3), (1, 2, 1, 1)),
+        Phi=np.zeros((1, 2, 3, 2)), Psi=np.zeros((1, 2, 3, 2)),
+    )  # fmt: skip
+    ws, zero, states, residuals = Workspace.for_system(system), np.zeros(1), [], 0
+    for time in (-h, 0.0):
+        state = allocate_state(system)
+        state.q[0, 0] = 1.0
+        state.u[0, 0], state.V[0, 6] = rate * time, rate
+        state.u[0, 1], state.V[0, 7] = state.u[0, 0] ** 2, 2.0 * state.u[0, 0] * rate
+        states.append(state)
+    for _ in range(steps):
+        now = allocate_state(system)
+        instants = Instants(*states[-2:], now)
+        code, _, solved, _ = newton.step(system, bdf2_integrator(h), instants, zero, zero, False, ws)
+        assert code == newton.CONVERGED
+        residuals += solved
+        states.append(now)
+    return residuals, states[-1].u[0, 0]
+
+
+@pytest.mark.parametrize("h", [0.01, 0.02])
+def test_stiff_springs_that_follow_a_turn_do_not_lead_astray(h):
+    """Corrections that are halved end at no state here (stiffness 1e10, 10 ms; 1e8, 20 ms)."""
+    steps = round(1.0 / h)
+    ends = []
+    for stiffness in (1e6, 1e8, 1e10):
+        residuals, end = valley_run(stiffness, h, steps)
+        assert residuals < 8 * steps
+        ends.append(end)
+    assert ends[2] == pytest.approx(ends[1], rel=1e-3) and ends[1] == pytest.approx(ends[0], rel=1e-2)

@@ -1,9 +1,12 @@
-"""One implicit step by Newton's method, safeguarded; compiled.
+"""One implicit step by Newton's method; compiled.
 
 The first correction of a step uses the tangent at its state. Later ones keep the factors while the corrections shrink
-fast, as they cost a residual each and no factorisation; the remaining error is estimated from the rate of shrinking. A
-correction that the next one, by the same factors, does not confirm (the natural monotonicity test: Deuflhard, Newton
-Methods for Nonlinear Problems, 2004, section 2.1.3) is taken back and halved.
+fast, as they cost a residual each and no factorisation; the remaining error is estimated from the rate of shrinking.
+
+Corrections are taken whole, with a new tangent where the factors do not do: where rotations meet stiff springs, shorter
+ones lead astray. Where they grow, or do not end, the step begins again with a safeguard: a correction that the next
+one, by the same factors, does not confirm (the natural monotonicity test: Deuflhard, Newton Methods for Nonlinear
+Problems, 2004, section 2.1.3) is taken back and halved.
 """
 
 from __future__ import annotations
@@ -39,6 +42,8 @@ LEFT = 1e-13  # acceptable error where factors were kept
 FLOOR = 1e-12  # corrections below this are rounding
 ROUNDING = 2.0**-46  # of the distance from the origin, that corrections cannot be smaller than
 SLOW = 0.1  # shrinking of the corrections by less than this asks for a new tangent
+WHOLE = 30  # most iterations with whole corrections
+GROWN = 30.0  # times the first correction, above which whole ones are given up
 SMALLEST = 1.0 / 256.0  # part of a correction below which the step is given up
 HUGE = 1e6
 
@@ -171,6 +176,43 @@ def rounding_floor(system: System, state: State) -> float:
     return max(FLOOR, ROUNDING * far)
 
 
+@kernel
+def _correction(
+    system: System, integrator: Integrator, instants: Instants, angle: Array, rate: Array, fresh: bool, ws: Workspace
+) -> tuple[int, float]:
+    """Newton's correction of the new state into scratch.x and scratch.lam, by a new tangent or by the present factors;
+    returns -1 or the component that is singular, and the size of the correction."""
+    scratch = ws.scratch
+    _velocities(system, integrator, instants, scratch)
+    if fresh:
+        bad = _linearize(system, integrator, instants, angle, rate, ws)
+        if bad >= 0:
+            return bad, np.inf
+    else:
+        assemble(system, integrator, instants.now, scratch.Vd, angle, rate, scratch.Hv, NO, ws.work, ws.blocks)
+    solve_correction(system, ws.blocks, ws.matrix, scratch)
+    return -1, largest_entry(system, scratch.x)
+
+
+@kernel
+def _take(system: System, before: State, now: State, ws: Workspace) -> None:
+    """Take the correction, and keep it and the state before it."""
+    scratch = ws.scratch
+    _copy_positions(now, scratch.kept)
+    copy_rows(scratch.x, scratch.taken)
+    copy_rows(scratch.lam, scratch.taken_lam)
+    correct(system, before, now, ws.work.R, scratch.x, scratch.lam, 1.0, scratch.T)
+
+
+@inlined_kernel
+def _is_enough(size: float, last: float, fresh: bool, floor: float) -> bool:
+    """Whether the state is exact after a correction, by its size and that of the one before."""
+    if fresh:
+        return size < QUADRATIC
+    ratio = size / last
+    return size < floor or ratio * size < (1.0 - ratio) * LEFT
+
+
 @shared_kernel
 def step(
     system: System, integrator: Integrator, instants: Instants, angle: Array, rate: Array, predicted: bool,
@@ -187,29 +229,67 @@ def step(
     Returns:
         (code, factorisations, residuals, component): CONVERGED, or the reason for the failure and its component.
     """
-    work, blocks, scratch, before, now = ws.work, ws.blocks, ws.scratch, instants.before, instants.now
-    x, lam = scratch.x, scratch.lam
+    scratch, before, now = ws.scratch, instants.before, instants.now
     if not predicted:
         _predict(system, integrator.h, before, now, scratch.memory)
+    _copy_positions(now, scratch.start)
+    floor = rounding_floor(system, before)
+    found, factorisations, residuals = _whole(system, integrator, instants, angle, rate, floor, ws)
+    code, component = CONVERGED, -1
+    if not found:
+        _copy_positions(scratch.start, now)
+        code, more, others, component = _safeguarded(system, integrator, instants, angle, rate, floor, ws)
+        factorisations, residuals = factorisations + more, residuals + others
+    if code == CONVERGED:
+        _finish(system, integrator, instants, scratch)
+    return code, factorisations, residuals, component
+
+
+@kernel
+def _whole(
+    system: System, integrator: Integrator, instants: Instants, angle: Array, rate: Array, floor: float, ws: Workspace
+) -> tuple[bool, int, int]:
+    """Whole corrections; whether they ended, factorisations and residuals."""
+    fresh = True  # whether to linearise here
+    first, last = np.inf, np.inf  # sizes of the first correction and of the one taken last
+    factorisations = 0
+    for iteration in range(WHOLE):
+        factorisations += fresh
+        bad, size = _correction(system, integrator, instants, angle, rate, fresh, ws)
+        if iteration == 0:
+            first = size
+        if bad >= 0 or fresh and not (size < HUGE and size <= GROWN * first):
+            return False, factorisations, iteration + 1
+        slow = not (size <= SLOW * last or size < floor)
+        if slow and not fresh:
+            fresh = True
+            continue
+        _take(system, instants.before, instants.now, ws)
+        if _is_enough(size, last, fresh, floor):
+            return True, factorisations, iteration + 1
+        # where new tangents converge slowly, factors that are kept would not do
+        last, fresh = size, slow
+    return False, factorisations, WHOLE
+
+
+@kernel
+def _safeguarded(
+    system: System, integrator: Integrator, instants: Instants, angle: Array, rate: Array, floor: float, ws: Workspace
+) -> tuple[int, int, int, int]:
+    """Corrections that the next one confirms; as `step` returns it."""
+    scratch, before, now = ws.scratch, instants.before, instants.now
     fresh = True  # whether to linearise here
     taken_fresh = False  # whether the correction taken last came from a tangent at its own state
     part, last = 1.0, np.inf  # how much of it was taken, and its size
     factorisations = 0
-    floor = rounding_floor(system, before)
     for iteration in range(LIMIT):
-        _velocities(system, integrator, instants, scratch)
-        if fresh:
-            factorisations += 1
-            bad = _linearize(system, integrator, instants, angle, rate, ws)
-            if bad >= 0:
-                return SINGULAR, factorisations, iteration + 1, bad
-        else:
-            assemble(system, integrator, now, scratch.Vd, angle, rate, scratch.Hv, NO, work, blocks)
-        solve_correction(system, blocks, ws.matrix, scratch)
-        size = largest_entry(system, x)
+        factorisations += fresh
+        bad, size = _correction(system, integrator, instants, angle, rate, fresh, ws)
+        if bad >= 0:
+            return SINGULAR, factorisations, iteration + 1, bad
         if fresh:
             if not (size < HUGE):
-                return NOT_CONVERGED, factorisations, iteration + 1, worst_component(system, x)
+                return NOT_CONVERGED, factorisations, iteration + 1, worst_component(system, scratch.x)
         elif size <= (1.0 - 0.25 * part) * last or size < floor:
             if part < 1.0 or (size > SLOW * last and size > floor):
                 fresh, part = True, 1.0
@@ -222,22 +302,16 @@ def step(
                 continue
             part *= 0.5
             if part < SMALLEST:
-                return NOT_CONVERGED, factorisations, iteration + 1, worst_component(system, x)
+                return NOT_CONVERGED, factorisations, iteration + 1, worst_component(system, scratch.x)
             for b in range(len(system.parent)):
-                matrix_of(now.q[b], work.R[b])
-            correct(system, before, now, work.R, scratch.taken, scratch.taken_lam, part, scratch.T)
+                matrix_of(now.q[b], ws.work.R[b])
+            correct(system, before, now, ws.work.R, scratch.taken, scratch.taken_lam, part, scratch.T)
             continue
-        ratio = 0.0 if fresh else size / last
-        _copy_positions(now, scratch.kept)
-        copy_rows(x, scratch.taken)
-        copy_rows(lam, scratch.taken_lam)
-        correct(system, before, now, work.R, x, lam, part, scratch.T)
-        enough = size < QUADRATIC if fresh else (size < floor or ratio * size < (1.0 - ratio) * LEFT)
-        if enough:
-            _finish(system, integrator, instants, scratch)
+        _take(system, before, now, ws)
+        if _is_enough(size, last, fresh, floor):
             return CONVERGED, factorisations, iteration + 1, -1
         taken_fresh, last, fresh = fresh, size, False
-    return NOT_CONVERGED, factorisations, LIMIT, worst_component(system, x)
+    return NOT_CONVERGED, factorisations, LIMIT, worst_component(system, scratch.x)
 
 
 @inlined_kernel

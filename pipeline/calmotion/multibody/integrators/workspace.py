@@ -32,6 +32,7 @@ class Scratch(NamedTuple):
         solution, border: Scratch of the linear system.
         memory: Accelerations of the instant before: those of the motion, those of Newmark's formulas, and room for the
             new ones of these, shape [3, B, N]. Zero before a start at rest.
+        start: The state that was predicted.
         kept: The state before a correction.
         taken, taken_lam: That correction.
     """
@@ -46,6 +47,7 @@ class Scratch(NamedTuple):
     solution: SolutionScratch
     border: Border
     memory: Array
+    start: State
     kept: State
     taken: Array
     taken_lam: Array
@@ -65,6 +67,7 @@ def allocate_scratch(system: System) -> Scratch:
         solution=allocate_solution(system),
         border=allocate_border(system),
         memory=np.zeros((3, count, size)),
+        start=allocate_state(system),
         kept=allocate_state(system),
         taken=np.zeros((count, size)),
         taken_lam=np.zeros((joints, JOINT_ROWS)),
