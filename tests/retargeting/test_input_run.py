@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from calmotion.accuracy.integrator_choice import SAFE
 from calmotion.errors import IntegrationError
 from calmotion.retargeting import input_run
 from calmotion.retargeting.input_run import OF_SHAKE, with_input_resolved
@@ -67,11 +68,22 @@ def test_a_tolerance_above_it_needs_one_simulation(shot, rough, monkeypatch):
         return simulate_shot(shot, options, progress)
 
     monkeypatch.setattr(input_run, "simulate_shot", counted)
-    with_input_resolved(rough, shot, RunSettings(tolerance=1.0))
-    assert steps == [pytest.approx(rough.step_s / 2)]
+    with_input_resolved(rough, shot, RunSettings(tolerance=0.05))
+    assert steps == [pytest.approx(rough.step_s)]
     del steps[:]
     with_input_resolved(rough, shot, OPTIONS)
     assert len(steps) > 1
+
+
+def test_where_the_fast_integrator_fails_the_safe_one_takes_half_the_steps(shot, rough, fine, monkeypatch):
+    def slow_only(shot, options, progress):
+        if options.scheme != SAFE:
+            raise IntegrationError("no step", path="/Arm", remedy="none")
+        return simulate_shot(shot, options, progress)
+
+    monkeypatch.setattr(input_run, "simulate_shot", slow_only)
+    found = with_input_resolved(rough, shot, OPTIONS).before
+    assert off(found, fine) < 0.5 * off(rough.before, fine)
 
 
 def test_it_stays_where_finer_steps_fail(shot, rough, monkeypatch):

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from calmotion.accuracy.integrator_choice import by_fast_scheme
-from calmotion.accuracy.step_error import distance, order_of
+from calmotion.accuracy.integrator_choice import FAST, SAFE
+from calmotion.accuracy.step_error import CLOSED_GAP, distance, order_of
 from calmotion.errors import ShotError
 from calmotion.retargeting.found_curves import best_so_far
 from calmotion.shot import Result
@@ -16,7 +16,7 @@ from calmotion.simulation.report import at_instants
 from calmotion.simulation.simulate import simulate_shot
 
 OF_SHAKE = 0.01  # of the largest error of the input: how well it is told where the tolerance is less
-FINEST = 8  # most steps in one of the search
+FINEST = 4  # most steps in one of the search
 _ROUNDED = 1e-9  # relative, for a step that is a whole part of another
 
 
@@ -33,19 +33,23 @@ def with_input_resolved(result: Result, shot: CompiledShot, options: RunSettings
     enough = max(
         tolerance_of(shot.character, options.tolerance), OF_SHAKE * float(before.position_errors.max(initial=0.0))
     )
-    parts = 2
+    scheme, parts = FAST, 1  # a quarter of the search's error by the same steps, as by half of them otherwise
     while parts <= FINEST:
         step = result.step_s / parts * (1.0 + _ROUNDED)
-        finer = replace(options, step=step, pre_roll=result.pre_roll_s)
+        finer = replace(options, integrator=scheme, step=step, pre_roll=result.pre_roll_s)
         try:
-            found = by_fast_scheme(finer, lambda own: simulate_shot(shot, own, lambda fraction, message: None)).before
+            found = simulate_shot(shot, finer, lambda fraction, message: None).before
         except ShotError:
-            break
+            if scheme == SAFE:
+                break
+            scheme, parts = SAFE, 2 * parts
+            continue
         except KeyboardInterrupt:
             return best_so_far(result)
         found = at_instants(found, slice(None, None, parts))
         changed = distance(found.motion.target_positions, before.motion.target_positions)
         before, parts = found, 2 * parts
-        if changed <= (2.0 ** order_of(shot.character) - 1.0) * enough:  # Richardson's extrapolation
+        # Richardson's extrapolation
+        if changed <= (2.0 ** order_of(shot.character) - 1.0) * enough and found.max_joint_gap <= CLOSED_GAP:
             break
     return replace(result, before=before)
