@@ -38,6 +38,31 @@ def test_a_file_is_replaced_as_a_whole_and_is_as_public_as_others(tmp_path):
     assert stat.S_IMODE(file.stat().st_mode) == 0o666 & ~mask
 
 
+@pytest.mark.skipif(not Path("/proc/self/fd").is_dir(), reason="needs Linux")
+def test_links_of_the_system_are_never_replaced_also_where_they_lead_to_a_file(tmp_path):
+    """`/dev/stdout` leads to a file where the output is redirected; as root it would be replaced for all programs."""
+    with (tmp_path / "redirected").open("w") as file:
+        for own in (f"/proc/self/fd/{file.fileno()}", f"/dev/fd/{file.fileno()}", "/dev/calmotion.csv"):
+            for write in (try_writing, lambda path: write_text(path, "table")):
+                with pytest.raises(OSError, match="never replaced"):
+                    write(own)
+        (tmp_path / "mine").symlink_to(f"/proc/self/fd/{file.fileno()}")
+        with pytest.raises(OSError, match="never replaced"):
+            try_writing(tmp_path / "mine")
+    (tmp_path / "loop").symlink_to("loop")
+    with pytest.raises(OSError, match="."):
+        (tmp_path / "loop").stat()
+    try_writing(tmp_path / "loop")  # a link to itself is replaced as any other
+    assert names(tmp_path) == ["loop", "mine", "redirected"]
+
+
+def test_a_dash_is_no_name_of_an_output(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(OSError, match="standard output"):
+        try_writing("-")
+    assert names(tmp_path) == []
+
+
 def test_temporary_files_have_random_names_and_are_private(tmp_path):
     seen = []
     for _ in range(3):

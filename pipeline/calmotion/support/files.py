@@ -18,7 +18,9 @@ from functools import cache
 from pathlib import Path
 
 PREFIX = ".calmotion-"  # of the names of temporary files
+_LINKS = 40  # that the system follows
 _HERE, _EXCHANGE = -100, 2  # AT_FDCWD of fcntl.h, RENAME_EXCHANGE of stdio.h
+_SYSTEM = ("/proc", "/sys")  # what lies there is the system's, as are the links to it and the devices of /dev
 _ABANDONED = 3600.0  # a temporary file of another machine of that age [s] was left by a process that was killed
 _NAME = re.compile(re.escape(PREFIX) + r"([0-9a-f]{8})-(\d+)-")
 
@@ -46,6 +48,7 @@ def replaced(path: str | Path, keep_existing: bool = False, flush: bool = True) 
     """
     target = Path(path)
     refuse_special(target)
+    _refuse_system(target)
     target.parent.mkdir(parents=True, exist_ok=True)
     remove_abandoned(target.parent)
     with new_file(target) as temporary:
@@ -153,7 +156,10 @@ def try_writing(path: str | Path) -> None:
     target = Path(path)
     if target.is_dir():
         raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(target))
+    if target.name == "-":
+        raise OSError(errno.EINVAL, "This would be a file named -, not the standard output", str(path))
     refuse_special(target)
+    _refuse_system(target)
     target.parent.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryFile(dir=target.parent, prefix=PREFIX):
         pass
@@ -177,6 +183,23 @@ def refuse_special(path: str | os.PathLike[str]) -> None:
     """
     if is_special(path):
         raise OSError(errno.EINVAL, "Not a file but a named pipe, a socket or a device", str(path))
+
+
+def _refuse_system(target: Path) -> None:
+    """Refuse to replace what the system has made: `/dev/stdout` is a link, to a file where the output goes to one, and
+    a link that is replaced is gone for all programs.
+
+    Raises:
+        OSError: It lies in /dev, or a link of it leads to /proc or /sys.
+    """
+    place, seen = target.absolute(), 0
+    while seen < _LINKS:
+        folder = Path(os.path.realpath(place.parent))
+        if str(folder) == "/dev" or any(folder == Path(top) or Path(top) in folder.parents for top in _SYSTEM):
+            raise OSError(errno.EINVAL, "This is a file of the system, which is never replaced", str(target))
+        if not place.is_symlink():
+            return
+        place, seen = folder / os.readlink(place), seen + 1
 
 
 def remove_abandoned(folder: Path) -> None:
