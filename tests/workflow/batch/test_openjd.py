@@ -8,6 +8,7 @@ import sys
 import pytest
 import yaml
 from calmotion.errors import ShotError
+from calmotion.host import SettingError
 from calmotion.workflow.batch.jobs import jobs_for
 from calmotion.workflow.batch.openjd import MOST_TASKS, openjd_template, refuse_invalid, write_template
 from one_hinge import ONE_HINGE
@@ -43,6 +44,16 @@ def test_templates_are_valid_also_of_thousands_of_shots():
 def test_text_that_a_template_cannot_hold_is_refused(shot):
     with pytest.raises(ShotError, match="cannot hold"):
         openjd_template(jobs_for([shot], "/out", "optimize"))
+
+
+@pytest.mark.parametrize(("template", "folder"), [("shot.usda", "out"), ("out", "out"), ("job", "o"), ("a.yaml", "a.yaml")])
+def test_a_template_is_written_over_nothing_else(tmp_path, template, folder):
+    (tmp_path / "shot.usda").write_text(ONE_HINGE)
+    jobs = jobs_for([tmp_path / "shot.usda"], tmp_path / folder, "optimize")
+    with pytest.raises(SettingError, match="template"):
+        write_template(tmp_path / template, jobs)
+    assert [path.name for path in tmp_path.iterdir()] == ["shot.usda"]
+    assert (tmp_path / "shot.usda").read_text() == ONE_HINGE
 
 
 def test_a_template_is_run_by_openjd_with_progress_in_its_words(tmp_path, calmotion, repository):

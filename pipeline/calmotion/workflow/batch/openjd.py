@@ -12,10 +12,12 @@ from pathlib import Path
 from typing import Any
 
 from calmotion.errors import ShotError
+from calmotion.host import SettingError
 from calmotion.support.files import write_text
 from calmotion.workflow.batch.jobs import Job
 
 SPECIFICATION = "jobtemplate-2023-09"
+_SUFFIXES = (".yaml", ".yml")
 MOST_TASKS = 1024  # values of a task parameter, by the specification
 NOTICE = 120  # a task that is cancelled may write its best curves [s]
 _SHOT, _NAME, _FOLDER, _PROGRAM = "Shot", "Name", "OutputFolder", "Calmotion"
@@ -68,9 +70,11 @@ def write_template(path: str | os.PathLike[str], jobs: Sequence[Job]) -> dict[st
 
     Raises:
         ShotError: It cannot be written, or a text does not fit.
+        SettingError: It is not named as a template, or is the folder of the results.
     """
     import yaml
 
+    _refuse_other_files(os.fspath(path), jobs)
     template = openjd_template(jobs, os.path.dirname(os.path.abspath(path)))
     refuse_invalid(template, os.fspath(path))
     try:
@@ -80,6 +84,21 @@ def write_template(path: str | os.PathLike[str], jobs: Sequence[Job]) -> dict[st
             "the template cannot be written", path=os.fspath(path), found=error.strerror, remedy="Choose another file"
         ) from error
     return template
+
+
+def _refuse_other_files(path: str, jobs: Sequence[Job]) -> None:
+    """Refuse a template in the place of a shot, of the results, or of a file that Open Job Description does not read."""
+    if not path.lower().endswith(_SUFFIXES):
+        raise SettingError(
+            "the template is not named like one", path="--openjd", found=path,
+            remedy=f"Give it the extension {' or '.join(_SUFFIXES)}.",
+        )  # fmt: skip
+    for job in jobs:
+        if os.path.realpath(path) in (os.path.realpath(job.shot), os.path.realpath(job.folder)):
+            raise SettingError(
+                "the template would be written over a shot, or be in the place of the folder of the results",
+                path="--openjd", found=path, remedy="Choose another file.",
+            )  # fmt: skip
 
 
 def refuse_invalid(template: dict[str, Any], path: str) -> None:
