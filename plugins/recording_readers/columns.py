@@ -22,7 +22,8 @@ UNITS: Mapping[str, float] = {
 def read_columns(file: str) -> tuple[dict[str, Array], bool]:
     """Columns by name, NaN where a cell is empty; and whether a comment says that angles are in degrees.
 
-    The head may be a comment (`#time,...`); cells are separated by commas, semicolons or tabs.
+    The head may be a comment (`#time,...`); cells are separated by commas, semicolons or tabs. Where
+    it is not by commas, numbers may have a decimal comma.
 
     Raises:
         ShotError: It cannot be read, or a cell is no number.
@@ -30,8 +31,14 @@ def read_columns(file: str) -> tuple[dict[str, Array], bool]:
     try:
         lines = read_text(file).lstrip("\ufeff").splitlines()
     except (OSError, UnicodeDecodeError) as error:
-        found = error.strerror if isinstance(error, OSError) else error
-        raise ShotError("the recording cannot be read", path=file, found=found, remedy="Name another file") from error
+        if isinstance(error, UnicodeDecodeError):
+            raise ShotError(
+                "the recording is no text in UTF-8", path=file, found=f"byte {error.start + 1}",
+                remedy="Save it as a table of plain text (CSV) in UTF-8",
+            ) from error  # fmt: skip
+        raise ShotError(
+            "the recording cannot be read", path=file, found=error.strerror, remedy="Name another file"
+        ) from error
     degrees = any(line.startswith("#") and "angle deg" in line for line in lines)
     numbered = [(n, line) for n, line in enumerate(lines, 1) if line.strip()]
     rows = [(n, line) for n, line in numbered if not line.startswith("#")]
@@ -61,11 +68,15 @@ def read_columns(file: str) -> tuple[dict[str, Array], bool]:
         try:
             if len(row) != len(names):
                 raise ValueError
-            values[k] = [np.nan if cell.strip().lower() in MISSING else float(cell) for cell in row]
+            values[k] = [_number(cell, separator) for cell in row]
+            if np.isinf(values[k]).any():
+                raise ValueError
         except ValueError:
             raise ShotError(
                 f"a row that does not hold {len(names)} numbers", path=file, attribute=f"line {number}",
-                found=line[:60], remedy="Correct the row; leave cells without a sample empty",
+                found=line[:60],
+                remedy="Correct the row; leave cells without a sample empty, and separate columns with decimal commas "
+                "by semicolons or tabs",
             ) from None  # fmt: skip
     return {name: values[:, k] for k, name in enumerate(names)}, degrees
 
@@ -117,6 +128,13 @@ def unit_of(name: str, alike: tuple[str, ...], file: str, attribute: str) -> flo
             "this unit does not fit", path=file, attribute=attribute, found=name, remedy=f"Use {', '.join(alike)}"
         )
     return UNITS[name]
+
+
+def _number(cell: str, separator: str) -> float:
+    text = cell.strip()
+    if text.lower() in MISSING:
+        return np.nan
+    return float(text.replace(",", ".") if separator != "," and text.count(",") == 1 and "." not in text else text)
 
 
 def _is_number(text: str) -> bool:

@@ -57,6 +57,11 @@ def read_table(request: RecordingRequest, map_file: str) -> SensorRecording:
         ShotError: The table or the map cannot be read, or do not fit.
     """
     file = request.file
+    if request.prim:
+        raise ShotError(
+            "a table names the prims of its channels itself", path=file, found=f"@{request.prim}",
+            remedy=f"Name the file alone: --recording {file}",
+        )  # fmt: skip
     columns, degrees = read_columns(file)
     beside = f"{os.path.splitext(file)[0]}.toml"
     given = map_file or (beside if os.path.isfile(beside) else "")

@@ -100,12 +100,31 @@ def test_the_log_of_a_printer_is_in_millimetres_and_its_axes_are_chosen(read):
         ("time_s,/A.q\n0,1\n", "no column of a recording"), ("time_s,/A.x,/A.x\n0,1,1\n", "same name"),
         ("time_s,/A.x\n1,1\n0,1\n", "must not go back"), ("time_s,/A.x\n,1\n", "no time"),
         ("0,1\n1,2\n", "does not name its columns"), ("time_s,/A.error\n0,1\n", "no channel"),
-        (LOG, "where the accelerometer"),
+        (LOG, "where the accelerometer"), ("time_s,/A.x\n0,inf\n", "line 2.*not hold 2 numbers"),
+        ("time_s,/A.x\n0,0,5\n", "decimal commas by semicolons"),
     ],
 )  # fmt: skip
 def test_wrong_tables_are_refused_with_their_place(read, content, match):
     with pytest.raises(ShotError, match=match):
         read(content)
+
+
+def test_tables_of_spreadsheets_have_decimal_commas(read):
+    found = read("\ufefftime_s;/Arm/Hand.x;/Arm/Hand.y\r\n0,0;1,25;-3e-2\r\n0,5;;1.5\r\n")
+    (marker,) = found.channels
+    assert marker.times.tolist() == [0.0, 0.5] and marker.values[0, :2].tolist() == [1.25, -0.03]
+    assert np.isnan(marker.values[1, 0]) and marker.values[1, 1] == 1.5
+
+
+def test_a_prim_behind_a_table_that_names_its_own_is_refused(read):
+    with pytest.raises(ShotError, match="names the prims of its channels itself"):
+        read("time_s,/Arm/Hand.x\n0,1\n1,2\n", prim="/Arm/Elbow")
+
+
+def test_a_table_that_is_not_utf_8_says_so(repository, tmp_path):
+    (tmp_path / "a.csv").write_bytes("time_s,/A.x\n0,1\n".encode("utf-16"))
+    with pytest.raises(ShotError, match="Save it as"):
+        read_recordings(host_with(repository / "plugins" / "recording_readers"), [str(tmp_path / "a.csv")], {})
 
 
 @pytest.mark.parametrize(

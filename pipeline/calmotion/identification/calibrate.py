@@ -17,6 +17,7 @@ from calmotion.identification.parameters import DEFAULT, Parameter, robot_parame
 from calmotion.identification.problem import Calibrated
 from calmotion.identification.recordings.clocks import clock_of
 from calmotion.identification.recordings.noise import noise_of
+from calmotion.identification.recordings.plausible import refuse_far, refuse_long, refuse_still
 from calmotion.identification.robots import robot_at, robot_with
 from calmotion.identification.search import HALVINGS, STIFF, Found, profiled, search, step_of
 from calmotion.identification.signals import Signals, ends_at_rest, refuse_cyclic, signals_of
@@ -85,6 +86,7 @@ def calibrate_shot(
     """
     begin = time.perf_counter()
     refuse_cyclic(shot.character.retarget.cyclic, shot.character.path)
+    refuse_long(recordings, float(shot.animation.frame_times[-1]))
     if not recordings:
         raise ShotError("there are no recordings", path=shot.character.path, remedy="Name one with --recording")
     parameters = robot_parameters(shot, settings.parameters, settings.priors)
@@ -93,6 +95,8 @@ def calibrate_shot(
     if not ends_at_rest(shot.animation):  # what a robot does that is stopped amid a motion is not known
         settings = replace(settings, after=0.0)
     options, nominal = simulable(shot, options, settings.after)
+    refuse_far(shot.character, recordings, nominal)
+    refuse_still(shot.character, recordings, nominal)
     progress(0.02, "finding the clocks of the recordings")
     known = CLOCK_OFFSET in settings.priors  # then time 0 is the first frame, within this standard deviation
     robots = [nominal] if known else [nominal, *_hardly_shaking(shot, parameters, options, settings.after)]

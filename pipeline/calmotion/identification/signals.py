@@ -12,6 +12,7 @@ from scipy.spatial.transform import Rotation
 from calmotion.errors import ShotError
 from calmotion.identification.robots import Robot
 from calmotion.multibody.analysis.reactions import reactions
+from calmotion.multibody.failure import NOWHERE, Reason, SimulationFailure
 from calmotion.multibody.integrators.workspace import Workspace
 from calmotion.multibody.motors.drives import joint_values
 from calmotion.shot import Animation
@@ -115,6 +116,9 @@ def _measured(robot: Robot, prepared: Prepared, run: ForwardRun) -> Signals:
     found = reactions(model.system, run.trajectory, run.joint_angles, run.joint_rates)
     values = joint_values(model.system, model.motor, character.motors, run.trajectory.states.u, run.joint_angles)
     rotations = run.target_rotations
+    lost = np.flatnonzero(~np.isfinite(rotations).all(axis=(1, 2)))
+    if len(lost):  # a body that is bent so far that its frame at the target has no direction
+        raise SimulationFailure(float(prepared.grid.times[lost[0]]), NOWHERE, Reason.DIVERGED)
     matrices = Rotation.from_quat(rotations.reshape(-1, 4)[:, [1, 2, 3, 0]]).as_matrix()
     return Signals(
         prepared.grid.times, run.target_positions, matrices.reshape(*rotations.shape[:2], 3, 3),

@@ -46,7 +46,9 @@ def test_text_that_a_template_cannot_hold_is_refused(shot):
         openjd_template(jobs_for([shot], "/out", "optimize"))
 
 
-@pytest.mark.parametrize(("template", "folder"), [("shot.usda", "out"), ("out", "out"), ("job", "o"), ("a.yaml", "a.yaml")])
+@pytest.mark.parametrize(
+    ("template", "folder"), [("shot.usda", "out"), ("out", "out"), ("job", "o"), ("a.yaml", "a.yaml")]
+)
 def test_a_template_is_written_over_nothing_else(tmp_path, template, folder):
     (tmp_path / "shot.usda").write_text(ONE_HINGE)
     jobs = jobs_for([tmp_path / "shot.usda"], tmp_path / folder, "optimize")

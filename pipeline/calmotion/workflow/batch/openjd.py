@@ -87,7 +87,7 @@ def write_template(path: str | os.PathLike[str], jobs: Sequence[Job]) -> dict[st
 
 
 def _refuse_other_files(path: str, jobs: Sequence[Job]) -> None:
-    """Refuse a template in the place of a shot, of the results, or of a file that Open Job Description does not read."""
+    """Refuse a template in the place of a shot or of the results, or under a name that farms do not read."""
     if not path.lower().endswith(_SUFFIXES):
         raise SettingError(
             "the template is not named like one", path="--openjd", found=path,

@@ -10,11 +10,13 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from calmotion.accuracy.reduced_bodies import ConvergedReduction, compiled_in
-from calmotion.host import Settings, merge, parse_quantity
+from calmotion.host import SettingError, Settings, merge, nearest, parse_quantity
 from calmotion.identification.calibrate import CalibrationSettings, calibrate_shot
 from calmotion.identification.measurement import refuse_unknown_channels
 from calmotion.identification.parameters import DEFAULT, refuse_unknown
+from calmotion.identification.recordings.plausible import refuse_long
 from calmotion.identification.signals import refuse_cyclic
+from calmotion.multibody.integrators.coefficients import IMPLICIT
 from calmotion.shot import Animation, Character, Provenance
 from calmotion.shot.calibration.estimates import Calibration, Estimate
 from calmotion.shot.calibration.recording import SensorRecording
@@ -116,6 +118,11 @@ def calibrate(
     begin = time.perf_counter()
     chosen, hooks = read_settings(settings), Hooks(progress, on_operator, cancel)
     refuse_unknown(parameters, priors or {})
+    if integrator is not None and integrator not in IMPLICIT:
+        raise SettingError(
+            f"calibrate supports only {', '.join(IMPLICIT)}", path="--integrator", found=integrator,
+            remedy=f"{nearest(integrator, IMPLICIT)}Remove the option, or use one of these.",
+        )  # fmt: skip
     files = [recordings] if isinstance(recordings, (str, os.PathLike)) else recordings
     names = [os.fspath(file) for file in files]
     opened = with_sensors(shot)
@@ -159,6 +166,7 @@ def compiled_with_sensors(
     character = first.require(Character)
     refuse_cyclic(character.retarget.cyclic, character.path)
     refuse_unknown_channels(character, recordings)
+    refuse_long(recordings, float(first.require(Animation).frame_times[-1]))
     if layer is not None:
         from calmotion.usd.writing.result import refuse_inputs
 

@@ -101,6 +101,10 @@ def _run(args: argparse.Namespace, output: Output) -> int:
     return 0
 
 
+def _went(row: dict[str, Any]) -> str:
+    return "falls" if row["rms"] < row["rms_before"] else "goes"
+
+
 def _print(report: dict[str, Any], stream: TextIO) -> None:
     from calmotion.cli.quantities import counted, quantity_in
     from calmotion.cli.sentences import unbroken
@@ -116,7 +120,7 @@ def _print(report: dict[str, Any], stream: TextIO) -> None:
         checked = "" if held_out is None else f", {quantity_in(held_out, row['unit'], 3)} in samples not fitted"
         say(
             console,
-            f"{row['name']}: the difference of recording and robot falls from {before} to {after}{checked} "
+            f"{row['name']}: the difference of recording and robot {_went(row)} from {before} to {after}{checked} "
             f"(root mean square; noise {noise}).",
         )
     _print_parameters(console, "Parameters of the robot", of_robot)
