@@ -15,6 +15,7 @@ from calmotion.shot.character import Array
 from calmotion.shot.outputs import CsvFile, Figures, Recording, Verification, Video, WrittenLayer
 from calmotion.shot.run import OutputPaths
 from calmotion.shot.table import columns
+from calmotion.workflow.exporting.result_files import no_input
 from calmotion.workflow.run import Outcome, again
 
 if TYPE_CHECKING:
@@ -199,17 +200,17 @@ class SimulationResult:
         """Write the table as CSV; returns the path.
 
         Raises:
-            RunError: It cannot be written.
+            ShotError: It cannot be written, or the shot is read from this file.
         """
-        return again(self._outcome, CsvFile, OutputPaths(csv=os.fspath(path))).path
+        return again(self._outcome, CsvFile, OutputPaths(csv=no_input(self._outcome, path))).path
 
     def record(self, path: Path) -> str:
         """Write a recording for the rerun viewer; returns the path.
 
         Raises:
-            RunError: It cannot be written.
+            ShotError: It cannot be written, or the shot is read from this file.
         """
-        return again(self._outcome, Recording, OutputPaths(rrd=os.fspath(path))).path
+        return again(self._outcome, Recording, OutputPaths(rrd=no_input(self._outcome, path))).path
 
     def draw(self, folder: Path) -> tuple[str, ...]:
         """Draw the figures into a folder; returns their paths.
@@ -223,9 +224,9 @@ class SimulationResult:
         """Write a video (.webp, or .mp4 where ffmpeg is installed); returns the path.
 
         Raises:
-            RunError: It cannot be written.
+            ShotError: It cannot be written, or the shot is read from this file.
         """
-        return again(self._outcome, Video, OutputPaths(video=os.fspath(path))).path
+        return again(self._outcome, Video, OutputPaths(video=no_input(self._outcome, path))).path
 
     def write(
         self,
@@ -267,17 +268,19 @@ class SimulationResult:
 
         Raises:
             RunError: It cannot be written.
-            SettingError: There is no such format.
+            SettingError: There is no such format, it has no such rate, or the file is read as the shot.
         """
         from calmotion.control.commands import ExportRequest
         from calmotion.host import merge
         from calmotion.workflow.exporting.controller_files import curves_of, format_named, write_commands
+        from calmotion.workflow.exporting.given import given_export, refuse_beyond_format
         from calmotion.workflow.shot import read_settings
 
-        format_named(self.shot.host, to)
+        refuse_beyond_format(format_named(self.shot.host, to).highest_rate, given_export(to, rate, 0.0, None))
+        file = no_input(self._outcome, path)
         chosen = merge([{"export.csv": {"angles": "deg"}} if degrees else {}, read_settings(settings)])
         curves = curves_of(self._outcome, self.result)
-        written = write_commands(self._outcome, curves, ExportRequest(to, rate, os.fspath(path)), chosen)
+        written = write_commands(self._outcome, curves, ExportRequest(to, rate, file), chosen)
         return written.files[0]
 
     def verify(self, on: str = "", workers: int | None = None) -> Verification:

@@ -122,3 +122,19 @@ def test_a_shot_without_motors_is_refused(shot_file, tmp_path):
     shot_file.write_text(ONE_HINGE.replace('"PhysicsDriveAPI:angular"', '"PhysicsDriveAPI:linear"'))
     with pytest.raises(cm.ShotError):
         cm.export(shot_file, tmp_path / "a.csv", to="csv")
+
+
+def test_no_output_of_a_result_is_written_over_its_shot_or_a_layer_of_it(shot_file, tmp_path):
+    result = cm.simulate(shot_file, step="10ms", tolerance="1mm")
+    for write in (result.export, result.write_table, result.record, result.film):
+        with pytest.raises(cm.SettingError, match="never overwritten"):
+            write(shot_file)
+    assert shot_file.read_text() == ONE_HINGE
+
+
+@pytest.mark.parametrize("rate", [0.0, -1.0, float("nan"), float("inf")])
+def test_a_result_has_no_commands_at_a_rate_that_is_none(shot_file, tmp_path, rate):
+    result = cm.simulate(shot_file, step="10ms", tolerance="1mm")
+    with pytest.raises(cm.SettingError, match="rate"):
+        result.export(tmp_path / "a.csv", rate=rate)
+    assert not (tmp_path / "a.csv").exists()
