@@ -26,6 +26,7 @@ from calmotion.usd.reading.bodies.scenery import scenery_of
 from calmotion.usd.reading.bodies.shapes import shapes_of, tets_of
 from calmotion.usd.reading.context import Reading, grouped, is_rigid_body, prims_of
 from calmotion.usd.reading.generic_joints.chains import Between, expanded
+from calmotion.usd.reading.joint_places import tell_what_is_elsewhere
 from calmotion.usd.reading.joints import (
     JointPrim,
     body_index,
@@ -121,6 +122,7 @@ def read_skeleton(
         others = [] if posing else [prims[b] for b in bodies if b in prims and b not in roots]
         refuse_moving(reading, {prims[b]: fixed[b] for b in fixed if b in prims}, others)
     joints += contact_joints(reading, held, bodies, poses, clock)
+    tell_what_is_elsewhere(reading, joints, poses)
     inside = {b: between[b] for b in bodies if b in between}
     return Skeleton(bodies, {b: poses[b] for b in bodies}, joints, drives, target_prims, inside)
 
