@@ -22,8 +22,8 @@ _SCHEMAS = (
 _TYPES = ("SkelRoot", "Skeleton", "SkelAnimation", "PhysicsScene", "Mjc", "Newton")
 # what a set consists of: without a schema it is no body, and what is said of bodies lies on these or above it
 _GEOMETRY = frozenset((
-    "Mesh", "Cube", "Sphere", "Cylinder", "Capsule", "Cone", "Plane", "BasisCurves", "NurbsCurves", "NurbsPatch",
-    "Points", "GeomSubset", "Shader",
+    "Mesh", "Cube", "Sphere", "Cylinder", "Capsule", "Cone", "Cylinder_1", "Capsule_1", "Plane", "BasisCurves",
+    "NurbsCurves", "NurbsPatch", "Points", "GeomSubset", "Shader",
 ))  # fmt: skip
 _ATTRIBUTE = re.compile(  # one search in all names of a prim: most of the time goes into this
     "^(?:calm:|drive:|mjc:|newton:|physx|physics:mass|physics:density|physics:rigidBody)", re.MULTILINE

@@ -4,7 +4,7 @@ import pytest
 import small_shots as shots
 from calmotion.usd.reading.shot import read_shot
 from pxr import Gf, UsdGeom, UsdPhysics
-from small_shots import BASE, ELBOW, FORE
+from small_shots import BASE, ELBOW
 
 
 def found(tmp_path, edit):

@@ -1,4 +1,4 @@
-"""Joints whose frames do not meet where the transforms of their bodies are: the simulated robot is not the one shown."""
+"""Joints whose frames do not meet at the transforms of their bodies: what is simulated is not what is shown."""
 
 from __future__ import annotations
 

@@ -82,6 +82,17 @@ def test_a_collider_without_any_density_has_that_of_water_and_a_note(tmp_path):
     assert any("1000 kg/m^3" in note and CUBE in note for note in notes)
 
 
+def test_colliders_of_types_without_a_volume_are_named(tmp_path):
+    def edit(stage):
+        for name, kind in (("ground", "Plane"), ("cloud", "Points")):
+            UsdPhysics.CollisionAPI.Apply(stage.DefinePrim(f"{UPPER}/{name}", kind))
+
+    found, notes = body(tmp_path, UPPER, edit)
+    assert found.mass.mass == pytest.approx(1200.0 * VOLUME, rel=1e-6)
+    assert any(f"{UPPER}/ground" in note and "Plane" in note for note in notes)
+    assert any(f"{UPPER}/cloud" in note and "Points" in note for note in notes)
+
+
 def test_the_centre_of_mass_is_in_the_scaled_axes_of_the_body(tmp_path):
     def edit(stage):
         from pxr import UsdGeom

@@ -30,7 +30,12 @@ CASES = [
     ("Cylinder", {"radius": 0.5, "height": 2.0}, np.pi * 0.25 * 2),
     ("Capsule", {"radius": 0.5, "height": 2.0}, np.pi * 0.25 * 2 + 4 / 3 * np.pi * 0.125),
     ("Cone", {"radius": 0.5, "height": 2.0}, np.pi * 0.25 * 2 / 3),
-]
+    ("Cylinder_1", {"radiusTop": 0.3, "radiusBottom": 0.5, "height": 2.0}, np.pi * 2 * (0.09 + 0.15 + 0.25) / 3),
+    (
+        "Capsule_1", {"radiusTop": 0.3, "radiusBottom": 0.5, "height": 2.0},
+        np.pi * 2 * (0.09 + 0.15 + 0.25) / 3 + 2 / 3 * np.pi * (0.027 + 0.125),
+    ),
+]  # fmt: skip
 
 
 @pytest.mark.parametrize("axis", ["X", "Y", "Z"])
@@ -54,6 +59,14 @@ def test_the_axis_is_where_the_solid_is_long(kind):
     for column, axis in enumerate("XYZ"):
         points, _, _ = solid(prim_of(kind, axis, radius=0.1, height=3.0), 0.0)
         assert int(np.argmax(np.ptp(points, axis=0))) == column
+
+
+@pytest.mark.parametrize("kind", ["Cylinder", "Capsule"])
+def test_solids_of_two_equal_radii_are_those_of_one(kind):
+    *_, one = solid(prim_of(kind, "Y", radius=0.2, height=0.7), 0.0)
+    *_, two = solid(prim_of(f"{kind}_1", "Y", radiusTop=0.2, radiusBottom=0.2, height=0.7), 0.0)
+    assert two.volume == pytest.approx(one.volume, rel=1e-12)
+    assert np.allclose(two.center, one.center, atol=1e-15) and np.allclose(two.second, one.second, rtol=1e-12)
 
 
 def test_the_tip_of_a_cone_is_at_the_far_end_of_its_axis():

@@ -11,8 +11,9 @@ from calmotion.shot import MassProperties
 from calmotion.shot.character import Array
 from calmotion.usd import gf
 from calmotion.usd.reading.bodies.moments import Moments, sum_of, surface_moments
-from calmotion.usd.reading.bodies.shapes import Shape
-from calmotion.usd.reading.context import Reading
+from calmotion.usd.reading.bodies.primitives import TYPES
+from calmotion.usd.reading.bodies.shapes import MESH, Shape
+from calmotion.usd.reading.context import Reading, is_rigid_body, prims_below
 from calmotion.usd.schemas import is_applied
 from calmotion.usd.transforms import Pose, rotation_from_quaternion
 
@@ -149,6 +150,7 @@ def _from_geometry(
     reading: Reading, prim: Usd.Prim, shapes: list[Shape], body_mass: float | None
 ) -> MassProperties | None:
     """Mass properties from geometry and densities, scaled to the authored mass of the body where there is one."""
+    _note_unread_colliders(reading, prim)
     colliders = [s for s in shapes if s.collider]
     solids = colliders or [s for s in shapes if s.surface.visible]
     density = _authored(prim, "physics:density", "density")
@@ -192,6 +194,19 @@ def _from_geometry(
             "is used"
         )
     return MassProperties(body_mass, np.zeros(3), 0.4 * body_mass * radius2 * np.eye(3))
+
+
+def _note_unread_colliders(reading: Reading, prim: Usd.Prim) -> None:
+    """Note colliders that give no mass because their geometry is of a type without a volume here."""
+    from pxr import UsdGeom
+
+    for below in prims_below(prim, is_rigid_body):
+        kind = str(below.GetTypeName())
+        if below.IsA(UsdGeom.Gprim) and is_applied(below, "PhysicsCollisionAPI") and kind not in (MESH, *TYPES):
+            reading.note(
+                f"{below.GetPath()}: a collider of type {kind} gives no mass; author physics:mass on its body where it "
+                "should count"
+            )
 
 
 def _hull_moments(reading: Reading, shape: Shape) -> Moments:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -37,6 +38,17 @@ class Moments:
         """With a uniform density."""
         second = density * self.second
         return MassProperties(density * self.volume, self.center, np.trace(second) * np.eye(3) - second)
+
+
+def together(parts: Sequence[Moments]) -> Moments:
+    """The moments of solids that do not overlap."""
+    volume = sum(part.volume for part in parts)
+    center = sum((part.volume * part.center for part in parts), np.zeros(3)) / volume
+    second = np.zeros((3, 3))
+    for part in parts:
+        off = part.center - center
+        second += part.second + part.volume * np.outer(off, off)
+    return Moments(volume, center, second)
 
 
 def tetrahedron_moments(corners: Array) -> Moments:

@@ -1,4 +1,6 @@
-"""UsdGeom's solids: cube, sphere, cylinder, capsule, cone, as closed triangulations and with their exact moments."""
+"""UsdGeom's solids: cube, sphere, cylinder, capsule, cone, as closed triangulations and with their exact moments.
+
+Cylinders and capsules also of two radii (`Cylinder_1`, `Capsule_1`)."""
 
 from __future__ import annotations
 
@@ -8,12 +10,13 @@ import numpy as np
 
 from calmotion.errors import ShotError
 from calmotion.shot.character import Array, IntArray
-from calmotion.usd.reading.bodies.moments import Moments
+from calmotion.usd.reading.bodies.moments import Moments, together
 
 if TYPE_CHECKING:
     from pxr import Usd
 
-TYPES = ("Cube", "Sphere", "Cylinder", "Capsule", "Cone")
+_TWO_RADII = ("Cylinder_1", "Capsule_1")
+TYPES = ("Cube", "Sphere", "Cylinder", "Capsule", "Cone", *_TWO_RADII)
 _SIDES = 32  # facets around an axis: within 0.5 % of a circle
 _RINGS = 8  # rings of a hemisphere
 
@@ -39,6 +42,8 @@ def solid(prim: Usd.Prim, time: float) -> tuple[Array, IntArray, Moments]:
     if kind == "Cube":
         size = _positive(prim, "size", time)
         return (*_cube(size), Moments(size**3, np.zeros(3), np.eye(3) * size**5 / 12.0))
+    if kind in _TWO_RADII:
+        return _of_two_radii(prim, kind, time)
     radius = _positive(prim, "radius", time)
     if kind == "Sphere":
         profile = _arc(radius, 0.0, -np.pi / 2, np.pi / 2, 2 * _RINGS)
@@ -65,6 +70,20 @@ def solid(prim: Usd.Prim, time: float) -> tuple[Array, IntArray, Moments]:
     points, triangles = _revolve(profile)
     turn = _axis_permutation(prim, time)
     return points @ turn.T, triangles, moments.mapped(turn, np.zeros(3))
+
+
+def _of_two_radii(prim: Usd.Prim, kind: str, time: float) -> tuple[Array, IntArray, Moments]:
+    """A frustum, and with hemispheres of its radii for a capsule."""
+    low, high, height = (_positive(prim, name, time) for name in ("radiusBottom", "radiusTop", "height"))
+    half = height / 2.0
+    parts = [_frustum(low, high, height)]
+    profile = np.array([[0.0, -half], [low, -half], [high, half], [0.0, half]])
+    if kind == "Capsule_1":
+        parts += [_hemisphere(low, -half, -1.0), _hemisphere(high, half, 1.0)]
+        profile = np.concatenate([_arc(low, -half, -np.pi / 2, 0.0, _RINGS), _arc(high, half, 0.0, np.pi / 2, _RINGS)])
+    points, triangles = _revolve(profile)
+    turn = _axis_permutation(prim, time)
+    return points @ turn.T, triangles, together(parts).mapped(turn, np.zeros(3))
 
 
 def _positive(prim: Usd.Prim, name: str, time: float) -> float:
@@ -138,3 +157,25 @@ def _capsule(radius: float, height: float) -> Moments:
     offset = height / 2.0
     along = cylinder.second[2, 2] + 4.0 / 15.0 * np.pi * radius**5 + ball * (offset**2 + 0.75 * offset * radius)
     return Moments(cylinder.volume + ball, np.zeros(3), np.diag([across, across, along]))
+
+
+def _frustum(low: float, high: float, height: float) -> Moments:
+    """A cone that is cut off, from radius `low` at -height/2 to `high` at height/2: integrals of r^2 and r^4 over z."""
+    d = high - low
+    area = low**2 + low * d + d**2 / 3.0
+    first = low**2 / 2.0 + 2.0 * low * d / 3.0 + d**2 / 4.0  # times z / height, from the lower end
+    second = low**2 / 3.0 + low * d / 2.0 + d**2 / 5.0
+    fourth = sum(low**k * high ** (4 - k) for k in range(5)) / 5.0
+    center = first / area
+    across = np.pi * height * fourth / 4.0
+    along = np.pi * height**3 * (second - first * center)
+    return Moments(
+        np.pi * height * area, np.array([0.0, 0.0, height * (center - 0.5)]), np.diag([across, across, along])
+    )  # fmt: skip
+
+
+def _hemisphere(radius: float, equator: float, up: float) -> Moments:
+    """Half a ball on one side of its equator; up is 1 or -1 (centroid 3r/8 off the equator)."""
+    volume, own = 2.0 / 3.0 * np.pi * radius**3, 2.0 / 15.0 * np.pi * radius**5
+    off = 0.375 * radius
+    return Moments(volume, np.array([0.0, 0.0, equator + up * off]), np.diag([own, own, own - volume * off**2]))

@@ -21,6 +21,8 @@ from calmotion.usd.transforms import Pose
 if TYPE_CHECKING:
     from pxr import Usd
 
+MESH = "Mesh"
+
 
 @dataclass(frozen=True, eq=False)
 class Shape:
@@ -56,7 +58,7 @@ def shapes_of(reading: Reading, body_prim: Usd.Prim, pose: Pose) -> list[Shape]:
         if prim.GetTypeName() == "PointInstancer":
             _refuse_or_note_instances(reading, prim, body_prim)
         kind = str(prim.GetTypeName())
-        if kind == "Mesh":
+        if kind == MESH:
             points, triangles = mesh_geometry(prim, reading.start)
             moments = None
         elif kind in primitives.TYPES:
@@ -73,7 +75,7 @@ def shapes_of(reading: Reading, body_prim: Usd.Prim, pose: Pose) -> list[Shape]:
             moments = moments.mapped(linear, offset)
         elif is_closed(triangles, placed):
             moments = surface_moments(placed, triangles)
-        writable = kind == "Mesh" and not prim.IsInstanceProxy()
+        writable = kind == MESH and not prim.IsInstanceProxy()
         surface = SurfaceMesh(
             path=str(prim.GetPath()),
             points=placed,
