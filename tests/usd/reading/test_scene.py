@@ -8,7 +8,7 @@ from calmotion import ShotError
 from calmotion.shot.robust.settings import Uncertainty
 from calmotion.usd.reading import read_shot
 from pxr import Gf, Sdf, UsdGeom, UsdPhysics
-from small_shots import FORE, Scale, set_float, write_arm
+from small_shots import BASE, FORE, Scale, set_float, write_arm
 
 
 def read(tmp_path, edit=None, scale=None):
@@ -46,6 +46,23 @@ def test_the_conventions_of_usdphysics_are_followed(tmp_path, direction, magnitu
 def test_gravity_that_is_not_finite_is_refused(tmp_path):
     with pytest.raises(ShotError, match="gravityMagnitude"):
         read(tmp_path, lambda stage: scene(stage, None, float("nan")))
+
+
+def test_of_several_scenes_that_of_the_bodies_counts(tmp_path):
+    def edit(stage, *owners):
+        for name, magnitude in (("earth", 9.81), ("moon", 1.62)):
+            UsdPhysics.Scene.Define(stage, f"/{name}").CreateGravityMagnitudeAttr(magnitude)
+        for path, owner in zip((BASE, FORE), owners, strict=False):
+            UsdPhysics.RigidBodyAPI(stage.GetPrimAtPath(path)).CreateSimulationOwnerRel().SetTargets([owner])
+
+    for owners, expected, told in (
+        ((), -9.81, True),
+        (("/moon", "/moon"), -1.62, False),
+        (("/earth", "/moon"), -9.81, True),
+    ):
+        found = read(tmp_path, lambda stage, owners=owners: edit(stage, *owners))
+        assert np.allclose(found.gravity, [0, 0, expected], atol=1e-6)
+        assert told == any("several PhysicsScene" in note for note in found.notes)
 
 
 def retarget(stage, path: str, **values) -> None:

@@ -16,6 +16,7 @@ from calmotion.usd.clock import Clock
 from calmotion.usd.reading import scene, targets, topology
 from calmotion.usd.reading.animated_transforms import moves, refuse_moving
 from calmotion.usd.reading.bases.contacts import contact_carriers, contact_joints
+from calmotion.usd.reading.bases.joint_places import tell_what_is_elsewhere
 from calmotion.usd.reading.bases.roots import on_moving_prim
 from calmotion.usd.reading.bodies import mass
 from calmotion.usd.reading.bodies.absent import no_bodies
@@ -24,9 +25,9 @@ from calmotion.usd.reading.bodies.interfaces import interfaces_of
 from calmotion.usd.reading.bodies.part_materials import with_parts
 from calmotion.usd.reading.bodies.scenery import scenery_of
 from calmotion.usd.reading.bodies.shapes import shapes_of, tets_of
+from calmotion.usd.reading.bodies.unused_physics import tell_what_is_not_used
 from calmotion.usd.reading.context import Reading, grouped, is_rigid_body, prims_of
 from calmotion.usd.reading.generic_joints.chains import Between, expanded
-from calmotion.usd.reading.joint_places import tell_what_is_elsewhere
 from calmotion.usd.reading.joints import (
     JointPrim,
     body_index,
@@ -123,6 +124,7 @@ def read_skeleton(
         refuse_moving(reading, {prims[b]: fixed[b] for b in fixed if b in prims}, others)
     joints += contact_joints(reading, held, bodies, poses, clock)
     tell_what_is_elsewhere(reading, joints, poses)
+    tell_what_is_not_used(reading, [prims[b] for b in bodies if b in prims], joints)
     inside = {b: between[b] for b in bodies if b in between}
     return Skeleton(bodies, {b: poses[b] for b in bodies}, joints, drives, target_prims, inside)
 
@@ -171,7 +173,7 @@ def build_character(reading: Reading, skeleton: Skeleton) -> Character:
     root = topology.common_path([path for path in skeleton.bodies if path not in skeleton.between])
     gravity, settings = np.zeros(3), RetargetSettings()
     with reading.collecting_problems():
-        gravity = scene.gravity(reading)
+        gravity = scene.gravity(reading, skeleton.bodies)
     with reading.collecting_problems():
         settings = scene.retarget_settings(reading, root)
     raise_all(reading.problems)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import fields
 from typing import TYPE_CHECKING
 
@@ -24,10 +25,15 @@ if TYPE_CHECKING:
 _SCHEMA = "CalmRetargetAPI"
 
 
-def gravity(reading: Reading) -> Array:
+def gravity(reading: Reading, bodies: Sequence[str] = ()) -> Array:
     """Gravity [m/s^2], shape [3], world: of the PhysicsScene, else 9.81 down the up axis.
 
-    UsdPhysics: a direction (0, 0, 0) means down, a negative magnitude means that of the Earth.
+    UsdPhysics: a direction (0, 0, 0) means down, a negative magnitude means that of the Earth. Of several scenes that
+    one counts which the bodies name as their `physics:simulationOwner`.
+
+    Args:
+        reading: The stage.
+        bodies: Paths of the bodies.
 
     Raises:
         ShotError: A direction or magnitude that is not finite.
@@ -40,8 +46,10 @@ def gravity(reading: Reading) -> Array:
     if not scenes:
         reading.note(f"the shot has no PhysicsScene; gravity is {EARTH_GRAVITY} m/s^2 down the {up} axis")
         return EARTH_GRAVITY * down
-    scene = scenes[0]
-    if len(scenes) > 1:
+    owners = _owners(reading.stage, bodies)
+    named = [scene for scene in scenes if str(scene.GetPath()) in owners]
+    scene = (named or scenes)[0]
+    if len(scenes) > 1 and len(named) != 1:
         reading.note(f"{scene.GetPath()}: the shot has several PhysicsScene prims; gravity is taken from this one")
     direction = gf.vector(scene.GetAttribute("physics:gravityDirection").Get(reading.start))
     magnitude = float(scene.GetAttribute("physics:gravityMagnitude").Get(reading.start))
@@ -55,6 +63,16 @@ def gravity(reading: Reading) -> Array:
     size = float(np.linalg.norm(direction))
     along: Array = down if size == 0.0 else direction / size
     return along * (EARTH_GRAVITY if magnitude < 0.0 else reading.units.acceleration(magnitude))
+
+
+def _owners(stage: Usd.Stage, bodies: Sequence[str]) -> set[str]:
+    """Paths of the scenes that simulate the bodies, where these say so."""
+    owners = set()
+    for path in bodies:
+        prim = stage.GetPrimAtPath(path)
+        relationship = prim.GetRelationship("physics:simulationOwner") if prim else None
+        owners |= {str(target) for target in relationship.GetForwardedTargets()} if relationship else set()
+    return owners
 
 
 def retarget_settings(reading: Reading, root: str) -> RetargetSettings:
