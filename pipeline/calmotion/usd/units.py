@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, TypeVar
 
@@ -98,3 +99,36 @@ def units_of(stage: Usd.Stage) -> StageUnits:
             remedy="Author Y or Z in the root layer",
         )
     return units
+
+
+def other_units(stage: Usd.Stage, prims: Iterable[Usd.Prim]) -> list[ShotError]:
+    """Units of layers with some prims that are not those of the stage, which USD takes from its root layer alone.
+
+    Args:
+        stage: A composed stage.
+        prims: Those of bodies; others that are not valid are passed over.
+
+    Returns:
+        A warning for each unit; of the up axis for sublayers alone, since what is referenced can be turned.
+    """
+    root, stack = stage.GetRootLayer(), stage.GetLayerStack(False)
+    layers = list(dict.fromkeys(spec.layer for prim in prims if prim for spec in prim.GetPrimStack()))
+    found = []
+    for name in (*_USUAL, "upAxis"):
+        here = stage.GetMetadata(name)
+        for layer in layers:
+            there = layer.pseudoRoot.GetInfo(name) if layer.pseudoRoot.HasInfo(name) else here
+            same = there == here or (name in _USUAL and math.isclose(there, here, rel_tol=1e-6))
+            if layer == root or same or (name == "upAxis" and layer not in stack):
+                continue
+            of_stage = "" if root.pseudoRoot.HasInfo(name) else ", which is what USD takes where it says nothing"
+            found.append(
+                ShotError(
+                    f"the robot comes from a layer with another {name} than the shot", path=root.GetDisplayName(),
+                    attribute=name, found=f"{there} in {layer.GetDisplayName()}, {here} in the root layer{of_stage}",
+                    remedy=f"Author {name} = {there} in the root layer, unless all values of the robot, with its "
+                    "masses and materials, suit that of the shot",
+                )
+            )  # fmt: skip
+            break
+    return found

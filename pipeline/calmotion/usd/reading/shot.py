@@ -31,7 +31,7 @@ from calmotion.usd.reading.motors.unused_animation import target_positions
 from calmotion.usd.reading.provenance import provenance_of
 from calmotion.usd.reading.targets import weight_tracks
 from calmotion.usd.reading.well_formed import broken_transforms, wrong_types
-from calmotion.usd.units import units_of
+from calmotion.usd.units import other_units, units_of
 
 if TYPE_CHECKING:
     from pxr import Usd
@@ -117,6 +117,8 @@ def read_stage(
         reading = Reading(stage, units, clock.start, whole=whole)
         reading.notes += animated
         skeleton = read_skeleton(reading, clock, still, given_joints(stage, given), measured)
+        for warning in other_units(stage, map(stage.GetPrimAtPath, skeleton.poses)):
+            reading.warn(warning)
         tracks = motor_tracks(reading, skeleton.drives, clock, given)
         moving = moving_frames(reading, skeleton.joints, skeleton.poses, clock)
         _note_dense_samples(tracks, clock, reading)
