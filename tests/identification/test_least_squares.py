@@ -121,3 +121,8 @@ def test_a_chord_by_derivatives_that_lead_astray_is_none():
     back = dataclasses.replace(known, jacobian=-known.jacobian)
     assert chord(Exponential((0.4, 0.6), sigma=1e-3), known) is not None
     assert chord(Exponential((0.4, 0.6), sigma=1e-3), back) is None
+
+
+def test_a_chord_without_an_end_is_none():
+    known = minimize(Exponential((0.3, 0.5)), np.zeros(2), FREE)
+    assert chord(Exponential((0.4, 0.6), sigma=1e-3), known, most=1) is None

@@ -122,9 +122,9 @@ def minimize(problem: Problem, start: Array, lower: Array, most: int = MOST, eno
     return Solution(z, r, J, loss_of(r, counts) + 0.5 * float(z @ z), most, False)
 
 
-def chord(problem: Problem, known: Solution, most: int = 4) -> Solution | None:
+def chord(problem: Problem, known: Solution, most: int = 8) -> Solution | None:
     """The minimum of a problem near that of another one, with the derivatives of the other one; None where these lead
-    to more loss.
+    to more loss, or to no end.
 
     Args:
         problem: Its residuals.
@@ -140,12 +140,12 @@ def chord(problem: Problem, known: Solution, most: int = 4) -> Solution | None:
         H = J.T @ (w[:, None] * J) + np.eye(len(z))
         step = -np.linalg.solve(H, J.T @ (w * r) + z)
         if float(np.sqrt(step @ H @ step)) < ENOUGH:
-            break
+            return Solution(z, r, J, cost, known.iterations, known.converged)
         then = problem.residuals(z + step)
         if then is None or not (after := _cost(problem, z + step, then)) <= cost + RISEN:
             return None
         z, r, cost = z + step, then, after
-    return Solution(z, r, J, cost, known.iterations, known.converged)
+    return None
 
 
 def _cost(problem: Problem, z: Array, residuals: Array) -> float:

@@ -28,7 +28,6 @@ NEAR = 0.3  # change at which it ends, in standard deviations: another one follo
 ROUNDS, STEADY = 5, 0.05  # of the noise, and its relative change at which they end
 COARSE = 0.3  # error of a step, over the noise, with which no search begins but for a first guess
 HALVINGS, SHIFT = 5, 0.2  # of the step, and the change of an estimate at which they end, over its standard deviation
-FAR = 1.0  # such a change from which derivatives are computed anew
 ORDER = 2  # of the integrators
 
 
@@ -110,7 +109,7 @@ def _converged(problem: Calibrated, solution: Solution, iterations: int, halving
         # the first extrapolation is compared with what it extrapolates, the next ones with the one before
         off = then - limit if extrapolated else change / (2**ORDER - 1)
         shift = float(np.max(np.abs(off) / deviations, initial=0.0))
-        if near is None or shift > FAR:  # derivatives there are others
+        if near is None:  # derivatives there are others
             solution = minimize(problem, solution.z, problem.lower, FIRST_ITERATIONS)
             deviations, of_model = _deviations(problem, solution)
             earlier, limit, extrapolated, iterations = solution.z, solution.z, False, iterations + solution.iterations
