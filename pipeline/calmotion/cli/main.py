@@ -9,6 +9,7 @@ from calmotion.cli.commands.robots import import_robot, materials, motors, rig
 from calmotion.cli.commands.setup import bench, cache, completion, doctor, plugins, warmup
 from calmotion.cli.commands.shots import calibrate, excite, export, inspect, optimize, refine, simulate
 from calmotion.cli.commands.shows import batch, sequence, submit
+from calmotion.cli.diagnostics.streams import open_closed_streams
 from calmotion.cli.parser import Parser, add_examples, overview
 from calmotion.cli.signals import as_interrupts, ignore
 from calmotion.errors import ShotError, failure_of_machine
@@ -29,6 +30,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         0 done, 1 the shot cannot be processed, 2 wrong usage, 130 interrupted.
     """
     given = sys.argv[1:] if arguments is None else list(arguments)
+    if arguments is None:
+        open_closed_streams()
     with as_interrupts(ends=arguments is None):
         try:
             return _run(given)
@@ -48,10 +51,11 @@ def _run(given: list[str]) -> int:
         args = build_parser().parse_args([ALIASES.get(given[0], given[0]), *given[1:]])
     except SystemExit as stop:
         return stop.code if isinstance(stop.code, int) else WRONG_USAGE
-    from calmotion.cli.output import own_messages, print_error, printable, protected_stdout
+    from calmotion.cli.output import own_messages, print_error, printable, protected_stdout, refuse_missing_folder
 
     with printable(), protected_stdout(args.json) as output, own_messages():
         try:
+            refuse_missing_folder()
             status: int = args.command(args, output)
             return status
         except ShotError as error:

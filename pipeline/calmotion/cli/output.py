@@ -7,7 +7,7 @@ import json
 import os
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from typing import Any, TextIO
 
@@ -41,21 +41,19 @@ def protected_stdout(as_json: bool) -> Iterator[Output]:
     if not as_json:
         yield Output(sys.stdout, False)
         return
-    real = sys.stdout
+    stream = real = sys.stdout
     real.flush()
     sys.stdout = sys.stderr
     keeper = None
     try:
-        stream = real
         if _descriptor(real) == 1 and _descriptor(sys.stderr) is not None:
             keeper = os.dup(1)
             os.dup2(sys.stderr.fileno(), 1)
             stream = os.fdopen(os.dup(keeper), "w", encoding=real.encoding)
         yield Output(stream, True)
-        stream.flush()
-        if keeper is not None:
-            stream.close()
     finally:
+        with suppress(OSError):  # a failure is told by `object`, which flushes
+            stream.flush() if keeper is None else stream.close()
         if keeper is not None:
             os.dup2(keeper, 1)
             os.close(keeper)
@@ -123,8 +121,28 @@ def _descriptor(stream: TextIO) -> int | None:
 
 
 def print_error(error: ShotError, output: Output) -> None:
-    """Print an error: as the JSON object, or on stderr in lines for a person."""
-    conclude({}, error.problems if isinstance(error, RunError) else [Problem(one) for one in each(error)], output)
+    """Print an error: as the JSON object, or on stderr in lines for a person, also where stdout takes nothing."""
+    problems = error.problems if isinstance(error, RunError) else [Problem(one) for one in each(error)]
+    try:
+        conclude({}, problems, output)
+    except OSError:
+        with suppress(OSError):
+            conclude({}, problems, Output(sys.stderr, False))
+
+
+def refuse_missing_folder() -> None:
+    """Refuse to run in a folder that was removed meanwhile.
+
+    Raises:
+        ShotError: The working folder is gone.
+    """
+    try:
+        os.getcwd()
+    except OSError as error:
+        raise ShotError(
+            "the folder in which the command runs does not exist any more", path=os.environ.get("PWD", "."),
+            found=error.strerror, remedy="Change into a folder that is there",
+        ) from error  # fmt: skip
 
 
 def conclude(
