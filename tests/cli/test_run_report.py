@@ -40,6 +40,18 @@ def test_the_error_budget_is_a_table_and_the_verdict_a_sentence():
     assert f"{said}, whose meshes may be off by 0.05 mm" in " ".join(measured.split())
 
 
+@pytest.mark.parametrize(
+    ("delay", "said"),
+    [(0.031, "It delays the motion by 0.031 s; without this delay the largest error is 4 mm."), (0.0, "")],
+)
+def test_the_delay_of_a_shaper_is_told_with_the_error_without_it(delay, said):
+    worst = {"path": "/Arm/Hand", "max_error_m": 6e-3}
+    values = {"shaper": "zvd", "shaper_delay_s": delay, "delayed_max_error_m": 4e-3, "targets": [worst]}
+    text = " ".join(printed(report(**values)).split())
+    assert "With the shaper zvd, the largest error is 6 mm (at /Arm/Hand)." in text
+    assert said in text and ("delays" in text) == bool(said)
+
+
 @pytest.mark.parametrize("source", REMEDIES)
 def test_a_tolerance_that_is_not_kept_is_reported_with_what_would_help(source):
     text = printed(report(tolerance_kept=False, tolerance_missed_by=source, simulation_error_m=2e-3))

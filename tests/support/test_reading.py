@@ -59,3 +59,5 @@ def test_values_that_are_nested_too_deeply_are_refused(tmp_path, name):
 def test_a_table_is_read(tmp_path):
     (tmp_path / "file").write_text('["é"]\na = 1\n', encoding="utf-8")
     assert read_toml(tmp_path / "file") == {"é": {"a": 1}}
+    (tmp_path / "of_windows.toml").write_bytes(b"\xef\xbb\xbf[fe.mesh]\r\nsize = 1\r\n")
+    assert read_toml(tmp_path / "of_windows.toml") == {"fe": {"mesh": {"size": 1}}}

@@ -271,3 +271,14 @@ def test_inspecting_a_robot_with_gains_and_without_animation_is_no_problem(tmp_p
     inspection = cm.inspect(tmp_path / "still.usda")
     assert inspection.problems == () and inspection.report()["effects_of_gains"] == []
     assert inspection.report()["motors"][0]["gains_from"] == "drive:angular:physics:stiffness (UsdPhysics)"
+
+
+@pytest.mark.parametrize("value", [True, [1e-3], np.array([1e-3, 2e-3]), b"1mm"])
+def test_a_tolerance_that_is_no_quantity_is_an_error_of_the_caller(tmp_path, value):
+    (tmp_path / "shot.usda").write_text(ONE_HINGE)
+    with pytest.raises(cm.SettingError, match="must be a number or a text"):
+        cm.simulate(tmp_path / "shot.usda", tolerance=value)
+
+
+def test_one_kind_of_simplification_may_be_named_by_itself():
+    assert _forced("modes", ()) == _forced(["modes"], ()) and _forced((), "modes") == _forced((), ["modes"])

@@ -123,9 +123,9 @@ def print_verdict(console: Console, report: dict[str, Any]) -> None:
         if shaper:
             motion = "With the low-pass filter" if shaper == "lowpass" else f"With the shaper {shaper}"
         say(console, f"{motion}, the largest error is {length(worst['max_error_m'])} (at {worst['path']}).")
-        if shaper:
-            said = f"{report['shaper_delay_s']:.3f} s, not counted: {length(report['delayed_max_error_m'])}"
-            say(console, f"It delays the motion by {said}.")
+        if shaper and report["shaper_delay_s"] > 0.0:
+            late, without = f"{report['shaper_delay_s']:.3f} s", length(report["delayed_max_error_m"])
+            say(console, f"It delays the motion by {late}; without this delay the largest error is {without}.")
     tolerance = length(report["tolerance_m"])
     if report["tolerance_kept"]:
         error = about(report["simulation_error_m"])

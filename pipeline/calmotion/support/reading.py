@@ -29,6 +29,6 @@ def read_toml(path: str | Path) -> dict[str, Any]:
     """
     text = read_text(path)
     try:
-        return tomllib.loads(text)
+        return tomllib.loads(text.removeprefix("\ufeff"))  # which editors of Windows write
     except RecursionError:
         raise ValueError("its values are nested too deeply") from None

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Sequence
+from numbers import Real
 
 from calmotion.host import OperatorResult, SettingError, Settings, merge, parse_quantity
 from calmotion.shot.model_choice import KINDS, OFF, ON
@@ -238,7 +239,13 @@ def _source(
 
 
 def _quantity(value: float | str | None, unit: str) -> float | None:
-    return parse_quantity(value, unit) if isinstance(value, str) else value
+    if isinstance(value, str):
+        return parse_quantity(value, unit)
+    if value is not None and (isinstance(value, bool) or not isinstance(value, Real)):
+        raise SettingError(
+            "must be a number or a text", found=repr(value), remedy=f"Write a number, in {unit}, or a text with a unit."
+        )
+    return None if value is None else float(value)
 
 
 def _forced(keep: Sequence[str], leave_out: Sequence[str]) -> Settings:
@@ -247,6 +254,7 @@ def _forced(keep: Sequence[str], leave_out: Sequence[str]) -> Settings:
     Raises:
         SettingError: A kind is both.
     """
+    keep, leave_out = ((kinds,) if isinstance(kinds, str) else kinds for kinds in (keep, leave_out))
     for kind in set(keep) & set(leave_out):
         raise SettingError(
             "simplifications of one kind cannot be both made and not made", path="--keep, --leave-out", found=kind,

@@ -110,6 +110,7 @@ def test_two_batches_do_not_share_a_folder(shots, tmp_path):
 def test_wrong_arguments_are_setting_errors(shots, tmp_path, options, problem):
     with pytest.raises(SettingError, match=problem):
         batch(shots[:1], tmp_path / "out", **options)
+    assert not (tmp_path / "out").exists()
 
 
 def test_the_command_line_prints_one_line_for_each_job(shots, tmp_path, calmotion, monkeypatch):

@@ -53,7 +53,7 @@ def _measured_prim(reading: Reading, path: str) -> Usd.Prim:
         raise ShotError(
             "a recording names a prim that the shot does not have",
             path=path,
-            remedy=f"{near}Correct the column of the recording, or its row in the map",
+            remedy=f"{near}Correct the column of the recording, its row in the map, or --sensor",
         )
     return prim
 

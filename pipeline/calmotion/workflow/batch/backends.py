@@ -265,18 +265,28 @@ def backend_for(on: str, workers: int | None, folder: str) -> Backend:
         SettingError: There is no such backend.
         ShotError: It is not there.
     """
+    refuse_unknown_place(on)
     kind, _, rest = on.partition("://")
     if on == LOCAL:
         cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
         return LocalBackend(workers or cores)
     if kind == DASK and rest:
         return DaskBackend(rest, workers)
-    name, _, parameters = on.partition("?")
-    if name == SLURM:
-        return SlurmBackend(os.path.join(folder, SLURM), dict(parse_qsl(parameters)), workers)
-    raise SettingError(
-        "a batch cannot run there", path="--on", found=on, remedy="Use local, dask://HOST:PORT, or slurm"
-    )
+    parameters = on.partition("?")[2]
+    return SlurmBackend(os.path.join(folder, SLURM), dict(parse_qsl(parameters)), workers)
+
+
+def refuse_unknown_place(on: str) -> None:
+    """Refuse the name of a backend that there is not, as `backend_for` does, before a batch writes anything.
+
+    Raises:
+        SettingError: There is none of that name.
+    """
+    kind, _, rest = on.partition("://")
+    if on != LOCAL and not (kind == DASK and rest) and on.partition("?")[0] != SLURM:
+        raise SettingError(
+            "a batch cannot run there", path="--on", found=on, remedy="Use local, dask://HOST:PORT, or slurm"
+        )
 
 
 def _version() -> str:

@@ -19,7 +19,7 @@ from calmotion.support.caching.cache_folder import SHARED_VARIABLE
 from calmotion.support.caching.object_store import check_store, is_address
 from calmotion.support.files import try_writing, write_text
 from calmotion.workflow.batch.attempt import DIED, MARK
-from calmotion.workflow.batch.backends import LOCAL, Backend, backend_for
+from calmotion.workflow.batch.backends import LOCAL, Backend, backend_for, refuse_unknown_place
 from calmotion.workflow.batch.jobs import EXTRAS, LOGS, Job, forget, is_done, jobs_for
 from calmotion.workflow.batch.report import KEPT, WAITING, BatchResult, JobResult
 from calmotion.workflow.plain import plain
@@ -98,10 +98,13 @@ def run_jobs(
         target: Folder of the results, absolute.
     """
     begin = time.perf_counter()
+    refuse_unknown_place(on)
     try:
         try_writing(Path(target) / LOGS / "file")
     except OSError as error:
-        raise SettingError("the folder cannot be written", path="-o", found=f"{target}: {error.strerror}") from error
+        raise SettingError(
+            "the folder cannot be written", path="-o", found=f"{target}: {error.strerror}", remedy="Choose another."
+        ) from error
     with _alone(target):
         state = _State(jobs, target, command, on, begin, progress)
         left = [job for job in jobs if not state.keep(job)]

@@ -171,7 +171,10 @@ def sensor_of(text: str) -> PlannedSensor:
     if noise is not None:
         sigma = parse_quantity(noise, _UNITS[kind])
         if not sigma > 0.0:
-            raise SettingError("the noise of a sensor must be positive", path="--sensor", found=text)
+            raise SettingError(
+                "the noise of a sensor must be positive", path="--sensor", found=text,
+                remedy="Write its standard deviation, such as marker=0.3mm.",
+            )  # fmt: skip
     return PlannedSensor(kind, path or "", sigma, rate)
 
 
