@@ -212,6 +212,15 @@ CASES: dict[str, Case] = {
     ),
     "a BVH of nothing": simulated("--motion a.bvh", "a.bvh", make=beside(a_bvh="HIERARCHY\n")),
     # other commands
+    "a template over the shot": words("submit shot.usda --openjd shot.usda -o out --json", "--openjd", statuses=USAGE),
+    "a template in the place of the results": words("submit shot.usda --openjd out -o out --json", statuses=USAGE),
+    "a batch at a place that is none": words("batch shot.usda -o out --on cloud --json", "--on", statuses=USAGE),
+    "an output named by a dash": simulated("--csv -", "standard output", statuses=USAGE),
+    "an output on the standard output": simulated("--csv /dev/stdout", "/dev/stdout", statuses=USAGE),
+    "an option before the command": words("--quiet simulate shot.usda", "behind the command", statuses=USAGE),
+    "a negative value behind a blank": words(
+        "export shot.usda --to csv --start-delay -5ms", "out of range", statuses=USAGE
+    ),
     "an export to nothing": words("export shot.usda --json", "--to", statuses=USAGE),
     "an export to a format that is none": words("export shot.usda --to dance --json", "dance", statuses=USAGE),
     "an export at zero hertz": words("export shot.usda --to csv --rate 0 --json", "--rate"),

@@ -12,7 +12,7 @@ import numpy as np
 from commands import words
 from hostile import DONE, USAGE, Case, Edit, arm, layer, simulate
 from motions import EITHER
-from pxr import Gf, Sdf, Usd, UsdGeom, UsdUtils, Vt
+from pxr import Gf, Sdf, Usd, UsdGeom, UsdPhysics, UsdUtils, Vt
 from shot_edits import flexible, mesh, mesh_file, tet_mesh
 from small_shots import BASE, ELBOW, FORE, HAND, SHOULDER, UPPER, make_target
 
@@ -276,6 +276,34 @@ CASES: dict[str, Case] = {
     "everything is inactive": simulate("shot.usda", make=arm(inactive("/Arm"))),
     "everything is invisible": simulate(make=arm(hidden), statuses=DONE),
     "a flexible mesh that is a guide": simulate(make=arm(flexible(guide)), statuses=EITHER),
+    "a root layer that says nothing of units": simulate(
+        "metersPerUnit", "upAxis", make=then(lambda f: _above(f)), statuses=EITHER
+    ),
+    "a robot below a transform that turns it": simulate(
+        "do not meet",
+        make=arm(lambda s: UsdGeom.Xformable(s.GetPrimAtPath("/Arm")).AddRotateXOp().Set(90)),
+        statuses=DONE,
+    ),
+    "a robot that is mirrored": simulate(
+        "do not meet",
+        make=arm(lambda s: UsdGeom.Xformable(s.GetPrimAtPath("/Arm")).AddScaleOp().Set(Gf.Vec3f(1, -1, 1))),
+        statuses=EITHER,
+    ),
+    "a collider of a type without a volume": simulate(
+        "gives no mass",
+        make=arm(lambda s: UsdPhysics.CollisionAPI.Apply(s.DefinePrim(f"{UPPER}/p", "Plane"))),
+        statuses=DONE,
+    ),
+    "a joint that breaks": simulate(
+        "breakForce",
+        make=arm(lambda s: UsdPhysics.Joint(s.GetPrimAtPath(ELBOW)).CreateBreakForceAttr(1.0)),
+        statuses=DONE,
+    ),
+    "a body that moves at the start": simulate(
+        "angularVelocity",
+        make=arm(lambda s: UsdPhysics.RigidBodyAPI(s.GetPrimAtPath(FORE)).CreateAngularVelocityAttr((0, 500, 0))),
+        statuses=DONE,
+    ),
     "a variant that is not there": simulate(make=arm(variants), statuses=EITHER),
     "joints of which two have one name": simulate(
         make=layer(lambda own: Sdf.CopySpec(own, SHOULDER, own, f"{UPPER}/shoulder")), statuses=EITHER
@@ -348,3 +376,9 @@ CASES: dict[str, Case] = {
 def _sublayer(folder: Path, path: str) -> None:
     shot = folder / "shot.usda"
     shot.write_text(shot.read_text().replace("(\n", f"(\n    subLayers = [@{path}@]\n", 1))
+
+
+def _above(folder: Path) -> None:
+    """The arm as the sublayer of a root layer that says nothing."""
+    (folder / "shot.usda").rename(folder / "robot.usda")
+    (folder / "shot.usda").write_text("#usda 1.0\n(\n    subLayers = [@./robot.usda@]\n)\n")

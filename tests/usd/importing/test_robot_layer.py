@@ -96,6 +96,13 @@ def test_an_inertia_that_no_body_has_is_raised(make):
     assert any("moments of inertia" in note and "finger" in note for note in notes)
 
 
+def test_a_negative_inertia_is_told_to_be_wrong(make):
+    character, _, notes = make(lambda text: CONVERTED.replace("(0.001, 0.001, 0.001)", "(-0.001, 0.001, 0.001)"))
+    finger = next(body for body in character.bodies if body.path.endswith("/finger"))
+    assert np.linalg.eigvalsh(finger.mass.inertia).min() == pytest.approx(1e-5, rel=1e-5)
+    assert any("negative moments of inertia" in note and "<inertia> of finger" in note for note in notes)
+
+
 def test_an_inertia_of_nothing_is_that_of_a_ball(make):
     character, _, notes = make(lambda text: CONVERTED.replace("(0.001, 0.001, 0.001)", "(-5e-20, -5e-20, 0)"))
     finger = next(body for body in character.bodies if body.path.endswith("/finger"))

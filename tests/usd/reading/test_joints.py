@@ -236,3 +236,15 @@ def test_a_generic_joint_without_freedom_is_fixed_and_with_three_rotations_spher
     for free, kind in (([], "fixed"), (["rotX", "rotY", "rotZ"], "spherical")):
         found = joint(read(tmp_path, lambda s, free=free: generic(s, ELBOW, free)), ELBOW)
         assert found.kind == kind
+
+
+def test_limits_the_wrong_way_round_limit_nothing_and_are_named(tmp_path):
+    def edit(stage):
+        hinge = UsdPhysics.RevoluteJoint(stage.GetPrimAtPath(ELBOW))
+        hinge.GetLowerLimitAttr().Set(90.0)
+        hinge.GetUpperLimitAttr().Set(-90.0)
+
+    character, *_ = read_shot(str(write_arm(tmp_path / "arm.usda", edit)))
+    joint = next(joint for joint in character.joints if joint.path == ELBOW)
+    assert (joint.lower, joint.upper) == (-np.inf, np.inf)
+    assert any(ELBOW in note and "lower limit is above its upper one" in note for note in character.notes)

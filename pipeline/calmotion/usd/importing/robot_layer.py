@@ -186,7 +186,9 @@ class _Author:
         """Dummy links often have inertias that no body has, with all products as large as the moments."""
         from pxr import Gf
 
-        raised, missing = [], []
+        raised: list[str] = []
+        missing: list[str] = []
+        negative: list[str] = []
         for prim in self._bodies:
             attribute = prim.GetAttribute("physics:diagonalInertia")
             moments = np.array(attribute.Get() if attribute and attribute.HasAuthoredValue() else (1.0, 1.0, 1.0))
@@ -195,9 +197,14 @@ class _Author:
                 missing.append(named(prim))
             elif moments.min() <= _SMALLEST_MOMENT * moments.max():
                 attribute.Set(Gf.Vec3f(*np.maximum(moments, _RAISED * moments.max()).tolist()))
-                raised.append(named(prim))
+                (negative if moments.min() < -_RAISED * moments.max() else raised).append(named(prim))
         if missing:
             self.notes.append(f"links with an inertia of 0 have that of their geometry or a ball: {', '.join(missing)}")
+        if negative:
+            self.notes.append(
+                f"negative moments of inertia, which no body has, are replaced by {_RAISED:g} of the largest; correct "
+                f"the <inertia> of {', '.join(negative)}"
+            )
         if raised:
             self.notes.append(
                 f"moments of inertia that are 0 are raised to {_RAISED:g} of the largest: {', '.join(raised)}"

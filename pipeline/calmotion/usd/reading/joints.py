@@ -129,6 +129,10 @@ def read_joint(reading: Reading, prim: Usd.Prim, poses: dict[str, Pose]) -> Join
     meters = reading.units.length(1.0)
     to_si = np.deg2rad(1.0) if kind == "revolute" else meters
     lower, upper = _limits(prim, limits, to_si) if kind in _WITH_AXIS else (-np.inf, np.inf)
+    authored = [prim.GetAttribute(name) for name in limits] if kind in _WITH_AXIS else []
+    given = [attribute.Get() for attribute in authored if attribute and attribute.HasAuthoredValue()]
+    if len(given) == 2 and None not in given and given[0] > given[1]:
+        reading.note(f"{path}: its lower limit is above its upper one, so UsdPhysics does not limit it")
     (body0, position0, rotation0), (body1, position1, rotation1) = ends
     turned = body1 == ""
     if turned:
