@@ -9,6 +9,7 @@ from calmotion.accuracy.converged_reduction import converged_reduction
 from calmotion.accuracy.integrator_choice import FAST
 from calmotion.accuracy.pod_subspace import ReferenceRun
 from calmotion.accuracy.step_error import distance, simulate_at
+from calmotion.shot.character import with_settings
 from calmotion.shot.run import RunSettings
 from calmotion.simulation import body_reduction
 from calmotion.simulation.bodies import reduce_bodies
@@ -98,3 +99,11 @@ def test_reductions_are_compared_by_one_integrator(arm, animation, meshes, monke
     converged = refined(arm, animation, meshes, 1e-2)
     assert [run.integrator for run in runs] == [FAST, "bdf2", "bdf2", "bdf2"] and converged.known.run is runs[3]
     assert converged.error_m == distance(runs[3].positions, runs[2].positions)
+
+
+def test_what_authored_modes_leave_out_is_a_part_of_the_error(arm, animation, meshes, fine):
+    """No finer tolerance brings them back: the error was estimated as none, and the tolerance told to be kept."""
+    limited = with_settings(arm, lambda own: dataclasses.replace(own, mode_count=1))
+    converged = refined(limited, animation, meshes, 1e-3)
+    off = np.linalg.norm(simulate_at(converged.shot, BY, STEP).positions - fine[1], axis=2).max()
+    assert off > 4e-4 and converged.error_m == pytest.approx(off, rel=0.2)

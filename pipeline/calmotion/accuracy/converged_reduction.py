@@ -18,6 +18,7 @@ from calmotion.accuracy.simulate_to_tolerance import OF_SHAKE, intended_position
 from calmotion.accuracy.step_error import distance
 from calmotion.multibody.parallel import in_parallel
 from calmotion.reduction.reduced_body import ReducedBody
+from calmotion.shot.character import with_settings
 from calmotion.shot.run import RunSettings
 from calmotion.shot.tolerance import tolerance_of
 from calmotion.simulation.body_reduction import BodyReduction
@@ -76,7 +77,22 @@ def converged_reduction(
         if off <= allowed or (k and not retargeted and off <= OF_MESH * (mesh_error(shot, options, found.run) or 0.0)):
             break
     reduction.release()
-    return ConvergedReduction(shot, off, found or simulated(shot)[0], reduction)
+    found = found or simulated(shot)[0]
+    free = _with_modes_by_tolerance(reduction)
+    if free is not None:  # what authored modes leave out, which no finer tolerance brings back
+        progress(1.0, "the same with modes by the tolerance")
+        off = max(off, distance(simulated(shot.with_bodies(free.bodies(FINER * requested)))[0].run.positions,
+                                found.run.positions))  # fmt: skip
+    return ConvergedReduction(shot, off, found, reduction)
+
+
+def _with_modes_by_tolerance(reduction: BodyReduction) -> BodyReduction | None:
+    """The reduction without authored numbers and frequencies of modes; None where there are none."""
+    flexible = [body.flexible for body in reduction.character.bodies if body.flexible is not None]
+    if all(own.mode_count < 0 and own.max_frequency < 0.0 for own in flexible):
+        return None
+    character = with_settings(reduction.character, lambda own: replace(own, mode_count=-1, max_frequency=-1.0))
+    return BodyReduction(character, reduction.meshes, reduction.loads)
 
 
 def _same(one: Sequence[ReducedBody], other: Sequence[ReducedBody]) -> bool:
