@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from calmotion.usd.reading.context import Reading
 from calmotion.usd.reading.joints import JointPrim
 
@@ -14,6 +12,7 @@ if TYPE_CHECKING:
     from pxr import Usd
 
 _VELOCITIES = ("physics:velocity", "physics:angularVelocity")
+_NEVER = 1e30  # and more stands for no limit: some programs author the largest float
 _BREAKS = ("physics:breakForce", "physics:breakTorque")
 
 
@@ -32,7 +31,7 @@ def tell_what_is_not_used(reading: Reading, bodies: Iterable[Usd.Prim], joints: 
     prims = {joint.prim_path: joint.prim for joint in joints if joint.prim is not None}
     for path, prim in prims.items():
         for name in _BREAKS:
-            if any(np.isfinite(value) for value in _authored(prim, name, reading.start)):
+            if any(value < _NEVER for value in _authored(prim, name, reading.start)):
                 reading.note(f"{path}: {name} is not used: joints do not break; the table of --csv has their reactions")
         drives = {joint.drive for joint in joints if joint.prim_path == path and joint.drive}
         for name in (f"drive:{drive}:physics:targetVelocity" for drive in sorted(drives)):
