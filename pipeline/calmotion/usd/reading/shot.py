@@ -19,7 +19,7 @@ from calmotion.usd.reading.animated_transforms import carriers, codes_of
 from calmotion.usd.reading.bases.roots import moving_frames
 from calmotion.usd.reading.character import Skeleton, build_character, read_skeleton
 from calmotion.usd.reading.constants import hold_constants
-from calmotion.usd.reading.context import Reading, is_rigid_body, prims_of
+from calmotion.usd.reading.context import Reading, grouped, is_rigid_body, prims_of
 from calmotion.usd.reading.joints import joint_prims
 from calmotion.usd.reading.motors.driven_motors import BODIES, CONSTANT, DRIVE, GIVEN, Drive, to_si
 from calmotion.usd.reading.motors.free_ranges import free_tracks
@@ -30,6 +30,7 @@ from calmotion.usd.reading.motors.tracks import read_track, sample_codes
 from calmotion.usd.reading.motors.unused_animation import target_positions
 from calmotion.usd.reading.provenance import provenance_of
 from calmotion.usd.reading.targets import weight_tracks
+from calmotion.usd.reading.unread import unread_attributes
 from calmotion.usd.reading.well_formed import broken_transforms, wrong_types
 from calmotion.usd.units import other_units, units_of
 
@@ -82,8 +83,9 @@ def read_shot(
         provenance = provenance_of(path, stage, clock, earlier)
         weights = weight_tracks(part, character.targets, clock)
         free = free_tracks(part, character.motors, clock)
+        unread = grouped([error.message() for error in unread_attributes(part)])
     notes = (f"{place}: {message}" for place, message in with_places(messages, part, prims_of(part)))
-    character = dataclasses.replace(character, notes=(*character.notes, *notes))
+    character = dataclasses.replace(character, notes=(*character.notes, *unread, *notes))
     return character, Animation(clock.frame_times(), tracks, current, read.moving, weights, free), provenance
 
 

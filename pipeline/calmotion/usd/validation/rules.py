@@ -9,17 +9,15 @@ import numpy as np
 
 from calmotion.errors import ShotError, each
 from calmotion.shot.outputs import ERROR, WARNING, Finding
-from calmotion.support.naming import nearest
 from calmotion.usd import schemas
 from calmotion.usd.reading.context import is_rigid_body, prims_of
 from calmotion.usd.reading.shot import StageReading, read_stage
+from calmotion.usd.reading.unread import unread_attributes
 
 if TYPE_CHECKING:
     from pxr import Usd
 
 READABLE, SCHEMAS, PLACES, LIMITS = "ShotIsReadable", "SchemasAreKnown", "SchemasFit", "AnimationKeepsLimits"
-_NAMESPACE = "calm:"
-_FREE_NAMES = ("calm:interface:",)  # relationships of subsets, which need no schema
 
 
 def reading_findings(stage: Usd.Stage) -> Iterator[Finding]:
@@ -54,33 +52,8 @@ def _beyond_limits(read: StageReading) -> Iterator[Finding]:
 
 
 def unknown_attributes(stage: Usd.Stage) -> Iterator[Finding]:
-    """Attributes in the namespace calm: that no schema has, or whose schema is not applied; they are not read."""
-    owners = _owners()
-    for prim in prims_of(stage):
-        for prop in prim.GetAuthoredProperties():
-            name = prop.GetName()
-            if not name.startswith(_NAMESPACE) or name.startswith(_FREE_NAMES):
-                continue
-            place = str(prim.GetPath())
-            if name not in owners:
-                remedy = nearest(name, owners) or f"The names are {', '.join(sorted(owners))}"
-                yield Finding(WARNING, SCHEMAS, place, name, "no schema of Calmotion has this attribute", "", remedy)
-            elif not schemas.is_applied(prim, owners[name]):
-                yield Finding(
-                    WARNING, SCHEMAS, place, name, f"is not read, since {owners[name]} is not applied", "",
-                    f"Apply {owners[name]}, or remove the attribute",
-                )  # fmt: skip
-
-
-def _owners() -> dict[str, str]:
-    from pxr import Usd
-
-    registry, found = Usd.SchemaRegistry(), {}
-    for schema in schemas.NAMES:
-        definition = registry.FindAppliedAPIPrimDefinition(schema)
-        for name in definition.GetPropertyNames() if definition else ():
-            found[str(name)] = schema
-    return found
+    """Attributes in the namespace calm: that no applied schema declares."""
+    return (finding_of(error, WARNING, SCHEMAS) for error in unread_attributes(stage, declared=True))
 
 
 def wrong_prims(stage: Usd.Stage) -> Iterator[Finding]:
