@@ -70,6 +70,7 @@ def test_a_folder_that_cannot_be_made_is_refused(tmp_path):
 def test_the_folder_is_where_the_system_keeps_such_things(tmp_path):
     assert configuration_folder({"XDG_CONFIG_HOME": str(tmp_path)}).is_relative_to(tmp_path)
     assert configuration_folder({}).name == "calmotion"
+    assert configuration_folder({"XDG_CONFIG_HOME": "here"}) == configuration_folder({})
 
 
 def test_the_command_line_keeps_the_choice(calmotion_process, tmp_path):

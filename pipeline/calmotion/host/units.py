@@ -15,10 +15,12 @@ _UNITS = {
     "m": ("m", Decimal(1)),
     "cm": ("m", Decimal("0.01")),
     "mm": ("m", Decimal("0.001")),
+    "um": ("m", Decimal("0.000001")),
     "rad": ("rad", Decimal(1)),
     "deg": ("rad", Decimal(repr(math.pi)) / 180),
     "s": ("s", Decimal(1)),
     "ms": ("s", Decimal("0.001")),
+    "us": ("s", Decimal("0.000001")),
     "Hz": ("Hz", Decimal(1)),
     "kHz": ("Hz", Decimal(1000)),
     "Pa": ("Pa", Decimal(1)),
@@ -28,6 +30,7 @@ _UNITS = {
 }
 _LONGEST = 60  # characters of what is no number that an error shows
 _QUANTITY = re.compile(r"\s*([+-]?(?:(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|inf))\s*([A-Za-z]*)\s*")
+_MICRO = str.maketrans("\u00b5\u03bc", "uu")  # the sign, and the Greek letter
 
 
 def is_unit(unit: str) -> bool:
@@ -37,7 +40,7 @@ def is_unit(unit: str) -> bool:
 
 def has_no_unit(text: str) -> bool:
     """Whether a text is a number without a unit."""
-    match = _QUANTITY.fullmatch(text)
+    match = _QUANTITY.fullmatch(text.translate(_MICRO))
     return match is not None and not match[2]
 
 
@@ -54,7 +57,7 @@ def parse_quantity(text: str, unit: str = "") -> float:
     Raises:
         SettingError: When `text` is not a number, or its unit is unknown or of another kind.
     """
-    match = _QUANTITY.fullmatch(text)
+    match = _QUANTITY.fullmatch(text.translate(_MICRO))
     base, size = _UNITS[unit]
     alike = ", ".join(name for name, (kind, _) in _UNITS.items() if kind == base and name)
     remedy = f"Write a number, or one with a unit ({alike})." if alike else "Write a number without a unit."

@@ -5,7 +5,7 @@ import os
 import numpy as np
 import pytest
 from calmotion.support.caching import caches
-from calmotion.support.caching.cache_folder import CACHES, FORMER, KERNELS, MESHES, REDUCTIONS
+from calmotion.support.caching.cache_folder import CACHES, FORMER, KERNELS, MESHES, REDUCTIONS, cache_folder
 from calmotion.support.caching.caches import clear, entries, prune, store_arrays, stored_arrays
 from calmotion.support.files import PREFIX, _machine
 
@@ -14,6 +14,15 @@ from calmotion.support.files import PREFIX, _machine
 def folder(tmp_path, monkeypatch):
     monkeypatch.setenv("CALMOTION_CACHE", str(tmp_path))
     return tmp_path
+
+
+def test_a_relative_cache_folder_of_the_system_does_not_count(monkeypatch, tmp_path):
+    monkeypatch.delenv("CALMOTION_CACHE")
+    monkeypatch.setenv("HOME", str(tmp_path))
+    monkeypatch.setenv("XDG_CACHE_HOME", "caches")
+    assert cache_folder().is_absolute()
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "caches"))
+    assert cache_folder() == tmp_path / "caches" / "calmotion"
 
 
 def aged(path, seconds):

@@ -30,7 +30,7 @@ def cache_folder() -> Path:
     chosen = os.environ.get("CALMOTION_CACHE")
     if chosen:
         return Path(chosen)
-    base = os.environ.get("XDG_CACHE_HOME") or os.environ.get("LOCALAPPDATA") or Path.home() / ".cache"
+    base = _absolute(os.environ, "XDG_CACHE_HOME") or os.environ.get("LOCALAPPDATA") or Path.home() / ".cache"
     return Path(base) / "calmotion"
 
 
@@ -55,4 +55,11 @@ def configuration_folder(environment: Mapping[str, str] | None = None) -> Path:
         return Path(variables["APPDATA"]) / "calmotion"
     if sys.platform == "darwin":
         return Path.home() / "Library" / "Application Support" / "calmotion"
-    return Path(variables.get("XDG_CONFIG_HOME") or Path.home() / ".config") / "calmotion"
+    return Path(_absolute(variables, "XDG_CONFIG_HOME") or Path.home() / ".config") / "calmotion"
+
+
+def _absolute(variables: Mapping[str, str], name: str) -> str:
+    """A folder that the environment names; relative ones do not count, as the XDG base directories have it: they would
+    be another in each working folder."""
+    value = variables.get(name, "")
+    return value if os.path.isabs(value) else ""
