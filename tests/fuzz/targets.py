@@ -181,7 +181,7 @@ def recordings(data: bytes) -> None:
     beside.unlink(missing_ok=True)
     if table:
         beside.write_bytes(table)
-    request = RecordingRequest(str(path), "/Arm/hand")
+    request = RecordingRequest(str(path), "/Arm/hand" if kind else "")  # a table names its prims itself
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         try:

@@ -12,7 +12,7 @@ import commands  # noqa: E402
 import files  # noqa: E402
 import motions  # noqa: E402
 import physics  # noqa: E402
-import recordings  # noqa: E402
+import takes  # noqa: E402
 from broken_shots import CASES as BROKEN  # noqa: E402
 from hostile import DONE, REFUSED, SHOT, Case  # noqa: E402
 
@@ -28,7 +28,7 @@ GROUPS: dict[str, dict[str, Case]] = {
     "commands": commands.CASES,
     "files": files.CASES,
     "physics": physics.CASES,
-    "recordings": recordings.CASES,
+    "recordings": takes.CASES,
 }
 # Shots that are broken in one way each are refused by `tests/refusals`, in this way as well.
 GROUPS["broken"] = {name: broken(case) for name, case in BROKEN.items()}
