@@ -40,7 +40,7 @@ class Watch:
         used, threads = work(self.session), _wanted(self.session)
         grown = [used - self._before, *(time - self._threads.get(name, 0.0) for name, time in threads.items())]
         self._looked, self._before, self._threads = time.monotonic(), used, threads
-        return max(grown) < IDLE or used - self._first > self.limit
+        return max(grown) < IDLE and not _waits(self.session) or used - self._first > self.limit
 
 
 def work(session: int) -> float:
@@ -57,6 +57,16 @@ def _wanted(session: int) -> dict[str, float]:
             with suppress(OSError, ValueError):  # it has ended
                 found[file.parent.name] = 1e-9 * sum(map(int, file.read_text().split()[:2]))
     return found
+
+
+def _waits(session: int) -> bool:
+    """Whether a thread of a session works or waits for a processor now: how long is counted when it gets one."""
+    for process, _ in _processes(session):
+        for file in process.glob("task/*/stat"):
+            with suppress(OSError):  # it has ended
+                if file.read_text().rpartition(")")[2].split()[:1] == ["R"]:
+                    return True
+    return False
 
 
 def _processes(session: int) -> Iterator[tuple[Path, list[str]]]:
