@@ -30,12 +30,12 @@ def read_columns(file: str) -> tuple[dict[str, Array], bool]:
     """
     try:
         lines = read_text(file).lstrip("\ufeff").splitlines()
-    except (OSError, UnicodeDecodeError) as error:
-        if isinstance(error, UnicodeDecodeError):
-            raise ShotError(
-                "the recording is no text in UTF-8", path=file, found=f"byte {error.start + 1}",
-                remedy="Save it as a table of plain text (CSV) in UTF-8",
-            ) from error  # fmt: skip
+    except UnicodeDecodeError as error:
+        raise ShotError(
+            "the recording is no text in UTF-8", path=file, found=f"byte {error.start + 1}",
+            remedy="Save it as a table of plain text (CSV) in UTF-8",
+        ) from error  # fmt: skip
+    except OSError as error:
         raise ShotError(
             "the recording cannot be read", path=file, found=error.strerror, remedy="Name another file"
         ) from error

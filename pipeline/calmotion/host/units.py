@@ -40,7 +40,7 @@ def is_unit(unit: str) -> bool:
 
 def has_no_unit(text: str) -> bool:
     """Whether a text is a number without a unit."""
-    match = _QUANTITY.fullmatch(text.translate(_MICRO))
+    match = _matched(text)
     return match is not None and not match[2]
 
 
@@ -57,7 +57,7 @@ def parse_quantity(text: str, unit: str = "") -> float:
     Raises:
         SettingError: When `text` is not a number, or its unit is unknown or of another kind.
     """
-    match = _QUANTITY.fullmatch(text.translate(_MICRO))
+    match = _matched(text)
     base, size = _UNITS[unit]
     alike = ", ".join(name for name, (kind, _) in _UNITS.items() if kind == base and name)
     remedy = f"Write a number, or one with a unit ({alike})." if alike else "Write a number without a unit."
@@ -73,6 +73,11 @@ def parse_quantity(text: str, unit: str = "") -> float:
         raise SettingError(
             "this number is beyond what can be represented", found=_short(text), remedy=remedy
         ) from error
+
+
+def _matched(text: str) -> re.Match[str] | None:
+    """The number and the unit of a text; micro is u."""
+    return _QUANTITY.fullmatch(text.translate(_MICRO))
 
 
 def _short(text: str) -> str:
