@@ -194,16 +194,6 @@ def _correction(
     return -1, largest_entry(system, scratch.x)
 
 
-@kernel
-def _take(system: System, before: State, now: State, ws: Workspace) -> None:
-    """Take the correction, and keep it and the state before it."""
-    scratch = ws.scratch
-    _copy_positions(now, scratch.kept)
-    copy_rows(scratch.x, scratch.taken)
-    copy_rows(scratch.lam, scratch.taken_lam)
-    correct(system, before, now, ws.work.R, scratch.x, scratch.lam, 1.0, scratch.T)
-
-
 @inlined_kernel
 def _is_enough(size: float, last: float, fresh: bool, floor: float) -> bool:
     """Whether the state is exact after a correction, by its size and that of the one before."""
@@ -250,6 +240,7 @@ def _whole(
     system: System, integrator: Integrator, instants: Instants, angle: Array, rate: Array, floor: float, ws: Workspace
 ) -> tuple[bool, int, int]:
     """Whole corrections; whether they ended, factorisations and residuals."""
+    scratch = ws.scratch
     fresh = True  # whether to linearise here
     first, last = np.inf, np.inf  # sizes of the first correction and of the one taken last
     factorisations = 0
@@ -264,7 +255,7 @@ def _whole(
         if slow and not fresh:
             fresh = True
             continue
-        _take(system, instants.before, instants.now, ws)
+        correct(system, instants.before, instants.now, ws.work.R, scratch.x, scratch.lam, 1.0, scratch.T)
         if _is_enough(size, last, fresh, floor):
             return True, factorisations, iteration + 1
         # where new tangents converge slowly, factors that are kept would not do
@@ -307,7 +298,10 @@ def _safeguarded(
                 matrix_of(now.q[b], ws.work.R[b])
             correct(system, before, now, ws.work.R, scratch.taken, scratch.taken_lam, part, scratch.T)
             continue
-        _take(system, before, now, ws)
+        _copy_positions(now, scratch.kept)
+        copy_rows(scratch.x, scratch.taken)
+        copy_rows(scratch.lam, scratch.taken_lam)
+        correct(system, before, now, ws.work.R, scratch.x, scratch.lam, 1.0, scratch.T)
         if _is_enough(size, last, fresh, floor):
             return CONVERGED, factorisations, iteration + 1, -1
         taken_fresh, last, fresh = fresh, size, False
